@@ -1,0 +1,2 @@
+//! Pure computation: frames in, verdict out.
+#![no_std]

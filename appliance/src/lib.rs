@@ -1,0 +1,3 @@
+//! The daemon `fringed` and its command line.
+pub mod cli;
+pub mod output;
