@@ -1,2 +1,23 @@
-//! Pure computation: frames in, verdict out.
+//! From frames to a verdict: the pure computation of `fringed`.
+//!
+//! Data flows one way through the modules, and imports only point backwards along it:
+//! [`units`], [`math`] ← [`frame`] ← [`pattern`], [`phase`] ← [`geometry`] ← [`inspect`] ← [`pipeline`].
+//!
+//! Everything here is a function of its arguments: no input or output, no clock, no randomness, no
+//! global state. The per-pixel path from samples to absolute phase is integer arithmetic; geometry
+//! is `f64` with `+ − × ÷` and `libm`. So the same frames give the same bits on every machine, with
+//! any number of threads.
 #![no_std]
+
+extern crate alloc;
+#[cfg(test)]
+extern crate std;
+
+pub mod frame;
+pub mod geometry;
+pub mod inspect;
+pub mod math;
+pub mod pattern;
+pub mod phase;
+pub mod pipeline;
+pub mod units;

@@ -1,0 +1,5 @@
+//! Borrowed camera pixels.
+
+mod view;
+
+pub use view::{FrameError, FrameView, Sample, Samples};

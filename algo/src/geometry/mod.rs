@@ -1,0 +1,12 @@
+//! From absolute phase to height: devices, the reference phase map, triangulation.
+
+mod pinhole;
+mod reference;
+mod root;
+mod triangulate;
+mod vector;
+
+pub use pinhole::{ModelError, Pinhole, PinholeModel};
+pub use reference::{FittedMap, Reference, ReferenceError, fit_map};
+pub use triangulate::{HeightRange, RigError, Solution, Triangulator};
+pub use vector::Vector;

@@ -1,0 +1,403 @@
+//! A pinhole with Brown distortion, OpenCV's convention: cameras, and projectors run backwards.
+//!
+//! X_device = R · X_world + t; x = X/Z, y = Y/Z; with r² = x² + y²
+//! x_d = x(1 + k₁r² + k₂r⁴ + k₃r⁶) + 2p₁xy + p₂(r² + 2x²),
+//! y_d = y(1 + k₁r² + k₂r⁴ + k₃r⁶) + p₁(r² + 2y²) + 2p₂xy;
+//! u = f_x x_d + c_x, v = f_y y_d + c_y. Pixel centres at integers, x right, y down, z forward.
+//! Source: D. C. Brown, "Decentering distortion of lenses", 1966, as in OpenCV's calib3d.
+
+use super::Vector;
+use core::fmt;
+
+/// The numbers of a device model as a calibration gives them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PinholeModel {
+    /// Focal length along x, in pixels.
+    pub fx: f64,
+    /// Focal length along y, in pixels.
+    pub fy: f64,
+    /// Principal point, column.
+    pub cx: f64,
+    /// Principal point, row.
+    pub cy: f64,
+    /// k₁, k₂, p₁, p₂, k₃.
+    pub distortion: [f64; 5],
+    /// R, row-major.
+    pub rotation: [f64; 9],
+    /// t in mm.
+    pub translation: [f64; 3],
+}
+
+/// A device model, checked: every pixel of its frame has one ray, found by a converging iteration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pinhole {
+    model: PinholeModel,
+    width: usize,
+    height: usize,
+    centre: Vector,
+    /// R as rows; its transpose turns rays into the world.
+    rows: [Vector; 3],
+    /// Square of the normalised radius up to which the distortion was shown to be one-to-one;
+    /// beyond it the distortion goes on linearly.
+    radius_square: f64,
+}
+
+/// A device model that is no camera.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// A number is not finite.
+    NotFinite(&'static str),
+    /// A focal length is not positive, or absurd for the frame.
+    Focal {
+        /// f_x.
+        fx: f64,
+        /// f_y.
+        fy: f64,
+    },
+    /// The principal point lies more than ten frames away.
+    PrincipalPoint {
+        /// c_x.
+        cx: f64,
+        /// c_y.
+        cy: f64,
+    },
+    /// R · Rᵀ is not the unit matrix or R mirrors.
+    Rotation {
+        /// Largest deviation of R · Rᵀ from the unit matrix.
+        deviation: f64,
+        /// det R.
+        determinant: f64,
+    },
+    /// The distortion folds over: two rays meet in one pixel of the frame.
+    Distortion {
+        /// Column of the pixel.
+        u: f64,
+        /// Row of the pixel.
+        v: f64,
+    },
+}
+
+impl fmt::Display for ModelError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite(what) => write!(f, "{what} is not a finite number"),
+            Self::Focal { fx, fy } => write!(
+                f,
+                "focal lengths {fx} and {fy}: both must be positive and at most 1e6 pixels"
+            ),
+            Self::PrincipalPoint { cx, cy } => write!(
+                f,
+                "the principal point ({cx}, {cy}) lies more than ten frames away: it is in pixels"
+            ),
+            Self::Rotation {
+                deviation,
+                determinant,
+            } => write!(
+                f,
+                "the rotation is none: R·Rᵀ is off the unit matrix by {deviation:.2e}, det R = \
+                 {determinant:.6}; it is 9 numbers, row by row"
+            ),
+            Self::Distortion { u, v } => write!(
+                f,
+                "the distortion folds over at pixel ({u:.1}, {v:.1}): the order is k1, k2, p1, p2, k3"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for ModelError {}
+
+/// Rounded calibrations are off by less than this.
+const ROTATION_TOLERANCE: f64 = 1e-4;
+/// Newton steps until the undistortion must have converged; 4 suffice for lenses on sale.
+const NEWTON_STEPS: usize = 25;
+/// How far beyond the frame's border the distortion is followed, as shares of the radius there: the
+/// reference phase map is asked for up to 15 % outside. Every model must reach the last one.
+const REACHES: [f64; 4] = [1.3, 1.2, 1.1, 1.02];
+
+impl Pinhole {
+    /// Checks a model for a frame of `width` × `height` pixels.
+    ///
+    /// # Errors
+    /// If a number is not finite or absurd, R is no rotation, or the distortion is not one-to-one
+    /// over the frame.
+    pub fn new(model: PinholeModel, width: usize, height: usize) -> Result<Self, ModelError> {
+        let finite = |what, numbers: &[f64]| {
+            if numbers.iter().all(|x| x.is_finite()) {
+                Ok(())
+            } else {
+                Err(ModelError::NotFinite(what))
+            }
+        };
+        let PinholeModel { fx, fy, cx, cy, .. } = model;
+        finite("the focal length", &[fx, fy])?;
+        finite("the principal point", &[cx, cy])?;
+        finite("the distortion", &model.distortion)?;
+        finite("the rotation", &model.rotation)?;
+        finite("the translation", &model.translation)?;
+        if !(fx > 0.0 && fy > 0.0 && fx <= 1e6 && fy <= 1e6) {
+            return Err(ModelError::Focal { fx, fy });
+        }
+        let away = |centre: f64, size: usize| libm::fabs(centre) > 10.0 * size as f64;
+        if away(cx, width) || away(cy, height) {
+            return Err(ModelError::PrincipalPoint { cx, cy });
+        }
+        let rows = rotation(&model.rotation)?;
+        let [a, b, c] = model.translation;
+        let centre = (rows[0] * a + rows[1] * b + rows[2] * c) * -1.0;
+        let pinhole = Self {
+            model,
+            width,
+            height,
+            centre,
+            rows,
+            radius_square: f64::INFINITY,
+        };
+        pinhole.with_checked_distortion()
+    }
+
+    /// Follows the distortion from the axis to each border pixel: it must stay one-to-one, i.e. its
+    /// Jacobian's determinant positive, all the way. Sets the radius up to which it is used.
+    fn with_checked_distortion(mut self) -> Result<Self, ModelError> {
+        let mut reach_left = 0;
+        let mut radius_square = 0.0_f64;
+        let (right, bottom) = (self.width as f64 - 0.5, self.height as f64 - 0.5);
+        for i in 0..=32 {
+            let share = f64::from(i) / 32.0;
+            let (u, v) = (-0.5 + share * (right + 0.5), -0.5 + share * (bottom + 0.5));
+            for (u, v) in [(u, -0.5), (u, bottom), (-0.5, v), (right, v)] {
+                let error = ModelError::Distortion { u, v };
+                let (x, y) = self.undistorted(u, v).ok_or(error.clone())?;
+                let one_to_one = |reach: f64| {
+                    (0..=16).all(|step| {
+                        let along = reach * f64::from(step) / 16.0;
+                        self.jacobian(x * along, y * along).3 > 0.0
+                    })
+                };
+                while !one_to_one(REACHES[reach_left]) {
+                    reach_left += 1;
+                    if reach_left == REACHES.len() {
+                        return Err(error);
+                    }
+                }
+                radius_square = radius_square.max(x * x + y * y);
+            }
+        }
+        let reach = REACHES[reach_left];
+        self.radius_square = radius_square * reach * reach;
+        Ok(self)
+    }
+
+    /// Width of the frame in pixels.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height of the frame in pixels.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// The centre of projection in the world, mm.
+    pub fn centre(&self) -> Vector {
+        self.centre
+    }
+
+    /// The direction of the optical axis in the world, of length 1.
+    pub fn axis(&self) -> Vector {
+        self.rows[2]
+    }
+
+    /// The direction in the world in which pixel (u, v) looks, with a component of 1 along the
+    /// optical axis; `None` where the iteration does not converge (never inside the frame).
+    pub fn ray(&self, u: f64, v: f64) -> Option<Vector> {
+        let (x, y) = self.undistorted(u, v)?;
+        Some(self.rows[0] * x + self.rows[1] * y + self.rows[2])
+    }
+
+    /// The pixel (u, v) that sees a point of the world, also outside the frame; `None` behind the
+    /// device.
+    pub fn project(&self, point: Vector) -> Option<(f64, f64)> {
+        let from = point - self.centre;
+        let depth = self.rows[2].dot(from);
+        if !(depth > 0.0) {
+            return None;
+        }
+        let (x, y) = (self.rows[0].dot(from) / depth, self.rows[1].dot(from) / depth);
+        let r2 = x * x + y * y;
+        let (xd, yd) = if r2 <= self.radius_square {
+            self.distorted(x, y)
+        } else {
+            let outside = libm::sqrt(r2 / self.radius_square);
+            let (xd, yd) = self.distorted(x / outside, y / outside);
+            (xd * outside, yd * outside)
+        };
+        let model = &self.model;
+        Some((model.fx * xd + model.cx, model.fy * yd + model.cy))
+    }
+
+    /// (x, y) → (x_d, y_d).
+    #[inline]
+    fn distorted(&self, x: f64, y: f64) -> (f64, f64) {
+        let [k1, k2, p1, p2, k3] = self.model.distortion;
+        let r2 = x * x + y * y;
+        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        (
+            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+        )
+    }
+
+    /// ∂x_d/∂x, ∂x_d/∂y = ∂y_d/∂x, ∂y_d/∂y and the determinant.
+    #[inline]
+    fn jacobian(&self, x: f64, y: f64) -> (f64, f64, f64, f64) {
+        let [k1, k2, p1, p2, k3] = self.model.distortion;
+        let r2 = x * x + y * y;
+        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        // d(radial)/d(r²)
+        let slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
+        let xx = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x;
+        let xy = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
+        let yy = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x;
+        (xx, xy, yy, xx * yy - xy * xy)
+    }
+
+    /// Pixel → undistorted (x, y), by Newton's method from the distorted point.
+    fn undistorted(&self, u: f64, v: f64) -> Option<(f64, f64)> {
+        let model = &self.model;
+        let (xd, yd) = ((u - model.cx) / model.fx, (v - model.cy) / model.fy);
+        let (mut x, mut y) = (xd, yd);
+        for _ in 0..NEWTON_STEPS {
+            let (found_x, found_y) = self.distorted(x, y);
+            let (ex, ey) = (found_x - xd, found_y - yd);
+            // 1e-14 of the focal length: 1e-11 px.
+            if libm::fabs(ex) + libm::fabs(ey) <= 1e-14 {
+                return Some((x, y));
+            }
+            let (xx, xy, yy, determinant) = self.jacobian(x, y);
+            if !(determinant > 1e-9) {
+                return None;
+            }
+            x -= (yy * ex - xy * ey) / determinant;
+            y -= (xx * ey - xy * ex) / determinant;
+        }
+        // Rounding keeps it from 1e-14 where |x| is large; 1e-12 (1e-9 px) is as good as converged.
+        let (found_x, found_y) = self.distorted(x, y);
+        let left = libm::fabs(found_x - xd) + libm::fabs(found_y - yd);
+        (left <= 1e-12).then_some((x, y))
+    }
+}
+
+/// R as rows, if it is a rotation.
+fn rotation(r: &[f64; 9]) -> Result<[Vector; 3], ModelError> {
+    let rows = [
+        Vector::new(r[0], r[1], r[2]),
+        Vector::new(r[3], r[4], r[5]),
+        Vector::new(r[6], r[7], r[8]),
+    ];
+    let mut deviation = 0.0_f64;
+    for i in 0..3 {
+        for j in 0..3 {
+            let unit = if i == j { 1.0 } else { 0.0 };
+            deviation = deviation.max(libm::fabs(rows[i].dot(rows[j]) - unit));
+        }
+    }
+    let determinant = rows[0].x * (rows[1].y * rows[2].z - rows[1].z * rows[2].y)
+        - rows[0].y * (rows[1].x * rows[2].z - rows[1].z * rows[2].x)
+        + rows[0].z * (rows[1].x * rows[2].y - rows[1].y * rows[2].x);
+    if deviation > ROTATION_TOLERANCE || determinant < 0.0 {
+        return Err(ModelError::Rotation {
+            deviation,
+            determinant,
+        });
+    }
+    Ok(rows)
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A device that looks at the origin from `distance` mm, `angle` degrees from +z towards +x.
+    pub fn looking_at_origin(
+        (width, height): (usize, usize),
+        (fov_h, fov_v): (f64, f64),
+        angle: f64,
+        distance: f64,
+        distortion: [f64; 5],
+    ) -> Pinhole {
+        let (sin, cos) = (libm::sin(angle.to_radians()), libm::cos(angle.to_radians()));
+        let focal = |size: usize, fov: f64| size as f64 / 2.0 / libm::tan(fov.to_radians() / 2.0);
+        Pinhole::new(
+            PinholeModel {
+                fx: focal(width, fov_h),
+                fy: focal(height, fov_v),
+                cx: (width - 1) as f64 / 2.0,
+                cy: (height - 1) as f64 / 2.0,
+                distortion,
+                rotation: [cos, 0.0, -sin, 0.0, -1.0, 0.0, -sin, 0.0, -cos],
+                translation: [0.0, 0.0, distance],
+            },
+            width,
+            height,
+        )
+        .unwrap()
+    }
+
+    pub fn camera() -> Pinhole {
+        let distortion = [-0.12, 0.15, 2e-4, -3e-4, 0.0];
+        looking_at_origin((512, 512), (20.0, 20.0), 20.0, 600.0, distortion)
+    }
+
+    pub fn projector() -> Pinhole {
+        let distortion = [-0.05, 0.03, -3e-4, 2e-4, 0.0];
+        looking_at_origin((1024, 768), (43.6, 33.4), -7.0, 600.0, distortion)
+    }
+
+    #[test]
+    fn a_ray_leads_back_to_its_pixel() {
+        for device in [camera(), projector()] {
+            let (width, height) = (device.width() as f64, device.height() as f64);
+            for i in 0..=20 {
+                for j in 0..=20 {
+                    let (u, v) = (width * f64::from(i) / 20.0, height * f64::from(j) / 20.0);
+                    let ray = device.ray(u, v).unwrap();
+                    for distance in [1.0, 600.0, 1e4] {
+                        let (a, b) = device.project(device.centre() + ray * distance).unwrap();
+                        assert!((a - u).abs() < 1e-8 && (b - v).abs() < 1e-8);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_axis_looks_at_the_origin_and_points_behind_are_not_seen() {
+        let camera = camera();
+        let origin = camera.centre() + camera.axis() * 600.0;
+        assert!(origin.length() < 1e-9);
+        assert!(camera.project(camera.centre() - camera.axis()).is_none());
+    }
+
+    #[test]
+    fn absurd_models_are_refused_by_name() {
+        let good = camera().model;
+        let check = |model| Pinhole::new(model, 512, 512).unwrap_err();
+        let model = PinholeModel { fx: f64::NAN, ..good };
+        assert!(matches!(check(model), ModelError::NotFinite("the focal length")));
+        let model = PinholeModel { fy: -1000.0, ..good };
+        assert!(matches!(check(model), ModelError::Focal { .. }));
+        let mut model = good;
+        model.rotation[0] = 0.5;
+        assert!(matches!(check(model), ModelError::Rotation { .. }));
+        let mut model = good;
+        model.rotation.iter_mut().for_each(|r| *r = -*r);
+        assert!(matches!(check(model), ModelError::Rotation { .. }));
+        let mut model = good;
+        model.distortion[0] = -20.0;
+        assert!(matches!(check(model), ModelError::Distortion { .. }));
+        let model = PinholeModel { cx: 1e9, ..good };
+        assert!(matches!(check(model), ModelError::PrincipalPoint { .. }));
+    }
+}

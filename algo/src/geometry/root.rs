@@ -1,0 +1,88 @@
+//! A safe root finder for a bracketed sign change.
+
+/// A root of `f` between `a` and `b`, where f(a) = `fa` and f(b) = `fb` have opposite signs (or one is
+/// zero), to `tolerance` in the argument.
+///
+/// Regula falsi with Anderson and Björck's weights (1973), falling back to bisection whenever three
+/// steps have not halved the bracket: at most 3 log₂(|b − a| / tolerance) evaluations, typically 6. Never leaves the bracket. Where `f` answers `None` there is no
+/// root to be had.
+pub(super) fn bracketed(
+    f: impl Fn(f64) -> Option<f64>,
+    (mut a, mut fa): (f64, f64),
+    (mut b, mut fb): (f64, f64),
+    tolerance: f64,
+) -> Option<f64> {
+    if fa == 0.0 {
+        return Some(a);
+    }
+    let mut width = libm::fabs(b - a);
+    for step in 1..=200 {
+        if fb == 0.0 || libm::fabs(b - a) <= tolerance {
+            return Some(b);
+        }
+        let bisect = step % 3 == 0 && libm::fabs(b - a) > 0.5 * width;
+        if step % 3 == 0 {
+            width = libm::fabs(b - a) * if bisect { 0.5 } else { 1.0 };
+        }
+        let mut c = if bisect {
+            0.5 * (a + b)
+        } else {
+            b - fb * (b - a) / (fb - fa)
+        };
+        // Closer than the tolerance to an end gains nothing: step over the root instead.
+        let least = 0.5 * tolerance * if b > a { 1.0 } else { -1.0 };
+        if libm::fabs(c - b) < libm::fabs(least) {
+            c = b - least;
+        } else if libm::fabs(c - a) < libm::fabs(least) {
+            c = a + least;
+        }
+        let fc = f(c)?;
+        if fc * fb < 0.0 {
+            (a, fa) = (b, fb);
+        } else {
+            // The end `a` stays: weigh it down so that it moves next time.
+            let weight = 1.0 - fc / fb;
+            fa *= if weight > 0.0 { weight } else { 0.5 };
+        }
+        (b, fb) = (c, fc);
+    }
+    Some(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::bracketed;
+    use core::cell::Cell;
+
+    fn solve(f: impl Fn(f64) -> f64, a: f64, b: f64) -> (f64, u32) {
+        let calls = Cell::new(0);
+        let counted = |x| {
+            calls.set(calls.get() + 1);
+            Some(f(x))
+        };
+        let root = bracketed(counted, (a, f(a)), (b, f(b)), 1e-9).unwrap();
+        (root, calls.get())
+    }
+
+    #[test]
+    fn roots_are_found_inside_the_bracket_within_the_tolerance() {
+        for (f, root) in [
+            ((|x| x * x * x - 2.0) as fn(f64) -> f64, 1.259_921_049_894_873),
+            (|x| libm::exp(x) - 5.0, 1.609_437_912_434_100_3),
+            (|x| libm::atan(1e3 * (x - 0.123_456)), 0.123_456),
+            (|x| if x < 0.7 { -1e-6 } else { 1.0 }, 0.7),
+        ] {
+            for (a, b) in [(-3.0, 5.0), (5.0, -3.0)] {
+                let (found, calls) = solve(f, a, b);
+                assert!((found - root).abs() <= 1e-8, "{found} for {root}");
+                assert!(calls <= 3 * 34, "{calls} evaluations");
+            }
+        }
+    }
+
+    #[test]
+    fn a_smooth_function_takes_few_evaluations() {
+        let (_, calls) = solve(|x| x / (600.0 - x) - 0.05, -115.0, 115.0);
+        assert!(calls <= 8, "{calls}");
+    }
+}

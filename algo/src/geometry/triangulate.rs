@@ -1,0 +1,236 @@
+//! Exact triangulation by the reference phase map.
+//!
+//! The point X(z) at height z on pixel (u, v)'s ray, seen from the projector's centre, falls on the
+//! reference plane at R(z), which the camera would see at π(R(z)): solve Φ_R(π(R(z))) = Φ(u, v) for z
+//! in the working range. Works for any pattern and any distortion of either lens. With a reference
+//! map computed from the models, Φ_R(π(R(z))) is just Φ_P at the projector pixel that lights X(z).
+
+use super::{Pinhole, Reference, Vector, root};
+use crate::pattern::PhaseFunction;
+use crate::units::{AbsolutePhase, Height};
+use alloc::vec::Vec;
+use core::fmt;
+
+/// The working range of z in mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeightRange {
+    /// Lowest z.
+    pub low: f64,
+    /// Highest z.
+    pub high: f64,
+}
+
+/// A rig that cannot triangulate.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum RigError {
+    /// A device is not above the reference plane or does not look down at it.
+    NotAbove(&'static str),
+    /// Camera and projector stand in the same place.
+    NoBaseline,
+    /// The working range is empty, not finite, or reaches up to a device.
+    Range(HeightRange),
+}
+
+impl fmt::Display for RigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotAbove(device) => write!(
+                f,
+                "the {device} is not above the plane z = 0 looking down at it: +z points towards the \
+                 head and X_device = R·X_world + t"
+            ),
+            Self::NoBaseline => write!(
+                f,
+                "camera and projector have the same centre: without a baseline there is no height"
+            ),
+            Self::Range(range) => write!(
+                f,
+                "the working range {} to {} mm is empty or reaches up to a device",
+                range.low, range.high
+            ),
+        }
+    }
+}
+
+impl core::error::Error for RigError {}
+
+/// Turns phase into height for one rig and one phase function.
+#[derive(Clone, Debug)]
+pub struct Triangulator {
+    camera: Pinhole,
+    projector: Pinhole,
+    reference: Reference,
+    function: PhaseFunction,
+    range: HeightRange,
+}
+
+/// A pixel's solution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solution {
+    /// The point of the surface; its z is the height, in mm.
+    pub point: Vector,
+    /// ∂Φ/∂z along the pixel's ray, turns per mm.
+    pub slope: f64,
+}
+
+/// z is found to this many mm.
+const HEIGHT_TOLERANCE: f64 = 1e-7;
+/// Half the step of the numeric slope, mm: small against any fringe, large against rounding.
+const SLOPE_STEP: f64 = 0.01;
+/// Pieces of the working range searched for a change of sign where the phase need not be monotone
+/// along the ray (a sampled phase function whose rows are not in step).
+const PIECES: usize = 16;
+/// The default working range, as a share of the camera's distance from the plane along its axis.
+const RANGE_SHARE: f64 = 0.2;
+
+impl Triangulator {
+    /// Joins the rig, the reference and the phase function; without a range, ± 0.2 × the camera's
+    /// distance from the reference plane along its axis.
+    ///
+    /// # Errors
+    /// If the devices do not look down at the plane from two places, or the range is unusable.
+    pub fn new(
+        camera: Pinhole,
+        projector: Pinhole,
+        reference: Reference,
+        function: PhaseFunction,
+        range: Option<HeightRange>,
+    ) -> Result<Self, RigError> {
+        for (name, device) in [("camera", &camera), ("projector", &projector)] {
+            if !(device.centre().z > 0.0 && device.axis().z < 0.0) {
+                return Err(RigError::NotAbove(name));
+            }
+        }
+        let (eye, lamp) = (camera.centre(), projector.centre());
+        if !((eye - lamp).length() > 1e-3) {
+            return Err(RigError::NoBaseline);
+        }
+        let range = range.unwrap_or_else(|| {
+            let reach = RANGE_SHARE * eye.z / -camera.axis().z;
+            HeightRange {
+                low: -reach,
+                high: reach.min(0.9 * eye.z.min(lamp.z)),
+            }
+        });
+        let usable = range.low.is_finite() && range.low < range.high;
+        if !(usable && range.high < eye.z.min(lamp.z)) {
+            return Err(RigError::Range(range));
+        }
+        Ok(Self {
+            camera,
+            projector,
+            reference,
+            function,
+            range,
+        })
+    }
+
+    /// The working range.
+    pub fn range(&self) -> HeightRange {
+        self.range
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Pinhole {
+        &self.camera
+    }
+
+    /// The point at height `z` on a ray from the camera.
+    #[inline]
+    fn on_ray(&self, ray: Vector, z: f64) -> Vector {
+        let eye = self.camera.centre();
+        eye + ray * ((z - eye.z) / ray.z)
+    }
+
+    /// The projector point (ξ, η) that lights a point of space.
+    #[inline]
+    fn projector_point(&self, point: Vector) -> Option<(f64, f64)> {
+        match &self.reference {
+            Reference::Models => self.projector.project(point),
+            Reference::Measured { xi, eta } => {
+                let lamp = self.projector.centre();
+                let down = point - lamp;
+                let on_plane = lamp + down * (-lamp.z / down.z);
+                let (u, v) = self.camera.project(on_plane)?;
+                Some((xi.at(u, v), eta.at(u, v)))
+            }
+        }
+    }
+
+    /// The phase that pixel light from `point` carries.
+    #[inline]
+    fn phase_at(&self, point: Vector) -> Option<f64> {
+        let (xi, eta) = self.projector_point(point)?;
+        Some(self.function.at(xi, eta))
+    }
+
+    /// Φ_R(u, v) in turns: the phase of the reference plane, also outside the frame.
+    pub fn reference_phase(&self, u: f64, v: f64) -> Option<f64> {
+        let ray = self.camera.ray(u, v)?;
+        if ray.z >= 0.0 {
+            return None;
+        }
+        self.phase_at(self.on_ray(ray, 0.0))
+    }
+
+    /// One row of the reference phase map, [`AbsolutePhase::UNKNOWN`] where a pixel does not look
+    /// at the plane.
+    pub fn reference_row(&self, v: usize, out: &mut [AbsolutePhase]) {
+        for (u, phase) in out.iter_mut().enumerate() {
+            *phase = self
+                .reference_phase(u as f64, v as f64)
+                .map_or(AbsolutePhase::UNKNOWN, AbsolutePhase::from_turns);
+        }
+    }
+
+    /// The surface point that pixel (u, v) sees under phase `phase` (turns), or `None` where no
+    /// height in the working range has that phase, or more than one has.
+    pub fn solve(&self, u: f64, v: f64, phase: f64) -> Option<Solution> {
+        let ray = self.camera.ray(u, v)?;
+        // Parallel to the plane or upwards: such a ray meets no height once.
+        if !(ray.z < -1e-6) {
+            return None;
+        }
+        let off = |z: f64| Some(self.phase_at(self.on_ray(ray, z))? - phase);
+        let pieces = match self.function.is_sampled() {
+            true => PIECES,
+            false => 1,
+        };
+        let HeightRange { low, high } = self.range;
+        let mut bracket = None;
+        let mut before = (low, off(low)?);
+        for piece in 1..=pieces {
+            let z = low + (high - low) * piece as f64 / pieces as f64;
+            let here = (z, off(z)?);
+            if (before.1 < 0.0) != (here.1 < 0.0) {
+                if bracket.is_some() {
+                    return None;
+                }
+                bracket = Some((before, here));
+            }
+            before = here;
+        }
+        let (a, b) = bracket?;
+        let z = root::bracketed(off, a, b, HEIGHT_TOLERANCE)?;
+        let rise = off(z + SLOPE_STEP)? - off(z - SLOPE_STEP)?;
+        Some(Solution {
+            point: self.on_ray(ray, z),
+            slope: rise / (2.0 * SLOPE_STEP),
+        })
+    }
+
+    /// The height at pixel (u, v) for an absolute phase.
+    pub fn height(&self, u: usize, v: usize, phase: AbsolutePhase) -> Height {
+        self.solve(u as f64, v as f64, phase.turns())
+            .map_or(Height::UNKNOWN, |solution| Height::from_mm(solution.point.z))
+    }
+
+    /// The whole reference phase map, row-major, for unwrapping dense sequences about it.
+    pub fn reference_map(&self) -> Vec<AbsolutePhase> {
+        let (width, height) = (self.camera.width(), self.camera.height());
+        let mut map = alloc::vec![AbsolutePhase::UNKNOWN; width * height];
+        crate::pipeline::for_each_row(&mut map, width, |v, row| self.reference_row(v, row));
+        map
+    }
+}

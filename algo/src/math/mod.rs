@@ -1,0 +1,4 @@
+//! Integer trigonometry and small exact arithmetic.
+
+pub mod atan;
+pub mod solve;

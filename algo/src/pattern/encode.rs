@@ -1,0 +1,171 @@
+//! Grey rasters of a phase function (eq. 1 of Peng & Gupta 2008, with a phase step).
+
+use super::PhaseFunction;
+use alloc::vec::Vec;
+use core::f64::consts::TAU;
+use core::fmt;
+
+/// A raster of 8-bit grey levels, `height` rows of `width`, for a projector to show.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GreyRaster {
+    /// Projector columns.
+    pub width: usize,
+    /// Projector rows.
+    pub height: usize,
+    /// Grey levels, row-major.
+    pub pixels: Vec<u8>,
+}
+
+/// The projector's grey response and its inverse.
+///
+/// A projector that is asked for level g gives light `measured[g]`. The inverse asks for the level
+/// whose light comes nearest to linear between its darkest and brightest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GreyResponse {
+    inverse: [u8; 256],
+}
+
+/// A response that cannot be inverted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ResponseError {
+    /// The grey level at which the light is not finite or falls.
+    pub level: usize,
+}
+
+impl fmt::Display for ResponseError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "the grey response does not rise at level {}: measure it again with more light or longer \
+             exposure",
+            self.level
+        )
+    }
+}
+
+impl core::error::Error for ResponseError {}
+
+impl GreyResponse {
+    /// From the light measured at each of the 256 grey levels, in any linear unit.
+    ///
+    /// # Errors
+    /// If a value is not finite, falls below its predecessor, or nothing rises at all.
+    pub fn new(measured: &[f64; 256]) -> Result<Self, ResponseError> {
+        let bad = (0..256).find(|&g| {
+            !measured[g].is_finite() || (g > 0 && measured[g] < measured[g - 1])
+        });
+        if let Some(level) = bad {
+            return Err(ResponseError { level });
+        }
+        let (dark, bright) = (measured[0], measured[255]);
+        if dark >= bright {
+            return Err(ResponseError { level: 255 });
+        }
+        let mut inverse = [0; 256];
+        let mut level = 0;
+        for (wanted, entry) in inverse.iter_mut().enumerate() {
+            let light = dark + (bright - dark) * wanted as f64 / 255.0;
+            while level < 255 && measured[level] < light {
+                level += 1;
+            }
+            let nearer_below =
+                level > 0 && light - measured[level - 1] < measured[level] - light;
+            *entry = (if nearer_below { level - 1 } else { level }) as u8;
+        }
+        Ok(Self { inverse })
+    }
+
+    /// The level to ask for so that the light is linear in `wanted`.
+    pub fn level_for(&self, wanted: u8) -> u8 {
+        self.inverse[usize::from(wanted)]
+    }
+}
+
+/// Encodes I(ξ, η) = I_max/2 · (1 + sin 2π(r·Φ_P(ξ, η) + s)), I_max = 255, rounded to grey levels.
+///
+/// `ratio` is r, `shift` is s in turns; with a `response` the levels are passed through its inverse.
+/// The argument is taken at 1/65536 turn, which moves a level by at most 0.006 before rounding.
+pub fn encode(
+    function: &PhaseFunction,
+    ratio: f64,
+    shift: f64,
+    response: Option<&GreyResponse>,
+) -> GreyRaster {
+    let (width, height) = (function.columns(), function.rows());
+    let sine = grey_sine(response);
+    let grey = |column, row| {
+        let turns = ratio * function.at_pixel(column, row) + shift;
+        let bits = libm::rint((turns - libm::floor(turns)) * 65_536.0) as usize;
+        sine[bits & 0xFFFF]
+    };
+    let mut pixels = Vec::with_capacity(width * height);
+    for row in 0..height {
+        if row > 0 && function.is_vertical() {
+            pixels.extend_from_within(..width);
+        } else {
+            pixels.extend((0..width).map(|column| grey(column, row)));
+        }
+    }
+    GreyRaster {
+        width,
+        height,
+        pixels,
+    }
+}
+
+/// One turn of the projected sine in 65536 steps.
+fn grey_sine(response: Option<&GreyResponse>) -> Vec<u8> {
+    (0..65_536_u32)
+        .map(|bits| {
+            let light = 127.5 * (1.0 + libm::sin(TAU * f64::from(bits) / 65_536.0));
+            let level = libm::rint(light) as u8;
+            response.map_or(level, |response| response.level_for(level))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_raster_is_the_sine_of_equation_one() {
+        let function = PhaseFunction::vertical(64, 3, 4.0).unwrap();
+        let raster = encode(&function, 0.5, 0.25, None);
+        assert_eq!(raster.pixels.len(), 64 * 3);
+        for row in 0..3 {
+            for column in 0..64 {
+                let phase = 0.5 * 4.0 * column as f64 / 64.0 + 0.25;
+                let light = 127.5 * (1.0 + libm::sin(TAU * phase));
+                let error = f64::from(raster.pixels[row * 64 + column]) - light;
+                assert!(error.abs() <= 0.507, "row {row} column {column}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_inverse_response_makes_the_light_linear() {
+        let mut measured = [0.0; 256];
+        for (g, light) in measured.iter_mut().enumerate() {
+            *light = 3.0 + 200.0 * libm::pow(g as f64 / 255.0, 2.2);
+        }
+        let response = GreyResponse::new(&measured).unwrap();
+        for wanted in 0..=255_u8 {
+            let light = measured[usize::from(response.level_for(wanted))];
+            let linear = 3.0 + 200.0 * f64::from(wanted) / 255.0;
+            // Half the steepest step of a gamma of 2.2 (at white): 200 · 2.2 / 255 / 2.
+            assert!((light - linear).abs() <= 0.87, "{wanted}: {light} {linear}");
+        }
+    }
+
+    #[test]
+    fn a_response_that_falls_is_refused_with_the_level() {
+        let mut measured = [0.0; 256];
+        for (g, light) in measured.iter_mut().enumerate() {
+            *light = g as f64;
+        }
+        measured[100] = 90.0;
+        assert_eq!(GreyResponse::new(&measured), Err(ResponseError { level: 100 }));
+        assert!(GreyResponse::new(&[5.0; 256]).is_err());
+    }
+}

@@ -1,0 +1,367 @@
+//! The phase function Φ_P(ξ, η) of a pattern.
+
+use alloc::vec::Vec;
+use core::fmt;
+
+/// The phase function Φ_P(ξ, η) of a pattern in turns, over projector pixels (ξ = column, η = row,
+/// centres at integers). Defined for every real ξ and η: outside its raster it goes on linearly, so
+/// that a reference phase map can extend beyond the frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhaseFunction {
+    columns: usize,
+    rows: usize,
+    shape: Shape,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Shape {
+    /// Φ_P = fringes · ξ / columns.
+    Vertical { fringes: f64 },
+    /// Φ_P = fringes · η / rows.
+    Horizontal { fringes: f64 },
+    /// One value per pixel centre, row-major; between them Catmull–Rom (continuous first derivative).
+    Sampled(Vec<f64>),
+}
+
+/// The values that a phase function takes over the pixel centres of its raster, in turns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhaseRange {
+    /// Smallest Φ_P.
+    pub min: f64,
+    /// Largest Φ_P.
+    pub max: f64,
+}
+
+/// A phase function that no projector can show.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum PhaseFunctionError {
+    /// The raster has no pixels, or one row or column only where a sampled function needs two.
+    Size {
+        /// Projector columns.
+        columns: usize,
+        /// Projector rows.
+        rows: usize,
+    },
+    /// The number of fringes is not a positive number of at most 32,000 (the reach of Q16.16).
+    Fringes(f64),
+    /// The number of samples is not rows × columns.
+    Length {
+        /// rows × columns.
+        expected: usize,
+        /// Samples given.
+        given: usize,
+    },
+    /// A sample is not finite or beyond ± 32,000 turns.
+    Sample {
+        /// Projector column.
+        column: usize,
+        /// Projector row.
+        row: usize,
+        /// The value found.
+        value: f64,
+    },
+}
+
+impl fmt::Display for PhaseFunctionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Size { columns, rows } => {
+                write!(f, "a phase function of {columns} x {rows} pixels is empty or too small")
+            }
+            Self::Fringes(fringes) => write!(
+                f,
+                "{fringes} fringes: give a positive number of at most {MAX_TURNS}"
+            ),
+            Self::Length { expected, given } => write!(
+                f,
+                "the phase function has {given} samples where the projector has {expected} pixels"
+            ),
+            Self::Sample { column, row, value } => write!(
+                f,
+                "the phase function is {value} at column {column}, row {row}: every sample must be \
+                 finite and within ± {MAX_TURNS} turns"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for PhaseFunctionError {}
+
+/// Largest |Φ_P|: leaves room for extrapolation in the ± 32,768 turns of Q16.16.
+const MAX_TURNS: f64 = 32_000.0;
+
+impl PhaseFunction {
+    /// Fringes parallel to the projector's columns: Φ_P = fringes · ξ / columns.
+    ///
+    /// # Errors
+    /// If the raster is empty or `fringes` is not in (0, 32000].
+    pub fn vertical(columns: usize, rows: usize, fringes: f64) -> Result<Self, PhaseFunctionError> {
+        Self::fixed(columns, rows, fringes, Shape::Vertical { fringes })
+    }
+
+    /// Fringes parallel to the projector's rows: Φ_P = fringes · η / rows.
+    ///
+    /// # Errors
+    /// As for [`Self::vertical`].
+    pub fn horizontal(
+        columns: usize,
+        rows: usize,
+        fringes: f64,
+    ) -> Result<Self, PhaseFunctionError> {
+        Self::fixed(columns, rows, fringes, Shape::Horizontal { fringes })
+    }
+
+    fn fixed(
+        columns: usize,
+        rows: usize,
+        fringes: f64,
+        shape: Shape,
+    ) -> Result<Self, PhaseFunctionError> {
+        if columns == 0 || rows == 0 {
+            return Err(PhaseFunctionError::Size { columns, rows });
+        }
+        if !(fringes > 0.0 && fringes <= MAX_TURNS) {
+            return Err(PhaseFunctionError::Fringes(fringes));
+        }
+        Ok(Self {
+            columns,
+            rows,
+            shape,
+        })
+    }
+
+    /// From one value in turns per projector pixel, row-major.
+    ///
+    /// # Errors
+    /// If the size does not fit the samples, is smaller than 2 × 2, or a sample is not usable.
+    pub fn sampled(
+        columns: usize,
+        rows: usize,
+        turns: Vec<f64>,
+    ) -> Result<Self, PhaseFunctionError> {
+        if columns < 2 || rows < 2 {
+            return Err(PhaseFunctionError::Size { columns, rows });
+        }
+        let expected = columns.saturating_mul(rows);
+        if turns.len() != expected {
+            return Err(PhaseFunctionError::Length {
+                expected,
+                given: turns.len(),
+            });
+        }
+        // Written so that a NaN is caught as well.
+        if let Some(at) = turns.iter().position(|&t| !(libm::fabs(t) <= MAX_TURNS)) {
+            return Err(PhaseFunctionError::Sample {
+                column: at % columns,
+                row: at / columns,
+                value: turns[at],
+            });
+        }
+        Ok(Self {
+            columns,
+            rows,
+            shape: Shape::Sampled(turns),
+        })
+    }
+
+    /// Projector columns.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Projector rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Whether the function is given by samples, so that nothing is known of its course.
+    pub fn is_sampled(&self) -> bool {
+        matches!(self.shape, Shape::Sampled(_))
+    }
+
+    /// Whether all rows are alike, so that one encoded row serves for all.
+    pub(super) fn is_vertical(&self) -> bool {
+        matches!(self.shape, Shape::Vertical { .. })
+    }
+
+    /// Φ_P at the centre of a pixel of the raster, in turns.
+    #[inline]
+    pub fn at_pixel(&self, column: usize, row: usize) -> f64 {
+        match &self.shape {
+            Shape::Vertical { fringes } => fringes * column as f64 / self.columns as f64,
+            Shape::Horizontal { fringes } => fringes * row as f64 / self.rows as f64,
+            Shape::Sampled(turns) => turns[row * self.columns + column],
+        }
+    }
+
+    /// Φ_P(ξ, η) in turns, anywhere.
+    #[inline]
+    pub fn at(&self, xi: f64, eta: f64) -> f64 {
+        match &self.shape {
+            Shape::Vertical { fringes } => fringes * xi / self.columns as f64,
+            Shape::Horizontal { fringes } => fringes * eta / self.rows as f64,
+            Shape::Sampled(turns) => {
+                let (column, across) = Cell::new(xi, self.columns);
+                let (row, down) = Cell::new(eta, self.rows);
+                let mut lines = [0.0; 4];
+                for (line, offset) in lines.iter_mut().zip(-1_isize..) {
+                    *line = extended(row + offset, self.rows, |row| {
+                        let start = row * self.columns;
+                        let turns = &turns[start..start + self.columns];
+                        let mut taps = [0.0; 4];
+                        for (tap, offset) in taps.iter_mut().zip(-1_isize..) {
+                            *tap = extended(column + offset, self.columns, |i| turns[i]);
+                        }
+                        across.interpolate(taps)
+                    });
+                }
+                down.interpolate(lines)
+            }
+        }
+    }
+
+    /// The values over the pixel centres of the raster.
+    pub fn range(&self) -> PhaseRange {
+        match &self.shape {
+            Shape::Vertical { .. } => PhaseRange {
+                min: 0.0,
+                max: self.at_pixel(self.columns - 1, 0),
+            },
+            Shape::Horizontal { .. } => PhaseRange {
+                min: 0.0,
+                max: self.at_pixel(0, self.rows - 1),
+            },
+            Shape::Sampled(turns) => turns.iter().fold(
+                PhaseRange {
+                    min: f64::INFINITY,
+                    max: f64::NEG_INFINITY,
+                },
+                |range, &t| PhaseRange {
+                    min: range.min.min(t),
+                    max: range.max.max(t),
+                },
+            ),
+        }
+    }
+}
+
+impl PhaseRange {
+    /// max − min, in turns.
+    pub fn span(&self) -> f64 {
+        self.max - self.min
+    }
+}
+
+/// Sample `i` of a line of `count`, going on linearly beyond both ends.
+#[inline]
+fn extended(i: isize, count: usize, sample: impl Fn(usize) -> f64) -> f64 {
+    let last = count as isize - 1;
+    if i < 0 {
+        let (first, second) = (sample(0), sample(1));
+        first + (second - first) * i as f64
+    } else if i > last {
+        let (end, before) = (sample(count - 1), sample(count - 2));
+        end + (end - before) * (i - last) as f64
+    } else {
+        sample(i as usize)
+    }
+}
+
+/// Where a point lies between two samples of a line.
+enum Cell {
+    /// Inside or next to the raster: fraction of the cell, Catmull–Rom.
+    Within(f64),
+    /// Far outside: the distance from the cell's start, linear.
+    Beyond(f64),
+}
+
+impl Cell {
+    /// The sample before `x` on a line of `count` samples, and the place behind it.
+    #[inline]
+    fn new(x: f64, count: usize) -> (isize, Self) {
+        let floor = libm::floor(x);
+        if floor >= -2.0 && floor <= count as f64 {
+            (floor as isize, Cell::Within(x - floor))
+        } else if x < 0.0 {
+            (-2, Cell::Beyond(x + 2.0))
+        } else {
+            // A NaN lands here and stays a NaN.
+            (count as isize, Cell::Beyond(x - count as f64))
+        }
+    }
+
+    /// The value behind taps at −1, 0, 1, 2.
+    #[inline]
+    fn interpolate(&self, [a, b, c, d]: [f64; 4]) -> f64 {
+        match *self {
+            Cell::Within(t) => {
+                let cubic = 3.0 * (b - c) + d - a;
+                let square = 2.0 * a - 5.0 * b + 4.0 * c - d;
+                b + 0.5 * t * ((c - a) + t * (square + t * cubic))
+            }
+            Cell::Beyond(distance) => b + distance * (c - b),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    fn quadratic(columns: usize, rows: usize) -> Vec<f64> {
+        (0..rows * columns)
+            .map(|i| {
+                let (x, y) = ((i % columns) as f64, (i / columns) as f64);
+                0.5 * x + 0.01 * x * x + 0.2 * y
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_sampled_function_reproduces_quadratics_inside_and_goes_on_linearly_outside() {
+        let function = PhaseFunction::sampled(16, 8, quadratic(16, 8)).unwrap();
+        let truth = |x: f64, y: f64| 0.5 * x + 0.01 * x * x + 0.2 * y;
+        for (x, y) in [(3.0, 2.0), (7.3, 4.6), (12.9, 5.01)] {
+            assert!((function.at(x, y) - truth(x, y)).abs() < 1e-12);
+        }
+        let slope = truth(15.0, 3.0) - truth(14.0, 3.0);
+        for x in [17.5, 25.0, 4000.0] {
+            let expected = truth(15.0, 3.0) + slope * (x - 15.0);
+            assert!((function.at(x, 3.0) - expected).abs() < 1e-9, "at {x}");
+        }
+        let slope = truth(1.0, 3.0) - truth(0.0, 3.0);
+        for x in [-2.5, -40.0] {
+            assert!((function.at(x, 3.0) - (truth(0.0, 3.0) + slope * x)).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_first_derivative_is_continuous_across_the_edge_of_the_raster() {
+        let function = PhaseFunction::sampled(16, 8, quadratic(16, 8)).unwrap();
+        for edge in [-2.0, -1.0, 0.0, 5.0, 15.0, 16.0] {
+            let h = 1e-6;
+            let left = (function.at(edge, 3.3) - function.at(edge - h, 3.3)) / h;
+            let right = (function.at(edge + h, 3.3) - function.at(edge, 3.3)) / h;
+            assert!((left - right).abs() < 1e-5, "at {edge}: {left} {right}");
+        }
+    }
+
+    #[test]
+    fn unusable_phase_functions_are_refused_with_the_place() {
+        assert!(PhaseFunction::vertical(1024, 768, f64::NAN).is_err());
+        assert!(PhaseFunction::vertical(1024, 768, 0.0).is_err());
+        assert!(PhaseFunction::vertical(0, 768, 8.0).is_err());
+        let mut turns = quadratic(4, 4);
+        turns[6] = f64::NAN;
+        assert!(matches!(
+            PhaseFunction::sampled(4, 4, turns),
+            Err(PhaseFunctionError::Sample { column: 2, row: 1, .. })
+        ));
+        assert!(matches!(
+            PhaseFunction::sampled(4, 3, quadratic(4, 4)),
+            Err(PhaseFunctionError::Length { expected: 12, given: 16 })
+        ));
+    }
+}

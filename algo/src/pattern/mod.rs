@@ -1,0 +1,9 @@
+//! What is projected: phase functions, their grey rasters, and the sequence of levels and shifts.
+
+mod encode;
+mod function;
+mod sequence;
+
+pub use encode::{GreyRaster, GreyResponse, ResponseError, encode};
+pub use function::{PhaseFunction, PhaseFunctionError, PhaseRange};
+pub use sequence::{Level, MAX_LEVELS, MAX_SHIFTS, Sequence, SequenceError, Unwrapping};

@@ -1,0 +1,372 @@
+//! Levels and shifts of a sequence, and how its levels are unwrapped.
+
+use super::PhaseRange;
+use alloc::vec::Vec;
+use core::fmt;
+
+/// Levels that a sequence may have.
+pub const MAX_LEVELS: usize = 8;
+/// Shifts that a level may have; sums of 64 samples of 16 bits stay inside the kernels' bounds.
+pub const MAX_SHIFTS: usize = 64;
+/// How far a shift may lie from its place on the equally spaced grid, in turns.
+const SHIFT_TOLERANCE: f64 = 1e-6;
+/// How far a ratio may lie from the dense form.
+const RATIO_TOLERANCE: f64 = 1e-6;
+/// Largest span of the coarsest level, in turns, that is still absolute by itself.
+const GEOMETRIC_SPAN: f64 = 1.001;
+/// Largest step from one geometric level to the next: keeps n · Φ inside 63 bits.
+const MAX_STEP: f64 = 4096.0;
+
+/// All shifts at one ratio of the full phase function: s_k = start + k/N.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Level {
+    /// Share r of the full phase function.
+    pub ratio: f64,
+    /// Shift of the first frame, in turns.
+    pub start: f64,
+    /// For k = 0 … N−1, the place in the sequence of the frame with shift start + k/N.
+    pub frames: heapless::Vec<u16, MAX_SHIFTS>,
+}
+
+impl Level {
+    /// N, the number of shifts.
+    pub fn steps(&self) -> usize {
+        self.frames.len()
+    }
+}
+
+/// Which level and shift each frame of a measurement is; levels from coarse to fine.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sequence {
+    levels: heapless::Vec<Level, MAX_LEVELS>,
+    frame_count: usize,
+}
+
+/// Frames that do not make up a sequence, or one that cannot be unwrapped.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum SequenceError {
+    /// There are no frames.
+    Empty,
+    /// A ratio is not a positive finite number, or a shift not finite.
+    NotFinite {
+        /// The frame's ratio.
+        ratio: f64,
+        /// The frame's shift in turns.
+        shift: f64,
+    },
+    /// More levels than [`MAX_LEVELS`].
+    TooManyLevels(usize),
+    /// A level has fewer than 3 shifts or more than [`MAX_SHIFTS`].
+    Steps {
+        /// The level's ratio.
+        ratio: f64,
+        /// Its number of shifts.
+        steps: usize,
+    },
+    /// The shifts of a level are not equally spaced over one turn.
+    Spacing {
+        /// The level's ratio.
+        ratio: f64,
+        /// Its number of shifts.
+        steps: usize,
+        /// The shift that is off its place, in turns.
+        shift: f64,
+    },
+    /// The ratios are of no form that can be unwrapped.
+    Ratios(Vec<f64>),
+    /// The step between two geometric levels is too large.
+    Step {
+        /// Ratio of the coarser level.
+        from: f64,
+        /// Ratio of the finer level.
+        to: f64,
+    },
+}
+
+impl fmt::Display for SequenceError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty => write!(f, "there are no frames: a level needs at least 3"),
+            Self::NotFinite { ratio, shift } => write!(
+                f,
+                "a frame with ratio {ratio} and shift {shift}: both must be finite and the ratio positive"
+            ),
+            Self::TooManyLevels(levels) => {
+                write!(f, "{levels} levels where at most {MAX_LEVELS} can be decoded")
+            }
+            Self::Steps { ratio, steps } => write!(
+                f,
+                "the level of ratio {ratio} has {steps} shifts: it needs 3 to {MAX_SHIFTS}"
+            ),
+            Self::Spacing {
+                ratio,
+                steps,
+                shift,
+            } => write!(
+                f,
+                "the {steps} shifts of the level of ratio {ratio} are not equally spaced over one turn: \
+                 {shift} is off its place; shifts of a level are start + k/{steps}"
+            ),
+            Self::Ratios(ratios) => write!(
+                f,
+                "levels of ratios {ratios:?} cannot be unwrapped: the smallest must span at most one turn \
+                 of the pattern (geometric), or they are 1, 1 - 1/n^2, 1 - 1/n with n >= 3 or 1, 1 - 1/n \
+                 with n >= 2 (dense), or a single one"
+            ),
+            Self::Step { from, to } => write!(
+                f,
+                "the step from ratio {from} to {to} is over {MAX_STEP}: put a level between them"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for SequenceError {}
+
+impl Sequence {
+    /// From the ratio and the shift (turns) of each frame, in the order of the frames.
+    ///
+    /// Frames of equal ratio form a level; within it the shifts may come in any order and start
+    /// anywhere.
+    ///
+    /// # Errors
+    /// If a level has a number of shifts out of range or they are not equally spaced, or there are
+    /// too many levels.
+    pub fn from_frames(frames: &[(f64, f64)]) -> Result<Self, SequenceError> {
+        if frames.is_empty() {
+            return Err(SequenceError::Empty);
+        }
+        if let Some(&(ratio, shift)) = frames
+            .iter()
+            .find(|(ratio, shift)| !(ratio.is_finite() && *ratio > 0.0 && shift.is_finite()))
+        {
+            return Err(SequenceError::NotFinite { ratio, shift });
+        }
+        let mut ratios: Vec<f64> = frames.iter().map(|&(ratio, _)| ratio).collect();
+        ratios.sort_by(f64::total_cmp);
+        ratios.dedup();
+        let mut levels = heapless::Vec::new();
+        for &ratio in &ratios {
+            levels
+                .push(Self::level(ratio, frames)?)
+                .map_err(|_| SequenceError::TooManyLevels(ratios.len()))?;
+        }
+        Ok(Self {
+            levels,
+            frame_count: frames.len(),
+        })
+    }
+
+    fn level(ratio: f64, frames: &[(f64, f64)]) -> Result<Level, SequenceError> {
+        let shifts: Vec<(u16, f64)> = (0..)
+            .zip(frames)
+            .filter(|(_, frame)| frame.0 == ratio)
+            .map(|(at, frame)| (at, frame.1))
+            .collect();
+        let steps = shifts.len();
+        if !(3..=MAX_SHIFTS).contains(&steps) {
+            return Err(SequenceError::Steps { ratio, steps });
+        }
+        let start = shifts[0].1 - libm::floor(shifts[0].1);
+        let mut places = [None; MAX_SHIFTS];
+        for (at, shift) in shifts {
+            let place = (shift - start) * steps as f64;
+            let nearest = libm::rint(place);
+            let slot = nearest - steps as f64 * libm::floor(nearest / steps as f64);
+            let slot = &mut places[slot as usize];
+            if libm::fabs(place - nearest) > SHIFT_TOLERANCE * steps as f64 || slot.is_some() {
+                return Err(SequenceError::Spacing {
+                    ratio,
+                    steps,
+                    shift,
+                });
+            }
+            *slot = Some(at);
+        }
+        Ok(Level {
+            ratio,
+            start,
+            frames: places.iter().flatten().copied().collect(),
+        })
+    }
+
+    /// Our own geometric sequence for a phase function: `levels` levels of `steps` shifts, the frames
+    /// from coarse to fine, shifts k/N.
+    ///
+    /// The coarsest level spans 0.94 turn (one turn less a margin for noise on both sides), the
+    /// finest has ratio 1, the steps between are equal.
+    pub fn geometric(range: PhaseRange, levels: usize, steps: usize) -> Vec<(f64, f64)> {
+        let step = libm::pow((range.span() / 0.94).max(1.0), 1.0 / (levels.max(2) - 1) as f64);
+        (0..levels)
+            .flat_map(|level| {
+                let ratio = libm::pow(step, -((levels - 1 - level) as f64));
+                (0..steps).map(move |k| (ratio, k as f64 / steps as f64))
+            })
+            .collect()
+    }
+
+    /// The levels from coarse to fine.
+    pub fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
+    /// Number of frames.
+    pub fn frame_count(&self) -> usize {
+        self.frame_count
+    }
+}
+
+/// How the levels of a sequence become an absolute phase.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unwrapping {
+    /// From coarse to fine; absolute by itself.
+    Geometric,
+    /// By the beats of ratios 1, 1 − 1/n², 1 − 1/n about a known map.
+    DenseThree {
+        /// The n of the ratios.
+        n: f64,
+    },
+    /// By the beat of ratios 1, 1 − 1/n about a known map.
+    DenseTwo {
+        /// The n of the ratios.
+        n: f64,
+    },
+    /// One level within half a turn of a known map.
+    Single,
+}
+
+impl Unwrapping {
+    /// Recognises the form of a sequence for a phase function with this range.
+    ///
+    /// # Errors
+    /// If the ratios are of no known form.
+    pub fn recognise(sequence: &Sequence, range: PhaseRange) -> Result<Self, SequenceError> {
+        let ratios: heapless::Vec<f64, MAX_LEVELS> =
+            sequence.levels().iter().map(|level| level.ratio).collect();
+        let near = |a: f64, b: f64| libm::fabs(a - b) <= RATIO_TOLERANCE;
+        if ratios[0] * range.span() <= GEOMETRIC_SPAN {
+            if let Some(pair) = ratios.windows(2).find(|pair| pair[1] / pair[0] > MAX_STEP) {
+                return Err(SequenceError::Step {
+                    from: pair[0],
+                    to: pair[1],
+                });
+            }
+            return Ok(Self::Geometric);
+        }
+        match ratios[..] {
+            [_] => Ok(Self::Single),
+            [low, one] if near(one, 1.0) && low >= 0.5 - RATIO_TOLERANCE => Ok(Self::DenseTwo {
+                n: 1.0 / (1.0 - low),
+            }),
+            [low, middle, one] if near(one, 1.0) => {
+                let n = 1.0 / (1.0 - low);
+                if n >= 3.0 - 1e-5 && near(middle, 1.0 - 1.0 / (n * n)) {
+                    Ok(Self::DenseThree { n })
+                } else {
+                    Err(SequenceError::Ratios(ratios.to_vec()))
+                }
+            }
+            _ => Err(SequenceError::Ratios(ratios.to_vec())),
+        }
+    }
+
+    /// Whether the phase is unwrapped relative to a map that must be known beforehand.
+    pub fn needs_map(self) -> bool {
+        self != Self::Geometric
+    }
+
+    /// The word for reports: geometric, dense or single.
+    pub fn kind(self) -> &'static str {
+        match self {
+            Self::Geometric => "geometric",
+            Self::DenseThree { .. } | Self::DenseTwo { .. } => "dense",
+            Self::Single => "single",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec;
+    use std::vec::Vec;
+
+    const SPAN_100: PhaseRange = PhaseRange {
+        min: 0.0,
+        max: 100.0,
+    };
+
+    fn levels(ratios: &[f64]) -> Sequence {
+        let frames: Vec<_> = ratios
+            .iter()
+            .flat_map(|&ratio| (0..3).map(move |k| (ratio, f64::from(k) / 3.0)))
+            .collect();
+        Sequence::from_frames(&frames).unwrap()
+    }
+
+    #[test]
+    fn shifts_may_come_in_any_order_and_from_any_start() {
+        let frames = [(1.0, 0.25), (1.0, -0.083_333_333_33), (1.0, -0.416_666_666_7)];
+        let sequence = Sequence::from_frames(&frames).unwrap();
+        let level = &sequence.levels()[0];
+        assert_eq!(level.start, 0.25);
+        assert_eq!(level.frames, [0, 2, 1]);
+    }
+
+    #[test]
+    fn levels_go_from_coarse_to_fine() {
+        let sequence = levels(&[1.0, 0.01, 0.1]);
+        let ratios: Vec<_> = sequence.levels().iter().map(|level| level.ratio).collect();
+        assert_eq!(ratios, [0.01, 0.1, 1.0]);
+        assert_eq!(sequence.levels()[0].frames, [3, 4, 5]);
+    }
+
+    #[test]
+    fn unequal_few_and_repeated_shifts_are_refused() {
+        let unequal = [(1.0, 0.0), (1.0, 0.3), (1.0, 0.6)];
+        assert!(matches!(
+            Sequence::from_frames(&unequal),
+            Err(SequenceError::Spacing { steps: 3, .. })
+        ));
+        let repeated = [(1.0, 0.0), (1.0, 0.25), (1.0, 0.5), (1.0, 0.5)];
+        assert!(matches!(
+            Sequence::from_frames(&repeated),
+            Err(SequenceError::Spacing { steps: 4, .. })
+        ));
+        assert!(matches!(
+            Sequence::from_frames(&repeated[..2]),
+            Err(SequenceError::Steps { steps: 2, .. })
+        ));
+        assert_eq!(Sequence::from_frames(&[]), Err(SequenceError::Empty));
+        assert!(Sequence::from_frames(&[(f64::NAN, 0.0); 3]).is_err());
+    }
+
+    #[test]
+    fn each_form_is_recognised_and_anything_else_refused_with_its_ratios() {
+        let recognise = |ratios: &[f64]| Unwrapping::recognise(&levels(ratios), SPAN_100);
+        assert_eq!(recognise(&[0.01, 0.1, 1.0]), Ok(Unwrapping::Geometric));
+        assert_eq!(recognise(&[0.010_009, 0.5]), Ok(Unwrapping::Geometric));
+        assert_eq!(recognise(&[0.7]), Ok(Unwrapping::Single));
+        let Ok(Unwrapping::DenseThree { n }) = recognise(&[1.0, 35.0 / 36.0, 5.0 / 6.0]) else {
+            panic!("not dense");
+        };
+        assert!((n - 6.0).abs() < 1e-9);
+        assert!(matches!(
+            recognise(&[0.8, 1.0]),
+            Ok(Unwrapping::DenseTwo { n }) if (n - 5.0).abs() < 1e-9
+        ));
+        for ratios in [vec![0.1, 1.0], vec![0.5, 0.9, 1.0], vec![0.8, 0.9, 0.95, 1.0]] {
+            assert_eq!(recognise(&ratios), Err(SequenceError::Ratios(ratios)));
+        }
+    }
+
+    #[test]
+    fn our_own_geometric_sequence_is_recognised_and_keeps_a_margin() {
+        let frames = Sequence::geometric(SPAN_100, 3, 4);
+        let sequence = Sequence::from_frames(&frames).unwrap();
+        assert_eq!(Unwrapping::recognise(&sequence, SPAN_100), Ok(Unwrapping::Geometric));
+        assert!((sequence.levels()[0].ratio * 100.0 - 0.94).abs() < 1e-12);
+        assert_eq!(sequence.levels()[2].ratio, 1.0);
+    }
+}

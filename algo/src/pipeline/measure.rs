@@ -1,0 +1,119 @@
+//! Whole frames: frames → phase map → height map.
+
+use super::for_each;
+use crate::frame::FrameView;
+use crate::geometry::Triangulator;
+use crate::phase::{DecodeError, Decoder, PhaseRow, Scratch, Trust};
+use crate::units::{AbsolutePhase, Height, Modulation};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// Absolute phase, modulation and trust of every pixel, row-major.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PhaseMap {
+    /// Pixels per row.
+    pub width: usize,
+    /// Φ, [`AbsolutePhase::UNKNOWN`] where the phase is rejected.
+    pub phase: Vec<AbsolutePhase>,
+    /// The modulation that decides the phase's accuracy.
+    pub modulation: Vec<Modulation>,
+    /// Resolved, or the first reason why not.
+    pub trust: Vec<Trust>,
+}
+
+impl PhaseMap {
+    fn rows(&mut self) -> Vec<PhaseRow<'_>> {
+        let width = self.width.max(1);
+        self.phase
+            .chunks_mut(width)
+            .zip(self.modulation.chunks_mut(width))
+            .zip(self.trust.chunks_mut(width))
+            .map(|((phase, modulation), trust)| PhaseRow {
+                phase,
+                modulation,
+                trust,
+            })
+            .collect()
+    }
+
+    /// Number of pixels with this trust.
+    pub fn count(&self, trust: Trust) -> usize {
+        self.trust.iter().filter(|&&here| here == trust).count()
+    }
+}
+
+/// Height and its predicted error of every pixel, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeightMap {
+    /// Pixels per row.
+    pub width: usize,
+    /// z, [`Height::UNKNOWN`] where not resolved.
+    pub height: Vec<Height>,
+    /// σ_z in mm, NaN where not resolved or the frames' noise is not known.
+    pub sigma: Vec<f32>,
+}
+
+/// Decodes frames to absolute phase; `map` is the known map (row-major) for sequences that are
+/// unwrapped about one.
+///
+/// # Errors
+/// If the frames are not what the decoder was made for. Nothing else can fail.
+pub fn decode(
+    decoder: &Decoder,
+    frames: &[FrameView<'_>],
+    map: Option<&[AbsolutePhase]>,
+) -> Result<PhaseMap, DecodeError> {
+    decoder.check(frames)?;
+    let (width, height) = (frames[0].width(), frames[0].height());
+    let mut phases = PhaseMap {
+        width,
+        phase: vec![AbsolutePhase::UNKNOWN; width * height],
+        modulation: vec![Modulation::default(); width * height],
+        trust: vec![Trust::default(); width * height],
+    };
+    for_each(phases.rows(), Scratch::default, |v, row, scratch| {
+        let map = map.and_then(|map| map.get(v * width..(v + 1) * width));
+        decoder.row(frames, v, map, scratch, row);
+    });
+    Ok(phases)
+}
+
+/// Triangulates every resolved pixel, and marks those without a height in the working range as
+/// [`Trust::OutOfRange`]. `noise` is σ of one sample in counts, for σ_z.
+pub fn triangulate(
+    triangulator: &Triangulator,
+    decoder: &Decoder,
+    noise: Option<f64>,
+    phases: &mut PhaseMap,
+) -> HeightMap {
+    let width = phases.width;
+    let mut map = HeightMap {
+        width,
+        height: vec![Height::UNKNOWN; phases.phase.len()],
+        sigma: vec![f32::NAN; phases.phase.len()],
+    };
+    let heights = map.height.chunks_mut(width.max(1));
+    let rows = heights
+        .zip(map.sigma.chunks_mut(width.max(1)))
+        .zip(phases.rows())
+        .collect();
+    for_each(rows, || (), |v, ((heights, sigmas), phases), ()| {
+        for u in 0..heights.len() {
+            if phases.trust[u] != Trust::Resolved {
+                continue;
+            }
+            let phase = phases.phase[u].turns();
+            match triangulator.solve(u as f64, v as f64, phase) {
+                None => phases.trust[u] = Trust::OutOfRange,
+                Some(solution) => {
+                    heights[u] = Height::from_mm(solution.point.z);
+                    if let Some(noise) = noise {
+                        let turns = decoder.phase_noise(phases.modulation[u], noise);
+                        sigmas[u] = (turns / libm::fabs(solution.slope)) as f32;
+                    }
+                }
+            }
+        }
+    });
+    map
+}

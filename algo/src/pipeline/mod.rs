@@ -1,0 +1,10 @@
+//! Who computes which row: in turn or on a rayon pool, with the same bits.
+
+mod measure;
+mod noise;
+mod rows;
+
+pub use measure::{HeightMap, PhaseMap, decode, triangulate};
+pub use noise::sample_noise;
+pub use rows::for_each_row;
+pub(crate) use rows::{for_each, map_rows};

@@ -1,0 +1,43 @@
+//! The walk over rows, serial or parallel.
+
+use alloc::vec::Vec;
+#[cfg(feature = "parallel")]
+use rayon::prelude::*;
+
+/// Calls `each` with every row of `map` (row-major, rows of `width`).
+pub fn for_each_row<T: Send>(
+    map: &mut [T],
+    width: usize,
+    each: impl Fn(usize, &mut [T]) + Sync + Send,
+) {
+    let rows = map.chunks_mut(width.max(1)).collect();
+    for_each(rows, || (), |v, row, ()| each(v, row));
+}
+
+/// Calls `each` with every row (and its place), and with a scratch buffer that is reused from row to
+/// row.
+pub(crate) fn for_each<T: Send, S>(
+    rows: Vec<T>,
+    scratch: impl Fn() -> S + Sync + Send,
+    each: impl Fn(usize, T, &mut S) + Sync + Send,
+) {
+    #[cfg(feature = "parallel")]
+    rows.into_par_iter()
+        .enumerate()
+        .for_each_init(scratch, |scratch, (v, row)| each(v, row, scratch));
+    #[cfg(not(feature = "parallel"))]
+    {
+        let mut scratch = scratch();
+        for (v, row) in rows.into_iter().enumerate() {
+            each(v, row, &mut scratch);
+        }
+    }
+}
+
+/// One value per row, in the order of the rows.
+pub(crate) fn map_rows<R: Send>(rows: usize, each: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
+    #[cfg(feature = "parallel")]
+    return (0..rows).into_par_iter().map(each).collect();
+    #[cfg(not(feature = "parallel"))]
+    (0..rows).map(each).collect()
+}
