@@ -1,1 +1,19 @@
-//! Devices: traits and back-ends.
+//! Devices: traits, their one generic user, and the simulated and replay back-ends.
+//!
+//! This crate knows cameras, projectors, triggers and light. It knows nothing of phase: a pattern is a
+//! grey raster, a frame is an array of counts, and what the two have to do with each other is for the
+//! crate that decodes them.
+
+pub mod camera;
+pub mod contract;
+pub mod error;
+pub mod frame;
+pub mod head;
+pub mod model;
+pub mod projector;
+pub mod replay;
+pub mod sim;
+pub mod trigger;
+pub mod units;
+
+mod virtual_head;

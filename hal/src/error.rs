@@ -1,0 +1,97 @@
+//! What can go wrong with a device, and of which kind it is.
+
+use std::time::Duration;
+
+/// The kind of a device error: what the caller may do about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ErrorKind {
+    /// The device did not answer within the time given; the call may be repeated.
+    Timeout,
+    /// The device is gone; it has to be opened again.
+    Disconnected,
+    /// The device cannot do what was asked, now or later; the request has to change.
+    Unsupported,
+    /// The call does not fit what was called before or what the device answered.
+    Protocol,
+}
+
+/// A failed call of a device. The message says what was attempted, with what numbers, and the remedy.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// Nothing came within the time given.
+    #[error("{attempt} did not finish within {} ms: {remedy}", timeout.as_secs_f64() * 1e3)]
+    Timeout {
+        /// What was attempted, with its numbers.
+        attempt: String,
+        /// The time given.
+        timeout: Duration,
+        /// What to do about it.
+        remedy: String,
+    },
+    /// The device is gone.
+    #[error("{attempt} failed because the device is gone: {remedy}")]
+    Disconnected {
+        /// What was attempted, with its numbers.
+        attempt: String,
+        /// What to do about it.
+        remedy: String,
+    },
+    /// The device cannot do this.
+    #[error("{attempt} is not supported: {remedy}")]
+    Unsupported {
+        /// What was attempted, with its numbers.
+        attempt: String,
+        /// What to do about it.
+        remedy: String,
+    },
+    /// The call is out of order, or the answer was.
+    #[error("{attempt} is out of order: {remedy}")]
+    Protocol {
+        /// What was attempted, with its numbers.
+        attempt: String,
+        /// What to do about it.
+        remedy: String,
+    },
+}
+
+impl Error {
+    /// The kind of this error.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Timeout { .. } => ErrorKind::Timeout,
+            Self::Disconnected { .. } => ErrorKind::Disconnected,
+            Self::Unsupported { .. } => ErrorKind::Unsupported,
+            Self::Protocol { .. } => ErrorKind::Protocol,
+        }
+    }
+
+    /// A time-out of `attempt` after `timeout`.
+    pub fn timeout(
+        attempt: impl Into<String>,
+        timeout: Duration,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Self::Timeout {
+            attempt: attempt.into(),
+            timeout,
+            remedy: remedy.into(),
+        }
+    }
+
+    /// `attempt` cannot be done.
+    pub fn unsupported(attempt: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::Unsupported {
+            attempt: attempt.into(),
+            remedy: remedy.into(),
+        }
+    }
+
+    /// `attempt` does not fit what was called before.
+    pub fn protocol(attempt: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::Protocol {
+            attempt: attempt.into(),
+            remedy: remedy.into(),
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! The geometry of a device as files state it: pinhole and Brown distortion in OpenCV's convention.
+//!
+//! X_device = R · X_world + t in mm, pixel centres at integer coordinates, x right, y down, z forward.
+//! A projector is a camera run backwards. Whether the numbers make a usable camera is for the crate that
+//! measures with them; here they are only carried, and refused when they are no numbers.
+
+use serde::{Deserialize, Serialize};
+
+/// `MODEL` of recording format 1 (see the project's formats).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeviceModel {
+    /// Focal length in pixels along x.
+    pub fx: f64,
+    /// Focal length in pixels along y.
+    pub fy: f64,
+    /// Principal point, column.
+    pub cx: f64,
+    /// Principal point, row.
+    pub cy: f64,
+    /// Brown distortion k1, k2, p1, p2, k3.
+    pub distortion: [f64; 5],
+    /// Rotation from the world to the device, row-major.
+    pub rotation: [f64; 9],
+    /// Translation from the world to the device, mm.
+    pub translation_mm: [f64; 3],
+}
+
+impl DeviceModel {
+    /// The name of the first number that is not finite, if any.
+    #[must_use]
+    pub fn first_not_finite(&self) -> Option<&'static str> {
+        let groups: [(&'static str, &[f64]); 7] = [
+            ("fx", &[self.fx]),
+            ("fy", &[self.fy]),
+            ("cx", &[self.cx]),
+            ("cy", &[self.cy]),
+            ("distortion", &self.distortion),
+            ("rotation", &self.rotation),
+            ("translation_mm", &self.translation_mm),
+        ];
+        groups
+            .into_iter()
+            .find(|(_, values)| !values.iter().all(|v| v.is_finite()))
+            .map(|(name, _)| name)
+    }
+}

@@ -1,0 +1,47 @@
+//! Why a recording cannot be opened: it is not there, or its content is wrong.
+
+use std::path::{Path, PathBuf};
+
+/// A recording that cannot be opened. The message names the file and the remedy.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RecordingError {
+    /// The named folder, or its `recording.json`, does not exist.
+    #[error("open recording {}: no such {what}: name a folder that holds a recording.json", path.display())]
+    Missing {
+        /// What was looked for.
+        path: PathBuf,
+        /// "folder" or "recording.json".
+        what: &'static str,
+    },
+    /// Something in the folder is wrong, including a file that the manifest names and that is not there.
+    #[error("open recording {}: {problem}: {remedy}", path.display())]
+    Content {
+        /// The file that is wrong.
+        path: PathBuf,
+        /// What is wrong with it, with the numbers.
+        problem: String,
+        /// What to do about it.
+        remedy: String,
+    },
+}
+
+impl RecordingError {
+    /// Whether the recording does not exist at all (as against existing with wrong content).
+    #[must_use]
+    pub fn is_missing(&self) -> bool {
+        matches!(self, Self::Missing { .. })
+    }
+
+    /// `path` is wrong in that `problem`; do `remedy`.
+    pub(crate) fn content(
+        path: &Path,
+        problem: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Self::Content {
+            path: path.to_path_buf(),
+            problem: problem.into(),
+            remedy: remedy.into(),
+        }
+    }
+}

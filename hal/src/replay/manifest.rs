@@ -1,0 +1,187 @@
+//! The file form of `recording.json`, format 1: what may stand in it, before anything is checked.
+
+use std::path::Path;
+
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use super::failure::RecordingError;
+use crate::model::DeviceModel;
+
+/// The name every recording carries.
+pub const FORMAT: &str = "fringed-recording";
+/// The version this program reads and writes.
+pub const VERSION: u64 = 1;
+
+/// The whole of `recording.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Manifest {
+    pub format: String,
+    pub version: u64,
+    #[serde(default)]
+    pub description: String,
+    #[serde(default)]
+    pub source: String,
+    pub camera: CameraEntry,
+    pub projector: ProjectorEntry,
+    pub pattern: PatternEntries,
+    pub frames: Vec<FrameEntry>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range_mm: Option<[f64; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure_us: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part_id: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recipe: Option<RecipeReference>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct CameraEntry {
+    pub width: u32,
+    pub height: u32,
+    pub bit_depth: u8,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<DeviceModel>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_counts: Option<f64>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ProjectorEntry {
+    pub width: u32,
+    pub height: u32,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<DeviceModel>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub(crate) enum PatternEntry {
+    Vertical { fringes: f64 },
+    Horizontal { fringes: f64 },
+    File { file: String },
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct FrameEntry {
+    pub file: String,
+    pub ratio: f64,
+    pub shift_turns: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timestamp_ns: Option<u64>,
+    #[serde(default, skip_serializing_if = "is_first")]
+    pub pattern: usize,
+}
+
+/// The recipe a production measurement was made with.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecipeReference {
+    /// Recipe number.
+    pub number: u32,
+    /// Fingerprint of the recipe's content, as the recipe states it.
+    pub fingerprint: String,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_first(pattern: &usize) -> bool {
+    *pattern == 0
+}
+
+/// One pattern, or a list of them.
+///
+/// Not an untagged enum: serde's answer to a wrong key in one does not name the key.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct PatternEntries(pub Vec<PatternEntry>);
+
+impl Serialize for PatternEntries {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0.as_slice() {
+            [one] => one.serialize(serializer),
+            several => several.serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for PatternEntries {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OneOrList;
+        impl<'de> Visitor<'de> for OneOrList {
+            type Value = PatternEntries;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a pattern or a list of patterns")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+                let one = PatternEntry::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(PatternEntries(vec![one]))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Self::Value, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(list)).map(PatternEntries)
+            }
+        }
+        deserializer.deserialize_any(OneOrList)
+    }
+}
+
+/// Reads the manifest in `text`; `path` is for messages only.
+///
+/// Name and version are looked at first, by themselves, so that a newer version is called that and not a
+/// list of unknown keys.
+pub(crate) fn parse(text: &str, path: &Path) -> Result<Manifest, RecordingError> {
+    let value: serde_json::Value = serde_json::from_str(text).map_err(|error| {
+        RecordingError::content(path, format!("not valid JSON: {error}"), "mend the file")
+    })?;
+    match value.get("format").and_then(|name| name.as_str()) {
+        Some(FORMAT) => {}
+        Some(other) => {
+            return Err(RecordingError::content(
+                path,
+                format!("format is {other:?}, expected {FORMAT:?}"),
+                "name a folder that holds a recording",
+            ));
+        }
+        None => {
+            return Err(RecordingError::content(
+                path,
+                "the key format is missing or no text",
+                format!("write \"format\": {FORMAT:?}"),
+            ));
+        }
+    }
+    match value.get("version").and_then(serde_json::Value::as_u64) {
+        Some(VERSION) => {}
+        Some(newer) if newer > VERSION => {
+            return Err(RecordingError::content(
+                path,
+                format!("version {newer} is newer than this program reads ({VERSION})"),
+                "update fringed",
+            ));
+        }
+        _ => {
+            return Err(RecordingError::content(
+                path,
+                "the key version is missing or no whole number from 1",
+                format!("write \"version\": {VERSION}"),
+            ));
+        }
+    }
+    serde_json::from_str(text).map_err(|error| {
+        RecordingError::content(
+            path,
+            error.to_string(),
+            "correct or remove that key; recording format 1 lists the keys there are",
+        )
+    })
+}

@@ -1,0 +1,14 @@
+//! The replay back-end: recordings in format 1 are read, written, and played as if they came from a head.
+
+mod check;
+pub mod failure;
+mod grey;
+mod manifest;
+mod npy;
+pub mod recording;
+
+pub use failure::RecordingError;
+pub use recording::Recording;
+
+#[cfg(test)]
+pub(crate) mod shared_tests;

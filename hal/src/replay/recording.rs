@@ -1,0 +1,318 @@
+//! A recording, loaded whole and checked: frames from a camera with everything needed to measure from them again.
+
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::failure::RecordingError;
+use super::manifest::{self, Manifest, PatternEntry};
+use super::npy::Array;
+use super::{check, grey, npy};
+use crate::frame::{Frame, FrameFormat};
+use crate::model::DeviceModel;
+use crate::units::Timestamp;
+
+pub use super::manifest::RecipeReference;
+
+/// Name of the manifest in a recording's folder.
+pub(crate) const MANIFEST: &str = "recording.json";
+/// Longest manifest that is read: 1024 frames need a tenth of it.
+const MAX_MANIFEST_BYTES: u64 = 4 << 20;
+/// Longest frame or array that is read.
+const MAX_FILE_BYTES: u64 = 4 << 30;
+/// Names of the truth in a recording's folder.
+pub(crate) const TRUTH_HEIGHT: &str = "truth/height.npy";
+pub(crate) const TRUTH_CLASS: &str = "truth/class.npy";
+
+/// The projector of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedProjector {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Its geometry, if it is known.
+    pub model: Option<DeviceModel>,
+}
+
+/// The phase function Φ_P(ξ, η) of a pattern, in turns.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PatternSpec {
+    /// Φ_P = fringes · ξ / width.
+    Vertical {
+        /// Fringes over the projector's width.
+        fringes: f64,
+    },
+    /// Φ_P = fringes · η / height.
+    Horizontal {
+        /// Fringes over the projector's height.
+        fringes: f64,
+    },
+    /// Φ_P sampled at every projector pixel.
+    File {
+        /// Projector rows.
+        rows: usize,
+        /// Projector columns.
+        columns: usize,
+        /// Φ_P row by row, turns, finite.
+        turns: Vec<f64>,
+    },
+}
+
+/// One frame of a recording and what the projector showed during it:
+/// I_max/2 · (1 + sin 2π(ratio · Φ_P + shift)).
+#[derive(Clone, Debug)]
+pub struct RecordedFrame {
+    /// The level's share of the full phase function, above 0.
+    pub ratio: f64,
+    /// Phase shift in turns.
+    pub shift_turns: f64,
+    /// Index into the recording's patterns.
+    pub pattern: usize,
+    /// Start of the exposure, if it was recorded, in ns of the recording head's clock.
+    pub timestamp_ns: Option<u64>,
+    /// The image; its sequence number is the frame's place in the recording.
+    pub frame: Frame,
+}
+
+/// A recording of format 1, checked.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// Camera columns.
+    pub width: u32,
+    /// Camera rows.
+    pub height: u32,
+    /// Significant bits of a sample, 8…16.
+    pub bit_depth: u8,
+    /// One line about what was recorded.
+    pub description: String,
+    /// Where it came from, and its licence.
+    pub source: String,
+    /// The camera's geometry, if it is known.
+    pub camera_model: Option<DeviceModel>,
+    /// Standard deviation of one sample in counts, if it is known.
+    pub noise_counts: Option<f64>,
+    /// The projector.
+    pub projector: RecordedProjector,
+    /// One or two patterns.
+    pub patterns: Vec<PatternSpec>,
+    /// The frames in the order of the manifest.
+    pub frames: Vec<RecordedFrame>,
+    /// Lowest and highest z of the working range in mm, if it was stated.
+    pub range_mm: Option<[f64; 2]>,
+    /// Exposure of one frame in µs.
+    pub exposure_us: Option<f64>,
+    /// The part that was measured.
+    pub part_id: Option<String>,
+    /// The recipe it was measured with.
+    pub recipe: Option<RecipeReference>,
+    /// True z in mm on each pixel's central ray, row by row; NaN where camera and projector do not both see.
+    pub truth_height: Option<Vec<f32>>,
+    /// 0 unseen, 1 pixel centre lit, 2 whole pixel lit and no depth edge inside; row by row.
+    pub truth_class: Option<Vec<u8>>,
+}
+
+impl Recording {
+    /// Loads and checks the recording in `folder`.
+    ///
+    /// # Errors
+    /// [`RecordingError::Missing`] if the folder or its manifest is not there, [`RecordingError::Content`] for
+    /// everything else, naming the file and the remedy.
+    pub fn open(folder: &Path) -> Result<Self, RecordingError> {
+        let missing = |path: &Path, what| RecordingError::Missing {
+            path: path.to_path_buf(),
+            what,
+        };
+        if !folder.is_dir() {
+            return Err(missing(folder, "folder"));
+        }
+        let path = folder.join(MANIFEST);
+        if !path.exists() {
+            return Err(missing(&path, MANIFEST));
+        }
+        let text =
+            String::from_utf8(read(folder, MANIFEST, MAX_MANIFEST_BYTES)?).map_err(|_| {
+                RecordingError::content(&path, "the file is not UTF-8 text", "mend the file")
+            })?;
+        let manifest = manifest::parse(&text, &path)?;
+        check::manifest(&manifest, &path)?;
+
+        let format = FrameFormat::packed(
+            manifest.camera.width,
+            manifest.camera.height,
+            manifest.camera.bit_depth,
+        );
+        let frames = frames(folder, &manifest, format)?;
+        let patterns = patterns(folder, &manifest)?;
+        let shape = (format.height as usize, format.width as usize);
+        let truth_height = truth(folder, TRUTH_HEIGHT, shape, npy::read_f32)?;
+        let truth_class = truth(folder, TRUTH_CLASS, shape, npy::read_u8)?;
+
+        let Manifest {
+            description,
+            source,
+            camera,
+            projector,
+            range_mm,
+            ..
+        } = manifest;
+        Ok(Self {
+            width: camera.width,
+            height: camera.height,
+            bit_depth: camera.bit_depth,
+            description,
+            source,
+            camera_model: camera.model,
+            noise_counts: camera.noise_counts,
+            projector: RecordedProjector {
+                width: projector.width,
+                height: projector.height,
+                model: projector.model,
+            },
+            patterns,
+            frames,
+            range_mm,
+            exposure_us: manifest.exposure_us,
+            part_id: manifest.part_id,
+            recipe: manifest.recipe,
+            truth_height,
+            truth_class,
+        })
+    }
+
+    /// The format that every frame of the recording has.
+    #[must_use]
+    pub fn format(&self) -> FrameFormat {
+        FrameFormat::packed(self.width, self.height, self.bit_depth)
+    }
+}
+
+fn frames(
+    folder: &Path,
+    manifest: &Manifest,
+    format: FrameFormat,
+) -> Result<Vec<RecordedFrame>, RecordingError> {
+    let mut frames = Vec::with_capacity(manifest.frames.len());
+    for (sequence, entry) in manifest.frames.iter().enumerate() {
+        let path = folder.join(&entry.file);
+        let pixels = grey::decode(&read(folder, &entry.file, MAX_FILE_BYTES)?, &format, &path)?;
+        let timestamp = Timestamp(entry.timestamp_ns.unwrap_or(0));
+        let frame =
+            Frame::new(format, Arc::new(pixels), timestamp, sequence as u64).map_err(|error| {
+                RecordingError::content(&path, error.to_string(), "save the frame again")
+            })?;
+        frames.push(RecordedFrame {
+            ratio: entry.ratio,
+            shift_turns: entry.shift_turns,
+            pattern: entry.pattern,
+            timestamp_ns: entry.timestamp_ns,
+            frame,
+        });
+    }
+    Ok(frames)
+}
+
+fn patterns(folder: &Path, manifest: &Manifest) -> Result<Vec<PatternSpec>, RecordingError> {
+    let rows = manifest.projector.height as usize;
+    let columns = manifest.projector.width as usize;
+    let load = |entry: &PatternEntry| match entry {
+        PatternEntry::Vertical { fringes } => Ok(PatternSpec::Vertical { fringes: *fringes }),
+        PatternEntry::Horizontal { fringes } => Ok(PatternSpec::Horizontal { fringes: *fringes }),
+        PatternEntry::File { file } => {
+            let path = folder.join(file);
+            let array = npy::read_f64(&read(folder, file, MAX_FILE_BYTES)?, &path)?;
+            shaped(&array, (rows, columns), "projector", &path)?;
+            if let Some(at) = array.elements.iter().position(|turns| !turns.is_finite()) {
+                return Err(RecordingError::content(
+                    &path,
+                    format!(
+                        "the phase at row {}, column {} is not finite",
+                        at / columns,
+                        at % columns
+                    ),
+                    "give every projector pixel a phase",
+                ));
+            }
+            Ok(PatternSpec::File {
+                rows,
+                columns,
+                turns: array.elements,
+            })
+        }
+    };
+    manifest.pattern.0.iter().map(load).collect()
+}
+
+fn truth<T>(
+    folder: &Path,
+    name: &str,
+    shape: (usize, usize),
+    parse: impl Fn(&[u8], &Path) -> Result<Array<T>, RecordingError>,
+) -> Result<Option<Vec<T>>, RecordingError> {
+    let path = folder.join(name);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let array = parse(&read(folder, name, MAX_FILE_BYTES)?, &path)?;
+    shaped(&array, shape, "camera", &path)?;
+    Ok(Some(array.elements))
+}
+
+fn shaped<T>(
+    array: &Array<T>,
+    (rows, columns): (usize, usize),
+    device: &str,
+    path: &Path,
+) -> Result<(), RecordingError> {
+    if (array.rows, array.columns) == (rows, columns) {
+        return Ok(());
+    }
+    Err(RecordingError::content(
+        path,
+        format!(
+            "expected the {device}'s {rows} rows × {columns} columns, got {}×{}",
+            array.rows, array.columns
+        ),
+        format!("correct the {device}'s size in {MANIFEST} or replace the array"),
+    ))
+}
+
+/// Reads one file of the folder, which must be a file, be no longer than `limit`, and not be reached
+/// through a link that leads out of the folder.
+fn read(folder: &Path, name: &str, limit: u64) -> Result<Vec<u8>, RecordingError> {
+    let path = folder.join(name);
+    let wrong = |problem: String, remedy: &str| RecordingError::content(&path, problem, remedy);
+    let failed = |error: std::io::Error| match error.kind() {
+        std::io::ErrorKind::NotFound => wrong(
+            "the file is missing".to_owned(),
+            "copy the whole recording again, or take the file out of the manifest",
+        ),
+        _ => wrong(
+            format!("the file cannot be read ({error})"),
+            "check the file and its permissions",
+        ),
+    };
+    let real = |path: &Path| -> Result<PathBuf, std::io::Error> { fs::canonicalize(path) };
+    if !real(&path)
+        .map_err(failed)?
+        .starts_with(real(folder).map_err(failed)?)
+    {
+        return Err(wrong(
+            "the file is a link out of the folder".to_owned(),
+            "copy the file itself",
+        ));
+    }
+    let length = fs::metadata(&path).map_err(failed)?;
+    if !length.is_file() || length.len() > limit {
+        return Err(wrong(
+            format!("not a plain file of at most {limit} bytes"),
+            "replace it by what the recording format asks for",
+        ));
+    }
+    let mut bytes = Vec::with_capacity(usize::try_from(length.len()).unwrap_or(0));
+    fs::File::open(&path)
+        .and_then(|file| file.take(limit).read_to_end(&mut bytes))
+        .map_err(failed)?;
+    Ok(bytes)
+}

@@ -1,0 +1,55 @@
+//! The recordings beside the project, where they are: they open, and hold what their README says.
+
+use std::path::PathBuf;
+
+use super::recording::{PatternSpec, Recording};
+
+/// The folder of shared recordings beside the workspace, if it is there.
+pub(crate) fn shared_recordings() -> Option<PathBuf> {
+    let workspace = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let folder = workspace
+        .parent()?
+        .parent()?
+        .join("shared")
+        .join("recordings");
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    println!("skipped: the shared recordings are not beside the workspace");
+    None
+}
+
+#[test]
+fn every_shared_recording_opens() {
+    let Some(folder) = shared_recordings() else {
+        return;
+    };
+    for (name, size, frames, patterns) in [
+        ("slstudio-board2", (1688, 1352), 12, 2),
+        ("slstudio-skull", (1688, 1352), 6, 1),
+        ("study-cone-adaptive", (256, 256), 12, 1),
+        ("study-sphere-fixed81", (256, 256), 12, 1),
+        ("study-spline-dense121", (256, 256), 12, 1),
+    ] {
+        let recording = Recording::open(&folder.join(name)).unwrap();
+        assert_eq!((recording.width, recording.height), size, "{name}");
+        assert_eq!(recording.frames.len(), frames, "{name}");
+        assert_eq!(recording.patterns.len(), patterns, "{name}");
+        assert!(
+            recording.camera_model.is_some() && recording.projector.model.is_some(),
+            "{name}"
+        );
+        let rendered = name.starts_with("study");
+        assert_eq!(recording.truth_height.is_some(), rendered, "{name}");
+        assert_eq!(recording.truth_class.is_some(), rendered, "{name}");
+    }
+    let cone = Recording::open(&folder.join("study-cone-adaptive")).unwrap();
+    assert!(matches!(
+        cone.patterns[0],
+        PatternSpec::File {
+            rows: 768,
+            columns: 1024,
+            ..
+        }
+    ));
+}
