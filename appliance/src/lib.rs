@@ -1,3 +1,7 @@
-//! The daemon `fringed` and its command line.
+//! The daemon `fringed` and its command line: joins devices (`hal`) and computation (`algo`).
+
 pub mod cli;
+pub mod error;
+pub mod measure;
 pub mod output;
+pub mod seam;

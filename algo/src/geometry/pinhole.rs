@@ -224,7 +224,10 @@ impl Pinhole {
         if !(depth > 0.0) {
             return None;
         }
-        let (x, y) = (self.rows[0].dot(from) / depth, self.rows[1].dot(from) / depth);
+        let (x, y) = (
+            self.rows[0].dot(from) / depth,
+            self.rows[1].dot(from) / depth,
+        );
         let r2 = x * x + y * y;
         let (xd, yd) = if r2 <= self.radius_square {
             self.distorted(x, y)
@@ -384,9 +387,18 @@ pub(super) mod tests {
     fn absurd_models_are_refused_by_name() {
         let good = camera().model;
         let check = |model| Pinhole::new(model, 512, 512).unwrap_err();
-        let model = PinholeModel { fx: f64::NAN, ..good };
-        assert!(matches!(check(model), ModelError::NotFinite("the focal length")));
-        let model = PinholeModel { fy: -1000.0, ..good };
+        let model = PinholeModel {
+            fx: f64::NAN,
+            ..good
+        };
+        assert!(matches!(
+            check(model),
+            ModelError::NotFinite("the focal length")
+        ));
+        let model = PinholeModel {
+            fy: -1000.0,
+            ..good
+        };
         assert!(matches!(check(model), ModelError::Focal { .. }));
         let mut model = good;
         model.rotation[0] = 0.5;

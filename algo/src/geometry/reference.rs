@@ -65,7 +65,11 @@ impl FittedMap {
     /// The value at pixel (u, v), also outside the frame.
     pub fn at(&self, u: f64, v: f64) -> f64 {
         let terms = self.terms(u, v);
-        terms.iter().zip(&self.coefficients).map(|(t, c)| t * c).sum()
+        terms
+            .iter()
+            .zip(&self.coefficients)
+            .map(|(t, c)| t * c)
+            .sum()
     }
 
     /// RMS of the samples about the fit, in the samples' unit.
@@ -106,7 +110,10 @@ pub fn fit_map(
     height: usize,
     samples: impl Iterator<Item = (f64, f64, f64)> + Clone,
 ) -> Result<FittedMap, ReferenceError> {
-    let half = ((width as f64 / 2.0).max(0.5), (height as f64 / 2.0).max(0.5));
+    let half = (
+        (width as f64 / 2.0).max(0.5),
+        (height as f64 / 2.0).max(0.5),
+    );
     let mut map = FittedMap {
         coefficients: [0.0; TERMS],
         centre: (half.0 - 0.5, half.1 - 0.5),
@@ -153,7 +160,8 @@ mod tests {
 
     #[test]
     fn the_fit_follows_the_map_and_drops_its_noise() {
-        let truth = |u: f64, v: f64| 500.0 + 1.4 * u - 2e-4 * u * u + 1e-4 * u * v + 1e-7 * v * v * v;
+        let truth =
+            |u: f64, v: f64| 500.0 + 1.4 * u - 2e-4 * u * u + 1e-4 * u * v + 1e-7 * v * v * v;
         let mut seed = 7_u64;
         let samples: Vec<_> = (0..128 * 96)
             .map(|i| {
@@ -177,7 +185,10 @@ mod tests {
     #[test]
     fn samples_along_a_line_or_too_few_are_refused() {
         let line = (0..500).map(|i| (f64::from(i), 4.0, 1.0));
-        assert_eq!(fit_map(512, 512, line), Err(ReferenceError { samples: 500 }));
+        assert_eq!(
+            fit_map(512, 512, line),
+            Err(ReferenceError { samples: 500 })
+        );
         let few = (0..20).map(|i| (f64::from(i), f64::from(i * i % 7), 1.0));
         assert!(fit_map(512, 512, few).is_err());
     }

@@ -67,7 +67,10 @@ mod tests {
     #[test]
     fn roots_are_found_inside_the_bracket_within_the_tolerance() {
         for (f, root) in [
-            ((|x| x * x * x - 2.0) as fn(f64) -> f64, 1.259_921_049_894_873),
+            (
+                (|x| x * x * x - 2.0) as fn(f64) -> f64,
+                1.259_921_049_894_873,
+            ),
             (|x| libm::exp(x) - 5.0, 1.609_437_912_434_100_3),
             (|x| libm::atan(1e3 * (x - 0.123_456)), 0.123_456),
             (|x| if x < 0.7 { -1e-6 } else { 1.0 }, 0.7),

@@ -8,6 +8,7 @@
 use super::{Pinhole, Reference, Vector, root};
 use crate::pattern::PhaseFunction;
 use crate::units::{AbsolutePhase, Height};
+use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
 
@@ -220,16 +221,16 @@ impl Triangulator {
         })
     }
 
-    /// The height at pixel (u, v) for an absolute phase.
-    pub fn height(&self, u: usize, v: usize, phase: AbsolutePhase) -> Height {
-        self.solve(u as f64, v as f64, phase.turns())
-            .map_or(Height::UNKNOWN, |solution| Height::from_mm(solution.point.z))
+    /// The point at height `height` that pixel (u, v) looks at.
+    pub fn point(&self, u: usize, v: usize, height: Height) -> Option<Vector> {
+        let ray = self.camera.ray(u as f64, v as f64)?;
+        (height.is_known() && ray.z < 0.0).then(|| self.on_ray(ray, height.mm()))
     }
 
     /// The whole reference phase map, row-major, for unwrapping dense sequences about it.
     pub fn reference_map(&self) -> Vec<AbsolutePhase> {
         let (width, height) = (self.camera.width(), self.camera.height());
-        let mut map = alloc::vec![AbsolutePhase::UNKNOWN; width * height];
+        let mut map = vec![AbsolutePhase::UNKNOWN; width * height];
         crate::pipeline::for_each_row(&mut map, width, |v, row| self.reference_row(v, row));
         map
     }

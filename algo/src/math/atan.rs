@@ -33,7 +33,11 @@ pub fn atan2_u16(s: i32, c: i32) -> u16 {
         sum = coefficient + ((sum * square) >> 31);
     }
     let eighth = (sum * t) >> 31;
-    let quarter = if rise > run { (1 << 30) - eighth } else { eighth };
+    let quarter = if rise > run {
+        (1 << 30) - eighth
+    } else {
+        eighth
+    };
     let half = if c < 0 { (1 << 31) - quarter } else { quarter };
     let turn = if s < 0 { -half } else { half };
     ((turn + (1 << 15)) >> 16) as u16

@@ -51,9 +51,8 @@ impl GreyResponse {
     /// # Errors
     /// If a value is not finite, falls below its predecessor, or nothing rises at all.
     pub fn new(measured: &[f64; 256]) -> Result<Self, ResponseError> {
-        let bad = (0..256).find(|&g| {
-            !measured[g].is_finite() || (g > 0 && measured[g] < measured[g - 1])
-        });
+        let bad = (0..256)
+            .find(|&g| !measured[g].is_finite() || (g > 0 && measured[g] < measured[g - 1]));
         if let Some(level) = bad {
             return Err(ResponseError { level });
         }
@@ -68,8 +67,7 @@ impl GreyResponse {
             while level < 255 && measured[level] < light {
                 level += 1;
             }
-            let nearer_below =
-                level > 0 && light - measured[level - 1] < measured[level] - light;
+            let nearer_below = level > 0 && light - measured[level - 1] < measured[level] - light;
             *entry = (if nearer_below { level - 1 } else { level }) as u8;
         }
         Ok(Self { inverse })
@@ -165,7 +163,10 @@ mod tests {
             *light = g as f64;
         }
         measured[100] = 90.0;
-        assert_eq!(GreyResponse::new(&measured), Err(ResponseError { level: 100 }));
+        assert_eq!(
+            GreyResponse::new(&measured),
+            Err(ResponseError { level: 100 })
+        );
         assert!(GreyResponse::new(&[5.0; 256]).is_err());
     }
 }

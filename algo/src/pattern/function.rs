@@ -67,7 +67,10 @@ impl fmt::Display for PhaseFunctionError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Size { columns, rows } => {
-                write!(f, "a phase function of {columns} x {rows} pixels is empty or too small")
+                write!(
+                    f,
+                    "a phase function of {columns} x {rows} pixels is empty or too small"
+                )
             }
             Self::Fringes(fringes) => write!(
                 f,
@@ -357,11 +360,18 @@ mod tests {
         turns[6] = f64::NAN;
         assert!(matches!(
             PhaseFunction::sampled(4, 4, turns),
-            Err(PhaseFunctionError::Sample { column: 2, row: 1, .. })
+            Err(PhaseFunctionError::Sample {
+                column: 2,
+                row: 1,
+                ..
+            })
         ));
         assert!(matches!(
             PhaseFunction::sampled(4, 3, quadratic(4, 4)),
-            Err(PhaseFunctionError::Length { expected: 12, given: 16 })
+            Err(PhaseFunctionError::Length {
+                expected: 12,
+                given: 16
+            })
         ));
     }
 }

@@ -93,7 +93,10 @@ impl fmt::Display for SequenceError {
                 "a frame with ratio {ratio} and shift {shift}: both must be finite and the ratio positive"
             ),
             Self::TooManyLevels(levels) => {
-                write!(f, "{levels} levels where at most {MAX_LEVELS} can be decoded")
+                write!(
+                    f,
+                    "{levels} levels where at most {MAX_LEVELS} can be decoded"
+                )
             }
             Self::Steps { ratio, steps } => write!(
                 f,
@@ -197,7 +200,10 @@ impl Sequence {
     /// The coarsest level spans 0.94 turn (one turn less a margin for noise on both sides), the
     /// finest has ratio 1, the steps between are equal.
     pub fn geometric(range: PhaseRange, levels: usize, steps: usize) -> Vec<(f64, f64)> {
-        let step = libm::pow((range.span() / 0.94).max(1.0), 1.0 / (levels.max(2) - 1) as f64);
+        let step = libm::pow(
+            (range.span() / 0.94).max(1.0),
+            1.0 / (levels.max(2) - 1) as f64,
+        );
         (0..levels)
             .flat_map(|level| {
                 let ratio = libm::pow(step, -((levels - 1 - level) as f64));
@@ -307,7 +313,11 @@ mod tests {
 
     #[test]
     fn shifts_may_come_in_any_order_and_from_any_start() {
-        let frames = [(1.0, 0.25), (1.0, -0.083_333_333_33), (1.0, -0.416_666_666_7)];
+        let frames = [
+            (1.0, 0.25),
+            (1.0, -0.083_333_333_33),
+            (1.0, -0.416_666_666_7),
+        ];
         let sequence = Sequence::from_frames(&frames).unwrap();
         let level = &sequence.levels()[0];
         assert_eq!(level.start, 0.25);
@@ -356,7 +366,11 @@ mod tests {
             recognise(&[0.8, 1.0]),
             Ok(Unwrapping::DenseTwo { n }) if (n - 5.0).abs() < 1e-9
         ));
-        for ratios in [vec![0.1, 1.0], vec![0.5, 0.9, 1.0], vec![0.8, 0.9, 0.95, 1.0]] {
+        for ratios in [
+            vec![0.1, 1.0],
+            vec![0.5, 0.9, 1.0],
+            vec![0.8, 0.9, 0.95, 1.0],
+        ] {
             assert_eq!(recognise(&ratios), Err(SequenceError::Ratios(ratios)));
         }
     }
@@ -365,7 +379,10 @@ mod tests {
     fn our_own_geometric_sequence_is_recognised_and_keeps_a_margin() {
         let frames = Sequence::geometric(SPAN_100, 3, 4);
         let sequence = Sequence::from_frames(&frames).unwrap();
-        assert_eq!(Unwrapping::recognise(&sequence, SPAN_100), Ok(Unwrapping::Geometric));
+        assert_eq!(
+            Unwrapping::recognise(&sequence, SPAN_100),
+            Ok(Unwrapping::Geometric)
+        );
         assert!((sequence.levels()[0].ratio * 100.0 - 0.94).abs() < 1e-12);
         assert_eq!(sequence.levels()[2].ratio, 1.0);
     }

@@ -70,7 +70,10 @@ impl fmt::Display for DecodeError {
             Self::Sequence(error) => error.fmt(f),
             Self::BitDepth(bits) => write!(f, "samples of {bits} bits: 8 to 16 can be decoded"),
             Self::FrameCount { expected, given } => {
-                write!(f, "{given} frames were given where the sequence has {expected}")
+                write!(
+                    f,
+                    "{given} frames were given where the sequence has {expected}"
+                )
             }
             Self::FrameSize {
                 frame,
@@ -103,11 +106,7 @@ impl Decoder {
     ///
     /// # Errors
     /// If the levels are of no known form or the bit depth is not 8 to 16.
-    pub fn new(
-        sequence: &Sequence,
-        range: PhaseRange,
-        bit_depth: u8,
-    ) -> Result<Self, DecodeError> {
+    pub fn new(sequence: &Sequence, range: PhaseRange, bit_depth: u8) -> Result<Self, DecodeError> {
         if !(8..=16).contains(&bit_depth) {
             return Err(DecodeError::BitDepth(bit_depth));
         }
@@ -242,7 +241,8 @@ impl Scratch {
         v: usize,
         width: usize,
     ) {
-        self.levels.resize(kernels.len() * width, LevelPixel::default());
+        self.levels
+            .resize(kernels.len() * width, LevelPixel::default());
         let out = self.levels.chunks_exact_mut(width.max(1));
         let (mut eight, mut sixteen) = (Vec::new(), Vec::new());
         for frame in frames {

@@ -156,8 +156,9 @@ mod tests {
             let full = f64::from((1_u32 << depth) - 1);
             for steps in (3..=16).chain([33, 64]) {
                 for start in [0.0, 0.25, -0.37] {
-                    let shifts: Vec<f64> =
-                        (0..steps).map(|k| start - f64::from(k) / f64::from(steps)).collect();
+                    let shifts: Vec<f64> = (0..steps)
+                        .map(|k| start - f64::from(k) / f64::from(steps))
+                        .collect();
                     let kernel = kernel(&shifts, depth);
                     for i in 0..40 {
                         let phase = f64::from(i) / 40.0 + 0.003;

@@ -97,23 +97,27 @@ pub fn triangulate(
         .zip(map.sigma.chunks_mut(width.max(1)))
         .zip(phases.rows())
         .collect();
-    for_each(rows, || (), |v, ((heights, sigmas), phases), ()| {
-        for u in 0..heights.len() {
-            if phases.trust[u] != Trust::Resolved {
-                continue;
-            }
-            let phase = phases.phase[u].turns();
-            match triangulator.solve(u as f64, v as f64, phase) {
-                None => phases.trust[u] = Trust::OutOfRange,
-                Some(solution) => {
-                    heights[u] = Height::from_mm(solution.point.z);
-                    if let Some(noise) = noise {
-                        let turns = decoder.phase_noise(phases.modulation[u], noise);
-                        sigmas[u] = (turns / libm::fabs(solution.slope)) as f32;
+    for_each(
+        rows,
+        || (),
+        |v, ((heights, sigmas), phases), ()| {
+            for u in 0..heights.len() {
+                if phases.trust[u] != Trust::Resolved {
+                    continue;
+                }
+                let phase = phases.phase[u].turns();
+                match triangulator.solve(u as f64, v as f64, phase) {
+                    None => phases.trust[u] = Trust::OutOfRange,
+                    Some(solution) => {
+                        heights[u] = Height::from_mm(solution.point.z);
+                        if let Some(noise) = noise {
+                            let turns = decoder.phase_noise(phases.modulation[u], noise);
+                            sigmas[u] = (turns / libm::fabs(solution.slope)) as f32;
+                        }
                     }
                 }
             }
-        }
-    });
+        },
+    );
     map
 }

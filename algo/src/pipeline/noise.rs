@@ -13,11 +13,7 @@ use core::f64::consts::TAU;
 /// A level of N shifts has N − 3 degrees of freedom left when offset, modulation and phase are taken
 /// out: Σ I² − (ΣI)²/N − (2/N)(S² + C²) has the expectation (N − 3) σ_I²; for N = 4 it is
 /// (I₀ + I₂ − I₁ − I₃)²/4. Averaged over all resolved pixels and all such levels.
-pub fn sample_noise(
-    sequence: &Sequence,
-    frames: &[FrameView<'_>],
-    trust: &[Trust],
-) -> Option<f64> {
+pub fn sample_noise(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trust]) -> Option<f64> {
     let levels: Vec<Fit> = sequence
         .levels()
         .iter()

@@ -1,0 +1,89 @@
+//! `fringed measure RECORDING --out DIR`.
+
+use super::Common;
+use crate::error::{Exit, Failure};
+use crate::measure::{Measurement, measure};
+use crate::output::folder::OutputFolder;
+use crate::output::{array, cloud, picture};
+use algo::pipeline::PhaseMap;
+use hal::replay::Recording;
+use std::path::PathBuf;
+
+/// Measure a recording.
+#[derive(Debug, clap::Args)]
+pub struct Measure {
+    /// Folder with recording.json and its frames.
+    recording: PathBuf,
+    /// Folder for the results; made if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+impl Measure {
+    /// Measures, writes the results and prints the report.
+    ///
+    /// # Errors
+    /// If the recording cannot be opened or measured, or the results not be written.
+    #[expect(
+        clippy::print_stdout,
+        reason = "the report is what the command is asked for"
+    )]
+    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+        let recording = Recording::open(&self.recording)?;
+        let pool = common.pool()?;
+        let measurement = pool.install(|| measure(&recording, &self.recording))?;
+        let folder = OutputFolder::create(&self.out)?;
+        pool.install(|| write(&folder, &measurement))?;
+        let json = serde_json::to_string_pretty(&measurement.report)
+            .map_err(|error| Failure::because(Exit::Software, "write the report", error))?;
+        folder.write("report.json", format!("{json}\n").as_bytes())?;
+        if common.json {
+            println!("{json}");
+        } else if !common.quiet {
+            print!("{}", measurement.report.table());
+            println!("written to {}", self.out.display());
+        }
+        Ok(())
+    }
+}
+
+fn write(folder: &OutputFolder, measurement: &Measurement) -> Result<(), Failure> {
+    let array = |name: &str, width, values: &[f32]| {
+        let bytes = array::npy(width, values)
+            .map_err(|error| Failure::because(Exit::Software, format!("write {name}"), error))?;
+        folder.write(name, &bytes)
+    };
+    let phases = &measurement.phases;
+    let primary = &phases[measurement.primary];
+    array("phase.npy", primary.width, &turns(primary))?;
+    if phases.len() > 1 {
+        for (at, phase) in phases.iter().enumerate() {
+            array(&format!("phase-{at}.npy"), phase.width, &turns(phase))?;
+        }
+    }
+    if let Ok(surface) = &measurement.heights {
+        let map = &surface.map;
+        let mm: Vec<f32> = map.height.iter().map(|height| height.mm() as f32).collect();
+        array("height.npy", map.width, &mm)?;
+        array("sigma.npy", map.width, &map.sigma)?;
+        let rows = mm.len() / map.width.max(1);
+        let png = picture::height_png(map.width as u32, rows as u32, &mm);
+        folder.write("height.png", &png)?;
+        folder.write("cloud.ply", &cloud::ply(surface, &measurement.intensity))?;
+    }
+    Ok(())
+}
+
+/// Absolute phase in turns, NaN exactly where modulation, saturation or residual reject.
+fn turns(phases: &PhaseMap) -> Vec<f32> {
+    let pixels = phases.phase.iter().zip(&phases.trust);
+    pixels
+        .map(|(phase, trust)| {
+            if trust.has_phase() {
+                phase.turns() as f32
+            } else {
+                f32::NAN
+            }
+        })
+        .collect()
+}

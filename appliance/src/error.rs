@@ -1,0 +1,73 @@
+//! What ends a command early: a message for people and an exit code after sysexits.
+
+use std::fmt;
+use std::process::ExitCode;
+
+/// Exit codes, after BSD's `sysexits.h`. The README has the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exit {
+    /// The command line is wrong.
+    Usage = 64,
+    /// A recording, recipe or calibration has wrong content.
+    Content = 65,
+    /// The named folder or file does not exist.
+    Missing = 66,
+    /// A port is in use or a device missing.
+    Unavailable = 69,
+    /// The program itself is at fault.
+    Software = 70,
+    /// Output or state cannot be created.
+    CannotCreate = 73,
+    /// The configuration is wrong.
+    Configuration = 78,
+}
+
+/// A command that could not be carried out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// The exit code.
+    pub exit: Exit,
+    /// What was attempted with what, and the remedy.
+    pub message: String,
+}
+
+impl Failure {
+    /// With an exit code and a message.
+    pub fn new(exit: Exit, message: impl Into<String>) -> Self {
+        Self {
+            exit,
+            message: message.into(),
+        }
+    }
+
+    /// `error` while doing `what`, which names the file.
+    pub fn because(exit: Exit, what: impl fmt::Display, error: impl fmt::Display) -> Self {
+        Self::new(exit, format!("{what}: {error}"))
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Failure {}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+impl From<hal::replay::RecordingError> for Failure {
+    fn from(error: hal::replay::RecordingError) -> Self {
+        let exit = if error.is_missing() {
+            Exit::Missing
+        } else {
+            Exit::Content
+        };
+        Self::new(exit, error.to_string())
+    }
+}

@@ -1,0 +1,235 @@
+//! From a recording to phase, height and report: what `fringed measure` does.
+
+mod report;
+mod score;
+
+pub use report::{Report, StageTimes};
+pub use score::{Score, Truth};
+
+use crate::error::{Exit, Failure};
+use crate::seam;
+use algo::frame::FrameView;
+use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
+use algo::pattern::{PhaseFunction, Sequence};
+use algo::phase::Decoder;
+use algo::pipeline::{self, HeightMap, PhaseMap};
+use algo::units::AbsolutePhase;
+use hal::replay::Recording;
+use hal::replay::recording::PatternSpec;
+use std::path::Path;
+use std::time::Instant;
+
+/// A measured recording.
+#[derive(Debug)]
+pub struct Measurement {
+    /// One phase map per pattern of the recording.
+    pub phases: Vec<PhaseMap>,
+    /// Which of them the height comes from.
+    pub primary: usize,
+    /// Height and σ_z, or why there is none.
+    pub heights: Result<Surface, String>,
+    /// The summary.
+    pub report: Report,
+    /// Mean of the finest level's frames of the primary pattern, scaled to 8 bits.
+    pub intensity: Vec<u8>,
+}
+
+/// Heights with the geometry that they come from.
+#[derive(Debug)]
+pub struct Surface {
+    /// z and σ_z per pixel.
+    pub map: HeightMap,
+    /// The rig, for the points behind the heights.
+    pub triangulator: Triangulator,
+}
+
+/// Measures every pattern of a recording; the first vertical one gives the height.
+///
+/// # Errors
+/// If levels cannot be unwrapped, a model is absurd, or a map is needed that nothing gives; the
+/// message names `folder`.
+pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement, Failure> {
+    let wrong = |error: &dyn std::fmt::Display| {
+        let manifest = folder.join("recording.json");
+        Failure::because(Exit::Content, manifest.display(), error)
+    };
+    let rig = Rig::of(recording).map_err(|error| wrong(&error))?;
+    let primary = recording
+        .patterns
+        .iter()
+        .position(|spec| matches!(spec, PatternSpec::Vertical { .. }))
+        .unwrap_or(0);
+    let mut stages = StageTimes::default();
+    let mut phases = Vec::new();
+    let mut chosen = None;
+    for at in 0..recording.patterns.len() {
+        let channel = Channel::new(recording, at).map_err(|error| wrong(&*error))?;
+        let started = Instant::now();
+        let geometry = rig.triangulator(&channel.function);
+        let geometry = geometry.map_err(|error| wrong(&error))?;
+        let map = if channel.decoder.unwrapping().needs_map() {
+            let about = geometry.as_ref().map_err(|missing| {
+                wrong(&format!(
+                    "{} levels {:?} are unwrapped about a known map, and {missing}: add both models, or \
+                     give a recipe with a golden map",
+                    channel.decoder.unwrapping().kind(),
+                    channel.ratios(),
+                ))
+            })?;
+            Some(about.reference_map())
+        } else {
+            None
+        };
+        stages.map += started.elapsed();
+        let started = Instant::now();
+        let decoded = channel
+            .decode(map.as_deref())
+            .map_err(|error| wrong(&*error))?;
+        stages.phase += started.elapsed();
+        phases.push(decoded);
+        if at == primary {
+            chosen = Some((channel, geometry));
+        }
+    }
+    let Some((channel, geometry)) = chosen else {
+        return Err(wrong(&"the recording has no pattern"));
+    };
+    let started = Instant::now();
+    let noise = recording.noise_counts.or_else(|| {
+        pipeline::sample_noise(&channel.sequence, &channel.frames, &phases[primary].trust)
+    });
+    stages.noise = started.elapsed();
+    let started = Instant::now();
+    let heights = geometry.map(|triangulator| Surface {
+        map: pipeline::triangulate(&triangulator, &channel.decoder, noise, &mut phases[primary]),
+        triangulator,
+    });
+    stages.height = started.elapsed();
+    let report = Report::new(
+        &phases[primary],
+        &heights,
+        channel.decoder.unwrapping().kind(),
+        channel.ratios(),
+        noise,
+        &Truth::of(recording),
+        &stages,
+    );
+    Ok(Measurement {
+        intensity: channel.intensity(),
+        phases,
+        primary,
+        heights,
+        report,
+    })
+}
+
+/// The frames of one pattern of a recording, ready to decode.
+struct Channel<'a> {
+    function: PhaseFunction,
+    sequence: Sequence,
+    decoder: Decoder,
+    frames: Vec<FrameView<'a>>,
+}
+
+type AnyError = Box<dyn std::error::Error>;
+
+impl<'a> Channel<'a> {
+    fn new(recording: &'a Recording, pattern: usize) -> Result<Self, AnyError> {
+        let projector = &recording.projector;
+        let function = seam::phase_function(
+            &recording.patterns[pattern],
+            projector.width as usize,
+            projector.height as usize,
+        )?;
+        let recorded = || {
+            recording
+                .frames
+                .iter()
+                .filter(move |frame| frame.pattern == pattern)
+        };
+        let shifts: Vec<_> = recorded().map(|f| (f.ratio, f.shift_turns)).collect();
+        let sequence = Sequence::from_frames(&shifts)?;
+        let decoder = Decoder::new(&sequence, function.range(), recording.bit_depth)?;
+        let frames = recorded()
+            .map(|f| seam::view(&f.frame))
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            function,
+            sequence,
+            decoder,
+            frames,
+        })
+    }
+
+    fn decode(&self, map: Option<&[AbsolutePhase]>) -> Result<PhaseMap, AnyError> {
+        Ok(pipeline::decode(&self.decoder, &self.frames, map)?)
+    }
+
+    /// The ratios from coarse to fine.
+    fn ratios(&self) -> Vec<f64> {
+        self.sequence
+            .levels()
+            .iter()
+            .map(|level| level.ratio)
+            .collect()
+    }
+
+    fn intensity(&self) -> Vec<u8> {
+        let finest = &self.sequence.levels()[self.sequence.levels().len() - 1];
+        let frames: Vec<_> = finest
+            .frames
+            .iter()
+            .map(|&at| self.frames[usize::from(at)])
+            .collect();
+        algo::frame::mean(&frames, self.decoder.full_scale())
+    }
+}
+
+/// The devices of a recording, as far as it has models of them.
+struct Rig {
+    devices: Result<(Pinhole, Pinhole), String>,
+    range: Option<HeightRange>,
+}
+
+impl Rig {
+    fn of(recording: &Recording) -> Result<Self, String> {
+        let checked = |name: &str, model: &hal::model::DeviceModel, width: u32, height: u32| {
+            Pinhole::new(seam::pinhole_model(model), width as usize, height as usize)
+                .map_err(|error| format!("the {name}'s model: {error}"))
+        };
+        let projector = &recording.projector;
+        let devices = match (&recording.camera_model, &projector.model) {
+            (Some(camera), Some(lamp)) => Ok((
+                checked("camera", camera, recording.width, recording.height)?,
+                checked("projector", lamp, projector.width, projector.height)?,
+            )),
+            (None, None) => Err("the recording has no model of camera and projector"),
+            (None, _) => Err("the recording has no model of the camera"),
+            (_, None) => Err("the recording has no model of the projector"),
+        };
+        Ok(Self {
+            devices: devices.map_err(String::from),
+            range: recording
+                .range_mm
+                .map(|[low, high]| HeightRange { low, high }),
+        })
+    }
+
+    /// The inner error says why there is no geometry, the outer one that what there is is absurd.
+    fn triangulator(
+        &self,
+        function: &PhaseFunction,
+    ) -> Result<Result<Triangulator, String>, algo::geometry::RigError> {
+        match &self.devices {
+            Err(missing) => Ok(Err(missing.clone())),
+            Ok((camera, projector)) => Triangulator::new(
+                camera.clone(),
+                projector.clone(),
+                Reference::Models,
+                function.clone(),
+                self.range,
+            )
+            .map(Ok),
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! The summary of a measurement, as JSON and as a table.
+
+use super::{Score, Surface, Truth};
+use algo::phase::Trust;
+use algo::pipeline::PhaseMap;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::time::Duration;
+
+/// Wall time of each stage.
+#[derive(Clone, Debug, Default)]
+pub struct StageTimes {
+    /// The known map that dense levels are unwrapped about.
+    pub map: Duration,
+    /// Frames to absolute phase.
+    pub phase: Duration,
+    /// The noise of a sample.
+    pub noise: Duration,
+    /// Phase to height.
+    pub height: Duration,
+}
+
+/// The summary of a measurement. Everything but the times is the same with any number of threads.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Pixels whose coarsest level is modulated (or that truth calls wholly lit).
+    pub lit: usize,
+    /// Lit pixels whose phase and, where there is geometry, height are valid.
+    pub resolved: usize,
+    /// The others, by their first failing reason.
+    pub unresolved: BTreeMap<&'static str, usize>,
+    /// How the levels were unwrapped: geometric, dense or single.
+    pub kind: &'static str,
+    /// The levels' ratios from coarse to fine.
+    pub ratios: Vec<f64>,
+    /// Wall time per stage in µs.
+    pub stage_us: BTreeMap<&'static str, u64>,
+    /// σ of one sample in counts: the recording's, else from the frames' redundancy (N ≥ 4).
+    pub noise_counts: Option<f64>,
+    /// Why there is no height, if there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub no_height: Option<String>,
+    /// Why there is no σ, if there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub no_sigma: Option<&'static str>,
+    /// Lowest and highest height in mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub height_mm: Option<[f64; 2]>,
+    /// RMS of the predicted σ_z over resolved pixels, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma_mm: Option<f64>,
+    /// Errors against the recording's truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub score: Option<Score>,
+}
+
+impl Report {
+    pub(super) fn new(
+        phases: &PhaseMap,
+        heights: &Result<Surface, String>,
+        kind: &'static str,
+        ratios: Vec<f64>,
+        noise_counts: Option<f64>,
+        truth: &Truth<'_>,
+        stages: &StageTimes,
+    ) -> Self {
+        // A pixel that is dark although truth calls it wholly lit is lit and unresolved.
+        let dark_but_lit = (0..phases.trust.len())
+            .filter(|&at| phases.trust[at] == Trust::Dark && truth.whole(at))
+            .count();
+        let resolved = phases.count(Trust::Resolved);
+        let unresolved: BTreeMap<_, _> = Trust::REASONS
+            .into_iter()
+            .map(|reason| match reason {
+                Trust::Dark => (reason.word(), dark_but_lit),
+                _ => (reason.word(), phases.count(reason)),
+            })
+            .collect();
+        let map = heights.as_ref().ok().map(|surface| &surface.map);
+        let sigma_mm = map.and_then(|map| {
+            let known = || map.sigma.iter().filter(|sigma| !sigma.is_nan());
+            let squares: f64 = known().map(|&sigma| f64::from(sigma).powi(2)).sum();
+            (squares > 0.0).then(|| (squares / known().count() as f64).sqrt())
+        });
+        let height_mm = map.and_then(|map| {
+            let known = || map.height.iter().filter(|height| height.is_known());
+            Some([known().min()?.mm(), known().max()?.mm()])
+        });
+        let micros = |time: Duration| u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
+        Self {
+            lit: resolved + unresolved.values().sum::<usize>(),
+            resolved,
+            unresolved,
+            kind,
+            ratios,
+            stage_us: BTreeMap::from([
+                ("map", micros(stages.map)),
+                ("phase", micros(stages.phase)),
+                ("noise", micros(stages.noise)),
+                ("height", micros(stages.height)),
+            ]),
+            noise_counts,
+            no_height: heights.as_ref().err().cloned(),
+            no_sigma: noise_counts.is_none().then_some(
+                "the recording has no camera.noise_counts and no level of 4 shifts to estimate it",
+            ),
+            height_mm,
+            sigma_mm,
+            score: map.and_then(|map| truth.score(phases, map)),
+        }
+    }
+
+    /// The report as lines of a name and a value.
+    pub fn table(&self) -> String {
+        let mut table = String::new();
+        // Writing to a string cannot fail.
+        let mut line = |name: &str, value: String| {
+            let _ = writeln!(table, "{name:<26}{value}");
+        };
+        let ratios: Vec<String> = self
+            .ratios
+            .iter()
+            .map(|ratio| format!("{ratio:.6}"))
+            .collect();
+        line(
+            "levels",
+            format!("{}, ratios {}", self.kind, ratios.join(" ")),
+        );
+        line("lit", format!("{} px", self.lit));
+        line("resolved", format!("{} px", self.resolved));
+        for (reason, count) in self.unresolved.iter().filter(|(_, count)| **count > 0) {
+            line(&format!("  unresolved: {reason}"), format!("{count} px"));
+        }
+        if let Some([low, high]) = self.height_mm {
+            line("height", format!("{low:.3} to {high:.3} mm"));
+        }
+        if let Some(reason) = &self.no_height {
+            line("height", format!("none: {reason}"));
+        }
+        match (self.noise_counts, self.no_sigma) {
+            (Some(noise), _) => line("noise of a sample", format!("{noise:.2} counts")),
+            (None, Some(reason)) => line("noise of a sample", format!("not known: {reason}")),
+            (None, None) => {}
+        }
+        if let Some(sigma) = self.sigma_mm {
+            line("predicted error (1 σ)", format!("{sigma:.4} mm RMS"));
+        }
+        if let Some(score) = &self.score {
+            line(
+                "error against truth",
+                format!("{:.4} mm RMS over {} px", score.rms_mm, score.scored),
+            );
+            line("  bias", format!("{:+.4} mm", score.bias_mm));
+            line(
+                "  median, 99 %",
+                format!("{:.4} mm, {:.4} mm", score.median_mm, score.p99_mm),
+            );
+            line("  gross (over 1 mm)", format!("{} px", score.gross));
+        }
+        for (stage, us) in &self.stage_us {
+            line(
+                &format!("time: {stage}"),
+                format!("{:.1} ms", *us as f64 / 1000.0),
+            );
+        }
+        table
+    }
+}

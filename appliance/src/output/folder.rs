@@ -1,0 +1,71 @@
+//! A folder of results that appears whole or not at all.
+
+use crate::error::{Exit, Failure};
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// An output folder. Each file is written under a temporary name and renamed, so that what stands
+/// under a name is always whole; an older result of the same name is replaced.
+#[derive(Debug)]
+pub struct OutputFolder {
+    path: PathBuf,
+}
+
+impl OutputFolder {
+    /// Creates the folder and its parents where they do not exist.
+    ///
+    /// # Errors
+    /// If it cannot be created (exit code 73).
+    pub fn create(path: &Path) -> Result<Self, Failure> {
+        fs::create_dir_all(path).map_err(|error| {
+            let what = format!("create the output folder {}", path.display());
+            Failure::because(
+                Exit::CannotCreate,
+                what,
+                format!("{error}: name one that can be written"),
+            )
+        })?;
+        Ok(Self {
+            path: path.to_path_buf(),
+        })
+    }
+
+    /// Writes one file.
+    ///
+    /// # Errors
+    /// If it cannot be written (exit code 73).
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+        let target = self.path.join(name);
+        write_whole(&target, bytes).map_err(|error| {
+            let what = format!("write {}", target.display());
+            Failure::because(
+                Exit::CannotCreate,
+                what,
+                format!("{error}: free space or name another folder"),
+            )
+        })
+    }
+}
+
+/// Writes a file under a temporary name, syncs it, and renames it: whoever pulls the plug finds the
+/// old file or the new one.
+///
+/// # Errors
+/// Whatever the file system answers.
+pub fn write_whole(target: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut temporary = target.as_os_str().to_owned();
+    temporary.push(".new");
+    let temporary = PathBuf::from(temporary);
+    let mut file = fs::File::create(&temporary)?;
+    file.write_all(bytes)?;
+    file.sync_all()?;
+    fs::rename(&temporary, target)?;
+    if let Some(folder) = target
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+    {
+        fs::File::open(folder)?.sync_all()?;
+    }
+    Ok(())
+}

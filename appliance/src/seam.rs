@@ -1,0 +1,54 @@
+//! The seam between devices and computation: `hal`'s frames and models as `algo` takes them.
+
+use algo::frame::{FrameError, FrameView, Samples};
+use algo::geometry::PinholeModel;
+use algo::pattern::{PhaseFunction, PhaseFunctionError};
+use hal::model::DeviceModel;
+use hal::replay::recording::PatternSpec;
+
+/// Borrows a device's frame without a copy.
+///
+/// # Errors
+/// If the frame's samples do not make up its size.
+pub fn view(frame: &hal::frame::Frame) -> Result<FrameView<'_>, FrameError> {
+    let format = frame.format();
+    let samples = match frame.samples() {
+        hal::frame::Samples::Eight(samples) => Samples::Eight(samples),
+        hal::frame::Samples::Sixteen(samples) => Samples::Sixteen(samples),
+    };
+    FrameView::new(
+        samples,
+        format.width as usize,
+        format.height as usize,
+        format.stride,
+    )
+}
+
+/// A device model as geometry takes it.
+pub fn pinhole_model(model: &DeviceModel) -> PinholeModel {
+    PinholeModel {
+        fx: model.fx,
+        fy: model.fy,
+        cx: model.cx,
+        cy: model.cy,
+        distortion: model.distortion,
+        rotation: model.rotation,
+        translation: model.translation_mm,
+    }
+}
+
+/// The phase function of a recorded pattern on a projector of `columns` × `rows` pixels.
+///
+/// # Errors
+/// If no projector can show it.
+pub fn phase_function(
+    spec: &PatternSpec,
+    columns: usize,
+    rows: usize,
+) -> Result<PhaseFunction, PhaseFunctionError> {
+    match spec {
+        PatternSpec::Vertical { fringes } => PhaseFunction::vertical(columns, rows, *fringes),
+        PatternSpec::Horizontal { fringes } => PhaseFunction::horizontal(columns, rows, *fringes),
+        PatternSpec::File { turns, .. } => PhaseFunction::sampled(columns, rows, turns.clone()),
+    }
+}
