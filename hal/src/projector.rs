@@ -1,1 +1,115 @@
-//! To come.
+//! The projector of a head: load patterns, then show number n.
+
+use std::time::Duration;
+
+use crate::error::Error;
+use crate::units::Timestamp;
+
+/// A grey picture for the projector, row by row, 0 black … 255 white.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Raster {
+    width: u32,
+    height: u32,
+    pixels: Vec<u8>,
+}
+
+impl Raster {
+    /// A raster of `width` × `height` grey levels.
+    ///
+    /// # Errors
+    /// `Unsupported` if it has no pixels or `pixels` holds another number than width × height.
+    pub fn new(width: u32, height: u32, pixels: Vec<u8>) -> Result<Self, Error> {
+        let wanted = u64::from(width) * u64::from(height);
+        if wanted == 0 || pixels.len() as u64 != wanted {
+            return Err(Error::unsupported(
+                format!(
+                    "a raster of {width}×{height} with {} grey levels",
+                    pixels.len()
+                ),
+                format!("give {wanted} grey levels and at least one"),
+            ));
+        }
+        Ok(Self {
+            width,
+            height,
+            pixels,
+        })
+    }
+
+    /// A raster of one grey level everywhere.
+    ///
+    /// # Errors
+    /// `Unsupported` if it has no pixels.
+    pub fn uniform(width: u32, height: u32, level: u8) -> Result<Self, Error> {
+        Self::new(width, height, vec![level; width as usize * height as usize])
+    }
+
+    /// Columns.
+    #[must_use]
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows.
+    #[must_use]
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// Grey levels, row by row.
+    #[must_use]
+    pub fn pixels(&self) -> &[u8] {
+        &self.pixels
+    }
+}
+
+/// The moment a pattern came into view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Flip {
+    /// When the pattern's light was there; no frame exposed earlier can show it.
+    pub timestamp: Timestamp,
+    /// The projector's own count of flips; a gap means a missed refresh.
+    pub sequence: u64,
+}
+
+/// A projector that holds patterns and shows one of them at a time.
+pub trait Projector: Send {
+    /// Columns and rows.
+    fn size(&self) -> (u32, u32);
+
+    /// Replaces the patterns; nothing is shown until [`Projector::show`].
+    ///
+    /// # Errors
+    /// `Unsupported` if a raster does not have the projector's size.
+    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error>;
+
+    /// Shows pattern `index` and waits until it is in view.
+    ///
+    /// # Errors
+    /// `Timeout` if the refresh did not come within `timeout`, `Protocol` if no such pattern is loaded.
+    fn show(&mut self, index: usize, timeout: Duration) -> Result<Flip, Error>;
+
+    /// Shows nothing.
+    ///
+    /// # Errors
+    /// What the device says.
+    fn blank(&mut self) -> Result<(), Error>;
+}
+
+impl<P: Projector + ?Sized> Projector for Box<P> {
+    fn size(&self) -> (u32, u32) {
+        (**self).size()
+    }
+
+    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
+        (**self).load(rasters)
+    }
+
+    fn show(&mut self, index: usize, timeout: Duration) -> Result<Flip, Error> {
+        (**self).show(index, timeout)
+    }
+
+    fn blank(&mut self) -> Result<(), Error> {
+        (**self).blank()
+    }
+}

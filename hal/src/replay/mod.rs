@@ -5,10 +5,15 @@ pub mod failure;
 mod grey;
 mod manifest;
 mod npy;
+mod play;
+pub mod recorder;
 pub mod recording;
 
 pub use failure::RecordingError;
+pub use play::head;
 pub use recording::Recording;
 
 #[cfg(test)]
 pub(crate) mod shared_tests;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,131 @@
+//! The scene of a replay head: the pattern shown decides which recorded frame the camera gives.
+
+use std::time::Duration;
+
+use super::recording::Recording;
+use crate::error::Error;
+use crate::frame::{Frame, FrameFormat};
+use crate::head::DynHead;
+use crate::projector::Raster;
+use crate::units::Timestamp;
+use crate::virtual_head::{self, Scene};
+
+/// Refresh period of the replayed projector, 60 Hz.
+const REFRESH: Duration = Duration::from_nanos(16_666_667);
+
+/// A head that plays `recordings` one after the other, then from the first again.
+///
+/// Pattern k gives recorded frame k under the time and count of the replay. As many rasters must be loaded as a
+/// recording has frames. After each frame of a recording was given at least once, the next recording's turn has come.
+///
+/// # Errors
+/// `Unsupported` if there is no recording, or if they differ in camera format, projector size or number of frames.
+pub fn head(recordings: Vec<Recording>) -> Result<DynHead, Error> {
+    let Some(first) = recordings.first() else {
+        return Err(Error::unsupported(
+            "replaying 0 recordings",
+            "name at least one",
+        ));
+    };
+    let shape = |r: &Recording| {
+        (
+            r.format(),
+            r.projector.width,
+            r.projector.height,
+            r.frames.len(),
+        )
+    };
+    let wanted = shape(first);
+    if let Some((index, other)) = recordings
+        .iter()
+        .enumerate()
+        .find(|(_, r)| shape(r) != wanted)
+    {
+        let describe = |r: &Recording| {
+            format!(
+                "{} frames of {} under a {}×{} projector",
+                r.frames.len(),
+                r.format().describe(),
+                r.projector.width,
+                r.projector.height
+            )
+        };
+        return Err(Error::unsupported(
+            format!(
+                "replaying recording {index} with {} after recording 0 with {}",
+                describe(other),
+                describe(first)
+            ),
+            "replay recordings of one head and one kind of sequence together",
+        ));
+    }
+    let played = vec![false; wanted.3];
+    let scene = Played {
+        recordings,
+        current: 0,
+        played,
+        loaded: 0,
+    };
+    Ok(virtual_head::head(scene, REFRESH).0)
+}
+
+struct Played {
+    recordings: Vec<Recording>,
+    current: usize,
+    /// Which frames of the current recording were given.
+    played: Vec<bool>,
+    loaded: usize,
+}
+
+impl Scene for Played {
+    fn format(&self) -> FrameFormat {
+        self.recordings[self.current].format()
+    }
+
+    fn projector_size(&self) -> (u32, u32) {
+        let projector = &self.recordings[self.current].projector;
+        (projector.width, projector.height)
+    }
+
+    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
+        let recorded = self.played.len();
+        if rasters.len() != recorded {
+            return Err(Error::protocol(
+                format!(
+                    "loading {} rasters to replay {recorded} recorded frames",
+                    rasters.len()
+                ),
+                format!("load {recorded} rasters, one per recorded frame"),
+            ));
+        }
+        self.loaded = recorded;
+        Ok(())
+    }
+
+    fn loaded(&self) -> usize {
+        self.loaded
+    }
+
+    fn expose(
+        &mut self,
+        shown: Option<usize>,
+        timestamp: Timestamp,
+        sequence: u64,
+    ) -> Result<Frame, Error> {
+        let Some(index) = shown.filter(|index| *index < self.played.len()) else {
+            return Err(Error::protocol(
+                "replaying a frame with no pattern in view",
+                "show a pattern before triggering; nothing else was recorded",
+            ));
+        };
+        let frame = self.recordings[self.current].frames[index]
+            .frame
+            .restamped(timestamp, sequence);
+        self.played[index] = true;
+        if self.played.iter().all(|played| *played) {
+            self.played.fill(false);
+            self.current = (self.current + 1) % self.recordings.len();
+        }
+        Ok(frame)
+    }
+}

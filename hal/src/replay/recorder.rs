@@ -1,0 +1,295 @@
+//! Writes a recording in format 1: under a temporary name beside its place, synced, then renamed.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use super::failure::RecordingError;
+use super::manifest::{
+    CameraEntry, FORMAT, FrameEntry, Manifest, PatternEntries, PatternEntry, ProjectorEntry,
+    VERSION,
+};
+use super::recording::{MANIFEST, PatternSpec, Recording, TRUTH_CLASS, TRUTH_HEIGHT};
+use super::{check, grey, npy};
+use crate::frame::Samples;
+
+/// A recording that could not be written. Nothing is left behind.
+#[derive(Debug, thiserror::Error)]
+pub enum RecorderError {
+    /// There is something under that name already.
+    #[error("write recording {}: it exists already: name a folder that does not exist", path.display())]
+    Exists {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The recording would not be one that can be opened again.
+    #[error("write recording {}: {problem}", path.display())]
+    Content {
+        /// The folder.
+        path: PathBuf,
+        /// What is wrong, and the remedy.
+        problem: String,
+    },
+    /// A file or folder could not be created.
+    #[error("write recording: cannot create {} ({source}): check that the folder is writable and has space", path.display())]
+    Create {
+        /// What was to be created.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}
+
+/// Writes `recording` as the new folder `folder`, whose parent must exist.
+///
+/// # Errors
+/// [`RecorderError`]; the folder is then not there.
+pub fn write(recording: &Recording, folder: &Path) -> Result<(), RecorderError> {
+    if fs::symlink_metadata(folder).is_ok() {
+        return Err(RecorderError::Exists {
+            path: folder.to_path_buf(),
+        });
+    }
+    let manifest = manifest_of(recording);
+    check::manifest(&manifest, &folder.join(MANIFEST)).map_err(|error| wrong(folder, &error))?;
+    check_samples(recording, folder)?;
+
+    let name = folder
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    let partial = folder.with_file_name(format!(".{name}.partial-{}", std::process::id()));
+    let written = fill(recording, &manifest, &partial).and_then(|()| {
+        fs::rename(&partial, folder).map_err(|source| create(folder, source))?;
+        sync_folder(
+            folder
+                .parent()
+                .filter(|parent| !parent.as_os_str().is_empty()),
+        );
+        Ok(())
+    });
+    if written.is_err() {
+        // What matters is the first error; a temporary folder that cannot be removed either adds nothing to it.
+        let _ = fs::remove_dir_all(&partial);
+    }
+    written
+}
+
+fn wrong(folder: &Path, error: &RecordingError) -> RecorderError {
+    let problem = match error {
+        RecordingError::Content {
+            problem, remedy, ..
+        } => format!("{problem}: {remedy}"),
+        missing @ RecordingError::Missing { .. } => missing.to_string(),
+    };
+    RecorderError::Content {
+        path: folder.to_path_buf(),
+        problem,
+    }
+}
+
+fn create(path: &Path, source: std::io::Error) -> RecorderError {
+    RecorderError::Create {
+        path: path.to_path_buf(),
+        source,
+    }
+}
+
+/// Recorded renames survive a power cut only if the folder is synced; not every file system can, and then
+/// nothing is lost that was promised.
+fn sync_folder(folder: Option<&Path>) {
+    if let Ok(folder) = fs::File::open(folder.unwrap_or(Path::new("."))) {
+        let _ = folder.sync_all();
+    }
+}
+
+fn frame_file(index: usize) -> String {
+    format!("frames/{index:03}.png")
+}
+
+/// The first pattern from a file has the name that the format gives; a second one is numbered.
+fn phase_file(patterns: &[PatternSpec], index: usize) -> String {
+    let first = patterns
+        .iter()
+        .position(|pattern| matches!(pattern, PatternSpec::File { .. }));
+    if first == Some(index) {
+        "pattern/phase.npy".to_owned()
+    } else {
+        format!("pattern/phase-{index}.npy")
+    }
+}
+
+fn manifest_of(recording: &Recording) -> Manifest {
+    let pattern = |(index, pattern): (usize, &PatternSpec)| match pattern {
+        PatternSpec::Vertical { fringes } => PatternEntry::Vertical { fringes: *fringes },
+        PatternSpec::Horizontal { fringes } => PatternEntry::Horizontal { fringes: *fringes },
+        PatternSpec::File { .. } => PatternEntry::File {
+            file: phase_file(&recording.patterns, index),
+        },
+    };
+    let frames = recording
+        .frames
+        .iter()
+        .enumerate()
+        .map(|(index, frame)| FrameEntry {
+            file: frame_file(index),
+            ratio: frame.ratio,
+            shift_turns: frame.shift_turns,
+            timestamp_ns: frame.timestamp_ns,
+            pattern: frame.pattern,
+        });
+    Manifest {
+        format: FORMAT.to_owned(),
+        version: VERSION,
+        description: recording.description.clone(),
+        source: recording.source.clone(),
+        camera: CameraEntry {
+            width: recording.width,
+            height: recording.height,
+            bit_depth: recording.bit_depth,
+            model: recording.camera_model.clone(),
+            noise_counts: recording.noise_counts,
+        },
+        projector: ProjectorEntry {
+            width: recording.projector.width,
+            height: recording.projector.height,
+            model: recording.projector.model.clone(),
+        },
+        pattern: PatternEntries(recording.patterns.iter().enumerate().map(pattern).collect()),
+        frames: frames.collect(),
+        range_mm: recording.range_mm,
+        exposure_us: recording.exposure_us,
+        part_id: recording.part_id.clone(),
+        recipe: recording.recipe.clone(),
+    }
+}
+
+fn check_samples(recording: &Recording, folder: &Path) -> Result<(), RecorderError> {
+    let refuse = |problem: String| {
+        Err(RecorderError::Content {
+            path: folder.to_path_buf(),
+            problem: format!("{problem}: record it again"),
+        })
+    };
+    let wanted = recording.format();
+    for (index, frame) in recording.frames.iter().enumerate() {
+        let format = frame.frame.format();
+        if (format.width, format.height, format.bit_depth)
+            != (wanted.width, wanted.height, wanted.bit_depth)
+        {
+            return refuse(format!(
+                "frame {index} is {}, the recording {}",
+                format.describe(),
+                wanted.describe()
+            ));
+        }
+        if let Samples::Sixteen(samples) = frame.frame.samples()
+            && let Some(sample) = samples.iter().find(|sample| **sample > wanted.full_scale())
+        {
+            return refuse(format!(
+                "frame {index} holds the sample {sample} of {}",
+                wanted.describe()
+            ));
+        }
+    }
+    let (rows, columns) = (
+        recording.projector.height as usize,
+        recording.projector.width as usize,
+    );
+    for pattern in &recording.patterns {
+        if let PatternSpec::File {
+            rows: r,
+            columns: c,
+            turns,
+        } = pattern
+            && ((*r, *c) != (rows, columns)
+                || turns.len() != rows * columns
+                || !turns.iter().all(|turns| turns.is_finite()))
+        {
+            return refuse(format!(
+                "the phase of a {rows}×{columns} projector is {r}×{c} or not finite"
+            ));
+        }
+    }
+    let truths = [
+        recording.truth_height.as_ref().map(Vec::len),
+        recording.truth_class.as_ref().map(Vec::len),
+    ];
+    match truths
+        .into_iter()
+        .flatten()
+        .find(|length| *length != wanted.samples())
+    {
+        Some(length) => refuse(format!(
+            "the truth has {length} pixels of {}",
+            wanted.samples()
+        )),
+        None => Ok(()),
+    }
+}
+
+fn fill(recording: &Recording, manifest: &Manifest, partial: &Path) -> Result<(), RecorderError> {
+    for folder in ["", "frames", "pattern", "truth"] {
+        let needed = match folder {
+            "pattern" => recording
+                .patterns
+                .iter()
+                .any(|p| matches!(p, PatternSpec::File { .. })),
+            "truth" => recording.truth_height.is_some() || recording.truth_class.is_some(),
+            _ => true,
+        };
+        if needed {
+            let path = partial.join(folder);
+            fs::create_dir(&path).map_err(|source| create(&path, source))?;
+        }
+    }
+    for (index, frame) in recording.frames.iter().enumerate() {
+        let path = partial.join(frame_file(index));
+        let file = grey::encode(&frame.frame.format(), frame.frame.samples())
+            .map_err(|error| create(&path, std::io::Error::other(error)))?;
+        put(&path, &file)?;
+    }
+    for (index, pattern) in recording.patterns.iter().enumerate() {
+        if let PatternSpec::File {
+            rows,
+            columns,
+            turns,
+        } = pattern
+        {
+            let bytes: Vec<u8> = turns.iter().flat_map(|turns| turns.to_le_bytes()).collect();
+            put(
+                &partial.join(phase_file(&recording.patterns, index)),
+                &npy::write("<f8", *rows, *columns, &bytes),
+            )?;
+        }
+    }
+    let (rows, columns) = (recording.height as usize, recording.width as usize);
+    if let Some(height) = &recording.truth_height {
+        let bytes: Vec<u8> = height.iter().flat_map(|mm| mm.to_le_bytes()).collect();
+        put(
+            &partial.join(TRUTH_HEIGHT),
+            &npy::write("<f4", rows, columns, &bytes),
+        )?;
+    }
+    if let Some(class) = &recording.truth_class {
+        put(
+            &partial.join(TRUTH_CLASS),
+            &npy::write("|u1", rows, columns, class),
+        )?;
+    }
+    let path = partial.join(MANIFEST);
+    let mut text = serde_json::to_string_pretty(manifest)
+        .map_err(|error| create(&path, std::io::Error::other(error)))?;
+    text.push('\n');
+    put(&path, text.as_bytes())
+}
+
+fn put(path: &Path, bytes: &[u8]) -> Result<(), RecorderError> {
+    fs::File::create_new(path)
+        .and_then(|mut file| {
+            file.write_all(bytes)?;
+            file.sync_all()
+        })
+        .map_err(|source| create(path, source))
+}
