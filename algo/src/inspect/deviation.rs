@@ -1,0 +1,219 @@
+//! A measured height map against the golden one: deviation and coverage of regions.
+
+use super::Region;
+use crate::pipeline::HeightMap;
+use crate::units::Height;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// The part as taught, row-major over the camera's frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Golden {
+    /// Pixels per row.
+    pub width: usize,
+    /// Height as taught, [`Height::UNKNOWN`] where the part is not to be compared.
+    pub height: Vec<Height>,
+    /// Error (1 σ) of the taught height in mm.
+    pub sigma: Vec<f32>,
+}
+
+/// What a gauge found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// The value in mm or as a share.
+    pub value: f64,
+    /// Its error, 1 σ, where the noise is known.
+    pub sigma: Option<f64>,
+}
+
+/// A measured height map beside the golden one.
+///
+/// Sums of deviations over rectangles come from integral tables, so that any number of gauges over
+/// any smoothing costs one pass each over their region.
+#[derive(Clone, Debug)]
+pub struct Comparison<'a> {
+    golden: &'a Golden,
+    measured: &'a HeightMap,
+    /// Integral tables of (width + 1) × (rows + 1): deviation in nm, variance in nm², count.
+    deviation: Vec<i64>,
+    variance: Vec<f64>,
+    count: Vec<u32>,
+}
+
+/// A smoothed deviation needs at least this share of its square's pixels.
+const MIN_SUPPORT: f64 = 0.5;
+
+impl<'a> Comparison<'a> {
+    /// Compares two maps of the same size; places that only one of them knows do not count.
+    pub fn new(golden: &'a Golden, measured: &'a HeightMap) -> Self {
+        let width = golden.width;
+        let rows = golden.height.len() / width.max(1);
+        let stride = width + 1;
+        let mut comparison = Self {
+            golden,
+            measured,
+            deviation: vec![0; stride * (rows + 1)],
+            variance: vec![0.0; stride * (rows + 1)],
+            count: vec![0; stride * (rows + 1)],
+        };
+        for row in 0..rows {
+            let (mut sum, mut squares, mut count) = (0_i64, 0.0, 0_u32);
+            for column in 0..width {
+                if let Some((deviation, variance)) = comparison.at(row * width + column) {
+                    sum += deviation;
+                    squares += variance;
+                    count += 1;
+                }
+                let (here, above) = ((row + 1) * stride + column + 1, row * stride + column + 1);
+                comparison.deviation[here] = comparison.deviation[above] + sum;
+                comparison.variance[here] = comparison.variance[above] + squares;
+                comparison.count[here] = comparison.count[above] + count;
+            }
+        }
+        comparison
+    }
+
+    /// Deviation in nm and its variance in nm² (0 where the noise is not known).
+    fn at(&self, place: usize) -> Option<(i64, f64)> {
+        let (golden, measured) = (self.golden.height[place], self.measured.height[place]);
+        if !(golden.is_known() && measured.is_known()) {
+            return None;
+        }
+        let square = |sigma: f32| {
+            let nm = f64::from(sigma) * 1e6;
+            if nm.is_finite() { nm * nm } else { 0.0 }
+        };
+        let variance = square(self.golden.sigma[place]) + square(self.measured.sigma[place]);
+        Some((i64::from(measured.nm()) - i64::from(golden.nm()), variance))
+    }
+
+    /// The mean deviation over a square of `side` pixels around a place, in mm, and its σ.
+    fn smoothed(&self, row: usize, column: usize, side: usize) -> Option<Reading> {
+        let stride = self.golden.width + 1;
+        let rows = self.count.len() / stride - 1;
+        let half = side / 2;
+        let (top, bottom) = (row.saturating_sub(half), (row + half + 1).min(rows));
+        let (left, right) = (
+            column.saturating_sub(half),
+            (column + half + 1).min(self.golden.width),
+        );
+        let corners = [
+            bottom * stride + right,
+            bottom * stride + left,
+            top * stride + right,
+            top * stride + left,
+        ];
+        let [a, b, c, d] = corners.map(|at| i64::from(self.count[at]));
+        let count = (a - b - c + d) as f64;
+        if count < MIN_SUPPORT * (side * side) as f64 {
+            return None;
+        }
+        let [a, b, c, d] = corners.map(|at| self.deviation[at]);
+        let sum = (a - b - c + d) as f64;
+        let [a, b, c, d] = corners.map(|at| self.variance[at]);
+        let variance = (a - b - c + d).max(0.0);
+        let sigma = libm::sqrt(variance) / count / 1e6;
+        Some(Reading {
+            value: sum / count / 1e6,
+            sigma: (sigma > 0.0).then_some(sigma),
+        })
+    }
+
+    /// The deviation from golden of largest magnitude in a region, with its sign, after averaging
+    /// over squares of `side` pixels (odd; 1 = none): single noisy pixels do not decide. `None`
+    /// where no square has enough pixels that both maps know.
+    pub fn deviation(&self, region: &Region, side: usize) -> Option<Reading> {
+        let places = region
+            .spans()
+            .iter()
+            .flat_map(|(row, columns)| columns.clone().map(move |column| (*row, column)));
+        places
+            .filter(|(row, column)| self.at(row * self.golden.width + column).is_some())
+            .filter_map(|(row, column)| self.smoothed(row, column, side))
+            .max_by(|a, b| libm::fabs(a.value).total_cmp(&libm::fabs(b.value)))
+    }
+
+    /// The share of a region's pixels that the measurement resolves. Exact: its σ is 0.
+    pub fn coverage(&self, region: &Region) -> Reading {
+        let resolved = region
+            .places(self.golden.width)
+            .filter(|&place| self.measured.height[place].is_known())
+            .count();
+        Reading {
+            value: resolved as f64 / region.len().max(1) as f64,
+            sigma: None,
+        }
+    }
+
+    /// The share of what the golden map knows that the measurement resolves, over the whole frame.
+    pub fn golden_coverage(&self) -> f64 {
+        let pairs = || self.golden.height.iter().zip(&self.measured.height);
+        let known = pairs().filter(|(golden, _)| golden.is_known()).count();
+        let both = pairs()
+            .filter(|(golden, measured)| golden.is_known() && measured.is_known())
+            .count();
+        both as f64 / known.max(1) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WIDTH: usize = 40;
+
+    fn flat() -> (Golden, HeightMap, Region) {
+        let golden = Golden {
+            width: WIDTH,
+            height: vec![Height::from_nm(0); WIDTH * WIDTH],
+            sigma: vec![0.03; WIDTH * WIDTH],
+        };
+        let measured = HeightMap {
+            width: WIDTH,
+            height: vec![Height::from_nm(10_000); WIDTH * WIDTH],
+            sigma: vec![0.04; WIDTH * WIDTH],
+        };
+        let side = WIDTH as f64;
+        let corners = [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)];
+        (golden, measured, Region::polygon(&corners, WIDTH, WIDTH).unwrap())
+    }
+
+    #[test]
+    fn a_dent_is_found_with_its_sign_and_a_single_wild_pixel_is_not() {
+        let (golden, mut measured, region) = flat();
+        measured.height[5 * WIDTH + 5] = Height::from_mm(3.0);
+        for row in 20..27 {
+            for column in 20..27 {
+                measured.height[row * WIDTH + column] = Height::from_mm(-0.5);
+            }
+        }
+        let comparison = Comparison::new(&golden, &measured);
+        let dent = comparison.deviation(&region, 7).unwrap();
+        assert!((dent.value + 0.5).abs() < 1e-9, "{dent:?}");
+        // 49 pixels of √(0.03² + 0.04²) = 0.05 mm.
+        assert!((dent.sigma.unwrap() - 0.05 / 7.0).abs() < 1e-7);
+        let raw = comparison.deviation(&region, 1).unwrap();
+        assert!((raw.value - 3.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn coverage_counts_resolved_pixels_of_the_region_and_of_golden() {
+        let (mut golden, mut measured, region) = flat();
+        for place in 0..WIDTH * WIDTH / 4 {
+            measured.height[place] = Height::UNKNOWN;
+        }
+        golden.height[..WIDTH * WIDTH / 2].fill(Height::UNKNOWN);
+        let comparison = Comparison::new(&golden, &measured);
+        assert_eq!(comparison.coverage(&region).value, 0.75);
+        assert_eq!(comparison.golden_coverage(), 1.0);
+    }
+
+    #[test]
+    fn where_nothing_can_be_compared_there_is_no_deviation() {
+        let (golden, mut measured, region) = flat();
+        measured.height.fill(Height::UNKNOWN);
+        let comparison = Comparison::new(&golden, &measured);
+        assert_eq!(comparison.deviation(&region, 3), None);
+        assert_eq!(comparison.coverage(&region).value, 0.0);
+    }
+}

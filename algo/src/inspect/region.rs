@@ -1,0 +1,160 @@
+//! A polygon in camera pixels, as the pixels inside it.
+
+use alloc::vec::Vec;
+use core::fmt;
+use core::ops::Range;
+
+/// The pixels whose centres lie inside a polygon (even-odd rule), as spans of rows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Region {
+    /// Row and columns.
+    spans: Vec<(usize, Range<usize>)>,
+}
+
+/// A polygon that encloses nothing.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum RegionError {
+    /// Fewer than three corners.
+    Corners(usize),
+    /// A corner is not finite.
+    NotFinite {
+        /// Which corner.
+        corner: usize,
+    },
+    /// No pixel centre of the frame lies inside.
+    Empty,
+}
+
+impl fmt::Display for RegionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Corners(corners) => {
+                write!(f, "a region of {corners} corners: a polygon needs at least 3")
+            }
+            Self::NotFinite { corner } => {
+                write!(f, "corner {corner} of the region is not finite")
+            }
+            Self::Empty => write!(
+                f,
+                "the region holds no pixel of the frame: corners are (column, row) in camera pixels"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for RegionError {}
+
+impl Region {
+    /// The pixels of a frame of `width` × `height` inside a polygon of (u, v) corners. What lies
+    /// outside the frame is cut off.
+    ///
+    /// # Errors
+    /// If the polygon has fewer than three corners, one is not finite, or no pixel lies inside.
+    pub fn polygon(
+        corners: &[(f64, f64)],
+        width: usize,
+        height: usize,
+    ) -> Result<Self, RegionError> {
+        if corners.len() < 3 {
+            return Err(RegionError::Corners(corners.len()));
+        }
+        let bad = |(u, v): &(f64, f64)| !(u.is_finite() && v.is_finite());
+        if let Some(corner) = corners.iter().position(bad) {
+            return Err(RegionError::NotFinite { corner });
+        }
+        let mut spans = Vec::new();
+        let mut crossings = Vec::new();
+        for row in 0..height {
+            let v = row as f64;
+            crossings.clear();
+            for (at, &(u0, v0)) in corners.iter().enumerate() {
+                let (u1, v1) = corners[(at + 1) % corners.len()];
+                if (v0 <= v) != (v1 <= v) {
+                    crossings.push(u0 + (u1 - u0) * ((v - v0) / (v1 - v0)));
+                }
+            }
+            crossings.sort_by(f64::total_cmp);
+            for pair in crossings.chunks_exact(2) {
+                let column = |u: f64| libm::ceil(u).clamp(0.0, width as f64) as usize;
+                let (start, end) = (column(pair[0]), column(pair[1]));
+                if start < end {
+                    spans.push((row, start..end));
+                }
+            }
+        }
+        if spans.is_empty() {
+            return Err(RegionError::Empty);
+        }
+        Ok(Self { spans })
+    }
+
+    /// Number of pixels.
+    pub fn len(&self) -> usize {
+        self.spans.iter().map(|(_, columns)| columns.len()).sum()
+    }
+
+    /// Whether there are no pixels; never for a region that could be made.
+    pub fn is_empty(&self) -> bool {
+        self.spans.is_empty()
+    }
+
+    /// The pixels as places in a row-major map of rows of `width`.
+    pub fn places(&self, width: usize) -> impl Iterator<Item = usize> + '_ {
+        self.spans
+            .iter()
+            .flat_map(move |(row, columns)| row * width + columns.start..row * width + columns.end)
+    }
+
+    /// The rows and columns of the region's spans.
+    pub fn spans(&self) -> &[(usize, Range<usize>)] {
+        &self.spans
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rectangle_holds_the_pixel_centres_inside_it() {
+        let corners = [(1.5, 0.5), (4.5, 0.5), (4.5, 2.5), (1.5, 2.5)];
+        let region = Region::polygon(&corners, 10, 10).unwrap();
+        assert_eq!(region.spans(), [(1, 2..5), (2, 2..5)]);
+        assert_eq!(region.len(), 6);
+        assert_eq!(region.places(10).next(), Some(12));
+    }
+
+    #[test]
+    fn polygons_are_cut_at_the_frame_and_may_be_concave() {
+        let corners = [(-5.0, -5.0), (3.5, -5.0), (3.5, 20.0), (-5.0, 20.0)];
+        let region = Region::polygon(&corners, 8, 4).unwrap();
+        assert_eq!(region.len(), 4 * 4);
+        // A U: two spans in its upper rows.
+        let u = [
+            (0.0, 0.0),
+            (2.5, 0.0),
+            (2.5, 3.5),
+            (5.5, 3.5),
+            (5.5, 0.0),
+            (7.5, 0.0),
+            (7.5, 6.5),
+            (0.0, 6.5),
+        ];
+        let region = Region::polygon(&u, 8, 8).unwrap();
+        assert_eq!(region.spans().iter().filter(|(row, _)| *row == 1).count(), 2);
+        assert_eq!(region.spans().iter().filter(|(row, _)| *row == 5).count(), 1);
+    }
+
+    #[test]
+    fn polygons_that_hold_nothing_are_refused() {
+        assert_eq!(Region::polygon(&[(0.0, 0.0); 2], 8, 8), Err(RegionError::Corners(2)));
+        let away = [(20.0, 1.0), (30.0, 1.0), (30.0, 5.0)];
+        assert_eq!(Region::polygon(&away, 8, 8), Err(RegionError::Empty));
+        let broken = [(0.0, 0.0), (f64::NAN, 1.0), (3.0, 5.0)];
+        assert_eq!(
+            Region::polygon(&broken, 8, 8),
+            Err(RegionError::NotFinite { corner: 1 })
+        );
+    }
+}
