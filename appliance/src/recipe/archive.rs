@@ -1,0 +1,222 @@
+//! A recipe as one file: a ZIP (stored) of `recipe.json` and NumPy arrays, with a fingerprint.
+
+use super::file::{FORMAT, RecipeFile, VERSION};
+use crate::output::array;
+use sha2::{Digest, Sha256};
+use std::io::{Cursor, Read as _, Write as _};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
+
+/// The manifest's name in the archive.
+const MANIFEST: &str = "recipe.json";
+/// The largest manifest that is read, in bytes.
+const MAX_MANIFEST: u64 = 1 << 20;
+/// The fingerprint's value while it is computed.
+const NO_FINGERPRINT: &str = "0000000000000000000000000000000000000000000000000000000000000000";
+
+/// The arrays of a recipe, row-major over the camera's frame except the phase function.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Arrays {
+    /// Φ_P over the projector's raster in turns; empty where the pattern is given by a formula.
+    pub phase_function: Vec<f64>,
+    /// Φ as taught in turns, NaN where not resolved.
+    pub golden_phase: Vec<f64>,
+    /// z as taught in mm, NaN where not resolved.
+    pub golden_height: Vec<f32>,
+    /// ∂z/∂Φ in mm per turn.
+    pub height_slope: Vec<f32>,
+    /// ∂²z/∂Φ² in mm per turn².
+    pub height_curvature: Vec<f32>,
+    /// 1 where the part is compared with golden.
+    pub valid: Vec<u8>,
+    /// Modulation as taught, in counts.
+    pub modulation: Vec<f32>,
+}
+
+/// An archive that is no recipe of this version.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ArchiveError {
+    /// It is no ZIP, a member is missing or broken, or the manifest cannot be read.
+    #[error("{0}: export the recipe again or teach it")]
+    Broken(String),
+    /// It was written by a newer program.
+    #[error("version {0} is newer than this program reads ({VERSION}): update fringed")]
+    Newer(u64),
+    /// Its content is not what it was when it was written.
+    #[error(
+        "its fingerprint is {found}, its content has {computed}: the file was changed or damaged; export \
+         it again or teach it"
+    )]
+    Fingerprint {
+        /// In the manifest.
+        found: String,
+        /// Over the content.
+        computed: String,
+    },
+}
+
+fn broken(what: impl std::fmt::Display) -> ArchiveError {
+    ArchiveError::Broken(what.to_string())
+}
+
+/// Packs a recipe; its fingerprint is filled in and returned beside the bytes.
+///
+/// # Errors
+/// If an array is not a whole number of rows.
+pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), ArchiveError> {
+    let columns = file.camera.width as usize;
+    let mut members: Vec<(&str, Vec<u8>)> = Vec::new();
+    let mut add = |name, bytes: std::io::Result<Vec<u8>>| {
+        members.push((name, bytes.map_err(broken)?));
+        Ok::<_, ArchiveError>(())
+    };
+    if !arrays.phase_function.is_empty() {
+        let columns = file.projector.width as usize;
+        add("phase_function.npy", array::npy(columns, &arrays.phase_function))?;
+    }
+    add("golden_phase.npy", array::npy(columns, &arrays.golden_phase))?;
+    add("golden_height.npy", array::npy(columns, &arrays.golden_height))?;
+    add("height_slope.npy", array::npy(columns, &arrays.height_slope))?;
+    add("height_curvature.npy", array::npy(columns, &arrays.height_curvature))?;
+    add("valid.npy", array::npy(columns, &arrays.valid))?;
+    add("modulation.npy", array::npy(columns, &arrays.modulation))?;
+    let zeroed = RecipeFile {
+        fingerprint: NO_FINGERPRINT.into(),
+        ..file.clone()
+    };
+    let manifest = serde_json::to_string_pretty(&zeroed).map_err(broken)?;
+    let fingerprint = fingerprint(manifest.as_bytes(), &members);
+    let manifest = manifest.replacen(NO_FINGERPRINT, &fingerprint, 1);
+    members.insert(0, (MANIFEST, manifest.into_bytes()));
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+    for (name, bytes) in &members {
+        zip.start_file(*name, stored).map_err(broken)?;
+        zip.write_all(bytes).map_err(broken)?;
+    }
+    let bytes = zip.finish().map_err(broken)?.into_inner();
+    Ok((bytes, fingerprint))
+}
+
+/// Unpacks a recipe and checks its fingerprint.
+///
+/// # Errors
+/// If it is no recipe, of a newer version, or not what was written.
+pub fn unpack(bytes: &[u8]) -> Result<(RecipeFile, Arrays), ArchiveError> {
+    let mut zip = ZipArchive::new(Cursor::new(bytes)).map_err(broken)?;
+    let mut members = Vec::new();
+    for at in 0..zip.len() {
+        let mut member = zip.by_index(at).map_err(broken)?;
+        let name = member.name().to_owned();
+        let mut content = Vec::new();
+        // Members are stored, so none is larger than the file.
+        let limit = bytes.len() as u64;
+        let read = member.by_ref().take(limit).read_to_end(&mut content);
+        read.map_err(|error| broken(format!("member {name}: {error}")))?;
+        members.push((name, content));
+    }
+    let at = members.iter().position(|(name, _)| name == MANIFEST);
+    let (_, manifest) = members.remove(at.ok_or_else(|| broken("it holds no recipe.json"))?);
+    let text = String::from_utf8(manifest).map_err(broken)?;
+    let file = parse(&text)?;
+    let zeroed = text.replacen(&file.fingerprint, NO_FINGERPRINT, 1);
+    let borrowed: Vec<(&str, Vec<u8>)> = members
+        .iter_mut()
+        .map(|(name, content)| (name.as_str(), std::mem::take(content)))
+        .collect();
+    let computed = fingerprint(zeroed.as_bytes(), &borrowed);
+    if computed != file.fingerprint {
+        return Err(ArchiveError::Fingerprint {
+            found: file.fingerprint,
+            computed,
+        });
+    }
+    let arrays = read_arrays(&borrowed)?;
+    Ok((file, arrays))
+}
+
+/// Reads only the manifest of a recipe, without checking the fingerprint: for lists.
+///
+/// # Errors
+/// If it is no recipe or of a newer version.
+pub fn manifest(file: impl std::io::Read + std::io::Seek) -> Result<RecipeFile, ArchiveError> {
+    let mut zip = ZipArchive::new(file).map_err(broken)?;
+    let member = zip.by_name(MANIFEST).map_err(broken)?;
+    let mut text = String::new();
+    let read = member.take(MAX_MANIFEST).read_to_string(&mut text);
+    read.map_err(broken)?;
+    parse(&text)
+}
+
+fn parse(text: &str) -> Result<RecipeFile, ArchiveError> {
+    let value: serde_json::Value =
+        serde_json::from_str(text).map_err(|error| broken(format!("recipe.json: {error}")))?;
+    if value["format"] != FORMAT {
+        return Err(broken(format!("recipe.json: format is {}, not {FORMAT:?}", value["format"])));
+    }
+    match value["version"].as_u64() {
+        Some(version) if version > u64::from(VERSION) => return Err(ArchiveError::Newer(version)),
+        Some(1) => {}
+        _ => return Err(broken(format!("recipe.json: version is {}", value["version"]))),
+    }
+    serde_json::from_str(text).map_err(|error| broken(format!("recipe.json: {error}")))
+}
+
+fn read_arrays(members: &[(&str, Vec<u8>)]) -> Result<Arrays, ArchiveError> {
+    let mut arrays = Arrays::default();
+    for (name, bytes) in members {
+        match *name {
+            "phase_function.npy" => arrays.phase_function = read(name, bytes)?,
+            "golden_phase.npy" => arrays.golden_phase = read(name, bytes)?,
+            "golden_height.npy" => arrays.golden_height = read(name, bytes)?,
+            "height_slope.npy" => arrays.height_slope = read(name, bytes)?,
+            "height_curvature.npy" => arrays.height_curvature = read(name, bytes)?,
+            "valid.npy" => arrays.valid = read(name, bytes)?,
+            "modulation.npy" => arrays.modulation = read(name, bytes)?,
+            unknown => return Err(broken(format!("it holds an unknown member {unknown:?}"))),
+        }
+    }
+    Ok(arrays)
+}
+
+fn read<T: npyz::Deserialize>(name: &str, bytes: &[u8]) -> Result<Vec<T>, ArchiveError> {
+    let wrong = |error: std::io::Error| broken(format!("member {name}: {error}"));
+    let file = npyz::NpyFile::new(bytes).map_err(wrong)?;
+    // A header may claim any size; the data cannot be longer than the member.
+    if file.len() > bytes.len() as u64 {
+        return Err(broken(format!("member {name} ends early")));
+    }
+    file.into_vec().map_err(wrong)
+}
+
+/// SHA-256 over the manifest and all other members in the order of their names, each with its name
+/// and length in front.
+fn fingerprint(manifest: &[u8], members: &[(&str, Vec<u8>)]) -> String {
+    let mut sorted: Vec<_> = members.iter().collect();
+    sorted.sort_by_key(|(name, _)| *name);
+    let mut hash = Sha256::new();
+    let mut add = |name: &str, content: &[u8]| {
+        for part in [name.as_bytes(), content] {
+            hash.update((part.len() as u64).to_le_bytes());
+            hash.update(part);
+        }
+    };
+    add(MANIFEST, manifest);
+    for (name, content) in sorted {
+        add(name, content);
+    }
+    hex(&hash.finalize())
+}
+
+/// Lower-case hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The first 32 bits of a fingerprint: RECIPE_CRC32 on Modbus.
+pub fn short(fingerprint: &str) -> u32 {
+    fingerprint
+        .get(..8)
+        .and_then(|digits| u32::from_str_radix(digits, 16).ok())
+        .unwrap_or(0)
+}

@@ -1,0 +1,137 @@
+//! From the file form of a recipe to a checked one.
+
+use super::archive::{ArchiveError, Arrays, short, unpack};
+use super::file::{PatternFile, RecipeFile};
+use algo::inspect::Region;
+use algo::pattern::{PhaseFunction, Sequence};
+use std::collections::HashMap;
+
+/// A recipe whose parts fit each other.
+#[derive(Clone, Debug)]
+pub struct Recipe {
+    /// The manifest.
+    pub file: RecipeFile,
+    /// The arrays, each of the size that the manifest says.
+    pub arrays: Arrays,
+    /// Φ_P.
+    pub function: PhaseFunction,
+    /// Levels and shifts that are projected in production.
+    pub sequence: Sequence,
+    /// One per gauge.
+    pub regions: Vec<Region>,
+}
+
+/// A recipe that cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RecipeError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Archive(#[from] ArchiveError),
+    /// Its parts do not fit each other.
+    #[error("{0}: teach it again")]
+    Inconsistent(String),
+}
+
+/// Gauges of a recipe: bits and registers of the Modbus map.
+pub const MAX_GAUGES: usize = crate::station::MAX_GAUGES;
+/// Regions of a recipe.
+pub const MAX_REGIONS: usize = 32;
+
+impl Recipe {
+    /// Reads and checks a recipe file's bytes.
+    ///
+    /// # Errors
+    /// If it is broken, of a newer version, changed, or inconsistent.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, RecipeError> {
+        let (file, arrays) = unpack(bytes)?;
+        Self::check(file, arrays).map_err(RecipeError::Inconsistent)
+    }
+
+    /// First 32 bits of the fingerprint.
+    pub fn crc(&self) -> u32 {
+        short(&self.file.fingerprint)
+    }
+
+    /// Checks that manifest and arrays fit each other; the error says what does not.
+    ///
+    /// # Errors
+    /// In words.
+    pub fn check(file: RecipeFile, arrays: Arrays) -> Result<Self, String> {
+        if !(1..=9999).contains(&file.number) {
+            return Err(format!("recipe number {} is not 1 to 9999", file.number));
+        }
+        if file.part_number.len() > 32 || !file.part_number.is_ascii() {
+            let part_number = &file.part_number;
+            return Err(format!("part number {part_number:?} is not up to 32 ASCII characters"));
+        }
+        let (width, height) = (file.camera.width as usize, file.camera.height as usize);
+        let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
+        for (name, length) in [
+            ("golden_phase", arrays.golden_phase.len()),
+            ("golden_height", arrays.golden_height.len()),
+            ("height_slope", arrays.height_slope.len()),
+            ("height_curvature", arrays.height_curvature.len()),
+            ("valid", arrays.valid.len()),
+            ("modulation", arrays.modulation.len()),
+        ] {
+            if Some(length) != pixels {
+                return Err(format!("{name} has {length} values for a camera of {width}x{height}"));
+            }
+        }
+        let (columns, rows) = (file.projector.width as usize, file.projector.height as usize);
+        let function = match file.pattern {
+            PatternFile::Vertical { fringes } => PhaseFunction::vertical(columns, rows, fringes),
+            PatternFile::Horizontal { fringes } => PhaseFunction::horizontal(columns, rows, fringes),
+            PatternFile::File => PhaseFunction::sampled(columns, rows, arrays.phase_function.clone()),
+        };
+        let function = function.map_err(|error| error.to_string())?;
+        let production: Vec<_> = file
+            .sequence
+            .iter()
+            .filter(|frame| frame.production)
+            .map(|frame| (frame.ratio, frame.shift_turns))
+            .collect();
+        let sequence = Sequence::from_frames(&production).map_err(|error| error.to_string())?;
+        let regions = Self::regions(&file, width, height)?;
+        let positive = [file.noise_counts, file.expansion_range_turns];
+        if !positive.iter().all(|x| x.is_finite() && *x > 0.0) {
+            return Err("noise and range of the expansion must be positive".into());
+        }
+        if !(0.0..=1.0).contains(&file.min_coverage) {
+            return Err(format!("a least coverage of {} is no share", file.min_coverage));
+        }
+        Ok(Self {
+            file,
+            arrays,
+            function,
+            sequence,
+            regions,
+        })
+    }
+
+    fn regions(file: &RecipeFile, width: usize, height: usize) -> Result<Vec<Region>, String> {
+        if file.gauges.is_empty() || file.gauges.len() > MAX_GAUGES {
+            return Err(format!("{} gauges where 1 to {MAX_GAUGES} are needed", file.gauges.len()));
+        }
+        if file.regions.len() > MAX_REGIONS {
+            return Err(format!("{} regions, over {MAX_REGIONS}", file.regions.len()));
+        }
+        let mut named = HashMap::new();
+        for region in &file.regions {
+            let corners: Vec<_> = region.polygon.iter().map(|&[u, v]| (u, v)).collect();
+            let pixels = Region::polygon(&corners, width, height)
+                .map_err(|error| format!("region {:?}: {error}", region.name))?;
+            named.insert(region.name.as_str(), pixels);
+        }
+        let find = |gauge: &super::GaugeFile| {
+            let limits = [gauge.low, gauge.high];
+            if limits.iter().flatten().any(|limit| !limit.is_finite()) {
+                return Err(format!("gauge {:?} has a limit that is not finite", gauge.name));
+            }
+            named.get(gauge.region.as_str()).cloned().ok_or_else(|| {
+                format!("gauge {:?} names a region {:?} that is not there", gauge.name, gauge.region)
+            })
+        };
+        file.gauges.iter().map(find).collect()
+    }
+}

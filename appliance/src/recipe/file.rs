@@ -1,0 +1,149 @@
+//! `recipe.json` inside a recipe, version 1, as it stands on disk. Frozen: see `docs/formats.md`.
+
+use serde::{Deserialize, Serialize};
+
+/// The name of the format.
+pub const FORMAT: &str = "fringed-recipe";
+/// The version that this program writes, and the newest that it reads.
+pub const VERSION: u32 = 1;
+
+/// Everything in a recipe that is not an array.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecipeFile {
+    /// [`FORMAT`].
+    pub format: String,
+    /// [`VERSION`].
+    pub version: u32,
+    /// SHA-256 over all members with this field zeroed, 64 hexadecimal digits.
+    pub fingerprint: String,
+    /// 1–9999.
+    pub number: u16,
+    /// The key that a PLC may select by, at most 32 ASCII characters.
+    pub part_number: String,
+    /// For people.
+    pub name: String,
+    /// Who or what taught it.
+    pub taught_by: String,
+    /// When, in seconds since 1970 UTC; 0 if the clock was not synchronised.
+    pub taught_at_unix_s: u64,
+    /// Fingerprint of the calibration that it was made for.
+    pub calibration: String,
+    /// The camera's frames.
+    pub camera: CameraFile,
+    /// The projector's raster.
+    pub projector: RasterFile,
+    /// The pattern that is projected.
+    pub pattern: PatternFile,
+    /// Every frame of the full sequence.
+    pub sequence: Vec<SequenceFrame>,
+    /// Working range of z in mm.
+    pub range_mm: [f64; 2],
+    /// Exposure in µs; none where the head has no such setting.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure_us: Option<f64>,
+    /// σ of one sample in counts.
+    pub noise_counts: f64,
+    /// |ΔΦ| in turns up to which the expansion of the height holds.
+    pub expansion_range_turns: f64,
+    /// Least share of the golden pixels that must be resolved, else the verdict is INVALID.
+    pub min_coverage: f64,
+    /// Polygons in camera pixels.
+    pub regions: Vec<RegionFile>,
+    /// At most 16.
+    pub gauges: Vec<GaugeFile>,
+}
+
+/// A camera's frames.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraFile {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Bits per sample.
+    pub bit_depth: u8,
+}
+
+/// A projector's raster.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RasterFile {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// A phase function, as in recordings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum PatternFile {
+    /// Φ_P = fringes · ξ / width.
+    Vertical {
+        /// Fringes over the projector's width.
+        fringes: f64,
+    },
+    /// Φ_P = fringes · η / height.
+    Horizontal {
+        /// Fringes over the projector's height.
+        fringes: f64,
+    },
+    /// Φ_P in the member `phase_function.npy`.
+    File,
+}
+
+/// One frame of a sequence.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SequenceFrame {
+    /// Share of the full phase function.
+    pub ratio: f64,
+    /// Shift in turns.
+    pub shift_turns: f64,
+    /// Whether it is projected in production.
+    pub production: bool,
+}
+
+/// A named polygon.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RegionFile {
+    /// Its name.
+    pub name: String,
+    /// Corners [u, v] in camera pixels of the golden measurement.
+    pub polygon: Vec<[f64; 2]>,
+}
+
+/// A gauge and its limits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GaugeFile {
+    /// Its name.
+    pub name: String,
+    /// The name of its region.
+    pub region: String,
+    /// What it measures.
+    #[serde(flatten)]
+    pub kind: GaugeKind,
+    /// Lower limit, inclusive, in mm or as a share.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub low: Option<f64>,
+    /// Upper limit, inclusive.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub high: Option<f64>,
+}
+
+/// What a gauge measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum GaugeKind {
+    /// The deviation from golden of largest magnitude, in mm.
+    Deviation {
+        /// Side of the square that is averaged over, in camera pixels, odd.
+        smoothing_px: usize,
+    },
+    /// The share of the region's pixels that is resolved.
+    Coverage,
+}

@@ -1,0 +1,14 @@
+//! Recipes: everything that one part number needs, in one file.
+//!
+//! `file` is the form on disk, `archive` the ZIP around it with its fingerprint, `check` turns the
+//! one into a [`Recipe`] that can be planned, `store` keeps the files of a station.
+
+pub mod archive;
+pub mod check;
+pub mod file;
+pub mod store;
+pub mod teach;
+
+pub use check::Recipe;
+pub use file::{GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFrame};
+pub use store::{LoadError, Store};

@@ -1,0 +1,155 @@
+//! The recipes of a station: a folder of `NNNN.recipe` files with the generation before each.
+
+use super::{Recipe, archive};
+use crate::output::folder::write_whole;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// The folder.
+#[derive(Clone, Debug)]
+pub struct Store {
+    folder: PathBuf,
+}
+
+/// A recipe that could not be loaded.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LoadError {
+    /// There is no such recipe.
+    #[error("there is no recipe {0}: teach or import it")]
+    Unknown(String),
+    /// Both generations are damaged.
+    #[error("recipe file {path}: {reason}", path = path.display())]
+    Corrupt {
+        /// The newer file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+/// A loaded recipe.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// It.
+    pub recipe: Recipe,
+    /// Why the newest generation could not be used and this is the one before.
+    pub fallback: Option<String>,
+}
+
+impl Store {
+    /// Opens the folder, creating it where it does not exist.
+    ///
+    /// # Errors
+    /// Whatever the file system answers.
+    pub fn open(folder: &Path) -> io::Result<Self> {
+        fs::create_dir_all(folder)?;
+        Ok(Self {
+            folder: folder.to_path_buf(),
+        })
+    }
+
+    fn path(&self, number: u16) -> PathBuf {
+        self.folder.join(format!("{number:04}.recipe"))
+    }
+
+    fn previous(&self, number: u16) -> PathBuf {
+        self.folder.join(format!("{number:04}.recipe.previous"))
+    }
+
+    /// Stores a packed recipe under its number; the one before stays as the previous generation.
+    ///
+    /// # Errors
+    /// Whatever the file system answers; then the stored recipe is the one before.
+    pub fn save(&self, number: u16, bytes: &[u8]) -> io::Result<()> {
+        let path = self.path(number);
+        if let Ok(current) = fs::read(&path)
+            // A damaged file never pushes out the good generation behind it.
+            && Recipe::from_bytes(&current).is_ok()
+        {
+            write_whole(&self.previous(number), &current)?;
+        }
+        write_whole(&path, bytes)
+    }
+
+    /// Loads a recipe by number. Where the newest generation is damaged, the one before is used,
+    /// and the answer says so.
+    ///
+    /// # Errors
+    /// If there is none, or no generation can be used.
+    pub fn load(&self, number: u16) -> Result<Loaded, LoadError> {
+        let path = self.path(number);
+        let newest = Self::read(&path, number);
+        if let Some(Ok(recipe)) = newest {
+            return Ok(Loaded {
+                recipe,
+                fallback: None,
+            });
+        }
+        let reason = newest.and_then(Result::err);
+        match Self::read(&self.previous(number), number) {
+            Some(Ok(recipe)) => Ok(Loaded {
+                recipe,
+                fallback: Some(format!(
+                    "recipe file {} {}; the generation before it is used",
+                    path.display(),
+                    reason.as_deref().unwrap_or("is missing")
+                )),
+            }),
+            _ => match reason {
+                None => Err(LoadError::Unknown(number.to_string())),
+                Some(reason) => Err(LoadError::Corrupt { path, reason }),
+            },
+        }
+    }
+
+    /// The recipe in a file, if the file exists.
+    fn read(path: &Path, number: u16) -> Option<Result<Recipe, String>> {
+        let bytes = match fs::read(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
+            Err(error) => return Some(Err(error.to_string())),
+            Ok(bytes) => bytes,
+        };
+        Some(match Recipe::from_bytes(&bytes) {
+            Err(error) => Err(error.to_string()),
+            Ok(recipe) if recipe.file.number != number => Err(format!(
+                "holds recipe {}: rename it to {:04}.recipe",
+                recipe.file.number, recipe.file.number
+            )),
+            Ok(recipe) => Ok(recipe),
+        })
+    }
+
+    /// The number of the recipe taught for a part number.
+    ///
+    /// # Errors
+    /// If no recipe has it.
+    pub fn find(&self, part_number: &str) -> Result<u16, LoadError> {
+        let unknown = || LoadError::Unknown(format!("for part number {part_number:?}"));
+        if part_number.is_empty() {
+            return Err(unknown());
+        }
+        self.numbers()
+            .into_iter()
+            .find(|&number| {
+                let manifest = fs::File::open(self.path(number)).map(archive::manifest);
+                matches!(manifest, Ok(Ok(file)) if file.part_number == part_number)
+            })
+            .ok_or_else(unknown)
+    }
+
+    /// The numbers of all stored recipes, in order.
+    pub fn numbers(&self) -> Vec<u16> {
+        let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
+        let mut numbers: Vec<u16> = entries
+            .filter_map(|entry| {
+                let name = entry.file_name();
+                let (number, _) = name.to_str()?.split_once(".recipe")?;
+                number.parse().ok()
+            })
+            .collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        numbers
+    }
+}
