@@ -1,3 +1,4 @@
 //! The daemon `fringed` and its command line.
 pub mod cli;
 pub mod output;
+pub mod station;
