@@ -36,10 +36,13 @@ impl Station {
         if rose(control::ERROR_RESET) {
             self.reset(effects);
         }
-        if rose(control::ABORT) && !matches!(self.state, State::Stopping { .. }) {
-            if let Some(job) = self.state.job() {
-                push(effects, Effect::Abort { job });
-            }
+        let stopping = matches!(self.state, State::Stopping { .. });
+        if let Some(job) = self
+            .state
+            .job()
+            .filter(|_| rose(control::ABORT) && !stopping)
+        {
+            push(effects, Effect::Abort { job });
         }
         if matches!(self.state, State::Ready | State::Offline) {
             self.state = self.rest();

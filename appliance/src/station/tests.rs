@@ -436,7 +436,10 @@ fn buffered_results_are_popped_by_acknowledge_and_overflow_latches() {
     );
     let popped = bench.pulse(control::RESULT_ACK);
     assert_eq!(
-        (popped.buffered, popped.oldest.as_ref().map(|result| result.seq)),
+        (
+            popped.buffered,
+            popped.oldest.as_ref().map(|result| result.seq)
+        ),
         (31, Some(42))
     );
     assert!(popped.is(status::BUFFER_OVERFLOW));
