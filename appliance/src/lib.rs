@@ -3,5 +3,8 @@
 pub mod cli;
 pub mod error;
 pub mod measure;
+pub mod modbus;
 pub mod output;
+pub mod recipe;
 pub mod seam;
+pub mod station;

@@ -1,0 +1,315 @@
+//! The register map, version 1.0: one table, append-only, from which everything else is derived.
+
+/// MAP_VERSION, register 121.
+pub const VERSION: u16 = 0x0100;
+/// The most gauges of one result.
+pub const GAUGES: u16 = 16;
+
+/// How a register's words are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// 16 single bits.
+    Bits,
+    /// Unsigned, one register.
+    U16,
+    /// Signed, one register.
+    I16,
+    /// Unsigned, two registers.
+    U32,
+    /// Signed, two registers.
+    I32,
+    /// Unsigned, four registers.
+    U64,
+    /// IEEE 754 single, two registers.
+    F32,
+    /// Two characters per register.
+    Ascii,
+}
+
+impl Kind {
+    /// Registers per item.
+    pub const fn width(self) -> u16 {
+        match self {
+            Self::Bits | Self::U16 | Self::I16 | Self::Ascii => 1,
+            Self::U32 | Self::I32 | Self::F32 => 2,
+            Self::U64 => 4,
+        }
+    }
+
+    /// The word for it.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Bits => "bits",
+            Self::U16 => "u16",
+            Self::I16 => "i16",
+            Self::U32 => "u32",
+            Self::I32 => "i32",
+            Self::U64 => "u64",
+            Self::F32 => "f32",
+            Self::Ascii => "ascii",
+        }
+    }
+}
+
+/// A range of addresses that is read as a whole or in parts, but never across its ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Block {
+    /// Its name.
+    pub name: &'static str,
+    /// First address.
+    pub first: u16,
+    /// Last address.
+    pub last: u16,
+    /// Whether FC6, FC16 and FC23 may write it.
+    pub writable: bool,
+    /// Whether this version of the program serves it; the others answer with exception 2.
+    pub served: bool,
+}
+
+/// One named item of the map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Register {
+    /// 0-based PDU address of its first register.
+    pub address: u16,
+    /// Its name, unique in its block.
+    pub name: &'static str,
+    /// How it is read.
+    pub kind: Kind,
+    /// How many items stand one behind the other (for ASCII: registers).
+    pub items: u16,
+    /// What it means, with its unit.
+    pub meaning: &'static str,
+}
+
+impl Register {
+    /// How many registers it takes.
+    pub const fn count(&self) -> u16 {
+        self.items * self.kind.width()
+    }
+}
+
+/// Writes every row once: the constant with its address and the line of the table.
+macro_rules! registers {
+    ($($module:ident $table:ident { $($address:literal $name:ident $kind:ident x $items:literal, $meaning:literal;)* })*) => {
+        /// The addresses by block and name.
+        pub mod at {
+            $(
+                /// Addresses of one block.
+                pub mod $module {
+                    $(#[doc = $meaning] pub const $name: u16 = $address;)*
+                }
+            )*
+        }
+        $(
+            #[doc = concat!("The rows of block `", stringify!($module), "`.")]
+            pub const $table: &[Register] = &[
+                $(Register { address: $address, name: stringify!($name), kind: Kind::$kind, items: $items, meaning: $meaning },)*
+            ];
+        )*
+    };
+}
+
+registers! {
+    control CONTROL_ROWS {
+        0 CONTROL Bits x 1, "0 ONLINE request, 1 TRIGGER edge, 2 RESULT_ACK edge, 3 RECIPE_LOAD edge, 4 ERROR_RESET edge, 5 ABORT edge, 6 BUFFERED mode, 7 TEACH edge, 8-15 must be 0";
+        1 TRIGGER_TOKEN U16 x 1, "a write that changes it to a non-zero value triggers; echoed at 116 and 202";
+        2 RECIPE_SELECT U16 x 1, "1-9999; 0 leave the recipe; 65535 select by PART_NUMBER";
+        3 PLC_HEARTBEAT U16 x 1, "any changing value; stale for longer than plc_timeout sets a warning bit";
+        4 PART_ID U32 x 1, "the piece's serial, latched at the trigger, returned with the result";
+        6 PRESS_STROKE U32 x 1, "stroke or pallet counter, latched at the trigger, returned with the result";
+        8 PART_NUMBER Ascii x 16, "recipe key, 32 characters";
+    }
+    status STATUS_ROWS {
+        100 STATUS Bits x 1, "0 ONLINE, 1 READY, 2 BUSY, 3 PROCESSING, 4 EXPOSURE_DONE, 5 RESULT_VALID, 6 RESULT_TOGGLE, 7 TRIGGER_ACK, 8 RECIPE_LOADING, 9 RECIPE_OK, 10 WARNING, 11 ERROR, 12 MISSED_TRIGGER, 13 BUFFER_OVERFLOW, 14 WARMING_UP, 15 CALIBRATION_VALID";
+        101 HEARTBEAT U16 x 1, "+1 every 100 ms as long as the measuring task meets its deadlines";
+        102 ERROR_CODE U16 x 1, "0 none, 1xx camera, 2xx projector, 3xx sync, 4xx recipe, 5xx calibration, 6xx storage, 7xx thermal, 8xx internal";
+        103 WARNING Bits x 1, "0 temperature, 1 storage, 2 plc_lost, 3 clock_unsynced, 4 low_light, 5 saturation, 6 pattern_unfit, 7 frame_slip";
+        104 STATE U16 x 1, "0 boot, 1 ready, 2 acquiring, 3 processing, 4 loading, 5 teaching, 6 offline, 7 fault, 8 stopping";
+        105 ACTIVE_RECIPE U16 x 1, "number of the active recipe, 0 none";
+        106 RECIPE_CRC32 U32 x 1, "first 32 bits of the active recipe's fingerprint";
+        108 REQUESTED_RECIPE U16 x 1, "number of the last requested recipe";
+        109 RECIPE_RESULT U16 x 1, "0 ok, 1 unknown, 2 corrupt, 3 made for another calibration, 4 busy";
+        110 TRIGGERS U32 x 1, "accepted triggers since the start";
+        112 RESULT_SEQ U32 x 1, "last completed result; continues across restarts";
+        114 MISSED U32 x 1, "rejected triggers since the start";
+        116 LAST_TOKEN U16 x 1, "last accepted token";
+        117 BUFFERED U16 x 1, "results waiting for RESULT_ACK";
+        118 UPTIME U32 x 1, "s";
+        120 REJECT_REASON U16 x 1, "of the last rejected request: 1 not ready, 2 offline, 3 no recipe, 4 teach not allowed, 5 fault";
+        121 MAP_VERSION U16 x 1, "0x0100";
+        122 BOOT_ID U32 x 1, "random per start: tokens and counters restarted";
+    }
+    result RESULT_ROWS {
+        200 SEQ U32 x 1, "number of this result";
+        202 TOKEN U16 x 1, "token that triggered, 0 for an edge";
+        203 RECIPE U16 x 1, "recipe number";
+        204 RECIPE_CRC32 U32 x 1, "first 32 bits of the recipe's fingerprint";
+        206 PART_ID U32 x 1, "as latched at the trigger";
+        208 VERDICT U16 x 1, "0 none, 1 PASS, 2 FAIL, 3 INVALID";
+        209 ERROR_CODE U16 x 1, "of this result, 0 none";
+        210 PASS U32 x 1, "bits, gauge k = bit k";
+        212 VALID U32 x 1, "bits, gauge k = bit k";
+        214 TIME U64 x 1, "us since 1970 UTC of the trigger, 0 if the clock is not synchronised";
+        218 EXPOSURE_TIME U32 x 1, "us, trigger to exposure done";
+        220 TOTAL_TIME U32 x 1, "us, trigger to result";
+        222 VALID_POINTS U32 x 1, "resolved pixels";
+        224 COVERAGE U16 x 1, "per mille of the regions";
+        225 TEMPERATURE I16 x 1, "head, 0.1 degC, 0x8000 not known";
+        226 HEIGHT_NOISE U16 x 1, "0.1 um, 1 sigma, from the measured modulation";
+        227 GAUGE_COUNT U16 x 1, "0-16";
+        228 PRESS_STROKE U32 x 1, "as latched at the trigger";
+        230 FITNESS U16 x 1, "per mille, 1000 = pattern as taught";
+        231 FLAGS Bits x 1, "0 a pattern was retried, 1 single level used, 2 two levels used, 3 full sequence used, 4 stepped up from a shorter one, 5 simulated head, 6 warm-up, 7 at least one doubtful decision";
+        232 GAUGE_STEPS I32 x 16, "value in the unit's step: length 0.1 um, angle 0.0001 deg, volume 0.01 mm3, share 0.1 per mille; saturates at +-(2^31-1), 0x80000000 invalid";
+        264 GAUGE_VALUE F32 x 16, "the same in mm, deg, mm3, share 0-1; NaN (0x7FC00000) invalid";
+        296 GAUGE_DECISION Bits x 16, "0 pass, 1 valid, 2 low, 3 high, 4 doubtful (a limit lies within 2 sigma)";
+        318 SEQ_AGAIN U32 x 1, "equals SEQ unless two reads were mixed";
+    }
+    gauge_detail GAUGE_DETAIL_ROWS {
+        520 SEQ U32 x 1, "number of the result";
+        522 GAUGE_SIGMA F32 x 16, "1 sigma of each gauge, in its unit";
+        554 GAUGE_UNIT U16 x 16, "0 none, 1 length, 2 angle, 3 volume, 4 share";
+        582 SEQ_AGAIN U32 x 1, "equals SEQ unless two reads were mixed";
+    }
+    health HEALTH_ROWS {
+        600 CAMERA_FPS U32 x 1, "frames per second x 100";
+        602 PROJECTOR_REFRESH U32 x 1, "mHz";
+        604 SYNC_ERROR I32 x 1, "us";
+        606 DROPPED_FRAMES U32 x 1, "since the start";
+        608 MISSED_FLIPS U32 x 1, "since the start";
+        610 PROCESSING_TIME U32 x 1, "us, last cycle";
+        612 PROCESSING_TIME_MAX U32 x 1, "us, since the start";
+        614 STORAGE_ERRORS U32 x 1, "write errors";
+        616 BOOTS U32 x 1, "starts";
+        618 UNCLEAN_BOOTS U32 x 1, "starts after a crash or power loss";
+        620 WATCHDOG_RESTARTS U32 x 1, "restarts by the watchdog";
+        622 CPU_LOAD U16 x 1, "%";
+        623 FREE_MEMORY U16 x 1, "MiB";
+        624 FREE_STORAGE U16 x 1, "MiB, saturating";
+        625 CPU_TEMPERATURE I16 x 1, "0.1 degC, 0x8000 not known";
+        626 CAMERA_TEMPERATURE I16 x 1, "0.1 degC, 0x8000 not known";
+        627 PROJECTOR_TEMPERATURE I16 x 1, "0.1 degC, 0x8000 not known";
+        628 MODBUS_CLIENTS U16 x 1, "open connections";
+        629 WRITER_CONNECTED U16 x 1, "1 if a client that may write is connected";
+    }
+    recipe_directory RECIPE_DIRECTORY_ROWS {
+        700 STORED_RECIPES Bits x 64, "recipe r in register 700 + (r - 1) / 16, bit (r - 1) mod 16, r = 1-1024";
+    }
+    identity IDENTITY_ROWS {
+        900 MAGIC U32 x 1, "0x46524E47 (FRNG)";
+        902 SERIAL Ascii x 16, "32 characters";
+        918 VERSION Ascii x 16, "32 characters";
+        936 TEST_U32 U32 x 1, "0x12345678, word order test";
+        938 TEST_F32 F32 x 1, "123.456, word order test";
+    }
+}
+
+const fn read_only(name: &'static str, first: u16, last: u16, served: bool) -> Block {
+    Block {
+        name,
+        first,
+        last,
+        writable: false,
+        served,
+    }
+}
+
+/// CONTROL, the only block that can be written.
+pub const CONTROL: Block = Block {
+    name: "CONTROL",
+    first: 0,
+    last: 31,
+    writable: true,
+    served: true,
+};
+/// STATUS.
+pub const STATUS: Block = read_only("STATUS", 100, 131, true);
+/// RESULT: the last result.
+pub const RESULT: Block = read_only("RESULT", 200, 319, true);
+/// OLDEST: RESULT's twin with the oldest unacknowledged result.
+pub const OLDEST: Block = read_only("OLDEST", 400, 519, true);
+/// Gauge detail.
+pub const GAUGE_DETAIL: Block = read_only("GAUGE_DETAIL", 520, 583, false);
+/// Health.
+pub const HEALTH: Block = read_only("HEALTH", 600, 639, false);
+/// Recipe directory.
+pub const RECIPE_DIRECTORY: Block = read_only("RECIPE_DIRECTORY", 700, 763, false);
+/// Identity.
+pub const IDENTITY: Block = read_only("IDENTITY", 900, 939, true);
+
+/// Every block with its rows, by address. OLDEST repeats the rows of RESULT, moved by [`Block::first`].
+pub const BLOCKS: [(Block, &[Register]); 8] = [
+    (CONTROL, CONTROL_ROWS),
+    (STATUS, STATUS_ROWS),
+    (RESULT, RESULT_ROWS),
+    (OLDEST, RESULT_ROWS),
+    (GAUGE_DETAIL, GAUGE_DETAIL_ROWS),
+    (HEALTH, HEALTH_ROWS),
+    (RECIPE_DIRECTORY, RECIPE_DIRECTORY_ROWS),
+    (IDENTITY, IDENTITY_ROWS),
+];
+
+/// Every row of the map at its address, with its block.
+pub fn registers() -> impl Iterator<Item = (Block, Register)> {
+    BLOCKS.into_iter().flat_map(|(block, rows)| {
+        let moved = if block == OLDEST {
+            OLDEST.first - RESULT.first
+        } else {
+            0
+        };
+        rows.iter().map(move |row| {
+            (
+                block,
+                Register {
+                    address: row.address + moved,
+                    ..*row
+                },
+            )
+        })
+    })
+}
+
+/// The served block that holds all of `quantity` registers from `address` on.
+pub fn served(address: u16, quantity: u16) -> Option<Block> {
+    let last = address.checked_add(quantity.checked_sub(1)?)?;
+    let holds = |block: &Block| block.served && block.first <= address && last <= block.last;
+    BLOCKS.into_iter().map(|(block, _)| block).find(holds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_lie_inside_their_block_in_order_without_overlap() {
+        let mut free = 0;
+        for (block, row) in registers() {
+            let last = row.address + row.count() - 1;
+            assert!(
+                row.address >= free && row.address >= block.first && last <= block.last,
+                "{} {}",
+                block.name,
+                row.name
+            );
+            free = last + 1;
+        }
+    }
+
+    #[test]
+    fn every_32_bit_item_sits_at_an_even_address() {
+        for (block, row) in registers().filter(|(_, row)| row.kind.width() > 1) {
+            assert_eq!(row.address % 2, 0, "{} {}", block.name, row.name);
+        }
+    }
+
+    #[test]
+    fn a_range_is_served_only_inside_one_block() {
+        assert_eq!(served(200, 120), Some(RESULT));
+        assert_eq!(served(200, 121), None);
+        assert_eq!(served(31, 2), None);
+        assert_eq!(served(32, 1), None);
+        assert_eq!(served(u16::MAX, 2), None);
+        assert_eq!(served(0, 0), None);
+        assert_eq!(served(600, 1), None, "not served yet");
+    }
+}

@@ -1,0 +1,30 @@
+//! Modbus TCP: the register map, version 1.0, and the server that shows a [`Snapshot`](crate::station::Snapshot) through it.
+//!
+//! [`map`] is the one table; [`encode`] turns a snapshot into words, [`decode`] words into a write of the PLC, [`service`]
+//! answers one request, [`guard`] watches one connection's frames and time, [`server`] ties them to `tokio-modbus`.
+//!
+//! Decisions where the map is silent:
+//!
+//! - A gauge slot without a gauge reads as invalid (0x80000000, NaN), and so does the RESULT block before the first result:
+//!   a zero could be taken for a measured height.
+//! - A unit-less gauge has the register step 0.0001.
+//! - FC43/14 gives vendor, product code and version as the basic objects 0–2, the product name as 4 and the serial as 0x80.
+//! - A frame whose header is no Modbus TCP (protocol not 0, length not 2–254, function code above 127) closes the connection:
+//!   there is no telling where the next frame begins. A request that only contradicts itself (byte count, length, coil
+//!   value) gets exception 3; `tokio-modbus` alone would close the connection or panic, so the guard checks first.
+pub mod decode;
+pub mod encode;
+pub mod guard;
+pub mod map;
+pub mod render;
+pub mod server;
+pub mod service;
+
+#[cfg(test)]
+mod frozen;
+#[cfg(test)]
+mod tests;
+
+pub use encode::WordOrder;
+pub use render::{registers_csv, registers_json};
+pub use server::{ModbusError, Options, bind, serve};

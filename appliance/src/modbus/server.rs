@@ -1,0 +1,130 @@
+//! The server: connections, their number and their time, on top of `tokio-modbus`.
+
+use std::future::Future;
+use std::io;
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use thiserror::Error;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Semaphore;
+use tokio_modbus::server::tcp::Server;
+
+use super::encode::WordOrder;
+use super::guard::Guard;
+use super::service::{FrameFlaw, PlcService};
+use crate::station::{ConnectionEdges, StationHandle};
+
+/// How the server behaves.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Options {
+    /// Word order of 32- and 64-bit values.
+    pub word_order: WordOrder,
+    /// Answer only to this unit id, exception 0x0B to others.
+    pub strict_unit_id: Option<u8>,
+    /// Most connections at a time; a further one is closed at once.
+    pub connections: usize,
+    /// A connection without a request for this long is closed.
+    pub idle: Duration,
+    /// A started frame must be finished, and an answer be taken, in this time.
+    pub frame: Duration,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            word_order: WordOrder::Normal,
+            strict_unit_id: None,
+            connections: 8,
+            idle: Duration::from_secs(300),
+            frame: Duration::from_secs(10),
+        }
+    }
+}
+
+/// Why there is no Modbus server.
+#[derive(Debug, Error)]
+pub enum ModbusError {
+    /// Something else listens there.
+    #[error(
+        "could not listen for Modbus TCP on {address}: the port is in use; end the other program or choose another port"
+    )]
+    InUse {
+        /// What was attempted.
+        address: SocketAddr,
+    },
+    /// Ports below 1024 belong to the system.
+    #[error(
+        "could not listen for Modbus TCP on {address}: not permitted; choose a port from 1024 on or grant CAP_NET_BIND_SERVICE"
+    )]
+    NotPermitted {
+        /// What was attempted.
+        address: SocketAddr,
+    },
+    /// Anything else.
+    #[error(
+        "could not listen for Modbus TCP on {address}: {source}; check that the address belongs to this machine"
+    )]
+    Bind {
+        /// What was attempted.
+        address: SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// Opens the socket; the listener's own address tells the port if 0 was asked for.
+///
+/// # Errors
+/// The address is in use, not permitted, or not of this machine.
+pub async fn bind(address: SocketAddr) -> Result<TcpListener, ModbusError> {
+    TcpListener::bind(address)
+        .await
+        .map_err(|source| match source.kind() {
+            io::ErrorKind::AddrInUse => ModbusError::InUse { address },
+            io::ErrorKind::PermissionDenied => ModbusError::NotPermitted { address },
+            _ => ModbusError::Bind { address, source },
+        })
+}
+
+/// Serves the station on `listener` until `shutdown`; then every connection is closed.
+pub async fn serve(
+    listener: TcpListener,
+    handle: StationHandle,
+    options: Options,
+    shutdown: impl Future<Output = ()>,
+) {
+    let server = Server::new(listener);
+    let permits = Arc::new(Semaphore::new(options.connections));
+    let on_connected = |stream: TcpStream, _peer: SocketAddr| {
+        let connection = permits.clone().try_acquire_owned().ok().map(|permit| {
+            // Answers are small and awaited: Nagle's algorithm would only delay them. Without it the connection still works.
+            let _ = stream.set_nodelay(true);
+            let flaw = FrameFlaw::default();
+            let service = PlcService {
+                handle: handle.clone(),
+                word_order: options.word_order,
+                strict_unit_id: options.strict_unit_id,
+                flaw: flaw.clone(),
+                edges: Mutex::new(ConnectionEdges::default()),
+            };
+            (
+                service,
+                Guard::new(stream, permit, flaw, options.idle, options.frame),
+            )
+        });
+        std::future::ready(Ok(connection))
+    };
+    let accept = async {
+        loop {
+            // Ends only when accept fails, for example without file descriptors: wait for some, then go on.
+            let _ = server.serve(&on_connected, |_broken_connection| ()).await;
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+    };
+    tokio::select! {
+        () = accept => {}
+        () = shutdown => {}
+    }
+}

@@ -1,0 +1,235 @@
+//! What reaches the station (events) and what it wants done (effects).
+
+use std::sync::Arc;
+
+use super::control::ControlWrite;
+use super::result::{Inspection, ResultRecord};
+use super::state::ActiveRecipe;
+
+/// Names one order to the worker; the worker quotes it in every answer, so that a late answer is recognised as one.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct JobId(pub u64);
+
+/// How a recipe is chosen.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RecipeKey {
+    /// 1–9999.
+    Number(u16),
+    /// The recipe taught for this part number.
+    PartNumber(Arc<str>),
+}
+
+/// How the last recipe request ended: register 109.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum RecipeResult {
+    /// 0.
+    #[default]
+    Ok,
+    /// 1: no such recipe.
+    Unknown,
+    /// 2: it failed its checksum.
+    Corrupt,
+    /// 3: it was made for another calibration.
+    OtherCalibration,
+    /// 4: the station could not load now.
+    Busy,
+}
+
+impl RecipeResult {
+    /// The number of register 109.
+    pub fn number(self) -> u16 {
+        match self {
+            Self::Ok => 0,
+            Self::Unknown => 1,
+            Self::Corrupt => 2,
+            Self::OtherCalibration => 3,
+            Self::Busy => 4,
+        }
+    }
+}
+
+/// A request from this side of the wall: the daemon's own start, the command line, later the page.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Request {
+    /// Load a recipe.
+    Load(RecipeKey),
+    /// Teach a recipe; allowed whatever the PLC is allowed.
+    Teach {
+        /// 1–9999.
+        number: u16,
+    },
+}
+
+/// What the worker knows about the head, sent whenever it changes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Condition {
+    /// STATUS bit 14.
+    pub warming_up: bool,
+    /// STATUS bit 15.
+    pub calibration_valid: bool,
+    /// WARNING bits, see [`super::snapshot::warning`]; `PLC_LOST` and `CLOCK_UNSYNCED` are the station's own and ignored here.
+    pub warnings: u16,
+}
+
+/// Something that happened.
+#[derive(Debug, Clone)]
+pub enum Event {
+    /// The PLC wrote. `rising` are the CONTROL bits that rose on the writing connection.
+    Write {
+        /// What it wrote.
+        write: ControlWrite,
+        /// The edges, see [`super::ConnectionEdges`].
+        rising: u16,
+    },
+    /// A request from this side.
+    Request(Request),
+    /// The worker has opened its head: the boot is over.
+    Started,
+    /// The last frame is exposed; the part may move.
+    ExposureDone {
+        /// Quoted.
+        job: JobId,
+    },
+    /// A measurement ended with an inspection, which may say INVALID.
+    Finished {
+        /// Quoted.
+        job: JobId,
+        /// What was found.
+        inspection: Arc<Inspection>,
+    },
+    /// A measurement ended without one.
+    MeasureFailed {
+        /// Quoted.
+        job: JobId,
+        /// 1xx camera … 8xx internal; 0 becomes [`super::error_code::UNNAMED`].
+        error_code: u16,
+        /// What was attempted with what, and the remedy.
+        message: Arc<str>,
+    },
+    /// The recipe is active: everything a trigger needs is prepared.
+    RecipeLoaded {
+        /// Quoted.
+        job: JobId,
+        /// Which.
+        recipe: ActiveRecipe,
+    },
+    /// The recipe could not be loaded; the one before is still active.
+    LoadFailed {
+        /// Quoted.
+        job: JobId,
+        /// Why.
+        result: RecipeResult,
+        /// Why, in words.
+        message: Arc<str>,
+    },
+    /// Teaching goes on.
+    Progress {
+        /// Quoted.
+        job: JobId,
+        /// 0…1.
+        fraction: f32,
+        /// What it is doing.
+        words: Arc<str>,
+    },
+    /// The recipe is taught, stored and active.
+    Taught {
+        /// Quoted.
+        job: JobId,
+        /// Which.
+        recipe: ActiveRecipe,
+    },
+    /// Teaching failed; the recipe before is still active.
+    TeachFailed {
+        /// Quoted.
+        job: JobId,
+        /// 1xx camera … 8xx internal.
+        error_code: u16,
+        /// Why.
+        message: Arc<str>,
+    },
+    /// The head's condition changed.
+    Condition(Condition),
+    /// A device is broken and stays so.
+    Faulted {
+        /// 1xx camera … 8xx internal.
+        error_code: u16,
+        /// What happened.
+        cause: Arc<str>,
+        /// What to do about it.
+        remedy: Arc<str>,
+    },
+    /// The broken device works again.
+    Recovered,
+    /// The worker's sign of life.
+    Alive,
+    /// Time passes: about every 100 ms.
+    Tick {
+        /// The time in µs since 1970 UTC, if the clock is synchronised.
+        utc_us: Option<u64>,
+    },
+    /// The daemon is asked to end.
+    Stop,
+}
+
+impl Event {
+    /// Whether the worker sent it: every one of these is a sign of life.
+    pub fn from_worker(&self) -> bool {
+        !matches!(
+            self,
+            Self::Write { .. } | Self::Request(_) | Self::Tick { .. } | Self::Stop
+        )
+    }
+}
+
+/// An order to measure.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Job {
+    /// To quote.
+    pub job: JobId,
+    /// The token that triggered, 0 for an edge.
+    pub token: u16,
+    /// The piece's serial.
+    pub part_id: u32,
+    /// Stroke or pallet counter.
+    pub press_stroke: u32,
+    /// The recipe to measure with: the active one.
+    pub recipe: ActiveRecipe,
+}
+
+/// Something to be done by those who have threads, files and sockets. Carried out in order.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Effect {
+    /// Measure now.
+    Measure(Job),
+    /// Load a recipe.
+    Load {
+        /// To quote.
+        job: JobId,
+        /// Which.
+        key: RecipeKey,
+    },
+    /// Teach a recipe.
+    Teach {
+        /// To quote.
+        job: JobId,
+        /// 1–9999.
+        number: u16,
+    },
+    /// End the running job early; its answer is still awaited.
+    Abort {
+        /// The running job.
+        job: JobId,
+    },
+    /// Store this RESULT_SEQ as used. Always directly before the [`Effect::Publish`] of that result.
+    PersistSeq(u32),
+    /// A result is complete: for the history.
+    Publish(Arc<ResultRecord>),
+    /// For the log.
+    Log(Arc<str>),
+}
+
+/// The most effects that one event can cause (held by the random walk test).
+pub const MAX_EFFECTS: usize = 16;
+
+/// What one step wants done, in order.
+pub type Effects = heapless::Vec<Effect, MAX_EFFECTS>;

@@ -1,0 +1,128 @@
+//! The handle: the one place where the station meets a clock, a mutex and channels.
+
+use std::future::Future;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use tokio::sync::watch;
+use tokio::time::MissedTickBehavior;
+
+use super::control::{ConnectionEdges, ControlWrite, RefusedWrite};
+use super::event::{Effect, Event};
+use super::machine::Station;
+use super::snapshot::Snapshot;
+use super::state::Micros;
+use super::step::step;
+
+/// Carries out effects, in order. Called with the station locked: it hands on and returns, at most writing one small file.
+pub type EffectSink = Box<dyn FnMut(Effect) + Send>;
+
+struct Guarded {
+    station: Station,
+    sink: EffectSink,
+}
+
+/// A way to the station for the worker, Modbus and the page. Cheap to clone.
+#[derive(Clone)]
+pub struct StationHandle {
+    guarded: Arc<Mutex<Guarded>>,
+    snapshots: watch::Sender<Arc<Snapshot>>,
+    start: Instant,
+}
+
+impl StationHandle {
+    /// Takes a station made for `Micros(0)`; the time runs from `start`.
+    pub fn new(
+        station: Station,
+        start: Instant,
+        sink: impl FnMut(Effect) + Send + 'static,
+    ) -> Self {
+        let (snapshots, _) = watch::channel(Arc::new(station.snapshot()));
+        let guarded = Arc::new(Mutex::new(Guarded {
+            station,
+            sink: Box::new(sink),
+        }));
+        Self {
+            guarded,
+            snapshots,
+            start,
+        }
+    }
+
+    /// Time since the start.
+    pub fn now(&self) -> Micros {
+        Micros(u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX))
+    }
+
+    /// Applies one write of the PLC as a unit and answers with the snapshot after it.
+    ///
+    /// # Errors
+    /// A value is refused (see [`ControlWrite::check`]): then nothing was applied and `edges` are as before.
+    pub fn write(
+        &self,
+        edges: &mut ConnectionEdges,
+        write: ControlWrite,
+    ) -> Result<Arc<Snapshot>, RefusedWrite> {
+        write.check()?;
+        let rising = edges.rise(write.control);
+        Ok(self.take(Event::Write { write, rising }))
+    }
+
+    /// Takes an event from the worker or the daemon; answers with the snapshot after it.
+    pub fn event(&self, event: Event) -> Arc<Snapshot> {
+        self.take(event)
+    }
+
+    /// The latest snapshot.
+    pub fn snapshot(&self) -> Arc<Snapshot> {
+        self.snapshots.borrow().clone()
+    }
+
+    /// Every snapshot from now on, the latest first.
+    pub fn subscribe(&self) -> watch::Receiver<Arc<Snapshot>> {
+        self.snapshots.subscribe()
+    }
+
+    fn take(&self, event: Event) -> Arc<Snapshot> {
+        let mut guarded = self.lock();
+        // Read under the lock, so that events are numbered in the order in which they are taken.
+        let (station, effects) = step(guarded.station.clone(), event, self.now());
+        guarded.station = station;
+        for effect in effects {
+            (guarded.sink)(effect);
+        }
+        let snapshot = Arc::new(guarded.station.snapshot());
+        self.snapshots.send_replace(snapshot.clone());
+        snapshot
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Guarded> {
+        // A sink that panicked leaves a whole station behind: the step is stored before its effects are carried out.
+        self.guarded.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Lets the station's time pass: a [`Event::Tick`] every 100 ms until `shutdown`.
+///
+/// `utc_us` answers with the time in µs since 1970 if the clock is synchronised (see [`system_utc_us`]).
+pub async fn tick(
+    handle: StationHandle,
+    utc_us: impl Fn() -> Option<u64>,
+    shutdown: impl Future<Output = ()>,
+) {
+    let mut interval = tokio::time::interval(Duration::from_millis(100));
+    interval.set_missed_tick_behavior(MissedTickBehavior::Skip);
+    let mut shutdown = std::pin::pin!(shutdown);
+    loop {
+        tokio::select! {
+            () = &mut shutdown => return,
+            _ = interval.tick() => { handle.event(Event::Tick { utc_us: utc_us() }); }
+        }
+    }
+}
+
+/// The system clock in µs since 1970 UTC, taken as synchronised.
+pub fn system_utc_us() -> Option<u64> {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
+    u64::try_from(since.as_micros()).ok()
+}

@@ -1,0 +1,51 @@
+//! The station: the pure state machine that decides, and what it shows to the world.
+//!
+//! [`step()`] is a function `(station, event, now) → (station, effects)`. It knows no thread, no socket and no clock: time is
+//! an argument ([`Micros`]), the worker and the PLC are [`Event`]s, and everything it wants done is an [`Effect`]. Its
+//! register side follows `modbus.md`, version 1.0. One immutable [`Snapshot`] is the only thing that Modbus and the page
+//! see. [`StationHandle`] is the one place where the machine meets a clock, a mutex and channels.
+//!
+//! Decisions where the register map is silent:
+//!
+//! - **Every accepted trigger ends in exactly one result.** A measurement that failed, was aborted or ran into its deadline
+//!   gives a result with verdict INVALID and the cause in its ERROR_CODE; results since the start = TRIGGERS − cycles in flight.
+//! - **RECIPE_LOAD beats TRIGGER in one write**: the load begins, the trigger is rejected as not ready. Measuring the new
+//!   part with the old recipe could pass the wrong part. With RECIPE_SELECT 0 nothing is loaded and the trigger counts.
+//! - The bits of one CONTROL write act in this order: ERROR_RESET, ABORT, ONLINE, RESULT_ACK, BUFFERED, RECIPE_LOAD, TEACH,
+//!   TRIGGER. So one write can clear a fault and trigger, or abort and load the next recipe once the worker is free.
+//! - A trigger by edge answers with TOKEN 0 unless the same write brings a new token. LAST_TOKEN changes only by a token.
+//! - RECIPE_OK means that the requested recipe is the active one: a failed load keeps the old recipe and clears the bit.
+//! - ERROR and ERROR_CODE show a fault, else the last failed cycle until a cycle succeeds or ERROR_RESET.
+//! - EXPOSURE_DONE also rises with a result that never reported its exposure: the head is idle, the part may move.
+//! - The PLC's heartbeat is watched from its first change on; a PLC that never uses it is never reported lost.
+//! - REJECT_REASON stays until the next rejected request.
+pub mod control;
+pub mod error_code;
+pub mod event;
+pub mod handle;
+pub mod machine;
+pub mod result;
+pub mod snapshot;
+pub mod state;
+pub mod step;
+
+mod cycle;
+pub mod plc;
+
+#[cfg(test)]
+mod table;
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod walk;
+
+pub use control::{ConnectionEdges, ControlRegisters, ControlWrite, Masked, RefusedWrite};
+pub use event::{Condition, Effect, Effects, Event, Job, JobId, RecipeKey, RecipeResult, Request};
+pub use handle::{StationHandle, system_utc_us, tick};
+pub use machine::{Limits, Settings, Station};
+pub use result::{
+    Decision, GaugeValue, Inspection, MAX_GAUGES, ResultRecord, StageTime, Unit, Verdict,
+};
+pub use snapshot::{Identity, Snapshot, TeachProgress};
+pub use state::{ActiveRecipe, Cycle, Fault, Micros, State};
+pub use step::step;

@@ -1,0 +1,274 @@
+//! The snapshot: one immutable picture of the station, of which the registers and the page are two views.
+
+use std::sync::Arc;
+
+use super::control::ControlRegisters;
+use super::event::RecipeResult;
+use super::machine::Station;
+use super::result::ResultRecord;
+use super::state::{ActiveRecipe, Fault, Micros, State};
+
+/// STATUS bits, register 100.
+pub mod status {
+    /// The PLC asks for ONLINE and the station neither boots nor stops.
+    pub const ONLINE: u16 = 1 << 0;
+    /// A trigger would be accepted.
+    pub const READY: u16 = 1 << 1;
+    /// Exposing.
+    pub const BUSY: u16 = 1 << 2;
+    /// Computing.
+    pub const PROCESSING: u16 = 1 << 3;
+    /// The part may move.
+    pub const EXPOSURE_DONE: u16 = 1 << 4;
+    /// RESULT holds an unacknowledged result of the last trigger.
+    pub const RESULT_VALID: u16 = 1 << 5;
+    /// Inverts with every result.
+    pub const RESULT_TOGGLE: u16 = 1 << 6;
+    /// Follows CONTROL.1.
+    pub const TRIGGER_ACK: u16 = 1 << 7;
+    /// A recipe is being loaded.
+    pub const RECIPE_LOADING: u16 = 1 << 8;
+    /// The requested recipe is the active one.
+    pub const RECIPE_OK: u16 = 1 << 9;
+    /// A bit of WARNING is set.
+    pub const WARNING: u16 = 1 << 10;
+    /// ERROR_CODE is not 0.
+    pub const ERROR: u16 = 1 << 11;
+    /// A trigger was rejected; latched.
+    pub const MISSED_TRIGGER: u16 = 1 << 12;
+    /// A result was not queued; latched.
+    pub const BUFFER_OVERFLOW: u16 = 1 << 13;
+    /// The head warms up.
+    pub const WARMING_UP: u16 = 1 << 14;
+    /// The calibration is there and fits.
+    pub const CALIBRATION_VALID: u16 = 1 << 15;
+}
+
+/// WARNING bits, register 103.
+pub mod warning {
+    /// The head is too warm or too cold.
+    pub const TEMPERATURE: u16 = 1 << 0;
+    /// Storage is nearly full or slow.
+    pub const STORAGE: u16 = 1 << 1;
+    /// PLC_HEARTBEAT stands still.
+    pub const PLC_LOST: u16 = 1 << 2;
+    /// The clock is not synchronised.
+    pub const CLOCK_UNSYNCED: u16 = 1 << 3;
+    /// Too little light comes back.
+    pub const LOW_LIGHT: u16 = 1 << 4;
+    /// Too much light comes back.
+    pub const SATURATION: u16 = 1 << 5;
+    /// The adaptive pattern no longer fits the part.
+    pub const PATTERN_UNFIT: u16 = 1 << 6;
+    /// Camera and projector slipped by a frame.
+    pub const FRAME_SLIP: u16 = 1 << 7;
+    /// The words for bits 0–7, in order.
+    pub const WORDS: [&str; 8] = [
+        "temperature",
+        "storage",
+        "PLC lost",
+        "clock not synchronised",
+        "low light",
+        "saturation",
+        "pattern unfit",
+        "frame slip",
+    ];
+}
+
+/// Who this device is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Identity {
+    /// For FC43/14.
+    pub vendor: String,
+    /// For FC43/14.
+    pub product: String,
+    /// At most 32 ASCII characters are shown.
+    pub serial: String,
+    /// At most 32 ASCII characters are shown.
+    pub version: String,
+}
+
+/// How far teaching has come.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TeachProgress {
+    /// The recipe being taught.
+    pub number: u16,
+    /// 0…1.
+    pub fraction: f32,
+    /// What it is doing.
+    pub words: Arc<str>,
+}
+
+/// Everything that Modbus and the page show.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Snapshot {
+    /// When it was taken.
+    pub at: Micros,
+    /// Register 104.
+    pub state: u16,
+    /// The word for it.
+    pub state_word: &'static str,
+    /// STATUS, see [`status`].
+    pub status: u16,
+    /// WARNING, see [`warning`].
+    pub warnings: u16,
+    /// HEARTBEAT of the measuring task.
+    pub heartbeat: u16,
+    /// Whether the measuring task meets its deadlines.
+    pub worker_alive: bool,
+    /// ERROR_CODE: the fault's, else the last failed cycle's.
+    pub error_code: u16,
+    /// The words for it.
+    pub error: Option<Arc<str>>,
+    /// The fault, while there is one.
+    pub fault: Option<Fault>,
+    /// What the PLC wrote.
+    pub control: ControlRegisters,
+    /// The active recipe.
+    pub recipe: Option<ActiveRecipe>,
+    /// REQUESTED_RECIPE.
+    pub requested_recipe: u16,
+    /// RECIPE_RESULT.
+    pub recipe_result: RecipeResult,
+    /// Accepted triggers.
+    pub triggers: u32,
+    /// SEQ of the last result.
+    pub result_seq: u32,
+    /// Rejected triggers.
+    pub missed: u32,
+    /// The last accepted token.
+    pub last_token: u16,
+    /// Results waiting for RESULT_ACK.
+    pub buffered: u16,
+    /// REJECT_REASON, see [`super::plc::reject`].
+    pub reject_reason: u16,
+    /// Seconds since the start.
+    pub uptime_s: u32,
+    /// Random per start.
+    pub boot_id: u32,
+    /// Who this device is.
+    pub identity: Arc<Identity>,
+    /// The last result of this run.
+    pub result: Option<Arc<ResultRecord>>,
+    /// The oldest unacknowledged result.
+    pub oldest: Option<Arc<ResultRecord>>,
+    /// While teaching.
+    pub teach: Option<TeachProgress>,
+}
+
+impl Snapshot {
+    /// Whether a STATUS bit is set.
+    pub fn is(&self, bit: u16) -> bool {
+        self.status & bit != 0
+    }
+}
+
+impl Station {
+    /// The picture as of the last event.
+    pub fn snapshot(&self) -> Snapshot {
+        let now = self.now;
+        let fault = match &self.state {
+            State::Fault(fault) => Some(fault.clone()),
+            _ => None,
+        };
+        let (error_code, error) = match (&fault, &self.failure) {
+            (Some(fault), _) => (fault.code, Some(fault.cause.clone())),
+            (None, Some((code, words))) => (*code, Some(words.clone())),
+            (None, None) => (0, None),
+        };
+        let teach = match &self.state {
+            State::Teaching {
+                number,
+                fraction,
+                words,
+                ..
+            } => Some(TeachProgress {
+                number: *number,
+                fraction: *fraction,
+                words: words.clone(),
+            }),
+            _ => None,
+        };
+        let warnings = self.warnings(now);
+        Snapshot {
+            at: now,
+            state: self.state.number(),
+            state_word: self.state.word(),
+            status: self.status(warnings, error_code),
+            warnings,
+            heartbeat: self.heartbeat,
+            worker_alive: self.worker_meets_deadlines(now),
+            error_code,
+            error,
+            fault,
+            control: self.control,
+            recipe: self.recipe.clone(),
+            requested_recipe: self.requested_recipe,
+            recipe_result: self.recipe_result,
+            triggers: self.triggers,
+            result_seq: self.last_seq,
+            missed: self.missed,
+            last_token: self.last_token,
+            buffered: u16::try_from(self.queue.len()).unwrap_or(u16::MAX),
+            reject_reason: self.reject_reason,
+            uptime_s: u32::try_from(now.0 / 1_000_000).unwrap_or(u32::MAX),
+            boot_id: self.settings.boot_id,
+            identity: self.settings.identity.clone(),
+            result: self.result.clone(),
+            oldest: self.queue.front().cloned(),
+            teach,
+        }
+    }
+
+    fn warnings(&self, now: Micros) -> u16 {
+        let own = warning::PLC_LOST | warning::CLOCK_UNSYNCED;
+        let lost = if self.plc_is_lost(now) {
+            warning::PLC_LOST
+        } else {
+            0
+        };
+        let unsynced = if self.utc_at_zero.is_none() {
+            warning::CLOCK_UNSYNCED
+        } else {
+            0
+        };
+        (self.condition.warnings & !own & 0x00FF) | lost | unsynced
+    }
+
+    fn status(&self, warnings: u16, error_code: u16) -> u16 {
+        let state = &self.state;
+        let up = !matches!(state, State::Boot { .. } | State::Stopping { .. });
+        let bits = [
+            (status::ONLINE, up && self.wants_online()),
+            (status::READY, self.is_ready()),
+            (status::BUSY, matches!(state, State::Acquiring { .. })),
+            (
+                status::PROCESSING,
+                matches!(state, State::Processing { .. }),
+            ),
+            (status::EXPOSURE_DONE, self.exposure_done),
+            (status::RESULT_VALID, self.result_valid),
+            (status::RESULT_TOGGLE, self.result_toggle),
+            (
+                status::TRIGGER_ACK,
+                self.control.control & super::control::TRIGGER != 0,
+            ),
+            (
+                status::RECIPE_LOADING,
+                matches!(state, State::Loading { .. }),
+            ),
+            (
+                status::RECIPE_OK,
+                self.recipe.is_some() && self.recipe_result == RecipeResult::Ok,
+            ),
+            (status::WARNING, warnings != 0),
+            (status::ERROR, error_code != 0),
+            (status::MISSED_TRIGGER, self.missed_latch),
+            (status::BUFFER_OVERFLOW, self.overflow_latch),
+            (status::WARMING_UP, self.condition.warming_up),
+            (status::CALIBRATION_VALID, self.condition.calibration_valid),
+        ];
+        bits.iter()
+            .fold(0, |word, &(bit, set)| if set { word | bit } else { word })
+    }
+}

@@ -1,0 +1,241 @@
+//! Every state × every event: defined, without a panic, and with nothing that a stray event could disturb.
+
+use std::sync::Arc;
+
+use super::control;
+use super::tests::{Bench, good, recipe, settings};
+use super::*;
+
+const STATES: [u16; 9] = [0, 1, 2, 3, 4, 5, 6, 7, 8];
+
+fn in_state(number: u16) -> Bench {
+    let mut bench = if number == 0 {
+        Bench::booting_with(settings())
+    } else {
+        Bench::ready()
+    };
+    let online_off = ControlWrite {
+        control: Masked::<u16>::all(0),
+        ..Default::default()
+    };
+    match number {
+        2 | 3 => {
+            bench.write(ControlWrite {
+                token: Some(1),
+                ..Default::default()
+            });
+            if number == 3 {
+                let job = bench.job();
+                bench.event(Event::ExposureDone { job });
+            }
+        }
+        4 => {
+            bench.event(Event::Request(Request::Load(RecipeKey::Number(2))));
+        }
+        5 => {
+            bench.event(Event::Request(Request::Teach { number: 2 }));
+        }
+        6 => {
+            bench.write(online_off);
+        }
+        7 => {
+            bench.event(Event::Faulted {
+                error_code: 101,
+                cause: "c".into(),
+                remedy: "r".into(),
+            });
+        }
+        8 => {
+            bench.event(Event::Stop);
+        }
+        _ => {}
+    }
+    assert_eq!(bench.station.snapshot().state, number);
+    bench
+}
+
+/// Every event with a given job, and the state that it leads to from states 0…8.
+fn events(job: JobId) -> Vec<(Event, [u16; 9])> {
+    let words: Arc<str> = "w".into();
+    let write = |bits: u16, rising: u16, token: u16| Event::Write {
+        write: ControlWrite {
+            control: Masked::<u16>::all(bits),
+            token: Some(token),
+            recipe_select: Some(2),
+            ..Default::default()
+        },
+        rising,
+    };
+    let stay = STATES;
+    vec![
+        (write(1, 0, 0), [0, 1, 2, 3, 4, 5, 1, 7, 8]),
+        (write(0, 0, 0), [0, 6, 2, 3, 4, 5, 6, 7, 8]),
+        (write(3, control::TRIGGER, 0), [0, 2, 2, 3, 4, 5, 2, 7, 8]),
+        (write(1, 0, 99), [0, 2, 2, 3, 4, 5, 2, 7, 8]),
+        (
+            write(5, control::RESULT_ACK, 0),
+            [0, 1, 2, 3, 4, 5, 1, 7, 8],
+        ),
+        (
+            write(9, control::RECIPE_LOAD, 0),
+            [0, 4, 2, 3, 4, 5, 4, 7, 8],
+        ),
+        (
+            write(17, control::ERROR_RESET, 0),
+            [0, 1, 2, 3, 4, 5, 1, 7, 8],
+        ),
+        (write(33, control::ABORT, 0), [0, 1, 2, 3, 4, 5, 1, 7, 8]),
+        (write(129, control::TEACH, 0), [0, 1, 2, 3, 4, 5, 1, 7, 8]),
+        (
+            Event::Request(Request::Load(RecipeKey::PartNumber("x".into()))),
+            [0, 4, 2, 3, 4, 5, 4, 7, 8],
+        ),
+        (
+            Event::Request(Request::Teach { number: 9 }),
+            [0, 5, 2, 3, 4, 5, 5, 7, 8],
+        ),
+        (Event::Started, [1, 1, 2, 3, 4, 5, 6, 7, 8]),
+        (Event::ExposureDone { job }, [0, 1, 3, 3, 4, 5, 6, 7, 8]),
+        (
+            Event::Finished {
+                job,
+                inspection: good(),
+            },
+            [0, 1, 1, 1, 4, 5, 6, 7, 8],
+        ),
+        (
+            Event::MeasureFailed {
+                job,
+                error_code: 0,
+                message: words.clone(),
+            },
+            [0, 1, 1, 1, 4, 5, 6, 7, 8],
+        ),
+        (
+            Event::RecipeLoaded {
+                job,
+                recipe: recipe(2),
+            },
+            [0, 1, 2, 3, 1, 5, 6, 7, 8],
+        ),
+        (
+            Event::LoadFailed {
+                job,
+                result: RecipeResult::Corrupt,
+                message: words.clone(),
+            },
+            [0, 1, 2, 3, 1, 5, 6, 7, 8],
+        ),
+        (
+            Event::Progress {
+                job,
+                fraction: f32::NAN,
+                words: words.clone(),
+            },
+            stay,
+        ),
+        (
+            Event::Taught {
+                job,
+                recipe: recipe(2),
+            },
+            [0, 1, 2, 3, 4, 1, 6, 7, 8],
+        ),
+        (
+            Event::TeachFailed {
+                job,
+                error_code: 0,
+                message: words.clone(),
+            },
+            [0, 1, 2, 3, 4, 1, 6, 7, 8],
+        ),
+        (
+            Event::Condition(Condition {
+                warming_up: true,
+                calibration_valid: true,
+                warnings: 0xFFFF,
+            }),
+            stay,
+        ),
+        (
+            Event::Faulted {
+                error_code: 0,
+                cause: words.clone(),
+                remedy: words,
+            },
+            [7, 7, 7, 7, 7, 7, 7, 7, 8],
+        ),
+        (Event::Recovered, [0, 1, 2, 3, 4, 5, 6, 1, 8]),
+        (Event::Alive, stay),
+        (Event::Tick { utc_us: Some(0) }, stay),
+        (Event::Stop, [8; 9]),
+    ]
+}
+
+#[test]
+fn every_state_takes_every_event_and_leads_where_the_table_says() {
+    for state in STATES {
+        let bench = in_state(state);
+        for (event, next) in events(bench.job()) {
+            let (station, _) = step(
+                bench.station.clone(),
+                event.clone(),
+                bench.now.after(Micros(1)),
+            );
+            assert_eq!(
+                station.snapshot().state,
+                next[usize::from(state)],
+                "state {state}, {event:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn an_answer_of_another_job_changes_no_state() {
+    for state in STATES {
+        let bench = in_state(state);
+        for (event, _) in events(JobId(9999)) {
+            let answer = matches!(
+                event,
+                Event::ExposureDone { .. }
+                    | Event::Finished { .. }
+                    | Event::MeasureFailed { .. }
+                    | Event::RecipeLoaded { .. }
+                    | Event::LoadFailed { .. }
+                    | Event::Progress { .. }
+                    | Event::Taught { .. }
+                    | Event::TeachFailed { .. }
+            );
+            if answer {
+                let (station, effects) = step(bench.station.clone(), event.clone(), bench.now);
+                let only_logged = effects
+                    .iter()
+                    .all(|effect| matches!(effect, Effect::Log(_)));
+                assert!(
+                    station.state == bench.station.state && only_logged,
+                    "state {state}, {event:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn time_that_runs_backwards_or_to_its_end_is_survived() {
+    for state in STATES {
+        for (event, _) in events(JobId(1)) {
+            let bench = in_state(state);
+            let (station, _) = step(bench.station, event.clone(), Micros(u64::MAX));
+            let (station, _) = step(
+                station,
+                Event::Tick {
+                    utc_us: Some(u64::MAX),
+                },
+                Micros(0),
+            );
+            let (station, _) = step(station, event, Micros(u64::MAX));
+            assert_eq!(station.snapshot().at, Micros(u64::MAX));
+        }
+    }
+}

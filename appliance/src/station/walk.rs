@@ -1,0 +1,210 @@
+//! A seeded random walk: whatever happens in whatever order, the promises to the PLC hold.
+
+use std::sync::Arc;
+
+use super::control;
+use super::event::MAX_EFFECTS;
+use super::machine::MAX_BUFFERED;
+use super::snapshot::status;
+use super::tests::{good, recipe, settings};
+use super::*;
+
+const EVENTS: u32 = 100_000;
+
+/// SplitMix64 (Steele, Lea, Flood 2014): a small generator is enough to shuffle events.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, n: u64) -> u64 {
+        self.next() % n
+    }
+
+    fn word(&mut self, n: u64) -> u16 {
+        u16::try_from(self.below(n)).unwrap_or(0)
+    }
+}
+
+fn plc_write(random: &mut Random, edges: &mut ConnectionEdges) -> Event {
+    let mut write = ControlWrite::default();
+    if random.below(2) == 0 {
+        // Mostly online, so that the walk gets anywhere.
+        let online = u16::from(random.below(8) != 0);
+        write.control = Masked::<u16>::all((random.word(256) & !1) | online);
+    }
+    if random.below(2) == 0 {
+        write.token = Some(random.word(20));
+    }
+    if random.below(4) == 0 {
+        write.recipe_select = Some(random.word(4));
+    }
+    if random.below(4) == 0 {
+        write.plc_heartbeat = Some(random.word(9));
+    }
+    if random.below(50) == 0 {
+        *edges = ConnectionEdges::default();
+    }
+    write
+        .check()
+        .expect("the walk writes only what may be written");
+    let rising = edges.rise(write.control);
+    Event::Write { write, rising }
+}
+
+fn any_event(random: &mut Random, edges: &mut ConnectionEdges, last: JobId) -> Event {
+    let job = if random.below(10) == 0 {
+        JobId(last.0.wrapping_sub(1))
+    } else {
+        last
+    };
+    let words: Arc<str> = "w".into();
+    let number = random.word(9) + 1;
+    match random.below(40) {
+        0..10 => plc_write(random, edges),
+        10..14 => Event::ExposureDone { job },
+        14..20 => Event::Finished {
+            job,
+            inspection: good(),
+        },
+        20 => Event::MeasureFailed {
+            job,
+            error_code: random.word(900),
+            message: words,
+        },
+        21..24 => Event::RecipeLoaded {
+            job,
+            recipe: recipe(number),
+        },
+        24 => Event::LoadFailed {
+            job,
+            result: RecipeResult::Unknown,
+            message: words,
+        },
+        25 => Event::Progress {
+            job,
+            fraction: 0.3,
+            words,
+        },
+        26 | 27 => Event::Taught {
+            job,
+            recipe: recipe(number),
+        },
+        28 => Event::TeachFailed {
+            job,
+            error_code: 201,
+            message: words,
+        },
+        29 if random.below(20) == 0 => Event::Faulted {
+            error_code: 101,
+            cause: words.clone(),
+            remedy: words,
+        },
+        30 => Event::Recovered,
+        31 if random.below(4) == 0 => Event::Request(Request::Load(RecipeKey::Number(number))),
+        32 if random.below(9) == 0 => Event::Request(Request::Teach { number }),
+        33 => Event::Started,
+        34 => Event::Condition(Condition::default()),
+        35 => Event::Alive,
+        _ => Event::Tick {
+            utc_us: Some(random.below(1 << 50)),
+        },
+    }
+}
+
+#[test]
+fn a_hundred_thousand_random_events_break_no_promise() {
+    let mut random = Random(2024);
+    let mut edges = ConnectionEdges::default();
+    let settings = Settings {
+        teach_allowed: true,
+        next_seq: u32::MAX - 100,
+        ..settings()
+    };
+    let mut next_seq = settings.next_seq;
+    let mut station = Station::new(settings, Micros(0));
+    let (mut now, mut measures, mut results, mut most) = (Micros(0), 0_u32, 0_u32, 0);
+    for count in 0..EVENTS {
+        // Now and then long enough for a deadline.
+        let pause = if random.below(500) == 0 {
+            40_000
+        } else {
+            random.below(50)
+        };
+        now = now.after(Micros::from_millis(pause));
+        let before = station.snapshot();
+        let event = any_event(&mut random, &mut edges, station.last_job);
+        let (next, effects) = step(station, event.clone(), now);
+        station = next;
+        let after = station.snapshot();
+        most = most.max(effects.len());
+        let mut persisted = None;
+        for effect in &effects {
+            match effect {
+                Effect::Measure(job) => {
+                    measures += 1;
+                    assert!(
+                        before.state != 2 && before.state != 3,
+                        "{count}: measured twice at once"
+                    );
+                    assert!(
+                        after.recipe.as_ref() == Some(&job.recipe),
+                        "{count}: measured with another recipe"
+                    );
+                }
+                Effect::PersistSeq(seq) => persisted = Some(*seq),
+                Effect::Publish(record) => {
+                    results += 1;
+                    assert_eq!(
+                        persisted,
+                        Some(record.seq),
+                        "{count}: SEQ was not stored first"
+                    );
+                    assert_eq!(record.seq, next_seq, "{count}: SEQ has a gap");
+                    assert_ne!(record.verdict, Verdict::None);
+                    next_seq = next_seq.wrapping_add(1);
+                }
+                _ => {}
+            }
+        }
+        let in_flight = u32::from(matches!(after.state, 2 | 3));
+        assert_eq!(
+            (after.triggers, after.result_seq),
+            (measures, next_seq.wrapping_sub(1)),
+            "{count}: {event:?}"
+        );
+        assert_eq!(
+            results + in_flight,
+            measures,
+            "{count}: a trigger without its one result after {event:?}"
+        );
+        let may = after.state == 1
+            && after.recipe.is_some()
+            && after.control.control & control::ONLINE != 0;
+        assert_eq!(after.is(status::READY), may, "{count}: READY");
+        assert!(
+            !after.is(status::RESULT_VALID) || after.result.is_some(),
+            "{count}: RESULT_VALID without a result"
+        );
+        assert!(
+            usize::from(after.buffered) <= MAX_BUFFERED
+                && (after.buffered == 0) == after.oldest.is_none()
+        );
+        assert_eq!(after.is(status::ERROR), after.error_code != 0);
+        assert_eq!(after.fault.is_some(), after.state == 7);
+        assert!(after.missed >= before.missed && after.triggers >= before.triggers);
+    }
+    assert!(measures > 2_000, "the walk measured only {measures} times");
+    assert!(
+        station.missed > 1_000,
+        "the walk missed only {} triggers",
+        station.missed
+    );
+    assert!(most < MAX_EFFECTS, "{most} effects of one event");
+}
