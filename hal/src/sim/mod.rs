@@ -1,1 +1,22 @@
-//! To come.
+//! The simulated back-end: surfaces, optics and noise under the light of a projector.
+//!
+//! It models light and knows nothing of how fringes are decoded, so that it can judge the code that decodes
+//! them. What the camera sees follows from what the projector shows.
+
+mod blur;
+mod devices;
+pub mod optics;
+pub mod parts;
+pub mod scenario;
+mod trace;
+pub mod transport;
+
+pub use devices::{Stage, head, head_with_progress};
+pub use parts::Part;
+pub use scenario::{Placement, Scenario};
+pub use transport::Truth;
+
+#[cfg(test)]
+mod study_tests;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,125 @@
+//! The parts that can be measured: thin surfaces z(x, y) of bounded slope, with nothing behind them.
+//!
+//! Sizes of the study's parts are those of its `parts.toml`; a part in a scenario may change them.
+
+mod shapes;
+mod sheet_metal;
+mod spline;
+
+use serde::{Deserialize, Serialize};
+
+use super::optics::Vector;
+use super::scenario::within;
+
+pub use shapes::{Cone, Flowerpot, Plane, Sawtooth, Sphere, Tube};
+pub use sheet_metal::{Defect, SheetMetal};
+pub use spline::Spline;
+
+/// A part by name, with its measures in mm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Part {
+    /// A block with a cone-shaped hole.
+    Cone(Cone),
+    /// Ridges along y.
+    Sawtooth(Sawtooth),
+    /// The upper part of a sphere.
+    Sphere(Sphere),
+    /// A lying cylinder.
+    Tube(Tube),
+    /// An open truncated cone.
+    Flowerpot(Flowerpot),
+    /// A free-form surface.
+    Spline(Spline),
+    /// A flat square.
+    Plane(Plane),
+    /// A stamped bracket, the default.
+    SheetMetal(SheetMetal),
+    /// Nothing at all.
+    Empty {},
+}
+
+impl Default for Part {
+    fn default() -> Self {
+        Self::SheetMetal(SheetMetal::default())
+    }
+}
+
+/// A thin surface z(x, y) in the part's own coordinates, mm.
+///
+/// `height` is defined and has bounded slope everywhere, also where the part is not `present` (outside its
+/// outline, in its holes): there a ray passes through.
+pub(crate) trait Surface: Send + Sync {
+    /// z at (x, y).
+    fn height(&self, x: f64, y: f64) -> f64;
+
+    /// Whether there is material at (x, y).
+    fn present(&self, x: f64, y: f64) -> bool;
+
+    /// No slope of `height` is larger than this, in any direction.
+    fn slope_bound(&self) -> f64;
+
+    /// Lowest and highest corner of a box around all material.
+    fn bounds(&self) -> [Vector; 2];
+}
+
+impl Part {
+    /// What is wrong with the measures, if anything.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let positive = |key: &str, value: f64| within(&format!("part.{key}"), value, 1e-3, 1000.0);
+        let finite = |key: &str, value: f64| within(&format!("part.{key}"), value, -1000.0, 1000.0);
+        match self {
+            Self::Cone(part) => {
+                positive("half_size", part.half_size)?;
+                positive("radius", part.radius)?;
+                finite("depth", part.depth)?;
+                finite("top", part.top)
+            }
+            Self::Sawtooth(part) => {
+                positive("half_size", part.half_size)?;
+                positive("period", part.period)?;
+                within("part.rise", part.rise, 0.01, 0.99)?;
+                finite("x0", part.x0)?;
+                finite("lo", part.lo)?;
+                finite("hi", part.hi)
+            }
+            Self::Sphere(part) => {
+                positive("radius", part.radius)?;
+                finite("centre_z", part.centre_z)?;
+                // Below a tenth of the radius above the centre the surface is too steep to be a height field.
+                let low = part.centre_z + 0.1 * part.radius;
+                within("part.cut", part.cut, low, part.centre_z + part.radius)
+            }
+            Self::Tube(part) => {
+                positive("diameter", part.diameter)?;
+                positive("half_length", part.half_length)?;
+                finite("centre_z", part.centre_z)
+            }
+            Self::Flowerpot(part) => {
+                positive("bottom_diameter", part.bottom_diameter)?;
+                positive("depth", part.depth)?;
+                let least = part.bottom_diameter + 0.05 * part.depth;
+                within("part.rim_diameter", part.rim_diameter, least, 1000.0)
+            }
+            Self::Spline(part) => part.check(),
+            Self::Plane(part) => positive("half_size", part.half_size),
+            Self::SheetMetal(part) => part.check(),
+            Self::Empty {} => Ok(()),
+        }
+    }
+
+    /// The surface to trace, or none where there is no part.
+    pub(crate) fn surface(&self) -> Option<Box<dyn Surface>> {
+        Some(match self {
+            Self::Cone(part) => Box::new(part.clone()),
+            Self::Sawtooth(part) => Box::new(part.clone()),
+            Self::Sphere(part) => Box::new(part.clone()),
+            Self::Tube(part) => Box::new(part.clone()),
+            Self::Flowerpot(part) => Box::new(part.clone()),
+            Self::Spline(part) => Box::new(part.clone()),
+            Self::Plane(part) => Box::new(part.clone()),
+            Self::SheetMetal(part) => Box::new(sheet_metal::Stamping::new(part)),
+            Self::Empty {} => return None,
+        })
+    }
+}

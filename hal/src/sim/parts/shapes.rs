@@ -1,0 +1,296 @@
+//! The study's analytic parts: cone, sawtooth, sphere, tube, flowerpot, and a flat plane.
+
+use serde::{Deserialize, Serialize};
+
+use super::Surface;
+use crate::sim::optics::Vector;
+
+/// A lying cylinder is vertical at its sides; what is steeper than this is left away.
+const TUBE_SLOPE: f64 = 6.0;
+
+/// A square block with a cone-shaped hole: z = top, and inside the radius top − depth · (1 − r / radius).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Cone {
+    /// Half the side of the block.
+    pub half_size: f64,
+    /// Radius of the hole at the top.
+    pub radius: f64,
+    /// Depth of the hole.
+    pub depth: f64,
+    /// z of the top.
+    pub top: f64,
+}
+
+impl Default for Cone {
+    fn default() -> Self {
+        Self {
+            half_size: 100.0,
+            radius: 66.0,
+            depth: 160.0,
+            top: 80.0,
+        }
+    }
+}
+
+impl Surface for Cone {
+    fn height(&self, x: f64, y: f64) -> f64 {
+        self.top - self.depth * (1.0 - x.hypot(y) / self.radius).max(0.0)
+    }
+
+    fn present(&self, x: f64, y: f64) -> bool {
+        in_square(self.half_size, x, y)
+    }
+
+    fn slope_bound(&self) -> f64 {
+        (self.depth / self.radius).abs()
+    }
+
+    fn bounds(&self) -> [Vector; 2] {
+        square(
+            self.half_size,
+            self.top - self.depth.max(0.0),
+            self.top - self.depth.min(0.0),
+        )
+    }
+}
+
+/// Ridges along y: with f = frac((x − x0) / period), z rises from lo to hi over f < rise and falls after.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sawtooth {
+    /// Half the side of the square.
+    pub half_size: f64,
+    /// Distance of the ridges.
+    pub period: f64,
+    /// Share of the period that rises, 0.01…0.99.
+    pub rise: f64,
+    /// x of a valley.
+    pub x0: f64,
+    /// z of the valleys.
+    pub lo: f64,
+    /// z of the ridges.
+    pub hi: f64,
+}
+
+impl Default for Sawtooth {
+    fn default() -> Self {
+        Self {
+            half_size: 100.0,
+            period: 40.0,
+            rise: 0.45,
+            x0: -100.0,
+            lo: -13.5,
+            hi: 13.5,
+        }
+    }
+}
+
+impl Surface for Sawtooth {
+    fn height(&self, x: f64, _: f64) -> f64 {
+        let f = ((x - self.x0) / self.period).rem_euclid(1.0);
+        let share = if f < self.rise {
+            f / self.rise
+        } else {
+            (1.0 - f) / (1.0 - self.rise)
+        };
+        self.lo + (self.hi - self.lo) * share
+    }
+
+    fn present(&self, x: f64, y: f64) -> bool {
+        in_square(self.half_size, x, y)
+    }
+
+    fn slope_bound(&self) -> f64 {
+        (self.hi - self.lo).abs() / (self.period * self.rise.min(1.0 - self.rise))
+    }
+
+    fn bounds(&self) -> [Vector; 2] {
+        square(self.half_size, self.lo.min(self.hi), self.lo.max(self.hi))
+    }
+}
+
+/// The part of a sphere above z = cut.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sphere {
+    /// Radius.
+    pub radius: f64,
+    /// z of the centre.
+    pub centre_z: f64,
+    /// z below which there is nothing.
+    pub cut: f64,
+}
+
+impl Default for Sphere {
+    fn default() -> Self {
+        Self {
+            radius: 125.0,
+            centre_z: -75.0,
+            cut: -10.4,
+        }
+    }
+}
+
+impl Sphere {
+    fn rim(&self) -> f64 {
+        let up = self.cut - self.centre_z;
+        (self.radius * self.radius - up * up).max(0.0).sqrt()
+    }
+}
+
+impl Surface for Sphere {
+    fn height(&self, x: f64, y: f64) -> f64 {
+        self.centre_z + capped_circle(self.radius, self.rim(), x.hypot(y))
+    }
+
+    fn present(&self, x: f64, y: f64) -> bool {
+        x.hypot(y) <= self.rim()
+    }
+
+    fn slope_bound(&self) -> f64 {
+        self.rim() / (self.cut - self.centre_z)
+    }
+
+    fn bounds(&self) -> [Vector; 2] {
+        square(self.rim(), self.cut, self.centre_z + self.radius)
+    }
+}
+
+/// The upper side of a cylinder whose axis lies along y.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Tube {
+    /// Diameter.
+    pub diameter: f64,
+    /// Half the length.
+    pub half_length: f64,
+    /// z of the axis.
+    pub centre_z: f64,
+}
+
+impl Default for Tube {
+    fn default() -> Self {
+        Self {
+            diameter: 127.34,
+            half_length: 47.5,
+            centre_z: -20.0,
+        }
+    }
+}
+
+impl Tube {
+    /// Distance from the axis where the slope reaches the cap.
+    fn side(&self) -> f64 {
+        self.diameter / 2.0 * TUBE_SLOPE / TUBE_SLOPE.hypot(1.0)
+    }
+}
+
+impl Surface for Tube {
+    fn height(&self, x: f64, _: f64) -> f64 {
+        self.centre_z + capped_circle(self.diameter / 2.0, self.side(), x.abs())
+    }
+
+    fn present(&self, x: f64, y: f64) -> bool {
+        x.abs() <= self.side() && y.abs() <= self.half_length
+    }
+
+    fn slope_bound(&self) -> f64 {
+        TUBE_SLOPE
+    }
+
+    fn bounds(&self) -> [Vector; 2] {
+        let (x, y) = (self.side(), self.half_length);
+        [
+            [-x, -y, self.centre_z],
+            [x, y, self.centre_z + self.diameter / 2.0],
+        ]
+    }
+}
+
+/// An open truncated cone, axis along z, half its depth above z = 0: the wall only, wider at the rim.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Flowerpot {
+    /// Diameter at the top.
+    pub rim_diameter: f64,
+    /// Diameter at the bottom.
+    pub bottom_diameter: f64,
+    /// Height of the wall.
+    pub depth: f64,
+}
+
+impl Default for Flowerpot {
+    fn default() -> Self {
+        Self {
+            rim_diameter: 198.0,
+            bottom_diameter: 120.0,
+            depth: 149.0,
+        }
+    }
+}
+
+impl Surface for Flowerpot {
+    fn height(&self, x: f64, y: f64) -> f64 {
+        self.depth / 2.0 - self.slope_bound() * (self.rim_diameter / 2.0 - x.hypot(y))
+    }
+
+    fn present(&self, x: f64, y: f64) -> bool {
+        (self.bottom_diameter..=self.rim_diameter).contains(&(2.0 * x.hypot(y)))
+    }
+
+    fn slope_bound(&self) -> f64 {
+        2.0 * self.depth / (self.rim_diameter - self.bottom_diameter)
+    }
+
+    fn bounds(&self) -> [Vector; 2] {
+        square(self.rim_diameter / 2.0, -self.depth / 2.0, self.depth / 2.0)
+    }
+}
+
+/// The reference plane z = 0, as a square that covers the study's field of view.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Plane {
+    /// Half the side of the square.
+    pub half_size: f64,
+}
+
+impl Default for Plane {
+    fn default() -> Self {
+        Self { half_size: 250.0 }
+    }
+}
+
+impl Surface for Plane {
+    fn height(&self, _: f64, _: f64) -> f64 {
+        0.0
+    }
+
+    fn present(&self, x: f64, y: f64) -> bool {
+        in_square(self.half_size, x, y)
+    }
+
+    fn slope_bound(&self) -> f64 {
+        0.0
+    }
+
+    fn bounds(&self) -> [Vector; 2] {
+        square(self.half_size, 0.0, 0.0)
+    }
+}
+
+/// √(radius² − r²), continued beyond `rim` along its tangent.
+fn capped_circle(radius: f64, rim: f64, r: f64) -> f64 {
+    let inside = r.min(rim);
+    let height = (radius * radius - inside * inside).max(0.0).sqrt();
+    height - (r - inside) * rim / height.max(f64::MIN_POSITIVE)
+}
+
+pub(super) fn in_square(half_size: f64, x: f64, y: f64) -> bool {
+    x.abs() <= half_size && y.abs() <= half_size
+}
+
+pub(super) fn square(half_size: f64, low: f64, high: f64) -> [Vector; 2] {
+    [[-half_size, -half_size, low], [half_size, half_size, high]]
+}

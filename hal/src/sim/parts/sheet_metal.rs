@@ -1,0 +1,250 @@
+//! The default part: a stamped sheet-metal bracket with holes, a slot, a bead, a flange, and its defects.
+//!
+//! 150 × 110 mm seen from above, upper side of the plate at z = 8 mm: three round holes and a slot, a raised
+//! bead, drawn edges, and the +x edge bent down as a flange. Measures are our own choice.
+
+use serde::{Deserialize, Serialize};
+
+use super::Surface;
+use crate::sim::optics::Vector;
+use crate::sim::scenario::within;
+
+/// z of the plate's upper side.
+const PLATE_Z: f64 = 8.0;
+/// The plate's outline before the flange: x from −75 to the bend line and |y| ≤ 55, corners rounded.
+const LEFT: f64 = -75.0;
+const BEND_LINE: f64 = 50.0;
+const HALF_HEIGHT: f64 = 55.0;
+const CORNER: f64 = 8.0;
+/// Flange: bend radius, straight length after the bend, and the angle it should have.
+const BEND_RADIUS: f64 = 4.0;
+const FLANGE_LENGTH: f64 = 25.0;
+const FLANGE_DEG: f64 = 35.0;
+/// Round holes x, y, radius.
+const HOLES: [[f64; 3]; 3] = [[-55.0, 30.0, 7.0], [-8.0, 30.0, 10.0], [32.0, 30.0, 7.0]];
+/// The slot and the bead run along x between these ends, at this y, with this half-width.
+const SLOT: Run = Run {
+    from: -35.0,
+    to: 5.0,
+    y: 2.0,
+    half_width: 5.0,
+};
+const BEAD: Run = Run {
+    from: -50.0,
+    to: 30.0,
+    y: -28.0,
+    half_width: 7.0,
+};
+const BEAD_HEIGHT: f64 = 2.2;
+/// The edges are drawn down by this much over this width.
+const EDGE_DROP: f64 = 0.4;
+const EDGE_WIDTH: f64 = 1.6;
+
+/// The bracket and what is wrong with it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SheetMetal {
+    /// Defects; none is a good part.
+    pub defects: Vec<Defect>,
+}
+
+/// One defect of the bracket.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Defect {
+    /// A round, smooth dent.
+    Dent {
+        /// Centre, mm.
+        x: f64,
+        /// Centre, mm.
+        y: f64,
+        /// Depth in mm; negative is a bump.
+        depth_mm: f64,
+        /// Diameter, mm.
+        diameter_mm: f64,
+    },
+    /// A round hole that was not punched.
+    MissingHole {
+        /// 0, 1 or 2, from −x to +x.
+        index: usize,
+    },
+    /// A flange that is bent too far.
+    BentFlange {
+        /// Degrees more than the flange should have; negative is less.
+        degrees: f64,
+    },
+}
+
+impl SheetMetal {
+    pub(super) fn check(&self) -> Result<(), String> {
+        let mut degrees_more = 0.0;
+        for defect in &self.defects {
+            match *defect {
+                Defect::Dent {
+                    x,
+                    y,
+                    depth_mm,
+                    diameter_mm,
+                } => {
+                    within("part.defects.x", x, -100.0, 100.0)?;
+                    within("part.defects.y", y, -100.0, 100.0)?;
+                    within("part.defects.diameter_mm", diameter_mm, 0.5, 200.0)?;
+                    within(
+                        "part.defects.depth_mm",
+                        depth_mm,
+                        -diameter_mm / 2.0,
+                        diameter_mm / 2.0,
+                    )?;
+                }
+                Defect::MissingHole { index } => {
+                    if index >= HOLES.len() {
+                        return Err(format!(
+                            "part.defects.index is {index}: write 0…{}",
+                            HOLES.len() - 1
+                        ));
+                    }
+                }
+                Defect::BentFlange { degrees } => degrees_more += degrees,
+            }
+        }
+        within("part.defects.degrees", degrees_more, -FLANGE_DEG, 40.0)
+    }
+}
+
+/// A straight feature with round ends, along x.
+struct Run {
+    from: f64,
+    to: f64,
+    y: f64,
+    half_width: f64,
+}
+
+impl Run {
+    /// Distance from the feature's middle line.
+    fn distance(&self, x: f64, y: f64) -> f64 {
+        (x - x.clamp(self.from, self.to)).hypot(y - self.y)
+    }
+}
+
+/// The surface of one bracket.
+pub(super) struct Stamping {
+    sin: f64,
+    cos: f64,
+    /// x of the flange's end.
+    right: f64,
+    holes: Vec<[f64; 3]>,
+    /// x, y, depth, diameter.
+    dents: Vec<[f64; 4]>,
+}
+
+impl Stamping {
+    pub(super) fn new(part: &SheetMetal) -> Self {
+        let mut degrees = FLANGE_DEG;
+        let mut missing = Vec::new();
+        let mut dents = Vec::new();
+        for defect in &part.defects {
+            match *defect {
+                Defect::Dent {
+                    x,
+                    y,
+                    depth_mm,
+                    diameter_mm,
+                } => {
+                    dents.push([x, y, depth_mm, diameter_mm]);
+                }
+                Defect::MissingHole { index } => missing.push(index),
+                Defect::BentFlange { degrees: more } => degrees += more,
+            }
+        }
+        let holes = HOLES
+            .iter()
+            .enumerate()
+            .filter(|(index, _)| !missing.contains(index));
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        Self {
+            sin,
+            cos,
+            right: BEND_LINE + BEND_RADIUS * sin + FLANGE_LENGTH * cos,
+            holes: holes.map(|(_, hole)| *hole).collect(),
+            dents,
+        }
+    }
+
+    /// How far the flange has dropped at `x`: a circular arc, then its tangent.
+    fn flange_drop(&self, x: f64) -> f64 {
+        let beyond = (x - BEND_LINE).max(0.0);
+        let arc = beyond.min(BEND_RADIUS * self.sin);
+        let on_arc = BEND_RADIUS - (BEND_RADIUS * BEND_RADIUS - arc * arc).sqrt();
+        on_arc + (beyond - arc) * self.sin / self.cos
+    }
+
+    /// Distance inside the rounded outline; negative outside.
+    fn inside(&self, x: f64, y: f64) -> f64 {
+        let middle = (LEFT + self.right) / 2.0;
+        let across = (x - middle).abs() - ((self.right - LEFT) / 2.0 - CORNER);
+        let down = y.abs() - (HALF_HEIGHT - CORNER);
+        CORNER - across.max(0.0).hypot(down.max(0.0)) - across.max(down).min(0.0)
+    }
+}
+
+/// cos² from 1 in the middle to 0 at `half_width`: smooth at both; its slope is at most π / (2 · half_width).
+fn bump(distance: f64, half_width: f64) -> f64 {
+    if distance >= half_width {
+        return 0.0;
+    }
+    let cos = (std::f64::consts::FRAC_PI_2 * distance / half_width).cos();
+    cos * cos
+}
+
+const BUMP_SLOPE: f64 = std::f64::consts::FRAC_PI_2;
+
+impl Surface for Stamping {
+    fn height(&self, x: f64, y: f64) -> f64 {
+        let mut z = PLATE_Z - self.flange_drop(x);
+        z += BEAD_HEIGHT * bump(BEAD.distance(x, y), BEAD.half_width);
+        let drawn = (1.0 - self.inside(x, y) / EDGE_WIDTH).clamp(0.0, 1.0);
+        z -= EDGE_DROP * drawn * drawn;
+        for [dent_x, dent_y, depth, diameter] in &self.dents {
+            z -= depth * bump((x - dent_x).hypot(y - dent_y), diameter / 2.0);
+        }
+        z
+    }
+
+    fn present(&self, x: f64, y: f64) -> bool {
+        let in_hole =
+            |[hole_x, hole_y, radius]: &[f64; 3]| (x - hole_x).hypot(y - hole_y) < *radius;
+        self.inside(x, y) >= 0.0
+            && SLOT.distance(x, y) >= SLOT.half_width
+            && !self.holes.iter().any(in_hole)
+    }
+
+    fn slope_bound(&self) -> f64 {
+        let dents: f64 = self
+            .dents
+            .iter()
+            .map(|[_, _, depth, diameter]| depth.abs() * BUMP_SLOPE * 2.0 / diameter)
+            .sum();
+        // The bead ends before the bend and keeps off the drawn edges, so only the larger of its slope and theirs acts.
+        let bead = BEAD_HEIGHT * BUMP_SLOPE / BEAD.half_width;
+        let edge = 2.0 * EDGE_DROP / EDGE_WIDTH;
+        (self.sin / self.cos + edge).max(bead) + dents
+    }
+
+    fn bounds(&self) -> [Vector; 2] {
+        let down: f64 = self
+            .dents
+            .iter()
+            .map(|[_, _, depth, _]| depth.max(0.0))
+            .sum();
+        let up: f64 = self
+            .dents
+            .iter()
+            .map(|[_, _, depth, _]| (-depth).max(0.0))
+            .sum();
+        let low = PLATE_Z - self.flange_drop(self.right) - EDGE_DROP - down;
+        [
+            [LEFT, -HALF_HEIGHT, low],
+            [self.right, HALF_HEIGHT, PLATE_Z + BEAD_HEIGHT + up],
+        ]
+    }
+}

@@ -1,0 +1,349 @@
+//! A scenario: rig, light, optics, noise and part of a simulated head, from TOML or built in code.
+//!
+//! The defaults are the study's rig and light (measurement.md, section 5) around the sheet-metal part.
+
+use serde::{Deserialize, Deserializer, Serialize};
+
+use super::parts::Part;
+use crate::model::DeviceModel;
+
+/// A whole simulated head. Keys that are left out of the TOML have the defaults of the study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Scenario {
+    /// Camera bits, 8, 10 or 12.
+    pub bit_depth: u8,
+    /// Rays per pixel along each side, 1…16.
+    pub sub_rays: u32,
+    /// Refresh rate of the projector, 1…1000 Hz.
+    pub refresh_hz: f64,
+    /// Camera and projector.
+    pub rig: Rig,
+    /// How the part answers light.
+    pub light: Light,
+    /// Noise of the camera.
+    pub noise: Noise,
+    /// Blur, response and exposure.
+    pub optics: Optics,
+    /// What is measured.
+    pub part: Part,
+    /// Where it lies.
+    pub placement: Placement,
+}
+
+/// The two devices. Each looks at the world's origin from the xz plane, image x along +x, image y along −y.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Rig {
+    /// The camera.
+    #[serde(deserialize_with = "camera_from")]
+    pub camera: Device,
+    /// The projector.
+    #[serde(deserialize_with = "projector_from")]
+    pub projector: Device,
+}
+
+/// One device of the rig.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Device {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Full angles of view, horizontal and vertical, degrees.
+    pub fov_deg: [f64; 2],
+    /// Direction from the origin to the device, degrees from +z towards +x.
+    pub angle_deg: f64,
+    /// Distance from the origin, mm.
+    pub distance_mm: f64,
+    /// Brown distortion k1, k2, p1, p2, k3.
+    pub distortion: [f64; 5],
+}
+
+/// Phong without specular part: I = ambient + diffuse · max(0, n·l) · pattern/255, 1 = full scale.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Light {
+    /// Light that needs no projector.
+    pub ambient: f64,
+    /// Share of the projector's light that a facing surface returns.
+    pub diffuse: f64,
+}
+
+/// Uniform noise of the camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Noise {
+    /// Half-width of the uniform noise, in counts of 8 bits; deeper cameras have the same share of full scale.
+    pub noise_counts: f64,
+    /// Seed; frame n of a head has the same noise whenever the seed is the same.
+    pub seed: u64,
+}
+
+/// What happens to light on its way.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Optics {
+    /// σ of the projector's Gaussian blur, projector pixels, 0…20.
+    pub projector_blur_px: f64,
+    /// σ of the camera's Gaussian blur, camera pixels, 0…20.
+    pub camera_blur_px: f64,
+    /// Exponent of the projector's response: light = (grey / 255)^gamma, 0.1…10.
+    pub gamma: f64,
+    /// Factor on all light before the camera clips it; above 1 saturates, below 1 darkens. 0…100.
+    pub gain: f64,
+}
+
+/// Where a part lies: turned about x, then y (tilt), then z (rotation), then shifted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Placement {
+    /// Shift x, y, z in mm.
+    pub shift_mm: [f64; 3],
+    /// Tilt about x and about y, degrees.
+    pub tilt_deg: [f64; 2],
+    /// Rotation about z, degrees.
+    pub rotation_deg: f64,
+}
+
+impl Default for Scenario {
+    fn default() -> Self {
+        Self {
+            bit_depth: 8,
+            sub_rays: 4,
+            refresh_hz: 60.0,
+            rig: Rig::default(),
+            light: Light::default(),
+            noise: Noise::default(),
+            optics: Optics::default(),
+            part: Part::default(),
+            placement: Placement::default(),
+        }
+    }
+}
+
+impl Default for Rig {
+    fn default() -> Self {
+        Self {
+            camera: Device {
+                width: 512,
+                height: 512,
+                fov_deg: [20.0, 20.0],
+                angle_deg: 20.0,
+                distance_mm: 600.0,
+                distortion: [-0.12, 0.15, 2e-4, -3e-4, 0.0],
+            },
+            projector: Device {
+                width: 1024,
+                height: 768,
+                fov_deg: [43.6, 33.4],
+                angle_deg: -7.0,
+                distance_mm: 600.0,
+                distortion: [-0.05, 0.03, -3e-4, 2e-4, 0.0],
+            },
+        }
+    }
+}
+
+impl Default for Light {
+    fn default() -> Self {
+        Self {
+            ambient: 0.04,
+            diffuse: 0.86,
+        }
+    }
+}
+
+impl Default for Noise {
+    fn default() -> Self {
+        Self {
+            noise_counts: 6.375,
+            seed: 1,
+        }
+    }
+}
+
+impl Default for Optics {
+    fn default() -> Self {
+        Self {
+            projector_blur_px: 0.0,
+            camera_blur_px: 0.0,
+            gamma: 1.0,
+            gain: 1.0,
+        }
+    }
+}
+
+impl Device {
+    /// The exact geometry of this device, as files state it.
+    #[must_use]
+    pub fn model(&self) -> DeviceModel {
+        let (sin, cos) = self.angle_deg.to_radians().sin_cos();
+        let focal =
+            |pixels: u32, fov: f64| f64::from(pixels) / 2.0 / (fov.to_radians() / 2.0).tan();
+        let centre = |pixels: u32| (f64::from(pixels) - 1.0) / 2.0;
+        DeviceModel {
+            fx: focal(self.width, self.fov_deg[0]),
+            fy: focal(self.height, self.fov_deg[1]),
+            cx: centre(self.width),
+            cy: centre(self.height),
+            distortion: self.distortion,
+            rotation: [cos, 0.0, -sin, 0.0, -1.0, 0.0, -sin, 0.0, -cos],
+            // The device stands at distance · (sin, 0, cos) and looks at the origin along its own z.
+            translation_mm: [0.0, 0.0, self.distance_mm],
+        }
+    }
+}
+
+/// A device of a file: every key may be left out.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DeviceFile {
+    width: Option<u32>,
+    height: Option<u32>,
+    fov_deg: Option<[f64; 2]>,
+    angle_deg: Option<f64>,
+    distance_mm: Option<f64>,
+    distortion: Option<[f64; 5]>,
+}
+
+impl DeviceFile {
+    fn over(self, base: Device) -> Device {
+        Device {
+            width: self.width.unwrap_or(base.width),
+            height: self.height.unwrap_or(base.height),
+            fov_deg: self.fov_deg.unwrap_or(base.fov_deg),
+            angle_deg: self.angle_deg.unwrap_or(base.angle_deg),
+            distance_mm: self.distance_mm.unwrap_or(base.distance_mm),
+            distortion: self.distortion.unwrap_or(base.distortion),
+        }
+    }
+}
+
+fn camera_from<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Device, D::Error> {
+    DeviceFile::deserialize(deserializer).map(|file| file.over(Rig::default().camera))
+}
+
+fn projector_from<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Device, D::Error> {
+    DeviceFile::deserialize(deserializer).map(|file| file.over(Rig::default().projector))
+}
+
+/// A scenario that cannot be simulated; the message names the file, the key and the remedy.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("read scenario {place}: {problem}")]
+pub struct ScenarioError {
+    /// The file, as the caller named it.
+    pub place: String,
+    /// The key, what is wrong with it and what to write.
+    pub problem: String,
+}
+
+impl Scenario {
+    /// Reads and checks a scenario; `place` is only named in messages.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] for text that is not TOML, an unknown key, or a value out of its range.
+    pub fn from_toml(text: &str, place: &str) -> Result<Self, ScenarioError> {
+        let failed = |problem: String| ScenarioError {
+            place: place.to_owned(),
+            problem,
+        };
+        let scenario: Self = toml::from_str(text).map_err(|error| failed(error.to_string()))?;
+        scenario.check().map_err(failed)?;
+        Ok(scenario)
+    }
+
+    /// Standard deviation of one sample in counts of this camera: uniform noise and rounding.
+    #[must_use]
+    pub fn noise_sigma_counts(&self) -> f64 {
+        let half_width = self.noise.noise_counts * self.full_scale() / 255.0;
+        // Variances of the uniform distributions of half-widths h and 1/2.
+        ((half_width * half_width + 0.25) / 3.0).sqrt()
+    }
+
+    /// The largest sample.
+    pub(crate) fn full_scale(&self) -> f64 {
+        f64::from((1_u32 << self.bit_depth.min(16)) - 1)
+    }
+
+    /// What is wrong with the values, if anything.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        if ![8, 10, 12].contains(&self.bit_depth) {
+            return Err(format!(
+                "bit_depth is {}: write 8, 10 or 12",
+                self.bit_depth
+            ));
+        }
+        if !(1..=16).contains(&self.sub_rays) {
+            return Err(format!("sub_rays is {}: write 1…16", self.sub_rays));
+        }
+        for (name, device) in [
+            ("rig.camera", &self.rig.camera),
+            ("rig.projector", &self.rig.projector),
+        ] {
+            device
+                .check()
+                .map_err(|problem| format!("{name}.{problem}"))?;
+        }
+        within("refresh_hz", self.refresh_hz, 1.0, 1000.0)?;
+        within("light.ambient", self.light.ambient, 0.0, 100.0)?;
+        within("light.diffuse", self.light.diffuse, 0.0, 100.0)?;
+        within("noise.noise_counts", self.noise.noise_counts, 0.0, 255.0)?;
+        within(
+            "optics.projector_blur_px",
+            self.optics.projector_blur_px,
+            0.0,
+            20.0,
+        )?;
+        within(
+            "optics.camera_blur_px",
+            self.optics.camera_blur_px,
+            0.0,
+            20.0,
+        )?;
+        within("optics.gamma", self.optics.gamma, 0.1, 10.0)?;
+        within("optics.gain", self.optics.gain, 0.0, 100.0)?;
+        self.placement.check()?;
+        self.part.check()
+    }
+}
+
+impl Placement {
+    /// What is wrong with the values, if anything.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        for shift in self.shift_mm {
+            within("placement.shift_mm", shift, -1000.0, 1000.0)?;
+        }
+        for tilt in self.tilt_deg {
+            within("placement.tilt_deg", tilt, -80.0, 80.0)?;
+        }
+        within("placement.rotation_deg", self.rotation_deg, -360.0, 360.0)
+    }
+}
+
+impl Device {
+    fn check(&self) -> Result<(), String> {
+        for (name, pixels) in [("width", self.width), ("height", self.height)] {
+            if !(1..=4096).contains(&pixels) {
+                return Err(format!("{name} is {pixels}: write 1…4096"));
+            }
+        }
+        for fov in self.fov_deg {
+            within("fov_deg", fov, 1.0, 120.0)?;
+        }
+        within("angle_deg", self.angle_deg, -80.0, 80.0)?;
+        within("distance_mm", self.distance_mm, 10.0, 100_000.0)?;
+        for coefficient in self.distortion {
+            within("distortion", coefficient, -1.0, 1.0)?;
+        }
+        Ok(())
+    }
+}
+
+/// An error that names `key` unless `value` lies in `low`…`high`; NaN does not.
+pub(crate) fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    Err(format!("{key} is {value}: write {low}…{high}"))
+}

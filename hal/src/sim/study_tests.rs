@@ -1,0 +1,148 @@
+//! The simulator against an independent one: the study's recordings, rendered again.
+
+use std::time::Duration;
+
+use super::parts::{Cone, Sphere, Spline};
+use super::scenario::Scenario;
+use super::{Part, head};
+use crate::frame::Samples;
+use crate::projector::Raster;
+use crate::replay::Recording;
+use crate::replay::recording::{PatternSpec, RecordedFrame};
+use crate::replay::shared_tests::shared_recordings;
+
+/// Truth heights agree this well, RMS mm: a hundredth of a millimetre is far below the noise of any measurement.
+const HEIGHT_RMS_MM: f64 = 0.01;
+/// Share of pixels whose class 2 agrees: the two programs find silhouettes and depth edges in their own ways.
+const CLASS_AGREEMENT: f64 = 0.995;
+/// Frames without noise differ from noisy recorded ones by the noise: σ of ±6.375 counts uniform and rounding, 3.69,
+/// twice rounded; the rest is room for the depth edges.
+const FRAME_RMS_COUNTS: std::ops::Range<f64> = 3.5..3.85;
+
+/// grey = 255/2 · (1 + sin 2π(ratio · Φ_P(ξ, η) + shift)), rounded: the format's definition.
+fn raster(recording: &Recording, frame: &RecordedFrame) -> Raster {
+    let (width, height) = (recording.projector.width, recording.projector.height);
+    let mut pixels = Vec::new();
+    for eta in 0..height {
+        for xi in 0..width {
+            let phase = match &recording.patterns[frame.pattern] {
+                PatternSpec::Vertical { fringes } => fringes * f64::from(xi) / f64::from(width),
+                PatternSpec::Horizontal { fringes } => fringes * f64::from(eta) / f64::from(height),
+                PatternSpec::File { columns, turns, .. } => {
+                    turns[eta as usize * columns + xi as usize]
+                }
+            };
+            let sine = (std::f64::consts::TAU * (frame.ratio * phase + frame.shift_turns)).sin();
+            pixels.push((255.0 / 2.0 * (1.0 + sine)).round() as u8);
+        }
+    }
+    Raster::new(width, height, pixels).unwrap()
+}
+
+fn compare(name: &str, part: Part) {
+    let Some(folder) = shared_recordings() else {
+        return;
+    };
+    let recording = Recording::open(&folder.join(name)).unwrap();
+    let mut scenario = Scenario {
+        part,
+        ..Scenario::default()
+    };
+    scenario.rig.camera.width = recording.width;
+    scenario.rig.camera.height = recording.height;
+    scenario.noise.noise_counts = 0.0;
+    let (mut head, stage) = head(&scenario).unwrap();
+
+    for (ours, theirs) in [
+        (
+            stage.camera_model(),
+            recording.camera_model.clone().unwrap(),
+        ),
+        (
+            stage.projector_model(),
+            recording.projector.model.clone().unwrap(),
+        ),
+    ] {
+        assert!((ours.fx - theirs.fx).abs() + (ours.fy - theirs.fy).abs() < 1e-9);
+        assert!(
+            ours.rotation
+                .iter()
+                .zip(theirs.rotation)
+                .all(|(a, b)| (a - b).abs() < 1e-12)
+        );
+    }
+
+    let ours = stage.truth();
+    let theirs_class = recording.truth_class.as_ref().unwrap();
+    let theirs_height = recording.truth_height.as_ref().unwrap();
+    let mut table = [[0_usize; 3]; 3];
+    let (mut squares, mut both) = (0.0, 0.0);
+    for at in 0..ours.class.len() {
+        table[usize::from(ours.class[at])][usize::from(theirs_class[at])] += 1;
+        if ours.class[at] == 2 && theirs_class[at] == 2 {
+            squares += f64::from(ours.height[at] - theirs_height[at]).powi(2);
+            both += 1.0;
+        }
+    }
+    let height_rms = (squares / both).sqrt();
+    let unlike = table[2][0] + table[2][1] + table[0][2] + table[1][2];
+    let agreement = 1.0 - unlike as f64 / ours.class.len() as f64;
+
+    head.load(
+        recording
+            .frames
+            .iter()
+            .map(|frame| raster(&recording, frame))
+            .collect(),
+    )
+    .unwrap();
+    let indices: Vec<usize> = (0..recording.frames.len()).collect();
+    let (mut squares, mut count) = (0.0, 0.0);
+    head.acquire(&indices, Duration::from_secs(1), &mut |index, frame| {
+        let (Samples::Eight(ours), Samples::Eight(theirs)) =
+            (frame.samples(), recording.frames[index].frame.samples())
+        else {
+            panic!("not 8 bit");
+        };
+        for (at, (a, b)) in ours.iter().zip(theirs).enumerate() {
+            // Dark pixels clip their noise.
+            if theirs_class[at] == 2 && *a > 8 && *a < 247 {
+                squares += (f64::from(*a) - f64::from(*b)).powi(2);
+                count += 1.0;
+            }
+        }
+    })
+    .unwrap();
+    let frame_rms = (squares / count).sqrt();
+    println!(
+        "{name}: height RMS {height_rms:.5} mm, class 2 agrees {:.3} %, frames differ by {frame_rms:.3}, {table:?}",
+        agreement * 100.0
+    );
+    assert!(
+        height_rms < HEIGHT_RMS_MM,
+        "{name}: height RMS {height_rms}"
+    );
+    assert!(
+        agreement > CLASS_AGREEMENT,
+        "{name}: class 2 agreement {agreement}, {table:?}"
+    );
+    assert!(
+        FRAME_RMS_COUNTS.contains(&frame_rms),
+        "{name}: frames differ by {frame_rms}"
+    );
+}
+
+#[test]
+fn the_sphere_is_rendered_as_the_independent_simulator_did() {
+    compare("study-sphere-fixed81", Part::Sphere(Sphere::default()));
+}
+
+#[test]
+fn the_cone_is_rendered_as_the_independent_simulator_did() {
+    compare("study-cone-adaptive", Part::Cone(Cone::default()));
+}
+
+#[test]
+fn the_spline_is_rendered_as_the_independent_simulator_did() {
+    compare("study-spline-dense121", Part::Spline(Spline::default()));
+}
