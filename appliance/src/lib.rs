@@ -3,3 +3,4 @@ pub mod cli;
 pub mod modbus;
 pub mod output;
 pub mod station;
+pub mod web;
