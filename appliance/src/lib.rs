@@ -10,3 +10,4 @@ pub mod plan;
 pub mod recipe;
 pub mod seam;
 pub mod station;
+pub mod web;
