@@ -3,6 +3,7 @@
 use crate::calibration::Calibration;
 use crate::recipe::{GaugeKind, Recipe};
 use crate::seam;
+use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED};
 use crate::station::{GaugeValue, Inspection, StageTime, Unit, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
@@ -16,8 +17,6 @@ use hal::projector::Raster;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// RESULT flag: the full sequence was used.
-use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED};
 
 /// A recipe joined with the head's calibration.
 #[derive(Debug)]
@@ -170,7 +169,7 @@ impl Plan {
     fn judge(&self, phases: &PhaseMap, heights: &HeightMap, inspection: &mut Inspection) {
         let comparison = Comparison::new(&self.golden, heights);
         for (gauge, region) in self.recipe.file.gauges.iter().zip(&self.recipe.regions) {
-            let (unit, reading) = match gauge.kind {
+            let (unit, reading) = match gauge.measures {
                 GaugeKind::Deviation { smoothing_px } => {
                     (Unit::Length, comparison.deviation(region, smoothing_px))
                 }

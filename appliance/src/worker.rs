@@ -2,10 +2,11 @@
 
 use crate::backend::Opened;
 use crate::plan::{Maps, Plan, PlanError};
+use crate::progress::Progress;
 use crate::recipe::teach::{Naming, TeachError, teach};
 use crate::recipe::{LoadError, Store};
 use crate::station::{
-    ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, StationHandle,
+    ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
 };
 use hal::error::ErrorKind;
 use hal::frame::Frame;
@@ -69,16 +70,23 @@ pub struct Worker {
     pub station: StationHandle,
     /// Where the last maps go.
     pub maps: LastMaps,
+    /// Shows how far teaching is, and the log.
+    pub progress: Progress,
 }
 
 impl Worker {
-    /// Works until told to stop, or until nobody can tell it anything any more.
-    pub fn run(mut self, orders: &Receiver<Order>) {
+    /// Works until told to stop, or until nobody can tell it anything any more. `first` is asked of the
+    /// station as soon as it is ready for it.
+    pub fn run(mut self, orders: &Receiver<Order>, first: Option<Request>) {
         self.station.event(Event::Condition(Condition {
             calibration_valid: true,
             ..Condition::default()
         }));
+        self.progress.clear();
         self.station.event(Event::Started);
+        if let Some(first) = first {
+            self.station.event(Event::Request(first));
+        }
         let mut plan = None;
         loop {
             match orders.recv_timeout(SIGN_OF_LIFE) {
@@ -136,7 +144,7 @@ impl Worker {
                 let recipe = active(&ready);
                 *plan = Some(ready);
                 if let Some(fallback) = fallback {
-                    eprintln!("fringed: {fallback}");
+                    self.progress.log(&fallback);
                 }
                 self.station.event(Event::RecipeLoaded { job, recipe });
                 return;
@@ -158,7 +166,7 @@ impl Worker {
         let Some(before) = plan else { return };
         let shown = before.rasters(&self.opened.calibration);
         if let Err(error) = shown.and_then(|rasters| self.opened.head.load(rasters)) {
-            eprintln!("fringed: {error}");
+            self.progress.log(&error.to_string());
             *plan = None;
         }
     }
@@ -197,8 +205,9 @@ impl Worker {
             name: format!("Part {number}"),
             taught_at_unix_s: crate::clock::utc_us().unwrap_or(0) / 1_000_000,
         };
-        let station = self.station.clone();
+        let (station, bar) = (self.station.clone(), self.progress.clone());
         let progress = |fraction: f64, words: &str| {
+            bar.tell(fraction, words);
             station.event(Event::Progress {
                 job,
                 fraction: fraction as f32,
@@ -209,6 +218,7 @@ impl Worker {
             head, calibration, ..
         } = &mut self.opened;
         let taught = self.pool.install(|| teach(head, calibration, &naming, DEVICE_TIMEOUT, &progress));
+        self.progress.clear();
         let stored = taught.map_err(|error| (code_of_teaching(&error), error.to_string())).and_then(
             |(bytes, recipe)| {
                 self.recipes

@@ -30,7 +30,7 @@ impl Measure {
     )]
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         let recording = Recording::open(&self.recording)?;
-        let pool = common.pool()?;
+        let pool = super::pool(common.threads.unwrap_or(0))?;
         let measurement = pool.install(|| measure(&recording, &self.recording))?;
         let folder = OutputFolder::create(&self.out)?;
         pool.install(|| write(&folder, &measurement))?;

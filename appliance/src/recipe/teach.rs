@@ -249,7 +249,7 @@ fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) 
         GaugeFile {
             name: "deviation".into(),
             region: "frame".into(),
-            kind: GaugeKind::Deviation {
+            measures: GaugeKind::Deviation {
                 smoothing_px: SMOOTHING_PX,
             },
             low: Some(-DEVIATION_MM),
@@ -258,7 +258,7 @@ fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) 
         GaugeFile {
             name: "coverage".into(),
             region: "frame".into(),
-            kind: GaugeKind::Coverage,
+            measures: GaugeKind::Coverage,
             low: Some((coverage - COVERAGE_CHANGE).max(0.0)),
             high: Some((coverage + COVERAGE_CHANGE).min(1.0)),
         },
@@ -275,7 +275,7 @@ fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) 
         gauges.push(GaugeFile {
             name: name.clone(),
             region: name,
-            kind: GaugeKind::Coverage,
+            measures: GaugeKind::Coverage,
             low: None,
             high: Some(OPENING_COVERAGE),
         });
