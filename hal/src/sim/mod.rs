@@ -4,6 +4,7 @@
 //! them. What the camera sees follows from what the projector shows.
 
 mod blur;
+mod limits;
 pub mod optics;
 pub mod parts;
 pub mod scenario;

@@ -8,8 +8,8 @@ mod spline;
 
 use serde::{Deserialize, Serialize};
 
+use super::limits::within;
 use super::optics::Vector;
-use super::scenario::within;
 
 pub use shapes::{Cone, Flowerpot, Plane, Sawtooth, Sphere, Tube};
 pub use sheet_metal::{Defect, SheetMetal};

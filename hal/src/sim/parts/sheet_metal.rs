@@ -6,8 +6,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::Surface;
+use crate::sim::limits::within;
 use crate::sim::optics::Vector;
-use crate::sim::scenario::within;
 
 /// z of the plate's upper side.
 const PLATE_Z: f64 = 8.0;
