@@ -2,6 +2,9 @@
 
 use super::scenario::{Device, Placement, Scenario};
 
+/// Most rays of a light transport. Each has at most four taps, which then fit the 32-bit offsets of the matrix.
+const MAX_RAYS: u64 = 1 << 28;
+
 impl Scenario {
     /// What is wrong with the values, if anything.
     pub(crate) fn check(&self) -> Result<(), String> {
@@ -21,6 +24,15 @@ impl Scenario {
             device
                 .check()
                 .map_err(|problem| format!("{name}.{problem}"))?;
+        }
+        let camera = &self.rig.camera;
+        let pixels = u64::from(camera.width) * u64::from(camera.height);
+        let rays = pixels * u64::from(self.sub_rays).pow(2);
+        if rays > MAX_RAYS {
+            return Err(format!(
+                "rig.camera of {}×{} pixels with {}² sub_rays is {rays} rays: keep within {MAX_RAYS}",
+                camera.width, camera.height, self.sub_rays
+            ));
         }
         within("refresh_hz", self.refresh_hz, 1.0, 1000.0)?;
         within("light.ambient", self.light.ambient, 0.0, 100.0)?;

@@ -96,6 +96,10 @@ fn a_scenario_is_read_over_its_defaults_and_refuses_what_it_does_not_know() {
         ("bit_depth = 9", "bit_depth is 9"),
         ("[rig.camera]\nfocus = 1", "focus"),
         ("[rig.camera]\nwidth = 0", "rig.camera.width is 0"),
+        (
+            "sub_rays = 16\n[rig.camera]\nwidth = 4096\nheight = 4096",
+            "4096×4096 pixels with 16²",
+        ),
         ("[part]\nkind = \"cube\"", "cube"),
         ("[part]\nkind = \"empty\"\nsize = 1", "size"),
         ("[part]\nkind = \"cone\"\nheight = 1", "height"),
