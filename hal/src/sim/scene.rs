@@ -1,6 +1,6 @@
 //! What the simulated camera sees of what the simulated projector shows: light, blur, noise and counts.
 //!
-//! Measured in release on one core for 512 × 512 pixels: 2.6 ms per frame including noise (the test
+//! Measured in release on one core for 512 × 512 pixels: about 3 ms per frame including noise (the test
 //! `speed_of_building_a_transport_and_of_one_frame` prints it).
 
 use std::sync::Arc;
