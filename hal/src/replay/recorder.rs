@@ -3,6 +3,7 @@
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::failure::RecordingError;
 use super::manifest::{
@@ -54,12 +55,9 @@ pub fn write(recording: &Recording, folder: &Path) -> Result<(), RecorderError> 
     check::manifest(&manifest, &folder.join(MANIFEST)).map_err(|error| wrong(folder, &error))?;
     check_samples(recording, folder)?;
 
-    let name = folder
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
-    let partial = folder.with_file_name(format!(".{name}.partial-{}", std::process::id()));
+    let partial = partial_name(folder);
+    // Made here and not in `fill`: what somebody else made is not ours to remove.
+    fs::create_dir(&partial).map_err(|source| create(&partial, source))?;
     let written = fill(recording, &manifest, &partial).and_then(|()| {
         fs::rename(&partial, folder).map_err(|source| create(folder, source))?;
         sync_folder(
@@ -74,6 +72,14 @@ pub fn write(recording: &Recording, folder: &Path) -> Result<(), RecorderError> 
         let _ = fs::remove_dir_all(&partial);
     }
     written
+}
+
+/// A hidden name beside `folder` that no other recorder uses at the same time.
+fn partial_name(folder: &Path) -> PathBuf {
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    folder.with_file_name(format!(".{name}.partial-{}-{count}", std::process::id()))
 }
 
 fn wrong(folder: &Path, error: &RecordingError) -> RecorderError {
@@ -230,7 +236,7 @@ fn check_samples(recording: &Recording, folder: &Path) -> Result<(), RecorderErr
 }
 
 fn fill(recording: &Recording, manifest: &Manifest, partial: &Path) -> Result<(), RecorderError> {
-    for folder in ["", "frames", "pattern", "truth"] {
+    for folder in ["frames", "pattern", "truth"] {
         let needed = match folder {
             "pattern" => recording
                 .patterns
