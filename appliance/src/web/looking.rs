@@ -204,13 +204,16 @@ async fn serve_one_scene_per_port() {
         tokio::spawn(tick(handle.clone(), system_utc_us, std::future::pending()));
         let hangs = scene == 7;
         let alive = handle.clone();
-        tokio::spawn(async move {
+        let beats = async move {
             let mut interval = tokio::time::interval(Duration::from_millis(200));
-            while !hangs {
+            loop {
                 interval.tick().await;
                 alive.event(Event::Alive);
             }
-        });
+        };
+        if !hangs {
+            tokio::spawn(beats);
+        }
         let port = FIRST_PORT + u16::try_from(scene).unwrap();
         let listener = bind(([127, 0, 0, 1], port).into()).await.unwrap();
         tokio::spawn(serve(

@@ -104,9 +104,16 @@ function showResult(result) {
   showStages(result);
   const points = result.valid_points.toLocaleString("en").replaceAll(",", " ");
   text("height-words", result.valid_points ? `${points} points · ${(result.coverage_permille / 10).toFixed(1)} % of the regions` : "");
+  // Without a single point the picture would be that of an older part.
+  if (!result.valid_points) {
+    show("picture", false);
+    show("no-picture", true);
+    text("no-picture", "no height was measured");
+    return;
+  }
   const picture = new Image();
   picture.onload = () => { $("picture").src = picture.src; show("picture", true); show("no-picture", false); };
-  picture.onerror = () => { show("picture", false); show("no-picture", true); };
+  picture.onerror = () => { show("picture", false); show("no-picture", true); text("no-picture", "no picture of this result"); };
   picture.src = `/height.png?seq=${result.seq}&boot=${boot}`;
 }
 
