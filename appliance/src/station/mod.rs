@@ -22,6 +22,7 @@
 pub mod control;
 pub mod error_code;
 pub mod event;
+pub mod gauge;
 pub mod handle;
 pub mod machine;
 pub mod result;
@@ -41,11 +42,10 @@ mod walk;
 
 pub use control::{ConnectionEdges, ControlRegisters, ControlWrite, Masked, RefusedWrite};
 pub use event::{Condition, Effect, Effects, Event, Job, JobId, RecipeKey, RecipeResult, Request};
+pub use gauge::{Decision, GaugeValue, Unit};
 pub use handle::{StationHandle, system_utc_us, tick};
 pub use machine::{Limits, Settings, Station};
-pub use result::{
-    Decision, GaugeValue, Inspection, MAX_GAUGES, ResultRecord, StageTime, Unit, Verdict,
-};
+pub use result::{Inspection, MAX_GAUGES, ResultRecord, StageTime, Verdict};
 pub use snapshot::{Identity, Snapshot, TeachProgress};
 pub use state::{ActiveRecipe, Cycle, Fault, Micros, State};
 pub use step::step;
