@@ -190,3 +190,13 @@ fn stopping_aborts_and_still_takes_the_result_in_flight() {
     });
     assert_eq!((snapshot.state, snapshot.result_seq), (8, 41));
 }
+
+#[test]
+fn a_missed_deadline_is_not_cleared_by_the_recovery_of_a_device_and_a_new_worker_holds_no_recipe() {
+    let mut bench = Bench::ready();
+    bench.token(1);
+    assert_eq!(bench.tick_after(31_000).state, 7);
+    assert_eq!(bench.event(Event::Recovered).state, 7);
+    let snapshot = bench.event(Event::Started);
+    assert_eq!((snapshot.state, snapshot.recipe), (1, None));
+}
