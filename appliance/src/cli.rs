@@ -107,7 +107,10 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
     }
 }
 
-#[expect(clippy::print_stdout, reason = "the map is what the command is asked for")]
+#[expect(
+    clippy::print_stdout,
+    reason = "the map is what the command is asked for"
+)]
 fn registers(common: &Common) {
     if common.json {
         println!("{:#}", registers_json());

@@ -106,7 +106,12 @@ impl Daemon {
             sockets,
             threads: [measuring, serving],
         };
-        let gone = || Failure::new(Exit::Software, "the measuring task ended before its head was open");
+        let gone = || {
+            Failure::new(
+                Exit::Software,
+                "the measuring task ended before its head was open",
+            )
+        };
         match opening.recv().unwrap_or_else(|_| Err(gone())) {
             Ok(stage) => Ok(Self {
                 station,
@@ -180,7 +185,9 @@ fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> Result<JoinHandle<(
     std::thread::Builder::new()
         .name(name.into())
         .spawn(run)
-        .map_err(|error| Failure::because(Exit::Software, format!("start the thread {name}"), error))
+        .map_err(|error| {
+            Failure::because(Exit::Software, format!("start the thread {name}"), error)
+        })
 }
 
 async fn listen(config: &Config) -> Result<(TcpListener, TcpListener), Failure> {
@@ -220,7 +227,11 @@ fn station(config: &Config, state: &StateFolder) -> Result<Station, Failure> {
 
 /// Carries out what the station wants done. Called with the station locked: it only hands on, and
 /// writes the counter, which must be stored before anybody sees the result.
-fn effects(orders: mpsc::Sender<Order>, counter: Counter, progress: Progress) -> impl FnMut(Effect) {
+fn effects(
+    orders: mpsc::Sender<Order>,
+    counter: Counter,
+    progress: Progress,
+) -> impl FnMut(Effect) {
     // An order that nobody takes is noticed by the station itself: its wait has a deadline.
     let order = move |order| drop(orders.send(order));
     move |effect| match effect {
@@ -229,7 +240,9 @@ fn effects(orders: mpsc::Sender<Order>, counter: Counter, progress: Progress) ->
         Effect::Teach { job, number } => order(Order::Teach(job, number)),
         Effect::PersistSeq(seq) => {
             if let Err(error) = counter.store(seq) {
-                progress.log(&format!("store the result counter {seq}: {error}: free space"));
+                progress.log(&format!(
+                    "store the result counter {seq}: {error}: free space"
+                ));
             }
         }
         Effect::Log(line) => progress.log(&line),
@@ -242,7 +255,11 @@ fn effects(orders: mpsc::Sender<Order>, counter: Counter, progress: Progress) ->
 
 /// What the station does first: load its recipe; a simulated head without it teaches the part that
 /// lies in front of it.
-fn first_request(config: &Config, simulated: bool, recipes: &crate::recipe::Store) -> Option<Request> {
+fn first_request(
+    config: &Config,
+    simulated: bool,
+    recipes: &crate::recipe::Store,
+) -> Option<Request> {
     let number = config.station.recipe;
     if recipes.numbers().contains(&number) {
         Some(Request::Load(RecipeKey::Number(number)))
@@ -276,7 +293,11 @@ async fn serve(
         let rows = maps.height_mm.len() / maps.width.max(1);
         Some(height_png(maps.width as u32, rows as u32, &maps.height_mm))
     };
-    let site = web::Site::new(station.clone(), Arc::new(picture), config.http.hosts.clone());
+    let site = web::Site::new(
+        station.clone(),
+        Arc::new(picture),
+        config.http.hosts.clone(),
+    );
     let pages = async {
         if let Err(error) = web::serve(page, site, stop()).await {
             eprintln!("fringed: {error}");

@@ -17,7 +17,6 @@ use hal::projector::Raster;
 use std::sync::Arc;
 use std::time::Instant;
 
-
 /// A recipe joined with the head's calibration.
 #[derive(Debug)]
 pub struct Plan {
@@ -70,7 +69,11 @@ impl Plan {
     ///
     /// # Errors
     /// If the recipe was made for another calibration or does not fit the head.
-    pub fn new(recipe: Recipe, calibration: &Calibration, simulated: bool) -> Result<Self, PlanError> {
+    pub fn new(
+        recipe: Recipe,
+        calibration: &Calibration,
+        simulated: bool,
+    ) -> Result<Self, PlanError> {
         let number = recipe.file.number;
         let present = calibration.fingerprint();
         if recipe.file.calibration != present {
@@ -89,7 +92,10 @@ impl Plan {
         let file = &recipe.file;
         let camera = (file.camera.width, file.camera.height, file.camera.bit_depth);
         if camera != calibration.camera {
-            return Err(format!("it is for frames {camera:?}, the camera gives {:?}", calibration.camera));
+            return Err(format!(
+                "it is for frames {camera:?}, the camera gives {:?}",
+                calibration.camera
+            ));
         }
         let (camera, projector) = calibration.devices()?;
         let [low, high] = file.range_mm;
@@ -106,7 +112,9 @@ impl Plan {
             .map_err(|error| error.to_string())?;
         let map = decoder.unwrapping().needs_map().then(|| {
             let golden = recipe.arrays.golden_phase.iter();
-            golden.map(|&turns| AbsolutePhase::from_turns(turns)).collect()
+            golden
+                .map(|&turns| AbsolutePhase::from_turns(turns))
+                .collect()
         });
         let golden = golden(&recipe, &decoder);
         Ok(Self {
@@ -126,7 +134,12 @@ impl Plan {
 
     /// The patterns of the sequence, in the order of its frames.
     pub fn rasters(&self, calibration: &Calibration) -> Result<Vec<Raster>, hal::error::Error> {
-        let production = self.recipe.file.sequence.iter().filter(|frame| frame.production);
+        let production = self
+            .recipe
+            .file
+            .sequence
+            .iter()
+            .filter(|frame| frame.production);
         let frames = production.map(|frame| (frame.ratio, frame.shift_turns));
         rasters(&self.recipe.function, frames, calibration)
     }
@@ -161,7 +174,11 @@ impl Plan {
         clock.stage("gauges", &mut inspection);
         let maps = Maps {
             width: heights.width,
-            height_mm: heights.height.iter().map(|height| height.mm() as f32).collect(),
+            height_mm: heights
+                .height
+                .iter()
+                .map(|height| height.mm() as f32)
+                .collect(),
         };
         (inspection, Some(maps))
     }
@@ -207,7 +224,10 @@ impl Plan {
                 least * 100.0
             ))
         } else if !missing.is_empty() {
-            Some(format!("gauge {} found nothing to measure", missing.join(", ")))
+            Some(format!(
+                "gauge {} found nothing to measure",
+                missing.join(", ")
+            ))
         } else {
             None
         };

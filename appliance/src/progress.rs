@@ -33,7 +33,8 @@ impl Progress {
         if self.bar.message() != words {
             self.bar.set_message(words.to_owned());
         }
-        self.bar.set_position((share.clamp(0.0, 1.0) * STEPS as f64) as u64);
+        self.bar
+            .set_position((share.clamp(0.0, 1.0) * STEPS as f64) as u64);
     }
 
     /// Takes the bar away until something is told again.

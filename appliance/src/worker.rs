@@ -34,7 +34,10 @@ pub struct LastMaps(Arc<Mutex<Option<Arc<Maps>>>>);
 impl LastMaps {
     /// The maps of the last cycle that had any.
     pub fn get(&self) -> Option<Arc<Maps>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
     }
 
     fn set(&self, maps: Maps) {
@@ -110,19 +113,24 @@ impl Worker {
         };
         let Some(plan) = plan else {
             // The station triggers only with an active recipe, and that is this plan's.
-            self.station.event(failed(code::RIG, "measure: no recipe is loaded".into()));
+            self.station
+                .event(failed(code::RIG, "measure: no recipe is loaded".into()));
             return;
         };
         let count = plan.recipe().sequence.frame_count();
         let mut frames: Vec<Frame> = Vec::with_capacity(count);
         let indices: Vec<usize> = (0..count).collect();
         let station = &self.station;
-        let taken = self.opened.head.acquire(&indices, DEVICE_TIMEOUT, &mut |_, frame| {
-            frames.push(frame);
-            station.event(Event::Alive);
-        });
+        let taken = self
+            .opened
+            .head
+            .acquire(&indices, DEVICE_TIMEOUT, &mut |_, frame| {
+                frames.push(frame);
+                station.event(Event::Alive);
+            });
         if let Err(error) = taken {
-            self.station.event(failed(code_of(&error), error.to_string()));
+            self.station
+                .event(failed(code_of(&error), error.to_string()));
             return;
         }
         let exposed = Instant::now();
@@ -171,7 +179,10 @@ impl Worker {
         }
     }
 
-    fn prepare(&mut self, key: &RecipeKey) -> Result<(Plan, Option<String>), (RecipeResult, String)> {
+    fn prepare(
+        &mut self,
+        key: &RecipeKey,
+    ) -> Result<(Plan, Option<String>), (RecipeResult, String)> {
         let refuse = |error: LoadError| {
             let result = match error {
                 LoadError::Unknown(_) => RecipeResult::Unknown,
@@ -185,13 +196,14 @@ impl Worker {
         };
         let loaded = self.recipes.load(number).map_err(refuse)?;
         let simulated = self.opened.stage.is_some();
-        let plan = Plan::new(loaded.recipe, &self.opened.calibration, simulated).map_err(|error| {
-            let result = match error {
-                PlanError::OtherCalibration { .. } => RecipeResult::OtherCalibration,
-                PlanError::Unfit { .. } => RecipeResult::Corrupt,
-            };
-            (result, error.to_string())
-        })?;
+        let plan =
+            Plan::new(loaded.recipe, &self.opened.calibration, simulated).map_err(|error| {
+                let result = match error {
+                    PlanError::OtherCalibration { .. } => RecipeResult::OtherCalibration,
+                    PlanError::Unfit { .. } => RecipeResult::Corrupt,
+                };
+                (result, error.to_string())
+            })?;
         plan.rasters(&self.opened.calibration)
             .and_then(|rasters| self.opened.head.load(rasters))
             .map_err(|error| (RecipeResult::Corrupt, error.to_string()))?;
@@ -217,19 +229,27 @@ impl Worker {
         let Opened {
             head, calibration, ..
         } = &mut self.opened;
-        let taught = self.pool.install(|| teach(head, calibration, &naming, DEVICE_TIMEOUT, &progress));
+        let taught = self
+            .pool
+            .install(|| teach(head, calibration, &naming, DEVICE_TIMEOUT, &progress));
         self.progress.clear();
-        let stored = taught.map_err(|error| (code_of_teaching(&error), error.to_string())).and_then(
-            |(bytes, recipe)| {
+        let stored = taught
+            .map_err(|error| (code_of_teaching(&error), error.to_string()))
+            .and_then(|(bytes, recipe)| {
                 self.recipes
                     .save(number, &bytes)
                     .map(|()| recipe)
-                    .map_err(|error| (code::NOT_STORED, format!("store recipe {number}: {error}: free space")))
-            },
-        );
+                    .map_err(|error| {
+                        (
+                            code::NOT_STORED,
+                            format!("store recipe {number}: {error}: free space"),
+                        )
+                    })
+            });
         let ready = stored.and_then(|_| {
             let key = RecipeKey::Number(number);
-            self.prepare(&key).map_err(|(_, message)| (code::RIG, message))
+            self.prepare(&key)
+                .map_err(|(_, message)| (code::RIG, message))
         });
         match ready {
             Ok((ready, _)) => {

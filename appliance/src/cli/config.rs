@@ -24,7 +24,10 @@ impl ConfigCommand {
     ///
     /// # Errors
     /// What is wrong with the configuration.
-    #[expect(clippy::print_stdout, reason = "the answer is what the command is asked for")]
+    #[expect(
+        clippy::print_stdout,
+        reason = "the answer is what the command is asked for"
+    )]
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         match self {
             Self::Keys if common.json => {

@@ -35,14 +35,19 @@ impl Record {
     ///
     /// # Errors
     /// If the head or the folder cannot be had, or the pattern not be shown.
-    #[expect(clippy::print_stdout, reason = "what was recorded is what the command is asked for")]
+    #[expect(
+        clippy::print_stdout,
+        reason = "what was recorded is what the command is asked for"
+    )]
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         let config = common.configuration()?;
         let progress = common.progress();
         let told = |share: f64| progress.tell(0.8 * share, "working out the light of the scene");
         let pool = super::pool(config.threads)?;
         let mut opened = pool.install(|| backend::open(&config.head, &told))?;
-        let taken = self.take(&mut opened, &|share| progress.tell(0.8 + 0.2 * share, "recording"));
+        let taken = self.take(&mut opened, &|share| {
+            progress.tell(0.8 + 0.2 * share, "recording")
+        });
         progress.clear();
         let recording = taken?;
         recorder::write(&recording, &self.folder)

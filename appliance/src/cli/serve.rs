@@ -22,7 +22,10 @@ pub fn run(common: &Common) -> Result<(), Failure> {
         // Without a recipe the station still serves: the PLC loads or teaches one.
         Err(failure) => progress.log(&failure.message),
     }
-    progress.log(&format!("Modbus TCP on {}, page on http://{}", daemon.modbus, daemon.http));
+    progress.log(&format!(
+        "Modbus TCP on {}, page on http://{}",
+        daemon.modbus, daemon.http
+    ));
     until_told()?;
     progress.log("stopping");
     daemon.stop();

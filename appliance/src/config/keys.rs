@@ -114,7 +114,8 @@ pub const KEYS: [Key; 13] = [
 
 /// All keys as a table in Markdown, as `docs/configuration.md` has it.
 pub fn table() -> String {
-    let mut table = String::from("| key | unit | range | default | meaning |\n|---|---|---|---|---|\n");
+    let mut table =
+        String::from("| key | unit | range | default | meaning |\n|---|---|---|---|---|\n");
     for key in KEYS {
         let Key {
             name,
@@ -124,7 +125,10 @@ pub fn table() -> String {
             meaning,
         } = key;
         // Writing to a string cannot fail.
-        let _ = writeln!(table, "| `{name}` | {unit} | {range} | {default} | {meaning} |");
+        let _ = writeln!(
+            table,
+            "| `{name}` | {unit} | {range} | {default} | {meaning} |"
+        );
     }
     table
 }
@@ -158,9 +162,14 @@ mod tests {
         let mut keys = BTreeMap::new();
         for (section, value) in sections {
             match value {
-                toml::Value::Table(values) => keys.extend(values.into_iter().map(|(key, value)| {
-                    (format!("{section}.{key}"), value.to_string().replace('"', ""))
-                })),
+                toml::Value::Table(values) => {
+                    keys.extend(values.into_iter().map(|(key, value)| {
+                        (
+                            format!("{section}.{key}"),
+                            value.to_string().replace('"', ""),
+                        )
+                    }))
+                }
                 value => {
                     keys.insert(section, value.to_string().replace('"', ""));
                 }
@@ -191,6 +200,9 @@ mod tests {
     fn the_documentation_holds_the_table() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/configuration.md");
         let text = std::fs::read_to_string(path).unwrap();
-        assert!(text.contains(&table()), "put the output of `fringed config keys` into docs/configuration.md");
+        assert!(
+            text.contains(&table()),
+            "put the output of `fringed config keys` into docs/configuration.md"
+        );
     }
 }

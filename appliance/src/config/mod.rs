@@ -161,7 +161,11 @@ impl Config {
         })?;
         let wrong = |error: String| {
             let remedy = format!("{error}; `fringed config keys` lists every key");
-            Failure::because(Exit::Configuration, format!("read configuration {place}"), remedy)
+            Failure::because(
+                Exit::Configuration,
+                format!("read configuration {place}"),
+                remedy,
+            )
         };
         let mut config: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
         config.check().map_err(wrong)?;
@@ -191,7 +195,9 @@ impl Config {
         let timeout = u64::from(self.station.plc_timeout_s);
         within("station.plc_timeout_s", timeout, 1, 3600)?;
         if self.head.backend == Backend::Replay && self.head.recordings.is_empty() {
-            return Err("head.recordings is empty: the replay head needs at least one folder".into());
+            return Err(
+                "head.recordings is empty: the replay head needs at least one folder".into(),
+            );
         }
         Ok(())
     }

@@ -11,8 +11,9 @@ use super::manifest::{
     VERSION,
 };
 use super::recording::{MANIFEST, PatternSpec, Recording, TRUTH_CLASS, TRUTH_HEIGHT};
-use super::{check, grey, npy};
+use super::{check, grey};
 use crate::frame::Samples;
+use crate::npy;
 
 /// A recording that could not be written. Nothing is left behind.
 #[derive(Debug, thiserror::Error)]
@@ -257,32 +258,17 @@ fn fill(recording: &Recording, manifest: &Manifest, partial: &Path) -> Result<()
         put(&path, &file)?;
     }
     for (index, pattern) in recording.patterns.iter().enumerate() {
-        if let PatternSpec::File {
-            rows,
-            columns,
-            turns,
-        } = pattern
-        {
-            let bytes: Vec<u8> = turns.iter().flat_map(|turns| turns.to_le_bytes()).collect();
-            put(
-                &partial.join(phase_file(&recording.patterns, index)),
-                &npy::write("<f8", *rows, *columns, &bytes),
-            )?;
+        if let PatternSpec::File { columns, turns, .. } = pattern {
+            let path = partial.join(phase_file(&recording.patterns, index));
+            put(&path, &npy::write(*columns, turns))?;
         }
     }
-    let (rows, columns) = (recording.height as usize, recording.width as usize);
+    let columns = recording.width as usize;
     if let Some(height) = &recording.truth_height {
-        let bytes: Vec<u8> = height.iter().flat_map(|mm| mm.to_le_bytes()).collect();
-        put(
-            &partial.join(TRUTH_HEIGHT),
-            &npy::write("<f4", rows, columns, &bytes),
-        )?;
+        put(&partial.join(TRUTH_HEIGHT), &npy::write(columns, height))?;
     }
     if let Some(class) = &recording.truth_class {
-        put(
-            &partial.join(TRUTH_CLASS),
-            &npy::write("|u1", rows, columns, class),
-        )?;
+        put(&partial.join(TRUTH_CLASS), &npy::write(columns, class))?;
     }
     let path = partial.join(MANIFEST);
     let mut text = serde_json::to_string_pretty(manifest)

@@ -23,8 +23,8 @@ pub const PARTS: [Placed; 10] = [
     Placed {
         what: "dent 0.6 mm",
         defect: Some(Defect::Dent {
-            x: 30.0,
-            y: 0.0,
+            x: 0.0,
+            y: -8.0,
             depth_mm: 0.6,
             diameter_mm: 14.0,
         }),

@@ -60,7 +60,9 @@ impl PlcResult {
         Self {
             seq: long(0),
             verdict: words[8],
-            values: (0..gauges).map(|k| f32::from_bits(long(64 + 2 * k))).collect(),
+            values: (0..gauges)
+                .map(|k| f32::from_bits(long(64 + 2 * k)))
+                .collect(),
             passes: (0..gauges).map(|k| words[96 + k] & 1 == 1).collect(),
             exposure_us: long(18),
             total_us: long(20),
@@ -69,7 +71,11 @@ impl PlcResult {
 }
 
 fn lost(error: impl std::fmt::Display) -> Failure {
-    Failure::because(Exit::Unavailable, "demo: talk Modbus TCP to the station", error)
+    Failure::because(
+        Exit::Unavailable,
+        "demo: talk Modbus TCP to the station",
+        error,
+    )
 }
 
 impl Plc {
@@ -100,12 +106,20 @@ impl Plc {
                 Err(lost(format!("no {what} within {PATIENCE:?}")))
             }
         };
-        while self.read(STATUS, 1).await?.first().is_none_or(|status| status & READY == 0) {
+        while self
+            .read(STATUS, 1)
+            .await?
+            .first()
+            .is_none_or(|status| status & READY == 0)
+        {
             patient("READY")?;
             tokio::time::sleep(POLL).await;
         }
         let trigger = [token, 0, token, 0, token, 0, token];
-        let written = self.context.write_multiple_registers(TRIGGER_TOKEN, &trigger).await;
+        let written = self
+            .context
+            .write_multiple_registers(TRIGGER_TOKEN, &trigger)
+            .await;
         written.map_err(lost)?.map_err(lost)?;
         loop {
             let words = self.read(RESULT.0, RESULT.1).await?;

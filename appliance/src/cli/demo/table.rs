@@ -23,7 +23,11 @@ pub fn text(rows: &[Row]) -> String {
             value(1) * 100.0,
             result.exposure_us / 1000,
             result.total_us / 1000,
-            if row.outside.is_empty() { "-".into() } else { row.outside.join(", ") },
+            if row.outside.is_empty() {
+                "-".into()
+            } else {
+                row.outside.join(", ")
+            },
         );
     }
     table
