@@ -8,5 +8,5 @@ mod vector;
 
 pub use pinhole::{ModelError, Pinhole, PinholeModel};
 pub use reference::{FittedMap, Reference, ReferenceError, fit_map};
-pub use triangulate::{HeightRange, RigError, Solution, Triangulator};
+pub use triangulate::{Expansion, HeightRange, RigError, Solution, Triangulator};
 pub use vector::Vector;

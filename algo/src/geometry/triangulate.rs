@@ -75,6 +75,17 @@ pub struct Solution {
     pub slope: f64,
 }
 
+/// The height about a phase.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Expansion {
+    /// z in mm.
+    pub height: f64,
+    /// ∂z/∂Φ in mm per turn.
+    pub first: f64,
+    /// ∂²z/∂Φ² in mm per turn².
+    pub second: f64,
+}
+
 /// z is found to this many mm.
 const HEIGHT_TOLERANCE: f64 = 1e-7;
 /// Half the step of the numeric slope, mm: small against any fringe, large against rounding.
@@ -218,6 +229,25 @@ impl Triangulator {
         Some(Solution {
             point: self.on_ray(ray, z),
             slope: rise / (2.0 * SLOPE_STEP),
+        })
+    }
+
+    /// The expansion z(Φ + δ) ≈ z + z′δ + z″δ²/2 of the height about a phase at pixel (u, v), in mm per
+    /// turn and turn²; the second derivative by central differences of ± ¼ turn, 0 where the working
+    /// range ends sooner.
+    pub fn expand(&self, u: f64, v: f64, phase: f64) -> Option<Expansion> {
+        const STEP: f64 = 0.25;
+        let solution = self.solve(u, v, phase)?;
+        let z = solution.point.z;
+        let beside = |delta| Some(self.solve(u, v, phase + delta)?.point.z);
+        let second = match (beside(-STEP), beside(STEP)) {
+            (Some(below), Some(above)) => (above - 2.0 * z + below) / (STEP * STEP),
+            _ => 0.0,
+        };
+        Some(Expansion {
+            height: z,
+            first: 1.0 / solution.slope,
+            second,
         })
     }
 

@@ -129,7 +129,7 @@ fn inspection() -> Inspection {
         temperature_c: Some(31.4),
         height_noise_mm: 0.0123,
         fitness_permille: 1000,
-        flags: crate::station::result::flag::SIMULATED,
+        flags: result::flag::SIMULATED,
         ..Default::default()
     }
 }

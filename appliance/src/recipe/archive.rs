@@ -107,7 +107,7 @@ pub fn unpack(bytes: &[u8]) -> Result<(RecipeFile, Arrays), ArchiveError> {
     let mut members = Vec::new();
     for at in 0..zip.len() {
         let mut member = zip.by_index(at).map_err(broken)?;
-        let name = member.name().to_owned();
+        let name = member.name().map_err(broken)?.into_owned();
         let mut content = Vec::new();
         // Members are stored, so none is larger than the file.
         let limit = bytes.len() as u64;

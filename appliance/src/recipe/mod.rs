@@ -7,6 +7,7 @@ pub mod archive;
 pub mod check;
 pub mod file;
 pub mod store;
+pub mod teach;
 
 pub use check::Recipe;
 pub use file::{GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFrame};

@@ -1,0 +1,113 @@
+//! The head that the configuration names: the one place that knows which back-ends there are.
+
+use crate::calibration::Calibration;
+use crate::config::{Backend, HeadConfig};
+use crate::error::{Exit, Failure};
+use hal::head::DynHead;
+use hal::replay::Recording;
+use hal::sim::{Scenario, Stage};
+use std::fs;
+use std::path::Path;
+
+/// An opened head.
+pub struct Opened {
+    /// The devices.
+    pub head: DynHead,
+    /// What is known of them.
+    pub calibration: Calibration,
+    /// Where parts are placed in front of a simulated head.
+    pub stage: Option<Stage>,
+}
+
+/// Opens the configured head. `progress` is told the share done, from any thread.
+///
+/// # Errors
+/// If a file of the head is missing or wrong, or a device is not there.
+pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
+    match config.backend {
+        Backend::Sim => simulated(config.scenario.as_deref(), progress),
+        Backend::Replay => replayed(&config.recordings),
+    }
+}
+
+/// The scenario of a file, or the default one.
+///
+/// # Errors
+/// If the file does not exist or is no scenario.
+pub fn scenario(path: Option<&Path>) -> Result<Scenario, Failure> {
+    let Some(path) = path else {
+        return Ok(Scenario::default());
+    };
+    let place = path.display().to_string();
+    let text = fs::read_to_string(path).map_err(|error| {
+        let what = format!("read scenario {place}");
+        Failure::because(Exit::Missing, what, format!("{error}: head.scenario names a TOML file"))
+    })?;
+    Scenario::from_toml(&text, &place)
+        .map_err(|error| Failure::new(Exit::Configuration, error.to_string()))
+}
+
+fn simulated(path: Option<&Path>, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
+    let scenario = scenario(path)?;
+    let (head, stage) = hal::sim::head_with_progress(&scenario, progress)
+        .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+    let (camera, projector) = (&scenario.rig.camera, &scenario.rig.projector);
+    let calibration = Calibration {
+        camera: (camera.width, camera.height, scenario.bit_depth),
+        camera_model: stage.camera_model(),
+        projector: (projector.width, projector.height),
+        projector_model: stage.projector_model(),
+        noise_counts: scenario.noise_sigma_counts(),
+        response: None,
+    };
+    Ok(Opened {
+        head,
+        calibration,
+        stage: Some(stage),
+    })
+}
+
+fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened, Failure> {
+    let recordings = folders
+        .iter()
+        .map(|folder| Recording::open(folder))
+        .collect::<Result<Vec<_>, _>>()?;
+    let calibration = calibration_of(folders, &recordings)?;
+    let head = hal::replay::head(recordings)
+        .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+    Ok(Opened {
+        head,
+        calibration,
+        stage: None,
+    })
+}
+
+/// The calibration that the first recording carries; the others were taken with the same head.
+fn calibration_of(
+    folders: &[std::path::PathBuf],
+    recordings: &[Recording],
+) -> Result<Calibration, Failure> {
+    let (Some(folder), Some(first)) = (folders.first(), recordings.first()) else {
+        return Err(Failure::new(
+            Exit::Configuration,
+            "head.backend is \"replay\" and head.recordings names no folder",
+        ));
+    };
+    let missing = |what: &str| {
+        let manifest = folder.join("recording.json");
+        let message = format!("{} has no {what}: the replay head needs it", manifest.display());
+        Failure::new(Exit::Content, message)
+    };
+    Ok(Calibration {
+        camera: (first.width, first.height, first.bit_depth),
+        camera_model: first.camera_model.clone().ok_or_else(|| missing("camera model"))?,
+        projector: (first.projector.width, first.projector.height),
+        projector_model: first
+            .projector
+            .model
+            .clone()
+            .ok_or_else(|| missing("projector model"))?,
+        noise_counts: first.noise_counts.ok_or_else(|| missing("camera.noise_counts"))?,
+        response: None,
+    })
+}

@@ -1,0 +1,183 @@
+//! The state folder: recipes, the result counter, the device's serial.
+
+use crate::error::{Exit, Failure};
+use crate::output::folder::write_whole;
+use crate::recipe::Store;
+use std::fs::{self, File, TryLockError};
+use std::path::{Path, PathBuf};
+
+/// The folder that outlives a restart. One daemon at a time holds it.
+#[derive(Debug)]
+pub struct StateFolder {
+    path: PathBuf,
+    recipes: Store,
+    /// Held until the daemon ends; the system drops it with the process, however that ends.
+    _lock: File,
+}
+
+/// The counter's file: the SEQ of the last result, in decimal.
+const COUNTER: &str = "result-seq";
+/// The serial's file.
+const SERIAL: &str = "serial";
+
+impl StateFolder {
+    /// The platform's state folder for this program.
+    ///
+    /// # Errors
+    /// If the platform has none, e.g. without a home directory.
+    pub fn default_path() -> Result<PathBuf, Failure> {
+        dirs::state_dir()
+            .or_else(dirs::data_local_dir)
+            .map(|folder| folder.join("fringed"))
+            .ok_or_else(|| {
+                Failure::new(
+                    Exit::CannotCreate,
+                    "find the state folder: this user has no home directory; name one with --state",
+                )
+            })
+    }
+
+    /// Opens the folder, creating it where it does not exist, and takes it for this process.
+    ///
+    /// # Errors
+    /// If it cannot be created or written, or another daemon holds it (exit code 73).
+    pub fn open(path: &Path) -> Result<Self, Failure> {
+        let failed = |error: String| {
+            let what = format!("open the state folder {}", path.display());
+            Failure::because(Exit::CannotCreate, what, error)
+        };
+        let cannot =
+            |error: std::io::Error| failed(format!("{error}: name one that can be written with --state"));
+        fs::create_dir_all(path).map_err(cannot)?;
+        let lock = File::create(path.join("lock")).map_err(cannot)?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(failed(
+                    "another fringed uses it: end that one or name another folder with --state".into(),
+                ));
+            }
+            Err(TryLockError::Error(error)) => return Err(cannot(error)),
+        }
+        let recipes = Store::open(&path.join("recipes")).map_err(cannot)?;
+        Ok(Self {
+            path: path.to_path_buf(),
+            recipes,
+            _lock: lock,
+        })
+    }
+
+    /// The recipes.
+    pub fn recipes(&self) -> &Store {
+        &self.recipes
+    }
+
+    /// The SEQ of the next result.
+    ///
+    /// # Errors
+    /// If the counter's file is damaged: guessing would let a SEQ be used twice.
+    pub fn next_seq(&self) -> Result<u32, Failure> {
+        let file = self.path.join(COUNTER);
+        let text = match fs::read_to_string(&file) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(1),
+            Err(error) => {
+                let what = format!("read {}", file.display());
+                return Err(Failure::because(Exit::CannotCreate, what, error));
+            }
+        };
+        text.trim().parse::<u32>().map(|last| last.wrapping_add(1)).map_err(|_| {
+            Failure::new(
+                Exit::CannotCreate,
+                format!(
+                    "read {}: {:?} is no number: write the SEQ of the last result there",
+                    file.display(),
+                    text.trim()
+                ),
+            )
+        })
+    }
+
+    /// A writer of the counter.
+    pub fn counter(&self) -> Counter {
+        Counter {
+            file: self.path.join(COUNTER),
+        }
+    }
+
+    /// The device's serial, made at the first start.
+    ///
+    /// # Errors
+    /// If it can neither be read nor written.
+    pub fn serial(&self) -> Result<String, Failure> {
+        let file = self.path.join(SERIAL);
+        if let Ok(serial) = fs::read_to_string(&file)
+            && !serial.trim().is_empty()
+        {
+            return Ok(serial.trim().to_owned());
+        }
+        let serial = format!("{:08X}", random()?);
+        write_whole(&file, format!("{serial}\n").as_bytes())
+            .map_err(|error| Failure::because(Exit::CannotCreate, format!("write {}", file.display()), error))?;
+        Ok(serial)
+    }
+}
+
+/// Stores the SEQ of each result before anybody sees the result, so that none is used twice.
+#[derive(Clone, Debug)]
+pub struct Counter {
+    file: PathBuf,
+}
+
+impl Counter {
+    /// Stores a SEQ as used.
+    ///
+    /// # Errors
+    /// Whatever the file system answers.
+    pub fn store(&self, seq: u32) -> std::io::Result<()> {
+        write_whole(&self.file, format!("{seq}\n").as_bytes())
+    }
+}
+
+/// 32 random bits from the system.
+///
+/// # Errors
+/// If the system gives none.
+pub fn random() -> Result<u32, Failure> {
+    getrandom::u32().map_err(|error| Failure::because(Exit::Software, "ask the system for random bits", error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_counter_and_the_serial_outlive_a_restart() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = StateFolder::open(folder.path()).unwrap();
+        assert_eq!(first.next_seq().unwrap(), 1);
+        first.counter().store(41).unwrap();
+        let serial = first.serial().unwrap();
+        drop(first);
+        let second = StateFolder::open(folder.path()).unwrap();
+        assert_eq!(second.next_seq().unwrap(), 42);
+        assert_eq!(second.serial().unwrap(), serial);
+    }
+
+    #[test]
+    fn one_daemon_at_a_time_holds_the_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let _first = StateFolder::open(folder.path()).unwrap();
+        let refused = StateFolder::open(folder.path()).unwrap_err();
+        assert_eq!(refused.exit, Exit::CannotCreate);
+        assert!(refused.message.contains("another fringed"), "{refused}");
+    }
+
+    #[test]
+    fn a_damaged_counter_is_not_guessed() {
+        let folder = tempfile::tempdir().unwrap();
+        let state = StateFolder::open(folder.path()).unwrap();
+        fs::write(folder.path().join(COUNTER), "4x").unwrap();
+        assert!(state.next_seq().unwrap_err().message.contains("result-seq"));
+    }
+}

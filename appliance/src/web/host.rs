@@ -1,0 +1,66 @@
+//! Which Host headers are answered.
+//!
+//! A page of another site can point its own name at this device (DNS rebinding) and then read it with its visitor's browser.
+//! It cannot forge the Host header: so only IP addresses, `localhost` and configured names are answered.
+
+use std::net::{IpAddr, Ipv6Addr};
+
+/// Whether a request with this Host header is meant for this device.
+pub fn is_allowed(header: &str, configured: &[String]) -> bool {
+    let name = if let Some(rest) = header.strip_prefix('[') {
+        let Some((address, port)) = rest.split_once(']') else {
+            return false;
+        };
+        return address.parse::<Ipv6Addr>().is_ok()
+            && (port.is_empty() || is_port(port.strip_prefix(':')));
+    } else if let Some((name, port)) = header.split_once(':') {
+        if !is_port(Some(port)) {
+            return false;
+        }
+        name
+    } else {
+        header
+    };
+    name.eq_ignore_ascii_case("localhost")
+        || name.parse::<IpAddr>().is_ok()
+        || configured
+            .iter()
+            .any(|allowed| name.eq_ignore_ascii_case(allowed))
+}
+
+fn is_port(text: Option<&str>) -> bool {
+    text.is_some_and(|text| text.parse::<u16>().is_ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_localhost_and_configured_names_are_answered_and_nothing_else() {
+        let configured = ["sensor-7.local".to_owned()];
+        for fine in [
+            "127.0.0.1:8080",
+            "10.0.0.5",
+            "[::1]:8080",
+            "[fe80::1]",
+            "localhost",
+            "LocalHost:80",
+            "Sensor-7.local:8080",
+        ] {
+            assert!(is_allowed(fine, &configured), "{fine}");
+        }
+        for other in [
+            "",
+            "evil.example",
+            "evil.example:8080",
+            "127.0.0.1.evil.example",
+            "localhost:x",
+            "[::1",
+            "[evil]",
+            "[::1]x",
+        ] {
+            assert!(!is_allowed(other, &configured), "{other}");
+        }
+    }
+}

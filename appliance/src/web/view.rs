@@ -1,0 +1,113 @@
+//! A snapshot as the JSON that the page and `/api/snapshot` show. Lengths in mm, angles in °, volumes in mm³, shares 0…1.
+
+use serde_json::{Value, json};
+
+use crate::station::result::flag;
+use crate::station::snapshot::{status, warning};
+use crate::station::{GaugeValue, ResultRecord, Snapshot, Unit, error_code};
+
+/// The whole snapshot.
+pub fn snapshot(snapshot: &Snapshot) -> Value {
+    let in_flight = u32::from(snapshot.is(status::BUSY) || snapshot.is(status::PROCESSING));
+    json!({
+        "heartbeat": snapshot.heartbeat,
+        "worker_alive": snapshot.worker_alive,
+        "uptime_s": snapshot.uptime_s,
+        "boot_id": format!("{:08x}", snapshot.boot_id),
+        "state": snapshot.state_word,
+        "ready": snapshot.is(status::READY),
+        "online": snapshot.is(status::ONLINE),
+        "warming_up": snapshot.is(status::WARMING_UP),
+        "calibration_valid": snapshot.is(status::CALIBRATION_VALID),
+        "missed_trigger": snapshot.is(status::MISSED_TRIGGER),
+        "buffer_overflow": snapshot.is(status::BUFFER_OVERFLOW),
+        "warnings": warnings(snapshot.warnings),
+        "error": snapshot.error.as_ref().map(|words| json!({
+            "code": snapshot.error_code, "family": error_code::family(snapshot.error_code), "words": &**words,
+        })),
+        "fault": snapshot.fault.as_ref().map(|fault| json!({
+            "code": fault.code, "family": error_code::family(fault.code), "cause": &*fault.cause, "remedy": &*fault.remedy,
+        })),
+        "recipe": snapshot.recipe.as_ref().map(|recipe| json!({
+            "number": recipe.number, "fingerprint": format!("{:08x}", recipe.crc), "name": &*recipe.name,
+        })),
+        "requested_recipe": snapshot.requested_recipe,
+        "recipe_result": snapshot.recipe_result.number(),
+        "counters": {
+            "triggers": snapshot.triggers,
+            "results": snapshot.triggers.wrapping_sub(in_flight),
+            "missed": snapshot.missed,
+            "sequence": snapshot.result_seq,
+            "buffered": snapshot.buffered,
+        },
+        "last_token": snapshot.last_token,
+        "teach": snapshot.teach.as_ref().map(|teach| json!({
+            "number": teach.number, "fraction": teach.fraction, "words": &*teach.words,
+        })),
+        "identity": {
+            "product": snapshot.identity.product, "serial": snapshot.identity.serial, "version": snapshot.identity.version,
+        },
+        "result": snapshot.result.as_deref().map(result),
+    })
+}
+
+fn warnings(bits: u16) -> Vec<&'static str> {
+    warning::WORDS
+        .iter()
+        .enumerate()
+        .filter(|(bit, _)| bits >> bit & 1 == 1)
+        .map(|(_, word)| *word)
+        .collect()
+}
+
+fn result(record: &ResultRecord) -> Value {
+    let found = &record.inspection;
+    json!({
+        "seq": record.seq,
+        "token": record.token,
+        "recipe": record.recipe,
+        "fingerprint": format!("{:08x}", record.recipe_crc),
+        "part_id": record.part_id,
+        "press_stroke": record.press_stroke,
+        "verdict": record.verdict.word(),
+        "error_code": record.error_code,
+        "reason": found.reason.as_deref(),
+        "time_utc_us": record.time_utc_us,
+        "exposure_us": record.exposure_us,
+        "total_us": record.total_us,
+        "valid_points": found.valid_points,
+        "coverage_permille": found.coverage_permille,
+        "temperature_c": found.temperature_c,
+        "height_noise_mm": found.height_noise_mm,
+        "fitness_permille": found.fitness_permille,
+        "simulated": record.flags() & flag::SIMULATED != 0,
+        "doubtful": record.flags() & flag::DOUBTFUL != 0,
+        "gauges": found.gauges.iter().map(gauge).collect::<Vec<_>>(),
+        "stages": found.stages.iter().map(|stage| json!({ "name": stage.name, "us": stage.us })).collect::<Vec<_>>(),
+    })
+}
+
+fn gauge(gauge: &GaugeValue) -> Value {
+    let kind = match gauge.unit {
+        Unit::None => "none",
+        Unit::Length => "length",
+        Unit::Angle => "angle",
+        Unit::Volume => "volume",
+        Unit::Share => "share",
+    };
+    let decision = gauge.decision;
+    json!({
+        "name": &*gauge.name,
+        "kind": kind,
+        "unit": gauge.unit.symbol(),
+        "value": gauge.value.filter(|_| decision.valid),
+        "sigma": gauge.sigma,
+        "lowest": gauge.low,
+        "highest": gauge.high,
+        "pass": decision.pass,
+        "valid": decision.valid,
+        "low": decision.low,
+        "high": decision.high,
+        "doubtful": decision.doubtful,
+    })
+}

@@ -1,0 +1,266 @@
+//! The measuring task: one thread that owns the head, the plan and the computing threads.
+
+use crate::backend::Opened;
+use crate::plan::{Maps, Plan, PlanError};
+use crate::recipe::teach::{Naming, TeachError, teach};
+use crate::recipe::{LoadError, Store};
+use crate::station::{
+    ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, StationHandle,
+};
+use hal::error::ErrorKind;
+use hal::frame::Frame;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// What the worker is told to do.
+#[derive(Debug)]
+pub enum Order {
+    /// Measure a part.
+    Measure(Job),
+    /// Load a recipe.
+    Load(JobId, RecipeKey),
+    /// Teach a recipe from the part in front of the head.
+    Teach(JobId, u16),
+    /// End.
+    Stop,
+}
+
+/// The maps of the last cycle, for the page.
+#[derive(Clone, Debug, Default)]
+pub struct LastMaps(Arc<Mutex<Option<Arc<Maps>>>>);
+
+impl LastMaps {
+    /// The maps of the last cycle that had any.
+    pub fn get(&self) -> Option<Arc<Maps>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn set(&self, maps: Maps) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(maps));
+    }
+}
+
+/// Idle, the worker gives a sign of life this often.
+const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
+/// Longest wait for one flip, one pulse or one frame.
+const DEVICE_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Error codes of the worker; the README has the table.
+mod code {
+    pub const CAMERA_LOST: u16 = 101;
+    pub const UNSUPPORTED: u16 = 102;
+    pub const TIMEOUT: u16 = 301;
+    pub const PROTOCOL: u16 = 302;
+    pub const NOTHING_TO_TEACH: u16 = 401;
+    pub const RIG: u16 = 501;
+    pub const NOT_STORED: u16 = 601;
+}
+
+/// Everything that the measuring task owns.
+pub struct Worker {
+    /// The head and its calibration.
+    pub opened: Opened,
+    /// Computing threads.
+    pub pool: rayon::ThreadPool,
+    /// The station's recipes.
+    pub recipes: Store,
+    /// The way to the station.
+    pub station: StationHandle,
+    /// Where the last maps go.
+    pub maps: LastMaps,
+}
+
+impl Worker {
+    /// Works until told to stop, or until nobody can tell it anything any more.
+    pub fn run(mut self, orders: &Receiver<Order>) {
+        self.station.event(Event::Condition(Condition {
+            calibration_valid: true,
+            ..Condition::default()
+        }));
+        self.station.event(Event::Started);
+        let mut plan = None;
+        loop {
+            match orders.recv_timeout(SIGN_OF_LIFE) {
+                Ok(Order::Measure(job)) => self.measure(plan.as_ref(), &job),
+                Ok(Order::Load(job, key)) => self.load(job, &key, &mut plan),
+                Ok(Order::Teach(job, number)) => self.teach(job, number, &mut plan),
+                Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
+                Err(RecvTimeoutError::Timeout) => {
+                    self.station.event(Event::Alive);
+                }
+            }
+        }
+    }
+
+    fn measure(&mut self, plan: Option<&Plan>, job: &Job) {
+        let id = job.job;
+        let failed = |error_code, message: String| Event::MeasureFailed {
+            job: id,
+            error_code,
+            message: message.into(),
+        };
+        let Some(plan) = plan else {
+            // The station triggers only with an active recipe, and that is this plan's.
+            self.station.event(failed(code::RIG, "measure: no recipe is loaded".into()));
+            return;
+        };
+        let count = plan.recipe().sequence.frame_count();
+        let mut frames: Vec<Frame> = Vec::with_capacity(count);
+        let indices: Vec<usize> = (0..count).collect();
+        let station = &self.station;
+        let taken = self.opened.head.acquire(&indices, DEVICE_TIMEOUT, &mut |_, frame| {
+            frames.push(frame);
+            station.event(Event::Alive);
+        });
+        if let Err(error) = taken {
+            self.station.event(failed(code_of(&error), error.to_string()));
+            return;
+        }
+        let exposed = Instant::now();
+        self.station.event(Event::ExposureDone { job: id });
+        let (inspection, maps) = self.pool.install(|| plan.inspect(&frames, exposed));
+        if let Some(maps) = maps {
+            self.maps.set(maps);
+        }
+        self.station.event(Event::Finished {
+            job: id,
+            inspection: Arc::new(inspection),
+        });
+    }
+
+    /// Loads a recipe; the one before stays active unless everything went well.
+    fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Plan>) {
+        let (result, message) = match self.prepare(key) {
+            Ok((ready, fallback)) => {
+                let recipe = active(&ready);
+                *plan = Some(ready);
+                if let Some(fallback) = fallback {
+                    eprintln!("fringed: {fallback}");
+                }
+                self.station.event(Event::RecipeLoaded { job, recipe });
+                return;
+            }
+            Err(refused) => refused,
+        };
+        self.restore(plan);
+        let message = Arc::from(message);
+        self.station.event(Event::LoadFailed {
+            job,
+            result,
+            message,
+        });
+    }
+
+    /// Puts the patterns of the active recipe back into the projector, after another one's may have
+    /// replaced them. Without them the recipe cannot measure: then each trigger ends INVALID.
+    fn restore(&mut self, plan: &mut Option<Plan>) {
+        let Some(before) = plan else { return };
+        let shown = before.rasters(&self.opened.calibration);
+        if let Err(error) = shown.and_then(|rasters| self.opened.head.load(rasters)) {
+            eprintln!("fringed: {error}");
+            *plan = None;
+        }
+    }
+
+    fn prepare(&mut self, key: &RecipeKey) -> Result<(Plan, Option<String>), (RecipeResult, String)> {
+        let refuse = |error: LoadError| {
+            let result = match error {
+                LoadError::Unknown(_) => RecipeResult::Unknown,
+                LoadError::Corrupt { .. } => RecipeResult::Corrupt,
+            };
+            (result, error.to_string())
+        };
+        let number = match key {
+            RecipeKey::Number(number) => *number,
+            RecipeKey::PartNumber(part_number) => self.recipes.find(part_number).map_err(refuse)?,
+        };
+        let loaded = self.recipes.load(number).map_err(refuse)?;
+        let simulated = self.opened.stage.is_some();
+        let plan = Plan::new(loaded.recipe, &self.opened.calibration, simulated).map_err(|error| {
+            let result = match error {
+                PlanError::OtherCalibration { .. } => RecipeResult::OtherCalibration,
+                PlanError::Unfit { .. } => RecipeResult::Corrupt,
+            };
+            (result, error.to_string())
+        })?;
+        plan.rasters(&self.opened.calibration)
+            .and_then(|rasters| self.opened.head.load(rasters))
+            .map_err(|error| (RecipeResult::Corrupt, error.to_string()))?;
+        Ok((plan, loaded.fallback))
+    }
+
+    fn teach(&mut self, job: JobId, number: u16, plan: &mut Option<Plan>) {
+        let naming = Naming {
+            number,
+            part_number: format!("PART-{number:04}"),
+            name: format!("Part {number}"),
+            taught_at_unix_s: crate::clock::utc_us().unwrap_or(0) / 1_000_000,
+        };
+        let station = self.station.clone();
+        let progress = |fraction: f64, words: &str| {
+            station.event(Event::Progress {
+                job,
+                fraction: fraction as f32,
+                words: words.into(),
+            });
+        };
+        let Opened {
+            head, calibration, ..
+        } = &mut self.opened;
+        let taught = self.pool.install(|| teach(head, calibration, &naming, DEVICE_TIMEOUT, &progress));
+        let stored = taught.map_err(|error| (code_of_teaching(&error), error.to_string())).and_then(
+            |(bytes, recipe)| {
+                self.recipes
+                    .save(number, &bytes)
+                    .map(|()| recipe)
+                    .map_err(|error| (code::NOT_STORED, format!("store recipe {number}: {error}: free space")))
+            },
+        );
+        let ready = stored.and_then(|_| {
+            let key = RecipeKey::Number(number);
+            self.prepare(&key).map_err(|(_, message)| (code::RIG, message))
+        });
+        match ready {
+            Ok((ready, _)) => {
+                let recipe = active(&ready);
+                *plan = Some(ready);
+                self.station.event(Event::Taught { job, recipe });
+            }
+            Err((error_code, message)) => {
+                self.restore(plan);
+                self.station.event(Event::TeachFailed {
+                    job,
+                    error_code,
+                    message: message.into(),
+                });
+            }
+        }
+    }
+}
+
+fn active(plan: &Plan) -> ActiveRecipe {
+    let recipe = plan.recipe();
+    ActiveRecipe {
+        number: recipe.file.number,
+        crc: recipe.crc(),
+        name: recipe.file.name.as_str().into(),
+    }
+}
+
+fn code_of(error: &hal::error::Error) -> u16 {
+    match error.kind() {
+        ErrorKind::Timeout => code::TIMEOUT,
+        ErrorKind::Disconnected => code::CAMERA_LOST,
+        ErrorKind::Unsupported => code::UNSUPPORTED,
+        ErrorKind::Protocol => code::PROTOCOL,
+    }
+}
+
+fn code_of_teaching(error: &TeachError) -> u16 {
+    match error {
+        TeachError::Device(error) => code_of(error),
+        TeachError::Scene(_) => code::NOTHING_TO_TEACH,
+        TeachError::Rig(_) => code::RIG,
+    }
+}
