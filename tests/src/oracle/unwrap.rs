@@ -156,7 +156,9 @@ mod tests {
             let form = recognise(&ratios, (-4.0, 96.0)).unwrap();
             for i in 0..1000 {
                 let phase = -4.0 + f64::from(i) / 10.0;
-                let map = reach.map_or(f64::NAN, |reach| phase + reach * f64::from(i % 21 - 10) / 10.0);
+                let map = reach.map_or(f64::NAN, |reach| {
+                    phase + reach * f64::from(i % 21 - 10) / 10.0
+                });
                 let (found, _) = unwrap(form, &seen(&ratios, phase), map).unwrap();
                 assert!((found - phase).abs() < 1e-9, "{ratios:?} {phase} {found}");
             }
@@ -165,7 +167,11 @@ mod tests {
 
     #[test]
     fn ratios_of_no_form_are_not_recognised() {
-        for ratios in [vec![0.1, 0.9], vec![0.5, 0.9, 1.0], vec![0.8, 0.9, 0.95, 1.0]] {
+        for ratios in [
+            vec![0.1, 0.9],
+            vec![0.5, 0.9, 1.0],
+            vec![0.8, 0.9, 0.95, 1.0],
+        ] {
             assert_eq!(recognise(&ratios, (0.0, 100.0)), None);
         }
     }
