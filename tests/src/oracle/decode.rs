@@ -29,6 +29,8 @@ pub struct PhaseTwin {
     pub information: Vec<f64>,
     /// Resolved or why not; heights have not been looked at yet.
     pub reason: Vec<Reason>,
+    /// Whether a level's modulation is exactly the least that is trusted, to rounding.
+    pub tie: Vec<bool>,
 }
 
 /// The levels of pattern `at`, from coarse to fine.
@@ -74,8 +76,10 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
                 .iter()
                 .map(|level| demodulate(&samples(recording, level, pixel), &level.shifts))
                 .collect();
+            let least = least_modulation(full_scale);
+            let tie = seen.iter().any(|s| (s.modulation - least).abs() < TIE);
             if let Some(reason) = distrust(&levels, &seen, full_scale) {
-                return (f64::NAN, 0.0, reason);
+                return (f64::NAN, 0.0, reason, tie);
             }
             let map = match (form, &rig) {
                 (Form::Geometric { .. }, _) => f64::NAN,
@@ -96,8 +100,8 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
                 })
                 .collect();
             match unwrap(form, &wrapped, map) {
-                Some((phase, information)) => (phase, information, Reason::Resolved),
-                None => (f64::NAN, 0.0, Reason::Residual),
+                Some((phase, information)) => (phase, information, Reason::Resolved, tie),
+                None => (f64::NAN, 0.0, Reason::Residual, tie),
             }
         })
         .collect();
@@ -106,14 +110,23 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
         phase: pixels.iter().map(|pixel| pixel.0).collect(),
         information: pixels.iter().map(|pixel| pixel.1).collect(),
         reason: pixels.iter().map(|pixel| pixel.2).collect(),
+        tie: pixels.iter().map(|pixel| pixel.3).collect(),
     }
+}
+
+/// Sums of sines of 16-bit counts are exact to about 1e-11 of a count: a modulation of exactly 16 is not
+/// below 16.
+const TIE: f64 = 1e-9;
+
+/// The least modulation that is trusted, in counts: 16 of 255.
+fn least_modulation(full_scale: f64) -> f64 {
+    16.0 * full_scale / 255.0
 }
 
 /// The first reason in the samples not to trust a pixel; `levels` go from coarse to fine.
 fn distrust(levels: &[Level], seen: &[Demodulated], full_scale: f64) -> Option<Reason> {
-    // Sums of sines are exact to about 1e-13: a modulation of exactly 16 is not below 16.
-    let least = 16.0 * full_scale / 255.0 - 1e-9;
-    let weak = |seen: &Demodulated| seen.modulation < least;
+    let least = least_modulation(full_scale);
+    let weak = |seen: &Demodulated| seen.modulation < least - TIE;
     let saturated = levels
         .iter()
         .zip(seen)
