@@ -41,7 +41,11 @@ pub fn scenario(path: Option<&Path>) -> Result<Scenario, Failure> {
     let place = path.display().to_string();
     let text = fs::read_to_string(path).map_err(|error| {
         let what = format!("read scenario {place}");
-        Failure::because(Exit::Missing, what, format!("{error}: head.scenario names a TOML file"))
+        Failure::because(
+            Exit::Missing,
+            what,
+            format!("{error}: head.scenario names a TOML file"),
+        )
     })?;
     Scenario::from_toml(&text, &place)
         .map_err(|error| Failure::new(Exit::Configuration, error.to_string()))
@@ -95,19 +99,27 @@ fn calibration_of(
     };
     let missing = |what: &str| {
         let manifest = folder.join("recording.json");
-        let message = format!("{} has no {what}: the replay head needs it", manifest.display());
+        let message = format!(
+            "{} has no {what}: the replay head needs it",
+            manifest.display()
+        );
         Failure::new(Exit::Content, message)
     };
     Ok(Calibration {
         camera: (first.width, first.height, first.bit_depth),
-        camera_model: first.camera_model.clone().ok_or_else(|| missing("camera model"))?,
+        camera_model: first
+            .camera_model
+            .clone()
+            .ok_or_else(|| missing("camera model"))?,
         projector: (first.projector.width, first.projector.height),
         projector_model: first
             .projector
             .model
             .clone()
             .ok_or_else(|| missing("projector model"))?,
-        noise_counts: first.noise_counts.ok_or_else(|| missing("camera.noise_counts"))?,
+        noise_counts: first
+            .noise_counts
+            .ok_or_else(|| missing("camera.noise_counts"))?,
         response: None,
     })
 }

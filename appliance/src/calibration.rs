@@ -30,7 +30,13 @@ impl Calibration {
     pub fn fingerprint(&self) -> String {
         let mut hash = Sha256::new();
         let (width, height, bits) = self.camera;
-        for number in [width, height, u32::from(bits), self.projector.0, self.projector.1] {
+        for number in [
+            width,
+            height,
+            u32::from(bits),
+            self.projector.0,
+            self.projector.1,
+        ] {
             hash.update(number.to_le_bytes());
         }
         for model in [&self.camera_model, &self.projector_model] {
@@ -57,7 +63,12 @@ impl Calibration {
         };
         Ok((
             checked("camera", &self.camera_model, self.camera.0, self.camera.1)?,
-            checked("projector", &self.projector_model, self.projector.0, self.projector.1)?,
+            checked(
+                "projector",
+                &self.projector_model,
+                self.projector.0,
+                self.projector.1,
+            )?,
         ))
     }
 }

@@ -1,14 +1,23 @@
 //! The command line.
 
+mod config;
+mod demo;
 mod measure;
+mod record;
+mod serve;
 
+use crate::config::Config;
 use crate::error::{Exit, Failure};
+use crate::modbus::{registers_csv, registers_json};
+use crate::progress::Progress;
 use clap::{Parser, Subcommand};
+use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// The open 3-D smart sensor.
 #[derive(Debug, Parser)]
-#[command(name = "fringed", version, about, subcommand_required = false)]
+#[command(name = "fringed", version, about)]
 struct Arguments {
     /// What to do; without a command: serve.
     #[command(subcommand)]
@@ -20,10 +29,22 @@ struct Arguments {
 /// Options that every command knows.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Common {
+    /// Configuration file (TOML); `fringed config keys` lists its keys.
+    #[arg(long, global = true, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// State folder: recipes, result counter, serial.
+    #[arg(long, global = true, value_name = "DIR")]
+    pub state: Option<PathBuf>,
+    /// Where to serve Modbus TCP.
+    #[arg(long, global = true, value_name = "ADDR:PORT")]
+    pub modbus: Option<SocketAddr>,
+    /// Where to serve the page.
+    #[arg(long, global = true, value_name = "ADDR:PORT")]
+    pub http: Option<SocketAddr>,
     /// Computing threads; 0 = one per core.
     #[arg(long, global = true, value_name = "N")]
     pub threads: Option<usize>,
-    /// No progress, no table.
+    /// No progress, no log, no table.
     #[arg(long, global = true)]
     pub quiet: bool,
     /// Print JSON where a table would be printed.
@@ -33,8 +54,19 @@ pub struct Common {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Run the station: Modbus TCP for the PLC, a page for the technician.
+    Serve,
+    /// Run the station and play the PLC: ten parts, three of them defective.
+    Demo(demo::Demo),
     /// Measure a recording: phase, height, picture, point cloud and report.
     Measure(measure::Measure),
+    /// Record a sequence from the configured head.
+    Record(record::Record),
+    /// Check a configuration, or list its keys.
+    #[command(subcommand)]
+    Config(config::ConfigCommand),
+    /// Print the register map as CSV (or JSON with --json).
+    Registers,
 }
 
 /// Parses the arguments, runs the command and answers with its exit code.
@@ -62,21 +94,73 @@ pub fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> Result<(), Failure> {
     let common = arguments.common;
-    match arguments.command {
-        Some(Command::Measure(command)) => command.run(&common),
-        None => Ok(()),
+    match arguments.command.unwrap_or(Command::Serve) {
+        Command::Serve => serve::run(&common),
+        Command::Demo(command) => command.run(&common),
+        Command::Measure(command) => command.run(&common),
+        Command::Record(command) => command.run(&common),
+        Command::Config(command) => command.run(&common),
+        Command::Registers => {
+            registers(&common);
+            Ok(())
+        }
+    }
+}
+
+#[expect(
+    clippy::print_stdout,
+    reason = "the map is what the command is asked for"
+)]
+fn registers(common: &Common) {
+    if common.json {
+        println!("{:#}", registers_json());
+    } else {
+        print!("{}", registers_csv());
     }
 }
 
 impl Common {
-    /// A pool of computing threads of the size asked for.
+    /// The configuration file, if one is named, with the command line's options over it.
     ///
     /// # Errors
-    /// If the system gives no threads (exit code 70).
-    pub fn pool(&self) -> Result<rayon::ThreadPool, Failure> {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(self.threads.unwrap_or(0))
-            .build()
-            .map_err(|error| Failure::because(Exit::Software, "start the computing threads", error))
+    /// If the file is missing or wrong.
+    pub fn configuration(&self) -> Result<Config, Failure> {
+        let mut config = match &self.config {
+            Some(path) => Config::read(path)?,
+            None => Config::default(),
+        };
+        if let Some(state) = &self.state {
+            config.state = Some(state.clone());
+        }
+        if let Some(listen) = self.modbus {
+            config.modbus.listen = listen;
+        }
+        if let Some(listen) = self.http {
+            config.http.listen = listen;
+        }
+        if let Some(threads) = self.threads {
+            config.threads = threads;
+        }
+        config
+            .check()
+            .map_err(|error| Failure::new(Exit::Configuration, error))?;
+        Ok(config)
     }
+
+    /// Progress as the user wants it.
+    pub fn progress(&self) -> Progress {
+        Progress::new(self.quiet)
+    }
+}
+
+/// A pool of computing threads; 0 = one per core.
+///
+/// # Errors
+/// If the system gives no threads (exit code 70).
+fn pool(threads: usize) -> Result<rayon::ThreadPool, Failure> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|at| format!("computing-{at}"))
+        .build()
+        .map_err(|error| Failure::because(Exit::Software, "start the computing threads", error))
 }

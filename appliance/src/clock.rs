@@ -12,7 +12,10 @@ pub fn utc_us() -> Option<u64> {
 
 /// Whether the kernel says that the clock is disciplined by a time service.
 #[cfg(target_os = "linux")]
-#[expect(unsafe_code, reason = "the kernel's word on the clock has no safe wrapper that is kept")]
+#[expect(
+    unsafe_code,
+    reason = "the kernel's word on the clock has no safe wrapper that is kept"
+)]
 fn synchronised() -> bool {
     let mut state = std::mem::MaybeUninit::<libc::timex>::zeroed();
     // SAFETY: `timex` is plain integers, for which zero is a value; with modes = 0 the call only

@@ -1,13 +1,20 @@
 //! The daemon `fringed` and its command line: joins devices (`hal`) and computation (`algo`).
 
+pub mod backend;
 pub mod calibration;
 pub mod cli;
+pub mod clock;
+pub mod config;
+pub mod daemon;
 pub mod error;
 pub mod measure;
 pub mod modbus;
 pub mod output;
 pub mod plan;
+pub mod progress;
 pub mod recipe;
 pub mod seam;
+pub mod state;
 pub mod station;
 pub mod web;
+pub mod worker;

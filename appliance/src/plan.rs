@@ -3,6 +3,7 @@
 use crate::calibration::Calibration;
 use crate::recipe::{GaugeKind, Recipe};
 use crate::seam;
+use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED};
 use crate::station::{GaugeValue, Inspection, StageTime, Unit, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
@@ -15,9 +16,6 @@ use hal::frame::Frame;
 use hal::projector::Raster;
 use std::sync::Arc;
 use std::time::Instant;
-
-/// RESULT flag: the full sequence was used.
-use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED};
 
 /// A recipe joined with the head's calibration.
 #[derive(Debug)]
@@ -71,7 +69,11 @@ impl Plan {
     ///
     /// # Errors
     /// If the recipe was made for another calibration or does not fit the head.
-    pub fn new(recipe: Recipe, calibration: &Calibration, simulated: bool) -> Result<Self, PlanError> {
+    pub fn new(
+        recipe: Recipe,
+        calibration: &Calibration,
+        simulated: bool,
+    ) -> Result<Self, PlanError> {
         let number = recipe.file.number;
         let present = calibration.fingerprint();
         if recipe.file.calibration != present {
@@ -90,7 +92,10 @@ impl Plan {
         let file = &recipe.file;
         let camera = (file.camera.width, file.camera.height, file.camera.bit_depth);
         if camera != calibration.camera {
-            return Err(format!("it is for frames {camera:?}, the camera gives {:?}", calibration.camera));
+            return Err(format!(
+                "it is for frames {camera:?}, the camera gives {:?}",
+                calibration.camera
+            ));
         }
         let (camera, projector) = calibration.devices()?;
         let [low, high] = file.range_mm;
@@ -107,7 +112,9 @@ impl Plan {
             .map_err(|error| error.to_string())?;
         let map = decoder.unwrapping().needs_map().then(|| {
             let golden = recipe.arrays.golden_phase.iter();
-            golden.map(|&turns| AbsolutePhase::from_turns(turns)).collect()
+            golden
+                .map(|&turns| AbsolutePhase::from_turns(turns))
+                .collect()
         });
         let golden = golden(&recipe, &decoder);
         Ok(Self {
@@ -127,7 +134,12 @@ impl Plan {
 
     /// The patterns of the sequence, in the order of its frames.
     pub fn rasters(&self, calibration: &Calibration) -> Result<Vec<Raster>, hal::error::Error> {
-        let production = self.recipe.file.sequence.iter().filter(|frame| frame.production);
+        let production = self
+            .recipe
+            .file
+            .sequence
+            .iter()
+            .filter(|frame| frame.production);
         let frames = production.map(|frame| (frame.ratio, frame.shift_turns));
         rasters(&self.recipe.function, frames, calibration)
     }
@@ -162,7 +174,11 @@ impl Plan {
         clock.stage("gauges", &mut inspection);
         let maps = Maps {
             width: heights.width,
-            height_mm: heights.height.iter().map(|height| height.mm() as f32).collect(),
+            height_mm: heights
+                .height
+                .iter()
+                .map(|height| height.mm() as f32)
+                .collect(),
         };
         (inspection, Some(maps))
     }
@@ -170,7 +186,7 @@ impl Plan {
     fn judge(&self, phases: &PhaseMap, heights: &HeightMap, inspection: &mut Inspection) {
         let comparison = Comparison::new(&self.golden, heights);
         for (gauge, region) in self.recipe.file.gauges.iter().zip(&self.recipe.regions) {
-            let (unit, reading) = match gauge.kind {
+            let (unit, reading) = match gauge.measures {
                 GaugeKind::Deviation { smoothing_px } => {
                     (Unit::Length, comparison.deviation(region, smoothing_px))
                 }
@@ -208,7 +224,10 @@ impl Plan {
                 least * 100.0
             ))
         } else if !missing.is_empty() {
-            Some(format!("gauge {} found nothing to measure", missing.join(", ")))
+            Some(format!(
+                "gauge {} found nothing to measure",
+                missing.join(", ")
+            ))
         } else {
             None
         };

@@ -46,15 +46,19 @@ impl StateFolder {
             let what = format!("open the state folder {}", path.display());
             Failure::because(Exit::CannotCreate, what, error)
         };
-        let cannot =
-            |error: std::io::Error| failed(format!("{error}: name one that can be written with --state"));
+        let cannot = |error: std::io::Error| {
+            failed(format!(
+                "{error}: name one that can be written with --state"
+            ))
+        };
         fs::create_dir_all(path).map_err(cannot)?;
         let lock = File::create(path.join("lock")).map_err(cannot)?;
         match lock.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
                 return Err(failed(
-                    "another fringed uses it: end that one or name another folder with --state".into(),
+                    "another fringed uses it: end that one or name another folder with --state"
+                        .into(),
                 ));
             }
             Err(TryLockError::Error(error)) => return Err(cannot(error)),
@@ -86,16 +90,19 @@ impl StateFolder {
                 return Err(Failure::because(Exit::CannotCreate, what, error));
             }
         };
-        text.trim().parse::<u32>().map(|last| last.wrapping_add(1)).map_err(|_| {
-            Failure::new(
-                Exit::CannotCreate,
-                format!(
-                    "read {}: {:?} is no number: write the SEQ of the last result there",
-                    file.display(),
-                    text.trim()
-                ),
-            )
-        })
+        text.trim()
+            .parse::<u32>()
+            .map(|last| last.wrapping_add(1))
+            .map_err(|_| {
+                Failure::new(
+                    Exit::CannotCreate,
+                    format!(
+                        "read {}: {:?} is no number: write the SEQ of the last result there",
+                        file.display(),
+                        text.trim()
+                    ),
+                )
+            })
     }
 
     /// A writer of the counter.
@@ -117,8 +124,13 @@ impl StateFolder {
             return Ok(serial.trim().to_owned());
         }
         let serial = format!("{:08X}", random()?);
-        write_whole(&file, format!("{serial}\n").as_bytes())
-            .map_err(|error| Failure::because(Exit::CannotCreate, format!("write {}", file.display()), error))?;
+        write_whole(&file, format!("{serial}\n").as_bytes()).map_err(|error| {
+            Failure::because(
+                Exit::CannotCreate,
+                format!("write {}", file.display()),
+                error,
+            )
+        })?;
         Ok(serial)
     }
 }
@@ -144,7 +156,8 @@ impl Counter {
 /// # Errors
 /// If the system gives none.
 pub fn random() -> Result<u32, Failure> {
-    getrandom::u32().map_err(|error| Failure::because(Exit::Software, "ask the system for random bits", error))
+    getrandom::u32()
+        .map_err(|error| Failure::because(Exit::Software, "ask the system for random bits", error))
 }
 
 #[cfg(test)]

@@ -2,10 +2,11 @@
 
 use crate::backend::Opened;
 use crate::plan::{Maps, Plan, PlanError};
+use crate::progress::Progress;
 use crate::recipe::teach::{Naming, TeachError, teach};
 use crate::recipe::{LoadError, Store};
 use crate::station::{
-    ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, StationHandle,
+    ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
 };
 use hal::error::ErrorKind;
 use hal::frame::Frame;
@@ -33,7 +34,10 @@ pub struct LastMaps(Arc<Mutex<Option<Arc<Maps>>>>);
 impl LastMaps {
     /// The maps of the last cycle that had any.
     pub fn get(&self) -> Option<Arc<Maps>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
     }
 
     fn set(&self, maps: Maps) {
@@ -69,16 +73,23 @@ pub struct Worker {
     pub station: StationHandle,
     /// Where the last maps go.
     pub maps: LastMaps,
+    /// Shows how far teaching is, and the log.
+    pub progress: Progress,
 }
 
 impl Worker {
-    /// Works until told to stop, or until nobody can tell it anything any more.
-    pub fn run(mut self, orders: &Receiver<Order>) {
+    /// Works until told to stop, or until nobody can tell it anything any more. `first` is asked of the
+    /// station as soon as it is ready for it.
+    pub fn run(mut self, orders: &Receiver<Order>, first: Option<Request>) {
         self.station.event(Event::Condition(Condition {
             calibration_valid: true,
             ..Condition::default()
         }));
+        self.progress.clear();
         self.station.event(Event::Started);
+        if let Some(first) = first {
+            self.station.event(Event::Request(first));
+        }
         let mut plan = None;
         loop {
             match orders.recv_timeout(SIGN_OF_LIFE) {
@@ -102,19 +113,24 @@ impl Worker {
         };
         let Some(plan) = plan else {
             // The station triggers only with an active recipe, and that is this plan's.
-            self.station.event(failed(code::RIG, "measure: no recipe is loaded".into()));
+            self.station
+                .event(failed(code::RIG, "measure: no recipe is loaded".into()));
             return;
         };
         let count = plan.recipe().sequence.frame_count();
         let mut frames: Vec<Frame> = Vec::with_capacity(count);
         let indices: Vec<usize> = (0..count).collect();
         let station = &self.station;
-        let taken = self.opened.head.acquire(&indices, DEVICE_TIMEOUT, &mut |_, frame| {
-            frames.push(frame);
-            station.event(Event::Alive);
-        });
+        let taken = self
+            .opened
+            .head
+            .acquire(&indices, DEVICE_TIMEOUT, &mut |_, frame| {
+                frames.push(frame);
+                station.event(Event::Alive);
+            });
         if let Err(error) = taken {
-            self.station.event(failed(code_of(&error), error.to_string()));
+            self.station
+                .event(failed(code_of(&error), error.to_string()));
             return;
         }
         let exposed = Instant::now();
@@ -136,7 +152,7 @@ impl Worker {
                 let recipe = active(&ready);
                 *plan = Some(ready);
                 if let Some(fallback) = fallback {
-                    eprintln!("fringed: {fallback}");
+                    self.progress.log(&fallback);
                 }
                 self.station.event(Event::RecipeLoaded { job, recipe });
                 return;
@@ -158,12 +174,15 @@ impl Worker {
         let Some(before) = plan else { return };
         let shown = before.rasters(&self.opened.calibration);
         if let Err(error) = shown.and_then(|rasters| self.opened.head.load(rasters)) {
-            eprintln!("fringed: {error}");
+            self.progress.log(&error.to_string());
             *plan = None;
         }
     }
 
-    fn prepare(&mut self, key: &RecipeKey) -> Result<(Plan, Option<String>), (RecipeResult, String)> {
+    fn prepare(
+        &mut self,
+        key: &RecipeKey,
+    ) -> Result<(Plan, Option<String>), (RecipeResult, String)> {
         let refuse = |error: LoadError| {
             let result = match error {
                 LoadError::Unknown(_) => RecipeResult::Unknown,
@@ -177,13 +196,14 @@ impl Worker {
         };
         let loaded = self.recipes.load(number).map_err(refuse)?;
         let simulated = self.opened.stage.is_some();
-        let plan = Plan::new(loaded.recipe, &self.opened.calibration, simulated).map_err(|error| {
-            let result = match error {
-                PlanError::OtherCalibration { .. } => RecipeResult::OtherCalibration,
-                PlanError::Unfit { .. } => RecipeResult::Corrupt,
-            };
-            (result, error.to_string())
-        })?;
+        let plan =
+            Plan::new(loaded.recipe, &self.opened.calibration, simulated).map_err(|error| {
+                let result = match error {
+                    PlanError::OtherCalibration { .. } => RecipeResult::OtherCalibration,
+                    PlanError::Unfit { .. } => RecipeResult::Corrupt,
+                };
+                (result, error.to_string())
+            })?;
         plan.rasters(&self.opened.calibration)
             .and_then(|rasters| self.opened.head.load(rasters))
             .map_err(|error| (RecipeResult::Corrupt, error.to_string()))?;
@@ -197,8 +217,9 @@ impl Worker {
             name: format!("Part {number}"),
             taught_at_unix_s: crate::clock::utc_us().unwrap_or(0) / 1_000_000,
         };
-        let station = self.station.clone();
+        let (station, bar) = (self.station.clone(), self.progress.clone());
         let progress = |fraction: f64, words: &str| {
+            bar.tell(fraction, words);
             station.event(Event::Progress {
                 job,
                 fraction: fraction as f32,
@@ -208,18 +229,27 @@ impl Worker {
         let Opened {
             head, calibration, ..
         } = &mut self.opened;
-        let taught = self.pool.install(|| teach(head, calibration, &naming, DEVICE_TIMEOUT, &progress));
-        let stored = taught.map_err(|error| (code_of_teaching(&error), error.to_string())).and_then(
-            |(bytes, recipe)| {
+        let taught = self
+            .pool
+            .install(|| teach(head, calibration, &naming, DEVICE_TIMEOUT, &progress));
+        self.progress.clear();
+        let stored = taught
+            .map_err(|error| (code_of_teaching(&error), error.to_string()))
+            .and_then(|(bytes, recipe)| {
                 self.recipes
                     .save(number, &bytes)
                     .map(|()| recipe)
-                    .map_err(|error| (code::NOT_STORED, format!("store recipe {number}: {error}: free space")))
-            },
-        );
+                    .map_err(|error| {
+                        (
+                            code::NOT_STORED,
+                            format!("store recipe {number}: {error}: free space"),
+                        )
+                    })
+            });
         let ready = stored.and_then(|_| {
             let key = RecipeKey::Number(number);
-            self.prepare(&key).map_err(|(_, message)| (code::RIG, message))
+            self.prepare(&key)
+                .map_err(|(_, message)| (code::RIG, message))
         });
         match ready {
             Ok((ready, _)) => {

@@ -282,4 +282,13 @@ mod tests {
             assert_eq!(FrameFormat::packed(1, 1, bits).full_scale(), largest);
         }
     }
+
+    #[test]
+    fn a_frame_can_be_shared_between_threads_and_a_head_moved_to_one() {
+        fn shared<T: Send + Sync + Clone>() {}
+        fn moved<T: Send>() {}
+        shared::<Frame>();
+        moved::<crate::head::DynHead>();
+        shared::<crate::sim::Stage>();
+    }
 }

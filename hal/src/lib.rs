@@ -10,6 +10,7 @@ pub mod error;
 pub mod frame;
 pub mod head;
 pub mod model;
+pub mod npy;
 pub mod projector;
 pub mod replay;
 pub mod sim;

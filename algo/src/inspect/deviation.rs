@@ -175,7 +175,11 @@ mod tests {
         };
         let side = WIDTH as f64;
         let corners = [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)];
-        (golden, measured, Region::polygon(&corners, WIDTH, WIDTH).unwrap())
+        (
+            golden,
+            measured,
+            Region::polygon(&corners, WIDTH, WIDTH).unwrap(),
+        )
     }
 
     #[test]

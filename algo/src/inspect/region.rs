@@ -30,7 +30,10 @@ impl fmt::Display for RegionError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Corners(corners) => {
-                write!(f, "a region of {corners} corners: a polygon needs at least 3")
+                write!(
+                    f,
+                    "a region of {corners} corners: a polygon needs at least 3"
+                )
             }
             Self::NotFinite { corner } => {
                 write!(f, "corner {corner} of the region is not finite")
@@ -142,13 +145,22 @@ mod tests {
             (0.0, 6.5),
         ];
         let region = Region::polygon(&u, 8, 8).unwrap();
-        assert_eq!(region.spans().iter().filter(|(row, _)| *row == 1).count(), 2);
-        assert_eq!(region.spans().iter().filter(|(row, _)| *row == 5).count(), 1);
+        assert_eq!(
+            region.spans().iter().filter(|(row, _)| *row == 1).count(),
+            2
+        );
+        assert_eq!(
+            region.spans().iter().filter(|(row, _)| *row == 5).count(),
+            1
+        );
     }
 
     #[test]
     fn polygons_that_hold_nothing_are_refused() {
-        assert_eq!(Region::polygon(&[(0.0, 0.0); 2], 8, 8), Err(RegionError::Corners(2)));
+        assert_eq!(
+            Region::polygon(&[(0.0, 0.0); 2], 8, 8),
+            Err(RegionError::Corners(2))
+        );
         let away = [(20.0, 1.0), (30.0, 1.0), (30.0, 5.0)];
         assert_eq!(Region::polygon(&away, 8, 8), Err(RegionError::Empty));
         let broken = [(0.0, 0.0), (f64::NAN, 1.0), (3.0, 5.0)];

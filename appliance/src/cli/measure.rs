@@ -4,8 +4,9 @@ use super::Common;
 use crate::error::{Exit, Failure};
 use crate::measure::{Measurement, measure};
 use crate::output::folder::OutputFolder;
-use crate::output::{array, cloud, picture};
+use crate::output::{cloud, picture};
 use algo::pipeline::PhaseMap;
+use hal::npy;
 use hal::replay::Recording;
 use std::path::PathBuf;
 
@@ -30,7 +31,7 @@ impl Measure {
     )]
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         let recording = Recording::open(&self.recording)?;
-        let pool = common.pool()?;
+        let pool = super::pool(common.threads.unwrap_or(0))?;
         let measurement = pool.install(|| measure(&recording, &self.recording))?;
         let folder = OutputFolder::create(&self.out)?;
         pool.install(|| write(&folder, &measurement))?;
@@ -48,11 +49,7 @@ impl Measure {
 }
 
 fn write(folder: &OutputFolder, measurement: &Measurement) -> Result<(), Failure> {
-    let array = |name: &str, width, values: &[f32]| {
-        let bytes = array::npy(width, values)
-            .map_err(|error| Failure::because(Exit::Software, format!("write {name}"), error))?;
-        folder.write(name, &bytes)
-    };
+    let array = |name: &str, width, values: &[f32]| folder.write(name, &npy::write(width, values));
     let phases = &measurement.phases;
     let primary = &phases[measurement.primary];
     array("phase.npy", primary.width, &turns(primary))?;

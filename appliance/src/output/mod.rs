@@ -1,6 +1,5 @@
-//! What a measurement leaves behind for people: arrays, pictures, clouds.
+//! What a measurement leaves behind for people: pictures, clouds.
 
-pub mod array;
 pub mod cloud;
 pub mod colour;
 pub mod folder;

@@ -1,7 +1,7 @@
 //! A recipe as one file: a ZIP (stored) of `recipe.json` and NumPy arrays, with a fingerprint.
 
 use super::file::{FORMAT, RecipeFile, VERSION};
-use crate::output::array;
+use hal::npy;
 use sha2::{Digest, Sha256};
 use std::io::{Cursor, Read as _, Write as _};
 use zip::write::SimpleFileOptions;
@@ -62,24 +62,36 @@ fn broken(what: impl std::fmt::Display) -> ArchiveError {
 /// Packs a recipe; its fingerprint is filled in and returned beside the bytes.
 ///
 /// # Errors
-/// If an array is not a whole number of rows.
+/// If the archive cannot be made.
 pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), ArchiveError> {
     let columns = file.camera.width as usize;
     let mut members: Vec<(&str, Vec<u8>)> = Vec::new();
-    let mut add = |name, bytes: std::io::Result<Vec<u8>>| {
-        members.push((name, bytes.map_err(broken)?));
-        Ok::<_, ArchiveError>(())
-    };
+    let mut add = |name, bytes| members.push((name, bytes));
     if !arrays.phase_function.is_empty() {
         let columns = file.projector.width as usize;
-        add("phase_function.npy", array::npy(columns, &arrays.phase_function))?;
+        add(
+            "phase_function.npy",
+            npy::write(columns, &arrays.phase_function),
+        );
     }
-    add("golden_phase.npy", array::npy(columns, &arrays.golden_phase))?;
-    add("golden_height.npy", array::npy(columns, &arrays.golden_height))?;
-    add("height_slope.npy", array::npy(columns, &arrays.height_slope))?;
-    add("height_curvature.npy", array::npy(columns, &arrays.height_curvature))?;
-    add("valid.npy", array::npy(columns, &arrays.valid))?;
-    add("modulation.npy", array::npy(columns, &arrays.modulation))?;
+    add(
+        "golden_phase.npy",
+        npy::write(columns, &arrays.golden_phase),
+    );
+    add(
+        "golden_height.npy",
+        npy::write(columns, &arrays.golden_height),
+    );
+    add(
+        "height_slope.npy",
+        npy::write(columns, &arrays.height_slope),
+    );
+    add(
+        "height_curvature.npy",
+        npy::write(columns, &arrays.height_curvature),
+    );
+    add("valid.npy", npy::write(columns, &arrays.valid));
+    add("modulation.npy", npy::write(columns, &arrays.modulation));
     let zeroed = RecipeFile {
         fingerprint: NO_FINGERPRINT.into(),
         ..file.clone()
@@ -152,12 +164,20 @@ fn parse(text: &str) -> Result<RecipeFile, ArchiveError> {
     let value: serde_json::Value =
         serde_json::from_str(text).map_err(|error| broken(format!("recipe.json: {error}")))?;
     if value["format"] != FORMAT {
-        return Err(broken(format!("recipe.json: format is {}, not {FORMAT:?}", value["format"])));
+        return Err(broken(format!(
+            "recipe.json: format is {}, not {FORMAT:?}",
+            value["format"]
+        )));
     }
     match value["version"].as_u64() {
         Some(version) if version > u64::from(VERSION) => return Err(ArchiveError::Newer(version)),
         Some(1) => {}
-        _ => return Err(broken(format!("recipe.json: version is {}", value["version"]))),
+        _ => {
+            return Err(broken(format!(
+                "recipe.json: version is {}",
+                value["version"]
+            )));
+        }
     }
     serde_json::from_str(text).map_err(|error| broken(format!("recipe.json: {error}")))
 }
@@ -179,14 +199,10 @@ fn read_arrays(members: &[(&str, Vec<u8>)]) -> Result<Arrays, ArchiveError> {
     Ok(arrays)
 }
 
-fn read<T: npyz::Deserialize>(name: &str, bytes: &[u8]) -> Result<Vec<T>, ArchiveError> {
-    let wrong = |error: std::io::Error| broken(format!("member {name}: {error}"));
-    let file = npyz::NpyFile::new(bytes).map_err(wrong)?;
-    // A header may claim any size; the data cannot be longer than the member.
-    if file.len() > bytes.len() as u64 {
-        return Err(broken(format!("member {name} ends early")));
-    }
-    file.into_vec().map_err(wrong)
+fn read<T: npy::Element>(name: &str, bytes: &[u8]) -> Result<Vec<T>, ArchiveError> {
+    npy::read(bytes)
+        .map(|array| array.elements)
+        .map_err(|error| broken(format!("member {name}: {error}")))
 }
 
 /// SHA-256 over the manifest and all other members in the order of their names, each with its name

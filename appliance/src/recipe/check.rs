@@ -62,7 +62,9 @@ impl Recipe {
         }
         if file.part_number.len() > 32 || !file.part_number.is_ascii() {
             let part_number = &file.part_number;
-            return Err(format!("part number {part_number:?} is not up to 32 ASCII characters"));
+            return Err(format!(
+                "part number {part_number:?} is not up to 32 ASCII characters"
+            ));
         }
         let (width, height) = (file.camera.width as usize, file.camera.height as usize);
         let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
@@ -75,14 +77,23 @@ impl Recipe {
             ("modulation", arrays.modulation.len()),
         ] {
             if Some(length) != pixels {
-                return Err(format!("{name} has {length} values for a camera of {width}x{height}"));
+                return Err(format!(
+                    "{name} has {length} values for a camera of {width}x{height}"
+                ));
             }
         }
-        let (columns, rows) = (file.projector.width as usize, file.projector.height as usize);
+        let (columns, rows) = (
+            file.projector.width as usize,
+            file.projector.height as usize,
+        );
         let function = match file.pattern {
             PatternFile::Vertical { fringes } => PhaseFunction::vertical(columns, rows, fringes),
-            PatternFile::Horizontal { fringes } => PhaseFunction::horizontal(columns, rows, fringes),
-            PatternFile::File => PhaseFunction::sampled(columns, rows, arrays.phase_function.clone()),
+            PatternFile::Horizontal { fringes } => {
+                PhaseFunction::horizontal(columns, rows, fringes)
+            }
+            PatternFile::File => {
+                PhaseFunction::sampled(columns, rows, arrays.phase_function.clone())
+            }
         };
         let function = function.map_err(|error| error.to_string())?;
         let production: Vec<_> = file
@@ -98,7 +109,10 @@ impl Recipe {
             return Err("noise and range of the expansion must be positive".into());
         }
         if !(0.0..=1.0).contains(&file.min_coverage) {
-            return Err(format!("a least coverage of {} is no share", file.min_coverage));
+            return Err(format!(
+                "a least coverage of {} is no share",
+                file.min_coverage
+            ));
         }
         Ok(Self {
             file,
@@ -111,10 +125,16 @@ impl Recipe {
 
     fn regions(file: &RecipeFile, width: usize, height: usize) -> Result<Vec<Region>, String> {
         if file.gauges.is_empty() || file.gauges.len() > MAX_GAUGES {
-            return Err(format!("{} gauges where 1 to {MAX_GAUGES} are needed", file.gauges.len()));
+            return Err(format!(
+                "{} gauges where 1 to {MAX_GAUGES} are needed",
+                file.gauges.len()
+            ));
         }
         if file.regions.len() > MAX_REGIONS {
-            return Err(format!("{} regions, over {MAX_REGIONS}", file.regions.len()));
+            return Err(format!(
+                "{} regions, over {MAX_REGIONS}",
+                file.regions.len()
+            ));
         }
         let mut named = HashMap::new();
         for region in &file.regions {
@@ -126,10 +146,16 @@ impl Recipe {
         let find = |gauge: &super::GaugeFile| {
             let limits = [gauge.low, gauge.high];
             if limits.iter().flatten().any(|limit| !limit.is_finite()) {
-                return Err(format!("gauge {:?} has a limit that is not finite", gauge.name));
+                return Err(format!(
+                    "gauge {:?} has a limit that is not finite",
+                    gauge.name
+                ));
             }
             named.get(gauge.region.as_str()).cloned().ok_or_else(|| {
-                format!("gauge {:?} names a region {:?} that is not there", gauge.name, gauge.region)
+                format!(
+                    "gauge {:?} names a region {:?} that is not there",
+                    gauge.name, gauge.region
+                )
             })
         };
         file.gauges.iter().map(find).collect()

@@ -125,8 +125,7 @@ pub struct GaugeFile {
     /// The name of its region.
     pub region: String,
     /// What it measures.
-    #[serde(flatten)]
-    pub kind: GaugeKind,
+    pub measures: GaugeKind,
     /// Lower limit, inclusive, in mm or as a share.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub low: Option<f64>,
@@ -137,7 +136,7 @@ pub struct GaugeFile {
 
 /// What a gauge measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum GaugeKind {
     /// The deviation from golden of largest magnitude, in mm.
     Deviation {

@@ -98,10 +98,17 @@ pub fn teach(
     let indices: Vec<usize> = (0..frames.len()).collect();
     head.acquire(&indices, timeout, &mut |_, frame| {
         taken.push(frame);
-        progress(0.1 + 0.5 * taken.len() as f64 / frames.len() as f64, "measuring the part");
+        progress(
+            0.1 + 0.5 * taken.len() as f64 / frames.len() as f64,
+            "measuring the part",
+        );
     })?;
     progress(0.6, "computing the golden map");
-    let views = taken.iter().map(seam::view).collect::<Result<Vec<_>, _>>().map_err(rig)?;
+    let views = taken
+        .iter()
+        .map(seam::view)
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(rig)?;
     let sequence = Sequence::from_frames(&frames).map_err(rig)?;
     let decoder = Decoder::new(&sequence, function.range(), calibration.camera.2).map_err(rig)?;
     let (camera, projector) = calibration.devices().map_err(rig)?;
@@ -113,7 +120,11 @@ pub fn teach(
     refuse_empty(&phases)?;
     progress(0.8, "working out the expansion");
     let arrays = arrays(&triangulator, &decoder, &phases, &heights);
-    let resolved: Vec<bool> = phases.trust.iter().map(|trust| *trust == Trust::Resolved).collect();
+    let resolved: Vec<bool> = phases
+        .trust
+        .iter()
+        .map(|trust| *trust == Trust::Resolved)
+        .collect();
     let (regions, gauges) = gauges(&resolved, phases.width);
     let range = triangulator.range();
     let file = RecipeFile {
@@ -167,10 +178,22 @@ fn refuse_empty(phases: &PhaseMap) -> Result<(), TeachError> {
     }
     let share = |trust| phases.count(trust) as f64 / pixels * 100.0;
     let reason = [
-        (Trust::Saturated, "is saturated: shorten the exposure or close the aperture"),
-        (Trust::OutOfRange, "lies outside the working range: move the part or widen range_mm"),
-        (Trust::LowModulation, "shows the coarse pattern only: focus camera and projector"),
-        (Trust::Residual, "gives contradicting phases: does the part or the light move?"),
+        (
+            Trust::Saturated,
+            "is saturated: shorten the exposure or close the aperture",
+        ),
+        (
+            Trust::OutOfRange,
+            "lies outside the working range: move the part or widen range_mm",
+        ),
+        (
+            Trust::LowModulation,
+            "shows the coarse pattern only: focus camera and projector",
+        ),
+        (
+            Trust::Residual,
+            "gives contradicting phases: does the part or the light move?",
+        ),
     ]
     .into_iter()
     .filter(|(trust, _)| share(*trust) > 100.0 * LEAST_RESOLVED)
@@ -211,9 +234,19 @@ fn arrays(
     Arrays {
         phase_function: Vec::new(),
         golden_phase: (0..phases.phase.len())
-            .map(|at| if resolved(&at) { phases.phase[at].turns() } else { f64::NAN })
+            .map(|at| {
+                if resolved(&at) {
+                    phases.phase[at].turns()
+                } else {
+                    f64::NAN
+                }
+            })
             .collect(),
-        golden_height: heights.height.iter().map(|height| height.mm() as f32).collect(),
+        golden_height: heights
+            .height
+            .iter()
+            .map(|height| height.mm() as f32)
+            .collect(),
         height_slope: expansions.iter().map(|[first, _]| *first).collect(),
         height_curvature: expansions.iter().map(|[_, second]| *second).collect(),
         valid: valid.into_iter().map(u8::from).collect(),
@@ -230,10 +263,15 @@ fn eroded(mask: &[bool], width: usize, by: usize) -> Vec<bool> {
     let rows = mask.len() / width.max(1);
     let inside = |column: usize, row: usize| {
         let fits = column >= by && row >= by && column + by < width && row + by < rows;
-        fits && (row - by..=row + by)
-            .all(|v| mask[v * width + column - by..=v * width + column + by].iter().all(|on| *on))
+        fits && (row - by..=row + by).all(|v| {
+            mask[v * width + column - by..=v * width + column + by]
+                .iter()
+                .all(|on| *on)
+        })
     };
-    (0..mask.len()).map(|at| inside(at % width, at / width)).collect()
+    (0..mask.len())
+        .map(|at| inside(at % width, at / width))
+        .collect()
 }
 
 /// The regions and gauges that a taught part gets by itself.
@@ -249,7 +287,7 @@ fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) 
         GaugeFile {
             name: "deviation".into(),
             region: "frame".into(),
-            kind: GaugeKind::Deviation {
+            measures: GaugeKind::Deviation {
                 smoothing_px: SMOOTHING_PX,
             },
             low: Some(-DEVIATION_MM),
@@ -258,24 +296,31 @@ fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) 
         GaugeFile {
             name: "coverage".into(),
             region: "frame".into(),
-            kind: GaugeKind::Coverage,
+            measures: GaugeKind::Coverage,
             low: Some((coverage - COVERAGE_CHANGE).max(0.0)),
             high: Some((coverage + COVERAGE_CHANGE).min(1.0)),
         },
     ];
     let found = openings(resolved, width, OPENING_PIXELS);
-    let usable = found.iter().filter(|opening| opening.reach >= OPENING_REACH);
+    let usable = found
+        .iter()
+        .filter(|opening| opening.reach >= OPENING_REACH);
     for (at, opening) in usable.take(MAX_OPENINGS).enumerate() {
         let name = format!("opening {}", at + 1);
         let ((u, v), reach) = (opening.centre, opening.reach as f64);
         regions.push(RegionFile {
             name: name.clone(),
-            polygon: vec![[u - reach, v], [u, v - reach], [u + reach, v], [u, v + reach]],
+            polygon: vec![
+                [u - reach, v],
+                [u, v - reach],
+                [u + reach, v],
+                [u, v + reach],
+            ],
         });
         gauges.push(GaugeFile {
             name: name.clone(),
             region: name,
-            kind: GaugeKind::Coverage,
+            measures: GaugeKind::Coverage,
             low: None,
             high: Some(OPENING_COVERAGE),
         });

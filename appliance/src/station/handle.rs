@@ -126,3 +126,70 @@ pub fn system_utc_us() -> Option<u64> {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
     u64::try_from(since.as_micros()).ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use super::super::event::{RecipeKey, Request};
+    use super::super::tests::settings;
+    use super::*;
+
+    #[tokio::test]
+    async fn ticking_moves_the_heartbeat_and_ends_with_its_shutdown() {
+        let handle =
+            StationHandle::new(Station::new(settings(), Micros(0)), Instant::now(), |_| ());
+        let mut snapshots = handle.subscribe();
+        let (end, ended) = tokio::sync::oneshot::channel::<()>();
+        let ticking = tokio::spawn(tick(handle.clone(), || Some(1), async {
+            drop(ended.await)
+        }));
+        let beaten = snapshots
+            .wait_for(|snapshot| snapshot.heartbeat >= 2)
+            .await
+            .unwrap();
+        assert!(beaten.at >= Micros::from_millis(200));
+        drop(beaten);
+        drop(end);
+        ticking.await.unwrap();
+    }
+
+    #[test]
+    fn effects_reach_the_sink_in_order_before_the_write_returns() {
+        let (sink, effects) = channel();
+        let station = Station::new(settings(), Micros(0));
+        let handle = StationHandle::new(station, Instant::now(), move |effect| {
+            sink.send(effect).unwrap()
+        });
+        handle.event(Event::Started);
+        let after = handle.event(Event::Request(Request::Load(RecipeKey::Number(3))));
+        assert_eq!((after.state, handle.snapshot()), (4, after.clone()));
+        assert!(matches!(
+            effects.try_recv(),
+            Ok(Effect::Load {
+                key: RecipeKey::Number(3),
+                ..
+            })
+        ));
+    }
+
+    #[test]
+    fn a_refused_write_changes_neither_the_station_nor_the_edges() {
+        let handle =
+            StationHandle::new(Station::new(settings(), Micros(0)), Instant::now(), |_| ());
+        let mut edges = ConnectionEdges::default();
+        let write = ControlWrite {
+            control: super::super::Masked::<u16>::all(0x0102),
+            ..Default::default()
+        };
+        let before = handle.snapshot();
+        assert_eq!(
+            handle.write(&mut edges, write),
+            Err(RefusedWrite::ReservedBits(0x0102))
+        );
+        assert_eq!(
+            (edges, handle.snapshot()),
+            (ConnectionEdges::default(), before)
+        );
+    }
+}

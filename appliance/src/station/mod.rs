@@ -12,7 +12,8 @@
 //! - **RECIPE_LOAD beats TRIGGER in one write**: the load begins, the trigger is rejected as not ready. Measuring the new
 //!   part with the old recipe could pass the wrong part. With RECIPE_SELECT 0 nothing is loaded and the trigger counts.
 //! - The bits of one CONTROL write act in this order: ERROR_RESET, ABORT, ONLINE, RESULT_ACK, BUFFERED, RECIPE_LOAD, TEACH,
-//!   TRIGGER. So one write can clear a fault and trigger, or abort and load the next recipe once the worker is free.
+//!   TRIGGER. So one write can clear a fault and trigger. An abort takes effect when the worker answers; until then the
+//!   station is busy.
 //! - A trigger by edge answers with TOKEN 0 unless the same write brings a new token. LAST_TOKEN changes only by a token.
 //! - RECIPE_OK means that the requested recipe is the active one: a failed load keeps the old recipe and clears the bit.
 //! - ERROR and ERROR_CODE show a fault, else the last failed cycle until a cycle succeeds or ERROR_RESET.
@@ -22,6 +23,7 @@
 pub mod control;
 pub mod error_code;
 pub mod event;
+pub mod gauge;
 pub mod handle;
 pub mod machine;
 pub mod result;
@@ -41,11 +43,10 @@ mod walk;
 
 pub use control::{ConnectionEdges, ControlRegisters, ControlWrite, Masked, RefusedWrite};
 pub use event::{Condition, Effect, Effects, Event, Job, JobId, RecipeKey, RecipeResult, Request};
+pub use gauge::{Decision, GaugeValue, Unit};
 pub use handle::{StationHandle, system_utc_us, tick};
 pub use machine::{Limits, Settings, Station};
-pub use result::{
-    Decision, GaugeValue, Inspection, MAX_GAUGES, ResultRecord, StageTime, Unit, Verdict,
-};
+pub use result::{Inspection, MAX_GAUGES, ResultRecord, StageTime, Verdict};
 pub use snapshot::{Identity, Snapshot, TeachProgress};
 pub use state::{ActiveRecipe, Cycle, Fault, Micros, State};
 pub use step::step;

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use super::gauge::GaugeValue;
+
 /// The most gauges that a recipe can have: bits and registers of the map.
 pub const MAX_GAUGES: usize = 16;
 /// The most stages whose time is shown.
@@ -39,141 +41,6 @@ impl Verdict {
             Self::Pass => "PASS",
             Self::Fail => "FAIL",
             Self::Invalid => "INVALID",
-        }
-    }
-}
-
-/// What a gauge's value is: registers 554–569.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Unit {
-    /// 0: a bare number; register step 0.0001.
-    #[default]
-    None,
-    /// 1: mm; register step 0.1 µm.
-    Length,
-    /// 2: degrees; register step 0.0001°.
-    Angle,
-    /// 3: mm³; register step 0.01 mm³.
-    Volume,
-    /// 4: 0…1; register step 0.1 ‰.
-    Share,
-}
-
-impl Unit {
-    /// The number of registers 554–569.
-    pub fn number(self) -> u16 {
-        match self {
-            Self::None => 0,
-            Self::Length => 1,
-            Self::Angle => 2,
-            Self::Volume => 3,
-            Self::Share => 4,
-        }
-    }
-
-    /// Register steps per mm, °, mm³ or 1.
-    pub fn steps(self) -> f64 {
-        match self {
-            Self::Volume => 100.0,
-            Self::None | Self::Length | Self::Angle | Self::Share => 10_000.0,
-        }
-    }
-
-    /// The symbol behind a value.
-    pub fn symbol(self) -> &'static str {
-        match self {
-            Self::None | Self::Share => "",
-            Self::Length => "mm",
-            Self::Angle => "°",
-            Self::Volume => "mm³",
-        }
-    }
-}
-
-/// What was decided about one gauge: bits 0–4 of registers 296–311.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Decision {
-    /// Measured and within its limits.
-    pub pass: bool,
-    /// Measured.
-    pub valid: bool,
-    /// Below its lower limit.
-    pub low: bool,
-    /// Above its upper limit.
-    pub high: bool,
-    /// A limit lies within 2 σ of the value.
-    pub doubtful: bool,
-}
-
-impl Decision {
-    /// The bits of registers 296–311.
-    pub fn bits(self) -> u16 {
-        [self.pass, self.valid, self.low, self.high, self.doubtful]
-            .iter()
-            .enumerate()
-            .fold(0, |bits, (k, &set)| bits | (u16::from(set) << k))
-    }
-
-    /// The decision that a value, its σ and its limits (inclusive) lead to. No value, or one that is not finite: nothing but
-    /// invalid.
-    pub fn of(value: Option<f64>, sigma: Option<f64>, low: Option<f64>, high: Option<f64>) -> Self {
-        let Some(value) = value.filter(|value| value.is_finite()) else {
-            return Self::default();
-        };
-        let below = low.is_some_and(|limit| value < limit);
-        let above = high.is_some_and(|limit| value > limit);
-        let near = |limit: Option<f64>| {
-            limit
-                .zip(sigma)
-                .is_some_and(|(limit, sigma)| (value - limit).abs() < 2.0 * sigma)
-        };
-        Self {
-            pass: !below && !above,
-            valid: true,
-            low: below,
-            high: above,
-            doubtful: near(low) || near(high),
-        }
-    }
-}
-
-/// One gauge of a result. Values in mm, °, mm³ or as a share 0…1.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GaugeValue {
-    /// The gauge's name in the recipe.
-    pub name: Arc<str>,
-    /// What the value is.
-    pub unit: Unit,
-    /// `None` if it could not be measured.
-    pub value: Option<f64>,
-    /// One standard deviation of the value, as far as predicted.
-    pub sigma: Option<f64>,
-    /// The lower limit.
-    pub low: Option<f64>,
-    /// The upper limit.
-    pub high: Option<f64>,
-    /// What was decided.
-    pub decision: Decision,
-}
-
-impl GaugeValue {
-    /// A gauge with the decision that its numbers lead to.
-    pub fn judged(
-        name: &str,
-        unit: Unit,
-        value: Option<f64>,
-        sigma: Option<f64>,
-        limits: (Option<f64>, Option<f64>),
-    ) -> Self {
-        let (low, high) = limits;
-        Self {
-            name: name.into(),
-            unit,
-            value,
-            sigma,
-            low,
-            high,
-            decision: Decision::of(value, sigma, low, high),
         }
     }
 }
@@ -292,6 +159,7 @@ impl ResultRecord {
 
 #[cfg(test)]
 mod tests {
+    use super::super::gauge::Unit;
     use super::*;
 
     fn inspection(judged: Verdict, values: &[Option<f64>]) -> Inspection {
@@ -334,17 +202,6 @@ mod tests {
         assert_eq!(
             inspection(Verdict::Fail, &[Some(1.1), None]).verdict(),
             Verdict::Invalid
-        );
-    }
-
-    #[test]
-    fn a_limit_within_two_sigma_makes_a_decision_doubtful() {
-        let near = Decision::of(Some(0.9), Some(0.06), Some(-1.0), Some(1.0));
-        assert!(near.doubtful && near.pass);
-        assert!(!Decision::of(Some(0.9), Some(0.04), Some(-1.0), Some(1.0)).doubtful);
-        assert_eq!(
-            Decision::of(Some(1.5), None, None, Some(1.0)).bits(),
-            0b01010
         );
     }
 }

@@ -129,7 +129,9 @@ pub fn step(mut station: Station, event: Event, now: Micros) -> (Station, Effect
             );
         }
         Event::Recovered => {
-            if let State::Fault(fault) = &station.state {
+            if let State::Fault(fault) = &station.state
+                && fault.cleared_by == ClearedBy::Recovery
+            {
                 log(
                     &mut effects,
                     format!("recovered from error {}: {}", fault.code, fault.cause),
@@ -157,9 +159,10 @@ impl Station {
     fn started(&mut self, effects: &mut Effects) {
         match &self.state {
             State::Boot { .. } => self.state = self.rest(),
-            // It booted too slowly, but it booted.
+            // It booted too slowly, but it booted; or it was started anew and holds no recipe any more.
             State::Fault(fault) if fault.cleared_by == ClearedBy::SignOfLife => {
-                self.state = self.rest()
+                self.recipe = None;
+                self.state = self.rest();
             }
             _ => log(effects, "the measuring task started twice; ignored"),
         }

@@ -18,6 +18,8 @@ pub mod server;
 pub mod view;
 
 #[cfg(test)]
+mod looking;
+#[cfg(test)]
 mod tests;
 
 pub use router::{HeightPicture, Site};

@@ -11,7 +11,7 @@ const MAX_SIZE: u32 = 16384;
 /// Most frames in a recording: two patterns of a hundred frames are plenty.
 const MAX_FRAMES: usize = 1024;
 /// Most bytes of decoded samples in a recording.
-const MAX_BYTES: u64 = 8 << 30;
+const MAX_BYTES: u64 = 2 << 30;
 /// The shifts of a level may be off their even spacing by this much, turns.
 pub(crate) const SHIFT_TOLERANCE_TURNS: f64 = 1e-6;
 /// Fewest frames that determine offset, modulation and phase.

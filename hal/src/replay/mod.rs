@@ -4,7 +4,6 @@ mod check;
 pub mod failure;
 mod grey;
 mod manifest;
-mod npy;
 mod play;
 pub mod recorder;
 pub mod recording;

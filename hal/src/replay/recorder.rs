@@ -3,6 +3,7 @@
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::failure::RecordingError;
 use super::manifest::{
@@ -10,8 +11,9 @@ use super::manifest::{
     VERSION,
 };
 use super::recording::{MANIFEST, PatternSpec, Recording, TRUTH_CLASS, TRUTH_HEIGHT};
-use super::{check, grey, npy};
+use super::{check, grey};
 use crate::frame::Samples;
+use crate::npy;
 
 /// A recording that could not be written. Nothing is left behind.
 #[derive(Debug, thiserror::Error)]
@@ -54,12 +56,9 @@ pub fn write(recording: &Recording, folder: &Path) -> Result<(), RecorderError> 
     check::manifest(&manifest, &folder.join(MANIFEST)).map_err(|error| wrong(folder, &error))?;
     check_samples(recording, folder)?;
 
-    let name = folder
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
-    let partial = folder.with_file_name(format!(".{name}.partial-{}", std::process::id()));
+    let partial = partial_name(folder);
+    // Made here and not in `fill`: what somebody else made is not ours to remove.
+    fs::create_dir(&partial).map_err(|source| create(&partial, source))?;
     let written = fill(recording, &manifest, &partial).and_then(|()| {
         fs::rename(&partial, folder).map_err(|source| create(folder, source))?;
         sync_folder(
@@ -74,6 +73,14 @@ pub fn write(recording: &Recording, folder: &Path) -> Result<(), RecorderError> 
         let _ = fs::remove_dir_all(&partial);
     }
     written
+}
+
+/// A hidden name beside `folder` that no other recorder uses at the same time.
+fn partial_name(folder: &Path) -> PathBuf {
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    folder.with_file_name(format!(".{name}.partial-{}-{count}", std::process::id()))
 }
 
 fn wrong(folder: &Path, error: &RecordingError) -> RecorderError {
@@ -230,7 +237,7 @@ fn check_samples(recording: &Recording, folder: &Path) -> Result<(), RecorderErr
 }
 
 fn fill(recording: &Recording, manifest: &Manifest, partial: &Path) -> Result<(), RecorderError> {
-    for folder in ["", "frames", "pattern", "truth"] {
+    for folder in ["frames", "pattern", "truth"] {
         let needed = match folder {
             "pattern" => recording
                 .patterns
@@ -251,32 +258,17 @@ fn fill(recording: &Recording, manifest: &Manifest, partial: &Path) -> Result<()
         put(&path, &file)?;
     }
     for (index, pattern) in recording.patterns.iter().enumerate() {
-        if let PatternSpec::File {
-            rows,
-            columns,
-            turns,
-        } = pattern
-        {
-            let bytes: Vec<u8> = turns.iter().flat_map(|turns| turns.to_le_bytes()).collect();
-            put(
-                &partial.join(phase_file(&recording.patterns, index)),
-                &npy::write("<f8", *rows, *columns, &bytes),
-            )?;
+        if let PatternSpec::File { columns, turns, .. } = pattern {
+            let path = partial.join(phase_file(&recording.patterns, index));
+            put(&path, &npy::write(*columns, turns))?;
         }
     }
-    let (rows, columns) = (recording.height as usize, recording.width as usize);
+    let columns = recording.width as usize;
     if let Some(height) = &recording.truth_height {
-        let bytes: Vec<u8> = height.iter().flat_map(|mm| mm.to_le_bytes()).collect();
-        put(
-            &partial.join(TRUTH_HEIGHT),
-            &npy::write("<f4", rows, columns, &bytes),
-        )?;
+        put(&partial.join(TRUTH_HEIGHT), &npy::write(columns, height))?;
     }
     if let Some(class) = &recording.truth_class {
-        put(
-            &partial.join(TRUTH_CLASS),
-            &npy::write("|u1", rows, columns, class),
-        )?;
+        put(&partial.join(TRUTH_CLASS), &npy::write(columns, class))?;
     }
     let path = partial.join(MANIFEST);
     let mut text = serde_json::to_string_pretty(manifest)

@@ -7,10 +7,10 @@ use std::sync::Arc;
 
 use super::failure::RecordingError;
 use super::manifest::{self, Manifest, PatternEntry};
-use super::npy::Array;
-use super::{check, grey, npy};
+use super::{check, grey};
 use crate::frame::{Frame, FrameFormat};
 use crate::model::DeviceModel;
+use crate::npy::{self, Array, Element, NpyError};
 use crate::units::Timestamp;
 
 pub use super::manifest::RecipeReference;
@@ -146,8 +146,8 @@ impl Recording {
         let frames = frames(folder, &manifest, format)?;
         let patterns = patterns(folder, &manifest)?;
         let shape = (format.height as usize, format.width as usize);
-        let truth_height = truth(folder, TRUTH_HEIGHT, shape, npy::read_f32)?;
-        let truth_class = truth(folder, TRUTH_CLASS, shape, npy::read_u8)?;
+        let truth_height = truth(folder, TRUTH_HEIGHT, shape)?;
+        let truth_class = truth(folder, TRUTH_CLASS, shape)?;
 
         let Manifest {
             description,
@@ -221,7 +221,8 @@ fn patterns(folder: &Path, manifest: &Manifest) -> Result<Vec<PatternSpec>, Reco
         PatternEntry::Horizontal { fringes } => Ok(PatternSpec::Horizontal { fringes: *fringes }),
         PatternEntry::File { file } => {
             let path = folder.join(file);
-            let array = npy::read_f64(&read(folder, file, MAX_FILE_BYTES)?, &path)?;
+            let array: Array<f64> =
+                npy::read(&read(folder, file, MAX_FILE_BYTES)?).map_err(unusable(&path))?;
             shaped(&array, (rows, columns), "projector", &path)?;
             if let Some(at) = array.elements.iter().position(|turns| !turns.is_finite()) {
                 return Err(RecordingError::content(
@@ -244,17 +245,20 @@ fn patterns(folder: &Path, manifest: &Manifest) -> Result<Vec<PatternSpec>, Reco
     manifest.pattern.0.iter().map(load).collect()
 }
 
-fn truth<T>(
+fn unusable(path: &Path) -> impl Fn(NpyError) -> RecordingError {
+    |error| RecordingError::content(path, error.problem, error.remedy)
+}
+
+fn truth<T: Element>(
     folder: &Path,
     name: &str,
     shape: (usize, usize),
-    parse: impl Fn(&[u8], &Path) -> Result<Array<T>, RecordingError>,
 ) -> Result<Option<Vec<T>>, RecordingError> {
     let path = folder.join(name);
     if !path.exists() {
         return Ok(None);
     }
-    let array = parse(&read(folder, name, MAX_FILE_BYTES)?, &path)?;
+    let array = npy::read(&read(folder, name, MAX_FILE_BYTES)?).map_err(unusable(&path))?;
     shaped(&array, shape, "camera", &path)?;
     Ok(Some(array.elements))
 }

@@ -4,16 +4,18 @@
 //! them. What the camera sees follows from what the projector shows.
 
 mod blur;
-mod devices;
+mod limits;
 pub mod optics;
 pub mod parts;
 pub mod scenario;
+mod scene;
+mod stage;
 mod trace;
 pub mod transport;
 
-pub use devices::{Stage, head, head_with_progress};
 pub use parts::Part;
 pub use scenario::{Placement, Scenario};
+pub use stage::{Stage, head, head_with_progress};
 pub use transport::Truth;
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::parts::{Cone, Sphere, Spline};
+use super::parts::{Cone, Sphere};
 use super::scenario::Scenario;
 use super::{Part, head};
 use crate::frame::Samples;
@@ -144,5 +144,5 @@ fn the_cone_is_rendered_as_the_independent_simulator_did() {
 
 #[test]
 fn the_spline_is_rendered_as_the_independent_simulator_did() {
-    compare("study-spline-dense121", Part::Spline(Spline::default()));
+    compare("study-spline-dense121", Part::Spline(Box::default()));
 }

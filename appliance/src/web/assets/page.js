@@ -28,10 +28,13 @@ function milliseconds(us) {
   return ms >= 1000 ? `${(ms / 1000).toFixed(2)} s` : ms >= 10 ? `${ms.toFixed(0)} ms` : `${ms.toFixed(1)} ms`;
 }
 
-function quantity(value, gauge, digits) {
-  if (gauge.kind === "share") return `${(value * 100).toFixed(digits ?? 2)} %`;
-  const places = digits ?? (gauge.kind === "volume" ? 2 : gauge.kind === "length" ? 3 : 3);
-  return `${value.toFixed(places)}${gauge.unit === "°" ? "°" : gauge.unit ? ` ${gauge.unit}` : ""}`;
+// Digits as the sensor resolves them; a σ gets one more.
+function quantity(value, gauge, more = 0, bare = false) {
+  const share = gauge.kind === "share";
+  const places = (share || gauge.kind === "volume" ? 2 : 3) + more;
+  const digits = (share ? 100 * value : value).toFixed(places).replace("-", "\u2212");
+  if (bare) return digits;
+  return `${digits}${share ? " %" : gauge.unit === "°" ? "°" : gauge.unit ? ` ${gauge.unit}` : ""}`;
 }
 
 function element(name, className, words) {
@@ -58,7 +61,7 @@ function limits(gauge) {
   track.append(band);
   if (value !== null) { const mark = element("span", "mark"); mark.style.left = place(value); track.append(mark); }
   const words = lowest === null ? `≤ ${quantity(highest, gauge)}` : highest === null ? `≥ ${quantity(lowest, gauge)}`
-    : `${quantity(lowest, gauge)} … ${quantity(highest, gauge)}`;
+    : `${quantity(lowest, gauge, 0, true)} … ${quantity(highest, gauge)}`;
   cell.append(track, element("small", "", words));
   return cell;
 }
@@ -67,7 +70,7 @@ function gaugeRow(gauge) {
   const row = document.createElement("tr");
   const value = document.createElement("td");
   value.append(element("span", "value", gauge.value === null ? "not measured" : quantity(gauge.value, gauge)));
-  if (gauge.value !== null && gauge.sigma !== null) value.append(element("small", "", `± ${quantity(gauge.sigma, gauge, gauge.kind === "share" ? 3 : 4)}`));
+  if (gauge.value !== null && gauge.sigma !== null) value.append(element("small", "", `± ${quantity(gauge.sigma, gauge, 1)}`));
   const verdict = document.createElement("td");
   const [kind, words] = !gauge.valid ? ["invalid", "? invalid"] : gauge.pass ? ["pass", "✓ pass"] : ["fail", gauge.low ? "✗ low" : gauge.high ? "✗ high" : "✗ fail"];
   verdict.append(element("span", `tag ${kind}`, words));
@@ -101,9 +104,16 @@ function showResult(result) {
   showStages(result);
   const points = result.valid_points.toLocaleString("en").replaceAll(",", " ");
   text("height-words", result.valid_points ? `${points} points · ${(result.coverage_permille / 10).toFixed(1)} % of the regions` : "");
+  // Without a single point the picture would be that of an older part.
+  if (!result.valid_points) {
+    show("picture", false);
+    show("no-picture", true);
+    text("no-picture", "no height was measured");
+    return;
+  }
   const picture = new Image();
   picture.onload = () => { $("picture").src = picture.src; show("picture", true); show("no-picture", false); };
-  picture.onerror = () => { show("picture", false); show("no-picture", true); };
+  picture.onerror = () => { show("picture", false); show("no-picture", true); text("no-picture", "no picture of this result"); };
   picture.src = `/height.png?seq=${result.seq}&boot=${boot}`;
 }
 
@@ -111,7 +121,7 @@ function partWords(result) {
   const words = [`no. ${result.seq}`, `part ${result.part_id}`];
   if (result.press_stroke) words.push(`stroke ${result.press_stroke}`);
   if (result.token) words.push(`token ${result.token}`);
-  if (result.time_utc_us) words.push(new Date(result.time_utc_us / 1000).toLocaleTimeString());
+  if (result.time_utc_us) words.push(new Date(result.time_utc_us / 1000).toLocaleTimeString([], { hour12: false }));
   if (result.simulated) words.push("simulated head");
   return words.join(" · ");
 }
@@ -123,6 +133,7 @@ function showVerdict(now) {
   // An old verdict keeps its words but loses its colour: it says nothing about what lies under the head now.
   const past = Boolean(result) && !measuring && now.state !== "ready";
   panel.classList.toggle("past", past);
+  document.body.classList.toggle("past", past || measuring);
   panel.dataset.verdict = measuring ? "MEASURING" : result ? result.verdict : "NONE";
   if (measuring) {
     text("word", "MEASURING");
@@ -184,6 +195,8 @@ function checkStale() {
   show("stale", stale);
   if (!stale) return;
   document.title = "STALE · fringed";
+  $("state").dataset.state = "wait";
+  text("state-words", "not live");
   const seconds = Math.floor((now - (silent ? lastEvent : lastBeat.at)) / 1000);
   text("stale-words", silent ? `no word from the sensor for ${seconds} s` : `the measuring task's heartbeat stands still for ${seconds} s`);
 }

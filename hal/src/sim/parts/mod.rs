@@ -8,8 +8,8 @@ mod spline;
 
 use serde::{Deserialize, Serialize};
 
+use super::limits::within;
 use super::optics::Vector;
-use super::scenario::within;
 
 pub use shapes::{Cone, Flowerpot, Plane, Sawtooth, Sphere, Tube};
 pub use sheet_metal::{Defect, SheetMetal};
@@ -30,7 +30,7 @@ pub enum Part {
     /// An open truncated cone.
     Flowerpot(Flowerpot),
     /// A free-form surface.
-    Spline(Spline),
+    Spline(Box<Spline>),
     /// A flat square.
     Plane(Plane),
     /// A stamped bracket, the default.
@@ -116,7 +116,7 @@ impl Part {
             Self::Sphere(part) => Box::new(part.clone()),
             Self::Tube(part) => Box::new(part.clone()),
             Self::Flowerpot(part) => Box::new(part.clone()),
-            Self::Spline(part) => Box::new(part.clone()),
+            Self::Spline(part) => Box::new((**part).clone()),
             Self::Plane(part) => Box::new(part.clone()),
             Self::SheetMetal(part) => Box::new(sheet_metal::Stamping::new(part)),
             Self::Empty {} => return None,

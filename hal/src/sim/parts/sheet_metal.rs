@@ -6,8 +6,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::Surface;
+use crate::sim::limits::within;
 use crate::sim::optics::Vector;
-use crate::sim::scenario::within;
 
 /// z of the plate's upper side.
 const PLATE_Z: f64 = 8.0;
@@ -20,19 +20,19 @@ const CORNER: f64 = 8.0;
 const BEND_RADIUS: f64 = 4.0;
 const FLANGE_LENGTH: f64 = 25.0;
 const FLANGE_DEG: f64 = 35.0;
-/// Round holes x, y, radius.
-const HOLES: [[f64; 3]; 3] = [[-55.0, 30.0, 7.0], [-8.0, 30.0, 10.0], [32.0, 30.0, 7.0]];
+/// Round holes x, y, radius: two small ones for screws and a large one.
+const HOLES: [[f64; 3]; 3] = [[-60.0, 40.0, 6.0], [-60.0, -40.0, 6.0], [24.0, 2.0, 11.0]];
 /// The slot and the bead run along x between these ends, at this y, with this half-width.
 const SLOT: Run = Run {
-    from: -35.0,
-    to: 5.0,
-    y: 2.0,
+    from: -32.0,
+    to: 12.0,
+    y: 36.0,
     half_width: 5.0,
 };
 const BEAD: Run = Run {
-    from: -50.0,
-    to: 30.0,
-    y: -28.0,
+    from: -38.0,
+    to: 34.0,
+    y: -30.0,
     half_width: 7.0,
 };
 const BEAD_HEIGHT: f64 = 2.2;
@@ -65,7 +65,7 @@ pub enum Defect {
     },
     /// A round hole that was not punched.
     MissingHole {
-        /// 0, 1 or 2, from −x to +x.
+        /// 0 and 1 are the small ones at −x, +y and −y; 2 is the large one.
         index: usize,
     },
     /// A flange that is bent too far.

@@ -4,14 +4,14 @@ use serde::{Deserialize, Serialize};
 
 use super::Surface;
 use super::shapes::{in_square, square};
+use crate::sim::limits::within;
 use crate::sim::optics::Vector;
-use crate::sim::scenario::within;
 
 /// Control values along each side: 8 patches of cubics.
 const CONTROL: usize = 11;
 const PATCHES: f64 = (CONTROL - 3) as f64;
 
-/// A uniform bicubic B-spline, z = Σ N_i(u_y) N_j(u_x) control[i][j] with u = (x / half_size + 1) · 4.
+/// A uniform bicubic B-spline, z = Σ N_i(u_y) N_j(u_x) c_ij with u = (x / half_size + 1) · 4.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Spline {

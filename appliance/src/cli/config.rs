@@ -1,0 +1,73 @@
+//! `fringed config check [FILE]` and `fringed config keys`.
+
+use super::Common;
+use crate::backend;
+use crate::config::{Backend, Config, KEYS, table};
+use crate::error::{Exit, Failure};
+use hal::replay::Recording;
+use std::path::PathBuf;
+
+/// Check a configuration, or list its keys.
+#[derive(Debug, clap::Subcommand)]
+pub enum ConfigCommand {
+    /// Read a configuration and every file that it names, and say what is wrong.
+    Check {
+        /// The file; without it, the one of --config.
+        file: Option<PathBuf>,
+    },
+    /// List every key with its unit, range and default.
+    Keys,
+}
+
+impl ConfigCommand {
+    /// Checks or lists.
+    ///
+    /// # Errors
+    /// What is wrong with the configuration.
+    #[expect(
+        clippy::print_stdout,
+        reason = "the answer is what the command is asked for"
+    )]
+    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+        match self {
+            Self::Keys if common.json => {
+                let keys: Vec<_> = KEYS
+                    .iter()
+                    .map(|key| {
+                        serde_json::json!({
+                            "name": key.name, "unit": key.unit, "range": key.range,
+                            "default": key.default, "meaning": key.meaning,
+                        })
+                    })
+                    .collect();
+                println!("{:#}", serde_json::Value::from(keys));
+            }
+            Self::Keys => print!("{}", table()),
+            Self::Check { file } => {
+                let Some(path) = file.as_ref().or(common.config.as_ref()) else {
+                    return Err(Failure::new(
+                        Exit::Usage,
+                        "config check: name a file: `fringed config check FILE`",
+                    ));
+                };
+                check_named_files(&Config::read(path)?)?;
+                if !common.quiet {
+                    println!("{} is right", path.display());
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_named_files(config: &Config) -> Result<(), Failure> {
+    match config.head.backend {
+        Backend::Sim => drop(backend::scenario(config.head.scenario.as_deref())?),
+        Backend::Replay => {
+            for folder in &config.head.recordings {
+                Recording::open(folder)?;
+            }
+        }
+    }
+    Ok(())
+}

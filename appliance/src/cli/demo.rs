@@ -1,0 +1,130 @@
+//! `fringed demo`: the station, and the PLC in front of it, over real Modbus TCP.
+
+mod parts;
+mod plc;
+mod table;
+
+use super::Common;
+use super::serve::until_told;
+use crate::config::Backend;
+use crate::daemon::{Daemon, runtime};
+use crate::error::{Exit, Failure};
+use crate::state::StateFolder;
+use parts::{PARTS, Placed};
+use plc::{Plc, PlcResult};
+use std::io::IsTerminal;
+
+/// Run the station and play the PLC.
+#[derive(Debug, clap::Args)]
+pub struct Demo {
+    /// End after the table; the default where stdout is no terminal.
+    #[arg(long)]
+    exit: bool,
+}
+
+/// Seed of the noise of the demonstration's frames.
+const NOISE_SEED: u64 = 2008;
+
+/// One part of the demonstration and what came of it.
+struct Row {
+    placed: &'static Placed,
+    result: PlcResult,
+    /// Names of the gauges outside their limits.
+    outside: Vec<String>,
+}
+
+impl Demo {
+    /// Starts the station, measures ten parts, prints the table, and leaves the page running unless
+    /// told to end.
+    ///
+    /// # Errors
+    /// If the station cannot start or answer, or judges a part wrongly.
+    #[expect(
+        clippy::print_stdout,
+        reason = "the table is what the command is asked for"
+    )]
+    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+        let mut config = common.configuration()?;
+        if config.head.backend != Backend::Sim || config.head.scenario.is_some() {
+            return Err(Failure::new(
+                Exit::Usage,
+                "demo: it brings its own parts: leave out head.backend and head.scenario",
+            ));
+        }
+        if common.state.is_none() && config.state.is_none() {
+            // Recipes that somebody taught stay untouched.
+            config.state = Some(StateFolder::default_path()?.join("demo"));
+        }
+        let progress = common.progress();
+        let daemon = Daemon::start(&config, super::pool(config.threads)?, progress.clone())?;
+        daemon.wait_until_ready()?;
+        progress.log(&format!(
+            "page on http://{}, Modbus TCP on {}",
+            daemon.http, daemon.modbus
+        ));
+        let rows = runtime()?.block_on(play(&daemon, &progress));
+        progress.clear();
+        let rows = rows?;
+        if common.json {
+            println!("{:#}", table::json(&rows));
+        } else if !common.quiet {
+            print!("{}", table::text(&rows));
+        }
+        if !self.exit && std::io::stdout().is_terminal() {
+            println!("\nThe page stays on http://{} until Ctrl-C.", daemon.http);
+            until_told()?;
+        }
+        daemon.stop();
+        let wrong = rows.iter().filter(|row| row.is_wrong()).count();
+        if wrong > 0 {
+            let message = format!("demo: {wrong} of {} parts were judged wrongly", rows.len());
+            return Err(Failure::new(Exit::Software, message));
+        }
+        Ok(())
+    }
+}
+
+impl Row {
+    /// A good part that did not pass, or a defective one that did.
+    fn is_wrong(&self) -> bool {
+        self.placed.defect.is_some() == self.result.passed()
+    }
+}
+
+/// Lets ten parts come by and triggers a measurement of each.
+async fn play(daemon: &Daemon, progress: &crate::progress::Progress) -> Result<Vec<Row>, Failure> {
+    let Some(stage) = &daemon.stage else {
+        return Err(Failure::new(
+            Exit::Software,
+            "demo: there is no simulated head",
+        ));
+    };
+    // Other noise than the golden map was taught with.
+    stage.reseed(NOISE_SEED);
+    let mut plc = Plc::connect(daemon.modbus).await?;
+    let mut rows = Vec::with_capacity(PARTS.len());
+    for (at, placed) in PARTS.iter().enumerate() {
+        progress.tell(at as f64 / PARTS.len() as f64, "measuring parts");
+        stage
+            .place(&placed.part(), &hal::sim::Placement::default())
+            .map_err(|error| Failure::new(Exit::Software, error.to_string()))?;
+        let result = plc.measure(at as u16 + 1).await?;
+        // The registers number the gauges; their names are the recipe's.
+        let snapshot = daemon.station.snapshot();
+        let names = snapshot
+            .result
+            .iter()
+            .flat_map(|record| &record.inspection.gauges);
+        let outside = names
+            .zip(&result.passes)
+            .filter(|(_, pass)| !**pass)
+            .map(|(gauge, _)| gauge.name.to_string())
+            .collect();
+        rows.push(Row {
+            placed,
+            result,
+            outside,
+        });
+    }
+    Ok(rows)
+}

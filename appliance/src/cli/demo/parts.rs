@@ -1,0 +1,54 @@
+//! The ten parts of the demonstration.
+
+use hal::sim::Part;
+use hal::sim::parts::{Defect, SheetMetal};
+
+/// A part that is put in front of the head.
+pub struct Placed {
+    /// For people.
+    pub what: &'static str,
+    /// What is wrong with it.
+    pub defect: Option<Defect>,
+}
+
+const GOOD: Placed = Placed {
+    what: "good",
+    defect: None,
+};
+
+/// Seven good parts, and one each with a dent, a missing hole and a bent flange.
+pub const PARTS: [Placed; 10] = [
+    GOOD,
+    GOOD,
+    Placed {
+        what: "dent 0.6 mm",
+        defect: Some(Defect::Dent {
+            x: 0.0,
+            y: -8.0,
+            depth_mm: 0.6,
+            diameter_mm: 14.0,
+        }),
+    },
+    GOOD,
+    GOOD,
+    Placed {
+        what: "missing hole",
+        defect: Some(Defect::MissingHole { index: 1 }),
+    },
+    GOOD,
+    Placed {
+        what: "bent flange 3°",
+        defect: Some(Defect::BentFlange { degrees: 3.0 }),
+    },
+    GOOD,
+    GOOD,
+];
+
+impl Placed {
+    /// The part as the simulator takes it.
+    pub fn part(&self) -> Part {
+        Part::SheetMetal(SheetMetal {
+            defects: self.defect.into_iter().collect(),
+        })
+    }
+}

@@ -1,0 +1,119 @@
+//! `fringed record DIR`: a sequence from the configured head as a recording.
+
+use super::Common;
+use crate::backend::{self, Opened};
+use crate::error::{Exit, Failure};
+use crate::plan::rasters;
+use algo::pattern::{PhaseFunction, Sequence};
+use hal::replay::Recording;
+use hal::replay::recorder;
+use hal::replay::recording::{PatternSpec, RecordedFrame, RecordedProjector};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Record a geometric sequence of vertical fringes.
+#[derive(Debug, clap::Args)]
+pub struct Record {
+    /// Folder for the recording; must not exist yet.
+    folder: PathBuf,
+    /// Fringes over the projector's width; without it, one per 12 pixels.
+    #[arg(long)]
+    fringes: Option<f64>,
+    /// Levels, from coarse to fine.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=8))]
+    levels: u8,
+    /// Shifts per level.
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u8).range(3..=64))]
+    steps: u8,
+}
+
+/// Longest wait for one frame.
+const TIMEOUT: Duration = Duration::from_secs(5);
+
+impl Record {
+    /// Opens the head, takes the sequence and writes it.
+    ///
+    /// # Errors
+    /// If the head or the folder cannot be had, or the pattern not be shown.
+    #[expect(
+        clippy::print_stdout,
+        reason = "what was recorded is what the command is asked for"
+    )]
+    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+        let config = common.configuration()?;
+        let progress = common.progress();
+        let told = |share: f64| progress.tell(0.8 * share, "working out the light of the scene");
+        let pool = super::pool(config.threads)?;
+        let mut opened = pool.install(|| backend::open(&config.head, &told))?;
+        let taken = self.take(&mut opened, &|share| {
+            progress.tell(0.8 + 0.2 * share, "recording")
+        });
+        progress.clear();
+        let recording = taken?;
+        recorder::write(&recording, &self.folder)
+            .map_err(|error| Failure::new(Exit::CannotCreate, error.to_string()))?;
+        if !common.quiet {
+            let count = recording.frames.len();
+            println!("recorded {count} frames to {}", self.folder.display());
+        }
+        Ok(())
+    }
+
+    fn take(&self, opened: &mut Opened, told: &dyn Fn(f64)) -> Result<Recording, Failure> {
+        let Opened {
+            head,
+            calibration,
+            stage,
+        } = opened;
+        let (columns, rows) = calibration.projector;
+        let fringes = self.fringes.unwrap_or(f64::from(columns) / 12.0);
+        let function = PhaseFunction::vertical(columns as usize, rows as usize, fringes)
+            .map_err(|error| Failure::because(Exit::Usage, "--fringes", error))?;
+        let (levels, steps) = (usize::from(self.levels), usize::from(self.steps));
+        let sequence = Sequence::geometric(function.range(), levels, steps);
+        let device = |error: hal::error::Error| Failure::new(Exit::Unavailable, error.to_string());
+        let patterns = rasters(&function, sequence.iter().copied(), calibration).map_err(device)?;
+        head.load(patterns).map_err(device)?;
+        let mut frames = Vec::with_capacity(sequence.len());
+        let indices: Vec<usize> = (0..sequence.len()).collect();
+        head.acquire(&indices, TIMEOUT, &mut |at, frame| {
+            let (ratio, shift_turns) = sequence[at];
+            frames.push(RecordedFrame {
+                ratio,
+                shift_turns,
+                pattern: 0,
+                timestamp_ns: Some(frame.timestamp().0),
+                frame,
+            });
+            told(frames.len() as f64 / sequence.len() as f64);
+        })
+        .map_err(device)?;
+        let truth = stage.as_ref().map(hal::sim::Stage::truth);
+        let (width, height, bit_depth) = calibration.camera;
+        Ok(Recording {
+            width,
+            height,
+            bit_depth,
+            description: format!("{levels} levels of {steps} shifts, {fringes} vertical fringes"),
+            source: match stage {
+                Some(_) => "fringed's simulated head".into(),
+                None => "a head of fringed".into(),
+            },
+            camera_model: Some(calibration.camera_model.clone()),
+            noise_counts: Some(calibration.noise_counts),
+            projector: RecordedProjector {
+                width: columns,
+                height: rows,
+                model: Some(calibration.projector_model.clone()),
+            },
+            patterns: vec![PatternSpec::Vertical { fringes }],
+            frames,
+            range_mm: None,
+            exposure_us: None,
+            part_id: None,
+            recipe: None,
+            truth_height: truth.as_ref().map(|truth| truth.height.clone()),
+            truth_class: truth.map(|truth| truth.class),
+        })
+    }
+}

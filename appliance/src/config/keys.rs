@@ -1,0 +1,208 @@
+//! Every configuration key with its unit, range, default and meaning.
+
+use std::fmt::Write as _;
+
+/// One key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Key {
+    /// `section.key`.
+    pub name: &'static str,
+    /// Its unit, or its type.
+    pub unit: &'static str,
+    /// What may be written.
+    pub range: &'static str,
+    /// What holds if it is not written.
+    pub default: &'static str,
+    /// What it does.
+    pub meaning: &'static str,
+}
+
+/// The table; a test compares it with the structs.
+pub const KEYS: [Key; 13] = [
+    Key {
+        name: "state",
+        unit: "folder",
+        range: "any that can be written",
+        default: "the platform's state folder",
+        meaning: "recipes, result counter, serial; `--state` goes before",
+    },
+    Key {
+        name: "threads",
+        unit: "threads",
+        range: "0 to 256",
+        default: "0",
+        meaning: "computing threads, 0 = one per core; `--threads` goes before",
+    },
+    Key {
+        name: "station.recipe",
+        unit: "number",
+        range: "1 to 9999",
+        default: "1",
+        meaning: "the recipe that is loaded at the start; on a simulated head without it, it is taught",
+    },
+    Key {
+        name: "station.teach_allowed",
+        unit: "true or false",
+        range: "true, false",
+        default: "false",
+        meaning: "whether the PLC may teach (CONTROL bit 7)",
+    },
+    Key {
+        name: "station.plc_timeout_s",
+        unit: "s",
+        range: "1 to 3600",
+        default: "5",
+        meaning: "PLC_HEARTBEAT may stand still for this long before the warning plc_lost",
+    },
+    Key {
+        name: "modbus.listen",
+        unit: "address:port",
+        range: "any of this machine",
+        default: "127.0.0.1:1502",
+        meaning: "where Modbus TCP is served; `--modbus` goes before",
+    },
+    Key {
+        name: "modbus.word_order",
+        unit: "word",
+        range: "normal (ABCD), swapped (CDAB)",
+        default: "normal",
+        meaning: "order of the words of 32- and 64-bit values",
+    },
+    Key {
+        name: "modbus.strict_unit_id",
+        unit: "unit id",
+        range: "0 to 255",
+        default: "any",
+        meaning: "answer only to this unit id, exception 0x0B to others",
+    },
+    Key {
+        name: "http.listen",
+        unit: "address:port",
+        range: "any of this machine",
+        default: "127.0.0.1:8080",
+        meaning: "where the page is served; `--http` goes before",
+    },
+    Key {
+        name: "http.hosts",
+        unit: "names",
+        range: "host names",
+        default: "[]",
+        meaning: "names by which the page may be asked for, beside IP addresses and localhost",
+    },
+    Key {
+        name: "head.backend",
+        unit: "word",
+        range: "sim, replay",
+        default: "sim",
+        meaning: "which head: simulated light, or recordings",
+    },
+    Key {
+        name: "head.scenario",
+        unit: "file",
+        range: "a scenario in TOML",
+        default: "the default sheet-metal part",
+        meaning: "what the simulated head sees",
+    },
+    Key {
+        name: "head.recordings",
+        unit: "folders",
+        range: "recordings of one head",
+        default: "[]",
+        meaning: "what the replay head plays, in turn; required with backend = \"replay\"",
+    },
+];
+
+/// All keys as a table in Markdown, as `docs/configuration.md` has it.
+pub fn table() -> String {
+    let mut table =
+        String::from("| key | unit | range | default | meaning |\n|---|---|---|---|---|\n");
+    for key in KEYS {
+        let Key {
+            name,
+            unit,
+            range,
+            default,
+            meaning,
+        } = key;
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            table,
+            "| `{name}` | {unit} | {range} | {default} | {meaning} |"
+        );
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{Config, HeadConfig, ModbusConfig};
+    use std::collections::BTreeMap;
+
+    /// A configuration in which nothing is left out.
+    fn full() -> Config {
+        Config {
+            state: Some("state".into()),
+            modbus: ModbusConfig {
+                strict_unit_id: Some(1),
+                ..ModbusConfig::default()
+            },
+            head: HeadConfig {
+                scenario: Some("scenario".into()),
+                ..HeadConfig::default()
+            },
+            ..Config::default()
+        }
+    }
+
+    fn flat(config: &Config) -> BTreeMap<String, String> {
+        let toml::Value::Table(sections) = toml::Value::try_from(config).unwrap() else {
+            panic!("no table");
+        };
+        let mut keys = BTreeMap::new();
+        for (section, value) in sections {
+            match value {
+                toml::Value::Table(values) => {
+                    keys.extend(values.into_iter().map(|(key, value)| {
+                        (
+                            format!("{section}.{key}"),
+                            value.to_string().replace('"', ""),
+                        )
+                    }))
+                }
+                value => {
+                    keys.insert(section, value.to_string().replace('"', ""));
+                }
+            }
+        }
+        keys
+    }
+
+    #[test]
+    fn the_table_has_every_key_of_the_code_and_no_other() {
+        let mut documented: Vec<_> = KEYS.iter().map(|key| key.name.to_owned()).collect();
+        documented.sort();
+        assert_eq!(documented, flat(&full()).into_keys().collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn the_documented_defaults_are_the_code_s() {
+        let defaults = flat(&Config::default());
+        for key in KEYS {
+            // What has no default value in the code is described in words.
+            if let Some(value) = defaults.get(key.name) {
+                assert_eq!(key.default, value, "{}", key.name);
+            }
+        }
+    }
+
+    #[test]
+    fn the_documentation_holds_the_table() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/configuration.md");
+        let text = std::fs::read_to_string(path).unwrap();
+        assert!(
+            text.contains(&table()),
+            "put the output of `fringed config keys` into docs/configuration.md"
+        );
+    }
+}

@@ -1,0 +1,245 @@
+//! The configuration: one TOML file, every key optional.
+
+mod keys;
+
+pub use keys::{KEYS, Key, table};
+
+use crate::error::{Exit, Failure};
+use crate::modbus::WordOrder;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+
+/// The whole configuration. The defaults need no file: a simulated head on this machine.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// State folder; none = the platform's.
+    pub state: Option<PathBuf>,
+    /// Computing threads; 0 = one per core.
+    pub threads: usize,
+    /// What the station does by itself.
+    pub station: StationConfig,
+    /// The PLC's side.
+    pub modbus: ModbusConfig,
+    /// The technician's side.
+    pub http: HttpConfig,
+    /// The devices.
+    pub head: HeadConfig,
+}
+
+/// What the station does by itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StationConfig {
+    /// The recipe that is loaded at the start.
+    pub recipe: u16,
+    /// Whether the PLC may teach.
+    pub teach_allowed: bool,
+    /// PLC_HEARTBEAT may stand still for this long, s.
+    pub plc_timeout_s: u32,
+}
+
+/// Modbus TCP.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ModbusConfig {
+    /// Address and port.
+    pub listen: SocketAddr,
+    /// Order of the words of 32- and 64-bit values.
+    pub word_order: WordOrderConfig,
+    /// Answer only to this unit id.
+    pub strict_unit_id: Option<u8>,
+}
+
+/// Order of the words of 32- and 64-bit values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WordOrderConfig {
+    /// High word first (ABCD).
+    Normal,
+    /// Low word first (CDAB).
+    Swapped,
+}
+
+/// The page.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HttpConfig {
+    /// Address and port.
+    pub listen: SocketAddr,
+    /// Names by which the page is asked for, beside IP addresses and localhost.
+    pub hosts: Vec<String>,
+}
+
+/// The devices.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HeadConfig {
+    /// Which kind of head.
+    pub backend: Backend,
+    /// Scenario file of the simulated head; none = the default part.
+    pub scenario: Option<PathBuf>,
+    /// Recordings that the replay head plays.
+    pub recordings: Vec<PathBuf>,
+}
+
+/// The kinds of head.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Backend {
+    /// Simulated light.
+    Sim,
+    /// Recordings.
+    Replay,
+}
+
+impl Default for StationConfig {
+    fn default() -> Self {
+        Self {
+            recipe: 1,
+            teach_allowed: false,
+            plc_timeout_s: 5,
+        }
+    }
+}
+
+impl Default for ModbusConfig {
+    fn default() -> Self {
+        Self {
+            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 1502)),
+            word_order: WordOrderConfig::Normal,
+            strict_unit_id: None,
+        }
+    }
+}
+
+impl Default for HttpConfig {
+    fn default() -> Self {
+        Self {
+            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
+            hosts: Vec::new(),
+        }
+    }
+}
+
+impl Default for HeadConfig {
+    fn default() -> Self {
+        Self {
+            backend: Backend::Sim,
+            scenario: None,
+            recordings: Vec::new(),
+        }
+    }
+}
+
+impl From<WordOrderConfig> for WordOrder {
+    fn from(order: WordOrderConfig) -> Self {
+        match order {
+            WordOrderConfig::Normal => Self::Normal,
+            WordOrderConfig::Swapped => Self::Swapped,
+        }
+    }
+}
+
+impl Config {
+    /// Reads and checks a file. Paths in it are relative to its folder.
+    ///
+    /// # Errors
+    /// If it does not exist (66), is no TOML, has an unknown key or a value out of range (78); the
+    /// message names the file, the key and the remedy.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let place = path.display();
+        let text = fs::read_to_string(path).map_err(|error| {
+            let exit = match error.kind() {
+                std::io::ErrorKind::NotFound => Exit::Missing,
+                _ => Exit::Configuration,
+            };
+            let remedy = format!("{error}: name a TOML file with --config");
+            Failure::because(exit, format!("read configuration {place}"), remedy)
+        })?;
+        let wrong = |error: String| {
+            let remedy = format!("{error}; `fringed config keys` lists every key");
+            Failure::because(
+                Exit::Configuration,
+                format!("read configuration {place}"),
+                remedy,
+            )
+        };
+        let mut config: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        config.check().map_err(wrong)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let head = &mut config.head;
+        let paths = head.scenario.iter_mut().chain(&mut head.recordings);
+        for path in paths.chain(&mut config.state) {
+            *path = folder.join(&*path);
+        }
+        Ok(config)
+    }
+
+    /// Checks the ranges that the types do not hold.
+    ///
+    /// # Errors
+    /// Naming the key and its range.
+    pub fn check(&self) -> Result<(), String> {
+        let within = |key: &str, value: u64, low: u64, high: u64| {
+            if (low..=high).contains(&value) {
+                Ok(())
+            } else {
+                Err(format!("{key} = {value}: write {low} to {high}"))
+            }
+        };
+        within("threads", self.threads as u64, 0, 256)?;
+        within("station.recipe", u64::from(self.station.recipe), 1, 9999)?;
+        let timeout = u64::from(self.station.plc_timeout_s);
+        within("station.plc_timeout_s", timeout, 1, 3600)?;
+        if self.head.backend == Backend::Replay && self.head.recordings.is_empty() {
+            return Err(
+                "head.recordings is empty: the replay head needs at least one folder".into(),
+            );
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Config, Failure> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("fringed.toml");
+        fs::write(&path, text).unwrap();
+        Config::read(&path)
+    }
+
+    #[test]
+    fn an_empty_file_is_the_default() {
+        assert_eq!(read("").unwrap(), Config::default());
+    }
+
+    #[test]
+    fn an_unknown_key_and_a_value_out_of_range_are_refused_by_name() {
+        for (text, word) in [
+            ("threats = 2", "threats"),
+            ("[modbus]\nport = 5", "port"),
+            ("[station]\nrecipe = 0", "station.recipe"),
+            ("[head]\nbackend = \"replay\"", "head.recordings"),
+            ("[modbus]\nlisten = \"nowhere\"", "listen"),
+            ("= 5", "TOML"),
+        ] {
+            let failure = read(text).unwrap_err();
+            assert_eq!(failure.exit, Exit::Configuration);
+            assert!(failure.message.contains(word), "{failure}");
+            assert!(failure.message.contains("fringed.toml"), "{failure}");
+        }
+    }
+
+    #[test]
+    fn paths_are_relative_to_the_file() {
+        let config = read("[head]\nscenario = \"parts/cone.toml\"").unwrap();
+        let scenario = config.head.scenario.unwrap();
+        assert!(scenario.is_absolute() && scenario.ends_with("parts/cone.toml"));
+    }
+}

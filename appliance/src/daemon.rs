@@ -1,0 +1,311 @@
+//! The daemon: station, measuring task, Modbus and page, each where it belongs.
+//!
+//! One OS thread measures ([`crate::worker`]), one serves sockets on a current-thread runtime, and
+//! the station is plain values behind a handle that both use.
+
+use crate::config::Config;
+use crate::error::{Exit, Failure};
+use crate::output::picture::height_png;
+use crate::progress::Progress;
+use crate::state::{Counter, StateFolder, random};
+use crate::station::snapshot::status;
+use crate::station::{
+    Effect, Event, Identity, Limits, Micros, RecipeKey, Request, Settings, Snapshot, Station,
+    StationHandle, tick,
+};
+use crate::worker::{LastMaps, Order, Worker};
+use crate::{backend, clock, modbus, web};
+use hal::sim::Stage;
+use std::net::SocketAddr;
+use std::sync::{Arc, mpsc};
+use std::thread::JoinHandle;
+use std::time::Instant;
+use tokio::net::TcpListener;
+use tokio::runtime::Runtime;
+use tokio::sync::watch;
+
+/// A running daemon.
+pub struct Daemon {
+    /// The way to the station.
+    pub station: StationHandle,
+    /// Where Modbus TCP is served.
+    pub modbus: SocketAddr,
+    /// Where the page is served.
+    pub http: SocketAddr,
+    /// Where parts are placed in front of a simulated head.
+    pub stage: Option<Stage>,
+    stopping: Stopping,
+    /// Held as long as the daemon runs.
+    _state: StateFolder,
+}
+
+/// What ends the daemon's threads.
+struct Stopping {
+    orders: mpsc::Sender<Order>,
+    sockets: watch::Sender<bool>,
+    threads: [JoinHandle<()>; 2],
+}
+
+impl Daemon {
+    /// Starts everything and returns when the head is open. The station is then on its way to READY:
+    /// it loads its recipe, or teaches it where a simulated head has none.
+    ///
+    /// # Errors
+    /// If the state folder cannot be used (73), a port is in use or the head missing (69), or the
+    /// configuration is wrong (78). Nothing keeps running then.
+    pub fn start(
+        config: &Config,
+        pool: rayon::ThreadPool,
+        progress: Progress,
+    ) -> Result<Self, Failure> {
+        let path = match &config.state {
+            Some(path) => path.clone(),
+            None => StateFolder::default_path()?,
+        };
+        let state = StateFolder::open(&path)?;
+        let runtime = runtime()?;
+        let (plc, page) = runtime.block_on(listen(config))?;
+        let (modbus, http) = (address_of(&plc)?, address_of(&page)?);
+        let (orders, inbox) = mpsc::channel();
+        let sink = effects(orders.clone(), state.counter(), progress.clone());
+        let station = StationHandle::new(station(config, &state)?, Instant::now(), sink);
+        let maps = LastMaps::default();
+        let (sockets, stopped) = watch::channel(false);
+        let serving = {
+            let (station, maps, config) = (station.clone(), maps.clone(), config.clone());
+            let serve = move || runtime.block_on(serve(plc, page, station, maps, &config, stopped));
+            spawn("sockets", serve)?
+        };
+        let (opened, opening) = mpsc::channel();
+        let measuring = {
+            let (station, recipes) = (station.clone(), state.recipes().clone());
+            let config = config.clone();
+            spawn("measuring", move || {
+                let told = |share: f64| progress.tell(share, "working out the light of the scene");
+                match pool.install(|| backend::open(&config.head, &told)) {
+                    Err(failure) => drop(opened.send(Err(failure))),
+                    Ok(head) => {
+                        // Nobody waits any more only if the start was given up.
+                        drop(opened.send(Ok(head.stage.clone())));
+                        let first = first_request(&config, head.stage.is_some(), &recipes);
+                        let worker = Worker {
+                            opened: head,
+                            pool,
+                            recipes,
+                            station,
+                            maps,
+                            progress,
+                        };
+                        worker.run(&inbox, first);
+                    }
+                }
+            })?
+        };
+        let stopping = Stopping {
+            orders,
+            sockets,
+            threads: [measuring, serving],
+        };
+        let gone = || {
+            Failure::new(
+                Exit::Software,
+                "the measuring task ended before its head was open",
+            )
+        };
+        match opening.recv().unwrap_or_else(|_| Err(gone())) {
+            Ok(stage) => Ok(Self {
+                station,
+                modbus,
+                http,
+                stage,
+                stopping,
+                _state: state,
+            }),
+            Err(failure) => {
+                stopping.stop();
+                Err(failure)
+            }
+        }
+    }
+
+    /// Waits until the station is READY, or says why it will not be.
+    ///
+    /// # Errors
+    /// The station's fault, or that its recipe could be neither loaded nor taught.
+    pub fn wait_until_ready(&self) -> Result<Arc<Snapshot>, Failure> {
+        let mut snapshots = self.station.subscribe();
+        let settled = |snapshot: &Arc<Snapshot>| {
+            snapshot.is(status::READY) || snapshot.fault.is_some() || snapshot.error.is_some()
+        };
+        let snapshot = runtime()?
+            .block_on(async { snapshots.wait_for(settled).await.map(|found| found.clone()) })
+            .map_err(|_| Failure::new(Exit::Software, "the station ended before it was ready"))?;
+        match (&snapshot.fault, &snapshot.error) {
+            (Some(fault), _) => {
+                let message = format!("{}: {}", fault.cause, fault.remedy);
+                Err(Failure::new(Exit::Unavailable, message))
+            }
+            (None, Some(error)) if !snapshot.is(status::READY) => {
+                Err(Failure::new(Exit::Unavailable, error.to_string()))
+            }
+            _ => Ok(snapshot),
+        }
+    }
+
+    /// Ends everything: the cycle in flight is finished, then the sockets close.
+    pub fn stop(self) {
+        self.station.event(Event::Stop);
+        self.stopping.stop();
+    }
+}
+
+impl Stopping {
+    fn stop(self) {
+        // An order that nobody takes, or a runtime that is gone, is what is wanted here.
+        drop(self.orders.send(Order::Stop));
+        let [measuring, serving] = self.threads;
+        drop(measuring.join());
+        let _ = self.sockets.send(true);
+        drop(serving.join());
+    }
+}
+
+/// A current-thread runtime.
+///
+/// # Errors
+/// If the system gives none.
+pub fn runtime() -> Result<Runtime, Failure> {
+    tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|error| Failure::because(Exit::Software, "start a socket runtime", error))
+}
+
+fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, Failure> {
+    std::thread::Builder::new()
+        .name(name.into())
+        .spawn(run)
+        .map_err(|error| {
+            Failure::because(Exit::Software, format!("start the thread {name}"), error)
+        })
+}
+
+async fn listen(config: &Config) -> Result<(TcpListener, TcpListener), Failure> {
+    let plc = modbus::bind(config.modbus.listen)
+        .await
+        .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+    let page = web::bind(config.http.listen)
+        .await
+        .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+    Ok((plc, page))
+}
+
+fn address_of(listener: &TcpListener) -> Result<SocketAddr, Failure> {
+    listener
+        .local_addr()
+        .map_err(|error| Failure::because(Exit::Unavailable, "ask for a socket's port", error))
+}
+
+fn station(config: &Config, state: &StateFolder) -> Result<Station, Failure> {
+    let settings = Settings {
+        next_seq: state.next_seq()?,
+        boot_id: random()?,
+        teach_allowed: config.station.teach_allowed,
+        identity: Arc::new(Identity {
+            vendor: "fringed".into(),
+            product: "fringed 3-D smart sensor".into(),
+            serial: state.serial()?,
+            version: env!("CARGO_PKG_VERSION").into(),
+        }),
+        limits: Limits {
+            plc: Micros::from_millis(u64::from(config.station.plc_timeout_s) * 1000),
+            ..Limits::default()
+        },
+    };
+    Ok(Station::new(settings, Micros(0)))
+}
+
+/// Carries out what the station wants done. Called with the station locked: it only hands on, and
+/// writes the counter, which must be stored before anybody sees the result.
+fn effects(
+    orders: mpsc::Sender<Order>,
+    counter: Counter,
+    progress: Progress,
+) -> impl FnMut(Effect) {
+    // An order that nobody takes is noticed by the station itself: its wait has a deadline.
+    let order = move |order| drop(orders.send(order));
+    move |effect| match effect {
+        Effect::Measure(job) => order(Order::Measure(job)),
+        Effect::Load { job, key } => order(Order::Load(job, key)),
+        Effect::Teach { job, number } => order(Order::Teach(job, number)),
+        Effect::PersistSeq(seq) => {
+            if let Err(error) = counter.store(seq) {
+                progress.log(&format!(
+                    "store the result counter {seq}: {error}: free space"
+                ));
+            }
+        }
+        Effect::Log(line) => progress.log(&line),
+        // A sequence is short and every wait in it has a time-out: it ends by itself, and the station
+        // drops its answer.
+        Effect::Abort { .. } => {}
+        Effect::Publish(_) => {}
+    }
+}
+
+/// What the station does first: load its recipe; a simulated head without it teaches the part that
+/// lies in front of it.
+fn first_request(
+    config: &Config,
+    simulated: bool,
+    recipes: &crate::recipe::Store,
+) -> Option<Request> {
+    let number = config.station.recipe;
+    if recipes.numbers().contains(&number) {
+        Some(Request::Load(RecipeKey::Number(number)))
+    } else {
+        simulated.then_some(Request::Teach { number })
+    }
+}
+
+async fn serve(
+    plc: TcpListener,
+    page: TcpListener,
+    station: StationHandle,
+    maps: LastMaps,
+    config: &Config,
+    stopped: watch::Receiver<bool>,
+) {
+    let stop = || {
+        let mut stopped = stopped.clone();
+        async move {
+            // An error means that the daemon itself is gone: stop as well.
+            let _ = stopped.wait_for(|stop| *stop).await;
+        }
+    };
+    let options = modbus::Options {
+        word_order: config.modbus.word_order.into(),
+        strict_unit_id: config.modbus.strict_unit_id,
+        ..modbus::Options::default()
+    };
+    let picture = move || {
+        let maps = maps.get()?;
+        let rows = maps.height_mm.len() / maps.width.max(1);
+        Some(height_png(maps.width as u32, rows as u32, &maps.height_mm))
+    };
+    let site = web::Site::new(
+        station.clone(),
+        Arc::new(picture),
+        config.http.hosts.clone(),
+    );
+    let pages = async {
+        if let Err(error) = web::serve(page, site, stop()).await {
+            eprintln!("fringed: {error}");
+        }
+    };
+    tokio::join!(
+        tick(station.clone(), clock::utc_us, stop()),
+        modbus::serve(plc, station, options, stop()),
+        pages,
+    );
+}

@@ -1,0 +1,166 @@
+//! What the blocks show.
+
+use super::*;
+
+#[tokio::test]
+async fn the_oldest_buffered_result_is_at_400_until_it_is_acknowledged() {
+    let plant = Plant::with(Options::default(), true).await;
+    let mut plc = plant.client().await;
+    plc.write_single_register(0, 0x41).await.unwrap().unwrap();
+    for token in [5, 6] {
+        plc.write_single_register(1, token).await.unwrap().unwrap();
+        plant.work();
+    }
+    for _ in 0..2 {
+        let oldest = plc.read_input_registers(400, 120).await.unwrap().unwrap();
+        assert_eq!(
+            (oldest[2], u32_at(&oldest, 118)),
+            (5, 1000),
+            "reads have no side effects"
+        );
+    }
+    plc.write_single_register(0, 0x45).await.unwrap().unwrap();
+    assert_eq!(
+        plc.read_input_registers(402, 1).await.unwrap().unwrap(),
+        [6]
+    );
+    assert_eq!(
+        plc.read_input_registers(117, 1).await.unwrap().unwrap(),
+        [1]
+    );
+}
+
+#[tokio::test]
+async fn word_order_swapped_swaps_reads_and_writes() {
+    let options = Options {
+        word_order: WordOrder::Swapped,
+        ..Default::default()
+    };
+    let plant = Plant::with(options, false).await;
+    let mut plc = plant.client().await;
+    assert_eq!(
+        plc.read_input_registers(936, 4).await.unwrap().unwrap(),
+        [0x5678, 0x1234, 0xE979, 0x42F6]
+    );
+    assert_eq!(
+        plc.read_input_registers(900, 2).await.unwrap().unwrap(),
+        [0x4E47, 0x4652]
+    );
+    plc.write_multiple_registers(4, &[0x2222, 0x1111])
+        .await
+        .unwrap()
+        .unwrap();
+    assert_eq!(plant.handle.snapshot().control.part_id, 0x1111_2222);
+}
+
+#[tokio::test]
+async fn identity_and_control_read_as_in_the_map() {
+    let plant = Plant::new().await;
+    let mut plc = plant.client().await;
+    let words = plc.read_holding_registers(900, 40).await.unwrap().unwrap();
+    assert_eq!(
+        (
+            u32_at(&words, 0),
+            u32_at(&words, 36),
+            f32::from_bits(u32_at(&words, 38))
+        ),
+        (0x4652_4E47, 0x1234_5678, 123.456)
+    );
+    assert_eq!(
+        (words[2], words[4], words[5], words[18]),
+        (0x534E, 0x3030, 0x3100, 0x312E)
+    );
+    assert_eq!(
+        plc.read_input_registers(0, 32).await.unwrap().unwrap()[0],
+        1,
+        "CONTROL starts with ONLINE"
+    );
+}
+
+#[tokio::test]
+async fn before_the_first_result_nothing_reads_as_measured() {
+    let plant = Plant::new().await;
+    let mut plc = plant.client().await;
+    for block in [200, 400] {
+        let words = plc.read_input_registers(block, 120).await.unwrap().unwrap();
+        assert_eq!(
+            (u32_at(&words, 0), words[8], words[27], u32_at(&words, 10)),
+            (0, 0, 0, 0)
+        );
+        assert_eq!(
+            (u32_at(&words, 32), u32_at(&words, 64), words[25]),
+            (0x8000_0000, 0x7FC0_0000, 0x8000)
+        );
+        assert_eq!(words[112..118], [0; 6], "reserved registers read 0");
+    }
+}
+
+#[tokio::test]
+async fn coils_and_discrete_inputs_mirror_control_and_status() {
+    let plant = Plant::new().await;
+    let mut plc = plant.client().await;
+    assert_eq!(
+        plc.read_coils(0, 16)
+            .await
+            .unwrap()
+            .unwrap()
+            .iter()
+            .position(|&set| set),
+        Some(0)
+    );
+    let inputs = plc.read_discrete_inputs(0, 16).await.unwrap().unwrap();
+    assert!(inputs[0] && inputs[1] && inputs[9] && !inputs[2]);
+    plc.write_single_coil(1, false).await.unwrap().unwrap();
+    plc.write_single_coil(1, true).await.unwrap().unwrap();
+    assert_eq!(plant.work(), 1);
+    assert_eq!(
+        plc.read_holding_registers(0, 1).await.unwrap().unwrap(),
+        [3]
+    );
+    plc.write_multiple_coils(0, &[true, false, true])
+        .await
+        .unwrap()
+        .unwrap();
+    assert_eq!(plant.handle.snapshot().control.control, 5);
+    assert_eq!(
+        plc.write_single_coil(8, true).await.unwrap(),
+        Err(Exception::IllegalDataValue)
+    );
+    assert_eq!(
+        plc.write_single_coil(16, true).await.unwrap(),
+        Err(Exception::IllegalDataAddress)
+    );
+    assert_eq!(
+        plc.read_coils(10, 7).await.unwrap(),
+        Err(Exception::IllegalDataAddress)
+    );
+    assert_eq!(
+        plc.read_discrete_inputs(0, 0).await.unwrap(),
+        Err(Exception::IllegalDataValue)
+    );
+}
+
+#[tokio::test]
+async fn status_bits_are_where_the_map_says() {
+    let plant = Plant::new().await;
+    plant.handle.event(Event::Condition(Condition {
+        warming_up: true,
+        calibration_valid: true,
+        warnings: 0x10,
+    }));
+    let mut plc = plant.client().await;
+    let words = plc
+        .read_input_registers(at::status::STATUS, 32)
+        .await
+        .unwrap()
+        .unwrap();
+    // ONLINE, READY, RECIPE_OK, WARNING, WARMING_UP, CALIBRATION_VALID; warnings clock_unsynced and low_light.
+    assert_eq!(
+        (words[0], words[3], words[4], words[5]),
+        (0xC603, 0x18, 1, 7)
+    );
+    assert_eq!(
+        (u32_at(&words, 6), u32_at(&words, 22)),
+        (0xCAFE_F00D, 0xB007_1D00)
+    );
+}

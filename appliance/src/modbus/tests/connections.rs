@@ -1,0 +1,119 @@
+//! Connections: number, time, garbage, addresses.
+
+use super::*;
+
+#[tokio::test]
+async fn pipelined_requests_are_answered_one_by_one_each_with_its_own_flaw() {
+    let plant = Plant::new().await;
+    let mut stream = TcpStream::connect(plant.address).await.unwrap();
+    let good = [0, 1, 0, 0, 0, 6, 1, 3, 0, 121, 0, 1];
+    let bad = [0, 2, 0, 0, 0, 5, 1, 3, 0, 121, 0];
+    stream
+        .write_all(&[&good[..], &bad[..], &good[..]].concat())
+        .await
+        .unwrap();
+    let mut answers = [0; 11 + 9 + 11];
+    stream.read_exact(&mut answers).await.unwrap();
+    assert_eq!(answers[7..11], [3, 2, 1, 0]);
+    assert_eq!(answers[11 + 7..11 + 9], [0x83, 3]);
+    assert_eq!(answers[20 + 7..], [3, 2, 1, 0]);
+}
+
+#[tokio::test]
+async fn unit_ids_are_all_accepted_unless_one_is_configured() {
+    let plant = Plant::with(
+        Options {
+            strict_unit_id: Some(3),
+            ..Default::default()
+        },
+        false,
+    )
+    .await;
+    let mut right = tcp::connect_slave(plant.address, Slave(3)).await.unwrap();
+    assert!(right.read_input_registers(100, 1).await.unwrap().is_ok());
+    let mut wrong = tcp::connect_slave(plant.address, Slave(4)).await.unwrap();
+    assert_eq!(
+        wrong.read_input_registers(100, 1).await.unwrap(),
+        Err(Exception::GatewayTargetDevice)
+    );
+}
+
+#[tokio::test]
+async fn garbage_closes_its_own_connection_and_disturbs_nobody() {
+    let plant = Plant::new().await;
+    let mut plc = plant.client().await;
+    for garbage in [
+        &b"GET / HTTP/1.1\r\nHost: x\r\n\r\n"[..],
+        &[0, 0, 0, 0, 0, 1, 1],
+        &[0, 0, 0, 0, 2, 0, 1, 3],
+        &[0, 0, 0, 0, 0, 2, 1, 0x83],
+    ] {
+        let mut stream = TcpStream::connect(plant.address).await.unwrap();
+        stream.write_all(garbage).await.unwrap();
+        let mut answer = Vec::new();
+        // Closed, with or without a reset for what was left unread.
+        let _ = stream.read_to_end(&mut answer).await;
+        assert!(
+            answer.is_empty(),
+            "{garbage:?} was answered with {answer:?}"
+        );
+        assert!(plc.read_input_registers(200, 120).await.unwrap().is_ok());
+    }
+}
+
+#[tokio::test]
+async fn idle_connections_and_unfinished_frames_are_closed_in_time() {
+    let options = Options {
+        idle: Duration::from_millis(40),
+        frame: Duration::from_millis(20),
+        ..Default::default()
+    };
+    let plant = Plant::with(options, false).await;
+    for start in [&[][..], &[0, 1, 0], &[0, 1, 0, 0, 0, 6, 1, 3]] {
+        let mut stream = TcpStream::connect(plant.address).await.unwrap();
+        stream.write_all(start).await.unwrap();
+        let mut answer = Vec::new();
+        assert_eq!(stream.read_to_end(&mut answer).await.unwrap_or(0), 0);
+    }
+}
+
+#[tokio::test]
+async fn the_connection_over_the_limit_is_closed_and_a_freed_place_is_taken_again() {
+    let plant = Plant::with(
+        Options {
+            connections: 2,
+            ..Default::default()
+        },
+        false,
+    )
+    .await;
+    let mut first = plant.client().await;
+    let mut second = plant.client().await;
+    for plc in [&mut first, &mut second] {
+        assert!(plc.read_input_registers(100, 1).await.unwrap().is_ok());
+    }
+    let mut third = plant.client().await;
+    assert!(third.read_input_registers(100, 1).await.is_err());
+    drop(first);
+    // The place is free as soon as the server has seen the end of the first connection.
+    loop {
+        let mut next = plant.client().await;
+        if let Ok(answer) = next.read_input_registers(100, 1).await {
+            assert!(answer.is_ok());
+            break;
+        }
+    }
+    assert!(second.read_input_registers(100, 1).await.unwrap().is_ok());
+}
+
+#[tokio::test]
+async fn a_port_in_use_is_an_error_that_names_the_address_and_the_remedy() {
+    let plant = Plant::new().await;
+    let error = bind(plant.address).await.unwrap_err();
+    assert!(matches!(error, ModbusError::InUse { .. }));
+    let words = error.to_string();
+    assert!(
+        words.contains(&plant.address.to_string()) && words.contains("choose another port"),
+        "{words}"
+    );
+}

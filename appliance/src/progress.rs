@@ -1,0 +1,56 @@
+//! Progress of anything longer than a second: on stderr, only on a terminal, not with `--quiet`.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// A progress bar that stays away where nobody looks. Cheap to clone; clones share the bar.
+#[derive(Clone, Debug)]
+pub struct Progress {
+    bar: ProgressBar,
+    quiet: bool,
+}
+
+/// Steps of the bar.
+const STEPS: u64 = 1000;
+
+impl Progress {
+    /// A bar, or none with `quiet`.
+    pub fn new(quiet: bool) -> Self {
+        let target = if quiet {
+            ProgressDrawTarget::hidden()
+        } else {
+            // Draws nothing where stderr is no terminal.
+            ProgressDrawTarget::stderr()
+        };
+        let bar = ProgressBar::with_draw_target(Some(STEPS), target);
+        if let Ok(style) = ProgressStyle::with_template("{bar:32} {percent:>3} % {msg}") {
+            bar.set_style(style);
+        }
+        Self { bar, quiet }
+    }
+
+    /// Shows the share done, 0…1, and what is being done. From any thread.
+    pub fn tell(&self, share: f64, words: &str) {
+        if self.bar.message() != words {
+            self.bar.set_message(words.to_owned());
+        }
+        self.bar
+            .set_position((share.clamp(0.0, 1.0) * STEPS as f64) as u64);
+    }
+
+    /// Takes the bar away until something is told again.
+    pub fn clear(&self) {
+        self.bar.set_position(0);
+        self.bar.set_message("");
+        self.bar.set_draw_target(ProgressDrawTarget::hidden());
+        if !self.quiet {
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+    }
+
+    /// A line for the log, above the bar.
+    pub fn log(&self, line: &str) {
+        if !self.quiet {
+            self.bar.suspend(|| eprintln!("fringed: {line}"));
+        }
+    }
+}

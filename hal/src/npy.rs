@@ -1,0 +1,258 @@
+//! NumPy arrays of two dimensions in `.npy` files, read and written.
+//!
+//! Format: NumPy enhancement proposal 1 (versions 1.0, 2.0 and 3.0 of the header). Read here by hand, because
+//! what arrives in a recording or a recipe may be broken on purpose: the header is bounded and matched against
+//! the one grammar NumPy writes, and nothing is allocated before the file's length is known to fit the shape.
+
+/// Rows and columns, then the elements row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Array<T> {
+    /// Rows.
+    pub rows: usize,
+    /// Columns.
+    pub columns: usize,
+    /// The elements, row by row.
+    pub elements: Vec<T>,
+}
+
+/// Bytes that are no array of the wanted kind.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{problem}: {remedy}")]
+pub struct NpyError {
+    /// What is wrong, with the numbers.
+    pub problem: String,
+    /// What to do about it.
+    pub remedy: &'static str,
+}
+
+/// A type of element that files hold, little-endian.
+pub trait Element: Copy {
+    /// NumPy's name of the type that is written.
+    const KIND: &'static str;
+    /// Reads all elements of a file of type `kind`; `None` if that type is not this one.
+    fn read(kind: &str, bytes: &[u8]) -> Option<Vec<Self>>;
+    /// Appends the element's bytes.
+    fn write(self, bytes: &mut Vec<u8>);
+}
+
+fn chunks<const SIZE: usize, T>(bytes: &[u8], from: impl Fn([u8; SIZE]) -> T) -> Vec<T> {
+    let (groups, _) = bytes.as_chunks::<SIZE>();
+    groups.iter().map(|group| from(*group)).collect()
+}
+
+impl Element for u8 {
+    const KIND: &'static str = "|u1";
+    fn read(kind: &str, bytes: &[u8]) -> Option<Vec<Self>> {
+        matches!(kind, "|u1" | "<u1").then(|| bytes.to_vec())
+    }
+    fn write(self, bytes: &mut Vec<u8>) {
+        bytes.push(self);
+    }
+}
+
+impl Element for f32 {
+    const KIND: &'static str = "<f4";
+    fn read(kind: &str, bytes: &[u8]) -> Option<Vec<Self>> {
+        (kind == "<f4").then(|| chunks(bytes, Self::from_le_bytes))
+    }
+    fn write(self, bytes: &mut Vec<u8>) {
+        bytes.extend_from_slice(&self.to_le_bytes());
+    }
+}
+
+/// Also reads files of `f32`.
+impl Element for f64 {
+    const KIND: &'static str = "<f8";
+    fn read(kind: &str, bytes: &[u8]) -> Option<Vec<Self>> {
+        match kind {
+            "<f4" => Some(chunks(bytes, |group| Self::from(f32::from_le_bytes(group)))),
+            "<f8" => Some(chunks(bytes, Self::from_le_bytes)),
+            _ => None,
+        }
+    }
+    fn write(self, bytes: &mut Vec<u8>) {
+        bytes.extend_from_slice(&self.to_le_bytes());
+    }
+}
+
+const MAGIC: &[u8] = b"\x93NUMPY";
+/// NumPy aligns the start of the elements to this many bytes.
+const ALIGNMENT: usize = 64;
+/// NumPy's headers of plain arrays are below 128 bytes; anything far longer is not one.
+const MAX_HEADER: usize = 4096;
+
+struct Header<'a> {
+    kind: &'a str,
+    rows: usize,
+    columns: usize,
+    elements: &'a [u8],
+}
+
+/// Reads an array.
+///
+/// # Errors
+/// If the bytes are no two-dimensional row-major array of this type of element, or end early.
+pub fn read<T: Element>(bytes: &[u8]) -> Result<Array<T>, NpyError> {
+    let Header {
+        kind,
+        rows,
+        columns,
+        elements,
+    } = header(bytes)?;
+    // The last character of a kind is its size in bytes: "<f4".
+    let size = kind
+        .strip_prefix(['<', '|', '>', '='])
+        .and_then(|kind| kind.get(1..)?.parse().ok());
+    let expected = rows
+        .checked_mul(columns)
+        .zip(size)
+        .and_then(|(count, size)| count.checked_mul(size));
+    if expected != Some(elements.len()) {
+        return Err(broken(format!(
+            "the file holds {} bytes of elements, a {rows}×{columns} array of {kind:?} needs another number",
+            elements.len(),
+        )));
+    }
+    let elements = T::read(kind, elements).ok_or_else(|| NpyError {
+        problem: format!(
+            "the array holds elements of type {kind:?}, expected {:?}",
+            T::KIND
+        ),
+        remedy: "save the array with that type, little-endian",
+    })?;
+    Ok(Array {
+        rows,
+        columns,
+        elements,
+    })
+}
+
+/// The bytes of a version 1.0 file with rows of `columns` elements; elements beyond the last whole row are left
+/// out.
+pub fn write<T: Element>(columns: usize, elements: &[T]) -> Vec<u8> {
+    let rows = elements.len() / columns.max(1);
+    let kind = T::KIND;
+    let mut text =
+        format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
+    let preamble = MAGIC.len() + 4;
+    // The header ends in a newline and is padded in front of it.
+    let padded = (preamble + text.len() + 1).next_multiple_of(ALIGNMENT) - preamble;
+    while text.len() + 1 < padded {
+        text.push(' ');
+    }
+    text.push('\n');
+    let mut bytes = Vec::with_capacity(preamble + padded + size_of_val(elements));
+    bytes.extend_from_slice(MAGIC);
+    bytes.extend_from_slice(&[1, 0]);
+    bytes.extend_from_slice(&u16::try_from(text.len()).unwrap_or(u16::MAX).to_le_bytes());
+    bytes.extend_from_slice(text.as_bytes());
+    for element in &elements[..rows * columns] {
+        element.write(&mut bytes);
+    }
+    bytes
+}
+
+fn broken(problem: impl Into<String>) -> NpyError {
+    NpyError {
+        problem: problem.into(),
+        remedy: "save the array again with numpy.save, row-major",
+    }
+}
+
+fn header(bytes: &[u8]) -> Result<Header<'_>, NpyError> {
+    let rest = bytes
+        .strip_prefix(MAGIC)
+        .ok_or_else(|| broken("not a NumPy array"))?;
+    let (length, rest) = match rest {
+        [1, 0, a, b, rest @ ..] => (usize::from(u16::from_le_bytes([*a, *b])), rest),
+        [2 | 3, 0, a, b, 0, 0, rest @ ..] => (usize::from(u16::from_le_bytes([*a, *b])), rest),
+        _ => {
+            return Err(broken(
+                "the array's header has an unknown version or length",
+            ));
+        }
+    };
+    let (text, elements) = (length <= MAX_HEADER)
+        .then(|| rest.split_at_checked(length))
+        .flatten()
+        .ok_or_else(|| broken("the array's header is cut off"))?;
+    let text = std::str::from_utf8(text).map_err(|_| broken("the array's header is no text"))?;
+    let unreadable = || {
+        broken(format!(
+            "the array's header {:?} is not understood",
+            text.trim_end()
+        ))
+    };
+    match value_of(text, "'fortran_order':").ok_or_else(unreadable)? {
+        order if order.starts_with("False") => {}
+        _ => return Err(broken("the array is stored column by column")),
+    }
+    let kind = value_of(text, "'descr':")
+        .and_then(|rest| rest.strip_prefix('\'')?.split_once('\''))
+        .map(|(kind, _)| kind)
+        .ok_or_else(unreadable)?;
+    let shape = value_of(text, "'shape':")
+        .and_then(|rest| rest.strip_prefix('(')?.split_once(')'))
+        .map(|(shape, _)| shape)
+        .ok_or_else(unreadable)?;
+    let sizes: Option<Vec<usize>> = shape
+        .split(',')
+        .map(str::trim)
+        .filter(|size| !size.is_empty())
+        .map(|size| size.parse().ok())
+        .collect();
+    match sizes.as_deref() {
+        Some(&[rows, columns]) => Ok(Header {
+            kind,
+            rows,
+            columns,
+            elements,
+        }),
+        _ => Err(broken(format!(
+            "the array has shape ({shape}), expected rows and columns"
+        ))),
+    }
+}
+
+fn value_of<'a>(text: &'a str, key: &str) -> Option<&'a str> {
+    text.split_once(key).map(|(_, rest)| rest.trim_start())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_array_written_here_is_read_by_another_library_and_by_this_one() {
+        let elements = [1.5_f64, -2.0, f64::MAX, 0.0, 1e-300, 7.0];
+        let file = write(3, &elements);
+        let theirs = npyz::NpyFile::new(&file[..]).unwrap();
+        assert_eq!(theirs.shape(), &[2, 3]);
+        assert_eq!(theirs.into_vec::<f64>().unwrap(), elements);
+        let ours = read::<f64>(&file).unwrap();
+        assert_eq!(
+            (ours.rows, ours.columns, &ours.elements[..]),
+            (2, 3, &elements[..])
+        );
+    }
+
+    #[test]
+    fn a_shape_that_overflows_or_does_not_fit_the_file_is_an_error() {
+        for shape in [
+            "18446744073709551615, 2",
+            "99999999999999999999, 1",
+            "2, 4",
+            "6",
+            "1, 2, 3",
+            "",
+        ] {
+            let text =
+                format!("{{'descr': '|u1', 'fortran_order': False, 'shape': ({shape}), }}\n");
+            let mut file = b"\x93NUMPY\x01\x00".to_vec();
+            file.extend_from_slice(&u16::try_from(text.len()).unwrap().to_le_bytes());
+            file.extend_from_slice(text.as_bytes());
+            file.extend_from_slice(&[0; 6]);
+            assert!(read::<u8>(&file).is_err(), "{shape}");
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! The limits of a scenario's values: what is outside is refused by name before anything is computed with it.
+
+use super::scenario::{Device, Placement, Scenario};
+
+/// Most rays of a light transport. Each has at most four taps, which then fit the 32-bit offsets of the matrix.
+const MAX_RAYS: u64 = 1 << 28;
+
+impl Scenario {
+    /// What is wrong with the values, if anything.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        if ![8, 10, 12].contains(&self.bit_depth) {
+            return Err(format!(
+                "bit_depth is {}: write 8, 10 or 12",
+                self.bit_depth
+            ));
+        }
+        if !(1..=16).contains(&self.sub_rays) {
+            return Err(format!("sub_rays is {}: write 1…16", self.sub_rays));
+        }
+        for (name, device) in [
+            ("rig.camera", &self.rig.camera),
+            ("rig.projector", &self.rig.projector),
+        ] {
+            device
+                .check()
+                .map_err(|problem| format!("{name}.{problem}"))?;
+        }
+        let camera = &self.rig.camera;
+        let pixels = u64::from(camera.width) * u64::from(camera.height);
+        let rays = pixels * u64::from(self.sub_rays).pow(2);
+        if rays > MAX_RAYS {
+            return Err(format!(
+                "rig.camera of {}×{} pixels with {}² sub_rays is {rays} rays: keep within {MAX_RAYS}",
+                camera.width, camera.height, self.sub_rays
+            ));
+        }
+        within("refresh_hz", self.refresh_hz, 1.0, 1000.0)?;
+        within("light.ambient", self.light.ambient, 0.0, 100.0)?;
+        within("light.diffuse", self.light.diffuse, 0.0, 100.0)?;
+        within("noise.noise_counts", self.noise.noise_counts, 0.0, 255.0)?;
+        within(
+            "optics.projector_blur_px",
+            self.optics.projector_blur_px,
+            0.0,
+            20.0,
+        )?;
+        within(
+            "optics.camera_blur_px",
+            self.optics.camera_blur_px,
+            0.0,
+            20.0,
+        )?;
+        within("optics.gamma", self.optics.gamma, 0.1, 10.0)?;
+        within("optics.gain", self.optics.gain, 0.0, 100.0)?;
+        self.placement.check()?;
+        self.part.check()
+    }
+}
+
+impl Placement {
+    /// What is wrong with the values, if anything.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        for shift in self.shift_mm {
+            within("placement.shift_mm", shift, -1000.0, 1000.0)?;
+        }
+        for tilt in self.tilt_deg {
+            within("placement.tilt_deg", tilt, -80.0, 80.0)?;
+        }
+        within("placement.rotation_deg", self.rotation_deg, -360.0, 360.0)
+    }
+}
+
+impl Device {
+    fn check(&self) -> Result<(), String> {
+        for (name, pixels) in [("width", self.width), ("height", self.height)] {
+            if !(1..=4096).contains(&pixels) {
+                return Err(format!("{name} is {pixels}: write 1…4096"));
+            }
+        }
+        for fov in self.fov_deg {
+            within("fov_deg", fov, 1.0, 120.0)?;
+        }
+        within("angle_deg", self.angle_deg, -80.0, 80.0)?;
+        within("distance_mm", self.distance_mm, 10.0, 100_000.0)?;
+        for coefficient in self.distortion {
+            within("distortion", coefficient, -1.0, 1.0)?;
+        }
+        Ok(())
+    }
+}
+
+/// An error that names `key` unless `value` lies in `low`…`high`; NaN does not.
+pub(crate) fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    Err(format!("{key} is {value}: write {low}…{high}"))
+}

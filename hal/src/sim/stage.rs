@@ -1,0 +1,173 @@
+//! The simulated head and its stage: parts are placed in front of it, and what is true of them is known.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use super::parts::Part;
+use super::scenario::{Placement, Scenario};
+use super::scene::SimScene;
+use super::transport::{Transport, Truth};
+use crate::error::Error;
+use crate::head::DynHead;
+use crate::model::DeviceModel;
+use crate::virtual_head::{self, Shared, lock};
+
+/// Placed parts whose transport is remembered; one of 512 × 512 takes about 20 MB.
+const MAX_REMEMBERED: usize = 8;
+
+/// The part in front of a simulated head. Clones place parts in front of the same head.
+#[derive(Clone)]
+pub struct Stage {
+    bench: Shared<SimScene>,
+    scenario: Arc<Scenario>,
+    remembered: Arc<Mutex<Vec<Remembered>>>,
+}
+
+/// A placed part whose transport is known; the one used last stands at the end.
+struct Remembered {
+    part: Part,
+    placement: Placement,
+    transport: Arc<Transport>,
+}
+
+/// A simulated head in front of the scenario's part, and the stage to place others on.
+///
+/// # Errors
+/// `Unsupported` if a value of the scenario is out of its range.
+pub fn head(scenario: &Scenario) -> Result<(DynHead, Stage), Error> {
+    head_with_progress(scenario, &|_| ())
+}
+
+/// As [`head`]; `progress` is told the share of the light transport that is worked out, 0…1, from any thread.
+///
+/// # Errors
+/// As [`head`].
+pub fn head_with_progress(
+    scenario: &Scenario,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<(DynHead, Stage), Error> {
+    scenario
+        .check()
+        .map_err(|problem| Error::unsupported("simulating this scenario", problem))?;
+    let scenario = Arc::new(scenario.clone());
+    let transport = Arc::new(Transport::build(
+        &scenario,
+        &scenario.part,
+        &scenario.placement,
+        progress,
+    ));
+    let remembered = Remembered {
+        part: scenario.part.clone(),
+        placement: scenario.placement,
+        transport: Arc::clone(&transport),
+    };
+    let refresh = Duration::from_secs_f64(1.0 / scenario.refresh_hz);
+    let (head, bench) =
+        virtual_head::head(SimScene::new(Arc::clone(&scenario), transport), refresh);
+    let stage = Stage {
+        bench,
+        scenario,
+        remembered: Arc::new(Mutex::new(vec![remembered])),
+    };
+    Ok((head, stage))
+}
+
+impl Stage {
+    /// Puts `part` in place of the one before; the next exposure sees it. The transport of the last few placed parts is
+    /// remembered, so going back to one of them costs nothing.
+    ///
+    /// # Errors
+    /// `Unsupported` if a measure of the part or the placement is out of its range.
+    pub fn place(&self, part: &Part, placement: &Placement) -> Result<(), Error> {
+        self.place_with_progress(part, placement, &|_| ())
+    }
+
+    /// As [`Stage::place`]; `progress` is told the share done, 0…1, from any thread.
+    ///
+    /// # Errors
+    /// As [`Stage::place`].
+    pub fn place_with_progress(
+        &self,
+        part: &Part,
+        placement: &Placement,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<(), Error> {
+        part.check()
+            .and_then(|()| placement.check())
+            .map_err(|problem| Error::unsupported("placing this part", problem))?;
+        let known = self.recall(part, placement);
+        let transport = known.unwrap_or_else(|| {
+            let built = Arc::new(Transport::build(&self.scenario, part, placement, progress));
+            self.remember(part, placement, &built);
+            built
+        });
+        lock(&self.bench).scene.place(transport);
+        Ok(())
+    }
+
+    fn recall(&self, part: &Part, placement: &Placement) -> Option<Arc<Transport>> {
+        let mut remembered = self
+            .remembered
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let at = remembered
+            .iter()
+            .position(|r| r.part == *part && r.placement == *placement)?;
+        let found = remembered.remove(at);
+        let transport = Arc::clone(&found.transport);
+        remembered.push(found);
+        Some(transport)
+    }
+
+    fn remember(&self, part: &Part, placement: &Placement, transport: &Arc<Transport>) {
+        let mut remembered = self
+            .remembered
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        if remembered.len() == MAX_REMEMBERED {
+            remembered.remove(0);
+        }
+        let (part, transport) = (part.clone(), Arc::clone(transport));
+        remembered.push(Remembered {
+            part,
+            placement: *placement,
+            transport,
+        });
+    }
+
+    /// What is true of the part that is in place.
+    #[must_use]
+    pub fn truth(&self) -> Truth {
+        let transport = lock(&self.bench).scene.transport();
+        transport.truth.clone()
+    }
+
+    /// Starts the noise anew from `seed`: the next frame is frame 0 of it.
+    pub fn reseed(&self, seed: u64) {
+        lock(&self.bench).scene.reseed(seed);
+    }
+
+    /// The scenario of this head, with the part it started with.
+    #[must_use]
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// The exact geometry of the camera.
+    #[must_use]
+    pub fn camera_model(&self) -> DeviceModel {
+        self.scenario.rig.camera.model()
+    }
+
+    /// The exact geometry of the projector.
+    #[must_use]
+    pub fn projector_model(&self) -> DeviceModel {
+        self.scenario.rig.projector.model()
+    }
+
+    /// Refresh period of the projector.
+    #[must_use]
+    pub fn refresh(&self) -> Duration {
+        Duration::from_secs_f64(1.0 / self.scenario.refresh_hz)
+    }
+}

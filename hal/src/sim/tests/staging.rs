@@ -1,0 +1,153 @@
+//! Parts on the stage: defects, placements, and what is remembered.
+
+use super::{all_parts, small};
+use crate::sim::parts::{Defect, Plane, SheetMetal};
+use crate::sim::{Part, Placement, Scenario, Stage, head};
+
+/// Pixels whose truth is not NaN, and the largest difference of truth from the good part.
+fn against_good(stage: &Stage, defects: Vec<Defect>) -> (usize, f32) {
+    let seen = |z: &[f32]| z.iter().filter(|z| !z.is_nan()).count();
+    stage
+        .place(&Part::default(), &Placement::default())
+        .unwrap();
+    let good = stage.truth().height;
+    stage
+        .place(
+            &Part::SheetMetal(SheetMetal { defects }),
+            &Placement::default(),
+        )
+        .unwrap();
+    let bad = stage.truth().height;
+    let differences = good
+        .iter()
+        .zip(&bad)
+        .map(|(a, b)| (a - b).abs())
+        .filter(|d| !d.is_nan());
+    (
+        seen(&bad).abs_diff(seen(&good)),
+        differences.fold(0.0, f32::max),
+    )
+}
+
+#[test]
+fn each_defect_of_the_bracket_shows_in_the_truth() {
+    let mut scenario = Scenario {
+        sub_rays: 1,
+        ..Scenario::default()
+    };
+    (scenario.rig.camera.width, scenario.rig.camera.height) = (128, 128);
+    let (_, stage) = head(&scenario).unwrap();
+    let truth = stage.truth();
+    let seen = truth.height.iter().filter(|z| !z.is_nan()).count();
+    assert!(
+        seen > 128 * 128 * 3 / 10,
+        "the bracket fills a good part of the picture: {seen}"
+    );
+    assert!(
+        truth
+            .height
+            .iter()
+            .filter(|z| !z.is_nan())
+            .all(|z| z.abs() < 40.0)
+    );
+    let edge = |at: usize| [0, 127].contains(&(at / 128)) || [0, 127].contains(&(at % 128));
+    assert!(
+        truth
+            .height
+            .iter()
+            .enumerate()
+            .all(|(at, z)| z.is_nan() || !edge(at)),
+        "it lies inside the picture"
+    );
+
+    let dent = Defect::Dent {
+        x: 10.0,
+        y: -8.0,
+        depth_mm: 1.5,
+        diameter_mm: 18.0,
+    };
+    let (_, depth) = against_good(&stage, vec![dent]);
+    assert!((depth - 1.5).abs() < 0.1, "{depth}");
+    let (more, _) = against_good(&stage, vec![Defect::MissingHole { index: 2 }]);
+    assert!(more > 60, "a hole of 11 mm radius is {more} pixels");
+    let (_, bend) = against_good(&stage, vec![Defect::BentFlange { degrees: 8.0 }]);
+    assert!(bend > 2.0, "{bend}");
+    assert_eq!(against_good(&stage, vec![]).1, 0.0);
+}
+
+#[test]
+fn a_placed_part_is_shifted_and_turned_as_its_placement_says() {
+    let (_, stage) = head(&small(Part::Plane(Plane::default()))).unwrap();
+    let part = Part::Plane(Plane::default());
+    stage
+        .place(
+            &part,
+            &Placement {
+                shift_mm: [3.0, 1.0, 7.5],
+                ..Placement::default()
+            },
+        )
+        .unwrap();
+    assert!(stage.truth().height.iter().all(|z| (z - 7.5).abs() < 1e-4));
+    // Tilted about x, +y goes up; +y is up in the picture too, so its first row is higher than its last.
+    stage
+        .place(
+            &part,
+            &Placement {
+                tilt_deg: [5.0, 0.0],
+                ..Placement::default()
+            },
+        )
+        .unwrap();
+    let tilted = stage.truth().height;
+    assert!(
+        tilted[32] > 3.0 && tilted[47 * 64 + 32] < -3.0,
+        "{} {}",
+        tilted[32],
+        tilted[47 * 64 + 32]
+    );
+    // Tilted about y, +x goes down.
+    stage
+        .place(
+            &part,
+            &Placement {
+                tilt_deg: [0.0, 5.0],
+                ..Placement::default()
+            },
+        )
+        .unwrap();
+    let tilted = stage.truth().height;
+    assert!(tilted[24 * 64] > 3.0 && tilted[24 * 64 + 63] < -3.0);
+    assert!(
+        stage
+            .place(
+                &part,
+                &Placement {
+                    rotation_deg: f64::NAN,
+                    ..Placement::default()
+                }
+            )
+            .is_err()
+    );
+}
+
+#[test]
+fn going_back_to_a_placed_part_costs_nothing() {
+    let (_, stage) = head(&small(Part::default())).unwrap();
+    let built = std::sync::atomic::AtomicU32::new(0);
+    let count = |_: f64| {
+        built.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+    };
+    for _ in 0..5 {
+        for part in all_parts().iter().take(4) {
+            stage
+                .place_with_progress(part, &Placement::default(), &count)
+                .unwrap();
+        }
+    }
+    assert_eq!(
+        built.into_inner(),
+        4 * 48,
+        "each of four parts is traced once, row by row"
+    );
+}
