@@ -1,1 +1,18 @@
-//! The harness of the integration suite.
+//! The harness of the integration suite: what judges the program and shares no code with it.
+//!
+//! - [`oracle`]: the textbook in `f64`, from frames to heights.
+//! - [`rig`], [`render`]: small recordings of our own, with their truth.
+//! - [`shared`]: the recordings that lie beside the project, where they are.
+//! - [`program`]: runs the binary and keeps what it says.
+//! - [`files`]: reads what it writes, [`score`]: compares it with the truth, [`plane`]: fits planes.
+//! - [`random`]: a seeded generator.
+
+pub mod files;
+pub mod oracle;
+pub mod plane;
+pub mod program;
+pub mod random;
+pub mod render;
+pub mod rig;
+pub mod score;
+pub mod shared;

@@ -1,1 +1,13 @@
-//! The integration suite: one binary.
+//! The integration suite: one binary, one module per topic.
+
+mod bad_input;
+mod cases;
+mod fuzz;
+mod house;
+mod measured;
+mod outputs;
+mod promises_own;
+mod promises_shared;
+mod triangulation;
+mod twin;
+mod written;

@@ -1,0 +1,178 @@
+//! Temporal unwrapping: the wrapped phases of a pixel's levels → its absolute phase.
+
+/// How the ratios of a sequence combine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Form {
+    /// From coarse to fine, absolute by itself.
+    Geometric {
+        /// Lowest phase of the coarsest level, turns of that level.
+        lowest: f64,
+    },
+    /// Ratios 1, 1 − 1/n², 1 − 1/n about a known map.
+    DenseThree {
+        /// The n of the ratios.
+        n: f64,
+    },
+    /// Ratios 1, 1 − 1/n about a known map.
+    DenseTwo {
+        /// The n of the ratios.
+        n: f64,
+    },
+    /// One level about a known map.
+    Single,
+}
+
+/// Largest residual of a rounding step, turns.
+const MAX_RESIDUAL: f64 = 0.40;
+
+/// Recognises the form of `ratios`, from coarse to fine, for a pattern with this range of phases.
+/// `None` for ratios of no form.
+pub fn recognise(ratios: &[f64], (min, max): (f64, f64)) -> Option<Form> {
+    let span = ratios[0] * (max - min);
+    if span <= 1.001 {
+        // The coarsest level keeps what it leaves free of its turn as a margin for noise.
+        let margin = ((1.0 - span) / 2.0).max(0.0);
+        return Some(Form::Geometric {
+            lowest: ratios[0] * min - margin,
+        });
+    }
+    let near = |a: f64, b: f64| (a - b).abs() <= 1e-6;
+    match *ratios {
+        [_] => Some(Form::Single),
+        [low, one] if near(one, 1.0) => Some(Form::DenseTwo {
+            n: 1.0 / (1.0 - low),
+        }),
+        [low, middle, one] if near(one, 1.0) => {
+            let n = 1.0 / (1.0 - low);
+            let dense = n > 2.999 && near(middle, 1.0 - 1.0 / (n * n));
+            dense.then_some(Form::DenseThree { n })
+        }
+        _ => None,
+    }
+}
+
+/// One level of a pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Wrapped {
+    /// Ratio r.
+    pub ratio: f64,
+    /// φ in turns.
+    pub turns: f64,
+    /// N r² B², in counts².
+    pub information: f64,
+}
+
+/// Φ in turns and the information Σ N r² B² behind it, or none where a rounding step leaves more than
+/// 0.40 turn over. `levels` go from coarse to fine; `map` is Φ₀ for the forms that need one.
+pub fn unwrap(form: Form, levels: &[Wrapped], map: f64) -> Option<(f64, f64)> {
+    match form {
+        Form::Geometric { lowest } => geometric(levels, lowest),
+        Form::DenseThree { n } => {
+            let (one, slow, low) = (levels[2], levels[1], levels[0]);
+            let a = wrap(relative(one, map) - relative(slow, map));
+            let b = wrap(relative(one, map) - relative(low, map));
+            let b = b + order(n * a - b)?;
+            average(&[one, low, slow], n * b, map)
+        }
+        Form::DenseTwo { n } => {
+            let (one, low) = (levels[1], levels[0]);
+            let b = wrap(relative(one, map) - relative(low, map));
+            average(&[one, low], n * b, map)
+        }
+        Form::Single => {
+            let only = levels[0];
+            let delta = wrap(relative(only, map)) / only.ratio;
+            Some((map + delta, only.information))
+        }
+    }
+}
+
+/// k = round(n Φ_coarse − φ), Φ = k + φ, from level to level.
+fn geometric(levels: &[Wrapped], lowest: f64) -> Option<(f64, f64)> {
+    let coarsest = levels[0];
+    let mut phase = lowest + (coarsest.turns - lowest).rem_euclid(1.0);
+    let mut ratio = coarsest.ratio;
+    for level in &levels[1..] {
+        let n = level.ratio / ratio;
+        phase = level.turns + order(n * phase - level.turns)?;
+        ratio = level.ratio;
+    }
+    Some((phase / ratio, levels[levels.len() - 1].information))
+}
+
+/// q = φ − frac(r Φ₀).
+fn relative(level: Wrapped, map: f64) -> f64 {
+    level.turns - (level.ratio * map).rem_euclid(1.0)
+}
+
+/// D_i = (q_i + round(r_i D − q_i)) / r_i for each level in turn, D the weighted mean of those so far.
+fn average(levels: &[Wrapped], start: f64, map: f64) -> Option<(f64, f64)> {
+    let mut delta = start;
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for level in levels {
+        let q = relative(*level, map);
+        let here = (q + order(level.ratio * delta - q)?) / level.ratio;
+        sum += level.information * here;
+        weights += level.information;
+        delta = sum / weights;
+    }
+    Some((map + delta, weights))
+}
+
+/// The short way round, −½ ≤ x < ½.
+fn wrap(turns: f64) -> f64 {
+    turns - (turns + 0.5).floor()
+}
+
+/// The whole number next to x, unless too much is left over.
+fn order(x: f64) -> Option<f64> {
+    let whole = x.round();
+    ((x - whole).abs() <= MAX_RESIDUAL).then_some(whole)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(ratios: &[f64], phase: f64) -> Vec<Wrapped> {
+        let level = |&ratio: &f64| Wrapped {
+            ratio,
+            turns: wrap(ratio * phase),
+            information: ratio * ratio,
+        };
+        ratios.iter().map(level).collect()
+    }
+
+    #[test]
+    fn each_form_finds_the_phase_that_its_levels_were_made_of() {
+        let n = 6.0_f64;
+        for (ratios, reach) in [
+            (vec![0.0095, 0.095, 1.0], None),
+            (vec![0.0095, 0.08, 0.7], None),
+            (vec![1.0 - 1.0 / n, 1.0 - 1.0 / (n * n), 1.0], Some(11.9)),
+            (vec![0.8, 1.0], Some(2.4)),
+            (vec![0.7], Some(0.7)),
+        ] {
+            let form = recognise(&ratios, (-4.0, 96.0)).unwrap();
+            for i in 0..1000 {
+                let phase = -4.0 + f64::from(i) / 10.0;
+                let map = reach.map_or(f64::NAN, |reach| {
+                    phase + reach * f64::from(i % 21 - 10) / 10.0
+                });
+                let (found, _) = unwrap(form, &seen(&ratios, phase), map).unwrap();
+                assert!((found - phase).abs() < 1e-9, "{ratios:?} {phase} {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn ratios_of_no_form_are_not_recognised() {
+        for ratios in [
+            vec![0.1, 0.9],
+            vec![0.5, 0.9, 1.0],
+            vec![0.8, 0.9, 0.95, 1.0],
+        ] {
+            assert_eq!(recognise(&ratios, (0.0, 100.0)), None);
+        }
+    }
+}

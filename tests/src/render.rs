@@ -1,0 +1,244 @@
+//! Small recordings of our own: equation 1 sampled on an analytic surface, with seeded noise.
+//!
+//! Each pixel is one point sample on its central ray (no pixel integration, no blur, no shadows), so
+//! the truth is exact and the only errors are the noise's. Patches are spoilt on purpose: one is
+//! dark, one over full scale, one has no contrast in its finest level, and one fades through the
+//! modulation threshold.
+
+use crate::oracle::{Pattern, Rig};
+use crate::random::Random;
+use crate::rig;
+use hal::frame::{Frame, FrameFormat, Pixels};
+use hal::replay::Recording;
+use hal::replay::recording::{PatternSpec, RecordedFrame, RecordedProjector};
+use hal::units::Timestamp;
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+/// What to render.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Camera pixels each way.
+    pub size: u32,
+    /// Bits of a sample.
+    pub bit_depth: u8,
+    /// Projector columns and rows.
+    pub projector: (u32, u32),
+    /// The patterns.
+    pub patterns: Vec<PatternSpec>,
+    /// Ratio and shift of each frame, for every pattern.
+    pub frames: Vec<(f64, f64)>,
+    /// Half width of the uniform noise, as a share of full scale.
+    pub noise: f64,
+    /// Whether the spoilt patches are there.
+    pub patches: bool,
+    /// Of the noise.
+    pub seed: u64,
+}
+
+/// Height of the bump's top above the plane, mm, and its radius on the plane.
+const BUMP: (f64, f64) = (9.0, 55.0);
+
+impl Scene {
+    /// 96 × 96 pixels of 8 bit, ± 2.5 % noise, vertical fringes.
+    pub fn new(fringes: f64, frames: Vec<(f64, f64)>) -> Self {
+        Self {
+            size: 96,
+            bit_depth: 8,
+            projector: (256, 192),
+            patterns: vec![PatternSpec::Vertical { fringes }],
+            frames,
+            noise: 0.025,
+            patches: true,
+            seed: 1,
+        }
+    }
+
+    /// Renders the frames, with truth and models.
+    pub fn record(&self) -> Recording {
+        let (columns, rows) = self.projector;
+        let format = FrameFormat::packed(self.size, self.size, self.bit_depth);
+        let mut recording = Recording {
+            width: self.size,
+            height: self.size,
+            bit_depth: self.bit_depth,
+            description: "a tilted plane with a bump".to_owned(),
+            source: "rendered by the integration suite".to_owned(),
+            camera_model: Some(rig::camera(self.size)),
+            noise_counts: None,
+            projector: RecordedProjector {
+                width: columns,
+                height: rows,
+                model: Some(rig::projector(columns, rows)),
+            },
+            patterns: self.patterns.clone(),
+            frames: Vec::new(),
+            range_mm: Some([-60.0, 60.0]),
+            exposure_us: None,
+            part_id: None,
+            recipe: None,
+            truth_height: None,
+            truth_class: None,
+        };
+        let geometry = Rig::of(&recording).expect("both models are there");
+        let pixels = (self.size * self.size) as usize;
+        let place = |at: usize| {
+            let size = self.size as usize;
+            ((at % size) as f64, (at / size) as f64)
+        };
+        let heights: Vec<f64> = (0..pixels)
+            .map(|at| height_on_ray(&geometry, place(at)))
+            .collect();
+        let finest = self.frames.iter().map(|f| f.0).fold(0.0, f64::max);
+        let full = f64::from(format.full_scale());
+        let mut random = Random::new(self.seed);
+        for pattern in 0..self.patterns.len() {
+            let function = Pattern::of(&recording, pattern);
+            let phases: Vec<f64> = (0..pixels)
+                .map(|at| {
+                    let (u, v) = place(at);
+                    geometry.phase_at(&function, u, v, heights[at])
+                })
+                .collect();
+            for &(ratio, shift_turns) in &self.frames {
+                let samples = (0..pixels).map(|at| {
+                    let light = self.light(place(at), ratio == finest);
+                    let sine = (TAU * (ratio * phases[at] + shift_turns)).sin();
+                    let noise = self.noise * (2.0 * random.share() - 1.0);
+                    let share = light.offset + light.modulation * sine + noise;
+                    (full * share).round().clamp(0.0, full) as u16
+                });
+                let samples: Vec<u16> = samples.collect();
+                let place = recording.frames.len() as u64;
+                recording.frames.push(RecordedFrame {
+                    ratio,
+                    shift_turns,
+                    pattern,
+                    timestamp_ns: Some(1_000_000 * place),
+                    frame: frame(format, samples, place),
+                });
+            }
+        }
+        let classes = (0..pixels).map(|at| match self.spoilt(place(at)) {
+            Patch::None => 2,
+            _ => 1,
+        });
+        recording.truth_class = Some(classes.collect());
+        recording.truth_height = Some(heights.iter().map(|z| *z as f32).collect());
+        recording
+    }
+
+    /// Offset and modulation of a pixel's light, as shares of full scale.
+    fn light(&self, (u, v): (f64, f64), finest: bool) -> Light {
+        // An even part lit a little more on one side; at 8 bit B is 82 to 113 counts.
+        let albedo = 0.32 + 0.12 * u / f64::from(self.size);
+        let even = Light {
+            offset: 0.06 + albedo,
+            modulation: albedo,
+        };
+        match self.spoilt((u, v)) {
+            Patch::None => even,
+            Patch::Dark => Light {
+                offset: 0.06,
+                modulation: 0.01,
+            },
+            Patch::Bright => Light {
+                offset: 0.62,
+                modulation: 0.45,
+            },
+            Patch::Flat if finest => Light {
+                modulation: 0.02,
+                ..even
+            },
+            Patch::Flat => even,
+            Patch::Fading => Light {
+                offset: 0.3,
+                modulation: 0.02 + 0.1 * v / f64::from(self.size),
+            },
+        }
+    }
+
+    fn spoilt(&self, (u, v): (f64, f64)) -> Patch {
+        let (u, v) = (u / f64::from(self.size), v / f64::from(self.size));
+        let inside = |left: f64, top: f64, side: f64| {
+            (left..left + side).contains(&u) && (top..top + side).contains(&v)
+        };
+        if !self.patches {
+            Patch::None
+        } else if inside(0.05, 0.05, 0.15) {
+            Patch::Dark
+        } else if inside(0.8, 0.05, 0.15) {
+            Patch::Bright
+        } else if inside(0.05, 0.8, 0.15) {
+            Patch::Flat
+        } else if u >= 0.94 {
+            Patch::Fading
+        } else {
+            Patch::None
+        }
+    }
+}
+
+/// Shares of full scale.
+struct Light {
+    offset: f64,
+    modulation: f64,
+}
+
+enum Patch {
+    None,
+    Dark,
+    Bright,
+    Flat,
+    Fading,
+}
+
+/// A frame of given samples, the `place`-th.
+fn frame(format: FrameFormat, samples: Vec<u16>, place: u64) -> Frame {
+    let pixels = if format.bit_depth == 8 {
+        Pixels::Eight(samples.iter().map(|sample| *sample as u8).collect())
+    } else {
+        Pixels::Sixteen(samples)
+    };
+    let timestamp = Timestamp(1_000_000 * place);
+    Frame::new(format, Arc::new(pixels), timestamp, place).expect("a frame of its own format")
+}
+
+/// The part: a plane tilted both ways and, on it, a bump of one cosine arch. Steepest slope 0.35, so
+/// that camera and projector see all of it.
+pub fn surface(x: f64, y: f64) -> f64 {
+    let (top, radius) = BUMP;
+    let r = ((x - 8.0).powi(2) + (y + 5.0).powi(2)).sqrt();
+    let bump = if r < radius {
+        top / 2.0 * (1.0 + (PI * r / radius).cos())
+    } else {
+        0.0
+    };
+    0.03 * x - 0.02 * y + bump - 1.0
+}
+
+/// Where the ray of a pixel meets the part: bisection, the ray being steeper than the part.
+fn height_on_ray(geometry: &Rig, (u, v): (f64, f64)) -> f64 {
+    let above = |z: f64| {
+        let [x, y, z] = geometry.camera.point_at(u, v, z);
+        z > surface(x, y)
+    };
+    let (mut low, mut high) = (-60.0, 60.0);
+    for _ in 0..80 {
+        let middle = (low + high) / 2.0;
+        if above(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    (low + high) / 2.0
+}
+
+/// Frames of several levels of `steps` shifts k/N, in the order of the ratios.
+pub fn levels(ratios: &[f64], steps: usize) -> Vec<(f64, f64)> {
+    ratios
+        .iter()
+        .flat_map(|&ratio| (0..steps).map(move |k| (ratio, k as f64 / steps as f64)))
+        .collect()
+}

@@ -1,0 +1,297 @@
+//! The house's plan: who may import whom. Each test fails with the sentence of the rule.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use tests::files;
+
+/// Longest file, in lines that are no tests. House: 100–300 lines, one concept each; this is where a
+/// file has clearly become two.
+const MAX_LINES: usize = 450;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap()
+        .to_path_buf()
+}
+
+/// A source file: its path from the root, and its text.
+struct Source {
+    name: String,
+    text: String,
+}
+
+/// All Rust files below a folder of the project; none if there is no such folder.
+fn sources(folder: &str) -> Vec<Source> {
+    let mut all = Vec::new();
+    collect(&root().join(folder), &mut all);
+    // A module may be one file beside its folder.
+    collect_file(&root().join(format!("{folder}.rs")), &mut all);
+    all
+}
+
+fn collect(folder: &Path, all: &mut Vec<Source>) {
+    for name in files::names(folder) {
+        let path = folder.join(name);
+        if path.is_dir() {
+            collect(&path, all);
+        } else {
+            collect_file(&path, all);
+        }
+    }
+}
+
+fn collect_file(path: &Path, all: &mut Vec<Source>) {
+    if path.extension().is_some_and(|e| e == "rs") && path.is_file() {
+        let name = path.strip_prefix(root()).unwrap().display().to_string();
+        let text = fs::read_to_string(path).unwrap();
+        all.push(Source { name, text });
+    }
+}
+
+/// The code of a text: without comments, and without the rest of a line behind one.
+fn code(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    (1..)
+        .zip(text.lines())
+        .map(|(line, text)| (line, text.split("//").next().unwrap_or_default()))
+}
+
+/// Whether a line of code names a path that starts with `path`, as a word.
+fn names(line: &str, path: &str) -> bool {
+    line.match_indices(path).any(|(at, _)| {
+        let before = line[..at].chars().next_back();
+        !before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':')
+    })
+}
+
+/// Fails with `rule` where a file below `folder` names one of `paths` in its code.
+fn forbid(rule: &str, folder: &str, paths: &[&str]) {
+    let mut broken = Vec::new();
+    for source in sources(folder) {
+        for (line, text) in code(&source.text) {
+            if let Some(path) = paths.iter().find(|path| names(text, path)) {
+                broken.push(format!("{}:{line} names {path}", source.name));
+            }
+        }
+    }
+    assert!(broken.is_empty(), "{rule}\n{}", broken.join("\n"));
+}
+
+/// The names of the packages that a manifest depends on (not for its tests).
+fn dependencies(package: &str) -> Vec<String> {
+    let text = fs::read_to_string(root().join(package).join("Cargo.toml")).unwrap();
+    let mut inside = false;
+    let mut found = Vec::new();
+    for line in text.lines() {
+        if line.starts_with('[') {
+            inside = line == "[dependencies]" || line.starts_with("[target.");
+        } else if inside && let Some((name, _)) = line.split_once(['.', '=', ' ']) {
+            found.push(name.trim().to_owned());
+        }
+    }
+    found
+}
+
+/// Fails with `rule` where a manifest names one of `packages`.
+fn forbid_dependency(rule: &str, package: &str, packages: &[&str]) {
+    let dependencies = dependencies(package);
+    assert!(!dependencies.is_empty(), "{package} has no dependencies?");
+    for other in packages {
+        assert!(
+            !dependencies.iter().any(|name| name == other),
+            "{rule}\n{package}/Cargo.toml depends on {other}"
+        );
+    }
+}
+
+#[test]
+fn algo_knows_neither_devices_nor_the_daemon_nor_the_outside_world() {
+    let rule = "algo is a function of its input: no I/O, clock, threads of its own, environment, \
+                randomness or global state, and it does not know hal or appliance.";
+    let outside = [
+        "hal::",
+        "appliance::",
+        "std::fs",
+        "std::io",
+        "std::net",
+        "std::env",
+        "std::process",
+        "std::time",
+        "std::thread",
+        "std::sync",
+        "println!",
+        "eprintln!",
+        "static mut",
+        "OnceLock",
+        "LazyLock",
+        "thread_local!",
+    ];
+    forbid(rule, "algo/src", &outside);
+    forbid_dependency(
+        rule,
+        "algo",
+        &["hal", "appliance", "tests", "rand_core", "getrandom"],
+    );
+    let text = fs::read_to_string(root().join("algo/src/lib.rs")).unwrap();
+    assert!(text.contains("#![no_std]"), "{rule}\nalgo must be no_std");
+}
+
+#[test]
+fn hal_knows_neither_the_computation_nor_the_daemon() {
+    let rule = "Two leaf crates that do not know each other: algo (pure computation) and hal \
+                (devices). appliance joins them.";
+    forbid(rule, "hal/src", &["algo::", "appliance::"]);
+    forbid_dependency(rule, "hal", &["algo", "appliance", "tests"]);
+}
+
+#[test]
+fn the_simulator_does_not_know_how_fringes_are_decoded() {
+    let rule = "The simulator models light, not phase: it knows surfaces, optics and noise, never how \
+                fringes are decoded, and imports nothing from algo.";
+    forbid(rule, "hal/src/sim", &["algo"]);
+}
+
+#[test]
+fn the_oracle_shares_no_code_with_what_it_judges() {
+    let rule = "The f64 textbook oracle judges algo without sharing its mistakes: it imports nothing \
+                from algo or appliance, and nothing of the simulator.";
+    let judged = ["algo::", "appliance::", "hal::sim", "libm::"];
+    forbid(rule, "tests/src/oracle", &judged);
+    forbid(rule, "tests/src/render", &judged);
+}
+
+#[test]
+fn modbus_and_web_see_only_the_snapshot() {
+    let rule = "modbus and web see only Snapshot, never each other, never algo or hal.";
+    let ours = ["algo::", "hal::"];
+    for (folder, other) in [
+        ("appliance/src/modbus", ["crate::web", "super::web"]),
+        ("appliance/src/web", ["crate::modbus", "super::modbus"]),
+    ] {
+        forbid(rule, folder, &ours);
+        forbid(rule, folder, &other);
+    }
+}
+
+#[test]
+fn the_stations_decisions_are_pure() {
+    let rule = "The station's decisions are a pure state machine: (state, event, now) → (state, \
+                effects). It gets time as an argument; threads and sockets only carry out effects.";
+    let outside = [
+        "std::fs",
+        "std::net",
+        "std::thread",
+        "Instant::now",
+        "SystemTime::now",
+        "tokio::",
+        "hal::",
+    ];
+    // The handle is where the decisions meet the clock and the sockets.
+    for part in ["state", "step", "control", "snapshot", "result"] {
+        forbid(rule, &format!("appliance/src/station/{part}"), &outside);
+    }
+}
+
+#[test]
+fn imports_inside_algo_only_go_backwards_along_the_flow() {
+    let rule = "Imports only go backwards along the flow: units, math ← frame ← pattern, phase ← \
+                geometry ← pipeline ← inspect ← adaptive.";
+    let order = [
+        &["units", "math"][..],
+        &["frame"],
+        &["pattern", "phase"],
+        &["geometry"],
+        &["pipeline"],
+        &["inspect"],
+        &["adaptive"],
+    ];
+    for (at, here) in order.iter().enumerate() {
+        let later: Vec<String> = order[at + 1..]
+            .concat()
+            .iter()
+            .map(|module| format!("crate::{module}"))
+            .collect();
+        for module in *here {
+            let mut later = later.clone();
+            // The row walk serves every map, also the reference phase map.
+            if *module == "geometry" {
+                later.retain(|path| path != "crate::pipeline");
+            }
+            let later: Vec<&str> = later.iter().map(String::as_str).collect();
+            forbid(rule, &format!("algo/src/{module}"), &later);
+        }
+    }
+}
+
+/// Lines of code and comment that stand before the tests of a file.
+fn untested_lines(source: &Source) -> usize {
+    let test_file = source.name.ends_with("tests.rs") || source.name.contains("/tests/");
+    if test_file {
+        return 0;
+    }
+    let lines = source.text.lines();
+    lines
+        .take_while(|line| !line.starts_with("#[cfg(test)]"))
+        .count()
+}
+
+#[test]
+fn files_hold_one_concept_each_and_say_which() {
+    let rule = format!("Files of 100–300 lines, one concept each; {MAX_LINES} is too much.");
+    let headed = "Each file opens with a module doc whose first line says what it does.";
+    let mut seen = 0;
+    for folder in [
+        "algo/src",
+        "hal/src",
+        "appliance/src",
+        "tests/src",
+        "tests/suite",
+    ] {
+        for source in sources(folder) {
+            let lines = untested_lines(&source);
+            assert!(lines <= MAX_LINES, "{rule}\n{} has {lines}", source.name);
+            assert!(source.text.starts_with("//! "), "{headed}\n{}", source.name);
+            seen += 1;
+        }
+    }
+    assert!(seen > 50, "{seen} files");
+}
+
+#[test]
+fn no_path_of_a_machine_stands_in_the_code() {
+    let rule = "No machine paths in code: files are found from the workspace or from an option.";
+    // In two parts, so that this file does not break its own rule.
+    let paths = [
+        concat!("/wor", "k/"),
+        concat!("/ho", "me/"),
+        concat!("/Use", "rs/"),
+    ];
+    for folder in ["algo", "hal", "appliance", "tests"] {
+        for source in sources(folder) {
+            for path in paths {
+                assert!(
+                    !source.text.contains(path),
+                    "{rule}\n{}: {path}",
+                    source.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rule_that_is_broken_is_found() {
+    assert!(names("use algo::units::Height;", "algo::"));
+    assert!(names("    let z = algo::math::atan();", "algo::"));
+    assert!(names("(hal::Frame, u8)", "hal::"));
+    assert!(!names("use crate::algo::units;", "algo::"));
+    assert!(!names("use shal::x;", "hal::"));
+    let lines: Vec<_> = code("let a = 1; // algo::x\n/// hal::y\n").collect();
+    assert!(
+        lines
+            .iter()
+            .all(|(_, text)| !names(text, "algo::") && !names(text, "hal::"))
+    );
+    assert!(dependencies("appliance").contains(&"algo".to_owned()));
+    assert!(sources("algo/src").len() > 15);
+}
