@@ -6,6 +6,7 @@ mod fuzz;
 mod house;
 mod measured;
 mod outputs;
+mod placement;
 mod promises_own;
 mod promises_shared;
 mod triangulation;
