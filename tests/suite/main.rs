@@ -1,5 +1,6 @@
 //! The integration suite: one binary, one module per topic.
 
+mod adapt;
 mod bad_input;
 mod cases;
 mod fuzz;
