@@ -32,6 +32,13 @@ pub const PROJECTOR_PITCH: f64 = 6.0;
 /// The smallest pitch in camera pixels unless one is asked for: where g·M(g) has its maximum under
 /// the box of the pixel alone.
 pub const IMAGE_PITCH: f64 = 2.2;
+/// No blur but the pixels' own.
+const SHARP: Optics = Optics {
+    projector_blur: 0.0,
+    camera_blur: 0.0,
+    projector_pitch: PROJECTOR_PITCH,
+    image_pitch: IMAGE_PITCH,
+};
 /// Coarsest pitch of a pattern, projector pixels: where the part is so steep that even this is not
 /// resolved, nothing is.
 const MAX_PITCH: f64 = 128.0;
@@ -65,6 +72,32 @@ fn sinc(x: f64) -> f64 {
     } else {
         libm::sin(angle) / angle
     }
+}
+
+/// σ of the blur of projector and camera together, in projector pixels, from the contrast that a
+/// preliminary measurement has at two frequencies: each sample is a pixel's slope J and its
+/// modulation at `fine` as a share of that at `coarse` (turns per projector pixel). The median
+/// decides, so that edges and noise do not.
+///
+/// `None` without samples. Contrast that is better than the pixels' own is no blur.
+pub fn measured_blur(
+    samples: impl Iterator<Item = ([f64; 2], f64)>,
+    fine: f64,
+    coarse: f64,
+) -> Option<f64> {
+    let at = |g: f64, [ju, jv]: [f64; 2]| contrast(&SHARP, g, [g * ju, g * jv]);
+    let mut shares: Vec<f64> = samples
+        .map(|(slope, share)| share * at(coarse, slope) / at(fine, slope))
+        .filter(|share| share.is_finite() && *share > 0.0)
+        .collect();
+    if shares.is_empty() {
+        return None;
+    }
+    let middle = shares.len() / 2;
+    let (_, median, _) = shares.select_nth_unstable_by(middle, f64::total_cmp);
+    // M_fine / M_coarse = exp(−2π²σ²(fine² − coarse²)).
+    let variance = -libm::log(*median) / (2.0 * PI * PI * (fine * fine - coarse * coarse));
+    Some(libm::sqrt(variance.max(0.0)))
 }
 
 /// The frequency for a surface that the camera sees with slope J: the coarsest one whose g·M(g)
@@ -160,6 +193,26 @@ mod tests {
         // Steep: 8 projector pixels per camera pixel, so that only the camera limits.
         let pitch = 1.0 / (best_frequency(&FREE, [8.0, 0.0]) * 8.0);
         assert!((2.1..2.6).contains(&pitch), "{pitch}");
+    }
+
+    #[test]
+    fn the_blur_is_found_from_the_contrast_of_two_levels() {
+        let blurred = Optics {
+            projector_blur: 1.3,
+            ..FREE
+        };
+        let (fine, coarse) = (1.0 / 20.0, 1.0 / 900.0);
+        let share = |[ju, jv]: [f64; 2]| {
+            contrast(&blurred, fine, [fine * ju, fine * jv])
+                / contrast(&blurred, coarse, [coarse * ju, coarse * jv])
+        };
+        let slopes = (0..99).map(|i| [0.5 + 0.01 * f64::from(i), 0.1]);
+        let samples = slopes.map(|slope| (slope, share(slope)));
+        // One pixel at an edge decides nothing.
+        let samples = samples.chain([([1.0, 0.0], 0.1)]);
+        let sigma = measured_blur(samples, fine, coarse).unwrap();
+        assert!((sigma - 1.3).abs() < 1e-6, "{sigma}");
+        assert_eq!(measured_blur(core::iter::empty(), fine, coarse), None);
     }
 
     #[test]

@@ -6,10 +6,11 @@ use super::PatternFile;
 use super::golden::GoldenPart;
 use crate::bench::{About, Bench, BenchError, Measured};
 use crate::calibration::Calibration;
+use crate::seam;
 use algo::adaptive::{AdaptError, ProjectorMap, noise};
 use algo::pattern::{PhaseFunction, Sequence};
-use algo::phase::Trust;
-use algo::pipeline::PhaseMap;
+use algo::phase::{Decoder, Trust};
+use algo::pipeline::{self, PhaseMap};
 use hal::head::DynHead;
 use std::time::Duration;
 
@@ -83,7 +84,13 @@ pub fn teach(
     refuse_empty(&first.phases)?;
     progress(0.35, "making the part's own pattern");
     let map = ProjectorMap::from_heights(&first.triangulator, &first.heights);
-    let function = noise::adapt(&map, columns, rows, &OPTICS)?;
+    let optics = noise::Optics {
+        projector_blur: blur(&first, &frames, &map, columns as f64)?,
+        camera_blur: 0.0,
+        projector_pitch: noise::PROJECTOR_PITCH,
+        image_pitch: noise::IMAGE_PITCH,
+    };
+    let function = noise::adapt(&map, columns, rows, &optics)?;
     let expected = map.expected_phase(&function);
     let full = dense(DENSE_N);
     let golden = bench.measure(&function, &full, About::Map(&expected), &|share| {
@@ -113,13 +120,38 @@ pub fn teach(
     Ok(taught)
 }
 
-/// What the pattern is made for until a calibration has measured the contrast: sharp devices.
-const OPTICS: noise::Optics = noise::Optics {
-    projector_blur: 0.0,
-    camera_blur: 0.0,
-    projector_pitch: noise::PROJECTOR_PITCH,
-    image_pitch: noise::IMAGE_PITCH,
-};
+/// The blur of the head in front of this part, projector pixels, from the contrast of the preliminary
+/// measurement's coarsest and finest level.
+fn blur(
+    first: &Measured,
+    frames: &[(f64, f64)],
+    map: &ProjectorMap,
+    columns: f64,
+) -> Result<f64, TeachError> {
+    let rig = |error: &dyn std::fmt::Display| TeachError::Rig(error.to_string());
+    let views = first.frames[..STEPS].iter().map(seam::view);
+    let views = views
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|error| rig(&error))?;
+    let sequence = Sequence::from_frames(&frames[..STEPS]).map_err(|error| rig(&error))?;
+    let function = first.triangulator.function();
+    let bit_depth = first.frames[0].format().bit_depth;
+    let decoder =
+        Decoder::new(&sequence, function.range(), bit_depth).map_err(|error| rig(&error))?;
+    let coarse = pipeline::decode(&decoder, &views, None).map_err(|error| rig(&error))?;
+    let slopes = map.slopes(noise::MAX_STEP);
+    let resolved = (0..slopes.len())
+        .filter(|&at| first.phases.trust[at] == Trust::Resolved && !slopes[at][0].is_nan());
+    let samples = resolved.map(|at| {
+        let fine = f64::from(first.phases.modulation[at].to_bits());
+        (
+            slopes[at],
+            fine / f64::from(coarse.modulation[at].to_bits()),
+        )
+    });
+    let frequency = function.range().span() / (columns - 1.0);
+    Ok(noise::measured_blur(samples, frequency, frequency * frames[0].0).unwrap_or(0.0))
+}
 
 /// Ratio and shift of three dense levels of four steps, ratios 1, 1 − 1/n², 1 − 1/n.
 pub fn dense(n: f64) -> Vec<(f64, f64)> {
