@@ -57,6 +57,7 @@ pub fn all() -> Vec<(&'static str, Recording)> {
         ),
         ("vertical and horizontal", both()),
         ("horizontal, no models", horizontal()),
+        ("sampled, geometric, both ends in view", ends_in_view()),
         ("sampled, geometric", sampled(&[0.0118, 0.11, 1.0])),
         ("sampled, dense three", sampled(&three(6.0))),
     ]
@@ -100,6 +101,30 @@ fn horizontal() -> Recording {
         patterns: vec![PatternSpec::Horizontal { fringes: 48.0 }],
         seed: 13,
         ..Scene::new(0.0, levels(&[0.02, 0.14, 1.0], 3))
+    }
+    .record();
+    recording.camera_model = None;
+    recording.projector.model = None;
+    recording
+}
+
+/// The least and the greatest phase lie where the camera looks, so that noise takes the coarsest level
+/// over both ends of its turn. Flat beyond them: phase only.
+fn ends_in_view() -> Recording {
+    let (columns, rows) = (256_usize, 192_usize);
+    let turns = (0..rows * columns).map(|at| {
+        let xi = (at % columns) as f64 / columns as f64;
+        5.2 + 40.0 * ((xi - 0.4) / 0.2).clamp(0.0, 1.0)
+    });
+    let spec = PatternSpec::File {
+        rows,
+        columns,
+        turns: turns.collect(),
+    };
+    let mut recording = Scene {
+        patterns: vec![spec],
+        seed: 15,
+        ..Scene::new(0.0, levels(&[0.94 / 40.0, 0.15, 1.0], 4))
     }
     .record();
     recording.camera_model = None;

@@ -195,13 +195,15 @@ fn the_stations_decisions_are_pure() {
 #[test]
 fn imports_inside_algo_only_go_backwards_along_the_flow() {
     let rule = "Imports only go backwards along the flow: units, math ← frame ← pattern, phase ← \
-                geometry ← inspect, pipeline.";
+                geometry ← pipeline ← inspect ← adaptive.";
     let order = [
         &["units", "math"][..],
         &["frame"],
         &["pattern", "phase"],
-        &["geometry", "adaptive"],
-        &["inspect", "pipeline"],
+        &["geometry"],
+        &["pipeline"],
+        &["inspect"],
+        &["adaptive"],
     ];
     for (at, here) in order.iter().enumerate() {
         let later: Vec<String> = order[at + 1..]

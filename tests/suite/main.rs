@@ -8,5 +8,6 @@ mod measured;
 mod outputs;
 mod promises_own;
 mod promises_shared;
+mod triangulation;
 mod twin;
 mod written;

@@ -157,7 +157,7 @@ impl Triangulator {
 
     /// The projector point (ξ, η) that lights a point of space.
     #[inline]
-    fn projector_point(&self, point: Vector) -> Option<(f64, f64)> {
+    pub fn projector_point(&self, point: Vector) -> Option<(f64, f64)> {
         match &self.reference {
             Reference::Models => self.projector.project(point),
             Reference::Measured { xi, eta } => {

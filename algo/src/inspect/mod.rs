@@ -6,4 +6,4 @@ mod region;
 
 pub use deviation::{Comparison, Golden, Reading};
 pub use openings::{Opening, openings};
-pub use region::{Region, RegionError};
+pub use region::{Region, RegionError, polygon_spans};

@@ -66,26 +66,7 @@ impl Region {
         if let Some(corner) = corners.iter().position(bad) {
             return Err(RegionError::NotFinite { corner });
         }
-        let mut spans = Vec::new();
-        let mut crossings = Vec::new();
-        for row in 0..height {
-            let v = row as f64;
-            crossings.clear();
-            for (at, &(u0, v0)) in corners.iter().enumerate() {
-                let (u1, v1) = corners[(at + 1) % corners.len()];
-                if (v0 <= v) != (v1 <= v) {
-                    crossings.push(u0 + (u1 - u0) * ((v - v0) / (v1 - v0)));
-                }
-            }
-            crossings.sort_by(f64::total_cmp);
-            for pair in crossings.chunks_exact(2) {
-                let column = |u: f64| libm::ceil(u).clamp(0.0, width as f64) as usize;
-                let (start, end) = (column(pair[0]), column(pair[1]));
-                if start < end {
-                    spans.push((row, start..end));
-                }
-            }
-        }
+        let spans = polygon_spans(corners, width, height);
         if spans.is_empty() {
             return Err(RegionError::Empty);
         }
@@ -113,6 +94,35 @@ impl Region {
     pub fn spans(&self) -> &[(usize, Range<usize>)] {
         &self.spans
     }
+}
+
+/// The spans of pixel centres of a frame inside a closed polygon of (u, v) corners, even-odd rule.
+pub fn polygon_spans(
+    corners: &[(f64, f64)],
+    width: usize,
+    height: usize,
+) -> Vec<(usize, Range<usize>)> {
+    let mut spans = Vec::new();
+    let mut crossings = Vec::new();
+    for row in 0..height {
+        let v = row as f64;
+        crossings.clear();
+        for (at, &(u0, v0)) in corners.iter().enumerate() {
+            let (u1, v1) = corners[(at + 1) % corners.len()];
+            if (v0 <= v) != (v1 <= v) {
+                crossings.push(u0 + (u1 - u0) * ((v - v0) / (v1 - v0)));
+            }
+        }
+        crossings.sort_by(f64::total_cmp);
+        for pair in crossings.chunks_exact(2) {
+            let column = |u: f64| libm::ceil(u).clamp(0.0, width as f64) as usize;
+            let (start, end) = (column(pair[0]), column(pair[1]));
+            if start < end {
+                spans.push((row, start..end));
+            }
+        }
+    }
+    spans
 }
 
 #[cfg(test)]

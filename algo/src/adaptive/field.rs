@@ -1,0 +1,212 @@
+//! A field of fringe frequencies over the projector's raster, and the filters that shape it.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// G(s, t): frequency along ξ in turns per projector pixel at row s, column t, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Field {
+    /// Projector columns.
+    pub columns: usize,
+    /// Frequencies; NaN where none is known yet.
+    pub frequency: Vec<f64>,
+}
+
+impl Field {
+    /// A field with the same frequency everywhere.
+    pub fn uniform(columns: usize, rows: usize, frequency: f64) -> Self {
+        Self {
+            columns,
+            frequency: vec![frequency; columns * rows],
+        }
+    }
+
+    /// Projector rows.
+    pub fn rows(&self) -> usize {
+        self.frequency.len() / self.columns.max(1)
+    }
+
+    /// The cell of a projector point, if it lies on the raster.
+    #[inline]
+    pub fn cell(&self, [xi, eta]: [f64; 2]) -> Option<usize> {
+        let (column, row) = (libm::rint(xi), libm::rint(eta));
+        let inside = column >= 0.0
+            && row >= 0.0
+            && column < self.columns as f64
+            && row < self.rows() as f64;
+        inside.then(|| row as usize * self.columns + column as usize)
+    }
+
+    /// Gaussian smoothing with σ in pixels; the edge values go on beyond the raster.
+    pub fn smoothed(&self, sigma: f64) -> Self {
+        let reach = libm::ceil(4.0 * sigma) as isize;
+        let weights: Vec<f64> = (-reach..=reach)
+            .map(|i| libm::exp(-0.5 * (i as f64 / sigma) * (i as f64 / sigma)))
+            .collect();
+        let sum: f64 = weights.iter().sum();
+        self.filtered(reach, |window| {
+            let products = window.iter().zip(&weights).map(|(g, w)| g * w);
+            products.sum::<f64>() / sum
+        })
+    }
+
+    /// The smallest value within `reach` pixels along both axes.
+    pub fn minimum(&self, reach: usize) -> Self {
+        self.filtered(reach as isize, |window| {
+            window.iter().copied().fold(f64::INFINITY, f64::min)
+        })
+    }
+
+    /// Applies a separable filter of 2·reach + 1 taps along the rows, then along the columns.
+    fn filtered(&self, reach: isize, filter: impl Fn(&[f64]) -> f64 + Sync + Send) -> Self {
+        self.along_rows(reach, &filter)
+            .transposed()
+            .along_rows(reach, &filter)
+            .transposed()
+    }
+
+    fn along_rows(&self, reach: isize, filter: &(impl Fn(&[f64]) -> f64 + Sync + Send)) -> Self {
+        let mut out = self.clone();
+        crate::pipeline::for_each_row(&mut out.frequency, self.columns, |row, out| {
+            let line = &self.frequency[row * self.columns..][..self.columns];
+            let last = self.columns as isize - 1;
+            let padded: Vec<f64> = (-reach..=last + reach)
+                .map(|i| line[i.clamp(0, last) as usize])
+                .collect();
+            let windows = padded.windows(2 * reach as usize + 1);
+            for (value, window) in out.iter_mut().zip(windows) {
+                *value = filter(window);
+            }
+        });
+        out
+    }
+
+    fn transposed(&self) -> Self {
+        let (columns, rows) = (self.columns, self.rows());
+        let at = |place: usize| self.frequency[place % rows * columns + place / rows];
+        Self {
+            columns: rows,
+            frequency: (0..self.frequency.len()).map(at).collect(),
+        }
+    }
+
+    /// Gives unknown cells the value of the nearest known one within `reach` pixels (chessboard
+    /// steps, the left and upper neighbour first).
+    pub fn fill_near(&mut self, reach: usize) {
+        let (columns, rows) = (self.columns, self.rows());
+        for _ in 0..reach {
+            let before = self.frequency.clone();
+            let known = |row: isize, column: isize| {
+                let inside = row >= 0
+                    && column >= 0
+                    && row < rows as isize
+                    && column < columns as isize;
+                let value = inside.then(|| before[row as usize * columns + column as usize])?;
+                (!value.is_nan()).then_some(value)
+            };
+            crate::pipeline::for_each_row(&mut self.frequency, columns, |row, line| {
+                for (column, value) in line.iter_mut().enumerate() {
+                    if !value.is_nan() {
+                        continue;
+                    }
+                    let (r, c) = (row as isize, column as isize);
+                    let beside = [(0, -1), (-1, 0), (0, 1), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)];
+                    let found = beside.iter().find_map(|(dr, dc)| known(r + dr, c + dc));
+                    *value = found.unwrap_or(f64::NAN);
+                }
+            });
+        }
+    }
+
+    /// Gives unknown cells the value of the nearest known row of their column.
+    pub fn fill_columns(&mut self) {
+        let (columns, rows) = (self.columns, self.rows());
+        for column in 0..columns {
+            let at = |row: usize| row * columns + column;
+            let known: Vec<usize> =
+                (0..rows).filter(|&row| !self.frequency[at(row)].is_nan()).collect();
+            let mut next = 0;
+            for row in 0..rows {
+                while next + 1 < known.len()
+                    && known[next + 1].abs_diff(row) <= known[next].abs_diff(row)
+                {
+                    next += 1;
+                }
+                if let Some(&nearest) = known.get(next) {
+                    self.frequency[at(row)] = self.frequency[at(nearest)];
+                }
+            }
+        }
+    }
+
+    /// Gives unknown cells of a row the value between their known neighbours, in proportion; beyond
+    /// the outermost ones theirs. A row without any takes `otherwise`.
+    pub fn fill_rows(&mut self, otherwise: f64) {
+        crate::pipeline::for_each_row(&mut self.frequency, self.columns, |_, line| {
+            let mut before: Option<usize> = None;
+            for column in 0..line.len() {
+                if line[column].is_nan() {
+                    continue;
+                }
+                let (start, from) = match before {
+                    Some(known) => (known + 1, line[known]),
+                    None => (0, line[column]),
+                };
+                let steps = (column + 1 - start) as f64;
+                let rise = (line[column] - from) / steps;
+                for (step, value) in line[start..column].iter_mut().enumerate() {
+                    *value = from + rise * (step + 1) as f64;
+                }
+                before = Some(column);
+            }
+            let (start, value) = match before {
+                Some(known) => (known + 1, line[known]),
+                None => (0, otherwise),
+            };
+            line[start..].fill(value);
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn smoothing_keeps_a_uniform_field_and_the_mean_of_a_spike() {
+        let mut field = Field::uniform(40, 30, 0.1);
+        let smooth = field.smoothed(3.0);
+        assert!(smooth.frequency.iter().all(|g| (g - 0.1).abs() < 1e-12));
+        field.frequency[15 * 40 + 20] = 1.1;
+        let sum: f64 = field.smoothed(2.0).frequency.iter().map(|g| g - 0.1).sum();
+        assert!((sum - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn unknown_cells_are_filled_by_their_rule_and_known_ones_kept() {
+        let mut field = Field::uniform(9, 5, f64::NAN);
+        field.frequency[2 * 9 + 2] = 0.1;
+        field.frequency[2 * 9 + 6] = 0.3;
+        let mut rows = field.clone();
+        rows.fill_rows(0.5);
+        assert_eq!(rows.frequency[0], 0.5);
+        assert!((rows.frequency[2 * 9 + 4] - 0.2).abs() < 1e-12);
+        assert_eq!(rows.frequency[2 * 9 + 8], 0.3);
+        let mut near = field.clone();
+        near.fill_near(1);
+        assert_eq!(near.frequency[9 + 1], 0.1);
+        assert!(near.frequency[2 * 9 + 4].is_nan());
+        field.fill_columns();
+        assert_eq!(field.frequency[6], 0.3);
+        assert!(field.frequency[5].is_nan());
+    }
+
+    #[test]
+    fn the_minimum_filter_spreads_low_values() {
+        let mut field = Field::uniform(9, 9, 0.2);
+        field.frequency[4 * 9 + 4] = 0.05;
+        let low = field.minimum(3);
+        let count = low.frequency.iter().filter(|g| **g == 0.05).count();
+        assert_eq!(count, 49);
+    }
+}

@@ -1,0 +1,132 @@
+//! Where the light of each camera pixel comes from.
+
+use crate::geometry::Triangulator;
+use crate::pipeline::{HeightMap, for_each_row};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// The projector point (ξ, η) of each camera pixel, row-major over the camera's frame, NaN where it is
+/// not known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProjectorMap {
+    /// Camera columns.
+    pub width: usize,
+    /// (ξ, η) in projector pixels.
+    pub points: Vec<[f64; 2]>,
+}
+
+/// An unknown projector point.
+const UNKNOWN: [f64; 2] = [f64::NAN; 2];
+
+impl ProjectorMap {
+    /// From the heights of a preliminary measurement: η comes from projecting the point, which is
+    /// thirty times more exact than a measured horizontal map, and half the frames.
+    pub fn from_heights(triangulator: &Triangulator, heights: &HeightMap) -> Self {
+        let width = heights.width;
+        let mut points = vec![UNKNOWN; heights.height.len()];
+        for_each_row(&mut points, width, |v, row| {
+            for (u, here) in row.iter_mut().enumerate() {
+                let found = triangulator
+                    .point(u, v, heights.height[v * width + u])
+                    .and_then(|point| triangulator.projector_point(point));
+                if let Some((xi, eta)) = found {
+                    *here = [xi, eta];
+                }
+            }
+        });
+        Self { width, points }
+    }
+
+    /// Camera rows.
+    pub fn height(&self) -> usize {
+        self.points.len() / self.width.max(1)
+    }
+
+    /// The projector point of a camera pixel, if it is inside the frame and known.
+    #[inline]
+    pub fn at(&self, u: isize, v: isize) -> Option<[f64; 2]> {
+        let inside = u >= 0 && v >= 0 && u < self.width as isize && v < self.height() as isize;
+        let point = inside.then(|| self.points[v as usize * self.width + u as usize])?;
+        (!point[0].is_nan()).then_some(point)
+    }
+
+    /// Takes the outermost pixels off every silhouette: a pixel stays if its 3 × 3 neighbours inside
+    /// the frame are all known.
+    pub fn eroded(&self) -> Self {
+        let (width, height) = (self.width as isize, self.height() as isize);
+        let keep = |u: isize, v: isize| {
+            (-1..=1).all(|dv| {
+                (-1..=1).all(|du| {
+                    let (u, v) = (u + du, v + dv);
+                    let outside = u < 0 || v < 0 || u >= width || v >= height;
+                    outside || self.at(u, v).is_some()
+                })
+            })
+        };
+        let points = (0..self.points.len()).map(|place| {
+            let (u, v) = (place % self.width, place / self.width);
+            if keep(u as isize, v as isize) {
+                self.points[place]
+            } else {
+                UNKNOWN
+            }
+        });
+        Self {
+            width: self.width,
+            points: points.collect(),
+        }
+    }
+
+    /// J = (∂ξ/∂u, ∂ξ/∂v) of each pixel by a plane fit over its known 5 × 5 neighbours that lie within
+    /// `max_step` projector pixels per camera pixel (edges do not mix surfaces); NaN where the
+    /// neighbours do not determine it.
+    pub fn slopes(&self, max_step: f64) -> Vec<[f64; 2]> {
+        let mut slopes = vec![[f64::NAN; 2]; self.points.len()];
+        for_each_row(&mut slopes, self.width, |v, row| {
+            for (u, slope) in row.iter_mut().enumerate() {
+                if let Some(found) = self.slope(u as isize, v as isize, max_step) {
+                    *slope = found;
+                }
+            }
+        });
+        slopes
+    }
+
+    fn slope(&self, u: isize, v: isize, max_step: f64) -> Option<[f64; 2]> {
+        let [centre, _] = self.at(u, v)?;
+        // Sums of x = du, y = dv and z = Δξ about their means.
+        let (mut n, mut x, mut y, mut z) = (0.0, 0.0, 0.0, 0.0);
+        let (mut xx, mut xy, mut yy, mut xz, mut yz) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for dv in -2..=2_isize {
+            for du in -2..=2_isize {
+                let Some([xi, _]) = self.at(u + du, v + dv) else {
+                    continue;
+                };
+                let (a, b, step) = (du as f64, dv as f64, xi - centre);
+                let distance = libm::fabs(a).max(libm::fabs(b));
+                if libm::fabs(step) > max_step * distance {
+                    continue;
+                }
+                n += 1.0;
+                x += a;
+                y += b;
+                z += step;
+                xx += a * a;
+                xy += a * b;
+                yy += b * b;
+                xz += a * step;
+                yz += b * step;
+            }
+        }
+        let (xx, xy, yy) = (xx - x * x / n, xy - x * y / n, yy - y * y / n);
+        let (xz, yz) = (xz - x * z / n, yz - y * z / n);
+        let determinant = xx * yy - xy * xy;
+        if n < 6.0 || determinant < 1.0 {
+            return None;
+        }
+        Some([
+            (xz * yy - yz * xy) / determinant,
+            (yz * xx - xz * xy) / determinant,
+        ])
+    }
+}

@@ -1,0 +1,43 @@
+//! Patterns made for a part: curved fringes of varying pitch.
+//!
+//! [`paper`] is the method of Peng & Gupta (2008), eqs. 2–9, as it stands: the baseline. [`noise`] is
+//! the better one: the local frequency that gives the least noise for the contrast that projector
+//! and camera have, on every part of the surface. Both work out a field of frequencies over the
+//! projector's raster ([`field`]) from where each camera pixel's light comes from ([`ProjectorMap`])
+//! and integrate it to a phase function ([`integrate`]).
+
+mod field;
+mod integrate;
+mod map;
+pub mod noise;
+pub mod paper;
+
+pub use field::Field;
+pub use map::ProjectorMap;
+
+use crate::pattern::PhaseFunctionError;
+use core::fmt;
+
+/// A part that no pattern can be made for.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum AdaptError {
+    /// No pixel of the part is known.
+    Empty,
+    /// The pattern that came out cannot be shown.
+    Pattern(PhaseFunctionError),
+}
+
+impl fmt::Display for AdaptError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty => write!(
+                f,
+                "the preliminary measurement resolved no pixel: is the part in place and the light on?"
+            ),
+            Self::Pattern(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for AdaptError {}

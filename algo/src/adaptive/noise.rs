@@ -1,0 +1,169 @@
+//! The better pattern: least noise for the contrast that there is.
+//!
+//! The noise of the height falls with g·M(g), frequency times contrast; so on each part of the
+//! surface the frequency is the one that maximises it, instead of a fixed image pitch. From one
+//! preliminary vertical measurement.
+
+use super::field::Field;
+use super::integrate::balanced_rows;
+use super::{AdaptError, ProjectorMap};
+use crate::pattern::PhaseFunction;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::f64::consts::PI;
+
+/// How contrast falls with frequency, and the limits of pitch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Optics {
+    /// σ of the projector's Gaussian blur, projector pixels.
+    pub projector_blur: f64,
+    /// σ of the camera's Gaussian blur, camera pixels; the pixel's own box comes on top.
+    pub camera_blur: f64,
+    /// Smallest pitch in projector pixels.
+    pub projector_pitch: f64,
+    /// Smallest pitch in camera pixels.
+    pub image_pitch: f64,
+}
+
+/// Coarsest pitch of a pattern, projector pixels: where the part is so steep that even this is not
+/// resolved, nothing is.
+const MAX_PITCH: f64 = 128.0;
+/// Neighbours further apart than this per camera pixel lie on different surfaces, projector pixels.
+const MAX_STEP: f64 = 6.0;
+/// Cells that no camera pixel hit take their neighbours' frequency up to this far.
+const FILL: usize = 8;
+/// Half of the minimum filter's side, and the σ of the smoothing after it.
+const MINIMUM_REACH: usize = 3;
+const SMOOTHING: f64 = 3.0;
+/// Frequencies that are tried, from the coarsest to the finest.
+const TRIED: usize = 160;
+
+/// The contrast M of a sine of frequency `g` (turns per projector pixel) that the camera sees with
+/// gradient `[a, b]` (turns per camera pixel along u and v): the projector's bilinear pixels and
+/// blur, the camera's blur and the box of its pixel.
+pub fn contrast(optics: &Optics, g: f64, [a, b]: [f64; 2]) -> f64 {
+    let gauss = |sigma: f64, f: f64| libm::exp(-2.0 * (PI * sigma * f) * (PI * sigma * f));
+    let projector = sinc(g) * sinc(g) * gauss(optics.projector_blur, g);
+    let across = libm::sqrt(a * a + b * b);
+    projector * sinc(a) * sinc(b) * gauss(optics.camera_blur, across)
+}
+
+/// sin πx / πx.
+fn sinc(x: f64) -> f64 {
+    let angle = PI * x;
+    if libm::fabs(angle) < 1e-9 {
+        1.0
+    } else {
+        libm::sin(angle) / angle
+    }
+}
+
+/// The frequency of least noise for a surface that the camera sees with slope J: the maximum of
+/// g·M(g) under both limits of pitch.
+pub fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2]) -> f64 {
+    let slope = libm::sqrt(ju * ju + jv * jv);
+    let coarsest = 1.0 / MAX_PITCH;
+    let finest = (1.0 / optics.projector_pitch)
+        .min(1.0 / (optics.image_pitch * slope.max(1e-6)))
+        .max(coarsest);
+    let ratio = libm::pow(finest / coarsest, 1.0 / TRIED as f64);
+    let mut best = (0.0, coarsest);
+    let mut g = coarsest;
+    for _ in 0..=TRIED {
+        let worth = g * contrast(optics, g, [g * ju, g * jv]);
+        // Behind the first zero of a sinc lie only worse maxima.
+        if worth > best.0 {
+            best = (worth, g);
+        }
+        g *= ratio;
+    }
+    best.1
+}
+
+/// Makes the phase function for a part, over a projector of `columns` × `rows` pixels.
+///
+/// # Errors
+/// If no pixel of the part is known.
+pub fn adapt(
+    map: &ProjectorMap,
+    columns: usize,
+    rows: usize,
+    optics: &Optics,
+) -> Result<PhaseFunction, AdaptError> {
+    let slopes = map.slopes(MAX_STEP);
+    let frequencies = frequencies(&slopes, map.width, optics);
+    let mut field = Field::uniform(columns, rows, f64::NAN);
+    let mut seen = vec![false; columns * rows];
+    for (point, g) in map.points.iter().zip(&frequencies) {
+        if g.is_nan() || point[0].is_nan() {
+            continue;
+        }
+        if let Some(cell) = field.cell(*point) {
+            seen[cell] = true;
+            // Several pixels see a cell: the steepest one decides. A NaN loses against any number.
+            field.frequency[cell] = g.min(field.frequency[cell]);
+        }
+    }
+    if !seen.contains(&true) {
+        return Err(AdaptError::Empty);
+    }
+    field.fill_near(FILL);
+    field.fill_columns();
+    field.fill_rows(1.0 / optics.projector_pitch);
+    let field = field.minimum(MINIMUM_REACH).smoothed(SMOOTHING);
+    PhaseFunction::sampled(columns, rows, balanced_rows(&field, &seen)).map_err(AdaptError::Pattern)
+}
+
+fn frequencies(slopes: &[[f64; 2]], width: usize, optics: &Optics) -> Vec<f64> {
+    let mut frequencies = vec![f64::NAN; slopes.len()];
+    crate::pipeline::for_each_row(&mut frequencies, width, |v, row| {
+        for (g, slope) in row.iter_mut().zip(&slopes[v * width..]) {
+            if !slope[0].is_nan() {
+                *g = best_frequency(optics, *slope);
+            }
+        }
+    });
+    frequencies
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FREE: Optics = Optics {
+        projector_blur: 0.0,
+        camera_blur: 0.0,
+        projector_pitch: 2.0,
+        image_pitch: 1.5,
+    };
+
+    #[test]
+    fn the_best_pitch_under_gaussian_blur_is_two_pi_sigma() {
+        let optics = Optics {
+            projector_blur: 2.0,
+            ..FREE
+        };
+        // A face-on surface seen very finely: only the projector matters. Its bilinear pixels move
+        // the optimum from 12.57 to 13 px.
+        let pitch = 1.0 / best_frequency(&optics, [0.01, 0.0]);
+        assert!((12.4..13.4).contains(&pitch), "{pitch}");
+    }
+
+    #[test]
+    fn the_best_image_pitch_for_the_pixel_box_alone_is_two_pixels() {
+        // Steep: 8 projector pixels per camera pixel, so that only the camera limits.
+        let pitch = 1.0 / (best_frequency(&FREE, [8.0, 0.0]) * 8.0);
+        assert!((1.95..2.35).contains(&pitch), "{pitch}");
+    }
+
+    #[test]
+    fn limits_of_pitch_hold() {
+        let optics = Optics {
+            projector_pitch: 8.0,
+            image_pitch: 5.0,
+            ..FREE
+        };
+        assert!((best_frequency(&optics, [0.1, 0.0]) - 0.125).abs() < 1e-9);
+        assert!((best_frequency(&optics, [3.0, 4.0]) - 1.0 / 25.0).abs() < 1e-9);
+    }
+}

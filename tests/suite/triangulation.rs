@@ -1,0 +1,131 @@
+//! Triangulation against the textbook where recordings seldom go: beyond the projector's raster, about
+//! the ends of the working range, and with patterns that give several heights.
+
+use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
+use appliance::seam;
+use hal::replay::Recording;
+use hal::replay::recording::PatternSpec;
+use std::f64::consts::TAU;
+use tests::oracle::{Pattern, Rig};
+use tests::random::Random;
+use tests::render::{Scene, levels};
+
+const SEED: u64 = 7;
+const CASES: usize = 4000;
+/// Both stop within 1e-7 mm.
+const HEIGHT_MM: f64 = 2.5e-7;
+/// Turns per mm. Central differences over 20 and over 10 µm differ by a quarter of the step times the
+/// jump of the spline's second derivative at its knots, here up to 2e-3 turn/mm².
+const SLOPE: f64 = 5e-6;
+/// Both evaluate the same spline or line in f64; phases are up to 100 turns.
+const PHASE_TURNS: f64 = 1e-9;
+
+/// The rig with a projector of only the middle 40 % of its columns: the camera sees beyond them.
+fn narrow(turns: impl Fn(f64, f64) -> f64) -> Recording {
+    let (columns, rows) = (102_usize, 192_usize);
+    let scene = Scene {
+        size: 32,
+        ..Scene::new(10.0, levels(&[0.09, 1.0], 3))
+    };
+    let mut recording = scene.record();
+    recording.projector.width = columns as u32;
+    recording.projector.model.as_mut().unwrap().cx -= 77.0;
+    let place = |at: usize| ((at % columns) as f64, (at / columns) as f64);
+    let samples = (0..rows * columns).map(|at| {
+        let (xi, eta) = place(at);
+        turns(xi / columns as f64, eta / rows as f64)
+    });
+    recording.patterns = vec![PatternSpec::File {
+        rows,
+        columns,
+        turns: samples.collect(),
+    }];
+    recording
+}
+
+fn triangulator(recording: &Recording) -> Triangulator {
+    let (width, height) = (recording.width as usize, recording.height as usize);
+    let projector = &recording.projector;
+    let (columns, rows) = (projector.width as usize, projector.height as usize);
+    let device = |model: &Option<_>, width, height| {
+        Pinhole::new(seam::pinhole_model(model.as_ref().unwrap()), width, height).unwrap()
+    };
+    Triangulator::new(
+        device(&recording.camera_model, width, height),
+        device(&projector.model, columns, rows),
+        Reference::Models,
+        seam::phase_function(&recording.patterns[0], columns, rows).unwrap(),
+        recording
+            .range_mm
+            .map(|[low, high]| HeightRange { low, high }),
+    )
+    .unwrap()
+}
+
+/// Solves seeded pixels and phases both ways; answers how many had a height and how many did not.
+fn compare(recording: &Recording, spread: f64) -> (usize, usize) {
+    let (solver, rig) = (triangulator(recording), Rig::of(recording).unwrap());
+    let pattern = Pattern::of(recording, 0);
+    let mut random = Random::new(SEED);
+    let (mut with, mut without) = (0, 0);
+    for _ in 0..CASES {
+        let (u, v) = (32.0 * random.share(), 32.0 * random.share());
+        let phase = rig.reference(&pattern, u, v) + spread * (2.0 * random.share() - 1.0);
+        match (solver.solve(u, v, phase), rig.height(&pattern, u, v, phase)) {
+            (None, None) => without += 1,
+            (Some(found), Some((z, slope))) => {
+                assert!((found.point.z - z).abs() <= HEIGHT_MM, "({u}, {v}) {phase}");
+                let off = (found.slope - slope).abs();
+                assert!(off <= SLOPE, "({u}, {v}): {off}");
+                with += 1;
+            }
+            (found, truth) => panic!("({u}, {v}) {phase}: {found:?} and {truth:?}"),
+        }
+    }
+    (with, without)
+}
+
+#[test]
+fn heights_beyond_the_raster_and_about_the_ends_of_the_range_are_the_textbooks() {
+    let recording = narrow(|xi, eta| 20.0 * xi + 3.0 * xi * xi + 0.5 * eta);
+    let (with, without) = compare(&recording, 12.0);
+    assert!(with > CASES / 4 && without > CASES / 4, "{with} {without}");
+}
+
+#[test]
+fn a_phase_of_several_heights_has_none() {
+    let recording = narrow(|xi, _| 20.0 * xi + 4.0 * (TAU * 3.0 * xi).sin());
+    let (with, without) = compare(&recording, 4.0);
+    assert!(with > CASES / 4 && without > CASES / 4, "{with} {without}");
+}
+
+#[test]
+fn the_reference_phase_is_the_textbooks_also_beyond_the_frame() {
+    let recording = narrow(|xi, eta| 20.0 * xi + 4.0 * (TAU * xi).sin() + eta * eta);
+    let (solver, rig) = (triangulator(&recording), Rig::of(&recording).unwrap());
+    let pattern = Pattern::of(&recording, 0);
+    let mut random = Random::new(SEED);
+    for _ in 0..CASES {
+        // A sixth of the frame beyond it, each way.
+        let mut place = || -5.0 + 42.0 * random.share();
+        let (u, v) = (place(), place());
+        let found = solver.reference_phase(u, v).unwrap();
+        let truth = rig.reference(&pattern, u, v);
+        assert!((found - truth).abs() < PHASE_TURNS, "({u}, {v})");
+    }
+    for (pixel, phase) in solver.reference_map().iter().enumerate() {
+        let truth = rig.reference(&pattern, (pixel % 32) as f64, (pixel / 32) as f64);
+        // Half a unit of Q16.16.
+        assert!((phase.turns() - truth).abs() <= 0.51 / 65_536.0, "{pixel}");
+    }
+}
+
+#[test]
+fn the_default_working_range_is_a_fifth_of_the_cameras_distance() {
+    let mut recording = narrow(|xi, _| 20.0 * xi);
+    recording.range_mm = None;
+    let (solver, rig) = (triangulator(&recording), Rig::of(&recording).unwrap());
+    assert!((solver.range().low - rig.range.0).abs() < 1e-9);
+    assert!((solver.range().high - rig.range.1).abs() < 1e-9);
+    assert!((rig.range.1 - 120.0).abs() < 1e-9);
+}
