@@ -2,12 +2,15 @@
 
 mod bad_input;
 mod cases;
+mod cli;
+mod formats;
 mod fuzz;
 mod house;
 mod measured;
 mod outputs;
 mod promises_own;
 mod promises_shared;
+mod station;
 mod triangulation;
 mod twin;
 mod written;

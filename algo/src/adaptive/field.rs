@@ -30,10 +30,8 @@ impl Field {
     #[inline]
     pub fn cell(&self, [xi, eta]: [f64; 2]) -> Option<usize> {
         let (column, row) = (libm::rint(xi), libm::rint(eta));
-        let inside = column >= 0.0
-            && row >= 0.0
-            && column < self.columns as f64
-            && row < self.rows() as f64;
+        let inside =
+            column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows() as f64;
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
@@ -97,10 +95,8 @@ impl Field {
         for _ in 0..reach {
             let before = self.frequency.clone();
             let known = |row: isize, column: isize| {
-                let inside = row >= 0
-                    && column >= 0
-                    && row < rows as isize
-                    && column < columns as isize;
+                let inside =
+                    row >= 0 && column >= 0 && row < rows as isize && column < columns as isize;
                 let value = inside.then(|| before[row as usize * columns + column as usize])?;
                 (!value.is_nan()).then_some(value)
             };
@@ -110,7 +106,16 @@ impl Field {
                         continue;
                     }
                     let (r, c) = (row as isize, column as isize);
-                    let beside = [(0, -1), (-1, 0), (0, 1), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)];
+                    let beside = [
+                        (0, -1),
+                        (-1, 0),
+                        (0, 1),
+                        (1, 0),
+                        (-1, -1),
+                        (-1, 1),
+                        (1, -1),
+                        (1, 1),
+                    ];
                     let found = beside.iter().find_map(|(dr, dc)| known(r + dr, c + dc));
                     *value = found.unwrap_or(f64::NAN);
                 }
@@ -123,8 +128,9 @@ impl Field {
         let (columns, rows) = (self.columns, self.rows());
         for column in 0..columns {
             let at = |row: usize| row * columns + column;
-            let known: Vec<usize> =
-                (0..rows).filter(|&row| !self.frequency[at(row)].is_nan()).collect();
+            let known: Vec<usize> = (0..rows)
+                .filter(|&row| !self.frequency[at(row)].is_nan())
+                .collect();
             let mut next = 0;
             for row in 0..rows {
                 while next + 1 < known.len()

@@ -40,7 +40,11 @@ pub(super) fn balanced_rows(field: &Field, seen: &[bool]) -> Vec<f64> {
                 count += 1.0;
             }
         }
-        if count > 0.0 { both / count } else { all / columns as f64 }
+        if count > 0.0 {
+            both / count
+        } else {
+            all / columns as f64
+        }
     });
     let mut offset = 0.0;
     for (row, step) in turns.chunks_mut(columns).zip(steps) {

@@ -145,13 +145,24 @@ fn stretch(
 /// The outer boundary of a component as a closed walk over its pixels (Moore's neighbour tracing,
 /// until the start is left in the first direction again).
 fn boundary(component: &[usize], width: usize) -> Vec<usize> {
-    const AROUND: [(isize, isize); 8] =
-        [(-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1)];
+    const AROUND: [(isize, isize); 8] = [
+        (-1, 0),
+        (-1, -1),
+        (0, -1),
+        (1, -1),
+        (1, 0),
+        (1, 1),
+        (0, 1),
+        (-1, 1),
+    ];
     let mut sorted = component.to_vec();
     sorted.sort_unstable();
     let on = |u: isize, v: isize| {
         let inside = u >= 0 && v >= 0 && u < width as isize;
-        inside && sorted.binary_search(&(v as usize * width + u as usize)).is_ok()
+        inside
+            && sorted
+                .binary_search(&(v as usize * width + u as usize))
+                .is_ok()
     };
     let start = sorted[0];
     let (mut u, mut v) = ((start % width) as isize, (start / width) as isize);
@@ -186,7 +197,9 @@ mod tests {
 
     #[test]
     fn the_boundary_goes_once_around_a_block() {
-        let component: Vec<usize> = (2..5).flat_map(|v| (3..7).map(move |u| v * 10 + u)).collect();
+        let component: Vec<usize> = (2..5)
+            .flat_map(|v| (3..7).map(move |u| v * 10 + u))
+            .collect();
         let mut walk = boundary(&component, 10);
         walk.sort_unstable();
         walk.dedup();
@@ -206,7 +219,11 @@ mod tests {
         let function = adapt(&flat, 400, 200, 5.0).unwrap();
         assert!((function.at(300.0, 90.0) - 300.0 / 8.0).abs() < 1e-9);
         let steep = ProjectorMap {
-            points: flat.points.iter().map(|[xi, eta]| [100.0 + 3.0 * (xi - 100.0), *eta]).collect(),
+            points: flat
+                .points
+                .iter()
+                .map(|[xi, eta]| [100.0 + 3.0 * (xi - 100.0), *eta])
+                .collect(),
             ..flat
         };
         let function = adapt(&steep, 400, 200, 5.0).unwrap();

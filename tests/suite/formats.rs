@@ -1,0 +1,153 @@
+//! The files that cross the border of the program are those that the documentation names.
+
+use crate::station::{Daemon, Place};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::Read as _;
+use tests::program::Program;
+
+fn document(name: &str) -> String {
+    let path = format!("{}/../docs/{name}", env!("CARGO_MANIFEST_DIR"));
+    fs::read_to_string(path).unwrap()
+}
+
+/// Members of a recipe, version 1. If this fails, do not change the test: old files must stay readable.
+const MEMBERS: [&str; 7] = [
+    "recipe.json",
+    "golden_phase.npy",
+    "golden_height.npy",
+    "height_slope.npy",
+    "height_curvature.npy",
+    "valid.npy",
+    "modulation.npy",
+];
+
+/// Keys of its `recipe.json`, version 1, as a taught recipe has them. The same holds for these.
+const KEYS: [&str; 38] = [
+    "calibration",
+    "camera",
+    "camera.bit_depth",
+    "camera.height",
+    "camera.width",
+    "expansion_range_turns",
+    "fingerprint",
+    "format",
+    "gauges",
+    "gauges.high",
+    "gauges.low",
+    "gauges.measures",
+    "gauges.measures.kind",
+    "gauges.measures.smoothing_px",
+    "gauges.name",
+    "gauges.region",
+    "min_coverage",
+    "name",
+    "noise_counts",
+    "number",
+    "part_number",
+    "pattern",
+    "pattern.fringes",
+    "pattern.kind",
+    "projector",
+    "projector.height",
+    "projector.width",
+    "range_mm",
+    "regions",
+    "regions.name",
+    "regions.polygon",
+    "sequence",
+    "sequence.production",
+    "sequence.ratio",
+    "sequence.shift_turns",
+    "taught_at_unix_s",
+    "taught_by",
+    "version",
+];
+/// What a taught recipe may leave out.
+const OPTIONAL: [&str; 2] = ["exposure_us", "phase_function.npy"];
+
+fn collect(value: &Value, prefix: &str, keys: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(object) => {
+            for (key, value) in object {
+                let path = format!("{prefix}{key}");
+                collect(value, &format!("{path}."), keys);
+                keys.insert(path);
+            }
+        }
+        Value::Array(items) => items.iter().for_each(|item| collect(item, prefix, keys)),
+        _ => {}
+    }
+}
+
+#[test]
+fn a_taught_recipe_has_exactly_the_documented_members_and_keys() {
+    let place = Place::new();
+    drop(Daemon::start(&place));
+    let mut zip = zip::ZipArchive::new(fs::File::open(place.recipe()).unwrap()).unwrap();
+    let members: Vec<String> = zip
+        .file_names()
+        .map(|name| name.unwrap().into_owned())
+        .collect();
+    assert_eq!(members, MEMBERS);
+    let mut text = String::new();
+    let mut manifest = zip.by_name("recipe.json").unwrap();
+    manifest.read_to_string(&mut text).unwrap();
+    let manifest: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(
+        (&manifest["format"], &manifest["version"]),
+        (&"fringed-recipe".into(), &1.into())
+    );
+    let mut keys = BTreeSet::new();
+    collect(&manifest, "", &mut keys);
+    assert_eq!(keys.iter().map(String::as_str).collect::<Vec<_>>(), KEYS);
+    let documented = document("formats.md");
+    for name in MEMBERS.iter().chain(&KEYS).chain(&OPTIONAL) {
+        let name = name
+            .rsplit('.')
+            .next()
+            .filter(|_| !name.ends_with(".npy") && !name.ends_with(".json"))
+            .unwrap_or(name);
+        assert!(
+            documented.contains(&format!("`{name}`")),
+            "docs/formats.md names no `{name}`"
+        );
+    }
+}
+
+#[test]
+fn the_documentation_holds_the_register_map() {
+    let program = Program::at(env!("CARGO_BIN_EXE_fringed-under-test"));
+    let json = program.run(&["registers", "--json"]).succeeded().stdout;
+    let json: Value = serde_json::from_str(&json).unwrap();
+    let documented = document("modbus.md");
+    let mut block = String::new();
+    for row in json["registers"].as_array().unwrap() {
+        let cell = |key: &str| match &row[key] {
+            Value::String(text) => text.clone(),
+            other => other.to_string(),
+        };
+        // The OLDEST block has the layout of RESULT and is documented by one sentence.
+        if cell("block") == "OLDEST" {
+            continue;
+        }
+        if block != cell("block") {
+            block = cell("block");
+            assert!(
+                documented.contains(&format!("**{block}**")),
+                "no block {block}"
+            );
+        }
+        let line = format!(
+            "| {} | {} | {} | {} | {} | {} |\n",
+            cell("address"),
+            cell("reference"),
+            cell("name"),
+            cell("type"),
+            cell("registers"),
+            cell("meaning")
+        );
+        assert!(documented.contains(&line), "docs/modbus.md lacks: {line}");
+    }
+}
