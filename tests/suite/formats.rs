@@ -151,3 +151,12 @@ fn the_documentation_holds_the_register_map() {
         assert!(documented.contains(&line), "docs/modbus.md lacks: {line}");
     }
 }
+
+#[test]
+fn the_documented_scenario_is_the_default_one() {
+    let documented = document("formats.md");
+    let (_, from) = documented.split_once("```toml\n").unwrap();
+    let (scenario, _) = from.split_once("```").unwrap();
+    let read = hal::sim::Scenario::from_toml(scenario, "docs/formats.md").unwrap();
+    assert_eq!(read, hal::sim::Scenario::default());
+}
