@@ -2,6 +2,7 @@
 
 mod config;
 mod demo;
+mod experiment;
 mod measure;
 mod record;
 mod serve;
@@ -62,6 +63,8 @@ enum Command {
     Measure(measure::Measure),
     /// Record a sequence from the configured head.
     Record(record::Record),
+    /// Repeat the paper's experiments on the simulated head.
+    Experiment(experiment::Experiment),
     /// Check a configuration, or list its keys.
     #[command(subcommand)]
     Config(config::ConfigCommand),
@@ -99,6 +102,7 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Command::Demo(command) => command.run(&common),
         Command::Measure(command) => command.run(&common),
         Command::Record(command) => command.run(&common),
+        Command::Experiment(command) => command.run(&common),
         Command::Config(command) => command.run(&common),
         Command::Registers => {
             registers(&common);

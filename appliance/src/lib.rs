@@ -1,12 +1,14 @@
 //! The daemon `fringed` and its command line: joins devices (`hal`) and computation (`algo`).
 
 pub mod backend;
+pub mod bench;
 pub mod calibration;
 pub mod cli;
 pub mod clock;
 pub mod config;
 pub mod daemon;
 pub mod error;
+pub mod experiment;
 pub mod measure;
 pub mod modbus;
 pub mod output;

@@ -16,6 +16,8 @@ const RATIO_TOLERANCE: f64 = 1e-6;
 const GEOMETRIC_SPAN: f64 = 1.001;
 /// Largest step from one geometric level to the next: keeps n · Φ inside 63 bits.
 const MAX_STEP: f64 = 4096.0;
+/// Largest phase of a level, in turns: Q16.16 reaches 32,768.
+const MAX_TURNS: f64 = 32_000.0;
 
 /// All shifts at one ratio of the full phase function: s_k = start + k/N.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,6 +77,13 @@ pub enum SequenceError {
     },
     /// The ratios are of no form that can be unwrapped.
     Ratios(Vec<f64>),
+    /// The finest level's ratio is out of the range of fixed point.
+    Finest {
+        /// Its ratio.
+        ratio: f64,
+        /// Its largest phase in turns.
+        turns: f64,
+    },
     /// The step between two geometric levels is too large.
     Step {
         /// Ratio of the coarser level.
@@ -116,6 +125,11 @@ impl fmt::Display for SequenceError {
                 "levels of ratios {ratios:?} cannot be unwrapped: the smallest must span at most one turn \
                  of the pattern (geometric), or they are 1, 1 - 1/n^2, 1 - 1/n with n >= 3 or 1, 1 - 1/n \
                  with n >= 2 (dense), or a single one"
+            ),
+            Self::Finest { ratio, turns } => write!(
+                f,
+                "the finest level has ratio {ratio} and {turns} turns: the ratio must be at least 1/{MAX_STEP} \
+                 and the phase at most {MAX_TURNS} turns"
             ),
             Self::Step { from, to } => write!(
                 f,
@@ -250,6 +264,14 @@ impl Unwrapping {
     pub fn recognise(sequence: &Sequence, range: PhaseRange) -> Result<Self, SequenceError> {
         let ratios: heapless::Vec<f64, MAX_LEVELS> =
             sequence.levels().iter().map(|level| level.ratio).collect();
+        let finest = ratios[ratios.len() - 1];
+        let turns = finest * libm::fabs(range.max).max(libm::fabs(range.min));
+        if !(finest >= 1.0 / MAX_STEP && turns <= MAX_TURNS) {
+            return Err(SequenceError::Finest {
+                ratio: finest,
+                turns,
+            });
+        }
         let near = |a: f64, b: f64| libm::fabs(a - b) <= RATIO_TOLERANCE;
         if ratios[0] * range.span() <= GEOMETRIC_SPAN {
             if let Some(pair) = ratios.windows(2).find(|pair| pair[1] / pair[0] > MAX_STEP) {

@@ -21,6 +21,9 @@ pub const FULL_TRUST_STEPS: usize = 8;
 
 /// Fractional bits of the weights.
 const WEIGHT_BITS: u32 = 20;
+/// Modulations of exactly the minimum are trusted: what the weights' rounding can take from S² + C²
+/// there, as a share (2 · 255 · 2⁻²¹ / 8 at 8 bit is 3e-5; far below the step of one count).
+const TIE: f64 = 1e-4;
 /// Bits of S and C after normalisation.
 const SUM_BITS: u32 = 30;
 
@@ -85,7 +88,7 @@ impl LevelKernel {
         Self {
             taps,
             shift,
-            power_min: libm::ceil(min_root * min_root) as u64,
+            power_min: libm::ceil(min_root * min_root * (1.0 - TIE)) as u64,
             modulation_scale: libm::rint(modulation_scale * 4_294_967_296.0) as u64,
             saturated_from: if steps < FULL_TRUST_STEPS {
                 full_scale as i32

@@ -1,4 +1,4 @@
-//! A folder of results that appears whole or not at all.
+//! A folder of results in which every file is whole.
 
 use crate::error::{Exit, Failure};
 use std::fs;
@@ -57,10 +57,14 @@ pub fn write_whole(target: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut temporary = target.as_os_str().to_owned();
     temporary.push(".new");
     let temporary = PathBuf::from(temporary);
-    let mut file = fs::File::create(&temporary)?;
-    file.write_all(bytes)?;
-    file.sync_all()?;
-    fs::rename(&temporary, target)?;
+    let written = fs::File::create(&temporary)
+        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
+        .and_then(|()| fs::rename(&temporary, target));
+    if let Err(error) = written {
+        // What cannot be finished is not left behind; there may be nothing to remove.
+        let _ = fs::remove_file(&temporary);
+        return Err(error);
+    }
     if let Some(folder) = target
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty())
