@@ -1,6 +1,6 @@
 //! The files that cross the border of the program are those that the documentation names.
 
-use crate::station::{Daemon, Place};
+use crate::plc::{Daemon, Place};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;

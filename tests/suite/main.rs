@@ -8,6 +8,7 @@ mod fuzz;
 mod house;
 mod measured;
 mod outputs;
+mod plc;
 mod promises_own;
 mod promises_shared;
 mod station;
