@@ -1,6 +1,6 @@
 //! The command line: what each command answers, and its exit code where it cannot.
 
-use crate::plc::{Daemon, Place};
+use crate::station_plc::{Daemon, Place};
 use serde_json::Value;
 use std::fs;
 use std::net::TcpListener;

@@ -1,6 +1,6 @@
 //! The daemon as a PLC sees it: the real binary, a socket, and a clock on the wall.
 
-use crate::plc::{
+use crate::station_plc::{
     BUSY, Daemon, EXPOSURE_DONE, ONLINE, Place, Plc, READY, RECIPE_OK, RESULT_ACK, RESULT_TOGGLE,
     RESULT_VALID, Status, TRIGGER, TRIGGER_ACK, long, trigger,
 };
