@@ -382,7 +382,6 @@ fn a_result_that_cannot_be_written_is_code_73_by_name() {
 }
 
 #[test]
-#[ignore = "appliance/src/output/folder.rs: write_whole leaves the temporary file where the rename fails"]
 fn a_result_that_cannot_be_written_leaves_no_temporary_file() {
     let written = Written::new(&tiny());
     fs::create_dir_all(written.out().join("phase.npy/mine")).unwrap();

@@ -263,13 +263,17 @@ impl Runner {
             class: Some(&truth.class),
         };
         let phases = &measured.phases;
-        let tally = known.tally(phases);
-        let lit = tally.iter().sum();
+        // As the study counts: over the pixels that truth calls wholly lit.
+        let whole = || (0..phases.trust.len()).filter(|&at| known.whole(at));
+        let lit = whole().count();
+        let resolved = whole()
+            .filter(|&at| phases.trust[at] == Trust::Resolved)
+            .count();
         let (mut squares, mut count) = (0.0, 0.0);
         for at in 0..truth.height.len() {
             let sigma = f64::from(measured.heights.sigma[at]);
             let error = measured.heights.height[at].mm() - f64::from(truth.height[at]);
-            let counts = phases.trust[at] == Trust::Resolved && known.lit(at, Trust::Resolved);
+            let counts = phases.trust[at] == Trust::Resolved && known.whole(at);
             if counts && error.abs() <= 1.0 && sigma > 0.0 {
                 squares += (error / sigma).powi(2);
                 count += 1.0;
@@ -278,7 +282,7 @@ impl Runner {
         Outcome {
             score: known.score(phases, &measured.heights),
             lit,
-            unresolved: lit - tally[Trust::Resolved as usize],
+            unresolved: lit - resolved,
             sigma_ratio: (squares / f64::max(count, 1.0)).sqrt(),
         }
     }

@@ -24,8 +24,7 @@ pub struct StageTimes {
 /// The summary of a measurement. Everything but the times is the same with any number of threads.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// Pixels whose coarsest level is modulated; where the recording has truth classes, those of
-    /// class 2 instead.
+    /// Pixels whose coarsest level is modulated, and those that truth calls wholly lit.
     pub lit: usize,
     /// Lit pixels whose phase and, where there is geometry, height are valid.
     pub resolved: usize,
@@ -66,11 +65,17 @@ impl Report {
         truth: &Truth<'_>,
         stages: &StageTimes,
     ) -> Self {
-        let tally = truth.tally(phases);
-        let resolved = tally[Trust::Resolved as usize];
-        let reasons = Trust::REASONS.into_iter();
-        let unresolved: BTreeMap<_, _> = reasons
-            .map(|reason| (reason.word(), tally[reason as usize]))
+        // A pixel that is dark although truth calls it wholly lit is lit and unresolved.
+        let dark_but_lit = (0..phases.trust.len())
+            .filter(|&at| phases.trust[at] == Trust::Dark && truth.whole(at))
+            .count();
+        let resolved = phases.count(Trust::Resolved);
+        let unresolved: BTreeMap<_, _> = Trust::REASONS
+            .into_iter()
+            .map(|reason| match reason {
+                Trust::Dark => (reason.word(), dark_but_lit),
+                _ => (reason.word(), phases.count(reason)),
+            })
             .collect();
         let map = heights.as_ref().ok().map(|surface| &surface.map);
         let sigma_mm = map.and_then(|map| {

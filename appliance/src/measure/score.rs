@@ -45,24 +45,9 @@ impl<'a> Truth<'a> {
         }
     }
 
-    /// Whether pixel `at` is lit: as truth says, where there are classes, else by the modulation of
-    /// its coarsest level.
-    pub fn lit(&self, at: usize, trust: Trust) -> bool {
-        match self.class {
-            Some(class) => class[at] == WHOLE_PIXEL,
-            None => trust != Trust::Dark,
-        }
-    }
-
-    /// Lit pixels by what became of them, in the order of [`Trust`].
-    pub fn tally(&self, phases: &PhaseMap) -> [usize; 6] {
-        let mut tally = [0; 6];
-        for (at, &trust) in phases.trust.iter().enumerate() {
-            if self.lit(at, trust) {
-                tally[trust as usize] += 1;
-            }
-        }
-        tally
+    /// Whether truth says that pixel `at` is wholly lit and holds no depth edge.
+    pub fn whole(&self, at: usize) -> bool {
+        self.class.is_some_and(|class| class[at] == WHOLE_PIXEL)
     }
 
     /// Scores measured heights; `None` without a truth or without a pixel to score.
@@ -70,7 +55,7 @@ impl<'a> Truth<'a> {
         let truth = self.height?;
         let mut errors: Vec<f64> = (0..truth.len())
             .filter(|&at| phases.trust[at] == Trust::Resolved)
-            .filter(|&at| self.lit(at, phases.trust[at]))
+            .filter(|&at| self.class.is_none() || self.whole(at))
             .map(|at| heights.height[at].mm() - f64::from(truth[at]))
             .filter(|error| error.is_finite())
             .collect();
