@@ -120,7 +120,7 @@ impl Bench<'_> {
         };
         let mut phases = pipeline::decode(&decoder, &views, map).map_err(rig)?;
         let noise = Some(self.calibration.noise_counts);
-        let heights = pipeline::triangulate(&triangulator, &decoder, noise, &mut phases);
+        let heights = pipeline::triangulate(&triangulator, &decoder, noise, None, &mut phases);
         Ok(Measured {
             phases,
             heights,

@@ -1,10 +1,11 @@
 //! A recipe made ready to run: from frames to an inspection without anything that can fail.
 
 use crate::calibration::Calibration;
-use crate::recipe::{GaugeKind, Recipe};
+use crate::recipe::{GaugeKind, Recipe, SequenceKind};
 use crate::seam;
-use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED};
+use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
 use crate::station::{GaugeValue, Inspection, StageTime, Unit, Verdict};
+use algo::adaptive::Field;
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
 use algo::inspect::{Comparison, Golden, Reading};
@@ -110,19 +111,18 @@ impl Plan {
         let range = recipe.function.range();
         let decoder = Decoder::new(&recipe.sequence, range, file.camera.bit_depth)
             .map_err(|error| error.to_string())?;
-        let map = decoder.unwrapping().needs_map().then(|| {
-            let golden = recipe.arrays.golden_phase.iter();
-            golden
-                .map(|&turns| AbsolutePhase::from_turns(turns))
-                .collect()
-        });
+        let map = decoder
+            .unwrapping()
+            .needs_map()
+            .then(|| known_map(&recipe, &triangulator));
         let golden = golden(&recipe, &decoder);
+        let flags = sequence_flag(recipe.kind) | if simulated { SIMULATED } else { 0 };
         Ok(Self {
             decoder,
             triangulator,
             golden,
             map,
-            flags: FULL_SEQUENCE | if simulated { SIMULATED } else { 0 },
+            flags,
             recipe,
         })
     }
@@ -134,13 +134,7 @@ impl Plan {
 
     /// The patterns of the sequence, in the order of its frames.
     pub fn rasters(&self, calibration: &Calibration) -> Result<Vec<Raster>, hal::error::Error> {
-        let production = self
-            .recipe
-            .file
-            .sequence
-            .iter()
-            .filter(|frame| frame.production);
-        let frames = production.map(|frame| (frame.ratio, frame.shift_turns));
+        let frames = self.recipe.production.iter().copied();
         rasters(&self.recipe.function, frames, calibration)
     }
 
@@ -168,7 +162,14 @@ impl Plan {
         let mut clock = StageClock::new(exposed);
         clock.stage("phase", &mut inspection);
         let noise = Some(self.recipe.file.noise_counts);
-        let heights = pipeline::triangulate(&self.triangulator, &self.decoder, noise, &mut phases);
+        let guess = |place: usize, phase: AbsolutePhase| self.expand(place, phase);
+        let heights = pipeline::triangulate(
+            &self.triangulator,
+            &self.decoder,
+            noise,
+            Some(&guess),
+            &mut phases,
+        );
         clock.stage("height", &mut inspection);
         self.judge(&phases, &heights, &mut inspection);
         clock.stage("gauges", &mut inspection);
@@ -181,6 +182,18 @@ impl Plan {
                 .collect(),
         };
         (inspection, Some(maps))
+    }
+
+    /// The height that the golden expansion gives for a phase, inside its range.
+    fn expand(&self, place: usize, phase: AbsolutePhase) -> Option<f64> {
+        let arrays = &self.recipe.arrays;
+        let delta = phase.turns() - arrays.golden_phase[place];
+        // A NaN, where golden knows nothing, is not inside.
+        (delta.abs() <= self.recipe.file.expansion_range_turns).then(|| {
+            let first = f64::from(arrays.height_slope[place]);
+            let second = f64::from(arrays.height_curvature[place]);
+            f64::from(arrays.golden_height[place]) + delta * (first + 0.5 * delta * second)
+        })
     }
 
     fn judge(&self, phases: &PhaseMap, heights: &HeightMap, inspection: &mut Inspection) {
@@ -258,6 +271,53 @@ pub fn rasters(
             Raster::new(grey.width as u32, grey.height as u32, grey.pixels)
         })
         .collect()
+}
+
+/// The map that the production sequence is unwrapped about: the golden phase. A sequence of limited
+/// reach knows nothing where the placement could move the phase further. The full one also looks
+/// where golden has nothing, an opening say, at the height of the surface around: material where
+/// there should be none must be seen.
+fn known_map(recipe: &Recipe, triangulator: &Triangulator) -> Vec<AbsolutePhase> {
+    let arrays = &recipe.arrays;
+    let golden = arrays
+        .golden_phase
+        .iter()
+        .map(|&turns| AbsolutePhase::from_turns(turns));
+    if let Some(reach) = recipe.kind.reach() {
+        let safe = arrays.phase_reach.iter().map(|moved| *moved < reach);
+        return golden
+            .zip(safe)
+            .map(|(phase, safe)| if safe { phase } else { AbsolutePhase::UNKNOWN })
+            .collect();
+    }
+    let width = recipe.file.camera.width as usize;
+    let mut surface = Field {
+        columns: width,
+        values: arrays
+            .golden_height
+            .iter()
+            .map(|&mm| f64::from(mm))
+            .collect(),
+    };
+    surface.fill_rows(0.0);
+    let mut map: Vec<AbsolutePhase> = golden.collect();
+    pipeline::for_each_row(&mut map, width, |v, row| {
+        for (u, phase) in row.iter_mut().enumerate() {
+            if !phase.is_known() {
+                *phase = triangulator.phase_of(u, v, surface.values[v * width + u]);
+            }
+        }
+    });
+    map
+}
+
+/// The bit of RESULT's flags that says which sequence was used.
+fn sequence_flag(kind: SequenceKind) -> u16 {
+    match kind {
+        SequenceKind::SingleLevel => SINGLE_LEVEL,
+        SequenceKind::TwoLevels => TWO_LEVELS,
+        SequenceKind::Full => FULL_SEQUENCE,
+    }
 }
 
 /// The golden map of a recipe: heights where it is valid, and their σ from the modulation as taught.

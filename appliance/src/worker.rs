@@ -47,6 +47,8 @@ impl LastMaps {
 
 /// Idle, the worker gives a sign of life this often.
 const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
+/// How far parts may lie from where they were taught, unless a recipe says otherwise.
+const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
 /// Longest wait for one flip, one pulse or one frame.
 const DEVICE_TIMEOUT: Duration = Duration::from_secs(2);
 
@@ -216,6 +218,7 @@ impl Worker {
             part_number: format!("PART-{number:04}"),
             name: format!("Part {number}"),
             taught_at_unix_s: crate::clock::utc_us().unwrap_or(0) / 1_000_000,
+            placement_tolerance_mm: PLACEMENT_TOLERANCE_MM,
         };
         let (station, bar) = (self.station.clone(), self.progress.clone());
         let progress = |fraction: f64, words: &str| {
@@ -235,18 +238,18 @@ impl Worker {
         self.progress.clear();
         let stored = taught
             .map_err(|error| (code_of_teaching(&error), error.to_string()))
-            .and_then(|(bytes, recipe)| {
-                self.recipes
-                    .save(number, &bytes)
-                    .map(|()| recipe)
-                    .map_err(|error| {
-                        (
-                            code::NOT_STORED,
-                            format!("store recipe {number}: {error}: free space"),
-                        )
-                    })
+            .and_then(|taught| {
+                for reason in &taught.choice.reasons {
+                    self.progress.log(reason);
+                }
+                self.recipes.save(number, &taught.bytes).map_err(|error| {
+                    (
+                        code::NOT_STORED,
+                        format!("store recipe {number}: {error}: free space"),
+                    )
+                })
             });
-        let ready = stored.and_then(|_| {
+        let ready = stored.and_then(|()| {
             let key = RecipeKey::Number(number);
             self.prepare(&key)
                 .map_err(|(_, message)| (code::RIG, message))

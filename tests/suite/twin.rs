@@ -29,8 +29,6 @@ struct Difference {
     phase_rms: f64,
     orders: usize,
     masks: usize,
-    /// Those of `masks` that have a modulation of exactly 16 in one level or another.
-    ties: usize,
 }
 
 fn same(trust: Trust, reason: Reason) -> bool {
@@ -43,11 +41,10 @@ fn compare(measured: &Measured, at: usize, twin: &PhaseTwin, reason: &[Reason]) 
     let found = &measured.result.phases[at];
     let finest = levels_of(&measured.recording, at).last().unwrap().ratio;
     let mut errors = Vec::new();
-    let (mut orders, mut masks, mut ties) = (0, 0, 0);
+    let (mut orders, mut masks) = (0, 0);
     for (pixel, reason) in reason.iter().enumerate() {
         if !same(found.trust[pixel], *reason) {
             masks += 1;
-            ties += usize::from(twin.tie[pixel]);
         }
         if found.trust[pixel].has_phase() && reason.has_phase() {
             let error = found.phase[pixel].turns() - twin.phase[pixel];
@@ -64,7 +61,6 @@ fn compare(measured: &Measured, at: usize, twin: &PhaseTwin, reason: &[Reason]) 
         phase_rms: rms(&errors),
         orders,
         masks,
-        ties,
     }
 }
 

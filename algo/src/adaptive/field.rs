@@ -1,29 +1,31 @@
-//! A field of fringe frequencies over the projector's raster, and the filters that shape it.
+//! A field of values over a raster, fringe frequencies over the projector's as a rule, and the
+//! filters that shape it.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// G(s, t): frequency along ξ in turns per projector pixel at row s, column t, row-major.
+/// Values over a raster, row-major; as a rule G(s, t), the frequency along ξ in turns per projector
+/// pixel at row s, column t.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
-    /// Projector columns.
+    /// Columns.
     pub columns: usize,
-    /// Frequencies; NaN where none is known yet.
-    pub frequency: Vec<f64>,
+    /// Values; NaN where none is known yet.
+    pub values: Vec<f64>,
 }
 
 impl Field {
-    /// A field with the same frequency everywhere.
-    pub fn uniform(columns: usize, rows: usize, frequency: f64) -> Self {
+    /// A field with the same value everywhere.
+    pub fn uniform(columns: usize, rows: usize, value: f64) -> Self {
         Self {
             columns,
-            frequency: vec![frequency; columns * rows],
+            values: vec![value; columns * rows],
         }
     }
 
-    /// Projector rows.
+    /// Rows.
     pub fn rows(&self) -> usize {
-        self.frequency.len() / self.columns.max(1)
+        self.values.len() / self.columns.max(1)
     }
 
     /// The cell of a projector point, if it lies on the raster.
@@ -65,8 +67,8 @@ impl Field {
 
     fn along_rows(&self, reach: isize, filter: &(impl Fn(&[f64]) -> f64 + Sync + Send)) -> Self {
         let mut out = self.clone();
-        crate::pipeline::for_each_row(&mut out.frequency, self.columns, |row, out| {
-            let line = &self.frequency[row * self.columns..][..self.columns];
+        crate::pipeline::for_each_row(&mut out.values, self.columns, |row, out| {
+            let line = &self.values[row * self.columns..][..self.columns];
             let last = self.columns as isize - 1;
             let padded: Vec<f64> = (-reach..=last + reach)
                 .map(|i| line[i.clamp(0, last) as usize])
@@ -81,10 +83,10 @@ impl Field {
 
     fn transposed(&self) -> Self {
         let (columns, rows) = (self.columns, self.rows());
-        let at = |place: usize| self.frequency[place % rows * columns + place / rows];
+        let at = |place: usize| self.values[place % rows * columns + place / rows];
         Self {
             columns: rows,
-            frequency: (0..self.frequency.len()).map(at).collect(),
+            values: (0..self.values.len()).map(at).collect(),
         }
     }
 
@@ -93,14 +95,14 @@ impl Field {
     pub fn fill_near(&mut self, reach: usize) {
         let (columns, rows) = (self.columns, self.rows());
         for _ in 0..reach {
-            let before = self.frequency.clone();
+            let before = self.values.clone();
             let known = |row: isize, column: isize| {
                 let inside =
                     row >= 0 && column >= 0 && row < rows as isize && column < columns as isize;
                 let value = inside.then(|| before[row as usize * columns + column as usize])?;
                 (!value.is_nan()).then_some(value)
             };
-            crate::pipeline::for_each_row(&mut self.frequency, columns, |row, line| {
+            crate::pipeline::for_each_row(&mut self.values, columns, |row, line| {
                 for (column, value) in line.iter_mut().enumerate() {
                     if !value.is_nan() {
                         continue;
@@ -129,7 +131,7 @@ impl Field {
         for column in 0..columns {
             let at = |row: usize| row * columns + column;
             let known: Vec<usize> = (0..rows)
-                .filter(|&row| !self.frequency[at(row)].is_nan())
+                .filter(|&row| !self.values[at(row)].is_nan())
                 .collect();
             let mut next = 0;
             for row in 0..rows {
@@ -139,7 +141,7 @@ impl Field {
                     next += 1;
                 }
                 if let Some(&nearest) = known.get(next) {
-                    self.frequency[at(row)] = self.frequency[at(nearest)];
+                    self.values[at(row)] = self.values[at(nearest)];
                 }
             }
         }
@@ -148,7 +150,7 @@ impl Field {
     /// Gives unknown cells of a row the value between their known neighbours, in proportion; beyond
     /// the outermost ones theirs. A row without any takes `otherwise`.
     pub fn fill_rows(&mut self, otherwise: f64) {
-        crate::pipeline::for_each_row(&mut self.frequency, self.columns, |_, line| {
+        crate::pipeline::for_each_row(&mut self.values, self.columns, |_, line| {
             let mut before: Option<usize> = None;
             for column in 0..line.len() {
                 if line[column].is_nan() {
@@ -182,37 +184,37 @@ mod tests {
     fn smoothing_keeps_a_uniform_field_and_the_mean_of_a_spike() {
         let mut field = Field::uniform(40, 30, 0.1);
         let smooth = field.smoothed(3.0);
-        assert!(smooth.frequency.iter().all(|g| (g - 0.1).abs() < 1e-12));
-        field.frequency[15 * 40 + 20] = 1.1;
-        let sum: f64 = field.smoothed(2.0).frequency.iter().map(|g| g - 0.1).sum();
+        assert!(smooth.values.iter().all(|g| (g - 0.1).abs() < 1e-12));
+        field.values[15 * 40 + 20] = 1.1;
+        let sum: f64 = field.smoothed(2.0).values.iter().map(|g| g - 0.1).sum();
         assert!((sum - 1.0).abs() < 1e-9);
     }
 
     #[test]
     fn unknown_cells_are_filled_by_their_rule_and_known_ones_kept() {
         let mut field = Field::uniform(9, 5, f64::NAN);
-        field.frequency[2 * 9 + 2] = 0.1;
-        field.frequency[2 * 9 + 6] = 0.3;
+        field.values[2 * 9 + 2] = 0.1;
+        field.values[2 * 9 + 6] = 0.3;
         let mut rows = field.clone();
         rows.fill_rows(0.5);
-        assert_eq!(rows.frequency[0], 0.5);
-        assert!((rows.frequency[2 * 9 + 4] - 0.2).abs() < 1e-12);
-        assert_eq!(rows.frequency[2 * 9 + 8], 0.3);
+        assert_eq!(rows.values[0], 0.5);
+        assert!((rows.values[2 * 9 + 4] - 0.2).abs() < 1e-12);
+        assert_eq!(rows.values[2 * 9 + 8], 0.3);
         let mut near = field.clone();
         near.fill_near(1);
-        assert_eq!(near.frequency[9 + 1], 0.1);
-        assert!(near.frequency[2 * 9 + 4].is_nan());
+        assert_eq!(near.values[9 + 1], 0.1);
+        assert!(near.values[2 * 9 + 4].is_nan());
         field.fill_columns();
-        assert_eq!(field.frequency[6], 0.3);
-        assert!(field.frequency[5].is_nan());
+        assert_eq!(field.values[6], 0.3);
+        assert!(field.values[5].is_nan());
     }
 
     #[test]
     fn the_minimum_filter_spreads_low_values() {
         let mut field = Field::uniform(9, 9, 0.2);
-        field.frequency[4 * 9 + 4] = 0.05;
+        field.values[4 * 9 + 4] = 0.05;
         let low = field.minimum(3);
-        let count = low.frequency.iter().filter(|g| **g == 0.05).count();
+        let count = low.values.iter().filter(|g| **g == 0.05).count();
         assert_eq!(count, 49);
     }
 }

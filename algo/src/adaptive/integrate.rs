@@ -7,8 +7,8 @@ use alloc::vec::Vec;
 /// Φ(s, t) = Φ(s, t−1) + G(s, t−1) with a zero first column (Peng & Gupta 2008, eq. 8), in f64: the
 /// sum over 10⁵ columns is exact to 1e-9 turn.
 pub(super) fn rows_from_zero(field: &Field) -> Vec<f64> {
-    let mut turns = Vec::with_capacity(field.frequency.len());
-    for row in field.frequency.chunks(field.columns.max(1)) {
+    let mut turns = Vec::with_capacity(field.values.len());
+    for row in field.values.chunks(field.columns.max(1)) {
         let mut sum = 0.0;
         for frequency in row {
             turns.push(sum);
@@ -81,7 +81,7 @@ mod tests {
         // The left half, unseen, is twice as fine in odd rows.
         let mut field = Field::uniform(100, 10, 0.1);
         for row in (1..10).step_by(2) {
-            field.frequency[row * 100..row * 100 + 50].fill(0.2);
+            field.values[row * 100..row * 100 + 50].fill(0.2);
         }
         let seen: Vec<bool> = (0..1000).map(|place| place % 100 >= 50).collect();
         let turns = balanced_rows(&field, &seen);

@@ -11,9 +11,11 @@ mod integrate;
 mod map;
 pub mod noise;
 pub mod paper;
+mod placement;
 
 pub use field::Field;
 pub use map::ProjectorMap;
+pub use placement::{Surface, phase_reach};
 
 use crate::pattern::PhaseFunctionError;
 use core::fmt;

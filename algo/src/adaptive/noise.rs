@@ -100,7 +100,7 @@ pub fn adapt(
         if let Some(cell) = field.cell(*point) {
             seen[cell] = true;
             // Several pixels see a cell: the steepest one decides. A NaN loses against any number.
-            field.frequency[cell] = g.min(field.frequency[cell]);
+            field.values[cell] = g.min(field.values[cell]);
         }
     }
     if !seen.contains(&true) {

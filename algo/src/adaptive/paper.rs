@@ -130,14 +130,14 @@ fn stretch(
     for (cell, &(sum, count)) in sums.iter().enumerate() {
         if count > 0.0 {
             masked[cell] = true;
-            inside.frequency[cell] = sum / count;
+            inside.values[cell] = sum / count;
         }
     }
     inside.fill_near(1);
     inside.fill_rows(1.0 / PROJECTOR_PITCH);
     for (cell, on) in masked.iter().enumerate() {
         if *on {
-            field.frequency[cell] = inside.frequency[cell];
+            field.values[cell] = inside.values[cell];
         }
     }
 }

@@ -88,6 +88,10 @@ pub struct Expansion {
 
 /// z is found to this many mm.
 const HEIGHT_TOLERANCE: f64 = 1e-7;
+/// A last secant step of at most this many mm leaves less than 1e-6 mm over.
+const NEAR_TOLERANCE: f64 = 1e-4;
+/// A secant step longer than this many mm has left the neighbourhood of the guess.
+const MAX_STEP: f64 = 2.0;
 /// Half the step of the numeric slope, mm: small against any fringe, large against rounding.
 const SLOPE_STEP: f64 = 0.01;
 /// Pieces of the working range searched for a change of sign where the phase need not be monotone
@@ -141,6 +145,11 @@ impl Triangulator {
     /// The working range.
     pub fn range(&self) -> HeightRange {
         self.range
+    }
+
+    /// Φ_P.
+    pub fn function(&self) -> &PhaseFunction {
+        &self.function
     }
 
     /// The camera.
@@ -225,7 +234,41 @@ impl Triangulator {
         }
         let (a, b) = bracket?;
         let z = root::bracketed(off, a, b, HEIGHT_TOLERANCE)?;
-        let rise = off(z + SLOPE_STEP)? - off(z - SLOPE_STEP)?;
+        self.solution(ray, z)
+    }
+
+    /// As [`Self::solve`], starting from a height that is nearly right: two or three evaluations
+    /// instead of twenty, and where several heights have the phase, the one near the guess.
+    pub fn solve_near(&self, u: f64, v: f64, phase: f64, guess: f64) -> Option<Solution> {
+        let ray = self.camera.ray(u, v)?;
+        if !(ray.z < -1e-6) {
+            return None;
+        }
+        let off = |z: f64| Some(self.phase_at(self.on_ray(ray, z))? - phase);
+        // The secant from a guess that is off by micrometres converges at the first or second step;
+        // where it does not, nothing is lost but time.
+        let (mut before, mut z) = (guess - SLOPE_STEP, guess);
+        let mut missed = off(before)?;
+        for _ in 0..4 {
+            let miss = off(z)?;
+            let slope = (miss - missed) / (z - before);
+            let step = miss / slope;
+            if !(libm::fabs(step) <= MAX_STEP) {
+                break;
+            }
+            (before, missed) = (z, miss);
+            z -= step;
+            if libm::fabs(step) <= NEAR_TOLERANCE {
+                let inside = z >= self.range.low && z <= self.range.high;
+                return inside.then(|| self.solution(ray, z)).flatten();
+            }
+        }
+        self.solve(u, v, phase)
+    }
+
+    fn solution(&self, ray: Vector, z: f64) -> Option<Solution> {
+        let at = |z: f64| self.phase_at(self.on_ray(ray, z));
+        let rise = at(z + SLOPE_STEP)? - at(z - SLOPE_STEP)?;
         Some(Solution {
             point: self.on_ray(ray, z),
             slope: rise / (2.0 * SLOPE_STEP),
@@ -255,6 +298,14 @@ impl Triangulator {
     pub fn point(&self, u: usize, v: usize, height: Height) -> Option<Vector> {
         let ray = self.camera.ray(u as f64, v as f64)?;
         (height.is_known() && ray.z < 0.0).then(|| self.on_ray(ray, height.mm()))
+    }
+
+    /// The phase that pixel (u, v) has if its surface is at `height`, [`AbsolutePhase::UNKNOWN`] where it
+    /// has none.
+    pub fn phase_of(&self, u: usize, v: usize, height: f64) -> AbsolutePhase {
+        self.point(u, v, Height::from_mm(height))
+            .and_then(|point| self.phase_at(point))
+            .map_or(AbsolutePhase::UNKNOWN, AbsolutePhase::from_turns)
     }
 
     /// The whole reference phase map, row-major, for unwrapping dense sequences about it.

@@ -78,12 +78,17 @@ pub fn decode(
     Ok(phases)
 }
 
+/// What is known of the heights beforehand: for a place (row-major) and its phase, a height in mm that
+/// is nearly right.
+pub type Guess<'a> = &'a (dyn Fn(usize, AbsolutePhase) -> Option<f64> + Sync);
+
 /// Triangulates every resolved pixel, and marks those without a height in the working range as
-/// [`Trust::OutOfRange`]. `noise` is σ of one sample in counts, for σ_z.
+/// [`Trust::OutOfRange`]. `noise` is σ of one sample in counts, for σ_z; `guess` makes it faster.
 pub fn triangulate(
     triangulator: &Triangulator,
     decoder: &Decoder,
     noise: Option<f64>,
+    guess: Option<Guess<'_>>,
     phases: &mut PhaseMap,
 ) -> HeightMap {
     let width = phases.width;
@@ -105,8 +110,14 @@ pub fn triangulate(
                 if phases.trust[u] != Trust::Resolved {
                     continue;
                 }
-                let phase = phases.phase[u].turns();
-                match triangulator.solve(u as f64, v as f64, phase) {
+                let phase = phases.phase[u];
+                let near = guess.and_then(|guess| guess(v * width + u, phase));
+                let (column, row) = (u as f64, v as f64);
+                let solved = match near {
+                    Some(near) => triangulator.solve_near(column, row, phase.turns(), near),
+                    None => triangulator.solve(column, row, phase.turns()),
+                };
+                match solved {
                     None => phases.trust[u] = Trust::OutOfRange,
                     Some(solution) => {
                         heights[u] = Height::from_mm(solution.point.z);

@@ -101,7 +101,13 @@ pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement, Fail
     stages.noise = started.elapsed();
     let started = Instant::now();
     let heights = geometry.map(|triangulator| Surface {
-        map: pipeline::triangulate(&triangulator, &channel.decoder, noise, &mut phases[primary]),
+        map: pipeline::triangulate(
+            &triangulator,
+            &channel.decoder,
+            noise,
+            None,
+            &mut phases[primary],
+        ),
         triangulator,
     });
     stages.height = started.elapsed();

@@ -31,6 +31,9 @@ pub struct Arrays {
     pub valid: Vec<u8>,
     /// Modulation as taught, in counts.
     pub modulation: Vec<f32>,
+    /// Largest |ΔΦ| in turns that a placement inside the tolerance can cause; infinite where golden
+    /// knows nothing.
+    pub phase_reach: Vec<f32>,
 }
 
 /// An archive that is no recipe of this version.
@@ -92,6 +95,7 @@ pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), Arc
     );
     add("valid.npy", npy::write(columns, &arrays.valid));
     add("modulation.npy", npy::write(columns, &arrays.modulation));
+    add("phase_reach.npy", npy::write(columns, &arrays.phase_reach));
     let zeroed = RecipeFile {
         fingerprint: NO_FINGERPRINT.into(),
         ..file.clone()
@@ -193,6 +197,7 @@ fn read_arrays(members: &[(&str, Vec<u8>)]) -> Result<Arrays, ArchiveError> {
             "height_curvature.npy" => arrays.height_curvature = read(name, bytes)?,
             "valid.npy" => arrays.valid = read(name, bytes)?,
             "modulation.npy" => arrays.modulation = read(name, bytes)?,
+            "phase_reach.npy" => arrays.phase_reach = read(name, bytes)?,
             unknown => return Err(broken(format!("it holds an unknown member {unknown:?}"))),
         }
     }

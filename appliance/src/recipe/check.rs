@@ -1,7 +1,7 @@
 //! From the file form of a recipe to a checked one.
 
 use super::archive::{ArchiveError, Arrays, short, unpack};
-use super::file::{PatternFile, RecipeFile};
+use super::file::{PatternFile, RecipeFile, SequenceKind};
 use algo::inspect::Region;
 use algo::pattern::{PhaseFunction, Sequence};
 use std::collections::HashMap;
@@ -15,7 +15,11 @@ pub struct Recipe {
     pub arrays: Arrays,
     /// Φ_P.
     pub function: PhaseFunction,
-    /// Levels and shifts that are projected in production.
+    /// What the production sequence can unwrap.
+    pub kind: SequenceKind,
+    /// Ratio and shift of each frame that is projected in production.
+    pub production: Vec<(f64, f64)>,
+    /// Its levels and shifts.
     pub sequence: Sequence,
     /// One per gauge.
     pub regions: Vec<Region>,
@@ -75,6 +79,7 @@ impl Recipe {
             ("height_curvature", arrays.height_curvature.len()),
             ("valid", arrays.valid.len()),
             ("modulation", arrays.modulation.len()),
+            ("phase_reach", arrays.phase_reach.len()),
         ] {
             if Some(length) != pixels {
                 return Err(format!(
@@ -96,11 +101,18 @@ impl Recipe {
             }
         };
         let function = function.map_err(|error| error.to_string())?;
-        let production: Vec<_> = file
-            .sequence
+        let production = file.sequences.get(file.production).ok_or_else(|| {
+            format!(
+                "production names sequence {} of {}",
+                file.production,
+                file.sequences.len()
+            )
+        })?;
+        let kind = production.kind;
+        let production: Vec<_> = production
+            .frames
             .iter()
-            .filter(|frame| frame.production)
-            .map(|frame| (frame.ratio, frame.shift_turns))
+            .map(|&[ratio, shift]| (ratio, shift))
             .collect();
         let sequence = Sequence::from_frames(&production).map_err(|error| error.to_string())?;
         let regions = Self::regions(&file, width, height)?;
@@ -118,6 +130,8 @@ impl Recipe {
             file,
             arrays,
             function,
+            kind,
+            production,
             sequence,
             regions,
         })

@@ -35,8 +35,12 @@ pub struct RecipeFile {
     pub projector: RasterFile,
     /// The pattern that is projected.
     pub pattern: PatternFile,
-    /// Every frame of the full sequence.
-    pub sequence: Vec<SequenceFrame>,
+    /// The sequences that the part can be measured with, from the cheapest to the full one.
+    pub sequences: Vec<SequenceFile>,
+    /// Which of them is projected in production, counted from 0.
+    pub production: usize,
+    /// How far a part may lie from where it was taught, in any direction, mm.
+    pub placement_tolerance_mm: f64,
     /// Working range of z in mm.
     pub range_mm: [f64; 2],
     /// Exposure in µs; none where the head has no such setting.
@@ -94,16 +98,43 @@ pub enum PatternFile {
     File,
 }
 
-/// One frame of a sequence.
+/// A sequence and what it is worth on this part.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SequenceFrame {
-    /// Share of the full phase function.
-    pub ratio: f64,
-    /// Shift in turns.
-    pub shift_turns: f64,
-    /// Whether it is projected in production.
-    pub production: bool,
+pub struct SequenceFile {
+    /// What it can unwrap.
+    pub kind: SequenceKind,
+    /// [ratio, shift in turns] of each frame.
+    pub frames: Vec<[f64; 2]>,
+    /// Predicted σ_z, RMS over the golden surface, mm.
+    pub sigma_mm: f64,
+    /// Share of the golden surface whose phase stays within the sequence's reach for every
+    /// placement inside the tolerance.
+    pub safe_share: f64,
+}
+
+/// The kinds of sequence, by how far from the golden map they can unwrap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SequenceKind {
+    /// One level: |ΔΦ| < 0.4 turn.
+    SingleLevel,
+    /// Two dense levels 1, 4/5: |ΔΦ| < 2.3 turns.
+    TwoLevels,
+    /// Absolute, or three dense levels: |ΔΦ| < n²/2 − n turns.
+    Full,
+}
+
+impl SequenceKind {
+    /// Largest |ΔΦ| about the golden map that is unwrapped rightly, in turns; none for the full
+    /// sequence, whose own residuals tell.
+    pub fn reach(self) -> Option<f32> {
+        match self {
+            Self::SingleLevel => Some(0.4),
+            Self::TwoLevels => Some(2.3),
+            Self::Full => None,
+        }
+    }
 }
 
 /// A named polygon.

@@ -6,9 +6,13 @@
 pub mod archive;
 pub mod check;
 pub mod file;
+pub mod golden;
+pub mod planner;
 pub mod store;
 pub mod teach;
 
 pub use check::Recipe;
-pub use file::{GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFrame};
+pub use file::{
+    GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFile, SequenceKind,
+};
 pub use store::{LoadError, Store};

@@ -1,64 +1,35 @@
 //! Teaching: from a good part in front of the head to a recipe.
 
-use super::archive::{self, Arrays};
-use super::file::{CameraFile, FORMAT, RasterFile, VERSION};
-use super::{GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile, SequenceFrame};
+pub use super::golden::{Naming, Taught};
+
+use super::PatternFile;
+use super::golden::GoldenPart;
+use crate::bench::{About, Bench, BenchError, Measured};
 use crate::calibration::Calibration;
-use crate::plan::rasters;
-use crate::seam;
-use algo::geometry::{Reference, Triangulator};
-use algo::inspect::openings;
+use algo::adaptive::{AdaptError, ProjectorMap, noise};
 use algo::pattern::{PhaseFunction, Sequence};
-use algo::phase::{Decoder, Trust};
-use algo::pipeline::{self, HeightMap, PhaseMap};
+use algo::phase::Trust;
+use algo::pipeline::PhaseMap;
+use algo::units::AbsolutePhase;
 use hal::head::DynHead;
 use std::time::Duration;
 
-/// Projector pitch of the taught pattern, in pixels.
-const PITCH_PX: f64 = 12.0;
-/// Levels and steps of the taught sequence.
+/// Projector pitch of the preliminary pattern, in pixels (c·p_P of the paper).
+const PRELIMINARY_PITCH_PX: f64 = 20.0;
+/// Levels and steps of the preliminary sequence.
 const LEVELS: usize = 3;
 const STEPS: usize = 4;
+/// n of the dense levels about the expected map: unwraps ± (n²/2 − n) = ± 4 turns.
+const DENSE_N: f64 = 4.0;
 /// A scene that resolves less than this share of the frame cannot be taught.
 const LEAST_RESOLVED: f64 = 0.005;
-/// Pixels at silhouettes mix two surfaces: the golden map is eroded by this much.
-const EROSION_PX: usize = 2;
-/// Pixels whose taught height is less certain than this are not compared, mm (1 σ).
-const MAX_SIGMA_MM: f64 = 0.25;
-/// Deviations are averaged over squares of this many camera pixels.
-const SMOOTHING_PX: usize = 9;
-/// Limit of the deviation, mm.
-const DEVIATION_MM: f64 = 0.25;
-/// Limit of the change of the part's coverage, as a share of the frame.
-const COVERAGE_CHANGE: f64 = 0.01;
-/// Least share of the golden surface that must be resolved.
-const MIN_COVERAGE: f64 = 0.80;
-/// An opening has at least this many pixels, and at most this share of it may be resolved.
-const OPENING_PIXELS: usize = 60;
-const OPENING_COVERAGE: f64 = 0.25;
-/// Openings that get a gauge of their own, and the least reach of their regions in pixels.
-const MAX_OPENINGS: usize = 8;
-const OPENING_REACH: usize = 4;
-
-/// What to call the recipe.
-#[derive(Clone, Debug)]
-pub struct Naming {
-    /// 1–9999.
-    pub number: u16,
-    /// The key for a PLC.
-    pub part_number: String,
-    /// For people.
-    pub name: String,
-    /// When, in seconds since 1970 UTC; 0 if not known.
-    pub taught_at_unix_s: u64,
-}
 
 /// A part that could not be taught.
 #[derive(Debug, thiserror::Error)]
 pub enum TeachError {
     /// A device failed.
     #[error("teach: {0}")]
-    Device(#[from] hal::error::Error),
+    Device(hal::error::Error),
     /// The scene does not make a recipe.
     #[error("teach: {0}")]
     Scene(String),
@@ -67,16 +38,23 @@ pub enum TeachError {
     Rig(String),
 }
 
-fn rig(error: impl std::fmt::Display) -> TeachError {
-    TeachError::Rig(error.to_string())
+impl From<BenchError> for TeachError {
+    fn from(error: BenchError) -> Self {
+        match error {
+            BenchError::Device(error) => Self::Device(error),
+            BenchError::Rig(error) => Self::Rig(error),
+        }
+    }
 }
 
-/// Measures the part in front of the head with a fixed pattern and makes it a recipe: its bytes and
-/// its checked form.
-///
-/// Gauges are made for what the part shows: deviation from golden and coverage of the whole part,
-/// and that each of its openings stays open. `progress` is told the share done and what is being
-/// done.
+impl From<AdaptError> for TeachError {
+    fn from(error: AdaptError) -> Self {
+        Self::Scene(error.to_string())
+    }
+}
+
+/// Measures the part in front of the head with a fixed pattern, makes its own pattern, measures it
+/// again with that, and makes it a recipe. `progress` is told the share done and what is being done.
 ///
 /// # Errors
 /// If a device fails or the scene cannot be taught. Nothing is stored here.
@@ -86,92 +64,81 @@ pub fn teach(
     naming: &Naming,
     timeout: Duration,
     progress: &dyn Fn(f64, &str),
-) -> Result<(Vec<u8>, Recipe), TeachError> {
-    progress(0.0, "making the pattern");
-    let (columns, rows) = calibration.projector;
-    let fringes = f64::from(columns) / PITCH_PX;
-    let function =
-        PhaseFunction::vertical(columns as usize, rows as usize, fringes).map_err(rig)?;
-    let frames = Sequence::geometric(function.range(), LEVELS, STEPS);
-    head.load(rasters(&function, frames.iter().copied(), calibration)?)?;
-    let mut taken = Vec::with_capacity(frames.len());
-    let indices: Vec<usize> = (0..frames.len()).collect();
-    head.acquire(&indices, timeout, &mut |_, frame| {
-        taken.push(frame);
-        progress(
-            0.1 + 0.5 * taken.len() as f64 / frames.len() as f64,
-            "measuring the part",
-        );
-    })?;
-    progress(0.6, "computing the golden map");
-    let views = taken
-        .iter()
-        .map(seam::view)
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(rig)?;
-    let sequence = Sequence::from_frames(&frames).map_err(rig)?;
-    let decoder = Decoder::new(&sequence, function.range(), calibration.camera.2).map_err(rig)?;
-    let (camera, projector) = calibration.devices().map_err(rig)?;
-    let triangulator =
-        Triangulator::new(camera, projector, Reference::Models, function, None).map_err(rig)?;
-    let mut phases = pipeline::decode(&decoder, &views, None).map_err(rig)?;
-    let noise = calibration.noise_counts;
-    let heights = pipeline::triangulate(&triangulator, &decoder, Some(noise), &mut phases);
-    refuse_empty(&phases)?;
-    progress(0.8, "working out the expansion");
-    let arrays = arrays(&triangulator, &decoder, &phases, &heights);
-    let resolved: Vec<bool> = phases
-        .trust
-        .iter()
-        .map(|trust| *trust == Trust::Resolved)
-        .collect();
-    let (regions, gauges) = gauges(&resolved, phases.width);
-    let range = triangulator.range();
-    let file = RecipeFile {
-        format: FORMAT.into(),
-        version: VERSION,
-        fingerprint: String::new(),
-        number: naming.number,
-        part_number: naming.part_number.clone(),
-        name: naming.name.clone(),
-        taught_by: concat!("fringed ", env!("CARGO_PKG_VERSION")).into(),
-        taught_at_unix_s: naming.taught_at_unix_s,
-        calibration: calibration.fingerprint(),
-        camera: CameraFile {
-            width: calibration.camera.0,
-            height: calibration.camera.1,
-            bit_depth: calibration.camera.2,
-        },
-        projector: RasterFile {
-            width: columns,
-            height: rows,
-        },
-        pattern: PatternFile::Vertical { fringes },
-        sequence: frames
-            .iter()
-            .map(|&(ratio, shift_turns)| SequenceFrame {
-                ratio,
-                shift_turns,
-                production: true,
-            })
-            .collect(),
-        range_mm: [range.low, range.high],
-        exposure_us: None,
-        noise_counts: noise,
-        expansion_range_turns: 0.5,
-        min_coverage: MIN_COVERAGE,
-        regions,
-        gauges,
+) -> Result<Taught, TeachError> {
+    let mut bench = Bench {
+        head,
+        calibration,
+        range: None,
+        timeout,
     };
-    let (bytes, _) = archive::pack(&file, &arrays).map_err(rig)?;
-    // Read back as it will be after a restart: what was just taught is known to load.
-    let recipe = Recipe::from_bytes(&bytes).map_err(rig)?;
+    let (columns, rows) = (
+        calibration.projector.0 as usize,
+        calibration.projector.1 as usize,
+    );
+    let preliminary = PhaseFunction::vertical(columns, rows, columns as f64 / PRELIMINARY_PITCH_PX)
+        .map_err(|error| TeachError::Rig(error.to_string()))?;
+    let frames = Sequence::geometric(preliminary.range(), LEVELS, STEPS);
+    let first = bench.measure(&preliminary, &frames, About::Reference, &|share| {
+        progress(0.3 * share, "measuring the part");
+    })?;
+    refuse_empty(&first.phases)?;
+    progress(0.35, "making the part's own pattern");
+    let map = ProjectorMap::from_heights(&first.triangulator, &first.heights);
+    let function = noise::adapt(&map, columns, rows, &OPTICS)?;
+    let expected: Vec<AbsolutePhase> = map
+        .points
+        .iter()
+        .map(|[xi, eta]| AbsolutePhase::from_turns(function.at(*xi, *eta)))
+        .collect();
+    let full = dense(DENSE_N);
+    let golden = bench.measure(&function, &full, About::Map(&expected), &|share| {
+        progress(0.4 + 0.3 * share, "measuring the part with its own pattern");
+    })?;
+    refuse_empty(&golden.phases)?;
+    progress(0.75, "working out the expansion and the safe mask");
+    let Measured {
+        phases,
+        heights,
+        decoder,
+        triangulator,
+        ..
+    } = &golden;
+    let part = GoldenPart {
+        calibration,
+        pattern: PatternFile::File,
+        full: &full,
+        decoder,
+        triangulator,
+        phases,
+        heights,
+        noise: calibration.noise_counts,
+    };
+    let taught = part.recipe(naming).map_err(TeachError::Rig)?;
     progress(1.0, "taught");
-    Ok((bytes, recipe))
+    Ok(taught)
+}
+
+/// What the pattern is made for until a calibration has measured the contrast: sharp devices.
+const OPTICS: noise::Optics = noise::Optics {
+    projector_blur: 0.0,
+    camera_blur: 0.0,
+    projector_pitch: 6.0,
+    image_pitch: 2.2,
+};
+
+/// Ratio and shift of three dense levels of four steps, ratios 1, 1 − 1/n², 1 − 1/n.
+pub fn dense(n: f64) -> Vec<(f64, f64)> {
+    [1.0, 1.0 - 1.0 / (n * n), 1.0 - 1.0 / n]
+        .into_iter()
+        .flat_map(|ratio| (0..4).map(move |k| (ratio, f64::from(k) / 4.0)))
+        .collect()
 }
 
 /// Says what keeps an unusable scene from being taught.
-fn refuse_empty(phases: &PhaseMap) -> Result<(), TeachError> {
+///
+/// # Errors
+/// If less than half a per cent of the frame is resolved: why.
+pub fn refuse_empty(phases: &PhaseMap) -> Result<(), TeachError> {
     let pixels = phases.trust.len() as f64;
     if phases.count(Trust::Resolved) as f64 >= LEAST_RESOLVED * pixels {
         return Ok(());
@@ -205,125 +172,4 @@ fn refuse_empty(phases: &PhaseMap) -> Result<(), TeachError> {
             share(Trust::Dark)
         ),
     }))
-}
-
-fn arrays(
-    triangulator: &Triangulator,
-    decoder: &Decoder,
-    phases: &PhaseMap,
-    heights: &HeightMap,
-) -> Arrays {
-    let width = phases.width;
-    let mut expansions = vec![[f32::NAN; 2]; phases.phase.len()];
-    pipeline::for_each_row(&mut expansions, width, |v, row| {
-        for (u, [first, second]) in row.iter_mut().enumerate() {
-            let at = v * width + u;
-            if phases.trust[at] != Trust::Resolved {
-                continue;
-            }
-            let phase = phases.phase[at].turns();
-            if let Some(expansion) = triangulator.expand(u as f64, v as f64, phase) {
-                (*first, *second) = (expansion.first as f32, expansion.second as f32);
-            }
-        }
-    });
-    let resolved = |at: &usize| phases.trust[*at] == Trust::Resolved;
-    let certain = |at: usize| resolved(&at) && f64::from(heights.sigma[at]) <= MAX_SIGMA_MM;
-    let certain: Vec<bool> = (0..phases.phase.len()).map(certain).collect();
-    let valid = eroded(&certain, width, EROSION_PX);
-    Arrays {
-        phase_function: Vec::new(),
-        golden_phase: (0..phases.phase.len())
-            .map(|at| {
-                if resolved(&at) {
-                    phases.phase[at].turns()
-                } else {
-                    f64::NAN
-                }
-            })
-            .collect(),
-        golden_height: heights
-            .height
-            .iter()
-            .map(|height| height.mm() as f32)
-            .collect(),
-        height_slope: expansions.iter().map(|[first, _]| *first).collect(),
-        height_curvature: expansions.iter().map(|[_, second]| *second).collect(),
-        valid: valid.into_iter().map(u8::from).collect(),
-        modulation: phases
-            .modulation
-            .iter()
-            .map(|modulation| modulation.counts(decoder.full_scale()) as f32)
-            .collect(),
-    }
-}
-
-/// Takes `by` pixels off every edge of a mask (square neighbourhood); the frame's border is an edge.
-fn eroded(mask: &[bool], width: usize, by: usize) -> Vec<bool> {
-    let rows = mask.len() / width.max(1);
-    let inside = |column: usize, row: usize| {
-        let fits = column >= by && row >= by && column + by < width && row + by < rows;
-        fits && (row - by..=row + by).all(|v| {
-            mask[v * width + column - by..=v * width + column + by]
-                .iter()
-                .all(|on| *on)
-        })
-    };
-    (0..mask.len())
-        .map(|at| inside(at % width, at / width))
-        .collect()
-}
-
-/// The regions and gauges that a taught part gets by itself.
-fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) {
-    let rows = resolved.len() / width.max(1);
-    let (right, bottom) = (width as f64 - 0.5, rows as f64 - 0.5);
-    let mut regions = vec![RegionFile {
-        name: "frame".into(),
-        polygon: vec![[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]],
-    }];
-    let coverage = resolved.iter().filter(|on| **on).count() as f64 / resolved.len().max(1) as f64;
-    let mut gauges = vec![
-        GaugeFile {
-            name: "deviation".into(),
-            region: "frame".into(),
-            measures: GaugeKind::Deviation {
-                smoothing_px: SMOOTHING_PX,
-            },
-            low: Some(-DEVIATION_MM),
-            high: Some(DEVIATION_MM),
-        },
-        GaugeFile {
-            name: "coverage".into(),
-            region: "frame".into(),
-            measures: GaugeKind::Coverage,
-            low: Some((coverage - COVERAGE_CHANGE).max(0.0)),
-            high: Some((coverage + COVERAGE_CHANGE).min(1.0)),
-        },
-    ];
-    let found = openings(resolved, width, OPENING_PIXELS);
-    let usable = found
-        .iter()
-        .filter(|opening| opening.reach >= OPENING_REACH);
-    for (at, opening) in usable.take(MAX_OPENINGS).enumerate() {
-        let name = format!("opening {}", at + 1);
-        let ((u, v), reach) = (opening.centre, opening.reach as f64);
-        regions.push(RegionFile {
-            name: name.clone(),
-            polygon: vec![
-                [u - reach, v],
-                [u, v - reach],
-                [u + reach, v],
-                [u, v + reach],
-            ],
-        });
-        gauges.push(GaugeFile {
-            name: name.clone(),
-            region: name,
-            measures: GaugeKind::Coverage,
-            low: None,
-            high: Some(OPENING_COVERAGE),
-        });
-    }
-    (regions, gauges)
 }

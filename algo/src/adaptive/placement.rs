@@ -1,0 +1,120 @@
+//! How far a part's placement can move the phase of each pixel.
+//!
+//! A single level cannot prove its fringe order: it is right only where the phase stays within half
+//! a turn of the golden map. Two dense levels reach further. Which pixels are safe follows from the
+//! golden surface and the declared tolerance of placement.
+
+use crate::geometry::{Triangulator, Vector};
+use crate::pipeline::{for_each_row, map_rows};
+use crate::units::{AbsolutePhase, Height};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// The part as taught, row-major over the camera's frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface<'a> {
+    /// Pixels per row.
+    pub width: usize,
+    /// z, [`Height::UNKNOWN`] where not resolved.
+    pub height: &'a [Height],
+    /// Φ, [`AbsolutePhase::UNKNOWN`] where not resolved.
+    pub phase: &'a [AbsolutePhase],
+}
+
+/// Moves that are tried: the 26 neighbours of a cube's centre, as directions.
+const DIRECTIONS: usize = 26;
+/// Shares of the tolerance that are tried along each direction: what passes through the frame on the
+/// way to the full move counts as well.
+const SHARES: [f64; 2] = [1.0, 0.5];
+
+/// The largest |ΔΦ| in turns that each pixel can see when the part is moved by up to `tolerance` mm
+/// in any direction; infinite where golden knows nothing within reach of the move.
+///
+/// Every golden point is moved along 26 directions and projected to the pixel that then looks at
+/// it, and to that pixel's neighbours; its phase there is compared with the golden one. That another
+/// part of the surface may stand in front is left out: it only makes the answer more careful.
+pub fn phase_reach(triangulator: &Triangulator, golden: Surface<'_>, tolerance: f64) -> Vec<f32> {
+    let width = golden.width.max(1);
+    let rows = golden.height.len() / width;
+    let points = points(triangulator, golden);
+    let mut reach = vec![0.0_f32; golden.height.len()];
+    let mut furthest = 1_usize;
+    for step in moves(tolerance) {
+        let seen = map_rows(rows, |v| {
+            let row = points[v * width..(v + 1) * width].iter().enumerate();
+            row.filter_map(|(u, point)| {
+                let moved = (*point)? + step;
+                let (column, line) = triangulator.camera().project(moved)?;
+                let (xi, eta) = triangulator.projector_point(moved)?;
+                let phase = triangulator.function().at(xi, eta);
+                let (column, line) = (libm::rint(column), libm::rint(line));
+                let away = libm::fabs(column - u as f64).max(libm::fabs(line - v as f64));
+                Some((column as isize, line as isize, phase, away as usize))
+            })
+            .collect::<Vec<_>>()
+        });
+        for (column, line, phase, away) in seen.into_iter().flatten() {
+            furthest = furthest.max(away + 1);
+            for v in line - 1..=line + 1 {
+                for u in column - 1..=column + 1 {
+                    let inside = u >= 0 && v >= 0 && u < width as isize && v < rows as isize;
+                    if !inside {
+                        continue;
+                    }
+                    let place = v as usize * width + u as usize;
+                    if golden.phase[place].is_known() {
+                        let moved = libm::fabs(phase - golden.phase[place].turns()) as f32;
+                        reach[place] = reach[place].max(moved);
+                    }
+                }
+            }
+        }
+    }
+    let known: Vec<bool> = golden.phase.iter().map(|phase| phase.is_known()).collect();
+    forbid_near_unknown(&mut reach, &known, width, furthest);
+    reach
+}
+
+fn points(triangulator: &Triangulator, golden: Surface<'_>) -> Vec<Option<Vector>> {
+    let mut points = vec![None; golden.height.len()];
+    for_each_row(&mut points, golden.width, |v, row| {
+        for (u, point) in row.iter_mut().enumerate() {
+            *point = triangulator.point(u, v, golden.height[v * golden.width + u]);
+        }
+    });
+    points
+}
+
+/// The moves that are tried, in mm.
+fn moves(tolerance: f64) -> impl Iterator<Item = Vector> {
+    let axis = |i: usize| (i % 3) as f64 - 1.0;
+    (0..=DIRECTIONS)
+        .map(move |i| Vector::new(axis(i), axis(i / 3), axis(i / 9)))
+        .filter(|direction| direction.length() > 0.0)
+        .flat_map(move |direction| {
+            let scale = tolerance / direction.length();
+            SHARES.map(|share| direction * (scale * share))
+        })
+}
+
+/// What golden does not know may move into view: pixels within `away` of it are not safe.
+fn forbid_near_unknown(reach: &mut [f32], known: &[bool], width: usize, away: usize) {
+    let rows = known.len() / width;
+    // Rows first, then columns: a separable square.
+    let mut near_row = vec![false; known.len()];
+    for_each_row(&mut near_row, width, |v, row| {
+        let line = &known[v * width..(v + 1) * width];
+        for (u, near) in row.iter_mut().enumerate() {
+            let window = &line[u.saturating_sub(away)..(u + away + 1).min(width)];
+            *near = window.contains(&false);
+        }
+    });
+    for_each_row(reach, width, |v, row| {
+        for (u, reach) in row.iter_mut().enumerate() {
+            let lines = v.saturating_sub(away)..(v + away + 1).min(rows);
+            if lines.into_iter().any(|v| near_row[v * width + u]) {
+                *reach = f32::INFINITY;
+            }
+        }
+    });
+}

@@ -1,0 +1,328 @@
+//! From a golden measurement to a recipe, whether it came from a head or from a recording.
+
+use super::archive::{self, Arrays};
+use super::file::{CameraFile, FORMAT, RasterFile, VERSION};
+use super::planner::{self, Choice};
+use super::{
+    GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile, SequenceFile, SequenceKind,
+};
+use crate::calibration::Calibration;
+use algo::adaptive::{Surface, phase_reach};
+use algo::geometry::Triangulator;
+use algo::inspect::openings;
+use algo::phase::{Decoder, Trust};
+use algo::pipeline::{self, HeightMap, PhaseMap};
+
+/// Pixels at silhouettes mix two surfaces: the golden map is eroded by this much.
+const EROSION_PX: usize = 2;
+/// Pixels whose taught height is less certain than this are not compared, mm (1 σ).
+const MAX_SIGMA_MM: f64 = 0.25;
+/// Deviations are averaged over squares of this many camera pixels.
+const SMOOTHING_PX: usize = 9;
+/// Limit of the deviation, mm.
+const DEVIATION_MM: f64 = 0.25;
+/// The part's coverage may fall by this share of the frame.
+const COVERAGE_CHANGE: f64 = 0.01;
+/// Least share of the golden surface that must be resolved.
+const MIN_COVERAGE: f64 = 0.80;
+/// An opening has at least this many pixels, and at most this share of it may be resolved.
+const OPENING_PIXELS: usize = 60;
+const OPENING_COVERAGE: f64 = 0.25;
+/// Openings that get a gauge of their own, and the least reach of their regions in pixels.
+const MAX_OPENINGS: usize = 8;
+const OPENING_REACH: usize = 4;
+/// |ΔΦ| up to which the expansion of the height is used, turns.
+const EXPANSION_TURNS: f64 = 0.5;
+
+/// What to call a recipe, and how carefully parts are placed.
+#[derive(Clone, Debug)]
+pub struct Naming {
+    /// 1–9999.
+    pub number: u16,
+    /// The key for a PLC.
+    pub part_number: String,
+    /// For people.
+    pub name: String,
+    /// When, in seconds since 1970 UTC; 0 if not known.
+    pub taught_at_unix_s: u64,
+    /// How far a part may lie from where it was taught, in any direction, mm.
+    pub placement_tolerance_mm: f64,
+}
+
+/// A measured golden part.
+pub struct GoldenPart<'a> {
+    /// The head's calibration.
+    pub calibration: &'a Calibration,
+    /// The pattern's file form; the function itself is the triangulator's.
+    pub pattern: PatternFile,
+    /// Ratio and shift of each frame of the full sequence.
+    pub full: &'a [(f64, f64)],
+    /// How it was decoded.
+    pub decoder: &'a Decoder,
+    /// The geometry with its phase function.
+    pub triangulator: &'a Triangulator,
+    /// Golden phase.
+    pub phases: &'a PhaseMap,
+    /// Golden height.
+    pub heights: &'a HeightMap,
+    /// σ of one sample in counts.
+    pub noise: f64,
+}
+
+/// A finished recipe.
+#[derive(Debug)]
+pub struct Taught {
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// Its checked form.
+    pub recipe: Recipe,
+    /// Why which sequence was chosen.
+    pub choice: Choice,
+}
+
+impl GoldenPart<'_> {
+    /// Makes the recipe: expansion, safe mask, regions, gauges and plan. Gauges are made for what
+    /// the part shows: deviation from golden and coverage of the whole part, and that each of its
+    /// openings stays open.
+    ///
+    /// # Errors
+    /// In words, if the parts do not make a recipe that loads.
+    pub fn recipe(&self, naming: &Naming) -> Result<Taught, String> {
+        let resolved: Vec<bool> = self
+            .phases
+            .trust
+            .iter()
+            .map(|trust| *trust == Trust::Resolved)
+            .collect();
+        let (regions, gauges) = gauges(&resolved, self.phases.width);
+        let arrays = self.arrays(naming.placement_tolerance_mm);
+        let sequences = self.sequences(&arrays);
+        let choice = planner::choose(&sequences, &gauges);
+        let range = self.triangulator.range();
+        let calibration = self.calibration;
+        let file = RecipeFile {
+            format: FORMAT.into(),
+            version: VERSION,
+            fingerprint: String::new(),
+            number: naming.number,
+            part_number: naming.part_number.clone(),
+            name: naming.name.clone(),
+            taught_by: concat!("fringed ", env!("CARGO_PKG_VERSION")).into(),
+            taught_at_unix_s: naming.taught_at_unix_s,
+            calibration: calibration.fingerprint(),
+            camera: CameraFile {
+                width: calibration.camera.0,
+                height: calibration.camera.1,
+                bit_depth: calibration.camera.2,
+            },
+            projector: RasterFile {
+                width: calibration.projector.0,
+                height: calibration.projector.1,
+            },
+            pattern: self.pattern.clone(),
+            sequences,
+            production: choice.production,
+            placement_tolerance_mm: naming.placement_tolerance_mm,
+            range_mm: [range.low, range.high],
+            exposure_us: None,
+            noise_counts: self.noise,
+            expansion_range_turns: EXPANSION_TURNS,
+            min_coverage: MIN_COVERAGE,
+            regions,
+            gauges,
+        };
+        let (bytes, _) = archive::pack(&file, &arrays).map_err(|error| error.to_string())?;
+        // Read back as it will be after a restart: what was just taught is known to load.
+        let recipe = Recipe::from_bytes(&bytes).map_err(|error| error.to_string())?;
+        Ok(Taught {
+            bytes,
+            recipe,
+            choice,
+        })
+    }
+
+    fn arrays(&self, tolerance: f64) -> Arrays {
+        let (phases, heights) = (self.phases, self.heights);
+        let width = phases.width;
+        let resolved = |at: usize| phases.trust[at] == Trust::Resolved;
+        let mut expansions = vec![[f32::NAN; 2]; phases.phase.len()];
+        pipeline::for_each_row(&mut expansions, width, |v, row| {
+            for (u, [first, second]) in row.iter_mut().enumerate() {
+                let at = v * width + u;
+                let phase = phases.phase[at].turns();
+                let expansion = resolved(at)
+                    .then(|| self.triangulator.expand(u as f64, v as f64, phase))
+                    .flatten();
+                if let Some(expansion) = expansion {
+                    (*first, *second) = (expansion.first as f32, expansion.second as f32);
+                }
+            }
+        });
+        let certain = |at: usize| resolved(at) && f64::from(heights.sigma[at]) <= MAX_SIGMA_MM;
+        let certain: Vec<bool> = (0..phases.phase.len()).map(certain).collect();
+        let surface = Surface {
+            width,
+            height: &heights.height,
+            phase: &phases.phase,
+        };
+        let full_scale = self.decoder.full_scale();
+        let function = self.triangulator.function();
+        let turns = |at: usize| {
+            if resolved(at) {
+                phases.phase[at].turns()
+            } else {
+                f64::NAN
+            }
+        };
+        Arrays {
+            phase_function: match self.pattern {
+                PatternFile::File => (0..function.rows())
+                    .flat_map(|row| (0..function.columns()).map(move |column| (column, row)))
+                    .map(|(column, row)| function.at_pixel(column, row))
+                    .collect(),
+                PatternFile::Vertical { .. } | PatternFile::Horizontal { .. } => Vec::new(),
+            },
+            golden_phase: (0..phases.phase.len()).map(turns).collect(),
+            golden_height: heights
+                .height
+                .iter()
+                .map(|height| height.mm() as f32)
+                .collect(),
+            height_slope: expansions.iter().map(|[first, _]| *first).collect(),
+            height_curvature: expansions.iter().map(|[_, second]| *second).collect(),
+            valid: eroded(&certain, width, EROSION_PX)
+                .into_iter()
+                .map(u8::from)
+                .collect(),
+            modulation: phases
+                .modulation
+                .iter()
+                .map(|modulation| modulation.counts(full_scale) as f32)
+                .collect(),
+            phase_reach: phase_reach(self.triangulator, surface, tolerance),
+        }
+    }
+
+    /// The sequences that the part can be measured with, and what each is worth.
+    fn sequences(&self, arrays: &Arrays) -> Vec<SequenceFile> {
+        let level = |ratio: f64, steps: u32| {
+            (0..steps).map(move |k| [ratio, f64::from(k) / f64::from(steps)])
+        };
+        let full: Vec<[f64; 2]> = self
+            .full
+            .iter()
+            .map(|&(ratio, shift)| [ratio, shift])
+            .collect();
+        let candidates = [
+            (SequenceKind::SingleLevel, level(1.0, 3).collect()),
+            (SequenceKind::SingleLevel, level(1.0, 4).collect()),
+            (
+                SequenceKind::TwoLevels,
+                level(1.0, 3).chain(level(0.8, 3)).collect(),
+            ),
+            (SequenceKind::Full, full),
+        ];
+        candidates
+            .map(|(kind, frames)| self.worth(kind, frames, arrays))
+            .into()
+    }
+
+    fn worth(&self, kind: SequenceKind, frames: Vec<[f64; 2]>, arrays: &Arrays) -> SequenceFile {
+        // Of a geometric sequence only the finest level carries the accuracy.
+        let absolute = !self.decoder.unwrapping().needs_map() && kind == SequenceKind::Full;
+        let carries = |ratio: f64| !absolute || ratio >= 0.999;
+        let squares = frames
+            .iter()
+            .filter(|[ratio, _]| carries(*ratio))
+            .map(|[ratio, _]| ratio * ratio);
+        let information: f64 = squares.sum();
+        let safe = |at: &usize| {
+            kind.reach()
+                .is_none_or(|reach| arrays.phase_reach[*at] < reach)
+        };
+        let valid = || (0..arrays.valid.len()).filter(|&at| arrays.valid[at] == 1);
+        let variance = |at: usize| {
+            let counts = f64::from(arrays.modulation[at]);
+            let turns =
+                self.noise / std::f64::consts::TAU * (2.0 / (information * counts * counts)).sqrt();
+            (turns * f64::from(arrays.height_slope[at])).powi(2)
+        };
+        let count = valid().count().max(1) as f64;
+        SequenceFile {
+            kind,
+            frames,
+            sigma_mm: (valid().map(variance).sum::<f64>() / count).sqrt(),
+            safe_share: valid().filter(safe).count() as f64 / count,
+        }
+    }
+}
+
+/// Takes `by` pixels off every edge of a mask (square neighbourhood); the frame's border is an edge.
+fn eroded(mask: &[bool], width: usize, by: usize) -> Vec<bool> {
+    let rows = mask.len() / width.max(1);
+    let inside = |column: usize, row: usize| {
+        let fits = column >= by && row >= by && column + by < width && row + by < rows;
+        fits && (row - by..=row + by).all(|v| {
+            mask[v * width + column - by..=v * width + column + by]
+                .iter()
+                .all(|on| *on)
+        })
+    };
+    (0..mask.len())
+        .map(|at| inside(at % width, at / width))
+        .collect()
+}
+
+/// The regions and gauges that a taught part gets by itself.
+fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) {
+    let rows = resolved.len() / width.max(1);
+    let (right, bottom) = (width as f64 - 0.5, rows as f64 - 0.5);
+    let mut regions = vec![RegionFile {
+        name: "frame".into(),
+        polygon: vec![[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]],
+    }];
+    let coverage = resolved.iter().filter(|on| **on).count() as f64 / resolved.len().max(1) as f64;
+    let mut gauges = vec![
+        GaugeFile {
+            name: "deviation".into(),
+            region: "frame".into(),
+            measures: GaugeKind::Deviation {
+                smoothing_px: SMOOTHING_PX,
+            },
+            low: Some(-DEVIATION_MM),
+            high: Some(DEVIATION_MM),
+        },
+        GaugeFile {
+            name: "coverage".into(),
+            region: "frame".into(),
+            measures: GaugeKind::Coverage,
+            low: Some((coverage - COVERAGE_CHANGE).max(0.0)),
+            high: None,
+        },
+    ];
+    let found = openings(resolved, width, OPENING_PIXELS);
+    let usable = found
+        .iter()
+        .filter(|opening| opening.reach >= OPENING_REACH);
+    for (at, opening) in usable.take(MAX_OPENINGS).enumerate() {
+        let name = format!("opening {}", at + 1);
+        let ((u, v), reach) = (opening.centre, opening.reach as f64);
+        regions.push(RegionFile {
+            name: name.clone(),
+            polygon: vec![
+                [u - reach, v],
+                [u, v - reach],
+                [u + reach, v],
+                [u, v + reach],
+            ],
+        });
+        gauges.push(GaugeFile {
+            name: name.clone(),
+            region: name,
+            measures: GaugeKind::Coverage,
+            low: None,
+            high: Some(OPENING_COVERAGE),
+        });
+    }
+    (regions, gauges)
+}

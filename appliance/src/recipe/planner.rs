@@ -1,0 +1,148 @@
+//! Which sequence is good enough for a part, and what it would cost to be better.
+
+use super::GaugeFile;
+use super::file::{GaugeKind, SequenceFile, SequenceKind};
+
+/// A sequence is good enough if its noise, after a gauge's smoothing, stays this many times inside
+/// the gauge's limit: a frame has some thousand independent places, whose extremes reach 4 σ.
+const SIGMAS: f64 = 6.0;
+/// Share of the golden surface that must be safe for a sequence that is not full.
+const SAFE_SHARE: f64 = 0.98;
+
+/// What each sequence would give.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// Which sequence to project.
+    pub production: usize,
+    /// One line per sequence, cheapest first: what it gives and why it was taken or not.
+    pub reasons: Vec<String>,
+}
+
+/// The largest σ_z, RMS over the surface, that a recipe's deviation limits allow.
+pub fn allowed_sigma(gauges: &[GaugeFile]) -> f64 {
+    let allowed = gauges.iter().filter_map(|gauge| {
+        let GaugeKind::Deviation { smoothing_px } = gauge.measures else {
+            return None;
+        };
+        let limits = [gauge.low, gauge.high];
+        let limit = limits
+            .into_iter()
+            .flatten()
+            .map(f64::abs)
+            .reduce(f64::min)?;
+        // Golden and measurement are both noisy, hence √2; averaging side² pixels divides by side.
+        Some(limit * smoothing_px as f64 / SIGMAS / std::f64::consts::SQRT_2)
+    });
+    allowed.fold(f64::INFINITY, f64::min)
+}
+
+/// Picks the cheapest sequence that is good enough; the full one, the last, if none is.
+pub fn choose(sequences: &[SequenceFile], gauges: &[GaugeFile]) -> Choice {
+    let allowed = allowed_sigma(gauges);
+    // Only the full sequence sees material where golden has none.
+    let looks_for_more = gauges
+        .iter()
+        .any(|gauge| gauge.measures == GaugeKind::Coverage && gauge.high.is_some());
+    let good = |sequence: &SequenceFile| {
+        let full = sequence.kind == SequenceKind::Full;
+        let safe = full || (!looks_for_more && sequence.safe_share >= SAFE_SHARE);
+        safe && sequence.sigma_mm <= allowed
+    };
+    let taken = sequences
+        .iter()
+        .position(good)
+        .unwrap_or(sequences.len().saturating_sub(1));
+    let reason = |(at, sequence): (usize, &SequenceFile)| {
+        let word = match at.cmp(&taken) {
+            std::cmp::Ordering::Less if sequence.sigma_mm > allowed => "too noisy",
+            std::cmp::Ordering::Less if looks_for_more => "blind where an opening must stay open",
+            std::cmp::Ordering::Less => "not safe enough",
+            std::cmp::Ordering::Equal => "taken",
+            std::cmp::Ordering::Greater => "better, not needed",
+        };
+        format!(
+            "{} frames: predicted σ {:.1} µm of {:.1} µm allowed, safe on {:.1} % of the part: {word}",
+            sequence.frames.len(),
+            sequence.sigma_mm * 1000.0,
+            allowed * 1000.0,
+            sequence.safe_share * 100.0,
+        )
+    };
+    Choice {
+        production: taken,
+        reasons: sequences.iter().enumerate().map(reason).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sequences(sigmas: [f64; 3], safe: [f64; 3]) -> Vec<SequenceFile> {
+        let kinds = [
+            SequenceKind::SingleLevel,
+            SequenceKind::TwoLevels,
+            SequenceKind::Full,
+        ];
+        (0..3)
+            .map(|i| SequenceFile {
+                kind: kinds[i],
+                frames: vec![[1.0, 0.0]; [4, 6, 12][i]],
+                sigma_mm: sigmas[i],
+                safe_share: safe[i],
+            })
+            .collect()
+    }
+
+    fn gauge(limit: f64) -> Vec<GaugeFile> {
+        vec![GaugeFile {
+            name: "deviation".into(),
+            region: "frame".into(),
+            measures: GaugeKind::Deviation { smoothing_px: 9 },
+            low: Some(-limit),
+            high: Some(2.0 * limit),
+        }]
+    }
+
+    #[test]
+    fn the_cheapest_sequence_that_is_safe_and_quiet_enough_is_taken() {
+        let quiet = [0.05, 0.045, 0.03];
+        let choose = |safe, limit| choose(&sequences(quiet, safe), &gauge(limit)).production;
+        assert_eq!(choose([1.0, 1.0, 1.0], 0.25), 0);
+        assert_eq!(choose([0.9, 0.99, 1.0], 0.25), 1);
+        assert_eq!(choose([0.9, 0.9, 1.0], 0.25), 2);
+        // A limit of 0.04 mm allows σ = 0.04 · 9 / (6 √2) = 0.042 mm.
+        assert_eq!(choose([1.0, 1.0, 1.0], 0.04), 2);
+    }
+
+    #[test]
+    fn an_opening_that_must_stay_open_needs_the_full_sequence() {
+        let mut gauges = gauge(0.25);
+        gauges.push(GaugeFile {
+            name: "opening 1".into(),
+            region: "opening 1".into(),
+            measures: GaugeKind::Coverage,
+            low: None,
+            high: Some(0.25),
+        });
+        let sequences = sequences([0.05, 0.045, 0.03], [1.0; 3]);
+        let choice = choose(&sequences, &gauges);
+        assert_eq!(choice.production, 2);
+        assert!(
+            choice.reasons[0].contains("opening"),
+            "{:?}",
+            choice.reasons
+        );
+    }
+
+    #[test]
+    fn it_says_what_each_sequence_would_cost_and_give() {
+        let choice = choose(
+            &sequences([0.05, 0.045, 0.03], [0.9, 1.0, 1.0]),
+            &gauge(0.25),
+        );
+        assert!(choice.reasons[0].contains("4 frames") && choice.reasons[0].contains("not safe"));
+        assert!(choice.reasons[1].ends_with("taken"));
+        assert!(choice.reasons[2].ends_with("better, not needed"));
+    }
+}
