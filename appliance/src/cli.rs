@@ -1,5 +1,6 @@
 //! The command line.
 
+mod adapt;
 mod config;
 mod demo;
 mod experiment;
@@ -61,6 +62,8 @@ enum Command {
     Demo(demo::Demo),
     /// Measure a recording: phase, height, picture, point cloud and report.
     Measure(measure::Measure),
+    /// Make a pattern for the part of a preliminary recording.
+    Adapt(adapt::Adapt),
     /// Record a sequence from the configured head.
     Record(record::Record),
     /// Repeat the paper's experiments on the simulated head.
@@ -101,6 +104,7 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Command::Serve => serve::run(&common),
         Command::Demo(command) => command.run(&common),
         Command::Measure(command) => command.run(&common),
+        Command::Adapt(command) => command.run(&common),
         Command::Record(command) => command.run(&common),
         Command::Experiment(command) => command.run(&common),
         Command::Config(command) => command.run(&common),

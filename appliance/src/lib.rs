@@ -1,5 +1,6 @@
 //! The daemon `fringed` and its command line: joins devices (`hal`) and computation (`algo`).
 
+pub mod adapt;
 pub mod backend;
 pub mod bench;
 pub mod calibration;

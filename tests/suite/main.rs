@@ -1,5 +1,6 @@
 //! The integration suite: one binary, one module per topic.
 
+mod adapt;
 mod bad_input;
 mod cases;
 mod cli;
@@ -8,6 +9,7 @@ mod fuzz;
 mod house;
 mod measured;
 mod outputs;
+mod placement;
 mod promises_own;
 mod promises_shared;
 mod station;

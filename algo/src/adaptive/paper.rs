@@ -16,6 +16,8 @@ use alloc::vec::Vec;
 pub const PROJECTOR_PITCH: f64 = 8.0;
 /// c_p0: the preliminary patterns are this much coarser.
 pub const PRELIMINARY: f64 = 2.5;
+/// p_I, the smallest image pitch, in camera pixels: the paper gives none, the baseline has this.
+pub const IMAGE_PITCH: f64 = 5.0;
 /// Largest local pitch, projector pixels.
 const MAX_PITCH: f64 = 128.0;
 /// Neighbours further apart are depth edges and not slopes, projector pixels.

@@ -30,9 +30,10 @@ const SHARES: [f64; 2] = [1.0, 0.5];
 /// The largest |ΔΦ| in turns that each pixel can see when the part is moved by up to `tolerance` mm
 /// in any direction; infinite where golden knows nothing within reach of the move.
 ///
-/// Every golden point is moved along 26 directions and projected to the pixel that then looks at
-/// it, and to that pixel's neighbours; its phase there is compared with the golden one. That another
-/// part of the surface may stand in front is left out: it only makes the answer more careful.
+/// Every golden point is moved along 26 directions and projected; each of the four pixels around it
+/// then sees about its phase, carried there by the golden gradient, and that is compared with the
+/// golden phase of the pixel. That another part of the surface may stand in front is left out: it
+/// only makes the answer more careful.
 pub fn phase_reach(triangulator: &Triangulator, golden: Surface<'_>, tolerance: f64) -> Vec<f32> {
     let width = golden.width.max(1);
     let rows = golden.height.len() / width;
@@ -46,33 +47,91 @@ pub fn phase_reach(triangulator: &Triangulator, golden: Surface<'_>, tolerance: 
                 let moved = (*point)? + step;
                 let (column, line) = triangulator.camera().project(moved)?;
                 let (xi, eta) = triangulator.projector_point(moved)?;
-                let phase = triangulator.function().at(xi, eta);
-                let (column, line) = (libm::rint(column), libm::rint(line));
-                let away = libm::fabs(column - u as f64).max(libm::fabs(line - v as f64));
-                Some((column as isize, line as isize, phase, away as usize))
+                Some(Moved {
+                    from: (u, v),
+                    to: (column, line),
+                    phase: triangulator.function().at(xi, eta),
+                    gradient: gradient(golden, u, v),
+                })
             })
             .collect::<Vec<_>>()
         });
-        for (column, line, phase, away) in seen.into_iter().flatten() {
-            furthest = furthest.max(away + 1);
-            for v in line - 1..=line + 1 {
-                for u in column - 1..=column + 1 {
-                    let inside = u >= 0 && v >= 0 && u < width as isize && v < rows as isize;
-                    if !inside {
-                        continue;
-                    }
-                    let place = v as usize * width + u as usize;
-                    if golden.phase[place].is_known() {
-                        let moved = libm::fabs(phase - golden.phase[place].turns()) as f32;
-                        reach[place] = reach[place].max(moved);
-                    }
-                }
-            }
+        for moved in seen.into_iter().flatten() {
+            furthest = furthest.max(moved.distance() + 1);
+            moved.raise(&mut reach, golden);
         }
     }
     let known: Vec<bool> = golden.phase.iter().map(|phase| phase.is_known()).collect();
     forbid_near_unknown(&mut reach, &known, width, furthest);
     reach
+}
+
+/// A golden point after a move.
+struct Moved {
+    /// The pixel that saw it.
+    from: (usize, usize),
+    /// Where it is seen now.
+    to: (f64, f64),
+    /// The phase that it has there, turns.
+    phase: f64,
+    /// The golden gradient where it was, turns per pixel.
+    gradient: (f64, f64),
+}
+
+impl Moved {
+    /// How far it went, in whole pixels.
+    fn distance(&self) -> usize {
+        let (u, v) = (self.from.0 as f64, self.from.1 as f64);
+        libm::ceil(libm::fabs(self.to.0 - u).max(libm::fabs(self.to.1 - v))) as usize
+    }
+
+    /// Raises the reach of the four pixels around it.
+    fn raise(&self, reach: &mut [f32], golden: Surface<'_>) {
+        let (width, rows) = (golden.width, golden.height.len() / golden.width);
+        let (left, top) = (libm::floor(self.to.0), libm::floor(self.to.1));
+        for (u, v) in [
+            (left, top),
+            (left + 1.0, top),
+            (left, top + 1.0),
+            (left + 1.0, top + 1.0),
+        ] {
+            let inside = u >= 0.0 && v >= 0.0 && u < width as f64 && v < rows as f64;
+            if !inside {
+                continue;
+            }
+            let place = v as usize * width + u as usize;
+            if golden.phase[place].is_known() {
+                let (du, dv) = (u - self.to.0, v - self.to.1);
+                let here = self.phase + self.gradient.0 * du + self.gradient.1 * dv;
+                let change = libm::fabs(here - golden.phase[place].turns()) as f32;
+                reach[place] = reach[place].max(change);
+            }
+        }
+    }
+}
+
+/// The golden gradient at a pixel in turns per pixel: the smaller of the differences to both sides,
+/// so that it stays on the pixel's own surface.
+fn gradient(golden: Surface<'_>, u: usize, v: usize) -> (f64, f64) {
+    let (width, rows) = (golden.width, golden.height.len() / golden.width);
+    let at = |u: usize, v: usize| {
+        let inside = u < width && v < rows;
+        let phase = inside.then(|| golden.phase[v * width + u])?;
+        phase.is_known().then(|| phase.turns())
+    };
+    let smaller = |before: Option<f64>, here: Option<f64>, after: Option<f64>| {
+        let back = before.zip(here).map(|(a, b)| b - a);
+        let forth = here.zip(after).map(|(a, b)| b - a);
+        match (back, forth) {
+            (Some(back), Some(forth)) if libm::fabs(back) < libm::fabs(forth) => back,
+            (back, forth) => forth.or(back).unwrap_or(0.0),
+        }
+    };
+    // Beyond the first column and row the index wraps to a value outside the frame.
+    (
+        smaller(at(u.wrapping_sub(1), v), at(u, v), at(u + 1, v)),
+        smaller(at(u, v.wrapping_sub(1)), at(u, v), at(u, v + 1)),
+    )
 }
 
 fn points(triangulator: &Triangulator, golden: Surface<'_>) -> Vec<Option<Vector>> {

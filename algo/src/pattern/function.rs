@@ -249,6 +249,22 @@ impl PhaseFunction {
     }
 }
 
+/// In words, for messages: what kind, how many fringes, on which raster.
+impl fmt::Display for PhaseFunction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (columns, rows) = (self.columns, self.rows);
+        match &self.shape {
+            Shape::Vertical { fringes } => write!(f, "{fringes} vertical fringes"),
+            Shape::Horizontal { fringes } => write!(f, "{fringes} horizontal fringes"),
+            Shape::Sampled(_) => {
+                let PhaseRange { min, max } = self.range();
+                write!(f, "a sampled phase function of {min:.3} to {max:.3} turns")
+            }
+        }?;
+        write!(f, " on {columns}x{rows} pixels")
+    }
+}
+
 impl PhaseRange {
     /// max − min, in turns.
     pub fn span(&self) -> f64 {

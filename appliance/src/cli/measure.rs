@@ -1,14 +1,15 @@
-//! `fringed measure RECORDING --out DIR`.
+//! `fringed measure RECORDING [--recipe FILE] --out DIR`.
 
 use super::Common;
 use crate::error::{Exit, Failure};
-use crate::measure::{Measurement, measure};
+use crate::measure::{Measurement, measure_with};
 use crate::output::folder::OutputFolder;
 use crate::output::{cloud, picture};
+use crate::recipe::Recipe;
 use algo::pipeline::PhaseMap;
 use hal::npy;
 use hal::replay::Recording;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Measure a recording.
 #[derive(Debug, clap::Args)]
@@ -18,6 +19,9 @@ pub struct Measure {
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Recipe of the part: dense and single levels are unwrapped about its golden map.
+    #[arg(long, value_name = "FILE")]
+    recipe: Option<PathBuf>,
 }
 
 impl Measure {
@@ -31,8 +35,10 @@ impl Measure {
     )]
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         let recording = Recording::open(&self.recording)?;
+        let recipe = self.recipe.as_deref().map(read).transpose()?;
         let pool = super::pool(common.threads.unwrap_or(0))?;
-        let measurement = pool.install(|| measure(&recording, &self.recording))?;
+        let measured = || measure_with(&recording, &self.recording, recipe.as_ref());
+        let measurement = pool.install(measured)?;
         let folder = OutputFolder::create(&self.out)?;
         pool.install(|| write(&folder, &measurement))?;
         let json = serde_json::to_string_pretty(&measurement.report)
@@ -46,6 +52,19 @@ impl Measure {
         }
         Ok(())
     }
+}
+
+/// Reads a recipe by itself: a file may lie anywhere and have any name.
+fn read(path: &Path) -> Result<Recipe, Failure> {
+    let what = || format!("read recipe {}", path.display());
+    let bytes = std::fs::read(path).map_err(|error| match error.kind() {
+        std::io::ErrorKind::NotFound => {
+            let message = format!("{error}: name the .recipe file of the part");
+            Failure::because(Exit::Missing, what(), message)
+        }
+        _ => Failure::because(Exit::Content, what(), error),
+    })?;
+    Recipe::from_bytes(&bytes).map_err(|error| Failure::because(Exit::Content, what(), error))
 }
 
 fn write(folder: &OutputFolder, measurement: &Measurement) -> Result<(), Failure> {

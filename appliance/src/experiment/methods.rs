@@ -195,8 +195,8 @@ impl Runner {
         noise::Optics {
             projector_blur: blur.projector_blur_px,
             camera_blur: blur.camera_blur_px,
-            projector_pitch: MIN_PITCH,
-            image_pitch: MIN_IMAGE_PITCH,
+            projector_pitch: noise::PROJECTOR_PITCH,
+            image_pitch: noise::IMAGE_PITCH,
         }
     }
 
@@ -287,11 +287,6 @@ impl Runner {
         }
     }
 }
-
-/// Smallest pitches of the better pattern. Below 6 px the projector's own pixels bend the fringes
-/// (a bilinear raster at 5 px: error / σ_z rises from 1.09 to 1.21 on the cone).
-const MIN_PITCH: f64 = 6.0;
-const MIN_IMAGE_PITCH: f64 = 2.2;
 
 /// The phase that each pixel will have if the surface is where it was measured.
 fn expected(map: &ProjectorMap, function: &PhaseFunction) -> Vec<AbsolutePhase> {

@@ -1,12 +1,14 @@
 //! From a recording to phase, height and report: what `fringed measure` does.
 
+mod known;
 mod report;
 mod score;
 
-pub use report::{Report, StageTimes};
+pub use report::{RecipeName, Report, StageTimes};
 pub use score::{Score, Truth};
 
 use crate::error::{Exit, Failure};
+use crate::recipe::Recipe;
 use crate::seam;
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
@@ -16,6 +18,8 @@ use algo::pipeline::{self, HeightMap, PhaseMap};
 use algo::units::AbsolutePhase;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
+use known::Known;
+use report::Manner;
 use std::path::Path;
 use std::time::Instant;
 
@@ -49,16 +53,32 @@ pub struct Surface {
 /// If levels cannot be unwrapped, a model is absurd, or a map is needed that nothing gives; the
 /// message names `folder`.
 pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement, Failure> {
+    measure_with(recording, folder, None)
+}
+
+/// As [`measure`], with what a recipe knows: the pattern that it is made of gives the height, and
+/// levels that need a map are unwrapped about its golden phase instead of the reference map. Noise
+/// and working range come from it where the recording has none.
+///
+/// # Errors
+/// As for [`measure`], and if the recipe is of another pattern or of frames of another size.
+pub fn measure_with(
+    recording: &Recording,
+    folder: &Path,
+    recipe: Option<&Recipe>,
+) -> Result<Measurement, Failure> {
     let wrong = |error: &dyn std::fmt::Display| {
         let manifest = folder.join("recording.json");
         Failure::because(Exit::Content, manifest.display(), error)
     };
-    let rig = Rig::of(recording).map_err(|error| wrong(&error))?;
-    let primary = recording
-        .patterns
-        .iter()
-        .position(|spec| matches!(spec, PatternSpec::Vertical { .. }))
-        .unwrap_or(0);
+    let known = recipe.map(|recipe| Known::of(recipe, recording));
+    let known = known.transpose().map_err(|error| wrong(&*error))?;
+    let rig = Rig::of(recording, recipe).map_err(|error| wrong(&error))?;
+    let vertical = |spec: &PatternSpec| matches!(spec, PatternSpec::Vertical { .. });
+    let primary = match &known {
+        Some(known) => known.pattern,
+        None => recording.patterns.iter().position(vertical).unwrap_or(0),
+    };
     let mut stages = StageTimes::default();
     let mut phases = Vec::new();
     let mut chosen = None;
@@ -67,7 +87,13 @@ pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement, Fail
         let started = Instant::now();
         let geometry = rig.triangulator(&channel.function);
         let geometry = geometry.map_err(|error| wrong(&error))?;
-        let map = if channel.decoder.unwrapping().needs_map() {
+        let golden = known.as_ref().filter(|known| known.pattern == at);
+        let reference;
+        let map: Option<(&str, &[AbsolutePhase])> = if !channel.decoder.unwrapping().needs_map() {
+            None
+        } else if let Some(known) = golden {
+            Some(("golden", &known.golden))
+        } else {
             let about = geometry.as_ref().map_err(|missing| {
                 wrong(&format!(
                     "{} levels {:?} are unwrapped about a known map, and {missing}: add both models, or \
@@ -76,26 +102,27 @@ pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement, Fail
                     channel.ratios(),
                 ))
             })?;
-            Some(about.reference_map())
-        } else {
-            None
+            reference = about.reference_map();
+            Some(("reference", &reference))
         };
         stages.map += started.elapsed();
         let started = Instant::now();
         let decoded = channel
-            .decode(map.as_deref())
+            .decode(map.map(|(_, map)| map))
             .map_err(|error| wrong(&*error))?;
         stages.phase += started.elapsed();
         phases.push(decoded);
         if at == primary {
-            chosen = Some((channel, geometry));
+            chosen = Some((channel, geometry, map.map(|(name, _)| name)));
         }
     }
-    let Some((channel, geometry)) = chosen else {
+    let Some((channel, geometry, map)) = chosen else {
         return Err(wrong(&"the recording has no pattern"));
     };
     let started = Instant::now();
-    let noise = recording.noise_counts.or_else(|| {
+    let stated = recording.noise_counts;
+    let stated = stated.or_else(|| recipe.map(|recipe| recipe.file.noise_counts));
+    let noise = stated.or_else(|| {
         pipeline::sample_noise(&channel.sequence, &channel.frames, &phases[primary].trust)
     });
     stages.noise = started.elapsed();
@@ -114,8 +141,15 @@ pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement, Fail
     let report = Report::new(
         &phases[primary],
         &heights,
-        channel.decoder.unwrapping().kind(),
-        channel.ratios(),
+        Manner {
+            kind: channel.decoder.unwrapping().kind(),
+            ratios: channel.ratios(),
+            map,
+            recipe: recipe.map(|recipe| RecipeName {
+                number: recipe.file.number,
+                fingerprint: recipe.file.fingerprint.clone(),
+            }),
+        },
         noise,
         &Truth::of(recording),
         &stages,
@@ -198,7 +232,7 @@ struct Rig {
 }
 
 impl Rig {
-    fn of(recording: &Recording) -> Result<Self, String> {
+    fn of(recording: &Recording, recipe: Option<&Recipe>) -> Result<Self, String> {
         let checked = |name: &str, model: &hal::model::DeviceModel, width: u32, height: u32| {
             Pinhole::new(seam::pinhole_model(model), width as usize, height as usize)
                 .map_err(|error| format!("the {name}'s model: {error}"))
@@ -217,6 +251,7 @@ impl Rig {
             devices: devices.map_err(String::from),
             range: recording
                 .range_mm
+                .or_else(|| recipe.map(|recipe| recipe.file.range_mm))
                 .map(|[low, high]| HeightRange { low, high }),
         })
     }

@@ -21,6 +21,28 @@ pub struct StageTimes {
     pub height: Duration,
 }
 
+/// How the levels were unwrapped.
+#[derive(Clone, Debug)]
+pub(super) struct Manner {
+    /// See [`Report::kind`].
+    pub kind: &'static str,
+    /// See [`Report::ratios`].
+    pub ratios: Vec<f64>,
+    /// See [`Report::map`].
+    pub map: Option<&'static str>,
+    /// See [`Report::recipe`].
+    pub recipe: Option<RecipeName>,
+}
+
+/// Which recipe a recording was measured with.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct RecipeName {
+    /// Its number.
+    pub number: u16,
+    /// Its fingerprint.
+    pub fingerprint: String,
+}
+
 /// The summary of a measurement. Everything but the times is the same with any number of threads.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
@@ -34,9 +56,15 @@ pub struct Report {
     pub kind: &'static str,
     /// The levels' ratios from coarse to fine.
     pub ratios: Vec<f64>,
+    /// The known map that they were unwrapped about: reference or golden; none where they are
+    /// absolute by themselves.
+    pub map: Option<&'static str>,
+    /// The recipe that was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recipe: Option<RecipeName>,
     /// Wall time per stage in µs.
     pub stage_us: BTreeMap<&'static str, u64>,
-    /// σ of one sample in counts: the recording's, else from the frames' redundancy (N ≥ 4).
+    /// σ of one sample in counts: the recording's, else the recipe's, else from the frames' redundancy (N ≥ 4).
     pub noise_counts: Option<f64>,
     /// Why there is no height, if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -59,8 +87,7 @@ impl Report {
     pub(super) fn new(
         phases: &PhaseMap,
         heights: &Result<Surface, String>,
-        kind: &'static str,
-        ratios: Vec<f64>,
+        manner: Manner,
         noise_counts: Option<f64>,
         truth: &Truth<'_>,
         stages: &StageTimes,
@@ -92,8 +119,10 @@ impl Report {
             lit: resolved + unresolved.values().sum::<usize>(),
             resolved,
             unresolved,
-            kind,
-            ratios,
+            kind: manner.kind,
+            ratios: manner.ratios,
+            map: manner.map,
+            recipe: manner.recipe,
             stage_us: BTreeMap::from([
                 ("map", micros(stages.map)),
                 ("phase", micros(stages.phase)),
@@ -127,6 +156,16 @@ impl Report {
             "levels",
             format!("{}, ratios {}", self.kind, ratios.join(" ")),
         );
+        if let Some(map) = self.map {
+            line("unwrapped about", format!("the {map} map"));
+        }
+        if let Some(RecipeName {
+            number,
+            fingerprint,
+        }) = &self.recipe
+        {
+            line("recipe", format!("{number}, fingerprint {fingerprint}"));
+        }
         line("lit", format!("{} px", self.lit));
         line("resolved", format!("{} px", self.resolved));
         for (reason, count) in self.unresolved.iter().filter(|(_, count)| **count > 0) {

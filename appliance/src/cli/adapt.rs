@@ -1,0 +1,119 @@
+//! `fringed adapt RECORDING --method paper|fringed --out phase.npy`.
+
+use super::Common;
+use crate::adapt::{Choice, Method, adapt};
+use crate::error::{Exit, Failure};
+use crate::output::folder::OutputFolder;
+use algo::adaptive::{noise, paper};
+use algo::pattern::PhaseFunction;
+use hal::npy;
+use hal::replay::Recording;
+use std::path::{Path, PathBuf};
+
+/// Make the phase function of a pattern for the part of a preliminary recording.
+#[derive(Debug, clap::Args)]
+pub struct Adapt {
+    /// Folder with recording.json and its frames: vertical fringes, and for the paper's method
+    /// horizontal ones as well.
+    recording: PathBuf,
+    /// How it is made.
+    #[arg(long, value_enum)]
+    method: Method,
+    /// The file for it: f64 turns, projector rows x columns.
+    #[arg(long, value_name = "FILE.npy")]
+    out: PathBuf,
+    /// σ of the projector's blur, projector pixels.
+    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = blur)]
+    projector_blur: f64,
+    /// σ of the camera's blur, camera pixels.
+    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = blur)]
+    camera_blur: f64,
+    /// Smallest pitch in projector pixels; 6 if not given, and 8 always for the paper's method.
+    #[arg(long, value_name = "PX", value_parser = pitch)]
+    projector_pitch: Option<f64>,
+    /// Smallest pitch in camera pixels; if not given 2.2, and 5 for the paper's method.
+    #[arg(long, value_name = "PX", value_parser = pitch)]
+    image_pitch: Option<f64>,
+}
+
+fn blur(text: &str) -> Result<f64, String> {
+    within(text, 0.0, 20.0)
+}
+
+fn pitch(text: &str) -> Result<f64, String> {
+    within(text, 2.0, 128.0)
+}
+
+/// A number of pixels from `low` to `high`.
+fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
+    let number: Option<f64> = text.parse().ok();
+    number
+        .filter(|number| (low..=high).contains(number))
+        .ok_or_else(|| format!("give a number of pixels from {low} to {high}"))
+}
+
+impl Adapt {
+    /// Measures the recording, makes the phase function, writes it and prints the report.
+    ///
+    /// # Errors
+    /// If the recording cannot be opened or lacks what the method needs, or the file not be written.
+    #[expect(
+        clippy::print_stdout,
+        reason = "the report is what the command is asked for"
+    )]
+    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+        let choice = self.choice()?;
+        let Some(name) = self.out.file_name().and_then(|name| name.to_str()) else {
+            let message = format!("--out {}: name a file", self.out.display());
+            return Err(Failure::new(Exit::Usage, message));
+        };
+        let recording = Recording::open(&self.recording)?;
+        let pool = super::pool(common.threads.unwrap_or(0))?;
+        let adapted = pool.install(|| adapt(&recording, &self.recording, &choice))?;
+        let folder = OutputFolder::create(self.out.parent().unwrap_or(Path::new("")))?;
+        folder.write(name, &array(&adapted.function))?;
+        if common.json {
+            let json = serde_json::to_string_pretty(&adapted.report)
+                .map_err(|error| Failure::because(Exit::Software, "write the report", error))?;
+            println!("{json}");
+        } else if !common.quiet {
+            print!("{}", adapted.report.table());
+            println!("written to {}", self.out.display());
+        }
+        Ok(())
+    }
+
+    fn choice(&self) -> Result<Choice, Failure> {
+        let (projector_pitch, image_pitch) = match self.method {
+            Method::Fringed => (noise::PROJECTOR_PITCH, noise::IMAGE_PITCH),
+            Method::Paper => (paper::PROJECTOR_PITCH, paper::IMAGE_PITCH),
+        };
+        if self.method == Method::Paper && self.projector_pitch.is_some() {
+            return Err(Failure::new(
+                Exit::Usage,
+                format!(
+                    "--projector-pitch: the paper's method has {projector_pitch} px: leave it out, or use \
+                     --method fringed"
+                ),
+            ));
+        }
+        Ok(Choice {
+            method: self.method,
+            optics: noise::Optics {
+                projector_blur: self.projector_blur,
+                camera_blur: self.camera_blur,
+                projector_pitch: self.projector_pitch.unwrap_or(projector_pitch),
+                image_pitch: self.image_pitch.unwrap_or(image_pitch),
+            },
+        })
+    }
+}
+
+/// The phase function as a file of rows × columns.
+fn array(function: &PhaseFunction) -> Vec<u8> {
+    let (columns, rows) = (function.columns(), function.rows());
+    let turns: Vec<f64> = (0..columns * rows)
+        .map(|at| function.at_pixel(at % columns, at / columns))
+        .collect();
+    npy::write(columns, &turns)
+}

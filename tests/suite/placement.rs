@@ -1,0 +1,184 @@
+//! Parts that lie elsewhere than where they were taught, and scenes that cannot be taught.
+
+use algo::phase::Trust;
+use algo::units::AbsolutePhase;
+use appliance::bench::{About, Bench};
+use appliance::calibration::Calibration;
+use appliance::recipe::teach::{Naming, Taught, teach};
+use hal::head::DynHead;
+use hal::sim::parts::{Cone, Plane, Sawtooth, SheetMetal, Sphere, Spline};
+use hal::sim::{Part, Placement, Scenario, Stage};
+use std::time::Duration;
+
+const TIMEOUT: Duration = Duration::from_secs(5);
+const TOLERANCE_MM: f64 = 1.0;
+
+struct Bed {
+    head: DynHead,
+    stage: Stage,
+    calibration: Calibration,
+}
+
+fn bed(scenario: &Scenario) -> Bed {
+    let (head, stage) = hal::sim::head(scenario).unwrap();
+    let (camera, projector) = (&scenario.rig.camera, &scenario.rig.projector);
+    Bed {
+        head,
+        calibration: Calibration {
+            camera: (camera.width, camera.height, scenario.bit_depth),
+            camera_model: stage.camera_model(),
+            projector: (projector.width, projector.height),
+            projector_model: stage.projector_model(),
+            noise_counts: scenario.noise_sigma_counts(),
+            response: None,
+        },
+        stage,
+    }
+}
+
+fn scenario(part: Part) -> Scenario {
+    let mut scenario = Scenario {
+        part,
+        ..Scenario::default()
+    };
+    // Half the study's resolution and a quarter of its rays: the geometry is the same.
+    scenario.rig.camera.width = 256;
+    scenario.rig.camera.height = 256;
+    scenario.sub_rays = 2;
+    scenario
+}
+
+fn taught(bed: &mut Bed) -> Result<Taught, String> {
+    let naming = Naming {
+        number: 1,
+        part_number: "P".into(),
+        name: "part".into(),
+        taught_at_unix_s: 0,
+        placement_tolerance_mm: TOLERANCE_MM,
+    };
+    teach(
+        &mut bed.head,
+        &bed.calibration,
+        &naming,
+        TIMEOUT,
+        &|_, _| (),
+    )
+    .map_err(|error| error.to_string())
+}
+
+/// Pixels whose phase is more than half a turn off the true one, and all that were compared, for a
+/// sequence about the golden map inside its safe mask.
+fn wrong_orders(
+    bed: &mut Bed,
+    taught: &Taught,
+    frames: &[(f64, f64)],
+    reach: f32,
+) -> (usize, usize) {
+    let arrays = &taught.recipe.arrays;
+    let map: Vec<AbsolutePhase> = arrays
+        .golden_phase
+        .iter()
+        .zip(&arrays.phase_reach)
+        .map(|(&turns, &moved)| {
+            if moved < reach {
+                AbsolutePhase::from_turns(turns)
+            } else {
+                AbsolutePhase::UNKNOWN
+            }
+        })
+        .collect();
+    let mut bench = Bench {
+        head: &mut bed.head,
+        calibration: &bed.calibration,
+        range: None,
+        timeout: TIMEOUT,
+    };
+    let function = &taught.recipe.function;
+    let measured = bench
+        .measure(function, frames, About::Map(&map), &|_| ())
+        .unwrap();
+    let truth = bed.stage.truth();
+    let width = measured.phases.width;
+    let (mut wrong, mut compared) = (0, 0);
+    for at in 0..truth.height.len() {
+        if measured.phases.trust[at] != Trust::Resolved || truth.class[at] != 2 {
+            continue;
+        }
+        let height = f64::from(truth.height[at]);
+        let true_phase = measured
+            .triangulator
+            .phase_of(at % width, at / width, height);
+        compared += 1;
+        if (measured.phases.phase[at] - true_phase).turns().abs() > 0.5 {
+            wrong += 1;
+        }
+    }
+    (wrong, compared)
+}
+
+#[test]
+fn moved_parts_have_no_wrong_fringe_order_inside_the_safe_masks() {
+    let parts = [
+        ("cone", Part::Cone(Cone::default())),
+        ("sawtooth", Part::Sawtooth(Sawtooth::default())),
+        ("sphere", Part::Sphere(Sphere::default())),
+        ("spline", Part::Spline(Box::<Spline>::default())),
+        ("sheet metal", Part::SheetMetal(SheetMetal::default())),
+    ];
+    // Two corners of the tolerance and one inside: all of length ≤ 1 mm.
+    let moves = [[0.57, -0.57, 0.57], [-0.99, 0.1, 0.0], [0.3, 0.4, -0.5]];
+    for (name, part) in parts {
+        let mut bed = bed(&scenario(part.clone()));
+        let taught = taught(&mut bed).unwrap();
+        for sequence in &taught.recipe.file.sequences {
+            let Some(reach) = sequence.kind.reach() else {
+                continue;
+            };
+            let frames: Vec<_> = sequence.frames.iter().map(|&[r, s]| (r, s)).collect();
+            let mut all = 0;
+            for (seed, shift_mm) in (7..).zip(moves) {
+                let placement = Placement {
+                    shift_mm,
+                    ..Placement::default()
+                };
+                bed.stage.place(&part, &placement).unwrap();
+                bed.stage.reseed(seed);
+                let (wrong, compared) = wrong_orders(&mut bed, &taught, &frames, reach);
+                assert_eq!(
+                    wrong,
+                    0,
+                    "{name}, {} frames, moved {shift_mm:?}",
+                    frames.len()
+                );
+                all += compared;
+            }
+            println!(
+                "{name}: {} frames safe on {:.1} % of the part, {all} pixels compared",
+                frames.len(),
+                sequence.safe_share * 100.0
+            );
+            // A mask that is empty keeps every promise.
+            assert!(sequence.safe_share > 0.5, "{name}: {}", sequence.safe_share);
+        }
+    }
+}
+
+#[test]
+fn a_scene_that_cannot_be_taught_says_which() {
+    let empty = scenario(Part::Empty {});
+    let mut saturated = scenario(Part::Plane(Plane::default()));
+    saturated.optics.gain = 3.0;
+    let mut away = scenario(Part::Plane(Plane::default()));
+    away.placement.shift_mm = [0.0, 0.0, 150.0];
+    let mut off = scenario(Part::Plane(Plane::default()));
+    off.light.diffuse = 0.0;
+    for (scene, word) in [
+        (empty, "dark"),
+        (saturated, "saturated"),
+        (away, "working range"),
+        (off, "dark"),
+    ] {
+        let error = taught(&mut bed(&scene)).unwrap_err();
+        assert!(error.contains(word), "{word}: {error}");
+    }
+}
