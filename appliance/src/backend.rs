@@ -105,21 +105,8 @@ fn calibration_of(
         );
         Failure::new(Exit::Content, message)
     };
-    Ok(Calibration {
-        camera: (first.width, first.height, first.bit_depth),
-        camera_model: first
-            .camera_model
-            .clone()
-            .ok_or_else(|| missing("camera model"))?,
-        projector: (first.projector.width, first.projector.height),
-        projector_model: first
-            .projector
-            .model
-            .clone()
-            .ok_or_else(|| missing("projector model"))?,
-        noise_counts: first
-            .noise_counts
-            .ok_or_else(|| missing("camera.noise_counts"))?,
-        response: None,
-    })
+    let noise = first
+        .noise_counts
+        .ok_or_else(|| missing("camera.noise_counts"))?;
+    Calibration::of(first, noise).map_err(missing)
 }

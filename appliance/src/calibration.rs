@@ -5,6 +5,7 @@ use crate::seam;
 use algo::geometry::{ModelError, Pinhole};
 use algo::pattern::GreyResponse;
 use hal::model::DeviceModel;
+use hal::replay::Recording;
 use sha2::{Digest, Sha256};
 
 /// The calibration of a head.
@@ -25,6 +26,22 @@ pub struct Calibration {
 }
 
 impl Calibration {
+    /// What a recording says of the head that took it, with the noise of a sample in counts.
+    ///
+    /// # Errors
+    /// The word for what it lacks.
+    pub fn of(recording: &Recording, noise_counts: f64) -> Result<Self, &'static str> {
+        let projector = &recording.projector;
+        Ok(Self {
+            camera: (recording.width, recording.height, recording.bit_depth),
+            camera_model: recording.camera_model.clone().ok_or("camera model")?,
+            projector: (projector.width, projector.height),
+            projector_model: projector.model.clone().ok_or("projector model")?,
+            noise_counts,
+            response: None,
+        })
+    }
+
     /// A strong hash over everything that heights depend on: a recipe made for another calibration
     /// is refused by it.
     pub fn fingerprint(&self) -> String {

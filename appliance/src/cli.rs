@@ -7,6 +7,7 @@ mod experiment;
 mod measure;
 mod record;
 mod serve;
+mod teach;
 
 use crate::config::Config;
 use crate::error::{Exit, Failure};
@@ -68,6 +69,8 @@ enum Command {
     Record(record::Record),
     /// Repeat the paper's experiments on the simulated head.
     Experiment(experiment::Experiment),
+    /// Make a recipe from a good part in front of the head, or from recordings.
+    Teach(teach::Teach),
     /// Check a configuration, or list its keys.
     #[command(subcommand)]
     Config(config::ConfigCommand),
@@ -107,6 +110,7 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Command::Adapt(command) => command.run(&common),
         Command::Record(command) => command.run(&common),
         Command::Experiment(command) => command.run(&common),
+        Command::Teach(command) => command.run(&common),
         Command::Config(command) => command.run(&common),
         Command::Registers => {
             registers(&common);

@@ -1,7 +1,7 @@
 //! A recipe made ready to run: from frames to an inspection without anything that can fail.
 
 use crate::calibration::Calibration;
-use crate::recipe::{GaugeKind, Recipe, SequenceKind};
+use crate::recipe::{GaugeKind, Recipe, SequenceKind, safe};
 use crate::seam;
 use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
 use crate::station::{GaugeValue, Inspection, StageTime, Unit, Verdict};
@@ -279,16 +279,12 @@ pub fn rasters(
 /// there should be none must be seen.
 fn known_map(recipe: &Recipe, triangulator: &Triangulator) -> Vec<AbsolutePhase> {
     let arrays = &recipe.arrays;
-    let golden = arrays
-        .golden_phase
-        .iter()
-        .map(|&turns| AbsolutePhase::from_turns(turns));
-    if let Some(reach) = recipe.kind.reach() {
-        let safe = arrays.phase_reach.iter().map(|moved| *moved < reach);
-        return golden
-            .zip(safe)
-            .map(|(phase, safe)| if safe { phase } else { AbsolutePhase::UNKNOWN })
-            .collect();
+    let golden = arrays.golden_phase.iter();
+    let golden: Vec<_> = golden
+        .map(|&turns| AbsolutePhase::from_turns(turns))
+        .collect();
+    if let Some(limit) = recipe.kind.reach() {
+        return safe(&golden, &arrays.phase_reach, limit);
     }
     let width = recipe.file.camera.width as usize;
     let mut surface = Field {
@@ -300,7 +296,7 @@ fn known_map(recipe: &Recipe, triangulator: &Triangulator) -> Vec<AbsolutePhase>
             .collect(),
     };
     surface.fill_rows(0.0);
-    let mut map: Vec<AbsolutePhase> = golden.collect();
+    let mut map = golden;
     pipeline::for_each_row(&mut map, width, |v, row| {
         for (u, phase) in row.iter_mut().enumerate() {
             if !phase.is_known() {

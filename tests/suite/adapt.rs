@@ -243,12 +243,15 @@ struct Taught {
 /// The one place that knows how a recipe is made.
 fn taught_recipe(head: &mut DynHead, calibration: &Calibration) -> (Vec<u8>, Recipe) {
     let naming = Naming {
-        number: 7,
-        part_number: "SPHERE".into(),
-        name: "a sphere".into(),
+        number: 3,
+        part_number: "S".into(),
+        name: "sphere".into(),
         taught_at_unix_s: 0,
+        placement_tolerance_mm: 1.0,
     };
-    teach(head, calibration, &naming, TIMEOUT, &|_, _| ()).expect("a sphere can be taught")
+    let taught = teach(head, calibration, &naming, TIMEOUT, &|_, _| ());
+    let taught = taught.expect("a sphere can be taught");
+    (taught.bytes, taught.recipe)
 }
 
 impl Taught {

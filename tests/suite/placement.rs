@@ -4,6 +4,7 @@ use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use appliance::bench::{About, Bench};
 use appliance::calibration::Calibration;
+use appliance::recipe::safe;
 use appliance::recipe::teach::{Naming, Taught, teach};
 use hal::head::DynHead;
 use hal::sim::parts::{Cone, Plane, Sawtooth, SheetMetal, Sphere, Spline};
@@ -75,18 +76,11 @@ fn wrong_orders(
     reach: f32,
 ) -> (usize, usize) {
     let arrays = &taught.recipe.arrays;
-    let map: Vec<AbsolutePhase> = arrays
-        .golden_phase
-        .iter()
-        .zip(&arrays.phase_reach)
-        .map(|(&turns, &moved)| {
-            if moved < reach {
-                AbsolutePhase::from_turns(turns)
-            } else {
-                AbsolutePhase::UNKNOWN
-            }
-        })
+    let golden = arrays.golden_phase.iter();
+    let golden: Vec<_> = golden
+        .map(|&turns| AbsolutePhase::from_turns(turns))
         .collect();
+    let map = safe(&golden, &arrays.phase_reach, reach);
     let mut bench = Bench {
         head: &mut bed.head,
         calibration: &bed.calibration,

@@ -1,7 +1,9 @@
 //! Where the light of each camera pixel comes from.
 
 use crate::geometry::Triangulator;
+use crate::pattern::PhaseFunction;
 use crate::pipeline::{HeightMap, for_each_row};
+use crate::units::AbsolutePhase;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -35,6 +37,13 @@ impl ProjectorMap {
             }
         });
         Self { width, points }
+    }
+
+    /// The phase that each pixel has under a phase function if the surface is where it was measured,
+    /// unknown where it was not.
+    pub fn expected_phase(&self, function: &PhaseFunction) -> Vec<AbsolutePhase> {
+        let phase = |[xi, eta]: &[f64; 2]| AbsolutePhase::from_turns(function.at(*xi, *eta));
+        self.points.iter().map(phase).collect()
     }
 
     /// Camera rows.

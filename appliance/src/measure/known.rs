@@ -1,25 +1,73 @@
-//! What a recipe knows of a recording: its golden map, once the two are found to fit.
+//! What is known of a recording's phase beforehand: a recipe's golden map, or where a preliminary
+//! measurement expects it.
 
 use super::AnyError;
-use crate::recipe::Recipe;
+use crate::recipe::{Recipe, SequenceKind, safe};
 use crate::seam;
-use algo::pattern::PhaseFunction;
+use algo::adaptive::ProjectorMap;
+use algo::pattern::{PhaseFunction, Unwrapping};
 use algo::units::AbsolutePhase;
 use hal::replay::Recording;
 
 /// Phase functions that differ by no more than this are the same one, in turns: files hold `f64`.
 const SAME: f64 = 1e-9;
 
-/// The golden map of a recipe that fits a recording.
+/// A known map that fits a recording.
 #[derive(Debug)]
 pub(super) struct Known {
-    /// Which of the recording's patterns is the recipe's.
+    /// "golden" or "preliminary", for reports.
+    pub name: &'static str,
+    /// Which of the recording's patterns it is of.
     pub pattern: usize,
-    /// Φ as taught, row-major over the camera's frame, unknown where it was not resolved.
-    pub golden: Vec<AbsolutePhase>,
+    /// Φ, row-major over the camera's frame, unknown where it was not resolved.
+    phase: Vec<AbsolutePhase>,
+    /// How far a placement inside the recipe's tolerance can move the phase, turns; none where
+    /// nothing is declared.
+    reach: Option<Vec<f32>>,
 }
 
 impl Known {
+    /// The map for levels that are unwrapped in this way: those of limited reach know nothing
+    /// outside their safe mask.
+    pub fn map(&self, unwrapping: Unwrapping) -> Vec<AbsolutePhase> {
+        let limit = match unwrapping {
+            Unwrapping::Single => SequenceKind::SingleLevel.reach(),
+            Unwrapping::DenseTwo { .. } => SequenceKind::TwoLevels.reach(),
+            Unwrapping::Geometric | Unwrapping::DenseThree { .. } => None,
+        };
+        match (limit, &self.reach) {
+            (Some(limit), Some(reach)) => safe(&self.phase, reach, limit),
+            _ => self.phase.clone(),
+        }
+    }
+
+    /// The phase that the recording's pattern has on the surface of a preliminary measurement.
+    ///
+    /// # Errors
+    /// If that has frames of another size.
+    pub fn expected(preliminary: &ProjectorMap, recording: &Recording) -> Result<Self, AnyError> {
+        let (width, height) = (recording.width as usize, recording.height as usize);
+        let given = (preliminary.width, preliminary.height());
+        if given != (width, height) {
+            return Err(format!(
+                "the preliminary recording has frames of {}x{}, this one of {width}x{height}: both must \
+                 come from one camera",
+                given.0, given.1
+            )
+            .into());
+        }
+        let pattern = super::primary_of(recording);
+        let projector = &recording.projector;
+        let (columns, rows) = (projector.width as usize, projector.height as usize);
+        let function = seam::phase_function(&recording.patterns[pattern], columns, rows)?;
+        Ok(Self {
+            name: "preliminary",
+            pattern,
+            phase: preliminary.expected_phase(&function),
+            reach: None,
+        })
+    }
+
     /// Finds the recipe's pattern among the recording's.
     ///
     /// # Errors
@@ -45,8 +93,10 @@ impl Known {
                 let golden = recipe.arrays.golden_phase.iter();
                 let golden = golden.map(|&turns| AbsolutePhase::from_turns(turns));
                 return Ok(Self {
+                    name: "golden",
                     pattern,
-                    golden: golden.collect(),
+                    phase: golden.collect(),
+                    reach: Some(recipe.arrays.phase_reach.clone()),
                 });
             }
             others.push(match apart {

@@ -10,6 +10,7 @@ pub use score::{Score, Truth};
 use crate::error::{Exit, Failure};
 use crate::recipe::Recipe;
 use crate::seam;
+use algo::adaptive::ProjectorMap;
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
 use algo::pattern::{PhaseFunction, Sequence};
@@ -32,6 +33,8 @@ pub struct Measurement {
     pub primary: usize,
     /// Height and σ_z, or why there is none.
     pub heights: Result<Surface, String>,
+    /// How the primary pattern was decoded.
+    pub decoder: Decoder,
     /// The summary.
     pub report: Report,
     /// Mean of the finest level's frames of the primary pattern, scaled to 8 bits.
@@ -56,6 +59,20 @@ pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement, Fail
     measure_with(recording, folder, None)
 }
 
+/// As [`measure`], with levels that need a map unwrapped about where a preliminary measurement of the
+/// part expects their phase.
+///
+/// # Errors
+/// As for [`measure`], and if the preliminary map is of frames of another size.
+pub fn measure_after(
+    recording: &Recording,
+    folder: &Path,
+    preliminary: &ProjectorMap,
+) -> Result<Measurement, Failure> {
+    let known = Known::expected(preliminary, recording).map_err(|error| wrong(folder, &*error))?;
+    measure_about(recording, folder, None, Some(known))
+}
+
 /// As [`measure`], with what a recipe knows: the pattern that it is made of gives the height, and
 /// levels that need a map are unwrapped about its golden phase instead of the reference map. Noise
 /// and working range come from it where the recording has none.
@@ -67,18 +84,28 @@ pub fn measure_with(
     folder: &Path,
     recipe: Option<&Recipe>,
 ) -> Result<Measurement, Failure> {
-    let wrong = |error: &dyn std::fmt::Display| {
-        let manifest = folder.join("recording.json");
-        Failure::because(Exit::Content, manifest.display(), error)
-    };
     let known = recipe.map(|recipe| Known::of(recipe, recording));
-    let known = known.transpose().map_err(|error| wrong(&*error))?;
+    let known = known.transpose().map_err(|error| wrong(folder, &*error))?;
+    measure_about(recording, folder, recipe, known)
+}
+
+/// A recording's content is wrong.
+fn wrong(folder: &Path, error: &dyn std::fmt::Display) -> Failure {
+    let manifest = folder.join("recording.json");
+    Failure::because(Exit::Content, manifest.display(), error)
+}
+
+fn measure_about(
+    recording: &Recording,
+    folder: &Path,
+    recipe: Option<&Recipe>,
+    known: Option<Known>,
+) -> Result<Measurement, Failure> {
+    let wrong = |error: &dyn std::fmt::Display| wrong(folder, error);
     let rig = Rig::of(recording, recipe).map_err(|error| wrong(&error))?;
-    let vertical = |spec: &PatternSpec| matches!(spec, PatternSpec::Vertical { .. });
-    let primary = match &known {
-        Some(known) => known.pattern,
-        None => recording.patterns.iter().position(vertical).unwrap_or(0),
-    };
+    let primary = known
+        .as_ref()
+        .map_or_else(|| primary_of(recording), |known| known.pattern);
     let mut stages = StageTimes::default();
     let mut phases = Vec::new();
     let mut chosen = None;
@@ -88,11 +115,12 @@ pub fn measure_with(
         let geometry = rig.triangulator(&channel.function);
         let geometry = geometry.map_err(|error| wrong(&error))?;
         let golden = known.as_ref().filter(|known| known.pattern == at);
-        let reference;
+        let made;
         let map: Option<(&str, &[AbsolutePhase])> = if !channel.decoder.unwrapping().needs_map() {
             None
         } else if let Some(known) = golden {
-            Some(("golden", &known.golden))
+            made = known.map(channel.decoder.unwrapping());
+            Some((known.name, &made))
         } else {
             let about = geometry.as_ref().map_err(|missing| {
                 wrong(&format!(
@@ -102,8 +130,8 @@ pub fn measure_with(
                     channel.ratios(),
                 ))
             })?;
-            reference = about.reference_map();
-            Some(("reference", &reference))
+            made = about.reference_map();
+            Some(("reference", &made))
         };
         stages.map += started.elapsed();
         let started = Instant::now();
@@ -159,8 +187,15 @@ pub fn measure_with(
         phases,
         primary,
         heights,
+        decoder: channel.decoder,
         report,
     })
+}
+
+/// The pattern that gives the height: the first vertical one, else the first.
+pub fn primary_of(recording: &Recording) -> usize {
+    let vertical = |spec: &PatternSpec| matches!(spec, PatternSpec::Vertical { .. });
+    recording.patterns.iter().position(vertical).unwrap_or(0)
 }
 
 /// The frames of one pattern of a recording, ready to decode.

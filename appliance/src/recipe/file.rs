@@ -1,5 +1,6 @@
 //! `recipe.json` inside a recipe, version 1, as it stands on disk. Frozen: see `docs/formats.md`.
 
+use algo::units::AbsolutePhase;
 use serde::{Deserialize, Serialize};
 
 /// The name of the format.
@@ -135,6 +136,21 @@ impl SequenceKind {
             Self::Full => None,
         }
     }
+}
+
+/// A phase map inside the safe mask of a sequence that unwraps less than `limit` turns about it:
+/// unknown where a placement could move the phase further.
+pub fn safe(phase: &[AbsolutePhase], reach: &[f32], limit: f32) -> Vec<AbsolutePhase> {
+    let pairs = phase.iter().zip(reach);
+    pairs
+        .map(|(&phase, &moved)| {
+            if moved < limit {
+                phase
+            } else {
+                AbsolutePhase::UNKNOWN
+            }
+        })
+        .collect()
 }
 
 /// A named polygon.

@@ -13,6 +13,6 @@ pub mod teach;
 
 pub use check::Recipe;
 pub use file::{
-    GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFile, SequenceKind,
+    GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFile, SequenceKind, safe,
 };
 pub use store::{LoadError, Store};

@@ -10,7 +10,6 @@ use algo::adaptive::{AdaptError, ProjectorMap, noise};
 use algo::pattern::{PhaseFunction, Sequence};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
-use algo::units::AbsolutePhase;
 use hal::head::DynHead;
 use std::time::Duration;
 
@@ -85,11 +84,7 @@ pub fn teach(
     progress(0.35, "making the part's own pattern");
     let map = ProjectorMap::from_heights(&first.triangulator, &first.heights);
     let function = noise::adapt(&map, columns, rows, &OPTICS)?;
-    let expected: Vec<AbsolutePhase> = map
-        .points
-        .iter()
-        .map(|[xi, eta]| AbsolutePhase::from_turns(function.at(*xi, *eta)))
-        .collect();
+    let expected = map.expected_phase(&function);
     let full = dense(DENSE_N);
     let golden = bench.measure(&function, &full, About::Map(&expected), &|share| {
         progress(0.4 + 0.3 * share, "measuring the part with its own pattern");
@@ -122,8 +117,8 @@ pub fn teach(
 const OPTICS: noise::Optics = noise::Optics {
     projector_blur: 0.0,
     camera_blur: 0.0,
-    projector_pitch: 6.0,
-    image_pitch: 2.2,
+    projector_pitch: noise::PROJECTOR_PITCH,
+    image_pitch: noise::IMAGE_PITCH,
 };
 
 /// Ratio and shift of three dense levels of four steps, ratios 1, 1 − 1/n², 1 − 1/n.

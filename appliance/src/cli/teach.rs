@@ -1,0 +1,214 @@
+//! `fringed teach`: a recipe from the part in front of the head, or from recordings.
+
+use super::Common;
+use crate::backend::{self, Opened};
+use crate::calibration::Calibration;
+use crate::error::{Exit, Failure};
+use crate::measure::{measure, measure_after, primary_of};
+use crate::output::folder::write_whole;
+use crate::recipe::PatternFile;
+use crate::recipe::golden::{GoldenPart, Naming, Taught};
+use crate::recipe::teach::{TeachError, teach};
+use crate::state::StateFolder;
+use algo::adaptive::ProjectorMap;
+use hal::replay::Recording;
+use hal::replay::recording::PatternSpec;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Make a recipe from a good part.
+#[derive(Debug, clap::Args)]
+pub struct Teach {
+    /// Recipe number.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=9999))]
+    number: u16,
+    /// Part number: the key that a PLC may select by; without it PART-NNNN.
+    #[arg(long)]
+    part_number: Option<String>,
+    /// Name for people.
+    #[arg(long)]
+    name: Option<String>,
+    /// How far parts may lie from where this one lies, in any direction, mm.
+    #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = tolerance)]
+    tolerance: f64,
+    /// Recording of the good part with the full sequence; its pattern becomes the recipe's. Without
+    /// it, the part in front of the configured head is taught.
+    #[arg(long, value_name = "DIR", requires = "out")]
+    golden: Option<PathBuf>,
+    /// Recording that tells the golden one's dense levels what phase to expect; without it, the
+    /// reference phase map does.
+    #[arg(long, value_name = "DIR", requires = "golden")]
+    preliminary: Option<PathBuf>,
+    /// Write the recipe to this file instead of the state folder.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Longest wait for one frame.
+const TIMEOUT: Duration = Duration::from_secs(5);
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    let mm: Option<f64> = text.parse().ok();
+    mm.filter(|mm| (0.0..=20.0).contains(mm))
+        .ok_or_else(|| "give millimetres from 0 to 20".into())
+}
+
+impl Teach {
+    /// Teaches, stores the recipe and says why which sequence was chosen.
+    ///
+    /// # Errors
+    /// If the part cannot be taught or the recipe not be stored; a recipe stored before is untouched.
+    #[expect(
+        clippy::print_stdout,
+        reason = "the choice is what the command is asked for"
+    )]
+    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+        let config = common.configuration()?;
+        let pool = super::pool(config.threads)?;
+        let taught = match &self.golden {
+            Some(golden) => pool.install(|| self.teach_recordings(golden))?,
+            None => self.teach_head(common, &pool)?,
+        };
+        let place = match &self.out {
+            Some(out) => {
+                write_whole(out, &taught.bytes).map_err(|error| {
+                    let what = format!("write {}", out.display());
+                    Failure::because(Exit::CannotCreate, what, error)
+                })?;
+                out.display().to_string()
+            }
+            None => self.store(config.state, &taught)?,
+        };
+        let file = &taught.recipe.file;
+        if common.json {
+            let summary = serde_json::json!({
+                "number": file.number,
+                "fingerprint": file.fingerprint,
+                "sequences": file.sequences,
+                "production": file.production,
+                "reasons": taught.choice.reasons,
+                "file": place,
+            });
+            println!("{summary:#}");
+        } else if !common.quiet {
+            for reason in &taught.choice.reasons {
+                println!("{reason}");
+            }
+            println!(
+                "recipe {}, fingerprint {}: {place}",
+                file.number,
+                &file.fingerprint[..8]
+            );
+        }
+        Ok(())
+    }
+
+    fn naming(&self) -> Naming {
+        Naming {
+            number: self.number,
+            part_number: self
+                .part_number
+                .clone()
+                .unwrap_or_else(|| format!("PART-{:04}", self.number)),
+            name: self
+                .name
+                .clone()
+                .unwrap_or_else(|| format!("Part {}", self.number)),
+            taught_at_unix_s: crate::clock::utc_us().unwrap_or(0) / 1_000_000,
+            placement_tolerance_mm: self.tolerance,
+        }
+    }
+
+    fn teach_head(&self, common: &Common, pool: &rayon::ThreadPool) -> Result<Taught, Failure> {
+        let config = common.configuration()?;
+        let progress = common.progress();
+        let told = |share: f64| progress.tell(share, "working out the light of the scene");
+        let Opened {
+            mut head,
+            calibration,
+            ..
+        } = pool.install(|| backend::open(&config.head, &told))?;
+        let told = |share: f64, words: &str| progress.tell(share, words);
+        let naming = self.naming();
+        let taught = pool.install(|| teach(&mut head, &calibration, &naming, TIMEOUT, &told));
+        progress.clear();
+        taught.map_err(|error| {
+            let exit = match error {
+                TeachError::Device(_) => Exit::Unavailable,
+                TeachError::Scene(_) | TeachError::Rig(_) => Exit::Content,
+            };
+            Failure::new(exit, error.to_string())
+        })
+    }
+
+    fn store(&self, state: Option<PathBuf>, taught: &Taught) -> Result<String, Failure> {
+        let path = match state {
+            Some(path) => path,
+            None => StateFolder::default_path()?,
+        };
+        let state = StateFolder::open(&path)?;
+        state
+            .recipes()
+            .save(self.number, &taught.bytes)
+            .map_err(|error| {
+                let what = format!("store recipe {} in {}", self.number, path.display());
+                Failure::because(Exit::CannotCreate, what, error)
+            })?;
+        Ok(format!("stored in {}", path.display()))
+    }
+
+    fn teach_recordings(&self, folder: &Path) -> Result<Taught, Failure> {
+        let recording = Recording::open(folder)?;
+        let manifest = folder.join("recording.json");
+        let wrong = |error: &dyn std::fmt::Display| {
+            Failure::because(
+                Exit::Content,
+                format!("teach from {}", manifest.display()),
+                error,
+            )
+        };
+        let measured = match &self.preliminary {
+            None => measure(&recording, folder)?,
+            Some(before) => {
+                let first = measure(&Recording::open(before)?, before)?;
+                let surface = first.heights.map_err(|missing| {
+                    let what = format!("teach from {}", before.display());
+                    Failure::because(Exit::Content, what, missing)
+                })?;
+                let map = ProjectorMap::from_heights(&surface.triangulator, &surface.map);
+                measure_after(&recording, folder, &map)?
+            }
+        };
+        let surface = measured
+            .heights
+            .as_ref()
+            .map_err(|missing| wrong(missing))?;
+        let noise = measured.report.noise_counts.ok_or_else(|| {
+            wrong(&"the noise of a sample is not known: add camera.noise_counts or levels of 4 shifts")
+        })?;
+        let calibration = Calibration::of(&recording, noise)
+            .map_err(|lacks| wrong(&format!("it has no {lacks}: add both models")))?;
+        let phases = &measured.phases[measured.primary];
+        crate::recipe::teach::refuse_empty(phases).map_err(|error| wrong(&error))?;
+        let at = primary_of(&recording);
+        let frames = recording.frames.iter().filter(|frame| frame.pattern == at);
+        let full: Vec<_> = frames
+            .map(|frame| (frame.ratio, frame.shift_turns))
+            .collect();
+        let part = GoldenPart {
+            calibration: &calibration,
+            pattern: match recording.patterns[at] {
+                PatternSpec::Vertical { fringes } => PatternFile::Vertical { fringes },
+                PatternSpec::Horizontal { fringes } => PatternFile::Horizontal { fringes },
+                PatternSpec::File { .. } => PatternFile::File,
+            },
+            full: &full,
+            decoder: &measured.decoder,
+            triangulator: &surface.triangulator,
+            phases,
+            heights: &surface.map,
+            noise,
+        };
+        part.recipe(&self.naming()).map_err(|error| wrong(&error))
+    }
+}
