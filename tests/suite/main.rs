@@ -3,6 +3,8 @@
 mod adapt;
 mod bad_input;
 mod cases;
+mod cli;
+mod formats;
 mod fuzz;
 mod house;
 mod measured;
@@ -10,6 +12,8 @@ mod outputs;
 mod placement;
 mod promises_own;
 mod promises_shared;
+mod station;
+mod station_plc;
 mod triangulation;
 mod twin;
 mod written;

@@ -81,8 +81,8 @@ function gaugeRow(gauge) {
 
 function showStages(result) {
   text("total", milliseconds(result.total_us));
-  const stages = result.stages.length ? result.stages
-    : [{ name: "exposure", us: result.exposure_us }, { name: "processing", us: Math.max(0, result.total_us - result.exposure_us) }];
+  const processing = [{ name: "processing", us: Math.max(0, result.total_us - result.exposure_us) }];
+  const stages = [{ name: "exposure", us: result.exposure_us }, ...(result.stages.length ? result.stages : processing)];
   const sum = stages.reduce((total, stage) => total + stage.us, 0) || 1;
   $("stages-bar").replaceChildren(...stages.map((stage, k) => {
     const part = element("span", `s${k % 8}`);

@@ -1,0 +1,266 @@
+//! The command line: what each command answers, and its exit code where it cannot.
+
+use crate::station_plc::{Daemon, Place};
+use serde_json::Value;
+use std::fs;
+use std::net::TcpListener;
+use std::path::Path;
+use tests::program::{Program, Run};
+
+/// A measured error may exceed the predicted one by this factor: the prediction knows the noise, not
+/// how a pixel averages over a slope.
+const OVER_PREDICTION: f64 = 1.2;
+
+fn run(arguments: &[&str]) -> Run {
+    Program::at(env!("CARGO_BIN_EXE_fringed-under-test")).run(arguments)
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// Checks the exit code and that the message holds each word.
+fn check_refused(run: &Run, code: i32, words: &[&str]) {
+    assert_eq!(run.code, code, "{}", run.stderr);
+    for word in words {
+        assert!(run.stderr.contains(word), "{word:?} in {}", run.stderr);
+    }
+    assert_eq!(run.stdout, "");
+}
+
+#[test]
+fn the_demonstration_finds_exactly_the_defective_parts() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = folder.path().join("state");
+    let run = run(&[
+        "demo",
+        "--exit",
+        "--json",
+        "--quiet",
+        "--state",
+        text(&state),
+        "--modbus",
+        "127.0.0.1:0",
+        "--http",
+        "127.0.0.1:0",
+    ]);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let rows: Value = serde_json::from_str(&run.stdout).unwrap();
+    let rows = rows.as_array().unwrap();
+    let verdicts: Vec<_> = rows
+        .iter()
+        .map(|row| {
+            (
+                row["placed"].as_str().unwrap(),
+                row["verdict"].as_str().unwrap(),
+            )
+        })
+        .collect();
+    assert_eq!(verdicts.len(), 10);
+    let defective = verdicts.iter().filter(|(placed, _)| *placed != "good");
+    assert_eq!(defective.count(), 3);
+    for (placed, verdict) in verdicts {
+        assert_eq!(placed == "good", verdict == "PASS", "{placed}: {verdict}");
+    }
+    let numbers: Vec<_> = rows
+        .iter()
+        .map(|row| row["seq"].as_u64().unwrap())
+        .collect();
+    assert_eq!(numbers, (1..=10).collect::<Vec<_>>());
+}
+
+#[test]
+fn what_is_recorded_is_measured_with_the_predicted_error() {
+    let place = Place::new();
+    let (recording, out) = (place.path("recording"), place.path("out"));
+    let config = place.path("fringed.toml");
+    let recorded = run(&["record", text(&recording), "--config", text(&config)]).succeeded();
+    assert!(recorded.stdout.contains("12 frames"), "{}", recorded.stdout);
+    let measured = run(&["measure", text(&recording), "--out", text(&out), "--json"]).succeeded();
+    let report: Value = serde_json::from_str(&measured.stdout).unwrap();
+    let score = &report["score"];
+    let (rms, predicted) = (
+        score["rms_mm"].as_f64().unwrap(),
+        report["sigma_mm"].as_f64().unwrap(),
+    );
+    assert!(
+        rms <= OVER_PREDICTION * predicted,
+        "{rms} against {predicted}"
+    );
+    assert_eq!(score["gross"], 0);
+    assert!(score["scored"].as_u64().unwrap() > 5_000, "{score}");
+    // A recording is never written over.
+    let again = run(&["record", text(&recording), "--config", text(&config)]);
+    check_refused(&again, 73, &["recording"]);
+}
+
+#[test]
+fn the_register_map_is_the_same_as_csv_and_as_json() {
+    let csv = run(&["registers"]).succeeded().stdout;
+    let json = run(&["registers", "--json"]).succeeded().stdout;
+    let json: Value = serde_json::from_str(&json).unwrap();
+    let keys: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
+    let rows = json["registers"].as_array().unwrap();
+    assert_eq!(rows.len(), csv.lines().count() - 1);
+    for (line, row) in csv.lines().skip(1).zip(rows) {
+        // The last column is quoted and the only one that may hold commas.
+        let cells: Vec<&str> = line.splitn(keys.len(), ',').collect();
+        for (key, cell) in keys.iter().zip(cells) {
+            let value = match &row[key] {
+                Value::Bool(true) => "yes".into(),
+                Value::Bool(false) => "later".into(),
+                Value::String(text) => text.clone(),
+                other => other.to_string(),
+            };
+            assert_eq!(
+                value,
+                cell.trim_matches('"').replace("\"\"", "\""),
+                "{line}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_wrong_configuration_is_refused_by_key_and_a_missing_one_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("fringed.toml");
+    let check = |content: &str| {
+        fs::write(&file, content).unwrap();
+        run(&["config", "check", text(&file)])
+    };
+    assert_eq!(check("threads = 2\n").succeeded().stdout.lines().count(), 1);
+    for (content, word) in [
+        ("threats = 2\n", "threats"),
+        ("threads = 2000\n", "0 to 256"),
+        ("[modbus]\nlisten = \"here\"\n", "listen"),
+        ("[head]\nbackend = \"replay\"\n", "head.recordings"),
+    ] {
+        check_refused(&check(content), 78, &["fringed.toml", word]);
+    }
+    for (content, word) in [
+        ("[head]\nscenario = \"none.toml\"\n", "none.toml"),
+        (
+            "[head]\nbackend = \"replay\"\nrecordings = [\"none\"]\n",
+            "none",
+        ),
+    ] {
+        check_refused(&check(content), 66, &[word]);
+    }
+    let missing = folder.path().join("missing.toml");
+    for arguments in [
+        ["config", "check", text(&missing)],
+        ["serve", "--config", text(&missing)],
+    ] {
+        check_refused(&run(&arguments), 66, &["missing.toml"]);
+    }
+}
+
+#[test]
+fn a_broken_scenario_is_refused_by_key_by_every_command_that_opens_the_head() {
+    let place = Place::new();
+    let (config, recording) = (place.path("fringed.toml"), place.path("recording"));
+    for (content, word) in [
+        ("sub_rays = 99\n", "sub_rays"),
+        ("[rig.camera]\nwidths = 5\n", "widths"),
+        ("[part]\nkind = \"teapot\"\n", "teapot"),
+        ("= 5\n", "TOML"),
+    ] {
+        fs::write(place.path("small.toml"), content).unwrap();
+        for command in [
+            vec!["config", "check", text(&config)],
+            vec!["record", text(&recording), "--config", text(&config)],
+            vec![
+                "serve",
+                "--config",
+                text(&config),
+                "--modbus",
+                "127.0.0.1:0",
+                "--http",
+                "127.0.0.1:0",
+            ],
+        ] {
+            check_refused(&run(&command), 78, &["small.toml", word]);
+        }
+    }
+    assert!(!recording.exists());
+}
+
+#[test]
+fn a_port_in_use_ends_the_start_and_is_named() {
+    let place = Place::new();
+    let config = place.path("fringed.toml");
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    for [modbus, http] in [[&*address, "127.0.0.1:0"], ["127.0.0.1:0", &*address]] {
+        let run = run(&[
+            "serve",
+            "--config",
+            text(&config),
+            "--modbus",
+            modbus,
+            "--http",
+            http,
+        ]);
+        check_refused(&run, 69, &[&address]);
+    }
+}
+
+#[test]
+fn a_state_folder_that_cannot_be_used_ends_the_start_and_is_named() {
+    let place = Place::new();
+    let (config, state) = (place.path("fringed.toml"), place.path("state"));
+    let serve = || {
+        run(&[
+            "serve",
+            "--config",
+            text(&config),
+            "--modbus",
+            "127.0.0.1:0",
+            "--http",
+            "127.0.0.1:0",
+        ])
+    };
+    fs::write(&state, "a file in its place").unwrap();
+    check_refused(&serve(), 73, &[text(&state), "--state"]);
+    fs::remove_file(&state).unwrap();
+    let daemon = Daemon::start(&place);
+    check_refused(&serve(), 73, &[text(&state), "another fringed"]);
+    drop(daemon);
+    fs::write(state.join("result-seq"), "4x").unwrap();
+    check_refused(&serve(), 73, &["result-seq"]);
+}
+
+#[test]
+fn what_cannot_be_asked_for_is_usage() {
+    for arguments in [
+        &["measures"][..],
+        &["measure"],
+        &["measure", "a-recording"],
+        &["record", "a-recording", "--steps", "2"],
+        &["serve", "--modbus", "here"],
+        &["config", "check"],
+        &["demo", "--parts", "3"],
+    ] {
+        check_refused(&run(arguments), 64, &[]);
+    }
+    for arguments in [["--help"], ["--version"]] {
+        assert!(run(&arguments).succeeded().stdout.contains("fringed"));
+    }
+}
+
+#[test]
+fn quiet_says_nothing() {
+    let place = Place::new();
+    let config = place.path("fringed.toml");
+    let (recording, out) = (place.path("recording"), place.path("out"));
+    let (config, recording, out) = (text(&config), text(&recording), text(&out));
+    for arguments in [
+        &["record", recording, "--config", config, "--quiet"][..],
+        &["measure", recording, "--out", out, "--quiet"],
+        &["config", "check", config, "--quiet"],
+    ] {
+        let run = run(arguments).succeeded();
+        assert_eq!((run.stdout, run.stderr), (String::new(), String::new()));
+    }
+}

@@ -1,0 +1,178 @@
+//! The files that cross the border of the program are those that the documentation names.
+
+use crate::station_plc::{Daemon, Place};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::fs;
+use tests::program::Program;
+
+fn document(name: &str) -> String {
+    let path = format!("{}/../docs/{name}", env!("CARGO_MANIFEST_DIR"));
+    fs::read_to_string(path).unwrap()
+}
+
+/// Members of a recipe, version 1. If this fails, do not change the test: old files must stay readable.
+const MEMBERS: [&str; 9] = [
+    "recipe.json",
+    "phase_function.npy",
+    "golden_phase.npy",
+    "golden_height.npy",
+    "height_slope.npy",
+    "height_curvature.npy",
+    "valid.npy",
+    "modulation.npy",
+    "phase_reach.npy",
+];
+
+/// Keys of its `recipe.json`, version 1, as a taught recipe has them. The same holds for these.
+const KEYS: [&str; 40] = [
+    "calibration",
+    "camera",
+    "camera.bit_depth",
+    "camera.height",
+    "camera.width",
+    "expansion_range_turns",
+    "fingerprint",
+    "format",
+    "gauges",
+    "gauges.high",
+    "gauges.low",
+    "gauges.measures",
+    "gauges.measures.kind",
+    "gauges.measures.smoothing_px",
+    "gauges.name",
+    "gauges.region",
+    "min_coverage",
+    "name",
+    "noise_counts",
+    "number",
+    "part_number",
+    "pattern",
+    "pattern.kind",
+    "placement_tolerance_mm",
+    "production",
+    "projector",
+    "projector.height",
+    "projector.width",
+    "range_mm",
+    "regions",
+    "regions.name",
+    "regions.polygon",
+    "sequences",
+    "sequences.frames",
+    "sequences.kind",
+    "sequences.safe_share",
+    "sequences.sigma_mm",
+    "taught_at_unix_s",
+    "taught_by",
+    "version",
+];
+/// What it may hold besides.
+const OPTIONAL: [&str; 2] = ["exposure_us", "fringes"];
+
+fn collect(value: &Value, prefix: &str, keys: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(object) => {
+            for (key, value) in object {
+                let path = format!("{prefix}{key}");
+                collect(value, &format!("{path}."), keys);
+                keys.insert(path);
+            }
+        }
+        Value::Array(items) => items.iter().for_each(|item| collect(item, prefix, keys)),
+        _ => {}
+    }
+}
+
+/// Name and content of each member of a ZIP that only stores (APPNOTE 6.3.10, section 4.3.7).
+fn stored_members(mut zip: &[u8]) -> Vec<(String, Vec<u8>)> {
+    let mut members = Vec::new();
+    while let Some(header) = zip.strip_prefix(b"PK\x03\x04") {
+        let short = |at: usize| usize::from(u16::from_le_bytes([header[at], header[at + 1]]));
+        let (method, size) = (short(4), short(14) | short(16) << 16);
+        assert_eq!(method, 0, "members are stored");
+        let name = 26..26 + short(22);
+        let content = name.end + short(24)..name.end + short(24) + size;
+        members.push((
+            String::from_utf8(header[name].to_vec()).unwrap(),
+            header[content.clone()].to_vec(),
+        ));
+        zip = &header[content.end..];
+    }
+    members
+}
+
+#[test]
+fn a_taught_recipe_has_exactly_the_documented_members_and_keys() {
+    let place = Place::new();
+    drop(Daemon::start(&place));
+    let members = stored_members(&fs::read(place.recipe()).unwrap());
+    let names: Vec<&str> = members.iter().map(|(name, _)| &**name).collect();
+    assert_eq!(names, MEMBERS);
+    let text = str::from_utf8(&members[0].1).unwrap();
+    let manifest: Value = serde_json::from_str(text).unwrap();
+    assert_eq!(
+        (&manifest["format"], &manifest["version"]),
+        (&"fringed-recipe".into(), &1.into())
+    );
+    let mut keys = BTreeSet::new();
+    collect(&manifest, "", &mut keys);
+    assert_eq!(keys.iter().map(String::as_str).collect::<Vec<_>>(), KEYS);
+    let documented = document("formats.md");
+    for name in MEMBERS.iter().chain(&KEYS).chain(&OPTIONAL) {
+        let name = name
+            .rsplit('.')
+            .next()
+            .filter(|_| !name.ends_with(".npy") && !name.ends_with(".json"))
+            .unwrap_or(name);
+        assert!(
+            documented.contains(&format!("`{name}`")),
+            "docs/formats.md names no `{name}`"
+        );
+    }
+}
+
+#[test]
+fn the_documentation_holds_the_register_map() {
+    let program = Program::at(env!("CARGO_BIN_EXE_fringed-under-test"));
+    let json = program.run(&["registers", "--json"]).succeeded().stdout;
+    let json: Value = serde_json::from_str(&json).unwrap();
+    let documented = document("modbus.md");
+    let mut block = String::new();
+    for row in json["registers"].as_array().unwrap() {
+        let cell = |key: &str| match &row[key] {
+            Value::String(text) => text.clone(),
+            other => other.to_string(),
+        };
+        // The OLDEST block has the layout of RESULT and is documented by one sentence.
+        if cell("block") == "OLDEST" {
+            continue;
+        }
+        if block != cell("block") {
+            block = cell("block");
+            assert!(
+                documented.contains(&format!("**{block}**")),
+                "no block {block}"
+            );
+        }
+        let line = format!(
+            "| {} | {} | {} | {} | {} | {} |\n",
+            cell("address"),
+            cell("reference"),
+            cell("name"),
+            cell("type"),
+            cell("registers"),
+            cell("meaning")
+        );
+        assert!(documented.contains(&line), "docs/modbus.md lacks: {line}");
+    }
+}
+
+#[test]
+fn the_documented_scenario_is_the_default_one() {
+    let documented = document("formats.md");
+    let (_, from) = documented.split_once("```toml\n").unwrap();
+    let (scenario, _) = from.split_once("```").unwrap();
+    let read = hal::sim::Scenario::from_toml(scenario, "docs/formats.md").unwrap();
+    assert_eq!(read, hal::sim::Scenario::default());
+}

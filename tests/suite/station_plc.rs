@@ -1,0 +1,249 @@
+//! The daemon on a small simulated head, and the PLC in front of it.
+
+use std::fs;
+use std::io::{BufRead as _, BufReader};
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use tokio::runtime::Runtime;
+use tokio_modbus::ExceptionCode;
+use tokio_modbus::client::{Context, Reader as _, Writer as _, tcp};
+
+/// Bits of STATUS.
+pub const READY: u16 = 1 << 1;
+pub const BUSY: u16 = 1 << 2;
+pub const EXPOSURE_DONE: u16 = 1 << 4;
+pub const RESULT_VALID: u16 = 1 << 5;
+pub const RESULT_TOGGLE: u16 = 1 << 6;
+pub const TRIGGER_ACK: u16 = 1 << 7;
+pub const RECIPE_OK: u16 = 1 << 9;
+/// Bits of CONTROL.
+pub const ONLINE: u16 = 1;
+pub const TRIGGER: u16 = 1 << 1;
+pub const RESULT_ACK: u16 = 1 << 2;
+/// Longest wait for anything that must happen.
+pub const PATIENCE: Duration = Duration::from_secs(30);
+/// SIGTERM ends the daemon within this time.
+pub const STOPPING: Duration = Duration::from_secs(5);
+
+/// A head with few pixels: where resolution does not matter, nothing waits for light.
+pub const SMALL_HEAD: &str = "sub_rays = 2\n\n[rig.camera]\nwidth = 160\nheight = 160\n";
+
+/// A configuration with a small simulated head beside a state folder, in a folder of its own.
+pub struct Place {
+    folder: TempDir,
+}
+
+impl Place {
+    pub fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("small.toml"), SMALL_HEAD).unwrap();
+        let config = "state = \"state\"\n[head]\nscenario = \"small.toml\"\n";
+        fs::write(folder.path().join("fringed.toml"), config).unwrap();
+        Self { folder }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn recipe(&self) -> PathBuf {
+        self.path("state/recipes/0001.recipe")
+    }
+}
+
+/// A running daemon. Dropped, it is killed.
+pub struct Daemon {
+    child: Child,
+    /// Where it serves Modbus TCP.
+    pub modbus: SocketAddr,
+    /// What it said until it served.
+    pub log: String,
+}
+
+impl Daemon {
+    /// Starts the program and waits until it says where it serves.
+    pub fn start(place: &Place) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_fringed-under-test"))
+            .args(["serve", "--modbus", "127.0.0.1:0", "--http", "127.0.0.1:0"])
+            .arg("--config")
+            .arg(place.path("fringed.toml"))
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        // Read by a thread of its own, so that the daemon can go on logging and nothing waits for ever.
+        let lines = BufReader::new(child.stderr.take().unwrap()).lines();
+        let (said, hear) = mpsc::channel();
+        std::thread::spawn(move || {
+            for line in lines.map_while(Result::ok) {
+                // Nobody listens any more once it serves.
+                let _ = said.send(line);
+            }
+        });
+        let mut log = String::new();
+        let modbus = loop {
+            let Ok(line) = hear.recv_timeout(PATIENCE) else {
+                let _ = child.kill();
+                panic!("it does not serve: {:?}\n{log}", child.wait());
+            };
+            if let Some((_, rest)) = line.split_once("Modbus TCP on ") {
+                break rest.split(',').next().unwrap().parse().unwrap();
+            }
+            log += &line;
+            log += "\n";
+        };
+        Self { child, modbus, log }
+    }
+
+    pub fn terminate(mut self) -> ExitStatus {
+        let pid = self.child.id().to_string();
+        let told = Command::new("kill").args(["-TERM", &pid]).status().unwrap();
+        assert!(told.success());
+        let started = Instant::now();
+        loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                return status;
+            }
+            assert!(started.elapsed() < STOPPING, "SIGTERM did not end it");
+            std::thread::yield_now();
+        }
+    }
+
+    pub fn kill(mut self) {
+        // SIGKILL: nothing is written, closed or said.
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+}
+
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The STATUS block.
+#[derive(Clone, Debug)]
+pub struct Status(pub Vec<u16>);
+
+impl Status {
+    pub fn bits(&self) -> u16 {
+        self.0[0]
+    }
+
+    pub fn has(&self, bits: u16) -> bool {
+        self.bits() & bits == bits
+    }
+
+    pub fn active_recipe(&self) -> u16 {
+        self.0[5]
+    }
+
+    pub fn crc(&self) -> u32 {
+        long(&self.0, 6)
+    }
+
+    pub fn recipe_result(&self) -> u16 {
+        self.0[9]
+    }
+
+    pub fn triggers(&self) -> u32 {
+        long(&self.0, 10)
+    }
+
+    pub fn seq(&self) -> u32 {
+        long(&self.0, 12)
+    }
+
+    pub fn missed(&self) -> u32 {
+        long(&self.0, 14)
+    }
+
+    pub fn last_token(&self) -> u16 {
+        self.0[16]
+    }
+
+    pub fn boot_id(&self) -> u32 {
+        long(&self.0, 22)
+    }
+}
+
+/// 32 bits, high word first.
+pub fn long(words: &[u16], at: usize) -> u32 {
+    u32::from(words[at]) << 16 | u32::from(words[at + 1])
+}
+
+/// A PLC with one connection.
+pub struct Plc {
+    pub runtime: Runtime,
+    pub context: Context,
+}
+
+impl Plc {
+    pub fn connect(daemon: &Daemon) -> Self {
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .unwrap();
+        let context = runtime.block_on(tcp::connect(daemon.modbus)).unwrap();
+        Self { runtime, context }
+    }
+
+    pub fn read(&mut self, address: u16, count: u16) -> Result<Vec<u16>, ExceptionCode> {
+        let answer = self.context.read_holding_registers(address, count);
+        self.runtime.block_on(answer).unwrap()
+    }
+
+    pub fn write(&mut self, address: u16, words: &[u16]) {
+        let answer = self.context.write_multiple_registers(address, words);
+        self.runtime.block_on(answer).unwrap().unwrap();
+    }
+
+    /// FC23: writes, then reads STATUS as it is after the write.
+    pub fn write_and_read_status(&mut self, address: u16, words: &[u16]) -> Status {
+        let answer = self
+            .context
+            .read_write_multiple_registers(100, 32, address, words);
+        Status(self.runtime.block_on(answer).unwrap().unwrap())
+    }
+
+    pub fn status(&mut self) -> Status {
+        Status(self.read(100, 32).unwrap())
+    }
+
+    pub fn wait(&mut self, what: &str, condition: impl Fn(&Status) -> bool) -> Status {
+        let started = Instant::now();
+        loop {
+            let status = self.status();
+            if condition(&status) {
+                return status;
+            }
+            assert!(started.elapsed() < PATIENCE, "no {what}: {status:?}");
+        }
+    }
+
+    /// Triggers by token and reads the result in one read of 120 registers.
+    pub fn measure(&mut self, token: u16) -> Vec<u16> {
+        self.wait("READY", |status| status.has(READY));
+        self.write(1, &trigger(token));
+        let started = Instant::now();
+        loop {
+            let words = self.read(200, 120).unwrap();
+            if words[2] == token {
+                return words;
+            }
+            assert!(started.elapsed() < PATIENCE, "no result");
+        }
+    }
+}
+
+/// TRIGGER_TOKEN, RECIPE_SELECT, PLC_HEARTBEAT, PART_ID and PRESS_STROKE.
+pub fn trigger(token: u16) -> [u16; 7] {
+    [token, 0, 0, 1, token, 2, token]
+}
