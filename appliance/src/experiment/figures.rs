@@ -98,14 +98,14 @@ fn over_fringes(rows: &[&Row], quantity: fn(&Row) -> f64) -> Vec<Series> {
             Some((number.parse().ok()?, quantity(row), number.to_owned()))
         });
         series.push(Series {
-            name: format!("fixed pitch, {optics}"),
+            name: format!("fixed, {optics}"),
             colour,
             kind,
             points: points.collect(),
         });
     }
     for (prefix, name, colour) in [
-        ("paper-5", "paper's adaptive, 12 frames", PAPER),
+        ("paper-5", "paper's adaptive, p_I 5", PAPER),
         ("better-12", "better adaptive, 12 frames", BETTER),
     ] {
         let of = rows.iter().filter(|row| row.method == prefix);

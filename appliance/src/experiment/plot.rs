@@ -45,7 +45,7 @@ pub enum Kind {
 }
 
 const WIDTH: f64 = 760.0;
-const HEIGHT: f64 = 500.0;
+const HEIGHT: f64 = 620.0;
 const LEFT: f64 = 74.0;
 const RIGHT: f64 = WIDTH - 24.0;
 const TOP: f64 = 66.0;
@@ -123,10 +123,14 @@ impl Plot {
                         "<path d=\"M{LEFT} {y:.1}H{RIGHT}\" stroke=\"{colour}\" stroke-dasharray=\"7 4\" \
                          stroke-width=\"1.5\"/>"
                     );
+                    block(&mut taken, (LEFT, y), (RIGHT, y));
                 }
                 continue;
             }
             if series.kind != Kind::Dots {
+                for pair in at.windows(2) {
+                    block(&mut taken, pair[0], pair[1]);
+                }
                 let path: Vec<String> = at.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
                 let dashes = match series.kind {
                     Kind::Dashed => " stroke-dasharray=\"7 4\"",
@@ -166,7 +170,7 @@ impl Plot {
                 text(
                     out,
                     area[0],
-                    area[3] - 3.0,
+                    area[3] - 2.5,
                     "start",
                     series.colour,
                     LABEL,
@@ -194,8 +198,21 @@ impl Plot {
                 ),
             };
             text(out, x + 26.0, 48.0, "start", "#222", LABEL, &series.name);
-            x += 44.0 + LETTER * series.name.chars().count() as f64;
+            x += 40.0 + 6.4 * series.name.chars().count() as f64;
         }
+    }
+}
+
+/// Keeps labels off a line.
+fn block(taken: &mut Vec<Area>, from: (f64, f64), to: (f64, f64)) {
+    let steps = (f64::hypot(to.0 - from.0, to.1 - from.1) / 4.0)
+        .ceil()
+        .max(1.0);
+    for i in 0..=steps as usize {
+        let share = i as f64 / steps;
+        let x = from.0 + share * (to.0 - from.0);
+        let y = from.1 + share * (to.1 - from.1);
+        taken.push([x - 1.5, y - 1.5, x + 1.5, y + 1.5]);
     }
 }
 
@@ -211,26 +228,26 @@ fn place(
         let start = x + dx;
         [
             start,
-            y + dy - LABEL / 2.0 - 1.0,
+            y + dy - LABEL / 2.0 - 0.5,
             start + width,
-            y + dy + LABEL / 2.0 + 2.0,
+            y + dy + LABEL / 2.0 + 1.0,
         ]
     };
     let near = [
         (8.0, 0.0),
+        (-8.0 - width, 0.0),
         (7.0, -11.0),
         (7.0, 11.0),
         (-width / 2.0, -14.0),
         (-width / 2.0, 14.0),
-        (-8.0 - width, 0.0),
         (-7.0 - width, -11.0),
         (-7.0 - width, 11.0),
     ];
     let order: Vec<(f64, f64)> = if left {
         vec![
-            (-width, -9.0),
+            (-width, -10.0),
             (-width, 10.0),
-            (-2.0 * width - 20.0, -9.0),
+            (-2.0 * width - 20.0, -10.0),
             (-2.0 * width - 20.0, 10.0),
         ]
     } else {
@@ -328,7 +345,7 @@ impl Axis {
         };
         let least = if from_zero { 0.0 } else { least };
         let span = (most - least).max(1e-3 * most.abs()).max(1e-9);
-        let low = if from_zero { 0.0 } else { least - 0.06 * span };
+        let low = if from_zero { 0.0 } else { least - 0.09 * span };
         let high = most + 0.09 * span;
         Self {
             low,
