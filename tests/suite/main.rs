@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod cases;
+mod experiment;
 mod fuzz;
 mod house;
 mod measured;

@@ -18,7 +18,8 @@ pub struct Scene {
     pub part: Part,
     /// Where it lies.
     pub placement: Placement,
-    /// Columns and rows of the camera.
+    /// Columns and rows of the camera: 512 as in the study; a smaller one sees the middle of the same
+    /// picture, with pixels of the same size.
     pub camera: u32,
 }
 
@@ -44,7 +45,7 @@ pub const PARTS: [&str; 7] = [
     "tube",
 ];
 
-/// Columns and rows of the paper's camera.
+/// Columns and rows of the study's camera.
 const CAMERA: u32 = 512;
 /// The paper's tilt about y, degrees.
 const TILT: f64 = 7.0;
@@ -115,8 +116,13 @@ impl Scene {
             optics: optics.blur(),
             ..Scenario::default()
         };
-        scenario.rig.camera.width = self.camera;
-        scenario.rig.camera.height = self.camera;
+        let camera = &mut scenario.rig.camera;
+        let share = f64::from(self.camera) / f64::from(camera.width);
+        for fov in &mut camera.fov_deg {
+            let half = (fov.to_radians() / 2.0).tan() * share;
+            *fov = 2.0 * half.atan().to_degrees();
+        }
+        (camera.width, camera.height) = (self.camera, self.camera);
         scenario.noise.seed = seed;
         scenario
     }
