@@ -244,17 +244,14 @@ fn place(
         (-7.0 - width, 11.0),
     ];
     let order: Vec<(f64, f64)> = if left {
-        vec![
-            (-width, -10.0),
-            (-width, 10.0),
-            (-2.0 * width - 20.0, -10.0),
-            (-2.0 * width - 20.0, 10.0),
-        ]
+        let steps = (0..8).map(|i| -width - 40.0 * f64::from(i));
+        steps.flat_map(|dx| [(dx, -10.0), (dx, 10.0)]).collect()
     } else {
         near.to_vec()
     };
     let free = |area: &Area| {
-        let inside = area[0] > LEFT && area[2] < RIGHT && area[1] > TOP && area[3] < BOTTOM;
+        let inside =
+            area[0] > LEFT + 3.0 && area[2] < RIGHT - 3.0 && area[1] > TOP && area[3] < BOTTOM;
         let clear = |other: &Area| {
             area[2] <= other[0] || other[2] <= area[0] || area[3] <= other[1] || other[3] <= area[1]
         };
