@@ -4,6 +4,7 @@ mod adapt;
 mod bad_input;
 mod cases;
 mod cli;
+mod experiment;
 mod formats;
 mod fuzz;
 mod house;

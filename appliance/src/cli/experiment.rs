@@ -1,59 +1,113 @@
-//! `fringed experiment`.
+//! `fringed experiment --out DIR`: the paper's experiments as tables, plots and pictures.
 
 use super::Common;
 use crate::error::{Exit, Failure};
-use crate::experiment::{Method, OpticsKind, PARTS, Runner, Scene};
+use crate::experiment::{Campaign, OpticsKind, PARTS, Results, Row, Scene, csv, figures, means};
+use crate::output::folder::OutputFolder;
+use std::path::PathBuf;
 
 /// Repeat the paper's experiments on the simulated head.
 #[derive(Debug, clap::Args)]
 pub struct Experiment {
-    /// A part, or all.
-    #[arg(long, default_value = "all")]
+    /// Parts, or all.
+    #[arg(long, value_name = "NAME", num_args = 1.., default_value = "all")]
     part: Vec<String>,
     /// How sharp projector and camera are.
     #[arg(long, value_enum, default_value = "ideal")]
     optics: OpticsKind,
     /// Noise seeds.
-    #[arg(long, default_value_t = 3)]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=100))]
     seeds: u64,
+    /// Folder for tables, plots and pictures; made if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
 }
 
 impl Experiment {
-    /// Runs the experiments and prints a table.
+    /// Runs the experiments, writes their results and prints the means.
     ///
     /// # Errors
-    /// If a part is not known or a run fails.
+    /// If a part is not known, a run fails or the results cannot be written.
     #[expect(
         clippy::print_stdout,
         reason = "the table is what the command is asked for"
     )]
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
+        let campaign = Campaign {
+            scenes: self.scenes()?,
+            optics: self.optics,
+            seeds: self.seeds,
+        };
+        let folder = OutputFolder::create(&self.out)?;
         let pool = super::pool(common.threads.unwrap_or(0))?;
-        let names: Vec<&str> = if self.part.iter().any(|name| name == "all") {
+        let progress = common.progress();
+        let told = |share: f64, words: &str| progress.tell(share, words);
+        let results = pool.install(|| campaign.run(&told));
+        progress.clear();
+        let results = results
+            .map_err(|error| Failure::because(Exit::Software, "run the experiments", error))?;
+        let means = means(&results.rows);
+        write(&folder, &campaign, &results, &means)?;
+        if common.json {
+            let json = serde_json::to_string_pretty(&means)
+                .map_err(|error| Failure::because(Exit::Software, "write the means", error))?;
+            println!("{json}");
+        } else if !common.quiet {
+            print!("{}", tables(&campaign, &means));
+            println!("written to {}", self.out.display());
+        }
+        Ok(())
+    }
+
+    fn scenes(&self) -> Result<Vec<Scene>, Failure> {
+        let all = self.part.iter().any(|name| name == "all");
+        let names: Vec<&str> = if all {
             PARTS.to_vec()
         } else {
             self.part.iter().map(String::as_str).collect()
         };
-        let failed =
-            |error: crate::bench::BenchError| Failure::new(Exit::Software, error.to_string());
+        let mut scenes: Vec<Scene> = Vec::new();
         for name in names {
             let scene = Scene::named(name).ok_or_else(|| {
-                let message = format!(
-                    "experiment: no part {name:?}: one of {}, all",
-                    PARTS.join(", ")
-                );
+                let known = PARTS.join(", ");
+                let message = format!("experiment: no part {name:?}: name one of {known}, all");
                 Failure::new(Exit::Usage, message)
             })?;
-            let mut runner = pool
-                .install(|| Runner::new(&scene, self.optics))
-                .map_err(failed)?;
-            for method in Method::all() {
-                for seed in 1..=self.seeds {
-                    let outcome = pool.install(|| runner.run(method, seed)).map_err(failed)?;
-                    println!("{name} {method:?} {seed} {outcome:?}");
-                }
+            if scenes.iter().all(|known| known.name != scene.name) {
+                scenes.push(scene);
             }
         }
-        Ok(())
+        Ok(scenes)
     }
+}
+
+fn write(
+    folder: &OutputFolder,
+    campaign: &Campaign,
+    results: &Results,
+    means: &[Row],
+) -> Result<(), Failure> {
+    folder.write("experiments.csv", csv(&results.rows).as_bytes())?;
+    for scene in &campaign.scenes {
+        for (name, svg) in figures(scene, means) {
+            folder.write(&name, svg.as_bytes())?;
+        }
+    }
+    for (name, png) in &results.pictures {
+        folder.write(name, png)?;
+    }
+    Ok(())
+}
+
+/// A table for each part and each of its optics.
+fn tables(campaign: &Campaign, means: &[Row]) -> String {
+    let mut tables = Vec::new();
+    for scene in &campaign.scenes {
+        for optics in scene.optics(campaign.optics) {
+            let same = |row: &&Row| row.part == scene.name && row.optics == optics.word();
+            let rows: Vec<&Row> = means.iter().filter(same).collect();
+            tables.push(crate::experiment::table(scene, &rows));
+        }
+    }
+    tables.join("\n")
 }

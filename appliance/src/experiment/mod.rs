@@ -1,8 +1,24 @@
 //! The paper's experiments on the simulated head, with fixed, the paper's adaptive and the better
 //! patterns (`fringed experiment`).
 
+mod campaign;
+mod canvas;
+mod cylinder;
+mod figures;
+mod gallery;
+mod judge;
 mod methods;
+mod plot;
+mod runner;
 mod scenes;
+mod shade;
+mod table;
 
-pub use methods::{Method, Outcome, Runner};
-pub use scenes::{OpticsKind, PARTS, Scene};
+pub use campaign::{Campaign, Results};
+pub use cylinder::Cylinder;
+pub use figures::figures;
+pub use judge::Outcome;
+pub use methods::{Method, Shot};
+pub use runner::{Run, Runner};
+pub use scenes::{Judged, OpticsKind, PARTS, Scene};
+pub use table::{HEADER, Row, Values, csv, means, table};

@@ -1,5 +1,6 @@
-//! Parts and optics of the experiments.
+//! Parts and optics of the experiments, and what each part is judged by.
 
+use super::methods::Method;
 use hal::sim::parts::{Cone, Flowerpot, Sawtooth, Sphere, Spline, Tube};
 use hal::sim::scenario::Optics;
 use hal::sim::{Part, Placement, Scenario};
@@ -11,10 +12,26 @@ pub struct Scene {
     pub name: &'static str,
     /// The paper's figure.
     pub figure: &'static str,
+    /// What its measurement is judged by.
+    pub judged: Judged,
     /// The part.
     pub part: Part,
     /// Where it lies.
     pub placement: Placement,
+    /// Columns and rows of the camera: 512 as in the study; a smaller one sees the middle of the same
+    /// picture, with pixels of the same size.
+    pub camera: u32,
+}
+
+/// The quantity that a part's figure shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Judged {
+    /// RMS error over unresolved pixels.
+    Error,
+    /// Share of resolved pixels over the number of fringes.
+    Coverage,
+    /// Residual of a cylinder fitted to the point cloud over the number of fringes, also defocused.
+    CylinderFit,
 }
 
 /// Names of all parts.
@@ -28,50 +45,67 @@ pub const PARTS: [&str; 7] = [
     "tube",
 ];
 
+/// Columns and rows of the study's camera.
+const CAMERA: u32 = 512;
+/// The paper's tilt about y, degrees.
+const TILT: f64 = 7.0;
+
 impl Scene {
     /// The part of a name.
     pub fn named(name: &str) -> Option<Self> {
-        let tilted = Placement {
-            tilt_deg: [0.0, 7.0],
-            ..Placement::default()
+        let at = PARTS.iter().position(|known| *known == name)?;
+        let (figure, judged, part) = match PARTS[at] {
+            "cone" => ("Fig. 12", Judged::Error, Part::Cone(Cone::default())),
+            "sawtooth" => {
+                let part = Part::Sawtooth(Sawtooth::default());
+                ("Fig. 13", Judged::Error, part)
+            }
+            "sphere" => ("Fig. 14", Judged::Error, Part::Sphere(Sphere::default())),
+            "spline" => {
+                let part = Part::Spline(Box::<Spline>::default());
+                ("Fig. 15", Judged::Error, part)
+            }
+            "cone-tilted" => {
+                let part = Part::Cone(Cone::default());
+                ("Fig. 12, tilted by 7°", Judged::Error, part)
+            }
+            "flowerpot" => {
+                let part = Part::Flowerpot(Flowerpot::default());
+                ("Fig. 16", Judged::Coverage, part)
+            }
+            _ => ("Fig. 17", Judged::CylinderFit, Part::Tube(Tube::default())),
         };
-        let level = Placement::default();
-        let (name, figure, part, placement) = match name {
-            "cone" => ("cone", "Fig. 12", Part::Cone(Cone::default()), level),
-            "sawtooth" => (
-                "sawtooth",
-                "Fig. 13",
-                Part::Sawtooth(Sawtooth::default()),
-                level,
-            ),
-            "sphere" => ("sphere", "Fig. 14", Part::Sphere(Sphere::default()), level),
-            "spline" => (
-                "spline",
-                "Fig. 15",
-                Part::Spline(Box::<Spline>::default()),
-                level,
-            ),
-            "cone-tilted" => (
-                "cone-tilted",
-                "Fig. 15",
-                Part::Cone(Cone::default()),
-                tilted,
-            ),
-            "flowerpot" => (
-                "flowerpot",
-                "Fig. 16",
-                Part::Flowerpot(Flowerpot::default()),
-                level,
-            ),
-            "tube" => ("tube", "Fig. 17", Part::Tube(Tube::default()), level),
-            _ => return None,
-        };
+        let mut placement = Placement::default();
+        if PARTS[at] == "cone-tilted" {
+            placement.tilt_deg = [0.0, TILT];
+        }
         Some(Self {
-            name,
+            name: PARTS[at],
             figure,
+            judged,
             part,
             placement,
+            camera: CAMERA,
         })
+    }
+
+    /// The methods that its figure compares.
+    pub fn methods(&self) -> Vec<Method> {
+        match self.judged {
+            Judged::Error => Method::table(&[49, 64, 81, 100, 121]),
+            Judged::Coverage | Judged::CylinderFit => {
+                Method::table(&[32, 49, 64, 81, 100, 121, 144])
+            }
+        }
+    }
+
+    /// The optics that its figure shows when `asked` are asked for.
+    pub fn optics(&self, asked: OpticsKind) -> Vec<OpticsKind> {
+        let mut kinds = vec![asked];
+        if self.judged == Judged::CylinderFit && asked != OpticsKind::Defocused {
+            kinds.push(OpticsKind::Defocused);
+        }
+        kinds
     }
 
     /// The study's scenario with this part.
@@ -82,6 +116,13 @@ impl Scene {
             optics: optics.blur(),
             ..Scenario::default()
         };
+        let camera = &mut scenario.rig.camera;
+        let share = f64::from(self.camera) / f64::from(camera.width);
+        for fov in &mut camera.fov_deg {
+            let half = (fov.to_radians() / 2.0).tan() * share;
+            *fov = 2.0 * half.atan().to_degrees();
+        }
+        (camera.width, camera.height) = (self.camera, self.camera);
         scenario.noise.seed = seed;
         scenario
     }
@@ -99,7 +140,7 @@ pub enum OpticsKind {
 }
 
 impl OpticsKind {
-    /// For tables.
+    /// For tables and file names.
     pub fn word(self) -> &'static str {
         match self {
             Self::Ideal => "ideal",

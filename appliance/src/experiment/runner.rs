@@ -1,0 +1,297 @@
+//! A simulated head in front of one part, and one run of each method.
+//!
+//! What a method learns of the part before it measures (preliminary maps, patterns, the golden map)
+//! is measured once per noise seed and shared by the runs that need it.
+
+use super::judge::{Outcome, judge};
+use super::methods::{self, Method, Shot};
+use super::scenes::{Judged, OpticsKind, Scene};
+use crate::bench::{About, Bench, BenchError, Measured};
+use crate::calibration::Calibration;
+use algo::adaptive::{ProjectorMap, noise, paper};
+use algo::pattern::{PhaseFunction, Sequence};
+use algo::phase::Trust;
+use algo::units::AbsolutePhase;
+use hal::head::DynHead;
+use hal::sim::{Stage, Truth};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// A simulated head in front of one part, with what has been learnt of it.
+pub struct Runner {
+    head: DynHead,
+    stage: Stage,
+    truth: Truth,
+    calibration: Calibration,
+    optics: OpticsKind,
+    judged: Judged,
+    learnt: Learnt,
+}
+
+/// What has been learnt of the part with the noise of one seed.
+#[derive(Default)]
+struct Learnt {
+    seed: u64,
+    preliminary: Option<Arc<Preliminary>>,
+    paper: Option<Arc<ProjectorMap>>,
+    better: Option<Arc<Better>>,
+    golden: Option<Arc<Vec<AbsolutePhase>>>,
+}
+
+/// The preliminary vertical measurement: its raw phase, and where each pixel's light comes from.
+struct Preliminary {
+    phase: Vec<AbsolutePhase>,
+    map: ProjectorMap,
+}
+
+/// The better pattern and the phase that each pixel will have if the surface is where it was measured.
+struct Better {
+    function: PhaseFunction,
+    expected: Vec<AbsolutePhase>,
+}
+
+/// A run: what it reached and what it saw.
+pub struct Run {
+    /// Against truth.
+    pub outcome: Outcome,
+    /// Frames, phases and heights.
+    pub measured: Measured,
+    /// The pattern.
+    pub function: PhaseFunction,
+    /// Which of the frames shows the finest level first.
+    pub finest: usize,
+}
+
+const TIMEOUT: Duration = Duration::from_secs(5);
+/// Pitch of the preliminary patterns, projector pixels.
+const PRELIMINARY_PITCH: f64 = paper::PROJECTOR_PITCH * paper::PRELIMINARY;
+
+/// Noise streams: each measurement of a seed has its own, so that a result does not depend on which
+/// other methods run.
+const STREAMS: u64 = 1000;
+const PRELIMINARY_STREAM: u64 = 0;
+const HORIZONTAL_STREAM: u64 = 1;
+const GOLDEN_STREAM: u64 = 2;
+
+fn stream(method: Method) -> u64 {
+    match method {
+        Method::Paper { image_pitch } => 10 + u64::from(image_pitch),
+        Method::Better(shot) => 30 + u64::from(shot.count()),
+        Method::Fixed { fringes } => 100 + u64::from(fringes),
+    }
+}
+
+impl Runner {
+    /// Sets the head up in front of the part.
+    ///
+    /// # Errors
+    /// If the scene cannot be simulated.
+    pub fn new(scene: &Scene, optics: OpticsKind) -> Result<Self, BenchError> {
+        let scenario = scene.scenario(optics, 1);
+        let (head, stage) = hal::sim::head(&scenario)?;
+        let (camera, projector) = (&scenario.rig.camera, &scenario.rig.projector);
+        let calibration = Calibration {
+            camera: (camera.width, camera.height, scenario.bit_depth),
+            camera_model: stage.camera_model(),
+            projector: (projector.width, projector.height),
+            projector_model: stage.projector_model(),
+            noise_counts: scenario.noise_sigma_counts(),
+            response: None,
+        };
+        Ok(Self {
+            head,
+            truth: stage.truth(),
+            stage,
+            calibration,
+            optics,
+            judged: scene.judged,
+            learnt: Learnt::default(),
+        })
+    }
+
+    /// Runs a method with the noise of `seed`.
+    ///
+    /// # Errors
+    /// If the head or the pattern fails.
+    pub fn run(&mut self, method: Method, seed: u64) -> Result<Run, BenchError> {
+        if self.learnt.seed != seed {
+            self.learnt = Learnt {
+                seed,
+                ..Learnt::default()
+            };
+        }
+        let (columns, rows) = self.size();
+        match method {
+            Method::Fixed { fringes } => {
+                self.paper_chain(method, self.vertical(f64::from(fringes))?)
+            }
+            Method::Paper { image_pitch } => {
+                let map = self.paper_map()?;
+                let function = paper::adapt(&map, columns, rows, f64::from(image_pitch));
+                self.paper_chain(method, function.map_err(rig)?)
+            }
+            Method::Better(shot) => self.better_shot(method, shot),
+        }
+    }
+
+    fn size(&self) -> (usize, usize) {
+        let (columns, rows) = self.calibration.projector;
+        (columns as usize, rows as usize)
+    }
+
+    fn measure(
+        &mut self,
+        noise_stream: u64,
+        function: &PhaseFunction,
+        frames: &[(f64, f64)],
+        about: About<'_>,
+    ) -> Result<Measured, BenchError> {
+        self.stage.reseed(self.learnt.seed * STREAMS + noise_stream);
+        let mut bench = Bench {
+            head: &mut self.head,
+            calibration: &self.calibration,
+            range: None,
+            timeout: TIMEOUT,
+        };
+        bench.measure(function, frames, about, &|_| ())
+    }
+
+    fn vertical(&self, fringes: f64) -> Result<PhaseFunction, BenchError> {
+        let (columns, rows) = self.size();
+        PhaseFunction::vertical(columns, rows, fringes).map_err(rig)
+    }
+
+    /// The preliminary measurement of both adaptive methods: one vertical sequence at 20 px pitch.
+    fn preliminary(&mut self) -> Result<Arc<Preliminary>, BenchError> {
+        if let Some(known) = &self.learnt.preliminary {
+            return Ok(Arc::clone(known));
+        }
+        let function = self.vertical(self.size().0 as f64 / PRELIMINARY_PITCH)?;
+        let frames = Sequence::geometric(function.range(), 3, 4);
+        let measured = self.measure(PRELIMINARY_STREAM, &function, &frames, About::Reference)?;
+        let map = ProjectorMap::from_heights(&measured.triangulator, &measured.heights);
+        let phase = measured.phases.phase;
+        let found = Arc::new(Preliminary { phase, map });
+        Ok(Arc::clone(self.learnt.preliminary.insert(found)))
+    }
+
+    /// The paper's preliminary maps: vertical and horizontal at 20 px, each measured by itself.
+    fn paper_map(&mut self) -> Result<Arc<ProjectorMap>, BenchError> {
+        if let Some(known) = &self.learnt.paper {
+            return Ok(Arc::clone(known));
+        }
+        let vertical = self.preliminary()?;
+        let (columns, rows) = self.size();
+        let fringes = rows as f64 / PRELIMINARY_PITCH;
+        let function = PhaseFunction::horizontal(columns, rows, fringes).map_err(rig)?;
+        let frames = Sequence::geometric(function.range(), 3, 4);
+        let horizontal = self.measure(HORIZONTAL_STREAM, &function, &frames, About::Reference)?;
+        let pairs = vertical.phase.iter().zip(&horizontal.phases.phase);
+        let map = ProjectorMap {
+            width: horizontal.phases.width,
+            points: pairs
+                .map(|(v, h)| {
+                    if v.is_known() && h.is_known() {
+                        [PRELIMINARY_PITCH * v.turns(), PRELIMINARY_PITCH * h.turns()]
+                    } else {
+                        [f64::NAN; 2]
+                    }
+                })
+                .collect(),
+        };
+        Ok(Arc::clone(self.learnt.paper.insert(Arc::new(map))))
+    }
+
+    /// The better pattern, made for the blur of the scenario.
+    fn better(&mut self) -> Result<Arc<Better>, BenchError> {
+        if let Some(known) = &self.learnt.better {
+            return Ok(Arc::clone(known));
+        }
+        let preliminary = self.preliminary()?;
+        let blur = self.optics.blur();
+        let optics = noise::Optics {
+            projector_blur: blur.projector_blur_px,
+            camera_blur: blur.camera_blur_px,
+            projector_pitch: noise::PROJECTOR_PITCH,
+            image_pitch: noise::IMAGE_PITCH,
+        };
+        let (columns, rows) = self.size();
+        let map = &preliminary.map;
+        let function = noise::adapt(map, columns, rows, &optics).map_err(rig)?;
+        let points = map.points.iter();
+        let expected = points
+            .map(|[xi, eta]| AbsolutePhase::from_turns(function.at(*xi, *eta)))
+            .collect();
+        let found = Arc::new(Better { function, expected });
+        Ok(Arc::clone(self.learnt.better.insert(found)))
+    }
+
+    /// The golden map: the full sequence of the better pattern.
+    fn golden(&mut self) -> Result<Arc<Vec<AbsolutePhase>>, BenchError> {
+        if let Some(known) = &self.learnt.golden {
+            return Ok(Arc::clone(known));
+        }
+        let better = self.better()?;
+        let about = About::Map(&better.expected);
+        let frames = Shot::Twelve.frames();
+        let measured = self.measure(GOLDEN_STREAM, &better.function, &frames, about)?;
+        let found = Arc::new(measured.phases.phase);
+        Ok(Arc::clone(self.learnt.golden.insert(found)))
+    }
+
+    fn better_shot(&mut self, method: Method, shot: Shot) -> Result<Run, BenchError> {
+        let better = self.better()?;
+        let golden = if shot.needs_golden() {
+            Some(self.golden()?)
+        } else {
+            None
+        };
+        let map = golden.as_deref().unwrap_or(&better.expected);
+        let frames = shot.frames();
+        let measured = self.measure(stream(method), &better.function, &frames, About::Map(map))?;
+        Ok(self.judged(better.function.clone(), &frames, measured))
+    }
+
+    /// The paper's chain with its own criterion of image pitch.
+    fn paper_chain(&mut self, method: Method, function: PhaseFunction) -> Result<Run, BenchError> {
+        let frames = methods::geometric(&function);
+        let mut measured = self.measure(stream(method), &function, &frames, About::Reference)?;
+        let fine = too_fine(&measured.phases.phase, measured.phases.width);
+        for (trust, fine) in measured.phases.trust.iter_mut().zip(fine) {
+            if fine && *trust == Trust::Resolved {
+                *trust = Trust::LowModulation;
+            }
+        }
+        Ok(self.judged(function, &frames, measured))
+    }
+
+    fn judged(&self, function: PhaseFunction, frames: &[(f64, f64)], measured: Measured) -> Run {
+        Run {
+            outcome: judge(&self.truth, &measured, self.judged),
+            measured,
+            function,
+            finest: methods::finest(frames),
+        }
+    }
+}
+
+fn rig(error: impl std::fmt::Display) -> BenchError {
+    BenchError::Rig(error.to_string())
+}
+
+/// Smallest image pitch along u that the paper's chain resolves, camera pixels.
+const RESOLVED_PITCH: f64 = 2.5;
+
+/// Where the image pitch along u is below [`RESOLVED_PITCH`], by central differences of Φ.
+fn too_fine(phase: &[AbsolutePhase], width: usize) -> Vec<bool> {
+    (0..phase.len())
+        .map(|at| {
+            let u = at % width;
+            let inside = u > 0 && u + 1 < width;
+            inside && phase[at - 1].is_known() && phase[at + 1].is_known() && {
+                let rise = (phase[at + 1] - phase[at - 1]).turns();
+                rise.abs() / 2.0 > 1.0 / RESOLVED_PITCH
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,168 @@
+//! A shaded view of a measured surface: neighbouring points as small facets, seen obliquely.
+
+use super::canvas::Canvas;
+use crate::bench::Measured;
+use algo::phase::Trust;
+
+/// The view comes from this far above the plane z = 0, after a turn about z, radians.
+const ELEVATION: f64 = 0.96;
+const TURN: f64 = 0.35;
+/// Facets with a larger step in z span a depth edge, mm.
+const MAX_STEP_MM: f64 = 10.0;
+/// Direction to the lamp (x, y, z), flat enough that noise is seen.
+const LAMP: [f64; 3] = [-0.70, -0.30, 0.65];
+/// Grey of a facet that turns away from the lamp, and what facing it adds.
+const DARK: f64 = 50.0;
+const BRIGHT: f64 = 200.0;
+/// Share of points at each end that do not decide how large the picture is.
+const TAIL: f64 = 0.002;
+
+/// The picture, `size` pixels wide and high.
+pub fn render(measured: &Measured, size: usize) -> Canvas {
+    let width = measured.heights.width;
+    let points = points(measured);
+    let mut canvas = Canvas::new(size, size);
+    let mut nearest = vec![f64::NEG_INFINITY; size * size];
+    let Some(frame) = Frame::around(&points, size) else {
+        return canvas;
+    };
+    for at in 0..points.len().saturating_sub(width + 1) {
+        if at % width + 1 == width {
+            continue;
+        }
+        for corners in [
+            [at, at + 1, at + width],
+            [at + 1, at + width + 1, at + width],
+        ] {
+            let [Some(a), Some(b), Some(c)] = corners.map(|corner| points[corner]) else {
+                continue;
+            };
+            let low = a[2].min(b[2]).min(c[2]);
+            if a[2].max(b[2]).max(c[2]) - low <= MAX_STEP_MM {
+                let seen = [a, b, c].map(|point| frame.seen(point));
+                facet(&mut canvas, &mut nearest, seen, grey(a, b, c));
+            }
+        }
+    }
+    canvas
+}
+
+/// The resolved points (x, y, z) of each camera pixel, mm.
+fn points(measured: &Measured) -> Vec<Option<[f64; 3]>> {
+    let heights = &measured.heights;
+    let pixels = heights.height.iter().zip(&measured.phases.trust);
+    pixels
+        .enumerate()
+        .map(|(at, (height, trust))| {
+            let (u, v) = (at % heights.width, at / heights.width);
+            let resolved = *trust == Trust::Resolved;
+            let point = resolved.then(|| measured.triangulator.point(u, v, *height));
+            point.flatten().map(|point| [point.x, point.y, point.z])
+        })
+        .collect()
+}
+
+/// Lambert's law on the facet's normal.
+fn grey(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> u8 {
+    let (p, q) = (minus(b, a), minus(c, a));
+    let normal = [
+        p[1] * q[2] - p[2] * q[1],
+        p[2] * q[0] - p[0] * q[2],
+        p[0] * q[1] - p[1] * q[0],
+    ];
+    // The camera is above: the side that it sees looks up.
+    let length = dot(normal, normal).sqrt() * if normal[2] < 0.0 { -1.0 } else { 1.0 };
+    let facing = dot(normal, LAMP) / (length * dot(LAMP, LAMP).sqrt());
+    // A facet without an area has no normal; a NaN becomes 0.
+    (DARK + BRIGHT * facing.max(0.0)) as u8
+}
+
+/// Where a point is in the picture: x, y in pixels, and how near it is.
+struct Frame {
+    scale: f64,
+    centre: [f64; 2],
+    half: f64,
+}
+
+impl Frame {
+    fn around(points: &[Option<[f64; 3]>], size: usize) -> Option<Self> {
+        let seen: Vec<_> = points
+            .iter()
+            .flatten()
+            .map(|point| turned(*point))
+            .collect();
+        let ends = |axis: usize| {
+            let mut values: Vec<f64> = seen.iter().map(|point| point[axis]).collect();
+            values.sort_by(f64::total_cmp);
+            let last = values.len().checked_sub(1)?;
+            let tail = (last as f64 * TAIL) as usize;
+            Some([values[tail], values[last - tail]])
+        };
+        let ([left, right], [low, high]) = (ends(0)?, ends(1)?);
+        let extent = (right - left).max(high - low).max(1e-3);
+        Some(Self {
+            scale: 0.96 * size as f64 / extent,
+            centre: [(left + right) / 2.0, (low + high) / 2.0],
+            half: size as f64 / 2.0,
+        })
+    }
+
+    fn seen(&self, point: [f64; 3]) -> [f64; 3] {
+        let [x, y, near] = turned(point);
+        [
+            self.half + self.scale * (x - self.centre[0]),
+            self.half - self.scale * (y - self.centre[1]),
+            near,
+        ]
+    }
+}
+
+/// A world point as the view has it: to the right, up, towards the eye.
+fn turned([x, y, z]: [f64; 3]) -> [f64; 3] {
+    let (sin, cos) = TURN.sin_cos();
+    let (x, y) = (cos * x - sin * y, sin * x + cos * y);
+    let (sin, cos) = ELEVATION.sin_cos();
+    [x, y * sin + z * cos, z * sin - y * cos]
+}
+
+/// Fills a facet where nothing nearer is.
+fn facet(canvas: &mut Canvas, nearest: &mut [f64], corners: [[f64; 3]; 3], grey: u8) {
+    let [a, b, c] = corners;
+    let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    if area == 0.0 {
+        return;
+    }
+    let size = canvas.width as f64 - 1.0;
+    let range = |axis: usize| {
+        let low = a[axis].min(b[axis]).min(c[axis]).ceil().max(0.0);
+        let high = a[axis].max(b[axis]).max(c[axis]).floor().min(size);
+        // A facet wholly outside has an empty range.
+        (low as usize)..((high + 1.0).max(0.0) as usize)
+    };
+    for y in range(1) {
+        for x in range(0) {
+            let (px, py) = (x as f64, y as f64);
+            let share = |p: [f64; 3], q: [f64; 3]| {
+                ((q[0] - p[0]) * (py - p[1]) - (q[1] - p[1]) * (px - p[0])) / area
+            };
+            let (of_c, of_a, of_b) = (share(a, b), share(b, c), share(c, a));
+            if of_a < 0.0 || of_b < 0.0 || of_c < 0.0 {
+                continue;
+            }
+            let near = of_a * a[2] + of_b * b[2] + of_c * c[2];
+            let at = y * canvas.width + x;
+            if near > nearest[at] {
+                nearest[at] = near;
+                canvas.set(x, y, grey);
+            }
+        }
+    }
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

@@ -1,0 +1,314 @@
+//! The results of the runs: one row per run as CSV, and their means over the noise seeds.
+
+use super::judge::Outcome;
+use super::methods::{Method, PAPER};
+use super::scenes::{Judged, OpticsKind, Scene};
+use serde::Serialize;
+use std::fmt::Write as _;
+
+/// Columns of `experiments.csv`.
+pub const HEADER: &str = "part,optics,method,frames,seed,scored_px,lit_px,unresolved_px,gross_px,\
+    rms_mm,bias_mm,median_mm,p99_mm,error_over_sigma,ratio_to_paper,coverage,fit_residual_mm,\
+    fit_radius_mm";
+
+/// A run, or the mean of some.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Name of the part.
+    pub part: &'static str,
+    /// Word of the optics.
+    pub optics: &'static str,
+    /// Name of the method.
+    pub method: String,
+    /// Frames of its measurement.
+    pub frames: u32,
+    /// Noise seed; 0 = the mean over all.
+    pub seed: u64,
+    /// What was reached.
+    #[serde(flatten)]
+    pub values: Values,
+}
+
+/// The measured quantities of a row; NaN (an empty cell, null) where there is none.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Values {
+    /// Resolved pixels that truth calls wholly lit.
+    pub scored_px: f64,
+    /// Pixels that truth calls wholly lit.
+    pub lit_px: f64,
+    /// Those that are not resolved.
+    pub unresolved_px: f64,
+    /// Errors above 1 mm.
+    pub gross_px: f64,
+    /// RMS error without gross errors, mm.
+    pub rms_mm: f64,
+    /// Mean error without gross errors, mm.
+    pub bias_mm: f64,
+    /// Median of |e|, mm.
+    pub median_mm: f64,
+    /// 99 % of |e| lie below this, mm.
+    pub p99_mm: f64,
+    /// RMS of error / σ_z.
+    pub error_over_sigma: f64,
+    /// RMS error as a share of the paper's adaptive run (p_I = 5) with the same noise seed.
+    pub ratio_to_paper: f64,
+    /// Resolved share of the lit pixels.
+    pub coverage: f64,
+    /// RMS distance from the fitted cylinder, mm.
+    pub fit_residual_mm: f64,
+    /// Radius of the fitted cylinder, mm.
+    pub fit_radius_mm: f64,
+}
+
+impl Values {
+    fn of(outcome: &Outcome) -> Self {
+        let score = outcome.score.as_ref();
+        let scored = |value: fn(&crate::measure::Score) -> f64| score.map_or(f64::NAN, value);
+        let fitted = outcome.cylinder;
+        Self {
+            scored_px: score.map_or(0.0, |score| score.scored as f64),
+            lit_px: outcome.lit as f64,
+            unresolved_px: outcome.unresolved as f64,
+            gross_px: score.map_or(0.0, |score| score.gross as f64),
+            rms_mm: scored(|score| score.rms_mm),
+            bias_mm: scored(|score| score.bias_mm),
+            median_mm: scored(|score| score.median_mm),
+            p99_mm: scored(|score| score.p99_mm),
+            error_over_sigma: outcome.error_over_sigma,
+            ratio_to_paper: f64::NAN,
+            coverage: outcome.coverage(),
+            fit_residual_mm: fitted.map_or(f64::NAN, |fit| fit.residual_mm),
+            fit_radius_mm: fitted.map_or(f64::NAN, |fit| fit.radius_mm),
+        }
+    }
+
+    fn array(&self) -> [f64; 13] {
+        [
+            self.scored_px,
+            self.lit_px,
+            self.unresolved_px,
+            self.gross_px,
+            self.rms_mm,
+            self.bias_mm,
+            self.median_mm,
+            self.p99_mm,
+            self.error_over_sigma,
+            self.ratio_to_paper,
+            self.coverage,
+            self.fit_residual_mm,
+            self.fit_radius_mm,
+        ]
+    }
+
+    fn from_array(values: [f64; 13]) -> Self {
+        let [
+            scored_px,
+            lit_px,
+            unresolved_px,
+            gross_px,
+            rms_mm,
+            bias_mm,
+            median_mm,
+            p99_mm,
+            error_over_sigma,
+            ratio_to_paper,
+            coverage,
+            fit_residual_mm,
+            fit_radius_mm,
+        ] = values;
+        Self {
+            scored_px,
+            lit_px,
+            unresolved_px,
+            gross_px,
+            rms_mm,
+            bias_mm,
+            median_mm,
+            p99_mm,
+            error_over_sigma,
+            ratio_to_paper,
+            coverage,
+            fit_residual_mm,
+            fit_radius_mm,
+        }
+    }
+}
+
+impl Row {
+    /// Of one run.
+    pub fn new(
+        scene: &Scene,
+        optics: OpticsKind,
+        method: Method,
+        seed: u64,
+        outcome: &Outcome,
+    ) -> Self {
+        Self {
+            part: scene.name,
+            optics: optics.word(),
+            method: method.name(),
+            frames: method.frame_count(),
+            seed,
+            values: Values::of(outcome),
+        }
+    }
+
+    /// A line of the CSV; an empty cell where there is no value.
+    fn line(&self) -> String {
+        let mut line = format!(
+            "{},{},{},{},{}",
+            self.part, self.optics, self.method, self.frames, self.seed
+        );
+        for (at, value) in self.values.array().iter().enumerate() {
+            // Writing to a string does not fail. The first four are counts.
+            let _ = match value {
+                value if value.is_nan() => write!(line, ","),
+                value if at < 4 => write!(line, ",{value:.0}"),
+                value => write!(line, ",{value:.6}"),
+            };
+        }
+        line
+    }
+}
+
+/// Fills in the ratio to the paper's run of the same part, optics and seed.
+pub fn set_ratios(rows: &mut [Row]) {
+    let paper: Vec<Row> = rows
+        .iter()
+        .filter(|row| row.method == PAPER.name())
+        .cloned()
+        .collect();
+    for row in rows {
+        let same = paper
+            .iter()
+            .find(|p| (p.part, p.optics, p.seed) == (row.part, row.optics, row.seed));
+        row.values.ratio_to_paper = same.map_or(f64::NAN, |p| row.values.rms_mm / p.values.rms_mm);
+    }
+}
+
+/// All runs as CSV.
+pub fn csv(rows: &[Row]) -> String {
+    let lines = rows.iter().map(Row::line);
+    let mut text = HEADER.to_owned();
+    for line in lines {
+        text.push('\n');
+        text.push_str(&line);
+    }
+    text.push('\n');
+    text
+}
+
+/// The means over the seeds, in the order of the first runs.
+pub fn means(rows: &[Row]) -> Vec<Row> {
+    let mut means: Vec<(Row, [f64; 13], f64)> = Vec::new();
+    for row in rows {
+        let known = means.iter_mut().find(|(mean, ..)| {
+            (mean.part, mean.optics, &mean.method) == (row.part, row.optics, &row.method)
+        });
+        let values = row.values.array();
+        match known {
+            Some((_, sums, count)) => {
+                *count += 1.0;
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum += value;
+                }
+            }
+            None => means.push((row.clone(), values, 1.0)),
+        }
+    }
+    means
+        .into_iter()
+        .map(|(row, sums, count)| Row {
+            seed: 0,
+            values: Values::from_array(sums.map(|sum| sum / count)),
+            ..row
+        })
+        .collect()
+}
+
+/// The means of one part under one optics, as a table for people.
+pub fn table(scene: &Scene, means: &[&Row]) -> String {
+    let fitted = scene.judged == Judged::CylinderFit;
+    let optics = means.first().map_or("", |row| row.optics);
+    let mut text = format!(
+        "{}, {}, {optics} optics\n{:<10} {:>8} {:>10} {:>7} {:>8} {:>9} {:>8}",
+        scene.name,
+        scene.figure,
+        "method",
+        "RMS mm",
+        "unresolved",
+        "gross",
+        "error/σ",
+        "× paper",
+        "coverage"
+    );
+    if fitted {
+        text.push_str("   fit mm  radius mm");
+    }
+    for row in means {
+        let v = &row.values;
+        let _ = write!(
+            text,
+            "\n{:<10} {:>8.4} {:>10.0} {:>7.0} {:>8.3} {:>9.3} {:>7.2}%",
+            row.method,
+            v.rms_mm,
+            v.unresolved_px,
+            v.gross_px,
+            v.error_over_sigma,
+            v.ratio_to_paper,
+            100.0 * v.coverage
+        );
+        if fitted {
+            let _ = write!(
+                text,
+                " {:>8.4} {:>10.3}",
+                v.fit_residual_mm, v.fit_radius_mm
+            );
+        }
+    }
+    text.push('\n');
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(method: &str, seed: u64, rms_mm: f64) -> Row {
+        let mut values = [1.0; 13];
+        values[4] = rms_mm;
+        values[11] = f64::NAN;
+        Row {
+            part: "cone",
+            optics: "ideal",
+            method: method.to_owned(),
+            frames: 12,
+            seed,
+            values: Values::from_array(values),
+        }
+    }
+
+    #[test]
+    fn ratios_refer_to_the_same_seed_and_means_keep_the_order() {
+        let mut rows = [
+            row("fixed-49", 1, 0.2),
+            row("paper-5", 1, 0.1),
+            row("fixed-49", 2, 0.9),
+            row("paper-5", 2, 0.3),
+        ];
+        set_ratios(&mut rows);
+        let ratios = rows.each_ref().map(|row| row.values.ratio_to_paper);
+        assert!((ratios[0] - 2.0).abs() < 1e-9 && (ratios[2] - 3.0).abs() < 1e-9);
+        let means = means(&rows);
+        assert_eq!(means[0].method, "fixed-49");
+        assert!((means[0].values.rms_mm - 0.55).abs() < 1e-9);
+        assert!((means[1].values.ratio_to_paper - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_line_has_a_cell_for_each_column_and_an_empty_one_for_no_value() {
+        let line = row("fixed-49", 1, 0.2).line();
+        assert_eq!(line.split(',').count(), HEADER.split(',').count());
+        assert!(line.ends_with(",,1.000000"), "{line}");
+    }
+}
