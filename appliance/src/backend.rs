@@ -55,15 +55,7 @@ fn simulated(path: Option<&Path>, progress: &(dyn Fn(f64) + Sync)) -> Result<Ope
     let scenario = scenario(path)?;
     let (head, stage) = hal::sim::head_with_progress(&scenario, progress)
         .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
-    let (camera, projector) = (&scenario.rig.camera, &scenario.rig.projector);
-    let calibration = Calibration {
-        camera: (camera.width, camera.height, scenario.bit_depth),
-        camera_model: stage.camera_model(),
-        projector: (projector.width, projector.height),
-        projector_model: stage.projector_model(),
-        noise_counts: scenario.noise_sigma_counts(),
-        response: None,
-    };
+    let calibration = Calibration::of_stage(&stage);
     Ok(Opened {
         head,
         calibration,

@@ -6,6 +6,7 @@ use algo::geometry::{ModelError, Pinhole};
 use algo::pattern::GreyResponse;
 use hal::model::DeviceModel;
 use hal::replay::Recording;
+use hal::sim::Stage;
 use sha2::{Digest, Sha256};
 
 /// The calibration of a head.
@@ -26,6 +27,20 @@ pub struct Calibration {
 }
 
 impl Calibration {
+    /// The exact calibration of a simulated head.
+    pub fn of_stage(stage: &Stage) -> Self {
+        let scenario = stage.scenario();
+        let (camera, projector) = (&scenario.rig.camera, &scenario.rig.projector);
+        Self {
+            camera: (camera.width, camera.height, scenario.bit_depth),
+            camera_model: stage.camera_model(),
+            projector: (projector.width, projector.height),
+            projector_model: stage.projector_model(),
+            noise_counts: scenario.noise_sigma_counts(),
+            response: None,
+        }
+    }
+
     /// What a recording says of the head that took it, with the noise of a sample in counts.
     ///
     /// # Errors

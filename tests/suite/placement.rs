@@ -22,17 +22,9 @@ struct Bed {
 
 fn bed(scenario: &Scenario) -> Bed {
     let (head, stage) = hal::sim::head(scenario).unwrap();
-    let (camera, projector) = (&scenario.rig.camera, &scenario.rig.projector);
     Bed {
         head,
-        calibration: Calibration {
-            camera: (camera.width, camera.height, scenario.bit_depth),
-            camera_model: stage.camera_model(),
-            projector: (projector.width, projector.height),
-            projector_model: stage.projector_model(),
-            noise_counts: scenario.noise_sigma_counts(),
-            response: None,
-        },
+        calibration: Calibration::of_stage(&stage),
         stage,
     }
 }

@@ -1,16 +1,16 @@
 //! Pictures of a part: pattern, fringe image and point cloud, one row per method.
 
-use super::canvas::{Canvas, LINE};
 use super::methods::Method;
 use super::runner::Run;
 use super::shade;
+use crate::output::canvas::{Canvas, LINE};
 use algo::pattern::encode;
 use hal::frame::Samples;
 
 /// What a method showed, saw and measured.
 pub struct View {
     caption: [String; 3],
-    tiles: [Canvas; 3],
+    tiles: [Canvas<1>; 3],
 }
 
 /// Columns and rows of a tile, and the space between tiles.
@@ -49,7 +49,7 @@ impl View {
 }
 
 /// The middle of a raster, at most a tile large, in [`LEVELS`] grey levels.
-fn middle(pixels: &[u8], stride: usize, width: usize) -> Canvas {
+fn middle(pixels: &[u8], stride: usize, width: usize) -> Canvas<1> {
     let rows = pixels.len() / stride.max(1);
     let (left, top) = (
         width.saturating_sub(TILE) / 2,
@@ -61,7 +61,7 @@ fn middle(pixels: &[u8], stride: usize, width: usize) -> Canvas {
         for x in 0..tile.width {
             let grey = pixels[(top + y) * stride + left + x];
             let level = (u16::from(grey) + u16::from(step) / 2) / u16::from(step);
-            tile.set(x, y, level as u8 * step);
+            tile.set(x, y, [level as u8 * step]);
         }
     }
     tile
@@ -79,5 +79,5 @@ pub fn png(views: &[View]) -> Vec<u8> {
             canvas.put(tile, left, top + LINE);
         }
     }
-    canvas.png()
+    canvas.png(png::Compression::High)
 }

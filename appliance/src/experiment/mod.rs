@@ -2,7 +2,6 @@
 //! patterns (`fringed experiment`).
 
 mod campaign;
-mod canvas;
 mod cylinder;
 mod figures;
 mod gallery;

@@ -89,15 +89,7 @@ impl Runner {
     pub fn new(scene: &Scene, optics: OpticsKind) -> Result<Self, BenchError> {
         let scenario = scene.scenario(optics, 1);
         let (head, stage) = hal::sim::head(&scenario)?;
-        let (camera, projector) = (&scenario.rig.camera, &scenario.rig.projector);
-        let calibration = Calibration {
-            camera: (camera.width, camera.height, scenario.bit_depth),
-            camera_model: stage.camera_model(),
-            projector: (projector.width, projector.height),
-            projector_model: stage.projector_model(),
-            noise_counts: scenario.noise_sigma_counts(),
-            response: None,
-        };
+        let calibration = Calibration::of_stage(&stage);
         Ok(Self {
             head,
             truth: stage.truth(),

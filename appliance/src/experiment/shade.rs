@@ -1,7 +1,7 @@
 //! A shaded view of a measured surface: neighbouring points as small facets, seen obliquely.
 
-use super::canvas::Canvas;
 use crate::bench::Measured;
+use crate::output::canvas::Canvas;
 use algo::phase::Trust;
 
 /// The view comes from this far above the plane z = 0, after a turn about z, radians.
@@ -18,7 +18,7 @@ const BRIGHT: f64 = 200.0;
 const TAIL: f64 = 0.002;
 
 /// The picture, `size` pixels wide and high.
-pub fn render(measured: &Measured, size: usize) -> Canvas {
+pub fn render(measured: &Measured, size: usize) -> Canvas<1> {
     let width = measured.heights.width;
     let points = points(measured);
     let mut canvas = Canvas::new(size, size);
@@ -126,7 +126,7 @@ fn turned([x, y, z]: [f64; 3]) -> [f64; 3] {
 }
 
 /// Fills a facet where nothing nearer is.
-fn facet(canvas: &mut Canvas, nearest: &mut [f64], corners: [[f64; 3]; 3], grey: u8) {
+fn facet(canvas: &mut Canvas<1>, nearest: &mut [f64], corners: [[f64; 3]; 3], grey: u8) {
     let [a, b, c] = corners;
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     if area == 0.0 {
@@ -153,7 +153,7 @@ fn facet(canvas: &mut Canvas, nearest: &mut [f64], corners: [[f64; 3]; 3], grey:
             let at = y * canvas.width + x;
             if near > nearest[at] {
                 nearest[at] = near;
-                canvas.set(x, y, grey);
+                canvas.set(x, y, [grey]);
             }
         }
     }

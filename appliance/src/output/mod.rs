@@ -1,5 +1,6 @@
 //! What a measurement leaves behind for people: pictures, clouds.
 
+pub mod canvas;
 pub mod cloud;
 pub mod colour;
 pub mod folder;

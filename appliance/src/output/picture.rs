@@ -1,14 +1,7 @@
 //! Colour pictures of a height map with a scale bar and its unit.
 
-use super::colour::{Rgb, UNRESOLVED, viridis};
-use embedded_graphics::Drawable;
-use embedded_graphics::mono_font::ascii::FONT_7X14;
-use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
-use embedded_graphics::pixelcolor::Rgb888;
-use embedded_graphics::prelude::{
-    Dimensions, DrawTarget, OriginDimensions, Pixel, Point, RgbColor, Size,
-};
-use embedded_graphics::text::{Baseline, Text};
+use super::canvas::{Canvas, LINE};
+use super::colour::{UNRESOLVED, viridis};
 
 /// Pictures are shrunk until the map is at most this wide.
 const MAX_WIDTH: usize = 1024;
@@ -18,8 +11,6 @@ const SCALE_WIDTH: usize = 96;
 const MIN_HEIGHT: usize = 120;
 const MARGIN: usize = 12;
 const BAR_WIDTH: usize = 16;
-const BACKGROUND: Rgb = [22, 23, 27];
-const FONT: MonoFont<'static> = FONT_7X14;
 /// The scale leaves out this share of the heights at each end, so that one stray pixel does not
 /// take the colours.
 const TAIL: f64 = 0.005;
@@ -44,7 +35,7 @@ pub fn height_png(width: u32, height: u32, mm: &[f32]) -> Vec<u8> {
         }
     }
     draw_scale(&mut canvas, columns + MARGIN, low, high);
-    canvas.png()
+    canvas.png(png::Compression::Fast)
 }
 
 /// The heights at both ends of the scale.
@@ -60,9 +51,8 @@ fn scale_of(mm: &[f32]) -> [f32; 2] {
 }
 
 /// The bar with ticks at round heights, and the unit on top.
-fn draw_scale(canvas: &mut Canvas, left: usize, low: f32, high: f32) {
-    let line = FONT.character_size.height as usize;
-    let (top, bottom) = (MARGIN + line + 6, canvas.height - MARGIN);
+fn draw_scale(canvas: &mut Canvas<3>, left: usize, low: f32, high: f32) {
+    let (top, bottom) = (MARGIN + LINE + 6, canvas.height - MARGIN);
     canvas.text("z in mm", left, MARGIN);
     for y in top..bottom {
         let share = (bottom - 1 - y) as f64 / (bottom - top - 1).max(1) as f64;
@@ -82,7 +72,7 @@ fn draw_scale(canvas: &mut Canvas, left: usize, low: f32, high: f32) {
             canvas.set(x, y, [200; 3]);
         }
         let label = format!("{:.*}", digits, tick * step + 0.0);
-        let label_top = y.saturating_sub(line / 2).min(canvas.height - line);
+        let label_top = y.saturating_sub(LINE / 2).min(canvas.height - LINE);
         canvas.text(&label, left + BAR_WIDTH + 8, label_top);
         tick += 1.0;
     }
@@ -96,81 +86,6 @@ fn round_step(least: f64) -> f64 {
         .map(|factor| factor * decade)
         .find(|step| *step >= least * 0.999_999)
         .unwrap_or(10.0 * decade)
-}
-
-/// An RGB raster that text can be drawn on.
-struct Canvas {
-    width: usize,
-    height: usize,
-    pixels: Vec<u8>,
-}
-
-impl Canvas {
-    fn new(width: usize, height: usize) -> Self {
-        Self {
-            width,
-            height,
-            pixels: BACKGROUND.repeat(width * height),
-        }
-    }
-
-    fn set(&mut self, x: usize, y: usize, colour: Rgb) {
-        if x < self.width && y < self.height {
-            let at = 3 * (y * self.width + x);
-            self.pixels[at..at + 3].copy_from_slice(&colour);
-        }
-    }
-
-    fn text(&mut self, text: &str, x: usize, y: usize) {
-        let style = MonoTextStyle::new(&FONT, Rgb888::new(225, 225, 230));
-        let at = Point::new(x as i32, y as i32);
-        // Drawing on this canvas cannot fail: its error type has no values.
-        let Ok(_) = Text::with_baseline(text, at, style, Baseline::Top).draw(self);
-    }
-
-    fn png(&self) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_compression(png::Compression::Fast);
-        let written = encoder
-            .write_header()
-            .and_then(|mut writer| writer.write_image_data(&self.pixels));
-        debug_assert!(
-            written.is_ok(),
-            "a canvas has at least one pixel and memory does not fail"
-        );
-        bytes
-    }
-}
-
-impl OriginDimensions for Canvas {
-    fn size(&self) -> Size {
-        Size::new(self.width as u32, self.height as u32)
-    }
-}
-
-impl DrawTarget for Canvas {
-    type Color = Rgb888;
-    type Error = core::convert::Infallible;
-
-    fn draw_iter<I>(&mut self, pixels: I) -> Result<(), Self::Error>
-    where
-        I: IntoIterator<Item = Pixel<Self::Color>>,
-    {
-        let frame = self.bounding_box();
-        for Pixel(at, colour) in pixels {
-            if frame.contains(at) {
-                self.set(
-                    at.x as usize,
-                    at.y as usize,
-                    [colour.r(), colour.g(), colour.b()],
-                );
-            }
-        }
-        Ok(())
-    }
 }
 
 #[cfg(test)]

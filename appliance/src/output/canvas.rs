@@ -1,42 +1,44 @@
-//! A grey picture that tiles and text are put on.
+//! A raster that pixels and text are put on, and its PNG.
 
 use embedded_graphics::Drawable;
-use embedded_graphics::mono_font::MonoTextStyle;
-use embedded_graphics::mono_font::ascii::FONT_8X13;
-use embedded_graphics::pixelcolor::Gray8;
-use embedded_graphics::prelude::{DrawTarget, GrayColor, OriginDimensions, Pixel, Point, Size};
+use embedded_graphics::mono_font::ascii::FONT_7X14;
+use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
+use embedded_graphics::pixelcolor::BinaryColor;
+use embedded_graphics::prelude::{DrawTarget, OriginDimensions, Pixel, Point, Size};
 use embedded_graphics::text::{Baseline, Text};
 
-/// Grey of the background and of text.
+/// The font of all pictures.
+const FONT: MonoFont<'static> = FONT_7X14;
+/// Height of a line of text, pixels.
+pub const LINE: usize = FONT.character_size.height as usize;
+/// Lightness of the background and of text.
 const BACKGROUND: u8 = 24;
 const INK: u8 = 225;
-/// Height of a line of text with its space.
-pub const LINE: usize = 22;
 
-/// A grey raster.
-pub struct Canvas {
+/// A raster of `N` channels of 8 bits: 1 is grey, 3 is red, green, blue.
+pub struct Canvas<const N: usize> {
     /// Columns.
     pub width: usize,
     /// Rows.
     pub height: usize,
     /// Row by row.
-    pub pixels: Vec<u8>,
+    pub pixels: Vec<[u8; N]>,
 }
 
-impl Canvas {
+impl<const N: usize> Canvas<N> {
     /// An empty picture.
     pub fn new(width: usize, height: usize) -> Self {
         Self {
             width,
             height,
-            pixels: vec![BACKGROUND; width * height],
+            pixels: vec![[BACKGROUND; N]; width * height],
         }
     }
 
     /// Sets a pixel; outside the picture nothing happens.
-    pub fn set(&mut self, x: usize, y: usize, grey: u8) {
+    pub fn set(&mut self, x: usize, y: usize, colour: [u8; N]) {
         if x < self.width && y < self.height {
-            self.pixels[y * self.width + x] = grey;
+            self.pixels[y * self.width + x] = colour;
         }
     }
 
@@ -44,33 +46,33 @@ impl Canvas {
     pub fn put(&mut self, other: &Self, x: usize, y: usize) {
         for row in 0..other.height {
             for column in 0..other.width {
-                self.set(
-                    x + column,
-                    y + row,
-                    other.pixels[row * other.width + column],
-                );
+                let colour = other.pixels[row * other.width + column];
+                self.set(x + column, y + row, colour);
             }
         }
     }
 
-    /// Writes a line of ASCII text.
+    /// Writes a line of ASCII text with its upper left corner at (x, y).
     pub fn text(&mut self, text: &str, x: usize, y: usize) {
-        let style = MonoTextStyle::new(&FONT_8X13, Gray8::new(INK));
+        let style = MonoTextStyle::new(&FONT, BinaryColor::On);
         let at = Point::new(x as i32, y as i32);
         // Drawing on this canvas cannot fail: its error type has no values.
         let Ok(_) = Text::with_baseline(text, at, style, Baseline::Top).draw(self);
     }
 
-    /// As a grey PNG.
-    pub fn png(&self) -> Vec<u8> {
+    /// As a PNG.
+    pub fn png(&self, compression: png::Compression) -> Vec<u8> {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
-        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_color(match N {
+            1 => png::ColorType::Grayscale,
+            _ => png::ColorType::Rgb,
+        });
         encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_compression(png::Compression::High);
+        encoder.set_compression(compression);
         let written = encoder
             .write_header()
-            .and_then(|mut writer| writer.write_image_data(&self.pixels));
+            .and_then(|mut writer| writer.write_image_data(self.pixels.as_flattened()));
         debug_assert!(
             written.is_ok(),
             "a canvas has at least one pixel and memory does not fail"
@@ -79,23 +81,24 @@ impl Canvas {
     }
 }
 
-impl OriginDimensions for Canvas {
+impl<const N: usize> OriginDimensions for Canvas<N> {
     fn size(&self) -> Size {
         Size::new(self.width as u32, self.height as u32)
     }
 }
 
-impl DrawTarget for Canvas {
-    type Color = Gray8;
+/// Text is drawn in one ink.
+impl<const N: usize> DrawTarget for Canvas<N> {
+    type Color = BinaryColor;
     type Error = core::convert::Infallible;
 
     fn draw_iter<I>(&mut self, pixels: I) -> Result<(), Self::Error>
     where
         I: IntoIterator<Item = Pixel<Self::Color>>,
     {
-        for Pixel(at, colour) in pixels {
+        for Pixel(at, _) in pixels.into_iter().filter(|pixel| pixel.1.is_on()) {
             if let (Ok(x), Ok(y)) = (usize::try_from(at.x), usize::try_from(at.y)) {
-                self.set(x, y, colour.luma());
+                self.set(x, y, [INK; N]);
             }
         }
         Ok(())
