@@ -118,9 +118,10 @@ impl Bench<'_> {
                 Some(&reference[..])
             }
         };
-        let mut phases = pipeline::decode(&decoder, &views, map).map_err(rig)?;
+        let mut phases = pipeline::decode(&decoder, &views, map, None).map_err(rig)?;
         let noise = Some(self.calibration.noise_counts);
-        let heights = pipeline::triangulate(&triangulator, &decoder, noise, None, &mut phases);
+        let heights =
+            pipeline::triangulate(&triangulator, &decoder, noise, None, None, &mut phases);
         Ok(Measured {
             phases,
             heights,

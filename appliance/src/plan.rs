@@ -15,6 +15,7 @@ use algo::pipeline::{self, HeightMap, PhaseMap};
 use algo::units::{AbsolutePhase, Height};
 use hal::frame::Frame;
 use hal::projector::Raster;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -27,6 +28,8 @@ pub struct Plan {
     golden: Golden,
     /// The known map for sequences that are unwrapped about one.
     map: Option<Vec<AbsolutePhase>>,
+    /// The columns of each row that some gauge looks at.
+    window: Vec<Range<usize>>,
     flags: u16,
 }
 
@@ -116,12 +119,14 @@ impl Plan {
             .needs_map()
             .then(|| known_map(&recipe, &triangulator));
         let golden = golden(&recipe, &decoder);
+        let window = window(&recipe);
         let flags = sequence_flag(recipe.kind) | if simulated { SIMULATED } else { 0 };
         Ok(Self {
             decoder,
             triangulator,
             golden,
             map,
+            window,
             flags,
             recipe,
         })
@@ -147,8 +152,13 @@ impl Plan {
         };
         let views: Result<Vec<FrameView<'_>>, _> = frames.iter().map(seam::view).collect();
         let decoded = views.map_err(|error| error.to_string()).and_then(|views| {
-            pipeline::decode(&self.decoder, &views, self.map.as_deref())
-                .map_err(|error| error.to_string())
+            pipeline::decode(
+                &self.decoder,
+                &views,
+                self.map.as_deref(),
+                Some(&self.window),
+            )
+            .map_err(|error| error.to_string())
         });
         let mut phases = match decoded {
             Ok(phases) => phases,
@@ -168,6 +178,7 @@ impl Plan {
             &self.decoder,
             noise,
             Some(&guess),
+            Some(&self.window),
             &mut phases,
         );
         clock.stage("height", &mut inspection);
@@ -215,7 +226,7 @@ impl Plan {
             // The recipe was checked for at most as many gauges as fit.
             let _ = inspection.gauges.push(judged);
         }
-        let coverage = comparison.golden_coverage();
+        let coverage = comparison.golden_coverage(&self.window);
         inspection.valid_points = phases.count(Trust::Resolved) as u32;
         inspection.coverage_permille = (coverage * 1000.0).round() as u16;
         inspection.height_noise_mm = rms(&heights.sigma, &self.golden.height);
@@ -271,6 +282,33 @@ pub fn rasters(
             Raster::new(grey.width as u32, grey.height as u32, grey.pixels)
         })
         .collect()
+}
+
+/// The columns of each row that some gauge looks at, its smoothing included: nothing else is
+/// computed.
+fn window(recipe: &Recipe) -> Vec<Range<usize>> {
+    let camera = &recipe.file.camera;
+    let (width, height) = (camera.width as usize, camera.height as usize);
+    let mut window = vec![0..0; height];
+    for (gauge, region) in recipe.file.gauges.iter().zip(&recipe.regions) {
+        let margin = match gauge.measures {
+            GaugeKind::Deviation { smoothing_px } => smoothing_px / 2,
+            GaugeKind::Coverage => 0,
+        };
+        for (row, columns) in region.spans() {
+            let left = columns.start.saturating_sub(margin);
+            let right = (columns.end + margin).min(width);
+            let near = row.saturating_sub(margin)..(row + margin + 1).min(height);
+            for seen in &mut window[near] {
+                *seen = if seen.start == seen.end {
+                    left..right
+                } else {
+                    seen.start.min(left)..seen.end.max(right)
+                };
+            }
+        }
+    }
+    window
 }
 
 /// The map that the production sequence is unwrapped about: the golden phase. A sequence of limited

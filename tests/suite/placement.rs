@@ -4,12 +4,14 @@ use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use appliance::bench::{About, Bench};
 use appliance::calibration::Calibration;
-use appliance::recipe::safe;
+use appliance::plan::Plan;
+use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::teach::{Naming, Taught, teach};
+use appliance::recipe::{GaugeFile, Recipe, RecipeFile, RegionFile, safe};
 use hal::head::DynHead;
 use hal::sim::parts::{Cone, Plane, Sawtooth, SheetMetal, Sphere, Spline};
 use hal::sim::{Part, Placement, Scenario, Stage};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const TIMEOUT: Duration = Duration::from_secs(5);
 const TOLERANCE_MM: f64 = 1.0;
@@ -167,4 +169,64 @@ fn a_scene_that_cannot_be_taught_says_which() {
         let error = taught(&mut bed(&scene)).unwrap_err();
         assert!(error.contains(word), "{word}: {error}");
     }
+}
+
+/// Heights of one cycle with the part in front of the head, and the first gauge's value.
+fn cycle(bed: &mut Bed, file: &RecipeFile, arrays: &Arrays) -> (Vec<f32>, f64) {
+    let (bytes, _) = pack(file, arrays).unwrap();
+    let recipe = Recipe::from_bytes(&bytes).unwrap();
+    let plan = Plan::new(recipe, &bed.calibration, true).unwrap();
+    let rasters = plan.rasters(&bed.calibration).unwrap();
+    let indices: Vec<usize> = (0..rasters.len()).collect();
+    bed.head.load(rasters).unwrap();
+    bed.stage.reseed(5);
+    let mut frames = Vec::new();
+    let mut keep = |_, frame| frames.push(frame);
+    bed.head.acquire(&indices, TIMEOUT, &mut keep).unwrap();
+    let (inspection, maps) = plan.inspect(&frames, Instant::now());
+    (maps.unwrap().height_mm, inspection.gauges[0].value.unwrap())
+}
+
+#[test]
+fn pixels_that_no_gauge_looks_at_are_not_computed_and_the_others_are_the_same() {
+    let mut bed = bed(&scenario(Part::Sphere(Sphere::default())));
+    let taught = taught(&mut bed).unwrap();
+    let Recipe { file, arrays, .. } = taught.recipe;
+    let region = RegionFile {
+        name: "middle".into(),
+        polygon: vec![
+            [100.0, 110.0],
+            [150.0, 110.0],
+            [150.0, 140.0],
+            [100.0, 140.0],
+        ],
+    };
+    let gauge = GaugeFile {
+        region: "middle".into(),
+        ..file.gauges[0].clone()
+    };
+    let small = RecipeFile {
+        regions: vec![region.clone()],
+        gauges: vec![gauge.clone()],
+        ..file.clone()
+    };
+    let mut whole = small.clone();
+    whole.regions.extend(file.regions.clone());
+    whole.gauges.push(file.gauges[0].clone());
+    let (seen, value) = cycle(&mut bed, &small, &arrays);
+    let (all, expected) = cycle(&mut bed, &whole, &arrays);
+    assert_eq!(value.to_bits(), expected.to_bits());
+    let (mut inside, mut outside) = (0, 0);
+    for (at, (seen, all)) in seen.iter().zip(&all).enumerate() {
+        let (u, v) = (at % 256, at / 256);
+        // Nine pixels of smoothing reach four further.
+        if (96..154).contains(&u) && (106..144).contains(&v) {
+            assert_eq!(seen.to_bits(), all.to_bits(), "at {u}, {v}");
+            inside += 1;
+        } else {
+            assert!(seen.is_nan(), "at {u}, {v}");
+            outside += usize::from(!all.is_nan());
+        }
+    }
+    assert!(inside > 2000 && outside > 20_000, "{inside} {outside}");
 }

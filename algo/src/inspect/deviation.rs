@@ -1,7 +1,7 @@
 //! A measured height map against the golden one: deviation and coverage of regions.
 
 use super::Region;
-use crate::pipeline::HeightMap;
+use crate::pipeline::{HeightMap, Window};
 use crate::units::Height;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -145,13 +145,20 @@ impl<'a> Comparison<'a> {
         }
     }
 
-    /// The share of what the golden map knows that the measurement resolves, over the whole frame.
-    pub fn golden_coverage(&self) -> f64 {
-        let pairs = || self.golden.height.iter().zip(&self.measured.height);
-        let known = pairs().filter(|(golden, _)| golden.is_known()).count();
-        let both = pairs()
-            .filter(|(golden, measured)| golden.is_known() && measured.is_known())
-            .count();
+    /// The share of what the golden map knows inside a window that the measurement resolves.
+    pub fn golden_coverage(&self, window: Window<'_>) -> f64 {
+        let (mut known, mut both) = (0_usize, 0_usize);
+        for (row, columns) in window.iter().enumerate() {
+            for place in columns
+                .clone()
+                .map(|column| row * self.golden.width + column)
+            {
+                if self.golden.height[place].is_known() {
+                    known += 1;
+                    both += usize::from(self.measured.height[place].is_known());
+                }
+            }
+        }
         both as f64 / known.max(1) as f64
     }
 }
@@ -209,7 +216,11 @@ mod tests {
         golden.height[..WIDTH * WIDTH / 2].fill(Height::UNKNOWN);
         let comparison = Comparison::new(&golden, &measured);
         assert_eq!(comparison.coverage(&region).value, 0.75);
-        assert_eq!(comparison.golden_coverage(), 1.0);
+        let window = vec![0..WIDTH; WIDTH];
+        assert_eq!(comparison.golden_coverage(&window), 1.0);
+        let mut top = vec![0..0; WIDTH];
+        top[WIDTH / 2] = 3..9;
+        assert_eq!(comparison.golden_coverage(&top), 1.0);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use crate::phase::{DecodeError, Decoder, PhaseRow, Scratch, Trust};
 use crate::units::{AbsolutePhase, Height, Modulation};
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 /// Absolute phase, modulation and trust of every pixel, row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -53,8 +54,11 @@ pub struct HeightMap {
     pub sigma: Vec<f32>,
 }
 
+/// The columns of each row that somebody looks at; the rest need not be computed.
+pub type Window<'a> = &'a [Range<usize>];
+
 /// Decodes frames to absolute phase; `map` is the known map (row-major) for sequences that are
-/// unwrapped about one.
+/// unwrapped about one. Rows of which `window` has no column are left out: their pixels stay dark.
 ///
 /// # Errors
 /// If the frames are not what the decoder was made for. Nothing else can fail.
@@ -62,6 +66,7 @@ pub fn decode(
     decoder: &Decoder,
     frames: &[FrameView<'_>],
     map: Option<&[AbsolutePhase]>,
+    window: Option<Window<'_>>,
 ) -> Result<PhaseMap, DecodeError> {
     decoder.check(frames)?;
     let (width, height) = (frames[0].width(), frames[0].height());
@@ -72,6 +77,9 @@ pub fn decode(
         trust: vec![Trust::default(); width * height],
     };
     for_each(phases.rows(), Scratch::default, |v, row, scratch| {
+        if window.is_some_and(|window| window[v].is_empty()) {
+            return;
+        }
         let map = map.and_then(|map| map.get(v * width..(v + 1) * width));
         decoder.row(frames, v, map, scratch, row);
     });
@@ -83,12 +91,14 @@ pub fn decode(
 pub type Guess<'a> = &'a (dyn Fn(usize, AbsolutePhase) -> Option<f64> + Sync);
 
 /// Triangulates every resolved pixel, and marks those without a height in the working range as
-/// [`Trust::OutOfRange`]. `noise` is σ of one sample in counts, for σ_z; `guess` makes it faster.
+/// [`Trust::OutOfRange`]. `noise` is σ of one sample in counts, for σ_z; `guess` makes it faster. Pixels outside
+/// `window` get no height.
 pub fn triangulate(
     triangulator: &Triangulator,
     decoder: &Decoder,
     noise: Option<f64>,
     guess: Option<Guess<'_>>,
+    window: Option<Window<'_>>,
     phases: &mut PhaseMap,
 ) -> HeightMap {
     let width = phases.width;
@@ -106,7 +116,7 @@ pub fn triangulate(
         rows,
         || (),
         |v, ((heights, sigmas), phases), ()| {
-            for u in 0..heights.len() {
+            for u in window.map_or(0..heights.len(), |window| window[v].clone()) {
                 if phases.trust[u] != Trust::Resolved {
                     continue;
                 }

@@ -161,6 +161,7 @@ fn measure_about(
             &channel.decoder,
             noise,
             None,
+            None,
             &mut phases[primary],
         ),
         triangulator,
@@ -237,7 +238,7 @@ impl<'a> Channel<'a> {
     }
 
     fn decode(&self, map: Option<&[AbsolutePhase]>) -> Result<PhaseMap, AnyError> {
-        Ok(pipeline::decode(&self.decoder, &self.frames, map)?)
+        Ok(pipeline::decode(&self.decoder, &self.frames, map, None)?)
     }
 
     /// The ratios from coarse to fine.

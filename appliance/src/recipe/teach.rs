@@ -138,7 +138,7 @@ fn blur(
     let bit_depth = first.frames[0].format().bit_depth;
     let decoder =
         Decoder::new(&sequence, function.range(), bit_depth).map_err(|error| rig(&error))?;
-    let coarse = pipeline::decode(&decoder, &views, None).map_err(|error| rig(&error))?;
+    let coarse = pipeline::decode(&decoder, &views, None, None).map_err(|error| rig(&error))?;
     let slopes = map.slopes(noise::MAX_STEP);
     let resolved = (0..slopes.len())
         .filter(|&at| first.phases.trust[at] == Trust::Resolved && !slopes[at][0].is_nan());
