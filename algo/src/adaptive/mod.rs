@@ -3,8 +3,8 @@
 //! [`paper`] is the method of Peng & Gupta (2008), eqs. 2–9, as it stands: the baseline. [`noise`] is
 //! the better one: the local frequency that gives the least noise for the contrast that projector
 //! and camera have, on every part of the surface. Both work out a field of frequencies over the
-//! projector's raster ([`field`]) from where each camera pixel's light comes from ([`ProjectorMap`])
-//! and integrate it to a phase function ([`integrate`]).
+//! projector's raster ([`Field`]) from where each camera pixel's light comes from ([`ProjectorMap`])
+//! and integrate it to a phase function.
 
 mod field;
 mod integrate;

@@ -101,7 +101,7 @@ pub fn measured_blur(
 }
 
 /// The frequency for a surface that the camera sees with slope J: the coarsest one whose g·M(g)
-/// reaches [`ENOUGH`] of the maximum, under both limits of pitch. The maximum is flat: the last
+/// reaches 98.5 % of the maximum, under both limits of pitch. The maximum is flat: the last
 /// share of precision costs a tenth of the contrast, and with it resolved pixels.
 pub fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2]) -> f64 {
     let slope = libm::sqrt(ju * ju + jv * jv);

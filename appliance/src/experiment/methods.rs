@@ -42,7 +42,7 @@ pub const SHOWN_ADAPTIVE: Method = Method::Better(Shot::Twelve);
 pub const PAPER: Method = Method::Paper { image_pitch: 5 };
 
 impl Method {
-    /// The methods of a figure with these fixed patterns; [`PAPER`] is among them.
+    /// The methods of a figure with these fixed patterns; the paper's pattern is among them.
     pub fn table(fringes: &[u32]) -> Vec<Self> {
         let fixed = fringes.iter().map(|&fringes| Self::Fixed { fringes });
         let papers = [PAPER, Self::Paper { image_pitch: 4 }];
