@@ -1,7 +1,8 @@
 //! From frames to a verdict: the pure computation of `fringed`.
 //!
 //! Data flows one way through the modules, and imports only point backwards along it:
-//! [`units`], [`math`] ← [`frame`] ← [`pattern`], [`phase`] ← [`geometry`] ← [`inspect`] ← [`pipeline`].
+//! [`units`], [`math`] ← [`frame`] ← [`pattern`], [`phase`] ← [`geometry`] ←
+//! [`pipeline`] ← [`inspect`] ← [`adaptive`].
 //!
 //! Everything here is a function of its arguments: no input or output, no clock, no randomness, no
 //! global state. The per-pixel path from samples to absolute phase is integer arithmetic; geometry

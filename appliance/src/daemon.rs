@@ -3,15 +3,15 @@
 //! One OS thread measures ([`crate::worker`]), one serves sockets on a current-thread runtime, and
 //! the station is plain values behind a handle that both use.
 
-use crate::config::Config;
+use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
 use crate::output::picture::height_png;
 use crate::progress::Progress;
 use crate::state::{Counter, StateFolder, random};
 use crate::station::snapshot::status;
 use crate::station::{
-    Effect, Event, Identity, Limits, Micros, RecipeKey, Request, Settings, Snapshot, Station,
-    StationHandle, tick,
+    Effect, Event, Identity, Limits, Micros, RecipeKey, RecipeResult, Request, Settings, Snapshot,
+    Station, StationHandle, tick,
 };
 use crate::worker::{LastMaps, Order, Worker};
 use crate::{backend, clock, modbus, web};
@@ -34,6 +34,8 @@ pub struct Daemon {
     pub http: SocketAddr,
     /// Where parts are placed in front of a simulated head.
     pub stage: Option<Stage>,
+    /// Whether a recipe is loaded or taught at the start.
+    awaited: bool,
     stopping: Stopping,
     /// Held as long as the daemon runs.
     _state: StateFolder,
@@ -77,6 +79,9 @@ impl Daemon {
             spawn("sockets", serve)?
         };
         let (opened, opening) = mpsc::channel();
+        let simulated = config.head.backend == Backend::Sim;
+        let first = first_request(config, simulated, state.recipes());
+        let awaited = first.is_some();
         let measuring = {
             let (station, recipes) = (station.clone(), state.recipes().clone());
             let config = config.clone();
@@ -87,7 +92,6 @@ impl Daemon {
                     Ok(head) => {
                         // Nobody waits any more only if the start was given up.
                         drop(opened.send(Ok(head.stage.clone())));
-                        let first = first_request(&config, head.stage.is_some(), &recipes);
                         let worker = Worker {
                             opened: head,
                             pool,
@@ -118,6 +122,7 @@ impl Daemon {
                 modbus,
                 http,
                 stage,
+                awaited,
                 stopping,
                 _state: state,
             }),
@@ -133,9 +138,16 @@ impl Daemon {
     /// # Errors
     /// The station's fault, or that its recipe could be neither loaded nor taught.
     pub fn wait_until_ready(&self) -> Result<Arc<Snapshot>, Failure> {
+        if !self.awaited {
+            let message =
+                "there is no recipe yet: load or teach one, or import it with `fringed teach`";
+            return Err(Failure::new(Exit::Unavailable, message));
+        }
         let mut snapshots = self.station.subscribe();
+        let refused = |snapshot: &Snapshot| snapshot.recipe_result != RecipeResult::Ok;
         let settled = |snapshot: &Arc<Snapshot>| {
-            snapshot.is(status::READY) || snapshot.fault.is_some() || snapshot.error.is_some()
+            let broken = snapshot.fault.is_some() || snapshot.error.is_some();
+            snapshot.is(status::READY) || broken || refused(snapshot)
         };
         let snapshot = runtime()?
             .block_on(async { snapshots.wait_for(settled).await.map(|found| found.clone()) })
@@ -147,6 +159,10 @@ impl Daemon {
             }
             (None, Some(error)) if !snapshot.is(status::READY) => {
                 Err(Failure::new(Exit::Unavailable, error.to_string()))
+            }
+            (None, None) if refused(&snapshot) => {
+                let message = "the recipe was not loaded: load another, or teach it again";
+                Err(Failure::new(Exit::Content, message))
             }
             _ => Ok(snapshot),
         }

@@ -57,10 +57,6 @@ impl Adapt {
     ///
     /// # Errors
     /// If the recording cannot be opened or lacks what the method needs, or the file not be written.
-    #[expect(
-        clippy::print_stdout,
-        reason = "the report is what the command is asked for"
-    )]
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         let choice = self.choice()?;
         let Some(name) = self.out.file_name().and_then(|name| name.to_str()) else {
@@ -75,10 +71,10 @@ impl Adapt {
         if common.json {
             let json = serde_json::to_string_pretty(&adapted.report)
                 .map_err(|error| Failure::because(Exit::Software, "write the report", error))?;
-            println!("{json}");
+            say!("{json}");
         } else if !common.quiet {
-            print!("{}", adapted.report.table());
-            println!("written to {}", self.out.display());
+            say!("{}", adapted.report.table().trim_end());
+            say!("written to {}", self.out.display());
         }
         Ok(())
     }

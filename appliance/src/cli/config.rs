@@ -24,10 +24,6 @@ impl ConfigCommand {
     ///
     /// # Errors
     /// What is wrong with the configuration.
-    #[expect(
-        clippy::print_stdout,
-        reason = "the answer is what the command is asked for"
-    )]
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         match self {
             Self::Keys if common.json => {
@@ -40,9 +36,9 @@ impl ConfigCommand {
                         })
                     })
                     .collect();
-                println!("{:#}", serde_json::Value::from(keys));
+                say!("{:#}", serde_json::Value::from(keys));
             }
-            Self::Keys => print!("{}", table()),
+            Self::Keys => say!("{}", table().trim_end()),
             Self::Check { file } => {
                 let Some(path) = file.as_ref().or(common.config.as_ref()) else {
                     return Err(Failure::new(
@@ -52,7 +48,7 @@ impl ConfigCommand {
                 };
                 check_named_files(&Config::read(path)?)?;
                 if !common.quiet {
-                    println!("{} is right", path.display());
+                    say!("{} is right", path.display());
                 }
             }
         }

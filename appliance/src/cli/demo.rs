@@ -39,10 +39,6 @@ impl Demo {
     ///
     /// # Errors
     /// If the station cannot start or answer, or judges a part wrongly.
-    #[expect(
-        clippy::print_stdout,
-        reason = "the table is what the command is asked for"
-    )]
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         let mut config = common.configuration()?;
         if config.head.backend != Backend::Sim || config.head.scenario.is_some() {
@@ -66,12 +62,12 @@ impl Demo {
         progress.clear();
         let rows = rows?;
         if common.json {
-            println!("{:#}", table::json(&rows));
+            say!("{:#}", table::json(&rows));
         } else if !common.quiet {
-            print!("{}", table::text(&rows));
+            say!("{}", table::text(&rows).trim_end());
         }
         if !self.exit && std::io::stdout().is_terminal() {
-            println!("\nThe page stays on http://{} until Ctrl-C.", daemon.http);
+            say!("\nThe page stays on http://{} until Ctrl-C.", daemon.http);
             until_told()?;
         }
         daemon.stop();

@@ -28,10 +28,6 @@ impl Experiment {
     ///
     /// # Errors
     /// If a part is not known, a run fails or the results cannot be written.
-    #[expect(
-        clippy::print_stdout,
-        reason = "the table is what the command is asked for"
-    )]
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         let campaign = Campaign {
             scenes: self.scenes()?,
@@ -51,10 +47,10 @@ impl Experiment {
         if common.json {
             let json = serde_json::to_string_pretty(&means)
                 .map_err(|error| Failure::because(Exit::Software, "write the means", error))?;
-            println!("{json}");
+            say!("{json}");
         } else if !common.quiet {
-            print!("{}", tables(&campaign, &means));
-            println!("written to {}", self.out.display());
+            say!("{}", tables(&campaign, &means).trim_end());
+            say!("written to {}", self.out.display());
         }
         Ok(())
     }

@@ -29,14 +29,10 @@ impl Measure {
     ///
     /// # Errors
     /// If the recording cannot be opened or measured, or the results not be written.
-    #[expect(
-        clippy::print_stdout,
-        reason = "the report is what the command is asked for"
-    )]
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         let recording = Recording::open(&self.recording)?;
         let recipe = self.recipe.as_deref().map(read).transpose()?;
-        let pool = super::pool(common.threads.unwrap_or(0))?;
+        let pool = super::pool(common.configuration()?.threads)?;
         let measured = || measure_with(&recording, &self.recording, recipe.as_ref());
         let measurement = pool.install(measured)?;
         let folder = OutputFolder::create(&self.out)?;
@@ -45,10 +41,10 @@ impl Measure {
             .map_err(|error| Failure::because(Exit::Software, "write the report", error))?;
         folder.write("report.json", format!("{json}\n").as_bytes())?;
         if common.json {
-            println!("{json}");
+            say!("{json}");
         } else if !common.quiet {
-            print!("{}", measurement.report.table());
-            println!("written to {}", self.out.display());
+            say!("{}", measurement.report.table().trim_end());
+            say!("written to {}", self.out.display());
         }
         Ok(())
     }

@@ -35,10 +35,6 @@ impl Record {
     ///
     /// # Errors
     /// If the head or the folder cannot be had, or the pattern not be shown.
-    #[expect(
-        clippy::print_stdout,
-        reason = "what was recorded is what the command is asked for"
-    )]
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         let config = common.configuration()?;
         let progress = common.progress();
@@ -54,7 +50,7 @@ impl Record {
             .map_err(|error| Failure::new(Exit::CannotCreate, error.to_string()))?;
         if !common.quiet {
             let count = recording.frames.len();
-            println!("recorded {count} frames to {}", self.folder.display());
+            say!("recorded {count} frames to {}", self.folder.display());
         }
         Ok(())
     }

@@ -58,10 +58,6 @@ impl Teach {
     ///
     /// # Errors
     /// If the part cannot be taught or the recipe not be stored; a recipe stored before is untouched.
-    #[expect(
-        clippy::print_stdout,
-        reason = "the choice is what the command is asked for"
-    )]
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         let config = common.configuration()?;
         let pool = super::pool(config.threads)?;
@@ -89,12 +85,12 @@ impl Teach {
                 "reasons": taught.choice.reasons,
                 "file": place,
             });
-            println!("{summary:#}");
+            say!("{summary:#}");
         } else if !common.quiet {
             for reason in &taught.choice.reasons {
-                println!("{reason}");
+                say!("{reason}");
             }
-            println!(
+            say!(
                 "recipe {}, fingerprint {}: {place}",
                 file.number,
                 &file.fingerprint[..8]

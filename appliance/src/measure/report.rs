@@ -145,7 +145,7 @@ impl Report {
         let mut table = String::new();
         // Writing to a string cannot fail.
         let mut line = |name: &str, value: String| {
-            let _ = writeln!(table, "{name:<26}{value}");
+            let _ = writeln!(table, "{name:<30}{value}");
         };
         let ratios: Vec<String> = self
             .ratios

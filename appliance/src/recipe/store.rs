@@ -144,8 +144,9 @@ impl Store {
         let mut numbers: Vec<u16> = entries
             .filter_map(|entry| {
                 let name = entry.file_name();
-                let (number, _) = name.to_str()?.split_once(".recipe")?;
-                number.parse().ok()
+                let (number, rest) = name.to_str()?.split_once(".recipe")?;
+                // A file that was being written when the plug was pulled is no recipe.
+                matches!(rest, "" | ".previous").then(|| number.parse().ok())?
             })
             .collect();
         numbers.sort_unstable();
