@@ -13,6 +13,8 @@ pub struct View {
     tiles: [Canvas<1>; 3],
 }
 
+/// Height of a caption with the space under it, pixels.
+const CAPTION: usize = LINE + 8;
 /// Columns and rows of a tile, and the space between tiles.
 const TILE: usize = 512;
 const GAP: usize = 8;
@@ -69,14 +71,14 @@ fn middle(pixels: &[u8], stride: usize, width: usize) -> Canvas<1> {
 
 /// One picture of all views: a row each.
 pub fn png(views: &[View]) -> Vec<u8> {
-    let (across, down) = (TILE + GAP, TILE + LINE + GAP);
+    let (across, down) = (TILE + GAP, TILE + CAPTION + GAP);
     let mut canvas = Canvas::new(3 * across + GAP, views.len().max(1) * down + GAP);
     for (row, view) in views.iter().enumerate() {
         let top = GAP + row * down;
         for (column, (tile, caption)) in view.tiles.iter().zip(&view.caption).enumerate() {
             let left = GAP + column * across;
             canvas.text(caption, left, top);
-            canvas.put(tile, left, top + LINE);
+            canvas.put(tile, left, top + CAPTION);
         }
     }
     canvas.png(png::Compression::High)
