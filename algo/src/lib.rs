@@ -11,7 +11,7 @@
 #![no_std]
 
 extern crate alloc;
-#[cfg(test)]
+#[cfg(any(test, feature = "parallel"))]
 extern crate std;
 
 pub mod adaptive;
@@ -22,4 +22,5 @@ pub mod math;
 pub mod pattern;
 pub mod phase;
 pub mod pipeline;
+pub mod simd;
 pub mod units;

@@ -14,6 +14,7 @@ const WRAPPED_TURN: f64 = 65_536.0;
 /// A phase within its fringe: the full range of `u16` is one turn, so the wrap of the integer is the
 /// wrap of the phase.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(transparent)]
 pub struct WrappedPhase(u16);
 
 impl WrappedPhase {
@@ -47,6 +48,7 @@ impl WrappedPhase {
 /// An absolute phase Φ in turns of its phase function, Q16.16: the high half is the fringe order,
 /// the low half the wrapped phase. ± 32,768 turns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(transparent)]
 pub struct AbsolutePhase(i32);
 
 impl AbsolutePhase {
@@ -149,6 +151,7 @@ impl FringeOrder {
 /// A modulation B as a share of full scale, in units of full scale / 65535, so that it means the
 /// same at every bit depth. At 8 bit one count is exactly 257 units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(transparent)]
 pub struct Modulation(u16);
 
 impl Modulation {
@@ -170,6 +173,7 @@ impl Modulation {
 
 /// A height z in nanometres above the reference plane; ± 2.1 m.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(transparent)]
 pub struct Height(i32);
 
 impl Height {

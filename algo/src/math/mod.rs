@@ -1,4 +1,3 @@
-//! Integer trigonometry and small exact arithmetic.
+//! Small exact arithmetic.
 
-pub mod atan;
 pub mod solve;

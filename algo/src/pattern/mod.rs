@@ -6,4 +6,7 @@ mod sequence;
 
 pub use encode::{GreyRaster, GreyResponse, ResponseError, encode};
 pub use function::{PhaseFunction, PhaseFunctionError, PhaseRange};
-pub use sequence::{Level, MAX_LEVELS, MAX_SHIFTS, Sequence, SequenceError, Unwrapping};
+pub use sequence::{
+    Level, MAX_DENSE_N, MAX_FRAMES, MAX_LEVELS, MAX_SHIFTS, MAX_TURNS, Sequence, SequenceError,
+    Unwrapping,
+};

@@ -8,16 +8,19 @@ use core::fmt;
 pub const MAX_LEVELS: usize = 8;
 /// Shifts that a level may have; sums of 64 samples of 16 bits stay inside the kernels' bounds.
 pub const MAX_SHIFTS: usize = 64;
+/// Frames that a sequence may have.
+pub const MAX_FRAMES: usize = 128;
 /// How far a shift may lie from its place on the equally spaced grid, in turns.
 const SHIFT_TOLERANCE: f64 = 1e-6;
 /// How far a ratio may lie from the dense form.
 const RATIO_TOLERANCE: f64 = 1e-6;
 /// Largest span of the coarsest level, in turns, that is still absolute by itself.
 const GEOMETRIC_SPAN: f64 = 1.001;
-/// Largest step from one geometric level to the next: keeps n · Φ inside 63 bits.
-const MAX_STEP: f64 = 4096.0;
-/// Largest phase of a level, in turns: Q16.16 reaches 32,768.
-const MAX_TURNS: f64 = 32_000.0;
+/// Largest n of dense levels: their D stays within ± 450 turns, which words hold with 5 fractional bits.
+pub const MAX_DENSE_N: f64 = 30.0;
+/// Largest phase of a level, in turns, and largest step between two levels: the kernels find the fringe order of a step
+/// as a word with at least 4 fractional bits.
+pub const MAX_TURNS: f64 = 1000.0;
 
 /// All shifts at one ratio of the full phase function: s_k = start + k/N.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,6 +53,8 @@ pub struct Sequence {
 pub enum SequenceError {
     /// There are no frames.
     Empty,
+    /// More frames than [`MAX_FRAMES`].
+    TooManyFrames(usize),
     /// A ratio is not a positive finite number, or a shift not finite.
     NotFinite {
         /// The frame's ratio.
@@ -84,6 +89,11 @@ pub enum SequenceError {
         /// Its largest phase in turns.
         turns: f64,
     },
+    /// Dense levels of too large an n.
+    Dense {
+        /// The n of their ratios.
+        n: f64,
+    },
     /// The step between two geometric levels is too large.
     Step {
         /// Ratio of the coarser level.
@@ -97,6 +107,12 @@ impl fmt::Display for SequenceError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Empty => write!(f, "there are no frames: a level needs at least 3"),
+            Self::TooManyFrames(frames) => {
+                write!(
+                    f,
+                    "{frames} frames where at most {MAX_FRAMES} can be decoded"
+                )
+            }
             Self::NotFinite { ratio, shift } => write!(
                 f,
                 "a frame with ratio {ratio} and shift {shift}: both must be finite and the ratio positive"
@@ -128,12 +144,16 @@ impl fmt::Display for SequenceError {
             ),
             Self::Finest { ratio, turns } => write!(
                 f,
-                "the finest level has ratio {ratio} and {turns} turns: the ratio must be at least 1/{MAX_STEP} \
+                "the finest level has ratio {ratio} and {turns} turns: the ratio must be at least 1/{MAX_TURNS} \
                  and the phase at most {MAX_TURNS} turns"
             ),
             Self::Step { from, to } => write!(
                 f,
-                "the step from ratio {from} to {to} is over {MAX_STEP}: put a level between them"
+                "the step from ratio {from} to {to} is too long for its fringe order: put a level between them"
+            ),
+            Self::Dense { n } => write!(
+                f,
+                "dense levels with n = {n}: n must be at most {MAX_DENSE_N}"
             ),
         }
     }
@@ -153,6 +173,9 @@ impl Sequence {
     pub fn from_frames(frames: &[(f64, f64)]) -> Result<Self, SequenceError> {
         if frames.is_empty() {
             return Err(SequenceError::Empty);
+        }
+        if frames.len() > MAX_FRAMES {
+            return Err(SequenceError::TooManyFrames(frames.len()));
         }
         if let Some(&(ratio, shift)) = frames
             .iter()
@@ -266,7 +289,7 @@ impl Unwrapping {
             sequence.levels().iter().map(|level| level.ratio).collect();
         let finest = ratios[ratios.len() - 1];
         let turns = finest * libm::fabs(range.max).max(libm::fabs(range.min));
-        if !(finest >= 1.0 / MAX_STEP && turns <= MAX_TURNS) {
+        if !(finest >= 1.0 / MAX_TURNS && turns <= MAX_TURNS) {
             return Err(SequenceError::Finest {
                 ratio: finest,
                 turns,
@@ -274,7 +297,7 @@ impl Unwrapping {
         }
         let near = |a: f64, b: f64| libm::fabs(a - b) <= RATIO_TOLERANCE;
         if ratios[0] * range.span() <= GEOMETRIC_SPAN {
-            if let Some(pair) = ratios.windows(2).find(|pair| pair[1] / pair[0] > MAX_STEP) {
+            if let Some(pair) = ratios.windows(2).find(|pair| pair[1] / pair[0] > MAX_TURNS) {
                 return Err(SequenceError::Step {
                     from: pair[0],
                     to: pair[1],

@@ -1,10 +1,21 @@
 //! Wrapped phase and modulation, which pixels to trust, and the absolute phase.
 
+mod about;
+mod angle;
+mod block;
 mod decode;
-mod demodulate;
+mod fold;
+mod geometric;
+mod level;
+mod narrow;
 mod trust;
 mod unwrap;
+mod wrapped;
 
-pub use decode::{DecodeError, Decoder, PhaseRow, Scratch};
-pub use demodulate::FULL_TRUST_STEPS;
+pub use decode::{DecodeError, Decoder, PhaseRow};
+pub use level::FULL_TRUST_STEPS;
 pub use trust::{MIN_MODULATION_8_BIT, Trust};
+pub use wrapped::Wrapped;
+
+#[cfg(test)]
+mod tests;

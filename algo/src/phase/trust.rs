@@ -18,21 +18,27 @@ pub enum Trust {
     LowModulation = 2,
     /// A sample is at full scale in a level of fewer than 8 shifts.
     Saturated = 3,
-    /// An unwrapping step left more than 0.40 turn over, or no map is known to unwrap about.
+    /// An unwrapping step left more than 0.40 turn over.
     Residual = 4,
     /// No height in the working range has this phase.
     OutOfRange = 5,
+    /// Nothing is known here to unwrap about: not looked at.
+    Unexpected = 6,
 }
 
 impl Trust {
     /// Every reason for rejecting a pixel, in the order in which they are looked for.
-    pub const REASONS: [Self; 5] = [
+    pub const REASONS: [Self; 6] = [
+        Self::Unexpected,
         Self::Dark,
         Self::LowModulation,
         Self::Saturated,
         Self::Residual,
         Self::OutOfRange,
     ];
+
+    /// The largest of their numbers.
+    pub(crate) const LAST: u8 = Self::Unexpected as u8;
 
     /// The word for reports.
     pub fn word(self) -> &'static str {
@@ -43,6 +49,7 @@ impl Trust {
             Self::Saturated => "saturated",
             Self::Residual => "residual",
             Self::OutOfRange => "out_of_range",
+            Self::Unexpected => "unexpected",
         }
     }
 

@@ -3,7 +3,7 @@
 use super::for_each;
 use crate::frame::FrameView;
 use crate::geometry::Triangulator;
-use crate::phase::{DecodeError, Decoder, PhaseRow, Scratch, Trust};
+use crate::phase::{DecodeError, Decoder, PhaseRow, Trust, Wrapped};
 use crate::units::{AbsolutePhase, Height, Modulation};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -23,6 +23,17 @@ pub struct PhaseMap {
 }
 
 impl PhaseMap {
+    /// A map of which nothing is known yet.
+    pub fn new(width: usize, height: usize) -> Self {
+        let pixels = width * height;
+        Self {
+            width,
+            phase: vec![AbsolutePhase::UNKNOWN; pixels],
+            modulation: vec![Modulation::default(); pixels],
+            trust: vec![Trust::default(); pixels],
+        }
+    }
+
     fn rows(&mut self) -> Vec<PhaseRow<'_>> {
         let width = self.width.max(1);
         self.phase
@@ -58,7 +69,7 @@ pub struct HeightMap {
 pub type Window<'a> = &'a [Range<usize>];
 
 /// Decodes frames to absolute phase; `map` is the known map (row-major) for sequences that are
-/// unwrapped about one. Rows of which `window` has no column are left out: their pixels stay dark.
+/// unwrapped about one. Pixels outside `window` are left out: they stay dark.
 ///
 /// # Errors
 /// If the frames are not what the decoder was made for. Nothing else can fail.
@@ -70,20 +81,71 @@ pub fn decode(
 ) -> Result<PhaseMap, DecodeError> {
     decoder.check(frames)?;
     let (width, height) = (frames[0].width(), frames[0].height());
-    let mut phases = PhaseMap {
-        width,
-        phase: vec![AbsolutePhase::UNKNOWN; width * height],
-        modulation: vec![Modulation::default(); width * height],
-        trust: vec![Trust::default(); width * height],
-    };
-    for_each(phases.rows(), Scratch::default, |v, row, scratch| {
-        if window.is_some_and(|window| window[v].is_empty()) {
-            return;
-        }
-        let map = map.and_then(|map| map.get(v * width..(v + 1) * width));
-        decoder.row(frames, v, map, scratch, row);
-    });
+    let mut phases = PhaseMap::new(width, height);
+    let map = map.unwrap_or(&[]);
+    for_each(
+        phases.rows(),
+        || (),
+        |v, row, ()| {
+            let known = map.get(v * width..(v + 1) * width).unwrap_or(&[]);
+            decoder.row(frames, v, known, columns(window, v, width), row);
+        },
+    );
     Ok(phases)
+}
+
+/// Demodulates the frames of one level (in the order of their shifts) before the finer ones are there. Blocks that the
+/// coarsest level, if it is given, found dark are left out.
+///
+/// # Errors
+/// If the frames are not those of the level.
+pub fn wrap(
+    decoder: &Decoder,
+    level: usize,
+    frames: &[FrameView<'_>],
+    coarsest: Option<&Wrapped>,
+    out: &mut Wrapped,
+) -> Result<(), DecodeError> {
+    decoder.check_level(level, frames)?;
+    for_each(
+        out.rows(),
+        || (),
+        |v, row, ()| {
+            decoder.wrap_row(level, frames, v, coarsest, row);
+        },
+    );
+    Ok(())
+}
+
+/// As [`decode`], from the coarser levels demodulated by [`wrap`] and the frames of the finest.
+///
+/// # Errors
+/// If the frames are not those of the finest level.
+pub fn decode_last(
+    decoder: &Decoder,
+    before: &[Wrapped],
+    last: &[FrameView<'_>],
+    map: Option<&[AbsolutePhase]>,
+    window: Option<Window<'_>>,
+) -> Result<PhaseMap, DecodeError> {
+    decoder.check_level(before.len(), last)?;
+    let (width, height) = (last[0].width(), last[0].height());
+    let mut phases = PhaseMap::new(width, height);
+    let map = map.unwrap_or(&[]);
+    for_each(
+        phases.rows(),
+        || (),
+        |v, row, ()| {
+            let known = map.get(v * width..(v + 1) * width).unwrap_or(&[]);
+            decoder.last_row(before, last, v, known, columns(window, v, width), row);
+        },
+    );
+    Ok(phases)
+}
+
+/// The columns of row `v` that a window lets through.
+fn columns(window: Option<Window<'_>>, v: usize, width: usize) -> Range<usize> {
+    window.map_or(0..width, |window| window[v].clone())
 }
 
 /// What is known of the heights beforehand: for a place (row-major) and its phase, a height in mm that

@@ -4,7 +4,7 @@ mod measure;
 mod noise;
 mod rows;
 
-pub use measure::{Guess, HeightMap, PhaseMap, Window, decode, triangulate};
+pub use measure::{Guess, HeightMap, PhaseMap, Window, decode, decode_last, triangulate, wrap};
 pub use noise::sample_noise;
 pub use rows::for_each_row;
 pub(crate) use rows::{for_each, map_rows};

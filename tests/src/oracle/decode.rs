@@ -78,9 +78,6 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
                 .collect();
             let least = least_modulation(full_scale);
             let tie = seen.iter().any(|s| (s.modulation - least).abs() < TIE);
-            if let Some(reason) = distrust(&levels, &seen, full_scale) {
-                return (f64::NAN, 0.0, reason, tie);
-            }
             let map = match (form, &rig) {
                 (Form::Geometric { .. }, _) => f64::NAN,
                 (_, Some(rig)) => {
@@ -88,6 +85,12 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
                 }
                 (_, None) => panic!("a map is needed and there are no models"),
             };
+            if map.is_nan() && !matches!(form, Form::Geometric { .. }) {
+                return (f64::NAN, 0.0, Reason::Unexpected, false);
+            }
+            if let Some(reason) = distrust(&levels, &seen, full_scale) {
+                return (f64::NAN, 0.0, reason, tie);
+            }
             let wrapped: Vec<Wrapped> = levels
                 .iter()
                 .zip(&seen)

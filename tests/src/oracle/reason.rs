@@ -5,6 +5,8 @@
 pub enum Reason {
     /// Phase and height are valid.
     Resolved,
+    /// The map that the levels are unwrapped about knows nothing here.
+    Unexpected,
     /// The coarsest level's modulation is below 16 counts of 255.
     Dark,
     /// Another level's modulation is.
@@ -22,6 +24,7 @@ impl Reason {
     pub fn word(self) -> &'static str {
         match self {
             Self::Resolved => "resolved",
+            Self::Unexpected => "unexpected",
             Self::Dark => "dark",
             Self::LowModulation => "low_modulation",
             Self::Saturated => "saturated",

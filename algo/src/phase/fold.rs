@@ -1,0 +1,331 @@
+//! The samples of a level at a block of pixels → the pointer (C, S) of its fringes, folded into the first octant.
+//!
+//! S = Σ I_k cos 2πs_k, C = Σ I_k sin 2πs_k for I_k = A + B sin 2π(φ + s_k) (Peng & Gupta 2008, eq. 1 with a phase step;
+//! the generalised N-step method); φ = atan2(S, C)/2π, B = (2/N) √(S² + C²). With k/N for s_k:
+//!
+//! - N = 4: S = I₀ − I₂, C = I₁ − I₃. At 8 bits all of it, the folding too, is done in bytes, exactly.
+//! - N = 3: S = (2I₀ − I₁ − I₂)/2, C = (√3/2)(I₁ − I₂).
+//! - any other N, and 3 or 4 of more than 12 bits: sums of products in 32 bits, with as many bits of weight as fit.
+
+use super::level::{Level, Samples};
+use crate::frame::Sample;
+use crate::simd::Lanes;
+
+/// Where the pointer lies: in the first octant after folding, and how to unfold.
+pub(super) struct Folded<V: Lanes> {
+    /// The longer component, scaled by a power of two to 2¹⁴…2¹⁵ (less only where the pixel is weak).
+    pub long: [V::W; 2],
+    /// The shorter, with the same factor.
+    pub short: [V::W; 2],
+    /// The longer before scaling, in the level's unit.
+    pub length: [V::W; 2],
+    /// Mask: the angle in the octant counts backwards.
+    pub backwards: [V::W; 2],
+    /// The axis from which it counts in 1/65536 turn, plus 1 where it counts backwards.
+    pub axis: [V::W; 2],
+    /// Mask: the modulation is below the trusted minimum.
+    pub weak: V::B,
+    /// Mask: a sample is at full scale.
+    pub saturated: V::B,
+}
+
+/// A sample that blocks of pixels can be made of.
+pub(crate) trait BlockSample: Sample {
+    /// Demodulation of four equally spaced shifts, the quickest that there is for this width.
+    fn four<V: Lanes>(v: V, level: &Level, rows: [&[Self]; 4], at: usize) -> Folded<V>;
+    /// A block of samples as words.
+    fn words<V: Lanes>(v: V, row: &[Self], at: usize) -> [V::W; 2];
+    /// Mask: the sample is at full scale or above.
+    fn saturated<V: Lanes>(v: V, level: &Level, row: &[Self], at: usize) -> V::B;
+}
+
+/// Folds the block at `at` of a level's rows.
+#[inline(always)]
+pub(super) fn fold<V: Lanes, T: BlockSample>(
+    v: V,
+    level: &Level,
+    rows: &[&[T]],
+    at: usize,
+) -> Folded<V> {
+    match (&level.samples, rows) {
+        (Samples::Four, &[a, b, c, d]) => T::four(v, level, [a, b, c, d], at),
+        (Samples::Three, &[a, b, c]) => three(v, level, [a, b, c], at),
+        (Samples::Weighted(weights), rows) => weighted(v, level, weights, rows, at),
+        // A level is prepared with as many rows as it has shifts.
+        _ => weighted(v, level, &[], rows, at),
+    }
+}
+
+/// Scales by which the bytes of a first nibble come to 2¹⁴…2¹⁵ with [`Lanes::widen_scaled`].
+const SCALES: [u8; 16] = [
+    128, 128, 64, 64, 32, 32, 32, 32, 16, 16, 16, 16, 16, 16, 16, 16,
+];
+/// At 8 bits and N = 4, B = √(S² + C²)/2: trusted from 16 counts, so from S² + C² = 32².
+const LEAST_8_BIT: u8 = 32;
+
+impl BlockSample for u8 {
+    #[inline(always)]
+    fn four<V: Lanes>(v: V, _level: &Level, rows: [&[Self]; 4], at: usize) -> Folded<V> {
+        let [a, b, c, d] = rows;
+        let (a, b) = (v.load8(a, at), v.load8(b, at));
+        let (c, d) = (v.load8(c, at), v.load8(d, at));
+        let zero = v.splat8(0);
+        let (s_up, c_up) = (v.sub_sat8(a, c), v.sub_sat8(b, d));
+        let s = v.or8(s_up, v.sub_sat8(c, a));
+        let c_ = v.or8(c_up, v.sub_sat8(d, b));
+        // Also where S or C is 0: the angle is the same from either side.
+        let (s_down, c_down) = (v.eq8(s_up, zero), v.eq8(c_up, zero));
+        let (long, short) = (v.max8(s, c_), v.min8(s, c_));
+        let steep = v.eq8(long, s);
+        let backwards = v.xor8(v.xor8(s_down, c_down), steep);
+        let half = v.and8(v.pick8(steep, s_down, c_down), v.splat8(0x80));
+        let axis = v.or8(half, v.and8(steep, v.splat8(0x40)));
+        let scale = v.by_high_nibble(&SCALES, long);
+        let least = v.splat8(LEAST_8_BIT);
+        let power = v.sum_of_squares(v.min8(s, least), v.min8(c_, least));
+        let enough = v.splat16(i16::from(LEAST_8_BIT) * i16::from(LEAST_8_BIT));
+        let brightest = v.max8(v.max8(a, b), v.max8(c, d));
+        let [length_0, length_1] = v.widen(zero, long);
+        Folded {
+            long: v.widen_scaled(long, scale),
+            short: v.widen_scaled(short, scale),
+            length: [v.shr_by(length_0, 1), v.shr_by(length_1, 1)],
+            backwards: v.widen(backwards, backwards),
+            axis: v.widen(v.and8(backwards, v.splat8(1)), axis),
+            weak: v.narrow_mask([v.gt(enough, power[0]), v.gt(enough, power[1])]),
+            saturated: v.eq8(brightest, v.splat8(u8::MAX)),
+        }
+    }
+
+    #[inline(always)]
+    fn words<V: Lanes>(v: V, row: &[Self], at: usize) -> [V::W; 2] {
+        v.widen(v.load8(row, at), v.splat8(0))
+    }
+
+    #[inline(always)]
+    fn saturated<V: Lanes>(v: V, _level: &Level, row: &[Self], at: usize) -> V::B {
+        v.eq8(v.load8(row, at), v.splat8(u8::MAX))
+    }
+}
+
+impl BlockSample for u16 {
+    #[inline(always)]
+    fn four<V: Lanes>(v: V, level: &Level, rows: [&[Self]; 4], at: usize) -> Folded<V> {
+        let [a, b, c, d] = rows;
+        let (a, b) = (v.load16(a, at), v.load16(b, at));
+        let (c, d) = (v.load16(c, at), v.load16(d, at));
+        let s = [
+            v.shl_by(v.sub(a[0], c[0]), level.lift),
+            v.shl_by(v.sub(a[1], c[1]), level.lift),
+        ];
+        let c_ = [
+            v.shl_by(v.sub(b[0], d[0]), level.lift),
+            v.shl_by(v.sub(b[1], d[1]), level.lift),
+        ];
+        let over = [
+            any_full(v, level, a[0], b[0], c[0], d[0]),
+            any_full(v, level, a[1], b[1], c[1], d[1]),
+        ];
+        let weak = [
+            dot_below(v, level, [s[0], s[0], c_[0], c_[0]]),
+            dot_below(v, level, [s[1], s[1], c_[1], c_[1]]),
+        ];
+        octant(v, s, c_, v.narrow_mask(weak), v.narrow_mask(over))
+    }
+
+    #[inline(always)]
+    fn words<V: Lanes>(v: V, row: &[Self], at: usize) -> [V::W; 2] {
+        v.load16(row, at)
+    }
+
+    #[inline(always)]
+    fn saturated<V: Lanes>(v: V, level: &Level, row: &[Self], at: usize) -> V::B {
+        let x = v.load16(row, at);
+        v.narrow_mask([
+            any_full(v, level, x[0], x[0], x[0], x[0]),
+            any_full(v, level, x[1], x[1], x[1], x[1]),
+        ])
+    }
+}
+
+/// Mask: one of the samples is at full scale or above.
+#[inline(always)]
+fn any_full<V: Lanes>(v: V, level: &Level, a: V::W, b: V::W, c: V::W, d: V::W) -> V::W {
+    // With the sign bit turned the order of unsigned words is that of signed ones.
+    let turn = v.splat16(i16::MIN);
+    let (a, b) = (v.xor(a, turn), v.xor(b, turn));
+    let (c, d) = (v.xor(c, turn), v.xor(d, turn));
+    let brightest = v.max(v.max(a, b), v.max(c, d));
+    v.gt(brightest, v.xor(v.splat16(level.below_full_scale), turn))
+}
+
+/// Mask: a·b + c·d is below the level's least power.
+#[inline(always)]
+fn dot_below<V: Lanes>(v: V, level: &Level, [a, b, c, d]: [V::W; 4]) -> V::W {
+    let power = v.dot(a, b, c, d);
+    let least = v.splat32(level.least_power);
+    v.narrow_mask32([v.gt32(least, power[0]), v.gt32(least, power[1])])
+}
+
+/// √3/2 in Q15.
+const ROOT_3_HALVES: i16 = 28_378;
+
+#[inline(always)]
+fn three<V: Lanes, T: BlockSample>(v: V, level: &Level, rows: [&[T]; 3], at: usize) -> Folded<V> {
+    let [a, b, c] = rows;
+    let saturated = v.or8(
+        v.or8(T::saturated(v, level, a, at), T::saturated(v, level, b, at)),
+        T::saturated(v, level, c, at),
+    );
+    let (a, b, c) = (T::words(v, a, at), T::words(v, b, at), T::words(v, c, at));
+    let (s0, c0, weak0) = three_words(v, level, a[0], b[0], c[0]);
+    let (s1, c1, weak1) = three_words(v, level, a[1], b[1], c[1]);
+    octant(
+        v,
+        [s0, s1],
+        [c0, c1],
+        v.narrow_mask([weak0, weak1]),
+        saturated,
+    )
+}
+
+/// S, C and whether they are weak: 4 (S² + C²) = (2I₀ − I₁ − I₂)² + 3 (I₁ − I₂)², exactly.
+#[inline(always)]
+fn three_words<V: Lanes>(v: V, level: &Level, a: V::W, b: V::W, c: V::W) -> (V::W, V::W, V::W) {
+    let across = v.sub(b, c);
+    let along = v.sub(v.add(a, a), v.add(b, c));
+    let threefold = v.add(across, v.add(across, across));
+    let weak = dot_below(v, level, [along, along, across, threefold]);
+    let s = v.shl_by(along, level.lift - 1);
+    let c_ = v.mul_q15(v.shl_by(across, level.lift), v.splat16(ROOT_3_HALVES));
+    (s, c_, weak)
+}
+
+#[inline(always)]
+fn weighted<V: Lanes, T: BlockSample>(
+    v: V,
+    level: &Level,
+    weights: &[[i16; 2]],
+    rows: &[&[T]],
+    at: usize,
+) -> Folded<V> {
+    let zero = v.splat32(0);
+    let mut s = [[zero; 2]; 2];
+    let mut c = [[zero; 2]; 2];
+    let mut saturated = v.splat8(0);
+    let centre = v.splat16(level.centre);
+    let none = v.splat16(0);
+    // In pairs, as the instructions take them.
+    for (rows, weights) in rows.chunks(2).zip(weights.chunks(2)) {
+        let ([s_first, c_first], [s_second, c_second]) = match *weights {
+            [first, second] => (first, second),
+            [first] => (first, [0; 2]),
+            _ => ([0; 2], [0; 2]),
+        };
+        let first = T::words(v, rows[0], at);
+        saturated = v.or8(saturated, T::saturated(v, level, rows[0], at));
+        let second = match rows.get(1) {
+            Some(row) => {
+                saturated = v.or8(saturated, T::saturated(v, level, row, at));
+                T::words(v, row, at)
+            }
+            None => [none; 2],
+        };
+        let mut half = 0;
+        while half < 2 {
+            let first = v.sub(first[half], centre);
+            let second = v.sub(second[half], centre);
+            let along = v.dot(first, v.splat16(s_first), second, v.splat16(s_second));
+            let across = v.dot(first, v.splat16(c_first), second, v.splat16(c_second));
+            s[half] = [v.add32(s[half][0], along[0]), v.add32(s[half][1], along[1])];
+            c[half] = [
+                v.add32(c[half][0], across[0]),
+                v.add32(c[half][1], across[1]),
+            ];
+            half += 1;
+        }
+    }
+    let weak = [
+        weak_sums(v, level, s[0], c[0]),
+        weak_sums(v, level, s[1], c[1]),
+    ];
+    let (s, c) = (
+        [
+            v.narrow_rounded(s[0], level.lift),
+            v.narrow_rounded(s[1], level.lift),
+        ],
+        [
+            v.narrow_rounded(c[0], level.lift),
+            v.narrow_rounded(c[1], level.lift),
+        ],
+    );
+    octant(v, s, c, v.narrow_mask(weak), saturated)
+}
+
+/// Mask: S² + C² of the sums is below the level's least power, in singles (1e-7).
+#[inline(always)]
+fn weak_sums<V: Lanes>(v: V, level: &Level, s: [V::D; 2], c: [V::D; 2]) -> V::W {
+    let least = v.splat_single(level.least_sum_power);
+    let (s0, s1) = (v.to_single(s[0]), v.to_single(s[1]));
+    let (c0, c1) = (v.to_single(c[0]), v.to_single(c[1]));
+    let power0 = v.add_single(v.mul_single(s0, s0), v.mul_single(c0, c0));
+    let power1 = v.add_single(v.mul_single(s1, s1), v.mul_single(c1, c1));
+    v.narrow_mask32([v.lt_single(power0, least), v.lt_single(power1, least)])
+}
+
+/// Folds words.
+#[inline(always)]
+fn octant<V: Lanes>(v: V, s: [V::W; 2], c: [V::W; 2], weak: V::B, saturated: V::B) -> Folded<V> {
+    let (low, high) = (octant_words(v, s[0], c[0]), octant_words(v, s[1], c[1]));
+    Folded {
+        long: [low.long, high.long],
+        short: [low.short, high.short],
+        length: [low.length, high.length],
+        backwards: [low.backwards, high.backwards],
+        axis: [low.axis, high.axis],
+        weak,
+        saturated,
+    }
+}
+
+struct OctantWords<W> {
+    long: W,
+    short: W,
+    length: W,
+    backwards: W,
+    axis: W,
+}
+
+#[inline(always)]
+fn octant_words<V: Lanes>(v: V, s: V::W, c: V::W) -> OctantWords<V::W> {
+    let zero = v.splat16(0);
+    let (s_down, c_down) = (v.gt(zero, s), v.gt(zero, c));
+    let (s, c) = (v.abs(s), v.abs(c));
+    let (length, short) = (v.max(s, c), v.min(s, c));
+    let steep = v.eq(length, s);
+    let backwards = v.xor(v.xor(s_down, c_down), steep);
+    let half = v.and(v.pick(steep, s_down, c_down), v.splat16(i16::MIN));
+    let quarter = v.and(steep, v.splat16(0x4000));
+    let axis = v.or(v.or(half, quarter), v.and(backwards, v.splat16(1)));
+    // The weakest trusted pixel needs 2⁴ (see `level`): twice 2² and once 2.
+    let (long, short) = lift::<V, 2>(v, length, short, 1 << 13);
+    let (long, short) = lift::<V, 2>(v, long, short, 1 << 13);
+    let (long, short) = lift::<V, 1>(v, long, short, 1 << 14);
+    OctantWords {
+        long,
+        short,
+        length,
+        backwards,
+        axis,
+    }
+}
+
+/// Both times 2ᴺ where the longer is below `least`.
+#[inline(always)]
+fn lift<V: Lanes, const N: i32>(v: V, long: V::W, short: V::W, least: i16) -> (V::W, V::W) {
+    let small = v.gt(v.splat16(least), long);
+    (
+        v.pick(small, v.shl::<N>(long), long),
+        v.pick(small, v.shl::<N>(short), short),
+    )
+}

@@ -1,0 +1,208 @@
+//! One level prepared for demodulation, and its demodulation: samples → wrapped phase and modulation.
+
+use super::angle::{self, LENGTH};
+use super::fold::{BlockSample, fold};
+use super::trust::MIN_MODULATION_8_BIT;
+use crate::pattern;
+use crate::simd::Lanes;
+use alloc::vec::Vec;
+use core::f64::consts::TAU;
+
+/// Levels of at least this many shifts are trusted even with samples at full scale: the periodic
+/// error of a slight saturation falls from 3e-3 to 7e-4 turn.
+pub const FULL_TRUST_STEPS: usize = 8;
+
+/// Modulations of exactly the minimum are trusted: what the roundings can take from S² + C² there, as a share. It is
+/// 2e-3 of the step of one count.
+const TIE: f64 = 1e-4;
+/// Most bits per sample that the forms for 3 and 4 shifts take: 3·(2I₀ − I₁ − I₂) must fit a word.
+const WORD_FORM_BITS: u8 = 12;
+
+/// A level prepared for demodulation at one bit depth.
+#[derive(Clone, Debug)]
+pub(crate) struct Level {
+    /// Places of the level's frames in the sequence, in the order of their shifts.
+    pub frames: Vec<usize>,
+    /// How S and C come from the samples.
+    pub samples: Samples,
+    /// Bits by which S and C are shifted: up from counts to words, or down from sums to words.
+    pub lift: u8,
+    /// Full scale less one count, unsigned.
+    pub below_full_scale: i16,
+    /// Middle of the range of samples, unsigned.
+    pub centre: i16,
+    /// Least trusted power, in the units of the forms for 3 and 4 shifts.
+    pub least_power: i32,
+    /// Least trusted S² + C² of sums.
+    pub least_sum_power: f32,
+    /// Coefficients of √(1 + t²), times what makes a length a modulation.
+    hypotenuse: [i16; 3],
+    /// Whether the modulation must be doubled at last.
+    doubled: bool,
+    /// Whether a sample at full scale rejects its pixel.
+    pub saturates: bool,
+}
+
+/// How S and C come from the samples of a level.
+#[derive(Clone, Debug)]
+pub(crate) enum Samples {
+    /// By differences of 4.
+    Four,
+    /// By differences of 3.
+    Three,
+    /// By sums with these weights: sin-like for S (cos 2πs) and cos-like for C (sin 2πs).
+    Weighted(Vec<[i16; 2]>),
+}
+
+/// A block of pixels of a level.
+#[derive(Clone, Copy)]
+pub(crate) struct Demodulated<V: Lanes> {
+    /// Wrapped phase, 1/65536 turn.
+    pub phase: [V::W; 2],
+    /// Modulation in units of full scale / 32767.5. Only where it was asked for, and meaningless where weak.
+    pub modulation: [V::W; 2],
+    /// Mask: the modulation is below the trusted minimum.
+    pub weak: V::B,
+    /// Mask: a sample is at full scale, where that matters.
+    pub saturated: V::B,
+}
+
+impl Level {
+    pub fn new(level: &pattern::Level, bit_depth: u8) -> Self {
+        let steps = level.steps();
+        let mut frames: Vec<usize> = level.frames.iter().map(|&at| usize::from(at)).collect();
+        let full_scale = f64::from((1_u32 << bit_depth) - 1);
+        let least = MIN_MODULATION_8_BIT * full_scale / 255.0;
+        // Shifts that start elsewhere on the grid are the same shifts in another order.
+        let places = level.start * steps as f64;
+        let on_grid = libm::fabs(places - libm::rint(places)) < 1e-9;
+        let form = (on_grid && bit_depth <= WORD_FORM_BITS).then_some(steps);
+        let up = 15 - bit_depth.min(WORD_FORM_BITS);
+        let lifted = f64::from(1_u32 << up);
+        // `unit` is what one count weighs in the words of S and C; `powers` the factor from S² + C² in counts to what
+        // the forms compare.
+        let (samples, lift, unit, powers) = match form {
+            Some(4) => (Samples::Four, up, lifted, lifted * lifted),
+            Some(3) => (Samples::Three, up, lifted, 4.0),
+            _ => {
+                let (weights, bits, down) = weights(level, bit_depth);
+                let unit = libm::pow(2.0, f64::from(bits) - f64::from(down));
+                let sums = libm::pow(4.0, f64::from(bits));
+                (Samples::Weighted(weights), down, unit, sums)
+            }
+        };
+        if !matches!(samples, Samples::Weighted(_)) {
+            let back = (steps - libm::rint(places) as usize % steps) % steps;
+            frames.rotate_left(back);
+        }
+        let least_root = steps as f64 / 2.0 * least;
+        let least_power = least_root * least_root * powers * (1.0 - TIE);
+        // m = (2/N) · length · √(1 + t²) / unit, as a share of full scale in halves of a `Modulation`'s unit.
+        let mut factor = 2.0 / steps as f64 / (unit * full_scale) * 32_767.5;
+        let doubled = factor * core::f64::consts::SQRT_2 >= 0.999;
+        if doubled {
+            factor /= 2.0;
+        }
+        Self {
+            frames,
+            samples,
+            lift,
+            below_full_scale: (((1_u32 << bit_depth) - 2) as u16).cast_signed(),
+            centre: ((1_u32 << (bit_depth - 1)) as u16).cast_signed(),
+            least_power: libm::ceil(least_power.min(f64::from(i32::MAX))) as i32,
+            least_sum_power: least_power as f32,
+            hypotenuse: LENGTH.map(|c| libm::rint(c * factor * 32_768.0) as i16),
+            doubled,
+            saturates: steps < FULL_TRUST_STEPS,
+        }
+    }
+
+    /// Demodulates the block at `at` of the level's rows.
+    #[inline(always)]
+    pub fn demodulate<V: Lanes, T: BlockSample, const MODULATION: bool>(
+        &self,
+        v: V,
+        rows: &[&[T]],
+        at: usize,
+    ) -> Demodulated<V> {
+        let folded = fold(v, self, rows, at);
+        let t = [
+            angle::quotient(v, folded.short[0], folded.long[0]),
+            angle::quotient(v, folded.short[1], folded.long[1]),
+        ];
+        let low = angle::arctangent(v, t[0]);
+        let high = angle::arctangent(v, t[1]);
+        // −x is ¬x + 1; the axis holds the 1.
+        let phase = [
+            v.add(v.xor(low, folded.backwards[0]), folded.axis[0]),
+            v.add(v.xor(high, folded.backwards[1]), folded.axis[1]),
+        ];
+        let modulation = if MODULATION {
+            let low = angle::hypotenuse(v, folded.length[0], t[0], self.hypotenuse);
+            let high = angle::hypotenuse(v, folded.length[1], t[1], self.hypotenuse);
+            if self.doubled {
+                [v.add(low, low), v.add(high, high)]
+            } else {
+                [low, high]
+            }
+        } else {
+            [v.splat16(0); 2]
+        };
+        let saturated = if self.saturates {
+            folded.saturated
+        } else {
+            v.splat8(0)
+        };
+        Demodulated {
+            phase,
+            modulation,
+            weak: folded.weak,
+            saturated,
+        }
+    }
+}
+
+/// The weights of a level's samples (centred: the middle of their range counts as 0), their fractional bits, and the
+/// bits by which the sums are shifted down to words.
+///
+/// Sums of products fit 31 bits; the weights of S, and those of C, add up to 0, so that the offset A drops out
+/// exactly. Their rounding moves the phase by at most 2^−bits / 2π · (largest sample) / B turn.
+fn weights(level: &pattern::Level, bit_depth: u8) -> (Vec<[i16; 2]>, u8, u8) {
+    let steps = level.steps();
+    let log_steps = steps.next_power_of_two().ilog2() as u8;
+    let bits = (31 - (bit_depth - 1) - log_steps - 1).min(14);
+    let angle = |k: usize| TAU * (level.start + k as f64 / steps as f64);
+    let along: Vec<f64> = (0..steps).map(|k| libm::cos(angle(k))).collect();
+    let across: Vec<f64> = (0..steps).map(|k| libm::sin(angle(k))).collect();
+    let (along, across) = (balanced(&along, bits), balanced(&across, bits));
+    let largest = |weights: &[i16]| -> u64 {
+        let sum: u64 = weights.iter().map(|w| u64::from(w.unsigned_abs())).sum();
+        sum << (bit_depth - 1)
+    };
+    let mut down = 0;
+    while largest(&along).max(largest(&across)) >> down > 32_700 {
+        down += 1;
+    }
+    let weights = along.into_iter().zip(across).map(|(s, c)| [s, c]).collect();
+    (weights, bits, down)
+}
+
+/// The numbers in fixed point with `bits` fractional bits, rounded so that they add up to 0 as they did before.
+fn balanced(exact: &[f64], bits: u8) -> Vec<i16> {
+    let scale = f64::from(1_u32 << bits);
+    let mut rounded: Vec<i16> = exact.iter().map(|x| libm::rint(x * scale) as i16).collect();
+    let mut over: i32 = rounded.iter().map(|&x| i32::from(x)).sum();
+    while over != 0 {
+        let step = over.signum();
+        // The number that is nearest to being rounded the other way.
+        let cost = |at: usize| {
+            let error = f64::from(rounded[at]) - exact[at] * scale;
+            -error * f64::from(step)
+        };
+        let best = (0..exact.len()).min_by(|&a, &b| cost(a).total_cmp(&cost(b)));
+        let Some(best) = best else { break };
+        rounded[best] -= step as i16;
+        over -= step;
+    }
+    rounded
+}

@@ -1,0 +1,125 @@
+//! All back-ends of this machine give the same bits.
+
+use super::super::{Decoder, Wrapped};
+use crate::frame::{FrameView, Samples};
+use crate::pattern::{PhaseRange, Sequence};
+use crate::pipeline::{self, PhaseMap};
+use crate::simd::Backend;
+use crate::units::AbsolutePhase;
+use std::vec::Vec;
+
+/// xorshift: enough to hit every lane with every kind of sample.
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0
+    }
+}
+
+const WIDTH: usize = 75;
+const HEIGHT: usize = 4;
+
+/// Frames without any sense, with dark and bright stretches.
+fn frames(count: usize, depth: u8, noise: &mut Noise) -> Vec<Vec<u16>> {
+    (0..count)
+        .map(|_| {
+            (0..WIDTH * HEIGHT)
+                .map(|place| {
+                    let x = (noise.next() >> 20) as u16 >> (16 - depth);
+                    match place / 40 % 4 {
+                        0 => x >> (depth - 3),
+                        _ => x,
+                    }
+                })
+                .collect()
+        })
+        .collect()
+}
+
+fn decode(
+    decoder: &Decoder,
+    samples: &[Vec<u16>],
+    depth: u8,
+    map: &[AbsolutePhase],
+) -> [PhaseMap; 2] {
+    let bytes: Vec<Vec<u8>> = samples
+        .iter()
+        .map(|frame| frame.iter().map(|&x| x as u8).collect())
+        .collect();
+    let views: Vec<_> = (0..samples.len())
+        .map(|at| {
+            let samples = match depth {
+                8 => Samples::Eight(&bytes[at]),
+                _ => Samples::Sixteen(&samples[at]),
+            };
+            FrameView::new(samples, WIDTH, HEIGHT, WIDTH).unwrap()
+        })
+        .collect();
+    let whole = pipeline::decode(decoder, &views, Some(map), None).unwrap();
+    let levels: Vec<Vec<_>> = decoder
+        .levels()
+        .map(|places| places.iter().map(|&at| views[at]).collect())
+        .collect();
+    let (last, coarser) = levels.split_last().unwrap();
+    let mut before: Vec<Wrapped> = Vec::new();
+    for (at, level) in coarser.iter().enumerate() {
+        let mut wrapped = Wrapped::new(WIDTH, HEIGHT);
+        pipeline::wrap(decoder, at, level, before.first(), &mut wrapped).unwrap();
+        before.push(wrapped);
+    }
+    let late = pipeline::decode_last(decoder, &before, last, Some(map), None).unwrap();
+    [whole, late]
+}
+
+#[test]
+fn every_back_end_and_levels_on_arrival_give_the_same_bits() {
+    let mut noise = Noise(0x9E37_79B9_7F4A_7C15);
+    let ratios: [&[f64]; 5] = [
+        &[0.009, 0.1, 1.0],
+        &[0.009, 0.8],
+        &[5.0 / 6.0, 35.0 / 36.0, 1.0],
+        &[0.8, 1.0],
+        &[0.7],
+    ];
+    let range = PhaseRange {
+        min: -3.0,
+        max: 97.0,
+    };
+    for ratios in ratios {
+        for steps in [3, 4, 5, 8] {
+            for depth in [8, 10, 12, 16] {
+                let sequence: Vec<_> = ratios
+                    .iter()
+                    .flat_map(|&ratio| {
+                        (0..steps).map(move |k| (ratio, f64::from(k) / f64::from(steps)))
+                    })
+                    .collect();
+                let sequence = Sequence::from_frames(&sequence).unwrap();
+                let decoder = Decoder::new(&sequence, range, depth).unwrap();
+                let samples = frames(sequence.frame_count(), depth, &mut noise);
+                let map: Vec<_> = (0..WIDTH * HEIGHT)
+                    .map(|place| match place % 41 {
+                        0 => AbsolutePhase::UNKNOWN,
+                        _ => AbsolutePhase::from_bits((noise.next() as i32) >> 9),
+                    })
+                    .collect();
+                let mut expected = None;
+                for backend in Backend::available() {
+                    let decoder = decoder.clone().with_backend(backend);
+                    for found in decode(&decoder, &samples, depth, &map) {
+                        let expected = expected.get_or_insert_with(|| found.clone());
+                        assert!(
+                            *expected == found,
+                            "{} differs: ratios {ratios:?}, N = {steps}, {depth} bit",
+                            backend.name()
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! The promises of the phase kernels that can be checked on a row of pixels.
+
+mod backends;
+mod eight_bit;
+mod textbook;
+
+use super::{Decoder, Wrapped};
+use crate::frame::{FrameView, Samples};
+use crate::pattern::{PhaseRange, Sequence};
+use crate::pipeline;
+use core::f64::consts::TAU;
+use std::vec::Vec;
+
+const ONE_TURN: PhaseRange = PhaseRange { min: 0.0, max: 1.0 };
+
+/// A decoder of one level with these shifts.
+fn level(shifts: &[f64], depth: u8) -> Decoder {
+    let frames: Vec<_> = shifts.iter().map(|&shift| (1.0, shift)).collect();
+    Decoder::new(&Sequence::from_frames(&frames).unwrap(), ONE_TURN, depth).unwrap()
+}
+
+/// Demodulates one row; `rows` holds the samples of each frame.
+fn wrap(decoder: &Decoder, depth: u8, rows: &[Vec<u16>]) -> Wrapped {
+    let width = rows[0].len();
+    let bytes: Vec<Vec<u8>> = rows
+        .iter()
+        .map(|row| row.iter().map(|&x| x as u8).collect())
+        .collect();
+    let places = decoder.levels().next().unwrap();
+    let frames: Vec<_> = places
+        .iter()
+        .map(|&at| {
+            let samples = match depth {
+                8 => Samples::Eight(&bytes[at]),
+                _ => Samples::Sixteen(&rows[at]),
+            };
+            FrameView::new(samples, width, 1, width).unwrap()
+        })
+        .collect();
+    let mut wrapped = Wrapped::new(width, 1);
+    pipeline::wrap(decoder, 0, &frames, None, &mut wrapped).unwrap();
+    wrapped
+}
+
+/// φ in turns and B in counts by the definition.
+fn by_definition(samples: &[u16], shifts: &[f64]) -> (f64, f64) {
+    let (mut s, mut c) = (0.0, 0.0);
+    for (&sample, &shift) in samples.iter().zip(shifts) {
+        s += f64::from(sample) * libm::cos(TAU * shift);
+        c += f64::from(sample) * libm::sin(TAU * shift);
+    }
+    let modulation = 2.0 / samples.len() as f64 * libm::sqrt(s * s + c * c);
+    (libm::atan2(s, c) / TAU, modulation)
+}
+
+/// The short way round, in turns.
+fn off(found: u16, turns: f64) -> f64 {
+    let error = f64::from(found) / 65_536.0 - turns;
+    error - libm::rint(error)
+}

@@ -1,0 +1,373 @@
+//! Lanes of x86-64 with AVX2.
+//!
+//! AVX2 widens within each half of a vector, so the first `W` of a block holds its pixels 0–7 and 16–23, the second
+//! 8–15 and 24–31; narrowing undoes it.
+
+use super::lanes::Lanes;
+use core::arch::x86_64::*;
+
+/// AVX2 is there: only [`Avx2::detect`] makes one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Avx2(());
+
+impl Avx2 {
+    /// The proof, where this processor and its operating system have AVX2.
+    pub fn detect() -> Option<Self> {
+        #[cfg(feature = "parallel")]
+        let there = std::is_x86_feature_detected!("avx2");
+        #[cfg(not(feature = "parallel"))]
+        let there = cfg!(target_feature = "avx2");
+        there.then_some(Self(()))
+    }
+}
+
+const BYTES: usize = 32;
+
+/// Calls intrinsics of AVX2. Sound because `self` proves that the processor has it.
+macro_rules! avx2 {
+    ($e:expr) => {{
+        // SAFETY: an `Avx2` exists only where the processor has AVX2 (`Avx2::detect`), which is all that these
+        // intrinsics on values ask for.
+        unsafe { $e }
+    }};
+}
+
+/// The four sixteenths (or eighths) of a block, by where AVX2 puts them: for each `W` or pair of `D`s the pieces of
+/// 128 bits for its lower and upper half.
+#[inline(always)]
+fn load_halves<T>(from: &[T], at: usize, low: usize, high: usize) -> __m256i {
+    let block = &from[at..at + BYTES];
+    let (low, high) = (&block[low..], &block[high..]);
+    assert!(size_of_val(low) >= 16 && size_of_val(high) >= 16);
+    // SAFETY: both slices hold at least 16 bytes, asserted above; the loads need no alignment. AVX2 as above: only
+    // methods of `Avx2` call this.
+    unsafe { _mm256_loadu2_m128i(high.as_ptr().cast(), low.as_ptr().cast()) }
+}
+
+#[inline(always)]
+fn store_halves<T>(to: &mut [T], at: usize, low: usize, high: usize, x: __m256i) {
+    let block = &mut to[at..at + BYTES];
+    assert!(size_of_val(&block[low..]) >= 16 && size_of_val(&block[high..]) >= 16);
+    // SAFETY: at least 16 bytes follow both places, asserted above, and the two places do not overlap in any call; the
+    // stores need no alignment. AVX2 as above: only methods of `Avx2` call this.
+    unsafe {
+        let start = block.as_mut_ptr();
+        _mm256_storeu2_m128i(start.add(high).cast(), start.add(low).cast(), x);
+    }
+}
+
+impl Lanes for Avx2 {
+    const PIXELS: usize = BYTES;
+    type B = __m256i;
+    type W = __m256i;
+    type D = __m256i;
+    type F = __m256;
+
+    #[inline(always)]
+    fn splat8(self, x: u8) -> Self::B {
+        avx2!(_mm256_set1_epi8(x.cast_signed()))
+    }
+    #[inline(always)]
+    fn load8(self, from: &[u8], at: usize) -> Self::B {
+        let block = &from[at..at + BYTES];
+        // SAFETY: the slice holds the 32 bytes that are read; the load needs no alignment; `self` proves AVX2.
+        unsafe { _mm256_loadu_si256(block.as_ptr().cast()) }
+    }
+    #[inline(always)]
+    fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
+        let block = &mut to[at..at + BYTES];
+        // SAFETY: the slice holds the 32 bytes that are written; the store needs no alignment; `self` proves AVX2.
+        unsafe { _mm256_storeu_si256(block.as_mut_ptr().cast(), x) }
+    }
+    #[inline(always)]
+    fn min8(self, a: Self::B, b: Self::B) -> Self::B {
+        avx2!(_mm256_min_epu8(a, b))
+    }
+    #[inline(always)]
+    fn max8(self, a: Self::B, b: Self::B) -> Self::B {
+        avx2!(_mm256_max_epu8(a, b))
+    }
+    #[inline(always)]
+    fn sub_sat8(self, a: Self::B, b: Self::B) -> Self::B {
+        avx2!(_mm256_subs_epu8(a, b))
+    }
+    #[inline(always)]
+    fn eq8(self, a: Self::B, b: Self::B) -> Self::B {
+        avx2!(_mm256_cmpeq_epi8(a, b))
+    }
+    #[inline(always)]
+    fn and8(self, a: Self::B, b: Self::B) -> Self::B {
+        avx2!(_mm256_and_si256(a, b))
+    }
+    #[inline(always)]
+    fn or8(self, a: Self::B, b: Self::B) -> Self::B {
+        avx2!(_mm256_or_si256(a, b))
+    }
+    #[inline(always)]
+    fn xor8(self, a: Self::B, b: Self::B) -> Self::B {
+        avx2!(_mm256_xor_si256(a, b))
+    }
+    #[inline(always)]
+    fn pick8(self, mask: Self::B, a: Self::B, b: Self::B) -> Self::B {
+        avx2!(_mm256_blendv_epi8(b, a, mask))
+    }
+    #[inline(always)]
+    fn by_high_nibble(self, table: &[u8; 16], x: Self::B) -> Self::B {
+        // SAFETY: the table holds the 16 bytes that are read; the load needs no alignment; `self` proves AVX2.
+        let table = unsafe { _mm256_broadcastsi128_si256(_mm_loadu_si128(table.as_ptr().cast())) };
+        avx2!({
+            let high = _mm256_and_si256(_mm256_srli_epi16::<4>(x), _mm256_set1_epi8(15));
+            _mm256_shuffle_epi8(table, high)
+        })
+    }
+    #[inline(always)]
+    fn all8(self, mask: Self::B) -> bool {
+        avx2!(_mm256_movemask_epi8(mask)) == -1
+    }
+
+    #[inline(always)]
+    fn widen(self, low: Self::B, high: Self::B) -> [Self::W; 2] {
+        avx2!([
+            _mm256_unpacklo_epi8(low, high),
+            _mm256_unpackhi_epi8(low, high)
+        ])
+    }
+    #[inline(always)]
+    fn widen_scaled(self, x: Self::B, scale: Self::B) -> [Self::W; 2] {
+        let zero = self.splat8(0);
+        let (x, scale) = (self.widen(x, zero), self.widen(scale, zero));
+        avx2!([
+            _mm256_mullo_epi16(x[0], _mm256_slli_epi16::<3>(scale[0])),
+            _mm256_mullo_epi16(x[1], _mm256_slli_epi16::<3>(scale[1]))
+        ])
+    }
+    #[inline(always)]
+    fn sum_of_squares(self, a: Self::B, b: Self::B) -> [Self::W; 2] {
+        let [low, high] = self.widen(a, b);
+        avx2!([
+            _mm256_maddubs_epi16(low, low),
+            _mm256_maddubs_epi16(high, high)
+        ])
+    }
+    #[inline(always)]
+    fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B {
+        avx2!(_mm256_packs_epi16(mask[0], mask[1]))
+    }
+
+    #[inline(always)]
+    fn splat16(self, x: i16) -> Self::W {
+        avx2!(_mm256_set1_epi16(x))
+    }
+    #[inline(always)]
+    fn load16(self, from: &[u16], at: usize) -> [Self::W; 2] {
+        [load_halves(from, at, 0, 16), load_halves(from, at, 8, 24)]
+    }
+    #[inline(always)]
+    fn store16(self, to: &mut [u16], at: usize, x: [Self::W; 2]) {
+        store_halves(to, at, 0, 16, x[0]);
+        store_halves(to, at, 8, 24, x[1]);
+    }
+    #[inline(always)]
+    fn add(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_add_epi16(a, b))
+    }
+    #[inline(always)]
+    fn sub(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_sub_epi16(a, b))
+    }
+    #[inline(always)]
+    fn add_sat(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_adds_epi16(a, b))
+    }
+    #[inline(always)]
+    fn mul_q15(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_mulhrs_epi16(a, b))
+    }
+    #[inline(always)]
+    fn mul_low(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_mullo_epi16(a, b))
+    }
+    #[inline(always)]
+    fn mul_high(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_mulhi_epu16(a, b))
+    }
+    #[inline(always)]
+    fn shl<const N: i32>(self, x: Self::W) -> Self::W {
+        avx2!(_mm256_slli_epi16::<N>(x))
+    }
+    #[inline(always)]
+    fn sar<const N: i32>(self, x: Self::W) -> Self::W {
+        avx2!(_mm256_srai_epi16::<N>(x))
+    }
+    #[inline(always)]
+    fn shl_by(self, x: Self::W, n: u8) -> Self::W {
+        avx2!(_mm256_sll_epi16(x, _mm_cvtsi32_si128(i32::from(n))))
+    }
+    #[inline(always)]
+    fn sar_by(self, x: Self::W, n: u8) -> Self::W {
+        avx2!(_mm256_sra_epi16(x, _mm_cvtsi32_si128(i32::from(n))))
+    }
+    #[inline(always)]
+    fn shr_by(self, x: Self::W, n: u8) -> Self::W {
+        avx2!(_mm256_srl_epi16(x, _mm_cvtsi32_si128(i32::from(n))))
+    }
+    #[inline(always)]
+    fn halve(self, x: Self::W) -> Self::W {
+        avx2!(_mm256_avg_epu16(x, _mm256_setzero_si256()))
+    }
+    #[inline(always)]
+    fn abs(self, x: Self::W) -> Self::W {
+        avx2!(_mm256_abs_epi16(x))
+    }
+    #[inline(always)]
+    fn min(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_min_epi16(a, b))
+    }
+    #[inline(always)]
+    fn max(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_max_epi16(a, b))
+    }
+    #[inline(always)]
+    fn gt(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_cmpgt_epi16(a, b))
+    }
+    #[inline(always)]
+    fn eq(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_cmpeq_epi16(a, b))
+    }
+    #[inline(always)]
+    fn and(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_and_si256(a, b))
+    }
+    #[inline(always)]
+    fn or(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_or_si256(a, b))
+    }
+    #[inline(always)]
+    fn xor(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_xor_si256(a, b))
+    }
+    #[inline(always)]
+    fn pick(self, mask: Self::W, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_blendv_epi8(b, a, mask))
+    }
+
+    #[inline(always)]
+    fn join(self, low: Self::W, high: Self::W) -> [Self::D; 2] {
+        avx2!([
+            _mm256_unpacklo_epi16(low, high),
+            _mm256_unpackhi_epi16(low, high)
+        ])
+    }
+    #[inline(always)]
+    fn split(self, x: [Self::D; 2]) -> (Self::W, Self::W) {
+        avx2!({
+            let low0 = _mm256_srai_epi32::<16>(_mm256_slli_epi32::<16>(x[0]));
+            let low1 = _mm256_srai_epi32::<16>(_mm256_slli_epi32::<16>(x[1]));
+            let high0 = _mm256_srai_epi32::<16>(x[0]);
+            let high1 = _mm256_srai_epi32::<16>(x[1]);
+            (
+                _mm256_packs_epi32(low0, low1),
+                _mm256_packs_epi32(high0, high1),
+            )
+        })
+    }
+    #[inline(always)]
+    fn dot(self, a: Self::W, b: Self::W, c: Self::W, d: Self::W) -> [Self::D; 2] {
+        let (ac, bd) = (self.join(a, c), self.join(b, d));
+        avx2!([
+            _mm256_madd_epi16(ac[0], bd[0]),
+            _mm256_madd_epi16(ac[1], bd[1])
+        ])
+    }
+    #[inline(always)]
+    fn narrow_rounded(self, x: [Self::D; 2], n: u8) -> Self::W {
+        avx2!({
+            let half = _mm256_set1_epi32((1_i32 << n) >> 1);
+            let n = _mm_cvtsi32_si128(i32::from(n));
+            _mm256_packs_epi32(
+                _mm256_sra_epi32(_mm256_add_epi32(x[0], half), n),
+                _mm256_sra_epi32(_mm256_add_epi32(x[1], half), n),
+            )
+        })
+    }
+    #[inline(always)]
+    fn narrow_mask32(self, mask: [Self::D; 2]) -> Self::W {
+        avx2!(_mm256_packs_epi32(mask[0], mask[1]))
+    }
+
+    #[inline(always)]
+    fn splat32(self, x: i32) -> Self::D {
+        avx2!(_mm256_set1_epi32(x))
+    }
+    #[inline(always)]
+    fn load32(self, from: &[i32], at: usize) -> [[Self::D; 2]; 2] {
+        [
+            [load_halves(from, at, 0, 16), load_halves(from, at, 4, 20)],
+            [load_halves(from, at, 8, 24), load_halves(from, at, 12, 28)],
+        ]
+    }
+    #[inline(always)]
+    fn store32(self, to: &mut [i32], at: usize, x: [[Self::D; 2]; 2]) {
+        store_halves(to, at, 0, 16, x[0][0]);
+        store_halves(to, at, 4, 20, x[0][1]);
+        store_halves(to, at, 8, 24, x[1][0]);
+        store_halves(to, at, 12, 28, x[1][1]);
+    }
+    #[inline(always)]
+    fn add32(self, a: Self::D, b: Self::D) -> Self::D {
+        avx2!(_mm256_add_epi32(a, b))
+    }
+    #[inline(always)]
+    fn sub32(self, a: Self::D, b: Self::D) -> Self::D {
+        avx2!(_mm256_sub_epi32(a, b))
+    }
+    #[inline(always)]
+    fn gt32(self, a: Self::D, b: Self::D) -> Self::D {
+        avx2!(_mm256_cmpgt_epi32(a, b))
+    }
+    #[inline(always)]
+    fn eq32(self, a: Self::D, b: Self::D) -> Self::D {
+        avx2!(_mm256_cmpeq_epi32(a, b))
+    }
+    #[inline(always)]
+    fn pick32(self, mask: Self::D, a: Self::D, b: Self::D) -> Self::D {
+        avx2!(_mm256_blendv_epi8(b, a, mask))
+    }
+    #[inline(always)]
+    fn to_single(self, x: Self::D) -> Self::F {
+        avx2!(_mm256_cvtepi32_ps(x))
+    }
+    #[inline(always)]
+    fn to_whole(self, x: Self::F) -> Self::D {
+        avx2!(_mm256_cvtps_epi32(x))
+    }
+    #[inline(always)]
+    fn bits(self, x: Self::F) -> Self::D {
+        avx2!(_mm256_castps_si256(x))
+    }
+    #[inline(always)]
+    fn with_bits(self, x: Self::D) -> Self::F {
+        avx2!(_mm256_castsi256_ps(x))
+    }
+    #[inline(always)]
+    fn splat_single(self, x: f32) -> Self::F {
+        avx2!(_mm256_set1_ps(x))
+    }
+    #[inline(always)]
+    fn add_single(self, a: Self::F, b: Self::F) -> Self::F {
+        avx2!(_mm256_add_ps(a, b))
+    }
+    #[inline(always)]
+    fn sub_single(self, a: Self::F, b: Self::F) -> Self::F {
+        avx2!(_mm256_sub_ps(a, b))
+    }
+    #[inline(always)]
+    fn mul_single(self, a: Self::F, b: Self::F) -> Self::F {
+        avx2!(_mm256_mul_ps(a, b))
+    }
+    #[inline(always)]
+    fn lt_single(self, a: Self::F, b: Self::F) -> Self::D {
+        avx2!(_mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)))
+    }
+}

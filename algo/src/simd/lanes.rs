@@ -1,0 +1,166 @@
+//! What the phase kernels ask of a processor: a block of pixels as lanes of 8, 16 and 32 bits.
+//!
+//! A block is [`Lanes::PIXELS`] neighbouring pixels of a row: one vector of bytes, two of words (`[W; 2]`), four of
+//! double words. How the pixels of a block are spread over the two halves is the back-end's own affair: every way in
+//! (loading, widening) and out (storing, narrowing) agrees about it, so kernels never see it.
+//!
+//! Each operation is a whole number, or an IEEE 754 single with + − ×, with one result on every machine. Words are
+//! signed or not as the operation says; what does not fit wraps around unless the name says otherwise. Loads and stores
+//! panic outside of their slice.
+
+use core::fmt::Debug;
+
+/// A back-end: a proof that its instructions may be used on this machine. See the module's text.
+pub(crate) trait Lanes: Copy + Debug {
+    /// Pixels of a block.
+    const PIXELS: usize;
+    /// A byte per pixel of a block.
+    type B: Copy;
+    /// A word per pixel of half a block.
+    type W: Copy;
+    /// A double word per pixel of a quarter of a block.
+    type D: Copy;
+    /// A single-precision number per pixel of a quarter of a block.
+    type F: Copy;
+
+    // Bytes. Masks are 0 or 255.
+
+    /// Every pixel `x`.
+    fn splat8(self, x: u8) -> Self::B;
+    /// The block of `from` that starts at `at`.
+    fn load8(self, from: &[u8], at: usize) -> Self::B;
+    /// Into the block of `to` that starts at `at`.
+    fn store8(self, to: &mut [u8], at: usize, x: Self::B);
+    /// The smaller.
+    fn min8(self, a: Self::B, b: Self::B) -> Self::B;
+    /// The larger.
+    fn max8(self, a: Self::B, b: Self::B) -> Self::B;
+    /// a − b, at least 0.
+    fn sub_sat8(self, a: Self::B, b: Self::B) -> Self::B;
+    /// Mask: a = b.
+    fn eq8(self, a: Self::B, b: Self::B) -> Self::B;
+    /// Bits of both.
+    fn and8(self, a: Self::B, b: Self::B) -> Self::B;
+    /// Bits of either.
+    fn or8(self, a: Self::B, b: Self::B) -> Self::B;
+    /// Bits of just one.
+    fn xor8(self, a: Self::B, b: Self::B) -> Self::B;
+    /// a where the mask is set, else b.
+    fn pick8(self, mask: Self::B, a: Self::B, b: Self::B) -> Self::B;
+    /// table\[x / 16\].
+    fn by_high_nibble(self, table: &[u8; 16], x: Self::B) -> Self::B;
+    /// Whether every byte of a mask is set.
+    fn all8(self, mask: Self::B) -> bool;
+
+    // Between bytes and words.
+
+    /// Words low + 256 · high.
+    fn widen(self, low: Self::B, high: Self::B) -> [Self::W; 2];
+    /// Words 8 · x · scale.
+    fn widen_scaled(self, x: Self::B, scale: Self::B) -> [Self::W; 2];
+    /// Words a² + b² of bytes below 128.
+    fn sum_of_squares(self, a: Self::B, b: Self::B) -> [Self::W; 2];
+    /// Masks of words as masks of bytes.
+    fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B;
+
+    // Words. Masks are 0 or −1.
+
+    /// Every pixel `x`.
+    fn splat16(self, x: i16) -> Self::W;
+    /// The block of `from` that starts at `at`.
+    fn load16(self, from: &[u16], at: usize) -> [Self::W; 2];
+    /// Into the block of `to` that starts at `at`.
+    fn store16(self, to: &mut [u16], at: usize, x: [Self::W; 2]);
+    /// a + b.
+    fn add(self, a: Self::W, b: Self::W) -> Self::W;
+    /// a − b.
+    fn sub(self, a: Self::W, b: Self::W) -> Self::W;
+    /// a + b, signed, at most 32767.
+    fn add_sat(self, a: Self::W, b: Self::W) -> Self::W;
+    /// (a · b + 2¹⁴) / 2¹⁵ rounded down, signed; not for −32768 · −32768.
+    fn mul_q15(self, a: Self::W, b: Self::W) -> Self::W;
+    /// The low half of a · b.
+    fn mul_low(self, a: Self::W, b: Self::W) -> Self::W;
+    /// The high half of a · b, unsigned.
+    fn mul_high(self, a: Self::W, b: Self::W) -> Self::W;
+    /// x · 2ⁿ.
+    fn shl<const N: i32>(self, x: Self::W) -> Self::W;
+    /// x / 2ⁿ rounded down, signed.
+    fn sar<const N: i32>(self, x: Self::W) -> Self::W;
+    /// x · 2ⁿ, n below 16.
+    fn shl_by(self, x: Self::W, n: u8) -> Self::W;
+    /// x / 2ⁿ rounded down, signed, n below 16.
+    fn sar_by(self, x: Self::W, n: u8) -> Self::W;
+    /// x / 2ⁿ rounded down, unsigned, n below 16.
+    fn shr_by(self, x: Self::W, n: u8) -> Self::W;
+    /// (x + 1) / 2 rounded down, unsigned.
+    fn halve(self, x: Self::W) -> Self::W;
+    /// |x| of x above −32768.
+    fn abs(self, x: Self::W) -> Self::W;
+    /// The smaller, signed.
+    fn min(self, a: Self::W, b: Self::W) -> Self::W;
+    /// The larger, signed.
+    fn max(self, a: Self::W, b: Self::W) -> Self::W;
+    /// Mask: a > b, signed.
+    fn gt(self, a: Self::W, b: Self::W) -> Self::W;
+    /// Mask: a = b.
+    fn eq(self, a: Self::W, b: Self::W) -> Self::W;
+    /// Bits of both.
+    fn and(self, a: Self::W, b: Self::W) -> Self::W;
+    /// Bits of either.
+    fn or(self, a: Self::W, b: Self::W) -> Self::W;
+    /// Bits of just one.
+    fn xor(self, a: Self::W, b: Self::W) -> Self::W;
+    /// a where the mask is set, else b.
+    fn pick(self, mask: Self::W, a: Self::W, b: Self::W) -> Self::W;
+
+    // Between words and double words.
+
+    /// Double words low + 65536 · high.
+    fn join(self, low: Self::W, high: Self::W) -> [Self::D; 2];
+    /// The low words (as they are) and the high words of x.
+    fn split(self, x: [Self::D; 2]) -> (Self::W, Self::W);
+    /// a · b + c · d, signed.
+    fn dot(self, a: Self::W, b: Self::W, c: Self::W, d: Self::W) -> [Self::D; 2];
+    /// x / 2ⁿ rounded to nearest, signed and kept inside a word; n below 31.
+    fn narrow_rounded(self, x: [Self::D; 2], n: u8) -> Self::W;
+    /// Masks of double words as masks of words.
+    fn narrow_mask32(self, mask: [Self::D; 2]) -> Self::W;
+
+    // Double words and singles.
+
+    /// Every pixel `x`.
+    fn splat32(self, x: i32) -> Self::D;
+    /// The block of `from` that starts at `at`.
+    fn load32(self, from: &[i32], at: usize) -> [[Self::D; 2]; 2];
+    /// Into the block of `to` that starts at `at`.
+    fn store32(self, to: &mut [i32], at: usize, x: [[Self::D; 2]; 2]);
+    /// a + b.
+    fn add32(self, a: Self::D, b: Self::D) -> Self::D;
+    /// a − b.
+    fn sub32(self, a: Self::D, b: Self::D) -> Self::D;
+    /// Mask: a > b, signed.
+    fn gt32(self, a: Self::D, b: Self::D) -> Self::D;
+    /// Mask: a = b.
+    fn eq32(self, a: Self::D, b: Self::D) -> Self::D;
+    /// a where the mask is set, else b.
+    fn pick32(self, mask: Self::D, a: Self::D, b: Self::D) -> Self::D;
+    /// The single next to x.
+    fn to_single(self, x: Self::D) -> Self::F;
+    /// The whole number next to x, ties to even; |x| below 2²².
+    fn to_whole(self, x: Self::F) -> Self::D;
+    /// The bits of x as a whole number.
+    fn bits(self, x: Self::F) -> Self::D;
+    /// The single of these bits.
+    fn with_bits(self, x: Self::D) -> Self::F;
+    /// Every pixel `x`.
+    fn splat_single(self, x: f32) -> Self::F;
+    /// a + b.
+    fn add_single(self, a: Self::F, b: Self::F) -> Self::F;
+    /// a − b.
+    fn sub_single(self, a: Self::F, b: Self::F) -> Self::F;
+    /// a · b.
+    fn mul_single(self, a: Self::F, b: Self::F) -> Self::F;
+    /// Mask: a < b.
+    fn lt_single(self, a: Self::F, b: Self::F) -> Self::D;
+}

@@ -1,0 +1,106 @@
+//! The instructions of a processor behind one small trait, and which of them this machine has.
+//!
+//! [`Lanes`] is what the phase kernels are written in; [`Portable`] is its definition as code, [`Avx2`] and [`Neon`] are
+//! the same results by vector instructions. A back-end's value proves that its instructions may be used, so the
+//! operations are safe to call. This is the only module with `unsafe`: calls of intrinsics that the proof covers, and
+//! loads and stores inside slices whose length has been asserted.
+//!
+//! Kernels are generic functions, inlined into entry points that are compiled for the back-end's instructions: see
+//! `back_end_entry!`. They hold no closures: those would be compiled without the instructions.
+#![allow(unsafe_code)]
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+mod lanes;
+#[cfg(target_arch = "aarch64")]
+mod neon;
+pub(crate) mod plain;
+mod portable;
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use avx2::Avx2;
+pub(crate) use lanes::Lanes;
+#[cfg(target_arch = "aarch64")]
+pub(crate) use neon::Neon;
+pub(crate) use portable::Portable;
+
+/// The instructions that the phase kernels are compiled for. All give the same bits.
+#[derive(Clone, Copy, Debug)]
+pub struct Backend(pub(crate) Proof);
+
+/// A back-end that may be used on this machine.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Proof {
+    /// No particular instructions.
+    Portable(Portable),
+    /// x86-64 with AVX2.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+    /// aarch64.
+    #[cfg(target_arch = "aarch64")]
+    Neon(Neon),
+}
+
+impl Backend {
+    /// Arrays instead of vectors: slow, and the oracle of the others.
+    pub const PORTABLE: Self = Self(Proof::Portable(Portable));
+
+    /// The back-ends that this machine has, the fastest last.
+    pub fn available() -> impl Iterator<Item = Self> {
+        #[cfg(target_arch = "x86_64")]
+        let special = Avx2::detect().map(|proof| Self(Proof::Avx2(proof)));
+        #[cfg(target_arch = "aarch64")]
+        let special = Some(Self(Proof::Neon(Neon)));
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+        let special = None;
+        core::iter::once(Self::PORTABLE).chain(special)
+    }
+
+    /// The fastest that this machine has.
+    pub fn best() -> Self {
+        Self::available().last().unwrap_or(Self::PORTABLE)
+    }
+
+    /// The word for reports: portable, avx2 or neon.
+    pub fn name(self) -> &'static str {
+        match self.0 {
+            Proof::Portable(_) => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Proof::Avx2(_) => "avx2",
+            #[cfg(target_arch = "aarch64")]
+            Proof::Neon(_) => "neon",
+        }
+    }
+}
+
+/// Defines `fn name(backend: Backend, arguments)`, which runs the generic `kernel(lanes, arguments)` compiled for that
+/// back-end's instructions.
+macro_rules! back_end_entry {
+    ($(#[$doc:meta])* fn $name:ident [$($generics:tt)*] = $kernel:ident ( $($arg:ident : $type:ty),* $(,)? )) => {
+        $(#[$doc])*
+        #[allow(clippy::too_many_arguments, unsafe_code)]
+        pub(crate) fn $name<$($generics)*>(backend: $crate::simd::Backend, $($arg: $type),*) {
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx2")]
+            #[inline(never)]
+            fn avx2<$($generics)*>(lanes: $crate::simd::Avx2, $($arg: $type),*) {
+                $kernel(lanes, $($arg),*);
+            }
+            #[inline(never)]
+            fn plain<$($generics)*>(lanes: impl $crate::simd::Lanes, $($arg: $type),*) {
+                $kernel(lanes, $($arg),*);
+            }
+            match backend.0 {
+                $crate::simd::Proof::Portable(lanes) => plain(lanes, $($arg),*),
+                #[cfg(target_arch = "x86_64")]
+                $crate::simd::Proof::Avx2(lanes) => {
+                    // SAFETY: an `Avx2` exists only where the processor has AVX2.
+                    unsafe { avx2(lanes, $($arg),*) }
+                }
+                #[cfg(target_arch = "aarch64")]
+                $crate::simd::Proof::Neon(lanes) => plain(lanes, $($arg),*),
+            }
+        }
+    };
+}
+pub(crate) use back_end_entry;

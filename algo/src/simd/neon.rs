@@ -1,0 +1,367 @@
+//! Lanes of aarch64, where NEON is always there.
+
+use super::lanes::Lanes;
+use core::arch::aarch64::*;
+
+/// NEON belongs to aarch64.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Neon;
+
+const BYTES: usize = 16;
+
+/// Calls intrinsics of NEON.
+macro_rules! neon {
+    ($e:expr) => {{
+        // SAFETY: every aarch64 processor that this is compiled for has NEON, which is all that these intrinsics on
+        // values ask for.
+        unsafe { $e }
+    }};
+}
+
+impl Lanes for Neon {
+    const PIXELS: usize = BYTES;
+    type B = uint8x16_t;
+    type W = int16x8_t;
+    type D = int32x4_t;
+    type F = float32x4_t;
+
+    #[inline(always)]
+    fn splat8(self, x: u8) -> Self::B {
+        neon!(vdupq_n_u8(x))
+    }
+    #[inline(always)]
+    fn load8(self, from: &[u8], at: usize) -> Self::B {
+        let block = &from[at..at + BYTES];
+        // SAFETY: the slice holds the 16 bytes that are read.
+        unsafe { vld1q_u8(block.as_ptr()) }
+    }
+    #[inline(always)]
+    fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
+        let block = &mut to[at..at + BYTES];
+        // SAFETY: the slice holds the 16 bytes that are written.
+        unsafe { vst1q_u8(block.as_mut_ptr(), x) }
+    }
+    #[inline(always)]
+    fn min8(self, a: Self::B, b: Self::B) -> Self::B {
+        neon!(vminq_u8(a, b))
+    }
+    #[inline(always)]
+    fn max8(self, a: Self::B, b: Self::B) -> Self::B {
+        neon!(vmaxq_u8(a, b))
+    }
+    #[inline(always)]
+    fn sub_sat8(self, a: Self::B, b: Self::B) -> Self::B {
+        neon!(vqsubq_u8(a, b))
+    }
+    #[inline(always)]
+    fn eq8(self, a: Self::B, b: Self::B) -> Self::B {
+        neon!(vceqq_u8(a, b))
+    }
+    #[inline(always)]
+    fn and8(self, a: Self::B, b: Self::B) -> Self::B {
+        neon!(vandq_u8(a, b))
+    }
+    #[inline(always)]
+    fn or8(self, a: Self::B, b: Self::B) -> Self::B {
+        neon!(vorrq_u8(a, b))
+    }
+    #[inline(always)]
+    fn xor8(self, a: Self::B, b: Self::B) -> Self::B {
+        neon!(veorq_u8(a, b))
+    }
+    #[inline(always)]
+    fn pick8(self, mask: Self::B, a: Self::B, b: Self::B) -> Self::B {
+        neon!(vbslq_u8(mask, a, b))
+    }
+    #[inline(always)]
+    fn by_high_nibble(self, table: &[u8; 16], x: Self::B) -> Self::B {
+        // SAFETY: the table holds the 16 bytes that are read.
+        let table = unsafe { vld1q_u8(table.as_ptr()) };
+        neon!(vqtbl1q_u8(table, vshrq_n_u8::<4>(x)))
+    }
+    #[inline(always)]
+    fn all8(self, mask: Self::B) -> bool {
+        neon!(vminvq_u8(mask)) == u8::MAX
+    }
+
+    #[inline(always)]
+    fn widen(self, low: Self::B, high: Self::B) -> [Self::W; 2] {
+        neon!([
+            vreinterpretq_s16_u8(vzip1q_u8(low, high)),
+            vreinterpretq_s16_u8(vzip2q_u8(low, high))
+        ])
+    }
+    #[inline(always)]
+    fn widen_scaled(self, x: Self::B, scale: Self::B) -> [Self::W; 2] {
+        neon!({
+            let low = vmull_u8(vget_low_u8(x), vget_low_u8(scale));
+            let high = vmull_high_u8(x, scale);
+            [
+                vreinterpretq_s16_u16(vshlq_n_u16::<3>(low)),
+                vreinterpretq_s16_u16(vshlq_n_u16::<3>(high)),
+            ]
+        })
+    }
+    #[inline(always)]
+    fn sum_of_squares(self, a: Self::B, b: Self::B) -> [Self::W; 2] {
+        neon!({
+            let low = vmull_u8(vget_low_u8(a), vget_low_u8(a));
+            let high = vmull_high_u8(a, a);
+            [
+                vreinterpretq_s16_u16(vmlal_u8(low, vget_low_u8(b), vget_low_u8(b))),
+                vreinterpretq_s16_u16(vmlal_high_u8(high, b, b)),
+            ]
+        })
+    }
+    #[inline(always)]
+    fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B {
+        neon!(vuzp1q_u8(
+            vreinterpretq_u8_s16(mask[0]),
+            vreinterpretq_u8_s16(mask[1])
+        ))
+    }
+
+    #[inline(always)]
+    fn splat16(self, x: i16) -> Self::W {
+        neon!(vdupq_n_s16(x))
+    }
+    #[inline(always)]
+    fn load16(self, from: &[u16], at: usize) -> [Self::W; 2] {
+        let block = &from[at..at + BYTES];
+        // SAFETY: the slice holds the 16 words that are read, 8 at a time.
+        let [low, high] = unsafe { [vld1q_u16(block.as_ptr()), vld1q_u16(block.as_ptr().add(8))] };
+        neon!([vreinterpretq_s16_u16(low), vreinterpretq_s16_u16(high)])
+    }
+    #[inline(always)]
+    fn store16(self, to: &mut [u16], at: usize, x: [Self::W; 2]) {
+        let block = &mut to[at..at + BYTES];
+        // SAFETY: the slice holds the 16 words that are written, 8 at a time.
+        unsafe {
+            vst1q_u16(block.as_mut_ptr(), vreinterpretq_u16_s16(x[0]));
+            vst1q_u16(block.as_mut_ptr().add(8), vreinterpretq_u16_s16(x[1]));
+        }
+    }
+    #[inline(always)]
+    fn add(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!(vaddq_s16(a, b))
+    }
+    #[inline(always)]
+    fn sub(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!(vsubq_s16(a, b))
+    }
+    #[inline(always)]
+    fn add_sat(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!(vqaddq_s16(a, b))
+    }
+    #[inline(always)]
+    fn mul_q15(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!(vqrdmulhq_s16(a, b))
+    }
+    #[inline(always)]
+    fn mul_low(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!(vmulq_s16(a, b))
+    }
+    #[inline(always)]
+    fn mul_high(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!({
+            let (a, b) = (vreinterpretq_u16_s16(a), vreinterpretq_u16_s16(b));
+            let low = vmull_u16(vget_low_u16(a), vget_low_u16(b));
+            let high = vmull_high_u16(a, b);
+            vreinterpretq_s16_u16(vuzp2q_u16(
+                vreinterpretq_u16_u32(low),
+                vreinterpretq_u16_u32(high),
+            ))
+        })
+    }
+    #[inline(always)]
+    fn shl<const N: i32>(self, x: Self::W) -> Self::W {
+        neon!(vshlq_n_s16::<N>(x))
+    }
+    #[inline(always)]
+    fn sar<const N: i32>(self, x: Self::W) -> Self::W {
+        neon!(vshrq_n_s16::<N>(x))
+    }
+    #[inline(always)]
+    fn shl_by(self, x: Self::W, n: u8) -> Self::W {
+        neon!(vshlq_s16(x, vdupq_n_s16(i16::from(n))))
+    }
+    #[inline(always)]
+    fn sar_by(self, x: Self::W, n: u8) -> Self::W {
+        neon!(vshlq_s16(x, vdupq_n_s16(-i16::from(n))))
+    }
+    #[inline(always)]
+    fn shr_by(self, x: Self::W, n: u8) -> Self::W {
+        neon!(vreinterpretq_s16_u16(vshlq_u16(
+            vreinterpretq_u16_s16(x),
+            vdupq_n_s16(-i16::from(n))
+        )))
+    }
+    #[inline(always)]
+    fn halve(self, x: Self::W) -> Self::W {
+        neon!(vreinterpretq_s16_u16(vrshrq_n_u16::<1>(
+            vreinterpretq_u16_s16(x)
+        )))
+    }
+    #[inline(always)]
+    fn abs(self, x: Self::W) -> Self::W {
+        neon!(vabsq_s16(x))
+    }
+    #[inline(always)]
+    fn min(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!(vminq_s16(a, b))
+    }
+    #[inline(always)]
+    fn max(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!(vmaxq_s16(a, b))
+    }
+    #[inline(always)]
+    fn gt(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!(vreinterpretq_s16_u16(vcgtq_s16(a, b)))
+    }
+    #[inline(always)]
+    fn eq(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!(vreinterpretq_s16_u16(vceqq_s16(a, b)))
+    }
+    #[inline(always)]
+    fn and(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!(vandq_s16(a, b))
+    }
+    #[inline(always)]
+    fn or(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!(vorrq_s16(a, b))
+    }
+    #[inline(always)]
+    fn xor(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!(veorq_s16(a, b))
+    }
+    #[inline(always)]
+    fn pick(self, mask: Self::W, a: Self::W, b: Self::W) -> Self::W {
+        neon!(vbslq_s16(vreinterpretq_u16_s16(mask), a, b))
+    }
+
+    #[inline(always)]
+    fn join(self, low: Self::W, high: Self::W) -> [Self::D; 2] {
+        neon!([
+            vreinterpretq_s32_s16(vzip1q_s16(low, high)),
+            vreinterpretq_s32_s16(vzip2q_s16(low, high))
+        ])
+    }
+    #[inline(always)]
+    fn split(self, x: [Self::D; 2]) -> (Self::W, Self::W) {
+        neon!({
+            let (a, b) = (vreinterpretq_s16_s32(x[0]), vreinterpretq_s16_s32(x[1]));
+            (vuzp1q_s16(a, b), vuzp2q_s16(a, b))
+        })
+    }
+    #[inline(always)]
+    fn dot(self, a: Self::W, b: Self::W, c: Self::W, d: Self::W) -> [Self::D; 2] {
+        neon!({
+            let low = vmull_s16(vget_low_s16(a), vget_low_s16(b));
+            let high = vmull_high_s16(a, b);
+            [
+                vmlal_s16(low, vget_low_s16(c), vget_low_s16(d)),
+                vmlal_high_s16(high, c, d),
+            ]
+        })
+    }
+    #[inline(always)]
+    fn narrow_rounded(self, x: [Self::D; 2], n: u8) -> Self::W {
+        neon!({
+            let half = vdupq_n_s32((1_i32 << n) >> 1);
+            let down = vdupq_n_s32(-i32::from(n));
+            let low = vqmovn_s32(vshlq_s32(vaddq_s32(x[0], half), down));
+            vqmovn_high_s32(low, vshlq_s32(vaddq_s32(x[1], half), down))
+        })
+    }
+    #[inline(always)]
+    fn narrow_mask32(self, mask: [Self::D; 2]) -> Self::W {
+        neon!(vuzp1q_s16(
+            vreinterpretq_s16_s32(mask[0]),
+            vreinterpretq_s16_s32(mask[1])
+        ))
+    }
+
+    #[inline(always)]
+    fn splat32(self, x: i32) -> Self::D {
+        neon!(vdupq_n_s32(x))
+    }
+    #[inline(always)]
+    fn load32(self, from: &[i32], at: usize) -> [[Self::D; 2]; 2] {
+        let block = &from[at..at + BYTES];
+        // SAFETY: the slice holds the 16 double words that are read, 4 at a time.
+        unsafe {
+            let start = block.as_ptr();
+            [
+                [vld1q_s32(start), vld1q_s32(start.add(4))],
+                [vld1q_s32(start.add(8)), vld1q_s32(start.add(12))],
+            ]
+        }
+    }
+    #[inline(always)]
+    fn store32(self, to: &mut [i32], at: usize, x: [[Self::D; 2]; 2]) {
+        let block = &mut to[at..at + BYTES];
+        // SAFETY: the slice holds the 16 double words that are written, 4 at a time.
+        unsafe {
+            vst1q_s32(block.as_mut_ptr(), x[0][0]);
+            vst1q_s32(block.as_mut_ptr().add(4), x[0][1]);
+            vst1q_s32(block.as_mut_ptr().add(8), x[1][0]);
+            vst1q_s32(block.as_mut_ptr().add(12), x[1][1]);
+        }
+    }
+    #[inline(always)]
+    fn add32(self, a: Self::D, b: Self::D) -> Self::D {
+        neon!(vaddq_s32(a, b))
+    }
+    #[inline(always)]
+    fn sub32(self, a: Self::D, b: Self::D) -> Self::D {
+        neon!(vsubq_s32(a, b))
+    }
+    #[inline(always)]
+    fn gt32(self, a: Self::D, b: Self::D) -> Self::D {
+        neon!(vreinterpretq_s32_u32(vcgtq_s32(a, b)))
+    }
+    #[inline(always)]
+    fn eq32(self, a: Self::D, b: Self::D) -> Self::D {
+        neon!(vreinterpretq_s32_u32(vceqq_s32(a, b)))
+    }
+    #[inline(always)]
+    fn pick32(self, mask: Self::D, a: Self::D, b: Self::D) -> Self::D {
+        neon!(vbslq_s32(vreinterpretq_u32_s32(mask), a, b))
+    }
+    #[inline(always)]
+    fn to_single(self, x: Self::D) -> Self::F {
+        neon!(vcvtq_f32_s32(x))
+    }
+    #[inline(always)]
+    fn to_whole(self, x: Self::F) -> Self::D {
+        neon!(vcvtnq_s32_f32(x))
+    }
+    #[inline(always)]
+    fn bits(self, x: Self::F) -> Self::D {
+        neon!(vreinterpretq_s32_f32(x))
+    }
+    #[inline(always)]
+    fn with_bits(self, x: Self::D) -> Self::F {
+        neon!(vreinterpretq_f32_s32(x))
+    }
+    #[inline(always)]
+    fn splat_single(self, x: f32) -> Self::F {
+        neon!(vdupq_n_f32(x))
+    }
+    #[inline(always)]
+    fn add_single(self, a: Self::F, b: Self::F) -> Self::F {
+        neon!(vaddq_f32(a, b))
+    }
+    #[inline(always)]
+    fn sub_single(self, a: Self::F, b: Self::F) -> Self::F {
+        neon!(vsubq_f32(a, b))
+    }
+    #[inline(always)]
+    fn mul_single(self, a: Self::F, b: Self::F) -> Self::F {
+        neon!(vmulq_f32(a, b))
+    }
+    #[inline(always)]
+    fn lt_single(self, a: Self::F, b: Self::F) -> Self::D {
+        neon!(vreinterpretq_s32_u32(vcltq_f32(a, b)))
+    }
+}
