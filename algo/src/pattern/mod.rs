@@ -5,5 +5,5 @@ mod function;
 mod sequence;
 
 pub use encode::{GreyRaster, GreyResponse, ResponseError, encode};
-pub use function::{PhaseFunction, PhaseFunctionError, PhaseRange};
-pub use sequence::{Level, MAX_LEVELS, MAX_SHIFTS, Sequence, SequenceError, Unwrapping};
+pub use function::{MAX_TURNS, PhaseFunction, PhaseFunctionError, PhaseRange};
+pub use sequence::{Level, MAX_LEVELS, MAX_SHIFTS, MAX_STEP, Sequence, SequenceError, Unwrapping};

@@ -1,6 +1,7 @@
 //! Levels and shifts of a sequence, and how its levels are unwrapped.
 
 use super::PhaseRange;
+use super::function::MAX_TURNS;
 use alloc::vec::Vec;
 use core::fmt;
 
@@ -14,10 +15,9 @@ const SHIFT_TOLERANCE: f64 = 1e-6;
 const RATIO_TOLERANCE: f64 = 1e-6;
 /// Largest span of the coarsest level, in turns, that is still absolute by itself.
 const GEOMETRIC_SPAN: f64 = 1.001;
-/// Largest step from one geometric level to the next: keeps n · Φ inside 63 bits.
-const MAX_STEP: f64 = 4096.0;
-/// Largest phase of a level, in turns: Q16.16 reaches 32,768.
-const MAX_TURNS: f64 = 32_000.0;
+/// Largest step from one geometric level to the next, and largest n of dense levels: keeps n · Φ inside
+/// 63 bits.
+pub const MAX_STEP: f64 = 4096.0;
 
 /// All shifts at one ratio of the full phase function: s_k = start + k/N.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,7 +124,7 @@ impl fmt::Display for SequenceError {
                 f,
                 "levels of ratios {ratios:?} cannot be unwrapped: the smallest must span at most one turn \
                  of the pattern (geometric), or they are 1, 1 - 1/n^2, 1 - 1/n with n >= 3 or 1, 1 - 1/n \
-                 with n >= 2 (dense), or a single one"
+                 with n >= 2 (dense, n up to {MAX_STEP}), or a single one"
             ),
             Self::Finest { ratio, turns } => write!(
                 f,
@@ -282,18 +282,21 @@ impl Unwrapping {
             }
             return Ok(Self::Geometric);
         }
+        // Not a number of levels that is dense, or ratios of 1 and more, have an n that is none.
+        let n = 1.0 / (1.0 - ratios[0]);
+        let reachable = n > 0.0 && n <= MAX_STEP * (1.0 + RATIO_TOLERANCE);
         match ratios[..] {
             [_] => Ok(Self::Single),
-            [low, one] if near(one, 1.0) && low >= 0.5 - RATIO_TOLERANCE => Ok(Self::DenseTwo {
-                n: 1.0 / (1.0 - low),
-            }),
-            [low, middle, one] if near(one, 1.0) => {
-                let n = 1.0 / (1.0 - low);
-                if n >= 3.0 - 1e-5 && near(middle, 1.0 - 1.0 / (n * n)) {
-                    Ok(Self::DenseThree { n })
-                } else {
-                    Err(SequenceError::Ratios(ratios.to_vec()))
-                }
+            [low, one] if near(one, 1.0) && low >= 0.5 - RATIO_TOLERANCE && reachable => {
+                Ok(Self::DenseTwo { n })
+            }
+            [_, middle, one]
+                if near(one, 1.0)
+                    && n >= 3.0 - 1e-5
+                    && reachable
+                    && near(middle, 1.0 - 1.0 / (n * n)) =>
+            {
+                Ok(Self::DenseThree { n })
             }
             _ => Err(SequenceError::Ratios(ratios.to_vec())),
         }
