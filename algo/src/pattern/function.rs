@@ -5,7 +5,7 @@ use core::fmt;
 
 /// Largest |Φ_P| and largest phase of a level, in turns: leaves room for extrapolation in the ± 32,768
 /// turns of Q16.16.
-pub const MAX_TURNS: f64 = 32_000.0;
+pub const MAX_TURNS: f64 = 4096.0;
 
 /// The phase function Φ_P(ξ, η) of a pattern in turns, over projector pixels (ξ = column, η = row,
 /// centres at integers). Defined for every real ξ and η: outside its raster it goes on linearly, so

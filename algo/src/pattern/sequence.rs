@@ -17,7 +17,7 @@ const RATIO_TOLERANCE: f64 = 1e-6;
 const GEOMETRIC_SPAN: f64 = 1.001;
 /// Largest step from one geometric level to the next, and largest n of dense levels: keeps n · Φ inside
 /// 63 bits.
-pub const MAX_STEP: f64 = 4096.0;
+pub const MAX_STEP: f64 = 64.0;
 
 /// All shifts at one ratio of the full phase function: s_k = start + k/N.
 #[derive(Clone, Debug, PartialEq)]

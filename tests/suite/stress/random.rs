@@ -1,6 +1,7 @@
 //! Seeded stacks of every form: any number of shifts, depth, ratios, size and stride.
 
 use super::stack::Stack;
+use algo::pattern::MAX_STEP;
 use algo::units::AbsolutePhase;
 use std::f64::consts::TAU;
 use tests::random::Random;
@@ -100,8 +101,10 @@ fn ratios(random: &mut Random, kind: Kind, span: f64) -> (Vec<f64>, f64) {
             } else {
                 between(random, 0.4, 1.8)
             };
-            let steps = 1 + random.below(4);
-            let step = (finest / coarsest).powf(1.0 / steps as f64);
+            let rise: f64 = finest / coarsest;
+            let fewest = (rise.ln() / MAX_STEP.ln()).ceil() as usize;
+            let steps = fewest + random.below(4);
+            let step = rise.powf(1.0 / steps as f64);
             let mut ratios: Vec<f64> = (0..steps)
                 .map(|level| coarsest * step.powi(level as i32))
                 .collect();
