@@ -217,7 +217,8 @@ fn a_recording_with_a_calibration_that_is_none_is_refused_by_device_and_number()
         ..Scene::new(40.0, levels(&[0.02, 0.14, 1.0], 3))
     };
     let whole = scene.record();
-    let damages: [(fn(&mut DeviceModel), &str); 7] = [
+    type Damage = (fn(&mut DeviceModel), &'static str);
+    let damages: [Damage; 7] = [
         (|m| m.fx = f64::NAN, "focal length"),
         (|m| m.fy = 0.0, "focal lengths"),
         (|m| m.cy = f64::INFINITY, "principal point"),
@@ -234,9 +235,9 @@ fn a_recording_with_a_calibration_that_is_none_is_refused_by_device_and_number()
                 false => (&mut recording.projector.model, "projector"),
             };
             damage(model.as_mut().unwrap());
-            let error = measure(&recording, Path::new("in memory"))
-                .err()
-                .expect(word);
+            let Err(error) = measure(&recording, Path::new("in memory")) else {
+                panic!("{device} with another {word} was measured");
+            };
             let text = error.to_string();
             assert!(
                 text.contains(word) && text.contains(device),

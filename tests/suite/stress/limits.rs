@@ -135,7 +135,7 @@ fn the_largest_step_between_levels_decodes_and_a_larger_one_is_refused() {
     let ratios = [1.0 / MAX_STEP, 1.0];
     // Half a count of 12 bit in a level of 16 shifts leaves at most 9e-5 turn: the step must not take more
     // than the limit of the residual from it.
-    assert!(MAX_STEP * 9e-5 < 0.4, "a step that rounding alone slips");
+    const { assert!(MAX_STEP * 9e-5 < 0.4, "a step that rounding alone slips") };
     decodes("two levels", lit(levels(&ratios, 16), (0.0, span), 0.0));
     // The finest ratio may be as small as the step is large.
     let small = [1.0 / MAX_STEP];
