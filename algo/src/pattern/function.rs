@@ -3,8 +3,9 @@
 use alloc::vec::Vec;
 use core::fmt;
 
-/// Largest |Φ_P| and largest phase of a level, in turns: leaves room for extrapolation in the ± 32,768
-/// turns of Q16.16.
+/// Largest |Φ_P| and largest phase of a level, in turns: twice what a projector of 4,096 columns can show
+/// at 2 pixels per turn. Leaves room for extrapolation in the ± 32,768 turns of Q16.16, and keeps what the factors' rounding
+/// in Q20 takes from a phase below 2e-3 turn.
 pub const MAX_TURNS: f64 = 4096.0;
 
 /// The phase function Φ_P(ξ, η) of a pattern in turns, over projector pixels (ξ = column, η = row,

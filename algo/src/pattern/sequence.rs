@@ -15,8 +15,8 @@ const SHIFT_TOLERANCE: f64 = 1e-6;
 const RATIO_TOLERANCE: f64 = 1e-6;
 /// Largest span of the coarsest level, in turns, that is still absolute by itself.
 const GEOMETRIC_SPAN: f64 = 1.001;
-/// Largest step from one geometric level to the next, and largest n of dense levels: keeps n · Φ inside
-/// 63 bits.
+/// Largest step from one geometric level to the next, and largest n of dense levels: what a level's error of
+/// up to 1.4e-4 turn becomes in the step must stay far below the 0.40 turn that a residual may have.
 pub const MAX_STEP: f64 = 64.0;
 
 /// All shifts at one ratio of the full phase function: s_k = start + k/N.
