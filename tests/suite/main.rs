@@ -15,6 +15,7 @@ mod promises_own;
 mod promises_shared;
 mod station;
 mod station_plc;
+mod stress;
 mod triangulation;
 mod twin;
 mod written;

@@ -48,7 +48,8 @@ pub struct Pinhole {
 pub enum ModelError {
     /// A number is not finite.
     NotFinite(&'static str),
-    /// A focal length is not positive, or absurd for the frame.
+    /// A focal length is not positive, or absurd for the frame: less than a hundredth of it (an angle of
+    /// view of 179°) or more than 1e6 pixels.
     Focal {
         /// f_x.
         fx: f64,
@@ -69,6 +70,11 @@ pub enum ModelError {
         /// det R.
         determinant: f64,
     },
+    /// The device stands more than a kilometre from the origin.
+    Translation {
+        /// Its distance from the origin, mm.
+        distance: f64,
+    },
     /// The distortion folds over: two rays meet in one pixel of the frame.
     Distortion {
         /// Column of the pixel.
@@ -84,7 +90,8 @@ impl fmt::Display for ModelError {
             Self::NotFinite(what) => write!(f, "{what} is not a finite number"),
             Self::Focal { fx, fy } => write!(
                 f,
-                "focal lengths {fx} and {fy}: both must be positive and at most 1e6 pixels"
+                "focal lengths {fx} and {fy}: both must be positive, at least a hundredth of the frame and \
+                 at most 1e6 pixels"
             ),
             Self::PrincipalPoint { cx, cy } => write!(
                 f,
@@ -98,6 +105,10 @@ impl fmt::Display for ModelError {
                 "the rotation is none: R·Rᵀ is off the unit matrix by {deviation:.2e}, det R = \
                  {determinant:.6}; it is 9 numbers, row by row"
             ),
+            Self::Translation { distance } => write!(
+                f,
+                "the translation of {distance:e} mm is over a kilometre: it is in mm"
+            ),
             Self::Distortion { u, v } => write!(
                 f,
                 "the distortion folds over at pixel ({u:.1}, {v:.1}): the order is k1, k2, p1, p2, k3"
@@ -110,6 +121,8 @@ impl core::error::Error for ModelError {}
 
 /// Rounded calibrations are off by less than this.
 const ROTATION_TOLERANCE: f64 = 1e-4;
+/// A kilometre in mm: beyond it the translation is in another unit, and f64 is no longer exact to 1e-9 mm.
+const MAX_DISTANCE: f64 = 1e6;
 /// Newton steps until the undistortion must have converged; 4 suffice for lenses on sale.
 const NEWTON_STEPS: usize = 25;
 /// How far beyond the frame's border the distortion is followed, as shares of the radius there: the
@@ -136,7 +149,9 @@ impl Pinhole {
         finite("the distortion", &model.distortion)?;
         finite("the rotation", &model.rotation)?;
         finite("the translation", &model.translation)?;
-        if !(fx > 0.0 && fy > 0.0 && fx <= 1e6 && fy <= 1e6) {
+        let focal =
+            |focal: f64, size: usize| focal > 0.0 && focal >= size as f64 / 100.0 && focal <= 1e6;
+        if !(focal(fx, width) && focal(fy, height)) {
             return Err(ModelError::Focal { fx, fy });
         }
         let away = |centre: f64, size: usize| libm::fabs(centre) > 10.0 * size as f64;
@@ -145,6 +160,10 @@ impl Pinhole {
         }
         let rows = rotation(&model.rotation)?;
         let [a, b, c] = model.translation;
+        let distance = Vector::new(a, b, c).length();
+        if !(distance <= MAX_DISTANCE) {
+            return Err(ModelError::Translation { distance });
+        }
         let centre = (rows[0] * a + rows[1] * b + rows[2] * c) * -1.0;
         let pinhole = Self {
             model,

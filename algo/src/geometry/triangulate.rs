@@ -64,6 +64,8 @@ pub struct Triangulator {
     reference: Reference,
     function: PhaseFunction,
     range: HeightRange,
+    /// The least |∂Φ/∂z| that tells a height, turns per mm.
+    slope_min: f64,
 }
 
 /// A pixel's solution.
@@ -97,12 +99,21 @@ const SLOPE_STEP: f64 = 0.01;
 /// Pieces of the working range searched for a change of sign where the phase need not be monotone
 /// along the ray (a sampled phase function whose rows are not in step).
 const PIECES: usize = 16;
+/// A ray falls at least so steeply, as dz against the way along the optical axis: others meet the plane at a
+/// thousand kilometres or nowhere.
+const FALL: f64 = -1e-6;
+/// A phase that changes by less than this over the default working range is noise at any height: one
+/// level of 4 frames has 7.4e-3 turn. So it is on rays along the baseline, and with fringes along it.
+const LEAST_TURNS: f64 = 0.01;
+/// Heights are stored to ± this many mm.
+const HEIGHT_REACH: f64 = i32::MAX as f64 / 1e6;
 /// The default working range, as a share of the camera's distance from the plane along its axis.
 const RANGE_SHARE: f64 = 0.2;
 
 impl Triangulator {
     /// Joins the rig, the reference and the phase function; without a range, ± 0.2 × the camera's
-    /// distance from the reference plane along its axis.
+    /// distance from the reference plane along its axis. The range ends where heights can no longer be
+    /// stored, ± 2.147 m.
     ///
     /// # Errors
     /// If the devices do not look down at the plane from two places, or the range is unusable.
@@ -129,16 +140,22 @@ impl Triangulator {
                 high: reach.min(0.9 * eye.z.min(lamp.z)),
             }
         });
-        let usable = range.low.is_finite() && range.low < range.high;
+        let stored = HeightRange {
+            low: range.low.max(-HEIGHT_REACH),
+            high: range.high.min(HEIGHT_REACH),
+        };
+        let usable = range.low.is_finite() && range.high.is_finite() && stored.low < stored.high;
         if !(usable && range.high < eye.z.min(lamp.z)) {
             return Err(RigError::Range(range));
         }
+        let slope_min = LEAST_TURNS / (2.0 * RANGE_SHARE * eye.z);
         Ok(Self {
             camera,
             projector,
             reference,
             function,
-            range,
+            range: stored,
+            slope_min,
         })
     }
 
@@ -155,6 +172,12 @@ impl Triangulator {
     /// The camera.
     pub fn camera(&self) -> &Pinhole {
         &self.camera
+    }
+
+    /// The ray of pixel (u, v) if it meets every height once.
+    #[inline]
+    fn falling_ray(&self, u: f64, v: f64) -> Option<Vector> {
+        self.camera.ray(u, v).filter(|ray| ray.z < FALL)
     }
 
     /// The point at height `z` on a ray from the camera.
@@ -188,11 +211,9 @@ impl Triangulator {
 
     /// Φ_R(u, v) in turns: the phase of the reference plane, also outside the frame.
     pub fn reference_phase(&self, u: f64, v: f64) -> Option<f64> {
-        let ray = self.camera.ray(u, v)?;
-        if ray.z >= 0.0 {
-            return None;
-        }
-        self.phase_at(self.on_ray(ray, 0.0))
+        let ray = self.falling_ray(u, v)?;
+        let phase = self.phase_at(self.on_ray(ray, 0.0))?;
+        phase.is_finite().then_some(phase)
     }
 
     /// One row of the reference phase map, [`AbsolutePhase::UNKNOWN`] where a pixel does not look
@@ -206,13 +227,9 @@ impl Triangulator {
     }
 
     /// The surface point that pixel (u, v) sees under phase `phase` (turns), or `None` where no
-    /// height in the working range has that phase, or more than one has.
+    /// height in the working range has that phase, more than one has, or the phase hardly depends on it.
     pub fn solve(&self, u: f64, v: f64, phase: f64) -> Option<Solution> {
-        let ray = self.camera.ray(u, v)?;
-        // Parallel to the plane or upwards: such a ray meets no height once.
-        if !(ray.z < -1e-6) {
-            return None;
-        }
+        let ray = self.falling_ray(u, v)?;
         let off = |z: f64| Some(self.phase_at(self.on_ray(ray, z))? - phase);
         let pieces = match self.function.is_sampled() {
             true => PIECES,
@@ -240,17 +257,14 @@ impl Triangulator {
     /// As [`Self::solve`], starting from a height that is nearly right: two or three evaluations
     /// instead of twenty, and where several heights have the phase, the one near the guess.
     pub fn solve_near(&self, u: f64, v: f64, phase: f64, guess: f64) -> Option<Solution> {
-        let ray = self.camera.ray(u, v)?;
-        if !(ray.z < -1e-6) {
-            return None;
-        }
+        let ray = self.falling_ray(u, v)?;
         let off = |z: f64| Some(self.phase_at(self.on_ray(ray, z))? - phase);
         // The secant from a guess that is off by micrometres converges at the first or second step;
         // where it does not, nothing is lost but time.
         let (mut before, mut z) = (guess - SLOPE_STEP, guess);
-        let mut missed = off(before)?;
+        let mut missed = off(before).unwrap_or(f64::NAN);
         for _ in 0..4 {
-            let miss = off(z)?;
+            let miss = off(z).unwrap_or(f64::NAN);
             let slope = (miss - missed) / (z - before);
             let step = miss / slope;
             if !(libm::fabs(step) <= MAX_STEP) {
@@ -269,9 +283,10 @@ impl Triangulator {
     fn solution(&self, ray: Vector, z: f64) -> Option<Solution> {
         let at = |z: f64| self.phase_at(self.on_ray(ray, z));
         let rise = at(z + SLOPE_STEP)? - at(z - SLOPE_STEP)?;
-        Some(Solution {
+        let slope = rise / (2.0 * SLOPE_STEP);
+        (libm::fabs(slope) >= self.slope_min).then(|| Solution {
             point: self.on_ray(ray, z),
-            slope: rise / (2.0 * SLOPE_STEP),
+            slope,
         })
     }
 
@@ -296,8 +311,8 @@ impl Triangulator {
 
     /// The point at height `height` that pixel (u, v) looks at.
     pub fn point(&self, u: usize, v: usize, height: Height) -> Option<Vector> {
-        let ray = self.camera.ray(u as f64, v as f64)?;
-        (height.is_known() && ray.z < 0.0).then(|| self.on_ray(ray, height.mm()))
+        let ray = self.falling_ray(u as f64, v as f64)?;
+        height.is_known().then(|| self.on_ray(ray, height.mm()))
     }
 
     /// The phase that pixel (u, v) has if its surface is at `height`, [`AbsolutePhase::UNKNOWN`] where it

@@ -3,6 +3,10 @@
 use alloc::vec::Vec;
 use core::fmt;
 
+/// Largest |Φ_P| and largest phase of a level, in turns: a projector of 4,096 columns at 4 pixels per turn. The kernels
+/// find the fringe order of a step as a word with at least 4 fractional bits.
+pub const MAX_TURNS: f64 = 1000.0;
+
 /// The phase function Φ_P(ξ, η) of a pattern in turns, over projector pixels (ξ = column, η = row,
 /// centres at integers). Defined for every real ξ and η: outside its raster it goes on linearly, so
 /// that a reference phase map can extend beyond the frame.
@@ -43,7 +47,7 @@ pub enum PhaseFunctionError {
         /// Projector rows.
         rows: usize,
     },
-    /// The number of fringes is not a positive number of at most 32,000 (the reach of Q16.16).
+    /// The number of fringes is not a positive number of at most [`MAX_TURNS`].
     Fringes(f64),
     /// The number of samples is not rows × columns.
     Length {
@@ -52,7 +56,7 @@ pub enum PhaseFunctionError {
         /// Samples given.
         given: usize,
     },
-    /// A sample is not finite or beyond ± 32,000 turns.
+    /// A sample is not finite or beyond ± [`MAX_TURNS`].
     Sample {
         /// Projector column.
         column: usize,
@@ -91,14 +95,11 @@ impl fmt::Display for PhaseFunctionError {
 
 impl core::error::Error for PhaseFunctionError {}
 
-/// Largest |Φ_P|: leaves room for extrapolation in the ± 32,768 turns of Q16.16.
-const MAX_TURNS: f64 = 32_000.0;
-
 impl PhaseFunction {
     /// Fringes parallel to the projector's columns: Φ_P = fringes · ξ / columns.
     ///
     /// # Errors
-    /// If the raster is empty or `fringes` is not in (0, 32000].
+    /// If the raster is empty or `fringes` is not in (0, [`MAX_TURNS`]].
     pub fn vertical(columns: usize, rows: usize, fringes: f64) -> Result<Self, PhaseFunctionError> {
         Self::fixed(columns, rows, fringes, Shape::Vertical { fringes })
     }

@@ -5,8 +5,8 @@ mod function;
 mod sequence;
 
 pub use encode::{GreyRaster, GreyResponse, ResponseError, encode};
-pub use function::{PhaseFunction, PhaseFunctionError, PhaseRange};
+pub use function::{MAX_TURNS, PhaseFunction, PhaseFunctionError, PhaseRange};
 pub use sequence::{
-    Level, MAX_DENSE_N, MAX_FRAMES, MAX_LEVELS, MAX_SHIFTS, MAX_TURNS, Sequence, SequenceError,
+    Level, MAX_DENSE_N, MAX_FRAMES, MAX_LEVELS, MAX_SHIFTS, MAX_STEP, Sequence, SequenceError,
     Unwrapping,
 };

@@ -1,6 +1,7 @@
 //! Levels and shifts of a sequence, and how its levels are unwrapped.
 
 use super::PhaseRange;
+use super::function::MAX_TURNS;
 use alloc::vec::Vec;
 use core::fmt;
 
@@ -9,18 +10,18 @@ pub const MAX_LEVELS: usize = 8;
 /// Shifts that a level may have; sums of 64 samples of 16 bits stay inside the kernels' bounds.
 pub const MAX_SHIFTS: usize = 64;
 /// Frames that a sequence may have.
-pub const MAX_FRAMES: usize = 128;
+pub const MAX_FRAMES: usize = MAX_LEVELS * MAX_SHIFTS;
 /// How far a shift may lie from its place on the equally spaced grid, in turns.
 const SHIFT_TOLERANCE: f64 = 1e-6;
 /// How far a ratio may lie from the dense form.
 const RATIO_TOLERANCE: f64 = 1e-6;
 /// Largest span of the coarsest level, in turns, that is still absolute by itself.
 const GEOMETRIC_SPAN: f64 = 1.001;
+/// Largest step from one geometric level to the next: what a level's error of up to 1.4e-4 turn becomes in the step must
+/// stay far below the 0.40 turn that a residual may have.
+pub const MAX_STEP: f64 = 64.0;
 /// Largest n of dense levels: their D stays within ± 450 turns, which words hold with 5 fractional bits.
 pub const MAX_DENSE_N: f64 = 30.0;
-/// Largest phase of a level, in turns, and largest step between two levels: the kernels find the fringe order of a step
-/// as a word with at least 4 fractional bits.
-pub const MAX_TURNS: f64 = 1000.0;
 
 /// All shifts at one ratio of the full phase function: s_k = start + k/N.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,8 +54,6 @@ pub struct Sequence {
 pub enum SequenceError {
     /// There are no frames.
     Empty,
-    /// More frames than [`MAX_FRAMES`].
-    TooManyFrames(usize),
     /// A ratio is not a positive finite number, or a shift not finite.
     NotFinite {
         /// The frame's ratio.
@@ -89,11 +88,6 @@ pub enum SequenceError {
         /// Its largest phase in turns.
         turns: f64,
     },
-    /// Dense levels of too large an n.
-    Dense {
-        /// The n of their ratios.
-        n: f64,
-    },
     /// The step between two geometric levels is too large.
     Step {
         /// Ratio of the coarser level.
@@ -107,12 +101,6 @@ impl fmt::Display for SequenceError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Empty => write!(f, "there are no frames: a level needs at least 3"),
-            Self::TooManyFrames(frames) => {
-                write!(
-                    f,
-                    "{frames} frames where at most {MAX_FRAMES} can be decoded"
-                )
-            }
             Self::NotFinite { ratio, shift } => write!(
                 f,
                 "a frame with ratio {ratio} and shift {shift}: both must be finite and the ratio positive"
@@ -140,20 +128,17 @@ impl fmt::Display for SequenceError {
                 f,
                 "levels of ratios {ratios:?} cannot be unwrapped: the smallest must span at most one turn \
                  of the pattern (geometric), or they are 1, 1 - 1/n^2, 1 - 1/n with n >= 3 or 1, 1 - 1/n \
-                 with n >= 2 (dense), or a single one"
+                 with n >= 2 (dense, n up to {MAX_DENSE_N}), or a single one"
             ),
             Self::Finest { ratio, turns } => write!(
                 f,
-                "the finest level has ratio {ratio} and {turns} turns: the ratio must be at least 1/{MAX_TURNS} \
+                "the finest level has ratio {ratio} and {turns} turns: the ratio must be at least 1/{MAX_STEP} \
                  and the phase at most {MAX_TURNS} turns"
             ),
             Self::Step { from, to } => write!(
                 f,
-                "the step from ratio {from} to {to} is too long for its fringe order: put a level between them"
-            ),
-            Self::Dense { n } => write!(
-                f,
-                "dense levels with n = {n}: n must be at most {MAX_DENSE_N}"
+                "the step from ratio {from} to {to} is over {MAX_STEP}, or too long beside the other levels: put a level \
+                 between them"
             ),
         }
     }
@@ -173,9 +158,6 @@ impl Sequence {
     pub fn from_frames(frames: &[(f64, f64)]) -> Result<Self, SequenceError> {
         if frames.is_empty() {
             return Err(SequenceError::Empty);
-        }
-        if frames.len() > MAX_FRAMES {
-            return Err(SequenceError::TooManyFrames(frames.len()));
         }
         if let Some(&(ratio, shift)) = frames
             .iter()
@@ -289,7 +271,7 @@ impl Unwrapping {
             sequence.levels().iter().map(|level| level.ratio).collect();
         let finest = ratios[ratios.len() - 1];
         let turns = finest * libm::fabs(range.max).max(libm::fabs(range.min));
-        if !(finest >= 1.0 / MAX_TURNS && turns <= MAX_TURNS) {
+        if !(finest >= 1.0 / MAX_STEP && turns <= MAX_TURNS) {
             return Err(SequenceError::Finest {
                 ratio: finest,
                 turns,
@@ -297,7 +279,7 @@ impl Unwrapping {
         }
         let near = |a: f64, b: f64| libm::fabs(a - b) <= RATIO_TOLERANCE;
         if ratios[0] * range.span() <= GEOMETRIC_SPAN {
-            if let Some(pair) = ratios.windows(2).find(|pair| pair[1] / pair[0] > MAX_TURNS) {
+            if let Some(pair) = ratios.windows(2).find(|pair| pair[1] / pair[0] > MAX_STEP) {
                 return Err(SequenceError::Step {
                     from: pair[0],
                     to: pair[1],
@@ -305,18 +287,21 @@ impl Unwrapping {
             }
             return Ok(Self::Geometric);
         }
+        // Not a number of levels that is dense, or ratios of 1 and more, have an n that is none.
+        let n = 1.0 / (1.0 - ratios[0]);
+        let reachable = n > 0.0 && n <= MAX_DENSE_N * (1.0 + RATIO_TOLERANCE);
         match ratios[..] {
             [_] => Ok(Self::Single),
-            [low, one] if near(one, 1.0) && low >= 0.5 - RATIO_TOLERANCE => Ok(Self::DenseTwo {
-                n: 1.0 / (1.0 - low),
-            }),
-            [low, middle, one] if near(one, 1.0) => {
-                let n = 1.0 / (1.0 - low);
-                if n >= 3.0 - 1e-5 && near(middle, 1.0 - 1.0 / (n * n)) {
-                    Ok(Self::DenseThree { n })
-                } else {
-                    Err(SequenceError::Ratios(ratios.to_vec()))
-                }
+            [low, one] if near(one, 1.0) && low >= 0.5 - RATIO_TOLERANCE && reachable => {
+                Ok(Self::DenseTwo { n })
+            }
+            [_, middle, one]
+                if near(one, 1.0)
+                    && n >= 3.0 - 1e-5
+                    && reachable
+                    && near(middle, 1.0 - 1.0 / (n * n)) =>
+            {
+                Ok(Self::DenseThree { n })
             }
             _ => Err(SequenceError::Ratios(ratios.to_vec())),
         }

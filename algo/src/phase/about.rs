@@ -8,7 +8,7 @@
 
 use super::level::Demodulated;
 use super::unwrap::{MAX_RESIDUAL_BITS, beyond};
-use crate::pattern::{Level, MAX_DENSE_N, SequenceError, Unwrapping};
+use crate::pattern::{Level, Unwrapping};
 use crate::simd::Lanes;
 
 /// Most levels about a map.
@@ -83,16 +83,13 @@ struct Turns<W> {
 }
 
 impl About {
-    pub fn new(unwrapping: Unwrapping, levels: &[Level]) -> Result<Self, SequenceError> {
+    pub fn new(unwrapping: Unwrapping, levels: &[Level]) -> Self {
         let finest = levels.len() - 1;
         let (n, order): (f64, &[usize]) = match unwrapping {
             Unwrapping::DenseThree { n } => (n, &[0, 1]),
             Unwrapping::DenseTwo { n } => (n, &[0]),
             Unwrapping::Single | Unwrapping::Geometric => (1.0, &[]),
         };
-        if n > MAX_DENSE_N {
-            return Err(SequenceError::Dense { n });
-        }
         let weight = |at: usize| levels[at].steps() as f64 * levels[at].ratio * levels[at].ratio;
         let rated = |at: usize| Rated::new(at, levels[at].ratio, weight(at) / weight(finest));
         let fast_reach = match unwrapping {
@@ -123,7 +120,7 @@ impl About {
             *share = q15(weight(at) / total);
         }
         let ratio = levels[finest].ratio;
-        Ok(Self {
+        Self {
             finest: rated(finest),
             slow: three.then(|| Beat::new(n, 0.5)),
             fast: (!order.is_empty()).then(|| Beat::new(n, fast_reach)),
@@ -131,7 +128,7 @@ impl About {
             scale: (libm::fabs(ratio - 1.0) > 1e-12).then_some((1.0 / ratio) as f32),
             shares,
             weights: (total / weight(finest)) as f32,
-        })
+        }
     }
 }
 
@@ -333,7 +330,8 @@ impl About {
                 v.add32(known.map[1], delta[1]),
             ],
             modulation,
-            doubtful: beyond(v, q1, MAX_RESIDUAL_BITS),
+            // No step, so nothing is left over: whether the map is near enough is known to who made it.
+            doubtful: v.splat16(0),
         }
     }
 
@@ -358,6 +356,7 @@ impl About {
             v.mul_q15(b1, v.splat16(self.shares[self.finest.at])),
             v.mul_q15(b3, v.splat16(self.shares[first.rated.at])),
         );
+        let mut most = v.max(b1, b3);
         let (b1, b3) = (v.join(b1, zero), v.join(b3, zero));
         let e3_wide = v.join(e3, v.sar::<15>(e3));
         let (mut b2, mut e2_wide) = (b3, e3_wide);
@@ -365,10 +364,12 @@ impl About {
             let b = levels[second.rated.at].modulation[half];
             let share = v.splat16(self.shares[second.rated.at]);
             mean = v.add(mean, v.mul_q15(b, share));
+            most = v.max(most, b);
             b2 = v.join(b, zero);
             e2_wide = v.join(e2, v.sar::<15>(e2));
         }
-        let mean = v.join(mean, zero);
+        // The root of the mean square lies between the mean and the largest.
+        let near = v.join(v.halve(v.add(mean, most)), zero);
         let mut correction = [v.splat32(0); 2];
         let mut modulation = [v.splat32(0); 2];
         let mut quarter = 0;
@@ -392,13 +393,8 @@ impl About {
             let zero = v.splat_single(0.0);
             let off = v.sub_single(zero, v.mul_single(sum, inverse));
             correction[quarter] = v.to_whole(off);
-            // Newton's step for the root of the mean square, from the mean x: x (3 − x²/mean square)/2. Two
-            // levels of 10 % difference leave 1e-5.
-            let x = v.to_single(mean[quarter]);
-            let part = v.mul_single(v.mul_single(x, x), inverse);
-            let part = v.mul_single(part, v.splat_single(0.5 * self.weights));
-            let root = v.mul_single(x, v.sub_single(v.splat_single(1.5), part));
-            modulation[quarter] = v.to_whole(root);
+            let inverse = v.mul_single(inverse, v.splat_single(self.weights));
+            modulation[quarter] = v.to_whole(root(v, v.to_single(near[quarter]), inverse));
             quarter += 1;
         }
         (correction, v.narrow_rounded(modulation, 0))
@@ -409,6 +405,17 @@ impl About {
 fn square<V: Lanes>(v: V, x: V::D) -> V::F {
     let x = v.to_single(x);
     v.mul_single(x, x)
+}
+
+/// The root of a mean square from a number x near it and 1/(mean square): two of Newton's steps x (3 − x²/(mean square))/2.
+#[inline(always)]
+fn root<V: Lanes>(v: V, x: V::F, inverse: V::F) -> V::F {
+    let (half, more) = (v.splat_single(0.5), v.splat_single(1.5));
+    let inverse = v.mul_single(inverse, half);
+    let share = v.mul_single(v.mul_single(x, x), inverse);
+    let x = v.mul_single(x, v.sub_single(more, share));
+    let share = v.mul_single(v.mul_single(x, x), inverse);
+    v.mul_single(x, v.sub_single(more, share))
 }
 
 /// 1/x of a positive x, relative error 3e-4: two Newton steps from the exponent and mantissa taken as one number.

@@ -237,11 +237,8 @@ fn weighted<V: Lanes, T: BlockSample>(
             let second = v.sub(second[half], centre);
             let along = v.dot(first, v.splat16(s_first), second, v.splat16(s_second));
             let across = v.dot(first, v.splat16(c_first), second, v.splat16(c_second));
-            s[half] = [v.add32(s[half][0], along[0]), v.add32(s[half][1], along[1])];
-            c[half] = [
-                v.add32(c[half][0], across[0]),
-                v.add32(c[half][1], across[1]),
-            ];
+            s[half] = add_part(v, level, s[half], along);
+            c[half] = add_part(v, level, c[half], across);
             half += 1;
         }
     }
@@ -260,6 +257,18 @@ fn weighted<V: Lanes, T: BlockSample>(
         ],
     );
     octant(v, s, c, v.narrow_mask(weak), saturated)
+}
+
+/// A sum, and products brought down so far that all of them fit.
+#[inline(always)]
+fn add_part<V: Lanes>(v: V, level: &Level, sum: [V::D; 2], products: [V::D; 2]) -> [V::D; 2] {
+    if level.drop == 0 {
+        return [v.add32(sum[0], products[0]), v.add32(sum[1], products[1])];
+    }
+    [
+        v.add32(sum[0], v.sar32_by(products[0], level.drop)),
+        v.add32(sum[1], v.sar32_by(products[1], level.drop)),
+    ]
 }
 
 /// Mask: S² + C² of the sums is below the level's least power, in singles (1e-7).

@@ -15,6 +15,8 @@ pub const FULL_TRUST_STEPS: usize = 8;
 /// Modulations of exactly the minimum are trusted: what the roundings can take from S² + C² there, as a share. It is
 /// 2e-3 of the step of one count.
 const TIE: f64 = 1e-4;
+/// Fractional bits of weights.
+const WEIGHT_BITS: u8 = 14;
 /// Most bits per sample that the forms for 3 and 4 shifts take: 3·(2I₀ − I₁ − I₂) must fit a word.
 const WORD_FORM_BITS: u8 = 12;
 
@@ -27,6 +29,8 @@ pub(crate) struct Level {
     pub samples: Samples,
     /// Bits by which S and C are shifted: up from counts to words, or down from sums to words.
     pub lift: u8,
+    /// Bits by which products are brought down before they are added up.
+    pub drop: u8,
     /// Full scale less one count, unsigned.
     pub below_full_scale: i16,
     /// Middle of the range of samples, unsigned.
@@ -81,14 +85,16 @@ impl Level {
         let lifted = f64::from(1_u32 << up);
         // `unit` is what one count weighs in the words of S and C; `powers` the factor from S² + C² in counts to what
         // the forms compare.
+        let mut drop = 0;
         let (samples, lift, unit, powers) = match form {
             Some(4) => (Samples::Four, up, lifted, lifted * lifted),
             Some(3) => (Samples::Three, up, lifted, 4.0),
             _ => {
-                let (weights, bits, down) = weights(level, bit_depth);
-                let unit = libm::pow(2.0, f64::from(bits) - f64::from(down));
-                let sums = libm::pow(4.0, f64::from(bits));
-                (Samples::Weighted(weights), down, unit, sums)
+                let (weights, down);
+                (weights, drop, down) = weighted_samples(level, bit_depth);
+                let bits = f64::from(WEIGHT_BITS) - f64::from(drop);
+                let unit = libm::pow(2.0, bits - f64::from(down));
+                (Samples::Weighted(weights), down, unit, libm::pow(4.0, bits))
             }
         };
         if !matches!(samples, Samples::Weighted(_)) {
@@ -107,6 +113,7 @@ impl Level {
             frames,
             samples,
             lift,
+            drop,
             below_full_scale: (((1_u32 << bit_depth) - 2) as u16).cast_signed(),
             centre: ((1_u32 << (bit_depth - 1)) as u16).cast_signed(),
             least_power: libm::ceil(least_power.min(f64::from(i32::MAX))) as i32,
@@ -162,34 +169,33 @@ impl Level {
     }
 }
 
-/// The weights of a level's samples (centred: the middle of their range counts as 0), their fractional bits, and the
-/// bits by which the sums are shifted down to words.
+/// The weights of a level's samples (centred: the middle of their range counts as 0), the bits by which pairs of products
+/// are brought down before they are added, and those by which the sums are brought down to words.
 ///
-/// Sums of products fit 31 bits; the weights of S, and those of C, add up to 0, so that the offset A drops out
-/// exactly. Their rounding moves the phase by at most 2^−bits / 2π · (largest sample) / B turn.
-fn weights(level: &pattern::Level, bit_depth: u8) -> (Vec<[i16; 2]>, u8, u8) {
+/// Sums fit 31 bits; the weights of S, and those of C, add up to 0, so that the offset A drops out exactly.
+fn weighted_samples(level: &pattern::Level, bit_depth: u8) -> (Vec<[i16; 2]>, u8, u8) {
     let steps = level.steps();
     let log_steps = steps.next_power_of_two().ilog2() as u8;
-    let bits = (31 - (bit_depth - 1) - log_steps - 1).min(14);
+    let drop = (bit_depth - 1 + WEIGHT_BITS + log_steps).saturating_sub(30);
     let angle = |k: usize| TAU * (level.start + k as f64 / steps as f64);
     let along: Vec<f64> = (0..steps).map(|k| libm::cos(angle(k))).collect();
     let across: Vec<f64> = (0..steps).map(|k| libm::sin(angle(k))).collect();
-    let (along, across) = (balanced(&along, bits), balanced(&across, bits));
+    let (along, across) = (balanced(&along), balanced(&across));
     let largest = |weights: &[i16]| -> u64 {
         let sum: u64 = weights.iter().map(|w| u64::from(w.unsigned_abs())).sum();
-        sum << (bit_depth - 1)
+        (sum << (bit_depth - 1)) >> drop
     };
     let mut down = 0;
     while largest(&along).max(largest(&across)) >> down > 32_700 {
         down += 1;
     }
     let weights = along.into_iter().zip(across).map(|(s, c)| [s, c]).collect();
-    (weights, bits, down)
+    (weights, drop, down)
 }
 
-/// The numbers in fixed point with `bits` fractional bits, rounded so that they add up to 0 as they did before.
-fn balanced(exact: &[f64], bits: u8) -> Vec<i16> {
-    let scale = f64::from(1_u32 << bits);
+/// The numbers with [`WEIGHT_BITS`] fractional bits, rounded so that they add up to 0 as they did before.
+fn balanced(exact: &[f64]) -> Vec<i16> {
+    let scale = f64::from(1_u32 << WEIGHT_BITS);
     let mut rounded: Vec<i16> = exact.iter().map(|x| libm::rint(x * scale) as i16).collect();
     let mut over: i32 = rounded.iter().map(|&x| i32::from(x)).sum();
     while over != 0 {

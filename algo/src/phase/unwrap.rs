@@ -28,7 +28,7 @@ impl Unwrapper {
         let levels = sequence.levels();
         Ok(match unwrapping {
             Unwrapping::Geometric => Self::Geometric(Geometric::new(levels, range)?),
-            _ => Self::About(About::new(unwrapping, levels)?),
+            _ => Self::About(About::new(unwrapping, levels)),
         })
     }
 }

@@ -323,6 +323,10 @@ impl Lanes for Avx2 {
         avx2!(_mm256_sub_epi32(a, b))
     }
     #[inline(always)]
+    fn sar32_by(self, x: Self::D, n: u8) -> Self::D {
+        avx2!(_mm256_sra_epi32(x, _mm_cvtsi32_si128(i32::from(n))))
+    }
+    #[inline(always)]
     fn gt32(self, a: Self::D, b: Self::D) -> Self::D {
         avx2!(_mm256_cmpgt_epi32(a, b))
     }

@@ -139,6 +139,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn add32(self, a: Self::D, b: Self::D) -> Self::D;
     /// a − b.
     fn sub32(self, a: Self::D, b: Self::D) -> Self::D;
+    /// x / 2ⁿ rounded down, signed, n below 32.
+    fn sar32_by(self, x: Self::D, n: u8) -> Self::D;
     /// Mask: a > b, signed.
     fn gt32(self, a: Self::D, b: Self::D) -> Self::D;
     /// Mask: a = b.

@@ -317,6 +317,10 @@ impl Lanes for Neon {
         neon!(vsubq_s32(a, b))
     }
     #[inline(always)]
+    fn sar32_by(self, x: Self::D, n: u8) -> Self::D {
+        neon!(vshlq_s32(x, vdupq_n_s32(-i32::from(n))))
+    }
+    #[inline(always)]
     fn gt32(self, a: Self::D, b: Self::D) -> Self::D {
         neon!(vreinterpretq_s32_u32(vcgtq_s32(a, b)))
     }

@@ -311,6 +311,10 @@ impl Lanes for Portable {
         pairs(a, b, i32::wrapping_sub)
     }
     #[inline(never)]
+    fn sar32_by(self, x: Self::D, n: u8) -> Self::D {
+        lanes(x, |x| x >> n)
+    }
+    #[inline(never)]
     fn gt32(self, a: Self::D, b: Self::D) -> Self::D {
         pairs(a, b, |a, b| mask32(a > b))
     }

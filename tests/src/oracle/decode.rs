@@ -1,8 +1,8 @@
 //! Frames → absolute phase and mask of a whole recording.
 
-use super::demodulate::{Demodulated, demodulate};
-use super::unwrap::{Form, Wrapped, recognise, unwrap};
-use super::{Pattern, Reason, Rig};
+use super::demodulate::demodulate;
+use super::unwrap::{Form, recognise};
+use super::{Pattern, PixelTwin, Reason, Rig};
 use hal::frame::Samples;
 use hal::replay::Recording;
 use rayon::prelude::*;
@@ -35,20 +35,24 @@ pub struct PhaseTwin {
 
 /// The levels of pattern `at`, from coarse to fine.
 pub fn levels_of(recording: &Recording, at: usize) -> Vec<Level> {
+    let frames = recording.frames.iter().enumerate();
+    let own = frames.filter(|(_, frame)| frame.pattern == at);
+    levels_from(own.map(|(place, frame)| (place, frame.ratio, frame.shift_turns)))
+}
+
+/// The levels of frames given as place, ratio and shift, from coarse to fine.
+pub fn levels_from(frames: impl Iterator<Item = (usize, f64, f64)>) -> Vec<Level> {
     let mut levels: Vec<Level> = Vec::new();
-    for (place, frame) in recording.frames.iter().enumerate() {
-        if frame.pattern != at {
-            continue;
-        }
-        if !levels.iter().any(|level| level.ratio == frame.ratio) {
+    for (place, ratio, shift) in frames {
+        if !levels.iter().any(|level| level.ratio == ratio) {
             levels.push(Level {
-                ratio: frame.ratio,
+                ratio,
                 shifts: Vec::new(),
                 frames: Vec::new(),
             });
         }
-        for level in levels.iter_mut().filter(|l| l.ratio == frame.ratio) {
-            level.shifts.push(frame.shift_turns);
+        for level in levels.iter_mut().filter(|level| level.ratio == ratio) {
+            level.shifts.push(shift);
             level.frames.push(place);
         }
     }
@@ -69,79 +73,29 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
     let rig = Rig::of(recording);
     let full_scale = f64::from((1_u32 << recording.bit_depth) - 1);
     let width = recording.width as usize;
-    let pixels: Vec<_> = (0..width * recording.height as usize)
+    let pixels: Vec<PixelTwin> = (0..width * recording.height as usize)
         .into_par_iter()
         .map(|pixel| {
-            let seen: Vec<Demodulated> = levels
+            let samples: Vec<Vec<f64>> = levels
                 .iter()
-                .map(|level| demodulate(&samples(recording, level, pixel), &level.shifts))
+                .map(|level| samples(recording, level, pixel))
                 .collect();
-            let least = least_modulation(full_scale);
-            let tie = seen.iter().any(|s| (s.modulation - least).abs() < TIE);
-            let map = match (form, &rig) {
-                (Form::Geometric { .. }, _) => f64::NAN,
-                (_, Some(rig)) => {
-                    rig.reference(&pattern, (pixel % width) as f64, (pixel / width) as f64)
-                }
-                (_, None) => panic!("a map is needed and there are no models"),
+            let map = || {
+                let rig = rig.as_ref().expect("a map is needed: there must be models");
+                rig.reference(&pattern, (pixel % width) as f64, (pixel / width) as f64)
             };
-            if map.is_nan() && !matches!(form, Form::Geometric { .. }) {
-                return (f64::NAN, 0.0, Reason::Unexpected, false);
-            }
-            if let Some(reason) = distrust(&levels, &seen, full_scale) {
-                return (f64::NAN, 0.0, reason, tie);
-            }
-            let wrapped: Vec<Wrapped> = levels
-                .iter()
-                .zip(&seen)
-                .map(|(level, seen)| Wrapped {
-                    ratio: level.ratio,
-                    turns: seen.turns,
-                    information: level.shifts.len() as f64
-                        * level.ratio.powi(2)
-                        * seen.modulation.powi(2),
-                })
-                .collect();
-            match unwrap(form, &wrapped, map) {
-                Some((phase, information)) => (phase, information, Reason::Resolved, tie),
-                None => (f64::NAN, 0.0, Reason::Residual, tie),
-            }
+            PixelTwin::of(form, &levels, &samples, full_scale, map)
         })
         .collect();
     PhaseTwin {
         form,
-        phase: pixels.iter().map(|pixel| pixel.0).collect(),
-        information: pixels.iter().map(|pixel| pixel.1).collect(),
-        reason: pixels.iter().map(|pixel| pixel.2).collect(),
-        tie: pixels.iter().map(|pixel| pixel.3).collect(),
-    }
-}
-
-/// Sums of sines of 16-bit counts are exact to about 1e-11 of a count: a modulation of exactly 16 is not
-/// below 16.
-const TIE: f64 = 1e-9;
-
-/// The least modulation that is trusted, in counts: 16 of 255.
-fn least_modulation(full_scale: f64) -> f64 {
-    16.0 * full_scale / 255.0
-}
-
-/// The first reason in the samples not to trust a pixel; `levels` go from coarse to fine.
-fn distrust(levels: &[Level], seen: &[Demodulated], full_scale: f64) -> Option<Reason> {
-    let least = least_modulation(full_scale);
-    let weak = |seen: &Demodulated| seen.modulation < least - TIE;
-    let saturated = levels
-        .iter()
-        .zip(seen)
-        .any(|(level, seen)| level.shifts.len() < 8 && seen.brightest >= full_scale);
-    if weak(&seen[0]) {
-        Some(Reason::Dark)
-    } else if seen.iter().any(weak) {
-        Some(Reason::LowModulation)
-    } else if saturated {
-        Some(Reason::Saturated)
-    } else {
-        None
+        phase: pixels.iter().map(|pixel| pixel.phase).collect(),
+        information: pixels.iter().map(|pixel| pixel.information).collect(),
+        reason: pixels.iter().map(|pixel| pixel.reason).collect(),
+        tie: pixels
+            .iter()
+            .map(|pixel| pixel.is_tie(full_scale))
+            .collect(),
     }
 }
 

@@ -12,6 +12,8 @@ pub struct Demodulated {
     pub turns: f64,
     /// B in counts.
     pub modulation: f64,
+    /// A, the mean of the samples, counts.
+    pub offset: f64,
     /// The largest sample, counts.
     pub brightest: f64,
 }
@@ -20,15 +22,18 @@ pub struct Demodulated {
 pub fn demodulate(samples: &[f64], shifts: &[f64]) -> Demodulated {
     let mut s = 0.0;
     let mut c = 0.0;
+    let mut sum = 0.0;
     let mut brightest = 0.0_f64;
     for (sample, shift) in samples.iter().zip(shifts) {
         s += sample * (TAU * shift).cos();
         c += sample * (TAU * shift).sin();
+        sum += sample;
         brightest = brightest.max(*sample);
     }
     Demodulated {
         turns: s.atan2(c) / TAU,
         modulation: 2.0 / samples.len() as f64 * (s * s + c * c).sqrt(),
+        offset: sum / samples.len() as f64,
         brightest,
     }
 }

@@ -9,11 +9,13 @@ pub mod demodulate;
 pub mod device;
 pub mod height;
 pub mod pattern;
+pub mod pixel;
 pub mod reason;
 pub mod unwrap;
 
-pub use decode::{PhaseTwin, decode, levels_of, sample_noise};
+pub use decode::{Level, PhaseTwin, decode, levels_from, levels_of, sample_noise};
 pub use device::Device;
 pub use height::Rig;
 pub use pattern::Pattern;
+pub use pixel::PixelTwin;
 pub use reason::Reason;

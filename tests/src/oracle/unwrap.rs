@@ -62,39 +62,95 @@ pub struct Wrapped {
     pub information: f64,
 }
 
+/// How near a pixel came to another answer.
+#[derive(Clone, Copy, Debug)]
+pub struct Doubt {
+    /// The least error of the wrapped phases, in turns, that could have turned a decision (a fringe
+    /// order, a wrap, a residual at its limit).
+    pub slack: f64,
+    /// How far apart the averaged levels lie, in turns.
+    pub spread: f64,
+}
+
+impl Doubt {
+    /// Before anything was decided.
+    const NONE: Self = Self {
+        slack: f64::INFINITY,
+        spread: 0.0,
+    };
+
+    /// A decision that is `distance` turns from its threshold, made from a sum of wrapped phases whose
+    /// factors add up to `gain`.
+    fn look(&mut self, distance: f64, gain: f64) {
+        self.slack = self.slack.min(distance / gain);
+    }
+
+    /// The short way round, −½ ≤ x < ½.
+    fn wrap(&mut self, turns: f64, gain: f64) -> f64 {
+        let wrapped = turns - (turns + 0.5).floor();
+        self.look(0.5 - wrapped.abs(), gain);
+        wrapped
+    }
+
+    /// The whole number next to x, unless too much is left over.
+    fn order(&mut self, x: f64, gain: f64) -> Option<f64> {
+        let whole = x.round();
+        let residual = (x - whole).abs();
+        self.look((residual - MAX_RESIDUAL).abs(), gain);
+        (residual <= MAX_RESIDUAL).then_some(whole)
+    }
+}
+
 /// Φ in turns and the information Σ N r² B² behind it, or none where a rounding step leaves more than
 /// 0.40 turn over. `levels` go from coarse to fine; `map` is Φ₀ for the forms that need one.
 pub fn unwrap(form: Form, levels: &[Wrapped], map: f64) -> Option<(f64, f64)> {
+    unwrap_with_doubt(form, levels, map).0
+}
+
+/// As [`unwrap`], and how near the pixel came to another answer.
+pub fn unwrap_with_doubt(form: Form, levels: &[Wrapped], map: f64) -> (Option<(f64, f64)>, Doubt) {
+    let mut doubt = Doubt::NONE;
+    let found = match form {
+        Form::Geometric { lowest } => geometric(levels, lowest, &mut doubt),
+        _ => about(form, levels, map, &mut doubt),
+    };
+    (found, doubt)
+}
+
+/// The forms that are unwrapped about a map.
+fn about(form: Form, levels: &[Wrapped], map: f64, doubt: &mut Doubt) -> Option<(f64, f64)> {
+    let q = |level: Wrapped| relative(level, map);
     match form {
-        Form::Geometric { lowest } => geometric(levels, lowest),
         Form::DenseThree { n } => {
             let (one, slow, low) = (levels[2], levels[1], levels[0]);
-            let a = wrap(relative(one, map) - relative(slow, map));
-            let b = wrap(relative(one, map) - relative(low, map));
-            let b = b + order(n * a - b)?;
-            average(&[one, low, slow], n * b, map)
+            let a = doubt.wrap(q(one) - q(slow), 2.0);
+            let b = doubt.wrap(q(one) - q(low), 2.0);
+            let b = b + doubt.order(n * a - b, 2.0 * n + 2.0)?;
+            average(&[one, low, slow], n * b, 2.0 * n, map, doubt)
         }
         Form::DenseTwo { n } => {
             let (one, low) = (levels[1], levels[0]);
-            let b = wrap(relative(one, map) - relative(low, map));
-            average(&[one, low], n * b, map)
+            let b = doubt.wrap(q(one) - q(low), 2.0);
+            average(&[one, low], n * b, 2.0 * n, map, doubt)
         }
-        Form::Single => {
+        _ => {
             let only = levels[0];
-            let delta = wrap(relative(only, map)) / only.ratio;
+            let delta = doubt.wrap(q(only), 1.0) / only.ratio;
             Some((map + delta, only.information))
         }
     }
 }
 
 /// k = round(n Φ_coarse − φ), Φ = k + φ, from level to level.
-fn geometric(levels: &[Wrapped], lowest: f64) -> Option<(f64, f64)> {
+fn geometric(levels: &[Wrapped], lowest: f64, doubt: &mut Doubt) -> Option<(f64, f64)> {
     let coarsest = levels[0];
-    let mut phase = lowest + (coarsest.turns - lowest).rem_euclid(1.0);
+    let within = (coarsest.turns - lowest).rem_euclid(1.0);
+    doubt.look(within.min(1.0 - within), 1.0);
+    let mut phase = lowest + within;
     let mut ratio = coarsest.ratio;
     for level in &levels[1..] {
         let n = level.ratio / ratio;
-        phase = level.turns + order(n * phase - level.turns)?;
+        phase = level.turns + doubt.order(n * phase - level.turns, n + 1.0)?;
         ratio = level.ratio;
     }
     Some((phase / ratio, levels[levels.len() - 1].information))
@@ -106,28 +162,31 @@ fn relative(level: Wrapped, map: f64) -> f64 {
 }
 
 /// D_i = (q_i + round(r_i D − q_i)) / r_i for each level in turn, D the weighted mean of those so far.
-fn average(levels: &[Wrapped], start: f64, map: f64) -> Option<(f64, f64)> {
+/// `gain` is what an error of the wrapped phases becomes in `start`.
+fn average(
+    levels: &[Wrapped],
+    start: f64,
+    mut gain: f64,
+    map: f64,
+    doubt: &mut Doubt,
+) -> Option<(f64, f64)> {
     let mut delta = start;
     let (mut sum, mut weights) = (0.0, 0.0);
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for level in levels {
         let q = relative(*level, map);
-        let here = (q + order(level.ratio * delta - q)?) / level.ratio;
+        let order = doubt.order(level.ratio * delta - q, level.ratio * gain + 1.0)?;
+        let here = (q + order) / level.ratio;
         sum += level.information * here;
         weights += level.information;
         delta = sum / weights;
+        (low, high) = (low.min(here), high.max(here));
+        doubt.spread = high - low;
+        // A mean is off by no more than the worst of its parts.
+        let own = 1.0 / level.ratio;
+        gain = if low == high { own } else { gain.max(own) };
     }
     Some((map + delta, weights))
-}
-
-/// The short way round, −½ ≤ x < ½.
-fn wrap(turns: f64) -> f64 {
-    turns - (turns + 0.5).floor()
-}
-
-/// The whole number next to x, unless too much is left over.
-fn order(x: f64) -> Option<f64> {
-    let whole = x.round();
-    ((x - whole).abs() <= MAX_RESIDUAL).then_some(whole)
 }
 
 #[cfg(test)]
@@ -137,7 +196,7 @@ mod tests {
     fn seen(ratios: &[f64], phase: f64) -> Vec<Wrapped> {
         let level = |&ratio: &f64| Wrapped {
             ratio,
-            turns: wrap(ratio * phase),
+            turns: ratio * phase - (ratio * phase).round(),
             information: ratio * ratio,
         };
         ratios.iter().map(level).collect()

@@ -80,7 +80,7 @@ fn every_back_end_and_levels_on_arrival_give_the_same_bits() {
     let mut noise = Noise(0x9E37_79B9_7F4A_7C15);
     let ratios: [&[f64]; 5] = [
         &[0.009, 0.1, 1.0],
-        &[0.009, 0.8],
+        &[0.0095, 0.55],
         &[5.0 / 6.0, 35.0 / 36.0, 1.0],
         &[0.8, 1.0],
         &[0.7],

@@ -1,0 +1,228 @@
+//! How far a decoded pixel may be from the textbook, and which pixels are too near a threshold to say.
+//!
+//! The bounds are those of a kernel in 16-bit lanes; they hold for every back-end.
+
+use super::stack::Stack;
+use algo::pipeline::PhaseMap;
+use algo::units::{AbsolutePhase, Modulation};
+use std::f64::consts::{SQRT_2, TAU};
+use tests::oracle::demodulate::Demodulated;
+use tests::oracle::unwrap::Form;
+use tests::oracle::{Level, PixelTwin, Reason};
+
+/// The arctangent: a polynomial of degree 5 about a reciprocal of one Newton step (kernel.md).
+pub const ARCTANGENT: f64 = 2.5e-5;
+/// Half a unit of 1/65536 turn.
+pub const ROUNDING: f64 = 1.0 / 131_072.0;
+/// S and C lie within ± N/2 of full scale; in 16 bits their rounding is 2⁻¹⁷ of N full scales each.
+const SUMS: f64 = 1.0 / 131_072.0;
+/// Half the last bit of a weight in Q15.
+const WEIGHTS: f64 = 1.0 / 65_536.0;
+/// Half the last bit of a factor (a ratio, its inverse, n) in Q20: what it moves a phase of one turn.
+const FACTORS: f64 = 1.0 / 2_097_152.0;
+/// Weights of 8 significant bits: the ratio of two is off by at most two parts in 256, which moves a mean
+/// by no more than this share of what it is taken over.
+const MEAN: f64 = 1.0 / 128.0;
+/// B is reported to 8 significant bits at the threshold (16/255: 257 of 4095 units), off by up to two
+/// units; σ_z has the same bound.
+const MODULATION: f64 = 2.0 / 257.0;
+/// Masks may differ on this share of the pixels, besides those on a threshold.
+const MASK_SHARE: f64 = 1e-4;
+/// The thresholds' neighbourhood must stay small, or nothing would be asked.
+const TIE_SHARE: f64 = 0.03;
+/// RMS of the error of the finest level of a geometric sequence, turns: 1e-5 for the arctangent, and
+/// the same again for sums and weights, whose worst case is 2.8e-5 at a quarter of full scale.
+const RMS: f64 = 2e-5;
+
+/// What the samples of a level can move (S, C) by, in counts of B.
+fn rounding_counts(level: &Level, seen: &Demodulated, stack: &Stack) -> f64 {
+    if is_exact(level, stack) {
+        return 0.0;
+    }
+    let full_scale = f64::from(stack.full_scale());
+    // (2/N) · √2 · (N · SUMS · full scale + Σ I · WEIGHTS)
+    2.0 * SQRT_2 * (SUMS * full_scale + WEIGHTS * seen.offset)
+}
+
+/// Differences of 8-bit samples with weights 0 and ± 1 need no rounding.
+fn is_exact(level: &Level, stack: &Stack) -> bool {
+    let quarter = |shift: &f64| (4.0 * shift).fract() == 0.0;
+    stack.bit_depth == 8 && level.shifts.len() == 4 && level.shifts.iter().all(quarter)
+}
+
+/// Largest error of a level's wrapped phase, turns.
+fn wrapped(level: &Level, seen: &Demodulated, stack: &Stack) -> f64 {
+    let rounded = rounding_counts(level, seen, stack) / seen.modulation / TAU;
+    ARCTANGENT + ROUNDING + rounded
+}
+
+/// Largest error of a resolved pixel's Φ, turns.
+fn absolute(form: Form, levels: &[Level], twin: &PixelTwin, map: f64, stack: &Stack) -> f64 {
+    let each = levels.iter().zip(&twin.levels);
+    let each = each.map(|(level, seen)| (level.ratio, wrapped(level, seen, stack)));
+    let worst = |pairs: &mut dyn Iterator<Item = (f64, f64)>| {
+        pairs.fold(0.0_f64, |worst, (ratio, error)| worst.max(error / ratio))
+    };
+    if let Form::Geometric { .. } = form {
+        let last = levels.len() - 1;
+        let ratio = levels[last].ratio;
+        let scaled = if ratio == 1.0 {
+            0.0
+        } else {
+            (twin.phase * ratio).abs() * FACTORS + ROUNDING
+        };
+        worst(&mut each.skip(last)) + scaled
+    } else {
+        // r Φ₀ is rounded as well, then the sum and each step of the mean.
+        let relative = worst(&mut each.map(|(ratio, error)| (ratio, error + ROUNDING)));
+        let spread = twin.doubt.map_or(0.0, |doubt| doubt.spread);
+        let factor = (twin.phase - map).abs() * FACTORS;
+        relative + MEAN * spread + factor + 3.0 * ROUNDING
+    }
+}
+
+/// Whether a pixel lies so near a threshold that rounding may decide.
+fn on_a_threshold(levels: &[Level], twin: &PixelTwin, stack: &Stack) -> bool {
+    let full_scale = f64::from(stack.full_scale());
+    let each = || levels.iter().zip(&twin.levels);
+    let counts = each().fold(0.0_f64, |worst, (level, seen)| {
+        worst.max(rounding_counts(level, seen, stack))
+    });
+    if twin.on_the_threshold(full_scale, counts) {
+        return true;
+    }
+    let Some(doubt) = twin.doubt else {
+        return false;
+    };
+    let error = each().fold(0.0_f64, |worst, (level, seen)| {
+        worst.max(wrapped(level, seen, stack))
+    });
+    doubt.slack <= error + ROUNDING + MEAN * doubt.spread + factors(levels, stack)
+}
+
+/// What the factors' rounding moves a decision by, as an error of the wrapped phases, turns.
+fn factors(levels: &[Level], stack: &Stack) -> f64 {
+    let turns = stack.range.max.abs().max(stack.range.min.abs());
+    match stack.form() {
+        // n · Φ of the coarser level, of a decision that weighs wrapped phases by n + 1.
+        Form::Geometric { .. } => levels.windows(2).fold(0.0_f64, |worst, pair| {
+            let n = pair[1].ratio / pair[0].ratio;
+            worst.max(FACTORS * turns * pair[0].ratio / (n + 1.0))
+        }),
+        // r · D, with D within ± n²/2.
+        Form::DenseThree { n } => FACTORS * n * n / 2.0,
+        Form::DenseTwo { n } => FACTORS * n / 2.0,
+        Form::Single => 0.0,
+    }
+}
+
+/// What comparing many stacks with the textbook has shown.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    pub stacks: usize,
+    pub pixels: usize,
+    pub resolved: usize,
+    /// Pixels on a threshold, of which nothing is asked.
+    pub ties: usize,
+    /// Pixels of another mask.
+    pub masks: usize,
+    /// Squares of the errors of geometric levels of ratio 1.
+    squares: f64,
+    squared: usize,
+    /// The largest error as a share of its bound.
+    pub worst_share: f64,
+    /// The largest error in turns.
+    pub worst: f64,
+}
+
+impl Tally {
+    /// Compares what was decoded with the textbook: phases within their bound and with it the fringe
+    /// orders, modulations, masks.
+    pub fn add(&mut self, stack: &Stack, found: &PhaseMap) {
+        let (levels, form, twins) = (stack.levels(), stack.form(), stack.twins());
+        let full_scale = stack.full_scale();
+        self.stacks += 1;
+        for (pixel, twin) in twins.iter().enumerate() {
+            self.pixels += 1;
+            if on_a_threshold(&levels, twin, stack) {
+                self.ties += 1;
+                continue;
+            }
+            if found.trust[pixel].word() != twin.reason.word() {
+                self.masks += 1;
+                continue;
+            }
+            if twin.reason != Reason::Resolved {
+                continue;
+            }
+            self.resolved += 1;
+            let map = stack.map.as_ref().map_or(0.0, |map| map[pixel].turns());
+            let bound = absolute(form, &levels, twin, map, stack);
+            let error = error(found.phase[pixel], twin.phase);
+            assert!(
+                error <= bound,
+                "pixel {pixel}: {} turns where the textbook has {}, off by {error:.2e} and not \
+                 {bound:.2e}: {:?}, {} bit",
+                found.phase[pixel].turns(),
+                twin.phase,
+                stack.frames,
+                stack.bit_depth
+            );
+            self.worst_share = self.worst_share.max(error / bound);
+            self.worst = self.worst.max(error);
+            if matches!(form, Form::Geometric { .. }) && levels[levels.len() - 1].ratio == 1.0 {
+                self.squares += error * error;
+                self.squared += 1;
+            }
+            check_modulation(found.modulation[pixel], &levels, twin, full_scale);
+        }
+    }
+
+    /// RMS error over geometric levels whose finest ratio is 1, turns.
+    pub fn rms(&self) -> f64 {
+        (self.squares / self.squared.max(1) as f64).sqrt()
+    }
+
+    /// Prints the figures and checks those that hold over all pixels together.
+    pub fn conclude(&self, name: &str) {
+        println!(
+            "{name}: {} stacks, {} pixels, {} resolved, {} on a threshold, {} other masks; worst error \
+             {:.2e} turn, {:.0} % of its bound at most, RMS (geometric) {:.2e}",
+            self.stacks,
+            self.pixels,
+            self.resolved,
+            self.ties,
+            self.masks,
+            self.worst,
+            100.0 * self.worst_share,
+            self.rms()
+        );
+        assert!(self.resolved > 0, "{name}: nothing was compared");
+        assert!((self.ties as f64) < TIE_SHARE * self.pixels as f64);
+        assert!(self.rms() <= RMS, "{name}: {:e}", self.rms());
+        let allowed = (self.pixels as f64 * MASK_SHARE).floor() as usize;
+        assert!(self.masks <= allowed, "{name}: {} masks", self.masks);
+    }
+}
+
+/// |Φ − Φ_textbook|, turns.
+fn error(found: AbsolutePhase, truth: f64) -> f64 {
+    (found.turns() - truth).abs()
+}
+
+/// The modulation behind a resolved phase, Σ N r² B² = (Σ N r²) · B².
+fn check_modulation(found: Modulation, levels: &[Level], twin: &PixelTwin, full_scale: u16) {
+    let weight = |level: &Level| level.shifts.len() as f64 * level.ratio * level.ratio;
+    let of_one = levels.last().map_or(0.0, weight);
+    let all: f64 = levels.iter().map(weight).sum();
+    let finest = &twin.levels[twin.levels.len() - 1];
+    // Of the finest level alone where the information is.
+    let alone = of_one * finest.modulation * finest.modulation;
+    let truth = if (twin.information / alone - 1.0).abs() < 1e-9 {
+        finest.modulation
+    } else {
+        (twin.information / all).sqrt()
+    };
+    let off = found.counts(full_scale) / truth - 1.0;
+    assert!(off.abs() <= MODULATION, "{found:?} where B is {truth}");
+}
