@@ -1,0 +1,158 @@
+//! Shows what the kernels give and lets others count what they cost, on any machine.
+//!
+//! ```text
+//! cargo run -p algo --example probe                 one line per back-end and case: hashes of the maps
+//! cargo run -p algo --example probe decode CASE R   decodes the first R rows of one case, once
+//! ```
+//!
+//! The hashes must be those of `frozen.txt` on every machine, with every back-end: the test here says so. After a
+//! change that is meant to move bits, `probe | sed 's/[^ ]* //' | awk '!seen[$0]++'` writes that file anew.
+
+mod cases;
+mod hash;
+mod rig;
+mod scene;
+
+use algo::phase::Decoder;
+use algo::pipeline::{decode, triangulate};
+use cases::{CASES, Case};
+use hash::Hash;
+use scene::{Image, Light};
+use std::env;
+use std::error::Error;
+use std::hint::black_box;
+use std::io::{Write, stdout};
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// Sizes that leave a rest with every lane width, and one that is below all of them.
+const SIZES: [(usize, usize); 2] = [(67, 48), (13, 9)];
+/// The frames for counting: as wide as the camera's.
+const COUNTED: (usize, usize) = (1456, 48);
+
+/// The decoder with each back-end of this machine.
+fn backends(decoder: &Decoder) -> Vec<(&'static str, Decoder)> {
+    vec![("portable", decoder.clone())]
+}
+
+/// The case's name and the hashes of phase, modulation, trust and height.
+fn line(case: &Case, decoder: &Decoder) -> Outcome<String> {
+    let mut hashes = [Hash::default(); 4];
+    for (width, height) in SIZES {
+        let image = Image::new(case, Light::Everything, width, height);
+        let mut map = decode(decoder, &image.frames(height)?, image.map(case), None)?;
+        let heights = {
+            let [phase, modulation, trust, _] = &mut hashes;
+            map.phase
+                .iter()
+                .for_each(|x| phase.add(&x.to_bits().to_le_bytes()));
+            map.modulation
+                .iter()
+                .for_each(|x| modulation.add(&x.to_bits().to_le_bytes()));
+            map.trust.iter().for_each(|&x| trust.add(&[x as u8]));
+            triangulate(
+                &rig::triangulator(width, height)?,
+                decoder,
+                None,
+                None,
+                None,
+                &mut map,
+            )
+        };
+        heights
+            .height
+            .iter()
+            .for_each(|x| hashes[3].add(&x.nm().to_le_bytes()));
+    }
+    let [phase, modulation, trust, height] = hashes;
+    Ok(format!(
+        "{} {phase} {modulation} {trust} {height}",
+        case.name
+    ))
+}
+
+fn main() -> Outcome<()> {
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        [] => {
+            for case in CASES {
+                for (name, decoder) in backends(&case.decoder()?) {
+                    writeln!(stdout(), "{name} {}", line(case, &decoder)?)?;
+                }
+            }
+            Ok(())
+        }
+        ["decode", name, rows] => {
+            let case = CASES
+                .iter()
+                .find(|case| case.name == name)
+                .ok_or("no such case")?;
+            let (width, height) = COUNTED;
+            let image = Image::new(case, Light::Even, width, height);
+            let rows = rows.parse::<usize>()?.min(height);
+            black_box(decode(
+                &case.decoder()?,
+                &image.frames(rows)?,
+                image.map(case),
+                None,
+            )?);
+            Ok(())
+        }
+        _ => Err("usage: probe [decode CASE ROWS]".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use algo::phase::Trust;
+
+    #[test]
+    fn every_back_end_on_every_machine_gives_the_frozen_bits() {
+        let frozen: Vec<&str> = include_str!("frozen.txt").lines().collect();
+        for case in CASES {
+            for (name, decoder) in backends(&case.decoder().unwrap()) {
+                let line = line(case, &decoder).unwrap();
+                assert!(frozen.contains(&line.as_str()), "{name} gives\n{line}");
+            }
+        }
+        assert_eq!(frozen.len(), CASES.len());
+    }
+
+    #[test]
+    fn the_frames_show_every_reason_and_most_of_the_surface() {
+        for case in CASES {
+            let (width, height) = SIZES[0];
+            let image = Image::new(case, Light::Everything, width, height);
+            let decoder = case.decoder().unwrap();
+            let frames = image.frames(height).unwrap();
+            let mut map = decode(&decoder, &frames, image.map(case), None).unwrap();
+            let rig = rig::triangulator(width, height).unwrap();
+            triangulate(&rig, &decoder, None, None, None, &mut map);
+            for reason in Trust::REASONS {
+                // The only level is the coarsest; 8 shifts tolerate saturation; a phase within a few turns of the
+                // map is within the working range.
+                let expected = match reason {
+                    Trust::LowModulation => case.ratios.len() > 1,
+                    Trust::Saturated => case.steps < 8,
+                    Trust::OutOfRange => !case.needs_map() || case.ratios.len() > 2,
+                    _ => true,
+                };
+                assert_eq!(map.count(reason) > 0, expected, "{}: {reason:?}", case.name);
+            }
+            let resolved = map.count(Trust::Resolved);
+            assert!(3 * resolved > width * height, "{}: {resolved}", case.name);
+        }
+    }
+
+    #[test]
+    fn what_is_counted_is_resolved_everywhere() {
+        for case in CASES {
+            let (width, height) = (COUNTED.0, 4);
+            let image = Image::new(case, Light::Even, width, height);
+            let frames = image.frames(height).unwrap();
+            let map = decode(&case.decoder().unwrap(), &frames, image.map(case), None).unwrap();
+            assert_eq!(map.count(Trust::Resolved), width * height, "{}", case.name);
+        }
+    }
+}
