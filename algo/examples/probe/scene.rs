@@ -18,7 +18,7 @@ pub enum Light {
     /// Every pixel can be decoded.
     Even,
     /// Of six parts of the rows four are a part with dark, dazzling, faint and doubtful patches, one is noise alone,
-    /// and one jumps between the ends of the scale.
+    /// and one jumps between the ends of the scale and about the threshold of modulation.
     Everything,
 }
 
@@ -126,7 +126,9 @@ impl Scene {
         let below = |end: i64| (draw % (end as u64)) as i64;
         let sample = match band {
             4 => below(full + 1),
-            5 => [0, 1, full / 2, full - 1, full][below(5) as usize],
+            5 if u % 8 < 4 => [0, 1, full / 2, full - 1, full][below(5) as usize],
+            // Two such steps apart a level of 4 shifts is exactly at the threshold.
+            5 => full / 2 + 16 * full / 255 * below(3),
             _ => {
                 // Offset and modulation, 1/256 of full scale.
                 let patch = (u / 8 * 5 + v / 8 * 3) % 16;
