@@ -3,6 +3,7 @@
 #
 #     tests/aarch64/bits.sh DIR      DIR as toolchain.sh made it
 set -euo pipefail
+shopt -s inherit_errexit
 dir=${1:?usage: bits.sh DIR}
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 probe=(run --quiet --release -p algo --no-default-features --example probe)

@@ -19,8 +19,13 @@ unavailable() {
 [[ $(cat "$dir/complete" 2>/dev/null) == "$dir" ]] && exit 0
 [[ $(dpkg --print-architecture 2>/dev/null) == amd64 ]] || unavailable "this is no Debian on x86-64"
 [[ $dir != *[[:space:]]* ]] || unavailable "the linker's scripts cannot name a folder with a space: $dir"
+if [[ ! -f $dir/.toolchain && -n $(ls -A "$dir") ]]; then
+    echo "$dir holds files that are not from this script: name a folder of its own" >&2
+    exit 64
+fi
 rm -rf "$dir"
 mkdir -p "$dir"/{apt/lists/partial,apt/archives/partial,bin,root}
+touch "$dir/.toolchain"
 
 cat >"$dir/apt/apt.conf" <<END
 APT::Architectures { "amd64"; "arm64"; };

@@ -35,6 +35,7 @@ pub const CASES: &[Case] = &[
     case("geometric-2x8-8", GEOMETRIC_TWO, 8, 8),
     case("geometric-3x4-10", GEOMETRIC, 4, 10),
     case("geometric-3x3-12", GEOMETRIC, 3, 12),
+    case("geometric-3x4-12", GEOMETRIC, 4, 12),
     case("geometric-3x4-16", GEOMETRIC, 4, 16),
     case("dense-3x4-8", DENSE, 4, 8),
     case("dense-3x3-8", DENSE, 3, 8),

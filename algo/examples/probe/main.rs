@@ -2,8 +2,11 @@
 //!
 //! ```text
 //! cargo run -p algo --example probe                 one line per back-end and case: hashes of the maps
-//! cargo run -p algo --example probe decode CASE R   decodes the first R rows of one case, once
+//! cargo run -p algo --example probe decode CASE R   decodes the first R rows of one case, once, and
+//!                                                   says how many pixels that are
 //! ```
+//!
+//! CASE is a case's name, with `/background` behind it if three quarters of the frames shall be dark.
 //!
 //! The hashes must be those of `frozen.txt` on every machine, with every back-end: the test here says so. After a
 //! change that is meant to move bits, `probe | sed 's/[^ ]* //' | awk '!seen[$0]++'` writes that file anew.
@@ -82,21 +85,18 @@ fn main() -> Outcome<()> {
             }
             Ok(())
         }
-        ["decode", name, rows] => {
-            let case = CASES
-                .iter()
-                .find(|case| case.name == name)
-                .ok_or("no such case")?;
+        ["decode", counted, rows] => {
+            let (name, light) = match counted.strip_suffix("/background") {
+                Some(name) => (name, Light::Background),
+                None => (counted, Light::Even),
+            };
+            let case = CASES.iter().find(|case| case.name == name);
+            let case = case.ok_or("no such case")?;
             let (width, height) = COUNTED;
-            let image = Image::new(case, Light::Even, width, height);
-            let rows = rows.parse::<usize>()?.min(height);
-            black_box(decode(
-                &case.decoder()?,
-                &image.frames(rows)?,
-                image.map(case),
-                None,
-            )?);
-            Ok(())
+            let image = Image::new(case, light, width, height);
+            let frames = image.frames(rows.parse::<usize>()?.min(height))?;
+            let map = decode(&case.decoder()?, &frames, image.map(case), None)?;
+            Ok(writeln!(stdout(), "{}", black_box(map).phase.len())?)
         }
         _ => Err("usage: probe [decode CASE ROWS]".into()),
     }

@@ -17,6 +17,8 @@ const RISE: i64 = 20_000;
 pub enum Light {
     /// Every pixel can be decoded.
     Even,
+    /// The same in the first quarter of the columns, and no light in the others.
+    Background,
     /// Of six parts of the rows four are a part with dark, dazzling, faint and doubtful patches, one is noise alone,
     /// and one jumps between the ends of the scale and about the threshold of modulation.
     Everything,
@@ -133,7 +135,8 @@ impl Scene {
                 // Offset and modulation, 1/256 of full scale.
                 let patch = (u / 8 * 5 + v / 8 * 3) % 16;
                 let (offset, modulation) = match (self.light, patch) {
-                    (Light::Even, _) => (120, 90),
+                    (Light::Background, _) if 4 * u >= self.width => (12, 4),
+                    (Light::Even | Light::Background, _) => (120, 90),
                     (_, 0) => (12, 4),
                     (_, 1) => (170, 95),
                     (_, 2) if finest => (90, 3),
@@ -144,7 +147,7 @@ impl Scene {
                 let light = (offset << 15) + modulation * sine(turn);
                 let noise = match self.light {
                     Light::Everything => full / NOISE.0,
-                    Light::Even => full / NOISE.1,
+                    Light::Even | Light::Background => full / NOISE.1,
                 };
                 let noise = below(2 * noise + 1) - noise;
                 ((full * light) >> 23) + noise
