@@ -40,38 +40,22 @@ fn backends(decoder: &Decoder) -> Vec<(&'static str, Decoder)> {
 
 /// The case's name and the hashes of phase, modulation, trust and height.
 fn line(case: &Case, decoder: &Decoder) -> Outcome<String> {
-    let mut hashes = [Hash::default(); 4];
-    for (width, height) in SIZES {
-        let image = Image::new(case, Light::Everything, width, height);
-        let mut map = decode(decoder, &image.frames(height)?, image.map(case), None)?;
-        let heights = {
-            let [phase, modulation, trust, _] = &mut hashes;
-            map.phase
-                .iter()
-                .for_each(|x| phase.add(&x.to_bits().to_le_bytes()));
-            map.modulation
-                .iter()
-                .for_each(|x| modulation.add(&x.to_bits().to_le_bytes()));
-            map.trust.iter().for_each(|&x| trust.add(&[x as u8]));
-            triangulate(
-                &rig::triangulator(width, height)?,
-                decoder,
-                None,
-                None,
-                None,
-                &mut map,
-            )
-        };
-        heights
-            .height
-            .iter()
-            .for_each(|x| hashes[3].add(&x.nm().to_le_bytes()));
+    let [mut phase, mut modulation, mut trust, mut height] = [Hash::default(); 4];
+    for (columns, rows) in SIZES {
+        let image = Image::new(case, Light::Everything, columns, rows);
+        let mut map = decode(decoder, &image.frames(rows)?, image.map(case), None)?;
+        for at in 0..columns * rows {
+            phase.add(&map.phase[at].to_bits().to_le_bytes());
+            modulation.add(&map.modulation[at].to_bits().to_le_bytes());
+            trust.add(&[map.trust[at] as u8]);
+        }
+        let rig = rig::triangulator(columns, rows)?;
+        for z in triangulate(&rig, decoder, None, None, None, &mut map).height {
+            height.add(&z.nm().to_le_bytes());
+        }
     }
-    let [phase, modulation, trust, height] = hashes;
-    Ok(format!(
-        "{} {phase} {modulation} {trust} {height}",
-        case.name
-    ))
+    let name = case.name;
+    Ok(format!("{name} {phase} {modulation} {trust} {height}"))
 }
 
 fn main() -> Outcome<()> {
