@@ -1,0 +1,142 @@
+//! Shows what the kernels give and lets others count what they cost, on any machine.
+//!
+//! ```text
+//! cargo run -p algo --example probe                 one line per back-end and case: hashes of the maps
+//! cargo run -p algo --example probe decode CASE R   decodes the first R rows of one case, once, and
+//!                                                   says how many pixels that are
+//! ```
+//!
+//! CASE is a case's name, with `/background` behind it if three quarters of the frames shall be dark.
+//!
+//! The hashes must be those of `frozen.txt` on every machine, with every back-end: the test here says so. After a
+//! change that is meant to move bits, `probe | sed 's/[^ ]* //' | awk '!seen[$0]++'` writes that file anew.
+
+mod cases;
+mod hash;
+mod rig;
+mod scene;
+
+use algo::phase::Decoder;
+use algo::pipeline::{decode, triangulate};
+use cases::{CASES, Case};
+use hash::Hash;
+use scene::{Image, Light};
+use std::env;
+use std::error::Error;
+use std::hint::black_box;
+use std::io::{Write, stdout};
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// Sizes that leave a rest with every lane width, and one that is below all of them.
+const SIZES: [(usize, usize); 2] = [(67, 48), (13, 9)];
+/// The frames for counting: as wide as the camera's.
+const COUNTED: (usize, usize) = (1456, 48);
+
+/// The decoder with each back-end of this machine.
+fn backends(decoder: &Decoder) -> Vec<(&'static str, Decoder)> {
+    vec![("portable", decoder.clone())]
+}
+
+/// The case's name and the hashes of phase, modulation, trust and height.
+fn line(case: &Case, decoder: &Decoder) -> Outcome<String> {
+    let [mut phase, mut modulation, mut trust, mut height] = [Hash::default(); 4];
+    for (columns, rows) in SIZES {
+        let image = Image::new(case, Light::Everything, columns, rows);
+        let mut map = decode(decoder, &image.frames(rows)?, image.map(case), None)?;
+        for at in 0..columns * rows {
+            phase.add(&map.phase[at].to_bits().to_le_bytes());
+            modulation.add(&map.modulation[at].to_bits().to_le_bytes());
+            trust.add(&[map.trust[at] as u8]);
+        }
+        let rig = rig::triangulator(columns, rows)?;
+        for z in triangulate(&rig, decoder, None, None, None, &mut map).height {
+            height.add(&z.nm().to_le_bytes());
+        }
+    }
+    let name = case.name;
+    Ok(format!("{name} {phase} {modulation} {trust} {height}"))
+}
+
+fn main() -> Outcome<()> {
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        [] => {
+            for case in CASES {
+                for (name, decoder) in backends(&case.decoder()?) {
+                    writeln!(stdout(), "{name} {}", line(case, &decoder)?)?;
+                }
+            }
+            Ok(())
+        }
+        ["decode", counted, rows] => {
+            let (name, light) = match counted.strip_suffix("/background") {
+                Some(name) => (name, Light::Background),
+                None => (counted, Light::Even),
+            };
+            let case = CASES.iter().find(|case| case.name == name);
+            let case = case.ok_or("no such case")?;
+            let (width, height) = COUNTED;
+            let image = Image::new(case, light, width, height);
+            let frames = image.frames(rows.parse::<usize>()?.min(height))?;
+            let map = decode(&case.decoder()?, &frames, image.map(case), None)?;
+            Ok(writeln!(stdout(), "{}", black_box(map).phase.len())?)
+        }
+        _ => Err("usage: probe [decode CASE ROWS]".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use algo::phase::Trust;
+
+    #[test]
+    fn every_back_end_on_every_machine_gives_the_frozen_bits() {
+        let frozen: Vec<&str> = include_str!("frozen.txt").lines().collect();
+        for case in CASES {
+            for (name, decoder) in backends(&case.decoder().unwrap()) {
+                let line = line(case, &decoder).unwrap();
+                assert!(frozen.contains(&line.as_str()), "{name} gives\n{line}");
+            }
+        }
+        assert_eq!(frozen.len(), CASES.len());
+    }
+
+    #[test]
+    fn the_frames_show_every_reason_and_most_of_the_surface() {
+        for case in CASES {
+            let (width, height) = SIZES[0];
+            let image = Image::new(case, Light::Everything, width, height);
+            let decoder = case.decoder().unwrap();
+            let frames = image.frames(height).unwrap();
+            let mut map = decode(&decoder, &frames, image.map(case), None).unwrap();
+            let rig = rig::triangulator(width, height).unwrap();
+            triangulate(&rig, &decoder, None, None, None, &mut map);
+            for reason in Trust::REASONS {
+                // The only level is the coarsest; 8 shifts tolerate saturation; a phase within a few turns of the
+                // map is within the working range.
+                let expected = match reason {
+                    Trust::LowModulation => case.ratios.len() > 1,
+                    Trust::Saturated => case.steps < 8,
+                    Trust::OutOfRange => !case.needs_map() || case.ratios.len() > 2,
+                    _ => true,
+                };
+                assert_eq!(map.count(reason) > 0, expected, "{}: {reason:?}", case.name);
+            }
+            let resolved = map.count(Trust::Resolved);
+            assert!(3 * resolved > width * height, "{}: {resolved}", case.name);
+        }
+    }
+
+    #[test]
+    fn what_is_counted_is_resolved_everywhere() {
+        for case in CASES {
+            let (width, height) = (COUNTED.0, 4);
+            let image = Image::new(case, Light::Even, width, height);
+            let frames = image.frames(height).unwrap();
+            let map = decode(&case.decoder().unwrap(), &frames, image.map(case), None).unwrap();
+            assert_eq!(map.count(Trust::Resolved), width * height, "{}", case.name);
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! Frames of an uneven part, made with whole numbers only: the same on every machine.
+
+use super::Outcome;
+use super::cases::{Case, FRINGES};
+use algo::frame::{FrameView, Samples};
+use algo::units::AbsolutePhase;
+
+/// Samples between the end of a row and the next.
+const PADDING: usize = 3;
+/// Half of the noise's width on an uneven and on an even scene, as a share 1/n of full scale.
+const NOISE: (i64, i64) = (60, 250);
+/// The part rises by this share of a turn, in 1/65536: less than half, so that one level about a map is enough.
+const RISE: i64 = 20_000;
+
+/// What the light does.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Light {
+    /// Every pixel can be decoded.
+    Even,
+    /// The same in the first quarter of the columns, and no light in the others.
+    Background,
+    /// Of six parts of the rows four are a part with dark, dazzling, faint and doubtful patches, one is noise alone,
+    /// and one jumps between the ends of the scale and about the threshold of modulation.
+    Everything,
+}
+
+/// The frames of one case and the map about which they are unwrapped.
+pub struct Image {
+    eight: Vec<Vec<u8>>,
+    sixteen: Vec<Vec<u16>>,
+    map: Vec<AbsolutePhase>,
+    width: usize,
+}
+
+impl Image {
+    /// Exposes `width` × `height` pixels.
+    pub fn new(case: &Case, light: Light, width: usize, height: usize) -> Self {
+        let scene = Scene {
+            full: (1 << case.bits) - 1,
+            light,
+            width,
+            height,
+        };
+        let mut random = Random(u64::from(case.bits) << 8 | case.steps as u64);
+        let frames = case.frames().map(|(ratio, k)| {
+            let mut samples = vec![0; (width + PADDING) * height];
+            for (v, row) in samples.chunks_mut(width + PADDING).enumerate() {
+                for (u, sample) in row.iter_mut().enumerate() {
+                    let turn = scene.turn(u, v, ratio) + (65_536 * k / case.steps) as i64;
+                    *sample = scene.sample(u, v, turn as u16, ratio == 1.0, &mut random);
+                }
+            }
+            samples
+        });
+        let frames: Vec<Vec<u16>> = frames.collect();
+        let byte = |frame: &Vec<u16>| frame.iter().map(|&sample| sample as u8).collect();
+        let map = (0..width * height).map(|at| scene.known(at % width));
+        Self {
+            eight: if case.bits == 8 {
+                frames.iter().map(byte).collect()
+            } else {
+                Vec::new()
+            },
+            map: map.collect(),
+            sixteen: frames,
+            width,
+        }
+    }
+
+    /// The first `rows` rows.
+    pub fn frames(&self, rows: usize) -> Outcome<Vec<FrameView<'_>>> {
+        let view = |samples| FrameView::new(samples, self.width, rows, self.width + PADDING);
+        let views: Result<Vec<_>, _> = if self.eight.is_empty() {
+            let frames = self.sixteen.iter();
+            frames.map(|frame| view(Samples::Sixteen(frame))).collect()
+        } else {
+            self.eight
+                .iter()
+                .map(|frame| view(Samples::Eight(frame)))
+                .collect()
+        };
+        Ok(views?)
+    }
+
+    /// The map, where the case needs one.
+    pub fn map(&self, case: &Case) -> Option<&[AbsolutePhase]> {
+        case.needs_map().then_some(&self.map[..])
+    }
+}
+
+struct Scene {
+    full: i64,
+    light: Light,
+    width: usize,
+    height: usize,
+}
+
+impl Scene {
+    /// Φ of the plane, 1/65536 turn: from one fringe to the last but one.
+    fn plane(&self, u: usize) -> i64 {
+        65_536 + (FRINGES - 2) * 65_536 * u as i64 / self.width as i64
+    }
+
+    /// Φ that is known beforehand; not everywhere.
+    fn known(&self, u: usize) -> AbsolutePhase {
+        if self.light == Light::Everything && u % 16 == 7 {
+            return AbsolutePhase::UNKNOWN;
+        }
+        AbsolutePhase::from_bits((self.plane(u) + RISE / 2) as i32)
+    }
+
+    /// The phase of a level, 1/65536 turn: the part is an arch over the rows.
+    fn turn(&self, u: usize, v: usize, ratio: f64) -> i64 {
+        let (v, height) = (v as i64, self.height as i64);
+        let phase = self.plane(u) + 4 * RISE * v * (height - v) / (height * height);
+        // A power of two times a number is exact.
+        (phase * (ratio * f64::from(1 << 30)) as i64) >> 30
+    }
+
+    fn sample(&self, u: usize, v: usize, turn: u16, finest: bool, random: &mut Random) -> u16 {
+        let draw = random.next();
+        let band = if self.light == Light::Everything {
+            6 * v / self.height
+        } else {
+            0
+        };
+        let full = self.full;
+        let below = |end: i64| (draw % (end as u64)) as i64;
+        let sample = match band {
+            4 => below(full + 1),
+            5 if u % 8 < 4 => [0, 1, full / 2, full - 1, full][below(5) as usize],
+            // Two such steps apart a level of 4 shifts is exactly at the threshold.
+            5 => full / 2 + 16 * full / 255 * below(3),
+            _ => {
+                // Offset and modulation, 1/256 of full scale.
+                let patch = (u / 8 * 5 + v / 8 * 3) % 16;
+                let (offset, modulation) = match (self.light, patch) {
+                    (Light::Background, _) if 4 * u >= self.width => (12, 4),
+                    (Light::Even | Light::Background, _) => (120, 90),
+                    (_, 0) => (12, 4),
+                    (_, 1) => (170, 95),
+                    (_, 2) if finest => (90, 3),
+                    // Through the threshold of 16 of 255 counts.
+                    (_, 3) => (60, 14 + (u % 8) as i64 / 2),
+                    (_, patch) => (110, 30 + 5 * patch as i64),
+                };
+                let light = (offset << 15) + modulation * sine(turn);
+                let noise = match self.light {
+                    Light::Everything => full / NOISE.0,
+                    Light::Even | Light::Background => full / NOISE.1,
+                };
+                let noise = below(2 * noise + 1) - noise;
+                ((full * light) >> 23) + noise
+            }
+        };
+        sample.clamp(0, full) as u16
+    }
+}
+
+/// sin of 1/65536 turns in Q15, within 0.2 %: a parabola, mended by its own square.
+fn sine(turn: u16) -> i64 {
+    let x = i64::from(turn as i16);
+    let y = (4 * x * (32_768 - x.abs())) >> 15;
+    y + ((29 * (((y * y.abs()) >> 15) - y)) >> 7)
+}
+
+/// SplitMix64 (Steele, Lea & Flood 2014).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+}

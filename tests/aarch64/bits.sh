@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# Compares the bits of every back-end of this machine and of aarch64 (under qemu) with each other and with the frozen ones.
+#
+#     tests/aarch64/bits.sh DIR      DIR as toolchain.sh made it
+set -euo pipefail
+shopt -s inherit_errexit
+dir=${1:?usage: bits.sh DIR}
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+probe=(run --quiet --release -p algo --no-default-features --example probe)
+frozen=algo/examples/probe/frozen.txt
+
+here=$(cargo "${probe[@]}")
+there=$("$dir/bin/cargo" "${probe[@]}")
+for machine in here there; do
+    for back_end in $(cut -d ' ' -f 1 <<<"${!machine}" | sort -u); do
+        if ! diff "$frozen" <(sed -n "s/^$back_end //p" <<<"${!machine}"); then
+            echo "$back_end $machine (>) does not give the frozen bits (<)" >&2
+            exit 1
+        fi
+        echo "$back_end $machine: $(wc -l <"$frozen") cases as frozen"
+    done
+done

@@ -1,0 +1,71 @@
+#!/usr/bin/env bash
+# Counts the instructions per pixel of what `ceilings.txt` names, exactly, and fails where a ceiling is exceeded.
+#
+#     tests/aarch64/cost.sh DIR             DIR as toolchain.sh made it
+#     tests/aarch64/cost.sh DIR record      writes what is counted now, plus 2 %, as the new ceilings
+#
+# The program decodes two heights of the same frames; in the difference everything that does not grow with them cancels.
+set -euo pipefail
+shopt -s inherit_errexit
+dir=$(cd "${1:?usage: cost.sh DIR [record]}" && pwd)
+mode=${2:-check}
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+ceilings=tests/aarch64/ceilings.txt
+few=16 many=48 # rows
+# Another compiler may need a few instructions more: new ceilings stand this share above what was counted.
+headroom=0.02
+# A ceiling further above than this holds nothing.
+slack=0.03
+
+build=(build --quiet --release -p algo --no-default-features --example probe)
+cargo "${build[@]}"
+"$dir/bin/cargo" "${build[@]}"
+declare -A probe=(
+    [aarch64]=$dir/build/aarch64-unknown-linux-gnu/release/examples/probe
+    [x86_64]=${CARGO_TARGET_DIR:-target}/release/examples/probe
+)
+cc -shared -fPIC -O2 -o "$dir/count.so" tests/aarch64/count.c
+
+# counts MACHINE CASE ROWS FILE: writes "count symbol" for every symbol, and prints the number of pixels.
+counts() {
+    "$dir/bin/qemu-$1" -d plugin -D "$4.raw" -plugin "$dir/count.so" "${probe[$1]}" decode "$2" "$3"
+    c++filt <"$4.raw" >"$4"
+}
+
+failed=0 recorded=
+while read -r machine case part ceiling; do
+    if [[ -z $machine || $machine == '#'* ]]; then
+        recorded+="$machine${case:+ $case}${part:+ $part}${ceiling:+ $ceiling}"$'\n'
+        continue
+    fi
+    less=$(counts "$machine" "$case" $few "$dir/few")
+    more=$(counts "$machine" "$case" $many "$dir/many")
+    # Instructions per pixel of every symbol that grows, the largest first.
+    awk -v pixels=$((more - less)) '
+        { count = $1; sub(/^[0-9]+ /, ""); grown[$0] += FILENAME ~ /few$/ ? -count : count }
+        END { for (symbol in grown) if (grown[symbol]) printf "%.3f %s\n", grown[symbol] / pixels, symbol }
+    ' "$dir/few" "$dir/many" | sort -rn >"$dir/grown"
+    counted=$(awk -v part="$part" '
+        part == "all" && $2 != "-" || index($0, part) { sum += $1 }
+        END { printf "%.2f", sum }' "$dir/grown")
+    echo "$machine $case $part: $counted instructions/px, ceiling $ceiling"
+    awk '$1 >= 0.5 { print "    " $0 }' "$dir/grown"
+    recorded+="$machine $case $part $(awk -v n="$counted" -v h=$headroom 'BEGIN { printf "%.1f", n * (1 + h) + 0.05 }')"$'\n'
+    [[ $mode == check ]] || continue
+    case $(awk -v n="$counted" -v c="$ceiling" -v s=$slack 'BEGIN { print (n > c ? "above" : n <= 0 ? "none" : n < c * (1 - s) ? "below" : "at") }') in
+    above)
+        echo "    FAILED: above the ceiling" >&2
+        failed=1
+        ;;
+    none)
+        echo "    FAILED: nothing of that name was executed" >&2
+        failed=1
+        ;;
+    below) echo "    more than 3 % below the ceiling: lower it ($0 $1 record)" ;;
+    esac
+done <"$ceilings"
+
+if [[ $mode == record ]]; then
+    printf '%s' "$recorded" >"$ceilings"
+fi
+exit $failed
