@@ -11,7 +11,7 @@
 #![no_std]
 
 extern crate alloc;
-#[cfg(any(test, feature = "parallel"))]
+#[cfg(any(test, feature = "std"))]
 extern crate std;
 
 pub mod adaptive;

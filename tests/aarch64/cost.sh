@@ -17,7 +17,7 @@ headroom=0.02
 # A ceiling further above than this holds nothing.
 slack=0.03
 
-build=(build --quiet --release -p algo --no-default-features --example probe)
+build=(build --quiet --release -p algo --no-default-features --features std --example probe)
 cargo "${build[@]}"
 "$dir/bin/cargo" "${build[@]}"
 declare -A probe=(

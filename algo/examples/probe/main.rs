@@ -6,7 +6,8 @@
 //!                                                   says how many pixels that are
 //! ```
 //!
-//! CASE is a case's name, with `/background` behind it if three quarters of the frames shall be dark.
+//! CASE is a case's name, with `/background` behind it if three quarters of the frames shall be dark, or `/arrival` if the
+//! coarser levels shall be demodulated first.
 //!
 //! The hashes must be those of `frozen.txt` on every machine, with every back-end: the test here says so. After a
 //! change that is meant to move bits, `probe | sed 's/[^ ]* //' | awk '!seen[$0]++'` writes that file anew.
@@ -16,8 +17,11 @@ mod hash;
 mod rig;
 mod scene;
 
-use algo::phase::Decoder;
-use algo::pipeline::{decode, triangulate};
+use algo::frame::FrameView;
+use algo::phase::{Decoder, Wrapped};
+use algo::pipeline::{PhaseMap, decode, decode_last, triangulate, wrap};
+use algo::simd::Backend;
+use algo::units::AbsolutePhase;
 use cases::{CASES, Case};
 use hash::Hash;
 use scene::{Image, Light};
@@ -35,7 +39,29 @@ const COUNTED: (usize, usize) = (1456, 48);
 
 /// The decoder with each back-end of this machine.
 fn backends(decoder: &Decoder) -> Vec<(&'static str, Decoder)> {
-    vec![("portable", decoder.clone())]
+    Backend::available()
+        .map(|backend| (backend.name(), decoder.clone().with_backend(backend)))
+        .collect()
+}
+
+/// Decodes level by level, as the frames of each are there.
+fn arrival(
+    decoder: &Decoder,
+    frames: &[FrameView<'_>],
+    map: Option<&[AbsolutePhase]>,
+) -> Outcome<PhaseMap> {
+    let (width, height) = (frames[0].width(), frames[0].height());
+    let mut before: Vec<Wrapped> = Vec::new();
+    for (level, places) in decoder.levels().enumerate() {
+        let frames: Vec<_> = places.iter().map(|&at| frames[at]).collect();
+        if level + 1 == decoder.levels().len() {
+            return Ok(decode_last(decoder, &before, &frames, map, None)?);
+        }
+        let mut wrapped = Wrapped::new(width, height);
+        wrap(decoder, level, &frames, before.first(), &mut wrapped)?;
+        before.push(wrapped);
+    }
+    Err("a sequence has levels".into())
 }
 
 /// The case's name and the hashes of phase, modulation, trust and height.
@@ -70,16 +96,21 @@ fn main() -> Outcome<()> {
             Ok(())
         }
         ["decode", counted, rows] => {
-            let (name, light) = match counted.strip_suffix("/background") {
-                Some(name) => (name, Light::Background),
-                None => (counted, Light::Even),
+            let (name, way) = counted.split_once('/').unwrap_or((counted, ""));
+            let light = match way {
+                "background" => Light::Background,
+                _ => Light::Even,
             };
             let case = CASES.iter().find(|case| case.name == name);
             let case = case.ok_or("no such case")?;
             let (width, height) = COUNTED;
             let image = Image::new(case, light, width, height);
             let frames = image.frames(rows.parse::<usize>()?.min(height))?;
-            let map = decode(&case.decoder()?, &frames, image.map(case), None)?;
+            let decoder = case.decoder()?;
+            let map = match way {
+                "arrival" => arrival(&decoder, &frames, image.map(case))?,
+                _ => decode(&decoder, &frames, image.map(case), None)?,
+            };
             Ok(writeln!(stdout(), "{}", black_box(map).phase.len())?)
         }
         _ => Err("usage: probe [decode CASE ROWS]".into()),

@@ -13,9 +13,9 @@ pub(crate) struct Avx2(());
 impl Avx2 {
     /// The proof, where this processor and its operating system have AVX2.
     pub fn detect() -> Option<Self> {
-        #[cfg(feature = "parallel")]
+        #[cfg(feature = "std")]
         let there = std::is_x86_feature_detected!("avx2");
-        #[cfg(not(feature = "parallel"))]
+        #[cfg(not(feature = "std"))]
         let there = cfg!(target_feature = "avx2");
         there.then_some(Self(()))
     }
