@@ -43,10 +43,10 @@ pub(super) fn arctangent<V: Lanes>(v: V, t: V::W) -> V::W {
 
 /// length · √(1 + t²) · (what `coefficients` have been multiplied by).
 #[inline(always)]
-pub(super) fn hypotenuse<V: Lanes>(v: V, length: V::W, t: V::W, coefficients: [i16; 3]) -> V::W {
+pub(super) fn hypotenuse<V: Lanes>(v: V, length: V::W, t: V::W, coefficients: [V::W; 3]) -> V::W {
     let [c0, c1, c2] = coefficients;
     let square = v.mul_q15(t, t);
-    let root = v.add(v.mul_q15(square, v.splat16(c2)), v.splat16(c1));
-    let root = v.add(v.mul_q15(square, root), v.splat16(c0));
+    let root = v.add(v.mul_q15(square, c2), c1);
+    let root = v.add(v.mul_q15(square, root), c0);
     v.mul_q15(length, root)
 }

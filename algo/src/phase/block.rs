@@ -1,11 +1,13 @@
 //! A row, block by block: the levels of a block → its absolute phase, modulation and trust.
 
-use super::about::{About, Known, MAX_ABOUT};
+use super::about::{About, AboutLanes, MAX_ABOUT};
 use super::decode::PhaseRow;
 use super::fold::BlockSample;
-use super::geometric::{Climb, Geometric};
-use super::level::{Demodulated, Level};
+use super::geometric::Geometric;
+use super::level::{Level, LevelLanes};
+use super::step::{StepLanes, Turns};
 use super::trust::Trust;
+use super::unwrap::too_far;
 use super::wrapped::{WrappedRow, WrappedRowMut};
 use crate::pattern::MAX_LEVELS;
 use crate::simd::{Lanes, back_end_entry, plain};
@@ -68,17 +70,19 @@ fn next_block<V: Lanes>(at: usize, columns: &Range<usize>) -> Option<usize> {
     Some(at.min(columns.end - V::PIXELS))
 }
 
+/// The levels of a row with every constant in all lanes.
 #[inline(always)]
-fn level_block<V: Lanes, T: BlockSample, const MODULATION: bool>(
+fn in_lanes<'a, V: Lanes, T: BlockSample>(
     v: V,
-    level: &Level,
-    row: &LevelRow<'_, T>,
-    at: usize,
-) -> Demodulated<V> {
-    match row {
-        LevelRow::Frames(rows) => level.demodulate::<V, T, MODULATION>(v, rows, at),
-        LevelRow::Wrapped(row) => row.block(v, at),
+    levels: &'a [Level],
+    rows: &'a [LevelRow<'a, T>],
+) -> heapless::Vec<LevelLanes<'a, V, T>, MAX_LEVELS> {
+    let mut lanes = heapless::Vec::new();
+    for (level, row) in levels.iter().zip(rows) {
+        // A sequence has no more levels than fit.
+        let _ = lanes.push(LevelLanes::new(v, level, *row));
     }
+    lanes
 }
 
 #[inline(always)]
@@ -97,15 +101,29 @@ fn geometric_columns<V: Lanes, T: BlockSample>(
     } = out;
     let phases = plain::phase_bits_mut(phase);
     let modulations = plain::modulation_bits_mut(modulation);
-    let finest = levels.len() - 1;
+    let levels = in_lanes(v, levels, rows);
+    let mut steps: heapless::Vec<StepLanes<V>, MAX_LEVELS> = heapless::Vec::new();
+    for step in &plan.steps {
+        let _ = steps.push(StepLanes::new(v, step));
+    }
+    let (Some(coarsest), Some(finest)) = (levels.first(), levels.last()) else {
+        return;
+    };
+    let (last, between) = match steps.split_last() {
+        Some((last, between)) => (Some(last), between),
+        None => (None, &[][..]),
+    };
     let zero = v.splat16(0);
+    let middle = v.splat16(plan.middle as i16);
+    let origin = v.splat16((plan.origin >> 16) as i16);
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
-        let mut here = if finest == 0 {
-            level_block::<V, T, true>(v, &levels[0], &rows[0], at)
+        // Of a single level the coarsest is the finest.
+        let mut here = if steps.is_empty() {
+            finest.block::<true>(v, at)
         } else {
-            level_block::<V, T, false>(v, &levels[0], &rows[0], at)
+            coarsest.block::<false>(v, at)
         };
         let dark = here.weak;
         if v.all8(dark) {
@@ -118,60 +136,81 @@ fn geometric_columns<V: Lanes, T: BlockSample>(
             );
             continue;
         }
-        let lowest = v.splat16(plan.lowest as i16);
-        let mut low = Climb::<V> {
+        let mut low = Turns::<V> {
             order: zero,
-            phase: v.sub(here.phase[0], lowest),
-            doubtful: zero,
+            phase: v.sub(here.phase[0], middle),
         };
-        let mut high = Climb::<V> {
+        let mut high = Turns::<V> {
             order: zero,
-            phase: v.sub(here.phase[1], lowest),
-            doubtful: zero,
+            phase: v.sub(here.phase[1], middle),
         };
+        let mut left = [zero; 2];
         let mut weak = v.splat8(0);
         let mut saturated = here.saturated;
-        for (place, step) in plan.steps.iter().enumerate() {
-            let level = place + 1;
-            here = if level == finest {
-                level_block::<V, T, true>(v, &levels[level], &rows[level], at)
-            } else {
-                level_block::<V, T, false>(v, &levels[level], &rows[level], at)
-            };
+        for (level, step) in levels.iter().skip(1).zip(between) {
+            here = level.block::<false>(v, at);
             weak = v.or8(weak, here.weak);
             saturated = v.or8(saturated, here.saturated);
-            low = step.climb(v, low, here.phase[0]);
-            high = step.climb(v, high, here.phase[1]);
+            let (left_low, left_high);
+            (low, left_low) = step.climb(v, low, here.phase[0]);
+            (high, left_high) = step.climb(v, high, here.phase[1]);
+            left = [
+                v.max_unsigned(left[0], left_low),
+                v.max_unsigned(left[1], left_high),
+            ];
         }
-        let doubtful = v.narrow_mask([low.doubtful, high.doubtful]);
+        if let Some(step) = last {
+            here = finest.block::<true>(v, at);
+            weak = v.or8(weak, here.weak);
+            saturated = v.or8(saturated, here.saturated);
+            let (left_low, left_high);
+            (low, left_low) = step.climb(v, low, here.phase[0]);
+            (high, left_high) = step.climb(v, high, here.phase[1]);
+            left = [
+                v.max_unsigned(left[0], left_low),
+                v.max_unsigned(left[1], left_high),
+            ];
+        }
+        let doubtful = v.narrow_mask([too_far(v, left[0]), too_far(v, left[1])]);
         let verdict = Verdict {
             dark,
             weak,
             saturated,
             doubtful,
         };
-        let found = [v.join(low.phase, low.order), v.join(high.phase, high.order)];
-        let origin = v.splat32(plan.origin);
+        let reason = verdict.trust(v);
+        let trusted = v.eq8(reason, v.splat8(Trust::Resolved as u8));
+        let trusted = v.widen(trusted, trusted);
+        let unknown = v.splat16(i16::MIN);
+        // Half a turn below is the other half of the turn before.
+        let low_order = v.add(v.add(low.order, origin), v.sar::<15>(low.phase));
+        let high_order = v.add(v.add(high.order, origin), v.sar::<15>(high.phase));
+        let low_order = v.pick(trusted[0], low_order, unknown);
+        let high_order = v.pick(trusted[1], high_order, unknown);
         let found = [
-            [v.add32(found[0][0], origin), v.add32(found[0][1], origin)],
-            [v.add32(found[1][0], origin), v.add32(found[1][1], origin)],
+            v.join(v.and(low.phase, trusted[0]), low_order),
+            v.join(v.and(high.phase, trusted[1]), high_order),
         ];
-        store(
-            v,
-            verdict.trust(v),
-            v.or8(dark, weak),
-            found,
-            here.modulation,
-            (&mut *phases, &mut *modulations, &mut *trust),
-            at,
-        );
+        v.store32(phases, at, found);
+        store_modulation(v, v.or8(dark, weak), here.modulation, modulations, at);
+        plain::store_trust(v, trust, at, reason);
     }
-    if let Some(scale) = plan.scale {
-        for phase in &mut phases[columns] {
-            if *phase != AbsolutePhase::UNKNOWN.to_bits() {
-                let scaled = (i64::from(*phase) * scale + (1 << 19)) >> 20;
-                *phase = AbsolutePhase::saturate(scaled).to_bits();
-            }
+    finish(plan, &mut phases[columns]);
+}
+
+/// What few sequences need: an origin between two orders (of a single level), a finest ratio that is not 1.
+fn finish(plan: &Geometric, phases: &mut [i32]) {
+    let part = plan.origin & 0xFFFF;
+    if part == 0 && plan.scale.is_none() {
+        return;
+    }
+    for phase in phases {
+        if *phase != AbsolutePhase::UNKNOWN.to_bits() {
+            let whole = i64::from(*phase) + i64::from(part);
+            let scaled = plan
+                .scale
+                .map_or(whole, |scale| (whole * scale + (1 << 19)) >> 20);
+            *phase = AbsolutePhase::saturate(scaled).to_bits();
         }
     }
 }
@@ -207,35 +246,15 @@ fn store_unknown<V: Lanes>(v: V, reason: V::B, (phases, modulations, trusts): Ro
     plain::store_trust(v, trusts, at, reason);
 }
 
-/// Stores a block: the phase only where it is trusted, the modulation only where it is not weak.
+/// Stores the modulation of a block where it is not weak.
 #[inline(always)]
-fn store<V: Lanes>(
+fn store_modulation<V: Lanes>(
     v: V,
-    trust: V::B,
     weak: V::B,
-    found: [[V::D; 2]; 2],
     modulation: [V::W; 2],
-    (phases, modulations, trusts): Row<'_>,
+    modulations: &mut [u16],
     at: usize,
 ) {
-    let trusted = v.eq8(trust, v.splat8(Trust::Resolved as u8));
-    let trusted = v.widen(trusted, trusted);
-    let (low, high) = (
-        v.join(trusted[0], trusted[0]),
-        v.join(trusted[1], trusted[1]),
-    );
-    let unknown = v.splat32(AbsolutePhase::UNKNOWN.to_bits());
-    let known = [
-        [
-            v.pick32(low[0], found[0][0], unknown),
-            v.pick32(low[1], found[0][1], unknown),
-        ],
-        [
-            v.pick32(high[0], found[1][0], unknown),
-            v.pick32(high[1], found[1][1], unknown),
-        ],
-    ];
-    v.store32(phases, at, known);
     let weak = v.widen(weak, weak);
     let zero = v.splat16(0);
     let strong = [
@@ -243,7 +262,6 @@ fn store<V: Lanes>(
         v.pick(weak[1], zero, v.add(modulation[1], modulation[1])),
     ];
     v.store16(modulations, at, strong);
-    plain::store_trust(v, trusts, at, trust);
 }
 
 #[inline(always)]
@@ -264,6 +282,11 @@ fn about_columns<V: Lanes, T: BlockSample>(
     let phases = plain::phase_bits_mut(phase);
     let modulations = plain::modulation_bits_mut(modulation);
     let map = plain::phase_bits(map);
+    let levels = in_lanes(v, levels, rows);
+    let Some(first) = levels.first() else {
+        return;
+    };
+    let about = AboutLanes::new(v, plan);
     let unknown = v.splat32(AbsolutePhase::UNKNOWN.to_bits());
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
@@ -283,7 +306,7 @@ fn about_columns<V: Lanes, T: BlockSample>(
             );
             continue;
         }
-        let coarsest = level_block::<V, T, true>(v, &levels[0], &rows[0], at);
+        let coarsest = first.block::<true>(v, at);
         let dark = v.or8(unexpected, coarsest.weak);
         if v.all8(dark) {
             let reason = v.pick8(
@@ -306,13 +329,13 @@ fn about_columns<V: Lanes, T: BlockSample>(
             saturated: coarsest.saturated,
             doubtful: v.splat8(0),
         };
-        for (level, found) in found.iter_mut().enumerate().take(levels.len()).skip(1) {
-            *found = level_block::<V, T, true>(v, &levels[level], &rows[level], at);
+        for (level, found) in levels.iter().zip(&mut found).skip(1) {
+            *found = level.block::<true>(v, at);
             verdict.weak = v.or8(verdict.weak, found.weak);
             verdict.saturated = v.or8(verdict.saturated, found.saturated);
         }
-        let low = plan.unwrap(v, Known { map: known[0] }, &found, 0);
-        let high = plan.unwrap(v, Known { map: known[1] }, &found, 1);
+        let low = about.unwrap(v, known[0], &found, 0);
+        let high = about.unwrap(v, known[1], &found, 1);
         verdict.doubtful = v.narrow_mask([low.doubtful, high.doubtful]);
         let reason = v.pick8(
             unexpected,
@@ -320,15 +343,25 @@ fn about_columns<V: Lanes, T: BlockSample>(
             verdict.trust(v),
         );
         let weak = v.or8(unexpected, v.or8(verdict.dark, verdict.weak));
-        store(
-            v,
-            reason,
-            weak,
-            [low.phase, high.phase],
-            [low.modulation, high.modulation],
-            (&mut *phases, &mut *modulations, &mut *trust),
-            at,
+        let trusted = v.eq8(reason, v.splat8(Trust::Resolved as u8));
+        let trusted = v.widen(trusted, trusted);
+        let (low_mask, high_mask) = (
+            v.join(trusted[0], trusted[0]),
+            v.join(trusted[1], trusted[1]),
         );
+        let phase = [
+            [
+                v.pick32(low_mask[0], low.phase[0], unknown),
+                v.pick32(low_mask[1], low.phase[1], unknown),
+            ],
+            [
+                v.pick32(high_mask[0], high.phase[0], unknown),
+                v.pick32(high_mask[1], high.phase[1], unknown),
+            ],
+        ];
+        v.store32(phases, at, phase);
+        store_modulation(v, weak, [low.modulation, high.modulation], modulations, at);
+        plain::store_trust(v, trust, at, reason);
     }
 }
 
@@ -341,14 +374,17 @@ fn wrap_columns<V: Lanes, T: BlockSample>(
     columns: Range<usize>,
     mut out: WrappedRowMut<'_>,
 ) {
+    let level = LevelLanes::new(v, level, LevelRow::Frames(row));
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
-        if before.is_some_and(|before| v.all8(before.weak(v, at))) {
-            out.store_weak(v, at);
-            continue;
+        if let Some(before) = &before {
+            if v.all8(before.weak(v, at)) {
+                out.store_weak(v, at);
+                continue;
+            }
         }
-        let found = level.demodulate::<V, T, true>(v, row, at);
+        let found = level.block::<true>(v, at);
         out.store(v, at, &found);
     }
 }

@@ -7,9 +7,9 @@
 //! - N = 3: S = (2I₀ − I₁ − I₂)/2, C = (√3/2)(I₁ − I₂).
 //! - any other N, and 3 or 4 of more than 12 bits: sums of products in 32 bits, with as many bits of weight as fit.
 
-use super::level::{Level, Samples};
+use super::level::{LevelLanes, Samples};
 use crate::frame::Sample;
-use crate::simd::Lanes;
+use crate::simd::{Four, Lanes};
 
 /// Where the pointer lies: in the first octant after folding, and how to unfold.
 pub(super) struct Folded<V: Lanes> {
@@ -32,23 +32,27 @@ pub(super) struct Folded<V: Lanes> {
 /// A sample that blocks of pixels can be made of.
 pub(crate) trait BlockSample: Sample {
     /// Demodulation of four equally spaced shifts, the quickest that there is for this width.
-    fn four<V: Lanes>(v: V, level: &Level, rows: [&[Self]; 4], at: usize) -> Folded<V>;
+    fn four<V: Lanes>(
+        v: V,
+        level: &LevelLanes<'_, V, Self>,
+        rows: &Four<'_, Self>,
+        at: usize,
+    ) -> Folded<V>;
     /// A block of samples as words.
     fn words<V: Lanes>(v: V, row: &[Self], at: usize) -> [V::W; 2];
     /// Mask: the sample is at full scale or above.
-    fn saturated<V: Lanes>(v: V, level: &Level, row: &[Self], at: usize) -> V::B;
+    fn saturated<V: Lanes>(v: V, level: &LevelLanes<'_, V, Self>, row: &[Self], at: usize) -> V::B;
 }
 
 /// Folds the block at `at` of a level's rows.
 #[inline(always)]
 pub(super) fn fold<V: Lanes, T: BlockSample>(
     v: V,
-    level: &Level,
+    level: &LevelLanes<'_, V, T>,
     rows: &[&[T]],
     at: usize,
 ) -> Folded<V> {
-    match (&level.samples, rows) {
-        (Samples::Four, &[a, b, c, d]) => T::four(v, level, [a, b, c, d], at),
+    match (&level.plan.samples, rows) {
         (Samples::Three, &[a, b, c]) => three(v, level, [a, b, c], at),
         (Samples::Weighted(weights), rows) => weighted(v, level, weights, rows, at),
         // A level is prepared with as many rows as it has shifts.
@@ -65,10 +69,13 @@ const LEAST_8_BIT: u8 = 32;
 
 impl BlockSample for u8 {
     #[inline(always)]
-    fn four<V: Lanes>(v: V, _level: &Level, rows: [&[Self]; 4], at: usize) -> Folded<V> {
-        let [a, b, c, d] = rows;
-        let (a, b) = (v.load8(a, at), v.load8(b, at));
-        let (c, d) = (v.load8(c, at), v.load8(d, at));
+    fn four<V: Lanes>(
+        v: V,
+        _level: &LevelLanes<'_, V, Self>,
+        rows: &Four<'_, Self>,
+        at: usize,
+    ) -> Folded<V> {
+        let [a, b, c, d] = v.load8_of_four(rows, at);
         let zero = v.splat8(0);
         let (s_up, c_up) = (v.sub_sat8(a, c), v.sub_sat8(b, d));
         let s = v.or8(s_up, v.sub_sat8(c, a));
@@ -85,11 +92,11 @@ impl BlockSample for u8 {
         let power = v.sum_of_squares(v.min8(s, least), v.min8(c_, least));
         let enough = v.splat16(i16::from(LEAST_8_BIT) * i16::from(LEAST_8_BIT));
         let brightest = v.max8(v.max8(a, b), v.max8(c, d));
-        let [length_0, length_1] = v.widen(zero, long);
+        let length = v.widen(zero, long);
         Folded {
             long: v.widen_scaled(long, scale),
             short: v.widen_scaled(short, scale),
-            length: [v.shr_by(length_0, 1), v.shr_by(length_1, 1)],
+            length: [v.shr::<1>(length[0]), v.shr::<1>(length[1])],
             backwards: v.widen(backwards, backwards),
             axis: v.widen(v.and8(backwards, v.splat8(1)), axis),
             weak: v.narrow_mask([v.gt(enough, power[0]), v.gt(enough, power[1])]),
@@ -103,15 +110,25 @@ impl BlockSample for u8 {
     }
 
     #[inline(always)]
-    fn saturated<V: Lanes>(v: V, _level: &Level, row: &[Self], at: usize) -> V::B {
+    fn saturated<V: Lanes>(
+        v: V,
+        _level: &LevelLanes<'_, V, Self>,
+        row: &[Self],
+        at: usize,
+    ) -> V::B {
         v.eq8(v.load8(row, at), v.splat8(u8::MAX))
     }
 }
 
 impl BlockSample for u16 {
     #[inline(always)]
-    fn four<V: Lanes>(v: V, level: &Level, rows: [&[Self]; 4], at: usize) -> Folded<V> {
-        let [a, b, c, d] = rows;
+    fn four<V: Lanes>(
+        v: V,
+        level: &LevelLanes<'_, V, Self>,
+        rows: &Four<'_, Self>,
+        at: usize,
+    ) -> Folded<V> {
+        let [a, b, c, d] = rows.rows();
         let (a, b) = (v.load16(a, at), v.load16(b, at));
         let (c, d) = (v.load16(c, at), v.load16(d, at));
         let s = [
@@ -139,7 +156,7 @@ impl BlockSample for u16 {
     }
 
     #[inline(always)]
-    fn saturated<V: Lanes>(v: V, level: &Level, row: &[Self], at: usize) -> V::B {
+    fn saturated<V: Lanes>(v: V, level: &LevelLanes<'_, V, Self>, row: &[Self], at: usize) -> V::B {
         let x = v.load16(row, at);
         v.narrow_mask([
             any_full(v, level, x[0], x[0], x[0], x[0]),
@@ -150,20 +167,27 @@ impl BlockSample for u16 {
 
 /// Mask: one of the samples is at full scale or above.
 #[inline(always)]
-fn any_full<V: Lanes>(v: V, level: &Level, a: V::W, b: V::W, c: V::W, d: V::W) -> V::W {
+fn any_full<V: Lanes, T>(
+    v: V,
+    level: &LevelLanes<'_, V, T>,
+    a: V::W,
+    b: V::W,
+    c: V::W,
+    d: V::W,
+) -> V::W {
     // With the sign bit turned the order of unsigned words is that of signed ones.
     let turn = v.splat16(i16::MIN);
     let (a, b) = (v.xor(a, turn), v.xor(b, turn));
     let (c, d) = (v.xor(c, turn), v.xor(d, turn));
     let brightest = v.max(v.max(a, b), v.max(c, d));
-    v.gt(brightest, v.xor(v.splat16(level.below_full_scale), turn))
+    v.gt(brightest, level.below_full_scale)
 }
 
 /// Mask: a·b + c·d is below the level's least power.
 #[inline(always)]
-fn dot_below<V: Lanes>(v: V, level: &Level, [a, b, c, d]: [V::W; 4]) -> V::W {
+fn dot_below<V: Lanes, T>(v: V, level: &LevelLanes<'_, V, T>, [a, b, c, d]: [V::W; 4]) -> V::W {
     let power = v.dot(a, b, c, d);
-    let least = v.splat32(level.least_power);
+    let least = level.least_power;
     v.narrow_mask32([v.gt32(least, power[0]), v.gt32(least, power[1])])
 }
 
@@ -171,7 +195,12 @@ fn dot_below<V: Lanes>(v: V, level: &Level, [a, b, c, d]: [V::W; 4]) -> V::W {
 const ROOT_3_HALVES: i16 = 28_378;
 
 #[inline(always)]
-fn three<V: Lanes, T: BlockSample>(v: V, level: &Level, rows: [&[T]; 3], at: usize) -> Folded<V> {
+fn three<V: Lanes, T: BlockSample>(
+    v: V,
+    level: &LevelLanes<'_, V, T>,
+    rows: [&[T]; 3],
+    at: usize,
+) -> Folded<V> {
     let [a, b, c] = rows;
     let saturated = v.or8(
         v.or8(T::saturated(v, level, a, at), T::saturated(v, level, b, at)),
@@ -191,12 +220,18 @@ fn three<V: Lanes, T: BlockSample>(v: V, level: &Level, rows: [&[T]; 3], at: usi
 
 /// S, C and whether they are weak: 4 (S² + C²) = (2I₀ − I₁ − I₂)² + 3 (I₁ − I₂)², exactly.
 #[inline(always)]
-fn three_words<V: Lanes>(v: V, level: &Level, a: V::W, b: V::W, c: V::W) -> (V::W, V::W, V::W) {
+fn three_words<V: Lanes, T>(
+    v: V,
+    level: &LevelLanes<'_, V, T>,
+    a: V::W,
+    b: V::W,
+    c: V::W,
+) -> (V::W, V::W, V::W) {
     let across = v.sub(b, c);
     let along = v.sub(v.add(a, a), v.add(b, c));
     let threefold = v.add(across, v.add(across, across));
     let weak = dot_below(v, level, [along, along, across, threefold]);
-    let s = v.shl_by(along, level.lift - 1);
+    let s = v.shl_by(along, level.half_lift);
     let c_ = v.mul_q15(v.shl_by(across, level.lift), v.splat16(ROOT_3_HALVES));
     (s, c_, weak)
 }
@@ -204,7 +239,7 @@ fn three_words<V: Lanes>(v: V, level: &Level, a: V::W, b: V::W, c: V::W) -> (V::
 #[inline(always)]
 fn weighted<V: Lanes, T: BlockSample>(
     v: V,
-    level: &Level,
+    level: &LevelLanes<'_, V, T>,
     weights: &[[i16; 2]],
     rows: &[&[T]],
     at: usize,
@@ -213,7 +248,7 @@ fn weighted<V: Lanes, T: BlockSample>(
     let mut s = [[zero; 2]; 2];
     let mut c = [[zero; 2]; 2];
     let mut saturated = v.splat8(0);
-    let centre = v.splat16(level.centre);
+    let centre = level.centre;
     let none = v.splat16(0);
     // In pairs, as the instructions take them.
     for (rows, weights) in rows.chunks(2).zip(weights.chunks(2)) {
@@ -248,12 +283,12 @@ fn weighted<V: Lanes, T: BlockSample>(
     ];
     let (s, c) = (
         [
-            v.narrow_rounded(s[0], level.lift),
-            v.narrow_rounded(s[1], level.lift),
+            v.narrow_rounded(s[0], level.plan.lift),
+            v.narrow_rounded(s[1], level.plan.lift),
         ],
         [
-            v.narrow_rounded(c[0], level.lift),
-            v.narrow_rounded(c[1], level.lift),
+            v.narrow_rounded(c[0], level.plan.lift),
+            v.narrow_rounded(c[1], level.plan.lift),
         ],
     );
     octant(v, s, c, v.narrow_mask(weak), saturated)
@@ -261,20 +296,25 @@ fn weighted<V: Lanes, T: BlockSample>(
 
 /// A sum, and products brought down so far that all of them fit.
 #[inline(always)]
-fn add_part<V: Lanes>(v: V, level: &Level, sum: [V::D; 2], products: [V::D; 2]) -> [V::D; 2] {
-    if level.drop == 0 {
+fn add_part<V: Lanes, T>(
+    v: V,
+    level: &LevelLanes<'_, V, T>,
+    sum: [V::D; 2],
+    products: [V::D; 2],
+) -> [V::D; 2] {
+    if level.plan.drop == 0 {
         return [v.add32(sum[0], products[0]), v.add32(sum[1], products[1])];
     }
     [
-        v.add32(sum[0], v.sar32_by(products[0], level.drop)),
-        v.add32(sum[1], v.sar32_by(products[1], level.drop)),
+        v.add32(sum[0], v.sar32_by(products[0], level.plan.drop)),
+        v.add32(sum[1], v.sar32_by(products[1], level.plan.drop)),
     ]
 }
 
 /// Mask: S² + C² of the sums is below the level's least power, in singles (1e-7).
 #[inline(always)]
-fn weak_sums<V: Lanes>(v: V, level: &Level, s: [V::D; 2], c: [V::D; 2]) -> V::W {
-    let least = v.splat_single(level.least_sum_power);
+fn weak_sums<V: Lanes, T>(v: V, level: &LevelLanes<'_, V, T>, s: [V::D; 2], c: [V::D; 2]) -> V::W {
+    let least = level.least_sum_power;
     let (s0, s1) = (v.to_single(s[0]), v.to_single(s[1]));
     let (c0, c1) = (v.to_single(c[0]), v.to_single(c[1]));
     let power0 = v.add_single(v.mul_single(s0, s0), v.mul_single(c0, c0));

@@ -1,10 +1,12 @@
 //! One level prepared for demodulation, and its demodulation: samples → wrapped phase and modulation.
 
 use super::angle::{self, LENGTH};
+use super::block::LevelRow;
 use super::fold::{BlockSample, fold};
 use super::trust::MIN_MODULATION_8_BIT;
+use super::wrapped::WrappedRow;
 use crate::pattern;
-use crate::simd::Lanes;
+use crate::simd::{Four, Lanes};
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
@@ -123,16 +125,72 @@ impl Level {
             saturates: steps < FULL_TRUST_STEPS,
         }
     }
+}
 
-    /// Demodulates the block at `at` of the level's rows.
+/// Where the samples of a level of a row come from.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Source<'a, T> {
+    /// From four rows of frames, in the order of their shifts.
+    Four(Four<'a, T>),
+    /// From the rows of any number of frames.
+    Rows(&'a [&'a [T]]),
+    /// The level has been demodulated before.
+    Wrapped(WrappedRow<'a>),
+}
+
+/// A level of a row, ready to be read block by block: every constant in all lanes.
+pub(super) struct LevelLanes<'a, V: Lanes, T> {
+    pub plan: &'a Level,
+    pub source: Source<'a, T>,
+    pub lift: V::Count,
+    /// One bit less.
+    pub half_lift: V::Count,
+    pub least_power: V::D,
+    pub least_sum_power: V::F,
+    pub centre: V::W,
+    /// Full scale less one count, with its sign bit turned.
+    pub below_full_scale: V::W,
+    hypotenuse: [V::W; 3],
+    doubled: V::Count,
+}
+
+impl<'a, V: Lanes, T: BlockSample> LevelLanes<'a, V, T> {
     #[inline(always)]
-    pub fn demodulate<V: Lanes, T: BlockSample, const MODULATION: bool>(
-        &self,
-        v: V,
-        rows: &[&[T]],
-        at: usize,
-    ) -> Demodulated<V> {
-        let folded = fold(v, self, rows, at);
+    pub fn new(v: V, plan: &'a Level, row: LevelRow<'a, T>) -> Self {
+        let source = match (row, &plan.samples) {
+            (LevelRow::Wrapped(row), _) => Source::Wrapped(row),
+            (LevelRow::Frames(&[a, b, c, d]), Samples::Four) => {
+                Source::Four(Four::new([a, b, c, d]))
+            }
+            (LevelRow::Frames(rows), _) => Source::Rows(rows),
+        };
+        let turn = v.splat16(i16::MIN);
+        Self {
+            plan,
+            source,
+            lift: v.left(plan.lift),
+            half_lift: v.left(plan.lift.saturating_sub(1)),
+            least_power: v.splat32(plan.least_power),
+            least_sum_power: v.splat_single(plan.least_sum_power),
+            centre: v.splat16(plan.centre),
+            below_full_scale: v.xor(v.splat16(plan.below_full_scale), turn),
+            hypotenuse: [
+                v.splat16(plan.hypotenuse[0]),
+                v.splat16(plan.hypotenuse[1]),
+                v.splat16(plan.hypotenuse[2]),
+            ],
+            doubled: v.left(u8::from(plan.doubled)),
+        }
+    }
+
+    /// Demodulates the block at `at`.
+    #[inline(always)]
+    pub fn block<const MODULATION: bool>(&self, v: V, at: usize) -> Demodulated<V> {
+        let folded = match &self.source {
+            Source::Wrapped(row) => return row.block(v, at),
+            Source::Four(rows) => T::four(v, self, rows, at),
+            Source::Rows(rows) => fold(v, self, rows, at),
+        };
         let t = [
             angle::quotient(v, folded.short[0], folded.long[0]),
             angle::quotient(v, folded.short[1], folded.long[1]),
@@ -144,22 +202,21 @@ impl Level {
             v.add(v.xor(low, folded.backwards[0]), folded.axis[0]),
             v.add(v.xor(high, folded.backwards[1]), folded.axis[1]),
         ];
-        let modulation = if MODULATION {
-            let low = angle::hypotenuse(v, folded.length[0], t[0], self.hypotenuse);
-            let high = angle::hypotenuse(v, folded.length[1], t[1], self.hypotenuse);
-            if self.doubled {
-                [v.add(low, low), v.add(high, high)]
-            } else {
-                [low, high]
-            }
-        } else {
-            [v.splat16(0); 2]
-        };
-        let saturated = if self.saturates {
-            folded.saturated
-        } else {
-            v.splat8(0)
-        };
+        let mut modulation = [v.splat16(0); 2];
+        if MODULATION {
+            modulation = [
+                angle::hypotenuse(v, folded.length[0], t[0], self.hypotenuse),
+                angle::hypotenuse(v, folded.length[1], t[1], self.hypotenuse),
+            ];
+            modulation = [
+                v.shl_by(modulation[0], self.doubled),
+                v.shl_by(modulation[1], self.doubled),
+            ];
+        }
+        let mut saturated = folded.saturated;
+        if !self.plan.saturates {
+            saturated = v.splat8(0);
+        }
         Demodulated {
             phase,
             modulation,

@@ -28,7 +28,9 @@ impl Unwrapper {
         let levels = sequence.levels();
         Ok(match unwrapping {
             Unwrapping::Geometric => Self::Geometric(Geometric::new(levels, range)?),
-            _ => Self::About(About::new(unwrapping, levels)),
+            _ => Self::About(About::new(unwrapping, levels).ok_or_else(|| {
+                SequenceError::Ratios(levels.iter().map(|level| level.ratio).collect())
+            })?),
         })
     }
 }
@@ -47,8 +49,19 @@ pub(super) fn information(unwrapping: Unwrapping, sequence: &Sequence) -> f64 {
         .sum()
 }
 
-/// Mask: |x| is above `limit`; |−32768| counts as above.
+/// |x| of a residual in 1/65536 turn, unsigned.
 #[inline(always)]
-pub(super) fn beyond<V: Lanes>(v: V, x: V::W, limit: i16) -> V::W {
-    v.or(v.gt(x, v.splat16(limit)), v.gt(v.splat16(-limit), x))
+pub(super) fn farness<V: Lanes>(v: V, x: V::W) -> V::W {
+    v.abs(x)
+}
+
+/// Mask: a residual of this farness is too large.
+#[inline(always)]
+pub(super) fn too_far<V: Lanes>(v: V, farness: V::W) -> V::W {
+    // With the sign bit turned the order of unsigned words is that of signed ones.
+    let turn = v.splat16(i16::MIN);
+    v.gt(
+        v.xor(farness, turn),
+        v.splat16(MAX_RESIDUAL_BITS ^ i16::MIN),
+    )
 }

@@ -4,6 +4,7 @@
 //! 8–15 and 24–31; narrowing undoes it.
 
 use super::lanes::Lanes;
+use super::rows::Four;
 use core::arch::x86_64::*;
 
 /// AVX2 is there: only [`Avx2::detect`] makes one.
@@ -62,6 +63,7 @@ impl Lanes for Avx2 {
     type W = __m256i;
     type D = __m256i;
     type F = __m256;
+    type Count = __m128i;
 
     #[inline(always)]
     fn splat8(self, x: u8) -> Self::B {
@@ -72,6 +74,19 @@ impl Lanes for Avx2 {
         let block = &from[at..at + BYTES];
         // SAFETY: the slice holds the 32 bytes that are read; the load needs no alignment; `self` proves AVX2.
         unsafe { _mm256_loadu_si256(block.as_ptr().cast()) }
+    }
+    #[inline(always)]
+    fn load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [Self::B; 4] {
+        let [a, b, c, d] = from.blocks(at, BYTES);
+        // SAFETY: 32 bytes may be read from each (`Four::blocks`); the loads need no alignment; `self` proves AVX2.
+        unsafe {
+            [
+                _mm256_loadu_si256(a.cast()),
+                _mm256_loadu_si256(b.cast()),
+                _mm256_loadu_si256(c.cast()),
+                _mm256_loadu_si256(d.cast()),
+            ]
+        }
     }
     #[inline(always)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
@@ -200,16 +215,28 @@ impl Lanes for Avx2 {
         avx2!(_mm256_srai_epi16::<N>(x))
     }
     #[inline(always)]
-    fn shl_by(self, x: Self::W, n: u8) -> Self::W {
-        avx2!(_mm256_sll_epi16(x, _mm_cvtsi32_si128(i32::from(n))))
+    fn shr<const N: i32>(self, x: Self::W) -> Self::W {
+        avx2!(_mm256_srli_epi16::<N>(x))
     }
     #[inline(always)]
-    fn sar_by(self, x: Self::W, n: u8) -> Self::W {
-        avx2!(_mm256_sra_epi16(x, _mm_cvtsi32_si128(i32::from(n))))
+    fn left(self, n: u8) -> Self::Count {
+        avx2!(_mm_cvtsi32_si128(i32::from(n)))
     }
     #[inline(always)]
-    fn shr_by(self, x: Self::W, n: u8) -> Self::W {
-        avx2!(_mm256_srl_epi16(x, _mm_cvtsi32_si128(i32::from(n))))
+    fn right(self, n: u8) -> Self::Count {
+        self.left(n)
+    }
+    #[inline(always)]
+    fn shl_by(self, x: Self::W, n: Self::Count) -> Self::W {
+        avx2!(_mm256_sll_epi16(x, n))
+    }
+    #[inline(always)]
+    fn sar_by(self, x: Self::W, n: Self::Count) -> Self::W {
+        avx2!(_mm256_sra_epi16(x, n))
+    }
+    #[inline(always)]
+    fn shr_by(self, x: Self::W, n: Self::Count) -> Self::W {
+        avx2!(_mm256_srl_epi16(x, n))
     }
     #[inline(always)]
     fn halve(self, x: Self::W) -> Self::W {
@@ -226,6 +253,10 @@ impl Lanes for Avx2 {
     #[inline(always)]
     fn max(self, a: Self::W, b: Self::W) -> Self::W {
         avx2!(_mm256_max_epi16(a, b))
+    }
+    #[inline(always)]
+    fn max_unsigned(self, a: Self::W, b: Self::W) -> Self::W {
+        avx2!(_mm256_max_epu16(a, b))
     }
     #[inline(always)]
     fn gt(self, a: Self::W, b: Self::W) -> Self::W {

@@ -8,6 +8,7 @@
 //! signed or not as the operation says; what does not fit wraps around unless the name says otherwise. Loads and stores
 //! panic outside of their slice.
 
+use super::rows::Four;
 use core::fmt::Debug;
 
 /// A back-end: a proof that its instructions may be used on this machine. See the module's text.
@@ -22,6 +23,8 @@ pub(crate) trait Lanes: Copy + Debug {
     type D: Copy;
     /// A single-precision number per pixel of a quarter of a block.
     type F: Copy;
+    /// A number of bits to shift by.
+    type Count: Copy;
 
     // Bytes. Masks are 0 or 255.
 
@@ -29,6 +32,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn splat8(self, x: u8) -> Self::B;
     /// The block of `from` that starts at `at`.
     fn load8(self, from: &[u8], at: usize) -> Self::B;
+    /// The blocks of four rows that start at `at`.
+    fn load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [Self::B; 4];
     /// Into the block of `to` that starts at `at`.
     fn store8(self, to: &mut [u8], at: usize, x: Self::B);
     /// The smaller.
@@ -87,20 +92,28 @@ pub(crate) trait Lanes: Copy + Debug {
     fn shl<const N: i32>(self, x: Self::W) -> Self::W;
     /// x / 2ⁿ rounded down, signed.
     fn sar<const N: i32>(self, x: Self::W) -> Self::W;
-    /// x · 2ⁿ, n below 16.
-    fn shl_by(self, x: Self::W, n: u8) -> Self::W;
-    /// x / 2ⁿ rounded down, signed, n below 16.
-    fn sar_by(self, x: Self::W, n: u8) -> Self::W;
-    /// x / 2ⁿ rounded down, unsigned, n below 16.
-    fn shr_by(self, x: Self::W, n: u8) -> Self::W;
+    /// x / 2ⁿ rounded down, unsigned.
+    fn shr<const N: i32>(self, x: Self::W) -> Self::W;
+    /// Prepares shifts of words to the left by n below 16.
+    fn left(self, n: u8) -> Self::Count;
+    /// Prepares shifts of words to the right by n below 16.
+    fn right(self, n: u8) -> Self::Count;
+    /// x · 2ⁿ.
+    fn shl_by(self, x: Self::W, n: Self::Count) -> Self::W;
+    /// x / 2ⁿ rounded down, signed.
+    fn sar_by(self, x: Self::W, n: Self::Count) -> Self::W;
+    /// x / 2ⁿ rounded down, unsigned.
+    fn shr_by(self, x: Self::W, n: Self::Count) -> Self::W;
     /// (x + 1) / 2 rounded down, unsigned.
     fn halve(self, x: Self::W) -> Self::W;
-    /// |x| of x above −32768.
+    /// |x|, 32768 of −32768 as an unsigned word.
     fn abs(self, x: Self::W) -> Self::W;
     /// The smaller, signed.
     fn min(self, a: Self::W, b: Self::W) -> Self::W;
     /// The larger, signed.
     fn max(self, a: Self::W, b: Self::W) -> Self::W;
+    /// The larger, unsigned.
+    fn max_unsigned(self, a: Self::W, b: Self::W) -> Self::W;
     /// Mask: a > b, signed.
     fn gt(self, a: Self::W, b: Self::W) -> Self::W;
     /// Mask: a = b.

@@ -16,6 +16,7 @@ mod lanes;
 mod neon;
 pub(crate) mod plain;
 mod portable;
+mod rows;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
@@ -23,6 +24,7 @@ pub(crate) use lanes::Lanes;
 #[cfg(target_arch = "aarch64")]
 pub(crate) use neon::Neon;
 pub(crate) use portable::Portable;
+pub(crate) use rows::Four;
 
 /// The instructions that the phase kernels are compiled for. All give the same bits.
 #[derive(Clone, Copy, Debug)]

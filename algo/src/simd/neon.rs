@@ -1,6 +1,7 @@
 //! Lanes of aarch64, where NEON is always there.
 
 use super::lanes::Lanes;
+use super::rows::Four;
 use core::arch::aarch64::*;
 
 /// NEON belongs to aarch64.
@@ -24,6 +25,7 @@ impl Lanes for Neon {
     type W = int16x8_t;
     type D = int32x4_t;
     type F = float32x4_t;
+    type Count = int16x8_t;
 
     #[inline(always)]
     fn splat8(self, x: u8) -> Self::B {
@@ -34,6 +36,12 @@ impl Lanes for Neon {
         let block = &from[at..at + BYTES];
         // SAFETY: the slice holds the 16 bytes that are read.
         unsafe { vld1q_u8(block.as_ptr()) }
+    }
+    #[inline(always)]
+    fn load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [Self::B; 4] {
+        let [a, b, c, d] = from.blocks(at, BYTES);
+        // SAFETY: 16 bytes may be read from each (`Four::blocks`).
+        unsafe { [vld1q_u8(a), vld1q_u8(b), vld1q_u8(c), vld1q_u8(d)] }
     }
     #[inline(always)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
@@ -182,18 +190,32 @@ impl Lanes for Neon {
         neon!(vshrq_n_s16::<N>(x))
     }
     #[inline(always)]
-    fn shl_by(self, x: Self::W, n: u8) -> Self::W {
-        neon!(vshlq_s16(x, vdupq_n_s16(i16::from(n))))
+    fn shr<const N: i32>(self, x: Self::W) -> Self::W {
+        neon!(vreinterpretq_s16_u16(vshrq_n_u16::<N>(
+            vreinterpretq_u16_s16(x)
+        )))
     }
     #[inline(always)]
-    fn sar_by(self, x: Self::W, n: u8) -> Self::W {
-        neon!(vshlq_s16(x, vdupq_n_s16(-i16::from(n))))
+    fn left(self, n: u8) -> Self::Count {
+        neon!(vdupq_n_s16(i16::from(n)))
     }
     #[inline(always)]
-    fn shr_by(self, x: Self::W, n: u8) -> Self::W {
+    fn right(self, n: u8) -> Self::Count {
+        neon!(vdupq_n_s16(-i16::from(n)))
+    }
+    #[inline(always)]
+    fn shl_by(self, x: Self::W, n: Self::Count) -> Self::W {
+        neon!(vshlq_s16(x, n))
+    }
+    #[inline(always)]
+    fn sar_by(self, x: Self::W, n: Self::Count) -> Self::W {
+        neon!(vshlq_s16(x, n))
+    }
+    #[inline(always)]
+    fn shr_by(self, x: Self::W, n: Self::Count) -> Self::W {
         neon!(vreinterpretq_s16_u16(vshlq_u16(
             vreinterpretq_u16_s16(x),
-            vdupq_n_s16(-i16::from(n))
+            n
         )))
     }
     #[inline(always)]
@@ -213,6 +235,13 @@ impl Lanes for Neon {
     #[inline(always)]
     fn max(self, a: Self::W, b: Self::W) -> Self::W {
         neon!(vmaxq_s16(a, b))
+    }
+    #[inline(always)]
+    fn max_unsigned(self, a: Self::W, b: Self::W) -> Self::W {
+        neon!(vreinterpretq_s16_u16(vmaxq_u16(
+            vreinterpretq_u16_s16(a),
+            vreinterpretq_u16_s16(b)
+        )))
     }
     #[inline(always)]
     fn gt(self, a: Self::W, b: Self::W) -> Self::W {

@@ -3,6 +3,7 @@
 //! hundreds of them, lane by lane, take the compiler minutes.
 
 use super::lanes::Lanes;
+use super::rows::Four;
 
 /// May always be used.
 #[derive(Clone, Copy, Debug)]
@@ -69,6 +70,7 @@ impl Lanes for Portable {
     type W = [i16; WORDS];
     type D = [i32; DOUBLES];
     type F = [f32; DOUBLES];
+    type Count = u8;
 
     #[inline(never)]
     fn splat8(self, x: u8) -> Self::B {
@@ -77,6 +79,10 @@ impl Lanes for Portable {
     #[inline(never)]
     fn load8(self, from: &[u8], at: usize) -> Self::B {
         core::array::from_fn(|lane| from[at + lane])
+    }
+    #[inline(never)]
+    fn load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [Self::B; 4] {
+        from.rows().map(|row| self.load8(row, at))
     }
     #[inline(never)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
@@ -202,6 +208,18 @@ impl Lanes for Portable {
         lanes(x, |x| x >> N)
     }
     #[inline(never)]
+    fn shr<const N: i32>(self, x: Self::W) -> Self::W {
+        lanes(x, |x| (x.cast_unsigned() >> N).cast_signed())
+    }
+    #[inline(never)]
+    fn left(self, n: u8) -> Self::Count {
+        n
+    }
+    #[inline(never)]
+    fn right(self, n: u8) -> Self::Count {
+        n
+    }
+    #[inline(never)]
     fn shl_by(self, x: Self::W, n: u8) -> Self::W {
         lanes(x, |x| x << n)
     }
@@ -228,6 +246,12 @@ impl Lanes for Portable {
     #[inline(never)]
     fn max(self, a: Self::W, b: Self::W) -> Self::W {
         pairs(a, b, i16::max)
+    }
+    #[inline(never)]
+    fn max_unsigned(self, a: Self::W, b: Self::W) -> Self::W {
+        pairs(a, b, |a, b| {
+            a.cast_unsigned().max(b.cast_unsigned()).cast_signed()
+        })
     }
     #[inline(never)]
     fn gt(self, a: Self::W, b: Self::W) -> Self::W {

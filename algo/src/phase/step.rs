@@ -1,0 +1,148 @@
+//! A step from a coarse phase to a fine one: k = round(n·Φ − φ), Φ_fine = k + φ, in words.
+//!
+//! A phase is a number of turns and −½…½ of one. The fraction of n·Φ is exact to 2/65536 turn and decides whether the step is
+//! trusted; its whole part is needed only to within ± 0.1 turn, because a residual above 0.40 turn is rejected anyhow,
+//! and is taken from a fixed-point product with as many fractional bits as fit beside the largest number of turns.
+
+use super::unwrap::farness;
+use crate::simd::Lanes;
+
+/// A step prepared for any back-end.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Step {
+    /// Whole part of n.
+    whole: i16,
+    /// Fraction of n in Q15, for phases, and in Q16, for turns.
+    part_q15: i16,
+    part_q16: i16,
+    /// Fraction of n · (what the coarse phase counts from), Q16.
+    origin: i16,
+    /// The coarse number of turns takes this many bits, with its sign.
+    order_bits: u8,
+    /// n in the fixed point of the product with the coarse phase.
+    gain: i16,
+    /// Fractional bits of the product.
+    bits: u8,
+    /// The product's origin, and half a turn for rounding.
+    offset: i16,
+}
+
+/// Fewest fractional bits of the product: with 4 the order is off by at most 1/16 turn for the product and 1/16 for the
+/// fine phase.
+const LEAST_BITS: f64 = 4.0;
+
+impl Step {
+    /// From phases of at most `reach` turns either way of an origin to n times as many; `behind` is n · that origin less the
+    /// origin of the fine phase, in turns. `None` if a word cannot hold the fine ones with enough precision.
+    pub fn new(n: f64, reach: f64, behind: f64) -> Option<Self> {
+        let order_bits = if reach <= 0.5 {
+            0.0
+        } else {
+            libm::ceil(libm::log2(2.0 * (reach + 0.5)))
+        };
+        let range = libm::pow(2.0, order_bits);
+        // The product is taken by Q15, so its gain is half of n · range.
+        let largest = (n * (reach + 0.5) + libm::fabs(behind) + 1.0).max(n * range / 2.0);
+        let bits = libm::floor(libm::log2(32_767.0 / largest)).min(15.0);
+        if !(bits >= LEAST_BITS) {
+            return None;
+        }
+        let unit = libm::pow(2.0, bits);
+        let part = n - libm::floor(n);
+        Some(Self {
+            whole: word(libm::floor(n)),
+            part_q15: q15(part),
+            part_q16: word(part * 65_536.0),
+            origin: word(behind * 65_536.0),
+            order_bits: order_bits as u8,
+            gain: word(n * range / 2.0 * unit),
+            bits: bits as u8,
+            offset: word((behind + 0.5) * unit),
+        })
+    }
+}
+
+/// In Q15, at most 32767.
+pub(super) fn q15(x: f64) -> i16 {
+    libm::rint(x * 32_768.0).clamp(-32_767.0, 32_767.0) as i16
+}
+
+/// The low 16 bits of the number next to x.
+pub(super) fn word(x: f64) -> i16 {
+    libm::rint(x) as i64 as i16
+}
+
+/// Half a block of phases: turns, and −½…½ of one in 1/65536.
+#[derive(Clone, Copy)]
+pub(super) struct Turns<V: Lanes> {
+    pub order: V::W,
+    pub phase: V::W,
+}
+
+impl<V: Lanes> Turns<V> {
+    /// 1/65536 turns in double words.
+    #[inline(always)]
+    pub fn join(self, v: V) -> [V::D; 2] {
+        v.join(self.phase, v.add(self.order, v.sar::<15>(self.phase)))
+    }
+}
+
+/// A step with every constant in all lanes.
+pub(super) struct StepLanes<V: Lanes> {
+    whole: V::W,
+    part_q15: V::W,
+    part_q16: V::W,
+    origin: V::W,
+    gain: V::W,
+    offset: V::W,
+    /// Whether the coarse phase has turns to multiply, and how they and the phase make one word.
+    turns: bool,
+    order_left: V::Count,
+    phase_right: V::Count,
+    fine_right: V::Count,
+    bits_right: V::Count,
+}
+
+impl<V: Lanes> StepLanes<V> {
+    #[inline(always)]
+    pub fn new(v: V, step: &Step) -> Self {
+        let turns = step.order_bits > 0;
+        Self {
+            whole: v.splat16(step.whole),
+            part_q15: v.splat16(step.part_q15),
+            part_q16: v.splat16(step.part_q16),
+            origin: v.splat16(step.origin),
+            gain: v.splat16(step.gain),
+            offset: v.splat16(step.offset),
+            turns,
+            order_left: v.left(if turns { 16 - step.order_bits } else { 0 }),
+            phase_right: v.right(step.order_bits),
+            fine_right: v.right(16 - step.bits),
+            bits_right: v.right(step.bits),
+        }
+    }
+
+    /// The fine phase of which `fine` is the wrapped one, and what was left over ([`farness`]).
+    #[inline(always)]
+    pub fn climb(&self, v: V, coarse: Turns<V>, fine: V::W) -> (Turns<V>, V::W) {
+        let Turns { order, phase } = coarse;
+        let mut fraction = v.add(
+            v.mul_low(phase, self.whole),
+            v.mul_q15(phase, self.part_q15),
+        );
+        let mut product = phase;
+        if self.turns {
+            fraction = v.add(fraction, v.mul_low(order, self.part_q16));
+            let high = v.shl_by(order, self.order_left);
+            product = v.add(high, v.sar_by(phase, self.phase_right));
+        }
+        let left = farness(v, v.sub(v.add(fraction, self.origin), fine));
+        let turns = v.add(v.mul_q15(product, self.gain), self.offset);
+        let turns = v.sub(turns, v.sar_by(fine, self.fine_right));
+        let climbed = Turns {
+            order: v.sar_by(turns, self.bits_right),
+            phase: fine,
+        };
+        (climbed, left)
+    }
+}
