@@ -6,8 +6,8 @@
 use super::judge::{Outcome, judge};
 use super::methods::{self, Method, Shot};
 use super::scenes::{Judged, OpticsKind, Scene};
-use crate::bench::{About, Bench, BenchError, Measured};
 use crate::calibration::Calibration;
+use crate::rig::{About, Measured, Rig, RigError};
 use algo::adaptive::{ProjectorMap, noise, paper};
 use algo::pattern::{PhaseFunction, Sequence};
 use algo::phase::Trust;
@@ -86,7 +86,7 @@ impl Runner {
     ///
     /// # Errors
     /// If the scene cannot be simulated.
-    pub fn new(scene: &Scene, optics: OpticsKind) -> Result<Self, BenchError> {
+    pub fn new(scene: &Scene, optics: OpticsKind) -> Result<Self, RigError> {
         let scenario = scene.scenario(optics, 1);
         let (head, stage) = hal::sim::head(&scenario)?;
         let calibration = Calibration::of_stage(&stage);
@@ -105,7 +105,7 @@ impl Runner {
     ///
     /// # Errors
     /// If the head or the pattern fails.
-    pub fn run(&mut self, method: Method, seed: u64) -> Result<Run, BenchError> {
+    pub fn run(&mut self, method: Method, seed: u64) -> Result<Run, RigError> {
         if self.learnt.seed != seed {
             self.learnt = Learnt {
                 seed,
@@ -137,24 +137,24 @@ impl Runner {
         function: &PhaseFunction,
         frames: &[(f64, f64)],
         about: About<'_>,
-    ) -> Result<Measured, BenchError> {
+    ) -> Result<Measured, RigError> {
         self.stage.reseed(self.learnt.seed * STREAMS + noise_stream);
-        let mut bench = Bench {
+        let mut rig = Rig {
             head: &mut self.head,
             calibration: &self.calibration,
             range: None,
             timeout: TIMEOUT,
         };
-        bench.measure(function, frames, about, &|_| ())
+        rig.measure(function, frames, about, &|_| ())
     }
 
-    fn vertical(&self, fringes: f64) -> Result<PhaseFunction, BenchError> {
+    fn vertical(&self, fringes: f64) -> Result<PhaseFunction, RigError> {
         let (columns, rows) = self.size();
         PhaseFunction::vertical(columns, rows, fringes).map_err(rig)
     }
 
     /// The preliminary measurement of both adaptive methods: one vertical sequence at 20 px pitch.
-    fn preliminary(&mut self) -> Result<Arc<Preliminary>, BenchError> {
+    fn preliminary(&mut self) -> Result<Arc<Preliminary>, RigError> {
         if let Some(known) = &self.learnt.preliminary {
             return Ok(Arc::clone(known));
         }
@@ -168,7 +168,7 @@ impl Runner {
     }
 
     /// The paper's preliminary maps: vertical and horizontal at 20 px, each measured by itself.
-    fn paper_map(&mut self) -> Result<Arc<ProjectorMap>, BenchError> {
+    fn paper_map(&mut self) -> Result<Arc<ProjectorMap>, RigError> {
         if let Some(known) = &self.learnt.paper {
             return Ok(Arc::clone(known));
         }
@@ -195,7 +195,7 @@ impl Runner {
     }
 
     /// The better pattern, made for the blur of the scenario.
-    fn better(&mut self) -> Result<Arc<Better>, BenchError> {
+    fn better(&mut self) -> Result<Arc<Better>, RigError> {
         if let Some(known) = &self.learnt.better {
             return Ok(Arc::clone(known));
         }
@@ -219,7 +219,7 @@ impl Runner {
     }
 
     /// The golden map: the full sequence of the better pattern.
-    fn golden(&mut self) -> Result<Arc<Vec<AbsolutePhase>>, BenchError> {
+    fn golden(&mut self) -> Result<Arc<Vec<AbsolutePhase>>, RigError> {
         if let Some(known) = &self.learnt.golden {
             return Ok(Arc::clone(known));
         }
@@ -231,7 +231,7 @@ impl Runner {
         Ok(Arc::clone(self.learnt.golden.insert(found)))
     }
 
-    fn better_shot(&mut self, method: Method, shot: Shot) -> Result<Run, BenchError> {
+    fn better_shot(&mut self, method: Method, shot: Shot) -> Result<Run, RigError> {
         let better = self.better()?;
         let golden = if shot.needs_golden() {
             Some(self.golden()?)
@@ -245,7 +245,7 @@ impl Runner {
     }
 
     /// The paper's chain with its own criterion of image pitch.
-    fn paper_chain(&mut self, method: Method, function: PhaseFunction) -> Result<Run, BenchError> {
+    fn paper_chain(&mut self, method: Method, function: PhaseFunction) -> Result<Run, RigError> {
         let frames = methods::geometric(&function);
         let mut measured = self.measure(stream(method), &function, &frames, About::Reference)?;
         let fine = too_fine(&measured.phases.phase, measured.phases.width);
@@ -267,8 +267,8 @@ impl Runner {
     }
 }
 
-fn rig(error: impl std::fmt::Display) -> BenchError {
-    BenchError::Rig(error.to_string())
+fn rig(error: impl std::fmt::Display) -> RigError {
+    RigError::Impossible(error.to_string())
 }
 
 /// Smallest image pitch along u that the paper's chain resolves, camera pixels.
