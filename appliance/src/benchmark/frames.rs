@@ -143,13 +143,8 @@ impl Rotation {
     }
 
     /// Number of copies.
-    pub fn len(&self) -> usize {
+    pub fn copies(&self) -> usize {
         self.sets.len()
-    }
-
-    /// Never: there is at least one.
-    pub fn is_empty(&self) -> bool {
-        self.sets.is_empty()
     }
 
     /// The set that was not used for longest.

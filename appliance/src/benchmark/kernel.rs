@@ -154,7 +154,7 @@ fn interleaved(
 /// Processor time of `kernel` in ns per pixel, over at most one rotation of `sets`.
 pub fn rotate(kernel: &mut dyn Kernel, sets: &mut Rotation, patience: Duration) -> f64 {
     let (mut taken, mut pixels) = (Duration::ZERO, 0);
-    for _ in 0..sets.len() {
+    for _ in 0..sets.copies() {
         let set = sets.next();
         taken += kernel.run(set);
         pixels += set.pixels();

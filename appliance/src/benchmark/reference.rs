@@ -98,12 +98,11 @@ impl<T: Real> Textbook<T> {
         self.trusted.fill(true);
         for (at, level) in self.levels.iter().enumerate() {
             for (sums, weights) in self.sums.iter_mut().zip([&level.cos, &level.sin]) {
-                for (pixel, sum) in sums.iter_mut().enumerate() {
-                    let samples = level.frames.iter().map(|&frame| frames[frame][pixel]);
-                    let terms = samples
-                        .zip(weights)
-                        .map(|(sample, &weight)| T::count(sample.into()) * weight);
-                    *sum = terms.fold(T::of(0.0), |sum, term| sum + term);
+                sums.fill(T::of(0.0));
+                for (&frame, &weight) in level.frames.iter().zip(weights) {
+                    for (sum, &sample) in sums.iter_mut().zip(frames[frame]) {
+                        *sum = *sum + T::count(sample.into()) * weight;
+                    }
                 }
             }
             let [s, c] = &self.sums;
