@@ -126,14 +126,16 @@ fn ends(sorted: &[f64]) -> [f64; 2] {
 }
 
 /// Times of one round, ns per pixel.
-struct Round {
-    of: f64,
-    floor: f64,
+pub(super) struct Round {
+    /// Of the variant.
+    pub of: f64,
+    /// Of the floor.
+    pub floor: f64,
 }
 
 /// For each variant its rounds; in every round the floor and then each variant in turn, so that what disturbs the
 /// machine disturbs all of them.
-fn interleaved(
+pub(super) fn interleaved(
     variants: &mut [Variant],
     sets: &mut Rotation,
     base: &mut FloorSets,
@@ -183,13 +185,13 @@ fn share_right(
 }
 
 /// What the floor reads and writes.
-struct FloorSets {
+pub(super) struct FloorSets {
     sets: Vec<(Vec<u8>, Vec<[u8; 4]>)>,
     pixels: usize,
 }
 
 impl FloorSets {
-    fn new(effort: &Effort) -> Self {
+    pub(super) fn new(effort: &Effort) -> Self {
         let pixels = effort.size.0 * effort.size.1;
         let bytes = floor::FRAMES * pixels;
         let frames: Vec<u8> = (0..bytes).map(|at| (at * 7 + at / 251) as u8 | 1).collect();

@@ -40,15 +40,25 @@ const NOISE: f64 = 0.025;
 const MAP_OFFSET: f64 = 0.25;
 
 impl Workload {
+    /// The first of them: twelve frames of three geometric levels, all of it lit.
+    pub fn geometric() -> Self {
+        Self {
+            name: "geometric_12",
+            frames: Sequence::geometric(RANGE, 3, 4),
+            lit: 1.0,
+            bit_depth: 8,
+            about_map: false,
+            has_references: true,
+        }
+    }
+
     /// All kinds.
     pub fn all() -> Vec<Self> {
         let geometric = |name, steps| Self {
             name,
             frames: Sequence::geometric(RANGE, 3, steps),
-            lit: 1.0,
-            bit_depth: 8,
-            about_map: false,
             has_references: false,
+            ..Self::geometric()
         };
         let twelve = |name| geometric(name, 4);
         let compared = |workload| Self {
@@ -69,7 +79,7 @@ impl Workload {
             ..twelve(name)
         };
         vec![
-            compared(twelve("geometric_12")),
+            Self::geometric(),
             lit("background_25", 0.75),
             lit("background_50", 0.50),
             lit("background_75", 0.25),

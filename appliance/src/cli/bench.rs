@@ -1,69 +1,142 @@
-//! `fringed bench`: the kernel table, time against error, and the budget from trigger to verdict.
+//! `fringed bench`: the kernel table, run time against error, and the budget from trigger to verdict.
 
 use super::Common;
-use crate::benchmark::{Effort, KernelTable, Machine, kernel_table};
+use crate::benchmark::{self, Effort, Machine, Report, Study};
 use crate::error::{Exit, Failure};
-use serde_json::{Map, Value, json};
+use crate::output::folder::OutputFolder;
+use std::path::PathBuf;
 
 /// Time the kernels, time against error, and trigger to verdict.
 #[derive(Debug, clap::Args)]
 pub struct Bench {
+    /// What to measure; without it all three.
+    #[arg(value_enum)]
+    what: Option<What>,
     /// Small frames and one round: whether everything works, not how fast it is.
     #[arg(long)]
     quick: bool,
+    /// Folder for tables, CSV and plot; made if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write the twelve frames that the kernels are timed on to this folder, for other programs to be timed on, and
+    /// measure nothing.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["what", "out"])]
+    frames: Option<PathBuf>,
 }
 
+/// A part of the benchmark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum What {
+    /// Processor time per pixel of every variant.
+    Kernel,
+    /// Run time against error on the simulated parts.
+    Accuracy,
+    /// From trigger to verdict, stage by stage.
+    Budget,
+}
+
+/// Columns and rows of the cameras of the budget: the study's physical head, and the sensor that is aimed at.
+const CAMERAS: [(u32, u32); 2] = [(640, 480), (1456, 1088)];
+const QUICK_CAMERAS: [(u32, u32); 1] = [(160, 120)];
+
 impl Bench {
-    /// Measures and prints.
+    /// Measures, writes and prints.
     ///
     /// # Errors
     /// If something cannot be simulated or results not be written.
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
-        let effort = if self.quick {
-            Effort::QUICK
-        } else {
-            Effort::FULL
-        };
+        if let Some(folder) = &self.frames {
+            return self.write_frames(folder, common);
+        }
+        // Made before the minutes of measuring, not found wanting after them.
+        let folder = self.out.as_deref().map(OutputFolder::create);
+        let folder = folder.transpose()?;
         let progress = common.progress();
         let told = |share: f64, words: &str| progress.tell(share, words);
-        let table = kernel_table(&effort, &told)
-            .map_err(|error| Failure::because(Exit::Software, "time the kernels", error))?;
+        let report = self.measure(common, &told);
         progress.clear();
-        if common.json {
-            let all = json!({"machine": Machine::this(), "kernel": kernel_json(&table)});
-            say!("{all:#}");
-        } else {
-            say!(
-                "floor {:.3} ns/px ({:.3}-{:.3})",
-                table.floor_ns_per_px,
-                table.floor_range[0],
-                table.floor_range[1]
-            );
-            for row in &table.rows {
-                say!(
-                    "{:30} {:3} frames {:8.3} ns/px {:8.2} x floor ({:.2}-{:.2}) {:.4}",
-                    row.name,
-                    row.frames,
-                    row.ns_per_px,
-                    row.x_floor,
-                    row.x_floor_range[0],
-                    row.x_floor_range[1],
-                    row.right
-                );
+        let report = report?;
+        let json = format!("{:#}\n", report.json());
+        let tables = report.markdown();
+        if let Some(folder) = &folder {
+            folder.write("benchmarks.json", json.as_bytes())?;
+            folder.write("benchmarks.md", tables.as_bytes())?;
+            if let Some(csv) = report.csv() {
+                folder.write("accuracy.csv", csv.as_bytes())?;
             }
+            for (name, bytes) in report.figures() {
+                folder.write(&name, &bytes)?;
+            }
+        }
+        if common.json {
+            say!("{}", json.trim_end());
+        } else if !common.quiet {
+            say!("{}", tables.trim_end());
         }
         Ok(())
     }
-}
 
-fn kernel_json(table: &KernelTable) -> Value {
-    let mut all = Map::new();
-    all.insert("floor_ns_per_px".into(), json!(table.floor_ns_per_px));
-    for row in &table.rows {
-        all.insert(
-            row.name.clone(),
-            json!({"frames": row.frames, "ns_per_px": row.ns_per_px, "x_floor": row.x_floor, "x_floor_range": row.x_floor_range, "right": row.right}),
-        );
+    fn measure(
+        &self,
+        common: &Common,
+        told: &(dyn Fn(f64, &str) + Sync),
+    ) -> Result<Report, Failure> {
+        let software =
+            |what: &'static str| move |error: String| Failure::because(Exit::Software, what, error);
+        let wanted = |what| self.what.is_none_or(|asked| asked == what);
+        let pool = super::pool(common.threads.unwrap_or(0))?;
+        let mut report = Report {
+            machine: Machine::this(),
+            kernel: None,
+            accuracy: None,
+            budget: None,
+        };
+        if wanted(What::Kernel) {
+            let table = benchmark::kernel_table(&self.effort(), told);
+            report.kernel = Some(table.map_err(software("time the kernels"))?);
+        }
+        if wanted(What::Accuracy) {
+            let study = if self.quick {
+                Study::quick()
+            } else {
+                Study::full()
+            };
+            let points = pool.install(|| study.run(told));
+            report.accuracy = Some(points.map_err(software("measure run time against error"))?);
+        }
+        if wanted(What::Budget) {
+            let cameras = if self.quick {
+                &QUICK_CAMERAS[..]
+            } else {
+                &CAMERAS
+            };
+            let rounds = self.effort().rounds;
+            let budgets = pool.install(|| {
+                let each = |&camera| benchmark::budgets(camera, rounds, told);
+                cameras.iter().map(each).collect::<Result<Vec<_>, _>>()
+            });
+            let budgets = budgets.map_err(software("measure from trigger to verdict"))?;
+            report.budget = Some(budgets.concat());
+        }
+        Ok(report)
     }
-    Value::Object(all)
+
+    fn effort(&self) -> Effort {
+        if self.quick {
+            Effort::QUICK
+        } else {
+            Effort::FULL
+        }
+    }
+
+    fn write_frames(&self, folder: &std::path::Path, common: &Common) -> Result<(), Failure> {
+        let folder_of_frames = OutputFolder::create(folder)?;
+        for (name, bytes) in benchmark::frame_files(self.effort().size) {
+            folder_of_frames.write(&name, &bytes)?;
+        }
+        if !common.quiet {
+            say!("written to {}", folder.display());
+        }
+        Ok(())
+    }
 }

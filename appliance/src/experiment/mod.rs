@@ -18,6 +18,6 @@ pub use cylinder::Cylinder;
 pub use figures::figures;
 pub use judge::Outcome;
 pub use methods::{Method, Shot};
-pub use runner::{Run, Runner};
+pub use runner::{Pattern, Run, Runner};
 pub use scenes::{Judged, OpticsKind, PARTS, Scene};
 pub use table::{HEADER, Row, Values, csv, means, table};

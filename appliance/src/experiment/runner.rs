@@ -9,7 +9,7 @@ use super::scenes::{Judged, OpticsKind, Scene};
 use crate::calibration::Calibration;
 use crate::rig::{About, Measured, Rig, RigError};
 use algo::adaptive::{ProjectorMap, noise, paper};
-use algo::pattern::{PhaseFunction, Sequence};
+use algo::pattern::{PhaseFunction, PhaseRange, Sequence};
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use hal::head::DynHead;
@@ -50,6 +50,20 @@ struct Better {
     expected: Vec<AbsolutePhase>,
 }
 
+/// The pattern of a sequence that the caller chooses, and what it is unwrapped about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pattern {
+    /// Fixed pitch, absolute by itself.
+    Fixed {
+        /// Fringes over the projector's width.
+        fringes: u32,
+    },
+    /// The better pattern about the map of the preliminary measurement.
+    Better,
+    /// The better pattern about the golden map.
+    Golden,
+}
+
 /// A run: what it reached and what it saw.
 pub struct Run {
     /// Against truth.
@@ -72,6 +86,7 @@ const STREAMS: u64 = 1000;
 const PRELIMINARY_STREAM: u64 = 0;
 const HORIZONTAL_STREAM: u64 = 1;
 const GOLDEN_STREAM: u64 = 2;
+const CHOSEN_STREAM: u64 = 3;
 
 fn stream(method: Method) -> u64 {
     match method {
@@ -106,12 +121,7 @@ impl Runner {
     /// # Errors
     /// If the head or the pattern fails.
     pub fn run(&mut self, method: Method, seed: u64) -> Result<Run, RigError> {
-        if self.learnt.seed != seed {
-            self.learnt = Learnt {
-                seed,
-                ..Learnt::default()
-            };
-        }
+        self.learn_with(seed);
         let (columns, rows) = self.size();
         match method {
             Method::Fixed { fringes } => {
@@ -123,6 +133,49 @@ impl Runner {
                 self.paper_chain(method, function.map_err(rig)?)
             }
             Method::Better(shot) => self.better_shot(method, shot),
+        }
+    }
+
+    /// Measures with a sequence of the caller's choice and the noise of `seed`: the levels for a phase function with
+    /// this range are asked for. Answers the map that it is unwrapped about as well.
+    ///
+    /// # Errors
+    /// If the head or the pattern fails.
+    pub fn measure_with(
+        &mut self,
+        pattern: Pattern,
+        frames: impl Fn(PhaseRange) -> Vec<(f64, f64)>,
+        seed: u64,
+    ) -> Result<(Measured, Option<Vec<AbsolutePhase>>), RigError> {
+        self.learn_with(seed);
+        let (function, map) = match pattern {
+            Pattern::Fixed { fringes } => (self.vertical(f64::from(fringes))?, None),
+            Pattern::Better => {
+                let better = self.better()?;
+                (better.function.clone(), Some(better.expected.clone()))
+            }
+            Pattern::Golden => {
+                let golden = self.golden()?;
+                (self.better()?.function.clone(), Some(golden.to_vec()))
+            }
+        };
+        let about = map.as_deref().map_or(About::Reference, About::Map);
+        let frames = frames(function.range());
+        let measured = self.measure(CHOSEN_STREAM, &function, &frames, about)?;
+        Ok((measured, map))
+    }
+
+    /// What is true of the part.
+    pub fn truth(&self) -> &Truth {
+        &self.truth
+    }
+
+    fn learn_with(&mut self, seed: u64) {
+        if self.learnt.seed != seed {
+            self.learnt = Learnt {
+                seed,
+                ..Learnt::default()
+            };
         }
     }
 
