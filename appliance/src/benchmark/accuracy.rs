@@ -30,7 +30,7 @@ pub struct Study {
 }
 
 /// One implementation on one sequence, or the mean over the parts.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Point {
     /// The part; `mean` over all.
     pub part: &'static str,

@@ -7,7 +7,6 @@ mod figures;
 mod gallery;
 mod judge;
 mod methods;
-mod plot;
 mod runner;
 mod scenes;
 mod shade;
