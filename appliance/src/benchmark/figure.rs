@@ -47,7 +47,7 @@ fn plot(means: &[Point], machine: &str) -> Plot {
         })
         .collect();
     series.push(Series {
-        name: "Pareto front: frames, N, levels, bits, implementation".into(),
+        name: "Pareto front: pattern, levels × N, bits, implementation".into(),
         colour: FRONT,
         kind: Kind::Line,
         points: front
@@ -75,7 +75,8 @@ fn label(point: &Point) -> String {
         ..
     } = point;
     let skipping = if point.skipping { ", skipping" } else { "" };
-    format!("{frames} frames, N {steps}, {sequence}, {bits} bit, {implementation}{skipping}")
+    let levels = frames / steps.max(&1);
+    format!("{sequence} {levels}×{steps}, {bits} bit, {implementation}{skipping}")
 }
 
 /// The points that none beats in both, from fast to slow.
