@@ -156,14 +156,15 @@ impl<T: Real> Textbook<T> {
             }
         }
         let q = &self.wrapped;
-        for at in 0..self.phase.len() {
-            self.phase[at] = match self.unwrapping {
+        let pixels = self.phase.iter_mut().zip(&mut self.trusted);
+        for (at, (phase, trusted)) in pixels.enumerate() {
+            *phase = match self.unwrapping {
                 Unwrapping::DenseThree { n } => {
                     let n = T::of(n);
                     let fast = wrap(q[2][at] - q[0][at]);
                     let slow = wrap(q[2][at] - q[1][at]);
                     let (order, fits) = order(n * slow - fast);
-                    self.trusted[at] &= fits;
+                    *trusted &= fits;
                     n * (fast + order)
                 }
                 Unwrapping::DenseTwo { n } => T::of(n) * wrap(q[1][at] - q[0][at]),

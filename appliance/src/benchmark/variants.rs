@@ -7,6 +7,9 @@ use super::workload::{RANGE, Workload};
 use algo::pattern::{PhaseRange, Sequence};
 use algo::phase::Decoder;
 
+/// An implementation by its name.
+pub type Named = (&'static str, Box<dyn Kernel>);
+
 /// An implementation on a workload.
 pub struct Variant {
     /// `f32_geometric_12`: a key in JSON.
@@ -37,7 +40,7 @@ pub fn references(
     range: PhaseRange,
     bit_depth: u8,
     pixels: usize,
-) -> Result<[(&'static str, Box<dyn Kernel>); 2], String> {
+) -> Result<[Named; 2], String> {
     let double = Textbook::<f64>::new(sequence, range, bit_depth, pixels).map_err(words)?;
     let single = Textbook::<f32>::new(sequence, range, bit_depth, pixels).map_err(words)?;
     Ok([("f64", Box::new(double)), ("f32", Box::new(single))])
