@@ -3,6 +3,7 @@
 use super::decoding::Decoding;
 use super::frames::{FrameSet, Rotation};
 use super::kernel::{Effort, FloorSets, Kernel, interleaved};
+use super::point::Point;
 use super::stopwatch::median;
 use super::variants::{Variant, decoders, references};
 use crate::experiment::{OpticsKind, Pattern, Runner, Scene};
@@ -13,7 +14,6 @@ use algo::pattern::{PhaseRange, Sequence};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::{AbsolutePhase, Modulation};
-use serde::Serialize;
 use std::ops::Range;
 use std::time::Duration;
 
@@ -28,37 +28,6 @@ pub struct Study {
     pub bit_depths: Vec<u8>,
     /// How long times are measured; its size is that of the floor.
     pub effort: Effort,
-}
-
-/// One implementation on one sequence, or the mean over the parts.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Point {
-    /// The part; `mean` over all.
-    pub part: &'static str,
-    /// `f64`, `f32`, or the back-end of the decoder.
-    pub implementation: &'static str,
-    /// `fixed` with geometric levels, or `better` with dense ones or a single one.
-    pub sequence: &'static str,
-    /// Frames of a set.
-    pub frames: usize,
-    /// Shifts per level, N.
-    pub steps: usize,
-    /// Bits of a sample.
-    pub bits: u8,
-    /// Whether rows that nobody looks at are left out.
-    pub skipping: bool,
-    /// Processor time of the decoding per pixel of a frame.
-    pub ns_per_px: f64,
-    /// The same in floors.
-    pub x_floor: f64,
-    /// Processor time of the decoding of a set, ms.
-    pub ms_per_set: f64,
-    /// RMS error of the height without gross errors, mm.
-    pub rms_mm: f64,
-    /// Wholly lit pixels that are not resolved.
-    pub unresolved_px: f64,
-    /// Errors above 1 mm.
-    pub gross_px: f64,
 }
 
 /// A sequence that is compared.
@@ -300,46 +269,4 @@ fn score(measured: &Measured, truth: &hal::sim::Truth, turns: &[f64]) -> Option<
 
 fn words(error: impl std::fmt::Display) -> String {
     error.to_string()
-}
-
-/// The means over the parts, in the order of the first part's points.
-pub fn means(points: &[Point]) -> Vec<Point> {
-    let mut means: Vec<Point> = Vec::new();
-    for first in points {
-        let same = |other: &Point| {
-            (
-                other.implementation,
-                other.sequence,
-                other.frames,
-                other.steps,
-                other.bits,
-                other.skipping,
-            ) == (
-                first.implementation,
-                first.sequence,
-                first.frames,
-                first.steps,
-                first.bits,
-                first.skipping,
-            )
-        };
-        if means.iter().any(same) {
-            continue;
-        }
-        let all: Vec<&Point> = points.iter().filter(|point| same(point)).collect();
-        let mean = |of: fn(&Point) -> f64| {
-            all.iter().map(|point| of(point)).sum::<f64>() / all.len() as f64
-        };
-        means.push(Point {
-            part: "mean",
-            ns_per_px: mean(|point| point.ns_per_px),
-            x_floor: mean(|point| point.x_floor),
-            ms_per_set: mean(|point| point.ms_per_set),
-            rms_mm: mean(|point| point.rms_mm),
-            unresolved_px: mean(|point| point.unresolved_px),
-            gross_px: mean(|point| point.gross_px),
-            ..first.clone()
-        });
-    }
-    means
 }

@@ -1,6 +1,6 @@
 //! The plot of run time against error: every point, and the front of those that none beats in both.
 
-use super::accuracy::{Point, means};
+use super::point::{Point, means};
 use super::report::Report;
 use crate::output::plot::{Kind, Plot, Series};
 

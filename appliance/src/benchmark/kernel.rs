@@ -10,7 +10,8 @@ use std::time::Duration;
 
 /// Something that finds the phases of a set of frames.
 pub trait Kernel {
-    /// Decodes a set; answers the processor time of what is to be timed.
+    /// Decodes a set; answers the processor time of what is to be timed: all of it, or what is left to do when the last
+    /// frame is there and the coarser levels were decoded outside of the stopwatch.
     fn run(&mut self, set: &mut FrameSet) -> Duration;
     /// Φ in turns that the last run found in `set`, NaN where rejected.
     fn turns(&self, set: &FrameSet) -> Vec<f64>;

@@ -1,9 +1,9 @@
 //! The results as one JSON object, as CSV, and as tables for people.
 
-use super::accuracy::{Point, means};
 use super::budget::Budget;
 use super::kernel::KernelTable;
 use super::machine::Machine;
+use super::point::{Point, means};
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 
@@ -156,28 +156,57 @@ fn kernel_table(text: &mut String, table: &KernelTable) {
     }
 }
 
+/// A row for each sequence and depth, a column of times for each implementation.
 fn accuracy_table(text: &mut String, means: &[Point]) {
-    text.push_str(
-        "\n### Run time against error\n\nMeans over the parts.\n\n\
-         | sequence | frames | N | bits | implementation | skipping | ns/px | × floor | RMS error, mm | unresolved px | gross |\n\
-         |---|---:|---:|---:|---|---|---:|---:|---:|---:|---:|\n",
-    );
+    let mut implementations: Vec<(&str, bool)> = Vec::new();
+    let mut sequences: Vec<&Point> = Vec::new();
     for point in means {
-        let _ = writeln!(
+        let implementation = (point.implementation, point.skipping);
+        if !implementations.contains(&implementation) {
+            implementations.push(implementation);
+        }
+        if !sequences.iter().any(|known| known.same_frames(point)) {
+            sequences.push(point);
+        }
+    }
+    text.push_str(
+        "\n### Run time against error\n\nMeans over the parts. The error is that of the first implementation; spread: how much the \
+         others' errors differ from it at most. Times in ns/px.\n\n| pattern | frames | N | bits | RMS error, mm | spread | unresolved px | gross |",
+    );
+    for (name, skipping) in &implementations {
+        let skipping = if *skipping { ", skipping" } else { "" };
+        let _ = write!(text, " {name}{skipping} |");
+    }
+    text.push_str("\n|---|---:|---:|---:|---:|---:|---:|---:|");
+    text.push_str(&"---:|".repeat(implementations.len()));
+    text.push('\n');
+    for first in sequences {
+        let same: Vec<&Point> = means.iter().filter(|p| p.same_frames(first)).collect();
+        let differences = same
+            .iter()
+            .map(|point| (point.rms_mm / first.rms_mm - 1.0).abs());
+        let _ = write!(
             text,
-            "| {} | {} | {} | {} | {} | {} | {:.2} | {:.1} | {:.4} | {:.0} | {:.0} |",
-            point.sequence,
-            point.frames,
-            point.steps,
-            point.bits,
-            point.implementation,
-            if point.skipping { "yes" } else { "no" },
-            point.ns_per_px,
-            point.x_floor,
-            point.rms_mm,
-            point.unresolved_px,
-            point.gross_px,
+            "| {} | {} | {} | {} | {:.4} | {:.4} % | {:.0} | {:.0} |",
+            first.sequence,
+            first.frames,
+            first.steps,
+            first.bits,
+            first.rms_mm,
+            100.0 * differences.fold(0.0, f64::max),
+            first.unresolved_px,
+            first.gross_px,
         );
+        for (name, skipping) in &implementations {
+            let here =
+                |point: &&&Point| point.implementation == *name && point.skipping == *skipping;
+            let time = same.iter().find(here).map(|point| point.ns_per_px);
+            let _ = match time {
+                Some(time) => write!(text, " {time:.2} |"),
+                None => write!(text, " |"),
+            };
+        }
+        text.push('\n');
     }
 }
 
