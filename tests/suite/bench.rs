@@ -54,6 +54,9 @@ fn the_kernel_table_has_its_keys_and_every_variant_decodes_rightly() {
         for key in ["frames", "ns_per_px", "x_floor"] {
             positive(variant, key);
         }
+        let [least, most] = [0, 1].map(|end| variant["x_floor_range"][end].as_f64());
+        let median = variant["x_floor"].as_f64();
+        assert!(least <= median && median <= most, "{name}: {variant}");
         let right = positive(variant, "right");
         assert!(right >= RIGHT, "{name} has {right} of its pixels right");
     }
