@@ -15,6 +15,7 @@ import os
 import pathlib
 import statistics
 import time
+import warnings
 
 for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ[threads] = "1"
@@ -96,7 +97,10 @@ def package(ratios, size, finest):
     decoder.v = [finest * ratio for ratio in ratios]
 
     def decode(frames):
-        x = np.asarray(decoder.decode(frames, bmin=LEAST_MODULATION, threads=1).x)
+        # It divides by the fractional part of its frequencies and says so on every call.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            x = np.asarray(decoder.decode(frames, bmin=LEAST_MODULATION, threads=1).x)
         return x.squeeze() * (finest / width)
 
     return decode
