@@ -9,6 +9,7 @@ macro_rules! say {
 }
 
 mod adapt;
+mod bench;
 mod config;
 mod demo;
 mod experiment;
@@ -77,6 +78,8 @@ enum Command {
     Record(record::Record),
     /// Repeat the paper's experiments on the simulated head.
     Experiment(experiment::Experiment),
+    /// Time the kernels, time against error, and trigger to verdict.
+    Bench(bench::Bench),
     /// Make a recipe from a good part in front of the head, or from recordings.
     Teach(teach::Teach),
     /// Check a configuration, or list its keys.
@@ -118,6 +121,7 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Command::Adapt(command) => command.run(&common),
         Command::Record(command) => command.run(&common),
         Command::Experiment(command) => command.run(&common),
+        Command::Bench(command) => command.run(&common),
         Command::Teach(command) => command.run(&common),
         Command::Config(command) => command.run(&common),
         Command::Registers => {

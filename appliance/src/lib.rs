@@ -2,7 +2,7 @@
 
 pub mod adapt;
 pub mod backend;
-pub mod bench;
+pub mod benchmark;
 pub mod calibration;
 pub mod cli;
 pub mod clock;
@@ -16,6 +16,7 @@ pub mod output;
 pub mod plan;
 pub mod progress;
 pub mod recipe;
+pub mod rig;
 pub mod seam;
 pub mod state;
 pub mod station;

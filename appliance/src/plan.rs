@@ -137,6 +137,11 @@ impl Plan {
         &self.recipe
     }
 
+    /// The columns of each row that some gauge looks at.
+    pub fn window(&self) -> &[Range<usize>] {
+        &self.window
+    }
+
     /// The patterns of the sequence, in the order of its frames.
     pub fn rasters(&self, calibration: &Calibration) -> Result<Vec<Raster>, hal::error::Error> {
         let frames = self.recipe.production.iter().copied();

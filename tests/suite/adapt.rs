@@ -2,10 +2,10 @@
 
 use crate::measured::SPHERE;
 use crate::written::{Written, geometric, program};
-use appliance::bench::{About, Bench};
 use appliance::calibration::Calibration;
 use appliance::recipe::Recipe;
 use appliance::recipe::teach::{Naming, teach};
+use appliance::rig::{self, About};
 use hal::head::DynHead;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedFrame, RecordedProjector};
@@ -308,14 +308,14 @@ fn record(
     recipe: &Recipe,
     frames: &[(f64, f64)],
 ) -> Recording {
-    let mut bench = Bench {
+    let mut rig = rig::Rig {
         head,
         calibration,
         range: None,
         timeout: TIMEOUT,
     };
     let function = &recipe.function;
-    let measured = bench
+    let measured = rig
         .measure(function, frames, About::Reference, &|_| ())
         .expect("a measurement");
     let (columns, rows) = (function.columns(), function.rows());

@@ -2,6 +2,7 @@
 
 mod adapt;
 mod bad_input;
+mod bench;
 mod cases;
 mod cli;
 mod experiment;

@@ -2,12 +2,12 @@
 
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
-use appliance::bench::{About, Bench};
 use appliance::calibration::Calibration;
 use appliance::plan::Plan;
 use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::teach::{Naming, Taught, teach};
 use appliance::recipe::{GaugeFile, Recipe, RecipeFile, RegionFile, safe};
+use appliance::rig::{About, Rig};
 use hal::head::DynHead;
 use hal::sim::parts::{Cone, Plane, Sawtooth, SheetMetal, Sphere, Spline};
 use hal::sim::{Part, Placement, Scenario, Stage};
@@ -75,14 +75,14 @@ fn wrong_orders(
         .map(|&turns| AbsolutePhase::from_turns(turns))
         .collect();
     let map = safe(&golden, &arrays.phase_reach, reach);
-    let mut bench = Bench {
+    let mut rig = Rig {
         head: &mut bed.head,
         calibration: &bed.calibration,
         range: None,
         timeout: TIMEOUT,
     };
     let function = &taught.recipe.function;
-    let measured = bench
+    let measured = rig
         .measure(function, frames, About::Map(&map), &|_| ())
         .unwrap();
     let truth = bed.stage.truth();

@@ -378,11 +378,11 @@ fn wrap_columns<V: Lanes, T: BlockSample>(
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
-        if let Some(before) = &before {
-            if v.all8(before.weak(v, at)) {
-                out.store_weak(v, at);
-                continue;
-            }
+        if let Some(before) = &before
+            && v.all8(before.weak(v, at))
+        {
+            out.store_weak(v, at);
+            continue;
         }
         let found = level.block::<true>(v, at);
         out.store(v, at, &found);

@@ -203,10 +203,6 @@ impl Lanes for Avx2 {
         avx2!(_mm256_mullo_epi16(a, b))
     }
     #[inline(always)]
-    fn mul_high(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_mulhi_epu16(a, b))
-    }
-    #[inline(always)]
     fn shl<const N: i32>(self, x: Self::W) -> Self::W {
         avx2!(_mm256_slli_epi16::<N>(x))
     }
@@ -233,10 +229,6 @@ impl Lanes for Avx2 {
     #[inline(always)]
     fn sar_by(self, x: Self::W, n: Self::Count) -> Self::W {
         avx2!(_mm256_sra_epi16(x, n))
-    }
-    #[inline(always)]
-    fn shr_by(self, x: Self::W, n: Self::Count) -> Self::W {
-        avx2!(_mm256_srl_epi16(x, n))
     }
     #[inline(always)]
     fn halve(self, x: Self::W) -> Self::W {

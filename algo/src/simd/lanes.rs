@@ -86,8 +86,6 @@ pub(crate) trait Lanes: Copy + Debug {
     fn mul_q15(self, a: Self::W, b: Self::W) -> Self::W;
     /// The low half of a · b.
     fn mul_low(self, a: Self::W, b: Self::W) -> Self::W;
-    /// The high half of a · b, unsigned.
-    fn mul_high(self, a: Self::W, b: Self::W) -> Self::W;
     /// x · 2ⁿ.
     fn shl<const N: i32>(self, x: Self::W) -> Self::W;
     /// x / 2ⁿ rounded down, signed.
@@ -102,8 +100,6 @@ pub(crate) trait Lanes: Copy + Debug {
     fn shl_by(self, x: Self::W, n: Self::Count) -> Self::W;
     /// x / 2ⁿ rounded down, signed.
     fn sar_by(self, x: Self::W, n: Self::Count) -> Self::W;
-    /// x / 2ⁿ rounded down, unsigned.
-    fn shr_by(self, x: Self::W, n: Self::Count) -> Self::W;
     /// (x + 1) / 2 rounded down, unsigned.
     fn halve(self, x: Self::W) -> Self::W;
     /// |x|, 32768 of −32768 as an unsigned word.

@@ -170,18 +170,6 @@ impl Lanes for Neon {
         neon!(vmulq_s16(a, b))
     }
     #[inline(always)]
-    fn mul_high(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!({
-            let (a, b) = (vreinterpretq_u16_s16(a), vreinterpretq_u16_s16(b));
-            let low = vmull_u16(vget_low_u16(a), vget_low_u16(b));
-            let high = vmull_high_u16(a, b);
-            vreinterpretq_s16_u16(vuzp2q_u16(
-                vreinterpretq_u16_u32(low),
-                vreinterpretq_u16_u32(high),
-            ))
-        })
-    }
-    #[inline(always)]
     fn shl<const N: i32>(self, x: Self::W) -> Self::W {
         neon!(vshlq_n_s16::<N>(x))
     }
@@ -210,13 +198,6 @@ impl Lanes for Neon {
     #[inline(always)]
     fn sar_by(self, x: Self::W, n: Self::Count) -> Self::W {
         neon!(vshlq_s16(x, n))
-    }
-    #[inline(always)]
-    fn shr_by(self, x: Self::W, n: Self::Count) -> Self::W {
-        neon!(vreinterpretq_s16_u16(vshlq_u16(
-            vreinterpretq_u16_s16(x),
-            n
-        )))
     }
     #[inline(always)]
     fn halve(self, x: Self::W) -> Self::W {

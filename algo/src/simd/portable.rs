@@ -193,13 +193,6 @@ impl Lanes for Portable {
         pairs(a, b, i16::wrapping_mul)
     }
     #[inline(never)]
-    fn mul_high(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, |a, b| {
-            let product = u32::from(a.cast_unsigned()) * u32::from(b.cast_unsigned());
-            (product >> 16) as i16
-        })
-    }
-    #[inline(never)]
     fn shl<const N: i32>(self, x: Self::W) -> Self::W {
         lanes(x, |x| x << N)
     }
@@ -226,10 +219,6 @@ impl Lanes for Portable {
     #[inline(never)]
     fn sar_by(self, x: Self::W, n: u8) -> Self::W {
         lanes(x, |x| x >> n)
-    }
-    #[inline(never)]
-    fn shr_by(self, x: Self::W, n: u8) -> Self::W {
-        lanes(x, |x| (x.cast_unsigned() >> n).cast_signed())
     }
     #[inline(never)]
     fn halve(self, x: Self::W) -> Self::W {

@@ -5,7 +5,7 @@ use super::methods::{SHOWN_ADAPTIVE, SHOWN_FIXED};
 use super::runner::Runner;
 use super::scenes::{OpticsKind, Scene};
 use super::table::{self, Row};
-use crate::bench::BenchError;
+use crate::rig::RigError;
 
 /// What is to be run.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ impl Campaign {
     ///
     /// # Errors
     /// If the simulated head or a pattern fails.
-    pub fn run(&self, progress: &dyn Fn(f64, &str)) -> Result<Results, BenchError> {
+    pub fn run(&self, progress: &dyn Fn(f64, &str)) -> Result<Results, RigError> {
         let mut results = Results::default();
         let settings = self.scenes.iter().flat_map(|scene| {
             let kinds = scene.optics(self.optics);

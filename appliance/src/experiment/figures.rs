@@ -1,8 +1,8 @@
 //! The figures of the experiments: what is plotted for each part.
 
-use super::plot::{Kind, Plot, Series};
 use super::scenes::{Judged, Scene};
 use super::table::Row;
+use crate::output::plot::{Kind, Plot, Series};
 
 const FIXED: &str = "#1f5fa8";
 const PAPER: &str = "#c2410c";
@@ -21,6 +21,7 @@ pub fn figures(scene: &Scene, means: &[Row]) -> Vec<(String, String)> {
             title,
             x_label: "unresolvable pixels",
             y_label: "RMS error, mm",
+            log_x: false,
             from_zero: true,
             series: errors(&rows),
         },
@@ -28,6 +29,7 @@ pub fn figures(scene: &Scene, means: &[Row]) -> Vec<(String, String)> {
             title,
             x_label: "fringes over the projector's width, n_F",
             y_label: "resolved share of the lit pixels, %",
+            log_x: false,
             from_zero: false,
             series: over_fringes(&rows, |row| 100.0 * row.values.coverage),
         },
@@ -38,6 +40,7 @@ pub fn figures(scene: &Scene, means: &[Row]) -> Vec<(String, String)> {
             ),
             x_label: "fringes over the projector's width, n_F",
             y_label: "RMS distance from the cylinder, mm",
+            log_x: false,
             from_zero: true,
             series: over_fringes(&rows, |row| row.values.fit_residual_mm),
         },

@@ -2,8 +2,8 @@
 
 use super::cylinder::{self, Cylinder};
 use super::scenes::Judged;
-use crate::bench::Measured;
 use crate::measure::{Score, Truth};
+use crate::rig::Measured;
 use algo::phase::Trust;
 
 /// What a method reached on a part.

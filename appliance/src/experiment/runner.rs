@@ -6,10 +6,10 @@
 use super::judge::{Outcome, judge};
 use super::methods::{self, Method, Shot};
 use super::scenes::{Judged, OpticsKind, Scene};
-use crate::bench::{About, Bench, BenchError, Measured};
 use crate::calibration::Calibration;
+use crate::rig::{About, Measured, Rig, RigError};
 use algo::adaptive::{ProjectorMap, noise, paper};
-use algo::pattern::{PhaseFunction, Sequence};
+use algo::pattern::{PhaseFunction, PhaseRange, Sequence};
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use hal::head::DynHead;
@@ -50,6 +50,20 @@ struct Better {
     expected: Vec<AbsolutePhase>,
 }
 
+/// The pattern of a sequence that the caller chooses, and what it is unwrapped about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pattern {
+    /// Fixed pitch, absolute by itself.
+    Fixed {
+        /// Fringes over the projector's width.
+        fringes: u32,
+    },
+    /// The better pattern about the map of the preliminary measurement.
+    Better,
+    /// The better pattern about the golden map.
+    Golden,
+}
+
 /// A run: what it reached and what it saw.
 pub struct Run {
     /// Against truth.
@@ -72,6 +86,7 @@ const STREAMS: u64 = 1000;
 const PRELIMINARY_STREAM: u64 = 0;
 const HORIZONTAL_STREAM: u64 = 1;
 const GOLDEN_STREAM: u64 = 2;
+const CHOSEN_STREAM: u64 = 3;
 
 fn stream(method: Method) -> u64 {
     match method {
@@ -86,7 +101,7 @@ impl Runner {
     ///
     /// # Errors
     /// If the scene cannot be simulated.
-    pub fn new(scene: &Scene, optics: OpticsKind) -> Result<Self, BenchError> {
+    pub fn new(scene: &Scene, optics: OpticsKind) -> Result<Self, RigError> {
         let scenario = scene.scenario(optics, 1);
         let (head, stage) = hal::sim::head(&scenario)?;
         let calibration = Calibration::of_stage(&stage);
@@ -105,13 +120,8 @@ impl Runner {
     ///
     /// # Errors
     /// If the head or the pattern fails.
-    pub fn run(&mut self, method: Method, seed: u64) -> Result<Run, BenchError> {
-        if self.learnt.seed != seed {
-            self.learnt = Learnt {
-                seed,
-                ..Learnt::default()
-            };
-        }
+    pub fn run(&mut self, method: Method, seed: u64) -> Result<Run, RigError> {
+        self.learn_with(seed);
         let (columns, rows) = self.size();
         match method {
             Method::Fixed { fringes } => {
@@ -126,6 +136,49 @@ impl Runner {
         }
     }
 
+    /// Measures with a sequence of the caller's choice and the noise of `seed`: the levels for a phase function with
+    /// this range are asked for. Answers the map that it is unwrapped about as well.
+    ///
+    /// # Errors
+    /// If the head or the pattern fails.
+    pub fn measure_with(
+        &mut self,
+        pattern: Pattern,
+        frames: impl Fn(PhaseRange) -> Vec<(f64, f64)>,
+        seed: u64,
+    ) -> Result<(Measured, Option<Vec<AbsolutePhase>>), RigError> {
+        self.learn_with(seed);
+        let (function, map) = match pattern {
+            Pattern::Fixed { fringes } => (self.vertical(f64::from(fringes))?, None),
+            Pattern::Better => {
+                let better = self.better()?;
+                (better.function.clone(), Some(better.expected.clone()))
+            }
+            Pattern::Golden => {
+                let golden = self.golden()?;
+                (self.better()?.function.clone(), Some(golden.to_vec()))
+            }
+        };
+        let about = map.as_deref().map_or(About::Reference, About::Map);
+        let frames = frames(function.range());
+        let measured = self.measure(CHOSEN_STREAM, &function, &frames, about)?;
+        Ok((measured, map))
+    }
+
+    /// What is true of the part.
+    pub fn truth(&self) -> &Truth {
+        &self.truth
+    }
+
+    fn learn_with(&mut self, seed: u64) {
+        if self.learnt.seed != seed {
+            self.learnt = Learnt {
+                seed,
+                ..Learnt::default()
+            };
+        }
+    }
+
     fn size(&self) -> (usize, usize) {
         let (columns, rows) = self.calibration.projector;
         (columns as usize, rows as usize)
@@ -137,24 +190,24 @@ impl Runner {
         function: &PhaseFunction,
         frames: &[(f64, f64)],
         about: About<'_>,
-    ) -> Result<Measured, BenchError> {
+    ) -> Result<Measured, RigError> {
         self.stage.reseed(self.learnt.seed * STREAMS + noise_stream);
-        let mut bench = Bench {
+        let mut rig = Rig {
             head: &mut self.head,
             calibration: &self.calibration,
             range: None,
             timeout: TIMEOUT,
         };
-        bench.measure(function, frames, about, &|_| ())
+        rig.measure(function, frames, about, &|_| ())
     }
 
-    fn vertical(&self, fringes: f64) -> Result<PhaseFunction, BenchError> {
+    fn vertical(&self, fringes: f64) -> Result<PhaseFunction, RigError> {
         let (columns, rows) = self.size();
         PhaseFunction::vertical(columns, rows, fringes).map_err(rig)
     }
 
     /// The preliminary measurement of both adaptive methods: one vertical sequence at 20 px pitch.
-    fn preliminary(&mut self) -> Result<Arc<Preliminary>, BenchError> {
+    fn preliminary(&mut self) -> Result<Arc<Preliminary>, RigError> {
         if let Some(known) = &self.learnt.preliminary {
             return Ok(Arc::clone(known));
         }
@@ -168,7 +221,7 @@ impl Runner {
     }
 
     /// The paper's preliminary maps: vertical and horizontal at 20 px, each measured by itself.
-    fn paper_map(&mut self) -> Result<Arc<ProjectorMap>, BenchError> {
+    fn paper_map(&mut self) -> Result<Arc<ProjectorMap>, RigError> {
         if let Some(known) = &self.learnt.paper {
             return Ok(Arc::clone(known));
         }
@@ -195,7 +248,7 @@ impl Runner {
     }
 
     /// The better pattern, made for the blur of the scenario.
-    fn better(&mut self) -> Result<Arc<Better>, BenchError> {
+    fn better(&mut self) -> Result<Arc<Better>, RigError> {
         if let Some(known) = &self.learnt.better {
             return Ok(Arc::clone(known));
         }
@@ -219,7 +272,7 @@ impl Runner {
     }
 
     /// The golden map: the full sequence of the better pattern.
-    fn golden(&mut self) -> Result<Arc<Vec<AbsolutePhase>>, BenchError> {
+    fn golden(&mut self) -> Result<Arc<Vec<AbsolutePhase>>, RigError> {
         if let Some(known) = &self.learnt.golden {
             return Ok(Arc::clone(known));
         }
@@ -231,7 +284,7 @@ impl Runner {
         Ok(Arc::clone(self.learnt.golden.insert(found)))
     }
 
-    fn better_shot(&mut self, method: Method, shot: Shot) -> Result<Run, BenchError> {
+    fn better_shot(&mut self, method: Method, shot: Shot) -> Result<Run, RigError> {
         let better = self.better()?;
         let golden = if shot.needs_golden() {
             Some(self.golden()?)
@@ -245,7 +298,7 @@ impl Runner {
     }
 
     /// The paper's chain with its own criterion of image pitch.
-    fn paper_chain(&mut self, method: Method, function: PhaseFunction) -> Result<Run, BenchError> {
+    fn paper_chain(&mut self, method: Method, function: PhaseFunction) -> Result<Run, RigError> {
         let frames = methods::geometric(&function);
         let mut measured = self.measure(stream(method), &function, &frames, About::Reference)?;
         let fine = too_fine(&measured.phases.phase, measured.phases.width);
@@ -267,8 +320,8 @@ impl Runner {
     }
 }
 
-fn rig(error: impl std::fmt::Display) -> BenchError {
-    BenchError::Rig(error.to_string())
+fn rig(error: impl std::fmt::Display) -> RigError {
+    RigError::Impossible(error.to_string())
 }
 
 /// Smallest image pitch along u that the paper's chain resolves, camera pixels.

@@ -21,6 +21,8 @@ pub struct Scene {
     /// Columns and rows of the camera: 512 as in the study; a smaller one sees the middle of the same
     /// picture, with pixels of the same size.
     pub camera: u32,
+    /// Bits of the camera: 8 in the study.
+    pub bit_depth: u8,
 }
 
 /// The quantity that a part's figure shows.
@@ -47,6 +49,8 @@ pub const PARTS: [&str; 7] = [
 
 /// Columns and rows of the study's camera.
 const CAMERA: u32 = 512;
+/// Bits of it.
+const BIT_DEPTH: u8 = 8;
 /// The paper's tilt about y, degrees.
 const TILT: f64 = 7.0;
 
@@ -86,6 +90,7 @@ impl Scene {
             part,
             placement,
             camera: CAMERA,
+            bit_depth: BIT_DEPTH,
         })
     }
 
@@ -114,6 +119,7 @@ impl Scene {
             part: self.part.clone(),
             placement: self.placement,
             optics: optics.blur(),
+            bit_depth: self.bit_depth,
             ..Scenario::default()
         };
         let camera = &mut scenario.rig.camera;

@@ -1,7 +1,7 @@
 //! A shaded view of a measured surface: neighbouring points as small facets, seen obliquely.
 
-use crate::bench::Measured;
 use crate::output::canvas::Canvas;
+use crate::rig::Measured;
 use algo::phase::Trust;
 
 /// The view comes from this far above the plane z = 0, after a turn about z, radians.

@@ -1,7 +1,7 @@
 //! A raster that pixels and text are put on, and its PNG.
 
 use embedded_graphics::Drawable;
-use embedded_graphics::mono_font::ascii::FONT_7X14;
+use embedded_graphics::mono_font::iso_8859_1::FONT_7X14;
 use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::BinaryColor;
 use embedded_graphics::prelude::{DrawTarget, OriginDimensions, Pixel, Point, Size};
@@ -11,6 +11,8 @@ use embedded_graphics::text::{Baseline, Text};
 const FONT: MonoFont<'static> = FONT_7X14;
 /// Height of a line of text, pixels.
 pub const LINE: usize = FONT.character_size.height as usize;
+/// Width of a letter with the space after it, pixels.
+pub const LETTER: usize = FONT.character_size.width as usize;
 /// Lightness of the background and of text.
 const BACKGROUND: u8 = 24;
 const INK: u8 = 225;
@@ -52,12 +54,21 @@ impl<const N: usize> Canvas<N> {
         }
     }
 
-    /// Writes a line of ASCII text with its upper left corner at (x, y).
+    /// Writes a line of Latin text with its upper left corner at (x, y).
     pub fn text(&mut self, text: &str, x: usize, y: usize) {
+        self.text_in(text, x, y, [INK; N]);
+    }
+
+    /// As [`Self::text`], in a colour.
+    pub fn text_in(&mut self, text: &str, x: usize, y: usize, colour: [u8; N]) {
         let style = MonoTextStyle::new(&FONT, BinaryColor::On);
         let at = Point::new(x as i32, y as i32);
+        let mut ink = Ink {
+            canvas: self,
+            colour,
+        };
         // Drawing on this canvas cannot fail: its error type has no values.
-        let Ok(_) = Text::with_baseline(text, at, style, Baseline::Top).draw(self);
+        let Ok(_) = Text::with_baseline(text, at, style, Baseline::Top).draw(&mut ink);
     }
 
     /// As a PNG.
@@ -81,14 +92,19 @@ impl<const N: usize> Canvas<N> {
     }
 }
 
-impl<const N: usize> OriginDimensions for Canvas<N> {
+/// A canvas that is written on in one colour.
+struct Ink<'a, const N: usize> {
+    canvas: &'a mut Canvas<N>,
+    colour: [u8; N],
+}
+
+impl<const N: usize> OriginDimensions for Ink<'_, N> {
     fn size(&self) -> Size {
-        Size::new(self.width as u32, self.height as u32)
+        Size::new(self.canvas.width as u32, self.canvas.height as u32)
     }
 }
 
-/// Text is drawn in one ink.
-impl<const N: usize> DrawTarget for Canvas<N> {
+impl<const N: usize> DrawTarget for Ink<'_, N> {
     type Color = BinaryColor;
     type Error = core::convert::Infallible;
 
@@ -98,7 +114,7 @@ impl<const N: usize> DrawTarget for Canvas<N> {
     {
         for Pixel(at, _) in pixels.into_iter().filter(|pixel| pixel.1.is_on()) {
             if let (Ok(x), Ok(y)) = (usize::try_from(at.x), usize::try_from(at.y)) {
-                self.set(x, y, [INK; N]);
+                self.canvas.set(x, y, self.colour);
             }
         }
         Ok(())

@@ -4,8 +4,8 @@ pub use super::golden::{Naming, Taught};
 
 use super::PatternFile;
 use super::golden::GoldenPart;
-use crate::bench::{About, Bench, BenchError, Measured};
 use crate::calibration::Calibration;
+use crate::rig::{About, Measured, Rig, RigError};
 use crate::seam;
 use algo::adaptive::{AdaptError, ProjectorMap, noise};
 use algo::pattern::{PhaseFunction, Sequence};
@@ -38,11 +38,11 @@ pub enum TeachError {
     Rig(String),
 }
 
-impl From<BenchError> for TeachError {
-    fn from(error: BenchError) -> Self {
+impl From<RigError> for TeachError {
+    fn from(error: RigError) -> Self {
         match error {
-            BenchError::Device(error) => Self::Device(error),
-            BenchError::Rig(error) => Self::Rig(error),
+            RigError::Device(error) => Self::Device(error),
+            RigError::Impossible(error) => Self::Rig(error),
         }
     }
 }
@@ -65,7 +65,7 @@ pub fn teach(
     timeout: Duration,
     progress: &dyn Fn(f64, &str),
 ) -> Result<Taught, TeachError> {
-    let mut bench = Bench {
+    let mut rig = Rig {
         head,
         calibration,
         range: None,
@@ -78,7 +78,7 @@ pub fn teach(
     let preliminary = PhaseFunction::vertical(columns, rows, columns as f64 / PRELIMINARY_PITCH_PX)
         .map_err(|error| TeachError::Rig(error.to_string()))?;
     let frames = Sequence::geometric(preliminary.range(), LEVELS, STEPS);
-    let first = bench.measure(&preliminary, &frames, About::Reference, &|share| {
+    let first = rig.measure(&preliminary, &frames, About::Reference, &|share| {
         progress(0.3 * share, "measuring the part");
     })?;
     refuse_empty(&first.phases)?;
@@ -93,7 +93,7 @@ pub fn teach(
     let function = noise::adapt(&map, columns, rows, &optics)?;
     let expected = map.expected_phase(&function);
     let full = dense(DENSE_N);
-    let golden = bench.measure(&function, &full, About::Map(&expected), &|share| {
+    let golden = rig.measure(&function, &full, About::Map(&expected), &|share| {
         progress(0.4 + 0.3 * share, "measuring the part with its own pattern");
     })?;
     refuse_empty(&golden.phases)?;

@@ -13,7 +13,7 @@ use hal::head::DynHead;
 use std::time::Duration;
 
 /// A head with its calibration, for measurements that no recipe describes yet.
-pub struct Bench<'a> {
+pub struct Rig<'a> {
     /// The devices.
     pub head: &'a mut DynHead,
     /// What is known of them.
@@ -50,25 +50,25 @@ pub struct Measured {
 
 /// A measurement that failed.
 #[derive(Debug, thiserror::Error)]
-pub enum BenchError {
+pub enum RigError {
     /// A device failed.
     #[error(transparent)]
     Device(#[from] hal::error::Error),
     /// The pattern, the sequence or the rig is impossible.
     #[error("{0}")]
-    Rig(String),
+    Impossible(String),
 }
 
-fn rig(error: impl std::fmt::Display) -> BenchError {
-    BenchError::Rig(error.to_string())
+fn rig(error: impl std::fmt::Display) -> RigError {
+    RigError::Impossible(error.to_string())
 }
 
-impl Bench<'_> {
+impl Rig<'_> {
     /// The geometry for a phase function.
     ///
     /// # Errors
     /// If the calibration is absurd.
-    pub fn triangulator(&self, function: &PhaseFunction) -> Result<Triangulator, BenchError> {
+    pub fn triangulator(&self, function: &PhaseFunction) -> Result<Triangulator, RigError> {
         let (camera, projector) = self.calibration.devices().map_err(rig)?;
         Triangulator::new(
             camera,
@@ -91,7 +91,7 @@ impl Bench<'_> {
         frames: &[(f64, f64)],
         about: About<'_>,
         progress: &dyn Fn(f64),
-    ) -> Result<Measured, BenchError> {
+    ) -> Result<Measured, RigError> {
         let sequence = Sequence::from_frames(frames).map_err(rig)?;
         let bit_depth = self.calibration.camera.2;
         let decoder = Decoder::new(&sequence, function.range(), bit_depth).map_err(rig)?;

@@ -1,0 +1,272 @@
+//! Run time against error: what each implementation, sequence and depth costs on the simulated parts, and what it is worth.
+
+use super::decoding::Decoding;
+use super::frames::{FrameSet, Rotation};
+use super::kernel::{Effort, FloorSets, Kernel, interleaved};
+use super::point::Point;
+use super::stopwatch::median;
+use super::variants::{Variant, decoders, references};
+use crate::experiment::{OpticsKind, Pattern, Runner, Scene};
+use crate::measure::{Score, Truth};
+use crate::recipe::teach::dense;
+use crate::rig::Measured;
+use algo::pattern::{PhaseRange, Sequence};
+use algo::phase::Trust;
+use algo::pipeline::{self, PhaseMap};
+use algo::units::{AbsolutePhase, Modulation};
+use std::ops::Range;
+use std::time::Duration;
+
+/// What is measured, and how thoroughly.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// Names of the simulated parts.
+    pub parts: Vec<&'static str>,
+    /// Columns and rows of their camera.
+    pub camera: u32,
+    /// Bits of it.
+    pub bit_depths: Vec<u8>,
+    /// How long times are measured; its size is that of the floor.
+    pub effort: Effort,
+}
+
+/// A sequence that is compared.
+struct Compared {
+    name: &'static str,
+    pattern: Pattern,
+    levels: usize,
+    steps: usize,
+}
+
+/// Fringes of the fixed pattern.
+const FIXED: Pattern = Pattern::Fixed { fringes: 100 };
+/// n of the dense levels: reaches ± 4 turns, as recipes have it.
+const DENSE_N: f64 = 4.0;
+/// The noise of all measurements.
+const SEED: u64 = 1;
+
+const fn compared(name: &'static str, pattern: Pattern, levels: usize, steps: usize) -> Compared {
+    Compared {
+        name,
+        pattern,
+        levels,
+        steps,
+    }
+}
+
+const SEQUENCES: [Compared; 10] = [
+    compared("fixed", FIXED, 3, 3),
+    compared("fixed", FIXED, 3, 4),
+    compared("fixed", FIXED, 3, 8),
+    compared("better", Pattern::Better, 3, 3),
+    compared("better", Pattern::Better, 3, 4),
+    compared("better", Pattern::Better, 3, 8),
+    compared("better", Pattern::Golden, 2, 3),
+    compared("better", Pattern::Golden, 1, 3),
+    compared("better", Pattern::Golden, 1, 4),
+    compared("better", Pattern::Golden, 1, 8),
+];
+
+impl Compared {
+    fn frames(&self, range: PhaseRange) -> Vec<(f64, f64)> {
+        if matches!(self.pattern, Pattern::Fixed { .. }) {
+            return Sequence::geometric(range, self.levels, self.steps);
+        }
+        let mut ratios: Vec<f64> = match self.levels {
+            3 => dense(DENSE_N).iter().map(|frame| frame.0).collect(),
+            2 => vec![1.0, 0.8],
+            _ => vec![1.0],
+        };
+        ratios.dedup();
+        let steps = self.steps;
+        let level = |ratio| (0..steps).map(move |k| (ratio, k as f64 / steps as f64));
+        ratios.into_iter().flat_map(level).collect()
+    }
+}
+
+impl Study {
+    /// What figures are quoted from.
+    pub fn full() -> Self {
+        Self {
+            parts: vec!["cone", "sawtooth", "sphere", "spline"],
+            camera: 512,
+            bit_depths: vec![8, 10, 12],
+            // Ten sequences of three depths on four parts: a shorter look at each.
+            effort: Effort {
+                patience: Duration::from_millis(15),
+                ..Effort::FULL
+            },
+        }
+    }
+
+    /// Whether everything works.
+    pub fn quick() -> Self {
+        Self {
+            parts: vec!["cone"],
+            camera: 64,
+            bit_depths: vec![8],
+            effort: Effort::QUICK,
+        }
+    }
+
+    /// Measures all, a point for each part and implementation.
+    ///
+    /// # Errors
+    /// If something cannot be simulated or decoded.
+    pub fn run(&self, progress: &dyn Fn(f64, &str)) -> Result<Vec<Point>, String> {
+        let mut base = FloorSets::new(&self.effort);
+        let mut points = Vec::new();
+        let total = (self.parts.len() * self.bit_depths.len() * SEQUENCES.len()) as f64;
+        let mut done = 0.0;
+        for &part in &self.parts {
+            for &bit_depth in &self.bit_depths {
+                let scene = Scene::named(part).ok_or("there is no such part")?;
+                let scene = Scene {
+                    camera: self.camera,
+                    bit_depth,
+                    ..scene
+                };
+                let mut runner = Runner::new(&scene, OpticsKind::Ideal).map_err(words)?;
+                for compared in &SEQUENCES {
+                    let told = format!(
+                        "{part}, {bit_depth} bit, {} {}x{}",
+                        compared.name, compared.levels, compared.steps
+                    );
+                    progress(done / total, &told);
+                    points.extend(self.compare(
+                        &mut runner,
+                        compared,
+                        part,
+                        bit_depth,
+                        &mut base,
+                    )?);
+                    done += 1.0;
+                }
+            }
+        }
+        Ok(points)
+    }
+
+    fn compare(
+        &self,
+        runner: &mut Runner,
+        compared: &Compared,
+        part: &'static str,
+        bits: u8,
+        base: &mut FloorSets,
+    ) -> Result<Vec<Point>, String> {
+        let frames = |range| compared.frames(range);
+        let (measured, map) = runner
+            .measure_with(compared.pattern, frames, SEED)
+            .map_err(words)?;
+        let range = measured.triangulator.function().range();
+        let sequence = Sequence::from_frames(&compared.frames(range)).map_err(words)?;
+        let set = FrameSet::of(&measured.frames, map);
+        let truth = runner.truth();
+        let pixels = set.pixels();
+        let mut variants = Vec::new();
+        let mut named = Vec::new();
+        for (name, kernel) in references(&sequence, range, bits, pixels)? {
+            variants.push(variant(name, kernel));
+            named.push((name, false));
+        }
+        for (name, decoder) in decoders(&sequence, range, bits)? {
+            let window = rows_seen(truth, set.width());
+            let whole = Decoding::new(decoder.clone(), None);
+            variants.push(variant(name, Box::new(whole)));
+            variants.push(variant(
+                name,
+                Box::new(Decoding::new(decoder, Some(window))),
+            ));
+            named.extend([(name, false), (name, true)]);
+        }
+        let mut sets = Rotation::of(set, self.effort.bytes);
+        let rounds = interleaved(&mut variants, &mut sets, base, &self.effort);
+        let mut points = Vec::new();
+        for (((implementation, skipping), variant), rounds) in
+            named.into_iter().zip(&mut variants).zip(rounds)
+        {
+            let set = sets.next();
+            variant.kernel.run(set);
+            let score = score(&measured, truth, &variant.kernel.turns(set));
+            let ns_per_px = median(rounds.iter().map(|round| round.of).collect());
+            points.push(Point {
+                part,
+                implementation,
+                sequence: compared.name,
+                frames: compared.levels * compared.steps,
+                steps: compared.steps,
+                bits,
+                skipping,
+                ns_per_px,
+                x_floor: median(rounds.iter().map(|round| round.of / round.floor).collect()),
+                ms_per_set: ns_per_px * pixels as f64 / 1e6,
+                rms_mm: score.as_ref().map_or(f64::NAN, |score| score.rms_mm),
+                unresolved_px: score
+                    .as_ref()
+                    .map_or(f64::NAN, |score| (lit(truth) - score.scored) as f64),
+                gross_px: score.map_or(f64::NAN, |score| score.gross as f64),
+            });
+        }
+        Ok(points)
+    }
+}
+
+fn variant(name: &str, kernel: Box<dyn Kernel>) -> Variant {
+    Variant {
+        name: name.to_owned(),
+        kernel,
+    }
+}
+
+/// Truth class of a pixel that is wholly lit.
+const WHOLE_PIXEL: u8 = 2;
+
+fn lit(truth: &hal::sim::Truth) -> usize {
+    truth
+        .class
+        .iter()
+        .filter(|&&class| class == WHOLE_PIXEL)
+        .count()
+}
+
+/// The rows in which some of the part is seen, as a recipe's gauges would ask for them.
+fn rows_seen(truth: &hal::sim::Truth, width: usize) -> Vec<Range<usize>> {
+    let rows = truth.class.chunks(width.max(1));
+    let seen = rows.map(|row| row.iter().any(|&class| class > 0));
+    seen.map(|seen| if seen { 0..width } else { 0..0 })
+        .collect()
+}
+
+/// The heights of an implementation's phases, by exact triangulation, against the truth.
+fn score(measured: &Measured, truth: &hal::sim::Truth, turns: &[f64]) -> Option<Score> {
+    let mut phases = PhaseMap {
+        width: measured.phases.width,
+        phase: turns
+            .iter()
+            .map(|&turns| AbsolutePhase::from_turns(turns))
+            .collect(),
+        modulation: vec![Modulation::default(); turns.len()],
+        trust: turns
+            .iter()
+            .map(|turns| {
+                if turns.is_nan() {
+                    Trust::Residual
+                } else {
+                    Trust::Resolved
+                }
+            })
+            .collect(),
+    };
+    let (triangulator, decoder) = (&measured.triangulator, &measured.decoder);
+    let heights = pipeline::triangulate(triangulator, decoder, None, None, None, &mut phases);
+    let known = Truth {
+        height: Some(&truth.height),
+        class: Some(&truth.class),
+    };
+    known.score(&phases, &heights)
+}
+
+fn words(error: impl std::fmt::Display) -> String {
+    error.to_string()
+}

@@ -1,0 +1,193 @@
+//! From trigger to verdict: how long each stage takes on a simulated head with a taught recipe.
+
+use super::decoding::Decoding;
+use super::frames::FrameSet;
+use super::kernel::Kernel;
+use super::stopwatch::{median, timed};
+use super::variants::decoders;
+use crate::calibration::Calibration;
+use crate::plan::Plan;
+use crate::recipe::teach::{Naming, teach};
+use crate::recipe::{Recipe, archive};
+use algo::units::AbsolutePhase;
+use hal::frame::Frame;
+use hal::head::DynHead;
+use hal::sim::Scenario;
+use serde::Serialize;
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+/// Angles of view of the physical head of the study (section 5.2), degrees.
+const FOV_DEG: [f64; 2] = [22.28, 16.77];
+/// Longest wait for a frame.
+const TIMEOUT: Duration = Duration::from_secs(5);
+/// How far parts may lie from where they were taught, mm: careful enough for single levels.
+const PLACEMENT_MM: f64 = 0.5;
+
+/// The time of one cycle, stage by stage.
+#[derive(Clone, Debug, Serialize)]
+pub struct Budget {
+    /// Columns of the camera.
+    pub width: u32,
+    /// Rows of it.
+    pub height: u32,
+    /// Frames of the production sequence.
+    pub frames: usize,
+    /// From the trigger to the end of the last exposure at the projector's refresh rate, ms.
+    pub exposure_ms: f64,
+    /// Stage and wall time on all threads, ms, medians.
+    pub stages: Vec<(String, f64)>,
+    /// From the last frame to the verdict, ms: all stages.
+    pub verdict_ms: f64,
+    /// From the trigger to the verdict, ms.
+    pub total_ms: f64,
+    /// Processor time of frames → verdict on one thread, ms.
+    pub one_thread_ms: f64,
+    /// Processor time of the phase kernel alone, same frames and window, ms.
+    pub kernel_ms: f64,
+    /// Their ratio.
+    pub x_kernel: f64,
+}
+
+/// Budgets of a camera of this size: with four frames of one level about the golden map, and with the full sequence.
+///
+/// # Errors
+/// If something cannot be simulated or taught.
+pub fn budgets(
+    (width, height): (u32, u32),
+    rounds: usize,
+    progress: &dyn Fn(f64, &str),
+) -> Result<Vec<Budget>, String> {
+    let mut scenario = Scenario::default();
+    let camera = &mut scenario.rig.camera;
+    (camera.width, camera.height, camera.fov_deg) = (width, height, FOV_DEG);
+    let about = format!("{width}x{height}");
+    progress(0.0, &format!("{about}: light of the scene"));
+    let (mut head, stage) = hal::sim::head(&scenario).map_err(words)?;
+    let calibration = Calibration::of_stage(&stage);
+    let naming = Naming {
+        number: 1,
+        part_number: "BENCH".into(),
+        name: "bench".into(),
+        taught_at_unix_s: 0,
+        placement_tolerance_mm: PLACEMENT_MM,
+    };
+    let told = |share: f64, words: &str| progress(0.3 + 0.4 * share, &format!("{about}: {words}"));
+    let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &told).map_err(words)?;
+    let sequences = &taught.recipe.file.sequences;
+    let full = sequences.len().saturating_sub(1);
+    let four = sequences
+        .iter()
+        .position(|sequence| sequence.frames.len() == 4);
+    let mut found = Vec::new();
+    for production in four.into_iter().chain([full]) {
+        progress(
+            0.8,
+            &format!("{about}: {} frames", sequences[production].frames.len()),
+        );
+        let mut file = taught.recipe.file.clone();
+        file.production = production;
+        let (bytes, _) = archive::pack(&file, &taught.recipe.arrays).map_err(words)?;
+        let recipe = Recipe::from_bytes(&bytes).map_err(words)?;
+        let plan = Plan::new(recipe, &calibration, true).map_err(words)?;
+        found.push(budget(
+            &plan,
+            &mut head,
+            &calibration,
+            stage.refresh(),
+            rounds,
+        )?);
+    }
+    Ok(found)
+}
+
+fn budget(
+    plan: &Plan,
+    head: &mut DynHead,
+    calibration: &Calibration,
+    refresh: Duration,
+    rounds: usize,
+) -> Result<Budget, String> {
+    head.load(plan.rasters(calibration).map_err(words)?)
+        .map_err(words)?;
+    let indices: Vec<usize> = (0..plan.recipe().production.len()).collect();
+    let mut frames = Vec::new();
+    let exposure = head
+        .acquire(&indices, TIMEOUT, &mut |_, frame| frames.push(frame))
+        .map_err(words)?;
+    // The last exposure lasts a refresh, and the trigger waits for up to one before the first.
+    let shown = Duration::from_nanos(exposure.done.0.saturating_sub(exposure.started.0));
+    let exposure_ms = ms(shown + 2 * refresh);
+    let mut runs: Vec<Vec<(String, f64)>> = Vec::new();
+    for _ in 0..rounds {
+        let (inspection, maps) = plan.inspect(&frames, Instant::now());
+        black_box(maps);
+        let stages = inspection.stages.iter();
+        runs.push(
+            stages
+                .map(|stage| (stage.name.to_owned(), f64::from(stage.us) / 1e3))
+                .collect(),
+        );
+    }
+    let middle = |at: usize| median(runs.iter().map(|run| run[at].1).collect());
+    let stages: Vec<(String, f64)> = runs
+        .first()
+        .into_iter()
+        .flatten()
+        .enumerate()
+        .map(|(at, (name, _))| (name.clone(), middle(at)))
+        .collect();
+    let whole = |run: &Vec<(String, f64)>| run.iter().map(|stage| stage.1).sum();
+    let verdict_ms = median(runs.iter().map(whole).collect());
+    let [one_thread_ms, kernel_ms, x_kernel] = on_one_thread(plan, &frames, rounds)?;
+    let (width, height, _) = calibration.camera;
+    Ok(Budget {
+        width,
+        height,
+        frames: frames.len(),
+        exposure_ms,
+        stages,
+        verdict_ms,
+        total_ms: exposure_ms + verdict_ms,
+        one_thread_ms,
+        kernel_ms,
+        x_kernel,
+    })
+}
+
+/// Processor time of frames → verdict and of the phase kernel alone, ms, and their ratio; interleaved.
+fn on_one_thread(plan: &Plan, frames: &[Frame], rounds: usize) -> Result<[f64; 3], String> {
+    let recipe = plan.recipe();
+    let known = recipe.arrays.golden_phase.iter();
+    let map = known
+        .map(|&turns| AbsolutePhase::from_turns(turns))
+        .collect();
+    let mut set = FrameSet::of(frames, Some(map));
+    let depth = recipe.file.camera.bit_depth;
+    let (_, decoder) = decoders(&recipe.sequence, recipe.function.range(), depth)?
+        .pop()
+        .ok_or("there is no back-end")?;
+    let mut kernel = Decoding::new(decoder, Some(plan.window().to_vec()));
+    let alone = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .map_err(words)?;
+    let (mut inspected, mut decoded, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..rounds {
+        let inspection =
+            alone.install(|| timed(|| drop(black_box(plan.inspect(frames, Instant::now())))));
+        let phase = kernel.run(&mut set);
+        inspected.push(ms(inspection));
+        decoded.push(ms(phase));
+        ratios.push(inspection.as_secs_f64() / phase.as_secs_f64().max(f64::MIN_POSITIVE));
+    }
+    Ok([inspected, decoded, ratios].map(median))
+}
+
+fn ms(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
+}
+
+fn words(error: impl std::fmt::Display) -> String {
+    error.to_string()
+}

@@ -1,0 +1,115 @@
+//! The product's decoder as something to time.
+
+use super::frames::{FrameSet, Output};
+use super::kernel::Kernel;
+use super::stopwatch::timed;
+use algo::phase::{Decoder, PhaseRow, Wrapped};
+use algo::pipeline::wrap;
+use std::ops::Range;
+use std::time::Duration;
+
+/// A decoder on one thread, into memory that is there already.
+pub struct Decoding {
+    decoder: Decoder,
+    /// The columns of each row that somebody looks at; none = all.
+    window: Option<Vec<Range<usize>>>,
+    /// Whether the coarser levels are demodulated before the clock starts, as they are when each is decoded while the next
+    /// is being exposed.
+    on_arrival: bool,
+}
+
+impl Decoding {
+    /// With a decoder; rows without a column in `window` are left out.
+    pub fn new(decoder: Decoder, window: Option<Vec<Range<usize>>>) -> Self {
+        Self {
+            decoder,
+            window,
+            on_arrival: false,
+        }
+    }
+
+    /// With a decoder that has had all levels but the last.
+    pub fn after_the_last(decoder: Decoder) -> Self {
+        Self {
+            decoder,
+            window: None,
+            on_arrival: true,
+        }
+    }
+
+    /// All levels but the last, demodulated.
+    fn before(&self, set: &mut FrameSet) -> Vec<Wrapped> {
+        let (width, height) = (set.width(), set.out.phase.len() / set.width().max(1));
+        let (frames, _, _) = set.parts();
+        let mut before: Vec<Wrapped> = Vec::new();
+        for (level, places) in self.decoder.levels().enumerate() {
+            if level + 1 == self.decoder.levels().len() {
+                break;
+            }
+            let frames: Vec<_> = places.iter().map(|&at| frames[at]).collect();
+            let mut wrapped = Wrapped::new(width, height);
+            // The frames are those that the decoder was made for.
+            let _ = wrap(&self.decoder, level, &frames, before.first(), &mut wrapped);
+            before.push(wrapped);
+        }
+        before
+    }
+}
+
+impl Kernel for Decoding {
+    fn run(&mut self, set: &mut FrameSet) -> Duration {
+        let width = set.width().max(1);
+        let before = if self.on_arrival {
+            self.before(set)
+        } else {
+            Vec::new()
+        };
+        let last: Vec<usize> = self
+            .decoder
+            .levels()
+            .last()
+            .map_or(Vec::new(), <[_]>::to_vec);
+        timed(|| {
+            let (frames, map, out) = set.parts();
+            let Output {
+                phase,
+                modulation,
+                trust,
+            } = out;
+            let rows = phase
+                .chunks_mut(width)
+                .zip(modulation.chunks_mut(width))
+                .zip(trust.chunks_mut(width));
+            for (v, ((phase, modulation), trust)) in rows.enumerate() {
+                let columns = match &self.window {
+                    Some(window) => window[v].clone(),
+                    None => 0..width,
+                };
+                let row = PhaseRow {
+                    phase,
+                    modulation,
+                    trust,
+                };
+                let map = map.map_or(&[][..], |map| &map[v * width..(v + 1) * width]);
+                if self.on_arrival {
+                    let last: Vec<_> = last.iter().map(|&at| frames[at]).collect();
+                    self.decoder.last_row(&before, &last, v, map, columns, row);
+                } else {
+                    self.decoder.row(&frames, v, map, columns, row);
+                }
+            }
+        })
+    }
+
+    fn turns(&self, set: &FrameSet) -> Vec<f64> {
+        let found = set.out.phase.iter();
+        let turns = |phase: &algo::units::AbsolutePhase| {
+            if phase.is_known() {
+                phase.turns()
+            } else {
+                f64::NAN
+            }
+        };
+        found.map(turns).collect()
+    }
+}

@@ -1,0 +1,56 @@
+//! The floor: a loop that only reads twelve frames of 8 bits and writes one map of 32 bits.
+//!
+//! No decoder can be faster, as it must do that as well; so times are told in floors, which makes machines
+//! comparable. Memory bounds it: a block of pixels is an exclusive or over twelve streams, and four copies of that,
+//! each with another constant, are the block's 32-bit values.
+
+/// Frames that the floor reads.
+pub const FRAMES: usize = 12;
+
+/// Pixels of a block: one line of a cache.
+const BLOCK: usize = 64;
+
+/// Reads all of `frames` (equally long) and writes all of `map`, a value for each pixel. What is left over behind the
+/// last whole block is not touched.
+pub fn floor(frames: &[&[u8]; FRAMES], map: &mut [[u8; 4]]) {
+    let mut blocks = frames.map(|frame| frame.as_chunks::<BLOCK>().0.iter());
+    let (out, _) = map.as_chunks_mut::<BLOCK>();
+    for out in out {
+        let mut mixed = [0_u8; BLOCK];
+        for stream in &mut blocks {
+            let Some(block) = stream.next() else { return };
+            for (mixed, sample) in mixed.iter_mut().zip(block) {
+                *mixed ^= sample;
+            }
+        }
+        let out = out.as_flattened_mut();
+        for (quarter, constant) in out.chunks_exact_mut(BLOCK).zip([0, 0x55, 0xAA, 0xFF]) {
+            for (out, mixed) in quarter.iter_mut().zip(&mixed) {
+                *out = mixed ^ constant;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_sample_reaches_the_map() {
+        let mut samples = [[0_u8; 2 * BLOCK]; FRAMES];
+        let map_of = |samples: &[[u8; 2 * BLOCK]; FRAMES]| {
+            let mut map = [[1; 4]; 2 * BLOCK];
+            floor(&samples.each_ref().map(|frame| &frame[..]), &mut map);
+            map
+        };
+        let before = map_of(&samples);
+        for frame in 0..FRAMES {
+            for at in [0, 63, 64, 127] {
+                samples[frame][at] = 7;
+                assert_ne!(map_of(&samples), before, "{frame} {at}");
+                samples[frame][at] = 0;
+            }
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! Sets of frames that kernels are timed on, and the rotation through so many that no cache holds them.
+
+use algo::frame::{FrameView, Samples};
+use algo::phase::Trust;
+use algo::units::{AbsolutePhase, Modulation};
+use hal::frame::Frame;
+
+/// The frames of one measurement, the map that they are unwrapped about, and room for what comes out.
+#[derive(Clone)]
+pub struct FrameSet {
+    width: usize,
+    height: usize,
+    samples: Buffer,
+    map: Option<Vec<AbsolutePhase>>,
+    /// What the kernel found.
+    pub out: Output,
+}
+
+/// All frames of a set, one behind the other.
+#[derive(Clone)]
+pub enum Buffer {
+    /// 8 bits.
+    Eight(Vec<u8>),
+    /// 9 to 16 bits.
+    Sixteen(Vec<u16>),
+}
+
+/// What a kernel finds in each pixel, row-major.
+#[derive(Clone)]
+pub struct Output {
+    /// Φ.
+    pub phase: Vec<AbsolutePhase>,
+    /// B.
+    pub modulation: Vec<Modulation>,
+    /// Resolved or why not.
+    pub trust: Vec<Trust>,
+}
+
+impl FrameSet {
+    /// Frames of `width` × `height` samples, one behind the other, and the map for sequences that need one.
+    pub fn new(
+        (width, height): (usize, usize),
+        samples: Buffer,
+        map: Option<Vec<AbsolutePhase>>,
+    ) -> Self {
+        let pixels = width * height;
+        // No value is zero, so that the memory is really there before the first run.
+        let out = Output {
+            phase: vec![AbsolutePhase::UNKNOWN; pixels],
+            modulation: vec![Modulation::from_bits(1); pixels],
+            trust: vec![Trust::Dark; pixels],
+        };
+        Self {
+            width,
+            height,
+            samples,
+            map,
+            out,
+        }
+    }
+
+    /// From what a head took (frames of equal format), without the padding of its rows.
+    pub fn of(frames: &[Frame], map: Option<Vec<AbsolutePhase>>) -> Self {
+        let (mut eight, mut sixteen) = (Vec::new(), Vec::new());
+        let mut size = (0, 0);
+        for frame in frames {
+            let format = frame.format();
+            size = (format.width as usize, format.height as usize);
+            let stride = format.stride;
+            match frame.samples() {
+                hal::frame::Samples::Eight(samples) => {
+                    let rows = samples.chunks(stride).take(size.1);
+                    eight.extend(rows.flat_map(|row| &row[..size.0]));
+                }
+                hal::frame::Samples::Sixteen(samples) => {
+                    let rows = samples.chunks(stride).take(size.1);
+                    sixteen.extend(rows.flat_map(|row| &row[..size.0]));
+                }
+            }
+        }
+        let samples = if sixteen.is_empty() {
+            Buffer::Eight(eight)
+        } else {
+            Buffer::Sixteen(sixteen)
+        };
+        Self::new(size, samples, map)
+    }
+
+    /// Number of pixels of a frame.
+    pub fn pixels(&self) -> usize {
+        self.width * self.height
+    }
+
+    /// Samples per row.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// The frames.
+    pub fn samples(&self) -> &Buffer {
+        &self.samples
+    }
+
+    /// Frames, map and room, borrowed apart.
+    pub fn parts(&mut self) -> (Vec<FrameView<'_>>, Option<&[AbsolutePhase]>, &mut Output) {
+        let pixels = (self.width * self.height).max(1);
+        let frames: Vec<Samples<'_>> = match &self.samples {
+            Buffer::Eight(all) => all.chunks_exact(pixels).map(Samples::Eight).collect(),
+            Buffer::Sixteen(all) => all.chunks_exact(pixels).map(Samples::Sixteen).collect(),
+        };
+        let views = frames
+            .into_iter()
+            // A chunk is exactly a frame, so none is left out.
+            .filter_map(|frame| FrameView::new(frame, self.width, self.height, self.width).ok())
+            .collect();
+        (views, self.map.as_deref(), &mut self.out)
+    }
+
+    /// Bytes that a kernel reads.
+    fn bytes(&self) -> usize {
+        let frames = match &self.samples {
+            Buffer::Eight(all) => all.len(),
+            Buffer::Sixteen(all) => 2 * all.len(),
+        };
+        frames + 4 * self.map.as_ref().map_or(0, Vec::len)
+    }
+}
+
+/// Copies of one set, used in turn.
+pub struct Rotation {
+    sets: Vec<FrameSet>,
+    next: usize,
+}
+
+impl Rotation {
+    /// As many copies as read `bytes` in all, at least one.
+    pub fn of(set: FrameSet, bytes: usize) -> Self {
+        let copies = bytes.div_ceil(set.bytes().max(1)).max(1);
+        Self {
+            sets: vec![set; copies],
+            next: 0,
+        }
+    }
+
+    /// Number of copies.
+    pub fn copies(&self) -> usize {
+        self.sets.len()
+    }
+
+    /// The set that was not used for longest.
+    pub fn next(&mut self) -> &mut FrameSet {
+        self.next = (self.next + 1) % self.sets.len();
+        &mut self.sets[self.next]
+    }
+}

@@ -1,0 +1,219 @@
+//! The kernel table: processor time per pixel of every variant, and how many floors that is.
+
+use super::floor::{self, floor};
+use super::frames::{FrameSet, Rotation};
+use super::stopwatch::{median, timed};
+use super::variants::{self, Variant};
+use super::workload::Workload;
+use std::hint::black_box;
+use std::time::Duration;
+
+/// Something that finds the phases of a set of frames.
+pub trait Kernel {
+    /// Decodes a set; answers the processor time of what is to be timed: all of it, or what is left to do when the last
+    /// frame is there and the coarser levels were decoded outside of the stopwatch.
+    fn run(&mut self, set: &mut FrameSet) -> Duration;
+    /// Φ in turns that the last run found in `set`, NaN where rejected.
+    fn turns(&self, set: &FrameSet) -> Vec<f64>;
+}
+
+/// How large and how often.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Columns and rows of the frames.
+    pub size: (usize, usize),
+    /// Bytes that are read before the first frame set comes again: more than caches hold.
+    pub bytes: usize,
+    /// Rounds; of each time the median counts.
+    pub rounds: usize,
+    /// A time is measured over a whole rotation, or over fewer sets once it has taken this long.
+    pub patience: Duration,
+}
+
+impl Effort {
+    /// What figures are quoted from.
+    pub const FULL: Self = Self {
+        size: (1456, 1088),
+        bytes: 210_000_000,
+        rounds: 5,
+        patience: Duration::from_millis(60),
+    };
+    /// Whether everything works.
+    pub const QUICK: Self = Self {
+        size: (64, 48),
+        bytes: 1,
+        rounds: 1,
+        patience: Duration::ZERO,
+    };
+}
+
+/// One row of the table.
+#[derive(Clone, Debug)]
+pub struct Timing {
+    /// Implementation and workload, `f32_geometric_12`.
+    pub name: String,
+    /// Frames of a set.
+    pub frames: usize,
+    /// Processor time per pixel of one frame, median.
+    pub ns_per_px: f64,
+    /// Median of the ratios to the floor of the same round.
+    pub x_floor: f64,
+    /// The least and the most of these ratios.
+    pub x_floor_range: [f64; 2],
+    /// Share of the pixels that come out as they went in: the phase within 0.05 turn, or rejected where it is dark.
+    pub right: f64,
+}
+
+/// The whole table.
+#[derive(Clone, Debug)]
+pub struct KernelTable {
+    /// Processor time of the floor per pixel, median over all rounds.
+    pub floor_ns_per_px: f64,
+    /// The least and the most of it.
+    pub floor_range: [f64; 2],
+    /// A row for each variant.
+    pub rows: Vec<Timing>,
+}
+
+/// A phase is right within this many turns: seven σ of the noise that the frames have.
+const RIGHT: f64 = 0.05;
+
+/// Times every variant on every workload. Frames of one workload at a time are in memory, beside those of the floor.
+///
+/// # Errors
+/// If a sequence cannot be decoded.
+pub fn kernel_table(effort: &Effort, progress: &dyn Fn(f64, &str)) -> Result<KernelTable, String> {
+    let workloads = Workload::all();
+    let mut base = FloorSets::new(effort);
+    let (mut floors, mut rows) = (Vec::new(), Vec::new());
+    for (at, workload) in workloads.iter().enumerate() {
+        progress(at as f64 / workloads.len() as f64, workload.name);
+        let mut sets = Rotation::of(workload.render(effort.size), effort.bytes);
+        let mut variants = variants::of(workload, effort.size)?;
+        let right: Vec<f64> = variants
+            .iter_mut()
+            .map(|variant| share_right(variant, workload, effort.size, sets.next()))
+            .collect();
+        let times = interleaved(&mut variants, &mut sets, &mut base, effort);
+        for (((variant, right), times), frames) in variants
+            .iter()
+            .zip(right)
+            .zip(&times)
+            .zip(std::iter::repeat(workload.frames.len()))
+        {
+            let mut ratios: Vec<f64> = times.iter().map(|time| time.of / time.floor).collect();
+            ratios.sort_by(f64::total_cmp);
+            rows.push(Timing {
+                name: variant.name.clone(),
+                frames,
+                ns_per_px: median(times.iter().map(|time| time.of).collect()),
+                x_floor: median(ratios.clone()),
+                x_floor_range: ends(&ratios),
+                right,
+            });
+        }
+        floors.extend(times.first().into_iter().flatten().map(|time| time.floor));
+    }
+    floors.sort_by(f64::total_cmp);
+    Ok(KernelTable {
+        floor_ns_per_px: median(floors.clone()),
+        floor_range: ends(&floors),
+        rows,
+    })
+}
+
+fn ends(sorted: &[f64]) -> [f64; 2] {
+    [sorted.first(), sorted.last()].map(|end| end.copied().unwrap_or(f64::NAN))
+}
+
+/// Times of one round, ns per pixel.
+pub(super) struct Round {
+    /// Of the variant.
+    pub of: f64,
+    /// Of the floor.
+    pub floor: f64,
+}
+
+/// For each variant its rounds; in every round the floor and then each variant in turn, so that what disturbs the
+/// machine disturbs all of them.
+pub(super) fn interleaved(
+    variants: &mut [Variant],
+    sets: &mut Rotation,
+    base: &mut FloorSets,
+    effort: &Effort,
+) -> Vec<Vec<Round>> {
+    let mut rounds: Vec<Vec<Round>> = variants.iter().map(|_| Vec::new()).collect();
+    base.time();
+    for _ in 0..effort.rounds {
+        let floor = base.time();
+        for (variant, rounds) in variants.iter_mut().zip(&mut rounds) {
+            let of = rotate(&mut *variant.kernel, sets, effort.patience);
+            rounds.push(Round { of, floor });
+        }
+    }
+    rounds
+}
+
+/// Processor time of `kernel` in ns per pixel, over at most one rotation of `sets`.
+pub fn rotate(kernel: &mut dyn Kernel, sets: &mut Rotation, patience: Duration) -> f64 {
+    let (mut taken, mut pixels) = (Duration::ZERO, 0);
+    for _ in 0..sets.copies() {
+        let set = sets.next();
+        taken += kernel.run(set);
+        pixels += set.pixels();
+        black_box(&set.out);
+        if taken >= patience {
+            break;
+        }
+    }
+    taken.as_secs_f64() * 1e9 / pixels.max(1) as f64
+}
+
+/// Share of the pixels that a variant gets right.
+fn share_right(
+    variant: &mut Variant,
+    workload: &Workload,
+    size: (usize, usize),
+    set: &mut FrameSet,
+) -> f64 {
+    variant.kernel.run(set);
+    let found = variant.kernel.turns(set);
+    let right = found.iter().enumerate().filter(|&(at, found)| {
+        let phase = workload.phase(at, size);
+        (phase.is_nan() && found.is_nan()) || (found - phase).abs() <= RIGHT
+    });
+    right.count() as f64 / found.len().max(1) as f64
+}
+
+/// What the floor reads and writes.
+pub(super) struct FloorSets {
+    sets: Vec<(Vec<u8>, Vec<[u8; 4]>)>,
+    pixels: usize,
+}
+
+impl FloorSets {
+    pub(super) fn new(effort: &Effort) -> Self {
+        let pixels = effort.size.0 * effort.size.1;
+        let bytes = floor::FRAMES * pixels;
+        let frames: Vec<u8> = (0..bytes).map(|at| (at * 7 + at / 251) as u8 | 1).collect();
+        let copies = effort.bytes.div_ceil(bytes).max(1);
+        Self {
+            sets: vec![(frames, vec![[1; 4]; pixels]); copies],
+            pixels,
+        }
+    }
+
+    /// Processor time of one rotation, ns per pixel.
+    fn time(&mut self) -> f64 {
+        let pixels = self.pixels;
+        let taken = timed(|| {
+            for (frames, map) in &mut self.sets {
+                let mut frames = frames.chunks(pixels);
+                let frames = [(); floor::FRAMES].map(|()| frames.next().unwrap_or_default());
+                floor(&frames, map);
+                black_box(map);
+            }
+        });
+        taken.as_secs_f64() * 1e9 / (self.sets.len() * pixels).max(1) as f64
+    }
+}

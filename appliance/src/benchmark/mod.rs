@@ -1,0 +1,26 @@
+//! `fringed bench`: how fast the kernels are, what accuracy costs, and the time from trigger to verdict.
+
+mod accuracy;
+mod budget;
+mod decoding;
+mod export;
+mod figure;
+mod floor;
+mod frames;
+mod kernel;
+mod machine;
+mod point;
+mod real;
+mod reference;
+mod report;
+mod stopwatch;
+mod variants;
+mod workload;
+
+pub use accuracy::Study;
+pub use budget::{Budget, budgets};
+pub use export::frame_files;
+pub use kernel::{Effort, KernelTable, Timing, kernel_table};
+pub use machine::Machine;
+pub use point::{Point, means};
+pub use report::{HEADER, Report};

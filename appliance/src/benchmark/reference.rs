@@ -1,0 +1,240 @@
+//! What a newcomer writes: the textbook's formulas in floating point, one pass over whole frames per step.
+//!
+//! S, C, atan2, modulation and one unwrapping step per level each walk over the frame and leave an intermediate of its
+//! size behind. In `f64` it is the textbook, in `f32` the straightforward fast version of it. The intermediates are
+//! kept from run to run, which is more than most newcomers do.
+
+use super::frames::{Buffer, FrameSet};
+use super::kernel::Kernel;
+use super::real::Real;
+use super::stopwatch::timed;
+use algo::pattern::{Level, PhaseRange, Sequence, Unwrapping};
+use algo::phase::{DecodeError, FULL_TRUST_STEPS, MIN_MODULATION_8_BIT};
+use algo::units::AbsolutePhase;
+use std::time::Duration;
+
+/// Largest residual of an unwrapping step, turns.
+const MAX_RESIDUAL: f64 = 0.40;
+
+/// A decoder of whole frames in the precision `T`.
+pub struct Textbook<T> {
+    levels: Vec<Step<T>>,
+    unwrapping: Unwrapping,
+    /// Lowest phase of the coarsest level of a geometric sequence, turns of that level.
+    lowest: T,
+    full_scale: T,
+    least_modulation: T,
+    sums: [Vec<T>; 2],
+    wrapped: Vec<Vec<T>>,
+    modulation: Vec<Vec<T>>,
+    trusted: Vec<bool>,
+    phase: Vec<T>,
+    weights: Vec<T>,
+}
+
+/// One level.
+struct Step<T> {
+    frames: Vec<usize>,
+    cos: Vec<T>,
+    sin: Vec<T>,
+    ratio: T,
+}
+
+impl<T: Real> Step<T> {
+    fn new(level: &Level) -> Self {
+        let steps = level.steps();
+        let angles = (0..steps).map(|k| {
+            let turns = level.start + k as f64 / steps as f64;
+            std::f64::consts::TAU * turns
+        });
+        Self {
+            frames: level.frames.iter().map(|&at| usize::from(at)).collect(),
+            cos: angles.clone().map(|angle| T::of(angle.cos())).collect(),
+            sin: angles.map(|angle| T::of(angle.sin())).collect(),
+            ratio: T::of(level.ratio),
+        }
+    }
+
+    fn steps(&self) -> T {
+        T::of(self.frames.len() as f64)
+    }
+}
+
+impl<T: Real> Textbook<T> {
+    /// For a sequence of a phase function with this range, and frames of `pixels` samples.
+    ///
+    /// # Errors
+    /// If the levels are of no known form.
+    pub fn new(
+        sequence: &Sequence,
+        range: PhaseRange,
+        bit_depth: u8,
+        pixels: usize,
+    ) -> Result<Self, DecodeError> {
+        let unwrapping = Unwrapping::recognise(sequence, range)?;
+        let coarsest = sequence.levels()[0].ratio;
+        let margin = (1.0 - coarsest * range.span()).max(0.0) / 2.0;
+        let full_scale = f64::from((1_u32 << bit_depth) - 1);
+        let count = sequence.levels().len();
+        // Not zero, so that the memory is really there before the first run.
+        let buffer = || vec![T::of(1.0); pixels];
+        Ok(Self {
+            levels: sequence.levels().iter().map(Step::new).collect(),
+            unwrapping,
+            lowest: T::of(coarsest * range.min - margin),
+            full_scale: T::of(full_scale),
+            least_modulation: T::of(MIN_MODULATION_8_BIT * full_scale / 255.0 - 1e-3),
+            sums: [buffer(), buffer()],
+            wrapped: vec![buffer(); count],
+            modulation: vec![buffer(); count],
+            trusted: vec![true; pixels],
+            phase: buffer(),
+            weights: buffer(),
+        })
+    }
+
+    fn demodulate<S: Copy + Into<u16>>(&mut self, frames: &[&[S]]) {
+        let tau = T::of(std::f64::consts::TAU);
+        self.trusted.fill(true);
+        for (at, level) in self.levels.iter().enumerate() {
+            for (sums, weights) in self.sums.iter_mut().zip([&level.cos, &level.sin]) {
+                sums.fill(T::of(0.0));
+                for (&frame, &weight) in level.frames.iter().zip(weights) {
+                    for (sum, &sample) in sums.iter_mut().zip(frames[frame]) {
+                        *sum = *sum + T::count(sample.into()) * weight;
+                    }
+                }
+            }
+            let [s, c] = &self.sums;
+            for (wrapped, (&s, &c)) in self.wrapped[at].iter_mut().zip(s.iter().zip(c)) {
+                *wrapped = s.atan2(c) / tau;
+            }
+            let scale = T::of(2.0) / level.steps();
+            for (modulation, (&s, &c)) in self.modulation[at].iter_mut().zip(s.iter().zip(c)) {
+                *modulation = scale * (s * s + c * c).sqrt();
+            }
+            for (trusted, &modulation) in self.trusted.iter_mut().zip(&self.modulation[at]) {
+                *trusted &= modulation >= self.least_modulation;
+            }
+            if level.frames.len() < FULL_TRUST_STEPS {
+                for &frame in &level.frames {
+                    for (trusted, &sample) in self.trusted.iter_mut().zip(frames[frame]) {
+                        *trusted &= T::count(sample.into()) < self.full_scale;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Coarse to fine: k = round(n Φ − φ), Φ = k + φ.
+    fn geometric(&mut self) {
+        let lowest = self.lowest;
+        for (phase, &wrapped) in self.phase.iter_mut().zip(&self.wrapped[0]) {
+            let above = wrapped - lowest;
+            *phase = lowest + above - above.floor();
+        }
+        for at in 1..self.levels.len() {
+            let n = self.levels[at].ratio / self.levels[at - 1].ratio;
+            let pixels = self.phase.iter_mut().zip(&mut self.trusted);
+            for ((phase, trusted), &wrapped) in pixels.zip(&self.wrapped[at]) {
+                let (order, fits) = order(n * *phase - wrapped);
+                *trusted &= fits;
+                *phase = wrapped + order;
+            }
+        }
+        let finest = self.levels[self.levels.len() - 1].ratio;
+        for phase in &mut self.phase {
+            *phase = *phase / finest;
+        }
+    }
+
+    /// Relative to a map Φ₀: q = φ − frac(r Φ₀), D from the beats, then the weighted mean of the D of each level.
+    fn about(&mut self, map: &[AbsolutePhase]) {
+        for (level, wrapped) in self.levels.iter().zip(&mut self.wrapped) {
+            for (wrapped, map) in wrapped.iter_mut().zip(map) {
+                *wrapped = wrap(*wrapped - level.ratio * T::of(map.turns()));
+            }
+        }
+        let q = &self.wrapped;
+        let pixels = self.phase.iter_mut().zip(&mut self.trusted);
+        for (at, (phase, trusted)) in pixels.enumerate() {
+            *phase = match self.unwrapping {
+                Unwrapping::DenseThree { n } => {
+                    let n = T::of(n);
+                    let fast = wrap(q[2][at] - q[0][at]);
+                    let slow = wrap(q[2][at] - q[1][at]);
+                    let (order, fits) = order(n * slow - fast);
+                    *trusted &= fits;
+                    n * (fast + order)
+                }
+                Unwrapping::DenseTwo { n } => T::of(n) * wrap(q[1][at] - q[0][at]),
+                _ => q[0][at] / self.levels[0].ratio,
+            };
+        }
+        if self.levels.len() > 1 {
+            self.average();
+        }
+        for (phase, map) in self.phase.iter_mut().zip(map) {
+            *phase = *phase + T::of(map.turns());
+        }
+    }
+
+    /// Moves D to the mean of the levels' own, weighted by N r² B²: ratio 1 first, then coarse to fine.
+    fn average(&mut self) {
+        let last = self.levels.len() - 1;
+        self.weights.fill(T::of(0.0));
+        for at in std::iter::once(last).chain(0..last) {
+            let level = &self.levels[at];
+            let share = level.steps() * level.ratio * level.ratio;
+            for pixel in 0..self.phase.len() {
+                let q = self.wrapped[at][pixel];
+                let (order, fits) = order(level.ratio * self.phase[pixel] - q);
+                self.trusted[pixel] &= fits;
+                let here = (q + order) / level.ratio;
+                let modulation = self.modulation[at][pixel];
+                let weight = share * modulation * modulation;
+                let before = self.weights[pixel];
+                let sum = before + weight;
+                self.phase[pixel] = (before * self.phase[pixel] + weight * here) / sum;
+                self.weights[pixel] = sum;
+            }
+        }
+    }
+}
+
+impl<T: Real> Kernel for Textbook<T> {
+    fn run(&mut self, set: &mut FrameSet) -> Duration {
+        timed(|| {
+            let pixels = set.pixels().max(1);
+            match set.samples() {
+                Buffer::Eight(all) => self.demodulate(&all.chunks(pixels).collect::<Vec<_>>()),
+                Buffer::Sixteen(all) => self.demodulate(&all.chunks(pixels).collect::<Vec<_>>()),
+            }
+            match set.parts().1 {
+                Some(map) => self.about(map),
+                None => self.geometric(),
+            }
+            for (phase, &trusted) in self.phase.iter_mut().zip(&self.trusted) {
+                if !trusted {
+                    *phase = T::of(f64::NAN);
+                }
+            }
+        })
+    }
+
+    fn turns(&self, _: &FrameSet) -> Vec<f64> {
+        self.phase.iter().map(|phase| phase.wide()).collect()
+    }
+}
+
+/// The nearest whole number, and whether little enough is left over.
+fn order<T: Real>(turns: T) -> (T, bool) {
+    let order = turns.round();
+    let left = turns - order;
+    (order, left * left <= T::of(MAX_RESIDUAL * MAX_RESIDUAL))
+}
+
+/// The short way round, −½ ≤ x < ½.
+fn wrap<T: Real>(turns: T) -> T {
+    turns - (turns + T::of(0.5)).floor()
+}

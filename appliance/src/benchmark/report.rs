@@ -1,0 +1,241 @@
+//! The results as one JSON object, as CSV, and as tables for people.
+
+use super::budget::Budget;
+use super::kernel::KernelTable;
+use super::machine::Machine;
+use super::point::{Point, means};
+use serde_json::{Map, Value, json};
+use std::fmt::Write as _;
+
+/// What was measured; nothing where it was not asked for.
+#[derive(Debug)]
+pub struct Report {
+    /// Where.
+    pub machine: Machine,
+    /// The kernel table.
+    pub kernel: Option<KernelTable>,
+    /// Run time against error, a point for each part.
+    pub accuracy: Option<Vec<Point>>,
+    /// From trigger to verdict.
+    pub budget: Option<Vec<Budget>>,
+}
+
+/// Columns of `accuracy.csv`.
+pub const HEADER: &str = "part,implementation,sequence,frames,steps,bits,skipping,ns_per_px,x_floor,\
+    ms_per_set,rms_mm,unresolved_px,gross_px";
+
+impl Report {
+    /// One object; its keys are documented in the README of `algo`.
+    pub fn json(&self) -> Value {
+        let mut all = Map::new();
+        all.insert("machine".into(), json!(self.machine));
+        if let Some(table) = &self.kernel {
+            all.insert("kernel".into(), kernel(table));
+        }
+        if let Some(points) = &self.accuracy {
+            all.insert("accuracy".into(), json!(means(points)));
+        }
+        if let Some(budgets) = &self.budget {
+            all.insert("budget".into(), budget(budgets));
+        }
+        Value::Object(all)
+    }
+
+    /// The points of every part, if there are any.
+    pub fn csv(&self) -> Option<String> {
+        let points = self.accuracy.as_ref()?;
+        let mut csv = format!("{HEADER}\n");
+        for point in points {
+            let number = |x: f64| {
+                if x.is_finite() {
+                    x.to_string()
+                } else {
+                    String::new()
+                }
+            };
+            // Writing to a string does not fail, here and below.
+            let _ = writeln!(
+                csv,
+                "{},{},{},{},{},{},{},{:.3},{:.2},{:.3},{},{},{}",
+                point.part,
+                point.implementation,
+                point.sequence,
+                point.frames,
+                point.steps,
+                point.bits,
+                point.skipping,
+                point.ns_per_px,
+                point.x_floor,
+                point.ms_per_set,
+                number(point.rms_mm),
+                number(point.unresolved_px),
+                number(point.gross_px),
+            );
+        }
+        Some(csv)
+    }
+
+    /// Tables in Markdown.
+    pub fn markdown(&self) -> String {
+        let Machine {
+            processor,
+            cores,
+            architecture,
+        } = &self.machine;
+        let mut text = format!("Machine: {processor}, {cores} cores, {architecture}.\n");
+        if let Some(table) = &self.kernel {
+            kernel_table(&mut text, table);
+        }
+        if let Some(points) = &self.accuracy {
+            accuracy_table(&mut text, &means(points));
+        }
+        if let Some(budgets) = &self.budget {
+            budget_table(&mut text, budgets);
+        }
+        text
+    }
+}
+
+fn kernel(table: &KernelTable) -> Value {
+    let mut all = Map::new();
+    all.insert("floor_ns_per_px".into(), json!(table.floor_ns_per_px));
+    all.insert("floor_range".into(), json!(table.floor_range));
+    for row in &table.rows {
+        let values = json!({
+            "frames": row.frames,
+            "ns_per_px": row.ns_per_px,
+            "x_floor": row.x_floor,
+            "x_floor_range": row.x_floor_range,
+            "right": row.right,
+        });
+        all.insert(row.name.clone(), values);
+    }
+    Value::Object(all)
+}
+
+/// `{"640x480": {"12": {…}, "4": {…}}}`: sizes, then frames of the sequence.
+fn budget(budgets: &[Budget]) -> Value {
+    let mut all = Map::new();
+    for budget in budgets {
+        let stages: Map<String, Value> = budget
+            .stages
+            .iter()
+            .map(|(name, ms)| (format!("{name}_ms"), json!(ms)))
+            .collect();
+        let values = json!({
+            "exposure_ms": budget.exposure_ms,
+            "stages": stages,
+            "verdict_ms": budget.verdict_ms,
+            "total_ms": budget.total_ms,
+            "one_thread_ms": budget.one_thread_ms,
+            "kernel_ms": budget.kernel_ms,
+            "x_kernel": budget.x_kernel,
+        });
+        let size = format!("{}x{}", budget.width, budget.height);
+        let sizes = all.entry(size).or_insert_with(|| json!({}));
+        sizes[budget.frames.to_string()] = values;
+    }
+    Value::Object(all)
+}
+
+fn kernel_table(text: &mut String, table: &KernelTable) {
+    let [least, most] = table.floor_range;
+    let _ = write!(
+        text,
+        "\n### Kernels\n\nFloor {:.3} ns/px ({least:.3} to {most:.3}).\n\n\
+         | variant | frames | ns/px | × floor | least to most |\n|---|---:|---:|---:|---:|\n",
+        table.floor_ns_per_px
+    );
+    for row in &table.rows {
+        let [least, most] = row.x_floor_range;
+        let _ = writeln!(
+            text,
+            "| {} | {} | {:.2} | {:.2} | {least:.2} to {most:.2} |",
+            row.name, row.frames, row.ns_per_px, row.x_floor
+        );
+    }
+}
+
+/// A row for each sequence and depth, a column of times for each implementation.
+fn accuracy_table(text: &mut String, means: &[Point]) {
+    let mut implementations: Vec<(&str, bool)> = Vec::new();
+    let mut sequences: Vec<&Point> = Vec::new();
+    for point in means {
+        let implementation = (point.implementation, point.skipping);
+        if !implementations.contains(&implementation) {
+            implementations.push(implementation);
+        }
+        if !sequences.iter().any(|known| known.same_frames(point)) {
+            sequences.push(point);
+        }
+    }
+    text.push_str(
+        "\n### Run time against error\n\nMeans over the parts. The error is that of the first implementation; spread: how much the \
+         others' errors differ from it at most. Times in ns/px.\n\n| pattern | frames | N | bits | RMS error, mm | spread | unresolved px | gross |",
+    );
+    for (name, skipping) in &implementations {
+        let skipping = if *skipping { ", skipping" } else { "" };
+        let _ = write!(text, " {name}{skipping} |");
+    }
+    text.push_str("\n|---|---:|---:|---:|---:|---:|---:|---:|");
+    text.push_str(&"---:|".repeat(implementations.len()));
+    text.push('\n');
+    for first in sequences {
+        let same: Vec<&Point> = means.iter().filter(|p| p.same_frames(first)).collect();
+        let differences = same
+            .iter()
+            .map(|point| (point.rms_mm / first.rms_mm - 1.0).abs());
+        let _ = write!(
+            text,
+            "| {} | {} | {} | {} | {:.4} | {:.4} % | {:.0} | {:.0} |",
+            first.sequence,
+            first.frames,
+            first.steps,
+            first.bits,
+            first.rms_mm,
+            100.0 * differences.fold(0.0, f64::max),
+            first.unresolved_px,
+            first.gross_px,
+        );
+        for (name, skipping) in &implementations {
+            let here =
+                |point: &&&Point| point.implementation == *name && point.skipping == *skipping;
+            let time = same.iter().find(here).map(|point| point.ns_per_px);
+            let _ = match time {
+                Some(time) => write!(text, " {time:.2} |"),
+                None => write!(text, " |"),
+            };
+        }
+        text.push('\n');
+    }
+}
+
+fn budget_table(text: &mut String, budgets: &[Budget]) {
+    text.push_str(
+        "\n### From trigger to verdict\n\nMilliseconds; stages in wall time on all threads, the last three columns in \
+         processor time on one.\n\n\
+         | camera | frames | exposure | stages | frames → verdict | trigger → verdict | frames → verdict, one thread | phase kernel alone | ratio |\n\
+         |---|---:|---:|---|---:|---:|---:|---:|---:|\n",
+    );
+    for budget in budgets {
+        let stages: Vec<String> = budget
+            .stages
+            .iter()
+            .map(|(name, ms)| format!("{name} {ms:.1}"))
+            .collect();
+        let _ = writeln!(
+            text,
+            "| {}×{} | {} | {:.0} | {} | {:.1} | {:.0} | {:.1} | {:.2} | {:.2} |",
+            budget.width,
+            budget.height,
+            budget.frames,
+            budget.exposure_ms,
+            stages.join(", "),
+            budget.verdict_ms,
+            budget.total_ms,
+            budget.one_thread_ms,
+            budget.kernel_ms,
+            budget.x_kernel,
+        );
+    }
+}

@@ -1,0 +1,48 @@
+//! How much processor time a piece of work takes on its own thread.
+
+use rustix::time::{ClockId, clock_gettime};
+use std::time::Duration;
+
+/// Runs `work` and answers how much processor time this thread spent on it. Time in which somebody else had the
+/// core does not count.
+pub fn timed(work: impl FnOnce()) -> Duration {
+    let began = now();
+    work();
+    now().saturating_sub(began)
+}
+
+fn now() -> Duration {
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    // Processor time is never negative.
+    Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
+}
+
+/// The middle value; of an even number the upper of the two, of none NaN.
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_work_takes_processor_time() {
+        let slept = timed(|| std::thread::sleep(Duration::from_millis(30)));
+        let worked = timed(|| {
+            let began = std::time::Instant::now();
+            while began.elapsed() < Duration::from_millis(2) {
+                std::hint::spin_loop();
+            }
+        });
+        assert!(slept < Duration::from_millis(15), "{slept:?}");
+        assert!(worked > Duration::ZERO);
+    }
+
+    #[test]
+    fn the_median_is_the_middle() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
+        assert!(median(Vec::new()).is_nan());
+    }
+}

@@ -1,0 +1,160 @@
+//! What the kernels are timed on: synthetic frames of every kind of sequence, and the phase that is in them.
+
+use super::frames::{Buffer, FrameSet};
+use crate::recipe::teach::dense;
+use algo::pattern::{PhaseRange, Sequence};
+use algo::units::AbsolutePhase;
+use std::f64::consts::TAU;
+
+/// A kind of sequence, and how much of its frames is lit.
+#[derive(Clone, Debug)]
+pub struct Workload {
+    /// For tables and keys.
+    pub name: &'static str,
+    /// Ratio and shift of each frame.
+    pub frames: Vec<(f64, f64)>,
+    /// Share of the pixels on which the part is; the rest is dark.
+    pub lit: f64,
+    /// Bits of a sample.
+    pub bit_depth: u8,
+    /// Whether it is unwrapped about a map.
+    pub about_map: bool,
+    /// Whether the references are timed on it as well.
+    pub has_references: bool,
+}
+
+/// Range of the phase function: 64 fringes, so that three geometric levels are 8 apart.
+pub const RANGE: PhaseRange = PhaseRange {
+    min: 0.0,
+    max: 64.0,
+};
+/// n of the dense levels.
+const DENSE_N: f64 = 6.0;
+/// Offset and modulation of lit pixels and the light of dark ones, shares of full scale.
+const OFFSET: f64 = 0.48;
+const MODULATION: f64 = 0.40;
+const DARK: f64 = 0.04;
+/// Half-width of the uniform noise of a sample, share of full scale: as the simulated head has it.
+const NOISE: f64 = 0.025;
+/// The map differs from the phase by up to this, turns.
+const MAP_OFFSET: f64 = 0.25;
+
+impl Workload {
+    /// The first of them: twelve frames of three geometric levels, all of it lit.
+    pub fn geometric() -> Self {
+        Self {
+            name: "geometric_12",
+            frames: Sequence::geometric(RANGE, 3, 4),
+            lit: 1.0,
+            bit_depth: 8,
+            about_map: false,
+            has_references: true,
+        }
+    }
+
+    /// All kinds.
+    pub fn all() -> Vec<Self> {
+        let geometric = |name, steps| Self {
+            name,
+            frames: Sequence::geometric(RANGE, 3, steps),
+            has_references: false,
+            ..Self::geometric()
+        };
+        let twelve = |name| geometric(name, 4);
+        let compared = |workload| Self {
+            has_references: true,
+            ..workload
+        };
+        let about = |name, frames| Self {
+            frames,
+            about_map: true,
+            ..twelve(name)
+        };
+        let lit = |name, lit| Self {
+            lit,
+            ..twelve(name)
+        };
+        let bits = |name, bit_depth| Self {
+            bit_depth,
+            ..twelve(name)
+        };
+        vec![
+            Self::geometric(),
+            lit("background_25", 0.75),
+            lit("background_50", 0.50),
+            lit("background_75", 0.25),
+            geometric("geometric_9", 3),
+            geometric("geometric_24", 8),
+            bits("bits_10", 10),
+            bits("bits_12", 12),
+            compared(about("dense_12", dense(DENSE_N))),
+            compared(about("golden_4", level(1.0, 4).collect())),
+            about("golden_3", level(1.0, 3).collect()),
+            about("golden_6", level(1.0, 3).chain(level(0.8, 3)).collect()),
+        ]
+    }
+
+    /// Its frames.
+    pub fn render(&self, (width, height): (usize, usize)) -> FrameSet {
+        let full = f64::from((1_u32 << self.bit_depth) - 1);
+        let sine: Vec<f64> = (0..65_536)
+            .map(|bits| full * (OFFSET + MODULATION * (TAU * f64::from(bits) / 65_536.0).sin()))
+            .collect();
+        let size = (width, height);
+        let phases: Vec<f64> = (0..width * height).map(|at| self.phase(at, size)).collect();
+        let mut seed = 0;
+        let mut samples = Vec::with_capacity(self.frames.len() * phases.len());
+        for &(ratio, shift) in &self.frames {
+            samples.extend(phases.iter().map(|phase| {
+                seed += 1;
+                let light = if phase.is_nan() {
+                    DARK * full
+                } else {
+                    let turns = ratio * phase + shift;
+                    sine[((turns - turns.floor()) * 65_536.0) as usize & 0xFFFF]
+                };
+                let noise = (2.0 * random(seed) - 1.0) * NOISE * full;
+                (light + noise).round().clamp(0.0, full) as u16
+            }));
+        }
+        let samples = if self.bit_depth == 8 {
+            Buffer::Eight(samples.into_iter().map(|sample| sample as u8).collect())
+        } else {
+            Buffer::Sixteen(samples)
+        };
+        let map = self.about_map.then(|| {
+            let near = |(at, phase): (usize, &f64)| {
+                let offset = MAP_OFFSET * (at as f64 / 997.0).sin();
+                AbsolutePhase::from_turns(phase + offset)
+            };
+            phases.iter().enumerate().map(near).collect()
+        });
+        FrameSet::new(size, samples, map)
+    }
+
+    /// Φ of a pixel in turns, NaN where it is dark. The part is an ellipse in the middle of the frame.
+    pub fn phase(&self, at: usize, (width, height): (usize, usize)) -> f64 {
+        let (x, y) = (
+            ((at % width) as f64 + 0.5) / width as f64,
+            ((at / width) as f64 + 0.5) / height as f64,
+        );
+        let radius = f64::hypot(x - 0.5, y - 0.5);
+        if std::f64::consts::PI * radius * radius > self.lit && self.lit < 1.0 {
+            return f64::NAN;
+        }
+        0.5 + (RANGE.span() - 1.0) * x + 0.4 * (3.0 * TAU * y).sin()
+    }
+}
+
+/// The shifts of one level of `steps`.
+fn level(ratio: f64, steps: u32) -> impl Iterator<Item = (f64, f64)> {
+    (0..steps).map(move |k| (ratio, f64::from(k) / f64::from(steps)))
+}
+
+/// A number in 0…1 for each seed: SplitMix64 (Steele, Lea & Flood 2014).
+fn random(seed: u64) -> f64 {
+    let mut z = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+}

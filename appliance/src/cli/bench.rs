@@ -1,0 +1,142 @@
+//! `fringed bench`: the kernel table, run time against error, and the budget from trigger to verdict.
+
+use super::Common;
+use crate::benchmark::{self, Effort, Machine, Report, Study};
+use crate::error::{Exit, Failure};
+use crate::output::folder::OutputFolder;
+use std::path::PathBuf;
+
+/// Time the kernels, time against error, and trigger to verdict.
+#[derive(Debug, clap::Args)]
+pub struct Bench {
+    /// What to measure; without it all three.
+    #[arg(value_enum)]
+    what: Option<What>,
+    /// Small frames and one round: whether everything works, not how fast it is.
+    #[arg(long)]
+    quick: bool,
+    /// Folder for tables, CSV and plot; made if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write the twelve frames that the kernels are timed on to this folder, for other programs to be timed on, and
+    /// measure nothing.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["what", "out"])]
+    frames: Option<PathBuf>,
+}
+
+/// A part of the benchmark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum What {
+    /// Processor time per pixel of every variant.
+    Kernel,
+    /// Run time against error on the simulated parts.
+    Accuracy,
+    /// From trigger to verdict, stage by stage.
+    Budget,
+}
+
+/// Columns and rows of the cameras of the budget: the study's physical head, and the sensor that is aimed at.
+const CAMERAS: [(u32, u32); 2] = [(640, 480), (1456, 1088)];
+const QUICK_CAMERAS: [(u32, u32); 1] = [(160, 120)];
+
+impl Bench {
+    /// Measures, writes and prints.
+    ///
+    /// # Errors
+    /// If something cannot be simulated or results not be written.
+    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+        if let Some(folder) = &self.frames {
+            return self.write_frames(folder, common);
+        }
+        // Made before the minutes of measuring, not found wanting after them.
+        let folder = self.out.as_deref().map(OutputFolder::create);
+        let folder = folder.transpose()?;
+        let progress = common.progress();
+        let told = |share: f64, words: &str| progress.tell(share, words);
+        let report = self.measure(common, &told);
+        progress.clear();
+        let report = report?;
+        let json = format!("{:#}\n", report.json());
+        let tables = report.markdown();
+        if let Some(folder) = &folder {
+            folder.write("benchmarks.json", json.as_bytes())?;
+            folder.write("benchmarks.md", tables.as_bytes())?;
+            if let Some(csv) = report.csv() {
+                folder.write("accuracy.csv", csv.as_bytes())?;
+            }
+            for (name, bytes) in report.figures() {
+                folder.write(&name, &bytes)?;
+            }
+        }
+        if common.json {
+            say!("{}", json.trim_end());
+        } else if !common.quiet {
+            say!("{}", tables.trim_end());
+        }
+        Ok(())
+    }
+
+    fn measure(
+        &self,
+        common: &Common,
+        told: &(dyn Fn(f64, &str) + Sync),
+    ) -> Result<Report, Failure> {
+        let software =
+            |what: &'static str| move |error: String| Failure::because(Exit::Software, what, error);
+        let wanted = |what| self.what.is_none_or(|asked| asked == what);
+        let pool = super::pool(common.threads.unwrap_or(0))?;
+        let mut report = Report {
+            machine: Machine::this(),
+            kernel: None,
+            accuracy: None,
+            budget: None,
+        };
+        if wanted(What::Kernel) {
+            let table = benchmark::kernel_table(&self.effort(), told);
+            report.kernel = Some(table.map_err(software("time the kernels"))?);
+        }
+        if wanted(What::Accuracy) {
+            let study = if self.quick {
+                Study::quick()
+            } else {
+                Study::full()
+            };
+            let points = pool.install(|| study.run(told));
+            report.accuracy = Some(points.map_err(software("measure run time against error"))?);
+        }
+        if wanted(What::Budget) {
+            let cameras = if self.quick {
+                &QUICK_CAMERAS[..]
+            } else {
+                &CAMERAS
+            };
+            let rounds = self.effort().rounds;
+            let budgets = pool.install(|| {
+                let each = |&camera| benchmark::budgets(camera, rounds, told);
+                cameras.iter().map(each).collect::<Result<Vec<_>, _>>()
+            });
+            let budgets = budgets.map_err(software("measure from trigger to verdict"))?;
+            report.budget = Some(budgets.concat());
+        }
+        Ok(report)
+    }
+
+    fn effort(&self) -> Effort {
+        if self.quick {
+            Effort::QUICK
+        } else {
+            Effort::FULL
+        }
+    }
+
+    fn write_frames(&self, folder: &std::path::Path, common: &Common) -> Result<(), Failure> {
+        let folder_of_frames = OutputFolder::create(folder)?;
+        for (name, bytes) in benchmark::frame_files(self.effort().size) {
+            folder_of_frames.write(&name, &bytes)?;
+        }
+        if !common.quiet {
+            say!("written to {}", folder.display());
+        }
+        Ok(())
+    }
+}

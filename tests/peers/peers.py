@@ -1,0 +1,191 @@
+"""Times what others offer for the same work on the same frames: fringes, OpenCV, NumPy.
+
+    peers.py FRAMES BENCHMARKS [--docs FILE]
+
+FRAMES is the folder that `fringed bench --frames` writes, BENCHMARKS the folder that `fringed bench --out` writes: its
+floor of this machine is the unit, and its kernels stand in the same table. The table is printed and written there as
+peers.json and peers.md. With --docs, everything behind the marker line of FILE is replaced by both tables.
+
+Processor time of the process on one thread, medians of five, frame sets rotating through more than 200 MB.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import statistics
+import time
+import warnings
+
+for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ[threads] = "1"
+
+import cv2  # noqa: E402
+import fringes  # noqa: E402
+import numpy as np  # noqa: E402
+
+ROUNDS = 5
+ROTATION_BYTES = 210_000_000
+LEAST_MODULATION = 16
+MAX_RESIDUAL = 0.40
+RIGHT = 0.05  # turns; seven sigma of the noise in the frames
+MARKER = "<!-- Behind this line: written by tests/peers/run.sh -->"
+
+
+class Numpy:
+    """The textbook's formulas on whole arrays in one precision."""
+
+    def __init__(self, ratios, kind):
+        self.ratios, self.kind = ratios, kind
+
+    def __call__(self, frames):
+        phase, bad = None, np.zeros(frames.shape[1:], bool)
+        coarser = None
+        for level, ratio in enumerate(self.ratios):
+            shifts = frames[4 * level : 4 * level + 4].astype(self.kind)
+            s, c = shifts[0] - shifts[2], shifts[1] - shifts[3]
+            wrapped = np.arctan2(s, c) * self.kind(1 / (2 * np.pi))
+            bad |= np.hypot(s, c) < self.kind(2 * LEAST_MODULATION)
+            if phase is None:
+                phase = wrapped - np.floor(wrapped + self.kind(0.03))
+            else:
+                turns = phase * self.kind(ratio / coarser) - wrapped
+                order = np.rint(turns)
+                bad |= np.abs(turns - order) > self.kind(MAX_RESIDUAL)
+                phase = wrapped + order
+            coarser = ratio
+        phase[bad] = np.nan
+        return phase
+
+
+def opencv(ratios):
+    """The same with OpenCV's calls where it has one."""
+
+    def decode(frames):
+        phase, bad, coarser = None, None, None
+        for level, ratio in enumerate(ratios):
+            i0, i1, i2, i3 = frames[4 * level : 4 * level + 4]
+            s = cv2.subtract(i0, i2, dtype=cv2.CV_32F)
+            c = cv2.subtract(i1, i3, dtype=cv2.CV_32F)
+            modulation, angle = cv2.cartToPolar(c, s)
+            wrapped = cv2.multiply(angle, 1 / (2 * np.pi))
+            weak = cv2.compare(modulation, 2.0 * LEAST_MODULATION, cv2.CMP_LT)
+            bad = weak if bad is None else cv2.bitwise_or(bad, weak)
+            if phase is None:
+                # The angle is 0 to 1 turn; what noise put below zero comes back.
+                above = cv2.compare(wrapped, 0.97, cv2.CMP_GT)
+                phase = cv2.subtract(wrapped, 1.0, mask=above, dst=wrapped.copy())
+            else:
+                turns = cv2.scaleAdd(phase, ratio / coarser, cv2.multiply(wrapped, -1.0))
+                order = np.rint(turns)
+                residual = cv2.compare(cv2.absdiff(turns, order), MAX_RESIDUAL, cv2.CMP_GT)
+                bad = cv2.bitwise_or(bad, residual)
+                phase = cv2.add(wrapped, order)
+            coarser = ratio
+        phase[bad != 0] = np.nan
+        return phase
+
+    return decode
+
+
+def package(ratios, size, finest):
+    """The package fringes, told of our frames: its shifts run the other way, from a cosine."""
+    height, width = size
+    decoder = fringes.Fringes()
+    decoder.X, decoder.Y, decoder.D, decoder.axes = width, height, 1, [1]
+    decoder.K, decoder.N, decoder.p0 = len(ratios), 4, 0
+    decoder.v = [finest * ratio for ratio in ratios]
+
+    def decode(frames):
+        # It divides by the fractional part of its frequencies and says so on every call.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            x = np.asarray(decoder.decode(frames, bmin=LEAST_MODULATION, threads=1).x)
+        return x.squeeze() * (finest / width)
+
+    return decode
+
+
+def reordered(frames):
+    order = [4 * level + shift for level in range(len(frames) // 4) for shift in (1, 0, 3, 2)]
+    return np.ascontiguousarray(frames[order][..., None])
+
+
+def measured(decode, frames):
+    """Median processor time of one set, ns per pixel."""
+    sets = [frames.copy() for _ in range(-(-ROTATION_BYTES // frames.nbytes))]
+    pixels = frames.shape[1] * frames.shape[2]
+    times = []
+    for at in range(ROUNDS):
+        began = time.process_time_ns()
+        decode(sets[at % len(sets)])
+        times.append((time.process_time_ns() - began) / pixels)
+    return statistics.median(times)
+
+
+def rows_of(folder):
+    """Name, ns per pixel and share of right pixels of each peer."""
+    sequence = json.loads((folder / "sequence.json").read_text())
+    frames = np.stack([np.load(path) for path in sorted(folder.glob("frame-*.npy"))])
+    truth = np.load(folder / "phase.npy")
+    ratios = [frame["ratio"] for frame in sequence["frames"]][::4]
+    finest = sequence["fringes"]
+    cv2.setNumThreads(1)
+    peers = [
+        ("OpenCV, its calls", opencv(ratios), frames),
+        ("NumPy, f32", Numpy(ratios, np.float32), frames),
+        ("NumPy, f64", Numpy(ratios, np.float64), frames),
+        (
+            f"fringes {fringes.__version__}",
+            package(ratios, truth.shape, finest),
+            reordered(frames),
+        ),
+    ]
+    for name, decode, frames in peers:
+        found = decode(frames)
+        right = float(np.mean(np.abs(found - truth) <= RIGHT))
+        yield {"name": name, "ns_per_px": measured(decode, frames), "right": right}
+
+
+def table(rows, machine):
+    lines = [
+        f"### Peers\n\n{machine['processor']}, one thread; twelve frames of 8 bits, 3 levels of 4 shifts.\n",
+        "| decoder | ns/px | × floor | right, % |",
+        "|---|---:|---:|---:|",
+    ]
+    for row in rows:
+        lines.append(
+            f"| {row['name']} | {row['ns_per_px']:.2f} | {row['x_floor']:.1f} | {100 * row['right']:.1f} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("frames", type=pathlib.Path)
+    parser.add_argument("benchmarks", type=pathlib.Path)
+    parser.add_argument("--docs", type=pathlib.Path)
+    arguments = parser.parse_args()
+    results = json.loads((arguments.benchmarks / "benchmarks.json").read_text())
+    floor = results["kernel"]["floor_ns_per_px"]
+    rows = [
+        {"name": f"ours: {name.removesuffix('_geometric_12')}", **row}
+        for name, row in results["kernel"].items()
+        if name.endswith("_geometric_12")
+    ]
+    rows += [{**row, "x_floor": row["ns_per_px"] / floor} for row in rows_of(arguments.frames)]
+    rows.sort(key=lambda row: row["x_floor"])
+    peers = table(rows, results["machine"])
+    print(peers)
+    (arguments.benchmarks / "peers.json").write_text(json.dumps(rows, indent=2) + "\n")
+    (arguments.benchmarks / "peers.md").write_text(peers)
+    if arguments.docs:
+        before, marker, _ = arguments.docs.read_text().partition(MARKER)
+        if not marker:
+            parser.error(f"{arguments.docs} has no line {MARKER}")
+        tables = (arguments.benchmarks / "benchmarks.md").read_text()
+        arguments.docs.write_text(f"{before}{MARKER}\n\n{tables}\n{peers}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,160 @@
+//! `fringed bench`: its keys and files, on frames too small to say anything about speed.
+
+use crate::written::program;
+use serde_json::Value;
+use std::fs;
+
+/// A kernel gets nearly every pixel right; at the smallest size a handful of pixels stand on the edge of the part.
+const RIGHT: f64 = 0.99;
+
+fn json(arguments: &[&str]) -> Value {
+    let run = program().run(arguments).succeeded();
+    serde_json::from_str(&run.stdout).unwrap()
+}
+
+fn positive(value: &Value, key: &str) -> f64 {
+    let number = value[key].as_f64();
+    let number = number.unwrap_or_else(|| panic!("{key} of {value} is no number"));
+    assert!(number > 0.0, "{key} is {number}");
+    number
+}
+
+#[test]
+fn the_kernel_table_has_its_keys_and_every_variant_decodes_rightly() {
+    // People's scripts know these keys: if this fails, do not change the test.
+    let all = json(&["bench", "kernel", "--quick", "--json"]);
+    assert!(all["machine"]["processor"].is_string());
+    assert!(positive(&all["machine"], "cores") >= 1.0);
+    let kernel = all["kernel"].as_object().unwrap();
+    positive(&all["kernel"], "floor_ns_per_px");
+    let workloads = [
+        "geometric_12",
+        "background_25",
+        "background_50",
+        "background_75",
+        "geometric_9",
+        "geometric_24",
+        "bits_10",
+        "bits_12",
+        "dense_12",
+        "golden_6",
+        "golden_4",
+        "golden_3",
+    ];
+    for workload in workloads {
+        let decoders = kernel.keys().filter(|name| name.ends_with(workload));
+        assert!(decoders.count() >= 1, "{workload} is not timed");
+    }
+    for reference in ["f64", "f32"] {
+        for workload in ["geometric_12", "dense_12", "golden_4"] {
+            assert!(kernel.contains_key(&format!("{reference}_{workload}")));
+        }
+    }
+    for (name, variant) in kernel.iter().filter(|(_, value)| value.is_object()) {
+        for key in ["frames", "ns_per_px", "x_floor"] {
+            positive(variant, key);
+        }
+        let [least, most] = [0, 1].map(|end| variant["x_floor_range"][end].as_f64());
+        let median = variant["x_floor"].as_f64();
+        assert!(least <= median && median <= most, "{name}: {variant}");
+        let right = positive(variant, "right");
+        assert!(right >= RIGHT, "{name} has {right} of its pixels right");
+    }
+}
+
+#[test]
+fn time_stands_against_error_and_the_cycle_has_its_stages() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let out_name = out.to_str().unwrap();
+    let all = json(&["bench", "accuracy", "--quick", "--json", "--out", out_name]);
+    let points = all["accuracy"].as_array().unwrap();
+    for point in points {
+        for key in [
+            "frames",
+            "steps",
+            "bits",
+            "ns_per_px",
+            "x_floor",
+            "ms_per_set",
+        ] {
+            positive(point, key);
+        }
+        assert!(positive(point, "rms_mm") < 0.5, "{point}");
+    }
+    let frames: Vec<u64> = points.iter().filter_map(|p| p["frames"].as_u64()).collect();
+    for count in [24, 12, 9, 6, 4, 3] {
+        assert!(frames.contains(&count), "{count} frames are missing");
+    }
+    assert!(points.iter().any(|point| point["skipping"] == true));
+    let csv = fs::read_to_string(out.join("accuracy.csv")).unwrap();
+    let header = csv.lines().next().unwrap();
+    assert_eq!(header, appliance::benchmark::HEADER);
+    // One part: every line is a mean.
+    assert_eq!(csv.lines().count(), points.len() + 1);
+    for (name, start) in [("accuracy.svg", "<svg"), ("benchmarks.md", "Machine")] {
+        let text = fs::read_to_string(out.join(name)).unwrap();
+        assert!(text.starts_with(start), "{name}");
+    }
+    assert_eq!(&fs::read(out.join("accuracy.png")).unwrap()[1..4], b"PNG");
+    let written = fs::read_to_string(out.join("benchmarks.json")).unwrap();
+    assert_eq!(serde_json::from_str::<Value>(&written).unwrap(), all);
+
+    let all = json(&["bench", "budget", "--quick", "--json"]);
+    for frames in ["4", "12"] {
+        let cycle = &all["budget"]["160x120"][frames];
+        for key in [
+            "exposure_ms",
+            "verdict_ms",
+            "one_thread_ms",
+            "kernel_ms",
+            "x_kernel",
+        ] {
+            positive(cycle, key);
+        }
+        assert!(positive(cycle, "total_ms") >= positive(cycle, "exposure_ms"));
+        assert!(!cycle["stages"].as_object().unwrap().is_empty());
+    }
+}
+
+#[test]
+fn the_frames_that_are_timed_can_be_had_as_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = folder.path().to_str().unwrap();
+    program()
+        .run(&["bench", "--quick", "--frames", name])
+        .succeeded();
+    let sequence = fs::read_to_string(folder.path().join("sequence.json")).unwrap();
+    let sequence: Value = serde_json::from_str(&sequence).unwrap();
+    assert_eq!(sequence["frames"].as_array().unwrap().len(), 12);
+    let bytes = fs::read(folder.path().join("frame-11.npy")).unwrap();
+    let frame: hal::npy::Array<u8> = hal::npy::read(&bytes).unwrap();
+    assert_eq!((frame.rows, frame.columns), (48, 64));
+    let bytes = fs::read(folder.path().join("phase.npy")).unwrap();
+    let phase: hal::npy::Array<f64> = hal::npy::read(&bytes).unwrap();
+    assert!(
+        phase
+            .elements
+            .iter()
+            .all(|turns| (0.0..64.0).contains(turns))
+    );
+}
+
+#[test]
+fn wrong_arguments_measure_nothing() {
+    for arguments in [
+        &["bench", "speed"][..],
+        &["bench", "--size", "3"],
+        &["bench", "kernel", "--frames", "x"],
+    ] {
+        let run = program().run(arguments);
+        assert_eq!(run.code, 64, "{arguments:?}: {}", run.stderr);
+        assert_eq!(run.stdout, "");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    fs::write(&file, "").unwrap();
+    let name = file.to_str().unwrap();
+    let run = program().run(&["bench", "--quick", "--out", name]);
+    assert_eq!(run.code, 73, "{}", run.stderr);
+}
