@@ -1,6 +1,7 @@
 //! A row, block by block: the levels of a block → its absolute phase, modulation and trust.
 
 use super::about::{About, AboutLanes, MAX_ABOUT};
+use super::angle::AngleLanes;
 use super::decode::PhaseRow;
 use super::fold::BlockSample;
 use super::geometric::Geometric;
@@ -109,24 +110,24 @@ fn geometric_columns<V: Lanes, T: BlockSample>(
     let (Some(coarsest), Some(finest)) = (levels.first(), levels.last()) else {
         return;
     };
-    let (last, between) = match steps.split_last() {
-        Some((last, between)) => (Some(last), between),
-        None => (None, &[][..]),
-    };
+    let single = levels.len() == 1;
+    let between = levels.get(1..levels.len() - 1).unwrap_or(&[]);
+    let angle = AngleLanes::new(v);
     let zero = v.splat16(0);
     let middle = v.splat16(plan.middle as i16);
     let origin = v.splat16((plan.origin >> 16) as i16);
+    let mut climb = [[zero; 2]; MAX_LEVELS];
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
         // Of a single level the coarsest is the finest.
-        let mut here = if steps.is_empty() {
-            finest.block::<true>(v, at)
+        let mut here = if single {
+            finest.block::<true>(v, &angle, at)
         } else {
-            coarsest.block::<false>(v, at)
+            coarsest.block::<false>(v, &angle, at)
         };
-        let dark = here.weak;
-        if v.all8(dark) {
+        let lit = here.strong;
+        if v.none8(lit) {
             let reason = v.splat8(Trust::Dark as u8);
             store_unknown(
                 v,
@@ -136,66 +137,73 @@ fn geometric_columns<V: Lanes, T: BlockSample>(
             );
             continue;
         }
-        let mut low = Turns::<V> {
-            order: zero,
-            phase: v.sub(here.phase[0], middle),
-        };
-        let mut high = Turns::<V> {
-            order: zero,
-            phase: v.sub(here.phase[1], middle),
-        };
-        let mut left = [zero; 2];
-        let mut weak = v.splat8(0);
-        let mut saturated = here.saturated;
-        for (level, step) in levels.iter().skip(1).zip(between) {
-            here = level.block::<false>(v, at);
-            weak = v.or8(weak, here.weak);
-            saturated = v.or8(saturated, here.saturated);
-            let (left_low, left_high);
-            (low, left_low) = step.climb(v, low, here.phase[0]);
-            (high, left_high) = step.climb(v, high, here.phase[1]);
-            left = [
-                v.max_unsigned(left[0], left_low),
-                v.max_unsigned(left[1], left_high),
-            ];
+        climb[0] = [v.sub(here.phase[0], middle), v.sub(here.phase[1], middle)];
+        let mut strong = lit;
+        let mut brightest = here.brightest;
+        for (level, phase) in between.iter().zip(&mut climb[1..]) {
+            here = level.block::<false>(v, &angle, at);
+            *phase = here.phase;
+            strong = v.and8(strong, here.strong);
+            brightest = v.max8(brightest, here.brightest);
         }
-        if let Some(step) = last {
-            here = finest.block::<true>(v, at);
-            weak = v.or8(weak, here.weak);
-            saturated = v.or8(saturated, here.saturated);
-            let (left_low, left_high);
-            (low, left_low) = step.climb(v, low, here.phase[0]);
-            (high, left_high) = step.climb(v, high, here.phase[1]);
-            left = [
-                v.max_unsigned(left[0], left_low),
-                v.max_unsigned(left[1], left_high),
-            ];
+        if !single {
+            here = finest.block::<true>(v, &angle, at);
+            climb[between.len() + 1] = here.phase;
+            strong = v.and8(strong, here.strong);
+            brightest = v.max8(brightest, here.brightest);
         }
-        let doubtful = v.narrow_mask([too_far(v, left[0]), too_far(v, left[1])]);
+        let (low, left_low) = climb_half(v, &steps, &climb, 0);
+        let (high, left_high) = climb_half(v, &steps, &climb, 1);
+        let doubtful = v.narrow_mask([too_far(v, left_low), too_far(v, left_high)]);
         let verdict = Verdict {
-            dark,
-            weak,
-            saturated,
+            lit,
+            strong,
+            brightest,
             doubtful,
         };
         let reason = verdict.trust(v);
         let trusted = v.eq8(reason, v.splat8(Trust::Resolved as u8));
         let trusted = v.widen(trusted, trusted);
-        let unknown = v.splat16(i16::MIN);
-        // Half a turn below is the other half of the turn before.
-        let low_order = v.add(v.add(low.order, origin), v.sar::<15>(low.phase));
-        let high_order = v.add(v.add(high.order, origin), v.sar::<15>(high.phase));
-        let low_order = v.pick(trusted[0], low_order, unknown);
-        let high_order = v.pick(trusted[1], high_order, unknown);
         let found = [
-            v.join(v.and(low.phase, trusted[0]), low_order),
-            v.join(v.and(high.phase, trusted[1]), high_order),
+            known_phase(v, low, origin, trusted[0]),
+            known_phase(v, high, origin, trusted[1]),
         ];
         v.store32(phases, at, found);
-        store_modulation(v, v.or8(dark, weak), here.modulation, modulations, at);
+        store_modulation(v, strong, here.modulation, modulations, at);
         plain::store_trust(v, trust, at, reason);
     }
     finish(plan, &mut phases[columns]);
+}
+
+/// From the coarsest to the finest of a block's levels, half a block, and the most that a step left over.
+#[inline(always)]
+fn climb_half<V: Lanes>(
+    v: V,
+    steps: &[StepLanes<V>],
+    levels: &[[V::W; 2]; MAX_LEVELS],
+    half: usize,
+) -> (Turns<V>, V::W) {
+    let zero = v.splat16(0);
+    let mut here = Turns {
+        order: zero,
+        phase: levels[0][half],
+    };
+    let mut most = zero;
+    for (step, level) in steps.iter().zip(&levels[1..]) {
+        let left;
+        (here, left) = step.climb(v, here, level[half]);
+        most = v.max_unsigned(most, left);
+    }
+    (here, most)
+}
+
+/// The phase from its origin on where it is trusted, [`AbsolutePhase::UNKNOWN`] elsewhere.
+#[inline(always)]
+fn known_phase<V: Lanes>(v: V, found: Turns<V>, origin: V::W, trusted: V::W) -> [V::D; 2] {
+    // Half a turn below is the other half of the turn before.
+    let order = v.add(v.add(found.order, origin), v.sar::<15>(found.phase));
+    let order = v.pick(trusted, order, v.splat16(i16::MIN));
+    v.join(v.and(found.phase, trusted), order)
 }
 
 /// What few sequences need: an origin between two orders (of a single level), a finest ratio that is not 1.
@@ -215,11 +223,15 @@ fn finish(plan: &Geometric, phases: &mut [i32]) {
     }
 }
 
-/// Why the pixels of a block are not trusted.
+/// What is known of the pixels of a block.
 struct Verdict<B> {
-    dark: B,
-    weak: B,
-    saturated: B,
+    /// Mask: the coarsest level is strong.
+    lit: B,
+    /// Mask: every level is.
+    strong: B,
+    /// 255 where a sample is at full scale.
+    brightest: B,
+    /// Mask: a step left too much over.
     doubtful: B,
 }
 
@@ -227,10 +239,11 @@ impl<B: Copy> Verdict<B> {
     /// The first reason of each pixel.
     #[inline(always)]
     fn trust<V: Lanes<B = B>>(&self, v: V) -> B {
+        let saturated = v.eq8(self.brightest, v.splat8(u8::MAX));
         let trust = v.and8(self.doubtful, v.splat8(Trust::Residual as u8));
-        let trust = v.pick8(self.saturated, v.splat8(Trust::Saturated as u8), trust);
-        let trust = v.pick8(self.weak, v.splat8(Trust::LowModulation as u8), trust);
-        v.pick8(self.dark, v.splat8(Trust::Dark as u8), trust)
+        let trust = v.pick8(saturated, v.splat8(Trust::Saturated as u8), trust);
+        let trust = v.pick8(self.strong, trust, v.splat8(Trust::LowModulation as u8));
+        v.pick8(self.lit, trust, v.splat8(Trust::Dark as u8))
     }
 }
 
@@ -246,22 +259,21 @@ fn store_unknown<V: Lanes>(v: V, reason: V::B, (phases, modulations, trusts): Ro
     plain::store_trust(v, trusts, at, reason);
 }
 
-/// Stores the modulation of a block where it is not weak.
+/// Stores the modulation of a block where every level is strong.
 #[inline(always)]
 fn store_modulation<V: Lanes>(
     v: V,
-    weak: V::B,
+    strong: V::B,
     modulation: [V::W; 2],
     modulations: &mut [u16],
     at: usize,
 ) {
-    let weak = v.widen(weak, weak);
-    let zero = v.splat16(0);
-    let strong = [
-        v.pick(weak[0], zero, v.add(modulation[0], modulation[0])),
-        v.pick(weak[1], zero, v.add(modulation[1], modulation[1])),
+    let strong = v.widen(strong, strong);
+    let known = [
+        v.and(strong[0], v.add(modulation[0], modulation[0])),
+        v.and(strong[1], v.add(modulation[1], modulation[1])),
     ];
-    v.store16(modulations, at, strong);
+    v.store16(modulations, at, known);
 }
 
 #[inline(always)]
@@ -287,6 +299,7 @@ fn about_columns<V: Lanes, T: BlockSample>(
         return;
     };
     let about = AboutLanes::new(v, plan);
+    let angle = AngleLanes::new(v);
     let unknown = v.splat32(AbsolutePhase::UNKNOWN.to_bits());
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
@@ -306,14 +319,11 @@ fn about_columns<V: Lanes, T: BlockSample>(
             );
             continue;
         }
-        let coarsest = first.block::<true>(v, at);
-        let dark = v.or8(unexpected, coarsest.weak);
-        if v.all8(dark) {
-            let reason = v.pick8(
-                unexpected,
-                v.splat8(Trust::Unexpected as u8),
-                v.splat8(Trust::Dark as u8),
-            );
+        let coarsest = first.block::<true>(v, &angle, at);
+        let lit = coarsest.strong;
+        if v.all8(v.pick8(lit, unexpected, v.splat8(u8::MAX))) {
+            let dark = v.splat8(Trust::Dark as u8);
+            let reason = v.pick8(unexpected, v.splat8(Trust::Unexpected as u8), dark);
             store_unknown(
                 v,
                 reason,
@@ -323,26 +333,26 @@ fn about_columns<V: Lanes, T: BlockSample>(
             continue;
         }
         let mut found = [coarsest; MAX_ABOUT];
-        let mut verdict = Verdict {
-            dark: coarsest.weak,
-            weak: v.splat8(0),
-            saturated: coarsest.saturated,
-            doubtful: v.splat8(0),
-        };
+        let mut strong = v.pick8(unexpected, v.splat8(0), lit);
+        let mut brightest = coarsest.brightest;
         for (level, found) in levels.iter().zip(&mut found).skip(1) {
-            *found = level.block::<true>(v, at);
-            verdict.weak = v.or8(verdict.weak, found.weak);
-            verdict.saturated = v.or8(verdict.saturated, found.saturated);
+            *found = level.block::<true>(v, &angle, at);
+            strong = v.and8(strong, found.strong);
+            brightest = v.max8(brightest, found.brightest);
         }
         let low = about.unwrap(v, known[0], &found, 0);
         let high = about.unwrap(v, known[1], &found, 1);
-        verdict.doubtful = v.narrow_mask([low.doubtful, high.doubtful]);
+        let verdict = Verdict {
+            lit,
+            strong,
+            brightest,
+            doubtful: v.narrow_mask([low.doubtful, high.doubtful]),
+        };
         let reason = v.pick8(
             unexpected,
             v.splat8(Trust::Unexpected as u8),
             verdict.trust(v),
         );
-        let weak = v.or8(unexpected, v.or8(verdict.dark, verdict.weak));
         let trusted = v.eq8(reason, v.splat8(Trust::Resolved as u8));
         let trusted = v.widen(trusted, trusted);
         let (low_mask, high_mask) = (
@@ -360,7 +370,13 @@ fn about_columns<V: Lanes, T: BlockSample>(
             ],
         ];
         v.store32(phases, at, phase);
-        store_modulation(v, weak, [low.modulation, high.modulation], modulations, at);
+        store_modulation(
+            v,
+            strong,
+            [low.modulation, high.modulation],
+            modulations,
+            at,
+        );
         plain::store_trust(v, trust, at, reason);
     }
 }
@@ -375,16 +391,17 @@ fn wrap_columns<V: Lanes, T: BlockSample>(
     mut out: WrappedRowMut<'_>,
 ) {
     let level = LevelLanes::new(v, level, LevelRow::Frames(row));
+    let angle = AngleLanes::new(v);
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
         if let Some(before) = &before
-            && v.all8(before.weak(v, at))
+            && v.none8(before.strong(v, at))
         {
             out.store_weak(v, at);
             continue;
         }
-        let found = level.block::<true>(v, at);
+        let found = level.block::<true>(v, &angle, at);
         out.store(v, at, &found);
     }
 }

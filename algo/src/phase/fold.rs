@@ -23,10 +23,10 @@ pub(super) struct Folded<V: Lanes> {
     pub backwards: [V::W; 2],
     /// The axis from which it counts in 1/65536 turn, plus 1 where it counts backwards.
     pub axis: [V::W; 2],
-    /// Mask: the modulation is below the trusted minimum.
-    pub weak: V::B,
-    /// Mask: a sample is at full scale.
-    pub saturated: V::B,
+    /// Mask: the modulation is at least the trusted minimum.
+    pub strong: V::B,
+    /// 255 where a sample is at full scale.
+    pub brightest: V::B,
 }
 
 /// A sample that blocks of pixels can be made of.
@@ -64,8 +64,11 @@ pub(super) fn fold<V: Lanes, T: BlockSample>(
 const SCALES: [u8; 16] = [
     128, 128, 64, 64, 32, 32, 32, 32, 16, 16, 16, 16, 16, 16, 16, 16,
 ];
-/// At 8 bits and N = 4, B = √(S² + C²)/2: trusted from 16 counts, so from S² + C² = 32².
-const LEAST_8_BIT: u8 = 32;
+/// At 8 bits and N = 4, B = √(S² + C²)/2 is trusted from 16 counts, so from S² + C² = 32²: the least of the shorter component
+/// for each longer one from 16 to 31; 255 where none is enough.
+const LEAST_SHORT: [u8; 16] = [
+    255, 255, 255, 255, 255, 255, 255, 23, 22, 20, 19, 18, 16, 14, 12, 8,
+];
 
 impl BlockSample for u8 {
     #[inline(always)]
@@ -75,32 +78,28 @@ impl BlockSample for u8 {
         rows: &Four<'_, Self>,
         at: usize,
     ) -> Folded<V> {
-        let [a, b, c, d] = v.load8_of_four(rows, at);
-        let zero = v.splat8(0);
-        let (s_up, c_up) = (v.sub_sat8(a, c), v.sub_sat8(b, d));
-        let s = v.or8(s_up, v.sub_sat8(c, a));
-        let c_ = v.or8(c_up, v.sub_sat8(d, b));
+        let [i0, i1, i2, i3] = v.load8_of_four(rows, at);
+        let (even, odd) = (v.max8(i0, i2), v.max8(i1, i3));
+        let s = v.sub8(even, v.min8(i0, i2));
+        let c = v.sub8(odd, v.min8(i1, i3));
         // Also where S or C is 0: the angle is the same from either side.
-        let (s_down, c_down) = (v.eq8(s_up, zero), v.eq8(c_up, zero));
-        let (long, short) = (v.max8(s, c_), v.min8(s, c_));
+        let (s_down, c_down) = (v.eq8(even, i2), v.eq8(odd, i3));
+        let (long, short) = (v.max8(s, c), v.min8(s, c));
         let steep = v.eq8(long, s);
         let backwards = v.xor8(v.xor8(s_down, c_down), steep);
         let half = v.and8(v.pick8(steep, s_down, c_down), v.splat8(0x80));
         let axis = v.or8(half, v.and8(steep, v.splat8(0x40)));
         let scale = v.by_high_nibble(&SCALES, long);
-        let least = v.splat8(LEAST_8_BIT);
-        let power = v.sum_of_squares(v.min8(s, least), v.min8(c_, least));
-        let enough = v.splat16(i16::from(LEAST_8_BIT) * i16::from(LEAST_8_BIT));
-        let brightest = v.max8(v.max8(a, b), v.max8(c, d));
-        let length = v.widen(zero, long);
+        let least = v.by_excess(&LEAST_SHORT, long);
+        let length = v.widen(v.splat8(0), long);
         Folded {
             long: v.widen_scaled(long, scale),
             short: v.widen_scaled(short, scale),
             length: [v.shr::<1>(length[0]), v.shr::<1>(length[1])],
             backwards: v.widen(backwards, backwards),
             axis: v.widen(v.and8(backwards, v.splat8(1)), axis),
-            weak: v.narrow_mask([v.gt(enough, power[0]), v.gt(enough, power[1])]),
-            saturated: v.eq8(brightest, v.splat8(u8::MAX)),
+            strong: v.eq8(v.max8(short, least), short),
+            brightest: v.max8(even, odd),
         }
     }
 
@@ -143,11 +142,11 @@ impl BlockSample for u16 {
             any_full(v, level, a[0], b[0], c[0], d[0]),
             any_full(v, level, a[1], b[1], c[1], d[1]),
         ];
-        let weak = [
-            dot_below(v, level, [s[0], s[0], c_[0], c_[0]]),
-            dot_below(v, level, [s[1], s[1], c_[1], c_[1]]),
+        let strong = [
+            dot_enough(v, level, [s[0], s[0], c_[0], c_[0]]),
+            dot_enough(v, level, [s[1], s[1], c_[1], c_[1]]),
         ];
-        octant(v, s, c_, v.narrow_mask(weak), v.narrow_mask(over))
+        octant(v, s, c_, v.narrow_mask(strong), v.narrow_mask(over))
     }
 
     #[inline(always)]
@@ -183,12 +182,12 @@ fn any_full<V: Lanes, T>(
     v.gt(brightest, level.below_full_scale)
 }
 
-/// Mask: a·b + c·d is below the level's least power.
+/// Mask: a·b + c·d is at least the level's least power.
 #[inline(always)]
-fn dot_below<V: Lanes, T>(v: V, level: &LevelLanes<'_, V, T>, [a, b, c, d]: [V::W; 4]) -> V::W {
+fn dot_enough<V: Lanes, T>(v: V, level: &LevelLanes<'_, V, T>, [a, b, c, d]: [V::W; 4]) -> V::W {
     let power = v.dot(a, b, c, d);
-    let least = level.least_power;
-    v.narrow_mask32([v.gt32(least, power[0]), v.gt32(least, power[1])])
+    let below = level.below_least_power;
+    v.narrow_mask32([v.gt32(power[0], below), v.gt32(power[1], below)])
 }
 
 /// √3/2 in Q15.
@@ -207,18 +206,18 @@ fn three<V: Lanes, T: BlockSample>(
         T::saturated(v, level, c, at),
     );
     let (a, b, c) = (T::words(v, a, at), T::words(v, b, at), T::words(v, c, at));
-    let (s0, c0, weak0) = three_words(v, level, a[0], b[0], c[0]);
-    let (s1, c1, weak1) = three_words(v, level, a[1], b[1], c[1]);
+    let (s0, c0, strong0) = three_words(v, level, a[0], b[0], c[0]);
+    let (s1, c1, strong1) = three_words(v, level, a[1], b[1], c[1]);
     octant(
         v,
         [s0, s1],
         [c0, c1],
-        v.narrow_mask([weak0, weak1]),
+        v.narrow_mask([strong0, strong1]),
         saturated,
     )
 }
 
-/// S, C and whether they are weak: 4 (S² + C²) = (2I₀ − I₁ − I₂)² + 3 (I₁ − I₂)², exactly.
+/// S, C and whether they are enough: 4 (S² + C²) = (2I₀ − I₁ − I₂)² + 3 (I₁ − I₂)², exactly.
 #[inline(always)]
 fn three_words<V: Lanes, T>(
     v: V,
@@ -230,10 +229,10 @@ fn three_words<V: Lanes, T>(
     let across = v.sub(b, c);
     let along = v.sub(v.add(a, a), v.add(b, c));
     let threefold = v.add(across, v.add(across, across));
-    let weak = dot_below(v, level, [along, along, across, threefold]);
+    let strong = dot_enough(v, level, [along, along, across, threefold]);
     let s = v.shl_by(along, level.half_lift);
     let c_ = v.mul_q15(v.shl_by(across, level.lift), v.splat16(ROOT_3_HALVES));
-    (s, c_, weak)
+    (s, c_, strong)
 }
 
 #[inline(always)]
@@ -277,9 +276,9 @@ fn weighted<V: Lanes, T: BlockSample>(
             half += 1;
         }
     }
-    let weak = [
-        weak_sums(v, level, s[0], c[0]),
-        weak_sums(v, level, s[1], c[1]),
+    let strong = [
+        enough_sums(v, level, s[0], c[0]),
+        enough_sums(v, level, s[1], c[1]),
     ];
     let (s, c) = (
         [
@@ -291,7 +290,7 @@ fn weighted<V: Lanes, T: BlockSample>(
             v.narrow_rounded(c[1], level.plan.lift),
         ],
     );
-    octant(v, s, c, v.narrow_mask(weak), saturated)
+    octant(v, s, c, v.narrow_mask(strong), saturated)
 }
 
 /// A sum, and products brought down so far that all of them fit.
@@ -311,20 +310,25 @@ fn add_part<V: Lanes, T>(
     ]
 }
 
-/// Mask: S² + C² of the sums is below the level's least power, in singles (1e-7).
+/// Mask: S² + C² of the sums is at least the level's least power, in singles (1e-7).
 #[inline(always)]
-fn weak_sums<V: Lanes, T>(v: V, level: &LevelLanes<'_, V, T>, s: [V::D; 2], c: [V::D; 2]) -> V::W {
-    let least = level.least_sum_power;
+fn enough_sums<V: Lanes, T>(
+    v: V,
+    level: &LevelLanes<'_, V, T>,
+    s: [V::D; 2],
+    c: [V::D; 2],
+) -> V::W {
+    let below = level.below_least_sum_power;
     let (s0, s1) = (v.to_single(s[0]), v.to_single(s[1]));
     let (c0, c1) = (v.to_single(c[0]), v.to_single(c[1]));
     let power0 = v.add_single(v.mul_single(s0, s0), v.mul_single(c0, c0));
     let power1 = v.add_single(v.mul_single(s1, s1), v.mul_single(c1, c1));
-    v.narrow_mask32([v.lt_single(power0, least), v.lt_single(power1, least)])
+    v.narrow_mask32([v.lt_single(below, power0), v.lt_single(below, power1)])
 }
 
 /// Folds words.
 #[inline(always)]
-fn octant<V: Lanes>(v: V, s: [V::W; 2], c: [V::W; 2], weak: V::B, saturated: V::B) -> Folded<V> {
+fn octant<V: Lanes>(v: V, s: [V::W; 2], c: [V::W; 2], strong: V::B, brightest: V::B) -> Folded<V> {
     let (low, high) = (octant_words(v, s[0], c[0]), octant_words(v, s[1], c[1]));
     Folded {
         long: [low.long, high.long],
@@ -332,8 +336,8 @@ fn octant<V: Lanes>(v: V, s: [V::W; 2], c: [V::W; 2], weak: V::B, saturated: V::
         length: [low.length, high.length],
         backwards: [low.backwards, high.backwards],
         axis: [low.axis, high.axis],
-        weak,
-        saturated,
+        strong,
+        brightest,
     }
 }
 

@@ -1,6 +1,6 @@
 //! One level prepared for demodulation, and its demodulation: samples → wrapped phase and modulation.
 
-use super::angle::{self, LENGTH};
+use super::angle::{AngleLanes, LENGTH, hypotenuse};
 use super::block::LevelRow;
 use super::fold::{BlockSample, fold};
 use super::trust::MIN_MODULATION_8_BIT;
@@ -37,10 +37,10 @@ pub(crate) struct Level {
     pub below_full_scale: i16,
     /// Middle of the range of samples, unsigned.
     pub centre: i16,
-    /// Least trusted power, in the units of the forms for 3 and 4 shifts.
-    pub least_power: i32,
-    /// Least trusted S² + C² of sums.
-    pub least_sum_power: f32,
+    /// What the power must be above, in the units of the forms for 3 and 4 shifts.
+    below_least_power: i32,
+    /// What S² + C² of sums must be above.
+    below_least_sum_power: f32,
     /// Coefficients of √(1 + t²), times what makes a length a modulation.
     hypotenuse: [i16; 3],
     /// Whether the modulation must be doubled at last.
@@ -67,10 +67,10 @@ pub(crate) struct Demodulated<V: Lanes> {
     pub phase: [V::W; 2],
     /// Modulation in units of full scale / 32767.5. Only where it was asked for, and meaningless where weak.
     pub modulation: [V::W; 2],
-    /// Mask: the modulation is below the trusted minimum.
-    pub weak: V::B,
-    /// Mask: a sample is at full scale, where that matters.
-    pub saturated: V::B,
+    /// Mask: the modulation is at least the trusted minimum.
+    pub strong: V::B,
+    /// 255 where a sample is at full scale and that matters.
+    pub brightest: V::B,
 }
 
 impl Level {
@@ -118,8 +118,8 @@ impl Level {
             drop,
             below_full_scale: (((1_u32 << bit_depth) - 2) as u16).cast_signed(),
             centre: ((1_u32 << (bit_depth - 1)) as u16).cast_signed(),
-            least_power: libm::ceil(least_power.min(f64::from(i32::MAX))) as i32,
-            least_sum_power: least_power as f32,
+            below_least_power: libm::ceil(least_power.min(f64::from(i32::MAX))) as i32 - 1,
+            below_least_sum_power: f32::from_bits((least_power as f32).to_bits() - 1),
             hypotenuse: LENGTH.map(|c| libm::rint(c * factor * 32_768.0) as i16),
             doubled,
             saturates: steps < FULL_TRUST_STEPS,
@@ -145,8 +145,8 @@ pub(super) struct LevelLanes<'a, V: Lanes, T> {
     pub lift: V::Count,
     /// One bit less.
     pub half_lift: V::Count,
-    pub least_power: V::D,
-    pub least_sum_power: V::F,
+    pub below_least_power: V::D,
+    pub below_least_sum_power: V::F,
     pub centre: V::W,
     /// Full scale less one count, with its sign bit turned.
     pub below_full_scale: V::W,
@@ -170,8 +170,8 @@ impl<'a, V: Lanes, T: BlockSample> LevelLanes<'a, V, T> {
             source,
             lift: v.left(plan.lift),
             half_lift: v.left(plan.lift.saturating_sub(1)),
-            least_power: v.splat32(plan.least_power),
-            least_sum_power: v.splat_single(plan.least_sum_power),
+            below_least_power: v.splat32(plan.below_least_power),
+            below_least_sum_power: v.splat_single(plan.below_least_sum_power),
             centre: v.splat16(plan.centre),
             below_full_scale: v.xor(v.splat16(plan.below_full_scale), turn),
             hypotenuse: [
@@ -185,18 +185,23 @@ impl<'a, V: Lanes, T: BlockSample> LevelLanes<'a, V, T> {
 
     /// Demodulates the block at `at`.
     #[inline(always)]
-    pub fn block<const MODULATION: bool>(&self, v: V, at: usize) -> Demodulated<V> {
+    pub fn block<const MODULATION: bool>(
+        &self,
+        v: V,
+        angle: &AngleLanes<V>,
+        at: usize,
+    ) -> Demodulated<V> {
         let folded = match &self.source {
             Source::Wrapped(row) => return row.block(v, at),
             Source::Four(rows) => T::four(v, self, rows, at),
             Source::Rows(rows) => fold(v, self, rows, at),
         };
         let t = [
-            angle::quotient(v, folded.short[0], folded.long[0]),
-            angle::quotient(v, folded.short[1], folded.long[1]),
+            angle.quotient(v, folded.short[0], folded.long[0]),
+            angle.quotient(v, folded.short[1], folded.long[1]),
         ];
-        let low = angle::arctangent(v, t[0]);
-        let high = angle::arctangent(v, t[1]);
+        let low = angle.arctangent(v, t[0]);
+        let high = angle.arctangent(v, t[1]);
         // −x is ¬x + 1; the axis holds the 1.
         let phase = [
             v.add(v.xor(low, folded.backwards[0]), folded.axis[0]),
@@ -205,23 +210,23 @@ impl<'a, V: Lanes, T: BlockSample> LevelLanes<'a, V, T> {
         let mut modulation = [v.splat16(0); 2];
         if MODULATION {
             modulation = [
-                angle::hypotenuse(v, folded.length[0], t[0], self.hypotenuse),
-                angle::hypotenuse(v, folded.length[1], t[1], self.hypotenuse),
+                hypotenuse(v, folded.length[0], t[0], self.hypotenuse),
+                hypotenuse(v, folded.length[1], t[1], self.hypotenuse),
             ];
             modulation = [
                 v.shl_by(modulation[0], self.doubled),
                 v.shl_by(modulation[1], self.doubled),
             ];
         }
-        let mut saturated = folded.saturated;
+        let mut brightest = folded.brightest;
         if !self.plan.saturates {
-            saturated = v.splat8(0);
+            brightest = v.splat8(0);
         }
         Demodulated {
             phase,
             modulation,
-            weak: folded.weak,
-            saturated,
+            strong: folded.strong,
+            brightest,
         }
     }
 }

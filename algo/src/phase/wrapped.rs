@@ -78,11 +78,11 @@ pub(crate) struct WrappedRowMut<'a> {
 }
 
 impl WrappedRow<'_> {
-    /// Mask: the block's weak pixels.
+    /// Mask: the block's pixels that are not weak.
     #[inline(always)]
-    pub fn weak<V: Lanes>(&self, v: V, at: usize) -> V::B {
+    pub fn strong<V: Lanes>(&self, v: V, at: usize) -> V::B {
         let weak = v.splat8(WEAK);
-        v.eq8(v.and8(v.load8(self.doubts, at), weak), weak)
+        v.eq8(v.and8(v.load8(self.doubts, at), weak), v.splat8(0))
     }
 
     #[inline(always)]
@@ -92,8 +92,8 @@ impl WrappedRow<'_> {
         Demodulated {
             phase: v.load16(self.phase, at),
             modulation: v.load16(self.modulation, at),
-            weak: self.weak(v, at),
-            saturated: v.eq8(v.and8(doubts, saturated), saturated),
+            strong: self.strong(v, at),
+            brightest: v.eq8(v.and8(doubts, saturated), saturated),
         }
     }
 }
@@ -101,21 +101,19 @@ impl WrappedRow<'_> {
 impl WrappedRowMut<'_> {
     #[inline(always)]
     pub fn store<V: Lanes>(&mut self, v: V, at: usize, block: &Demodulated<V>) {
-        let weak = v.widen(block.weak, block.weak);
-        let zero = v.splat16(0);
+        let strong = v.widen(block.strong, block.strong);
         v.store16(self.phase, at, block.phase);
         v.store16(
             self.modulation,
             at,
             [
-                v.pick(weak[0], zero, block.modulation[0]),
-                v.pick(weak[1], zero, block.modulation[1]),
+                v.and(strong[0], block.modulation[0]),
+                v.and(strong[1], block.modulation[1]),
             ],
         );
-        let doubts = v.or8(
-            v.and8(block.weak, v.splat8(WEAK)),
-            v.and8(block.saturated, v.splat8(SATURATED)),
-        );
+        let weak = v.pick8(block.strong, v.splat8(0), v.splat8(WEAK));
+        let saturated = v.eq8(block.brightest, v.splat8(u8::MAX));
+        let doubts = v.or8(weak, v.and8(saturated, v.splat8(SATURATED)));
         v.store8(self.doubts, at, doubts);
     }
 

@@ -103,8 +103,8 @@ impl Lanes for Avx2 {
         avx2!(_mm256_max_epu8(a, b))
     }
     #[inline(always)]
-    fn sub_sat8(self, a: Self::B, b: Self::B) -> Self::B {
-        avx2!(_mm256_subs_epu8(a, b))
+    fn sub8(self, a: Self::B, b: Self::B) -> Self::B {
+        avx2!(_mm256_sub_epi8(a, b))
     }
     #[inline(always)]
     fn eq8(self, a: Self::B, b: Self::B) -> Self::B {
@@ -136,8 +136,24 @@ impl Lanes for Avx2 {
         })
     }
     #[inline(always)]
+    fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
+        // SAFETY: the table holds the 16 bytes that are read; the load needs no alignment; `self` proves AVX2.
+        let table = unsafe { _mm256_broadcastsi128_si256(_mm_loadu_si128(table.as_ptr().cast())) };
+        avx2!({
+            // A set high bit reads 0: from 32 on, with 112 more than the excess.
+            let excess = _mm256_subs_epu8(x, _mm256_set1_epi8(16));
+            let index = _mm256_adds_epu8(excess, _mm256_set1_epi8(112));
+            _mm256_shuffle_epi8(table, index)
+        })
+    }
+    #[inline(always)]
     fn all8(self, mask: Self::B) -> bool {
         avx2!(_mm256_movemask_epi8(mask)) == -1
+    }
+
+    #[inline(always)]
+    fn none8(self, mask: Self::B) -> bool {
+        avx2!(_mm256_testz_si256(mask, mask)) == 1
     }
 
     #[inline(always)]
@@ -154,14 +170,6 @@ impl Lanes for Avx2 {
         avx2!([
             _mm256_mullo_epi16(x[0], _mm256_slli_epi16::<3>(scale[0])),
             _mm256_mullo_epi16(x[1], _mm256_slli_epi16::<3>(scale[1]))
-        ])
-    }
-    #[inline(always)]
-    fn sum_of_squares(self, a: Self::B, b: Self::B) -> [Self::W; 2] {
-        let [low, high] = self.widen(a, b);
-        avx2!([
-            _mm256_maddubs_epi16(low, low),
-            _mm256_maddubs_epi16(high, high)
         ])
     }
     #[inline(always)]

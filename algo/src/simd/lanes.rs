@@ -40,8 +40,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn min8(self, a: Self::B, b: Self::B) -> Self::B;
     /// The larger.
     fn max8(self, a: Self::B, b: Self::B) -> Self::B;
-    /// a − b, at least 0.
-    fn sub_sat8(self, a: Self::B, b: Self::B) -> Self::B;
+    /// a − b.
+    fn sub8(self, a: Self::B, b: Self::B) -> Self::B;
     /// Mask: a = b.
     fn eq8(self, a: Self::B, b: Self::B) -> Self::B;
     /// Bits of both.
@@ -54,8 +54,12 @@ pub(crate) trait Lanes: Copy + Debug {
     fn pick8(self, mask: Self::B, a: Self::B, b: Self::B) -> Self::B;
     /// table\[x / 16\].
     fn by_high_nibble(self, table: &[u8; 16], x: Self::B) -> Self::B;
+    /// table\[x − 16\] for 16 ≤ x < 32, table\[0\] below, 0 above.
+    fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B;
     /// Whether every byte of a mask is set.
     fn all8(self, mask: Self::B) -> bool;
+    /// Whether no byte of a mask is set.
+    fn none8(self, mask: Self::B) -> bool;
 
     // Between bytes and words.
 
@@ -63,8 +67,6 @@ pub(crate) trait Lanes: Copy + Debug {
     fn widen(self, low: Self::B, high: Self::B) -> [Self::W; 2];
     /// Words 8 · x · scale.
     fn widen_scaled(self, x: Self::B, scale: Self::B) -> [Self::W; 2];
-    /// Words a² + b² of bytes below 128.
-    fn sum_of_squares(self, a: Self::B, b: Self::B) -> [Self::W; 2];
     /// Masks of words as masks of bytes.
     fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B;
 

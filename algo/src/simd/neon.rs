@@ -58,8 +58,8 @@ impl Lanes for Neon {
         neon!(vmaxq_u8(a, b))
     }
     #[inline(always)]
-    fn sub_sat8(self, a: Self::B, b: Self::B) -> Self::B {
-        neon!(vqsubq_u8(a, b))
+    fn sub8(self, a: Self::B, b: Self::B) -> Self::B {
+        neon!(vsubq_u8(a, b))
     }
     #[inline(always)]
     fn eq8(self, a: Self::B, b: Self::B) -> Self::B {
@@ -88,8 +88,19 @@ impl Lanes for Neon {
         neon!(vqtbl1q_u8(table, vshrq_n_u8::<4>(x)))
     }
     #[inline(always)]
+    fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
+        // SAFETY: the table holds the 16 bytes that are read.
+        let table = unsafe { vld1q_u8(table.as_ptr()) };
+        neon!(vqtbl1q_u8(table, vqsubq_u8(x, vdupq_n_u8(16))))
+    }
+    #[inline(always)]
     fn all8(self, mask: Self::B) -> bool {
         neon!(vminvq_u8(mask)) == u8::MAX
+    }
+
+    #[inline(always)]
+    fn none8(self, mask: Self::B) -> bool {
+        neon!(vmaxvq_u8(mask)) == 0
     }
 
     #[inline(always)]
@@ -107,17 +118,6 @@ impl Lanes for Neon {
             [
                 vreinterpretq_s16_u16(vshlq_n_u16::<3>(low)),
                 vreinterpretq_s16_u16(vshlq_n_u16::<3>(high)),
-            ]
-        })
-    }
-    #[inline(always)]
-    fn sum_of_squares(self, a: Self::B, b: Self::B) -> [Self::W; 2] {
-        neon!({
-            let low = vmull_u8(vget_low_u8(a), vget_low_u8(a));
-            let high = vmull_high_u8(a, a);
-            [
-                vreinterpretq_s16_u16(vmlal_u8(low, vget_low_u8(b), vget_low_u8(b))),
-                vreinterpretq_s16_u16(vmlal_high_u8(high, b, b)),
             ]
         })
     }

@@ -97,8 +97,8 @@ impl Lanes for Portable {
         pairs(a, b, u8::max)
     }
     #[inline(never)]
-    fn sub_sat8(self, a: Self::B, b: Self::B) -> Self::B {
-        pairs(a, b, u8::saturating_sub)
+    fn sub8(self, a: Self::B, b: Self::B) -> Self::B {
+        pairs(a, b, u8::wrapping_sub)
     }
     #[inline(never)]
     fn eq8(self, a: Self::B, b: Self::B) -> Self::B {
@@ -126,8 +126,21 @@ impl Lanes for Portable {
         lanes(x, |x| table[usize::from(x >> 4)])
     }
     #[inline(never)]
+    fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
+        lanes(x, |x| match x {
+            0..16 => table[0],
+            16..32 => table[usize::from(x - 16)],
+            _ => 0,
+        })
+    }
+    #[inline(never)]
     fn all8(self, mask: Self::B) -> bool {
         mask == [u8::MAX; BYTES]
+    }
+
+    #[inline(never)]
+    fn none8(self, mask: Self::B) -> bool {
+        mask == [0; BYTES]
     }
 
     #[inline(never)]
@@ -142,13 +155,6 @@ impl Lanes for Portable {
                 .wrapping_mul(u16::from(scale))
                 .wrapping_mul(8)
                 .cast_signed()
-        });
-        halves(words, |half| half)
-    }
-    #[inline(never)]
-    fn sum_of_squares(self, a: Self::B, b: Self::B) -> [Self::W; 2] {
-        let words: [i16; BYTES] = pairs(a, b, |a, b| {
-            i16::from(a) * i16::from(a) + i16::from(b) * i16::from(b)
         });
         halves(words, |half| half)
     }
