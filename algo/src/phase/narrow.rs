@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 /// At least the pixels of any back-end's block.
-pub(super) const MAX_PIXELS: usize = 32;
+pub(super) const MAX_PIXELS: usize = 64;
 
 /// A sample by which a frame's rows can be asked for.
 pub(super) trait RowSample: BlockSample + Default {

@@ -17,6 +17,7 @@ mod neon;
 pub(crate) mod plain;
 mod portable;
 mod rows;
+mod twice;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
@@ -25,6 +26,7 @@ pub(crate) use lanes::Lanes;
 pub(crate) use neon::Neon;
 pub(crate) use portable::Portable;
 pub(crate) use rows::Four;
+pub(crate) use twice::Twice;
 
 /// The instructions that the phase kernels are compiled for. All give the same bits.
 #[derive(Clone, Copy, Debug)]
@@ -86,7 +88,7 @@ macro_rules! back_end_entry {
             #[target_feature(enable = "avx2")]
             #[inline(never)]
             fn avx2<$($generics)*>(lanes: $crate::simd::Avx2, $($arg: $type),*) {
-                $kernel(lanes, $($arg),*);
+                $kernel($crate::simd::Twice(lanes), $($arg),*);
             }
             #[inline(never)]
             fn plain<$($generics)*>(lanes: impl $crate::simd::Lanes, $($arg: $type),*) {
@@ -100,7 +102,7 @@ macro_rules! back_end_entry {
                     unsafe { avx2(lanes, $($arg),*) }
                 }
                 #[cfg(target_arch = "aarch64")]
-                $crate::simd::Proof::Neon(lanes) => plain(lanes, $($arg),*),
+                $crate::simd::Proof::Neon(lanes) => plain($crate::simd::Twice(lanes), $($arg),*),
             }
         }
     };
