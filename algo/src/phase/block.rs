@@ -5,7 +5,7 @@ use super::angle::AngleLanes;
 use super::decode::PhaseRow;
 use super::fold::BlockSample;
 use super::geometric::Geometric;
-use super::level::{Level, LevelLanes};
+use super::level::{Level, LevelLanes, Pointer};
 use super::step::{StepLanes, Turns};
 use super::trust::Trust;
 use super::unwrap::too_far;
@@ -120,13 +120,8 @@ fn geometric_columns<V: Lanes, T: BlockSample>(
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
-        // Of a single level the coarsest is the finest.
-        let mut here = if single {
-            finest.block::<true>(v, &angle, at)
-        } else {
-            coarsest.block::<false>(v, &angle, at)
-        };
-        let lit = here.strong;
+        let pointer = coarsest.pointer(v, at);
+        let lit = pointer.strong();
         if v.none8(lit) {
             let reason = v.splat8(Trust::Dark as u8);
             store_unknown(
@@ -137,6 +132,12 @@ fn geometric_columns<V: Lanes, T: BlockSample>(
             );
             continue;
         }
+        // Of a single level the coarsest is the finest.
+        let mut here = match pointer {
+            Pointer::Demodulated(block) => block,
+            Pointer::Folded(folded) if single => finest.demodulated::<true>(v, &angle, folded),
+            Pointer::Folded(folded) => coarsest.demodulated::<false>(v, &angle, folded),
+        };
         climb[0] = [v.sub(here.phase[0], middle), v.sub(here.phase[1], middle)];
         let mut strong = lit;
         let mut brightest = here.brightest;
@@ -319,9 +320,10 @@ fn about_columns<V: Lanes, T: BlockSample>(
             );
             continue;
         }
-        let coarsest = first.block::<true>(v, &angle, at);
-        let lit = coarsest.strong;
-        if v.all8(v.pick8(lit, unexpected, v.splat8(u8::MAX))) {
+        let pointer = first.pointer(v, at);
+        let lit = pointer.strong();
+        let looked_at = v.pick8(unexpected, v.splat8(0), lit);
+        if v.none8(looked_at) {
             let dark = v.splat8(Trust::Dark as u8);
             let reason = v.pick8(unexpected, v.splat8(Trust::Unexpected as u8), dark);
             store_unknown(
@@ -332,8 +334,12 @@ fn about_columns<V: Lanes, T: BlockSample>(
             );
             continue;
         }
+        let coarsest = match pointer {
+            Pointer::Demodulated(block) => block,
+            Pointer::Folded(folded) => first.demodulated::<true>(v, &angle, folded),
+        };
         let mut found = [coarsest; MAX_ABOUT];
-        let mut strong = v.pick8(unexpected, v.splat8(0), lit);
+        let mut strong = looked_at;
         let mut brightest = coarsest.brightest;
         for (level, found) in levels.iter().zip(&mut found).skip(1) {
             *found = level.block::<true>(v, &angle, at);

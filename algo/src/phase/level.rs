@@ -2,7 +2,7 @@
 
 use super::angle::{AngleLanes, LENGTH, hypotenuse};
 use super::block::LevelRow;
-use super::fold::{BlockSample, fold};
+use super::fold::{BlockSample, Folded, fold};
 use super::trust::MIN_MODULATION_8_BIT;
 use super::wrapped::WrappedRow;
 use crate::pattern;
@@ -71,6 +71,23 @@ pub(crate) struct Demodulated<V: Lanes> {
     pub strong: V::B,
     /// 255 where a sample is at full scale and that matters.
     pub brightest: V::B,
+}
+
+/// A block of pixels of a level before its angles are known.
+pub(super) enum Pointer<V: Lanes> {
+    Folded(Folded<V>),
+    Demodulated(Demodulated<V>),
+}
+
+impl<V: Lanes> Pointer<V> {
+    /// Mask: the modulation is at least the trusted minimum.
+    #[inline(always)]
+    pub fn strong(&self) -> V::B {
+        match self {
+            Self::Folded(folded) => folded.strong,
+            Self::Demodulated(block) => block.strong,
+        }
+    }
 }
 
 impl Level {
@@ -191,11 +208,33 @@ impl<'a, V: Lanes, T: BlockSample> LevelLanes<'a, V, T> {
         angle: &AngleLanes<V>,
         at: usize,
     ) -> Demodulated<V> {
-        let folded = match &self.source {
-            Source::Wrapped(row) => return row.block(v, at),
-            Source::Four(rows) => T::four(v, self, rows, at),
-            Source::Rows(rows) => fold(v, self, rows, at),
-        };
+        match self.pointer(v, at) {
+            Pointer::Folded(folded) => self.demodulated::<MODULATION>(v, angle, folded),
+            Pointer::Demodulated(block) => block,
+        }
+    }
+
+    /// The block at `at` as far as whether it is strong.
+    #[inline(always)]
+    pub fn pointer(&self, v: V, at: usize) -> Pointer<V> {
+        match &self.source {
+            Source::Wrapped(row) => Pointer::Demodulated(row.block(v, at)),
+            Source::Four(rows) => {
+                v.fetch_ahead(rows, at);
+                Pointer::Folded(T::four(v, self, rows, at))
+            }
+            Source::Rows(rows) => Pointer::Folded(fold(v, self, rows, at)),
+        }
+    }
+
+    /// The angle and the length of a pointer.
+    #[inline(always)]
+    pub fn demodulated<const MODULATION: bool>(
+        &self,
+        v: V,
+        angle: &AngleLanes<V>,
+        folded: Folded<V>,
+    ) -> Demodulated<V> {
         let t = [
             angle.quotient(v, folded.short[0], folded.long[0]),
             angle.quotient(v, folded.short[1], folded.long[1]),

@@ -84,6 +84,8 @@ impl Lanes for Portable {
     fn load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [Self::B; 4] {
         from.rows().map(|row| self.load8(row, at))
     }
+    #[inline(always)]
+    fn fetch_ahead<T>(self, _from: &Four<'_, T>, _at: usize) {}
     #[inline(never)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
         to[at..at + BYTES].copy_from_slice(&x);

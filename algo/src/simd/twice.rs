@@ -40,6 +40,10 @@ impl<V: Lanes> Lanes for Twice<V> {
         ]
     }
     #[inline(always)]
+    fn fetch_ahead<T>(self, from: &Four<'_, T>, at: usize) {
+        self.0.fetch_ahead(from, at);
+    }
+    #[inline(always)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
         self.0.store8(to, at, x[0]);
         self.0.store8(to, at + V::PIXELS, x[1]);
