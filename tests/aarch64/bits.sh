@@ -6,7 +6,7 @@ set -euo pipefail
 shopt -s inherit_errexit
 dir=${1:?usage: bits.sh DIR}
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-probe=(run --quiet --release -p algo --no-default-features --example probe)
+probe=(run --quiet --release -p algo --no-default-features --features std --example probe)
 frozen=algo/examples/probe/frozen.txt
 
 here=$(cargo "${probe[@]}")

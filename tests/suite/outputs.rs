@@ -225,8 +225,9 @@ fn of_two_patterns_the_vertical_one_is_the_phase_and_gives_the_height() {
     let twin = oracle::decode(&recording, 0);
     for (pixel, phase) in horizontal.iter().enumerate() {
         assert_eq!(phase.is_nan(), twin.phase[pixel].is_nan(), "{pixel}");
-        // 36 turns as f32 are exact to 2e-6.
-        assert!(phase.is_nan() || (f64::from(*phase) - twin.phase[pixel]).abs() < 2e-5);
+        // The arctangent's bound; 36 turns as f32 are exact to 2e-6.
+        let bound = 2.5e-5 + 2e-6;
+        assert!(phase.is_nan() || (f64::from(*phase) - twin.phase[pixel]).abs() < bound);
     }
 }
 

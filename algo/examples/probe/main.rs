@@ -145,11 +145,14 @@ mod tests {
             let rig = rig::triangulator(width, height).unwrap();
             triangulate(&rig, &decoder, None, None, None, &mut map);
             for reason in Trust::REASONS {
-                // The only level is the coarsest; 8 shifts tolerate saturation; a phase within a few turns of the
+                // The only level is the coarsest, and has no step that leaves something over; only maps have places of which
+                // nothing is known; 8 shifts tolerate saturation; a phase within a few turns of the
                 // map is within the working range.
                 let expected = match reason {
                     Trust::LowModulation => case.ratios.len() > 1,
                     Trust::Saturated => case.steps < 8,
+                    Trust::Unexpected => case.needs_map(),
+                    Trust::Residual => case.ratios.len() > 1,
                     Trust::OutOfRange => !case.needs_map() || case.ratios.len() > 2,
                     _ => true,
                 };

@@ -7,11 +7,11 @@ use super::fold::BlockSample;
 use super::geometric::Geometric;
 use super::level::{Level, LevelLanes, Pointer};
 use super::step::{StepLanes, Turns};
-use super::trust::Trust;
 use super::unwrap::too_far;
 use super::wrapped::{WrappedRow, WrappedRowMut};
 use crate::pattern::MAX_LEVELS;
 use crate::simd::{Lanes, back_end_entry, plain};
+use crate::trust::Trust;
 use crate::units::AbsolutePhase;
 use core::ops::Range;
 

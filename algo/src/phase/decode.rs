@@ -3,12 +3,12 @@
 use super::block::{LevelRow, Levels, about_row, geometric_row, wrap_row};
 use super::level::Level;
 use super::narrow::{MAX_PIXELS, PaddedLevel, RowSample, padded_level};
-use super::trust::Trust;
 use super::unwrap::{Unwrapper, information};
 use super::wrapped::{Wrapped, WrappedRow, WrappedRowMut};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{MAX_FRAMES, PhaseRange, Sequence, SequenceError, Unwrapping};
 use crate::simd::Backend;
+use crate::trust::Trust;
 use crate::units::{AbsolutePhase, Modulation};
 use alloc::vec::Vec;
 use core::fmt;
@@ -226,7 +226,8 @@ impl Decoder {
         self.levels.iter().map(|level| &level.frames[..])
     }
 
-    /// Demodulates row `v` of a level whose frames [`Self::check_level`] has passed; see [`crate::pipeline::wrap`].
+    /// Demodulates row `v` of a level whose frames [`Self::check_level`] has passed; not where `coarsest` says that a
+    /// whole block is dark.
     pub(crate) fn wrap_row(
         &self,
         level: usize,

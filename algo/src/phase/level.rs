@@ -3,10 +3,10 @@
 use super::angle::{AngleLanes, LENGTH, hypotenuse};
 use super::block::LevelRow;
 use super::fold::{BlockSample, Folded, fold};
-use super::trust::MIN_MODULATION_8_BIT;
 use super::wrapped::WrappedRow;
 use crate::pattern;
 use crate::simd::{Four, Lanes};
+use crate::trust::MIN_MODULATION_8_BIT;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 

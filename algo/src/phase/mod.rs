@@ -10,13 +10,12 @@ mod level;
 mod mean;
 mod narrow;
 mod step;
-mod trust;
 mod unwrap;
 mod wrapped;
 
+pub use crate::trust::{MIN_MODULATION_8_BIT, Trust};
 pub use decode::{DecodeError, Decoder, PhaseRow};
 pub use level::FULL_TRUST_STEPS;
-pub use trust::{MIN_MODULATION_8_BIT, Trust};
 pub use wrapped::Wrapped;
 
 #[cfg(test)]

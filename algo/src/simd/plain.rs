@@ -1,6 +1,6 @@
 //! Units as the plain numbers that lanes are stored to.
 
-use crate::phase::Trust;
+use crate::trust::Trust;
 use crate::units::{AbsolutePhase, Modulation};
 
 /// Phases as their bits.

@@ -52,6 +52,8 @@ pub struct Report {
     pub resolved: usize,
     /// The others, by their first failing reason.
     pub unresolved: BTreeMap<&'static str, usize>,
+    /// Pixels that were not looked at, because the known map has nothing there.
+    pub skipped: usize,
     /// How the levels were unwrapped: geometric, dense or single.
     pub kind: &'static str,
     /// The levels' ratios from coarse to fine.
@@ -99,6 +101,7 @@ impl Report {
         let resolved = phases.count(Trust::Resolved);
         let unresolved: BTreeMap<_, _> = Trust::REASONS
             .into_iter()
+            .filter(|&reason| reason != Trust::Unexpected)
             .map(|reason| match reason {
                 Trust::Dark => (reason.word(), dark_but_lit),
                 _ => (reason.word(), phases.count(reason)),
@@ -119,6 +122,7 @@ impl Report {
             lit: resolved + unresolved.values().sum::<usize>(),
             resolved,
             unresolved,
+            skipped: phases.count(Trust::Unexpected),
             kind: manner.kind,
             ratios: manner.ratios,
             map: manner.map,

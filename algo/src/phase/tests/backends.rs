@@ -1,11 +1,10 @@
 //! All back-ends of this machine give the same bits.
 
-use super::super::{Decoder, Wrapped};
+use super::super::{Decoder, PhaseRow, Trust, Wrapped};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence};
-use crate::pipeline::{self, PhaseMap};
 use crate::simd::Backend;
-use crate::units::AbsolutePhase;
+use crate::units::{AbsolutePhase, Modulation};
 use std::vec::Vec;
 
 /// xorshift: enough to hit every lane with every kind of sample.
@@ -17,6 +16,38 @@ impl Noise {
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
         self.0
+    }
+}
+
+/// What is decoded.
+#[derive(Clone, PartialEq)]
+struct Map {
+    phase: Vec<AbsolutePhase>,
+    modulation: Vec<Modulation>,
+    trust: Vec<Trust>,
+}
+
+impl Map {
+    fn new() -> Self {
+        Self {
+            phase: std::vec![AbsolutePhase::default(); WIDTH * HEIGHT],
+            modulation: std::vec![Modulation::default(); WIDTH * HEIGHT],
+            trust: std::vec![Trust::default(); WIDTH * HEIGHT],
+        }
+    }
+
+    fn rows(&mut self) -> impl Iterator<Item = (usize, PhaseRow<'_>)> {
+        let rows = self.phase.chunks_mut(WIDTH);
+        let rows = rows.zip(self.modulation.chunks_mut(WIDTH));
+        let rows = rows.zip(self.trust.chunks_mut(WIDTH));
+        rows.enumerate().map(|(v, ((phase, modulation), trust))| {
+            let row = PhaseRow {
+                phase,
+                modulation,
+                trust,
+            };
+            (v, row)
+        })
     }
 }
 
@@ -40,12 +71,7 @@ fn frames(count: usize, depth: u8, noise: &mut Noise) -> Vec<Vec<u16>> {
         .collect()
 }
 
-fn decode(
-    decoder: &Decoder,
-    samples: &[Vec<u16>],
-    depth: u8,
-    map: &[AbsolutePhase],
-) -> [PhaseMap; 2] {
+fn decode(decoder: &Decoder, samples: &[Vec<u16>], depth: u8, map: &[AbsolutePhase]) -> [Map; 2] {
     let bytes: Vec<Vec<u8>> = samples
         .iter()
         .map(|frame| frame.iter().map(|&x| x as u8).collect())
@@ -59,7 +85,11 @@ fn decode(
             FrameView::new(samples, WIDTH, HEIGHT, WIDTH).unwrap()
         })
         .collect();
-    let whole = pipeline::decode(decoder, &views, Some(map), None).unwrap();
+    let mut whole = Map::new();
+    for (v, row) in whole.rows() {
+        let map = &map[v * WIDTH..(v + 1) * WIDTH];
+        decoder.row(&views, v, map, 0..WIDTH, row);
+    }
     let levels: Vec<Vec<_>> = decoder
         .levels()
         .map(|places| places.iter().map(|&at| views[at]).collect())
@@ -68,10 +98,16 @@ fn decode(
     let mut before: Vec<Wrapped> = Vec::new();
     for (at, level) in coarser.iter().enumerate() {
         let mut wrapped = Wrapped::new(WIDTH, HEIGHT);
-        pipeline::wrap(decoder, at, level, before.first(), &mut wrapped).unwrap();
+        for (v, row) in wrapped.rows().into_iter().enumerate() {
+            decoder.wrap_row(at, level, v, before.first(), row);
+        }
         before.push(wrapped);
     }
-    let late = pipeline::decode_last(decoder, &before, last, Some(map), None).unwrap();
+    let mut late = Map::new();
+    for (v, row) in late.rows() {
+        let map = &map[v * WIDTH..(v + 1) * WIDTH];
+        decoder.last_row(&before, last, v, map, 0..WIDTH, row);
+    }
     [whole, late]
 }
 

@@ -7,7 +7,6 @@ mod textbook;
 use super::{Decoder, Wrapped};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence};
-use crate::pipeline;
 use core::f64::consts::TAU;
 use std::vec::Vec;
 
@@ -38,7 +37,9 @@ fn wrap(decoder: &Decoder, depth: u8, rows: &[Vec<u16>]) -> Wrapped {
         })
         .collect();
     let mut wrapped = Wrapped::new(width, 1);
-    pipeline::wrap(decoder, 0, &frames, None, &mut wrapped).unwrap();
+    for (v, row) in wrapped.rows().into_iter().enumerate() {
+        decoder.wrap_row(0, &frames, v, None, row);
+    }
     wrapped
 }
 
