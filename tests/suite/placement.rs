@@ -183,8 +183,9 @@ fn cycle(bed: &mut Bed, file: &RecipeFile, arrays: &Arrays) -> (Vec<f32>, f64) {
     let mut frames = Vec::new();
     let mut keep = |_, frame| frames.push(frame);
     bed.head.acquire(&indices, TIMEOUT, &mut keep).unwrap();
-    let (inspection, maps) = plan.inspect(&frames, Instant::now());
-    (maps.unwrap().height_mm, inspection.gauges[0].value.unwrap())
+    let inspection = plan.inspect(&frames, Instant::now());
+    let maps = plan.heights(&frames).unwrap();
+    (maps.height_mm, inspection.gauges[0].value.unwrap())
 }
 
 #[test]
