@@ -7,7 +7,9 @@ mod rows;
 
 pub use measure::{Guess, HeightMap, PhaseMap, Window, decode, decode_last, triangulate, wrap};
 pub use noise::sample_noise;
+pub(crate) use rise::{
+    COMPARED, Risen, RowTally, Seen, UNKNOWN as NO_RISE, VARIANCE_UNIT_NM, rise_row,
+};
 pub use rise::{KnownSurface, Rises};
-pub(crate) use rise::{Risen, RowTally, Seen, UNKNOWN as NO_RISE, VARIANCE_UNIT_NM, rise_row};
 pub use rows::for_each_row;
 pub(crate) use rows::{for_each, map_rows};

@@ -17,21 +17,16 @@ pub(super) fn taught(file: &RecipeFile, arrays: &mut Arrays, decoder: &Decoder) 
     let noises = take(&mut arrays.modulation)
         .into_iter()
         .zip(take(&mut arrays.height_slope));
-    let sigma = noises
-        .map(|(counts, slope)| {
-            let share = (f64::from(counts) / full_scale * 65_535.0).round() as u16;
-            let turns = decoder.phase_noise(Modulation::from_bits(share), file.noise_counts);
-            Taught::sigma_units(turns * f64::from(slope).abs())
-        })
-        .collect();
-    let pairs = take(&mut arrays.valid)
-        .into_iter()
-        .zip(&arrays.golden_height);
-    let compared = pairs.map(|(valid, height)| u8::from(valid == 1 && height.is_finite()));
-    Taught {
-        compared: compared.collect(),
-        sigma,
-    }
+    let sigmas = noises.map(|(counts, slope)| {
+        let share = (f64::from(counts) / full_scale * 65_535.0).round() as u16;
+        let turns = decoder.phase_noise(Modulation::from_bits(share), file.noise_counts);
+        turns * f64::from(slope).abs()
+    });
+    let valid = take(&mut arrays.valid).into_iter();
+    let compared = valid
+        .zip(&arrays.golden_height)
+        .map(|(valid, height)| valid == 1 && height.is_finite());
+    Taught::new(compared.zip(sigmas))
 }
 
 /// The surface that production's phases are unwrapped about and its heights counted from: golden. A sequence of limited

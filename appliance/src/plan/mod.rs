@@ -182,6 +182,11 @@ impl Plan {
         &self.production
     }
 
+    /// The same, for its own sake.
+    pub fn into_production(self) -> Production {
+        self.production
+    }
+
     /// The patterns of the sequence, in the order of its frames.
     pub fn rasters(&self, calibration: &Calibration) -> Result<Vec<Raster>, hal::error::Error> {
         let frames = self.frames.iter().copied();

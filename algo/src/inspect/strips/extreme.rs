@@ -37,45 +37,53 @@ pub(super) fn least_support(side: usize) -> i64 {
     libm::ceil(MIN_SUPPORT * (side * side) as f64) as i64
 }
 
-/// Looks at the squares around the known pixels of a span of row `row`; `sums` are the packed sums down the columns, with
-/// half a side of padding in front. Of equals the last counts.
-pub(super) fn search(
-    best: &mut Option<Extreme>,
-    sums: &[i64],
-    centres: &[i32],
-    side: usize,
-    row: usize,
-    span: Range<usize>,
-) {
-    let reach = side / 2 * 2;
-    let least = least_support(side);
-    let mut floor = floor_of(*best, least);
-    let mut packed = sums[span.start..span.start + reach].iter().sum::<i64>();
-    let entering = &sums[span.start + reach..span.end + reach];
-    let leaving = &sums[span.clone()];
-    for (offset, (enters, leaves)) in entering.iter().zip(leaving).enumerate() {
-        packed += enters;
-        let sum = (packed << (64 - COUNT_BIT)) >> (64 - COUNT_BIT);
-        if sum.abs() >= floor {
-            let column = span.start + offset;
-            let found = Extreme {
-                sum,
-                count: (packed - sum) >> COUNT_BIT,
-                row,
-                column,
-            };
-            let counts = found.count >= least && centres[column] != NO_RISE;
-            if counts && best.is_none_or(|best| found.reaches(&best)) {
-                *best = Some(found);
-                floor = floor_of(*best, least);
+/// The squares around the pixels of one row.
+pub(super) struct SquareRow<'a> {
+    /// Packed sums down the columns, with half a side of padding in front.
+    pub sums: &'a [i64],
+    /// Deviations of the row itself.
+    pub centres: &'a [i32],
+    /// Of the squares.
+    pub side: usize,
+    /// Its place.
+    pub row: usize,
+}
+
+impl SquareRow<'_> {
+    /// Looks at the squares around the known pixels of a span. Of equals the last counts.
+    pub fn search(&self, best: &mut Option<Extreme>, span: Range<usize>) {
+        let reach = self.side / 2 * 2;
+        let least = least_support(self.side);
+        let mut floor = floor_of(*best, self.side);
+        let mut packed = self.sums[span.start..span.start + reach]
+            .iter()
+            .sum::<i64>();
+        let entering = &self.sums[span.start + reach..span.end + reach];
+        let leaving = &self.sums[span.clone()];
+        for (offset, (enters, leaves)) in entering.iter().zip(leaving).enumerate() {
+            packed += enters;
+            let sum = (packed << (64 - COUNT_BIT)) >> (64 - COUNT_BIT);
+            if sum.abs() >= floor {
+                let column = span.start + offset;
+                let found = Extreme {
+                    sum,
+                    count: (packed - sum) >> COUNT_BIT,
+                    row: self.row,
+                    column,
+                };
+                let counts = found.count >= least && self.centres[column] != NO_RISE;
+                if counts && best.is_none_or(|best| found.reaches(&best)) {
+                    *best = Some(found);
+                    floor = floor_of(*best, self.side);
+                }
             }
+            packed -= leaves;
         }
-        packed -= leaves;
     }
 }
 
 /// No sum below this reaches the best: it has at least the least support.
-fn floor_of(best: Option<Extreme>, least: i64) -> i64 {
+pub(super) fn floor_of(best: Option<Extreme>, side: usize) -> i64 {
     // Rounded down, so nothing that could reach it is left out.
-    best.map_or(0, |best| best.sum.abs() * least / best.count)
+    best.map_or(0, |best| best.sum.abs() * least_support(side) / best.count)
 }

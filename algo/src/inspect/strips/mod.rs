@@ -9,6 +9,7 @@
 mod columns;
 mod extreme;
 mod findings;
+mod squares;
 mod strip;
 
 pub use findings::{Findings, Skipped};
@@ -18,7 +19,8 @@ use super::Region;
 use crate::frame::FrameView;
 use crate::geometry::Triangulator;
 use crate::phase::{DecodeError, Decoder};
-use crate::pipeline::{Rises, VARIANCE_UNIT_NM, for_each};
+use crate::pipeline::{COMPARED, Rises, VARIANCE_UNIT_NM, for_each};
+use crate::simd::Backend;
 use crate::units::Modulation;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -38,25 +40,33 @@ pub enum Measure {
 
 /// The part as taught, as far as parts are compared with it; row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Taught {
-    /// 1 where the part is compared, else 0.
-    pub compared: Vec<u8>,
-    /// σ of the taught heights in units of [`Taught::SIGMA_UNIT_NM`], 0 where not known.
-    pub sigma: Vec<u16>,
-}
+pub struct Taught(Vec<u16>);
 
 impl Taught {
     /// Unit of σ in nm.
-    pub const SIGMA_UNIT_NM: f64 = 32.0;
+    const SIGMA_UNIT_NM: f64 = 32.0;
 
-    /// A σ in mm as it is stored: at most 1 mm, at least one unit, 0 where it is not finite.
-    pub fn sigma_units(mm: f64) -> u16 {
-        let units = libm::rint(mm * 1e6 / Self::SIGMA_UNIT_NM);
-        if units.is_finite() {
-            units.clamp(1.0, 32_767.0) as u16
-        } else {
-            0
-        }
+    /// From where the part is compared and σ of its heights in mm, NaN where not known. σ is stored in units of 32 nm, at
+    /// most 1 mm.
+    pub fn new(pixels: impl Iterator<Item = (bool, f64)>) -> Self {
+        let stored = |(compared, mm): (bool, f64)| {
+            let units = libm::rint(mm * 1e6 / Self::SIGMA_UNIT_NM);
+            let sigma = match units.is_finite() {
+                true => units.clamp(1.0, f64::from(COMPARED - 1)) as u16,
+                false => 0,
+            };
+            sigma | if compared { COMPARED } else { 0 }
+        };
+        Self(pixels.map(stored).collect())
+    }
+
+    fn compared(&self, place: usize) -> bool {
+        self.0[place] & COMPARED != 0
+    }
+
+    /// σ in its units.
+    fn sigma(&self, place: usize) -> u16 {
+        self.0[place] & !COMPARED
     }
 }
 
@@ -132,8 +142,8 @@ impl Production {
             ..seen().map(|columns| columns.end).max().unwrap_or(0);
         let width = rises.surface().width;
         let compared = window.iter().enumerate().map(|(v, columns)| {
-            let row = &taught.compared[v * width + columns.start..v * width + columns.end];
-            row.iter().map(|&on| u64::from(on)).sum::<u64>()
+            let row = v * width + columns.start..v * width + columns.end;
+            row.filter(|&place| taught.compared(place)).count() as u64
         });
         let compared = compared.sum();
         let turns = decoder.phase_noise(Modulation::from_bits(1), noise_counts) / rises.range();
@@ -151,6 +161,12 @@ impl Production {
             noise_counts,
             noise: noise as f32,
         })
+    }
+
+    /// The same on another back-end of this machine, with the same bits.
+    pub fn with_backend(self, backend: Backend) -> Self {
+        let decoder = self.decoder.with_backend(backend);
+        Self { decoder, ..self }
     }
 
     /// The columns of each row that are looked at.

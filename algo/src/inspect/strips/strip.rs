@@ -1,7 +1,8 @@
 //! One strip of rows: its buffers, and the walk down its rows.
 
 use super::columns::{TRUSTS, count_known, count_trusts, slide};
-use super::extreme::{Extreme, search};
+use super::extreme::{Extreme, SquareRow};
+use super::squares::{MAX_TAME, Squares};
 use super::{Measure, Production};
 use crate::frame::FrameView;
 use crate::geometry::Solution;
@@ -29,6 +30,10 @@ pub struct Strip {
     none: Vec<i32>,
     /// For each smoothing the packed sums down the columns, with half a side of padding at both ends.
     sums: Vec<Vec<i64>>,
+    /// Sums over squares of the row that is being worked on.
+    squares: Squares,
+    /// The last row with a rise that sums over squares may not hold.
+    wild: Option<usize>,
     pub(super) found: Found,
 }
 
@@ -65,6 +70,8 @@ impl Strip {
                 .iter()
                 .map(|side| vec![0; width + side / 2 * 2])
                 .collect(),
+            squares: Squares::new(width + kept),
+            wild: None,
             found: Found {
                 covered: vec![0; plan.gauges.len()],
                 extremes: vec![None; plan.gauges.len()],
@@ -107,6 +114,7 @@ impl Strip {
     }
 
     fn clear(&mut self) {
+        self.wild = None;
         for sums in &mut self.sums {
             sums.fill(0);
         }
@@ -148,8 +156,7 @@ impl Strip {
             phase: &self.phase,
             modulation: &self.modulation,
             trust: &self.trust,
-            compared: &plan.taught.compared[row.clone()],
-            taught: &plan.taught.sigma[row],
+            taught: &plan.taught.0[row],
             noise: plan.noise,
         };
         let risen = Risen {
@@ -191,12 +198,15 @@ impl Strip {
             let height = Height::from_mm(solution.point.z).nm();
             // One above the value for "unknown".
             let rise = height.saturating_sub(base).max(NO_RISE + 1);
+            if rise.unsigned_abs() > MAX_TAME {
+                self.wild = Some(v);
+            }
             self.rise[u] = rise;
             tally.measured += 1;
-            let taught = u64::from(plan.taught.sigma[place]);
+            let taught = u64::from(plan.taught.sigma(place));
             tally.taught += u64::from(taught != 0);
             tally.taught_variance += (taught * taught + 128) >> 8;
-            if plan.taught.compared[place] != 0 {
+            if plan.taught.compared(place) {
                 self.recent[recent + u] = rise;
                 tally.compared += 1;
                 let sigma = plan.sigma_nm(self.modulation[u], 1.0 / solution.slope);
@@ -258,11 +268,26 @@ impl Strip {
                 continue;
             };
             let centres = &self.recent[row(centre)];
+            let wild = self.wild.is_some_and(|wild| wild + 2 * half >= v);
+            let tame = !wild && Squares::hold(side);
+            if tame {
+                self.squares.add(plan.decoder.backend(), sums, side);
+            }
             let gauges = plan.gauges.iter().zip(&mut self.found.extremes);
             for ((region, measure), best) in gauges {
                 if *measure == (Measure::Deviation { side }) {
                     for (_, span) in region.row(centre) {
-                        search(best, sums, centres, side, centre, span.clone());
+                        let row = SquareRow {
+                            sums,
+                            centres,
+                            side,
+                            row: centre,
+                        };
+                        if tame {
+                            self.squares.search(best, &row, span.clone());
+                        } else {
+                            row.search(best, span.clone());
+                        }
                     }
                 }
             }
@@ -285,7 +310,7 @@ impl Strip {
                 let place = v * self.width + u;
                 let slope = plan.slope((u, v), self.phase[u]);
                 let measured = plan.sigma_nm(self.modulation[u], slope);
-                let taught = f64::from(plan.taught.sigma[place]) * super::Taught::SIGMA_UNIT_NM;
+                let taught = f64::from(plan.taught.sigma(place)) * super::Taught::SIGMA_UNIT_NM;
                 sum += measured * measured + taught * taught;
             }
         }

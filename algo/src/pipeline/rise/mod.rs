@@ -7,11 +7,15 @@
 mod fit;
 mod row;
 
-pub(crate) use row::{RiseRow, Risen, RowTally, Seen, UNKNOWN, VARIANCE_UNIT_NM, rise_row};
+pub(crate) use row::{
+    COMPARED, RiseRow, Risen, RowTally, Seen, UNKNOWN, VARIANCE_UNIT_NM, rise_row,
+};
 
 use super::{Window, for_each};
 use crate::geometry::Triangulator;
-use crate::units::{AbsolutePhase, Height};
+use crate::phase::Trust;
+use crate::simd::Backend;
+use crate::units::{AbsolutePhase, Height, Modulation};
 use alloc::vec;
 use alloc::vec::Vec;
 use fit::Fitting;
@@ -106,6 +110,33 @@ impl Rises {
     /// The largest |Φ − Φ₀| in turns that the cubic of a place (row-major) is used for, 0 where it has none.
     pub fn reach(&self, place: usize) -> f64 {
         f64::from(self.reach[place]) * REACH_UNIT
+    }
+
+    /// The heights of phases of row `v`, [`Height::UNKNOWN`] where the cubic does not reach them: what production computes,
+    /// without anything around it. Slices are as long as the row.
+    pub fn heights(&self, backend: Backend, v: usize, phase: &[AbsolutePhase], out: &mut [Height]) {
+        let width = self.surface.width;
+        let seen = Seen {
+            phase,
+            modulation: &vec![Modulation::from_bits(1); width],
+            trust: &vec![Trust::Resolved; width],
+            taught: &vec![0; width],
+            noise: 0.0,
+        };
+        let mut rise = vec![UNKNOWN; width];
+        let risen = Risen {
+            rise: &mut rise,
+            deviation: &mut vec![UNKNOWN; width],
+            tally: &mut RowTally::default(),
+        };
+        rise_row(backend, self.row(v), seen, 0..width, risen);
+        let bases = &self.surface.height[v * width..];
+        for ((out, base), rise) in out.iter_mut().zip(bases).zip(rise) {
+            *out = match rise {
+                UNKNOWN => Height::UNKNOWN,
+                _ => Height::from_nm(base.nm() + rise),
+            };
+        }
     }
 
     /// y of a phase at a place, if the cubic reaches it.

@@ -9,14 +9,18 @@ use crate::simd::{Lanes, back_end_entry};
 use crate::units::{AbsolutePhase, Height, Modulation};
 use core::ops::Range;
 
+/// The bit of what is taught that says that the part is compared.
+pub(crate) const COMPARED: u16 = 1 << 15;
 /// Variances are summed in units of the square of this many nm, each rounded to nearest.
 pub(crate) const VARIANCE_UNIT_NM: f64 = 512.0;
 /// Standard deviations of the known heights are given in sixteenths of that.
 const SIGMAS_PER_UNIT_BITS: u32 = 4;
+/// Half of the square of a unit, in squares of these.
+const HALF: u32 = 1 << (2 * SIGMAS_PER_UNIT_BITS - 1);
 /// The largest variance that is summed, (1 mm)²: no sum over a block exceeds 32 bits.
 const MAX_VARIANCE: f32 = 4_000_000.0;
-/// Pixels whose sums fit into 32 bits.
-const BLOCK: usize = 512;
+/// Pixels that are skipped together where none is resolved; sums over so many fit into 32 bits.
+const BLOCK: usize = 128;
 /// 1.5 · 2²³: added to a single below 2²², it leaves the nearest whole number in the low bits.
 const ROUNDER: f32 = 12_582_912.0;
 
@@ -46,9 +50,8 @@ pub(crate) struct Seen<'a> {
     pub modulation: &'a [Modulation],
     /// Which to believe.
     pub trust: &'a [Trust],
-    /// 1 where the part is compared with golden, else 0.
-    pub compared: &'a [u8],
-    /// σ of golden's heights in 32 nm, at most 2¹⁵ − 1; 0 where not known.
+    /// σ of golden's heights in 32 nm, at most 2¹⁵ − 1, 0 where not known; [`COMPARED`] where the part is compared with
+    /// golden.
     pub taught: &'a [u16],
     /// σ_z² = `noise` · (∂z/∂y)² / B², in units of [`VARIANCE_UNIT_NM`]².
     pub noise: f32,
@@ -113,24 +116,34 @@ fn rise_columns<V: Lanes>(
     out: Risen<'_>,
 ) {
     let scale = (1.0 / (plan.range * 65_536.0)) as f32;
+    let tally = &mut *out.tally;
+    let mut slopes = [0.0_f32; BLOCK];
     let mut start = columns.start;
     while start < columns.end {
         let end = (start + BLOCK).min(columns.end);
         let length = end - start;
+        let trust = &seen.trust[start..end][..length];
+        let rises = &mut out.rise[start..end][..length];
+        let deviations = &mut out.deviation[start..end][..length];
+        let mut resolved = 0_u32;
+        for &trust in trust {
+            resolved += u32::from(trust as u8 == Trust::Resolved as u8);
+        }
+        if resolved == 0 {
+            rises.fill(UNKNOWN);
+            deviations.fill(UNKNOWN);
+            start = end;
+            continue;
+        }
+        tally.resolved += u64::from(resolved);
         let base = &plan.base[start..end][..length];
         let first = &plan.first[start..end][..length];
         let second = &plan.second[start..end][..length];
         let third = &plan.third[start..end][..length];
         let reach = &plan.reach[start..end][..length];
         let phase = &seen.phase[start..end][..length];
-        let modulation = &seen.modulation[start..end][..length];
-        let trust = &seen.trust[start..end][..length];
-        let compared = &seen.compared[start..end][..length];
         let taught = &seen.taught[start..end][..length];
-        let rises = &mut out.rise[start..end][..length];
-        let deviations = &mut out.deviation[start..end][..length];
-        let (mut resolved, mut measured, mut counted, mut variances) = (0_u32, 0_u32, 0_u32, 0_u32);
-        let (mut taught_count, mut taught_variances) = (0_u32, 0_u32);
+        let slopes = &mut slopes[..length];
         for i in 0..length {
             let delta = phase[i].to_bits().wrapping_sub(base[i].to_bits());
             let far = i32::from(reach[i]) << 9;
@@ -142,32 +155,34 @@ fn rise_columns<V: Lanes>(
                 f32::from(second[i]) * UNIT_NM as f32,
                 f32::from(third[i]) * UNIT_NM as f32,
             );
-            let nm = y * (a + y * (b + y * c));
-            let nm = rounded(nm);
-            let compare = inside & (compared[i] != 0);
+            let nm = rounded(y * (a + y * (b + y * c)));
+            let compare = inside & (taught[i] >= COMPARED);
             rises[i] = if inside { nm } else { UNKNOWN };
             deviations[i] = if compare { nm } else { UNKNOWN };
-            let slope = a + y * ((b + b) + y * (3.0 * c));
+            slopes[i] = a + y * ((b + b) + y * (3.0 * c));
+        }
+        let modulation = &seen.modulation[start..end][..length];
+        let (mut measured, mut counted, mut variances) = (0_u32, 0_u32, 0_u32);
+        let (mut taught_count, mut taught_variances) = (0_u32, 0_u32);
+        for i in 0..length {
+            let inside = rises[i] != UNKNOWN;
+            let compare = deviations[i] != UNKNOWN;
             let counts = f32::from(modulation[i].to_bits());
-            let variance = seen.noise * (slope * slope) / (counts * counts);
+            let variance = seen.noise * (slopes[i] * slopes[i]) / (counts * counts);
             let variance = if variance < MAX_VARIANCE {
                 variance
             } else {
                 MAX_VARIANCE
             };
             let variance = rounded(variance) as u32;
-            resolved += u32::from(known);
             measured += u32::from(inside);
             counted += u32::from(compare);
             variances = variances.wrapping_add(if compare { variance } else { 0 });
-            let sigma = u32::from(taught[i] & 0x7FFF);
-            let half = 1 << (2 * SIGMAS_PER_UNIT_BITS - 1);
-            let square = (sigma * sigma + half) >> (2 * SIGMAS_PER_UNIT_BITS);
+            let sigma = u32::from(taught[i] & !COMPARED);
+            let square = (sigma * sigma + HALF) >> (2 * SIGMAS_PER_UNIT_BITS);
             taught_count += u32::from(inside & (sigma != 0));
             taught_variances = taught_variances.wrapping_add(if inside { square } else { 0 });
         }
-        let tally = &mut *out.tally;
-        tally.resolved += u64::from(resolved);
         tally.measured += u64::from(measured);
         tally.compared += u64::from(counted);
         tally.variance += u64::from(variances);
