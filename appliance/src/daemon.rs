@@ -5,6 +5,7 @@
 
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
+use crate::latest::LastMaps;
 use crate::output::picture::height_png;
 use crate::progress::Progress;
 use crate::state::{Counter, StateFolder, random};
@@ -13,7 +14,7 @@ use crate::station::{
     Effect, Event, Identity, Limits, Micros, RecipeKey, RecipeResult, Request, Settings, Snapshot,
     Station, StationHandle, tick,
 };
-use crate::worker::{LastMaps, Order, Worker};
+use crate::worker::{Order, Worker};
 use crate::{backend, clock, modbus, web};
 use hal::sim::Stage;
 use std::net::SocketAddr;

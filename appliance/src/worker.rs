@@ -1,7 +1,8 @@
 //! The measuring task: one thread that owns the head, the plan and the computing threads.
 
 use crate::backend::Opened;
-use crate::plan::{Maps, Plan, PlanError};
+use crate::latest::LastMaps;
+use crate::plan::{Plan, PlanError};
 use crate::progress::Progress;
 use crate::recipe::teach::{Naming, TeachError, teach};
 use crate::recipe::{LoadError, Store};
@@ -10,8 +11,8 @@ use crate::station::{
 };
 use hal::error::ErrorKind;
 use hal::frame::Frame;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// What the worker is told to do.
@@ -25,24 +26,6 @@ pub enum Order {
     Teach(JobId, u16),
     /// End.
     Stop,
-}
-
-/// The maps of the last cycle, for the page.
-#[derive(Clone, Debug, Default)]
-pub struct LastMaps(Arc<Mutex<Option<Arc<Maps>>>>);
-
-impl LastMaps {
-    /// The maps of the last cycle that had any.
-    pub fn get(&self) -> Option<Arc<Maps>> {
-        self.0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone()
-    }
-
-    fn set(&self, maps: Maps) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(maps));
-    }
 }
 
 /// Idle, the worker gives a sign of life this often.
@@ -93,11 +76,29 @@ impl Worker {
             self.station.event(Event::Request(first));
         }
         let mut plan = None;
+        let mut frames = Vec::new();
         loop {
+            if self.maps.wanted() {
+                let shown = plan.as_ref().and_then(|plan: &Plan| {
+                    let show = || plan.heights(&frames);
+                    self.pool.install(show)
+                });
+                self.maps.set(shown);
+            }
             match orders.recv_timeout(SIGN_OF_LIFE) {
-                Ok(Order::Measure(job)) => self.measure(plan.as_ref(), &job),
-                Ok(Order::Load(job, key)) => self.load(job, &key, &mut plan),
-                Ok(Order::Teach(job, number)) => self.teach(job, number, &mut plan),
+                Ok(Order::Measure(job)) => {
+                    // The memory of the frames before is what these are written to.
+                    drop(frames);
+                    frames = self.measure(plan.as_ref(), &job);
+                }
+                Ok(Order::Load(job, key)) => {
+                    frames = self.forget();
+                    self.load(job, &key, &mut plan);
+                }
+                Ok(Order::Teach(job, number)) => {
+                    frames = self.forget();
+                    self.teach(job, number, &mut plan);
+                }
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
                 Err(RecvTimeoutError::Timeout) => {
                     self.station.event(Event::Alive);
@@ -106,7 +107,14 @@ impl Worker {
         }
     }
 
-    fn measure(&mut self, plan: Option<&Plan>, job: &Job) {
+    /// No frames: those of the last cycle are nothing to another recipe.
+    fn forget(&self) -> Vec<Frame> {
+        self.maps.forget();
+        Vec::new()
+    }
+
+    /// Runs a cycle; the frames that it was judged by.
+    fn measure(&mut self, plan: Option<&Plan>, job: &Job) -> Vec<Frame> {
         let id = job.job;
         let failed = |error_code, message: String| Event::MeasureFailed {
             job: id,
@@ -117,9 +125,9 @@ impl Worker {
             // The station triggers only with an active recipe, and that is this plan's.
             self.station
                 .event(failed(code::RIG, "measure: no recipe is loaded".into()));
-            return;
+            return Vec::new();
         };
-        let count = plan.recipe().sequence.frame_count();
+        let count = plan.sequence().frame_count();
         let mut frames: Vec<Frame> = Vec::with_capacity(count);
         let indices: Vec<usize> = (0..count).collect();
         let station = &self.station;
@@ -133,18 +141,17 @@ impl Worker {
         if let Err(error) = taken {
             self.station
                 .event(failed(code_of(&error), error.to_string()));
-            return;
+            return Vec::new();
         }
         let exposed = Instant::now();
         self.station.event(Event::ExposureDone { job: id });
-        let (inspection, maps) = self.pool.install(|| plan.inspect(&frames, exposed));
-        if let Some(maps) = maps {
-            self.maps.set(maps);
-        }
+        let inspection = self.pool.install(|| plan.inspect(&frames, exposed));
+        self.maps.outdated();
         self.station.event(Event::Finished {
             job: id,
             inspection: Arc::new(inspection),
         });
+        frames
     }
 
     /// Loads a recipe; the one before stays active unless everything went well.
@@ -198,8 +205,10 @@ impl Worker {
         };
         let loaded = self.recipes.load(number).map_err(refuse)?;
         let simulated = self.opened.stage.is_some();
-        let plan =
-            Plan::new(loaded.recipe, &self.opened.calibration, simulated).map_err(|error| {
+        let (pool, calibration) = (&self.pool, &self.opened.calibration);
+        let plan = pool
+            .install(|| Plan::new(loaded.recipe, calibration, simulated))
+            .map_err(|error| {
                 let result = match error {
                     PlanError::OtherCalibration { .. } => RecipeResult::OtherCalibration,
                     PlanError::Unfit { .. } => RecipeResult::Corrupt,
@@ -273,11 +282,10 @@ impl Worker {
 }
 
 fn active(plan: &Plan) -> ActiveRecipe {
-    let recipe = plan.recipe();
     ActiveRecipe {
-        number: recipe.file.number,
-        crc: recipe.crc(),
-        name: recipe.file.name.as_str().into(),
+        number: plan.file().number,
+        crc: plan.crc(),
+        name: plan.file().name.as_str().into(),
     }
 }
 

@@ -102,7 +102,12 @@ fn time_stands_against_error_and_the_cycle_has_its_stages() {
 
     let all = json(&["bench", "budget", "--quick", "--json"]);
     for frames in ["4", "12"] {
-        let cycle = &all["budget"]["160x120"][frames];
+        let sizes = &all["budget"]["160x120"];
+        let cycle = &sizes[frames];
+        for name in ["production", "kernel"] {
+            positive(&sizes[format!("{name}_golden_{frames}")], "ns_per_px");
+        }
+        positive(&sizes[format!("production_golden_{frames}")], "x_kernel");
         for key in [
             "exposure_ms",
             "verdict_ms",

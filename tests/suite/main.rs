@@ -12,6 +12,7 @@ mod house;
 mod measured;
 mod outputs;
 mod placement;
+mod production;
 mod promises_own;
 mod promises_shared;
 mod station;

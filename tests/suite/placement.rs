@@ -13,16 +13,16 @@ use hal::sim::parts::{Cone, Plane, Sawtooth, SheetMetal, Sphere, Spline};
 use hal::sim::{Part, Placement, Scenario, Stage};
 use std::time::{Duration, Instant};
 
-const TIMEOUT: Duration = Duration::from_secs(5);
+pub(crate) const TIMEOUT: Duration = Duration::from_secs(5);
 const TOLERANCE_MM: f64 = 1.0;
 
-struct Bed {
-    head: DynHead,
-    stage: Stage,
-    calibration: Calibration,
+pub(crate) struct Bed {
+    pub head: DynHead,
+    pub stage: Stage,
+    pub calibration: Calibration,
 }
 
-fn bed(scenario: &Scenario) -> Bed {
+pub(crate) fn bed(scenario: &Scenario) -> Bed {
     let (head, stage) = hal::sim::head(scenario).unwrap();
     Bed {
         head,
@@ -31,7 +31,7 @@ fn bed(scenario: &Scenario) -> Bed {
     }
 }
 
-fn scenario(part: Part) -> Scenario {
+pub(crate) fn scenario(part: Part) -> Scenario {
     let mut scenario = Scenario {
         part,
         ..Scenario::default()
@@ -43,7 +43,7 @@ fn scenario(part: Part) -> Scenario {
     scenario
 }
 
-fn taught(bed: &mut Bed) -> Result<Taught, String> {
+pub(crate) fn taught(bed: &mut Bed) -> Result<Taught, String> {
     let naming = Naming {
         number: 1,
         part_number: "P".into(),
@@ -183,8 +183,9 @@ fn cycle(bed: &mut Bed, file: &RecipeFile, arrays: &Arrays) -> (Vec<f32>, f64) {
     let mut frames = Vec::new();
     let mut keep = |_, frame| frames.push(frame);
     bed.head.acquire(&indices, TIMEOUT, &mut keep).unwrap();
-    let (inspection, maps) = plan.inspect(&frames, Instant::now());
-    (maps.unwrap().height_mm, inspection.gauges[0].value.unwrap())
+    let inspection = plan.inspect(&frames, Instant::now());
+    let maps = plan.heights(&frames).unwrap();
+    (maps.height_mm, inspection.gauges[0].value.unwrap())
 }
 
 #[test]

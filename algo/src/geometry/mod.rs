@@ -3,10 +3,12 @@
 mod pinhole;
 mod reference;
 mod root;
+mod sight;
 mod triangulate;
 mod vector;
 
 pub use pinhole::{ModelError, Pinhole, PinholeModel};
 pub use reference::{FittedMap, Reference, ReferenceError, fit_map};
+pub use sight::Sight;
 pub use triangulate::{Expansion, HeightRange, RigError, Solution, Triangulator};
 pub use vector::Vector;

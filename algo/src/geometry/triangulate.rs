@@ -176,13 +176,13 @@ impl Triangulator {
 
     /// The ray of pixel (u, v) if it meets every height once.
     #[inline]
-    fn falling_ray(&self, u: f64, v: f64) -> Option<Vector> {
+    pub(super) fn falling_ray(&self, u: f64, v: f64) -> Option<Vector> {
         self.camera.ray(u, v).filter(|ray| ray.z < FALL)
     }
 
     /// The point at height `z` on a ray from the camera.
     #[inline]
-    fn on_ray(&self, ray: Vector, z: f64) -> Vector {
+    pub(super) fn on_ray(&self, ray: Vector, z: f64) -> Vector {
         let eye = self.camera.centre();
         eye + ray * ((z - eye.z) / ray.z)
     }
@@ -204,7 +204,7 @@ impl Triangulator {
 
     /// The phase that pixel light from `point` carries.
     #[inline]
-    fn phase_at(&self, point: Vector) -> Option<f64> {
+    pub(super) fn phase_at(&self, point: Vector) -> Option<f64> {
         let (xi, eta) = self.projector_point(point)?;
         Some(self.function.at(xi, eta))
     }

@@ -41,7 +41,7 @@ pub struct Comparison<'a> {
 }
 
 /// A smoothed deviation needs at least this share of its square's pixels.
-const MIN_SUPPORT: f64 = 0.5;
+pub(super) const MIN_SUPPORT: f64 = 0.5;
 
 impl<'a> Comparison<'a> {
     /// Compares two maps of the same size; places that only one of them knows do not count.

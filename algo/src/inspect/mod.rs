@@ -3,7 +3,9 @@
 mod deviation;
 mod openings;
 mod region;
+mod strips;
 
 pub use deviation::{Comparison, Golden, Reading};
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
+pub use strips::{Findings, Measure, Production, Skipped, Strip, Taught, TooSmooth};

@@ -94,6 +94,14 @@ impl Region {
     pub fn spans(&self) -> &[(usize, Range<usize>)] {
         &self.spans
     }
+
+    /// The spans of one row.
+    pub(super) fn row(&self, v: usize) -> &[(usize, Range<usize>)] {
+        // From the top row down.
+        let first = self.spans.partition_point(|(row, _)| *row < v);
+        let end = self.spans.partition_point(|(row, _)| *row <= v);
+        &self.spans[first..end]
+    }
 }
 
 /// The spans of pixel centres of a frame inside a closed polygon of (u, v) corners, even-odd rule.

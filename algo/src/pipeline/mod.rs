@@ -2,9 +2,14 @@
 
 mod measure;
 mod noise;
+mod rise;
 mod rows;
 
 pub use measure::{Guess, HeightMap, PhaseMap, Window, decode, decode_last, triangulate, wrap};
 pub use noise::sample_noise;
+pub(crate) use rise::{
+    COMPARED, Risen, RowTally, Seen, UNKNOWN as NO_RISE, VARIANCE_UNIT_NM, rise_row,
+};
+pub use rise::{KnownSurface, Rises};
 pub use rows::for_each_row;
 pub(crate) use rows::{for_each, map_rows};

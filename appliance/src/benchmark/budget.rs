@@ -1,20 +1,17 @@
 //! From trigger to verdict: how long each stage takes on a simulated head with a taught recipe.
 
-use super::decoding::Decoding;
-use super::frames::FrameSet;
-use super::kernel::Kernel;
-use super::stopwatch::{median, timed};
-use super::variants::decoders;
+use super::decoding::{Decoding, Inspecting};
+use super::frames::{FrameSet, Rotation};
+use super::kernel::{Effort, Kernel, rotate};
+use super::stopwatch::median;
 use crate::calibration::Calibration;
 use crate::plan::Plan;
 use crate::recipe::teach::{Naming, teach};
 use crate::recipe::{Recipe, archive};
-use algo::units::AbsolutePhase;
 use hal::frame::Frame;
 use hal::head::DynHead;
 use hal::sim::Scenario;
 use serde::Serialize;
-use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 /// Angles of view of the physical head of the study (section 5.2), degrees.
@@ -55,7 +52,7 @@ pub struct Budget {
 /// If something cannot be simulated or taught.
 pub fn budgets(
     (width, height): (u32, u32),
-    rounds: usize,
+    effort: &Effort,
     progress: &dyn Fn(f64, &str),
 ) -> Result<Vec<Budget>, String> {
     let mut scenario = Scenario::default();
@@ -95,7 +92,7 @@ pub fn budgets(
             &mut head,
             &calibration,
             stage.refresh(),
-            rounds,
+            effort,
         )?);
     }
     Ok(found)
@@ -106,11 +103,11 @@ fn budget(
     head: &mut DynHead,
     calibration: &Calibration,
     refresh: Duration,
-    rounds: usize,
+    effort: &Effort,
 ) -> Result<Budget, String> {
     head.load(plan.rasters(calibration).map_err(words)?)
         .map_err(words)?;
-    let indices: Vec<usize> = (0..plan.recipe().production.len()).collect();
+    let indices: Vec<usize> = (0..plan.sequence().frame_count()).collect();
     let mut frames = Vec::new();
     let exposure = head
         .acquire(&indices, TIMEOUT, &mut |_, frame| frames.push(frame))
@@ -119,9 +116,8 @@ fn budget(
     let shown = Duration::from_nanos(exposure.done.0.saturating_sub(exposure.started.0));
     let exposure_ms = ms(shown + 2 * refresh);
     let mut runs: Vec<Vec<(String, f64)>> = Vec::new();
-    for _ in 0..rounds {
-        let (inspection, maps) = plan.inspect(&frames, Instant::now());
-        black_box(maps);
+    for _ in 0..effort.rounds {
+        let inspection = plan.inspect(&frames, Instant::now());
         let stages = inspection.stages.iter();
         runs.push(
             stages
@@ -139,7 +135,7 @@ fn budget(
         .collect();
     let whole = |run: &Vec<(String, f64)>| run.iter().map(|stage| stage.1).sum();
     let verdict_ms = median(runs.iter().map(whole).collect());
-    let [one_thread_ms, kernel_ms, x_kernel] = on_one_thread(plan, &frames, rounds)?;
+    let [one_thread_ms, kernel_ms, x_kernel] = on_one_thread(plan, &frames, effort)?;
     let (width, height, _) = calibration.camera;
     Ok(Budget {
         width,
@@ -155,31 +151,28 @@ fn budget(
     })
 }
 
-/// Processor time of frames → verdict and of the phase kernel alone, ms, and their ratio; interleaved.
-fn on_one_thread(plan: &Plan, frames: &[Frame], rounds: usize) -> Result<[f64; 3], String> {
-    let recipe = plan.recipe();
-    let known = recipe.arrays.golden_phase.iter();
-    let map = known
-        .map(|&turns| AbsolutePhase::from_turns(turns))
-        .collect();
-    let mut set = FrameSet::of(frames, Some(map));
-    let depth = recipe.file.camera.bit_depth;
-    let (_, decoder) = decoders(&recipe.sequence, recipe.function.range(), depth)?
-        .pop()
-        .ok_or("there is no back-end")?;
+/// Processor time of frames → verdict and of the phase kernel alone, ms, and their ratio; interleaved, each over frame sets
+/// in turn so that no cache holds them.
+fn on_one_thread(plan: &Plan, frames: &[Frame], effort: &Effort) -> Result<[f64; 3], String> {
+    let map = plan.golden_phase().to_vec();
+    let mut sets = Rotation::of(FrameSet::of(frames, Some(map)), effort.bytes);
+    let pixels = sets.next().pixels() as f64;
+    let decoder = plan.production().decoder().clone();
     let mut kernel = Decoding::new(decoder, Some(plan.window().to_vec()));
+    let mut whole = Inspecting::new(plan.production());
     let alone = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
         .map_err(words)?;
     let (mut inspected, mut decoded, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
-    for _ in 0..rounds {
-        let inspection =
-            alone.install(|| timed(|| drop(black_box(plan.inspect(frames, Instant::now())))));
-        let phase = kernel.run(&mut set);
-        inspected.push(ms(inspection));
-        decoded.push(ms(phase));
-        ratios.push(inspection.as_secs_f64() / phase.as_secs_f64().max(f64::MIN_POSITIVE));
+    for _ in 0..effort.rounds {
+        let [inspection, phase] = alone.install(|| {
+            [&mut whole as &mut dyn Kernel, &mut kernel]
+                .map(|kernel| rotate(kernel, &mut sets, effort.patience))
+        });
+        inspected.push(inspection * pixels / 1e6);
+        decoded.push(phase * pixels / 1e6);
+        ratios.push(inspection / phase.max(f64::MIN_POSITIVE));
     }
     Ok([inspected, decoded, ratios].map(median))
 }

@@ -1,10 +1,13 @@
-//! The product's decoder as something to time.
+//! The product's decoder, and all of production from frames to readings, as something to time.
 
 use super::frames::{FrameSet, Output};
 use super::kernel::Kernel;
 use super::stopwatch::timed;
+use crate::plan::STRIPS;
+use algo::inspect::{Production, Strip};
 use algo::phase::{Decoder, PhaseRow, Wrapped};
 use algo::pipeline::wrap;
+use std::hint::black_box;
 use std::ops::Range;
 use std::time::Duration;
 
@@ -53,6 +56,37 @@ impl Decoding {
             before.push(wrapped);
         }
         before
+    }
+}
+
+/// Production from frames to the readings of gauges, on as many threads as the pool has that it is run in.
+pub struct Inspecting<'a> {
+    production: &'a Production,
+    strips: Vec<Strip>,
+}
+
+impl<'a> Inspecting<'a> {
+    /// As a plan has it.
+    pub fn new(production: &'a Production) -> Self {
+        let rows = production.window().len();
+        Self {
+            strips: production.strips(rows.div_ceil(STRIPS)),
+            production,
+        }
+    }
+}
+
+impl Kernel for Inspecting<'_> {
+    fn run(&mut self, set: &mut FrameSet) -> Duration {
+        let (frames, _, _) = set.parts();
+        let (production, strips) = (self.production, &mut self.strips);
+        // The frames are those that it was made for.
+        timed(|| drop(black_box(production.inspect(&frames, strips, None))))
+    }
+
+    /// No map is left behind.
+    fn turns(&self, _: &FrameSet) -> Vec<f64> {
+        Vec::new()
     }
 }
 

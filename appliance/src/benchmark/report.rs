@@ -134,6 +134,14 @@ fn budget(budgets: &[Budget]) -> Value {
         let size = format!("{}x{}", budget.width, budget.height);
         let sizes = all.entry(size).or_insert_with(|| json!({}));
         sizes[budget.frames.to_string()] = values;
+        let per_px =
+            |ms: f64| json!(ms * 1e6 / (f64::from(budget.width) * f64::from(budget.height)));
+        let key = |of: &str| format!("{of}_golden_{}", budget.frames);
+        sizes[key("production")] = json!({
+            "ns_per_px": per_px(budget.one_thread_ms),
+            "x_kernel": budget.x_kernel,
+        });
+        sizes[key("kernel")] = json!({ "ns_per_px": per_px(budget.kernel_ms) });
     }
     Value::Object(all)
 }

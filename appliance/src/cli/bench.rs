@@ -110,9 +110,9 @@ impl Bench {
             } else {
                 &CAMERAS
             };
-            let rounds = self.effort().rounds;
+            let effort = self.effort();
             let budgets = pool.install(|| {
-                let each = |&camera| benchmark::budgets(camera, rounds, told);
+                let each = |&camera| benchmark::budgets(camera, &effort, told);
                 cameras.iter().map(each).collect::<Result<Vec<_>, _>>()
             });
             let budgets = budgets.map_err(software("measure from trigger to verdict"))?;

@@ -11,6 +11,7 @@ pub mod planner;
 pub mod store;
 pub mod teach;
 
+pub use archive::short;
 pub use check::Recipe;
 pub use file::{
     GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFile, SequenceKind, safe,

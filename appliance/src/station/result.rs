@@ -74,6 +74,19 @@ pub mod flag {
     pub const DOUBTFUL: u16 = 1 << 7;
 }
 
+/// What was not computed in a cycle because nobody needs it, in pixels; and what took longer than usual.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Skipped {
+    /// Outside of every gauge's region.
+    pub outside: u32,
+    /// Golden knows nothing there to unwrap about.
+    pub unexpected: u32,
+    /// The pattern's light does not reach them.
+    pub dark: u32,
+    /// Too far from golden for its expansion: their heights were solved exactly.
+    pub exact: u32,
+}
+
 /// What the worker found in one cycle.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Inspection {
@@ -97,6 +110,8 @@ pub struct Inspection {
     pub fitness_permille: u16,
     /// See [`flag`].
     pub flags: u16,
+    /// What was not computed.
+    pub skipped: Skipped,
     /// Times of the stages, in their order.
     pub stages: heapless::Vec<StageTime, MAX_STAGES>,
 }

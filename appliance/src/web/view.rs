@@ -82,6 +82,12 @@ fn result(record: &ResultRecord) -> Value {
         "fitness_permille": found.fitness_permille,
         "simulated": record.flags() & flag::SIMULATED != 0,
         "doubtful": record.flags() & flag::DOUBTFUL != 0,
+        "skipped": {
+            "outside": found.skipped.outside,
+            "unexpected": found.skipped.unexpected,
+            "dark": found.skipped.dark,
+            "exact": found.skipped.exact,
+        },
         "gauges": found.gauges.iter().map(gauge).collect::<Vec<_>>(),
         "stages": found.stages.iter().map(|stage| json!({ "name": stage.name, "us": stage.us })).collect::<Vec<_>>(),
     })

@@ -103,7 +103,10 @@ function showResult(result) {
   $("gauge-rows").replaceChildren(...result.gauges.map(gaugeRow));
   showStages(result);
   const points = result.valid_points.toLocaleString("en").replaceAll(",", " ");
-  text("height-words", result.valid_points ? `${points} points · ${(result.coverage_permille / 10).toFixed(1)} % of the regions` : "");
+  const { outside, unexpected, dark } = result.skipped;
+  const skipped = [[outside, "outside of the regions"], [unexpected, "not expected"], [dark, "dark"]]
+    .filter(([count]) => count > 0).map(([count, words]) => `${count.toLocaleString("en").replaceAll(",", " ")} ${words}`);
+  text("height-words", result.valid_points ? [`${points} points`, `${(result.coverage_permille / 10).toFixed(1)} % of the regions`, ...skipped].join(" · ") : "");
   // Without a single point the picture would be that of an older part.
   if (!result.valid_points) {
     show("picture", false);

@@ -1,0 +1,348 @@
+//! One strip of rows: its buffers, and the walk down its rows.
+
+use super::columns::{TRUSTS, count_known, count_trusts, slide};
+use super::extreme::{Extreme, SquareRow};
+use super::squares::{MAX_TAME, Squares};
+use super::{Measure, Production};
+use crate::frame::FrameView;
+use crate::geometry::Solution;
+use crate::phase::{PhaseRow, Trust};
+use crate::pipeline::{NO_RISE, Risen, RowTally, Seen, VARIANCE_UNIT_NM, rise_row};
+use crate::units::{AbsolutePhase, Height, Modulation};
+use alloc::vec;
+use alloc::vec::Vec;
+use core::ops::Range;
+
+/// A strip of rows, with room for all that it needs and what it found. Reused from cycle to cycle.
+#[derive(Debug)]
+pub struct Strip {
+    rows: Range<usize>,
+    width: usize,
+    /// The row that is being worked on.
+    phase: Vec<AbsolutePhase>,
+    modulation: Vec<Modulation>,
+    trust: Vec<Trust>,
+    rise: Vec<i32>,
+    /// Deviations of the last rows, the place of row v is v modulo their number.
+    recent: Vec<i32>,
+    kept: usize,
+    /// A row without any.
+    none: Vec<i32>,
+    /// For each smoothing the packed sums down the columns, with half a side of padding at both ends.
+    sums: Vec<Vec<i64>>,
+    /// Sums over squares of the row that is being worked on.
+    squares: Squares,
+    /// The last row with a rise that sums over squares may not hold.
+    wild: Option<usize>,
+    pub(super) found: Found,
+}
+
+/// What a strip found.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Found {
+    pub tally: RowTally,
+    /// Pixels of each trust.
+    pub trusts: [u64; TRUSTS],
+    /// Heights that were solved exactly.
+    pub exact: u64,
+    /// Per gauge: pixels with a height.
+    pub covered: Vec<u64>,
+    /// Per gauge: the square of largest deviation.
+    pub extremes: Vec<Option<Extreme>>,
+}
+
+impl Strip {
+    pub(super) fn new(plan: &Production, rows: Range<usize>) -> Self {
+        let width = plan.rises.surface().width;
+        let kept = plan.sides.iter().max().map_or(1, |side| side / 2 * 2 + 2);
+        Self {
+            rows,
+            width,
+            phase: vec![AbsolutePhase::UNKNOWN; width],
+            modulation: vec![Modulation::default(); width],
+            trust: vec![Trust::default(); width],
+            rise: vec![NO_RISE; width],
+            recent: vec![NO_RISE; width * kept],
+            kept,
+            none: vec![NO_RISE; width],
+            sums: plan
+                .sides
+                .iter()
+                .map(|side| vec![0; width + side / 2 * 2])
+                .collect(),
+            squares: Squares::new(width + kept),
+            wild: None,
+            found: Found {
+                covered: vec![0; plan.gauges.len()],
+                extremes: vec![None; plan.gauges.len()],
+                ..Found::default()
+            },
+        }
+    }
+
+    /// Its rows.
+    pub fn rows(&self) -> Range<usize> {
+        self.rows.clone()
+    }
+
+    /// Inspects its rows; `heights` is z of them in mm.
+    pub(super) fn inspect(
+        &mut self,
+        plan: &Production,
+        frames: &[FrameView<'_>],
+        mut heights: Option<&mut [f32]>,
+    ) {
+        self.clear();
+        let halo = plan.sides.iter().max().map_or(0, |side| side / 2);
+        let bottom = plan.window.len();
+        let first = self.rows.start.saturating_sub(halo);
+        for v in first..self.rows.end + halo {
+            let own = self.rows.contains(&v);
+            if v < bottom {
+                let mut tally = RowTally::default();
+                let exact = self.row(plan, frames, v, plan.window[v].clone(), &mut tally);
+                if own {
+                    self.count(plan, v, &tally, exact);
+                    if let Some(heights) = &mut heights {
+                        let row = (v - self.rows.start) * self.width;
+                        self.store(plan, v, &mut heights[row..row + self.width]);
+                    }
+                }
+            }
+            self.smooth(plan, v, first);
+        }
+    }
+
+    fn clear(&mut self) {
+        self.wild = None;
+        for sums in &mut self.sums {
+            sums.fill(0);
+        }
+        let found = &mut self.found;
+        found.tally = RowTally::default();
+        found.trusts = [0; TRUSTS];
+        found.exact = 0;
+        found.covered.fill(0);
+        found.extremes.fill(None);
+    }
+
+    /// Decodes columns of row `v` and finds their rises; the number of those that took an exact solution.
+    pub(super) fn row(
+        &mut self,
+        plan: &Production,
+        frames: &[FrameView<'_>],
+        v: usize,
+        columns: Range<usize>,
+        tally: &mut RowTally,
+    ) -> u64 {
+        let place = v % self.kept * self.width;
+        let deviation = &mut self.recent[place..place + self.width];
+        for row in [&mut *deviation, &mut self.rise] {
+            row[..columns.start].fill(NO_RISE);
+            row[columns.end..].fill(NO_RISE);
+        }
+        if columns.is_empty() {
+            return 0;
+        }
+        let out = PhaseRow {
+            phase: &mut self.phase,
+            modulation: &mut self.modulation,
+            trust: &mut self.trust,
+        };
+        let decoder = &plan.decoder;
+        decoder.row(frames, v, plan.map_row(v), columns.clone(), out);
+        let row = v * self.width..(v + 1) * self.width;
+        let seen = Seen {
+            phase: &self.phase,
+            modulation: &self.modulation,
+            trust: &self.trust,
+            taught: &plan.taught.0[row],
+            noise: plan.noise,
+        };
+        let risen = Risen {
+            rise: &mut self.rise,
+            deviation,
+            tally,
+        };
+        let rises = plan.rises.row(v);
+        rise_row(decoder.backend(), rises, seen, columns.clone(), risen);
+        if tally.resolved == tally.measured {
+            return 0;
+        }
+        self.solve(plan, v, columns, tally)
+    }
+
+    /// Solves what the cubics do not reach; how many pixels that were.
+    fn solve(
+        &mut self,
+        plan: &Production,
+        v: usize,
+        columns: Range<usize>,
+        tally: &mut RowTally,
+    ) -> u64 {
+        let mut exact = 0;
+        let recent = v % self.kept * self.width;
+        for u in columns {
+            if self.trust[u] != Trust::Resolved || self.rise[u] != NO_RISE {
+                continue;
+            }
+            exact += 1;
+            let place = v * self.width + u;
+            let Some(solution) = plan.solve((u, v), self.phase[u]) else {
+                self.trust[u] = Trust::OutOfRange;
+                tally.resolved -= 1;
+                continue;
+            };
+            let base = plan.rises.surface().height[place];
+            let base = if base.is_known() { base.nm() } else { 0 };
+            let height = Height::from_mm(solution.point.z).nm();
+            // One above the value for "unknown".
+            let rise = height.saturating_sub(base).max(NO_RISE + 1);
+            if rise.unsigned_abs() > MAX_TAME {
+                self.wild = Some(v);
+            }
+            self.rise[u] = rise;
+            tally.measured += 1;
+            let taught = u64::from(plan.taught.sigma(place));
+            tally.taught += u64::from(taught != 0);
+            tally.taught_variance += (taught * taught + 128) >> 8;
+            if plan.taught.compared(place) {
+                self.recent[recent + u] = rise;
+                tally.compared += 1;
+                let sigma = plan.sigma_nm(self.modulation[u], 1.0 / solution.slope);
+                let units = sigma / VARIANCE_UNIT_NM;
+                tally.variance += libm::rint((units * units).min(4_000_000.0)) as u64;
+            }
+        }
+        exact
+    }
+
+    fn count(&mut self, plan: &Production, v: usize, tally: &RowTally, exact: u64) {
+        let backend = plan.decoder.backend();
+        let found = &mut self.found;
+        found.tally.add(tally);
+        found.exact += exact;
+        let seen = &self.trust[plan.window[v].clone()];
+        count_trusts(backend, seen, &mut found.trusts);
+        for ((region, measure), covered) in plan.gauges.iter().zip(&mut found.covered) {
+            if *measure == Measure::Coverage {
+                for (_, columns) in region.row(v) {
+                    count_known(backend, &self.rise[columns.clone()], covered);
+                }
+            }
+        }
+    }
+
+    /// Writes the heights of row `v`, which has just been worked on.
+    fn store(&self, plan: &Production, v: usize, heights: &mut [f32]) {
+        let bases = &plan.rises.surface().height[v * self.width..];
+        for ((mm, &rise), base) in heights.iter_mut().zip(&self.rise).zip(bases) {
+            let base = if base.is_known() { base.nm() } else { 0 };
+            *mm = if rise == NO_RISE {
+                f32::NAN
+            } else {
+                ((f64::from(base) + f64::from(rise)) / 1e6) as f32
+            };
+        }
+    }
+
+    /// Slides the sums of each smoothing down to row `v`, and looks at the squares that are complete with it. `first` is
+    /// the first row that was worked on.
+    fn smooth(&mut self, plan: &Production, v: usize, first: usize) {
+        let row = |v: usize| v % self.kept * self.width..(v % self.kept + 1) * self.width;
+        let bounds = plan.bounds.clone();
+        for (&side, sums) in plan.sides.iter().zip(&mut self.sums) {
+            let half = side / 2;
+            let new = match v < plan.window.len() {
+                true => &self.recent[row(v)],
+                false => &self.none[..],
+            };
+            let old = match v.checked_sub(2 * half + 1) {
+                Some(old) if old >= first => &self.recent[row(old)],
+                _ => &self.none[..],
+            };
+            let inside = &mut sums[half + bounds.start..half + bounds.end];
+            let (new, old) = (&new[bounds.clone()], &old[bounds.clone()]);
+            slide(plan.decoder.backend(), inside, new, old);
+            let Some(centre) = v.checked_sub(half).filter(|v| self.rows.contains(v)) else {
+                continue;
+            };
+            let centres = &self.recent[row(centre)];
+            let wild = self.wild.is_some_and(|wild| wild + 2 * half >= v);
+            let tame = !wild && Squares::hold(side);
+            if tame {
+                self.squares.add(plan.decoder.backend(), sums, side);
+            }
+            let gauges = plan.gauges.iter().zip(&mut self.found.extremes);
+            for ((region, measure), best) in gauges {
+                if *measure == (Measure::Deviation { side }) {
+                    for (_, span) in region.row(centre) {
+                        let row = SquareRow {
+                            sums,
+                            centres,
+                            side,
+                            row: centre,
+                        };
+                        if tame {
+                            self.squares.search(best, &row, span.clone());
+                        } else {
+                            row.search(best, span.clone());
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Σ of the variances of the deviations of row `v` inside `columns`, nm².
+    pub(super) fn variance(
+        &mut self,
+        plan: &Production,
+        frames: &[FrameView<'_>],
+        v: usize,
+        columns: Range<usize>,
+    ) -> f64 {
+        let mut tally = RowTally::default();
+        self.row(plan, frames, v, columns.clone(), &mut tally);
+        let mut sum = 0.0;
+        for u in columns {
+            if self.recent[v % self.kept * self.width + u] != NO_RISE {
+                let place = v * self.width + u;
+                let slope = plan.slope((u, v), self.phase[u]);
+                let measured = plan.sigma_nm(self.modulation[u], slope);
+                let taught = f64::from(plan.taught.sigma(place)) * super::Taught::SIGMA_UNIT_NM;
+                sum += measured * measured + taught * taught;
+            }
+        }
+        sum
+    }
+}
+
+impl Production {
+    /// The exact height of a phase.
+    fn solve(&self, (u, v): (usize, usize), phase: AbsolutePhase) -> Option<Solution> {
+        let (column, row) = (u as f64, v as f64);
+        let place = v * self.rises.surface().width + u;
+        match self.rises.near(place, phase) {
+            Some(near) => self
+                .triangulator
+                .solve_near(column, row, phase.turns(), near),
+            None => self.triangulator.solve(column, row, phase.turns()),
+        }
+    }
+
+    /// ∂z/∂Φ in mm per turn.
+    fn slope(&self, (u, v): (usize, usize), phase: AbsolutePhase) -> f64 {
+        let place = v * self.rises.surface().width + u;
+        self.rises.slope(place, phase).unwrap_or_else(|| {
+            self.solve((u, v), phase)
+                .map_or(0.0, |solution| 1.0 / solution.slope)
+        })
+    }
+
+    /// σ_z in nm.
+    fn sigma_nm(&self, modulation: Modulation, slope: f64) -> f64 {
+        let turns = self.decoder.phase_noise(modulation, self.noise_counts);
+        libm::fabs(turns * slope) * 1e6
+    }
+}

@@ -1,0 +1,150 @@
+//! The cubic of one pixel: least squares over exact phases at heights around the known one.
+
+use super::REACH_UNIT;
+use crate::geometry::{Sight, Triangulator};
+use crate::units::{AbsolutePhase, Height};
+
+/// Coefficients of y² and y³ are stored in units of this many nm: their rounding is below 0.05 µm each.
+pub(super) const UNIT_NM: f64 = 100.0;
+/// The farthest a cubic is used from the known height, mm: rises in nm are rounded as singles below 2²².
+const MAX_RISE_MM: f64 = 4.1;
+/// A cubic is off an exact height by at most this many mm. A fifth of the largest error that is allowed, as between the
+/// nodes it may be larger; its RMS is far smaller.
+const MAX_MISS_MM: f64 = 1e-3;
+/// Heights whose phases the cubic is fitted to, as shares of the step that the slope at the known height predicts for the
+/// whole range. The pattern's samples lie closer than the nodes at no pitch above 4 px per turn.
+const NODES: [f64; 8] = [-1.06, -0.82, -0.56, -0.28, 0.28, 0.56, 0.82, 1.06];
+/// Step of the first slope, mm.
+const SLOPE_STEP: f64 = 0.05;
+/// How often the range is halved until a cubic fits.
+const HALVINGS: usize = 4;
+
+/// A pixel's cubic as it is stored.
+pub(super) struct Cubic {
+    pub first: f32,
+    pub second: i16,
+    pub third: i16,
+    pub reach: u8,
+}
+
+/// What the fits of all pixels have in common.
+pub(super) struct Fitting<'a> {
+    triangulator: &'a Triangulator,
+    range: f64,
+}
+
+impl<'a> Fitting<'a> {
+    pub fn new(triangulator: &'a Triangulator, range: f64) -> Self {
+        Self {
+            triangulator,
+            range,
+        }
+    }
+
+    /// The cubic about phase and height of pixel (u, v); `None` where neither the range nor a sixteenth of it has one.
+    pub fn cubic(
+        &self,
+        (u, v): (usize, usize),
+        phase: AbsolutePhase,
+        height: Height,
+    ) -> Option<Cubic> {
+        if !(phase.is_known() && height.is_known()) {
+            return None;
+        }
+        let (phase, height) = (phase.turns(), height.mm());
+        let working = self.triangulator.range();
+        let room = (working.high - height).min(height - working.low);
+        let sight = self.triangulator.sight(u as f64, v as f64)?;
+        let here = sight.phase(height)?;
+        let slope = (sight.phase(height + SLOPE_STEP)? - here) / SLOPE_STEP;
+        let mut step = (self.range / libm::fabs(slope)).min(room.min(MAX_RISE_MM) / NODES[7]);
+        if !(step > 0.0) {
+            return None;
+        }
+        for _ in 0..=HALVINGS {
+            if let Some(cubic) = self.fit(&sight, (phase, height), here, step) {
+                return Some(cubic);
+            }
+            step *= 0.5;
+        }
+        None
+    }
+
+    /// The cubic through the known point that fits heights up to `step` mm away, if it fits them well enough.
+    fn fit(
+        &self,
+        sight: &Sight<'_>,
+        (phase, height): (f64, f64),
+        here: f64,
+        step: f64,
+    ) -> Option<Cubic> {
+        let mut nodes = [(0.0, 0.0); NODES.len()];
+        for (node, share) in nodes.iter_mut().zip(NODES) {
+            let rise = share * step;
+            *node = ((sight.phase(height + rise)? - phase) / self.range, rise);
+        }
+        let ends = [nodes[0].0, nodes[NODES.len() - 1].0];
+        let rising = ends[1] > ends[0];
+        let monotone = nodes
+            .windows(2)
+            .all(|pair| (pair[1].0 > pair[0].0) == rising && pair[1].0 != pair[0].0);
+        let reach = libm::fabs(ends[0]).min(libm::fabs(ends[1])).min(1.0) * self.range;
+        let reach = libm::floor(reach / REACH_UNIT + 1e-9);
+        if !(monotone && ends[0] * ends[1] < 0.0 && reach >= 1.0) {
+            return None;
+        }
+        let [first, second, third] = least_squares(&nodes)?;
+        let stored = |mm: f64| {
+            let units = libm::rint(mm * 1e6 / UNIT_NM);
+            (libm::fabs(units) <= f64::from(i16::MAX)).then_some(units as i16)
+        };
+        let cubic = Cubic {
+            first: (first * 1e6) as f32,
+            second: stored(second)?,
+            third: stored(third)?,
+            reach: reach as u8,
+        };
+        let known = ((here - phase) / self.range, 0.0);
+        let fits = nodes.iter().chain([&known]).all(|&(y, rise)| {
+            // Also catches what is not finite.
+            libm::fabs(cubic.rise(y) - rise) <= MAX_MISS_MM
+        });
+        fits.then_some(cubic)
+    }
+}
+
+impl Cubic {
+    /// z − z₀ in mm.
+    fn rise(&self, y: f64) -> f64 {
+        let [second, third] = [self.second, self.third].map(|units| f64::from(units) * UNIT_NM);
+        y * (f64::from(self.first) + y * (second + y * third)) * 1e-6
+    }
+}
+
+/// The coefficients of y, y² and y³ that fit (y, rise) best.
+fn least_squares(nodes: &[(f64, f64)]) -> Option<[f64; 3]> {
+    // Sums of y² to y⁶, and of rise times y to y³.
+    let (mut powers, mut right) = ([0.0; 5], [0.0; 3]);
+    for &(y, rise) in nodes {
+        let square = y * y;
+        let mut power = square;
+        for sum in &mut powers {
+            *sum += power;
+            power *= y;
+        }
+        right[0] += rise * y;
+        right[1] += rise * square;
+        right[2] += rise * square * y;
+    }
+    let [a, b, c, d, e] = powers;
+    // The matrix [a b c; b c d; c d e] by its cofactors.
+    let rows = [
+        [c * e - d * d, c * d - b * e, b * d - c * c],
+        [c * d - b * e, a * e - c * c, b * c - a * d],
+        [b * d - c * c, b * c - a * d, a * c - b * b],
+    ];
+    let determinant = a * rows[0][0] + b * rows[0][1] + c * rows[0][2];
+    (determinant > 0.0).then(|| {
+        rows.map(|row| (row[0] * right[0] + row[1] * right[1] + row[2] * right[2]) / determinant)
+    })
+}

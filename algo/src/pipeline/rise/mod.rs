@@ -1,0 +1,188 @@
+//! Heights about a known surface: z − z₀ as a cubic of Φ − Φ₀, planned for every pixel.
+//!
+//! The cubic is fitted to exact evaluations of Φ(z) on the pixel's line of sight, and holds within the pixel's own
+//! reach: the largest |Φ − Φ₀| up to the declared range for which it stays next to the exact height. Further away, and
+//! where there is no such cubic, the height is found by the exact solution. A pixel takes 9 bytes beside Φ₀ and z₀.
+
+mod fit;
+mod row;
+
+pub(crate) use row::{
+    COMPARED, RiseRow, Risen, RowTally, Seen, UNKNOWN, VARIANCE_UNIT_NM, rise_row,
+};
+
+use super::{Window, for_each};
+use crate::geometry::Triangulator;
+use crate::phase::Trust;
+use crate::simd::Backend;
+use crate::units::{AbsolutePhase, Height, Modulation};
+use alloc::vec;
+use alloc::vec::Vec;
+use fit::Fitting;
+
+/// A surface that is known beforehand, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownSurface {
+    /// Pixels per row.
+    pub width: usize,
+    /// Φ₀, [`AbsolutePhase::UNKNOWN`] where nothing is known.
+    pub phase: Vec<AbsolutePhase>,
+    /// z₀, the height that has this phase.
+    pub height: Vec<Height>,
+}
+
+/// The heights of every pixel about a known surface.
+#[derive(Clone, Debug)]
+pub struct Rises {
+    surface: KnownSurface,
+    /// The declared range in turns, of which y = 1 is the end.
+    range: f64,
+    /// Coefficient of y, nm.
+    first: Vec<f32>,
+    /// Coefficients of y² and y³, units of [`fit::UNIT_NM`].
+    second: Vec<i16>,
+    third: Vec<i16>,
+    /// |Φ − Φ₀| below which the cubic holds, units of [`REACH_UNIT`] turns.
+    reach: Vec<u8>,
+}
+
+/// The unit of a pixel's reach in turns.
+const REACH_UNIT: f64 = 1.0 / 128.0;
+/// The largest range that a reach can express, turns.
+const MAX_RANGE: f64 = 127.0 * REACH_UNIT;
+
+impl Rises {
+    /// Plans the pixels inside `window` for |Φ − Φ₀| up to `range` turns (or a little less than a turn).
+    pub fn new(
+        triangulator: &Triangulator,
+        surface: KnownSurface,
+        range: f64,
+        window: Window<'_>,
+    ) -> Self {
+        let pixels = surface.phase.len();
+        let width = surface.width.max(1);
+        let range = range.clamp(REACH_UNIT, MAX_RANGE);
+        let mut rises = Self {
+            surface,
+            range,
+            first: vec![0.0; pixels],
+            second: vec![0; pixels],
+            third: vec![0; pixels],
+            reach: vec![0; pixels],
+        };
+        let rows = rises
+            .first
+            .chunks_mut(width)
+            .zip(rises.second.chunks_mut(width))
+            .zip(rises.third.chunks_mut(width))
+            .zip(rises.reach.chunks_mut(width))
+            .collect();
+        let fitting = Fitting::new(triangulator, range);
+        let surface = &rises.surface;
+        for_each(
+            rows,
+            || (),
+            |v, (((first, second), third), reach), ()| {
+                for u in window[v].clone() {
+                    let at = v * width + u;
+                    let (phase, height) = (surface.phase[at], surface.height[at]);
+                    if let Some(cubic) = fitting.cubic((u, v), phase, height) {
+                        first[u] = cubic.first;
+                        (second[u], third[u]) = (cubic.second, cubic.third);
+                        reach[u] = cubic.reach;
+                    }
+                }
+            },
+        );
+        rises
+    }
+
+    /// The known surface.
+    pub fn surface(&self) -> &KnownSurface {
+        &self.surface
+    }
+
+    /// The declared range in turns.
+    pub fn range(&self) -> f64 {
+        self.range
+    }
+
+    /// The largest |Φ − Φ₀| in turns that the cubic of a place (row-major) is used for, 0 where it has none.
+    pub fn reach(&self, place: usize) -> f64 {
+        f64::from(self.reach[place]) * REACH_UNIT
+    }
+
+    /// The heights of phases of row `v`, [`Height::UNKNOWN`] where the cubic does not reach them: what production computes,
+    /// without anything around it. Slices are as long as the row.
+    pub fn heights(&self, backend: Backend, v: usize, phase: &[AbsolutePhase], out: &mut [Height]) {
+        let width = self.surface.width;
+        let seen = Seen {
+            phase,
+            modulation: &vec![Modulation::from_bits(1); width],
+            trust: &vec![Trust::Resolved; width],
+            taught: &vec![0; width],
+            noise: 0.0,
+        };
+        let mut rise = vec![UNKNOWN; width];
+        let risen = Risen {
+            rise: &mut rise,
+            deviation: &mut vec![UNKNOWN; width],
+            tally: &mut RowTally::default(),
+        };
+        rise_row(backend, self.row(v), seen, 0..width, risen);
+        let bases = &self.surface.height[v * width..];
+        for ((out, base), rise) in out.iter_mut().zip(bases).zip(rise) {
+            *out = match rise {
+                UNKNOWN => Height::UNKNOWN,
+                _ => Height::from_nm(base.nm() + rise),
+            };
+        }
+    }
+
+    /// y of a phase at a place, if the cubic reaches it.
+    fn share(&self, place: usize, phase: AbsolutePhase) -> Option<f64> {
+        let base = self.surface.phase[place];
+        let delta = (phase - base).turns();
+        (base.is_known() && libm::fabs(delta) < self.reach(place)).then(|| delta / self.range)
+    }
+
+    /// ∂z/∂Φ in mm per turn, where the cubic of a place reaches the phase.
+    pub fn slope(&self, place: usize, phase: AbsolutePhase) -> Option<f64> {
+        let y = self.share(place, phase)?;
+        let [first, second, third] = self.coefficients(place);
+        Some((first + y * (2.0 * second + y * 3.0 * third)) / self.range)
+    }
+
+    /// A height in mm that is near that of a phase, as far as the cubic's slope at the known height tells.
+    pub fn near(&self, place: usize, phase: AbsolutePhase) -> Option<f64> {
+        let (base, height) = (self.surface.phase[place], self.surface.height[place]);
+        let known = base.is_known() && height.is_known() && self.reach[place] > 0;
+        let delta = (phase - base).turns();
+        (known && libm::fabs(delta) <= 2.0 * self.range)
+            .then(|| height.mm() + delta / self.range * self.coefficients(place)[0])
+    }
+
+    /// Of y, y² and y³ in mm.
+    fn coefficients(&self, place: usize) -> [f64; 3] {
+        [
+            f64::from(self.first[place]),
+            f64::from(self.second[place]) * fit::UNIT_NM,
+            f64::from(self.third[place]) * fit::UNIT_NM,
+        ]
+        .map(|nm| nm * 1e-6)
+    }
+
+    /// What the rises of row `v` are computed from.
+    pub(crate) fn row(&self, v: usize) -> RiseRow<'_> {
+        let width = self.surface.width;
+        let row = v * width..(v + 1) * width;
+        RiseRow {
+            base: &self.surface.phase[row.clone()],
+            first: &self.first[row.clone()],
+            second: &self.second[row.clone()],
+            third: &self.third[row.clone()],
+            reach: &self.reach[row],
+            range: self.range,
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! A row of phases → a row of rises above the known surface, in nm.
+//!
+//! Plain loops over slices, compiled for each back-end's instructions; singles with + − × ÷ only and whole-number sums,
+//! so that the bits are the same everywhere.
+
+use super::fit::UNIT_NM;
+use crate::phase::Trust;
+use crate::simd::{Lanes, back_end_entry};
+use crate::units::{AbsolutePhase, Height, Modulation};
+use core::ops::Range;
+
+/// The bit of what is taught that says that the part is compared.
+pub(crate) const COMPARED: u16 = 1 << 15;
+/// Variances are summed in units of the square of this many nm, each rounded to nearest.
+pub(crate) const VARIANCE_UNIT_NM: f64 = 512.0;
+/// Standard deviations of the known heights are given in sixteenths of that.
+const SIGMAS_PER_UNIT_BITS: u32 = 4;
+/// Half of the square of a unit, in squares of these.
+const HALF: u32 = 1 << (2 * SIGMAS_PER_UNIT_BITS - 1);
+/// The largest variance that is summed, (1 mm)²: no sum over a block exceeds 32 bits.
+const MAX_VARIANCE: f32 = 4_000_000.0;
+/// Pixels that are skipped together where none is resolved; sums over so many fit into 32 bits.
+const BLOCK: usize = 128;
+/// 1.5 · 2²³: added to a single below 2²², it leaves the nearest whole number in the low bits.
+const ROUNDER: f32 = 12_582_912.0;
+
+/// A row of the plan.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RiseRow<'a> {
+    /// Φ₀.
+    pub base: &'a [AbsolutePhase],
+    /// Coefficient of y in nm.
+    pub first: &'a [f32],
+    /// Coefficient of y².
+    pub second: &'a [i16],
+    /// Coefficient of y³.
+    pub third: &'a [i16],
+    /// How far the cubic holds.
+    pub reach: &'a [u8],
+    /// The phase of y = 1, turns.
+    pub range: f64,
+}
+
+/// A decoded row and what else is known of its pixels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen<'a> {
+    /// Φ.
+    pub phase: &'a [AbsolutePhase],
+    /// B.
+    pub modulation: &'a [Modulation],
+    /// Which to believe.
+    pub trust: &'a [Trust],
+    /// σ of golden's heights in 32 nm, at most 2¹⁵ − 1, 0 where not known; [`COMPARED`] where the part is compared with
+    /// golden.
+    pub taught: &'a [u16],
+    /// σ_z² = `noise` · (∂z/∂y)² / B², in units of [`VARIANCE_UNIT_NM`]².
+    pub noise: f32,
+}
+
+/// What a row of rises is written to, and counted in.
+#[derive(Debug)]
+pub(crate) struct Risen<'a> {
+    /// z − z₀ in nm, [`Height::UNKNOWN`]'s bits where the cubic gives none.
+    pub rise: &'a mut [i32],
+    /// The same where the part is compared.
+    pub deviation: &'a mut [i32],
+    /// Sums.
+    pub tally: &'a mut RowTally,
+}
+
+/// Counts and sums of rises.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct RowTally {
+    /// Resolved pixels.
+    pub resolved: u64,
+    /// Pixels with a height.
+    pub measured: u64,
+    /// Of these those that are compared.
+    pub compared: u64,
+    /// Σ of σ_z² over the compared ones.
+    pub variance: u64,
+    /// Pixels with a height whose golden σ is known.
+    pub taught: u64,
+    /// Σ of its square.
+    pub taught_variance: u64,
+}
+
+impl RowTally {
+    /// Adds what another counted.
+    pub fn add(&mut self, other: &Self) {
+        self.resolved += other.resolved;
+        self.measured += other.measured;
+        self.compared += other.compared;
+        self.variance += other.variance;
+        self.taught += other.taught;
+        self.taught_variance += other.taught_variance;
+    }
+}
+
+back_end_entry! {
+    /// Rises of columns of a row; everything outside of them is left as it is.
+    fn rise_row [] = rise_columns(
+        plan: RiseRow<'_>,
+        seen: Seen<'_>,
+        columns: Range<usize>,
+        out: Risen<'_>,
+    )
+}
+
+#[inline(always)]
+fn rise_columns<V: Lanes>(
+    _: V,
+    plan: RiseRow<'_>,
+    seen: Seen<'_>,
+    columns: Range<usize>,
+    out: Risen<'_>,
+) {
+    let scale = (1.0 / (plan.range * 65_536.0)) as f32;
+    let tally = &mut *out.tally;
+    let mut slopes = [0.0_f32; BLOCK];
+    let mut start = columns.start;
+    while start < columns.end {
+        let end = (start + BLOCK).min(columns.end);
+        let length = end - start;
+        let trust = &seen.trust[start..end][..length];
+        let rises = &mut out.rise[start..end][..length];
+        let deviations = &mut out.deviation[start..end][..length];
+        let mut resolved = 0_u32;
+        for &trust in trust {
+            resolved += u32::from(trust as u8 == Trust::Resolved as u8);
+        }
+        if resolved == 0 {
+            rises.fill(UNKNOWN);
+            deviations.fill(UNKNOWN);
+            start = end;
+            continue;
+        }
+        tally.resolved += u64::from(resolved);
+        let base = &plan.base[start..end][..length];
+        let first = &plan.first[start..end][..length];
+        let second = &plan.second[start..end][..length];
+        let third = &plan.third[start..end][..length];
+        let reach = &plan.reach[start..end][..length];
+        let phase = &seen.phase[start..end][..length];
+        let taught = &seen.taught[start..end][..length];
+        let slopes = &mut slopes[..length];
+        for i in 0..length {
+            let delta = phase[i].to_bits().wrapping_sub(base[i].to_bits());
+            let far = i32::from(reach[i]) << 9;
+            let known = trust[i] as u8 == Trust::Resolved as u8;
+            let inside = known & (delta < far) & (delta > -far);
+            let y = delta as f32 * scale;
+            let (a, b, c) = (
+                first[i],
+                f32::from(second[i]) * UNIT_NM as f32,
+                f32::from(third[i]) * UNIT_NM as f32,
+            );
+            let nm = rounded(y * (a + y * (b + y * c)));
+            let compare = inside & (taught[i] >= COMPARED);
+            rises[i] = if inside { nm } else { UNKNOWN };
+            deviations[i] = if compare { nm } else { UNKNOWN };
+            slopes[i] = a + y * ((b + b) + y * (3.0 * c));
+        }
+        let modulation = &seen.modulation[start..end][..length];
+        let (mut measured, mut counted, mut variances) = (0_u32, 0_u32, 0_u32);
+        let (mut taught_count, mut taught_variances) = (0_u32, 0_u32);
+        for i in 0..length {
+            let inside = rises[i] != UNKNOWN;
+            let compare = deviations[i] != UNKNOWN;
+            let counts = f32::from(modulation[i].to_bits());
+            let variance = seen.noise * (slopes[i] * slopes[i]) / (counts * counts);
+            let variance = if variance < MAX_VARIANCE {
+                variance
+            } else {
+                MAX_VARIANCE
+            };
+            let variance = rounded(variance) as u32;
+            measured += u32::from(inside);
+            counted += u32::from(compare);
+            variances = variances.wrapping_add(if compare { variance } else { 0 });
+            let sigma = u32::from(taught[i] & !COMPARED);
+            let square = (sigma * sigma + HALF) >> (2 * SIGMAS_PER_UNIT_BITS);
+            taught_count += u32::from(inside & (sigma != 0));
+            taught_variances = taught_variances.wrapping_add(if inside { square } else { 0 });
+        }
+        tally.measured += u64::from(measured);
+        tally.compared += u64::from(counted);
+        tally.variance += u64::from(variances);
+        tally.taught += u64::from(taught_count);
+        tally.taught_variance += u64::from(taught_variances);
+        start = end;
+    }
+}
+
+/// "No height" among rises.
+pub(crate) const UNKNOWN: i32 = Height::UNKNOWN.nm();
+
+/// The nearest whole number, ties to even; |x| below 2²².
+#[inline(always)]
+fn rounded(x: f32) -> i32 {
+    ((x + ROUNDER).to_bits() as i32).wrapping_sub(ROUNDER.to_bits() as i32)
+}
