@@ -1,6 +1,6 @@
 //! The instructions of a processor behind one small trait, and which of them this machine has.
 //!
-//! [`Lanes`] is what the phase kernels are written in; [`Portable`] is its definition as code, [`Avx2`] and [`Neon`] are
+//! `Lanes` is what the phase kernels are written in; `Portable` is its definition as code, `Avx2` and `Neon` are
 //! the same results by vector instructions. A back-end's value proves that its instructions may be used, so the
 //! operations are safe to call. This is the only module with `unsafe`: calls of intrinsics that the proof covers, and
 //! loads and stores inside slices whose length has been asserted.
