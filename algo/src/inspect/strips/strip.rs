@@ -250,7 +250,7 @@ impl Strip {
     /// the first row that was worked on.
     fn smooth(&mut self, plan: &Production, v: usize, first: usize) {
         let row = |v: usize| v % self.kept * self.width..(v % self.kept + 1) * self.width;
-        let bounds = plan.bounds.clone();
+        let (bounds, backend) = (plan.bounds.clone(), plan.decoder.backend());
         for (&side, sums) in plan.sides.iter().zip(&mut self.sums) {
             let half = side / 2;
             let new = match v < plan.window.len() {
@@ -263,7 +263,7 @@ impl Strip {
             };
             let inside = &mut sums[half + bounds.start..half + bounds.end];
             let (new, old) = (&new[bounds.clone()], &old[bounds.clone()]);
-            slide(plan.decoder.backend(), inside, new, old);
+            slide(backend, inside, new, old);
             let Some(centre) = v.checked_sub(half).filter(|v| self.rows.contains(v)) else {
                 continue;
             };
@@ -271,7 +271,7 @@ impl Strip {
             let wild = self.wild.is_some_and(|wild| wild + 2 * half >= v);
             let tame = !wild && Squares::hold(side);
             if tame {
-                self.squares.add(plan.decoder.backend(), sums, side);
+                self.squares.add(backend, sums, side);
             }
             let gauges = plan.gauges.iter().zip(&mut self.found.extremes);
             for ((region, measure), best) in gauges {
@@ -284,7 +284,7 @@ impl Strip {
                             row: centre,
                         };
                         if tame {
-                            self.squares.search(best, &row, span.clone());
+                            self.squares.search(backend, best, &row, span.clone());
                         } else {
                             row.search(best, span.clone());
                         }
