@@ -22,8 +22,9 @@ pub(super) struct Squares {
     columns: Vec<i32>,
     /// Of some columns.
     some: Vec<i32>,
-    /// Of as many as the square has: what starts at a column.
+    /// Of as many as the square has: around the first column and those behind it.
     all: Vec<i32>,
+    first: usize,
 }
 
 impl Squares {
@@ -33,6 +34,7 @@ impl Squares {
             columns: vec![0; columns],
             some: vec![0; columns],
             all: vec![0; columns],
+            first: 0,
         }
     }
 
@@ -41,8 +43,10 @@ impl Squares {
         (side | 1) * (side | 1) < MAX_PIXELS
     }
 
-    /// Sums over squares from packed sums down the columns.
-    pub fn add(&mut self, backend: Backend, sums: &[i64], side: usize) {
+    /// Sums over the squares around some columns, from packed sums down the columns with half a side of padding.
+    pub fn add(&mut self, backend: Backend, sums: &[i64], side: usize, around: Range<usize>) {
+        self.first = around.start;
+        let sums = &sums[around.start..around.end + side / 2 * 2];
         let length = sums.len();
         let columns = &mut self.columns[..length];
         unpack(backend, sums, columns);
@@ -77,7 +81,7 @@ impl Squares {
         while start < span.end {
             let block = start..(start + BLOCK).min(span.end);
             start = block.end;
-            let sums = &self.all[block.clone()];
+            let sums = &self.all[block.start - self.first..block.end - self.first];
             let centres = &row.centres[block.clone()];
             let mut reached = false;
             let floor = floor_of(*best, least_support(row.side));
