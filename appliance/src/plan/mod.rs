@@ -69,8 +69,8 @@ pub struct Maps {
     pub height_mm: Vec<f32>,
 }
 
-/// A frame is inspected in this many strips: work for eight threads, and few rows that two of them need.
-pub const STRIPS: usize = 8;
+/// A frame is inspected in this many strips: work for four threads, and few rows that two of them need.
+pub const STRIPS: usize = 4;
 /// Error code of a cycle whose frames are not what the recipe was made for.
 const WRONG_FRAMES: u16 = 103;
 

@@ -3,7 +3,7 @@
 use super::file::{FORMAT, RecipeFile, VERSION};
 use hal::npy;
 use sha2::{Digest, Sha256};
-use std::io::{Cursor, Read as _, Write as _};
+use std::io::{Cursor, Read, Seek, Write as _};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
@@ -114,48 +114,64 @@ pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), Arc
     Ok((bytes, fingerprint))
 }
 
-/// Unpacks a recipe and checks its fingerprint.
+/// Unpacks a recipe of at most `size` bytes and checks its fingerprint. No more than one member is in memory beside what
+/// has been read from the others.
 ///
 /// # Errors
 /// If it is no recipe, of a newer version, or not what was written.
-pub fn unpack(bytes: &[u8]) -> Result<(RecipeFile, Arrays), ArchiveError> {
-    let mut zip = ZipArchive::new(Cursor::new(bytes)).map_err(broken)?;
+pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays), ArchiveError> {
+    let mut zip = ZipArchive::new(source).map_err(broken)?;
     let mut members = Vec::new();
     for at in 0..zip.len() {
-        let mut member = zip.by_index(at).map_err(broken)?;
-        let name = member.name().map_err(broken)?.into_owned();
-        let mut content = Vec::new();
-        // Members are stored, so none is larger than the file.
-        let limit = bytes.len() as u64;
-        let read = member.by_ref().take(limit).read_to_end(&mut content);
-        read.map_err(|error| broken(format!("member {name}: {error}")))?;
-        members.push((name, content));
+        let member = zip.by_index(at).map_err(broken)?;
+        members.push((member.name().map_err(broken)?.into_owned(), at));
     }
-    let at = members.iter().position(|(name, _)| name == MANIFEST);
-    let (_, manifest) = members.remove(at.ok_or_else(|| broken("it holds no recipe.json"))?);
-    let text = String::from_utf8(manifest).map_err(broken)?;
+    members.sort();
+    let found = members.iter().position(|(name, _)| name == MANIFEST);
+    let (_, at) = members.remove(found.ok_or_else(|| broken("it holds no recipe.json"))?);
+    let text = String::from_utf8(content(&mut zip, at, size).map_err(broken)?).map_err(broken)?;
     let file = parse(&text)?;
     let zeroed = text.replacen(&file.fingerprint, NO_FINGERPRINT, 1);
-    let borrowed: Vec<(&str, Vec<u8>)> = members
-        .iter_mut()
-        .map(|(name, content)| (name.as_str(), std::mem::take(content)))
-        .collect();
-    let computed = fingerprint(zeroed.as_bytes(), &borrowed);
+    let mut hash = Fingerprint::new(zeroed.as_bytes());
+    let mut arrays = Arrays::default();
+    let mut problem = None;
+    for (name, at) in &members {
+        let content = content(&mut zip, *at, size)
+            .map_err(|error| broken(format!("member {name}: {error}")))?;
+        hash.add(name, &content);
+        // That the file was damaged explains more than what the damage broke.
+        problem = problem.or(read_array(&mut arrays, name, &content).err());
+    }
+    let computed = hash.finish();
     if computed != file.fingerprint {
         return Err(ArchiveError::Fingerprint {
             found: file.fingerprint,
             computed,
         });
     }
-    let arrays = read_arrays(&borrowed)?;
-    Ok((file, arrays))
+    match problem {
+        Some(problem) => Err(problem),
+        None => Ok((file, arrays)),
+    }
+}
+
+/// A member of at most `size` bytes: they are stored, so none is larger than the file.
+fn content(
+    zip: &mut ZipArchive<impl Read + Seek>,
+    at: usize,
+    size: u64,
+) -> std::io::Result<Vec<u8>> {
+    let member = zip.by_index(at)?;
+    let mut content = Vec::with_capacity(member.size().min(size) as usize);
+    member.take(size).read_to_end(&mut content)?;
+    Ok(content)
 }
 
 /// Reads only the manifest of a recipe, without checking the fingerprint: for lists.
 ///
 /// # Errors
 /// If it is no recipe or of a newer version.
-pub fn manifest(file: impl std::io::Read + std::io::Seek) -> Result<RecipeFile, ArchiveError> {
+pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, ArchiveError> {
     let mut zip = ZipArchive::new(file).map_err(broken)?;
     let member = zip.by_name(MANIFEST).map_err(broken)?;
     let mut text = String::new();
@@ -186,22 +202,19 @@ fn parse(text: &str) -> Result<RecipeFile, ArchiveError> {
     serde_json::from_str(text).map_err(|error| broken(format!("recipe.json: {error}")))
 }
 
-fn read_arrays(members: &[(&str, Vec<u8>)]) -> Result<Arrays, ArchiveError> {
-    let mut arrays = Arrays::default();
-    for (name, bytes) in members {
-        match *name {
-            "phase_function.npy" => arrays.phase_function = read(name, bytes)?,
-            "golden_phase.npy" => arrays.golden_phase = read(name, bytes)?,
-            "golden_height.npy" => arrays.golden_height = read(name, bytes)?,
-            "height_slope.npy" => arrays.height_slope = read(name, bytes)?,
-            "height_curvature.npy" => arrays.height_curvature = read(name, bytes)?,
-            "valid.npy" => arrays.valid = read(name, bytes)?,
-            "modulation.npy" => arrays.modulation = read(name, bytes)?,
-            "phase_reach.npy" => arrays.phase_reach = read(name, bytes)?,
-            unknown => return Err(broken(format!("it holds an unknown member {unknown:?}"))),
-        }
+fn read_array(arrays: &mut Arrays, name: &str, bytes: &[u8]) -> Result<(), ArchiveError> {
+    match name {
+        "phase_function.npy" => arrays.phase_function = read(name, bytes)?,
+        "golden_phase.npy" => arrays.golden_phase = read(name, bytes)?,
+        "golden_height.npy" => arrays.golden_height = read(name, bytes)?,
+        "height_slope.npy" => arrays.height_slope = read(name, bytes)?,
+        "height_curvature.npy" => arrays.height_curvature = read(name, bytes)?,
+        "valid.npy" => arrays.valid = read(name, bytes)?,
+        "modulation.npy" => arrays.modulation = read(name, bytes)?,
+        "phase_reach.npy" => arrays.phase_reach = read(name, bytes)?,
+        unknown => return Err(broken(format!("it holds an unknown member {unknown:?}"))),
     }
-    Ok(arrays)
+    Ok(())
 }
 
 fn read<T: npy::Element>(name: &str, bytes: &[u8]) -> Result<Vec<T>, ArchiveError> {
@@ -212,21 +225,35 @@ fn read<T: npy::Element>(name: &str, bytes: &[u8]) -> Result<Vec<T>, ArchiveErro
 
 /// SHA-256 over the manifest and all other members in the order of their names, each with its name
 /// and length in front.
+struct Fingerprint(Sha256);
+
+impl Fingerprint {
+    fn new(manifest: &[u8]) -> Self {
+        let mut fingerprint = Self(Sha256::new());
+        fingerprint.add(MANIFEST, manifest);
+        fingerprint
+    }
+
+    fn add(&mut self, name: &str, content: &[u8]) {
+        for part in [name.as_bytes(), content] {
+            self.0.update((part.len() as u64).to_le_bytes());
+            self.0.update(part);
+        }
+    }
+
+    fn finish(self) -> String {
+        hex(&self.0.finalize())
+    }
+}
+
 fn fingerprint(manifest: &[u8], members: &[(&str, Vec<u8>)]) -> String {
     let mut sorted: Vec<_> = members.iter().collect();
     sorted.sort_by_key(|(name, _)| *name);
-    let mut hash = Sha256::new();
-    let mut add = |name: &str, content: &[u8]| {
-        for part in [name.as_bytes(), content] {
-            hash.update((part.len() as u64).to_le_bytes());
-            hash.update(part);
-        }
-    };
-    add(MANIFEST, manifest);
+    let mut hash = Fingerprint::new(manifest);
     for (name, content) in sorted {
-        add(name, content);
+        hash.add(name, content);
     }
-    hex(&hash.finalize())
+    hash.finish()
 }
 
 /// Lower-case hexadecimal digits.

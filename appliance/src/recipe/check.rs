@@ -5,6 +5,7 @@ use super::file::{PatternFile, RecipeFile, SequenceKind};
 use algo::inspect::Region;
 use algo::pattern::{PhaseFunction, Sequence};
 use std::collections::HashMap;
+use std::io::{Cursor, Read, Seek};
 
 /// A recipe whose parts fit each other.
 #[derive(Clone, Debug)]
@@ -47,7 +48,15 @@ impl Recipe {
     /// # Errors
     /// If it is broken, of a newer version, changed, or inconsistent.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, RecipeError> {
-        let (file, arrays) = unpack(bytes)?;
+        Self::read(Cursor::new(bytes), bytes.len() as u64)
+    }
+
+    /// As [`Self::from_bytes`], from a file of `size` bytes that need not be in memory.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn read(source: impl Read + Seek, size: u64) -> Result<Self, RecipeError> {
+        let (file, arrays) = unpack(source, size)?;
         Self::check(file, arrays).map_err(RecipeError::Inconsistent)
     }
 

@@ -105,12 +105,13 @@ impl Store {
 
     /// The recipe in a file, if the file exists.
     fn read(path: &Path, number: u16) -> Option<Result<Recipe, String>> {
-        let bytes = match fs::read(path) {
+        let opened = fs::File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
+        let (size, file) = match opened {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
             Err(error) => return Some(Err(error.to_string())),
-            Ok(bytes) => bytes,
+            Ok(opened) => opened,
         };
-        Some(match Recipe::from_bytes(&bytes) {
+        Some(match Recipe::read(io::BufReader::new(file), size) {
             Err(error) => Err(error.to_string()),
             Ok(recipe) if recipe.file.number != number => Err(format!(
                 "holds recipe {}: rename it to {:04}.recipe",

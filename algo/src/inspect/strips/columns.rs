@@ -6,6 +6,16 @@ use crate::simd::{Lanes, back_end_entry};
 
 /// Number of trusts.
 pub(super) const TRUSTS: usize = Trust::REASONS.len() + 1;
+/// All of them, the frequent ones first.
+const ORDER: [Trust; TRUSTS] = [
+    Trust::Resolved,
+    Trust::Unexpected,
+    Trust::Dark,
+    Trust::LowModulation,
+    Trust::Saturated,
+    Trust::Residual,
+    Trust::OutOfRange,
+];
 /// Pixels whose counts fit into a byte.
 const BLOCK: usize = 255;
 /// A packed sum holds the number of its terms above this bit, and their sum below it.
@@ -30,8 +40,8 @@ back_end_entry! {
 fn trusts<V: Lanes>(_: V, row: &[Trust], counts: &mut [u64; TRUSTS]) {
     for block in row.chunks(BLOCK) {
         let mut left = block.len() as u64;
-        // Nearly all are resolved or have the first reasons: it ends when all are counted.
-        for (trust, count) in counts.iter_mut().enumerate() {
+        for trust in ORDER {
+            // Mostly there are only the first ones: it ends when all are counted.
             if left == 0 {
                 break;
             }
@@ -39,7 +49,7 @@ fn trusts<V: Lanes>(_: V, row: &[Trust], counts: &mut [u64; TRUSTS]) {
             for &seen in block {
                 here = here.wrapping_add(u8::from(seen as u8 == trust as u8));
             }
-            *count += u64::from(here);
+            counts[trust as usize] += u64::from(here);
             left -= u64::from(here);
         }
     }

@@ -54,7 +54,7 @@ impl SquareRow<'_> {
     pub fn search(&self, best: &mut Option<Extreme>, span: Range<usize>) {
         let reach = self.side / 2 * 2;
         let least = least_support(self.side);
-        let mut floor = floor_of(*best, self.side);
+        let mut floor = floor_of(*best, least);
         let mut packed = self.sums[span.start..span.start + reach]
             .iter()
             .sum::<i64>();
@@ -74,7 +74,7 @@ impl SquareRow<'_> {
                 let counts = found.count >= least && self.centres[column] != NO_RISE;
                 if counts && best.is_none_or(|best| found.reaches(&best)) {
                     *best = Some(found);
-                    floor = floor_of(*best, self.side);
+                    floor = floor_of(*best, least);
                 }
             }
             packed -= leaves;
@@ -82,8 +82,8 @@ impl SquareRow<'_> {
     }
 }
 
-/// No sum below this reaches the best: it has at least the least support.
-pub(super) fn floor_of(best: Option<Extreme>, side: usize) -> i64 {
+/// No sum of at least `least` deviations below this reaches the best.
+pub(super) fn floor_of(best: Option<Extreme>, least: i64) -> i64 {
     // Rounded down, so nothing that could reach it is left out.
-    best.map_or(0, |best| best.sum.abs() * least_support(side) / best.count)
+    best.map_or(0, |best| best.sum.abs() * least / best.count)
 }

@@ -81,8 +81,6 @@ pub struct Production {
     /// The sides of the gauges' squares, each once.
     sides: Vec<usize>,
     window: Vec<Range<usize>>,
-    /// The columns that some row of the window has.
-    bounds: Range<usize>,
     /// Pixels inside the window that are compared.
     compared: u64,
     noise_counts: f64,
@@ -137,9 +135,6 @@ impl Production {
                 sides.push(side);
             }
         }
-        let seen = || window.iter().filter(|columns| !columns.is_empty());
-        let bounds = seen().map(|columns| columns.start).min().unwrap_or(0)
-            ..seen().map(|columns| columns.end).max().unwrap_or(0);
         let width = rises.surface().width;
         let compared = window.iter().enumerate().map(|(v, columns)| {
             let row = v * width + columns.start..v * width + columns.end;
@@ -156,7 +151,6 @@ impl Production {
             gauges,
             sides,
             window,
-            bounds,
             compared,
             noise_counts,
             noise: noise as f32,

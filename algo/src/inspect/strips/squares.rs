@@ -1,6 +1,8 @@
 //! Which squares of a row can have the largest deviation at all: sums in 32 bits, many pixels at a time.
 
-use super::extreme::{Extreme, SquareRow, floor_of};
+use super::columns::COUNT_BIT;
+use super::extreme::{Extreme, SquareRow, floor_of, least_support};
+use crate::pipeline::NO_RISE;
 use crate::simd::{Backend, Lanes, back_end_entry};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -20,8 +22,9 @@ pub(super) struct Squares {
     columns: Vec<i32>,
     /// Of some columns.
     some: Vec<i32>,
-    /// Of as many as the square has: what starts at a column.
+    /// Of as many as the square has: around the first column and those behind it.
     all: Vec<i32>,
+    first: usize,
 }
 
 impl Squares {
@@ -31,6 +34,7 @@ impl Squares {
             columns: vec![0; columns],
             some: vec![0; columns],
             all: vec![0; columns],
+            first: 0,
         }
     }
 
@@ -39,8 +43,10 @@ impl Squares {
         (side | 1) * (side | 1) < MAX_PIXELS
     }
 
-    /// Sums over squares from packed sums down the columns.
-    pub fn add(&mut self, backend: Backend, sums: &[i64], side: usize) {
+    /// Sums over the squares around some columns, from packed sums down the columns with half a side of padding.
+    pub fn add(&mut self, backend: Backend, sums: &[i64], side: usize, around: Range<usize>) {
+        self.first = around.start;
+        let sums = &sums[around.start..around.end + side / 2 * 2];
         let length = sums.len();
         let columns = &mut self.columns[..length];
         unpack(backend, sums, columns);
@@ -63,21 +69,49 @@ impl Squares {
     }
 
     /// Looks closer where a sum is large enough to matter.
-    pub fn search(&self, best: &mut Option<Extreme>, row: &SquareRow<'_>, span: Range<usize>) {
+    pub fn search(
+        &self,
+        backend: Backend,
+        best: &mut Option<Extreme>,
+        row: &SquareRow<'_>,
+        span: Range<usize>,
+    ) {
+        let reach = row.side / 2 * 2;
         let mut start = span.start;
         while start < span.end {
-            let end = (start + BLOCK).min(span.end);
-            let floor = floor_of(*best, row.side).min(i64::from(i32::MAX)) as i32;
-            let mut reached = 0_u32;
-            for &sum in &self.all[start..end] {
-                reached |= u32::from(sum >= floor) | u32::from(sum <= -floor);
+            let block = start..(start + BLOCK).min(span.end);
+            start = block.end;
+            let sums = &self.all[block.start - self.first..block.end - self.first];
+            let centres = &row.centres[block.clone()];
+            let mut reached = false;
+            let floor = floor_of(*best, least_support(row.side));
+            sift(backend, sums, centres, floor, &mut reached);
+            if reached {
+                // No square of the block has fewer deviations than this: mostly all that there can be.
+                let mut least = i64::MAX;
+                least_count(
+                    backend,
+                    &row.sums[block.start..block.end + reach],
+                    &mut least,
+                );
+                let least = (least * (reach as i64 + 1)).max(least_support(row.side));
+                sift(backend, sums, centres, floor_of(*best, least), &mut reached);
             }
-            if reached != 0 {
-                row.search(best, start..end);
+            if reached {
+                row.search(best, block);
             }
-            start = end;
         }
     }
+}
+
+back_end_entry! {
+    /// Whether a sum around a known centre reaches a floor.
+    fn sift [] = sift_sums(sums: &[i32], centres: &[i32], floor: i64, reached: &mut bool)
+}
+
+back_end_entry! {
+    /// The smallest count of packed sums, or what was there if it is smaller.
+    fn least_count [] = least_of(sums: &[i64], least: &mut i64)
 }
 
 back_end_entry! {
@@ -93,6 +127,34 @@ back_end_entry! {
 back_end_entry! {
     /// a + b + c.
     fn add_three [] = three(a: &[i32], b: &[i32], c: &[i32], out: &mut [i32])
+}
+
+#[inline(always)]
+fn sift_sums<V: Lanes>(_: V, sums: &[i32], centres: &[i32], floor: i64, reached: &mut bool) {
+    let floor = if floor > i64::from(i32::MAX) {
+        i32::MAX
+    } else {
+        floor as i32
+    };
+    let centres = &centres[..sums.len()];
+    let mut any = 0_u32;
+    for i in 0..sums.len() {
+        let far = (sums[i] >= floor) | (sums[i] <= -floor);
+        any |= u32::from(far & (centres[i] != NO_RISE));
+    }
+    *reached = any != 0;
+}
+
+#[inline(always)]
+fn least_of<V: Lanes>(_: V, sums: &[i64], least: &mut i64) {
+    let mut smallest = i64::MAX;
+    for &packed in sums {
+        // Sums are of either sign: counts are next to whole.
+        let lifted = packed + (1 << (COUNT_BIT - 1));
+        smallest = if lifted < smallest { lifted } else { smallest };
+    }
+    let count = smallest >> COUNT_BIT;
+    *least = if count < *least { count } else { *least };
 }
 
 #[inline(always)]

@@ -26,6 +26,8 @@ pub struct Strip {
     /// Deviations of the last rows, the place of row v is v modulo their number.
     recent: Vec<i32>,
     kept: usize,
+    /// The columns of these rows outside of which there are none.
+    extents: Vec<Range<usize>>,
     /// A row without any.
     none: Vec<i32>,
     /// For each smoothing the packed sums down the columns, with half a side of padding at both ends.
@@ -64,6 +66,7 @@ impl Strip {
             rise: vec![NO_RISE; width],
             recent: vec![NO_RISE; width * kept],
             kept,
+            extents: vec![0..0; kept],
             none: vec![NO_RISE; width],
             sums: plan
                 .sides
@@ -141,6 +144,8 @@ impl Strip {
             row[..columns.start].fill(NO_RISE);
             row[columns.end..].fill(NO_RISE);
         }
+        let extent = &mut self.extents[v % self.kept];
+        *extent = 0..0;
         if columns.is_empty() {
             return 0;
         }
@@ -163,6 +168,7 @@ impl Strip {
             rise: &mut self.rise,
             deviation,
             tally,
+            extent,
         };
         let rises = plan.rises.row(v);
         rise_row(decoder.backend(), rises, seen, columns.clone(), risen);
@@ -227,7 +233,8 @@ impl Strip {
         for ((region, measure), covered) in plan.gauges.iter().zip(&mut found.covered) {
             if *measure == Measure::Coverage {
                 for (_, columns) in region.row(v) {
-                    count_known(backend, &self.rise[columns.clone()], covered);
+                    let columns = common(columns, &self.extents[v % self.kept]);
+                    count_known(backend, &self.rise[columns], covered);
                 }
             }
         }
@@ -249,21 +256,25 @@ impl Strip {
     /// Slides the sums of each smoothing down to row `v`, and looks at the squares that are complete with it. `first` is
     /// the first row that was worked on.
     fn smooth(&mut self, plan: &Production, v: usize, first: usize) {
+        let backend = plan.decoder.backend();
         let row = |v: usize| v % self.kept * self.width..(v % self.kept + 1) * self.width;
-        let bounds = plan.bounds.clone();
+        let known = |v: usize| match v >= first && v < plan.window.len() {
+            true => (&self.recent[row(v)], self.extents[v % self.kept].clone()),
+            false => (&self.none[..], 0..0),
+        };
         for (&side, sums) in plan.sides.iter().zip(&mut self.sums) {
             let half = side / 2;
-            let new = match v < plan.window.len() {
-                true => &self.recent[row(v)],
-                false => &self.none[..],
+            let (new, entering) = known(v);
+            let (old, leaving) = match v.checked_sub(2 * half + 1) {
+                Some(old) => known(old),
+                None => (&self.none[..], 0..0),
             };
-            let old = match v.checked_sub(2 * half + 1) {
-                Some(old) if old >= first => &self.recent[row(old)],
-                _ => &self.none[..],
-            };
-            let inside = &mut sums[half + bounds.start..half + bounds.end];
-            let (new, old) = (&new[bounds.clone()], &old[bounds.clone()]);
-            slide(plan.decoder.backend(), inside, new, old);
+            let changed = hull(entering, leaving);
+            let inside = &mut sums[half + changed.start..half + changed.end];
+            slide(backend, inside, &new[changed.clone()], &old[changed]);
+            let seen = (v.saturating_sub(2 * half)..=v)
+                .map(|v| known(v).1)
+                .fold(0..0, hull);
             let Some(centre) = v.checked_sub(half).filter(|v| self.rows.contains(v)) else {
                 continue;
             };
@@ -271,12 +282,13 @@ impl Strip {
             let wild = self.wild.is_some_and(|wild| wild + 2 * half >= v);
             let tame = !wild && Squares::hold(side);
             if tame {
-                self.squares.add(plan.decoder.backend(), sums, side);
+                self.squares.add(backend, sums, side, seen.clone());
             }
             let gauges = plan.gauges.iter().zip(&mut self.found.extremes);
             for ((region, measure), best) in gauges {
                 if *measure == (Measure::Deviation { side }) {
                     for (_, span) in region.row(centre) {
+                        let span = common(span, &seen);
                         let row = SquareRow {
                             sums,
                             centres,
@@ -284,9 +296,9 @@ impl Strip {
                             row: centre,
                         };
                         if tame {
-                            self.squares.search(best, &row, span.clone());
+                            self.squares.search(backend, best, &row, span);
                         } else {
-                            row.search(best, span.clone());
+                            row.search(best, span);
                         }
                     }
                 }
@@ -315,6 +327,21 @@ impl Strip {
             }
         }
         sum
+    }
+}
+
+/// The columns of both, possibly none.
+fn common(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    let start = a.start.max(b.start);
+    start..a.end.min(b.end).max(start)
+}
+
+/// The columns from the first to the last of either.
+fn hull(a: Range<usize>, b: Range<usize>) -> Range<usize> {
+    match (a.is_empty(), b.is_empty()) {
+        (true, _) => b,
+        (_, true) => a,
+        _ => a.start.min(b.start)..a.end.max(b.end),
     }
 }
 

@@ -128,6 +128,7 @@ impl Rises {
             rise: &mut rise,
             deviation: &mut vec![UNKNOWN; width],
             tally: &mut RowTally::default(),
+            extent: &mut (0..0),
         };
         rise_row(backend, self.row(v), seen, 0..width, risen);
         let bases = &self.surface.height[v * width..];

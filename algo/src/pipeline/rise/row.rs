@@ -66,6 +66,8 @@ pub(crate) struct Risen<'a> {
     pub deviation: &'a mut [i32],
     /// Sums.
     pub tally: &'a mut RowTally,
+    /// Columns outside of which no pixel is resolved.
+    pub extent: &'a mut Range<usize>,
 }
 
 /// Counts and sums of rises.
@@ -118,6 +120,7 @@ fn rise_columns<V: Lanes>(
     let scale = (1.0 / (plan.range * 65_536.0)) as f32;
     let tally = &mut *out.tally;
     let mut slopes = [0.0_f32; BLOCK];
+    *out.extent = 0..0;
     let mut start = columns.start;
     while start < columns.end {
         let end = (start + BLOCK).min(columns.end);
@@ -125,9 +128,9 @@ fn rise_columns<V: Lanes>(
         let trust = &seen.trust[start..end][..length];
         let rises = &mut out.rise[start..end][..length];
         let deviations = &mut out.deviation[start..end][..length];
-        let mut resolved = 0_u32;
+        let mut resolved = 0_u8;
         for &trust in trust {
-            resolved += u32::from(trust as u8 == Trust::Resolved as u8);
+            resolved += u8::from(trust as u8 == Trust::Resolved as u8);
         }
         if resolved == 0 {
             rises.fill(UNKNOWN);
@@ -136,6 +139,10 @@ fn rise_columns<V: Lanes>(
             continue;
         }
         tally.resolved += u64::from(resolved);
+        if out.extent.start >= out.extent.end {
+            out.extent.start = start;
+        }
+        out.extent.end = end;
         let base = &plan.base[start..end][..length];
         let first = &plan.first[start..end][..length];
         let second = &plan.second[start..end][..length];
