@@ -5,7 +5,7 @@
 //!
 //! - N = 4: S = I₀ − I₂, C = I₁ − I₃. At 8 bits all of it, the folding too, is done in bytes, exactly.
 //! - N = 3: S = (2I₀ − I₁ − I₂)/2, C = (√3/2)(I₁ − I₂).
-//! - any other N, and 3 or 4 of more than 12 bits: sums of products in 32 bits, with as many bits of weight as fit.
+//! - any other N, and 3 or 4 of more than 12 bits: sums of products in 32 bits with weights in Q14.
 
 use super::level::{LevelLanes, Samples};
 use crate::frame::Sample;

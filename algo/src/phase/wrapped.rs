@@ -12,7 +12,7 @@ pub struct Wrapped {
     pub(crate) width: usize,
     /// φ in 1/65536 turn.
     pub(crate) phase: Vec<u16>,
-    /// Modulation, full scale / 32767.5; 0 where weak.
+    /// Modulation in units of full scale / 32767.5; 0 where weak.
     pub(crate) modulation: Vec<u16>,
     /// [`WEAK`] and [`SATURATED`].
     pub(crate) doubts: Vec<u8>,

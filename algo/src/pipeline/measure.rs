@@ -80,18 +80,14 @@ pub fn decode(
     window: Option<Window<'_>>,
 ) -> Result<PhaseMap, DecodeError> {
     decoder.check(frames)?;
-    let (width, height) = (frames[0].width(), frames[0].height());
-    let mut phases = PhaseMap::new(width, height);
-    let map = map.unwrap_or(&[]);
-    for_each(
-        phases.rows(),
-        || (),
-        |v, row, ()| {
-            let known = map.get(v * width..(v + 1) * width).unwrap_or(&[]);
-            decoder.row(frames, v, known, columns(window, v, width), row);
+    Ok(each_row(
+        &frames[0],
+        map,
+        window,
+        |v, known, columns, row| {
+            decoder.row(frames, v, known, columns, row);
         },
-    );
-    Ok(phases)
+    ))
 }
 
 /// Demodulates the frames of one level (in the order of their shifts) before the finer ones are there. Blocks that the
@@ -129,18 +125,30 @@ pub fn decode_last(
     window: Option<Window<'_>>,
 ) -> Result<PhaseMap, DecodeError> {
     decoder.check_level(before.len(), last)?;
-    let (width, height) = (last[0].width(), last[0].height());
-    let mut phases = PhaseMap::new(width, height);
+    Ok(each_row(&last[0], map, window, |v, known, columns, row| {
+        decoder.last_row(before, last, v, known, columns, row);
+    }))
+}
+
+/// A phase map of frames like `frame`, each row decoded with the known map's row and the columns that are looked at.
+fn each_row(
+    frame: &FrameView<'_>,
+    map: Option<&[AbsolutePhase]>,
+    window: Option<Window<'_>>,
+    decode: impl Fn(usize, &[AbsolutePhase], Range<usize>, PhaseRow<'_>) + Sync + Send,
+) -> PhaseMap {
+    let width = frame.width();
+    let mut phases = PhaseMap::new(width, frame.height());
     let map = map.unwrap_or(&[]);
     for_each(
         phases.rows(),
         || (),
         |v, row, ()| {
             let known = map.get(v * width..(v + 1) * width).unwrap_or(&[]);
-            decoder.last_row(before, last, v, known, columns(window, v, width), row);
+            decode(v, known, columns(window, v, width), row);
         },
     );
-    Ok(phases)
+    phases
 }
 
 /// The columns of row `v` that a window lets through.
