@@ -16,7 +16,9 @@ mod lanes;
 mod neon;
 pub(crate) mod plain;
 mod portable;
+mod results;
 mod rows;
+#[cfg(target_arch = "x86_64")]
 mod twice;
 
 #[cfg(target_arch = "x86_64")]
@@ -25,7 +27,9 @@ pub(crate) use lanes::Lanes;
 #[cfg(target_arch = "aarch64")]
 pub(crate) use neon::Neon;
 pub(crate) use portable::Portable;
+pub(crate) use results::Results;
 pub(crate) use rows::Four;
+#[cfg(target_arch = "x86_64")]
 pub(crate) use twice::Twice;
 
 /// The instructions that the phase kernels are compiled for. All give the same bits.
@@ -102,7 +106,7 @@ macro_rules! back_end_entry {
                     unsafe { avx2(lanes, $($arg),*) }
                 }
                 #[cfg(target_arch = "aarch64")]
-                $crate::simd::Proof::Neon(lanes) => plain($crate::simd::Twice(lanes), $($arg),*),
+                $crate::simd::Proof::Neon(lanes) => plain(lanes, $($arg),*),
             }
         }
     };

@@ -3,7 +3,7 @@
 //! Demodulation is a chain of some forty dependent operations; a processor that looks ahead a few hundred instructions sees
 //! little more than one block of them. Two chains side by side keep it busy, and share every constant that is loaded.
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, Scaled};
 use super::rows::Four;
 
 /// A back-end's blocks in pairs.
@@ -84,10 +84,10 @@ impl<V: Lanes> Lanes for Twice<V> {
         ]
     }
     #[inline(always)]
-    fn by_high_nibble(self, table: &[u8; 16], x: Self::B) -> Self::B {
+    fn quarters8(self, half: Self::B, quarter: Self::B) -> Self::B {
         [
-            self.0.by_high_nibble(table, x[0]),
-            self.0.by_high_nibble(table, x[1]),
+            self.0.quarters8(half[0], quarter[0]),
+            self.0.quarters8(half[1], quarter[1]),
         ]
     }
     #[inline(always)]
@@ -96,11 +96,11 @@ impl<V: Lanes> Lanes for Twice<V> {
     }
     #[inline(always)]
     fn all8(self, mask: Self::B) -> bool {
-        self.0.all8(mask[0]) && self.0.all8(mask[1])
+        self.0.all8(self.0.and8(mask[0], mask[1]))
     }
     #[inline(always)]
     fn none8(self, mask: Self::B) -> bool {
-        self.0.none8(mask[0]) && self.0.none8(mask[1])
+        self.0.none8(self.0.or8(mask[0], mask[1]))
     }
     #[inline(always)]
     fn widen(self, low: Self::B, high: Self::B) -> [Self::W; 2] {
@@ -108,12 +108,34 @@ impl<V: Lanes> Lanes for Twice<V> {
         [[first[0], second[0]], [first[1], second[1]]]
     }
     #[inline(always)]
-    fn widen_scaled(self, x: Self::B, scale: Self::B) -> [Self::W; 2] {
-        let (first, second) = (
-            self.0.widen_scaled(x[0], scale[0]),
-            self.0.widen_scaled(x[1], scale[1]),
-        );
+    fn signs(self, mask: Self::B) -> [Self::W; 2] {
+        let (first, second) = (self.0.signs(mask[0]), self.0.signs(mask[1]));
         [[first[0], second[0]], [first[1], second[1]]]
+    }
+    #[inline(always)]
+    fn widen_256(self, x: Self::B) -> [Self::W; 2] {
+        let (first, second) = (self.0.widen_256(x[0]), self.0.widen_256(x[1]));
+        [[first[0], second[0]], [first[1], second[1]]]
+    }
+    #[inline(always)]
+    fn widen_128(self, x: Self::B) -> [Self::W; 2] {
+        let (first, second) = (self.0.widen_128(x[0]), self.0.widen_128(x[1]));
+        [[first[0], second[0]], [first[1], second[1]]]
+    }
+    #[inline(always)]
+    fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W> {
+        let (first, second) = (
+            self.0.scaled(long[0], short[0]),
+            self.0.scaled(long[1], short[1]),
+        );
+        Scaled {
+            long: [[first.long[0], second.long[0]], [first.long[1], second.long[1]]],
+            short: [[first.short[0], second.short[0]], [first.short[1], second.short[1]]],
+            centred: [
+                [first.centred[0], second.centred[0]],
+                [first.centred[1], second.centred[1]],
+            ],
+        }
     }
     #[inline(always)]
     fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B {
@@ -145,6 +167,13 @@ impl<V: Lanes> Lanes for Twice<V> {
         [self.0.sub(a[0], b[0]), self.0.sub(a[1], b[1])]
     }
     #[inline(always)]
+    fn add_signed(self, a: Self::W, b: Self::W, sign: Self::W) -> Self::W {
+        [
+            self.0.add_signed(a[0], b[0], sign[0]),
+            self.0.add_signed(a[1], b[1], sign[1]),
+        ]
+    }
+    #[inline(always)]
     fn add_sat(self, a: Self::W, b: Self::W) -> Self::W {
         [self.0.add_sat(a[0], b[0]), self.0.add_sat(a[1], b[1])]
     }
@@ -165,10 +194,6 @@ impl<V: Lanes> Lanes for Twice<V> {
         [self.0.sar::<N>(x[0]), self.0.sar::<N>(x[1])]
     }
     #[inline(always)]
-    fn shr<const N: i32>(self, x: Self::W) -> Self::W {
-        [self.0.shr::<N>(x[0]), self.0.shr::<N>(x[1])]
-    }
-    #[inline(always)]
     fn left(self, n: u8) -> Self::Count {
         self.0.left(n)
     }
@@ -183,6 +208,10 @@ impl<V: Lanes> Lanes for Twice<V> {
     #[inline(always)]
     fn sar_by(self, x: Self::W, n: Self::Count) -> Self::W {
         [self.0.sar_by(x[0], n), self.0.sar_by(x[1], n)]
+    }
+    #[inline(always)]
+    fn shr_by(self, x: Self::W, n: Self::Count) -> Self::W {
+        [self.0.shr_by(x[0], n), self.0.shr_by(x[1], n)]
     }
     #[inline(always)]
     fn halve(self, x: Self::W) -> Self::W {
