@@ -120,19 +120,19 @@ impl<V: Lanes> RatedLanes<V> {
         if self.plan.one {
             return x.phase;
         }
-        let order = x.nearest(v);
-        let orders = v.add(v.mul_low(order, self.high), v.mul_q15(order, self.low));
-        let mut product = v.add(orders, v.mul_q15(x.phase, self.part));
-        if self.plan.whole != 0 {
-            product = v.add(product, v.mul_low(x.phase, self.whole));
+        let product = self.part_times(v, x);
+        if self.plan.whole == 0 {
+            return product;
         }
-        product
+        v.add(product, v.mul_low(x.phase, self.whole))
     }
 
-    /// q = φ − frac(r·Φ₀) of half a block.
+    /// frac(r·x) of a ratio below 1.
     #[inline(always)]
-    fn relative(&self, v: V, level: &Demodulated<V>, half: usize, map: Turns<V>) -> V::W {
-        v.sub(level.phase[half], self.times(v, map))
+    fn part_times(&self, v: V, x: Turns<V>) -> V::W {
+        let order = x.nearest(v);
+        let orders = v.add(v.mul_low(order, self.high), v.mul_q15(order, self.low));
+        v.add(orders, v.mul_q15(x.phase, self.part))
     }
 }
 
@@ -193,7 +193,7 @@ impl<V: Lanes> AboutLanes<V> {
                 first: RatedLanes::new(v, plan.first),
                 fast: StepLanes::new(v, &plan.fast),
                 second,
-                mean: MeanLanes::new::<LEVELS>(v, &plan.mean),
+                mean: MeanLanes::new::<LEVELS>(v, &plan.mean)?,
             });
         }
         Some(Self {
@@ -214,10 +214,13 @@ impl<V: Lanes> AboutLanes<V> {
     ) -> Unwrapped<V> {
         let (phase, order) = v.split(known);
         let map = Turns { order, phase };
-        let q1 = self.finest.relative(v, &levels.finest, half, map);
+        let finest = &levels.finest;
         match &self.dense {
-            Some(dense) => dense.unwrap(v, known, map, q1, levels, half),
-            None => self.single(v, known, q1, levels.finest.modulation[half]),
+            Some(dense) => dense.unwrap(v, known, map, levels, half),
+            None => {
+                let q1 = v.sub(finest.phase[half], self.finest.times(v, map));
+                self.single(v, known, q1, finest.modulation[half])
+            }
         }
     }
 
@@ -246,16 +249,17 @@ impl<V: Lanes> DenseLanes<V> {
         v: V,
         known: [V::D; 2],
         map: Turns<V>,
-        q1: V::W,
         levels: &Around<V>,
         half: usize,
     ) -> Unwrapped<V> {
         let zero = v.splat16(0);
-        let q3 = self.first.relative(v, &levels.first, half, map);
+        // Of several levels the finest has ratio 1, the others less.
+        let q1 = v.sub(levels.finest.phase[half], map.phase);
+        let q3 = v.sub(levels.first.phase[half], self.first.part_times(v, map));
         let beat = v.sub(q1, q3);
         let (mut left, mut q2) = (zero, zero);
         let ahead = if let Some((rated, slow)) = &self.second {
-            q2 = rated.relative(v, &levels.second, half, map);
+            q2 = v.sub(levels.second.phase[half], rated.part_times(v, map));
             let slow_beat = v.sub(q1, q2);
             let [above, _] = slow.ahead_of_start(v, [slow_beat; 2]);
             let climbed;
@@ -265,13 +269,13 @@ impl<V: Lanes> DenseLanes<V> {
             self.fast.ahead_of_start(v, [beat; 2])[0]
         };
         let (d1, left_fast) = self.fast.land(v, ahead, q1);
-        let e3 = v.sub(self.first.times(v, d1), q3);
+        let e3 = v.sub(self.first.part_times(v, d1), q3);
         left = v.max_unsigned(left, v.max_unsigned(left_fast, farness(v, e3)));
         let mut e2 = zero;
         if let Some((rated, _)) = &self.second {
             // About the mean so far, as far as it matters for trust.
             let moved = self.mean.moved(v, e3);
-            e2 = v.sub(v.sub(rated.times(v, d1), q2), moved);
+            e2 = v.sub(v.sub(rated.part_times(v, d1), q2), moved);
             left = v.max_unsigned(left, farness(v, e2));
         }
         let (correction, modulation) = self.mean.of(v, levels, half, e3, e2);

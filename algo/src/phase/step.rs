@@ -31,10 +31,16 @@ pub(super) struct Step {
 /// fine phase.
 const LEAST_BITS: f64 = 4.0;
 
+/// An n this near to a whole number is that number: over 1000 turns 1e-6 turn.
+const WHOLE: f64 = 1e-9;
+
 impl Step {
     /// From phases of at most `reach` turns either way of an origin to n times as many; `behind` is n · that origin less the
     /// origin of the fine phase, in turns. `None` if a word cannot hold the fine ones with enough precision.
     pub fn new(n: f64, reach: f64, behind: f64) -> Option<Self> {
+        // A whole n that comes out of ratios is off in its last digits.
+        let next = libm::rint(n);
+        let n = if libm::fabs(n - next) < WHOLE { next } else { n };
         let order_bits = if reach <= 0.5 {
             0.0
         } else {

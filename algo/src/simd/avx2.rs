@@ -92,7 +92,10 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     fn fetch_ahead<T>(self, from: &Four<'_, T>, at: usize) {
-        // Twelve rows are more than the processor follows by itself.
+        // Twelve rows are more than the processor follows by itself. Two blocks are a line of its cache.
+        if !(at / BYTES).is_multiple_of(2) {
+            return;
+        }
         for row in from.rows() {
             let ahead = row
                 .as_ptr()

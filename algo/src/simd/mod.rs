@@ -18,8 +18,6 @@ pub(crate) mod plain;
 mod portable;
 mod results;
 mod rows;
-#[cfg(target_arch = "x86_64")]
-mod twice;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
@@ -29,8 +27,6 @@ pub(crate) use neon::Neon;
 pub(crate) use portable::Portable;
 pub(crate) use results::Results;
 pub(crate) use rows::Four;
-#[cfg(target_arch = "x86_64")]
-pub(crate) use twice::Twice;
 
 /// The instructions that the phase kernels are compiled for. All give the same bits.
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +88,7 @@ macro_rules! back_end_entry {
             #[target_feature(enable = "avx2")]
             #[inline(never)]
             fn avx2<$($generics)*>(lanes: $crate::simd::Avx2, $($arg: $type),*) {
-                $kernel($crate::simd::Twice(lanes), $($arg),*);
+                $kernel(lanes, $($arg),*);
             }
             #[inline(never)]
             fn plain<$($generics)*>(lanes: impl $crate::simd::Lanes, $($arg: $type),*) {

@@ -195,6 +195,15 @@ fn store<V: Lanes>(
         brightest: light.brightest,
         left: [low.left, high.left],
     };
+    if doubts.none(v, light.strong) {
+        let modulation = [
+            v.add(low.modulation, low.modulation),
+            v.add(high.modulation, high.modulation),
+        ];
+        let resolved = v.splat8(Trust::Resolved as u8);
+        out.store(v, at, [low.phase, high.phase], modulation, resolved);
+        return;
+    }
     let first = known.first(v, light.lit, doubts.first(v));
     let trusted = none(v, first);
     let unknown = v.splat32(AbsolutePhase::UNKNOWN.to_bits());
