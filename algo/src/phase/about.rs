@@ -205,13 +205,7 @@ impl<V: Lanes> AboutLanes<V> {
 
     /// Unwraps half a block (`half` 0 or 1) about `known`, Φ₀ in 1/65536 turn.
     #[inline(always)]
-    pub fn unwrap(
-        &self,
-        v: V,
-        known: [V::D; 2],
-        levels: &Around<V>,
-        half: usize,
-    ) -> Unwrapped<V> {
+    pub fn unwrap(&self, v: V, known: [V::D; 2], levels: &Around<V>, half: usize) -> Unwrapped<V> {
         let (phase, order) = v.split(known);
         let map = Turns { order, phase };
         let finest = &levels.finest;

@@ -126,7 +126,10 @@ impl Arrived {
     pub(super) fn wrapped_rows(&self, v: usize) -> heapless::Vec<WrappedRow<'_>, MAX_LEVELS> {
         match &self.planes {
             Planes::Climbed(_) => heapless::Vec::new(),
-            Planes::Wrapped(levels) => levels.iter().map(|level| level.row(self.width, v)).collect(),
+            Planes::Wrapped(levels) => levels
+                .iter()
+                .map(|level| level.row(self.width, v))
+                .collect(),
         }
     }
 
@@ -162,7 +165,6 @@ impl Arrived {
         }
     }
 }
-
 
 impl Wrapped {
     fn row(&self, width: usize, v: usize) -> WrappedRow<'_> {

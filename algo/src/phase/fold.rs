@@ -63,9 +63,7 @@ pub(super) fn fold<V: Lanes, T: BlockSample>(
     at: usize,
 ) -> Folded<V> {
     let mut folded = match (&level.plan.samples, rows) {
-        (Samples::Four, &[a, b, c, d]) => {
-            T::four(v, level, &Four::new([a, b, c, d], a.len()), at)
-        }
+        (Samples::Four, &[a, b, c, d]) => T::four(v, level, &Four::new([a, b, c, d], a.len()), at),
         (Samples::Three, &[a, b, c]) => three(v, level, [a, b, c], at),
         _ => weighted(v, level, &level.plan.weights, rows, at),
     };
@@ -117,12 +115,7 @@ impl BlockSample for u8 {
     }
 
     #[inline(always)]
-    fn saturated<V: Lanes>(
-        v: V,
-        _level: &LevelLanes<'_, V>,
-        row: &[Self],
-        at: usize,
-    ) -> V::B {
+    fn saturated<V: Lanes>(v: V, _level: &LevelLanes<'_, V>, row: &[Self], at: usize) -> V::B {
         v.eq8(v.load8(row, at), v.splat8(u8::MAX))
     }
 }
@@ -174,14 +167,7 @@ impl BlockSample for u16 {
 
 /// Mask: one of the samples is at full scale or above.
 #[inline(always)]
-fn any_full<V: Lanes>(
-    v: V,
-    level: &LevelLanes<'_, V>,
-    a: V::W,
-    b: V::W,
-    c: V::W,
-    d: V::W,
-) -> V::W {
+fn any_full<V: Lanes>(v: V, level: &LevelLanes<'_, V>, a: V::W, b: V::W, c: V::W, d: V::W) -> V::W {
     // With the sign bit turned the order of unsigned words is that of signed ones.
     let turn = v.splat16(i16::MIN);
     let (a, b) = (v.xor(a, turn), v.xor(b, turn));
@@ -320,12 +306,7 @@ fn add_part<V: Lanes>(
 
 /// Mask: S² + C² of the sums is at least the level's least power, in singles (1e-7).
 #[inline(always)]
-fn enough_sums<V: Lanes>(
-    v: V,
-    level: &LevelLanes<'_, V>,
-    s: [V::D; 2],
-    c: [V::D; 2],
-) -> V::W {
+fn enough_sums<V: Lanes>(v: V, level: &LevelLanes<'_, V>, s: [V::D; 2], c: [V::D; 2]) -> V::W {
     let below = level.below_least_sum_power;
     let (s0, s1) = (v.to_single(s[0]), v.to_single(s[1]));
     let (c0, c1) = (v.to_single(c[0]), v.to_single(c[1]));

@@ -16,9 +16,9 @@ mod step;
 mod unwrap;
 
 pub use crate::trust::{MIN_MODULATION_8_BIT, Trust};
+pub use arrived::Arrived;
 pub use decode::{DecodeError, Decoder, PhaseRow};
 pub use level::FULL_TRUST_STEPS;
-pub use arrived::Arrived;
 
 #[cfg(test)]
 mod tests;

@@ -138,7 +138,12 @@ impl Decoder {
         match row {
             ArrivingRow::Climbing(out) => {
                 let mut few = FewClimbed::new(out.as_row(), &columns);
-                self.arrive(level, &rows, MAX_PIXELS, ArrivingRow::Climbing(few.row_mut()));
+                self.arrive(
+                    level,
+                    &rows,
+                    MAX_PIXELS,
+                    ArrivingRow::Climbing(few.row_mut()),
+                );
                 out.fraction.copy_from_slice(&few.fraction[..width]);
                 out.turns.copy_from_slice(&few.turns[..width]);
                 out.doubt.copy_from_slice(&few.doubt[..width]);

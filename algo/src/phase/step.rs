@@ -40,7 +40,11 @@ impl Step {
     pub fn new(n: f64, reach: f64, behind: f64) -> Option<Self> {
         // A whole n that comes out of ratios is off in its last digits.
         let next = libm::rint(n);
-        let n = if libm::fabs(n - next) < WHOLE { next } else { n };
+        let n = if libm::fabs(n - next) < WHOLE {
+            next
+        } else {
+            n
+        };
         let order_bits = if reach <= 0.5 {
             0.0
         } else {

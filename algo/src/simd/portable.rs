@@ -152,7 +152,9 @@ impl Lanes for Portable {
     }
     #[inline(never)]
     fn signs(self, mask: Self::B) -> [Self::W; 2] {
-        halves(mask, |mask| lanes(mask, |mask| if mask == 0 { 1 } else { -1 }))
+        halves(mask, |mask| {
+            lanes(mask, |mask| if mask == 0 { 1 } else { -1 })
+        })
     }
     #[inline(never)]
     fn widen_256(self, x: Self::B) -> [Self::W; 2] {

@@ -31,8 +31,8 @@ pub(crate) fn climb_row<T: BlockSample>(
     let out = &mut out;
     match (rows, &fours[..]) {
         (&[a], _) => single(backend, plan, levels, a, columns, out),
-        (&[_, _], &[a, b]) => fused(backend, plan, levels, a, [], b, columns, out),
-        (&[_, _, _], &[a, b, c]) => fused(backend, plan, levels, a, [b], c, columns, out),
+        (&[_, _], &[a, b]) => fused(backend, plan, levels, (a, [], b), columns, out),
+        (&[_, _, _], &[a, b, c]) => fused(backend, plan, levels, (a, [b], c), columns, out),
         _ => in_turn(backend, plan, levels, rows, columns, out),
     }
     plan.finish(&mut out.phase[part]);
@@ -126,9 +126,7 @@ back_end_entry! {
     fn fused [S: Frames, const BETWEEN: usize] = fused_columns(
         plan: &Geometric,
         levels: &[Level],
-        coarsest: S,
-        between: [S; BETWEEN],
-        finest: S,
+        frames: (S, [S; BETWEEN], S),
         columns: Range<usize>,
         out: &mut Results<'_>,
     )
@@ -319,13 +317,7 @@ impl<'a, V: Lanes, S: Frames> Rung<'a, V, S> {
 
     /// Up to this level, and the modulation there.
     #[inline(always)]
-    fn fine(
-        &self,
-        v: V,
-        ground: &Ground<V>,
-        below: &Below<V>,
-        at: usize,
-    ) -> (Climb<V>, [V::W; 2]) {
+    fn fine(&self, v: V, ground: &Ground<V>, below: &Below<V>, at: usize) -> (Climb<V>, [V::W; 2]) {
         let folded = self.frames.fold(v, &self.level, at);
         let block = (self.level).fine(v, &ground.angle, &folded, S::DOUBLED);
         let climb = self.land(v, below, block.phase, &folded);
@@ -380,9 +372,7 @@ fn fused_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
     v: V,
     plan: &Geometric,
     levels: &[Level],
-    coarsest: S,
-    between: [S; BETWEEN],
-    finest: S,
+    (coarsest, between, finest): (S, [S; BETWEEN], S),
     columns: Range<usize>,
     out: &mut Results<'_>,
 ) {
@@ -395,9 +385,8 @@ fn fused_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
     let level = LevelLanes::new(v, first);
     let finest = Rung::new(v, step, last, finest);
     let mut rungs = [finest; BETWEEN];
-    for (rung, ((step, level), frames)) in rungs
-        .iter_mut()
-        .zip(steps.iter().zip(middle).zip(between))
+    for (rung, ((step, level), frames)) in
+        rungs.iter_mut().zip(steps.iter().zip(middle).zip(between))
     {
         *rung = Rung::new(v, step, level, frames.first(columns.end));
     }
@@ -426,7 +415,11 @@ fn fused_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
 }
 
 /// Four rows up to the end of the columns, of a level whose samples are subtracted in pairs.
-pub(super) fn four<'a, T>(level: &Level, rows: &[&'a [T]], columns: &Range<usize>) -> Option<Four<'a, T>> {
+pub(super) fn four<'a, T>(
+    level: &Level,
+    rows: &[&'a [T]],
+    columns: &Range<usize>,
+) -> Option<Four<'a, T>> {
     match (level.samples, rows) {
         (Samples::Four, &[a, b, c, d]) => Some(Four::new([a, b, c, d], columns.end)),
         _ => None,

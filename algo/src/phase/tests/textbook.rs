@@ -67,7 +67,11 @@ fn the_modulation_threshold_is_sixteen_counts_exactly() {
     assert_eq!(with(131).row().doubts, [1; 33]);
     let thirds = level(&[0.0, 1.0 / 3.0, 2.0 / 3.0], 8);
     // B = (2/3) · 24 = 16.
-    let found = |first| wrap(&thirds, 8, &[row(first), row(100), row(100)]).row().doubts[32];
+    let found = |first| {
+        wrap(&thirds, 8, &[row(first), row(100), row(100)])
+            .row()
+            .doubts[32]
+    };
     assert_eq!((found(124), found(123)), (0, 1));
 }
 
