@@ -27,7 +27,9 @@ impl<T: BlockSample> Frames for Four<'_, T> {
 
     #[inline(always)]
     fn fold<V: Lanes>(&self, v: V, level: &LevelLanes<'_, V>, at: usize) -> Folded<V> {
-        v.fetch_ahead(self, at);
+        for row in self.rows() {
+            v.fetch_ahead(row, at);
+        }
         T::four(v, level, self, at)
     }
 }

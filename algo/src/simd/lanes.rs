@@ -45,9 +45,11 @@ pub(crate) trait Lanes: Copy + Debug {
     fn load8(self, from: &[u8], at: usize) -> Self::B;
     /// The blocks of four rows that start at `at`.
     fn load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [Self::B; 4];
-    /// Has what lies some blocks after `at` in four rows fetched, where waiting for it would cost. Rows follow one another
-    /// in memory, so past the end of one lies the next.
-    fn fetch_ahead<T>(self, from: &Four<'_, T>, at: usize);
+    /// Has what lies some blocks after `at` fetched, where waiting for it would cost. Rows follow one another in memory, so
+    /// past the end of one lies the next.
+    fn fetch_ahead<T>(self, row: &[T], at: usize);
+    /// The same for what is going to be written.
+    fn claim_ahead<T>(self, row: &[T], at: usize);
     /// Into the block of `to` that starts at `at`.
     fn store8(self, to: &mut [u8], at: usize, x: Self::B);
     /// The smaller.

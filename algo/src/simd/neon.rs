@@ -44,7 +44,9 @@ impl Lanes for Neon {
         unsafe { [vld1q_u8(a), vld1q_u8(b), vld1q_u8(c), vld1q_u8(d)] }
     }
     #[inline(always)]
-    fn fetch_ahead<T>(self, _from: &Four<'_, T>, _at: usize) {}
+    fn fetch_ahead<T>(self, _row: &[T], _at: usize) {}
+    #[inline(always)]
+    fn claim_ahead<T>(self, _row: &[T], _at: usize) {}
     #[inline(always)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
         let block = block_mut(to, at, BYTES);

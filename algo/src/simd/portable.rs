@@ -85,7 +85,9 @@ impl Lanes for Portable {
         from.rows().map(|row| self.load8(row, at))
     }
     #[inline(always)]
-    fn fetch_ahead<T>(self, _from: &Four<'_, T>, _at: usize) {}
+    fn fetch_ahead<T>(self, _row: &[T], _at: usize) {}
+    #[inline(always)]
+    fn claim_ahead<T>(self, _row: &[T], _at: usize) {}
     #[inline(never)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
         to[at..at + BYTES].copy_from_slice(&x);

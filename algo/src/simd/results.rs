@@ -51,6 +51,9 @@ impl<'a> Results<'a> {
         modulation: [V::W; 2],
         trust: V::B,
     ) {
+        v.claim_ahead(self.phase, at);
+        v.claim_ahead(self.modulation, at);
+        v.claim_ahead(self.trust, at);
         v.store32(self.phase, at, phase);
         v.store16(self.modulation, at, modulation);
         // SAFETY: `Trust` is one byte, and its numbers are 0 to `LAST`: no byte above is stored.

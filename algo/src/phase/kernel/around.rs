@@ -161,6 +161,7 @@ impl<V: Lanes> Known<V> {
     #[inline(always)]
     fn new(v: V, map: &[i32], at: usize) -> Self {
         let unknown = v.splat32(AbsolutePhase::UNKNOWN.to_bits());
+        v.fetch_ahead(map, at);
         let phase = v.load32(map, at);
         let unexpected = v.narrow_mask([
             v.narrow_mask32([v.eq32(phase[0][0], unknown), v.eq32(phase[0][1], unknown)]),

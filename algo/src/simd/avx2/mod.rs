@@ -3,12 +3,12 @@
 //! AVX2 widens within each half of a vector, so the first `W` of a block holds its pixels 0–7 and 16–23, the second
 //! 8–15 and 24–31; narrowing undoes it.
 
-mod halves;
+mod memory;
 
 use super::lanes::{Lanes, Scaled};
 use super::rows::{Four, block, block_mut};
 use core::arch::x86_64::*;
-use halves::{load_halves, store_halves};
+use memory::{hint_ahead, load_halves, store_halves};
 
 /// AVX2 is there: only [`Avx2::detect`] makes one.
 #[derive(Clone, Copy, Debug)]
@@ -26,8 +26,6 @@ impl Avx2 {
 }
 
 const BYTES: usize = 32;
-/// How far ahead rows are fetched, bytes: some 400 ns of work.
-const AHEAD: usize = 512;
 
 /// Calls intrinsics of AVX2. Sound because `self` proves that the processor has it.
 macro_rules! avx2 {
@@ -70,20 +68,12 @@ impl Lanes for Avx2 {
         }
     }
     #[inline(always)]
-    fn fetch_ahead<T>(self, from: &Four<'_, T>, at: usize) {
-        // Twelve rows are more than the processor follows by itself. Two blocks are a line of its cache.
-        if !(at / BYTES).is_multiple_of(2) {
-            return;
-        }
-        for row in from.rows() {
-            let ahead = row
-                .as_ptr()
-                .wrapping_add(at)
-                .cast::<i8>()
-                .wrapping_add(AHEAD);
-            // SAFETY: a hint, which no address makes fail.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(ahead) };
-        }
+    fn fetch_ahead<T>(self, row: &[T], at: usize) {
+        hint_ahead::<T, _MM_HINT_T0>(row, at);
+    }
+    #[inline(always)]
+    fn claim_ahead<T>(self, row: &[T], at: usize) {
+        hint_ahead::<T, _MM_HINT_ET0>(row, at);
     }
     #[inline(always)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {

@@ -1,8 +1,13 @@
-//! Vectors in memory whose halves AVX2 keeps apart.
+//! Memory: vectors whose halves AVX2 keeps apart, and what will be wanted soon.
 
 use super::BYTES;
 use crate::simd::rows::{block, block_mut};
 use core::arch::x86_64::*;
+
+/// How many blocks ahead rows are fetched: some 500 ns of work.
+const AHEAD: usize = 16;
+/// A line of the cache, bytes.
+const LINE: usize = 64;
 
 /// The four sixteenths (or eighths) of a block, by where AVX2 puts them: for each `W` or pair of `D`s the pieces of
 /// 128 bits for its lower and upper half.
@@ -25,5 +30,23 @@ pub(super) fn store_halves<T>(to: &mut [T], at: usize, low: usize, high: usize, 
     unsafe {
         let start = block.as_mut_ptr();
         _mm256_storeu2_m128i(start.add(high).cast(), start.add(low).cast(), x);
+    }
+}
+
+/// Hints at the lines of the block that is [`AHEAD`] blocks after the one at `at`: more rows than the processor follows by
+/// itself.
+#[inline(always)]
+pub(super) fn hint_ahead<T, const HINT: i32>(row: &[T], at: usize) {
+    let lines = BYTES * size_of::<T>() / LINE;
+    // Two blocks of bytes are one line.
+    if lines == 0 && !(at / BYTES).is_multiple_of(2) {
+        return;
+    }
+    let ahead = row.as_ptr().wrapping_add(at + AHEAD * BYTES).cast::<i8>();
+    let mut line = 0;
+    while line < lines.max(1) {
+        // SAFETY: a hint, which no address makes fail.
+        unsafe { _mm_prefetch::<HINT>(ahead.wrapping_add(line * LINE)) };
+        line += 1;
     }
 }
