@@ -32,6 +32,7 @@ pub(crate) fn climb_row<T: BlockSample>(
         (&[a], _) => single(backend, plan, levels, a, columns, out),
         (&[_, _], &[a, b]) => fused(backend, plan, levels, (a, [], b), columns, out),
         (&[_, _, _], &[a, b, c]) => fused(backend, plan, levels, (a, [b], c), columns, out),
+        (&[a, b, c], _) => fused(backend, plan, levels, (a, [b], c), columns, out),
         _ => in_turn(backend, plan, levels, rows, columns, out),
     }
     plan.finish(&mut out.phase[part]);
