@@ -10,6 +10,7 @@ pub mod config;
 pub mod daemon;
 pub mod error;
 pub mod experiment;
+pub mod history;
 pub mod latest;
 pub mod measure;
 pub mod modbus;
