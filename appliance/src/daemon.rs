@@ -3,10 +3,11 @@
 //! One OS thread measures ([`crate::worker`]), one serves sockets on a current-thread runtime, and
 //! the station is plain values behind a handle that both use.
 
+use crate::access::Access;
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
+use crate::history::Reader;
 use crate::latest::LastMaps;
-use crate::output::picture::height_png;
 use crate::progress::Progress;
 use crate::state::{Counter, StateFolder, random};
 use crate::station::snapshot::status;
@@ -14,6 +15,7 @@ use crate::station::{
     Effect, Event, Identity, Limits, Micros, RecipeKey, RecipeResult, Request, Settings, Snapshot,
     Station, StationHandle, tick,
 };
+use crate::tally::Tally;
 use crate::worker::{Order, Worker};
 use crate::{backend, clock, modbus, web};
 use hal::sim::Stage;
@@ -66,17 +68,36 @@ impl Daemon {
             None => StateFolder::default_path()?,
         };
         let state = StateFolder::open(&path)?;
+        let access = open_access(&state)?;
         let runtime = runtime()?;
         let (plc, page) = runtime.block_on(listen(config))?;
         let (modbus, http) = (address_of(&plc)?, address_of(&page)?);
         let (orders, inbox) = mpsc::channel();
-        let sink = effects(orders.clone(), state.counter(), progress.clone());
+        let tally = Tally::default();
+        let sink = effects(
+            orders.clone(),
+            state.counter(),
+            progress.clone(),
+            tally.clone(),
+        );
         let station = StationHandle::new(station(config, &state)?, Instant::now(), sink);
         let maps = LastMaps::default();
         let (sockets, stopped) = watch::channel(false);
         let serving = {
-            let (station, maps, config) = (station.clone(), maps.clone(), config.clone());
-            let serve = move || runtime.block_on(serve(plc, page, station, maps, &config, stopped));
+            let site = web::Site::new(web::Parts {
+                station: station.clone(),
+                access,
+                recipes: state.recipes().clone(),
+                maps: maps.clone(),
+                history: Reader::of(&path),
+                tally,
+                log: progress.logbook().clone(),
+                registers: modbus::live,
+                configuration: toml::to_string(config).unwrap_or_default(),
+                hosts: config.http.hosts.clone(),
+            });
+            let (station, config) = (station.clone(), config.clone());
+            let serve = move || runtime.block_on(serve(plc, page, station, site, &config, stopped));
             spawn("sockets", serve)?
         };
         let (opened, opening) = mpsc::channel();
@@ -187,6 +208,21 @@ impl Stopping {
     }
 }
 
+/// Opens the way in; the secret of a new device is shown here and never again.
+fn open_access(state: &StateFolder) -> Result<Access, Failure> {
+    let folder = state.place("access");
+    let (access, secret) = Access::open(&folder)?;
+    if let Some(secret) = secret {
+        // Whatever is quiet: without it nobody could ever sign in.
+        eprintln!(
+            "fringed: the secret of this device, shown this once: {secret} (sign in on the page with it; for another one \
+             delete {} and start again)",
+            folder.join("secret").display()
+        );
+    }
+    Ok(access)
+}
+
 /// A current-thread runtime.
 ///
 /// # Errors
@@ -248,6 +284,7 @@ fn effects(
     orders: mpsc::Sender<Order>,
     counter: Counter,
     progress: Progress,
+    tally: Tally,
 ) -> impl FnMut(Effect) {
     // An order that nobody takes is noticed by the station itself: its wait has a deadline.
     let order = move |order| drop(orders.send(order));
@@ -266,7 +303,7 @@ fn effects(
         // A sequence is short and every wait in it has a time-out: it ends by itself, and the station
         // drops its answer.
         Effect::Abort { .. } => {}
-        Effect::Publish(_) => {}
+        Effect::Publish(result) => tally.add(result.verdict),
     }
 }
 
@@ -289,7 +326,7 @@ async fn serve(
     plc: TcpListener,
     page: TcpListener,
     station: StationHandle,
-    maps: LastMaps,
+    site: web::Site,
     config: &Config,
     stopped: watch::Receiver<bool>,
 ) {
@@ -305,24 +342,9 @@ async fn serve(
         strict_unit_id: config.modbus.strict_unit_id,
         ..modbus::Options::default()
     };
-    let picture = move || {
-        let maps = maps.get()?;
-        let rows = maps.height_mm.len() / maps.width.max(1);
-        Some(height_png(maps.width as u32, rows as u32, &maps.height_mm))
-    };
-    let site = web::Site::new(
-        station.clone(),
-        Arc::new(picture),
-        config.http.hosts.clone(),
-    );
-    let pages = async {
-        if let Err(error) = web::serve(page, site, stop()).await {
-            eprintln!("fringed: {error}");
-        }
-    };
     tokio::join!(
         tick(station.clone(), clock::utc_us, stop()),
         modbus::serve(plc, station, options, stop()),
-        pages,
+        web::serve(page, site, stop()),
     );
 }

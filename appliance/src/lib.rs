@@ -1,5 +1,6 @@
 //! The daemon `fringed` and its command line: joins devices (`hal`) and computation (`algo`).
 
+pub mod access;
 pub mod adapt;
 pub mod backend;
 pub mod benchmark;
@@ -12,6 +13,7 @@ pub mod error;
 pub mod experiment;
 pub mod history;
 pub mod latest;
+pub mod logbook;
 pub mod measure;
 pub mod modbus;
 pub mod output;
@@ -22,5 +24,6 @@ pub mod rig;
 pub mod seam;
 pub mod state;
 pub mod station;
+pub mod tally;
 pub mod web;
 pub mod worker;

@@ -76,6 +76,11 @@ impl StateFolder {
         &self.recipes
     }
 
+    /// Where a part of the state lies that somebody else opens.
+    pub fn place(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
     /// The SEQ of the next result.
     ///
     /// # Errors

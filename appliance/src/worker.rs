@@ -1,7 +1,7 @@
 //! The measuring task: one thread that owns the head, the plan and the computing threads.
 
 use crate::backend::Opened;
-use crate::latest::LastMaps;
+use crate::latest::{LastCycle, LastMaps};
 use crate::plan::{Plan, PlanError};
 use crate::progress::Progress;
 use crate::recipe::teach::{Naming, TeachError, teach};
@@ -79,11 +79,7 @@ impl Worker {
         let mut frames = Vec::new();
         loop {
             if self.maps.wanted() {
-                let shown = plan.as_ref().and_then(|plan: &Plan| {
-                    let show = || plan.heights(&frames);
-                    self.pool.install(show)
-                });
-                self.maps.set(shown);
+                self.tell(plan.as_ref(), &frames);
             }
             match orders.recv_timeout(SIGN_OF_LIFE) {
                 Ok(Order::Measure(job)) => {
@@ -92,11 +88,11 @@ impl Worker {
                     frames = self.measure(plan.as_ref(), &job);
                 }
                 Ok(Order::Load(job, key)) => {
-                    frames = self.forget();
+                    frames = Vec::new();
                     self.load(job, &key, &mut plan);
                 }
                 Ok(Order::Teach(job, number)) => {
-                    frames = self.forget();
+                    frames = Vec::new();
                     self.teach(job, number, &mut plan);
                 }
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
@@ -107,10 +103,14 @@ impl Worker {
         }
     }
 
-    /// No frames: those of the last cycle are nothing to another recipe.
-    fn forget(&self) -> Vec<Frame> {
-        self.maps.forget();
-        Vec::new()
+    /// Answers those who want to know more of the last cycle.
+    fn tell(&self, plan: Option<&Plan>, frames: &[Frame]) {
+        let result = self.station.snapshot().result.clone();
+        let measured = plan.filter(|_| !frames.is_empty()).zip(result);
+        let cycle = measured.map(|(plan, result)| (plan, result.seq));
+        let maps = &self.maps;
+        self.pool
+            .install(|| maps.answer(cycle.map(|(plan, seq)| LastCycle { seq, plan, frames })));
     }
 
     /// Runs a cycle; the frames that it was judged by.
@@ -146,7 +146,6 @@ impl Worker {
         let exposed = Instant::now();
         self.station.event(Event::ExposureDone { job: id });
         let inspection = self.pool.install(|| plan.inspect(&frames, exposed));
-        self.maps.outdated();
         self.station.event(Event::Finished {
             job: id,
             inspection: Arc::new(inspection),

@@ -15,6 +15,7 @@
 pub mod decode;
 pub mod encode;
 pub mod guard;
+pub mod live;
 pub mod map;
 pub mod render;
 pub mod server;
@@ -26,5 +27,6 @@ mod frozen;
 mod tests;
 
 pub use encode::WordOrder;
+pub use live::live;
 pub use render::{registers_csv, registers_json};
 pub use server::{ModbusError, Options, bind, serve};

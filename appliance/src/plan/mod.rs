@@ -2,7 +2,10 @@
 
 mod golden;
 mod judge;
+mod layers;
 mod window;
+
+pub use layers::Layers;
 
 use crate::calibration::Calibration;
 use crate::recipe::{GaugeKind, Recipe, RecipeFile, SequenceKind, short};

@@ -1,5 +1,6 @@
 //! `recipe.json` inside a recipe, version 1, as it stands on disk. Frozen: see `docs/formats.md`.
 
+use super::comparison::ComparisonFile;
 use algo::units::AbsolutePhase;
 use serde::{Deserialize, Serialize};
 
@@ -57,6 +58,9 @@ pub struct RecipeFile {
     pub regions: Vec<RegionFile>,
     /// At most 16.
     pub gauges: Vec<GaugeFile>,
+    /// What teaching gained; none where it was taught from a recording.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub comparison: Option<ComparisonFile>,
 }
 
 /// A camera's frames.

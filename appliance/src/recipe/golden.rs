@@ -1,6 +1,7 @@
 //! From a golden measurement to a recipe, whether it came from a head or from a recording.
 
 use super::archive::{self, Arrays};
+use super::comparison::ComparisonFile;
 use super::file::{CameraFile, FORMAT, RasterFile, VERSION};
 use super::planner::{self, Choice};
 use super::{
@@ -67,6 +68,8 @@ pub struct GoldenPart<'a> {
     pub heights: &'a HeightMap,
     /// σ of one sample in counts.
     pub noise: f64,
+    /// What its own pattern gained, if a fixed one was measured as well.
+    pub comparison: Option<ComparisonFile>,
 }
 
 /// A finished recipe.
@@ -130,6 +133,7 @@ impl GoldenPart<'_> {
             min_coverage: MIN_COVERAGE,
             regions,
             gauges,
+            comparison: self.comparison.clone(),
         };
         let (bytes, _) = archive::pack(&file, &arrays).map_err(|error| error.to_string())?;
         // Read back as it will be after a restart: what was just taught is known to load.

@@ -5,6 +5,8 @@
 
 pub mod archive;
 pub mod check;
+pub mod comparison;
+pub mod edit;
 pub mod file;
 pub mod golden;
 pub mod planner;

@@ -1,6 +1,6 @@
 //! The recipes of a station: a folder of `NNNN.recipe` files with the generation before each.
 
-use super::{Recipe, archive};
+use super::{Recipe, RecipeFile, archive};
 use crate::output::folder::write_whole;
 use std::fs;
 use std::io;
@@ -119,6 +119,24 @@ impl Store {
             )),
             Ok(recipe) => Ok(recipe),
         })
+    }
+
+    /// The manifest of a recipe, without checking the rest: for lists.
+    ///
+    /// # Errors
+    /// In words: there is none, or it cannot be read.
+    pub fn manifest(&self, number: u16) -> Result<RecipeFile, String> {
+        let file = fs::File::open(self.path(number))
+            .map_err(|error| format!("recipe {number}: {error}: teach or import it"))?;
+        archive::manifest(file).map_err(|error| error.to_string())
+    }
+
+    /// The file of a recipe as it is, to be exported.
+    ///
+    /// # Errors
+    /// Whatever the file system answers.
+    pub fn bytes(&self, number: u16) -> io::Result<Vec<u8>> {
+        fs::read(self.path(number))
     }
 
     /// The number of the recipe taught for a part number.
