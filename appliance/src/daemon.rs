@@ -15,14 +15,15 @@ use crate::station::{
     Effect, Event, Identity, Limits, Micros, RecipeKey, RecipeResult, Request, Settings, Snapshot,
     Station, StationHandle, tick,
 };
+use crate::survey::Survey;
 use crate::tally::Tally;
-use crate::worker::{Order, Worker};
+use crate::worker::{Aborts, Order, Worker};
 use crate::{backend, clock, modbus, web};
 use hal::sim::Stage;
 use std::net::SocketAddr;
 use std::sync::{Arc, mpsc};
 use std::thread::JoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
@@ -48,7 +49,9 @@ pub struct Daemon {
 struct Stopping {
     orders: mpsc::Sender<Order>,
     sockets: watch::Sender<bool>,
-    threads: [JoinHandle<()>; 2],
+    survey: mpsc::Sender<()>,
+    threads: [JoinHandle<()>; 3],
+    progress: Progress,
 }
 
 impl Daemon {
@@ -74,8 +77,10 @@ impl Daemon {
         let (modbus, http) = (address_of(&plc)?, address_of(&page)?);
         let (orders, inbox) = mpsc::channel();
         let tally = Tally::default();
+        let aborts = Aborts::default();
         let sink = effects(
             orders.clone(),
+            aborts.clone(),
             state.counter(),
             progress.clone(),
             tally.clone(),
@@ -83,6 +88,7 @@ impl Daemon {
         let station = StationHandle::new(station(config, &state)?, Instant::now(), sink);
         let maps = LastMaps::default();
         let (sockets, stopped) = watch::channel(false);
+        let clients = modbus::Clients::new(modbus::CONNECTIONS);
         let serving = {
             let site = web::Site::new(web::Parts {
                 station: station.clone(),
@@ -97,8 +103,23 @@ impl Daemon {
                 hosts: config.http.hosts.clone(),
             });
             let (station, config) = (station.clone(), config.clone());
-            let serve = move || runtime.block_on(serve(plc, page, station, site, &config, stopped));
+            let log = progress.clone();
+            let plc = PlcSide {
+                listener: plc,
+                clients: clients.clone(),
+                refusals: modbus::Refusals::new(move |line| log.log(line)),
+            };
+            let serve = move || {
+                runtime.block_on(serve(plc, page, station, site, &config, stopped));
+            };
             spawn("sockets", serve)?
+        };
+        let (survey, surveyed) = mpsc::channel();
+        let surveying = {
+            let station = station.clone();
+            let recipes = state.recipes().clone();
+            let survey = Survey::new(&path, recipes, clients, progress.clone());
+            spawn("survey", move || survey.run(&station, &surveyed))?
         };
         let (opened, opening) = mpsc::channel();
         let simulated = config.head.backend == Backend::Sim;
@@ -106,7 +127,7 @@ impl Daemon {
         let awaited = first.is_some();
         let measuring = {
             let (station, recipes) = (station.clone(), state.recipes().clone());
-            let config = config.clone();
+            let (config, progress) = (config.clone(), progress.clone());
             spawn("measuring", move || {
                 let told = |share: f64| progress.tell(share, "working out the light of the scene");
                 match pool.install(|| backend::open(&config.head, &told)) {
@@ -121,6 +142,9 @@ impl Daemon {
                             station,
                             maps,
                             progress,
+                            config: config.head,
+                            aborts,
+                            lost: None,
                         };
                         worker.run(&inbox, first);
                     }
@@ -130,7 +154,9 @@ impl Daemon {
         let stopping = Stopping {
             orders,
             sockets,
-            threads: [measuring, serving],
+            survey,
+            threads: [measuring, serving, surveying],
+            progress,
         };
         let gone = || {
             Failure::new(
@@ -197,15 +223,38 @@ impl Daemon {
     }
 }
 
+/// Time between two looks at a thread that ends.
+const LOOKING: Duration = Duration::from_millis(2);
+/// A thread that has not ended after this time is left behind.
+const STOPPING: Duration = Duration::from_secs(3);
+
 impl Stopping {
     fn stop(self) {
         // An order that nobody takes, or a runtime that is gone, is what is wanted here.
         drop(self.orders.send(Order::Stop));
-        let [measuring, serving] = self.threads;
-        drop(measuring.join());
+        let [measuring, serving, surveying] = self.threads;
+        join("measuring", measuring, &self.progress);
         let _ = self.sockets.send(true);
-        drop(serving.join());
+        join("sockets", serving, &self.progress);
+        drop(self.survey);
+        join("survey", surveying, &self.progress);
     }
+}
+
+/// Waits for a thread to end. One that hangs in a device or in a storage must not keep the program from ending.
+fn join(name: &str, thread: JoinHandle<()>, progress: &Progress) {
+    let began = Instant::now();
+    while !thread.is_finished() {
+        if began.elapsed() > STOPPING {
+            progress.log(&format!(
+                "the thread {name} does not end and is left behind"
+            ));
+            return;
+        }
+        std::thread::sleep(LOOKING);
+    }
+    // One that panicked has said so.
+    drop(thread.join());
 }
 
 /// Opens the way in; the secret of a new device is shown here and never again.
@@ -282,28 +331,28 @@ fn station(config: &Config, state: &StateFolder) -> Result<Station, Failure> {
 /// writes the counter, which must be stored before anybody sees the result.
 fn effects(
     orders: mpsc::Sender<Order>,
+    aborts: Aborts,
     counter: Counter,
     progress: Progress,
     tally: Tally,
-) -> impl FnMut(Effect) {
+) -> impl FnMut(Effect) -> Option<Event> {
     // An order that nobody takes is noticed by the station itself: its wait has a deadline.
     let order = move |order| drop(orders.send(order));
-    move |effect| match effect {
-        Effect::Measure(job) => order(Order::Measure(job)),
-        Effect::Load { job, key } => order(Order::Load(job, key)),
-        Effect::Teach { job, number } => order(Order::Teach(job, number)),
-        Effect::PersistSeq(seq) => {
-            if let Err(error) = counter.store(seq) {
-                progress.log(&format!(
-                    "store the result counter {seq}: {error}: free space"
-                ));
+    move |effect| {
+        match effect {
+            Effect::Measure(job) => order(Order::Measure(job)),
+            Effect::Load { job, key } => order(Order::Load(job, key)),
+            Effect::Teach { job, number } => order(Order::Teach(job, number)),
+            Effect::PersistSeq(seq) => {
+                let failed = counter.store(seq).err();
+                let failed = failed.map(|error| error.to_string().into());
+                return Some(Event::Stored { seq, failed });
             }
+            Effect::Log(line) => progress.log(&line),
+            Effect::Abort { job } => aborts.abort(job),
+            Effect::Publish(result) => tally.add(result.verdict),
         }
-        Effect::Log(line) => progress.log(&line),
-        // A sequence is short and every wait in it has a time-out: it ends by itself, and the station
-        // drops its answer.
-        Effect::Abort { .. } => {}
-        Effect::Publish(result) => tally.add(result.verdict),
+        None
     }
 }
 
@@ -322,8 +371,15 @@ fn first_request(
     }
 }
 
+/// The PLC's side of the sockets.
+struct PlcSide {
+    listener: TcpListener,
+    clients: modbus::Clients,
+    refusals: modbus::Refusals,
+}
+
 async fn serve(
-    plc: TcpListener,
+    plc: PlcSide,
     page: TcpListener,
     station: StationHandle,
     site: web::Site,
@@ -340,11 +396,20 @@ async fn serve(
     let options = modbus::Options {
         word_order: config.modbus.word_order.into(),
         strict_unit_id: config.modbus.strict_unit_id,
+        readers: config.modbus.readers.clone(),
+        writers: config.modbus.writers.clone(),
         ..modbus::Options::default()
     };
     tokio::join!(
         tick(station.clone(), clock::utc_us, stop()),
-        modbus::serve(plc, station, options, stop()),
+        modbus::serve(
+            plc.listener,
+            station,
+            options,
+            plc.clients,
+            plc.refusals,
+            stop()
+        ),
         web::serve(page, site, stop()),
     );
 }

@@ -24,6 +24,7 @@ pub mod rig;
 pub mod seam;
 pub mod state;
 pub mod station;
+pub mod survey;
 pub mod tally;
 pub mod web;
 pub mod worker;

@@ -47,7 +47,31 @@ pub fn snapshot(snapshot: &Snapshot) -> Value {
         "identity": {
             "product": snapshot.identity.product, "serial": snapshot.identity.serial, "version": snapshot.identity.version,
         },
+        "health": health(snapshot),
         "result": snapshot.result.as_deref().map(result),
+    })
+}
+
+/// What the device says of itself; null where it is not known.
+fn health(snapshot: &Snapshot) -> Value {
+    let (system, pace) = (&snapshot.health.system, &snapshot.health.pace);
+    json!({
+        "cpu_percent": system.cpu_percent,
+        "free_memory_mib": system.free_memory_mib,
+        "free_storage_mib": system.free_storage_mib,
+        "cpu_temperature_c": system.cpu_temperature_c,
+        "boots": system.boots,
+        "unclean_boots": system.unclean_boots,
+        "modbus_clients": system.clients,
+        "writer_connected": system.writer_connected,
+        "camera_hz": f64::from(pace.camera_centihertz) / 100.0,
+        "projector_hz": f64::from(pace.refresh_millihertz) / 1000.0,
+        "lag_us": pace.lag_us,
+        "dropped_frames": pace.dropped,
+        "missed_flips": pace.missed_flips,
+        "processing_us": snapshot.health.processing_us,
+        "processing_max_us": snapshot.health.processing_max_us,
+        "storage_errors": snapshot.health.storage_errors,
     })
 }
 

@@ -44,7 +44,7 @@ async fn served() -> Served {
         limits: Limits::default(),
     };
     let folder = tempfile::tempdir().unwrap();
-    let handle = StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| ());
+    let handle = StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| None);
     let (access, secret) = Access::open(&folder.path().join("access")).unwrap();
     let site = Site::new(Parts {
         station: handle.clone(),
