@@ -5,10 +5,11 @@
 
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
+use crate::history::{self, Bounds, History};
 use crate::latest::LastMaps;
 use crate::output::picture::height_png;
 use crate::progress::Progress;
-use crate::state::{Counter, StateFolder, random};
+use crate::state::{StateFolder, random};
 use crate::station::snapshot::status;
 use crate::station::{
     Effect, Event, Identity, Limits, Micros, RecipeKey, RecipeResult, Request, Settings, Snapshot,
@@ -47,6 +48,9 @@ struct Stopping {
     orders: mpsc::Sender<Order>,
     sockets: watch::Sender<bool>,
     threads: [JoinHandle<()>; 2],
+    station: StationHandle,
+    history: History,
+    writing: JoinHandle<()>,
 }
 
 impl Daemon {
@@ -70,8 +74,17 @@ impl Daemon {
         let (plc, page) = runtime.block_on(listen(config))?;
         let (modbus, http) = (address_of(&plc)?, address_of(&page)?);
         let (orders, inbox) = mpsc::channel();
-        let sink = effects(orders.clone(), state.counter(), progress.clone());
-        let station = StationHandle::new(station(config, &state)?, Instant::now(), sink);
+        let (history, task, next_seq, complaint) = open_history(config, &state)?;
+        if let Some(complaint) = complaint {
+            progress.log(&complaint);
+        }
+        let sink = effects(orders.clone(), history.clone(), progress.clone());
+        let settings = station(config, &state, next_seq)?;
+        let station = StationHandle::new(settings, Instant::now(), sink);
+        let writing = {
+            let station = station.clone();
+            spawn("history", move || task.run(&station))?
+        };
         let maps = LastMaps::default();
         let (sockets, stopped) = watch::channel(false);
         let serving = {
@@ -85,7 +98,7 @@ impl Daemon {
         let awaited = first.is_some();
         let measuring = {
             let (station, recipes) = (station.clone(), state.recipes().clone());
-            let config = config.clone();
+            let (config, history) = (config.clone(), history.clone());
             spawn("measuring", move || {
                 let told = |share: f64| progress.tell(share, "working out the light of the scene");
                 match pool.install(|| backend::open(&config.head, &told)) {
@@ -99,6 +112,7 @@ impl Daemon {
                             recipes,
                             station,
                             maps,
+                            history,
                             progress,
                         };
                         worker.run(&inbox, first);
@@ -110,6 +124,9 @@ impl Daemon {
             orders,
             sockets,
             threads: [measuring, serving],
+            station: station.clone(),
+            history,
+            writing,
         };
         let gone = || {
             Failure::new(
@@ -184,6 +201,9 @@ impl Stopping {
         drop(measuring.join());
         let _ = self.sockets.send(true);
         drop(serving.join());
+        // Last: what the others brought to an end is stored.
+        self.history.stop(self.station.snapshot().result_seq);
+        drop(self.writing.join());
     }
 }
 
@@ -223,9 +243,21 @@ fn address_of(listener: &TcpListener) -> Result<SocketAddr, Failure> {
         .map_err(|error| Failure::because(Exit::Unavailable, "ask for a socket's port", error))
 }
 
-fn station(config: &Config, state: &StateFolder) -> Result<Station, Failure> {
+fn open_history(
+    config: &Config,
+    state: &StateFolder,
+) -> Result<(History, history::Task, u32, Option<String>), Failure> {
+    let bounds = Bounds {
+        results: u64::from(config.history.results),
+        recordings: u64::from(config.history.recordings_mib) << 20,
+    };
+    history::open(state.path(), state.counter(), state.next_seq()?, bounds)
+        .map_err(|error| Failure::new(Exit::CannotCreate, error.to_string()))
+}
+
+fn station(config: &Config, state: &StateFolder, next_seq: u32) -> Result<Station, Failure> {
     let settings = Settings {
-        next_seq: state.next_seq()?,
+        next_seq,
         boot_id: random()?,
         teach_allowed: config.station.teach_allowed,
         identity: Arc::new(Identity {
@@ -242,11 +274,10 @@ fn station(config: &Config, state: &StateFolder) -> Result<Station, Failure> {
     Ok(Station::new(settings, Micros(0)))
 }
 
-/// Carries out what the station wants done. Called with the station locked: it only hands on, and
-/// writes the counter, which must be stored before anybody sees the result.
+/// Carries out what the station wants done. Called with the station locked: it only hands on and waits for nothing.
 fn effects(
     orders: mpsc::Sender<Order>,
-    counter: Counter,
+    history: History,
     progress: Progress,
 ) -> impl FnMut(Effect) {
     // An order that nobody takes is noticed by the station itself: its wait has a deadline.
@@ -256,9 +287,9 @@ fn effects(
         Effect::Load { job, key } => order(Order::Load(job, key)),
         Effect::Teach { job, number } => order(Order::Teach(job, number)),
         Effect::PersistSeq(seq) => {
-            if let Err(error) = counter.store(seq) {
+            if !history.covers(seq) {
                 progress.log(&format!(
-                    "store the result counter {seq}: {error}: free space"
+                    "result number {seq} is not stored as used: the storage does not answer"
                 ));
             }
         }
@@ -266,7 +297,7 @@ fn effects(
         // A sequence is short and every wait in it has a time-out: it ends by itself, and the station
         // drops its answer.
         Effect::Abort { .. } => {}
-        Effect::Publish(_) => {}
+        Effect::Publish(record) => history.record(record),
     }
 }
 

@@ -1,13 +1,15 @@
 //! The measuring task: one thread that owns the head, the plan and the computing threads.
 
 use crate::backend::Opened;
+use crate::history::{FailedPart, History};
 use crate::latest::LastMaps;
 use crate::plan::{Plan, PlanError};
 use crate::progress::Progress;
 use crate::recipe::teach::{Naming, TeachError, teach};
 use crate::recipe::{LoadError, Store};
 use crate::station::{
-    ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
+    ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, ResultRecord,
+    StationHandle,
 };
 use hal::error::ErrorKind;
 use hal::frame::Frame;
@@ -58,6 +60,8 @@ pub struct Worker {
     pub station: StationHandle,
     /// Where the last maps go.
     pub maps: LastMaps,
+    /// Where the frames of failed parts go.
+    pub history: History,
     /// Shows how far teaching is, and the log.
     pub progress: Progress,
 }
@@ -75,11 +79,11 @@ impl Worker {
         if let Some(first) = first {
             self.station.event(Event::Request(first));
         }
-        let mut plan = None;
+        let mut plan: Option<Arc<Plan>> = None;
         let mut frames = Vec::new();
         loop {
             if self.maps.wanted() {
-                let shown = plan.as_ref().and_then(|plan: &Plan| {
+                let shown = plan.as_ref().and_then(|plan| {
                     let show = || plan.heights(&frames);
                     self.pool.install(show)
                 });
@@ -114,7 +118,7 @@ impl Worker {
     }
 
     /// Runs a cycle; the frames that it was judged by.
-    fn measure(&mut self, plan: Option<&Plan>, job: &Job) -> Vec<Frame> {
+    fn measure(&mut self, plan: Option<&Arc<Plan>>, job: &Job) -> Vec<Frame> {
         let id = job.job;
         let failed = |error_code, message: String| Event::MeasureFailed {
             job: id,
@@ -147,19 +151,32 @@ impl Worker {
         self.station.event(Event::ExposureDone { job: id });
         let inspection = self.pool.install(|| plan.inspect(&frames, exposed));
         self.maps.outdated();
-        self.station.event(Event::Finished {
+        let inspection = Arc::new(inspection);
+        let after = self.station.event(Event::Finished {
             job: id,
-            inspection: Arc::new(inspection),
+            inspection: inspection.clone(),
         });
+        // Not where the station no longer waited for it.
+        let published = |record: &Arc<ResultRecord>| Arc::ptr_eq(&record.inspection, &inspection);
+        if let Some(record) = after.result.clone().filter(published)
+            && self.history.wants(&record)
+        {
+            self.history.keep(FailedPart {
+                record,
+                frames: frames.clone(),
+                plan: plan.clone(),
+                calibration: self.opened.calibration.clone(),
+            });
+        }
         frames
     }
 
     /// Loads a recipe; the one before stays active unless everything went well.
-    fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Plan>) {
+    fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Arc<Plan>>) {
         let (result, message) = match self.prepare(key) {
             Ok((ready, fallback)) => {
                 let recipe = active(&ready);
-                *plan = Some(ready);
+                *plan = Some(Arc::new(ready));
                 if let Some(fallback) = fallback {
                     self.progress.log(&fallback);
                 }
@@ -179,7 +196,7 @@ impl Worker {
 
     /// Puts the patterns of the active recipe back into the projector, after another one's may have
     /// replaced them. Without them the recipe cannot measure: then each trigger ends INVALID.
-    fn restore(&mut self, plan: &mut Option<Plan>) {
+    fn restore(&mut self, plan: &mut Option<Arc<Plan>>) {
         let Some(before) = plan else { return };
         let shown = before.rasters(&self.opened.calibration);
         if let Err(error) = shown.and_then(|rasters| self.opened.head.load(rasters)) {
@@ -221,7 +238,7 @@ impl Worker {
         Ok((plan, loaded.fallback))
     }
 
-    fn teach(&mut self, job: JobId, number: u16, plan: &mut Option<Plan>) {
+    fn teach(&mut self, job: JobId, number: u16, plan: &mut Option<Arc<Plan>>) {
         let naming = Naming {
             number,
             part_number: format!("PART-{number:04}"),
@@ -266,7 +283,7 @@ impl Worker {
         match ready {
             Ok((ready, _)) => {
                 let recipe = active(&ready);
-                *plan = Some(ready);
+                *plan = Some(Arc::new(ready));
                 self.station.event(Event::Taught { job, recipe });
             }
             Err((error_code, message)) => {

@@ -8,6 +8,7 @@ mod cli;
 mod experiment;
 mod formats;
 mod fuzz;
+mod history;
 mod house;
 mod measured;
 mod outputs;

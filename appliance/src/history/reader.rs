@@ -102,13 +102,29 @@ impl Reader {
     /// # Errors
     /// As [`Self::results`].
     pub fn result(&self, seq: u32) -> Result<Option<Entry>, HistoryError> {
+        self.first(
+            "SELECT * FROM result WHERE seq = ?1 ORDER BY id DESC LIMIT 1",
+            seq,
+        )
+    }
+
+    /// The result whose frames are kept under this name.
+    ///
+    /// # Errors
+    /// As [`Self::results`].
+    pub fn recorded_as(&self, name: &str) -> Result<Option<Entry>, HistoryError> {
+        self.first(
+            "SELECT * FROM result WHERE recording = ?1 ORDER BY id DESC LIMIT 1",
+            name,
+        )
+    }
+
+    fn first(&self, query: &str, key: impl rusqlite::ToSql) -> Result<Option<Entry>, HistoryError> {
         let connection = self.open()?;
-        let failed = self.failed();
-        let by_seq = "SELECT * FROM result WHERE seq = ?1 ORDER BY id DESC LIMIT 1";
-        match connection.query_row(by_seq, [seq], |row| with_gauges(&connection, row)) {
+        match connection.query_row(query, [key], |row| with_gauges(&connection, row)) {
             Ok(entry) => Ok(Some(entry)),
             Err(rusqlite::Error::QueryReturnedNoRows) => Ok(None),
-            Err(error) => Err(failed(error)),
+            Err(error) => Err(self.failed()(error)),
         }
     }
 

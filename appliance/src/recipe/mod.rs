@@ -5,6 +5,7 @@
 
 pub mod archive;
 pub mod check;
+pub mod exchange;
 pub mod file;
 pub mod golden;
 pub mod planner;

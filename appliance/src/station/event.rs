@@ -160,6 +160,11 @@ pub enum Event {
     },
     /// The broken device works again.
     Recovered,
+    /// The history cannot be written, or can again.
+    History {
+        /// Why not, and the remedy; none if it can.
+        problem: Option<Arc<str>>,
+    },
     /// The worker's sign of life.
     Alive,
     /// Time passes: about every 100 ms.
@@ -176,7 +181,11 @@ impl Event {
     pub fn from_worker(&self) -> bool {
         !matches!(
             self,
-            Self::Write { .. } | Self::Request(_) | Self::Tick { .. } | Self::Stop
+            Self::Write { .. }
+                | Self::Request(_)
+                | Self::History { .. }
+                | Self::Tick { .. }
+                | Self::Stop
         )
     }
 }
@@ -220,7 +229,7 @@ pub enum Effect {
         /// The running job.
         job: JobId,
     },
-    /// Store this RESULT_SEQ as used. Always directly before the [`Effect::Publish`] of that result.
+    /// Make sure that this RESULT_SEQ is stored as used. Always directly before the [`Effect::Publish`] of that result.
     PersistSeq(u32),
     /// A result is complete: for the history.
     Publish(Arc<ResultRecord>),

@@ -86,6 +86,8 @@ pub struct Station {
     /// The last cycle's failure: its code and words.
     pub(super) failure: Option<(u16, Arc<str>)>,
     pub(super) condition: Condition,
+    /// Whether the history cannot be written.
+    pub(super) history_fails: bool,
     pub(super) heartbeat: u16,
     pub(super) next_beat: Micros,
     pub(super) last_alive: Micros,
@@ -123,6 +125,7 @@ impl Station {
             queue: heapless::Deque::new(),
             failure: None,
             condition: Condition::default(),
+            history_fails: false,
             heartbeat: 0,
             next_beat: now.after(BEAT),
             last_alive: now,

@@ -227,12 +227,17 @@ impl Station {
         } else {
             0
         };
+        let unwritten = if self.history_fails {
+            warning::STORAGE
+        } else {
+            0
+        };
         let unsynced = if self.utc_at_zero.is_none() {
             warning::CLOCK_UNSYNCED
         } else {
             0
         };
-        (self.condition.warnings & !own & 0x00FF) | lost | unsynced
+        (self.condition.warnings & !own & 0x00FF) | lost | unsynced | unwritten
     }
 
     fn status(&self, warnings: u16, error_code: u16) -> u16 {

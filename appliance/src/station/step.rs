@@ -139,6 +139,7 @@ pub fn step(mut station: Station, event: Event, now: Micros) -> (Station, Effect
                 station.state = station.rest();
             }
         }
+        Event::History { problem } => station.history_told(problem, &mut effects),
         Event::Alive => {}
         Event::Tick { utc_us } => station.tick(utc_us, now, &mut effects),
         Event::Stop => station.stop(&mut effects),
@@ -237,6 +238,13 @@ impl Station {
                 push(effects, Effect::Abort { job });
             }
         }
+    }
+
+    /// The history fails or works again: a warning, no fault. Verdicts go on.
+    fn history_told(&mut self, problem: Option<std::sync::Arc<str>>, effects: &mut Effects) {
+        self.history_fails = problem.is_some();
+        let works = || "the history is written again".into();
+        log(effects, problem.unwrap_or_else(works));
     }
 
     fn stop(&mut self, effects: &mut Effects) {
