@@ -48,6 +48,26 @@ pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Open
     }
 }
 
+/// What is known of the configured head, without opening it.
+///
+/// # Errors
+/// If a file of the head is missing or wrong.
+pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
+    match config.backend {
+        Backend::Sim => Ok(Calibration::of_scenario(&scenario(
+            config.scenario.as_deref(),
+        )?)),
+        Backend::Replay => {
+            let first = config
+                .recordings
+                .iter()
+                .take(1)
+                .map(|folder| Recording::open(folder));
+            calibration_of(&config.recordings, &first.collect::<Result<Vec<_>, _>>()?)
+        }
+    }
+}
+
 /// The scenario of a file, or the default one.
 ///
 /// # Errors

@@ -6,10 +6,10 @@
 use crate::access::Access;
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
-use crate::history::Reader;
+use crate::history::{self, Bounds, History, Reader};
 use crate::latest::LastMaps;
 use crate::progress::Progress;
-use crate::state::{Counter, StateFolder, random};
+use crate::state::{StateFolder, random};
 use crate::station::snapshot::status;
 use crate::station::{
     Effect, Event, Identity, Limits, Micros, RecipeKey, RecipeResult, Request, Settings, Snapshot,
@@ -52,6 +52,9 @@ struct Stopping {
     survey: mpsc::Sender<()>,
     threads: [JoinHandle<()>; 3],
     progress: Progress,
+    station: StationHandle,
+    history: History,
+    writing: JoinHandle<()>,
 }
 
 impl Daemon {
@@ -76,16 +79,25 @@ impl Daemon {
         let (plc, page) = runtime.block_on(listen(config))?;
         let (modbus, http) = (address_of(&plc)?, address_of(&page)?);
         let (orders, inbox) = mpsc::channel();
+        let (history, task, next_seq, complaint) = open_history(config, &state)?;
+        if let Some(complaint) = complaint {
+            progress.log(&complaint);
+        }
         let tally = Tally::default();
         let aborts = Aborts::default();
         let sink = effects(
             orders.clone(),
             aborts.clone(),
-            state.counter(),
+            history.clone(),
             progress.clone(),
             tally.clone(),
         );
-        let station = StationHandle::new(station(config, &state)?, Instant::now(), sink);
+        let settings = station(config, &state, next_seq)?;
+        let station = StationHandle::new(settings, Instant::now(), sink);
+        let writing = {
+            let station = station.clone();
+            spawn("history", move || task.run(&station))?
+        };
         let maps = LastMaps::default();
         let (sockets, stopped) = watch::channel(false);
         let clients = modbus::Clients::new(modbus::CONNECTIONS);
@@ -127,7 +139,8 @@ impl Daemon {
         let awaited = first.is_some();
         let measuring = {
             let (station, recipes) = (station.clone(), state.recipes().clone());
-            let (config, progress) = (config.clone(), progress.clone());
+            let (config, history) = (config.clone(), history.clone());
+            let progress = progress.clone();
             spawn("measuring", move || {
                 let told = |share: f64| progress.tell(share, "working out the light of the scene");
                 match pool.install(|| backend::open(&config.head, &told)) {
@@ -141,6 +154,7 @@ impl Daemon {
                             recipes,
                             station,
                             maps,
+                            history,
                             progress,
                             config: config.head,
                             aborts,
@@ -157,6 +171,9 @@ impl Daemon {
             survey,
             threads: [measuring, serving, surveying],
             progress,
+            station: station.clone(),
+            history,
+            writing,
         };
         let gone = || {
             Failure::new(
@@ -238,6 +255,9 @@ impl Stopping {
         join("sockets", serving, &self.progress);
         drop(self.survey);
         join("survey", surveying, &self.progress);
+        // Last: what the others brought to an end is stored.
+        self.history.stop(self.station.snapshot().result_seq);
+        join("history", self.writing, &self.progress);
     }
 }
 
@@ -308,9 +328,21 @@ fn address_of(listener: &TcpListener) -> Result<SocketAddr, Failure> {
         .map_err(|error| Failure::because(Exit::Unavailable, "ask for a socket's port", error))
 }
 
-fn station(config: &Config, state: &StateFolder) -> Result<Station, Failure> {
+fn open_history(
+    config: &Config,
+    state: &StateFolder,
+) -> Result<(History, history::Task, u32, Option<String>), Failure> {
+    let bounds = Bounds {
+        results: u64::from(config.history.results),
+        recordings: u64::from(config.history.recordings_mib) << 20,
+    };
+    history::open(state.path(), state.counter(), state.next_seq()?, bounds)
+        .map_err(|error| Failure::new(Exit::CannotCreate, error.to_string()))
+}
+
+fn station(config: &Config, state: &StateFolder, next_seq: u32) -> Result<Station, Failure> {
     let settings = Settings {
-        next_seq: state.next_seq()?,
+        next_seq,
         boot_id: random()?,
         teach_allowed: config.station.teach_allowed,
         identity: Arc::new(Identity {
@@ -327,12 +359,11 @@ fn station(config: &Config, state: &StateFolder) -> Result<Station, Failure> {
     Ok(Station::new(settings, Micros(0)))
 }
 
-/// Carries out what the station wants done. Called with the station locked: it only hands on, and
-/// writes the counter, which must be stored before anybody sees the result.
+/// Carries out what the station wants done. Called with the station locked: it only hands on and waits for nothing.
 fn effects(
     orders: mpsc::Sender<Order>,
     aborts: Aborts,
-    counter: Counter,
+    history: History,
     progress: Progress,
     tally: Tally,
 ) -> impl FnMut(Effect) -> Option<Event> {
@@ -344,13 +375,16 @@ fn effects(
             Effect::Load { job, key } => order(Order::Load(job, key)),
             Effect::Teach { job, number } => order(Order::Teach(job, number)),
             Effect::PersistSeq(seq) => {
-                let failed = counter.store(seq).err();
-                let failed = failed.map(|error| error.to_string().into());
+                let failed = !history.covers(seq);
+                let failed = failed.then(|| "the storage does not answer".into());
                 return Some(Event::Stored { seq, failed });
             }
             Effect::Log(line) => progress.log(&line),
             Effect::Abort { job } => aborts.abort(job),
-            Effect::Publish(result) => tally.add(result.verdict),
+            Effect::Publish(result) => {
+                tally.add(result.verdict);
+                history.record(result);
+            }
         }
         None
     }

@@ -3,7 +3,9 @@
 //! The measuring task keeps the plan and the frames of the last cycle. Whoever wants something of them asks and waits;
 //! the measuring task answers when it has nothing more urgent to do.
 
+use crate::calibration::Calibration;
 use crate::plan::{Layers, Plan};
+use crate::station::ResultRecord;
 use hal::frame::Frame;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -17,12 +19,21 @@ const MOST_WAITING: usize = 8;
 /// The last cycle as the measuring task holds it.
 #[derive(Clone, Copy, Debug)]
 pub struct LastCycle<'a> {
-    /// SEQ of its result.
-    pub seq: u32,
+    /// Its result.
+    pub record: &'a Arc<ResultRecord>,
     /// The recipe that it was judged by.
-    pub plan: &'a Plan,
+    pub plan: &'a Arc<Plan>,
     /// Its frames, in the order of the sequence.
     pub frames: &'a [Frame],
+    /// The head's calibration.
+    pub calibration: &'a Calibration,
+}
+
+impl LastCycle<'_> {
+    /// SEQ of its result.
+    pub fn seq(&self) -> u32 {
+        self.record.seq
+    }
 }
 
 /// A question, and the way back for its answer.
@@ -71,7 +82,8 @@ impl LastMaps {
         {
             return made;
         }
-        let asked = self.ask(|cycle| Some((cycle.seq, Arc::new(cycle.plan.layers(cycle.frames)?))));
+        let asked =
+            self.ask(|cycle| Some((cycle.seq(), Arc::new(cycle.plan.layers(cycle.frames)?))));
         let newest = asked.flatten().or(made);
         self.inside().layers.clone_from(&newest);
         newest
@@ -99,7 +111,7 @@ mod tests {
         let last = LastMaps::default();
         assert!(!last.wanted());
         let asking = last.clone();
-        let asked = std::thread::spawn(move || asking.ask(|cycle| cycle.seq));
+        let asked = std::thread::spawn(move || asking.ask(|cycle| cycle.seq()));
         while !last.wanted() {
             std::thread::yield_now();
         }
@@ -113,7 +125,7 @@ mod tests {
         for _ in 0..MOST_WAITING {
             last.inside().waiting.push(Box::new(|_| ()));
         }
-        assert_eq!(last.ask(|cycle| cycle.seq), None);
+        assert_eq!(last.ask(|cycle| cycle.seq()), None);
         assert_eq!(last.inside().waiting.len(), MOST_WAITING);
     }
 }

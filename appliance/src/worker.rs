@@ -4,6 +4,7 @@ mod recovery;
 
 use crate::backend::Opened;
 use crate::config::HeadConfig;
+use crate::history::{FailedPart, History};
 use crate::latest::{LastCycle, LastMaps};
 use crate::plan::{Plan, PlanError};
 use crate::progress::Progress;
@@ -11,7 +12,7 @@ use crate::recipe::teach::{Naming, TeachError, teach};
 use crate::recipe::{LoadError, Store};
 use crate::station::{
     ActiveRecipe, Condition, Event, Job, JobId, Pace, RecipeKey, RecipeResult, Request,
-    StationHandle, error_code,
+    ResultRecord, StationHandle, error_code,
 };
 use hal::error::{Device, Error};
 use hal::frame::Frame;
@@ -83,6 +84,8 @@ pub struct Worker {
     pub station: StationHandle,
     /// Where the last maps go.
     pub maps: LastMaps,
+    /// Where the frames of failed parts go.
+    pub history: History,
     /// Shows how far teaching is, and the log.
     pub progress: Progress,
     /// How the head is opened again.
@@ -106,7 +109,7 @@ impl Worker {
         if let Some(first) = first {
             self.station.event(Event::Request(first));
         }
-        let mut plan = None;
+        let mut plan: Option<Arc<Plan>> = None;
         let mut frames = Vec::new();
         loop {
             if self.maps.wanted() {
@@ -142,17 +145,21 @@ impl Worker {
     }
 
     /// Answers those who want to know more of the last cycle.
-    fn tell(&self, plan: Option<&Plan>, frames: &[Frame]) {
+    fn tell(&self, plan: Option<&Arc<Plan>>, frames: &[Frame]) {
+        let (maps, calibration) = (&self.maps, &self.opened.calibration);
         let result = self.station.snapshot().result.clone();
-        let measured = plan.filter(|_| !frames.is_empty()).zip(result);
-        let cycle = measured.map(|(plan, result)| (plan, result.seq));
-        let maps = &self.maps;
-        self.pool
-            .install(|| maps.answer(cycle.map(|(plan, seq)| LastCycle { seq, plan, frames })));
+        let measured = plan.filter(|_| !frames.is_empty()).zip(result.as_ref());
+        let cycle = measured.map(|(plan, record)| LastCycle {
+            record,
+            plan,
+            frames,
+            calibration,
+        });
+        self.pool.install(|| maps.answer(cycle));
     }
 
     /// Runs a cycle; the frames that it was judged by.
-    fn measure(&mut self, plan: Option<&Plan>, job: &Job) -> Vec<Frame> {
+    fn measure(&mut self, plan: Option<&Arc<Plan>>, job: &Job) -> Vec<Frame> {
         let id = job.job;
         let failed = |error_code, message: String| Event::MeasureFailed {
             job: id,
@@ -191,10 +198,23 @@ impl Worker {
         let exposed = Instant::now();
         self.station.event(Event::ExposureDone { job: id });
         let inspection = self.pool.install(|| plan.inspect(&frames, exposed));
-        self.station.event(Event::Finished {
+        let inspection = Arc::new(inspection);
+        let after = self.station.event(Event::Finished {
             job: id,
-            inspection: Arc::new(inspection),
+            inspection: inspection.clone(),
         });
+        // Not where the station no longer waited for it.
+        let published = |record: &Arc<ResultRecord>| Arc::ptr_eq(&record.inspection, &inspection);
+        if let Some(record) = after.result.clone().filter(published)
+            && self.history.wants(&record)
+        {
+            self.history.keep(FailedPart {
+                record,
+                frames: frames.clone(),
+                plan: plan.clone(),
+                calibration: self.opened.calibration.clone(),
+            });
+        }
         frames
     }
 
@@ -214,12 +234,12 @@ impl Worker {
     }
 
     /// Loads a recipe; the one before stays active unless everything went well.
-    fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Plan>) {
+    fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Arc<Plan>>) {
         let (result, message) = match self.prepare(key) {
             Ok(_) if self.aborts.has(job) => (RecipeResult::Busy, format!("load: {ABORTED}")),
             Ok((ready, fallback)) => {
                 let recipe = active(&ready);
-                *plan = Some(ready);
+                *plan = Some(Arc::new(ready));
                 if let Some(fallback) = fallback {
                     self.progress.log(&fallback);
                 }
@@ -242,7 +262,7 @@ impl Worker {
 
     /// Puts the patterns of the active recipe back into the projector, after another one's may have
     /// replaced them. Without them the recipe cannot measure: then each trigger ends INVALID.
-    fn restore(&mut self, plan: &mut Option<Plan>) {
+    fn restore(&mut self, plan: &mut Option<Arc<Plan>>) {
         let Some(before) = plan else { return };
         let shown = before.rasters(&self.opened.calibration);
         match shown.and_then(|rasters| self.opened.head.load(rasters)) {
@@ -292,7 +312,7 @@ impl Worker {
         Ok((plan, loaded.fallback))
     }
 
-    fn teach(&mut self, job: JobId, number: u16, plan: &mut Option<Plan>) {
+    fn teach(&mut self, job: JobId, number: u16, plan: &mut Option<Arc<Plan>>) {
         let naming = Naming {
             number,
             part_number: format!("PART-{number:04}"),
@@ -348,7 +368,7 @@ impl Worker {
         match ready {
             Ok((ready, _)) => {
                 let recipe = active(&ready);
-                *plan = Some(ready);
+                *plan = Some(Arc::new(ready));
                 self.station.event(Event::Taught { job, recipe });
             }
             Err((error_code, message)) => {

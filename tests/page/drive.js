@@ -9,6 +9,8 @@ import { pictures } from "./pictures.js";
 const [program, browserPath, folder] = process.argv.slice(2);
 // Longest wait for anything that must happen; nothing waits for so long when all is well.
 const PATIENCE = 30000;
+// Shift of the page's content by Chromium's measure; 0.1 is what is called good.
+const JUMPS = 0.02;
 // Two missed beats of one second, what the network may be late by, and one check of the page.
 const STALE_WITHIN = 4000;
 
@@ -17,6 +19,17 @@ const browser = await chromium.launch({ executablePath: browserPath, args: ["--n
 let daemon = await Daemon.start(program, place);
 const page = await (await browser.newContext({ viewport: { width: 1280, height: 800 } })).newPage();
 page.setDefaultTimeout(PATIENCE);
+// Lets a test hold the measuring task's heartbeat still, and sums up how far things on the page jump.
+await page.addInitScript(() => {
+  const parse = JSON.parse;
+  JSON.parse = (text) => {
+    const value = parse(text);
+    if (window.heldStill && value && value.heartbeat !== undefined) value.heartbeat = 7;
+    return value;
+  };
+  window.jumped = 0;
+  new PerformanceObserver((list) => list.getEntries().forEach((entry) => { window.jumped += entry.value; })).observe({ type: "layout-shift" });
+});
 const complaints = [];
 page.on("pageerror", (error) => complaints.push(error.message));
 page.on("console", (message) => {
@@ -80,6 +93,18 @@ try {
     assert.ok(await page.locator("#gauge-rows .trend path.line").count() >= 2);
     assert.match(await page.textContent("#total"), /\d+ m?s/);
     assert.ok(await page.locator("#stages li").count() >= 2);
+  });
+
+  await step("nothing jumps when results come", async () => {
+    await page.evaluate(() => { window.jumped = 0; });
+    for (let cycle = 0; cycle < 3; cycle += 1) {
+      const before = await number();
+      await page.evaluate(() => fetch("/api/trigger", { method: "POST" }));
+      await page.waitForFunction((seq) => Number(document.querySelector("#sequence").textContent.replace(/\D/g, "")) > seq, before);
+      await page.waitForSelector("#state[data-state=ready]");
+    }
+    const jumped = await page.evaluate(() => window.jumped);
+    assert.ok(jumped < JUMPS, `the page jumped by ${jumped}`);
   });
 
   await step("a limit that is edited on the page changes the verdict", async () => {
@@ -173,6 +198,14 @@ try {
     daemon.signal("SIGCONT");
     await page.waitForSelector("body:not(.stale)");
     await verdict("PASS");
+  });
+
+  await step("a measuring task whose heartbeat stands still makes the verdict STALE", async () => {
+    await page.evaluate(() => { window.heldStill = true; });
+    await page.waitForSelector("body.stale", { timeout: STALE_WITHIN });
+    assert.match(await page.textContent("#stale-words"), /heartbeat stands still/);
+    await page.evaluate(() => { window.heldStill = false; });
+    await page.waitForSelector("body:not(.stale)");
   });
 
   await step("the cover comes by itself when the scripts hang", async () => {

@@ -23,18 +23,21 @@ async function trigger(page, times) {
   await page.waitForFunction(() => document.querySelector("#no-picture").hidden);
 }
 
-async function shoot(browser, url, folder, name, view = "live", prepare = async () => {}) {
-  for (const size of Object.keys(SIZES)) {
-    for (const colour of ["light", "dark"]) {
-      const context = await browser.newContext({ viewport: SIZES[size], colorScheme: colour, deviceScaleFactor: 1 });
-      const page = await context.newPage();
-      await page.goto(`${url}/#${view}`);
-      await page.waitForSelector("#state:not([data-state=wait])");
-      await page.waitForTimeout(900);
-      await prepare(page);
-      await page.screenshot({ path: join(folder, `page-${name}-${size}-${colour}.png`) });
-      await context.close();
-    }
+const ALL = ["phone-light", "phone-dark", "desktop-light", "desktop-dark"];
+
+async function shoot(browser, url, folder, name, forms = ALL, view = "live", prepare = async () => {}, after = () => {}) {
+  for (const form of forms) {
+    const [size, colour] = form.split("-");
+    const context = await browser.newContext({ viewport: SIZES[size], colorScheme: colour, deviceScaleFactor: 1 });
+    const page = await context.newPage();
+    await page.goto(`${url}/#${view}`);
+    await page.waitForSelector("#state:not([data-state=wait])");
+    await page.waitForTimeout(900);
+    await prepare(page);
+    await page.evaluate(() => { if (document.querySelector("#editor").hidden) window.scrollTo(0, 0); });
+    await page.screenshot({ path: join(folder, `${name}-${form}.png`) });
+    after();
+    await context.close();
   }
 }
 
@@ -49,13 +52,12 @@ export async function pictures(browser, program, folder) {
     await signIn(page, secret);
     await trigger(page, CYCLES);
     await shoot(browser, daemon.url, folder, "pass");
-    for (const view of ["recipes", "registers", "device", "history"]) await shoot(browser, daemon.url, folder, view, view);
     const edit = async (page) => {
       await page.click("#recipe-rows tr button:has-text('Before')");
       await page.click("#recipe-rows tr button:has-text('Edit')");
       await page.waitForSelector("#editor-regions .handle");
     };
-    await shoot(browser, daemon.url, folder, "edit", "recipes", edit);
+    await shoot(browser, daemon.url, folder, "edit", ["desktop-light", "phone-dark"], "recipes", edit);
     await daemon.end();
     daemon = await Daemon.start(program, place, "dented");
     page = await context.newPage();
@@ -66,14 +68,16 @@ export async function pictures(browser, program, folder) {
       await page.click("[data-layer=deviation]");
       await page.waitForTimeout(500);
     };
-    await shoot(browser, daemon.url, folder, "fail", "live", deviation);
+    await shoot(browser, daemon.url, folder, "fail", ALL, "live", deviation);
+    await shoot(browser, daemon.url, folder, "history", ["desktop-dark"], "history");
+    await shoot(browser, daemon.url, folder, "registers", ["phone-light"], "registers");
+    await shoot(browser, daemon.url, folder, "device", ["desktop-light"], "device");
     const stale = async (page) => {
       daemon.signal("SIGSTOP");
       await page.waitForSelector("body.stale");
       await page.waitForTimeout(1200);
-      daemon.signal("SIGCONT");
     };
-    await shoot(browser, daemon.url, folder, "stale", "live", stale);
+    await shoot(browser, daemon.url, folder, "stale", ["desktop-light", "phone-dark"], "live", stale, () => daemon.signal("SIGCONT"));
     await context.close();
   } finally {
     await daemon.end("SIGKILL");

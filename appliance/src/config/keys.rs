@@ -18,7 +18,7 @@ pub struct Key {
 }
 
 /// The table; a test compares it with the structs.
-pub const KEYS: [Key; 15] = [
+pub const KEYS: [Key; 17] = [
     Key {
         name: "state",
         unit: "folder",
@@ -123,6 +123,20 @@ pub const KEYS: [Key; 15] = [
         range: "recordings of one head",
         default: "[]",
         meaning: "what the replay head plays, in turn; required with backend = \"replay\"",
+    },
+    Key {
+        name: "history.results",
+        unit: "results",
+        range: "1 to 10000000",
+        default: "100000",
+        meaning: "the most results in the history; the oldest go first",
+    },
+    Key {
+        name: "history.recordings_mib",
+        unit: "MiB",
+        range: "0 to 4294967295",
+        default: "1024",
+        meaning: "the most room for frames of parts that did not pass; the oldest go first; 0 = none are kept",
     },
 ];
 

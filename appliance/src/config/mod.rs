@@ -28,6 +28,18 @@ pub struct Config {
     pub http: HttpConfig,
     /// The devices.
     pub head: HeadConfig,
+    /// What is kept of results.
+    pub history: HistoryConfig,
+}
+
+/// What is kept of results; the oldest go first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HistoryConfig {
+    /// The most results.
+    pub results: u32,
+    /// The most MiB of recordings of failed parts; 0 = none are kept.
+    pub recordings_mib: u32,
 }
 
 /// What the station does by itself.
@@ -132,6 +144,15 @@ impl Default for HttpConfig {
     }
 }
 
+impl Default for HistoryConfig {
+    fn default() -> Self {
+        Self {
+            results: 100_000,
+            recordings_mib: 1024,
+        }
+    }
+}
+
 impl Default for HeadConfig {
     fn default() -> Self {
         Self {
@@ -202,6 +223,8 @@ impl Config {
         within("station.recipe", u64::from(self.station.recipe), 1, 9999)?;
         let timeout = u64::from(self.station.plc_timeout_s);
         within("station.plc_timeout_s", timeout, 1, 3600)?;
+        let results = u64::from(self.history.results);
+        within("history.results", results, 1, 10_000_000)?;
         if self.head.backend == Backend::Replay && self.head.recordings.is_empty() {
             return Err(
                 "head.recordings is empty: the replay head needs at least one folder".into(),

@@ -3,6 +3,7 @@
 use super::HistoryError;
 use super::entry::{Entry, Filter};
 use super::reader::{Reader, condition};
+use super::time::utc;
 use rusqlite::params_from_iter;
 use std::fmt::{Display, Write as _};
 use std::io::Write;
@@ -146,44 +147,9 @@ fn text(line: &mut String, text: &str) {
     }
 }
 
-/// A time in µs since 1970 UTC after ISO 8601.
-pub fn utc(us: u64) -> String {
-    let (days, rest) = (us / 86_400_000_000, us % 86_400_000_000);
-    let (year, month, day) = civil(days);
-    let (seconds, us) = (rest / 1_000_000, rest % 1_000_000);
-    let (hour, minute, second) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
-    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{us:06}Z")
-}
-
-/// Year, month and day of a number of days since 1970-01-01 (Hinnant, "chrono-compatible low-level date algorithms",
-/// `civil_from_days`, for days that are not negative).
-fn civil(days: u64) -> (u64, u64, u64) {
-    let shifted = days + 719_468;
-    let (era, day) = (shifted / 146_097, shifted % 146_097);
-    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let of_month = day - (153 * month + 2) / 5 + 1;
-    let (month, carry) = if month < 10 {
-        (month + 3, 0)
-    } else {
-        (month - 9, 1)
-    };
-    (era * 400 + year + carry, month, of_month)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn times_are_those_of_the_calendar() {
-        assert_eq!(utc(0), "1970-01-01T00:00:00.000000Z");
-        assert_eq!(utc(951_782_400_000_001), "2000-02-29T00:00:00.000001Z");
-        assert_eq!(utc(1_795_278_896_500_000), "2026-11-21T16:34:56.500000Z");
-        assert_eq!(utc(4_107_542_399_999_999), "2100-02-28T23:59:59.999999Z");
-        assert_eq!(utc(4_107_542_400_000_000), "2100-03-01T00:00:00.000000Z");
-    }
 
     #[test]
     fn a_text_is_quoted_where_it_must_be_and_is_no_formula() {

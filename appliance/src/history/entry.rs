@@ -168,6 +168,32 @@ fn gauges(record: &ResultRecord) -> Vec<GaugeEntry> {
         .collect()
 }
 
+/// What a replay found otherwise than the history has it, in words; `None` if it is the same bit by bit. What belongs to
+/// the cycle and not to its frames is not compared: numbers, times, temperature.
+pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
+    let same = Entry {
+        seq: stored.seq,
+        time_utc_us: stored.time_utc_us,
+        part_id: stored.part_id,
+        press_stroke: stored.press_stroke,
+        token: stored.token,
+        temperature_c: stored.temperature_c,
+        exposure_us: stored.exposure_us,
+        total_us: stored.total_us,
+        stages: stored.stages.clone(),
+        recording: stored.recording.clone(),
+        ..replayed.clone()
+    };
+    if same == *stored {
+        return None;
+    }
+    let mut gauges = stored.gauges.iter().zip(&same.gauges);
+    Some(match gauges.find(|(stored, replayed)| stored != replayed) {
+        Some((stored, replayed)) => format!("a gauge was {stored:?}, is {replayed:?}"),
+        None => format!("it was {stored:?}, is {same:?}"),
+    })
+}
+
 /// The verdict of a number of register 208; anything unknown counts as not judged.
 pub(super) fn verdict_of(number: u16) -> Verdict {
     [Verdict::Pass, Verdict::Fail, Verdict::Invalid]

@@ -7,6 +7,7 @@ use rusqlite::types::Value;
 use rusqlite::{Connection, Row, params_from_iter};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A way to read one history. Cheap to clone; each call opens the database anew, so that it also sees a new one that was
 /// begun in place of a damaged one. Every call blocks.
@@ -69,6 +70,13 @@ impl Reader {
         &self.path
     }
 
+    /// A new name for a folder that is only needed for a moment; what a kill leaves of it, the next start removes.
+    pub fn scratch(&self) -> PathBuf {
+        static COUNT: AtomicU64 = AtomicU64::new(0);
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        self.recordings.join(format!(".page.partial-{count}"))
+    }
+
     pub(super) fn open(&self) -> Result<Connection, HistoryError> {
         if !self.path.exists() {
             return Err(HistoryError {
@@ -102,13 +110,29 @@ impl Reader {
     /// # Errors
     /// As [`Self::results`].
     pub fn result(&self, seq: u32) -> Result<Option<Entry>, HistoryError> {
+        self.first(
+            "SELECT * FROM result WHERE seq = ?1 ORDER BY id DESC LIMIT 1",
+            seq,
+        )
+    }
+
+    /// The result whose frames are kept under this name.
+    ///
+    /// # Errors
+    /// As [`Self::results`].
+    pub fn recorded_as(&self, name: &str) -> Result<Option<Entry>, HistoryError> {
+        self.first(
+            "SELECT * FROM result WHERE recording = ?1 ORDER BY id DESC LIMIT 1",
+            name,
+        )
+    }
+
+    fn first(&self, query: &str, key: impl rusqlite::ToSql) -> Result<Option<Entry>, HistoryError> {
         let connection = self.open()?;
-        let failed = self.failed();
-        let by_seq = "SELECT * FROM result WHERE seq = ?1 ORDER BY id DESC LIMIT 1";
-        match connection.query_row(by_seq, [seq], |row| with_gauges(&connection, row)) {
+        match connection.query_row(query, [key], |row| with_gauges(&connection, row)) {
             Ok(entry) => Ok(Some(entry)),
             Err(rusqlite::Error::QueryReturnedNoRows) => Ok(None),
-            Err(error) => Err(failed(error)),
+            Err(error) => Err(self.failed()(error)),
         }
     }
 

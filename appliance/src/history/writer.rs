@@ -35,17 +35,10 @@ impl Writer {
                 complaint: None,
             }),
             Err(error) if error.damaged => {
-                let aside = schema::set_aside(path).map_err(|failed| HistoryError {
-                    path: path.to_path_buf(),
-                    reason: format!("{}; and it cannot be set aside: {failed}", error.reason),
-                    damaged: false,
-                })?;
+                let aside = set_aside(path, &error.reason)?;
                 Ok(Opening {
                     writer: Self::open_sound(path, limit)?,
-                    complaint: Some(format!(
-                        "{error}; it is kept as {} and a new history begins",
-                        aside.display()
-                    )),
+                    complaint: Some(said(&error, &aside)),
                 })
             }
             Err(error) => Err(error),
@@ -70,6 +63,20 @@ impl Writer {
             count,
             limit: limit.max(1),
         })
+    }
+
+    /// Sets the database aside, which `why` says is damaged, and begins a new one; answers with a line for the log.
+    ///
+    /// # Errors
+    /// If that is not possible; then nothing can be stored until it is.
+    pub fn begin_anew(&mut self, why: &HistoryError) -> Result<String, HistoryError> {
+        let failed = |error| HistoryError::of(&self.path, &error);
+        // Closed before it is renamed: a log that is still open would go with the new database.
+        self.connection = Connection::open_in_memory().map_err(failed)?;
+        let aside = set_aside(&self.path, &why.reason)?;
+        self.connection = schema::open(&self.path)?;
+        self.count = 0;
+        Ok(said(why, &aside))
     }
 
     /// The SEQ of the result that was stored last.
@@ -161,6 +168,19 @@ impl Writer {
     fn failed(&self, error: &rusqlite::Error) -> HistoryError {
         HistoryError::of(&self.path, error)
     }
+}
+
+fn set_aside(path: &Path, reason: &str) -> Result<PathBuf, HistoryError> {
+    schema::set_aside(path).map_err(|failed| HistoryError {
+        path: path.to_path_buf(),
+        reason: format!("{reason}; and it cannot be set aside: {failed}"),
+        damaged: false,
+    })
+}
+
+fn said(error: &HistoryError, aside: &Path) -> String {
+    let aside = aside.display();
+    format!("{error}; it is kept as {aside} and a new history begins")
 }
 
 fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {

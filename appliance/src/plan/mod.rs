@@ -170,6 +170,11 @@ impl Plan {
         &self.sequence
     }
 
+    /// Ratio and shift of each frame that is projected, in their order.
+    pub fn steps(&self) -> &[(f64, f64)] {
+        &self.frames
+    }
+
     /// The columns of each row that some gauge looks at.
     pub fn window(&self) -> &[Range<usize>] {
         self.production.window()

@@ -7,6 +7,7 @@ pub mod archive;
 pub mod check;
 pub mod comparison;
 pub mod edit;
+pub mod exchange;
 pub mod file;
 pub mod golden;
 pub mod planner;

@@ -175,6 +175,11 @@ pub enum Event {
         /// Why it could not be stored.
         failed: Option<Arc<str>>,
     },
+    /// The history cannot be written, or can again.
+    History {
+        /// Why not, and the remedy; none if it can.
+        problem: Option<Arc<str>>,
+    },
     /// The worker's sign of life.
     Alive,
     /// Time passes: about every 100 ms.
@@ -195,6 +200,7 @@ impl Event {
                 | Self::Request(_)
                 | Self::Surveyed(_)
                 | Self::Stored { .. }
+                | Self::History { .. }
                 | Self::Tick { .. }
                 | Self::Stop
         )
@@ -240,7 +246,7 @@ pub enum Effect {
         /// The running job.
         job: JobId,
     },
-    /// Store this RESULT_SEQ as used, and answer with [`Event::Stored`]. Always directly before the [`Effect::Publish`] of that
+    /// Make sure that this RESULT_SEQ is stored as used, and answer with [`Event::Stored`]. Always directly before the [`Effect::Publish`] of that
     /// result; again when it could not be stored.
     PersistSeq(u32),
     /// A result is complete: for the history.

@@ -93,6 +93,8 @@ pub struct Station {
     pub(super) health: Health,
     /// Whether the SEQ of the last result still has to be stored.
     pub(super) unstored: bool,
+    /// Whether the history cannot be written.
+    pub(super) history_fails: bool,
     pub(super) heartbeat: u16,
     pub(super) next_beat: Micros,
     pub(super) last_alive: Micros,
@@ -132,6 +134,7 @@ impl Station {
             condition: Condition::default(),
             health: Health::default(),
             unstored: false,
+            history_fails: false,
             heartbeat: 0,
             next_beat: now.after(BEAT),
             last_alive: now,

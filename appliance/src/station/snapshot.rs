@@ -236,7 +236,7 @@ impl Station {
         } else {
             0
         };
-        let storage = if self.unstored || self.health.storage_is_low() {
+        let storage = if self.unstored || self.history_fails || self.health.storage_is_low() {
             warning::STORAGE
         } else {
             0

@@ -133,6 +133,7 @@ pub fn step(mut station: Station, event: Event, now: Micros) -> (Station, Effect
         Event::Paced(pace) => station.health.paced(pace),
         Event::Surveyed(system) => station.surveyed(system, now, &mut effects),
         Event::Stored { seq, failed } => station.stored(seq, failed, now, &mut effects),
+        Event::History { problem } => station.history_told(problem, &mut effects),
         Event::Alive => {}
         Event::Tick { utc_us } => station.tick(utc_us, now, &mut effects),
         Event::Stop => station.stop(&mut effects),
@@ -281,6 +282,13 @@ impl Station {
             };
             self.fault(fault, now, effects);
         }
+    }
+
+    /// The history fails or works again: a warning, no fault. Verdicts go on.
+    fn history_told(&mut self, problem: Option<std::sync::Arc<str>>, effects: &mut Effects) {
+        self.history_fails = problem.is_some();
+        let works = || "the history is written again".into();
+        log(effects, problem.unwrap_or_else(works));
     }
 
     fn stop(&mut self, effects: &mut Effects) {

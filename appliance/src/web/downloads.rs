@@ -1,12 +1,16 @@
 //! Files to take along: point cloud, gauges, and everything that a distant colleague needs.
 
+use std::convert::Infallible;
 use std::io::{Cursor, Write as _};
 use std::path::Path;
 
+use axum::body::{Body, Bytes};
 use axum::extract::State;
-use axum::http::header;
+use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::{Value, json};
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
 use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
@@ -14,37 +18,90 @@ use zip::{CompressionMethod, ZipWriter};
 use super::problem::Problem;
 use super::site::Site;
 use super::{metrics, view};
-use crate::history::Filter;
+use crate::history::{FailedPart, Filter};
 
-/// A file to be stored under a name.
-pub(super) fn attachment(kind: &'static str, name: String, bytes: Vec<u8>) -> Response {
-    let name = format!("attachment; filename=\"{name}\"");
+/// Bytes of a file that are handed to a connection at a time.
+const CHUNK: usize = 64 << 10;
+
+/// A file to be stored under a name, both made by `work`; a few at a time.
+///
+/// # Errors
+/// Too many are on their way, or what `work` answers.
+pub(super) async fn file(
+    site: &Site,
+    kind: &'static str,
+    work: impl FnOnce(&Site) -> Result<(String, Vec<u8>), Problem> + Send + 'static,
+) -> Result<Response, Problem> {
+    let permit = site.files.clone().try_acquire_owned().map_err(|_| {
+        let words = "too many files are being taken along already: wait until one is done";
+        Problem::new(StatusCode::SERVICE_UNAVAILABLE, words)
+    })?;
+    let (name, bytes) = site.aside(work).await?;
     let headers = [
         (header::CONTENT_TYPE, kind.to_owned()),
-        (header::CONTENT_DISPOSITION, name),
+        (header::CONTENT_LENGTH, bytes.len().to_string()),
+        (
+            header::CONTENT_DISPOSITION,
+            format!("attachment; filename=\"{name}\""),
+        ),
     ];
-    (headers, bytes).into_response()
+    let (sender, receiver) = mpsc::channel::<Result<Bytes, Infallible>>(1);
+    tokio::spawn(async move {
+        // Held until the client has taken the file or is gone.
+        let _permit = permit;
+        let mut rest = Bytes::from(bytes);
+        while !rest.is_empty() {
+            let chunk = rest.split_to(CHUNK.min(rest.len()));
+            if sender.send(Ok(chunk)).await.is_err() {
+                return;
+            }
+        }
+    });
+    Ok((headers, Body::from_stream(ReceiverStream::new(receiver))).into_response())
 }
 
 pub(super) async fn cloud(State(site): State<Site>) -> Result<Response, Problem> {
-    let made = site.aside(|site| {
+    file(&site, "application/octet-stream", |site| {
         let asked = site.maps.ask(|cycle| {
             let cloud = cycle.plan.cloud(cycle.frames)?;
-            Some((cycle.seq, cloud))
+            Some((format!("{}.ply", cycle.seq()), cloud))
         });
-        let words =
-            "the frames of the last result are gone, or the station is busy; trigger a measurement";
-        asked.flatten().ok_or_else(|| Problem::missing(words))
-    });
-    let (seq, cloud) = made.await?;
-    Ok(attachment(
-        "application/octet-stream",
-        format!("{seq}.ply"),
-        cloud,
-    ))
+        asked.flatten().ok_or_else(|| Problem::missing(GONE))
+    })
+    .await
+}
+
+/// Without frames there is nothing to take along.
+const GONE: &str =
+    "the frames of the last result are gone, or the station is busy; trigger a measurement";
+
+pub(super) async fn recording(State(site): State<Site>) -> Result<Response, Problem> {
+    file(&site, "application/zip", |site| {
+        let asked = site.maps.ask(|cycle| FailedPart {
+            record: cycle.record.clone(),
+            frames: cycle.frames.to_vec(),
+            plan: cycle.plan.clone(),
+            calibration: cycle.calibration.clone(),
+        });
+        let part = asked.ok_or_else(|| Problem::missing(GONE))?;
+        let folder = site.history.scratch();
+        let written = part.write(&folder);
+        let packed = written.map_err(|error| error.to_string()).and_then(|()| {
+            zipped(&folder).map_err(|error| format!("pack the recording: {error}: free space"))
+        });
+        // Whatever cannot be removed now, the next start removes.
+        let _ = std::fs::remove_dir_all(&folder);
+        let name = format!("{}-recording.zip", part.record.seq);
+        Ok((name, packed.map_err(Problem::broken)?))
+    })
+    .await
 }
 
 pub(super) async fn gauges(State(site): State<Site>) -> Result<Response, Problem> {
+    file(&site, "text/csv; charset=utf-8", gauges_csv).await
+}
+
+fn gauges_csv(site: &Site) -> Result<(String, Vec<u8>), Problem> {
     let snapshot = site.station.snapshot();
     let words = "nothing was measured yet; trigger a measurement";
     let result = snapshot
@@ -70,11 +127,7 @@ pub(super) async fn gauges(State(site): State<Site>) -> Result<Response, Problem
             u8::from(decision.doubtful),
         );
     }
-    Ok(attachment(
-        "text/csv; charset=utf-8",
-        format!("{}.csv", result.seq),
-        csv.into_bytes(),
-    ))
+    Ok((format!("{}.csv", result.seq), csv.into_bytes()))
 }
 
 /// A folder and the folders in it as a ZIP.
@@ -102,14 +155,13 @@ pub(super) fn zipped(folder: &Path) -> Result<Vec<u8>, ZipError> {
 
 /// A ZIP of everything that explains a device's behaviour; no secrets.
 pub(super) async fn diagnostics(State(site): State<Site>) -> Result<Response, Problem> {
-    let packed = site.aside(|site| pack(site).map_err(|error| Problem::broken(error.to_string())));
-    let serial = site.station.snapshot().identity.serial.clone();
-    let safe: String = serial.chars().filter(char::is_ascii_alphanumeric).collect();
-    Ok(attachment(
-        "application/zip",
-        format!("fringed-{safe}.zip"),
-        packed.await?,
-    ))
+    file(&site, "application/zip", |site| {
+        let packed = pack(site).map_err(|error| Problem::broken(error.to_string()));
+        let serial = &site.station.snapshot().identity.serial;
+        let safe: String = serial.chars().filter(char::is_ascii_alphanumeric).collect();
+        Ok((format!("fringed-{safe}.zip"), packed?))
+    })
+    .await
 }
 
 fn pack(site: &Site) -> Result<Vec<u8>, ZipError> {

@@ -94,7 +94,7 @@ pub async fn record(
     outcome: String,
 ) {
     let written = site
-        .aside(move |site| {
+        .change(move |site| {
             let change = Change {
                 utc_us: clock::utc_us(),
                 from: peer.map_or(IpAddr::from([0, 0, 0, 0]), |Peer(address)| address),

@@ -5,7 +5,7 @@ use axum::response::{Json, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::downloads::{attachment, zipped};
+use super::downloads::{file, zipped};
 use super::problem::Problem;
 use super::site::Site;
 use crate::history::{Filter, HistoryError};
@@ -87,28 +87,28 @@ pub(super) async fn csv(
     Query(wanted): Query<Wanted>,
 ) -> Result<Response, Problem> {
     let filter = wanted.filter(MAX_CSV)?;
-    let written = site.aside(move |site| {
+    file(&site, "text/csv; charset=utf-8", move |site| {
         let mut bytes = Vec::new();
         site.history.csv(&filter, &mut bytes)?;
-        Ok(bytes)
-    });
-    let kind = "text/csv; charset=utf-8";
-    Ok(attachment(kind, "history.csv".into(), written.await?))
+        Ok(("history.csv".into(), bytes))
+    })
+    .await
 }
 
 pub(super) async fn recording(
     State(site): State<Site>,
     Path(seq): Path<u32>,
 ) -> Result<Response, Problem> {
-    let packed = site.aside(move |site| {
+    file(&site, "application/zip", move |site| {
         let words = format!("the frames of result {seq} were not kept");
         let folder = site.history.recording(seq)?;
         let folder = folder.filter(|folder| folder.is_dir());
         let folder = folder.ok_or_else(|| Problem::missing(words))?;
-        zipped(&folder).map_err(|error| Problem::broken(format!("pack the recording: {error}")))
-    });
-    let name = format!("{seq}-recording.zip");
-    Ok(attachment("application/zip", name, packed.await?))
+        let failed = |error| Problem::broken(format!("pack the recording: {error}"));
+        let zip = zipped(&folder).map_err(failed)?;
+        Ok((format!("{seq}-recording.zip"), zip))
+    })
+    .await
 }
 
 /// The last values of each gauge of the active recipe.

@@ -2,10 +2,11 @@
 
 use axum::body::Body;
 use axum::extract::{Path, Request, State};
-use axum::http::{StatusCode, header};
-use axum::response::{IntoResponse, Json, Response};
+use axum::http::StatusCode;
+use axum::response::{Json, Response};
 use serde_json::{Value, json};
 
+use super::downloads::file;
 use super::map::{Map, map};
 use super::problem::Problem;
 use super::site::Site;
@@ -71,16 +72,12 @@ pub(super) async fn export(
     State(site): State<Site>,
     Path(number): Path<u16>,
 ) -> Result<Response, Problem> {
-    let bytes = site.aside(move |site| {
+    file(&site, "application/zip", move |site| {
         let read = site.recipes.bytes(number);
-        read.map_err(|error| Problem::missing(format!("read recipe {number}: {error}")))
-    });
-    let name = format!("attachment; filename=\"{number:04}.recipe\"");
-    let headers = [
-        (header::CONTENT_TYPE, "application/zip".to_owned()),
-        (header::CONTENT_DISPOSITION, name),
-    ];
-    Ok((headers, bytes.await?).into_response())
+        let failed = |error| Problem::missing(format!("read recipe {number}: {error}"));
+        Ok((format!("{number:04}.recipe"), read.map_err(failed)?))
+    })
+    .await
 }
 
 pub(super) async fn picture(
@@ -105,7 +102,7 @@ pub(super) async fn edit(
     request: Request<Body>,
 ) -> Result<Json<Value>, Problem> {
     let wanted: Edit = body::json(request.into_body()).await?;
-    let edited = site.aside(move |site| Ok(edit::edit(&site.recipes, number, wanted)?));
+    let edited = site.change(move |site| Ok(edit::edit(&site.recipes, number, wanted)?));
     let fingerprint = edited.await?;
     let active = site
         .station
@@ -124,7 +121,7 @@ pub(super) async fn import(
     request: Request<Body>,
 ) -> Result<(StatusCode, Json<Value>), Problem> {
     let bytes = body::file(request.into_body()).await?;
-    let stored = site.aside(move |site| {
+    let stored = site.change(move |site| {
         let recipe = Recipe::from_bytes(&bytes).map_err(|error| Problem::unfit(error.to_string()))?;
         let number = recipe.file.number;
         let saved = site.recipes.save(number, &bytes);

@@ -77,6 +77,7 @@ pub fn routes() -> Vec<Route> {
         look("/api/log", look::log),
         look("/api/changes", look::changes),
         look("/api/last/cloud.ply", downloads::cloud),
+        look("/api/last/recording.zip", downloads::recording),
         look("/api/last/gauges.csv", downloads::gauges),
         look("/api/history", history::list),
         look("/api/history.csv", history::csv),

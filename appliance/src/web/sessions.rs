@@ -46,7 +46,7 @@ async fn enter(
 ) -> Result<Response, Problem> {
     let SignIn { secret } = body::json(request.into_body()).await?;
     let from = peer.map_or(IpAddr::from([0, 0, 0, 0]), |Peer(address)| address);
-    let guess = site.aside(move |site| Ok(site.access.sign_in(from, &secret, Instant::now())));
+    let guess = site.change(move |site| Ok(site.access.sign_in(from, &secret, Instant::now())));
     let (token, outcome) = match guess.await? {
         Ok(token) => (Ok(token), "done".to_owned()),
         Err(refused) => {

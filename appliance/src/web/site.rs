@@ -18,6 +18,10 @@ use crate::tally::Tally;
 pub const MAX_FOLLOWERS: usize = 16;
 /// The most pictures, files and recipes that are worked on at a time; the measuring task needs the cores.
 const MAX_ASIDE: usize = 2;
+/// The most sign-ins, changes and records of them at a time: whoever only looks must not keep them waiting.
+const MAX_CHANGES: usize = 2;
+/// The most files that are on their way at a time: each is in memory until its client has taken it.
+const MAX_FILES: usize = 4;
 
 /// What the page is made of, handed in by the daemon.
 pub struct Parts {
@@ -49,7 +53,10 @@ pub struct Site {
     parts: Arc<Parts>,
     /// Places for pages that follow the events.
     pub(super) followers: Arc<Semaphore>,
-    aside: Arc<Semaphore>,
+    /// Places for files that are being taken along.
+    pub(super) files: Arc<Semaphore>,
+    looking: Arc<Semaphore>,
+    changing: Arc<Semaphore>,
 }
 
 impl std::ops::Deref for Site {
@@ -66,11 +73,13 @@ impl Site {
         Self {
             parts: Arc::new(parts),
             followers: Arc::new(Semaphore::new(MAX_FOLLOWERS)),
-            aside: Arc::new(Semaphore::new(MAX_ASIDE)),
+            files: Arc::new(Semaphore::new(MAX_FILES)),
+            looking: Arc::new(Semaphore::new(MAX_ASIDE)),
+            changing: Arc::new(Semaphore::new(MAX_CHANGES)),
         }
     }
 
-    /// Does what takes its time on another thread, a few at a time.
+    /// Looks for what takes its time on another thread, a few at a time.
     ///
     /// # Errors
     /// What `work` answers.
@@ -78,8 +87,27 @@ impl Site {
         &self,
         work: impl FnOnce(&Self) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
+        self.queued(self.looking.clone(), work).await
+    }
+
+    /// Changes something on another thread, a few at a time.
+    ///
+    /// # Errors
+    /// What `work` answers.
+    pub async fn change<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Self) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        self.queued(self.changing.clone(), work).await
+    }
+
+    async fn queued<T: Send + 'static>(
+        &self,
+        places: Arc<Semaphore>,
+        work: impl FnOnce(&Self) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
         let gone = |_| Problem::broken("the page's workers are gone; restart fringed");
-        let permit = self.aside.clone().acquire_owned().await.map_err(gone)?;
+        let permit = places.acquire_owned().await.map_err(gone)?;
         let site = self.clone();
         let done = tokio::task::spawn_blocking(move || {
             let _permit = permit;

@@ -5,6 +5,7 @@ use crate::plan::Plan;
 use crate::station::Event;
 use hal::error::Error;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
 /// Waits before the head is opened again, in signs of life: doubled after each attempt, from the first to the last.
@@ -32,7 +33,7 @@ impl Worker {
     pub(super) fn recover(
         &mut self,
         error: &Error,
-        plan: &mut Option<Plan>,
+        plan: &mut Option<Arc<Plan>>,
         orders: &Receiver<Order>,
     ) -> ControlFlow<()> {
         self.station.event(Event::Faulted {
@@ -65,7 +66,7 @@ impl Worker {
                 said = problem;
             }
         }
-        let recipe = plan.as_ref().map(active);
+        let recipe = plan.as_deref().map(active);
         self.station.event(Event::Recovered { recipe });
         ControlFlow::Continue(())
     }

@@ -34,13 +34,13 @@ function bar(gauge) {
 function row(gauge) {
   const value = make("td", "", make("span", "value", gauge.value === null ? "not measured" : quantity(gauge.value, gauge.unit)));
   const sigma = gauge.value !== null && gauge.sigma !== null ? `± ${quantity(gauge.sigma, gauge.unit, 1)}` : "\u00a0";
-  value.append(make("small", "", sigma));
+  value.append(make("small", sigma === "\u00a0" ? "room" : "", sigma));
   const range = make("td", "limits", bar(gauge), make("small", "", limits(gauge.lowest, gauge.highest, gauge.unit)));
   const points = trends.get(gauge.name) || [];
   const kind = !gauge.valid ? "invalid" : gauge.pass ? "pass" : "fail";
   const words = !gauge.valid ? "? invalid" : gauge.pass ? "✓ pass" : gauge.low ? "✗ low" : gauge.high ? "✗ high" : "✗ fail";
   const verdict = make("td", "", make("span", `tag ${kind}`, words));
-  verdict.append(make("small", "", gauge.doubtful ? "close to a limit" : "\u00a0"));
+  verdict.append(gauge.doubtful ? make("small", "", "close to a limit") : make("small", "room", "\u00a0"));
   const name = make("th", "", gauge.name);
   name.scope = "row";
   return make("tr", "", name, value, range, make("td", "trend-cell", trend(points, gauge)), verdict);

@@ -11,7 +11,7 @@ function line(when, words, kind) {
 }
 
 function known(value, unit, places = 0) {
-  return value === null || value === undefined ? "not known" : value.toFixed(places) + unit;
+  return value === null || value === undefined ? "not known" : count(value.toFixed(places)) + unit;
 }
 
 function condition(now) {
@@ -42,20 +42,20 @@ function condition(now) {
   return pairs.map(([name, value]) => make("div", "", make("dt", "", name), make("dd", "", value)));
 }
 
-let last = null;
 async function refresh() {
   try {
     const [log, changes] = await Promise.all([ask("GET", "/api/log"), ask("GET", "/api/changes")]);
     fill($("log-lines"), ...log.lines.map((entry) => line(entry.utc_us ? moment(entry.utc_us) : `${entry.uptime_s} s after the start`, entry.words)));
     if (!log.lines.length) fill($("log-lines"), line("", "nothing happened yet"));
     fill($("change-lines"), ...changes.changes.map((entry) =>
-      line(moment(entry.utc_us), `${entry.action}, ${entry.subject}, from ${entry.from}: ${entry.outcome}`, entry.outcome === "done" ? "" : "refused")));
+      line(moment(entry.utc_us), `${entry.action} (${entry.subject}) from ${entry.from}: ${entry.outcome}`, entry.outcome === "done" ? "" : "refused")));
     if (!changes.changes.length) fill($("change-lines"), line("", "nothing was changed yet"));
-    if (last) fill($("health"), ...condition(last));
   } catch (error) { notice(error.message, true); }
 }
 
-export function showDevice(now) { last = now; }
+export function showDevice(now, visible) {
+  if (visible) fill($("health"), ...condition(now));
+}
 
 export function openDevice(visible) {
   clearInterval(timer);

@@ -58,7 +58,7 @@ function showSnapshot(now) {
   showVerdict(now);
   showCounters(now);
   showRecipes(now, view === "recipes");
-  showDevice(now);
+  showDevice(now, view === "device");
   const key = `${now.boot_id}/${now.result ? now.result.seq : "none"}`;
   if (key !== shown) {
     shown = key;
@@ -85,7 +85,10 @@ function openView() {
   showRegisters(view === "registers");
   openDevice(view === "device");
   openHistory(view === "history");
-  if (last) showPicture(last.result, view === "live");
+  if (last) {
+    showPicture(last.result, view === "live");
+    showDevice(last, view === "device");
+  }
 }
 
 startSession();

@@ -5,7 +5,7 @@ import { colours, paint } from "./colour.js";
 import { signed } from "./number.js";
 
 const UNITS = { mm: 3, counts: 1 };
-const state = { layer: "height", map: null, result: null, key: "", recipe: null, recipeKey: "", asked: 0, at: [0, 0] };
+const state = { layer: "height", map: null, deviation: null, result: null, key: "", recipe: null, recipeKey: "", asked: 0, at: [0, 0] };
 
 // The smallest of 1, 2, 5 × 10ⁿ that is at least `least`.
 function round(least) {
@@ -59,13 +59,12 @@ function drawOutlines() {
   const quiet = recipe.regions.filter((region) => !bad.has(region.name)).map((region) => outline(region, "quiet"));
   const failing = recipe.regions.filter((region) => bad.has(region.name));
   const loud = failing.map((region) => outline(region, `under`)).concat(failing.map((region) => outline(region, bad.get(region.name))));
-  const deviates = recipe.gauges.some((gauge) => gauge.measures.kind.startsWith("deviation") && bad.has(gauge.region));
-  fill(svg, ...quiet, ...loud, ...(deviates && state.layer === "deviation" ? most() : []));
+  fill(svg, ...quiet, ...loud, ...(state.deviation ? most(state.deviation) : []));
 }
 
 // A ring around the place that deviates most, averaged over squares of some pixels so that no single one decides.
-function most() {
-  const { width, height, stride } = state.map.about;
+function most(map) {
+  const { width, height, stride } = map.about;
   const half = Math.max(1, Math.round(4 / stride)), least = (2 * half + 1) * (2 * half + 1) / 2;
   let best = 0, at = null;
   for (let v = half; v < height - half; v += half) {
@@ -73,7 +72,7 @@ function most() {
       let sum = 0, count = 0;
       for (let row = v - half; row <= v + half; row += 1) {
         for (let column = u - half; column <= u + half; column += 1) {
-          const value = state.map.values[row * width + column];
+          const value = map.values[row * width + column];
           if (!Number.isNaN(value)) { sum += value; count += 1; }
         }
       }
@@ -124,8 +123,14 @@ async function load() {
     return;
   }
   if (turn !== state.asked) return;
+  let deviation = null;
+  if (result.gauges.some((gauge) => gauge.valid && !gauge.pass && gauge.name.startsWith("deviation"))) {
+    try { deviation = layer === "deviation" ? loaded : await map(`/api/picture/deviation?seq=${result.seq}`); } catch (none) { /* No ring then. */ }
+    if (turn !== state.asked) return;
+  }
   if (loaded.about.seq !== result.seq) { empty(`the frames of no. ${result.seq} are gone`); return; }
   state.map = loaded;
+  state.deviation = deviation;
   paint($("map"), loaded, layer);
   show("no-picture", false);
   drawScale();
@@ -134,6 +139,7 @@ async function load() {
 
 function empty(words) {
   state.map = null;
+  state.deviation = null;
   const canvas = $("map");
   canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
   text("no-picture", words);

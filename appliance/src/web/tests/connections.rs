@@ -103,3 +103,19 @@ async fn a_body_that_is_too_long_or_never_ends_is_refused() {
     answered.expect("an answer in time").unwrap();
     assert_eq!(&first, b"HTTP/1.1 408");
 }
+
+#[tokio::test]
+async fn only_a_few_files_are_on_their_way_at_a_time_and_others_are_told_to_wait() {
+    let served = served().await;
+    let places = served.site.files.clone();
+    let taken = places.acquire_many_owned(4).await.unwrap();
+    let answer = served.get("/api/diagnostics.zip").await;
+    assert!(
+        answer.status == 503 && answer.body.contains("wait"),
+        "{answer:?}"
+    );
+    drop(taken);
+    for _ in 0..8 {
+        assert_eq!(served.get("/api/diagnostics.zip").await.status, 200);
+    }
+}
