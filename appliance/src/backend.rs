@@ -19,6 +19,24 @@ pub struct Opened {
     pub stage: Option<Stage>,
 }
 
+impl Opened {
+    /// Opens the head again after it was lost. It may be another one then: what is known of it is read anew.
+    ///
+    /// # Errors
+    /// As long as a device of it is not there.
+    pub fn reopen(&mut self, config: &HeadConfig) -> Result<(), Failure> {
+        match &self.stage {
+            Some(stage) => {
+                self.head = stage
+                    .reopen()
+                    .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+            }
+            None => *self = open(config, &|_| ())?,
+        }
+        Ok(())
+    }
+}
+
 /// Opens the configured head. `progress` is told the share done, from any thread.
 ///
 /// # Errors

@@ -15,13 +15,14 @@ use crate::station::{
     Effect, Event, Identity, Limits, Micros, RecipeKey, RecipeResult, Request, Settings, Snapshot,
     Station, StationHandle, tick,
 };
-use crate::worker::{Order, Worker};
+use crate::survey::Survey;
+use crate::worker::{Aborts, Order, Worker};
 use crate::{backend, clock, modbus, web};
 use hal::sim::Stage;
 use std::net::SocketAddr;
 use std::sync::{Arc, mpsc};
 use std::thread::JoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
@@ -47,7 +48,9 @@ pub struct Daemon {
 struct Stopping {
     orders: mpsc::Sender<Order>,
     sockets: watch::Sender<bool>,
-    threads: [JoinHandle<()>; 2],
+    survey: mpsc::Sender<()>,
+    threads: [JoinHandle<()>; 3],
+    progress: Progress,
     station: StationHandle,
     history: History,
     writing: JoinHandle<()>,
@@ -78,7 +81,13 @@ impl Daemon {
         if let Some(complaint) = complaint {
             progress.log(&complaint);
         }
-        let sink = effects(orders.clone(), history.clone(), progress.clone());
+        let aborts = Aborts::default();
+        let sink = effects(
+            orders.clone(),
+            aborts.clone(),
+            history.clone(),
+            progress.clone(),
+        );
         let settings = station(config, &state, next_seq)?;
         let station = StationHandle::new(settings, Instant::now(), sink);
         let writing = {
@@ -87,10 +96,26 @@ impl Daemon {
         };
         let maps = LastMaps::default();
         let (sockets, stopped) = watch::channel(false);
+        let clients = modbus::Clients::new(modbus::CONNECTIONS);
         let serving = {
             let (station, maps, config) = (station.clone(), maps.clone(), config.clone());
-            let serve = move || runtime.block_on(serve(plc, page, station, maps, &config, stopped));
+            let log = progress.clone();
+            let plc = PlcSide {
+                listener: plc,
+                clients: clients.clone(),
+                refusals: modbus::Refusals::new(move |line| log.log(line)),
+            };
+            let serve = move || {
+                runtime.block_on(serve(plc, page, station, maps, &config, stopped));
+            };
             spawn("sockets", serve)?
+        };
+        let (survey, surveyed) = mpsc::channel();
+        let surveying = {
+            let station = station.clone();
+            let recipes = state.recipes().clone();
+            let survey = Survey::new(&path, recipes, clients, progress.clone());
+            spawn("survey", move || survey.run(&station, &surveyed))?
         };
         let (opened, opening) = mpsc::channel();
         let simulated = config.head.backend == Backend::Sim;
@@ -98,7 +123,7 @@ impl Daemon {
         let awaited = first.is_some();
         let measuring = {
             let (station, recipes) = (station.clone(), state.recipes().clone());
-            let (config, history) = (config.clone(), history.clone());
+            let (config, progress, history) = (config.clone(), progress.clone(), history.clone());
             spawn("measuring", move || {
                 let told = |share: f64| progress.tell(share, "working out the light of the scene");
                 match pool.install(|| backend::open(&config.head, &told)) {
@@ -114,6 +139,9 @@ impl Daemon {
                             maps,
                             history,
                             progress,
+                            config: config.head,
+                            aborts,
+                            lost: None,
                         };
                         worker.run(&inbox, first);
                     }
@@ -123,7 +151,9 @@ impl Daemon {
         let stopping = Stopping {
             orders,
             sockets,
-            threads: [measuring, serving],
+            survey,
+            threads: [measuring, serving, surveying],
+            progress,
             station: station.clone(),
             history,
             writing,
@@ -193,18 +223,41 @@ impl Daemon {
     }
 }
 
+/// Time between two looks at a thread that ends.
+const LOOKING: Duration = Duration::from_millis(2);
+/// A thread that has not ended after this time is left behind.
+const STOPPING: Duration = Duration::from_secs(3);
+
 impl Stopping {
     fn stop(self) {
         // An order that nobody takes, or a runtime that is gone, is what is wanted here.
         drop(self.orders.send(Order::Stop));
-        let [measuring, serving] = self.threads;
-        drop(measuring.join());
+        let [measuring, serving, surveying] = self.threads;
+        join("measuring", measuring, &self.progress);
         let _ = self.sockets.send(true);
-        drop(serving.join());
+        join("sockets", serving, &self.progress);
+        drop(self.survey);
+        join("survey", surveying, &self.progress);
         // Last: what the others brought to an end is stored.
         self.history.stop(self.station.snapshot().result_seq);
-        drop(self.writing.join());
+        join("history", self.writing, &self.progress);
     }
+}
+
+/// Waits for a thread to end. One that hangs in a device or in a storage must not keep the program from ending.
+fn join(name: &str, thread: JoinHandle<()>, progress: &Progress) {
+    let began = Instant::now();
+    while !thread.is_finished() {
+        if began.elapsed() > STOPPING {
+            progress.log(&format!(
+                "the thread {name} does not end and is left behind"
+            ));
+            return;
+        }
+        std::thread::sleep(LOOKING);
+    }
+    // One that panicked has said so.
+    drop(thread.join());
 }
 
 /// A current-thread runtime.
@@ -277,27 +330,27 @@ fn station(config: &Config, state: &StateFolder, next_seq: u32) -> Result<Statio
 /// Carries out what the station wants done. Called with the station locked: it only hands on and waits for nothing.
 fn effects(
     orders: mpsc::Sender<Order>,
+    aborts: Aborts,
     history: History,
     progress: Progress,
-) -> impl FnMut(Effect) {
+) -> impl FnMut(Effect) -> Option<Event> {
     // An order that nobody takes is noticed by the station itself: its wait has a deadline.
     let order = move |order| drop(orders.send(order));
-    move |effect| match effect {
-        Effect::Measure(job) => order(Order::Measure(job)),
-        Effect::Load { job, key } => order(Order::Load(job, key)),
-        Effect::Teach { job, number } => order(Order::Teach(job, number)),
-        Effect::PersistSeq(seq) => {
-            if !history.covers(seq) {
-                progress.log(&format!(
-                    "result number {seq} is not stored as used: the storage does not answer"
-                ));
+    move |effect| {
+        match effect {
+            Effect::Measure(job) => order(Order::Measure(job)),
+            Effect::Load { job, key } => order(Order::Load(job, key)),
+            Effect::Teach { job, number } => order(Order::Teach(job, number)),
+            Effect::PersistSeq(seq) => {
+                let unanswered = || "the storage does not answer".into();
+                let failed = (!history.covers(seq)).then(unanswered);
+                return Some(Event::Stored { seq, failed });
             }
+            Effect::Log(line) => progress.log(&line),
+            Effect::Abort { job } => aborts.abort(job),
+            Effect::Publish(record) => history.record(record),
         }
-        Effect::Log(line) => progress.log(&line),
-        // A sequence is short and every wait in it has a time-out: it ends by itself, and the station
-        // drops its answer.
-        Effect::Abort { .. } => {}
-        Effect::Publish(record) => history.record(record),
+        None
     }
 }
 
@@ -316,8 +369,15 @@ fn first_request(
     }
 }
 
+/// The PLC's side of the sockets.
+struct PlcSide {
+    listener: TcpListener,
+    clients: modbus::Clients,
+    refusals: modbus::Refusals,
+}
+
 async fn serve(
-    plc: TcpListener,
+    plc: PlcSide,
     page: TcpListener,
     station: StationHandle,
     maps: LastMaps,
@@ -334,6 +394,8 @@ async fn serve(
     let options = modbus::Options {
         word_order: config.modbus.word_order.into(),
         strict_unit_id: config.modbus.strict_unit_id,
+        readers: config.modbus.readers.clone(),
+        writers: config.modbus.writers.clone(),
         ..modbus::Options::default()
     };
     let picture = move || {
@@ -353,7 +415,14 @@ async fn serve(
     };
     tokio::join!(
         tick(station.clone(), clock::utc_us, stop()),
-        modbus::serve(plc, station, options, stop()),
+        modbus::serve(
+            plc.listener,
+            station,
+            options,
+            plc.clients,
+            plc.refusals,
+            stop()
+        ),
         pages,
     );
 }

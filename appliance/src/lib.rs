@@ -22,5 +22,6 @@ pub mod rig;
 pub mod seam;
 pub mod state;
 pub mod station;
+pub mod survey;
 pub mod web;
 pub mod worker;

@@ -1,6 +1,9 @@
 //! The measuring task: one thread that owns the head, the plan and the computing threads.
 
+mod recovery;
+
 use crate::backend::Opened;
+use crate::config::HeadConfig;
 use crate::history::{FailedPart, History};
 use crate::latest::LastMaps;
 use crate::plan::{Plan, PlanError};
@@ -8,12 +11,14 @@ use crate::progress::Progress;
 use crate::recipe::teach::{Naming, TeachError, teach};
 use crate::recipe::{LoadError, Store};
 use crate::station::{
-    ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, ResultRecord,
-    StationHandle,
+    ActiveRecipe, Condition, Event, Job, JobId, Pace, RecipeKey, RecipeResult, Request,
+    ResultRecord, StationHandle, error_code,
 };
-use hal::error::ErrorKind;
+use hal::error::{Device, Error};
 use hal::frame::Frame;
+use hal::head::Exposure;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
@@ -41,12 +46,31 @@ const DEVICE_TIMEOUT: Duration = Duration::from_secs(2);
 mod code {
     pub const CAMERA_LOST: u16 = 101;
     pub const UNSUPPORTED: u16 = 102;
+    pub const PROJECTOR_LOST: u16 = 201;
     pub const TIMEOUT: u16 = 301;
     pub const PROTOCOL: u16 = 302;
     pub const NOTHING_TO_TEACH: u16 = 401;
     pub const RIG: u16 = 501;
     pub const NOT_STORED: u16 = 601;
 }
+
+/// Which job was aborted last; told by the station, asked by the worker between two frames. Cheap to clone.
+#[derive(Clone, Debug, Default)]
+pub struct Aborts(Arc<AtomicU64>);
+
+impl Aborts {
+    /// Ends this job early. Jobs are numbered upwards.
+    pub fn abort(&self, job: JobId) {
+        self.0.fetch_max(job.0, Ordering::Relaxed);
+    }
+
+    fn has(&self, job: JobId) -> bool {
+        self.0.load(Ordering::Relaxed) == job.0
+    }
+}
+
+/// Words of what an abort ended.
+const ABORTED: &str = "the PLC or a stop ended it";
 
 /// Everything that the measuring task owns.
 pub struct Worker {
@@ -64,6 +88,12 @@ pub struct Worker {
     pub history: History,
     /// Shows how far teaching is, and the log.
     pub progress: Progress,
+    /// How the head is opened again.
+    pub config: HeadConfig,
+    /// What the station wants to be ended early.
+    pub aborts: Aborts,
+    /// The head is gone since this error.
+    pub lost: Option<Error>,
 }
 
 impl Worker {
@@ -106,6 +136,13 @@ impl Worker {
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
                 Err(RecvTimeoutError::Timeout) => {
                     self.station.event(Event::Alive);
+                    self.lost = self.opened.head.present().err();
+                }
+            }
+            if let Some(error) = self.lost.take() {
+                frames = self.forget();
+                if self.recover(&error, &mut plan, orders).is_break() {
+                    return;
                 }
             }
         }
@@ -134,18 +171,25 @@ impl Worker {
         let count = plan.sequence().frame_count();
         let mut frames: Vec<Frame> = Vec::with_capacity(count);
         let indices: Vec<usize> = (0..count).collect();
-        let station = &self.station;
-        let taken = self
-            .opened
-            .head
-            .acquire(&indices, DEVICE_TIMEOUT, &mut |_, frame| {
-                frames.push(frame);
-                station.event(Event::Alive);
-            });
-        if let Err(error) = taken {
-            self.station
-                .event(failed(code_of(&error), error.to_string()));
-            return Vec::new();
+        let (station, aborts) = (&self.station, &self.aborts);
+        let mut keep = |_, frame| {
+            frames.push(frame);
+            station.event(Event::Alive);
+            !aborts.has(id)
+        };
+        let head = &mut self.opened.head;
+        match head.acquire_while(&indices, DEVICE_TIMEOUT, &mut keep) {
+            Ok(_) if frames.len() < count => {
+                self.station
+                    .event(failed(error_code::ABORTED, format!("measure: {ABORTED}")));
+                return Vec::new();
+            }
+            Ok(exposure) => self.paced(count, &exposure),
+            Err(error) => {
+                let failed = failed(code_of(&error), error.to_string());
+                self.fail(error, failed);
+                return Vec::new();
+            }
         }
         let exposed = Instant::now();
         self.station.event(Event::ExposureDone { job: id });
@@ -171,9 +215,25 @@ impl Worker {
         frames
     }
 
+    /// Says how well the head kept time.
+    fn paced(&self, frames: usize, exposure: &Exposure) {
+        let us = |time: Duration| u32::try_from(time.as_micros()).unwrap_or(u32::MAX);
+        let span = exposure.done.since(exposure.started).as_secs_f64();
+        let refresh = self.opened.head.refresh().as_secs_f64();
+        // Saturating casts; a span of 0 gives the largest number.
+        self.station.event(Event::Paced(Pace {
+            camera_centihertz: (frames.saturating_sub(1) as f64 / span * 100.0) as u32,
+            refresh_millihertz: (1000.0 / refresh).round() as u32,
+            lag_us: us(exposure.lag),
+            dropped: exposure.dropped,
+            missed_flips: exposure.missed_flips,
+        }));
+    }
+
     /// Loads a recipe; the one before stays active unless everything went well.
     fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Arc<Plan>>) {
         let (result, message) = match self.prepare(key) {
+            Ok(_) if self.aborts.has(job) => (RecipeResult::Busy, format!("load: {ABORTED}")),
             Ok((ready, fallback)) => {
                 let recipe = active(&ready);
                 *plan = Some(Arc::new(ready));
@@ -186,12 +246,15 @@ impl Worker {
             Err(refused) => refused,
         };
         self.restore(plan);
-        let message = Arc::from(message);
-        self.station.event(Event::LoadFailed {
-            job,
-            result,
-            message,
-        });
+        // A lost head ends the job by itself.
+        if self.lost.is_none() {
+            let message = Arc::from(message);
+            self.station.event(Event::LoadFailed {
+                job,
+                result,
+                message,
+            });
+        }
     }
 
     /// Puts the patterns of the active recipe back into the projector, after another one's may have
@@ -199,9 +262,13 @@ impl Worker {
     fn restore(&mut self, plan: &mut Option<Arc<Plan>>) {
         let Some(before) = plan else { return };
         let shown = before.rasters(&self.opened.calibration);
-        if let Err(error) = shown.and_then(|rasters| self.opened.head.load(rasters)) {
-            self.progress.log(&error.to_string());
-            *plan = None;
+        match shown.and_then(|rasters| self.opened.head.load(rasters)) {
+            Ok(()) => {}
+            Err(error) if recovery::is_lost(&error) => self.lost = Some(error),
+            Err(error) => {
+                self.progress.log(&error.to_string());
+                *plan = None;
+            }
         }
     }
 
@@ -234,7 +301,11 @@ impl Worker {
             })?;
         plan.rasters(&self.opened.calibration)
             .and_then(|rasters| self.opened.head.load(rasters))
-            .map_err(|error| (RecipeResult::Corrupt, error.to_string()))?;
+            .map_err(|error| {
+                let message = error.to_string();
+                self.lost = Some(error).filter(recovery::is_lost);
+                (RecipeResult::Corrupt, message)
+            })?;
         Ok((plan, loaded.fallback))
     }
 
@@ -262,8 +333,19 @@ impl Worker {
             .pool
             .install(|| teach(head, calibration, &naming, DEVICE_TIMEOUT, &progress));
         self.progress.clear();
+        let aborted = self.aborts.has(job);
         let stored = taught
-            .map_err(|error| (code_of_teaching(&error), error.to_string()))
+            .map_err(|error| {
+                let failed = (code_of_teaching(&error), error.to_string());
+                if let TeachError::Device(error) = error {
+                    self.lost = Some(error).filter(recovery::is_lost);
+                }
+                failed
+            })
+            .and_then(|taught| match aborted {
+                true => Err((error_code::ABORTED, format!("teach: {ABORTED}"))),
+                false => Ok(taught),
+            })
             .and_then(|taught| {
                 for reason in &taught.choice.reasons {
                     self.progress.log(reason);
@@ -288,11 +370,13 @@ impl Worker {
             }
             Err((error_code, message)) => {
                 self.restore(plan);
-                self.station.event(Event::TeachFailed {
-                    job,
-                    error_code,
-                    message: message.into(),
-                });
+                if self.lost.is_none() {
+                    self.station.event(Event::TeachFailed {
+                        job,
+                        error_code,
+                        message: message.into(),
+                    });
+                }
             }
         }
     }
@@ -306,12 +390,15 @@ fn active(plan: &Plan) -> ActiveRecipe {
     }
 }
 
-fn code_of(error: &hal::error::Error) -> u16 {
-    match error.kind() {
-        ErrorKind::Timeout => code::TIMEOUT,
-        ErrorKind::Disconnected => code::CAMERA_LOST,
-        ErrorKind::Unsupported => code::UNSUPPORTED,
-        ErrorKind::Protocol => code::PROTOCOL,
+fn code_of(error: &Error) -> u16 {
+    match error {
+        Error::Timeout { .. } => code::TIMEOUT,
+        Error::Disconnected { device, .. } => match device {
+            Device::Camera => code::CAMERA_LOST,
+            Device::Projector => code::PROJECTOR_LOST,
+        },
+        Error::Unsupported { .. } => code::UNSUPPORTED,
+        Error::Protocol { .. } => code::PROTOCOL,
     }
 }
 

@@ -16,6 +16,7 @@ mod placement;
 mod production;
 mod promises_own;
 mod promises_shared;
+mod recovery;
 mod station;
 mod station_plc;
 mod stress;

@@ -187,11 +187,15 @@ pub struct Plc {
 
 impl Plc {
     pub fn connect(daemon: &Daemon) -> Self {
+        Self::at(daemon.modbus)
+    }
+
+    pub fn at(modbus: SocketAddr) -> Self {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()
             .unwrap();
-        let context = runtime.block_on(tcp::connect(daemon.modbus)).unwrap();
+        let context = runtime.block_on(tcp::connect(modbus)).unwrap();
         Self { runtime, context }
     }
 

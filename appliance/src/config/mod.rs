@@ -6,6 +6,7 @@ pub use keys::{KEYS, Key, table};
 
 use crate::error::{Exit, Failure};
 use crate::modbus::WordOrder;
+use ipnet::IpNet;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -63,6 +64,10 @@ pub struct ModbusConfig {
     pub word_order: WordOrderConfig,
     /// Answer only to this unit id.
     pub strict_unit_id: Option<u8>,
+    /// Networks from where it may be read.
+    pub readers: Vec<IpNet>,
+    /// Networks from where it may be written.
+    pub writers: Vec<IpNet>,
 }
 
 /// Order of the words of 32- and 64-bit values.
@@ -119,10 +124,13 @@ impl Default for StationConfig {
 
 impl Default for ModbusConfig {
     fn default() -> Self {
+        let defaults = crate::modbus::Options::default();
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 1502)),
             word_order: WordOrderConfig::Normal,
             strict_unit_id: None,
+            readers: defaults.readers,
+            writers: defaults.writers,
         }
     }
 }

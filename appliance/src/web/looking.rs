@@ -196,7 +196,8 @@ async fn serve_one_scene_per_port() {
             identity: Arc::new(identity),
             limits,
         };
-        let handle = StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| ());
+        let handle =
+            StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| None);
         handle.event(Event::Tick {
             utc_us: system_utc_us(),
         });

@@ -29,7 +29,7 @@ async fn served(picture: Option<Vec<u8>>) -> Served {
         identity: Arc::new(identity),
         limits: Limits::default(),
     };
-    let handle = StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| ());
+    let handle = StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| None);
     let listener = bind("127.0.0.1:0".parse().unwrap()).await.unwrap();
     let address = listener.local_addr().unwrap();
     let site = Site::new(
