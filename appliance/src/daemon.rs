@@ -139,8 +139,7 @@ impl Daemon {
         let awaited = first.is_some();
         let measuring = {
             let (station, recipes) = (station.clone(), state.recipes().clone());
-            let (config, history) = (config.clone(), history.clone());
-            let progress = progress.clone();
+            let (config, progress, history) = (config.clone(), progress.clone(), history.clone());
             spawn("measuring", move || {
                 let told = |share: f64| progress.tell(share, "working out the light of the scene");
                 match pool.install(|| backend::open(&config.head, &told)) {
@@ -375,8 +374,8 @@ fn effects(
             Effect::Load { job, key } => order(Order::Load(job, key)),
             Effect::Teach { job, number } => order(Order::Teach(job, number)),
             Effect::PersistSeq(seq) => {
-                let failed = !history.covers(seq);
-                let failed = failed.then(|| "the storage does not answer".into());
+                let unanswered = || "the storage does not answer".into();
+                let failed = (!history.covers(seq)).then(unanswered);
                 return Some(Event::Stored { seq, failed });
             }
             Effect::Log(line) => progress.log(&line),

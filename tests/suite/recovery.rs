@@ -5,6 +5,7 @@ use crate::station_plc::{
 };
 use appliance::config::Config;
 use appliance::daemon::Daemon;
+use appliance::history::seqs::AHEAD;
 use appliance::progress::Progress;
 use hal::error::Device;
 use std::fs;
@@ -137,16 +138,31 @@ fn a_result_counter_that_cannot_be_stored_stops_the_station_until_it_can() {
     let counter = place.path("state/result-seq");
     fs::remove_file(&counter).unwrap();
     fs::create_dir_all(counter.join("in the way")).unwrap();
-    let words = plc.measure(2);
-    assert_eq!((long(&words, 0), words[8]), (2, PASS));
-    let broken = plc.wait("the fault", |status| state(status) == FAULT);
+    // It goes on with the numbers that are reserved, and not one further.
+    let mut last = 1;
+    let broken = loop {
+        let words = plc.measure(last + 1);
+        last += 1;
+        assert_eq!((long(&words, 0), words[8]), (u32::from(last), PASS));
+        assert!(u32::from(last) <= 2 * AHEAD, "no fault");
+        let status = plc.status();
+        if state(&status) == FAULT {
+            break status;
+        }
+    };
     assert_eq!((error_code(&broken), broken.has(READY)), (603, false));
-    assert_eq!(plc.write_and_read_status(1, &trigger(3)).triggers(), 2);
+    let rejected = plc.write_and_read_status(1, &trigger(last + 1));
+    assert_eq!(rejected.triggers(), u32::from(last));
     assert!(long(&plc.read(614, 2).unwrap(), 0) > 0, "STORAGE_ERRORS");
     fs::remove_dir_all(&counter).unwrap();
     plc.wait("READY", |status| status.has(READY | RECIPE_OK));
-    assert_eq!(fs::read_to_string(&counter).unwrap().trim(), "2");
-    assert_eq!(long(&plc.measure(3), 0), 3);
+    let reserved: u32 = fs::read_to_string(&counter)
+        .unwrap()
+        .trim()
+        .parse()
+        .unwrap();
+    assert!(reserved >= u32::from(last), "{reserved}");
+    assert_eq!(long(&plc.measure(last + 1), 0), u32::from(last) + 1);
 }
 
 #[test]

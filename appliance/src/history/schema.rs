@@ -126,9 +126,15 @@ pub(super) fn checkpoint(path: &Path) -> Result<(), HistoryError> {
     let connection = Connection::open(path).map_err(failed)?;
     settle(&connection).map_err(failed)?;
     let passive = "PRAGMA wal_checkpoint(PASSIVE)";
-    connection
-        .query_row(passive, (), |_| Ok(()))
-        .map_err(failed)
+    let brought = connection.query_row(passive, (), |_| Ok(()));
+    let begun = brought.and_then(|()| begin_log(&connection));
+    begun.map_err(failed)
+}
+
+/// Begins the log anew where all of it is in the database. That is the one write that SQLite syncs by itself, so it is done
+/// before a result could have to wait for it.
+pub(super) fn begin_log(connection: &Connection) -> rusqlite::Result<()> {
+    connection.pragma_update(None, "user_version", VERSION)
 }
 
 fn version(connection: &Connection) -> rusqlite::Result<(i64, i64)> {

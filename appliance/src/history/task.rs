@@ -47,6 +47,7 @@ pub struct History {
     queue: SyncSender<Message>,
     shared: Arc<Shared>,
     seqs: Seqs,
+    syncer: Syncer,
     keeper: Keeper,
     reader: Reader,
 }
@@ -104,12 +105,18 @@ pub fn open(
     let (keeper, keeping) = keeper::open(&state.join(RECORDINGS), bounds.recordings, queue.clone())
         .map_err(|error| failed(RECORDINGS, error))?;
     let shared = Arc::new(Shared::default());
-    let (syncer, syncing) = syncing::open(&state.join(DATABASE), seqs.clone(), queue.clone());
+    let (syncer, syncing) = syncing::open(
+        &state.join(DATABASE),
+        seqs.clone(),
+        next.wrapping_sub(1),
+        queue.clone(),
+    );
     let history = History {
         queue,
         shared: shared.clone(),
         seqs: seqs.clone(),
         reader: Reader::of(state),
+        syncer: syncer.clone(),
         keeper: keeper.clone(),
     };
     let task = Task {
@@ -148,9 +155,13 @@ impl History {
         self.keeper.keep(part);
     }
 
-    /// Whether a SEQ is stored as used, so that its result may be shown.
+    /// Whether a SEQ is stored as used, so that its result may be shown. If not, the card is asked once more.
     pub fn covers(&self, seq: u32) -> bool {
-        self.seqs.covers(seq)
+        let covered = self.seqs.covers(seq);
+        if !covered {
+            self.syncer.wake(seq);
+        }
+        covered
     }
 
     /// Results that the history has lost since the start because the card did not keep up.
@@ -227,7 +238,7 @@ impl Task {
             }
             self.tell(problem, station);
         }
-        drop(self.syncer);
+        self.syncer.stop();
         drop(syncing.map(JoinHandle::join));
         if let Some(last_seq) = stopping {
             // Not settled, the reservation is skipped at the next start: nothing is used twice.

@@ -57,6 +57,7 @@ impl Writer {
         let count = connection
             .query_row("SELECT count(*) FROM result", (), |row| row.get(0))
             .map_err(|error| HistoryError::of(path, &error))?;
+        schema::begin_log(&connection).map_err(|error| HistoryError::of(path, &error))?;
         Ok(Self {
             connection,
             path: path.to_path_buf(),
@@ -75,6 +76,7 @@ impl Writer {
         self.connection = Connection::open_in_memory().map_err(failed)?;
         let aside = set_aside(&self.path, &why.reason)?;
         self.connection = schema::open(&self.path)?;
+        schema::begin_log(&self.connection).map_err(failed)?;
         self.count = 0;
         Ok(said(why, &aside))
     }

@@ -164,6 +164,11 @@ pub enum Event {
         /// What the worker has ready in its hands now.
         recipe: Option<ActiveRecipe>,
     },
+    /// The history cannot be written, or can again.
+    History {
+        /// Why not, and the remedy; none if it can.
+        problem: Option<Arc<str>>,
+    },
     /// A sequence was exposed: how well the head kept time.
     Paced(Pace),
     /// A survey of the system.
@@ -174,11 +179,6 @@ pub enum Event {
         seq: u32,
         /// Why it could not be stored.
         failed: Option<Arc<str>>,
-    },
-    /// The history cannot be written, or can again.
-    History {
-        /// Why not, and the remedy; none if it can.
-        problem: Option<Arc<str>>,
     },
     /// The worker's sign of life.
     Alive,
@@ -198,9 +198,9 @@ impl Event {
             self,
             Self::Write { .. }
                 | Self::Request(_)
+                | Self::History { .. }
                 | Self::Surveyed(_)
                 | Self::Stored { .. }
-                | Self::History { .. }
                 | Self::Tick { .. }
                 | Self::Stop
         )
@@ -246,8 +246,8 @@ pub enum Effect {
         /// The running job.
         job: JobId,
     },
-    /// Make sure that this RESULT_SEQ is stored as used, and answer with [`Event::Stored`]. Always directly before the [`Effect::Publish`] of that
-    /// result; again when it could not be stored.
+    /// Make sure that this RESULT_SEQ is stored as used, and answer with [`Event::Stored`]. Always directly before the
+    /// [`Effect::Publish`] of that result; again when it could not be stored.
     PersistSeq(u32),
     /// A result is complete: for the history.
     Publish(Arc<ResultRecord>),

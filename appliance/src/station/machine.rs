@@ -90,11 +90,11 @@ pub struct Station {
     /// The last cycle's failure: its code and words.
     pub(super) failure: Option<(u16, Arc<str>)>,
     pub(super) condition: Condition,
+    /// Whether the history cannot be written.
+    pub(super) history_fails: bool,
     pub(super) health: Health,
     /// Whether the SEQ of the last result still has to be stored.
     pub(super) unstored: bool,
-    /// Whether the history cannot be written.
-    pub(super) history_fails: bool,
     pub(super) heartbeat: u16,
     pub(super) next_beat: Micros,
     pub(super) last_alive: Micros,
@@ -132,9 +132,9 @@ impl Station {
             queue: heapless::Deque::new(),
             failure: None,
             condition: Condition::default(),
+            history_fails: false,
             health: Health::default(),
             unstored: false,
-            history_fails: false,
             heartbeat: 0,
             next_beat: now.after(BEAT),
             last_alive: now,

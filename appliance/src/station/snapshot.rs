@@ -231,12 +231,17 @@ impl Station {
         } else {
             0
         };
+        let unwritten = if self.history_fails {
+            warning::STORAGE
+        } else {
+            0
+        };
         let unsynced = if self.utc_at_zero.is_none() {
             warning::CLOCK_UNSYNCED
         } else {
             0
         };
-        let storage = if self.unstored || self.history_fails || self.health.storage_is_low() {
+        let storage = if self.unstored || self.health.storage_is_low() {
             warning::STORAGE
         } else {
             0
@@ -246,7 +251,7 @@ impl Station {
         } else {
             0
         };
-        (self.condition.warnings & !own & 0x00FF) | lost | unsynced | storage | hot
+        (self.condition.warnings & !own & 0x00FF) | lost | unsynced | storage | unwritten | hot
     }
 
     fn status(&self, warnings: u16, error_code: u16) -> u16 {

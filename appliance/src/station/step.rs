@@ -263,6 +263,13 @@ impl Station {
         }
     }
 
+    /// The history fails or works again: a warning, no fault. Verdicts go on.
+    fn history_told(&mut self, problem: Option<std::sync::Arc<str>>, effects: &mut Effects) {
+        self.history_fails = problem.is_some();
+        let works = || "the history is written again".into();
+        log(effects, problem.unwrap_or_else(works));
+    }
+
     /// A worker without orders that gives no sign of life would not take one either.
     fn watch_idle(&mut self, now: Micros, effects: &mut Effects) {
         let silent = now.since(self.last_alive);
@@ -282,13 +289,6 @@ impl Station {
             };
             self.fault(fault, now, effects);
         }
-    }
-
-    /// The history fails or works again: a warning, no fault. Verdicts go on.
-    fn history_told(&mut self, problem: Option<std::sync::Arc<str>>, effects: &mut Effects) {
-        self.history_fails = problem.is_some();
-        let works = || "the history is written again".into();
-        log(effects, problem.unwrap_or_else(works));
     }
 
     fn stop(&mut self, effects: &mut Effects) {
