@@ -25,12 +25,21 @@ const MEMBERS: [&str; 9] = [
 ];
 
 /// Keys of its `recipe.json`, version 1, as a taught recipe has them. The same holds for these.
-const KEYS: [&str; 40] = [
+const KEYS: [&str; 49] = [
     "calibration",
     "camera",
     "camera.bit_depth",
     "camera.height",
     "camera.width",
+    "comparison",
+    "comparison.adaptive",
+    "comparison.adaptive.coverage",
+    "comparison.adaptive.frames",
+    "comparison.adaptive.sigma_mm",
+    "comparison.fixed",
+    "comparison.fixed.coverage",
+    "comparison.fixed.frames",
+    "comparison.fixed.sigma_mm",
     "expansion_range_turns",
     "fingerprint",
     "format",

@@ -167,7 +167,7 @@ fn an_exported_recipe_comes_back_by_import_and_a_damaged_one_does_not() {
     let (status, answer) = browser.ask("POST", "/api/recipes", &file);
     let words = String::from_utf8(answer).unwrap();
     assert!(
-        status == 422 && words.contains("fingerprint"),
+        status == 422 && words.contains("export the recipe again"),
         "{status} {words}"
     );
     let recipes = browser.get("/api/recipes");

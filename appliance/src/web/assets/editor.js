@@ -9,10 +9,21 @@ const state = { recipe: null, map: null, chosen: [0, 0], drag: null, wide: 1 };
 // Factor and symbol of a gauge's limits as people write them.
 function unit(measures) {
   const kind = measures.kind;
-  if (kind === "coverage" || /share|part/.test(kind)) return [100, "%"];
-  if (/tilt|rotation|angle/.test(kind)) return [1, "°"];
-  if (/volume/.test(kind)) return [1, "mm³"];
-  return [1, "mm"];
+  if (kind === "coverage" || kind === "out_of_tolerance") return [100, "%"];
+  if (kind === "tilt" || (kind === "placement" && measures.component.startsWith("about"))) return [1, "°"];
+  return [1, kind === "volume" ? "mm³" : "mm"];
+}
+
+// "deviation over 9 px", "step from other region", "tilt about x".
+function words(measures) {
+  const more = [];
+  if (measures.from) more.push(`from ${measures.from}`);
+  if (measures.about) more.push(`about ${measures.about}`);
+  if (measures.component) more.push(measures.component.replace(/_/g, " "));
+  if (measures.above_mm !== undefined) more.push(`above ${measures.above_mm} mm`);
+  if (measures.tolerance_mm !== undefined) more.push(`of ${measures.tolerance_mm} mm`);
+  if (measures.smoothing_px) more.push(`over ${measures.smoothing_px} px`);
+  return [measures.kind.replace(/_/g, " ")].concat(more).join(" ");
 }
 
 export async function edit(number) {
@@ -120,8 +131,7 @@ function drawGauges() {
   const row = (gauge) => {
     const [factor, symbol] = unit(gauge.measures);
     const limit = (key) => (value) => { if (value === null) delete gauge[key]; else gauge[key] = value; };
-    const measures = gauge.measures.kind.replace(/_/g, " ") + (gauge.measures.smoothing_px ? ` over ${gauge.measures.smoothing_px} px` : "");
-    const line = make("tr", "", make("td", "", gauge.name), make("td", "", measures), make("td", "", gauge.region || "whole part"),
+    const line = make("tr", "", make("td", "", gauge.name), make("td", "", words(gauge.measures)), make("td", "", gauge.region || "whole part"),
       field(gauge.low, `lowest ${gauge.name} in ${symbol}`, factor, limit("low")), field(gauge.high, `highest ${gauge.name} in ${symbol}`, factor, limit("high")), make("td", "", symbol));
     line.addEventListener("focusin", () => {
       const at = recipe.regions.findIndex((region) => region.name === gauge.region);

@@ -49,7 +49,7 @@ function drawOutlines() {
   for (const gauge of recipe.gauges) {
     const found = result.gauges.find((value) => value.name === gauge.name);
     if (!found || (found.valid && found.pass)) continue;
-    const names = [gauge.region, gauge.second, gauge.other, gauge.reference].concat(gauge.regions || []);
+    const names = [gauge.region, gauge.measures.from];
     for (const name of names) if (name) bad.set(name, found.valid ? "fail" : "invalid");
   }
   const outline = (region, kind) => {
