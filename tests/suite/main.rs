@@ -8,6 +8,7 @@ mod cli;
 mod experiment;
 mod formats;
 mod fuzz;
+mod hostile;
 mod house;
 mod measured;
 mod outputs;
