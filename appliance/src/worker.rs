@@ -3,6 +3,7 @@
 mod recovery;
 
 use crate::backend::Opened;
+use crate::benchmark::stopwatch::timed_on;
 use crate::config::HeadConfig;
 use crate::history::{FailedPart, History};
 use crate::latest::{LastCycle, LastMaps};
@@ -197,7 +198,8 @@ impl Worker {
         }
         let exposed = Instant::now();
         self.station.event(Event::ExposureDone { job: id });
-        let inspection = self.pool.install(|| plan.inspect(&frames, exposed));
+        let (mut inspection, cpu) = timed_on(&self.pool, || plan.inspect(&frames, exposed));
+        inspection.cpu_us = u32::try_from(cpu.as_micros()).unwrap_or(u32::MAX);
         let inspection = Arc::new(inspection);
         let after = self.station.event(Event::Finished {
             job: id,

@@ -9,6 +9,7 @@ mod experiment;
 mod formats;
 mod fuzz;
 mod history;
+mod hostile;
 mod house;
 mod measured;
 mod outputs;

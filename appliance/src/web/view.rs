@@ -99,6 +99,7 @@ fn result(record: &ResultRecord) -> Value {
         "time_utc_us": record.time_utc_us,
         "exposure_us": record.exposure_us,
         "total_us": record.total_us,
+        "cpu_us": found.cpu_us,
         "valid_points": found.valid_points,
         "coverage_permille": found.coverage_permille,
         "temperature_c": found.temperature_c,

@@ -86,3 +86,32 @@ impl Worker {
         ControlFlow::Continue(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hal::error::Device;
+    use std::time::Duration;
+
+    #[test]
+    fn a_device_that_is_gone_or_silent_is_opened_again_and_one_that_cannot_is_not() {
+        assert!(is_lost(&Error::disconnected(
+            Device::Projector,
+            "showing pattern 3"
+        )));
+        let silent = Error::timeout(
+            "showing pattern 3",
+            Duration::from_secs(2),
+            "check the cable",
+        );
+        assert!(is_lost(&silent));
+        assert!(!is_lost(&Error::unsupported(
+            "a raster of 3×3",
+            "make it 8×8"
+        )));
+        assert!(!is_lost(&Error::protocol(
+            "showing pattern 3",
+            "load it first"
+        )));
+    }
+}

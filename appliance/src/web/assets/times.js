@@ -20,6 +20,9 @@ export function showTimes(result) {
     part.style.width = `${100 * stage.us / sum}%`;
     return part;
   }));
-  fill($("stages"), ...stages.map((stage, at) =>
-    make("li", "", make("span", `swatch s${at % 8}`), make("span", "", NAMES[stage.name] || stage.name), make("b", "", milliseconds(stage.us)))));
+  const line = (kind, name, us) => make("li", "", make("span", `swatch ${kind}`), make("span", "", name), make("b", "", milliseconds(us)));
+  const lines = stages.map((stage, at) => line(`s${at % 8}`, NAMES[stage.name] || stage.name, stage.us));
+  // What the computing threads spent, however busy the device was besides.
+  if (result.cpu_us) lines.push(line("", "processor time", result.cpu_us));
+  fill($("stages"), ...lines);
 }
