@@ -3,11 +3,6 @@
 //! One OS thread measures ([`crate::worker`]), one serves sockets on a current-thread runtime, and
 //! the station is plain values behind a handle that both use.
 
-mod descriptors;
-mod stopping;
-
-use stopping::Stopping;
-
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
 use crate::latest::LastMaps;
@@ -26,7 +21,7 @@ use hal::sim::Stage;
 use std::net::SocketAddr;
 use std::sync::{Arc, mpsc};
 use std::thread::JoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
@@ -48,6 +43,15 @@ pub struct Daemon {
     _state: StateFolder,
 }
 
+/// What ends the daemon's threads.
+struct Stopping {
+    orders: mpsc::Sender<Order>,
+    sockets: watch::Sender<bool>,
+    survey: mpsc::Sender<()>,
+    threads: [JoinHandle<()>; 3],
+    progress: Progress,
+}
+
 impl Daemon {
     /// Starts everything and returns when the head is open. The station is then on its way to READY:
     /// it loads its recipe, or teaches it where a simulated head has none.
@@ -64,7 +68,6 @@ impl Daemon {
             Some(path) => path.clone(),
             None => StateFolder::default_path()?,
         };
-        descriptors::raise();
         let state = StateFolder::open(&path)?;
         let runtime = runtime()?;
         let (plc, page) = runtime.block_on(listen(config))?;
@@ -201,6 +204,40 @@ impl Daemon {
         self.station.event(Event::Stop);
         self.stopping.stop();
     }
+}
+
+/// Time between two looks at a thread that ends.
+const LOOKING: Duration = Duration::from_millis(2);
+/// A thread that has not ended after this time is left behind.
+const STOPPING: Duration = Duration::from_secs(3);
+
+impl Stopping {
+    fn stop(self) {
+        // An order that nobody takes, or a runtime that is gone, is what is wanted here.
+        drop(self.orders.send(Order::Stop));
+        let [measuring, serving, surveying] = self.threads;
+        join("measuring", measuring, &self.progress);
+        let _ = self.sockets.send(true);
+        join("sockets", serving, &self.progress);
+        drop(self.survey);
+        join("survey", surveying, &self.progress);
+    }
+}
+
+/// Waits for a thread to end. One that hangs in a device or in a storage must not keep the program from ending.
+fn join(name: &str, thread: JoinHandle<()>, progress: &Progress) {
+    let began = Instant::now();
+    while !thread.is_finished() {
+        if began.elapsed() > STOPPING {
+            progress.log(&format!(
+                "the thread {name} does not end and is left behind"
+            ));
+            return;
+        }
+        std::thread::sleep(LOOKING);
+    }
+    // One that panicked has said so.
+    drop(thread.join());
 }
 
 /// A current-thread runtime.
