@@ -3,7 +3,6 @@
 //! One OS thread measures ([`crate::worker`]), one serves sockets on a current-thread runtime, and
 //! the station is plain values behind a handle that both use.
 
-mod descriptors;
 mod stopping;
 
 use stopping::Stopping;
@@ -66,7 +65,6 @@ impl Daemon {
             Some(path) => path.clone(),
             None => StateFolder::default_path()?,
         };
-        descriptors::raise();
         let state = StateFolder::open(&path)?;
         let access = open_access(&state)?;
         let runtime = runtime()?;

@@ -237,3 +237,28 @@ async fn processing_time_is_that_of_the_last_cycle_and_the_longest() {
         (processing, processing)
     );
 }
+
+#[tokio::test]
+async fn the_thirty_third_waiting_result_is_not_queued_and_latches_the_overflow() {
+    let plant = Plant::with(Options::default(), true).await;
+    let mut plc = plant.client().await;
+    plc.write_single_register(0, 0x41).await.unwrap().unwrap();
+    for token in 1..=33 {
+        plc.write_single_register(1, token).await.unwrap().unwrap();
+        plant.work();
+    }
+    let overflow = |words: &[u16]| words[0] & status::BUFFER_OVERFLOW != 0;
+    let full = plc.read_input_registers(100, 32).await.unwrap().unwrap();
+    assert_eq!((overflow(&full), full[17]), (true, 32));
+    let (newest, oldest) = (
+        plc.read_input_registers(200, 3).await.unwrap().unwrap(),
+        plc.read_input_registers(400, 3).await.unwrap().unwrap(),
+    );
+    assert_eq!((newest[2], oldest[2]), (33, 1));
+    plc.write_single_register(0, 0x45).await.unwrap().unwrap();
+    let popped = plc.read_input_registers(100, 32).await.unwrap().unwrap();
+    assert_eq!((overflow(&popped), popped[17]), (true, 31));
+    plc.write_single_register(0, 0x51).await.unwrap().unwrap();
+    let reset = plc.read_input_registers(100, 32).await.unwrap().unwrap();
+    assert_eq!((overflow(&reset), reset[17]), (false, 31));
+}
