@@ -9,6 +9,7 @@ use crate::history::{self, Bounds, History};
 use crate::latest::LastMaps;
 use crate::output::picture::height_png;
 use crate::progress::Progress;
+use crate::shelf::Shelf;
 use crate::state::{StateFolder, random};
 use crate::station::snapshot::status;
 use crate::station::{
@@ -72,6 +73,7 @@ impl Daemon {
             Some(path) => path.clone(),
             None => StateFolder::default_path()?,
         };
+        crate::memory::give_back();
         let state = StateFolder::open(&path)?;
         let runtime = runtime()?;
         let (plc, page) = runtime.block_on(listen(config))?;
@@ -142,6 +144,7 @@ impl Daemon {
                             config: config.head,
                             aborts,
                             lost: None,
+                            shelf: Shelf::default(),
                         };
                         worker.run(&inbox, first);
                     }

@@ -18,6 +18,7 @@ use algo::pipeline::Rises;
 use algo::units::AbsolutePhase;
 use hal::frame::Frame;
 use hal::projector::Raster;
+use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -253,7 +254,9 @@ pub fn rasters(
     frames: impl Iterator<Item = (f64, f64)>,
     calibration: &Calibration,
 ) -> Result<Vec<Raster>, hal::error::Error> {
+    let frames: Vec<_> = frames.collect();
     frames
+        .into_par_iter()
         .map(|(ratio, shift)| {
             let grey = encode(function, ratio, shift, calibration.response.as_ref());
             Raster::new(grey.width as u32, grey.height as u32, grey.pixels)

@@ -114,6 +114,9 @@ pub struct Inspection {
     pub skipped: Skipped,
     /// Times of the stages, in their order.
     pub stages: heapless::Vec<StageTime, MAX_STAGES>,
+    /// Processor time of all stages on all computing threads, µs: unlike the times above it does not grow when somebody else
+    /// has the processor.
+    pub cpu_us: u32,
 }
 
 impl Inspection {
