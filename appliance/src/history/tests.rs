@@ -228,6 +228,32 @@ fn without_a_history_reading_says_so() {
     assert!(!state.path().join(DATABASE).exists());
 }
 
+#[test]
+fn a_replay_compares_what_the_frames_show_to_the_last_bit_and_not_how_the_cycle_went() {
+    use crate::station::result::flag::{SIMULATED, STEPPED_UP};
+    let stored = Entry {
+        flags: STEPPED_UP | SIMULATED,
+        ..entry(7, 1, Verdict::Fail)
+    };
+    let mut replayed = Entry {
+        seq: 0,
+        total_us: 5,
+        flags: SIMULATED,
+        ..stored.clone()
+    };
+    assert_eq!(difference(&stored, &replayed), None);
+    let value = replayed.gauges[0].value.unwrap();
+    replayed.gauges[0].value = Some(f64::from_bits(value.to_bits() + 1));
+    assert!(
+        difference(&stored, &replayed)
+            .unwrap()
+            .contains("deviation")
+    );
+    replayed.gauges[0].value = Some(value);
+    replayed.flags = 0;
+    assert!(difference(&stored, &replayed).is_some());
+}
+
 /// Longest wait for the history's threads.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Room for the tables and some results, in pages of 4 KiB.

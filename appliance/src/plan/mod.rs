@@ -168,9 +168,13 @@ impl Plan {
         &self.sequence
     }
 
-    /// Ratio and shift of each frame that is projected, in their order.
-    pub fn steps(&self) -> &[(f64, f64)] {
-        &self.frames
+    /// Ratio and shift of each frame of the sequence that has `count` frames, in their order; empty if there is none.
+    pub fn shown(&self, count: usize) -> Vec<(f64, f64)> {
+        if self.frames.len() == count {
+            self.frames.clone()
+        } else {
+            Vec::new()
+        }
     }
 
     /// The columns of each row that some gauge looks at.
