@@ -13,6 +13,7 @@ use crate::error::{Exit, Failure};
 use crate::history::{self, Bounds, History, Reader};
 use crate::latest::LastMaps;
 use crate::progress::Progress;
+use crate::shelf::Shelf;
 use crate::state::{StateFolder, random};
 use crate::station::snapshot::status;
 use crate::station::{
@@ -65,6 +66,7 @@ impl Daemon {
             Some(path) => path.clone(),
             None => StateFolder::default_path()?,
         };
+        crate::memory::give_back();
         let state = StateFolder::open(&path)?;
         let access = open_access(&state)?;
         let runtime = runtime()?;
@@ -150,6 +152,7 @@ impl Daemon {
                             config: config.head,
                             aborts,
                             lost: None,
+                            shelf: Shelf::default(),
                         };
                         worker.run(&inbox, first);
                     }

@@ -9,8 +9,10 @@ use crate::history::{FailedPart, History};
 use crate::latest::{LastCycle, LastMaps};
 use crate::plan::{Plan, PlanError};
 use crate::progress::Progress;
+use crate::recipe::store::Stamp;
 use crate::recipe::teach::{Naming, TeachError, teach};
 use crate::recipe::{LoadError, Store};
+use crate::shelf::Shelf;
 use crate::station::{
     ActiveRecipe, Condition, Event, Job, JobId, Pace, RecipeKey, RecipeResult, Request,
     ResultRecord, StationHandle, error_code,
@@ -95,6 +97,8 @@ pub struct Worker {
     pub aborts: Aborts,
     /// The head is gone since this error.
     pub lost: Option<Error>,
+    /// Recipes made ready.
+    pub shelf: Shelf,
 }
 
 impl Worker {
@@ -241,7 +245,7 @@ impl Worker {
             Ok(_) if self.aborts.has(job) => (RecipeResult::Busy, format!("load: {ABORTED}")),
             Ok((ready, fallback)) => {
                 let recipe = active(&ready);
-                *plan = Some(Arc::new(ready));
+                *plan = Some(ready);
                 if let Some(fallback) = fallback {
                     self.progress.log(&fallback);
                 }
@@ -266,7 +270,9 @@ impl Worker {
     /// replaced them. Without them the recipe cannot measure: then each trigger ends INVALID.
     fn restore(&mut self, plan: &mut Option<Arc<Plan>>) {
         let Some(before) = plan else { return };
-        let shown = before.rasters(&self.opened.calibration);
+        let shown = self
+            .pool
+            .install(|| before.rasters(&self.opened.calibration));
         match shown.and_then(|rasters| self.opened.head.load(rasters)) {
             Ok(()) => {}
             Err(error) if recovery::is_lost(&error) => self.lost = Some(error),
@@ -280,7 +286,7 @@ impl Worker {
     fn prepare(
         &mut self,
         key: &RecipeKey,
-    ) -> Result<(Plan, Option<String>), (RecipeResult, String)> {
+    ) -> Result<(Arc<Plan>, Option<String>), (RecipeResult, String)> {
         let refuse = |error: LoadError| {
             let result = match error {
                 LoadError::Unknown(_) => RecipeResult::Unknown,
@@ -292,26 +298,36 @@ impl Worker {
             RecipeKey::Number(number) => *number,
             RecipeKey::PartNumber(part_number) => self.recipes.find(part_number).map_err(refuse)?,
         };
-        let loaded = self.recipes.load(number).map_err(refuse)?;
-        let simulated = self.opened.stage.is_some();
+        let stamp = self.recipes.stamp(number);
         let (pool, calibration) = (&self.pool, &self.opened.calibration);
-        let plan = pool
-            .install(|| Plan::new(loaded.recipe, calibration, simulated))
-            .map_err(|error| {
-                let result = match error {
-                    PlanError::OtherCalibration { .. } => RecipeResult::OtherCalibration,
-                    PlanError::Unfit { .. } => RecipeResult::Corrupt,
-                };
-                (result, error.to_string())
-            })?;
-        plan.rasters(&self.opened.calibration)
+        let fingerprint = calibration.fingerprint();
+        let kept = stamp
+            .as_ref()
+            .and_then(|stamp| self.shelf.take(stamp, &fingerprint));
+        let (plan, fallback) = match kept {
+            Some(plan) => (plan, None),
+            None => {
+                // Before the arrays of the next take their place.
+                self.shelf.make_room(stamp.as_ref().map_or(0, Stamp::bytes));
+                let loaded = self.recipes.load(number).map_err(refuse)?;
+                let simulated = self.opened.stage.is_some();
+                let planned = pool.install(|| Plan::new(loaded.recipe, calibration, simulated));
+                let plan = Arc::new(planned.map_err(refuse_plan)?);
+                // What stands in for a damaged file is not that file's plan.
+                if let Some(stamp) = stamp.filter(|_| loaded.fallback.is_none()) {
+                    self.shelf.put(stamp, fingerprint, plan.clone());
+                }
+                (plan, loaded.fallback)
+            }
+        };
+        pool.install(|| plan.rasters(calibration))
             .and_then(|rasters| self.opened.head.load(rasters))
             .map_err(|error| {
                 let message = error.to_string();
                 self.lost = Some(error).filter(recovery::is_lost);
                 (RecipeResult::Corrupt, message)
             })?;
-        Ok((plan, loaded.fallback))
+        Ok((plan, fallback))
     }
 
     fn teach(&mut self, job: JobId, number: u16, plan: &mut Option<Arc<Plan>>) {
@@ -370,7 +386,7 @@ impl Worker {
         match ready {
             Ok((ready, _)) => {
                 let recipe = active(&ready);
-                *plan = Some(Arc::new(ready));
+                *plan = Some(ready);
                 self.station.event(Event::Taught { job, recipe });
             }
             Err((error_code, message)) => {
@@ -385,6 +401,14 @@ impl Worker {
             }
         }
     }
+}
+
+fn refuse_plan(error: PlanError) -> (RecipeResult, String) {
+    let result = match error {
+        PlanError::OtherCalibration { .. } => RecipeResult::OtherCalibration,
+        PlanError::Unfit { .. } => RecipeResult::Corrupt,
+    };
+    (result, error.to_string())
 }
 
 fn active(plan: &Plan) -> ActiveRecipe {

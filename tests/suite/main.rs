@@ -4,6 +4,7 @@ mod adapt;
 mod bad_input;
 mod bench;
 mod cases;
+mod changeover;
 mod cli;
 mod experiment;
 mod formats;

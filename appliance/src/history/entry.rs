@@ -1,5 +1,6 @@
 //! A result as the history keeps it, and which results somebody wants to see.
 
+use crate::station::result::flag;
 use crate::station::{ResultRecord, Verdict};
 use serde::{Serialize, Serializer};
 
@@ -168,8 +169,11 @@ fn gauges(record: &ResultRecord) -> Vec<GaugeEntry> {
         .collect()
 }
 
+/// Flags that say how a cycle went, not what its frames show.
+const COURSE: u16 = flag::RETRIED | flag::STEPPED_UP | flag::WARM_UP;
+
 /// What a replay found otherwise than the history has it, in words; `None` if it is the same bit by bit. What belongs to
-/// the cycle and not to its frames is not compared: numbers, times, temperature.
+/// the cycle and not to its frames is not compared: numbers, times, temperature, the flags of its course.
 pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
     let same = Entry {
         seq: stored.seq,
@@ -177,6 +181,7 @@ pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
         part_id: stored.part_id,
         press_stroke: stored.press_stroke,
         token: stored.token,
+        flags: (stored.flags & COURSE) | (replayed.flags & !COURSE),
         temperature_c: stored.temperature_c,
         exposure_us: stored.exposure_us,
         total_us: stored.total_us,

@@ -84,8 +84,8 @@ impl Keeper {
 
     /// Ends the thread when it has done what it has in hand; it says so.
     pub(super) fn stop(&self) {
-        // A thread that is gone has stopped.
-        let _ = self.orders.send(Order::Stop);
+        // One that has its hands full is not waited for.
+        let _ = self.orders.try_send(Order::Stop);
     }
 }
 

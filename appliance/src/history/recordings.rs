@@ -146,7 +146,8 @@ fn recording(part: &FailedPart) -> Recording {
     } = part;
     let file = plan.file();
     let (width, height, bit_depth) = calibration.camera;
-    let steps = plan.steps().iter().zip(frames);
+    let shown = plan.shown(frames.len());
+    let steps = shown.iter().zip(frames);
     Recording {
         width,
         height,

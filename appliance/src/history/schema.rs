@@ -11,7 +11,7 @@ const APPLICATION: i64 = 0x4652_4E47;
 /// The schema that this program writes, as SQLite's `user_version`.
 pub const VERSION: i64 = 1;
 /// Longest wait for another process that holds the database, the command line's for instance.
-const BUSY: Duration = Duration::from_secs(5);
+const BUSY: Duration = Duration::from_secs(2);
 
 /// `docs/formats.md` has the columns in words.
 const TABLES: &str = "

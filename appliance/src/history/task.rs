@@ -14,12 +14,14 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, PoisonError, RwLock};
 use std::thread::{Builder, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Results that may wait for the card before the newest are lost to the history: half a minute of a fast line.
 const MAX_WAITING: usize = 256;
 /// A card that refuses is asked again this often.
 const RETRY: Duration = Duration::from_secs(1);
+/// When the daemon ends, a recording that is being written has this long.
+const LAST_PART: Duration = Duration::from_secs(1);
 
 /// What is kept, and how much of it.
 #[derive(Clone, Copy, Debug)]
@@ -191,8 +193,9 @@ impl Task {
     /// Works until told to stop. Problems are told to the station, which warns of them.
     pub fn run(mut self, station: &StationHandle) {
         let keeping = self.keep_parts();
-        let syncing = self.sync();
-        let mut stopping = None;
+        let mut syncing = self.sync();
+        // When it ends, whatever the keeper still writes: half a recording is removed at the next start.
+        let mut stopping: Option<Instant> = None;
         loop {
             let message =
                 if self.waiting.is_empty() && self.problem().is_none() && stopping.is_none() {
@@ -216,8 +219,8 @@ impl Task {
                 next = self.inbox.try_recv().ok();
             }
             let mut problem = self.flush();
-            let mut ended =
-                stopping.is_some() && keeping.as_ref().is_none_or(JoinHandle::is_finished);
+            let kept = || keeping.as_ref().is_none_or(JoinHandle::is_finished);
+            let mut ended = stopping.is_some_and(|until| Instant::now() >= until || kept());
             for message in news {
                 match message {
                     Message::Kept { seq, name } => problem = problem.or(self.link(seq, name)),
@@ -225,8 +228,12 @@ impl Task {
                     // A link to nothing is removed at the next start at the latest.
                     Message::Removed { name } => drop(self.writer.unlink(&name)),
                     Message::Stop { last_seq } => {
+                        self.syncer.stop();
+                        drop(syncing.take().map(JoinHandle::join));
+                        // Not settled, the reservation is skipped at the next start: nothing is used twice.
+                        let _ = self.seqs.settle(last_seq);
                         self.keeper.stop();
-                        stopping = Some(last_seq);
+                        stopping = Some(Instant::now() + LAST_PART);
                     }
                     Message::Synced { problem } => self.unsynced = problem,
                     Message::KeeperEnded => ended = true,
@@ -237,12 +244,6 @@ impl Task {
                 break;
             }
             self.tell(problem, station);
-        }
-        self.syncer.stop();
-        drop(syncing.map(JoinHandle::join));
-        if let Some(last_seq) = stopping {
-            // Not settled, the reservation is skipped at the next start: nothing is used twice.
-            let _ = self.seqs.settle(last_seq);
         }
     }
 

@@ -1,9 +1,14 @@
 //! What is stored is read again, bit by bit; filters, bounds, damage.
 
-use super::writer::Writer;
 use super::*;
-use crate::station::Verdict;
+use crate::state::StateFolder;
+use crate::station::snapshot::warning;
+use crate::station::{
+    Identity, Inspection, Limits, Micros, ResultRecord, Settings, Station, StationHandle, Verdict,
+};
 use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 const ENOUGH: u64 = 1000;
 
@@ -45,7 +50,11 @@ fn some(count: u32) -> Vec<Entry> {
         .collect()
 }
 
-fn open(state: &Path, limit: u64) -> Writer {
+fn open_writer(state: &Path) -> Writer {
+    bounded(state, ENOUGH)
+}
+
+fn bounded(state: &Path, limit: u64) -> Writer {
     let opening = Writer::open(&state.join(DATABASE), limit).unwrap();
     assert_eq!(opening.complaint, None);
     opening.writer
@@ -60,7 +69,7 @@ fn seqs(reader: &Reader, filter: &Filter) -> Vec<u32> {
 fn what_was_stored_is_read_again_bit_by_bit_and_while_the_writer_is_open() {
     let state = tempfile::tempdir().unwrap();
     let stored = some(3);
-    let mut writer = open(state.path(), ENOUGH);
+    let mut writer = bounded(state.path(), ENOUGH);
     writer.store(stored.iter()).unwrap();
     let reader = Reader::of(state.path());
     let mut read = reader.results(&Filter::default()).unwrap();
@@ -70,13 +79,15 @@ fn what_was_stored_is_read_again_bit_by_bit_and_while_the_writer_is_open() {
     assert_eq!(reader.result(9).unwrap(), None);
     assert_eq!(writer.last_seq().unwrap(), Some(3));
     drop(writer);
-    assert_eq!(open(state.path(), ENOUGH).last_seq().unwrap(), Some(3));
+    assert_eq!(bounded(state.path(), ENOUGH).last_seq().unwrap(), Some(3));
 }
 
 #[test]
 fn each_condition_of_a_filter_leaves_out_what_it_says() {
     let state = tempfile::tempdir().unwrap();
-    open(state.path(), ENOUGH).store(some(12).iter()).unwrap();
+    bounded(state.path(), ENOUGH)
+        .store(some(12).iter())
+        .unwrap();
     let reader = Reader::of(state.path());
     let all = Filter::default();
     let filter = |change: &dyn Fn(&mut Filter)| {
@@ -104,7 +115,9 @@ fn each_condition_of_a_filter_leaves_out_what_it_says() {
 #[test]
 fn a_trend_has_the_last_values_of_a_recipe_oldest_first() {
     let state = tempfile::tempdir().unwrap();
-    open(state.path(), ENOUGH).store(some(12).iter()).unwrap();
+    bounded(state.path(), ENOUGH)
+        .store(some(12).iter())
+        .unwrap();
     let reader = Reader::of(state.path());
     let trends = reader.trends(2, 3).unwrap();
     assert_eq!(trends[0].name, "deviation");
@@ -117,7 +130,7 @@ fn a_trend_has_the_last_values_of_a_recipe_oldest_first() {
 #[test]
 fn the_oldest_results_go_when_there_are_too_many() {
     let state = tempfile::tempdir().unwrap();
-    let mut writer = open(state.path(), 5);
+    let mut writer = bounded(state.path(), 5);
     for entry in some(12) {
         writer.store([entry].iter()).unwrap();
     }
@@ -130,7 +143,7 @@ fn the_oldest_results_go_when_there_are_too_many() {
         .unwrap();
     assert_eq!(gauges, 10);
     drop(writer);
-    open(state.path(), 2)
+    bounded(state.path(), 2)
         .store([entry(13, 1, Verdict::Pass)].iter())
         .unwrap();
     assert_eq!(seqs(&reader, &Filter::default()), [13, 12]);
@@ -139,7 +152,7 @@ fn the_oldest_results_go_when_there_are_too_many() {
 #[test]
 fn recordings_are_linked_to_the_newest_result_of_their_seq() {
     let state = tempfile::tempdir().unwrap();
-    let mut writer = open(state.path(), ENOUGH);
+    let mut writer = bounded(state.path(), ENOUGH);
     writer.store(some(3).iter()).unwrap();
     writer.link(2, "two").unwrap();
     let reader = Reader::of(state.path());
@@ -156,7 +169,7 @@ fn a_damaged_database_is_set_aside_with_a_message_and_a_new_one_begun() {
     let state = tempfile::tempdir().unwrap();
     let path = state.path().join(DATABASE);
     let mut bytes = {
-        let mut writer = open(state.path(), ENOUGH);
+        let mut writer = bounded(state.path(), ENOUGH);
         writer.store(some(300).iter()).unwrap();
         drop(writer);
         std::fs::read(&path).unwrap()
@@ -186,7 +199,7 @@ fn a_damaged_database_is_set_aside_with_a_message_and_a_new_one_begun() {
 #[test]
 fn csv_has_a_line_per_result_and_a_column_per_gauge() {
     let state = tempfile::tempdir().unwrap();
-    open(state.path(), ENOUGH).store(some(2).iter()).unwrap();
+    bounded(state.path(), ENOUGH).store(some(2).iter()).unwrap();
     let mut bytes = Vec::new();
     let reader = Reader::of(state.path());
     reader.csv(&Filter::default(), &mut bytes).unwrap();
@@ -213,4 +226,149 @@ fn without_a_history_reading_says_so() {
         .unwrap_err();
     assert!(error.to_string().contains("there is none"), "{error}");
     assert!(!state.path().join(DATABASE).exists());
+}
+
+#[test]
+fn a_replay_compares_what_the_frames_show_to_the_last_bit_and_not_how_the_cycle_went() {
+    use crate::station::result::flag::{SIMULATED, STEPPED_UP};
+    let stored = Entry {
+        flags: STEPPED_UP | SIMULATED,
+        ..entry(7, 1, Verdict::Fail)
+    };
+    let mut replayed = Entry {
+        seq: 0,
+        total_us: 5,
+        flags: SIMULATED,
+        ..stored.clone()
+    };
+    assert_eq!(difference(&stored, &replayed), None);
+    let value = replayed.gauges[0].value.unwrap();
+    replayed.gauges[0].value = Some(f64::from_bits(value.to_bits() + 1));
+    assert!(
+        difference(&stored, &replayed)
+            .unwrap()
+            .contains("deviation")
+    );
+    replayed.gauges[0].value = Some(value);
+    replayed.flags = 0;
+    assert!(difference(&stored, &replayed).is_some());
+}
+
+/// Longest wait for the history's threads.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// Room for the tables and some results, in pages of 4 KiB.
+const FEW_PAGES: u32 = 24;
+
+fn station() -> StationHandle {
+    let settings = Settings {
+        next_seq: 1,
+        boot_id: 1,
+        teach_allowed: false,
+        identity: Arc::new(Identity {
+            vendor: String::new(),
+            product: String::new(),
+            serial: String::new(),
+            version: String::new(),
+        }),
+        limits: Limits::default(),
+    };
+    StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| None)
+}
+
+fn record(seq: u32) -> Arc<ResultRecord> {
+    Arc::new(ResultRecord {
+        seq,
+        verdict: Verdict::Invalid,
+        inspection: Arc::new(Inspection {
+            reason: Some("x".repeat(2000).into()),
+            ..Inspection::default()
+        }),
+        ..ResultRecord::default()
+    })
+}
+
+fn wait(what: &str, done: impl Fn() -> bool) {
+    let began = Instant::now();
+    while !done() {
+        assert!(began.elapsed() < PATIENCE, "no {what}");
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn a_storage_that_refuses_is_a_warning_and_what_waited_is_stored_when_it_takes_it_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = StateFolder::open(folder.path()).unwrap();
+    let bounds = Bounds {
+        results: ENOUGH,
+        recordings: 0,
+    };
+    let (history, task, next, complaint) = open(state.path(), state.counter(), 1, bounds).unwrap();
+    assert_eq!((next, complaint), (1, None));
+    let station = station();
+    let warned = || station.snapshot().warnings & warning::STORAGE != 0;
+    // Somebody else holds the database for longer than anybody waits.
+    let other = rusqlite::Connection::open(folder.path().join(DATABASE)).unwrap();
+    other.execute_batch("BEGIN IMMEDIATE").unwrap();
+    let running = {
+        let station = station.clone();
+        std::thread::spawn(move || task.run(&station))
+    };
+    for seq in 1..=60 {
+        history.record(record(seq));
+    }
+    wait("warning", warned);
+    assert!(history.problem().unwrap().contains("locked"));
+    let reader = history.reader().clone();
+    assert_eq!(seqs(&reader, &Filter::default()), [0; 0]);
+    other.execute_batch("COMMIT").unwrap();
+    wait("recovery", || !warned());
+    assert_eq!((history.problem(), history.lost()), (None, 0));
+    let expected: Vec<u32> = (1..=60).rev().collect();
+    assert_eq!(seqs(&reader, &Filter::default()), expected);
+    history.stop(60);
+    running.join().unwrap();
+    assert_eq!(state.next_seq().unwrap(), 61);
+}
+
+#[test]
+fn a_full_card_stores_nothing_by_halves_and_everything_when_there_is_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut writer = open_writer(folder.path());
+    // SQLite's own answer of a full card: the database may not grow.
+    writer.bound_pages(FEW_PAGES);
+    let many = some(500);
+    let error = writer.store(many.iter()).unwrap_err();
+    assert!(
+        error.to_string().contains("full") && !error.damaged,
+        "{error}"
+    );
+    let reader = Reader::of(folder.path());
+    assert_eq!(seqs(&reader, &Filter::default()), [0; 0]);
+    writer.store(many[..3].iter()).unwrap();
+    writer.bound_pages(1 << 30);
+    writer.store(many[3..].iter()).unwrap();
+    let all = Filter {
+        limit: usize::MAX,
+        ..Filter::default()
+    };
+    assert_eq!(seqs(&reader, &all).len(), many.len());
+}
+
+#[test]
+fn a_database_that_is_damaged_while_it_is_used_is_set_aside_and_nothing_stops() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut writer = open_writer(folder.path());
+    writer.store(some(300).iter()).unwrap();
+    drop(writer);
+    let mut writer = open_writer(folder.path());
+    let error = HistoryError {
+        path: folder.path().join(DATABASE),
+        reason: "database disk image is malformed".into(),
+        damaged: true,
+    };
+    let said = writer.begin_anew(&error).unwrap();
+    assert!(said.contains("history.damaged.db"), "{said}");
+    writer.store(some(2).iter()).unwrap();
+    assert_eq!(seqs(&Reader::of(folder.path()), &Filter::default()), [2, 1]);
 }

@@ -81,6 +81,15 @@ impl Writer {
         Ok(said(why, &aside))
     }
 
+    /// The most pages that the database may have.
+    #[cfg(test)]
+    pub(super) fn bound_pages(&self, most: u32) {
+        let pragma = self
+            .connection
+            .pragma_update_and_check(None, "max_page_count", most, |_| Ok(()));
+        assert!(pragma.is_ok());
+    }
+
     /// The SEQ of the result that was stored last.
     ///
     /// # Errors

@@ -21,6 +21,7 @@ use algo::pipeline::Rises;
 use algo::units::AbsolutePhase;
 use hal::frame::Frame;
 use hal::projector::Raster;
+use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -170,9 +171,13 @@ impl Plan {
         &self.sequence
     }
 
-    /// Ratio and shift of each frame that is projected, in their order.
-    pub fn steps(&self) -> &[(f64, f64)] {
-        &self.frames
+    /// Ratio and shift of each frame of the sequence that has `count` frames, in their order; empty if there is none.
+    pub fn shown(&self, count: usize) -> Vec<(f64, f64)> {
+        if self.frames.len() == count {
+            self.frames.clone()
+        } else {
+            Vec::new()
+        }
     }
 
     /// The columns of each row that some gauge looks at.
@@ -256,7 +261,9 @@ pub fn rasters(
     frames: impl Iterator<Item = (f64, f64)>,
     calibration: &Calibration,
 ) -> Result<Vec<Raster>, hal::error::Error> {
+    let frames: Vec<_> = frames.collect();
     frames
+        .into_par_iter()
         .map(|(ratio, shift)| {
             let grey = encode(function, ratio, shift, calibration.response.as_ref());
             Raster::new(grey.width as u32, grey.height as u32, grey.pixels)

@@ -37,6 +37,13 @@ pub struct Stamp {
     fingerprint: String,
 }
 
+impl Stamp {
+    /// The file's size.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+}
+
 /// A loaded recipe.
 #[derive(Clone, Debug)]
 pub struct Loaded {
