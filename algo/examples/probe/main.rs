@@ -18,8 +18,8 @@ mod rig;
 mod scene;
 
 use algo::frame::FrameView;
-use algo::phase::{Decoder, Wrapped};
-use algo::pipeline::{PhaseMap, decode, decode_last, triangulate, wrap};
+use algo::phase::Decoder;
+use algo::pipeline::{PhaseMap, arrive, decode, decode_last, triangulate};
 use algo::simd::Backend;
 use algo::units::AbsolutePhase;
 use cases::{CASES, Case};
@@ -50,16 +50,13 @@ fn arrival(
     frames: &[FrameView<'_>],
     map: Option<&[AbsolutePhase]>,
 ) -> Outcome<PhaseMap> {
-    let (width, height) = (frames[0].width(), frames[0].height());
-    let mut before: Vec<Wrapped> = Vec::new();
+    let mut arrived = decoder.arrived(frames[0].width(), frames[0].height());
     for (level, places) in decoder.levels().enumerate() {
         let frames: Vec<_> = places.iter().map(|&at| frames[at]).collect();
         if level + 1 == decoder.levels().len() {
-            return Ok(decode_last(decoder, &before, &frames, map, None)?);
+            return Ok(decode_last(decoder, &arrived, &frames, map, None)?);
         }
-        let mut wrapped = Wrapped::new(width, height);
-        wrap(decoder, level, &frames, before.first(), &mut wrapped)?;
-        before.push(wrapped);
+        arrive(decoder, &frames, &mut arrived)?;
     }
     Err("a sequence has levels".into())
 }

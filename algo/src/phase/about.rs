@@ -9,12 +9,9 @@
 use super::level::Demodulated;
 use super::mean::{Mean, MeanLanes};
 use super::step::{Step, StepLanes, Turns, q15, word};
-use super::unwrap::{farness, too_far};
+use super::unwrap::farness;
 use crate::pattern::{Level, Unwrapping};
 use crate::simd::Lanes;
-
-/// Most levels about a map.
-pub(super) const MAX_ABOUT: usize = 3;
 
 /// Levels about a map, prepared for unwrapping.
 #[derive(Clone, Debug)]
@@ -43,8 +40,6 @@ struct Dense {
 /// A level's ratio in the forms that words need.
 #[derive(Clone, Copy, Debug)]
 struct Rated {
-    /// Place among the levels from coarse to fine.
-    at: usize,
     /// Whether the ratio is 1.
     one: bool,
     /// Whole part of r.
@@ -59,7 +54,7 @@ impl About {
     /// `None` for levels whose beats words cannot hold.
     pub fn new(unwrapping: Unwrapping, levels: &[Level]) -> Option<Self> {
         let finest = levels.len() - 1;
-        let rated = |at: usize| Rated::new(at, levels[at].ratio);
+        let rated = |at: usize| Rated::new(levels[at].ratio);
         let dense = match unwrapping {
             Unwrapping::DenseThree { n } => Some(Dense {
                 first: rated(0),
@@ -85,11 +80,10 @@ impl About {
 }
 
 impl Rated {
-    fn new(at: usize, ratio: f64) -> Self {
+    fn new(ratio: f64) -> Self {
         let fraction = ratio - libm::floor(ratio);
         let high = libm::rint(fraction * 65_536.0);
         Self {
-            at,
             one: libm::fabs(ratio - 1.0) < 1e-12,
             whole: word(libm::floor(ratio)),
             part: q15(fraction),
@@ -126,18 +120,19 @@ impl<V: Lanes> RatedLanes<V> {
         if self.plan.one {
             return x.phase;
         }
-        let orders = v.add(v.mul_low(x.order, self.high), v.mul_q15(x.order, self.low));
-        let mut product = v.add(orders, v.mul_q15(x.phase, self.part));
-        if self.plan.whole != 0 {
-            product = v.add(product, v.mul_low(x.phase, self.whole));
+        let product = self.part_times(v, x);
+        if self.plan.whole == 0 {
+            return product;
         }
-        product
+        v.add(product, v.mul_low(x.phase, self.whole))
     }
 
-    /// q = φ − frac(r·Φ₀) of half a block.
+    /// frac(r·x) of a ratio below 1.
     #[inline(always)]
-    fn relative(&self, v: V, levels: &[Demodulated<V>], half: usize, map: Turns<V>) -> V::W {
-        v.sub(levels[self.plan.at].phase[half], self.times(v, map))
+    fn part_times(&self, v: V, x: Turns<V>) -> V::W {
+        let order = x.nearest(v);
+        let orders = v.add(v.mul_low(order, self.high), v.mul_q15(order, self.low));
+        v.add(orders, v.mul_q15(x.phase, self.part))
     }
 }
 
@@ -155,60 +150,71 @@ struct DenseLanes<V: Lanes> {
     mean: MeanLanes<V>,
 }
 
+/// The levels of a block; of those that a sequence has not, nothing is looked at.
+#[derive(Clone, Copy)]
+pub(super) struct Around<V: Lanes> {
+    /// Of ratio 1 − 1/n.
+    pub first: Demodulated<V>,
+    /// Of ratio 1 − 1/n².
+    pub second: Demodulated<V>,
+    /// Whose ratio is the largest.
+    pub finest: Demodulated<V>,
+}
+
 /// Half a block unwrapped about a map.
 pub(super) struct Unwrapped<V: Lanes> {
     /// Φ, 1/65536 turn.
     pub phase: [V::D; 2],
     /// The modulation that stands for all levels: √(Σ N r² B² / Σ N r²).
     pub modulation: V::W,
-    /// Mask: a step left too much over.
-    pub doubtful: V::W,
+    /// The most that a step left over.
+    pub left: V::W,
 }
 
 impl<V: Lanes> AboutLanes<V> {
+    /// `None` where the plan is not for this number of levels.
     #[inline(always)]
-    pub fn new(v: V, plan: &About) -> Self {
+    pub fn new<const LEVELS: usize>(v: V, plan: &About) -> Option<Self> {
         let mut scale = None;
         if let Some(inverse) = plan.scale {
             scale = Some(v.splat_single(inverse));
         }
         let mut dense = None;
-        if let Some(plan) = &plan.dense {
+        if LEVELS > 1 {
+            let Some(plan) = &plan.dense else { return None };
             let mut second = None;
-            if let Some((rated, slow)) = &plan.second {
+            if LEVELS > 2 {
+                let Some((rated, slow)) = &plan.second else {
+                    return None;
+                };
                 second = Some((RatedLanes::new(v, *rated), StepLanes::new(v, slow)));
             }
             dense = Some(DenseLanes {
                 first: RatedLanes::new(v, plan.first),
                 fast: StepLanes::new(v, &plan.fast),
                 second,
-                mean: MeanLanes::new(v, &plan.mean),
+                mean: MeanLanes::new::<LEVELS>(v, &plan.mean)?,
             });
         }
-        Self {
+        Some(Self {
             finest: RatedLanes::new(v, plan.finest),
             scale,
             dense,
-        }
+        })
     }
 
     /// Unwraps half a block (`half` 0 or 1) about `known`, Φ₀ in 1/65536 turn.
     #[inline(always)]
-    pub fn unwrap(
-        &self,
-        v: V,
-        known: [V::D; 2],
-        levels: &[Demodulated<V>],
-        half: usize,
-    ) -> Unwrapped<V> {
-        // The phase part of Φ₀ as −½…½ turn.
+    pub fn unwrap(&self, v: V, known: [V::D; 2], levels: &Around<V>, half: usize) -> Unwrapped<V> {
         let (phase, order) = v.split(known);
-        let order = v.sub(order, v.sar::<15>(phase));
         let map = Turns { order, phase };
-        let q1 = self.finest.relative(v, levels, half, map);
+        let finest = &levels.finest;
         match &self.dense {
-            Some(dense) => dense.unwrap(v, known, map, q1, levels, half),
-            None => self.single(v, known, q1, levels[self.finest.plan.at].modulation[half]),
+            Some(dense) => dense.unwrap(v, known, map, levels, half),
+            None => {
+                let q1 = v.sub(finest.phase[half], self.finest.times(v, map));
+                self.single(v, known, q1, finest.modulation[half])
+            }
         }
     }
 
@@ -225,7 +231,7 @@ impl<V: Lanes> AboutLanes<V> {
             phase: [v.add32(known[0], delta[0]), v.add32(known[1], delta[1])],
             modulation,
             // No step, so nothing is left over: whether the map is near enough is known to who made it.
-            doubtful: v.splat16(0),
+            left: v.splat16(0),
         }
     }
 }
@@ -237,45 +243,44 @@ impl<V: Lanes> DenseLanes<V> {
         v: V,
         known: [V::D; 2],
         map: Turns<V>,
-        q1: V::W,
-        levels: &[Demodulated<V>],
+        levels: &Around<V>,
         half: usize,
     ) -> Unwrapped<V> {
         let zero = v.splat16(0);
-        let q3 = self.first.relative(v, levels, half, map);
-        let mut beat = Turns {
-            order: zero,
-            phase: v.sub(q1, q3),
+        // Of several levels the finest has ratio 1, the others less.
+        let q1 = v.sub(levels.finest.phase[half], map.phase);
+        let q3 = v.sub(levels.first.phase[half], self.first.part_times(v, map));
+        let beat = v.sub(q1, q3);
+        let (mut left, mut q2) = (zero, zero);
+        let ahead = if let Some((rated, slow)) = &self.second {
+            q2 = v.sub(levels.second.phase[half], rated.part_times(v, map));
+            let slow_beat = v.sub(q1, q2);
+            let [above, _] = slow.ahead_of_start(v, [slow_beat; 2]);
+            let climbed;
+            (climbed, left) = slow.land(v, above, beat);
+            self.fast.ahead(v, [climbed; 2])[0]
+        } else {
+            self.fast.ahead_of_start(v, [beat; 2])[0]
         };
-        let mut left = zero;
-        let mut q2 = zero;
-        if let Some((rated, slow)) = &self.second {
-            q2 = rated.relative(v, levels, half, map);
-            let a = Turns {
-                order: zero,
-                phase: v.sub(q1, q2),
-            };
-            (beat, left) = slow.climb(v, a, beat.phase);
-        }
-        let (d1, left_fast) = self.fast.climb(v, beat, q1);
-        let e3 = v.sub(self.first.times(v, d1), q3);
+        let (d1, left_fast) = self.fast.land(v, ahead, q1);
+        let e3 = v.sub(self.first.part_times(v, d1), q3);
         left = v.max_unsigned(left, v.max_unsigned(left_fast, farness(v, e3)));
         let mut e2 = zero;
         if let Some((rated, _)) = &self.second {
             // About the mean so far, as far as it matters for trust.
             let moved = self.mean.moved(v, e3);
-            e2 = v.sub(v.sub(rated.times(v, d1), q2), moved);
+            e2 = v.sub(v.sub(rated.part_times(v, d1), q2), moved);
             left = v.max_unsigned(left, farness(v, e2));
         }
         let (correction, modulation) = self.mean.of(v, levels, half, e3, e2);
-        let delta = d1.join(v);
+        let delta = v.join(d1.phase, d1.order);
         Unwrapped {
             phase: [
                 v.add32(v.add32(known[0], delta[0]), correction[0]),
                 v.add32(v.add32(known[1], delta[1]), correction[1]),
             ],
             modulation,
-            doubtful: too_far(v, left),
+            left,
         }
     }
 }

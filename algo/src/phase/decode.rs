@@ -1,43 +1,28 @@
 //! Rows of frames → rows of absolute phase, modulation and trust.
 
-use super::block::{LevelRow, Levels, about_row, geometric_row, wrap_row};
+use super::arrived::Arrived;
 use super::level::Level;
-use super::narrow::{MAX_PIXELS, PaddedLevel, RowSample, padded_level};
 use super::unwrap::{Unwrapper, information};
-use super::wrapped::{Wrapped, WrappedRow, WrappedRowMut};
 use crate::frame::{FrameView, Samples};
-use crate::pattern::{MAX_FRAMES, PhaseRange, Sequence, SequenceError, Unwrapping};
+use crate::pattern::{PhaseRange, Sequence, SequenceError, Unwrapping};
 use crate::simd::Backend;
 use crate::trust::Trust;
 use crate::units::{AbsolutePhase, Modulation};
 use alloc::vec::Vec;
 use core::fmt;
-use core::ops::Range;
 
 /// Everything that decoding a sequence needs, worked out once.
 #[derive(Clone, Debug)]
 pub struct Decoder {
     /// From coarse to fine.
-    levels: Vec<Level>,
-    unwrapper: Unwrapper,
+    pub(super) levels: Vec<Level>,
+    pub(super) unwrapper: Unwrapper,
     unwrapping: Unwrapping,
     /// Σ N_i r_i² over the levels that carry the result's accuracy.
     information: f64,
-    backend: Backend,
+    pub(super) backend: Backend,
     frame_count: usize,
-    bit_depth: u8,
-}
-
-/// What the levels of a row are made from.
-#[derive(Clone, Copy)]
-enum Source<'a> {
-    /// All frames of the sequence.
-    Frames(&'a [FrameView<'a>]),
-    /// Levels demodulated before, and the frames of the finest in the order of its shifts.
-    Last {
-        before: &'a [Wrapped],
-        last: &'a [FrameView<'a>],
-    },
+    pub(super) bit_depth: u8,
 }
 
 /// One row of results, each slice as long as the row.
@@ -46,7 +31,7 @@ pub struct PhaseRow<'a> {
     /// Φ in turns of the phase function, [`AbsolutePhase::UNKNOWN`] where not resolved.
     pub phase: &'a mut [AbsolutePhase],
     /// The modulation that decides the phase's accuracy: of the finest level, or the mean of dense levels with weights
-    /// N r². 0 where a level's is below the trusted minimum, and where nothing was looked at.
+    /// N r². 0 where the pixel is not resolved.
     pub modulation: &'a mut [Modulation],
     /// Resolved, or the first reason why not.
     pub trust: &'a mut [Trust],
@@ -76,6 +61,13 @@ pub enum DecodeError {
         /// Width and height of this one.
         given: (usize, usize),
     },
+    /// Levels have arrived in another number than this needs.
+    Level {
+        /// How many have arrived.
+        arrived: usize,
+        /// How many the sequence has.
+        levels: usize,
+    },
     /// A frame's samples are not of the width that the bit depth needs.
     SampleWidth {
         /// Place of the frame.
@@ -104,6 +96,10 @@ impl fmt::Display for DecodeError {
                 f,
                 "frame {frame} is {}x{} where {}x{} was expected",
                 given.0, given.1, expected.0, expected.1
+            ),
+            Self::Level { arrived, levels } => write!(
+                f,
+                "{arrived} of {levels} levels have arrived: all but the finest are decoded one after the other, it is last"
             ),
             Self::SampleWidth { frame, bit_depth } => write!(
                 f,
@@ -212,197 +208,53 @@ impl Decoder {
         Ok(())
     }
 
-    /// Checks that `frames` are those of one level: count, equal size, sample type.
+    /// Checks that `frames` are those of the level after those that have arrived: count, size, sample type.
     ///
     /// # Errors
-    /// Naming the frame that does not fit.
-    pub fn check_level(&self, level: usize, frames: &[FrameView<'_>]) -> Result<(), DecodeError> {
-        let steps = self.levels.get(level).map_or(0, |level| level.frames.len());
-        self.check_frames(steps, frames)
+    /// What does not fit.
+    pub fn check_arrival(
+        &self,
+        frames: &[FrameView<'_>],
+        arrived: &Arrived,
+    ) -> Result<(), DecodeError> {
+        let Some(level) = self.levels.get(arrived.levels()) else {
+            return Err(DecodeError::Level {
+                arrived: arrived.levels(),
+                levels: self.levels.len(),
+            });
+        };
+        self.check_frames(level.frames.len(), frames)?;
+        let (expected, given) = (arrived.size(), (frames[0].width(), frames[0].height()));
+        if given != expected {
+            return Err(DecodeError::FrameSize {
+                frame: 0,
+                expected,
+                given,
+            });
+        }
+        Ok(())
+    }
+
+    /// Checks that `frames` are those of the finest level and that all others have arrived.
+    ///
+    /// # Errors
+    /// What does not fit.
+    pub fn check_last(
+        &self,
+        frames: &[FrameView<'_>],
+        arrived: &Arrived,
+    ) -> Result<(), DecodeError> {
+        if arrived.levels() + 1 != self.levels.len() {
+            return Err(DecodeError::Level {
+                arrived: arrived.levels(),
+                levels: self.levels.len(),
+            });
+        }
+        self.check_arrival(frames, arrived)
     }
 
     /// Places in the sequence of the frames of a level, in the order of their shifts; levels from coarse to fine.
     pub fn levels(&self) -> impl ExactSizeIterator<Item = &[usize]> {
         self.levels.iter().map(|level| &level.frames[..])
-    }
-
-    /// Demodulates row `v` of a level whose frames [`Self::check_level`] has passed; not where `coarsest` says that a
-    /// whole block is dark.
-    pub(crate) fn wrap_row(
-        &self,
-        level: usize,
-        frames: &[FrameView<'_>],
-        v: usize,
-        coarsest: Option<&Wrapped>,
-        out: WrappedRowMut<'_>,
-    ) {
-        let before = coarsest.map(|coarsest| coarsest.row(v));
-        if self.bit_depth == 8 {
-            self.typed_wrap::<u8>(level, frames, v, before, out);
-        } else {
-            self.typed_wrap::<u16>(level, frames, v, before, out);
-        }
-    }
-
-    fn typed_wrap<T: RowSample>(
-        &self,
-        level: usize,
-        frames: &[FrameView<'_>],
-        v: usize,
-        before: Option<WrappedRow<'_>>,
-        out: WrappedRowMut<'_>,
-    ) {
-        let (level, width) = (&self.levels[level], out.phase.len());
-        let rows: Vec<&[T]> = frames.iter().map(|&frame| T::row(frame, v)).collect();
-        if width >= MAX_PIXELS {
-            wrap_row(self.backend, level, &rows, before, 0..width, out);
-            return;
-        }
-        let padded = padded_level(&LevelRow::Frames(&rows), &(0..width));
-        let rows: Vec<&[T]> = padded.samples().collect();
-        let mut wide = Wrapped::new(MAX_PIXELS, 1);
-        for row in wide.rows() {
-            wrap_row(self.backend, level, &rows, None, 0..MAX_PIXELS, row);
-        }
-        out.phase.copy_from_slice(&wide.phase[..width]);
-        out.modulation.copy_from_slice(&wide.modulation[..width]);
-        out.doubts.copy_from_slice(&wide.doubts[..width]);
-    }
-
-    /// Decodes `columns` of row `v` of frames that [`Self::check`] has passed, into the same columns of `out`.
-    ///
-    /// `map` is the row of the known map for dense and single-level sequences and is not looked at otherwise.
-    pub fn row(
-        &self,
-        frames: &[FrameView<'_>],
-        v: usize,
-        map: &[AbsolutePhase],
-        columns: Range<usize>,
-        out: PhaseRow<'_>,
-    ) {
-        self.sourced_row(Source::Frames(frames), v, map, columns, out);
-    }
-
-    /// As [`Self::row`], from levels demodulated on arrival (coarse to fine) and the frames of the finest.
-    pub fn last_row(
-        &self,
-        before: &[Wrapped],
-        last: &[FrameView<'_>],
-        v: usize,
-        map: &[AbsolutePhase],
-        columns: Range<usize>,
-        out: PhaseRow<'_>,
-    ) {
-        self.sourced_row(Source::Last { before, last }, v, map, columns, out);
-    }
-
-    fn sourced_row(
-        &self,
-        source: Source<'_>,
-        v: usize,
-        map: &[AbsolutePhase],
-        columns: Range<usize>,
-        out: PhaseRow<'_>,
-    ) {
-        if self.bit_depth == 8 {
-            self.typed_row::<u8>(source, v, map, columns, out);
-        } else {
-            self.typed_row::<u16>(source, v, map, columns, out);
-        }
-    }
-
-    fn typed_row<T: RowSample>(
-        &self,
-        source: Source<'_>,
-        v: usize,
-        map: &[AbsolutePhase],
-        columns: Range<usize>,
-        out: PhaseRow<'_>,
-    ) {
-        // Neither list can be longer than a sequence may be.
-        let mut samples: heapless::Vec<&[T], MAX_FRAMES> = heapless::Vec::new();
-        match source {
-            Source::Frames(frames) => {
-                let places = self.levels.iter().flat_map(|level| &level.frames);
-                samples.extend(places.map(|&at| T::row(frames[at], v)));
-            }
-            Source::Last { last, .. } => {
-                samples.extend(last.iter().map(|&frame| T::row(frame, v)));
-            }
-        }
-        let before = match source {
-            Source::Frames(_) => &[],
-            Source::Last { before, .. } => before,
-        };
-        let mut rows: Levels<'_, T> = before
-            .iter()
-            .map(|wrapped| LevelRow::Wrapped(wrapped.row(v)))
-            .collect();
-        let mut samples = &samples[..];
-        for level in &self.levels[before.len()..] {
-            let (here, rest) = samples.split_at(level.frames.len());
-            samples = rest;
-            rows.extend([LevelRow::Frames(here)]);
-        }
-        if columns.len() >= MAX_PIXELS {
-            self.columns(&rows, map, columns, out);
-        } else {
-            self.few_columns(&rows, map, columns, out);
-        }
-    }
-
-    /// The levels of a row, from a copy that is wide enough for a block.
-    fn few_columns<T: RowSample>(
-        &self,
-        rows: &[LevelRow<'_, T>],
-        map: &[AbsolutePhase],
-        columns: Range<usize>,
-        out: PhaseRow<'_>,
-    ) {
-        let few = columns.len();
-        let padded: Vec<PaddedLevel<T>> =
-            rows.iter().map(|row| padded_level(row, &columns)).collect();
-        let samples: Vec<Vec<&[T]>> = padded
-            .iter()
-            .map(|level| level.samples().collect())
-            .collect();
-        let levels: Levels<'_, T> = padded
-            .iter()
-            .zip(&samples)
-            .map(|(level, samples)| level.row(samples))
-            .collect();
-        let mut phase = [AbsolutePhase::UNKNOWN; MAX_PIXELS];
-        let mut modulation = [Modulation::default(); MAX_PIXELS];
-        let mut trust = [Trust::default(); MAX_PIXELS];
-        let mut known = [AbsolutePhase::UNKNOWN; MAX_PIXELS];
-        if let Some(map) = map.get(columns.clone()) {
-            known[..few].copy_from_slice(map);
-        }
-        let wide = PhaseRow {
-            phase: &mut phase,
-            modulation: &mut modulation,
-            trust: &mut trust,
-        };
-        self.columns(&levels, &known, 0..MAX_PIXELS, wide);
-        out.phase[columns.clone()].copy_from_slice(&phase[..few]);
-        out.modulation[columns.clone()].copy_from_slice(&modulation[..few]);
-        out.trust[columns].copy_from_slice(&trust[..few]);
-    }
-
-    fn columns<T: RowSample>(
-        &self,
-        rows: &[LevelRow<'_, T>],
-        map: &[AbsolutePhase],
-        columns: Range<usize>,
-        out: PhaseRow<'_>,
-    ) {
-        match &self.unwrapper {
-            Unwrapper::Geometric(plan) => {
-                geometric_row(self.backend, plan, &self.levels, rows, columns, out);
-            }
-            Unwrapper::About(plan) => {
-                about_row(self.backend, plan, &self.levels, rows, map, columns, out);
-            }
-        }
     }
 }

@@ -17,16 +17,26 @@ pub(super) struct Folded<V: Lanes> {
     pub long: [V::W; 2],
     /// The shorter, with the same factor.
     pub short: [V::W; 2],
+    /// 4 · long − 3 · 2¹⁵.
+    pub centred: [V::W; 2],
     /// The longer before scaling, in the level's unit.
     pub length: [V::W; 2],
-    /// Mask: the angle in the octant counts backwards.
-    pub backwards: [V::W; 2],
-    /// The axis from which it counts in 1/65536 turn, plus 1 where it counts backwards.
+    /// −1 where the angle in the octant counts backwards, else 1.
+    pub sign: [V::W; 2],
+    /// The axis from which it counts in 1/65536 turn.
     pub axis: [V::W; 2],
     /// Mask: the modulation is at least the trusted minimum.
     pub strong: V::B,
-    /// 255 where a sample is at full scale.
+    /// 255 where a sample is at full scale and that matters.
     pub brightest: V::B,
+}
+
+impl<V: Lanes> Folded<V> {
+    /// The phase of half a block that has this angle in its octant.
+    #[inline(always)]
+    pub fn unfold(&self, v: V, half: usize, angle: V::W) -> V::W {
+        v.add_signed(self.axis[half], angle, self.sign[half])
+    }
 }
 
 /// A sample that blocks of pixels can be made of.
@@ -34,36 +44,33 @@ pub(crate) trait BlockSample: Sample {
     /// Demodulation of four equally spaced shifts, the quickest that there is for this width.
     fn four<V: Lanes>(
         v: V,
-        level: &LevelLanes<'_, V, Self>,
+        level: &LevelLanes<'_, V>,
         rows: &Four<'_, Self>,
         at: usize,
     ) -> Folded<V>;
     /// A block of samples as words.
     fn words<V: Lanes>(v: V, row: &[Self], at: usize) -> [V::W; 2];
     /// Mask: the sample is at full scale or above.
-    fn saturated<V: Lanes>(v: V, level: &LevelLanes<'_, V, Self>, row: &[Self], at: usize) -> V::B;
+    fn saturated<V: Lanes>(v: V, level: &LevelLanes<'_, V>, row: &[Self], at: usize) -> V::B;
 }
 
-/// Folds the block at `at` of a level's rows.
+/// Folds the block at `at` of a level's rows, of which there are as many as it has shifts.
 #[inline(always)]
 pub(super) fn fold<V: Lanes, T: BlockSample>(
     v: V,
-    level: &LevelLanes<'_, V, T>,
+    level: &LevelLanes<'_, V>,
     rows: &[&[T]],
     at: usize,
 ) -> Folded<V> {
-    match (&level.plan.samples, rows) {
+    let mut folded = match (&level.plan.samples, rows) {
+        (Samples::Four, &[a, b, c, d]) => T::four(v, level, &Four::new([a, b, c, d], a.len()), at),
         (Samples::Three, &[a, b, c]) => three(v, level, [a, b, c], at),
-        (Samples::Weighted(weights), rows) => weighted(v, level, weights, rows, at),
-        // A level is prepared with as many rows as it has shifts.
-        _ => weighted(v, level, &[], rows, at),
-    }
+        _ => weighted(v, level, &level.plan.weights, rows, at),
+    };
+    folded.brightest = v.and8(folded.brightest, level.saturates);
+    folded
 }
 
-/// Scales by which the bytes of a first nibble come to 2¹⁴…2¹⁵ with [`Lanes::widen_scaled`].
-const SCALES: [u8; 16] = [
-    128, 128, 64, 64, 32, 32, 32, 32, 16, 16, 16, 16, 16, 16, 16, 16,
-];
 /// At 8 bits and N = 4, B = √(S² + C²)/2 is trusted from 16 counts, so from S² + C² = 32²: the least of the shorter component
 /// for each longer one from 16 to 31; 255 where none is enough.
 const LEAST_SHORT: [u8; 16] = [
@@ -74,7 +81,7 @@ impl BlockSample for u8 {
     #[inline(always)]
     fn four<V: Lanes>(
         v: V,
-        _level: &LevelLanes<'_, V, Self>,
+        _level: &LevelLanes<'_, V>,
         rows: &Four<'_, Self>,
         at: usize,
     ) -> Folded<V> {
@@ -87,17 +94,16 @@ impl BlockSample for u8 {
         let (long, short) = (v.max8(s, c), v.min8(s, c));
         let steep = v.eq8(long, s);
         let backwards = v.xor8(v.xor8(s_down, c_down), steep);
-        let half = v.and8(v.pick8(steep, s_down, c_down), v.splat8(0x80));
-        let axis = v.or8(half, v.and8(steep, v.splat8(0x40)));
-        let scale = v.by_high_nibble(&SCALES, long);
+        let axis = v.quarters8(v.pick8(steep, s_down, c_down), steep);
+        let scaled = v.scaled(long, short);
         let least = v.by_excess(&LEAST_SHORT, long);
-        let length = v.widen(v.splat8(0), long);
         Folded {
-            long: v.widen_scaled(long, scale),
-            short: v.widen_scaled(short, scale),
-            length: [v.shr::<1>(length[0]), v.shr::<1>(length[1])],
-            backwards: v.widen(backwards, backwards),
-            axis: v.widen(v.and8(backwards, v.splat8(1)), axis),
+            long: scaled.long,
+            short: scaled.short,
+            centred: scaled.centred,
+            length: v.widen_128(long),
+            sign: v.signs(backwards),
+            axis: v.widen_256(axis),
             strong: v.eq8(v.max8(short, least), short),
             brightest: v.max8(even, odd),
         }
@@ -109,12 +115,7 @@ impl BlockSample for u8 {
     }
 
     #[inline(always)]
-    fn saturated<V: Lanes>(
-        v: V,
-        _level: &LevelLanes<'_, V, Self>,
-        row: &[Self],
-        at: usize,
-    ) -> V::B {
+    fn saturated<V: Lanes>(v: V, _level: &LevelLanes<'_, V>, row: &[Self], at: usize) -> V::B {
         v.eq8(v.load8(row, at), v.splat8(u8::MAX))
     }
 }
@@ -123,7 +124,7 @@ impl BlockSample for u16 {
     #[inline(always)]
     fn four<V: Lanes>(
         v: V,
-        level: &LevelLanes<'_, V, Self>,
+        level: &LevelLanes<'_, V>,
         rows: &Four<'_, Self>,
         at: usize,
     ) -> Folded<V> {
@@ -155,7 +156,7 @@ impl BlockSample for u16 {
     }
 
     #[inline(always)]
-    fn saturated<V: Lanes>(v: V, level: &LevelLanes<'_, V, Self>, row: &[Self], at: usize) -> V::B {
+    fn saturated<V: Lanes>(v: V, level: &LevelLanes<'_, V>, row: &[Self], at: usize) -> V::B {
         let x = v.load16(row, at);
         v.narrow_mask([
             any_full(v, level, x[0], x[0], x[0], x[0]),
@@ -166,14 +167,7 @@ impl BlockSample for u16 {
 
 /// Mask: one of the samples is at full scale or above.
 #[inline(always)]
-fn any_full<V: Lanes, T>(
-    v: V,
-    level: &LevelLanes<'_, V, T>,
-    a: V::W,
-    b: V::W,
-    c: V::W,
-    d: V::W,
-) -> V::W {
+fn any_full<V: Lanes>(v: V, level: &LevelLanes<'_, V>, a: V::W, b: V::W, c: V::W, d: V::W) -> V::W {
     // With the sign bit turned the order of unsigned words is that of signed ones.
     let turn = v.splat16(i16::MIN);
     let (a, b) = (v.xor(a, turn), v.xor(b, turn));
@@ -184,7 +178,7 @@ fn any_full<V: Lanes, T>(
 
 /// Mask: a·b + c·d is at least the level's least power.
 #[inline(always)]
-fn dot_enough<V: Lanes, T>(v: V, level: &LevelLanes<'_, V, T>, [a, b, c, d]: [V::W; 4]) -> V::W {
+fn dot_enough<V: Lanes>(v: V, level: &LevelLanes<'_, V>, [a, b, c, d]: [V::W; 4]) -> V::W {
     let power = v.dot(a, b, c, d);
     let below = level.below_least_power;
     v.narrow_mask32([v.gt32(power[0], below), v.gt32(power[1], below)])
@@ -196,7 +190,7 @@ const ROOT_3_HALVES: i16 = 28_378;
 #[inline(always)]
 fn three<V: Lanes, T: BlockSample>(
     v: V,
-    level: &LevelLanes<'_, V, T>,
+    level: &LevelLanes<'_, V>,
     rows: [&[T]; 3],
     at: usize,
 ) -> Folded<V> {
@@ -219,9 +213,9 @@ fn three<V: Lanes, T: BlockSample>(
 
 /// S, C and whether they are enough: 4 (S² + C²) = (2I₀ − I₁ − I₂)² + 3 (I₁ − I₂)², exactly.
 #[inline(always)]
-fn three_words<V: Lanes, T>(
+fn three_words<V: Lanes>(
     v: V,
-    level: &LevelLanes<'_, V, T>,
+    level: &LevelLanes<'_, V>,
     a: V::W,
     b: V::W,
     c: V::W,
@@ -238,7 +232,7 @@ fn three_words<V: Lanes, T>(
 #[inline(always)]
 fn weighted<V: Lanes, T: BlockSample>(
     v: V,
-    level: &LevelLanes<'_, V, T>,
+    level: &LevelLanes<'_, V>,
     weights: &[[i16; 2]],
     rows: &[&[T]],
     at: usize,
@@ -295,9 +289,9 @@ fn weighted<V: Lanes, T: BlockSample>(
 
 /// A sum, and products brought down so far that all of them fit.
 #[inline(always)]
-fn add_part<V: Lanes, T>(
+fn add_part<V: Lanes>(
     v: V,
-    level: &LevelLanes<'_, V, T>,
+    level: &LevelLanes<'_, V>,
     sum: [V::D; 2],
     products: [V::D; 2],
 ) -> [V::D; 2] {
@@ -312,12 +306,7 @@ fn add_part<V: Lanes, T>(
 
 /// Mask: S² + C² of the sums is at least the level's least power, in singles (1e-7).
 #[inline(always)]
-fn enough_sums<V: Lanes, T>(
-    v: V,
-    level: &LevelLanes<'_, V, T>,
-    s: [V::D; 2],
-    c: [V::D; 2],
-) -> V::W {
+fn enough_sums<V: Lanes>(v: V, level: &LevelLanes<'_, V>, s: [V::D; 2], c: [V::D; 2]) -> V::W {
     let below = level.below_least_sum_power;
     let (s0, s1) = (v.to_single(s[0]), v.to_single(s[1]));
     let (c0, c1) = (v.to_single(c[0]), v.to_single(c[1]));
@@ -333,8 +322,9 @@ fn octant<V: Lanes>(v: V, s: [V::W; 2], c: [V::W; 2], strong: V::B, brightest: V
     Folded {
         long: [low.long, high.long],
         short: [low.short, high.short],
+        centred: [low.centred, high.centred],
         length: [low.length, high.length],
-        backwards: [low.backwards, high.backwards],
+        sign: [low.sign, high.sign],
         axis: [low.axis, high.axis],
         strong,
         brightest,
@@ -344,8 +334,9 @@ fn octant<V: Lanes>(v: V, s: [V::W; 2], c: [V::W; 2], strong: V::B, brightest: V
 struct OctantWords<W> {
     long: W,
     short: W,
+    centred: W,
     length: W,
-    backwards: W,
+    sign: W,
     axis: W,
 }
 
@@ -359,7 +350,6 @@ fn octant_words<V: Lanes>(v: V, s: V::W, c: V::W) -> OctantWords<V::W> {
     let backwards = v.xor(v.xor(s_down, c_down), steep);
     let half = v.and(v.pick(steep, s_down, c_down), v.splat16(i16::MIN));
     let quarter = v.and(steep, v.splat16(0x4000));
-    let axis = v.or(v.or(half, quarter), v.and(backwards, v.splat16(1)));
     // The weakest trusted pixel needs 2⁴ (see `level`): twice 2² and once 2.
     let (long, short) = lift::<V, 2>(v, length, short, 1 << 13);
     let (long, short) = lift::<V, 2>(v, long, short, 1 << 13);
@@ -367,9 +357,10 @@ fn octant_words<V: Lanes>(v: V, s: V::W, c: V::W) -> OctantWords<V::W> {
     OctantWords {
         long,
         short,
+        centred: v.xor(v.shl::<2>(long), v.splat16(i16::MIN)),
         length,
-        backwards,
-        axis,
+        sign: v.or(backwards, v.splat16(1)),
+        axis: v.or(half, quarter),
     }
 }
 

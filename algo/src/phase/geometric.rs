@@ -2,6 +2,7 @@
 
 use super::step::Step;
 use crate::pattern::{Level, PhaseRange, SequenceError};
+use crate::units::AbsolutePhase;
 use alloc::vec::Vec;
 
 /// Coarse-to-fine levels prepared for unwrapping.
@@ -46,5 +47,22 @@ impl Geometric {
             origin: libm::rint(origin * 65_536.0) as i32,
             scale: (!whole).then(|| libm::rint(f64::from(1_u32 << 20) / finest) as i64),
         })
+    }
+
+    /// What few sequences need: an origin between two orders (of a single level), a finest ratio that is not 1.
+    pub fn finish(&self, phases: &mut [i32]) {
+        let part = self.origin & 0xFFFF;
+        if part == 0 && self.scale.is_none() {
+            return;
+        }
+        for phase in phases {
+            if *phase != AbsolutePhase::UNKNOWN.to_bits() {
+                let whole = i64::from(*phase) + i64::from(part);
+                let scaled = self
+                    .scale
+                    .map_or(whole, |scale| (whole * scale + (1 << 19)) >> 20);
+                *phase = AbsolutePhase::saturate(scaled).to_bits();
+            }
+        }
     }
 }

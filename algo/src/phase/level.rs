@@ -1,11 +1,9 @@
 //! One level prepared for demodulation, and its demodulation: samples → wrapped phase and modulation.
 
 use super::angle::{AngleLanes, LENGTH, hypotenuse};
-use super::block::LevelRow;
-use super::fold::{BlockSample, Folded, fold};
-use super::wrapped::WrappedRow;
+use super::fold::Folded;
 use crate::pattern;
-use crate::simd::{Four, Lanes};
+use crate::simd::Lanes;
 use crate::trust::MIN_MODULATION_8_BIT;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
@@ -29,6 +27,8 @@ pub(crate) struct Level {
     pub frames: Vec<usize>,
     /// How S and C come from the samples.
     pub samples: Samples,
+    /// The weights of the samples, where they are summed with such.
+    pub weights: Vec<[i16; 2]>,
     /// Bits by which S and C are shifted: up from counts to words, or down from sums to words.
     pub lift: u8,
     /// Bits by which products are brought down before they are added up.
@@ -50,14 +50,14 @@ pub(crate) struct Level {
 }
 
 /// How S and C come from the samples of a level.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Samples {
     /// By differences of 4.
     Four,
     /// By differences of 3.
     Three,
-    /// By sums with these weights: sin-like for S (cos 2πs) and cos-like for C (sin 2πs).
-    Weighted(Vec<[i16; 2]>),
+    /// By sums with weights: sin-like for S (cos 2πs) and cos-like for C (sin 2πs).
+    Weighted,
 }
 
 /// A block of pixels of a level.
@@ -71,23 +71,6 @@ pub(crate) struct Demodulated<V: Lanes> {
     pub strong: V::B,
     /// 255 where a sample is at full scale and that matters.
     pub brightest: V::B,
-}
-
-/// A block of pixels of a level before its angles are known.
-pub(super) enum Pointer<V: Lanes> {
-    Folded(Folded<V>),
-    Demodulated(Demodulated<V>),
-}
-
-impl<V: Lanes> Pointer<V> {
-    /// Mask: the modulation is at least the trusted minimum.
-    #[inline(always)]
-    pub fn strong(&self) -> V::B {
-        match self {
-            Self::Folded(folded) => folded.strong,
-            Self::Demodulated(block) => block.strong,
-        }
-    }
 }
 
 impl Level {
@@ -104,19 +87,19 @@ impl Level {
         let lifted = f64::from(1_u32 << up);
         // `unit` is what one count weighs in the words of S and C; `powers` the factor from S² + C² in counts to what
         // the forms compare.
-        let mut drop = 0;
+        let (mut weights, mut drop) = (Vec::new(), 0);
         let (samples, lift, unit, powers) = match form {
             Some(4) => (Samples::Four, up, lifted, lifted * lifted),
             Some(3) => (Samples::Three, up, lifted, 4.0),
             _ => {
-                let (weights, down);
+                let down;
                 (weights, drop, down) = weighted_samples(level, bit_depth);
                 let bits = f64::from(WEIGHT_BITS) - f64::from(drop);
                 let unit = libm::pow(2.0, bits - f64::from(down));
-                (Samples::Weighted(weights), down, unit, libm::pow(4.0, bits))
+                (Samples::Weighted, down, unit, libm::pow(4.0, bits))
             }
         };
-        if !matches!(samples, Samples::Weighted(_)) {
+        if samples != Samples::Weighted {
             let back = (steps - libm::rint(places) as usize % steps) % steps;
             frames.rotate_left(back);
         }
@@ -131,6 +114,7 @@ impl Level {
         Self {
             frames,
             samples,
+            weights,
             lift,
             drop,
             below_full_scale: (((1_u32 << bit_depth) - 2) as u16).cast_signed(),
@@ -144,21 +128,10 @@ impl Level {
     }
 }
 
-/// Where the samples of a level of a row come from.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Source<'a, T> {
-    /// From four rows of frames, in the order of their shifts.
-    Four(Four<'a, T>),
-    /// From the rows of any number of frames.
-    Rows(&'a [&'a [T]]),
-    /// The level has been demodulated before.
-    Wrapped(WrappedRow<'a>),
-}
-
-/// A level of a row, ready to be read block by block: every constant in all lanes.
-pub(super) struct LevelLanes<'a, V: Lanes, T> {
+/// A level with every constant in all lanes.
+#[derive(Clone, Copy)]
+pub(super) struct LevelLanes<'a, V: Lanes> {
     pub plan: &'a Level,
-    pub source: Source<'a, T>,
     pub lift: V::Count,
     /// One bit less.
     pub half_lift: V::Count,
@@ -167,30 +140,25 @@ pub(super) struct LevelLanes<'a, V: Lanes, T> {
     pub centre: V::W,
     /// Full scale less one count, with its sign bit turned.
     pub below_full_scale: V::W,
+    /// Mask: a sample at full scale matters.
+    pub saturates: V::B,
     hypotenuse: [V::W; 3],
     doubled: V::Count,
 }
 
-impl<'a, V: Lanes, T: BlockSample> LevelLanes<'a, V, T> {
+impl<'a, V: Lanes> LevelLanes<'a, V> {
     #[inline(always)]
-    pub fn new(v: V, plan: &'a Level, row: LevelRow<'a, T>) -> Self {
-        let source = match (row, &plan.samples) {
-            (LevelRow::Wrapped(row), _) => Source::Wrapped(row),
-            (LevelRow::Frames(&[a, b, c, d]), Samples::Four) => {
-                Source::Four(Four::new([a, b, c, d]))
-            }
-            (LevelRow::Frames(rows), _) => Source::Rows(rows),
-        };
+    pub fn new(v: V, plan: &'a Level) -> Self {
         let turn = v.splat16(i16::MIN);
         Self {
             plan,
-            source,
             lift: v.left(plan.lift),
             half_lift: v.left(plan.lift.saturating_sub(1)),
             below_least_power: v.splat32(plan.below_least_power),
             below_least_sum_power: v.splat_single(plan.below_least_sum_power),
             centre: v.splat16(plan.centre),
             below_full_scale: v.xor(v.splat16(plan.below_full_scale), turn),
+            saturates: v.splat8(if plan.saturates { u8::MAX } else { 0 }),
             hypotenuse: [
                 v.splat16(plan.hypotenuse[0]),
                 v.splat16(plan.hypotenuse[1]),
@@ -200,72 +168,32 @@ impl<'a, V: Lanes, T: BlockSample> LevelLanes<'a, V, T> {
         }
     }
 
-    /// Demodulates the block at `at`.
+    /// Phase and modulation of a folded block; `doubled` where the plan may say so of the modulation.
     #[inline(always)]
-    pub fn block<const MODULATION: bool>(
+    pub fn fine(
         &self,
         v: V,
         angle: &AngleLanes<V>,
-        at: usize,
+        folded: &Folded<V>,
+        doubled: bool,
     ) -> Demodulated<V> {
-        match self.pointer(v, at) {
-            Pointer::Folded(folded) => self.demodulated::<MODULATION>(v, angle, folded),
-            Pointer::Demodulated(block) => block,
-        }
-    }
-
-    /// The block at `at` as far as whether it is strong.
-    #[inline(always)]
-    pub fn pointer(&self, v: V, at: usize) -> Pointer<V> {
-        match &self.source {
-            Source::Wrapped(row) => Pointer::Demodulated(row.block(v, at)),
-            Source::Four(rows) => {
-                v.fetch_ahead(rows, at);
-                Pointer::Folded(T::four(v, self, rows, at))
-            }
-            Source::Rows(rows) => Pointer::Folded(fold(v, self, rows, at)),
-        }
-    }
-
-    /// The angle and the length of a pointer.
-    #[inline(always)]
-    pub fn demodulated<const MODULATION: bool>(
-        &self,
-        v: V,
-        angle: &AngleLanes<V>,
-        folded: Folded<V>,
-    ) -> Demodulated<V> {
-        let t = [
-            angle.quotient(v, folded.short[0], folded.long[0]),
-            angle.quotient(v, folded.short[1], folded.long[1]),
+        let (low, t_low) = angle.fine(v, folded, 0);
+        let (high, t_high) = angle.fine(v, folded, 1);
+        let mut modulation = [
+            hypotenuse(v, folded.length[0], t_low, self.hypotenuse),
+            hypotenuse(v, folded.length[1], t_high, self.hypotenuse),
         ];
-        let low = angle.arctangent(v, t[0]);
-        let high = angle.arctangent(v, t[1]);
-        // −x is ¬x + 1; the axis holds the 1.
-        let phase = [
-            v.add(v.xor(low, folded.backwards[0]), folded.axis[0]),
-            v.add(v.xor(high, folded.backwards[1]), folded.axis[1]),
-        ];
-        let mut modulation = [v.splat16(0); 2];
-        if MODULATION {
-            modulation = [
-                hypotenuse(v, folded.length[0], t[0], self.hypotenuse),
-                hypotenuse(v, folded.length[1], t[1], self.hypotenuse),
-            ];
+        if doubled {
             modulation = [
                 v.shl_by(modulation[0], self.doubled),
                 v.shl_by(modulation[1], self.doubled),
             ];
         }
-        let mut brightest = folded.brightest;
-        if !self.plan.saturates {
-            brightest = v.splat8(0);
-        }
         Demodulated {
-            phase,
+            phase: [low, high],
             modulation,
             strong: folded.strong,
-            brightest,
+            brightest: folded.brightest,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The weighted mean of dense levels, in singles: + − × of IEEE 754, so the same bits everywhere.
 
-use super::level::Demodulated;
+use super::about::Around;
 use super::step::q15;
 use crate::pattern::Level;
 use crate::simd::Lanes;
@@ -8,7 +8,6 @@ use crate::simd::Lanes;
 /// What the mean of up to three levels needs: the finest, a first and perhaps a second other one.
 #[derive(Clone, Debug)]
 pub(super) struct Mean {
-    finest: usize,
     first: Averaged,
     second: Option<Averaged>,
     /// By how much the first is expected to have moved the mean, per unit of its residual and in units of the second:
@@ -21,8 +20,6 @@ pub(super) struct Mean {
 /// A level beside the finest.
 #[derive(Clone, Copy, Debug)]
 struct Averaged {
-    /// Place among the levels from coarse to fine.
-    at: usize,
     /// 1/r.
     inverse: f64,
     /// N r², relative to the finest's.
@@ -33,7 +30,6 @@ impl Mean {
     pub fn new(levels: &[Level], finest: usize, first: usize, second: Option<usize>) -> Self {
         let weight = |at: usize| levels[at].steps() as f64 * levels[at].ratio * levels[at].ratio;
         let averaged = |at: usize| Averaged {
-            at,
             inverse: 1.0 / levels[at].ratio,
             weight: weight(at) / weight(finest),
         };
@@ -47,7 +43,6 @@ impl Mean {
         let here = averaged(first);
         let share = here.weight / (1.0 + here.weight);
         Self {
-            finest,
             first: here,
             second: second.map(averaged),
             moved: second.map_or(0.0, |at| share * here.inverse * levels[at].ratio),
@@ -58,7 +53,6 @@ impl Mean {
 
 /// [`Mean`] with every constant in all lanes.
 pub(super) struct MeanLanes<V: Lanes> {
-    finest: usize,
     first: AveragedLanes<V>,
     second: Option<AveragedLanes<V>>,
     moved: V::W,
@@ -69,7 +63,6 @@ pub(super) struct MeanLanes<V: Lanes> {
 }
 
 struct AveragedLanes<V: Lanes> {
-    at: usize,
     weight: V::F,
     /// What its residual counts for: −weight/r.
     pull: V::F,
@@ -81,7 +74,6 @@ impl<V: Lanes> AveragedLanes<V> {
     #[inline(always)]
     fn new(v: V, plan: &Averaged, finest_share: f64) -> Self {
         Self {
-            at: plan.at,
             weight: v.splat_single(plan.weight as f32),
             pull: v.splat_single((-plan.weight * plan.inverse) as f32),
             share: v.splat16(q15(plan.weight * finest_share)),
@@ -91,21 +83,23 @@ impl<V: Lanes> AveragedLanes<V> {
 
 impl<V: Lanes> MeanLanes<V> {
     #[inline(always)]
-    pub fn new(v: V, plan: &Mean) -> Self {
+    pub fn new<const LEVELS: usize>(v: V, plan: &Mean) -> Option<Self> {
         let moved = q15(plan.moved);
         let mut second = None;
-        if let Some(plan_of_second) = &plan.second {
+        if LEVELS > 2 {
+            let Some(plan_of_second) = &plan.second else {
+                return None;
+            };
             second = Some(AveragedLanes::new(v, plan_of_second, plan.finest_share));
         }
-        Self {
-            finest: plan.finest,
+        Some(Self {
             first: AveragedLanes::new(v, &plan.first, plan.finest_share),
             second,
             moved: v.splat16(moved),
             moved_single: v.splat_single(f32::from(moved) / 32_768.0),
             finest_share: v.splat16(q15(plan.finest_share)),
             total: v.splat_single((1.0 / plan.finest_share) as f32),
-        }
+        })
     }
 
     /// By how much a residual of the first other level has moved the mean, for the second.
@@ -120,14 +114,14 @@ impl<V: Lanes> MeanLanes<V> {
     pub fn of(
         &self,
         v: V,
-        levels: &[Demodulated<V>],
+        levels: &Around<V>,
         half: usize,
         e3: V::W,
         e2: V::W,
     ) -> ([V::D; 2], V::W) {
         let zero = v.splat16(0);
-        let b1 = levels[self.finest].modulation[half];
-        let b3 = levels[self.first.at].modulation[half];
+        let b1 = levels.finest.modulation[half];
+        let b3 = levels.first.modulation[half];
         let mut mean = v.add(
             v.mul_q15(b1, self.finest_share),
             v.mul_q15(b3, self.first.share),
@@ -136,7 +130,7 @@ impl<V: Lanes> MeanLanes<V> {
         let e3 = v.join(e3, v.sar::<15>(e3));
         let (mut b2, mut e2_wide) = (b3, e3);
         if let Some(second) = &self.second {
-            let b = levels[second.at].modulation[half];
+            let b = levels.second.modulation[half];
             mean = v.add(mean, v.mul_q15(b, second.share));
             b2 = v.join(b, zero);
             e2_wide = v.join(e2, v.sar::<15>(e2));
@@ -180,16 +174,10 @@ fn square<V: Lanes>(v: V, x: V::D) -> V::F {
     v.mul_single(x, x)
 }
 
-/// The root of a mean square from the mean x and 1/(mean square): two steps of the third order, x (15 − 10 s + 3 s²)/8 with
-/// s = x²/(mean square). A mean a third too small, the most that three levels of any modulation make it, leaves 4e-3.
+/// The root of a mean square from the mean x and 1/(mean square): a step of the third order, x (15 − 10 s + 3 s²)/8 with
+/// s = x²/(mean square). Exact to 1e-5 where the levels' modulations are within a factor of 1.5 of one another.
 #[inline(always)]
-fn root<V: Lanes>(v: V, mean: V::F, inverse: V::F) -> V::F {
-    let x = root_step(v, mean, inverse);
-    root_step(v, x, inverse)
-}
-
-#[inline(always)]
-fn root_step<V: Lanes>(v: V, x: V::F, inverse: V::F) -> V::F {
+fn root<V: Lanes>(v: V, x: V::F, inverse: V::F) -> V::F {
     let share = v.mul_single(v.mul_single(x, x), inverse);
     let step = v.mul_single(share, v.splat_single(0.375));
     let step = v.mul_single(share, v.sub_single(v.splat_single(1.25), step));

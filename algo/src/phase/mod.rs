@@ -2,21 +2,23 @@
 
 mod about;
 mod angle;
-mod block;
+mod arrived;
 mod decode;
 mod fold;
 mod geometric;
+mod kernel;
 mod level;
 mod mean;
 mod narrow;
+mod rows;
+mod source;
 mod step;
 mod unwrap;
-mod wrapped;
 
 pub use crate::trust::{MIN_MODULATION_8_BIT, Trust};
+pub use arrived::Arrived;
 pub use decode::{DecodeError, Decoder, PhaseRow};
 pub use level::FULL_TRUST_STEPS;
-pub use wrapped::Wrapped;
 
 #[cfg(test)]
 mod tests;

@@ -1,11 +1,10 @@
 //! Rows that are narrower than a block: copied into one that is wide enough.
 
-use super::block::LevelRow;
+use super::PhaseRow;
 use super::fold::BlockSample;
-use super::wrapped::WrappedRow;
 use crate::frame::{FrameView, Samples};
-use alloc::vec;
-use alloc::vec::Vec;
+use crate::trust::Trust;
+use crate::units::{AbsolutePhase, Modulation};
 use core::ops::Range;
 
 /// At least the pixels of any back-end's block.
@@ -35,68 +34,43 @@ impl RowSample for u16 {
     }
 }
 
-/// A level of a few columns, followed by dark pixels up to a block.
-pub(super) enum PaddedLevel<T> {
-    Frames(Vec<[T; MAX_PIXELS]>),
-    Wrapped {
-        phase: Vec<u16>,
-        modulation: Vec<u16>,
-        doubts: Vec<u8>,
-    },
-}
-
-/// Copies `columns` of a level's row.
-pub(super) fn padded_level<T: RowSample>(
-    row: &LevelRow<'_, T>,
-    columns: &Range<usize>,
-) -> PaddedLevel<T> {
-    match row {
-        LevelRow::Frames(rows) => PaddedLevel::Frames(
-            rows.iter()
-                .map(|row| {
-                    let mut padded = [T::default(); MAX_PIXELS];
-                    padded[..columns.len()].copy_from_slice(&row[columns.clone()]);
-                    padded
-                })
-                .collect(),
-        ),
-        LevelRow::Wrapped(row) => PaddedLevel::Wrapped {
-            phase: padded(row.phase, columns),
-            modulation: padded(row.modulation, columns),
-            doubts: padded(row.doubts, columns),
-        },
-    }
-}
-
-fn padded<T: Copy + Default>(row: &[T], columns: &Range<usize>) -> Vec<T> {
-    let mut padded = vec![T::default(); MAX_PIXELS];
+/// Columns of a row, followed by what is dark, up to a block.
+pub(super) fn padded<T: Copy + Default>(row: &[T], columns: &Range<usize>) -> [T; MAX_PIXELS] {
+    let mut padded = [T::default(); MAX_PIXELS];
     padded[..columns.len()].copy_from_slice(&row[columns.clone()]);
     padded
 }
 
-impl<T: RowSample> PaddedLevel<T> {
-    /// Its rows of samples, if it is made of those.
-    pub fn samples(&self) -> impl Iterator<Item = &[T]> {
-        let rows: &[[T; MAX_PIXELS]] = match self {
-            Self::Frames(rows) => rows,
-            Self::Wrapped { .. } => &[],
-        };
-        rows.iter().map(|row| &row[..])
+/// A padded row of results, and the place that they belong to.
+pub(super) struct FewResults {
+    phase: [AbsolutePhase; MAX_PIXELS],
+    modulation: [Modulation; MAX_PIXELS],
+    trust: [Trust; MAX_PIXELS],
+}
+
+impl FewResults {
+    pub fn new() -> Self {
+        Self {
+            phase: [AbsolutePhase::UNKNOWN; MAX_PIXELS],
+            modulation: [Modulation::default(); MAX_PIXELS],
+            trust: [Trust::default(); MAX_PIXELS],
+        }
     }
 
-    /// As the level of a row; `samples` are its rows of samples.
-    pub fn row<'a>(&'a self, samples: &'a [&'a [T]]) -> LevelRow<'a, T> {
-        match self {
-            Self::Frames(_) => LevelRow::Frames(samples),
-            Self::Wrapped {
-                phase,
-                modulation,
-                doubts,
-            } => LevelRow::Wrapped(WrappedRow {
-                phase,
-                modulation,
-                doubts,
-            }),
+    /// To be written by a kernel.
+    pub fn row(&mut self) -> PhaseRow<'_> {
+        PhaseRow {
+            phase: &mut self.phase,
+            modulation: &mut self.modulation,
+            trust: &mut self.trust,
         }
+    }
+
+    /// To the columns that they were computed for.
+    pub fn copy_to(&self, out: PhaseRow<'_>, columns: Range<usize>) {
+        let few = columns.len();
+        out.phase[columns.clone()].copy_from_slice(&self.phase[..few]);
+        out.modulation[columns.clone()].copy_from_slice(&self.modulation[..few]);
+        out.trust[columns].copy_from_slice(&self.trust[..few]);
     }
 }

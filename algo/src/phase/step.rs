@@ -31,10 +31,20 @@ pub(super) struct Step {
 /// fine phase.
 const LEAST_BITS: f64 = 4.0;
 
+/// An n this near to a whole number is that number: over 1000 turns 1e-6 turn.
+const WHOLE: f64 = 1e-9;
+
 impl Step {
     /// From phases of at most `reach` turns either way of an origin to n times as many; `behind` is n · that origin less the
     /// origin of the fine phase, in turns. `None` if a word cannot hold the fine ones with enough precision.
     pub fn new(n: f64, reach: f64, behind: f64) -> Option<Self> {
+        // A whole n that comes out of ratios is off in its last digits.
+        let next = libm::rint(n);
+        let n = if libm::fabs(n - next) < WHOLE {
+            next
+        } else {
+            n
+        };
         let order_bits = if reach <= 0.5 {
             0.0
         } else {
@@ -72,22 +82,43 @@ pub(super) fn word(x: f64) -> i16 {
     libm::rint(x) as i64 as i16
 }
 
-/// Half a block of phases: turns, and −½…½ of one in 1/65536.
+/// Half a block of phases: whole turns, and what is beyond them in 1/65536.
 #[derive(Clone, Copy)]
 pub(super) struct Turns<V: Lanes> {
+    /// Rounded down.
     pub order: V::W,
+    /// 0…1 turn, as an unsigned word.
     pub phase: V::W,
 }
 
 impl<V: Lanes> Turns<V> {
-    /// 1/65536 turns in double words.
+    /// Of a phase of −½…½ turn.
     #[inline(always)]
-    pub fn join(self, v: V) -> [V::D; 2] {
-        v.join(self.phase, v.add(self.order, v.sar::<15>(self.phase)))
+    pub fn within_half(v: V, phase: V::W) -> Self {
+        Self {
+            order: v.sar::<15>(phase),
+            phase,
+        }
+    }
+
+    /// Whole turns next to the phase, of which it is −½…½ away.
+    #[inline(always)]
+    pub fn nearest(self, v: V) -> V::W {
+        v.sub(self.order, v.sar::<15>(self.phase))
     }
 }
 
+/// What half a block's coarse phases say of the fine ones: n·Φ.
+#[derive(Clone, Copy)]
+pub(super) struct Ahead<V: Lanes> {
+    /// Its fraction, 1/65536 turn.
+    pub fraction: V::W,
+    /// n·Φ + ½ in the step's fixed point.
+    pub turns: V::W,
+}
+
 /// A step with every constant in all lanes.
+#[derive(Clone, Copy)]
 pub(super) struct StepLanes<V: Lanes> {
     whole: V::W,
     part_q15: V::W,
@@ -95,8 +126,9 @@ pub(super) struct StepLanes<V: Lanes> {
     origin: V::W,
     gain: V::W,
     offset: V::W,
-    /// Whether the coarse phase has turns to multiply, and how they and the phase make one word.
-    turns: bool,
+    /// Whether n is whole.
+    integral: bool,
+    /// How turns of the coarse phase and what is beyond them make one word.
     order_left: V::Count,
     phase_right: V::Count,
     fine_right: V::Count,
@@ -106,7 +138,6 @@ pub(super) struct StepLanes<V: Lanes> {
 impl<V: Lanes> StepLanes<V> {
     #[inline(always)]
     pub fn new(v: V, step: &Step) -> Self {
-        let turns = step.order_bits > 0;
         Self {
             whole: v.splat16(step.whole),
             part_q15: v.splat16(step.part_q15),
@@ -114,31 +145,88 @@ impl<V: Lanes> StepLanes<V> {
             origin: v.splat16(step.origin),
             gain: v.splat16(step.gain),
             offset: v.splat16(step.offset),
-            turns,
-            order_left: v.left(if turns { 16 - step.order_bits } else { 0 }),
+            integral: step.part_q16 == 0 && step.part_q15 == 0,
+            order_left: v.left(16 - step.order_bits),
             phase_right: v.right(step.order_bits),
             fine_right: v.right(16 - step.bits),
             bits_right: v.right(step.bits),
         }
     }
 
+    /// What is expected at the fine level above coarse phases of −½…½ turn, for a step made for no more than that.
+    #[inline(always)]
+    pub fn ahead_of_start(&self, v: V, coarse: [V::W; 2]) -> [Ahead<V>; 2] {
+        let mut fraction = self.fraction(v, coarse);
+        if !self.integral {
+            fraction = self.add_part(v, fraction, coarse);
+        }
+        self.ahead_of(v, fraction, coarse)
+    }
+
+    /// What is expected at the fine level above coarse phases of any number of turns.
+    #[inline(always)]
+    pub fn ahead(&self, v: V, coarse: [Turns<V>; 2]) -> [Ahead<V>; 2] {
+        let [low, high] = coarse;
+        let phase = [low.phase, high.phase];
+        let mut fraction = self.fraction(v, phase);
+        if !self.integral {
+            fraction = self.add_part(v, fraction, phase);
+            fraction = [
+                v.add(fraction[0], v.mul_low(low.nearest(v), self.part_q16)),
+                v.add(fraction[1], v.mul_low(high.nearest(v), self.part_q16)),
+            ];
+        }
+        let product = [self.word(v, low), self.word(v, high)];
+        self.ahead_of(v, fraction, product)
+    }
+
+    /// The fraction of the origin's and of the whole part of n's share of n·Φ.
+    #[inline(always)]
+    fn fraction(&self, v: V, phase: [V::W; 2]) -> [V::W; 2] {
+        [
+            v.add(v.mul_low(phase[0], self.whole), self.origin),
+            v.add(v.mul_low(phase[1], self.whole), self.origin),
+        ]
+    }
+
+    #[inline(always)]
+    fn add_part(&self, v: V, fraction: [V::W; 2], phase: [V::W; 2]) -> [V::W; 2] {
+        [
+            v.add(fraction[0], v.mul_q15(phase[0], self.part_q15)),
+            v.add(fraction[1], v.mul_q15(phase[1], self.part_q15)),
+        ]
+    }
+
+    /// As much of a phase as a word holds.
+    #[inline(always)]
+    fn word(&self, v: V, Turns { order, phase }: Turns<V>) -> V::W {
+        let high = v.shl_by(order, self.order_left);
+        v.add(high, v.shr_by(phase, self.phase_right))
+    }
+
+    #[inline(always)]
+    fn ahead_of(&self, v: V, fraction: [V::W; 2], product: [V::W; 2]) -> [Ahead<V>; 2] {
+        let turns = [
+            v.add(v.mul_q15(product[0], self.gain), self.offset),
+            v.add(v.mul_q15(product[1], self.gain), self.offset),
+        ];
+        [
+            Ahead {
+                fraction: fraction[0],
+                turns: turns[0],
+            },
+            Ahead {
+                fraction: fraction[1],
+                turns: turns[1],
+            },
+        ]
+    }
+
     /// The fine phase of which `fine` is the wrapped one, and what was left over ([`farness`]).
     #[inline(always)]
-    pub fn climb(&self, v: V, coarse: Turns<V>, fine: V::W) -> (Turns<V>, V::W) {
-        let Turns { order, phase } = coarse;
-        let mut fraction = v.add(
-            v.mul_low(phase, self.whole),
-            v.mul_q15(phase, self.part_q15),
-        );
-        let mut product = phase;
-        if self.turns {
-            fraction = v.add(fraction, v.mul_low(order, self.part_q16));
-            let high = v.shl_by(order, self.order_left);
-            product = v.add(high, v.sar_by(phase, self.phase_right));
-        }
-        let left = farness(v, v.sub(v.add(fraction, self.origin), fine));
-        let turns = v.add(v.mul_q15(product, self.gain), self.offset);
-        let turns = v.sub(turns, v.sar_by(fine, self.fine_right));
+    pub fn land(&self, v: V, ahead: Ahead<V>, fine: V::W) -> (Turns<V>, V::W) {
+        let left = farness(v, v.sub(ahead.fraction, fine));
+        let turns = v.sub(ahead.turns, v.shr_by(fine, self.fine_right));
         let climbed = Turns {
             order: v.sar_by(turns, self.bits_right),
             phase: fine,

@@ -3,7 +3,7 @@
 use super::for_each;
 use crate::frame::FrameView;
 use crate::geometry::Triangulator;
-use crate::phase::{DecodeError, Decoder, PhaseRow, Trust, Wrapped};
+use crate::phase::{Arrived, DecodeError, Decoder, PhaseRow, Trust};
 use crate::units::{AbsolutePhase, Height, Modulation};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -90,43 +90,43 @@ pub fn decode(
     ))
 }
 
-/// Demodulates the frames of one level (in the order of their shifts) before the finer ones are there. Blocks that the
-/// coarsest level, if it is given, found dark are left out.
+/// Decodes the frames of the next level (in the order of their shifts, levels from coarse to fine) while those of finer
+/// ones are still being exposed.
 ///
 /// # Errors
-/// If the frames are not those of the level.
-pub fn wrap(
+/// If the frames are not those of the level, or the room is for frames of another size.
+pub fn arrive(
     decoder: &Decoder,
-    level: usize,
     frames: &[FrameView<'_>],
-    coarsest: Option<&Wrapped>,
-    out: &mut Wrapped,
+    arrived: &mut Arrived,
 ) -> Result<(), DecodeError> {
-    decoder.check_level(level, frames)?;
+    let level = arrived.levels();
+    decoder.check_arrival(frames, arrived)?;
     for_each(
-        out.rows(),
+        arrived.rows(),
         || (),
         |v, row, ()| {
-            decoder.wrap_row(level, frames, v, coarsest, row);
+            decoder.arrive_row(level, frames, v, row);
         },
     );
+    arrived.add_level();
     Ok(())
 }
 
-/// As [`decode`], from the coarser levels demodulated by [`wrap`] and the frames of the finest.
+/// As [`decode`], from the coarser levels that have gone through [`arrive`] and the frames of the finest.
 ///
 /// # Errors
-/// If the frames are not those of the finest level.
+/// If the frames are not those of the finest level, another level is missing, or they are of another size.
 pub fn decode_last(
     decoder: &Decoder,
-    before: &[Wrapped],
+    arrived: &Arrived,
     last: &[FrameView<'_>],
     map: Option<&[AbsolutePhase]>,
     window: Option<Window<'_>>,
 ) -> Result<PhaseMap, DecodeError> {
-    decoder.check_level(before.len(), last)?;
+    decoder.check_last(last, arrived)?;
     Ok(each_row(&last[0], map, window, |v, known, columns, row| {
-        decoder.last_row(before, last, v, known, columns, row);
+        decoder.last_row(arrived, last, v, known, columns, row);
     }))
 }
 

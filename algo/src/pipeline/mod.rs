@@ -5,7 +5,7 @@ mod noise;
 mod rise;
 mod rows;
 
-pub use measure::{Guess, HeightMap, PhaseMap, Window, decode, decode_last, triangulate, wrap};
+pub use measure::{Guess, HeightMap, PhaseMap, Window, arrive, decode, decode_last, triangulate};
 pub use noise::sample_noise;
 pub(crate) use rise::{
     COMPARED, Risen, RowTally, Seen, UNKNOWN as NO_RISE, VARIANCE_UNIT_NM, rise_row,

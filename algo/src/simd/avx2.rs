@@ -3,8 +3,8 @@
 //! AVX2 widens within each half of a vector, so the first `W` of a block holds its pixels 0–7 and 16–23, the second
 //! 8–15 and 24–31; narrowing undoes it.
 
-use super::lanes::Lanes;
-use super::rows::Four;
+use super::lanes::{Lanes, Scaled};
+use super::rows::{Four, block, block_mut};
 use core::arch::x86_64::*;
 
 /// AVX2 is there: only [`Avx2::detect`] makes one.
@@ -39,7 +39,7 @@ macro_rules! avx2 {
 /// 128 bits for its lower and upper half.
 #[inline(always)]
 fn load_halves<T>(from: &[T], at: usize, low: usize, high: usize) -> __m256i {
-    let block = &from[at..at + BYTES];
+    let block = block(from, at, BYTES);
     let (low, high) = (&block[low..], &block[high..]);
     assert!(size_of_val(low) >= 16 && size_of_val(high) >= 16);
     // SAFETY: both slices hold at least 16 bytes, asserted above; the loads need no alignment. AVX2 as above: only
@@ -49,7 +49,7 @@ fn load_halves<T>(from: &[T], at: usize, low: usize, high: usize) -> __m256i {
 
 #[inline(always)]
 fn store_halves<T>(to: &mut [T], at: usize, low: usize, high: usize, x: __m256i) {
-    let block = &mut to[at..at + BYTES];
+    let block = block_mut(to, at, BYTES);
     assert!(size_of_val(&block[low..]) >= 16 && size_of_val(&block[high..]) >= 16);
     // SAFETY: at least 16 bytes follow both places, asserted above, and the two places do not overlap in any call; the
     // stores need no alignment. AVX2 as above: only methods of `Avx2` call this.
@@ -73,7 +73,7 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     fn load8(self, from: &[u8], at: usize) -> Self::B {
-        let block = &from[at..at + BYTES];
+        let block = block(from, at, BYTES);
         // SAFETY: the slice holds the 32 bytes that are read; the load needs no alignment; `self` proves AVX2.
         unsafe { _mm256_loadu_si256(block.as_ptr().cast()) }
     }
@@ -92,7 +92,10 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     fn fetch_ahead<T>(self, from: &Four<'_, T>, at: usize) {
-        // Twelve rows are more than the processor follows by itself.
+        // Twelve rows are more than the processor follows by itself. Two blocks are a line of its cache.
+        if !(at / BYTES).is_multiple_of(2) {
+            return;
+        }
         for row in from.rows() {
             let ahead = row
                 .as_ptr()
@@ -105,7 +108,7 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
-        let block = &mut to[at..at + BYTES];
+        let block = block_mut(to, at, BYTES);
         // SAFETY: the slice holds the 32 bytes that are written; the store needs no alignment; `self` proves AVX2.
         unsafe { _mm256_storeu_si256(block.as_mut_ptr().cast(), x) }
     }
@@ -142,13 +145,11 @@ impl Lanes for Avx2 {
         avx2!(_mm256_blendv_epi8(b, a, mask))
     }
     #[inline(always)]
-    fn by_high_nibble(self, table: &[u8; 16], x: Self::B) -> Self::B {
-        // SAFETY: the table holds the 16 bytes that are read; the load needs no alignment; `self` proves AVX2.
-        let table = unsafe { _mm256_broadcastsi128_si256(_mm_loadu_si128(table.as_ptr().cast())) };
-        avx2!({
-            let high = _mm256_and_si256(_mm256_srli_epi16::<4>(x), _mm256_set1_epi8(15));
-            _mm256_shuffle_epi8(table, high)
-        })
+    fn quarters8(self, half: Self::B, quarter: Self::B) -> Self::B {
+        self.or8(
+            self.and8(half, self.splat8(128)),
+            self.and8(quarter, self.splat8(64)),
+        )
     }
     #[inline(always)]
     fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
@@ -179,13 +180,50 @@ impl Lanes for Avx2 {
         ])
     }
     #[inline(always)]
-    fn widen_scaled(self, x: Self::B, scale: Self::B) -> [Self::W; 2] {
+    fn signs(self, mask: Self::B) -> [Self::W; 2] {
+        self.widen(self.or8(mask, self.splat8(1)), mask)
+    }
+    #[inline(always)]
+    fn widen_256(self, x: Self::B) -> [Self::W; 2] {
+        self.widen(self.splat8(0), x)
+    }
+    #[inline(always)]
+    fn widen_128(self, x: Self::B) -> [Self::W; 2] {
+        let [low, high] = self.widen(self.splat8(0), x);
+        avx2!([_mm256_srli_epi16::<1>(low), _mm256_srli_epi16::<1>(high)])
+    }
+    #[inline(always)]
+    fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W> {
+        // An eighth of the scale fits a byte, and the first nibble of the longer decides it.
+        let table = avx2!(_mm256_setr_epi8(
+            -128, -128, 64, 64, 32, 32, 32, 32, 16, 16, 16, 16, 16, 16, 16, 16, //
+            -128, -128, 64, 64, 32, 32, 32, 32, 16, 16, 16, 16, 16, 16, 16, 16
+        ));
+        let eighth = avx2!({
+            let high = _mm256_and_si256(_mm256_srli_epi16::<4>(long), _mm256_set1_epi8(15));
+            _mm256_shuffle_epi8(table, high)
+        });
         let zero = self.splat8(0);
-        let (x, scale) = (self.widen(x, zero), self.widen(scale, zero));
-        avx2!([
-            _mm256_mullo_epi16(x[0], _mm256_slli_epi16::<3>(scale[0])),
-            _mm256_mullo_epi16(x[1], _mm256_slli_epi16::<3>(scale[1]))
-        ])
+        let [low, high] = self.widen(eighth, zero);
+        let scale = [self.shl::<3>(low), self.shl::<3>(high)];
+        let (long, short) = (self.widen(long, zero), self.widen(short, zero));
+        let long = [
+            self.mul_low(long[0], scale[0]),
+            self.mul_low(long[1], scale[1]),
+        ];
+        let short = [
+            self.mul_low(short[0], scale[0]),
+            self.mul_low(short[1], scale[1]),
+        ];
+        let turn = self.splat16(i16::MIN);
+        Scaled {
+            long,
+            short,
+            centred: [
+                self.xor(self.shl::<2>(long[0]), turn),
+                self.xor(self.shl::<2>(long[1]), turn),
+            ],
+        }
     }
     #[inline(always)]
     fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B {
@@ -214,6 +252,10 @@ impl Lanes for Avx2 {
         avx2!(_mm256_sub_epi16(a, b))
     }
     #[inline(always)]
+    fn add_signed(self, a: Self::W, b: Self::W, sign: Self::W) -> Self::W {
+        self.add(a, avx2!(_mm256_sign_epi16(b, sign)))
+    }
+    #[inline(always)]
     fn add_sat(self, a: Self::W, b: Self::W) -> Self::W {
         avx2!(_mm256_adds_epi16(a, b))
     }
@@ -234,10 +276,6 @@ impl Lanes for Avx2 {
         avx2!(_mm256_srai_epi16::<N>(x))
     }
     #[inline(always)]
-    fn shr<const N: i32>(self, x: Self::W) -> Self::W {
-        avx2!(_mm256_srli_epi16::<N>(x))
-    }
-    #[inline(always)]
     fn left(self, n: u8) -> Self::Count {
         avx2!(_mm_cvtsi32_si128(i32::from(n)))
     }
@@ -252,6 +290,10 @@ impl Lanes for Avx2 {
     #[inline(always)]
     fn sar_by(self, x: Self::W, n: Self::Count) -> Self::W {
         avx2!(_mm256_sra_epi16(x, n))
+    }
+    #[inline(always)]
+    fn shr_by(self, x: Self::W, n: Self::Count) -> Self::W {
+        avx2!(_mm256_srl_epi16(x, n))
     }
     #[inline(always)]
     fn halve(self, x: Self::W) -> Self::W {

@@ -11,6 +11,17 @@
 use super::rows::Four;
 use core::fmt::Debug;
 
+/// The components of the pointers of a block, scaled by a power of two.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scaled<W> {
+    /// The longer, 2¹⁴…2¹⁵.
+    pub long: [W; 2],
+    /// The shorter.
+    pub short: [W; 2],
+    /// 4 · long − 3 · 2¹⁵: the longer about the middle of its range, −2¹⁵…2¹⁵.
+    pub centred: [W; 2],
+}
+
 /// A back-end: a proof that its instructions may be used on this machine. See the module's text.
 pub(crate) trait Lanes: Copy + Debug {
     /// Pixels of a block.
@@ -55,8 +66,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn xor8(self, a: Self::B, b: Self::B) -> Self::B;
     /// a where the mask is set, else b.
     fn pick8(self, mask: Self::B, a: Self::B, b: Self::B) -> Self::B;
-    /// table\[x / 16\].
-    fn by_high_nibble(self, table: &[u8; 16], x: Self::B) -> Self::B;
+    /// 128 where the first mask is set, and 64 more where the second is.
+    fn quarters8(self, half: Self::B, quarter: Self::B) -> Self::B;
     /// table\[x − 16\] for 16 ≤ x < 32, table\[0\] below, 0 above.
     fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B;
     /// Whether every byte of a mask is set.
@@ -68,8 +79,15 @@ pub(crate) trait Lanes: Copy + Debug {
 
     /// Words low + 256 · high.
     fn widen(self, low: Self::B, high: Self::B) -> [Self::W; 2];
-    /// Words 8 · x · scale.
-    fn widen_scaled(self, x: Self::B, scale: Self::B) -> [Self::W; 2];
+    /// Words −1 where a mask is set, else 1.
+    fn signs(self, mask: Self::B) -> [Self::W; 2];
+    /// Words 256 · x.
+    fn widen_256(self, x: Self::B) -> [Self::W; 2];
+    /// Words 128 · x.
+    fn widen_128(self, x: Self::B) -> [Self::W; 2];
+    /// Both as words times 128 · 2ⁿ, with n so that 2¹⁴ ≤ long < 2¹⁵; of pixels where long < 16 or short > long nothing is
+    /// promised.
+    fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W>;
     /// Masks of words as masks of bytes.
     fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B;
 
@@ -85,6 +103,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn add(self, a: Self::W, b: Self::W) -> Self::W;
     /// a − b.
     fn sub(self, a: Self::W, b: Self::W) -> Self::W;
+    /// a + b · sign, where the sign is 1 or −1.
+    fn add_signed(self, a: Self::W, b: Self::W, sign: Self::W) -> Self::W;
     /// a + b, signed, at most 32767.
     fn add_sat(self, a: Self::W, b: Self::W) -> Self::W;
     /// (a · b + 2¹⁴) / 2¹⁵ rounded down, signed; not for −32768 · −32768.
@@ -95,9 +115,7 @@ pub(crate) trait Lanes: Copy + Debug {
     fn shl<const N: i32>(self, x: Self::W) -> Self::W;
     /// x / 2ⁿ rounded down, signed.
     fn sar<const N: i32>(self, x: Self::W) -> Self::W;
-    /// x / 2ⁿ rounded down, unsigned.
-    fn shr<const N: i32>(self, x: Self::W) -> Self::W;
-    /// Prepares shifts of words to the left by n below 16.
+    /// Prepares shifts of words to the left by n up to 16.
     fn left(self, n: u8) -> Self::Count;
     /// Prepares shifts of words to the right by n below 16.
     fn right(self, n: u8) -> Self::Count;
@@ -105,6 +123,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn shl_by(self, x: Self::W, n: Self::Count) -> Self::W;
     /// x / 2ⁿ rounded down, signed.
     fn sar_by(self, x: Self::W, n: Self::Count) -> Self::W;
+    /// x / 2ⁿ rounded down, unsigned.
+    fn shr_by(self, x: Self::W, n: Self::Count) -> Self::W;
     /// (x + 1) / 2 rounded down, unsigned.
     fn halve(self, x: Self::W) -> Self::W;
     /// |x|, 32768 of −32768 as an unsigned word.

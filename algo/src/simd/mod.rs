@@ -16,8 +16,8 @@ mod lanes;
 mod neon;
 pub(crate) mod plain;
 mod portable;
+mod results;
 mod rows;
-mod twice;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
@@ -25,8 +25,8 @@ pub(crate) use lanes::Lanes;
 #[cfg(target_arch = "aarch64")]
 pub(crate) use neon::Neon;
 pub(crate) use portable::Portable;
+pub(crate) use results::Results;
 pub(crate) use rows::Four;
-pub(crate) use twice::Twice;
 
 /// The instructions that the phase kernels are compiled for. All give the same bits.
 #[derive(Clone, Copy, Debug)]
@@ -88,7 +88,7 @@ macro_rules! back_end_entry {
             #[target_feature(enable = "avx2")]
             #[inline(never)]
             fn avx2<$($generics)*>(lanes: $crate::simd::Avx2, $($arg: $type),*) {
-                $kernel($crate::simd::Twice(lanes), $($arg),*);
+                $kernel(lanes, $($arg),*);
             }
             #[inline(never)]
             fn plain<$($generics)*>(lanes: impl $crate::simd::Lanes, $($arg: $type),*) {
@@ -102,7 +102,7 @@ macro_rules! back_end_entry {
                     unsafe { avx2(lanes, $($arg),*) }
                 }
                 #[cfg(target_arch = "aarch64")]
-                $crate::simd::Proof::Neon(lanes) => plain($crate::simd::Twice(lanes), $($arg),*),
+                $crate::simd::Proof::Neon(lanes) => plain(lanes, $($arg),*),
             }
         }
     };

@@ -1,7 +1,7 @@
 //! Lanes of aarch64, where NEON is always there.
 
-use super::lanes::Lanes;
-use super::rows::Four;
+use super::lanes::{Lanes, Scaled};
+use super::rows::{Four, block, block_mut};
 use core::arch::aarch64::*;
 
 /// NEON belongs to aarch64.
@@ -33,7 +33,7 @@ impl Lanes for Neon {
     }
     #[inline(always)]
     fn load8(self, from: &[u8], at: usize) -> Self::B {
-        let block = &from[at..at + BYTES];
+        let block = block(from, at, BYTES);
         // SAFETY: the slice holds the 16 bytes that are read.
         unsafe { vld1q_u8(block.as_ptr()) }
     }
@@ -47,7 +47,7 @@ impl Lanes for Neon {
     fn fetch_ahead<T>(self, _from: &Four<'_, T>, _at: usize) {}
     #[inline(always)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
-        let block = &mut to[at..at + BYTES];
+        let block = block_mut(to, at, BYTES);
         // SAFETY: the slice holds the 16 bytes that are written.
         unsafe { vst1q_u8(block.as_mut_ptr(), x) }
     }
@@ -84,10 +84,8 @@ impl Lanes for Neon {
         neon!(vbslq_u8(mask, a, b))
     }
     #[inline(always)]
-    fn by_high_nibble(self, table: &[u8; 16], x: Self::B) -> Self::B {
-        // SAFETY: the table holds the 16 bytes that are read.
-        let table = unsafe { vld1q_u8(table.as_ptr()) };
-        neon!(vqtbl1q_u8(table, vshrq_n_u8::<4>(x)))
+    fn quarters8(self, half: Self::B, quarter: Self::B) -> Self::B {
+        neon!(vandq_u8(vsriq_n_u8::<1>(half, quarter), vdupq_n_u8(192)))
     }
     #[inline(always)]
     fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
@@ -113,15 +111,34 @@ impl Lanes for Neon {
         ])
     }
     #[inline(always)]
-    fn widen_scaled(self, x: Self::B, scale: Self::B) -> [Self::W; 2] {
-        neon!({
-            let low = vmull_u8(vget_low_u8(x), vget_low_u8(scale));
-            let high = vmull_high_u8(x, scale);
-            [
-                vreinterpretq_s16_u16(vshlq_n_u16::<3>(low)),
-                vreinterpretq_s16_u16(vshlq_n_u16::<3>(high)),
-            ]
-        })
+    fn signs(self, mask: Self::B) -> [Self::W; 2] {
+        let signs = neon!(vreinterpretq_s8_u8(vorrq_u8(mask, vdupq_n_u8(1))));
+        neon!([vmovl_s8(vget_low_s8(signs)), vmovl_high_s8(signs)])
+    }
+    #[inline(always)]
+    fn widen_256(self, x: Self::B) -> [Self::W; 2] {
+        self.widen(self.splat8(0), x)
+    }
+    #[inline(always)]
+    fn widen_128(self, x: Self::B) -> [Self::W; 2] {
+        neon!([
+            vreinterpretq_s16_u16(vshll_n_u8::<7>(vget_low_u8(x))),
+            vreinterpretq_s16_u16(vshll_high_n_u8::<7>(x))
+        ])
+    }
+    #[inline(always)]
+    fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W> {
+        let (long, short) = neon!({
+            let n = vreinterpretq_s8_u8(vclzq_u8(long));
+            (vshlq_u8(long, n), vshlq_u8(short, n))
+        });
+        // Twice the longer without its first bit, from −128 on, in the upper byte.
+        let centred = neon!(veorq_u8(vshlq_n_u8::<1>(long), vdupq_n_u8(128)));
+        Scaled {
+            long: self.widen_128(long),
+            short: self.widen_128(short),
+            centred: self.widen(self.splat8(0), centred),
+        }
     }
     #[inline(always)]
     fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B {
@@ -137,14 +154,14 @@ impl Lanes for Neon {
     }
     #[inline(always)]
     fn load16(self, from: &[u16], at: usize) -> [Self::W; 2] {
-        let block = &from[at..at + BYTES];
+        let block = block(from, at, BYTES);
         // SAFETY: the slice holds the 16 words that are read, 8 at a time.
         let [low, high] = unsafe { [vld1q_u16(block.as_ptr()), vld1q_u16(block.as_ptr().add(8))] };
         neon!([vreinterpretq_s16_u16(low), vreinterpretq_s16_u16(high)])
     }
     #[inline(always)]
     fn store16(self, to: &mut [u16], at: usize, x: [Self::W; 2]) {
-        let block = &mut to[at..at + BYTES];
+        let block = block_mut(to, at, BYTES);
         // SAFETY: the slice holds the 16 words that are written, 8 at a time.
         unsafe {
             vst1q_u16(block.as_mut_ptr(), vreinterpretq_u16_s16(x[0]));
@@ -158,6 +175,10 @@ impl Lanes for Neon {
     #[inline(always)]
     fn sub(self, a: Self::W, b: Self::W) -> Self::W {
         neon!(vsubq_s16(a, b))
+    }
+    #[inline(always)]
+    fn add_signed(self, a: Self::W, b: Self::W, sign: Self::W) -> Self::W {
+        neon!(vmlaq_s16(a, b, sign))
     }
     #[inline(always)]
     fn add_sat(self, a: Self::W, b: Self::W) -> Self::W {
@@ -180,12 +201,6 @@ impl Lanes for Neon {
         neon!(vshrq_n_s16::<N>(x))
     }
     #[inline(always)]
-    fn shr<const N: i32>(self, x: Self::W) -> Self::W {
-        neon!(vreinterpretq_s16_u16(vshrq_n_u16::<N>(
-            vreinterpretq_u16_s16(x)
-        )))
-    }
-    #[inline(always)]
     fn left(self, n: u8) -> Self::Count {
         neon!(vdupq_n_s16(i16::from(n)))
     }
@@ -200,6 +215,13 @@ impl Lanes for Neon {
     #[inline(always)]
     fn sar_by(self, x: Self::W, n: Self::Count) -> Self::W {
         neon!(vshlq_s16(x, n))
+    }
+    #[inline(always)]
+    fn shr_by(self, x: Self::W, n: Self::Count) -> Self::W {
+        neon!(vreinterpretq_s16_u16(vshlq_u16(
+            vreinterpretq_u16_s16(x),
+            n
+        )))
     }
     #[inline(always)]
     fn halve(self, x: Self::W) -> Self::W {
@@ -299,7 +321,7 @@ impl Lanes for Neon {
     }
     #[inline(always)]
     fn load32(self, from: &[i32], at: usize) -> [[Self::D; 2]; 2] {
-        let block = &from[at..at + BYTES];
+        let block = block(from, at, BYTES);
         // SAFETY: the slice holds the 16 double words that are read, 4 at a time.
         unsafe {
             let start = block.as_ptr();
@@ -311,7 +333,7 @@ impl Lanes for Neon {
     }
     #[inline(always)]
     fn store32(self, to: &mut [i32], at: usize, x: [[Self::D; 2]; 2]) {
-        let block = &mut to[at..at + BYTES];
+        let block = block_mut(to, at, BYTES);
         // SAFETY: the slice holds the 16 double words that are written, 4 at a time.
         unsafe {
             vst1q_s32(block.as_mut_ptr(), x[0][0]);

@@ -2,7 +2,7 @@
 //! definition. The oracle of the other back-ends, and the fallback. Its operations are not inlined: kernels made of
 //! hundreds of them, lane by lane, take the compiler minutes.
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, Scaled};
 use super::rows::Four;
 
 /// May always be used.
@@ -124,8 +124,8 @@ impl Lanes for Portable {
         self.or8(self.and8(mask, a), b)
     }
     #[inline(never)]
-    fn by_high_nibble(self, table: &[u8; 16], x: Self::B) -> Self::B {
-        lanes(x, |x| table[usize::from(x >> 4)])
+    fn quarters8(self, half: Self::B, quarter: Self::B) -> Self::B {
+        pairs(half, quarter, |half, quarter| half & 128 | quarter & 64)
     }
     #[inline(never)]
     fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
@@ -151,14 +151,35 @@ impl Lanes for Portable {
         halves(words, |half| half)
     }
     #[inline(never)]
-    fn widen_scaled(self, x: Self::B, scale: Self::B) -> [Self::W; 2] {
-        let words: [i16; BYTES] = pairs(x, scale, |x, scale| {
-            u16::from(x)
-                .wrapping_mul(u16::from(scale))
-                .wrapping_mul(8)
-                .cast_signed()
-        });
-        halves(words, |half| half)
+    fn signs(self, mask: Self::B) -> [Self::W; 2] {
+        halves(mask, |mask| {
+            lanes(mask, |mask| if mask == 0 { 1 } else { -1 })
+        })
+    }
+    #[inline(never)]
+    fn widen_256(self, x: Self::B) -> [Self::W; 2] {
+        self.widen([0; BYTES], x)
+    }
+    #[inline(never)]
+    fn widen_128(self, x: Self::B) -> [Self::W; 2] {
+        halves(x, |x| lanes(x, |x| i16::from(x) << 7))
+    }
+    #[inline(never)]
+    fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W> {
+        let mut scaled = [[0; BYTES]; 3];
+        for lane in 0..BYTES {
+            let n = 7 + long[lane].leading_zeros().min(3);
+            let long = i16::from(long[lane]) << n;
+            scaled[0][lane] = long;
+            scaled[1][lane] = i16::from(short[lane]) << n;
+            scaled[2][lane] = (long << 2) ^ i16::MIN;
+        }
+        let [long, short, centred] = scaled.map(|block| halves(block, |half| half));
+        Scaled {
+            long,
+            short,
+            centred,
+        }
     }
     #[inline(never)]
     fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B {
@@ -187,6 +208,10 @@ impl Lanes for Portable {
         pairs(a, b, i16::wrapping_sub)
     }
     #[inline(never)]
+    fn add_signed(self, a: Self::W, b: Self::W, sign: Self::W) -> Self::W {
+        self.add(a, pairs(b, sign, i16::wrapping_mul))
+    }
+    #[inline(never)]
     fn add_sat(self, a: Self::W, b: Self::W) -> Self::W {
         pairs(a, b, i16::saturating_add)
     }
@@ -209,10 +234,6 @@ impl Lanes for Portable {
         lanes(x, |x| x >> N)
     }
     #[inline(never)]
-    fn shr<const N: i32>(self, x: Self::W) -> Self::W {
-        lanes(x, |x| (x.cast_unsigned() >> N).cast_signed())
-    }
-    #[inline(never)]
     fn left(self, n: u8) -> Self::Count {
         n
     }
@@ -222,11 +243,15 @@ impl Lanes for Portable {
     }
     #[inline(never)]
     fn shl_by(self, x: Self::W, n: u8) -> Self::W {
-        lanes(x, |x| x << n)
+        lanes(x, |x| x.checked_shl(u32::from(n)).unwrap_or(0))
     }
     #[inline(never)]
     fn sar_by(self, x: Self::W, n: u8) -> Self::W {
         lanes(x, |x| x >> n)
+    }
+    #[inline(never)]
+    fn shr_by(self, x: Self::W, n: u8) -> Self::W {
+        lanes(x, |x| (x.cast_unsigned() >> n).cast_signed())
     }
     #[inline(never)]
     fn halve(self, x: Self::W) -> Self::W {

@@ -9,9 +9,14 @@ pub(crate) struct Four<'a, T> {
 }
 
 impl<'a, T> Four<'a, T> {
-    /// Rows that are read as far as all of them reach.
-    pub fn new(rows: [&'a [T]; 4]) -> Self {
-        let length = rows.iter().map(|row| row.len()).min().unwrap_or(0);
+    /// Rows that are read up to `length`.
+    ///
+    /// # Panics
+    /// If a row ends before.
+    pub fn new(rows: [&'a [T]; 4], length: usize) -> Self {
+        for row in rows {
+            assert!(row.len() >= length);
+        }
         Self { rows, length }
     }
 
@@ -26,7 +31,7 @@ impl<'a, T> Four<'a, T> {
     /// If a row ends before.
     #[inline(always)]
     pub(super) fn blocks(&self, at: usize, pixels: usize) -> [*const T; 4] {
-        assert!(at < self.length && pixels <= self.length - at);
+        assert_fits(at, pixels, self.length);
         let [a, b, c, d] = self.rows;
         // SAFETY: every row holds at least `length` samples, and the block ends before that, asserted above.
         unsafe {
@@ -38,4 +43,30 @@ impl<'a, T> Four<'a, T> {
             ]
         }
     }
+}
+
+/// The block of `pixels` at `at`.
+///
+/// # Panics
+/// If it does not end within the row.
+#[inline(always)]
+pub(super) fn block<T>(row: &[T], at: usize, pixels: usize) -> &[T] {
+    assert_fits(at, pixels, row.len());
+    // SAFETY: the block ends within the row, asserted above.
+    unsafe { row.get_unchecked(at..at + pixels) }
+}
+
+/// As [`block`], to be written.
+#[inline(always)]
+pub(super) fn block_mut<T>(row: &mut [T], at: usize, pixels: usize) -> &mut [T] {
+    assert_fits(at, pixels, row.len());
+    // SAFETY: the block ends within the row, asserted above.
+    unsafe { row.get_unchecked_mut(at..at + pixels) }
+}
+
+/// Asserts that a block of `pixels` at `at` ends within `length`, in the one form that the compiler finds again for all rows
+/// of that length.
+#[inline(always)]
+fn assert_fits(at: usize, pixels: usize, length: usize) {
+    assert!(length >= pixels && at <= length - pixels);
 }

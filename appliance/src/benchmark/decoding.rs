@@ -5,8 +5,8 @@ use super::kernel::Kernel;
 use super::stopwatch::timed;
 use crate::plan::STRIPS;
 use algo::inspect::{Production, Strip};
-use algo::phase::{Decoder, PhaseRow, Wrapped};
-use algo::pipeline::wrap;
+use algo::phase::{Arrived, Decoder, PhaseRow};
+use algo::pipeline::arrive;
 use std::hint::black_box;
 use std::ops::Range;
 use std::time::Duration;
@@ -40,22 +40,18 @@ impl Decoding {
         }
     }
 
-    /// All levels but the last, demodulated.
-    fn before(&self, set: &mut FrameSet) -> Vec<Wrapped> {
+    /// All levels but the last.
+    fn before(&self, set: &mut FrameSet) -> Arrived {
         let (width, height) = (set.width(), set.out.phase.len() / set.width().max(1));
         let (frames, _, _) = set.parts();
-        let mut before: Vec<Wrapped> = Vec::new();
-        for (level, places) in self.decoder.levels().enumerate() {
-            if level + 1 == self.decoder.levels().len() {
-                break;
-            }
+        let mut arrived = self.decoder.arrived(width, height);
+        let coarser = self.decoder.levels().len().saturating_sub(1);
+        for places in self.decoder.levels().take(coarser) {
             let frames: Vec<_> = places.iter().map(|&at| frames[at]).collect();
-            let mut wrapped = Wrapped::new(width, height);
             // The frames are those that the decoder was made for.
-            let _ = wrap(&self.decoder, level, &frames, before.first(), &mut wrapped);
-            before.push(wrapped);
+            let _ = arrive(&self.decoder, &frames, &mut arrived);
         }
-        before
+        arrived
     }
 }
 
@@ -93,11 +89,7 @@ impl Kernel for Inspecting<'_> {
 impl Kernel for Decoding {
     fn run(&mut self, set: &mut FrameSet) -> Duration {
         let width = set.width().max(1);
-        let before = if self.on_arrival {
-            self.before(set)
-        } else {
-            Vec::new()
-        };
+        let arrived = self.on_arrival.then(|| self.before(set));
         let last: Vec<usize> = self
             .decoder
             .levels()
@@ -125,11 +117,12 @@ impl Kernel for Decoding {
                     trust,
                 };
                 let map = map.map_or(&[][..], |map| &map[v * width..(v + 1) * width]);
-                if self.on_arrival {
-                    let last: Vec<_> = last.iter().map(|&at| frames[at]).collect();
-                    self.decoder.last_row(&before, &last, v, map, columns, row);
-                } else {
-                    self.decoder.row(&frames, v, map, columns, row);
+                match &arrived {
+                    Some(arrived) => {
+                        let last: Vec<_> = last.iter().map(|&at| frames[at]).collect();
+                        self.decoder.last_row(arrived, &last, v, map, columns, row);
+                    }
+                    None => self.decoder.row(&frames, v, map, columns, row),
                 }
             }
         })

@@ -1,6 +1,6 @@
 //! All back-ends of this machine give the same bits.
 
-use super::super::{Decoder, PhaseRow, Trust, Wrapped};
+use super::super::{Decoder, PhaseRow, Trust};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence};
 use crate::simd::Backend;
@@ -95,18 +95,17 @@ fn decode(decoder: &Decoder, samples: &[Vec<u16>], depth: u8, map: &[AbsolutePha
         .map(|places| places.iter().map(|&at| views[at]).collect())
         .collect();
     let (last, coarser) = levels.split_last().unwrap();
-    let mut before: Vec<Wrapped> = Vec::new();
+    let mut arrived = decoder.arrived(WIDTH, HEIGHT);
     for (at, level) in coarser.iter().enumerate() {
-        let mut wrapped = Wrapped::new(WIDTH, HEIGHT);
-        for (v, row) in wrapped.rows().into_iter().enumerate() {
-            decoder.wrap_row(at, level, v, before.first(), row);
+        for (v, row) in arrived.rows().into_iter().enumerate() {
+            decoder.arrive_row(at, level, v, row);
         }
-        before.push(wrapped);
+        arrived.add_level();
     }
     let mut late = Map::new();
     for (v, row) in late.rows() {
         let map = &map[v * WIDTH..(v + 1) * WIDTH];
-        decoder.last_row(&before, last, v, map, 0..WIDTH, row);
+        decoder.last_row(&arrived, last, v, map, 0..WIDTH, row);
     }
     [whole, late]
 }

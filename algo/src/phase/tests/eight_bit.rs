@@ -1,44 +1,54 @@
 //! Four shifts of 8 bits: every pair of differences.
 
-use super::{by_definition, level, off, wrap};
+use super::super::Decoder;
+use super::{by_definition, bytes_of, level, off, wrap};
+use crate::frame::{FrameView, Samples};
+use crate::pattern::{PhaseRange, Sequence};
 use std::vec::Vec;
 
 const SHIFTS: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 /// Quotient, polynomial and two roundings; the bound.
 const WORST_TURNS: f64 = 2.5e-5;
 const RMS_TURNS: f64 = 1e-5;
+/// Reciprocal 0.2 % of t (1.4e-4 turn at t = 1), arctangent 1.9e-4, roundings.
+const ROUGH_TURNS: f64 = 3.4e-4;
 /// The polynomial for √(1 + t²), and the last bit of a word at the least modulation.
 const MODULATION_SHARE: f64 = 6.5e-4 + 4e-4;
+
+/// Rows of four samples whose differences are `s` and, from column to column, −255 to 255.
+fn differences(s: i32) -> [Vec<u16>; 4] {
+    let pair = |x: i32| [x.max(0) as u16, (-x).max(0) as u16];
+    core::array::from_fn(|frame| {
+        let sample = |c: i32| match frame {
+            0 | 2 => pair(s)[frame / 2],
+            _ => pair(c)[frame / 2],
+        };
+        (-255..=255).map(sample).collect()
+    })
+}
 
 #[test]
 fn every_pair_of_8_bit_differences_is_within_the_bound() {
     let decoder = level(&SHIFTS, 8);
     let (mut worst, mut squares, mut count) = (0.0_f64, 0.0_f64, 0.0_f64);
     for s in -255..=255_i32 {
-        let pair = |x: i32| [x.max(0) as u16, (-x).max(0) as u16];
-        let rows: [Vec<u16>; 4] = core::array::from_fn(|frame| {
-            let sample = |c: i32| match frame {
-                0 | 2 => pair(s)[frame / 2],
-                _ => pair(c)[frame / 2],
-            };
-            (-255..=255).map(sample).collect()
-        });
+        let rows = differences(s);
         let found = wrap(&decoder, 8, &rows);
         for (u, c) in (-255..=255_i32).enumerate() {
             let weak = s * s + c * c < 32 * 32;
             let full = s.abs() == 255 || c.abs() == 255;
             let doubts = u8::from(weak) + 2 * u8::from(full);
-            assert_eq!(found.doubts[u], doubts, "S {s} C {c}");
+            assert_eq!(found.row().doubts[u], doubts, "S {s} C {c}");
             if weak {
                 continue;
             }
             let samples: Vec<u16> = rows.iter().map(|row| row[u]).collect();
             let (turns, counts) = by_definition(&samples, &SHIFTS);
-            let error = off(found.phase[u], turns);
+            let error = off(found.row().phase[u], turns);
             worst = worst.max(error.abs());
             squares += error * error;
             count += 1.0;
-            let modulation = f64::from(found.modulation[u]) * 255.0 / 32_767.5;
+            let modulation = f64::from(found.row().modulation[u]) * 255.0 / 32_767.5;
             assert!(
                 (modulation - counts).abs() <= counts * MODULATION_SHARE,
                 "S {s} C {c}: {modulation} for {counts}"
@@ -49,6 +59,39 @@ fn every_pair_of_8_bit_differences_is_within_the_bound() {
     std::println!("8 bit, N = 4: largest error {worst:.3e} turn, RMS {rms:.3e}");
     assert!(worst <= WORST_TURNS, "{worst:e}");
     assert!(rms <= RMS_TURNS, "{rms:e}");
+}
+
+#[test]
+fn every_rough_angle_is_within_the_bound() {
+    let levels = [1.0 / 8.0, 1.0].map(|ratio| SHIFTS.map(|shift| (ratio, shift)));
+    let sequence = Sequence::from_frames(levels.as_flattened()).unwrap();
+    let range = PhaseRange { min: 0.0, max: 8.0 };
+    let decoder = Decoder::new(&sequence, range, 8).unwrap();
+    let mut worst = 0.0_f64;
+    for s in -255..=255_i32 {
+        let rows = differences(s);
+        let bytes = rows.each_ref().map(|row| bytes_of(row));
+        let frames = bytes
+            .each_ref()
+            .map(|row| FrameView::new(Samples::Eight(row), row.len(), 1, row.len()).unwrap());
+        let mut arrived = decoder.arrived(511, 1);
+        for row in arrived.rows() {
+            decoder.arrive_row(0, &frames, 0, row);
+        }
+        let row = arrived.climbed_row(0).unwrap();
+        for (u, c) in (-255..=255_i32).enumerate() {
+            if s * s + c * c < 32 * 32 {
+                continue;
+            }
+            let samples: Vec<u16> = rows.iter().map(|row| row[u]).collect();
+            // What it says of the next level, counted from the middle of the turn.
+            let (turns, _) = by_definition(&samples, &SHIFTS);
+            let expected = 8.0 * (turns - 0.5);
+            worst = worst.max(off(row.fraction[u], expected).abs() / 8.0);
+        }
+    }
+    std::println!("8 bit, N = 4: largest rough error {worst:.3e} turn");
+    assert!(worst <= ROUGH_TURNS, "{worst:e}");
 }
 
 #[test]
@@ -67,7 +110,7 @@ fn axes_and_diagonals_are_exact() {
         let of = |x: i32| std::vec![x as u16; 40];
         let rows = [of(s.max(0)), of(c.max(0)), of(-s.min(0)), of(-c.min(0))];
         let found = wrap(&decoder, 8, &rows);
-        let error = found.phase[17].wrapping_sub(turn).cast_signed();
+        let error = found.row().phase[17].wrapping_sub(turn).cast_signed();
         assert!(error.abs() <= 1, "S {s} C {c}: {error}");
     }
 }

@@ -4,7 +4,8 @@ mod backends;
 mod eight_bit;
 mod textbook;
 
-use super::{Decoder, Wrapped};
+use super::Decoder;
+use super::arrived::{Arrived, ArrivingRow, WrappedRow};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence};
 use core::f64::consts::TAU;
@@ -18,13 +19,19 @@ fn level(shifts: &[f64], depth: u8) -> Decoder {
     Decoder::new(&Sequence::from_frames(&frames).unwrap(), ONE_TURN, depth).unwrap()
 }
 
+/// One demodulated row.
+struct Wrapped(Arrived);
+
+impl Wrapped {
+    fn row(&self) -> WrappedRow<'_> {
+        self.0.wrapped_rows(0)[0]
+    }
+}
+
 /// Demodulates one row; `rows` holds the samples of each frame.
 fn wrap(decoder: &Decoder, depth: u8, rows: &[Vec<u16>]) -> Wrapped {
     let width = rows[0].len();
-    let bytes: Vec<Vec<u8>> = rows
-        .iter()
-        .map(|row| row.iter().map(|&x| x as u8).collect())
-        .collect();
+    let bytes: Vec<Vec<u8>> = rows.iter().map(|row| bytes_of(row)).collect();
     let places = decoder.levels().next().unwrap();
     let frames: Vec<_> = places
         .iter()
@@ -36,11 +43,17 @@ fn wrap(decoder: &Decoder, depth: u8, rows: &[Vec<u16>]) -> Wrapped {
             FrameView::new(samples, width, 1, width).unwrap()
         })
         .collect();
-    let mut wrapped = Wrapped::new(width, 1);
-    for (v, row) in wrapped.rows().into_iter().enumerate() {
-        decoder.wrap_row(0, &frames, v, None, row);
+    let mut arrived = Arrived::wrapping(width, 1, 1);
+    for (v, row) in arrived.rows().into_iter().enumerate() {
+        assert!(matches!(row, ArrivingRow::Wrapping { .. }));
+        decoder.arrive_row(0, &frames, v, row);
     }
-    wrapped
+    Wrapped(arrived)
+}
+
+/// Samples of at most 8 bits as bytes.
+fn bytes_of(row: &[u16]) -> Vec<u8> {
+    row.iter().map(|&x| x as u8).collect()
 }
 
 /// φ in turns and B in counts by the definition.

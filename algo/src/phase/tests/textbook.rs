@@ -35,18 +35,18 @@ fn any_number_of_steps_at_any_depth_agrees_with_the_definition() {
                 for u in 0..40 {
                     let samples: Vec<u16> = rows.iter().map(|row| row[u]).collect();
                     let (turns, counts) = by_definition(&samples, &shifts);
-                    let error = off(found.phase[u], turns).abs();
+                    let error = off(found.row().phase[u], turns).abs();
                     worst = worst.max(error);
                     assert!(
                         error <= PHASE_BOUND,
                         "{depth} bit, N = {steps}, start {start}: {error:e}"
                     );
-                    let modulation = f64::from(found.modulation[u]) * full / 32_767.5;
+                    let modulation = f64::from(found.row().modulation[u]) * full / 32_767.5;
                     assert!(
                         (modulation - counts).abs() <= counts * MODULATION_SHARE,
                         "{depth} bit, N = {steps}: {modulation} for {counts}"
                     );
-                    assert_eq!(found.doubts[u], 0);
+                    assert_eq!(found.row().doubts[u], 0);
                 }
             }
         }
@@ -63,11 +63,15 @@ fn the_modulation_threshold_is_sixteen_counts_exactly() {
         let [b, c, d] = others.clone();
         wrap(&decoder, 8, &[row(first), b, c, d])
     };
-    assert_eq!(with(132).doubts, [0; 33]);
-    assert_eq!(with(131).doubts, [1; 33]);
+    assert_eq!(with(132).row().doubts, [0; 33]);
+    assert_eq!(with(131).row().doubts, [1; 33]);
     let thirds = level(&[0.0, 1.0 / 3.0, 2.0 / 3.0], 8);
     // B = (2/3) · 24 = 16.
-    let found = |first| wrap(&thirds, 8, &[row(first), row(100), row(100)]).doubts[32];
+    let found = |first| {
+        wrap(&thirds, 8, &[row(first), row(100), row(100)])
+            .row()
+            .doubts[32]
+    };
     assert_eq!((found(124), found(123)), (0, 1));
 }
 
@@ -82,7 +86,7 @@ fn constant_frames_are_weak_and_full_scale_is_saturated_below_eight_steps() {
             let decoder = level(&shifts, depth);
             let constant = |x: u16| {
                 let rows = std::vec![std::vec![x; 40]; usize::from(steps)];
-                wrap(&decoder, depth, &rows).doubts[5]
+                wrap(&decoder, depth, &rows).row().doubts[5]
             };
             let saturated = if steps < 8 { 2 } else { 0 };
             assert_eq!(constant(full), 1 + saturated, "N = {steps}, {depth} bit");

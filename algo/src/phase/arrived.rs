@@ -1,0 +1,295 @@
+//! What the levels of a measurement say that were decoded when they arrived, while the next was being exposed.
+//!
+//! Geometric levels climb: of each pixel only what the finest level so far says of the next is kept, in place. Levels about a known map
+//! need one another at the end: wrapped phase, modulation and doubts of each are kept.
+
+use super::level::Demodulated;
+use crate::pattern::MAX_LEVELS;
+use crate::simd::Lanes;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// The levels that have arrived, coarse to fine, of a whole frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Arrived {
+    /// Pixels per row.
+    width: usize,
+    /// Rows.
+    height: usize,
+    /// How many levels.
+    levels: usize,
+    planes: Planes,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Planes {
+    Climbed(Climbed),
+    Wrapped(Vec<Wrapped>),
+}
+
+/// What the finest level so far says of the next, row-major.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Climbed {
+    /// Of the phase expected at the next level, 1/65536 turn.
+    pub fraction: Vec<u16>,
+    /// The same in turns, in the fixed point of the step to it.
+    pub turns: Vec<u16>,
+    /// The number of the first [`crate::trust::Trust`] that speaks against it, or [`NO_DOUBT`].
+    pub doubt: Vec<u8>,
+}
+
+/// Nothing speaks against a pixel so far. Above every reason, so that of two the smaller is the first.
+pub(super) const NO_DOUBT: u8 = u8::MAX;
+
+/// One demodulated level, row-major.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Wrapped {
+    /// φ in 1/65536 turn.
+    pub phase: Vec<u16>,
+    /// Modulation in units of full scale / 32767.5; 0 where weak.
+    pub modulation: Vec<u16>,
+    /// [`WEAK`] and [`SATURATED`].
+    pub doubts: Vec<u8>,
+}
+
+/// The modulation is below the trusted minimum.
+const WEAK: u8 = 1;
+/// A sample is at full scale, where that matters.
+const SATURATED: u8 = 2;
+
+impl Arrived {
+    pub(super) fn climbing(width: usize, height: usize) -> Self {
+        let pixels = width * height;
+        let planes = Planes::Climbed(Climbed {
+            fraction: vec![0; pixels],
+            turns: vec![0; pixels],
+            doubt: vec![NO_DOUBT; pixels],
+        });
+        Self {
+            width,
+            height,
+            levels: 0,
+            planes,
+        }
+    }
+
+    /// With room for this many levels.
+    pub(super) fn wrapping(width: usize, height: usize, levels: usize) -> Self {
+        let pixels = width * height;
+        let level = Wrapped {
+            phase: vec![0; pixels],
+            modulation: vec![0; pixels],
+            doubts: vec![0; pixels],
+        };
+        Self {
+            width,
+            height,
+            levels: 0,
+            planes: Planes::Wrapped(vec![level; levels]),
+        }
+    }
+
+    /// How many levels have arrived.
+    pub fn levels(&self) -> usize {
+        self.levels
+    }
+
+    /// Width and height of the frames.
+    pub fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// One more has been written.
+    pub(crate) fn add_level(&mut self) {
+        self.levels += 1;
+    }
+
+    /// Forgets all levels, for the next measurement.
+    pub fn clear(&mut self) {
+        self.levels = 0;
+    }
+
+    /// Row `v` of geometric levels.
+    pub(super) fn climbed_row(&self, v: usize) -> Option<ClimbedRow<'_>> {
+        let Planes::Climbed(planes) = &self.planes else {
+            return None;
+        };
+        let row = v * self.width..(v + 1) * self.width;
+        Some(ClimbedRow {
+            fraction: &planes.fraction[row.clone()],
+            turns: &planes.turns[row.clone()],
+            doubt: &planes.doubt[row],
+        })
+    }
+
+    /// Row `v` of each level about a known map, coarse to fine.
+    pub(super) fn wrapped_rows(&self, v: usize) -> heapless::Vec<WrappedRow<'_>, MAX_LEVELS> {
+        match &self.planes {
+            Planes::Climbed(_) => heapless::Vec::new(),
+            Planes::Wrapped(levels) => levels
+                .iter()
+                .map(|level| level.row(self.width, v))
+                .collect(),
+        }
+    }
+
+    /// Every row, for the next level to be written to.
+    pub(crate) fn rows(&mut self) -> Vec<ArrivingRow<'_>> {
+        let width = self.width.max(1);
+        match &mut self.planes {
+            Planes::Climbed(planes) => planes
+                .fraction
+                .chunks_mut(width)
+                .zip(planes.turns.chunks_mut(width))
+                .zip(planes.doubt.chunks_mut(width))
+                .map(|((fraction, turns), doubt)| {
+                    ArrivingRow::Climbing(ClimbedRowMut {
+                        fraction,
+                        turns,
+                        doubt,
+                    })
+                })
+                .collect(),
+            Planes::Wrapped(levels) => {
+                let there = self.levels.min(levels.len());
+                let (before, rest) = levels.split_at_mut(there);
+                let (coarsest, rest) = (before.first(), rest.first_mut());
+                let rows = rest.into_iter().flat_map(|level| level.rows_mut(width));
+                rows.enumerate()
+                    .map(|(v, row)| ArrivingRow::Wrapping {
+                        coarsest: coarsest.map(|level| level.row(width, v)),
+                        row,
+                    })
+                    .collect()
+            }
+        }
+    }
+}
+
+impl Wrapped {
+    fn row(&self, width: usize, v: usize) -> WrappedRow<'_> {
+        let row = v * width..(v + 1) * width;
+        WrappedRow {
+            phase: &self.phase[row.clone()],
+            modulation: &self.modulation[row.clone()],
+            doubts: &self.doubts[row],
+        }
+    }
+
+    fn rows_mut(&mut self, width: usize) -> impl Iterator<Item = WrappedRowMut<'_>> {
+        self.phase
+            .chunks_mut(width)
+            .zip(self.modulation.chunks_mut(width))
+            .zip(self.doubts.chunks_mut(width))
+            .map(|((phase, modulation), doubts)| WrappedRowMut {
+                phase,
+                modulation,
+                doubts,
+            })
+    }
+}
+
+/// A row of what has arrived, for the next level to be written to.
+#[derive(Debug)]
+pub(crate) enum ArrivingRow<'a> {
+    /// Of geometric levels.
+    Climbing(ClimbedRowMut<'a>),
+    /// Of levels about a known map.
+    Wrapping {
+        /// The first of them, if it is there already.
+        coarsest: Option<WrappedRow<'a>>,
+        row: WrappedRowMut<'a>,
+    },
+}
+
+/// A row of [`Climbed`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ClimbedRow<'a> {
+    pub fraction: &'a [u16],
+    pub turns: &'a [u16],
+    pub doubt: &'a [u8],
+}
+
+/// A row of [`Climbed`], to be written.
+#[derive(Debug)]
+pub(crate) struct ClimbedRowMut<'a> {
+    pub fraction: &'a mut [u16],
+    pub turns: &'a mut [u16],
+    pub doubt: &'a mut [u8],
+}
+
+impl ClimbedRowMut<'_> {
+    pub fn as_row(&self) -> ClimbedRow<'_> {
+        ClimbedRow {
+            fraction: self.fraction,
+            turns: self.turns,
+            doubt: self.doubt,
+        }
+    }
+}
+
+/// A row of a demodulated level.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct WrappedRow<'a> {
+    pub phase: &'a [u16],
+    pub modulation: &'a [u16],
+    pub doubts: &'a [u8],
+}
+
+/// A row of a demodulated level, to be written.
+#[derive(Debug)]
+pub(crate) struct WrappedRowMut<'a> {
+    pub phase: &'a mut [u16],
+    pub modulation: &'a mut [u16],
+    pub doubts: &'a mut [u8],
+}
+
+impl WrappedRow<'_> {
+    /// Mask: the block's pixels that are not weak.
+    #[inline(always)]
+    pub fn strong<V: Lanes>(&self, v: V, at: usize) -> V::B {
+        let weak = v.splat8(WEAK);
+        v.eq8(v.and8(v.load8(self.doubts, at), weak), v.splat8(0))
+    }
+
+    #[inline(always)]
+    pub fn block<V: Lanes>(&self, v: V, at: usize) -> Demodulated<V> {
+        let saturated = v.splat8(SATURATED);
+        let doubts = v.load8(self.doubts, at);
+        Demodulated {
+            phase: v.load16(self.phase, at),
+            modulation: v.load16(self.modulation, at),
+            strong: self.strong(v, at),
+            brightest: v.eq8(v.and8(doubts, saturated), saturated),
+        }
+    }
+}
+
+impl WrappedRowMut<'_> {
+    #[inline(always)]
+    pub fn store<V: Lanes>(&mut self, v: V, at: usize, block: &Demodulated<V>) {
+        let strong = v.widen(block.strong, block.strong);
+        v.store16(self.phase, at, block.phase);
+        v.store16(
+            self.modulation,
+            at,
+            [
+                v.and(strong[0], block.modulation[0]),
+                v.and(strong[1], block.modulation[1]),
+            ],
+        );
+        let weak = v.pick8(block.strong, v.splat8(0), v.splat8(WEAK));
+        let saturated = v.eq8(block.brightest, v.splat8(u8::MAX));
+        let doubts = v.or8(weak, v.and8(saturated, v.splat8(SATURATED)));
+        v.store8(self.doubts, at, doubts);
+    }
+
+    /// A block of which nothing is known but that it is weak.
+    #[inline(always)]
+    pub fn store_weak<V: Lanes>(&mut self, v: V, at: usize) {
+        let zero = v.splat16(0);
+        v.store16(self.phase, at, [zero; 2]);
+        v.store16(self.modulation, at, [zero; 2]);
+        v.store8(self.doubts, at, v.splat8(WEAK));
+    }
+}

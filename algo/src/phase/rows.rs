@@ -1,0 +1,330 @@
+//! Decoding row by row: all levels at once, or each when it arrives.
+
+use super::arrived::{Arrived, ArrivingRow, ClimbedRow, ClimbedRowMut, WrappedRow, WrappedRowMut};
+use super::kernel::{around, climb};
+use super::narrow::{FewResults, MAX_PIXELS, RowSample, padded};
+use super::unwrap::Unwrapper;
+use super::{Decoder, PhaseRow};
+use crate::frame::FrameView;
+use crate::pattern::{MAX_FRAMES, MAX_LEVELS, MAX_SHIFTS};
+use crate::simd::Results;
+use crate::units::AbsolutePhase;
+use alloc::vec::Vec;
+use core::ops::Range;
+
+impl Decoder {
+    /// Room for what the levels say that are decoded on arrival, of frames of this size.
+    pub fn arrived(&self, width: usize, height: usize) -> Arrived {
+        match &self.unwrapper {
+            Unwrapper::Geometric(_) => Arrived::climbing(width, height),
+            Unwrapper::About(_) => Arrived::wrapping(width, height, self.levels.len() - 1),
+        }
+    }
+
+    /// Decodes `columns` of row `v` of frames that [`Self::check`] has passed, into the same columns of `out`.
+    ///
+    /// `map` is the row of the known map for dense and single-level sequences and is not looked at otherwise.
+    pub fn row(
+        &self,
+        frames: &[FrameView<'_>],
+        v: usize,
+        map: &[AbsolutePhase],
+        columns: Range<usize>,
+        out: PhaseRow<'_>,
+    ) {
+        if self.bit_depth == 8 {
+            self.typed_row::<u8>(frames, v, map, columns, out);
+        } else {
+            self.typed_row::<u16>(frames, v, map, columns, out);
+        }
+    }
+
+    /// Decodes row `v` of level `level`, whose frames [`Self::check_level`] has passed; not where the levels before found a
+    /// whole block dark.
+    pub(crate) fn arrive_row(
+        &self,
+        level: usize,
+        frames: &[FrameView<'_>],
+        v: usize,
+        row: ArrivingRow<'_>,
+    ) {
+        if self.bit_depth == 8 {
+            self.typed_arrival::<u8>(level, frames, v, row);
+        } else {
+            self.typed_arrival::<u16>(level, frames, v, row);
+        }
+    }
+
+    /// As [`Self::row`], from all levels but the finest, which have arrived, and the frames of the finest.
+    pub fn last_row(
+        &self,
+        arrived: &Arrived,
+        last: &[FrameView<'_>],
+        v: usize,
+        map: &[AbsolutePhase],
+        columns: Range<usize>,
+        out: PhaseRow<'_>,
+    ) {
+        if self.bit_depth == 8 {
+            self.typed_last::<u8>(arrived, last, v, map, columns, out);
+        } else {
+            self.typed_last::<u16>(arrived, last, v, map, columns, out);
+        }
+    }
+
+    fn typed_row<T: RowSample>(
+        &self,
+        frames: &[FrameView<'_>],
+        v: usize,
+        map: &[AbsolutePhase],
+        columns: Range<usize>,
+        out: PhaseRow<'_>,
+    ) {
+        let places = self.levels.iter().flat_map(|level| &level.frames);
+        // A sequence has no more frames than fit.
+        let rows: heapless::Vec<&[T], MAX_FRAMES> =
+            places.map(|&at| T::row(frames[at], v)).collect();
+        if columns.len() >= MAX_PIXELS {
+            return self.columns(&rows, map, columns, out);
+        }
+        let rows: Vec<_> = rows.iter().map(|row| padded(row, &columns)).collect();
+        let rows: Vec<&[T]> = rows.iter().map(|row| &row[..]).collect();
+        let mut few = FewResults::new();
+        let map = few_known(map, &columns);
+        self.columns(&rows, &map, 0..MAX_PIXELS, few.row());
+        few.copy_to(out, columns);
+    }
+
+    /// From the rows of all frames, level by level.
+    fn columns<T: RowSample>(
+        &self,
+        mut rows: &[&[T]],
+        map: &[AbsolutePhase],
+        columns: Range<usize>,
+        out: PhaseRow<'_>,
+    ) {
+        let mut levels: heapless::Vec<&[&[T]], MAX_LEVELS> = heapless::Vec::new();
+        for level in &self.levels {
+            let (here, rest) = rows.split_at(level.frames.len());
+            levels.extend([here]);
+            rows = rest;
+        }
+        let out = results(out, &columns);
+        match &self.unwrapper {
+            Unwrapper::Geometric(plan) => {
+                climb::climb_row(self.backend, plan, &self.levels, &levels, columns, out);
+            }
+            Unwrapper::About(plan) => {
+                around::around_row(self.backend, plan, &self.levels, &levels, map, columns, out);
+            }
+        }
+    }
+
+    fn typed_arrival<T: RowSample>(
+        &self,
+        level: usize,
+        frames: &[FrameView<'_>],
+        v: usize,
+        row: ArrivingRow<'_>,
+    ) {
+        let rows = level_rows::<T>(frames, v);
+        let width = rows.first().map_or(0, |row| row.len());
+        if width >= MAX_PIXELS {
+            return self.arrive(level, &rows, width, row);
+        }
+        let columns = 0..width;
+        let rows: Vec<_> = rows.iter().map(|row| padded(row, &columns)).collect();
+        let rows: Vec<&[T]> = rows.iter().map(|row| &row[..]).collect();
+        match row {
+            ArrivingRow::Climbing(out) => {
+                let mut few = FewClimbed::new(out.as_row(), &columns);
+                self.arrive(
+                    level,
+                    &rows,
+                    MAX_PIXELS,
+                    ArrivingRow::Climbing(few.row_mut()),
+                );
+                out.fraction.copy_from_slice(&few.fraction[..width]);
+                out.turns.copy_from_slice(&few.turns[..width]);
+                out.doubt.copy_from_slice(&few.doubt[..width]);
+            }
+            ArrivingRow::Wrapping { row: out, .. } => {
+                let mut few = FewWrapped::default();
+                let row = ArrivingRow::Wrapping {
+                    coarsest: None,
+                    row: few.row_mut(),
+                };
+                self.arrive(level, &rows, MAX_PIXELS, row);
+                out.phase.copy_from_slice(&few.phase[..width]);
+                out.modulation.copy_from_slice(&few.modulation[..width]);
+                out.doubts.copy_from_slice(&few.doubts[..width]);
+            }
+        }
+    }
+
+    fn arrive<T: RowSample>(&self, at: usize, rows: &[&[T]], width: usize, row: ArrivingRow<'_>) {
+        let level = &self.levels[at];
+        match (&self.unwrapper, row) {
+            (Unwrapper::Geometric(plan), ArrivingRow::Climbing(row)) => {
+                climb::arrive_row(self.backend, plan, at, level, rows, 0..width, row);
+            }
+            (_, ArrivingRow::Wrapping { coarsest, row }) => {
+                around::wrap_row(self.backend, level, rows, coarsest, 0..width, row);
+            }
+            // `Decoder::arrived` gives geometric levels the one, and others the other.
+            (Unwrapper::About(_), ArrivingRow::Climbing(_)) => {}
+        }
+    }
+
+    fn typed_last<T: RowSample>(
+        &self,
+        arrived: &Arrived,
+        last: &[FrameView<'_>],
+        v: usize,
+        map: &[AbsolutePhase],
+        columns: Range<usize>,
+        out: PhaseRow<'_>,
+    ) {
+        let rows = level_rows::<T>(last, v);
+        let (climbed, wrapped) = (arrived.climbed_row(v), arrived.wrapped_rows(v));
+        if columns.len() >= MAX_PIXELS {
+            return self.last(&rows, climbed, &wrapped, map, columns, out);
+        }
+        let rows: Vec<_> = rows.iter().map(|row| padded(row, &columns)).collect();
+        let rows: Vec<&[T]> = rows.iter().map(|row| &row[..]).collect();
+        let climbed = climbed.map(|row| FewClimbed::new(row, &columns));
+        let wrapped: Vec<_> = wrapped
+            .iter()
+            .map(|row| FewWrapped::new(*row, &columns))
+            .collect();
+        let wrapped: Vec<_> = wrapped.iter().map(FewWrapped::row).collect();
+        let climbed = climbed.as_ref().map(FewClimbed::row);
+        let mut few = FewResults::new();
+        let map = few_known(map, &columns);
+        self.last(&rows, climbed, &wrapped, &map, 0..MAX_PIXELS, few.row());
+        few.copy_to(out, columns);
+    }
+
+    fn last<T: RowSample>(
+        &self,
+        rows: &[&[T]],
+        climbed: Option<ClimbedRow<'_>>,
+        wrapped: &[WrappedRow<'_>],
+        map: &[AbsolutePhase],
+        columns: Range<usize>,
+        out: PhaseRow<'_>,
+    ) {
+        let out = results(out, &columns);
+        let backend = self.backend;
+        match (&self.unwrapper, climbed, &self.levels[..]) {
+            (Unwrapper::Geometric(plan), _, [_]) => {
+                climb::climb_row(backend, plan, &self.levels, &[rows], columns, out);
+            }
+            (Unwrapper::Geometric(plan), Some(before), [.., level]) => {
+                climb::last_row(backend, plan, level, rows, before, columns, out);
+            }
+            (Unwrapper::About(plan), _, levels) => {
+                around::last_row(backend, plan, levels, wrapped, rows, map, columns, out);
+            }
+            // A decoder has levels, and gives geometric ones such room.
+            (Unwrapper::Geometric(_), ..) => {}
+        }
+    }
+}
+
+/// Where the kernels write.
+fn results<'a>(out: PhaseRow<'a>, columns: &Range<usize>) -> Results<'a> {
+    Results::new(out.phase, out.modulation, out.trust, columns.end)
+}
+
+/// The rows of a level's frames.
+fn level_rows<'a, T: RowSample>(
+    frames: &[FrameView<'a>],
+    v: usize,
+) -> heapless::Vec<&'a [T], MAX_SHIFTS> {
+    frames.iter().map(|&frame| T::row(frame, v)).collect()
+}
+
+fn few_known(map: &[AbsolutePhase], columns: &Range<usize>) -> [AbsolutePhase; MAX_PIXELS] {
+    let mut known = [AbsolutePhase::UNKNOWN; MAX_PIXELS];
+    if let Some(map) = map.get(columns.clone()) {
+        known[..map.len()].copy_from_slice(map);
+    }
+    known
+}
+
+/// A padded row of what geometric levels have come to.
+struct FewClimbed {
+    fraction: [u16; MAX_PIXELS],
+    turns: [u16; MAX_PIXELS],
+    doubt: [u8; MAX_PIXELS],
+}
+
+impl FewClimbed {
+    fn new(row: ClimbedRow<'_>, columns: &Range<usize>) -> Self {
+        Self {
+            fraction: padded(row.fraction, columns),
+            turns: padded(row.turns, columns),
+            doubt: padded(row.doubt, columns),
+        }
+    }
+
+    fn row(&self) -> ClimbedRow<'_> {
+        ClimbedRow {
+            fraction: &self.fraction,
+            turns: &self.turns,
+            doubt: &self.doubt,
+        }
+    }
+
+    fn row_mut(&mut self) -> ClimbedRowMut<'_> {
+        ClimbedRowMut {
+            fraction: &mut self.fraction,
+            turns: &mut self.turns,
+            doubt: &mut self.doubt,
+        }
+    }
+}
+
+/// A padded row of a level about a known map.
+struct FewWrapped {
+    phase: [u16; MAX_PIXELS],
+    modulation: [u16; MAX_PIXELS],
+    doubts: [u8; MAX_PIXELS],
+}
+
+impl Default for FewWrapped {
+    fn default() -> Self {
+        Self {
+            phase: [0; MAX_PIXELS],
+            modulation: [0; MAX_PIXELS],
+            doubts: [0; MAX_PIXELS],
+        }
+    }
+}
+
+impl FewWrapped {
+    fn new(row: WrappedRow<'_>, columns: &Range<usize>) -> Self {
+        Self {
+            phase: padded(row.phase, columns),
+            modulation: padded(row.modulation, columns),
+            doubts: padded(row.doubts, columns),
+        }
+    }
+
+    fn row(&self) -> WrappedRow<'_> {
+        WrappedRow {
+            phase: &self.phase,
+            modulation: &self.modulation,
+            doubts: &self.doubts,
+        }
+    }
+
+    fn row_mut(&mut self) -> WrappedRowMut<'_> {
+        WrappedRowMut {
+            phase: &mut self.phase,
+            modulation: &mut self.modulation,
+            doubts: &mut self.doubts,
+        }
+    }
+}

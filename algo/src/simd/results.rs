@@ -1,0 +1,70 @@
+//! A row of results that blocks are stored to, with one check of the place for all of them.
+
+use super::Lanes;
+use super::plain;
+use crate::trust::Trust;
+use crate::units::{AbsolutePhase, Modulation};
+
+/// Phase, modulation and trust of a row as plain numbers, of equal length.
+pub(crate) struct Results<'a> {
+    /// Φ, 1/65536 turn.
+    pub phase: &'a mut [i32],
+    modulation: &'a mut [u16],
+    trust: &'a mut [Trust],
+}
+
+impl<'a> Results<'a> {
+    /// The first `length` of a row.
+    ///
+    /// # Panics
+    /// If the row ends before.
+    pub fn new(
+        phase: &'a mut [AbsolutePhase],
+        modulation: &'a mut [Modulation],
+        trust: &'a mut [Trust],
+        length: usize,
+    ) -> Self {
+        Self {
+            phase: &mut plain::phase_bits_mut(phase)[..length],
+            modulation: &mut plain::modulation_bits_mut(modulation)[..length],
+            trust: &mut trust[..length],
+        }
+    }
+
+    /// The first `length` of a row.
+    #[inline(always)]
+    pub fn first(&mut self, length: usize) -> Results<'_> {
+        Results {
+            phase: &mut self.phase[..length],
+            modulation: &mut self.modulation[..length],
+            trust: &mut self.trust[..length],
+        }
+    }
+
+    /// Stores a block. A number that is no [`Trust`]'s is stored as the largest that is.
+    #[inline(always)]
+    pub fn store<V: Lanes>(
+        &mut self,
+        v: V,
+        at: usize,
+        phase: [[V::D; 2]; 2],
+        modulation: [V::W; 2],
+        trust: V::B,
+    ) {
+        v.store32(self.phase, at, phase);
+        v.store16(self.modulation, at, modulation);
+        // SAFETY: `Trust` is one byte, and its numbers are 0 to `LAST`: no byte above is stored.
+        let bytes = unsafe {
+            core::slice::from_raw_parts_mut(self.trust.as_mut_ptr().cast(), self.trust.len())
+        };
+        v.store8(bytes, at, v.min8(trust, v.splat8(Trust::LAST)));
+    }
+
+    /// Stores a block of which nothing is known but why.
+    #[inline(always)]
+    pub fn store_unknown<V: Lanes>(&mut self, v: V, at: usize, reason: V::B) {
+        let unknown = v.splat32(AbsolutePhase::UNKNOWN.to_bits());
+        let none = v.splat16(0);
+        self.store(v, at, [[unknown; 2]; 2], [none; 2], reason);
+    }
+}
