@@ -1,7 +1,7 @@
 //! Decoding row by row: all levels at once, or each when it arrives.
 
 use super::arrived::{Arrived, ArrivingRow, ClimbedRow, ClimbedRowMut, WrappedRow, WrappedRowMut};
-use super::kernel::{around, climb};
+use super::kernel::{around, arrive, fused};
 use super::narrow::{FewResults, MAX_PIXELS, RowSample, padded};
 use super::unwrap::Unwrapper;
 use super::{Decoder, PhaseRow};
@@ -112,7 +112,7 @@ impl Decoder {
         let out = results(out, &columns);
         match &self.unwrapper {
             Unwrapper::Geometric(plan) => {
-                climb::climb_row(self.backend, plan, &self.levels, &levels, columns, out);
+                fused::climb_row(self.backend, plan, &self.levels, &levels, columns, out);
             }
             Unwrapper::About(plan) => {
                 around::around_row(self.backend, plan, &self.levels, &levels, map, columns, out);
@@ -166,7 +166,7 @@ impl Decoder {
         let level = &self.levels[at];
         match (&self.unwrapper, row) {
             (Unwrapper::Geometric(plan), ArrivingRow::Climbing(row)) => {
-                climb::arrive_row(self.backend, plan, at, level, rows, 0..width, row);
+                arrive::arrive_row(self.backend, plan, at, level, rows, 0..width, row);
             }
             (_, ArrivingRow::Wrapping { coarsest, row }) => {
                 around::wrap_row(self.backend, level, rows, coarsest, 0..width, row);
@@ -218,10 +218,10 @@ impl Decoder {
         let backend = self.backend;
         match (&self.unwrapper, climbed, &self.levels[..]) {
             (Unwrapper::Geometric(plan), _, [_]) => {
-                climb::climb_row(backend, plan, &self.levels, &[rows], columns, out);
+                fused::climb_row(backend, plan, &self.levels, &[rows], columns, out);
             }
             (Unwrapper::Geometric(plan), Some(before), [.., level]) => {
-                climb::last_row(backend, plan, level, rows, before, columns, out);
+                arrive::last_row(backend, plan, level, rows, before, columns, out);
             }
             (Unwrapper::About(plan), _, levels) => {
                 around::last_row(backend, plan, levels, wrapped, rows, map, columns, out);

@@ -12,6 +12,9 @@ use tests::oracle::{Level, PixelTwin, Reason};
 
 /// The arctangent: a polynomial of degree 5 about a reciprocal of one Newton step (kernel.md).
 pub const ARCTANGENT: f64 = 2.5e-5;
+/// The arctangent of geometric levels below the finest, which give orders only: a cubic about a cubic reciprocal. Every pair
+/// of 8-bit differences is within it (`every_rough_angle_is_within_the_bound` of `algo`).
+const ROUGH_ARCTANGENT: f64 = 3.4e-4;
 /// Half a unit of 1/65536 turn.
 pub const ROUNDING: f64 = 1.0 / 131_072.0;
 /// S and C lie within ± N/2 of full scale; in 16 bits their rounding is 2⁻¹⁷ of N full scales each.
@@ -97,7 +100,11 @@ fn on_a_threshold(levels: &[Level], twin: &PixelTwin, stack: &Stack) -> bool {
     let error = each().fold(0.0_f64, |worst, (level, seen)| {
         worst.max(wrapped(level, seen, stack))
     });
-    doubt.slack <= error + ROUNDING + MEAN * doubt.spread + factors(levels, stack)
+    let rough = match stack.form() {
+        Form::Geometric { .. } if levels.len() > 1 => ROUGH_ARCTANGENT - ARCTANGENT,
+        _ => 0.0,
+    };
+    doubt.slack <= error + rough + ROUNDING + MEAN * doubt.spread + factors(levels, stack)
 }
 
 /// What the factors' rounding moves a decision by, as an error of the wrapped phases, turns.

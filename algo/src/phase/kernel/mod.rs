@@ -1,8 +1,10 @@
 //! Rows, block by block: the levels of a block → its absolute phase, modulation and trust.
 
 pub(super) mod around;
-pub(super) mod climb;
-pub(super) mod doubt;
+pub(super) mod arrive;
+mod climb;
+mod doubt;
+pub(super) mod fused;
 
 use crate::simd::Lanes;
 use core::ops::Range;

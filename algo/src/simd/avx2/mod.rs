@@ -3,9 +3,12 @@
 //! AVX2 widens within each half of a vector, so the first `W` of a block holds its pixels 0–7 and 16–23, the second
 //! 8–15 and 24–31; narrowing undoes it.
 
+mod halves;
+
 use super::lanes::{Lanes, Scaled};
 use super::rows::{Four, block, block_mut};
 use core::arch::x86_64::*;
+use halves::{load_halves, store_halves};
 
 /// AVX2 is there: only [`Avx2::detect`] makes one.
 #[derive(Clone, Copy, Debug)]
@@ -33,30 +36,6 @@ macro_rules! avx2 {
         // intrinsics on values ask for.
         unsafe { $e }
     }};
-}
-
-/// The four sixteenths (or eighths) of a block, by where AVX2 puts them: for each `W` or pair of `D`s the pieces of
-/// 128 bits for its lower and upper half.
-#[inline(always)]
-fn load_halves<T>(from: &[T], at: usize, low: usize, high: usize) -> __m256i {
-    let block = block(from, at, BYTES);
-    let (low, high) = (&block[low..], &block[high..]);
-    assert!(size_of_val(low) >= 16 && size_of_val(high) >= 16);
-    // SAFETY: both slices hold at least 16 bytes, asserted above; the loads need no alignment. AVX2 as above: only
-    // methods of `Avx2` call this.
-    unsafe { _mm256_loadu2_m128i(high.as_ptr().cast(), low.as_ptr().cast()) }
-}
-
-#[inline(always)]
-fn store_halves<T>(to: &mut [T], at: usize, low: usize, high: usize, x: __m256i) {
-    let block = block_mut(to, at, BYTES);
-    assert!(size_of_val(&block[low..]) >= 16 && size_of_val(&block[high..]) >= 16);
-    // SAFETY: at least 16 bytes follow both places, asserted above, and the two places do not overlap in any call; the
-    // stores need no alignment. AVX2 as above: only methods of `Avx2` call this.
-    unsafe {
-        let start = block.as_mut_ptr();
-        _mm256_storeu2_m128i(start.add(high).cast(), start.add(low).cast(), x);
-    }
 }
 
 impl Lanes for Avx2 {

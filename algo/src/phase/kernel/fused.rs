@@ -1,0 +1,155 @@
+//! Geometric levels in one pass over the frames of all of them.
+
+use super::arrive::{arrive_row, top_row};
+use super::climb::{Ground, Rung, four};
+use super::doubt::unless_dark;
+use super::next_block;
+use crate::phase::arrived::{Arrived, ArrivingRow};
+use crate::phase::fold::BlockSample;
+use crate::phase::geometric::Geometric;
+use crate::phase::level::{Level, LevelLanes};
+use crate::phase::source::Frames;
+use crate::simd::{Backend, Four, Lanes, Results, back_end_entry};
+use crate::trust::Trust;
+use core::ops::Range;
+
+/// Decodes columns of a row: the rows of each level's frames, coarse to fine, in the order of their shifts.
+pub(crate) fn climb_row<T: BlockSample>(
+    backend: Backend,
+    plan: &Geometric,
+    levels: &[Level],
+    rows: &[&[&[T]]],
+    columns: Range<usize>,
+    mut out: Results<'_>,
+) {
+    let part = columns.clone();
+    let fours: heapless::Vec<Four<'_, T>, 3> = (levels.iter().zip(rows))
+        .map_while(|(level, rows)| four(level, rows, &columns))
+        .take(3)
+        .collect();
+    let out = &mut out;
+    match (rows, &fours[..]) {
+        (&[a], _) => single(backend, plan, levels, a, columns, out),
+        (&[_, _], &[a, b]) => fused(backend, plan, levels, (a, [], b), columns, out),
+        (&[_, _, _], &[a, b, c]) => fused(backend, plan, levels, (a, [b], c), columns, out),
+        _ => in_turn(backend, plan, levels, rows, columns, out),
+    }
+    plan.finish(&mut out.phase[part]);
+}
+
+/// One level after the other, as if they arrived one after the other.
+fn in_turn<T: BlockSample>(
+    backend: Backend,
+    plan: &Geometric,
+    levels: &[Level],
+    rows: &[&[&[T]]],
+    columns: Range<usize>,
+    out: &mut Results<'_>,
+) {
+    let mut arrived = Arrived::climbing(columns.end, 1);
+    let (Some((finest, coarser)), Some((last, rows))) = (levels.split_last(), rows.split_last())
+    else {
+        return;
+    };
+    for (at, (level, rows)) in coarser.iter().zip(rows).enumerate() {
+        for row in arrived.rows() {
+            if let ArrivingRow::Climbing(row) = row {
+                arrive_row(backend, plan, at, level, rows, columns.clone(), row);
+            }
+        }
+    }
+    if let Some(before) = arrived.climbed_row(0) {
+        top_row(backend, plan, finest, last, before, columns, out);
+    }
+}
+
+back_end_entry! {
+    fn single [S: Frames] = single_columns(
+        plan: &Geometric,
+        levels: &[Level],
+        frames: S,
+        columns: Range<usize>,
+        out: &mut Results<'_>,
+    )
+}
+
+back_end_entry! {
+    fn fused [S: Frames, const BETWEEN: usize] = fused_columns(
+        plan: &Geometric,
+        levels: &[Level],
+        frames: (S, [S; BETWEEN], S),
+        columns: Range<usize>,
+        out: &mut Results<'_>,
+    )
+}
+
+#[inline(always)]
+fn single_columns<V: Lanes, S: Frames>(
+    v: V,
+    plan: &Geometric,
+    levels: &[Level],
+    frames: S,
+    columns: Range<usize>,
+    out: &mut Results<'_>,
+) {
+    let [level] = levels else { return };
+    let ground = Ground::new(v, plan);
+    let level = LevelLanes::new(v, level);
+    let (frames, mut out) = (frames.first(columns.end), out.first(columns.end));
+    let mut start = columns.start;
+    while let Some(at) = next_block::<V>(start, &columns) {
+        start += V::PIXELS;
+        let folded = frames.fold(v, &level, at);
+        let block = level.fine(v, &ground.angle, &folded, S::DOUBLED);
+        let climb = ground.start(v, block.phase, &folded);
+        let before = unless_dark(v, folded.strong);
+        ground.store(v, &climb, before, block.modulation, at, &mut out);
+    }
+}
+
+#[inline(always)]
+fn fused_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
+    v: V,
+    plan: &Geometric,
+    levels: &[Level],
+    (coarsest, between, finest): (S, [S; BETWEEN], S),
+    columns: Range<usize>,
+    out: &mut Results<'_>,
+) {
+    let ([first, middle @ .., last], [steps @ .., step]) = (levels, &plan.steps[..]) else {
+        return;
+    };
+    let ground = Ground::new(v, plan);
+    let mut out = out.first(columns.end);
+    let (coarsest, finest) = (coarsest.first(columns.end), finest.first(columns.end));
+    let level = LevelLanes::new(v, first);
+    let finest = Rung::new(v, step, last, finest);
+    let mut rungs = [finest; BETWEEN];
+    for (rung, ((step, level), frames)) in
+        rungs.iter_mut().zip(steps.iter().zip(middle).zip(between))
+    {
+        *rung = Rung::new(v, step, level, frames.first(columns.end));
+    }
+    let mut start = columns.start;
+    while let Some(at) = next_block::<V>(start, &columns) {
+        start += V::PIXELS;
+        let folded = coarsest.fold(v, &level, at);
+        let lit = folded.strong;
+        if v.none8(lit) {
+            out.store_unknown(v, at, v.splat8(Trust::Dark as u8));
+            continue;
+        }
+        let climb = ground.start(v, ground.rough(v, &folded), &folded);
+        // At most one level is between.
+        let below = match rungs.first() {
+            None => climb.ahead_of_start(v, &finest.step),
+            Some(rung) => {
+                let below = climb.ahead_of_start(v, &rung.step);
+                let climb = rung.rough(v, &ground, &below, at);
+                climb.ahead(v, &finest.step)
+            }
+        };
+        let (climb, modulation) = finest.fine(v, &ground, &below, at);
+        ground.store(v, &climb, unless_dark(v, lit), modulation, at, &mut out);
+    }
+}
