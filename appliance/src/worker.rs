@@ -6,6 +6,7 @@ use crate::plan::{Plan, PlanError};
 use crate::progress::Progress;
 use crate::recipe::teach::{Naming, TeachError, teach};
 use crate::recipe::{LoadError, Store};
+use crate::station::result::flag::STEPPED_UP;
 use crate::station::{
     ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
 };
@@ -127,31 +128,54 @@ impl Worker {
                 .event(failed(code::RIG, "measure: no recipe is loaded".into()));
             return Vec::new();
         };
-        let count = plan.sequence().frame_count();
-        let mut frames: Vec<Frame> = Vec::with_capacity(count);
-        let indices: Vec<usize> = (0..count).collect();
+        let mut flags = 0;
+        for step in 0.. {
+            let frames = match self.take(plan.indices(step)) {
+                Ok(frames) => frames,
+                Err(error) => {
+                    self.station
+                        .event(failed(code_of(&error), error.to_string()));
+                    return Vec::new();
+                }
+            };
+            let exposed = Instant::now();
+            let last = step + 1 >= plan.steps();
+            // The part must stay while another sequence may follow.
+            if last {
+                self.station.event(Event::ExposureDone { job: id });
+            }
+            let mut inspection = self.pool.install(|| plan.inspect(&frames, exposed));
+            if let Some(reason) = inspection.step_up.filter(|_| !last) {
+                self.progress
+                    .log(&format!("measuring again with more frames: {reason}"));
+                flags = STEPPED_UP;
+                continue;
+            }
+            if !last {
+                self.station.event(Event::ExposureDone { job: id });
+            }
+            inspection.flags |= flags;
+            self.maps.outdated();
+            self.station.event(Event::Finished {
+                job: id,
+                inspection: Arc::new(inspection),
+            });
+            return frames;
+        }
+        Vec::new()
+    }
+
+    /// The frames of some of the patterns.
+    fn take(&mut self, indices: &[usize]) -> Result<Vec<Frame>, hal::error::Error> {
+        let mut frames: Vec<Frame> = Vec::with_capacity(indices.len());
         let station = &self.station;
-        let taken = self
-            .opened
+        self.opened
             .head
-            .acquire(&indices, DEVICE_TIMEOUT, &mut |_, frame| {
+            .acquire(indices, DEVICE_TIMEOUT, &mut |_, frame| {
                 frames.push(frame);
                 station.event(Event::Alive);
-            });
-        if let Err(error) = taken {
-            self.station
-                .event(failed(code_of(&error), error.to_string()));
-            return Vec::new();
-        }
-        let exposed = Instant::now();
-        self.station.event(Event::ExposureDone { job: id });
-        let inspection = self.pool.install(|| plan.inspect(&frames, exposed));
-        self.maps.outdated();
-        self.station.event(Event::Finished {
-            job: id,
-            inspection: Arc::new(inspection),
-        });
-        frames
+            })?;
+        Ok(frames)
     }
 
     /// Loads a recipe; the one before stays active unless everything went well.
