@@ -1,6 +1,7 @@
 //! Gauges, alignment and the choice of sequence on parts in front of the simulated head.
 
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
+use super::station_plc::{Daemon, Place, Plc, READY, SMALL_HEAD};
 use algo::inspect::{Findings, Production};
 use algo::simd::Backend;
 use appliance::plan::Plan;
@@ -12,7 +13,8 @@ use appliance::seam;
 use appliance::station::{Inspection, Unit, Verdict};
 use hal::frame::Frame;
 use hal::sim::parts::{Cone, Plane, SheetMetal};
-use hal::sim::{Part, Placement};
+use hal::sim::{Part, Placement, Scenario};
+use std::fs;
 use std::time::Instant;
 
 /// Mean heights are off the true ones by at most this: 8-bit rounding without other noise is below 0.01 mm per pixel, and
@@ -396,4 +398,35 @@ fn a_recipe_without_the_key_is_not_aligned() {
     let found = inspect(&mut bed, &plan, 0);
     assert_eq!(found.verdict(), Verdict::Pass);
     assert!(found.placement.is_none());
+}
+
+#[test]
+fn a_part_that_the_short_sequence_cannot_vouch_for_is_measured_again_within_the_same_cycle() {
+    let scene = format!("{SMALL_HEAD}\n[part]\nkind = \"cone\"\n");
+    let scenario = Scenario::from_toml(&scene, "scene").unwrap();
+    let taught = taught(&mut bed(&scenario)).unwrap();
+    let file = RecipeFile {
+        production: 2,
+        ..taught.recipe.file.clone()
+    };
+    let place = Place::new();
+    fs::create_dir_all(place.recipe().parent().unwrap()).unwrap();
+    let (bytes, _) = pack(&file, &taught.recipe.arrays).unwrap();
+    fs::write(place.recipe(), bytes).unwrap();
+    // Twice as far as the recipe's tolerance.
+    let away = format!("{scene}\n[placement]\nshift_mm = [0.0, 0.0, 2.0]\n");
+    fs::write(place.path("small.toml"), away).unwrap();
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    plc.wait("READY", |status| status.has(READY));
+    let words = plc.measure(7);
+    let status = plc.status();
+    assert_eq!(
+        (status.seq(), status.triggers()),
+        (1, 1),
+        "one trigger, one result"
+    );
+    // Full sequence, stepped up, simulated head; the part is found to lie outside.
+    assert_eq!(words[31] & 0b11_1110, 0b11_1000, "{:b}", words[31]);
+    assert_eq!(words[8], Verdict::Invalid.number());
 }

@@ -124,7 +124,7 @@ fn a_region_of_which_less_than_half_is_left_measures_nothing() {
     assert_eq!(cells(&sums, &taught, Some(1)).len(), 8);
     // Cells with fewer pixels than asked for are left out.
     sums[8].count = 2;
-    sums[9] = sums[15];
+    sums[7] = sums[15];
     assert_eq!(cells(&sums, &taught, Some(3)).len(), 8);
     assert!(mean(&[]).is_none() && tilt(&[], Axis::X).is_none());
     assert!(rms(&[], 0.1, None).is_none() && peak_to_valley(&[], 0.1, None).is_none());
