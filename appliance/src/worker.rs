@@ -1,11 +1,11 @@
 //! The measuring task: one thread that owns the head, the plan and the computing threads.
 
+mod cycle;
 mod recovery;
 
 use crate::backend::Opened;
-use crate::benchmark::stopwatch::timed_on;
 use crate::config::HeadConfig;
-use crate::history::{FailedPart, History};
+use crate::history::History;
 use crate::latest::{LastCycle, LastMaps};
 use crate::plan::{Plan, PlanError};
 use crate::progress::Progress;
@@ -14,16 +14,15 @@ use crate::recipe::teach::{Naming, TeachError, teach};
 use crate::recipe::{LoadError, Store};
 use crate::shelf::Shelf;
 use crate::station::{
-    ActiveRecipe, Condition, Event, Job, JobId, Pace, RecipeKey, RecipeResult, Request,
-    ResultRecord, StationHandle, error_code,
+    ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
+    error_code,
 };
 use hal::error::{Device, Error};
 use hal::frame::Frame;
-use hal::head::Exposure;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// What the worker is told to do.
 #[derive(Debug)]
@@ -161,82 +160,6 @@ impl Worker {
             calibration,
         });
         self.pool.install(|| maps.answer(cycle));
-    }
-
-    /// Runs a cycle; the frames that it was judged by.
-    fn measure(&mut self, plan: Option<&Arc<Plan>>, job: &Job) -> Vec<Frame> {
-        let id = job.job;
-        let failed = |error_code, message: String| Event::MeasureFailed {
-            job: id,
-            error_code,
-            message: message.into(),
-        };
-        let Some(plan) = plan else {
-            // The station triggers only with an active recipe, and that is this plan's.
-            self.station
-                .event(failed(code::RIG, "measure: no recipe is loaded".into()));
-            return Vec::new();
-        };
-        let count = plan.sequence().frame_count();
-        let mut frames: Vec<Frame> = Vec::with_capacity(count);
-        let indices: Vec<usize> = (0..count).collect();
-        let (station, aborts) = (&self.station, &self.aborts);
-        let mut keep = |_, frame| {
-            frames.push(frame);
-            station.event(Event::Alive);
-            !aborts.has(id)
-        };
-        let head = &mut self.opened.head;
-        match head.acquire_while(&indices, DEVICE_TIMEOUT, &mut keep) {
-            Ok(_) if frames.len() < count => {
-                self.station
-                    .event(failed(error_code::ABORTED, format!("measure: {ABORTED}")));
-                return Vec::new();
-            }
-            Ok(exposure) => self.paced(count, &exposure),
-            Err(error) => {
-                let failed = failed(code_of(&error), error.to_string());
-                self.fail(error, failed);
-                return Vec::new();
-            }
-        }
-        let exposed = Instant::now();
-        self.station.event(Event::ExposureDone { job: id });
-        let (mut inspection, cpu) = timed_on(&self.pool, || plan.inspect(&frames, exposed));
-        inspection.cpu_us = u32::try_from(cpu.as_micros()).unwrap_or(u32::MAX);
-        let inspection = Arc::new(inspection);
-        let after = self.station.event(Event::Finished {
-            job: id,
-            inspection: inspection.clone(),
-        });
-        // Not where the station no longer waited for it.
-        let published = |record: &Arc<ResultRecord>| Arc::ptr_eq(&record.inspection, &inspection);
-        if let Some(record) = after.result.clone().filter(published)
-            && self.history.wants(&record)
-        {
-            self.history.keep(FailedPart {
-                record,
-                frames: frames.clone(),
-                plan: plan.clone(),
-                calibration: self.opened.calibration.clone(),
-            });
-        }
-        frames
-    }
-
-    /// Says how well the head kept time.
-    fn paced(&self, frames: usize, exposure: &Exposure) {
-        let us = |time: Duration| u32::try_from(time.as_micros()).unwrap_or(u32::MAX);
-        let span = exposure.done.since(exposure.started).as_secs_f64();
-        let refresh = self.opened.head.refresh().as_secs_f64();
-        // Saturating casts; a span of 0 gives the largest number.
-        self.station.event(Event::Paced(Pace {
-            camera_centihertz: (frames.saturating_sub(1) as f64 / span * 100.0) as u32,
-            refresh_millihertz: (1000.0 / refresh).round() as u32,
-            lag_us: us(exposure.lag),
-            dropped: exposure.dropped,
-            missed_flips: exposure.missed_flips,
-        }));
     }
 
     /// Loads a recipe; the one before stays active unless everything went well.

@@ -24,7 +24,8 @@ impl Plan {
     /// The maps of a part; `None` if the frames are not what the recipe was made for.
     pub fn layers(&self, frames: &[Frame]) -> Option<Layers> {
         let maps = self.heights(frames)?;
-        let golden = &self.production.rises().surface().height;
+        let production = &self.run_of(frames).production;
+        let golden = &production.rises().surface().height;
         let deviation = maps.height_mm.iter().zip(golden).map(|(&here, golden)| {
             if golden.is_known() {
                 here - golden.mm() as f32
@@ -33,10 +34,9 @@ impl Plan {
             }
         });
         let deviation_mm = deviation.collect();
-        let decoder = self.production.decoder();
+        let decoder = production.decoder();
         let views: Result<Vec<_>, _> = frames.iter().map(seam::view).collect();
-        let phases =
-            pipeline::decode(decoder, &views.ok()?, Some(self.golden_phase()), None).ok()?;
+        let phases = pipeline::decode(decoder, &views.ok()?, Some(production.map()), None).ok()?;
         let full_scale = decoder.full_scale();
         let counts = phases.modulation.iter();
         Some(Layers {
@@ -50,8 +50,9 @@ impl Plan {
     /// The point cloud of a part as binary PLY, with its modulation as intensity; `None` as for [`Self::layers`].
     pub fn cloud(&self, frames: &[Frame]) -> Option<Vec<u8>> {
         let layers = self.layers(frames)?;
-        let full_scale = f32::from(self.production.decoder().full_scale());
-        let triangulator = self.production.triangulator();
+        let production = &self.run_of(frames).production;
+        let full_scale = f32::from(production.decoder().full_scale());
+        let triangulator = production.triangulator();
         let known = layers
             .height_mm
             .iter()

@@ -5,7 +5,8 @@ use super::comparison::ComparisonFile;
 use super::file::{CameraFile, FORMAT, RasterFile, VERSION};
 use super::planner::{self, Choice};
 use super::{
-    GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile, SequenceFile, SequenceKind,
+    AlignmentKind, GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile, SequenceFile,
+    SequenceKind,
 };
 use crate::calibration::Calibration;
 use algo::adaptive::{Surface, phase_reach};
@@ -21,7 +22,7 @@ const MAX_SIGMA_MM: f64 = 0.25;
 /// Deviations are averaged over squares of this many camera pixels.
 const SMOOTHING_PX: usize = 9;
 /// Limit of the deviation, mm.
-const DEVIATION_MM: f64 = 0.25;
+const DEVIATION_MM: f64 = 0.15;
 /// The part's coverage may fall by this share of the frame.
 const COVERAGE_CHANGE: f64 = 0.01;
 /// Least share of the golden surface that must be resolved.
@@ -126,6 +127,7 @@ impl GoldenPart<'_> {
             sequences,
             production: choice.production,
             placement_tolerance_mm: naming.placement_tolerance_mm,
+            alignment: AlignmentKind::Rigid,
             range_mm: [range.low, range.high],
             exposure_us: None,
             noise_counts: self.noise,

@@ -53,7 +53,7 @@ pub use gauge::{Decision, GaugeValue, Unit};
 pub use handle::{StationHandle, system_utc_us, tick};
 pub use health::{Health, Pace, System};
 pub use machine::{Limits, Settings, Station};
-pub use result::{Inspection, MAX_GAUGES, ResultRecord, Skipped, StageTime, Verdict};
+pub use result::{Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, StageTime, Verdict};
 pub use snapshot::{Identity, Snapshot, TeachProgress};
 pub use state::{ActiveRecipe, Cycle, Fault, Micros, State};
 pub use step::step;

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::station::result::flag;
 use crate::station::snapshot::{status, warning};
-use crate::station::{GaugeValue, ResultRecord, Snapshot, Unit, error_code};
+use crate::station::{GaugeValue, Placement, ResultRecord, Snapshot, Unit, error_code};
 
 /// The whole snapshot.
 pub fn snapshot(snapshot: &Snapshot) -> Value {
@@ -113,8 +113,23 @@ fn result(record: &ResultRecord) -> Value {
             "dark": found.skipped.dark,
             "exact": found.skipped.exact,
         },
+        "placement": found.placement.as_ref().map(placement),
         "gauges": found.gauges.iter().map(gauge).collect::<Vec<_>>(),
         "stages": found.stages.iter().map(|stage| json!({ "name": stage.name, "us": stage.us })).collect::<Vec<_>>(),
+    })
+}
+
+/// Shifts in mm, turns in degrees; null where the part's shape does not determine them.
+fn placement(placement: &Placement) -> Value {
+    let values = placement.shift_mm.iter().chain(&placement.turn_deg);
+    let determined = values
+        .zip(placement.left_out)
+        .map(|(value, out)| (!out).then_some(*value));
+    json!({
+        "components": Placement::COMPONENTS,
+        "values": determined.collect::<Vec<_>>(),
+        "reach_mm": placement.reach_mm,
+        "outliers": placement.outliers,
     })
 }
 
