@@ -127,8 +127,14 @@ pub fn polygon_spans(
     width: usize,
     height: usize,
 ) -> Vec<(usize, Range<usize>)> {
-    let mut spans = Vec::new();
-    let mut crossings = Vec::new();
+    let (mut top, mut bottom) = (height as f64, 0.0_f64);
+    for (_, v) in corners {
+        (top, bottom) = (top.min(*v), bottom.max(*v));
+    }
+    // A span per row, mostly.
+    let rows = ((bottom - top).max(0.0) as usize).min(height) + 1;
+    let mut spans = Vec::with_capacity(rows);
+    let mut crossings = Vec::with_capacity(corners.len());
     for row in 0..height {
         let v = row as f64;
         crossings.clear();

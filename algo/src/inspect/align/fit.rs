@@ -10,7 +10,6 @@ use super::directions::{Directions, Six};
 use super::motion::Motion;
 use super::surface::{Facet, GoldenSurface};
 use crate::geometry::Vector;
-use alloc::vec;
 use alloc::vec::Vec;
 
 /// A measured point.
@@ -89,6 +88,7 @@ impl Weights {
 }
 
 /// A point as a step sees it: its residual and how that depends on the motion.
+#[derive(Debug)]
 struct Row {
     residual: f64,
     row: [f64; 6],
@@ -98,6 +98,14 @@ struct Row {
     /// Variance of the point's height, and of that with the surface's, mm².
     variance: f64,
     both: f64,
+}
+
+/// Room for a fit, for the next one to use again.
+#[derive(Debug, Default)]
+pub struct Room {
+    rows: Vec<Row>,
+    facets: Vec<Option<Facet>>,
+    sizes: Vec<f64>,
 }
 
 /// What the fit needs of the part.
@@ -115,25 +123,29 @@ pub struct Fitting<'a> {
 
 impl Fitting<'_> {
     /// The motion; none if too few points lie on the surface.
-    pub fn fit(&self, samples: &[Sample]) -> Option<Placed> {
+    pub fn fit(&self, samples: &[Sample], room: &mut Room) -> Option<Placed> {
         let mut motion = Motion::none(self.centre);
-        let mut rows = Vec::with_capacity(samples.len());
-        let mut facets = vec![None; samples.len()];
-        let mut sizes = Vec::with_capacity(samples.len());
+        let Room {
+            rows,
+            facets,
+            sizes,
+        } = room;
+        facets.clear();
+        facets.resize(samples.len(), None);
         let mut last = None;
         for weights in [Weights::Huber, Weights::Tukey] {
             for step in 0..STEPS {
                 if weights == Weights::Huber && step % 3 == 0 || step == 0 {
-                    self.face(samples, &motion, &mut facets);
+                    self.face(samples, &motion, facets);
                 }
-                self.rows(samples, &facets, &motion, &mut rows);
+                self.rows(samples, facets, &motion, rows);
                 if rows.len() < LEAST_POINTS {
                     return None;
                 }
                 let predicted = rows.iter().map(|row| row.both).sum::<f64>() / rows.len() as f64;
                 let predicted = libm::sqrt(predicted);
-                let scale = scale(&rows, &mut sizes).max(predicted);
-                let normal = Normal::of(&rows, weights, scale);
+                let scale = scale(rows, sizes).max(predicted);
+                let normal = Normal::of(rows, weights, scale);
                 let directions = Directions::of(&normal.matrix, &normal.noise, predicted);
                 let step = directions.solve(&normal.right);
                 let turn = Vector::new(step[3], step[4], step[5]) * (1.0 / self.radius);

@@ -6,7 +6,7 @@ mod motion;
 mod surface;
 
 pub use directions::{Directions, Six, form};
-pub use fit::{Fitting, Placed, Sample};
+pub use fit::{Fitting, Placed, Room, Sample};
 pub use motion::Motion;
 pub use surface::{Facet, GoldenSurface};
 
@@ -75,7 +75,10 @@ impl Alignment {
             rows,
             columns,
         };
-        alignment.left_out = alignment.fitting(golden).fit(&samples)?.left_out;
+        alignment.left_out = alignment
+            .fitting(golden)
+            .fit(&samples, &mut Room::default())?
+            .left_out;
         Some(alignment)
     }
 

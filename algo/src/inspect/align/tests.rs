@@ -127,7 +127,7 @@ fn a_motion_of_a_shape_that_determines_it_is_found_in_all_six_components() {
     let motion = motion(&alignment);
     let found = alignment
         .fitting(made.golden())
-        .fit(&made.moved(&motion))
+        .fit(&made.moved(&motion), &mut Room::default())
         .unwrap();
     assert_found(&found, &motion);
     assert!(found.outliers < 0.01, "{found:?}");
@@ -145,7 +145,10 @@ fn a_dent_over_a_tenth_of_the_part_does_not_pull_it() {
     for sample in &mut samples[..dented] {
         sample.point.z -= 1.0;
     }
-    let found = alignment.fitting(made.golden()).fit(&samples).unwrap();
+    let found = alignment
+        .fitting(made.golden())
+        .fit(&samples, &mut Room::default())
+        .unwrap();
     assert_found(&found, &motion);
     assert!((found.outliers - 0.1).abs() < 0.02, "{}", found.outliers);
 }
@@ -157,7 +160,7 @@ fn directions_that_a_shape_does_not_determine_are_left_out_and_stay_nought() {
     assert_eq!(alignment.left_out, [true, true, false, false, false, true]);
     let found = alignment
         .fitting(plate.golden())
-        .fit(&plate.moved(&motion(&alignment)))
+        .fit(&plate.moved(&motion(&alignment)), &mut Room::default())
         .unwrap();
     let values = found.motion.values();
     assert!(
@@ -178,12 +181,22 @@ fn directions_that_a_shape_does_not_determine_are_left_out_and_stay_nought() {
 fn what_is_not_there_has_no_place() {
     let made = made(hills);
     let alignment = made.alignment();
-    assert!(alignment.fitting(made.golden()).fit(&[]).is_none());
+    assert!(
+        alignment
+            .fitting(made.golden())
+            .fit(&[], &mut Room::default())
+            .is_none()
+    );
     let away = Motion::new(
         alignment.centre,
         Vector::new(500.0, 0.0, 0.0),
         Vector::default(),
     );
     let samples = made.moved(&away);
-    assert!(alignment.fitting(made.golden()).fit(&samples).is_none());
+    assert!(
+        alignment
+            .fitting(made.golden())
+            .fit(&samples, &mut Room::default())
+            .is_none()
+    );
 }

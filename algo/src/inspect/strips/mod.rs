@@ -365,12 +365,12 @@ impl Production {
             || (),
             |_, strip, ()| strip.sample(self, alignment, frames),
         );
-        let samples: Vec<_> = strips
-            .iter()
-            .flat_map(|strip| &strip.samples)
-            .copied()
-            .collect();
-        alignment.fitting(self.golden()).fit(&samples)
+        let (first, others) = strips.split_first_mut()?;
+        for strip in others {
+            first.samples.extend(&strip.samples);
+        }
+        let fitting = alignment.fitting(self.golden());
+        fitting.fit(&first.samples, &mut first.room)
     }
 
     /// The map that phases are unwrapped about, row-major.

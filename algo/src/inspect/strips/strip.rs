@@ -7,7 +7,7 @@ use super::squares::{MAX_TAME, Squares};
 use super::stance::Stance;
 use super::{Measure, Production};
 use crate::frame::FrameView;
-use crate::inspect::align::Sample;
+use crate::inspect::align::{Room, Sample};
 use crate::inspect::gauge::Sum;
 use crate::phase::{PhaseRow, Trust};
 use crate::pipeline::{NO_RISE, Risen, RowTally, Seen as Decoded, VARIANCE_UNIT_NM, rise_row};
@@ -39,8 +39,10 @@ pub struct Strip {
     squares: Squares,
     /// Where the pixels of the row lie on the part as taught.
     spots: Spots,
-    /// Points that the part's motion is found from.
+    /// Points that the part's motion is found from; in the first strip those of all in the end.
     pub(super) samples: Vec<Sample>,
+    /// For finding the motion: the first strip's is used.
+    pub(super) room: Room,
     /// The last row with a rise that sums over squares may not hold.
     wild: Option<usize>,
     pub(super) found: Found,
@@ -85,6 +87,7 @@ impl Strip {
             squares: Squares::new(width + kept),
             spots: Spots::new(width),
             samples: Vec::new(),
+            room: Room::default(),
             wild: None,
             found: Found {
                 covered: vec![0; plan.gauges.len()],
