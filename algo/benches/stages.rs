@@ -179,7 +179,6 @@ fn gauge_over_the_frame(bencher: Bencher<'_, '_>) {
     let golden = Golden {
         width: SIDE,
         height: heights.height.clone(),
-        sigma: heights.sigma.clone(),
     };
     let end = SIDE as f64;
     let corners = [(0.0, 0.0), (end, 0.0), (end, end), (0.0, end)];

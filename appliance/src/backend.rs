@@ -19,6 +19,24 @@ pub struct Opened {
     pub stage: Option<Stage>,
 }
 
+impl Opened {
+    /// Opens the head again after it was lost. It may be another one then: what is known of it is read anew.
+    ///
+    /// # Errors
+    /// As long as a device of it is not there.
+    pub fn reopen(&mut self, config: &HeadConfig) -> Result<(), Failure> {
+        match &self.stage {
+            Some(stage) => {
+                self.head = stage
+                    .reopen()
+                    .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+            }
+            None => *self = open(config, &|_| ())?,
+        }
+        Ok(())
+    }
+}
+
 /// Opens the configured head. `progress` is told the share done, from any thread.
 ///
 /// # Errors
@@ -27,6 +45,26 @@ pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Open
     match config.backend {
         Backend::Sim => simulated(config.scenario.as_deref(), progress),
         Backend::Replay => replayed(&config.recordings),
+    }
+}
+
+/// What is known of the configured head, without opening it.
+///
+/// # Errors
+/// If a file of the head is missing or wrong.
+pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
+    match config.backend {
+        Backend::Sim => Ok(Calibration::of_scenario(&scenario(
+            config.scenario.as_deref(),
+        )?)),
+        Backend::Replay => {
+            let first = config
+                .recordings
+                .iter()
+                .take(1)
+                .map(|folder| Recording::open(folder));
+            calibration_of(&config.recordings, &first.collect::<Result<Vec<_>, _>>()?)
+        }
     }
 }
 

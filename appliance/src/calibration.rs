@@ -6,7 +6,7 @@ use algo::geometry::{ModelError, Pinhole};
 use algo::pattern::GreyResponse;
 use hal::model::DeviceModel;
 use hal::replay::Recording;
-use hal::sim::Stage;
+use hal::sim::{Scenario, Stage};
 use sha2::{Digest, Sha256};
 
 /// The calibration of a head.
@@ -29,13 +29,17 @@ pub struct Calibration {
 impl Calibration {
     /// The exact calibration of a simulated head.
     pub fn of_stage(stage: &Stage) -> Self {
-        let scenario = stage.scenario();
+        Self::of_scenario(stage.scenario())
+    }
+
+    /// The same, of a head that need not be there.
+    pub fn of_scenario(scenario: &Scenario) -> Self {
         let (camera, projector) = (&scenario.rig.camera, &scenario.rig.projector);
         Self {
             camera: (camera.width, camera.height, scenario.bit_depth),
-            camera_model: stage.camera_model(),
+            camera_model: camera.model(),
             projector: (projector.width, projector.height),
-            projector_model: stage.projector_model(),
+            projector_model: projector.model(),
             noise_counts: scenario.noise_sigma_counts(),
             response: None,
         }

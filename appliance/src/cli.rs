@@ -13,8 +13,11 @@ mod bench;
 mod config;
 mod demo;
 mod experiment;
+mod history;
 mod measure;
+mod recipe;
 mod record;
+mod replay;
 mod serve;
 mod teach;
 
@@ -44,7 +47,7 @@ pub struct Common {
     /// Configuration file (TOML); `fringed config keys` lists its keys.
     #[arg(long, global = true, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// State folder: recipes, result counter, serial.
+    /// State folder: recipes, history, result counter, serial.
     #[arg(long, global = true, value_name = "DIR")]
     pub state: Option<PathBuf>,
     /// Where to serve Modbus TCP.
@@ -82,6 +85,13 @@ enum Command {
     Bench(bench::Bench),
     /// Make a recipe from a good part in front of the head, or from recordings.
     Teach(teach::Teach),
+    /// Show or export stored results.
+    History(history::History),
+    /// Judge a kept part again and compare with the history.
+    Replay(replay::Replay),
+    /// List, export, import or delete recipes.
+    #[command(subcommand)]
+    Recipe(recipe::RecipeCommand),
     /// Check a configuration, or list its keys.
     #[command(subcommand)]
     Config(config::ConfigCommand),
@@ -123,6 +133,9 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Command::Experiment(command) => command.run(&common),
         Command::Bench(command) => command.run(&common),
         Command::Teach(command) => command.run(&common),
+        Command::History(command) => command.run(&common),
+        Command::Replay(command) => command.run(&common),
+        Command::Recipe(command) => command.run(&common),
         Command::Config(command) => command.run(&common),
         Command::Registers => {
             registers(&common);
@@ -165,6 +178,17 @@ impl Common {
             .check()
             .map_err(|error| Failure::new(Exit::Configuration, error))?;
         Ok(config)
+    }
+
+    /// The state folder as configured, else the platform's.
+    ///
+    /// # Errors
+    /// If the configuration is wrong or the platform has none.
+    pub fn state_folder(&self) -> Result<PathBuf, Failure> {
+        match self.configuration()?.state {
+            Some(path) => Ok(path),
+            None => crate::state::StateFolder::default_path(),
+        }
     }
 
     /// Progress as the user wants it.

@@ -3,18 +3,26 @@
 //! One OS thread measures ([`crate::worker`]), one serves sockets on a current-thread runtime, and
 //! the station is plain values behind a handle that both use.
 
+mod stopping;
+
+use stopping::Stopping;
+
+use crate::access::Access;
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
+use crate::history::{self, Bounds, History, Reader};
 use crate::latest::LastMaps;
-use crate::output::picture::height_png;
 use crate::progress::Progress;
-use crate::state::{Counter, StateFolder, random};
+use crate::shelf::Shelf;
+use crate::state::{StateFolder, random};
 use crate::station::snapshot::status;
 use crate::station::{
     Effect, Event, Identity, Limits, Micros, RecipeKey, RecipeResult, Request, Settings, Snapshot,
     Station, StationHandle, tick,
 };
-use crate::worker::{Order, Worker};
+use crate::survey::Survey;
+use crate::tally::Tally;
+use crate::worker::{Aborts, Order, Worker};
 use crate::{backend, clock, modbus, web};
 use hal::sim::Stage;
 use std::net::SocketAddr;
@@ -42,13 +50,6 @@ pub struct Daemon {
     _state: StateFolder,
 }
 
-/// What ends the daemon's threads.
-struct Stopping {
-    orders: mpsc::Sender<Order>,
-    sockets: watch::Sender<bool>,
-    threads: [JoinHandle<()>; 2],
-}
-
 impl Daemon {
     /// Starts everything and returns when the head is open. The station is then on its way to READY:
     /// it loads its recipe, or teaches it where a simulated head has none.
@@ -65,19 +66,66 @@ impl Daemon {
             Some(path) => path.clone(),
             None => StateFolder::default_path()?,
         };
+        crate::memory::give_back();
         let state = StateFolder::open(&path)?;
+        let access = open_access(&state)?;
         let runtime = runtime()?;
         let (plc, page) = runtime.block_on(listen(config))?;
         let (modbus, http) = (address_of(&plc)?, address_of(&page)?);
         let (orders, inbox) = mpsc::channel();
-        let sink = effects(orders.clone(), state.counter(), progress.clone());
-        let station = StationHandle::new(station(config, &state)?, Instant::now(), sink);
+        let (history, task, next_seq, complaint) = open_history(config, &state)?;
+        if let Some(complaint) = complaint {
+            progress.log(&complaint);
+        }
+        let tally = Tally::default();
+        let aborts = Aborts::default();
+        let sink = effects(
+            orders.clone(),
+            aborts.clone(),
+            history.clone(),
+            progress.clone(),
+            tally.clone(),
+        );
+        let settings = station(config, &state, next_seq)?;
+        let station = StationHandle::new(settings, Instant::now(), sink);
+        let writing = {
+            let station = station.clone();
+            spawn("history", move || task.run(&station))?
+        };
         let maps = LastMaps::default();
         let (sockets, stopped) = watch::channel(false);
+        let clients = modbus::Clients::new(modbus::CONNECTIONS);
         let serving = {
-            let (station, maps, config) = (station.clone(), maps.clone(), config.clone());
-            let serve = move || runtime.block_on(serve(plc, page, station, maps, &config, stopped));
+            let site = web::Site::new(web::Parts {
+                station: station.clone(),
+                access,
+                recipes: state.recipes().clone(),
+                maps: maps.clone(),
+                history: Reader::of(&path),
+                tally,
+                log: progress.logbook().clone(),
+                registers: modbus::live,
+                configuration: toml::to_string(config).unwrap_or_default(),
+                hosts: config.http.hosts.clone(),
+            });
+            let (station, config) = (station.clone(), config.clone());
+            let log = progress.clone();
+            let plc = PlcSide {
+                listener: plc,
+                clients: clients.clone(),
+                refusals: modbus::Refusals::new(move |line| log.log(line)),
+            };
+            let serve = move || {
+                runtime.block_on(serve(plc, page, station, site, &config, stopped));
+            };
             spawn("sockets", serve)?
+        };
+        let (survey, surveyed) = mpsc::channel();
+        let surveying = {
+            let station = station.clone();
+            let recipes = state.recipes().clone();
+            let survey = Survey::new(&path, recipes, clients, progress.clone());
+            spawn("survey", move || survey.run(&station, &surveyed))?
         };
         let (opened, opening) = mpsc::channel();
         let simulated = config.head.backend == Backend::Sim;
@@ -85,7 +133,7 @@ impl Daemon {
         let awaited = first.is_some();
         let measuring = {
             let (station, recipes) = (station.clone(), state.recipes().clone());
-            let config = config.clone();
+            let (config, progress, history) = (config.clone(), progress.clone(), history.clone());
             spawn("measuring", move || {
                 let told = |share: f64| progress.tell(share, "working out the light of the scene");
                 match pool.install(|| backend::open(&config.head, &told)) {
@@ -99,7 +147,12 @@ impl Daemon {
                             recipes,
                             station,
                             maps,
+                            history,
                             progress,
+                            config: config.head,
+                            aborts,
+                            lost: None,
+                            shelf: Shelf::default(),
                         };
                         worker.run(&inbox, first);
                     }
@@ -109,7 +162,12 @@ impl Daemon {
         let stopping = Stopping {
             orders,
             sockets,
-            threads: [measuring, serving],
+            survey,
+            threads: [measuring, serving, surveying],
+            progress,
+            station: station.clone(),
+            history,
+            writing,
         };
         let gone = || {
             Failure::new(
@@ -169,22 +227,26 @@ impl Daemon {
         }
     }
 
-    /// Ends everything: the cycle in flight is finished, then the sockets close.
+    /// Ends everything: the cycle in flight ends with its result, INVALID if it was still exposing, then the sockets close.
     pub fn stop(self) {
         self.station.event(Event::Stop);
         self.stopping.stop();
     }
 }
 
-impl Stopping {
-    fn stop(self) {
-        // An order that nobody takes, or a runtime that is gone, is what is wanted here.
-        drop(self.orders.send(Order::Stop));
-        let [measuring, serving] = self.threads;
-        drop(measuring.join());
-        let _ = self.sockets.send(true);
-        drop(serving.join());
+/// Opens the way in; the secret of a new device is shown here and never again.
+fn open_access(state: &StateFolder) -> Result<Access, Failure> {
+    let folder = state.place("access");
+    let (access, secret) = Access::open(&folder)?;
+    if let Some(secret) = secret {
+        // Whatever is quiet: without it nobody could ever sign in.
+        eprintln!(
+            "fringed: the secret of this device, shown this once: {secret} (sign in on the page with it; for another one \
+             delete {} and start again)",
+            folder.join("secret").display()
+        );
     }
+    Ok(access)
 }
 
 /// A current-thread runtime.
@@ -223,9 +285,21 @@ fn address_of(listener: &TcpListener) -> Result<SocketAddr, Failure> {
         .map_err(|error| Failure::because(Exit::Unavailable, "ask for a socket's port", error))
 }
 
-fn station(config: &Config, state: &StateFolder) -> Result<Station, Failure> {
+fn open_history(
+    config: &Config,
+    state: &StateFolder,
+) -> Result<(History, history::Task, u32, Option<String>), Failure> {
+    let bounds = Bounds {
+        results: u64::from(config.history.results),
+        recordings: u64::from(config.history.recordings_mib) << 20,
+    };
+    history::open(state.path(), state.counter(), state.next_seq()?, bounds)
+        .map_err(|error| Failure::new(Exit::CannotCreate, error.to_string()))
+}
+
+fn station(config: &Config, state: &StateFolder, next_seq: u32) -> Result<Station, Failure> {
     let settings = Settings {
-        next_seq: state.next_seq()?,
+        next_seq,
         boot_id: random()?,
         teach_allowed: config.station.teach_allowed,
         identity: Arc::new(Identity {
@@ -242,31 +316,34 @@ fn station(config: &Config, state: &StateFolder) -> Result<Station, Failure> {
     Ok(Station::new(settings, Micros(0)))
 }
 
-/// Carries out what the station wants done. Called with the station locked: it only hands on, and
-/// writes the counter, which must be stored before anybody sees the result.
+/// Carries out what the station wants done. Called with the station locked: it only hands on and waits for nothing.
 fn effects(
     orders: mpsc::Sender<Order>,
-    counter: Counter,
+    aborts: Aborts,
+    history: History,
     progress: Progress,
-) -> impl FnMut(Effect) {
+    tally: Tally,
+) -> impl FnMut(Effect) -> Option<Event> {
     // An order that nobody takes is noticed by the station itself: its wait has a deadline.
     let order = move |order| drop(orders.send(order));
-    move |effect| match effect {
-        Effect::Measure(job) => order(Order::Measure(job)),
-        Effect::Load { job, key } => order(Order::Load(job, key)),
-        Effect::Teach { job, number } => order(Order::Teach(job, number)),
-        Effect::PersistSeq(seq) => {
-            if let Err(error) = counter.store(seq) {
-                progress.log(&format!(
-                    "store the result counter {seq}: {error}: free space"
-                ));
+    move |effect| {
+        match effect {
+            Effect::Measure(job) => order(Order::Measure(job)),
+            Effect::Load { job, key } => order(Order::Load(job, key)),
+            Effect::Teach { job, number } => order(Order::Teach(job, number)),
+            Effect::PersistSeq(seq) => {
+                let unanswered = || "the storage does not answer".into();
+                let failed = (!history.covers(seq)).then(unanswered);
+                return Some(Event::Stored { seq, failed });
+            }
+            Effect::Log(line) => progress.log(&line),
+            Effect::Abort { job } => aborts.abort(job),
+            Effect::Publish(result) => {
+                tally.add(result.verdict);
+                history.record(result);
             }
         }
-        Effect::Log(line) => progress.log(&line),
-        // A sequence is short and every wait in it has a time-out: it ends by itself, and the station
-        // drops its answer.
-        Effect::Abort { .. } => {}
-        Effect::Publish(_) => {}
+        None
     }
 }
 
@@ -285,11 +362,18 @@ fn first_request(
     }
 }
 
+/// The PLC's side of the sockets.
+struct PlcSide {
+    listener: TcpListener,
+    clients: modbus::Clients,
+    refusals: modbus::Refusals,
+}
+
 async fn serve(
-    plc: TcpListener,
+    plc: PlcSide,
     page: TcpListener,
     station: StationHandle,
-    maps: LastMaps,
+    site: web::Site,
     config: &Config,
     stopped: watch::Receiver<bool>,
 ) {
@@ -303,26 +387,20 @@ async fn serve(
     let options = modbus::Options {
         word_order: config.modbus.word_order.into(),
         strict_unit_id: config.modbus.strict_unit_id,
+        readers: config.modbus.readers.clone(),
+        writers: config.modbus.writers.clone(),
         ..modbus::Options::default()
-    };
-    let picture = move || {
-        let maps = maps.get()?;
-        let rows = maps.height_mm.len() / maps.width.max(1);
-        Some(height_png(maps.width as u32, rows as u32, &maps.height_mm))
-    };
-    let site = web::Site::new(
-        station.clone(),
-        Arc::new(picture),
-        config.http.hosts.clone(),
-    );
-    let pages = async {
-        if let Err(error) = web::serve(page, site, stop()).await {
-            eprintln!("fringed: {error}");
-        }
     };
     tokio::join!(
         tick(station.clone(), clock::utc_us, stop()),
-        modbus::serve(plc, station, options, stop()),
-        pages,
+        modbus::serve(
+            plc.listener,
+            station,
+            options,
+            plc.clients,
+            plc.refusals,
+            stop()
+        ),
+        web::serve(page, site, stop()),
     );
 }

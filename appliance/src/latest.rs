@@ -1,80 +1,104 @@
-//! The heights of the last cycle, made only when somebody wants to see them.
+//! What somebody wants to know of the last cycle, worked out only when it is wanted.
 //!
-//! The measuring task keeps the frames of the last cycle. Whoever wants its picture asks and waits; the measuring task
-//! answers when it has nothing more urgent to do.
+//! The measuring task keeps the plan and the frames of the last cycle. Whoever wants something of them asks and waits;
+//! the measuring task answers when it has nothing more urgent to do.
 
-use crate::plan::Maps;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use crate::calibration::Calibration;
+use crate::plan::{Layers, Plan};
+use crate::station::ResultRecord;
+use hal::frame::Frame;
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Longest wait for the measuring task: it may be in the middle of a cycle.
 const PATIENCE: Duration = Duration::from_secs(3);
+/// The most that wait at a time.
+const MOST_WAITING: usize = 8;
 
-/// The maps of the last cycle, for the page.
-#[derive(Clone, Debug, Default)]
-pub struct LastMaps(Arc<(Mutex<State>, Condvar)>);
+/// The last cycle as the measuring task holds it.
+#[derive(Clone, Copy, Debug)]
+pub struct LastCycle<'a> {
+    /// Its result.
+    pub record: &'a Arc<ResultRecord>,
+    /// The recipe that it was judged by.
+    pub plan: &'a Arc<Plan>,
+    /// Its frames, in the order of the sequence.
+    pub frames: &'a [Frame],
+    /// The head's calibration.
+    pub calibration: &'a Calibration,
+}
 
-#[derive(Debug, Default)]
-enum State {
-    /// Nothing was measured.
-    #[default]
-    Nothing,
-    /// There are frames; whether somebody wants to see them.
-    Frames { wanted: bool },
-    /// Somebody wanted to see them.
-    Made(Arc<Maps>),
+impl LastCycle<'_> {
+    /// SEQ of its result.
+    pub fn seq(&self) -> u32 {
+        self.record.seq
+    }
+}
+
+/// A question, and the way back for its answer.
+type Question = Box<dyn FnOnce(Option<LastCycle<'_>>) + Send>;
+
+/// The way to the last cycle. Cheap to clone.
+#[derive(Clone, Default)]
+pub struct LastMaps(Arc<Mutex<Inside>>);
+
+#[derive(Default)]
+struct Inside {
+    waiting: Vec<Question>,
+    /// The maps that were worked out last, and of which result.
+    layers: Option<(u32, Arc<Layers>)>,
 }
 
 impl LastMaps {
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.0.0.lock().unwrap_or_else(PoisonError::into_inner)
+    fn inside(&self) -> MutexGuard<'_, Inside> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The maps of the last cycle that had any. Waits until they are made, but not for ever.
-    pub fn get(&self) -> Option<Arc<Maps>> {
-        let mut state = self.state();
-        if let State::Frames { wanted } = &mut *state {
-            *wanted = true;
+    /// Asks the measuring task, and waits, but not for ever. None if there are no frames, too many ask, or it is too busy.
+    pub fn ask<T: Send + 'static>(
+        &self,
+        answer: impl FnOnce(LastCycle<'_>) -> T + Send + 'static,
+    ) -> Option<T> {
+        let (sender, receiver): (SyncSender<Option<T>>, _) = sync_channel(1);
+        let question: Question = Box::new(move |cycle| {
+            // Whoever asked may have given up.
+            let _ = sender.send(cycle.map(answer));
+        });
+        let mut inside = self.inside();
+        if inside.waiting.len() >= MOST_WAITING {
+            return None;
         }
-        let waiting = |state: &mut State| matches!(state, State::Frames { .. });
-        let (state, _) = self
-            .0
-            .1
-            .wait_timeout_while(state, PATIENCE, waiting)
-            .unwrap_or_else(PoisonError::into_inner);
-        match &*state {
-            State::Made(maps) => Some(maps.clone()),
-            State::Nothing | State::Frames { .. } => None,
-        }
+        inside.waiting.push(question);
+        drop(inside);
+        receiver.recv_timeout(PATIENCE).ok().flatten()
     }
 
-    /// There are frames of a newer cycle. Who waits for the maps of the one before gets these.
-    pub fn outdated(&self) {
-        let mut state = self.state();
-        if let State::Frames { wanted: true } = *state {
-            return;
+    /// The maps of the last cycle and the SEQ of its result; of the last one that had any, where the frames are gone.
+    pub fn layers(&self, seq: u32) -> Option<(u32, Arc<Layers>)> {
+        let made = self.inside().layers.clone();
+        if let Some((of, _)) = &made
+            && *of == seq
+        {
+            return made;
         }
-        *state = State::Frames { wanted: false };
+        let asked =
+            self.ask(|cycle| Some((cycle.seq(), Arc::new(cycle.plan.layers(cycle.frames)?))));
+        let newest = asked.flatten().or(made);
+        self.inside().layers.clone_from(&newest);
+        newest
     }
 
-    /// The frames of the last cycle are gone; maps that were made stay.
-    pub fn forget(&self) {
-        let mut state = self.state();
-        if let State::Frames { .. } = *state {
-            *state = State::Nothing;
-            self.0.1.notify_all();
+    /// Answers those who wait.
+    pub fn answer(&self, cycle: Option<LastCycle<'_>>) {
+        for question in std::mem::take(&mut self.inside().waiting) {
+            question(cycle);
         }
     }
 
     /// Whether somebody waits.
     pub fn wanted(&self) -> bool {
-        matches!(*self.state(), State::Frames { wanted: true })
-    }
-
-    /// Answers those who wait; `None` where there is nothing to show.
-    pub fn set(&self, maps: Option<Maps>) {
-        *self.state() = maps.map_or(State::Nothing, |maps| State::Made(Arc::new(maps)));
-        self.0.1.notify_all();
+        !self.inside().waiting.is_empty()
     }
 }
 
@@ -82,35 +106,26 @@ impl LastMaps {
 mod tests {
     use super::*;
 
-    fn maps(width: usize) -> Maps {
-        Maps {
-            width,
-            height_mm: vec![0.0; width],
+    #[test]
+    fn who_asks_before_there_are_frames_is_told_so_at_once() {
+        let last = LastMaps::default();
+        assert!(!last.wanted());
+        let asking = last.clone();
+        let asked = std::thread::spawn(move || asking.ask(|cycle| cycle.seq()));
+        while !last.wanted() {
+            std::thread::yield_now();
         }
+        last.answer(None);
+        assert_eq!(asked.join().unwrap(), None);
     }
 
     #[test]
-    fn maps_are_made_for_who_waits_and_not_before() {
-        let latest = LastMaps::default();
-        assert!(latest.get().is_none());
-        latest.outdated();
-        assert!(!latest.wanted());
-        let page = {
-            let latest = latest.clone();
-            std::thread::spawn(move || latest.get().map(|maps| maps.width))
-        };
-        while !latest.wanted() {
-            std::thread::yield_now();
+    fn more_than_can_wait_are_refused_instead_of_piling_up() {
+        let last = LastMaps::default();
+        for _ in 0..MOST_WAITING {
+            last.inside().waiting.push(Box::new(|_| ()));
         }
-        // A newer cycle ends in between: its maps are those that the page gets.
-        latest.outdated();
-        assert!(latest.wanted());
-        latest.set(Some(maps(3)));
-        assert_eq!(page.join().unwrap(), Some(3));
-        assert_eq!(latest.get().map(|maps| maps.width), Some(3));
-        latest.outdated();
-        assert!(!latest.wanted());
-        latest.set(None);
-        assert!(latest.get().is_none());
+        assert_eq!(last.ask(|cycle| cycle.seq()), None);
+        assert_eq!(last.inside().waiting.len(), MOST_WAITING);
     }
 }

@@ -1,5 +1,6 @@
 //! The daemon `fringed` and its command line: joins devices (`hal`) and computation (`algo`).
 
+pub mod access;
 pub mod adapt;
 pub mod backend;
 pub mod benchmark;
@@ -10,8 +11,11 @@ pub mod config;
 pub mod daemon;
 pub mod error;
 pub mod experiment;
+pub mod history;
 pub mod latest;
+pub mod logbook;
 pub mod measure;
+pub mod memory;
 pub mod modbus;
 pub mod output;
 pub mod plan;
@@ -19,7 +23,10 @@ pub mod progress;
 pub mod recipe;
 pub mod rig;
 pub mod seam;
+pub mod shelf;
 pub mod state;
 pub mod station;
+pub mod survey;
+pub mod tally;
 pub mod web;
 pub mod worker;

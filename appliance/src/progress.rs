@@ -1,5 +1,6 @@
 //! Progress of anything longer than a second: on stderr, only on a terminal, not with `--quiet`.
 
+use crate::logbook::Logbook;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// A progress bar that stays away where nobody looks. Cheap to clone; clones share the bar.
@@ -7,6 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 pub struct Progress {
     bar: ProgressBar,
     quiet: bool,
+    logbook: Logbook,
 }
 
 /// Steps of the bar.
@@ -25,7 +27,11 @@ impl Progress {
         if let Ok(style) = ProgressStyle::with_template("{bar:32} {percent:>3} % {msg}") {
             bar.set_style(style);
         }
-        Self { bar, quiet }
+        Self {
+            bar,
+            quiet,
+            logbook: Logbook::default(),
+        }
     }
 
     /// Shows the share done, 0…1, and what is being done. From any thread.
@@ -49,8 +55,14 @@ impl Progress {
 
     /// A line for the log, above the bar.
     pub fn log(&self, line: &str) {
+        self.logbook.add(line);
         if !self.quiet {
             self.bar.suspend(|| eprintln!("fringed: {line}"));
         }
+    }
+
+    /// The last lines of the log, also those that were not shown because of `quiet`.
+    pub fn logbook(&self) -> &Logbook {
+        &self.logbook
     }
 }

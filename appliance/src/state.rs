@@ -3,7 +3,8 @@
 use crate::error::{Exit, Failure};
 use crate::output::folder::write_whole;
 use crate::recipe::Store;
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// The folder that outlives a restart. One daemon at a time holds it.
@@ -15,7 +16,7 @@ pub struct StateFolder {
     _lock: File,
 }
 
-/// The counter's file: the SEQ of the last result, in decimal.
+/// The counter's file: the last SEQ that may be in use, in decimal.
 const COUNTER: &str = "result-seq";
 /// The serial's file.
 const SERIAL: &str = "serial";
@@ -71,9 +72,19 @@ impl StateFolder {
         })
     }
 
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// The recipes.
     pub fn recipes(&self) -> &Store {
         &self.recipes
+    }
+
+    /// Where a part of the state lies that somebody else opens.
+    pub fn place(&self, name: &str) -> PathBuf {
+        self.path.join(name)
     }
 
     /// The SEQ of the next result.
@@ -135,19 +146,28 @@ impl StateFolder {
     }
 }
 
-/// Stores the SEQ of each result before anybody sees the result, so that none is used twice.
+/// Stores which SEQs may be in use, before anybody sees their results, so that none is used twice.
 #[derive(Clone, Debug)]
 pub struct Counter {
     file: PathBuf,
 }
 
 impl Counter {
-    /// Stores a SEQ as used.
+    /// Stores that SEQs up to this one may be in use. Written in place, ten digits in one sector: it needs no room on a
+    /// full card, and whoever pulls the plug finds the old number or the new one.
     ///
     /// # Errors
     /// Whatever the file system answers.
     pub fn store(&self, seq: u32) -> std::io::Result<()> {
-        write_whole(&self.file, format!("{seq}\n").as_bytes())
+        let text = format!("{seq:010}\n");
+        match OpenOptions::new().write(true).open(&self.file) {
+            Ok(mut file) if file.metadata()?.len() == text.len() as u64 => {
+                file.write_all(text.as_bytes())?;
+                file.sync_data()
+            }
+            // The first time, or another program's or a person's file.
+            _ => write_whole(&self.file, text.as_bytes()),
+        }
     }
 }
 

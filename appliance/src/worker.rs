@@ -1,19 +1,28 @@
 //! The measuring task: one thread that owns the head, the plan and the computing threads.
 
+mod cycle;
+mod recovery;
+
 use crate::backend::Opened;
-use crate::latest::LastMaps;
+use crate::config::HeadConfig;
+use crate::history::History;
+use crate::latest::{LastCycle, LastMaps};
 use crate::plan::{Plan, PlanError};
 use crate::progress::Progress;
+use crate::recipe::store::Stamp;
 use crate::recipe::teach::{Naming, TeachError, teach};
 use crate::recipe::{LoadError, Store};
+use crate::shelf::Shelf;
 use crate::station::{
     ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
+    error_code,
 };
-use hal::error::ErrorKind;
+use hal::error::{Device, Error};
 use hal::frame::Frame;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// What the worker is told to do.
 #[derive(Debug)]
@@ -39,12 +48,31 @@ const DEVICE_TIMEOUT: Duration = Duration::from_secs(2);
 mod code {
     pub const CAMERA_LOST: u16 = 101;
     pub const UNSUPPORTED: u16 = 102;
+    pub const PROJECTOR_LOST: u16 = 201;
     pub const TIMEOUT: u16 = 301;
     pub const PROTOCOL: u16 = 302;
     pub const NOTHING_TO_TEACH: u16 = 401;
     pub const RIG: u16 = 501;
     pub const NOT_STORED: u16 = 601;
 }
+
+/// Which job was aborted last; told by the station, asked by the worker between two frames. Cheap to clone.
+#[derive(Clone, Debug, Default)]
+pub struct Aborts(Arc<AtomicU64>);
+
+impl Aborts {
+    /// Ends this job early. Jobs are numbered upwards.
+    pub fn abort(&self, job: JobId) {
+        self.0.fetch_max(job.0, Ordering::Relaxed);
+    }
+
+    fn has(&self, job: JobId) -> bool {
+        self.0.load(Ordering::Relaxed) == job.0
+    }
+}
+
+/// Words of what an abort ended.
+const ABORTED: &str = "the PLC or a stop ended it";
 
 /// Everything that the measuring task owns.
 pub struct Worker {
@@ -58,8 +86,18 @@ pub struct Worker {
     pub station: StationHandle,
     /// Where the last maps go.
     pub maps: LastMaps,
+    /// Where the frames of failed parts go.
+    pub history: History,
     /// Shows how far teaching is, and the log.
     pub progress: Progress,
+    /// How the head is opened again.
+    pub config: HeadConfig,
+    /// What the station wants to be ended early.
+    pub aborts: Aborts,
+    /// The head is gone since this error.
+    pub lost: Option<Error>,
+    /// Recipes made ready.
+    pub shelf: Shelf,
 }
 
 impl Worker {
@@ -75,15 +113,11 @@ impl Worker {
         if let Some(first) = first {
             self.station.event(Event::Request(first));
         }
-        let mut plan = None;
+        let mut plan: Option<Arc<Plan>> = None;
         let mut frames = Vec::new();
         loop {
             if self.maps.wanted() {
-                let shown = plan.as_ref().and_then(|plan: &Plan| {
-                    let show = || plan.heights(&frames);
-                    self.pool.install(show)
-                });
-                self.maps.set(shown);
+                self.tell(plan.as_ref(), &frames);
             }
             match orders.recv_timeout(SIGN_OF_LIFE) {
                 Ok(Order::Measure(job)) => {
@@ -92,71 +126,46 @@ impl Worker {
                     frames = self.measure(plan.as_ref(), &job);
                 }
                 Ok(Order::Load(job, key)) => {
-                    frames = self.forget();
+                    frames = Vec::new();
                     self.load(job, &key, &mut plan);
                 }
                 Ok(Order::Teach(job, number)) => {
-                    frames = self.forget();
+                    frames = Vec::new();
                     self.teach(job, number, &mut plan);
                 }
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
                 Err(RecvTimeoutError::Timeout) => {
                     self.station.event(Event::Alive);
+                    self.lost = self.opened.head.present().err();
+                }
+            }
+            if let Some(error) = self.lost.take() {
+                frames = Vec::new();
+                if self.recover(&error, &mut plan, orders).is_break() {
+                    return;
                 }
             }
         }
     }
 
-    /// No frames: those of the last cycle are nothing to another recipe.
-    fn forget(&self) -> Vec<Frame> {
-        self.maps.forget();
-        Vec::new()
-    }
-
-    /// Runs a cycle; the frames that it was judged by.
-    fn measure(&mut self, plan: Option<&Plan>, job: &Job) -> Vec<Frame> {
-        let id = job.job;
-        let failed = |error_code, message: String| Event::MeasureFailed {
-            job: id,
-            error_code,
-            message: message.into(),
-        };
-        let Some(plan) = plan else {
-            // The station triggers only with an active recipe, and that is this plan's.
-            self.station
-                .event(failed(code::RIG, "measure: no recipe is loaded".into()));
-            return Vec::new();
-        };
-        let count = plan.sequence().frame_count();
-        let mut frames: Vec<Frame> = Vec::with_capacity(count);
-        let indices: Vec<usize> = (0..count).collect();
-        let station = &self.station;
-        let taken = self
-            .opened
-            .head
-            .acquire(&indices, DEVICE_TIMEOUT, &mut |_, frame| {
-                frames.push(frame);
-                station.event(Event::Alive);
-            });
-        if let Err(error) = taken {
-            self.station
-                .event(failed(code_of(&error), error.to_string()));
-            return Vec::new();
-        }
-        let exposed = Instant::now();
-        self.station.event(Event::ExposureDone { job: id });
-        let inspection = self.pool.install(|| plan.inspect(&frames, exposed));
-        self.maps.outdated();
-        self.station.event(Event::Finished {
-            job: id,
-            inspection: Arc::new(inspection),
+    /// Answers those who want to know more of the last cycle.
+    fn tell(&self, plan: Option<&Arc<Plan>>, frames: &[Frame]) {
+        let (maps, calibration) = (&self.maps, &self.opened.calibration);
+        let result = self.station.snapshot().result.clone();
+        let measured = plan.filter(|_| !frames.is_empty()).zip(result.as_ref());
+        let cycle = measured.map(|(plan, record)| LastCycle {
+            record,
+            plan,
+            frames,
+            calibration,
         });
-        frames
+        self.pool.install(|| maps.answer(cycle));
     }
 
     /// Loads a recipe; the one before stays active unless everything went well.
-    fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Plan>) {
+    fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Arc<Plan>>) {
         let (result, message) = match self.prepare(key) {
+            Ok(_) if self.aborts.has(job) => (RecipeResult::Busy, format!("load: {ABORTED}")),
             Ok((ready, fallback)) => {
                 let recipe = active(&ready);
                 *plan = Some(ready);
@@ -169,29 +178,38 @@ impl Worker {
             Err(refused) => refused,
         };
         self.restore(plan);
-        let message = Arc::from(message);
-        self.station.event(Event::LoadFailed {
-            job,
-            result,
-            message,
-        });
+        // A lost head ends the job by itself.
+        if self.lost.is_none() {
+            let message = Arc::from(message);
+            self.station.event(Event::LoadFailed {
+                job,
+                result,
+                message,
+            });
+        }
     }
 
     /// Puts the patterns of the active recipe back into the projector, after another one's may have
     /// replaced them. Without them the recipe cannot measure: then each trigger ends INVALID.
-    fn restore(&mut self, plan: &mut Option<Plan>) {
+    fn restore(&mut self, plan: &mut Option<Arc<Plan>>) {
         let Some(before) = plan else { return };
-        let shown = before.rasters(&self.opened.calibration);
-        if let Err(error) = shown.and_then(|rasters| self.opened.head.load(rasters)) {
-            self.progress.log(&error.to_string());
-            *plan = None;
+        let shown = self
+            .pool
+            .install(|| before.rasters(&self.opened.calibration));
+        match shown.and_then(|rasters| self.opened.head.load(rasters)) {
+            Ok(()) => {}
+            Err(error) if recovery::is_lost(&error) => self.lost = Some(error),
+            Err(error) => {
+                self.progress.log(&error.to_string());
+                *plan = None;
+            }
         }
     }
 
     fn prepare(
         &mut self,
         key: &RecipeKey,
-    ) -> Result<(Plan, Option<String>), (RecipeResult, String)> {
+    ) -> Result<(Arc<Plan>, Option<String>), (RecipeResult, String)> {
         let refuse = |error: LoadError| {
             let result = match error {
                 LoadError::Unknown(_) => RecipeResult::Unknown,
@@ -203,25 +221,39 @@ impl Worker {
             RecipeKey::Number(number) => *number,
             RecipeKey::PartNumber(part_number) => self.recipes.find(part_number).map_err(refuse)?,
         };
-        let loaded = self.recipes.load(number).map_err(refuse)?;
-        let simulated = self.opened.stage.is_some();
+        let stamp = self.recipes.stamp(number);
         let (pool, calibration) = (&self.pool, &self.opened.calibration);
-        let plan = pool
-            .install(|| Plan::new(loaded.recipe, calibration, simulated))
-            .map_err(|error| {
-                let result = match error {
-                    PlanError::OtherCalibration { .. } => RecipeResult::OtherCalibration,
-                    PlanError::Unfit { .. } => RecipeResult::Corrupt,
-                };
-                (result, error.to_string())
-            })?;
-        plan.rasters(&self.opened.calibration)
+        let fingerprint = calibration.fingerprint();
+        let kept = stamp
+            .as_ref()
+            .and_then(|stamp| self.shelf.take(stamp, &fingerprint));
+        let (plan, fallback) = match kept {
+            Some(plan) => (plan, None),
+            None => {
+                // Before the arrays of the next take their place.
+                self.shelf.make_room(stamp.as_ref().map_or(0, Stamp::bytes));
+                let loaded = self.recipes.load(number).map_err(refuse)?;
+                let simulated = self.opened.stage.is_some();
+                let planned = pool.install(|| Plan::new(loaded.recipe, calibration, simulated));
+                let plan = Arc::new(planned.map_err(refuse_plan)?);
+                // What stands in for a damaged file is not that file's plan.
+                if let Some(stamp) = stamp.filter(|_| loaded.fallback.is_none()) {
+                    self.shelf.put(stamp, fingerprint, plan.clone());
+                }
+                (plan, loaded.fallback)
+            }
+        };
+        pool.install(|| plan.rasters(calibration))
             .and_then(|rasters| self.opened.head.load(rasters))
-            .map_err(|error| (RecipeResult::Corrupt, error.to_string()))?;
-        Ok((plan, loaded.fallback))
+            .map_err(|error| {
+                let message = error.to_string();
+                self.lost = Some(error).filter(recovery::is_lost);
+                (RecipeResult::Corrupt, message)
+            })?;
+        Ok((plan, fallback))
     }
 
-    fn teach(&mut self, job: JobId, number: u16, plan: &mut Option<Plan>) {
+    fn teach(&mut self, job: JobId, number: u16, plan: &mut Option<Arc<Plan>>) {
         let naming = Naming {
             number,
             part_number: format!("PART-{number:04}"),
@@ -245,8 +277,19 @@ impl Worker {
             .pool
             .install(|| teach(head, calibration, &naming, DEVICE_TIMEOUT, &progress));
         self.progress.clear();
+        let aborted = self.aborts.has(job);
         let stored = taught
-            .map_err(|error| (code_of_teaching(&error), error.to_string()))
+            .map_err(|error| {
+                let failed = (code_of_teaching(&error), error.to_string());
+                if let TeachError::Device(error) = error {
+                    self.lost = Some(error).filter(recovery::is_lost);
+                }
+                failed
+            })
+            .and_then(|taught| match aborted {
+                true => Err((error_code::ABORTED, format!("teach: {ABORTED}"))),
+                false => Ok(taught),
+            })
             .and_then(|taught| {
                 for reason in &taught.choice.reasons {
                     self.progress.log(reason);
@@ -271,14 +314,24 @@ impl Worker {
             }
             Err((error_code, message)) => {
                 self.restore(plan);
-                self.station.event(Event::TeachFailed {
-                    job,
-                    error_code,
-                    message: message.into(),
-                });
+                if self.lost.is_none() {
+                    self.station.event(Event::TeachFailed {
+                        job,
+                        error_code,
+                        message: message.into(),
+                    });
+                }
             }
         }
     }
+}
+
+fn refuse_plan(error: PlanError) -> (RecipeResult, String) {
+    let result = match error {
+        PlanError::OtherCalibration { .. } => RecipeResult::OtherCalibration,
+        PlanError::Unfit { .. } => RecipeResult::Corrupt,
+    };
+    (result, error.to_string())
 }
 
 fn active(plan: &Plan) -> ActiveRecipe {
@@ -289,12 +342,15 @@ fn active(plan: &Plan) -> ActiveRecipe {
     }
 }
 
-fn code_of(error: &hal::error::Error) -> u16 {
-    match error.kind() {
-        ErrorKind::Timeout => code::TIMEOUT,
-        ErrorKind::Disconnected => code::CAMERA_LOST,
-        ErrorKind::Unsupported => code::UNSUPPORTED,
-        ErrorKind::Protocol => code::PROTOCOL,
+fn code_of(error: &Error) -> u16 {
+    match error {
+        Error::Timeout { .. } => code::TIMEOUT,
+        Error::Disconnected { device, .. } => match device {
+            Device::Camera => code::CAMERA_LOST,
+            Device::Projector => code::PROJECTOR_LOST,
+        },
+        Error::Unsupported { .. } => code::UNSUPPORTED,
+        Error::Protocol { .. } => code::PROTOCOL,
     }
 }
 

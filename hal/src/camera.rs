@@ -13,6 +13,14 @@ pub trait Camera: Send {
     /// The format that every frame will have.
     fn format(&self) -> FrameFormat;
 
+    /// Asks whether the camera is still there, without disturbing it. A back-end whose driver cannot say answers that it is.
+    ///
+    /// # Errors
+    /// `Disconnected` if it is gone.
+    fn present(&self) -> Result<(), Error> {
+        Ok(())
+    }
+
     /// Arms the camera; triggers before this expose nothing.
     ///
     /// # Errors
@@ -35,6 +43,10 @@ pub trait Camera: Send {
 impl<C: Camera + ?Sized> Camera for Box<C> {
     fn format(&self) -> FrameFormat {
         (**self).format()
+    }
+
+    fn present(&self) -> Result<(), Error> {
+        (**self).present()
     }
 
     fn start(&mut self) -> Result<(), Error> {

@@ -15,6 +15,26 @@ pub enum ErrorKind {
     Protocol,
 }
 
+/// A device that can be pulled out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Device {
+    /// The camera.
+    Camera,
+    /// The projector.
+    Projector,
+}
+
+impl Device {
+    /// The word for it.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Camera => "camera",
+            Self::Projector => "projector",
+        }
+    }
+}
+
 /// A failed call of a device. The message says what was attempted, with what numbers, and the remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
@@ -29,8 +49,10 @@ pub enum Error {
         remedy: String,
     },
     /// The device is gone.
-    #[error("{attempt} failed because the device is gone: {remedy}")]
+    #[error("{attempt} failed because the {} is gone: {remedy}", device.word())]
     Disconnected {
+        /// Which.
+        device: Device,
         /// What was attempted, with its numbers.
         attempt: String,
         /// What to do about it.
@@ -76,6 +98,15 @@ impl Error {
             attempt: attempt.into(),
             timeout,
             remedy: remedy.into(),
+        }
+    }
+
+    /// `device` is gone, which `attempt` needs.
+    pub fn disconnected(device: Device, attempt: impl Into<String>) -> Self {
+        Self::Disconnected {
+            device,
+            attempt: attempt.into(),
+            remedy: format!("check the {}'s cable and its power", device.word()),
         }
     }
 

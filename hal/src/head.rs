@@ -32,6 +32,25 @@ pub struct Exposure {
     pub done: Timestamp,
     /// Frames that were older than their pattern and were discarded.
     pub stale: u32,
+    /// Frames that were exposed and never came: gaps in the camera's count.
+    pub dropped: u32,
+    /// Refreshes that the projector missed: gaps in its count of flips.
+    pub missed_flips: u32,
+    /// Longest time from a pattern's coming into view to the start of its exposure.
+    pub lag: Duration,
+}
+
+/// The counts of the frame and the flip before.
+#[derive(Clone, Copy, Default)]
+struct Counts {
+    frame: Option<u64>,
+    flip: Option<u64>,
+}
+
+/// How many counts are missing between two that follow each other.
+fn gap(before: Option<u64>, now: u64) -> u32 {
+    let missing = before.map_or(0, |before| now.saturating_sub(before).saturating_sub(1));
+    u32::try_from(missing).unwrap_or(u32::MAX)
 }
 
 impl<C: Camera, P: Projector, T: Trigger> Head<C, P, T> {
@@ -52,6 +71,20 @@ impl<C: Camera, P: Projector, T: Trigger> Head<C, P, T> {
     /// Columns and rows of the rasters that [`Head::load`] takes.
     pub fn projector_size(&self) -> (u32, u32) {
         self.projector.size()
+    }
+
+    /// Time between two refreshes of the projector.
+    pub fn refresh(&self) -> Duration {
+        self.projector.refresh()
+    }
+
+    /// Asks whether camera and projector are still there, without disturbing them.
+    ///
+    /// # Errors
+    /// `Disconnected` of the first one that is gone.
+    pub fn present(&self) -> Result<(), Error> {
+        self.camera.present()?;
+        self.projector.present()
     }
 
     /// Replaces the patterns.
@@ -77,6 +110,23 @@ impl<C: Camera, P: Projector, T: Trigger> Head<C, P, T> {
         timeout: Duration,
         sink: &mut dyn FnMut(usize, Frame),
     ) -> Result<Exposure, Error> {
+        let mut all = |index, frame| {
+            sink(index, frame);
+            true
+        };
+        self.acquire_while(indices, timeout, &mut all)
+    }
+
+    /// As [`Head::acquire`], but `sink` ends the sequence early by answering `false`.
+    ///
+    /// # Errors
+    /// As [`Head::acquire`]; ending early is none.
+    pub fn acquire_while(
+        &mut self,
+        indices: &[usize],
+        timeout: Duration,
+        sink: &mut dyn FnMut(usize, Frame) -> bool,
+    ) -> Result<Exposure, Error> {
         let result = self
             .camera
             .start()
@@ -94,21 +144,31 @@ impl<C: Camera, P: Projector, T: Trigger> Head<C, P, T> {
         &mut self,
         indices: &[usize],
         timeout: Duration,
-        sink: &mut dyn FnMut(usize, Frame),
+        sink: &mut dyn FnMut(usize, Frame) -> bool,
     ) -> Result<Exposure, Error> {
         let mut exposure: Option<Exposure> = None;
+        let mut before = Counts::default();
         for &index in indices {
             let flip = self.projector.show(index, timeout)?;
             self.trigger.fire(timeout)?;
-            let (frame, stale) = self.frame_of(index, flip, timeout)?;
+            let (frame, stale, dropped) = self.frame_of(index, flip, timeout, &mut before)?;
             let so_far = exposure.get_or_insert(Exposure {
                 started: flip.timestamp,
                 done: flip.timestamp,
                 stale: 0,
+                dropped: 0,
+                missed_flips: 0,
+                lag: Duration::ZERO,
             });
             so_far.done = frame.timestamp();
             so_far.stale += stale;
-            sink(index, frame);
+            so_far.dropped = so_far.dropped.saturating_add(dropped);
+            let missed = gap(before.flip.replace(flip.sequence), flip.sequence);
+            so_far.missed_flips = so_far.missed_flips.saturating_add(missed);
+            so_far.lag = so_far.lag.max(frame.timestamp().since(flip.timestamp));
+            if !sink(index, frame) {
+                break;
+            }
         }
         exposure.ok_or_else(|| {
             Error::protocol(
@@ -118,17 +178,22 @@ impl<C: Camera, P: Projector, T: Trigger> Head<C, P, T> {
         })
     }
 
-    /// The first frame that was exposed with pattern `index` in view, and how many older ones came before it.
+    /// The first frame that was exposed with pattern `index` in view, how many older ones came before it, and how many
+    /// are missing in the camera's count.
     fn frame_of(
         &mut self,
         index: usize,
         flip: Flip,
         timeout: Duration,
-    ) -> Result<(Frame, u32), Error> {
+        before: &mut Counts,
+    ) -> Result<(Frame, u32, u32), Error> {
+        let mut dropped = 0_u32;
         for stale in 0..=MAX_STALE_FRAMES {
             let frame = self.camera.next_frame(timeout)?;
+            let missing = gap(before.frame.replace(frame.sequence()), frame.sequence());
+            dropped = dropped.saturating_add(missing);
             if frame.timestamp() >= flip.timestamp {
-                return Ok((frame, stale));
+                return Ok((frame, stale, dropped));
             }
         }
         Err(Error::protocol(

@@ -77,6 +77,17 @@ pub trait Projector: Send {
     /// Columns and rows.
     fn size(&self) -> (u32, u32);
 
+    /// Time from one refresh to the next.
+    fn refresh(&self) -> Duration;
+
+    /// Asks whether the projector is still there, without disturbing it. A back-end whose driver cannot say answers that it is.
+    ///
+    /// # Errors
+    /// `Disconnected` if it is gone.
+    fn present(&self) -> Result<(), Error> {
+        Ok(())
+    }
+
     /// Replaces the patterns; nothing is shown until [`Projector::show`].
     ///
     /// # Errors
@@ -99,6 +110,14 @@ pub trait Projector: Send {
 impl<P: Projector + ?Sized> Projector for Box<P> {
     fn size(&self) -> (u32, u32) {
         (**self).size()
+    }
+
+    fn refresh(&self) -> Duration {
+        (**self).refresh()
+    }
+
+    fn present(&self) -> Result<(), Error> {
+        (**self).present()
     }
 
     fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {

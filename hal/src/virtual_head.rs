@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crate::camera::Camera;
-use crate::error::Error;
+use crate::error::{self, Error};
 use crate::frame::{Frame, FrameFormat};
 use crate::head::{DynHead, Head};
 use crate::projector::{Flip, Projector, Raster};
@@ -57,6 +57,30 @@ pub(crate) struct Bench<S> {
     busy_until: Timestamp,
     exposures: u64,
     pending: VecDeque<Frame>,
+    camera: Line,
+    projector: Line,
+}
+
+/// The cable of one device.
+#[derive(Clone, Copy, Default)]
+struct Line {
+    out: bool,
+    /// How often it was pulled out. Devices that were opened before the last time are dead for ever.
+    pulled: u64,
+}
+
+impl Line {
+    fn check(
+        self,
+        device: error::Device,
+        opened: u64,
+        attempt: impl FnOnce() -> String,
+    ) -> Result<(), Error> {
+        if self.out || self.pulled != opened {
+            return Err(Error::disconnected(device, attempt()));
+        }
+        Ok(())
+    }
 }
 
 /// One bench, shared by the three devices (and whoever changes the scene).
@@ -74,9 +98,49 @@ pub(crate) fn head<S: Scene + 'static>(scene: S, refresh: Duration) -> (DynHead,
         busy_until: Timestamp(0),
         exposures: 0,
         pending: VecDeque::with_capacity(MAX_PENDING),
+        camera: Line::default(),
+        projector: Line::default(),
     }));
-    let device = || Box::new(Device(Arc::clone(&bench)));
-    (Head::new(device(), device(), device()), bench)
+    let head = devices(&bench);
+    (head, bench)
+}
+
+/// The three devices, opened as the cables are now.
+fn devices<S: Scene + 'static>(bench: &Shared<S>) -> DynHead {
+    let (camera, projector) = {
+        let bench = lock(bench);
+        (bench.camera.pulled, bench.projector.pulled)
+    };
+    let device = || {
+        Box::new(Device {
+            bench: Arc::clone(bench),
+            camera,
+            projector,
+        })
+    };
+    Head::new(device(), device(), device())
+}
+
+/// Opens the devices of a bench anew: a stopped camera and a blank projector.
+///
+/// # Errors
+/// `Disconnected` if one of them is pulled out.
+pub(crate) fn reopen<S: Scene + 'static>(bench: &Shared<S>) -> Result<DynHead, Error> {
+    {
+        let mut bench = lock(bench);
+        for (line, device) in [
+            (bench.camera, error::Device::Camera),
+            (bench.projector, error::Device::Projector),
+        ] {
+            line.check(device, line.pulled, || {
+                format!("opening the {}", device.word())
+            })?;
+        }
+        bench.armed = false;
+        bench.shown = None;
+        bench.pending.clear();
+    }
+    Ok(devices(bench))
 }
 
 /// Locks a bench. A panic of another thread leaves no half-done state behind that would matter here.
@@ -84,8 +148,46 @@ pub(crate) fn lock<S>(bench: &Shared<S>) -> MutexGuard<'_, Bench<S>> {
     bench.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The bench seen as any of the three devices.
-struct Device<S>(Shared<S>);
+/// The bench seen as any of the three devices, with the state of the cables when it was opened.
+struct Device<S> {
+    bench: Shared<S>,
+    camera: u64,
+    projector: u64,
+}
+
+impl<S> Device<S> {
+    /// The bench, if the camera is the one that was opened.
+    fn as_camera(&self, attempt: &str) -> Result<MutexGuard<'_, Bench<S>>, Error> {
+        let bench = lock(&self.bench);
+        bench
+            .camera
+            .check(error::Device::Camera, self.camera, || attempt.to_owned())?;
+        Ok(bench)
+    }
+
+    /// The bench, if the projector is the one that was opened.
+    fn as_projector(&self, attempt: &str) -> Result<MutexGuard<'_, Bench<S>>, Error> {
+        let bench = lock(&self.bench);
+        bench
+            .projector
+            .check(error::Device::Projector, self.projector, || {
+                attempt.to_owned()
+            })?;
+        Ok(bench)
+    }
+}
+
+impl<S> Bench<S> {
+    /// Pulls a device's cable out, or puts it back. What was opened before stays dead.
+    pub fn plug(&mut self, device: error::Device, into: bool) {
+        let line = match device {
+            error::Device::Camera => &mut self.camera,
+            error::Device::Projector => &mut self.projector,
+        };
+        line.pulled += u64::from(!into);
+        line.out = !into;
+    }
+}
 
 impl<S: Scene> Bench<S> {
     fn exposure(&self) -> Duration {
@@ -117,11 +219,15 @@ impl<S: Scene> Bench<S> {
 
 impl<S: Scene> Camera for Device<S> {
     fn format(&self) -> FrameFormat {
-        lock(&self.0).scene.format()
+        lock(&self.bench).scene.format()
+    }
+
+    fn present(&self) -> Result<(), Error> {
+        self.as_camera("looking for the camera").map(|_| ())
     }
 
     fn start(&mut self) -> Result<(), Error> {
-        let mut bench = lock(&self.0);
+        let mut bench = self.as_camera("starting the camera")?;
         if bench.armed {
             return Err(Error::protocol(
                 "starting a camera that is running",
@@ -133,7 +239,7 @@ impl<S: Scene> Camera for Device<S> {
     }
 
     fn next_frame(&mut self, timeout: Duration) -> Result<Frame, Error> {
-        let mut bench = lock(&self.0);
+        let mut bench = self.as_camera("waiting for a frame")?;
         if !bench.armed {
             return Err(Error::protocol(
                 "waiting for a frame of a stopped camera",
@@ -157,7 +263,7 @@ impl<S: Scene> Camera for Device<S> {
     }
 
     fn stop(&mut self) -> Result<(), Error> {
-        let mut bench = lock(&self.0);
+        let mut bench = self.as_camera("stopping the camera")?;
         bench.armed = false;
         bench.pending.clear();
         Ok(())
@@ -166,11 +272,19 @@ impl<S: Scene> Camera for Device<S> {
 
 impl<S: Scene> Projector for Device<S> {
     fn size(&self) -> (u32, u32) {
-        lock(&self.0).scene.projector_size()
+        lock(&self.bench).scene.projector_size()
+    }
+
+    fn refresh(&self) -> Duration {
+        lock(&self.bench).refresh
+    }
+
+    fn present(&self) -> Result<(), Error> {
+        self.as_projector("looking for the projector").map(|_| ())
     }
 
     fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
-        let mut bench = lock(&self.0);
+        let mut bench = self.as_projector("loading patterns")?;
         let (width, height) = bench.scene.projector_size();
         for (index, raster) in rasters.iter().enumerate() {
             if (raster.width(), raster.height()) != (width, height) {
@@ -189,7 +303,7 @@ impl<S: Scene> Projector for Device<S> {
     }
 
     fn show(&mut self, index: usize, timeout: Duration) -> Result<Flip, Error> {
-        let mut bench = lock(&self.0);
+        let mut bench = self.as_projector("showing a pattern")?;
         let loaded = bench.scene.loaded();
         if index >= loaded {
             return Err(Error::protocol(
@@ -211,14 +325,14 @@ impl<S: Scene> Projector for Device<S> {
     }
 
     fn blank(&mut self) -> Result<(), Error> {
-        lock(&self.0).shown = None;
+        self.as_projector("blanking the projector")?.shown = None;
         Ok(())
     }
 }
 
 impl<S: Scene> Trigger for Device<S> {
     fn fire(&mut self, timeout: Duration) -> Result<Timestamp, Error> {
-        let mut bench = lock(&self.0);
+        let mut bench = lock(&self.bench);
         let free = bench.busy_until;
         bench.wait(free, timeout, || "starting an exposure".to_owned())?;
         let start = bench.now;

@@ -89,9 +89,22 @@ triggers=$(((after[10] << 16 | after[11]) - (before[10] << 16 | before[11])))
 [[ $((after[14] << 16 | after[15])) -eq $((before[14] << 16 | before[15])) ]] || broken "triggers were missed"
 [[ ${after[16]} -eq $token ]] || broken "LAST_TOKEN is ${after[16]}, not $token"
 
+# The README's examples, word for word but for the port.
+examples=0
+while IFS= read -r example; do
+    words=${example%%#*}
+    eval "${words/-p 1502/-m tcp -p $port}" >"$log.example" || broken "the README's example fails: $example"
+    examples=$((examples + 1))
+done < <(grep '^mbpoll -p 1502' "$(dirname "${BASH_SOURCE[0]}")/../../README.md")
+[[ $examples -eq 2 ]] || broken "the README has $examples examples for mbpoll, not 2"
+await_token 7
+[[ $((result[6] << 16 | result[7])) -eq 4711 && $((result[28] << 16 | result[29])) -eq 12 && ${result[8]} -eq 1 ]] ||
+    broken "the README's part 4711 of stroke 12 did not pass"
+rm -f "$log.example"
+
 kill -TERM "$daemon"
 code=0
 wait "$daemon" || code=$?
 daemon=
 [[ $code -eq 0 ]] || broken "SIGTERM ended the daemon with exit code $code"
-echo "mbpoll: $cycles cycles by token, each sent twice and measured once"
+echo "mbpoll: $cycles cycles by token, each sent twice and measured once; the README's examples hold"

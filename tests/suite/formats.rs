@@ -25,12 +25,22 @@ const MEMBERS: [&str; 9] = [
 ];
 
 /// Keys of its `recipe.json`, version 1, as a taught recipe has them. The same holds for these.
-const KEYS: [&str; 40] = [
+const KEYS: [&str; 50] = [
+    "alignment",
     "calibration",
     "camera",
     "camera.bit_depth",
     "camera.height",
     "camera.width",
+    "comparison",
+    "comparison.adaptive",
+    "comparison.adaptive.coverage",
+    "comparison.adaptive.frames",
+    "comparison.adaptive.sigma_mm",
+    "comparison.fixed",
+    "comparison.fixed.coverage",
+    "comparison.fixed.frames",
+    "comparison.fixed.sigma_mm",
     "expansion_range_turns",
     "fingerprint",
     "format",
@@ -68,7 +78,15 @@ const KEYS: [&str; 40] = [
     "version",
 ];
 /// What it may hold besides.
-const OPTIONAL: [&str; 2] = ["exposure_us", "fringes"];
+const OPTIONAL: [&str; 7] = [
+    "exposure_us",
+    "fringes",
+    "from",
+    "tolerance_mm",
+    "about",
+    "above_mm",
+    "component",
+];
 
 fn collect(value: &Value, prefix: &str, keys: &mut BTreeSet<String>) {
     match value {
@@ -129,6 +147,21 @@ fn a_taught_recipe_has_exactly_the_documented_members_and_keys() {
             documented.contains(&format!("`{name}`")),
             "docs/formats.md names no `{name}`"
         );
+    }
+}
+
+#[test]
+fn every_documented_gauge_is_read_and_written_as_it_stands_there() {
+    let documented = document("formats.md");
+    let (_, from) = documented
+        .split_once("all that there are:\n\n```json\n")
+        .unwrap();
+    let (list, _) = from.split_once("```").unwrap();
+    let list: Vec<Value> = serde_json::from_str(list).unwrap();
+    assert_eq!(list.len(), 11);
+    for gauge in list {
+        let read: appliance::recipe::GaugeKind = serde_json::from_value(gauge.clone()).unwrap();
+        assert_eq!(serde_json::to_value(read).unwrap(), gauge);
     }
 }
 

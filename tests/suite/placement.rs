@@ -6,7 +6,7 @@ use appliance::calibration::Calibration;
 use appliance::plan::Plan;
 use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::teach::{Naming, Taught, teach};
-use appliance::recipe::{GaugeFile, Recipe, RecipeFile, RegionFile, safe};
+use appliance::recipe::{AlignmentKind, GaugeFile, Recipe, RecipeFile, RegionFile, safe};
 use appliance::rig::{About, Rig};
 use hal::head::DynHead;
 use hal::sim::parts::{Cone, Plane, Sawtooth, SheetMetal, Sphere, Spline};
@@ -177,7 +177,7 @@ fn cycle(bed: &mut Bed, file: &RecipeFile, arrays: &Arrays) -> (Vec<f32>, f64) {
     let recipe = Recipe::from_bytes(&bytes).unwrap();
     let plan = Plan::new(recipe, &bed.calibration, true).unwrap();
     let rasters = plan.rasters(&bed.calibration).unwrap();
-    let indices: Vec<usize> = (0..rasters.len()).collect();
+    let indices = plan.indices(0).to_vec();
     bed.head.load(rasters).unwrap();
     bed.stage.reseed(5);
     let mut frames = Vec::new();
@@ -209,6 +209,8 @@ fn pixels_that_no_gauge_looks_at_are_not_computed_and_the_others_are_the_same() 
     let small = RecipeFile {
         regions: vec![region.clone()],
         gauges: vec![gauge.clone()],
+        // Alignment looks at the whole part.
+        alignment: AlignmentKind::None,
         ..file.clone()
     };
     let mut whole = small.clone();

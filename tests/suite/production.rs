@@ -1,15 +1,15 @@
 //! Production by strips against exact triangulation and against the comparison of whole maps.
 
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
-use algo::inspect::{Comparison, Findings, Golden, Production, Region};
+use algo::inspect::{Comparison, Findings, Golden, Measure, Production, Region};
 use algo::phase::Trust;
 use algo::pipeline::{HeightMap, decode};
 use algo::simd::Backend;
 use algo::units::{AbsolutePhase, Height, PhaseDelta};
 use appliance::plan::Plan;
-use appliance::recipe::Recipe;
 use appliance::recipe::archive::pack;
 use appliance::recipe::teach::Taught;
+use appliance::recipe::{AlignmentKind, Recipe};
 use appliance::seam;
 use hal::frame::Frame;
 use hal::sim::parts::{Cone, Sawtooth, SheetMetal};
@@ -35,10 +35,11 @@ fn parts() -> [(&'static str, Part); 3] {
     ]
 }
 
-/// The recipe's plan with one of its sequences, and its whole recipe.
+/// The recipe's plan with one of its sequences and without alignment, and its whole recipe.
 fn plan(bed: &Bed, taught: &Taught, sequence: usize) -> (Plan, Recipe) {
     let mut file = taught.recipe.file.clone();
     file.production = sequence;
+    file.alignment = AlignmentKind::None;
     let (bytes, _) = pack(&file, &taught.recipe.arrays).unwrap();
     let recipe = Recipe::from_bytes(&bytes).unwrap();
     let plan = Plan::new(recipe.clone(), &bed.calibration, true).unwrap();
@@ -47,7 +48,7 @@ fn plan(bed: &Bed, taught: &Taught, sequence: usize) -> (Plan, Recipe) {
 
 fn frames(bed: &mut Bed, plan: &Plan) -> Vec<Frame> {
     let rasters = plan.rasters(&bed.calibration).unwrap();
-    let indices: Vec<usize> = (0..rasters.len()).collect();
+    let indices: Vec<usize> = (0..plan.sequence().frame_count()).collect();
     bed.head.load(rasters).unwrap();
     bed.stage.reseed(11);
     let mut frames = Vec::new();
@@ -180,18 +181,18 @@ fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]) {
             .collect(),
         sigma,
     };
-    let golden = golden(recipe, plan);
+    let golden = golden(recipe);
     let comparison = Comparison::new(&golden, &measured);
     let close = |a: f64, b: f64, share: f64| (a - b).abs() <= share * b.abs();
-    for ((gauge, region), reading) in recipe
+    for ((gauge, planned), reading) in recipe
         .file
         .gauges
         .iter()
-        .zip(&recipe.regions)
+        .zip(&recipe.gauges)
         .zip(&found.readings)
     {
         let reading = reading.unwrap();
-        let expected = expected(&comparison, gauge, region);
+        let expected = expected(&comparison, &planned.measure, &planned.region);
         let tolerance = if expected.sigma.is_some() {
             SINGLE_MM
         } else {
@@ -227,7 +228,7 @@ fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]) {
         "{name}: {} {noise}",
         found.height_noise_mm
     );
-    let taught = rms(&golden.sigma, &measured.height);
+    let taught = rms(&golden_sigma(recipe, plan), &measured.height);
     assert!(
         close(found.taught_noise_mm, taught, SIGMA_SHARE),
         "{name}: {} {taught}",
@@ -249,37 +250,41 @@ fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]) {
 
 fn expected(
     comparison: &Comparison<'_>,
-    gauge: &appliance::recipe::GaugeFile,
+    measure: &Measure,
     region: &Region,
 ) -> algo::inspect::Reading {
-    match gauge.measures {
-        appliance::recipe::GaugeKind::Deviation { smoothing_px } => {
-            comparison.deviation(region, smoothing_px).unwrap()
-        }
-        appliance::recipe::GaugeKind::Coverage => comparison.coverage(region),
+    match *measure {
+        Measure::Deviation { side } => comparison.deviation(region, side).unwrap(),
+        Measure::Coverage => comparison.coverage(region),
+        _ => panic!("a taught recipe measures no {measure:?}"),
     }
 }
 
-fn golden(recipe: &Recipe, plan: &Plan) -> Golden {
+/// σ of golden's heights, mm, as the plan's sequence has it.
+fn golden_sigma(recipe: &Recipe, plan: &Plan) -> Vec<f32> {
     let arrays = &recipe.arrays;
     let decoder = plan.production().decoder();
     let full_scale = f64::from(decoder.full_scale());
-    let heights = arrays.golden_height.iter().zip(&arrays.valid);
     let sigma = arrays.modulation.iter().zip(&arrays.height_slope);
+    sigma
+        .map(|(&counts, &slope)| {
+            let share = (f64::from(counts) / full_scale * 65_535.0).round() as u16;
+            let modulation = algo::units::Modulation::from_bits(share);
+            let turns = decoder.phase_noise(modulation, recipe.file.noise_counts);
+            (turns * f64::from(slope).abs()) as f32
+        })
+        .collect()
+}
+
+fn golden(recipe: &Recipe) -> Golden {
+    let arrays = &recipe.arrays;
+    let heights = arrays.golden_height.iter().zip(&arrays.valid);
     Golden {
         width: recipe.file.camera.width as usize,
         height: heights
             .map(|(&mm, &valid)| match valid {
                 1 => Height::from_mm(f64::from(mm)),
                 _ => Height::UNKNOWN,
-            })
-            .collect(),
-        sigma: sigma
-            .map(|(&counts, &slope)| {
-                let share = (f64::from(counts) / full_scale * 65_535.0).round() as u16;
-                let modulation = algo::units::Modulation::from_bits(share);
-                let turns = decoder.phase_noise(modulation, recipe.file.noise_counts);
-                (turns * f64::from(slope).abs()) as f32
             })
             .collect(),
     }

@@ -60,6 +60,8 @@ pub struct Daemon {
     child: Child,
     /// Where it serves Modbus TCP.
     pub modbus: SocketAddr,
+    /// Where it serves the page.
+    pub http: SocketAddr,
     /// What it said until it served.
     pub log: String,
 }
@@ -86,18 +88,24 @@ impl Daemon {
             }
         });
         let mut log = String::new();
-        let modbus = loop {
+        let (modbus, http) = loop {
             let Ok(line) = hear.recv_timeout(PATIENCE) else {
                 let _ = child.kill();
                 panic!("it does not serve: {:?}\n{log}", child.wait());
             };
             if let Some((_, rest)) = line.split_once("Modbus TCP on ") {
-                break rest.split(',').next().unwrap().parse().unwrap();
+                let (modbus, page) = rest.split_once(", page on http://").unwrap();
+                break (modbus.parse().unwrap(), page.trim().parse().unwrap());
             }
             log += &line;
             log += "\n";
         };
-        Self { child, modbus, log }
+        Self {
+            child,
+            modbus,
+            http,
+            log,
+        }
     }
 
     pub fn terminate(mut self) -> ExitStatus {
@@ -187,11 +195,15 @@ pub struct Plc {
 
 impl Plc {
     pub fn connect(daemon: &Daemon) -> Self {
+        Self::at(daemon.modbus)
+    }
+
+    pub fn at(modbus: SocketAddr) -> Self {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()
             .unwrap();
-        let context = runtime.block_on(tcp::connect(daemon.modbus)).unwrap();
+        let context = runtime.block_on(tcp::connect(modbus)).unwrap();
         Self { runtime, context }
     }
 

@@ -24,6 +24,15 @@ impl Vector {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
+    /// The vector product.
+    pub fn cross(self, other: Self) -> Self {
+        Self::new(
+            self.y * other.z - self.z * other.y,
+            self.z * other.x - self.x * other.z,
+            self.x * other.y - self.y * other.x,
+        )
+    }
+
     /// The Euclidean length.
     pub fn length(self) -> f64 {
         libm::sqrt(self.dot(self))

@@ -13,8 +13,6 @@ pub struct Golden {
     pub width: usize,
     /// Height as taught, [`Height::UNKNOWN`] where the part is not to be compared.
     pub height: Vec<Height>,
-    /// Error (1 σ) of the taught height in mm.
-    pub sigma: Vec<f32>,
 }
 
 /// What a gauge found.
@@ -22,7 +20,8 @@ pub struct Golden {
 pub struct Reading {
     /// The value in mm or as a share.
     pub value: f64,
-    /// Its error, 1 σ, where the noise is known.
+    /// Its error from measurement to measurement of the same part, 1 σ, where the noise is known. What golden's own noise
+    /// does to it is the same every time and not in it.
     pub sigma: Option<f64>,
 }
 
@@ -79,11 +78,12 @@ impl<'a> Comparison<'a> {
         if !(golden.is_known() && measured.is_known()) {
             return None;
         }
-        let square = |sigma: f32| {
-            let nm = f64::from(sigma) * 1e6;
-            if nm.is_finite() { nm * nm } else { 0.0 }
+        let sigma = f64::from(self.measured.sigma[place]) * 1e6;
+        let variance = if sigma.is_finite() {
+            sigma * sigma
+        } else {
+            0.0
         };
-        let variance = square(self.golden.sigma[place]) + square(self.measured.sigma[place]);
         Some((i64::from(measured.nm()) - i64::from(golden.nm()), variance))
     }
 
@@ -173,7 +173,6 @@ mod tests {
         let golden = Golden {
             width: WIDTH,
             height: vec![Height::from_nm(0); WIDTH * WIDTH],
-            sigma: vec![0.03; WIDTH * WIDTH],
         };
         let measured = HeightMap {
             width: WIDTH,
@@ -201,8 +200,8 @@ mod tests {
         let comparison = Comparison::new(&golden, &measured);
         let dent = comparison.deviation(&region, 7).unwrap();
         assert!((dent.value + 0.5).abs() < 1e-9, "{dent:?}");
-        // 49 pixels of √(0.03² + 0.04²) = 0.05 mm.
-        assert!((dent.sigma.unwrap() - 0.05 / 7.0).abs() < 1e-7);
+        // 49 pixels of 0.04 mm.
+        assert!((dent.sigma.unwrap() - 0.04 / 7.0).abs() < 1e-7);
         let raw = comparison.deviation(&region, 1).unwrap();
         assert!((raw.value - 3.0).abs() < 1e-9);
     }

@@ -1,11 +1,14 @@
 //! What a height map says about a part: regions, gauges and the comparison with the golden map.
 
+pub mod align;
 mod deviation;
+pub mod gauge;
 mod openings;
 mod region;
 mod strips;
 
 pub use deviation::{Comparison, Golden, Reading};
+pub use gauge::{Axis, Measure};
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
-pub use strips::{Findings, Measure, Production, Skipped, Strip, Taught, TooSmooth};
+pub use strips::{Findings, Gauge, Parts, Production, Skipped, Strip, Taught, Unmeasurable};

@@ -5,8 +5,10 @@ use core::fmt;
 use core::ops::Range;
 
 /// The pixels whose centres lie inside a polygon (even-odd rule), as spans of rows.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Region {
+    /// Corners (u, v).
+    corners: Vec<(f64, f64)>,
     /// Row and columns.
     spans: Vec<(usize, Range<usize>)>,
 }
@@ -70,7 +72,21 @@ impl Region {
         if spans.is_empty() {
             return Err(RegionError::Empty);
         }
-        Ok(Self { spans })
+        Ok(Self {
+            corners: corners.to_vec(),
+            spans,
+        })
+    }
+
+    /// The region with its corners carried elsewhere; it may hold no pixel of the frame (width, height) then.
+    pub fn moved(
+        &self,
+        (width, height): (usize, usize),
+        to: impl Fn((f64, f64)) -> (f64, f64),
+    ) -> Self {
+        let corners: Vec<_> = self.corners.iter().map(|&corner| to(corner)).collect();
+        let spans = polygon_spans(&corners, width, height);
+        Self { corners, spans }
     }
 
     /// Number of pixels.
@@ -78,7 +94,8 @@ impl Region {
         self.spans.iter().map(|(_, columns)| columns.len()).sum()
     }
 
-    /// Whether there are no pixels; never for a region that could be made.
+    /// Whether there are no pixels: so it is with the default, for gauges that look at none, and where a region was moved out
+    /// of the frame.
     pub fn is_empty(&self) -> bool {
         self.spans.is_empty()
     }
@@ -110,8 +127,14 @@ pub fn polygon_spans(
     width: usize,
     height: usize,
 ) -> Vec<(usize, Range<usize>)> {
-    let mut spans = Vec::new();
-    let mut crossings = Vec::new();
+    let (mut top, mut bottom) = (height as f64, 0.0_f64);
+    for (_, v) in corners {
+        (top, bottom) = (top.min(*v), bottom.max(*v));
+    }
+    // A span per row, mostly.
+    let rows = ((bottom - top).max(0.0) as usize).min(height) + 1;
+    let mut spans = Vec::with_capacity(rows);
+    let mut crossings = Vec::with_capacity(corners.len());
     for row in 0..height {
         let v = row as f64;
         crossings.clear();

@@ -13,7 +13,7 @@ mod point;
 mod real;
 mod reference;
 mod report;
-mod stopwatch;
+pub mod stopwatch;
 mod variants;
 mod workload;
 

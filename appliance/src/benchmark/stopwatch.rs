@@ -1,5 +1,6 @@
-//! How much processor time a piece of work takes on its own thread.
+//! How much processor time a piece of work takes, on its own thread or on those of a pool.
 
+use rayon::ThreadPool;
 use rustix::time::{ClockId, clock_gettime};
 use std::time::Duration;
 
@@ -9,6 +10,15 @@ pub fn timed(work: impl FnOnce()) -> Duration {
     let began = now();
     work();
     now().saturating_sub(began)
+}
+
+/// Runs `work` on `pool` and answers how much processor time the pool's threads spent meanwhile, all together: the work, and
+/// on a pool of several threads their looking for some.
+pub fn timed_on<T: Send>(pool: &ThreadPool, work: impl FnOnce() -> T + Send) -> (T, Duration) {
+    let spent = || pool.broadcast(|_| now()).into_iter().sum::<Duration>();
+    let began = spent();
+    let done = pool.install(work);
+    (done, spent().saturating_sub(began))
 }
 
 fn now() -> Duration {
@@ -38,6 +48,21 @@ mod tests {
         });
         assert!(slept < Duration::from_millis(15), "{slept:?}");
         assert!(worked > Duration::ZERO);
+    }
+
+    #[test]
+    fn work_on_a_pool_is_timed_on_the_threads_that_do_it() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
+        let (sum, spent) = timed_on(&pool.unwrap(), || {
+            let busy = || (0..10_000_000_u64).map(std::hint::black_box).sum::<u64>();
+            rayon::join(busy, busy)
+        });
+        assert_eq!(sum.0, sum.1);
+        let alone = timed(|| {
+            std::hint::black_box((0..10_000_000_u64).map(std::hint::black_box).sum::<u64>());
+        });
+        // Twice the work; half of it would be one thread's.
+        assert!(spent > alone * 3 / 2, "{spent:?} for twice {alone:?}");
     }
 
     #[test]

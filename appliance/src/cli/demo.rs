@@ -68,7 +68,7 @@ impl Demo {
         }
         if !self.exit && std::io::stdout().is_terminal() {
             say!("\nThe page stays on http://{} until Ctrl-C.", daemon.http);
-            until_told()?;
+            until_told()?()?;
         }
         daemon.stop();
         let wrong = rows.iter().filter(|row| row.is_wrong()).count();

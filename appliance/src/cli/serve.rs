@@ -22,6 +22,8 @@ pub fn run(common: &Common) -> Result<(), Failure> {
         // Without a recipe the station still serves: the PLC loads or teaches one.
         Err(failure) => progress.log(&failure.message),
     }
+    // Before anybody is told that it serves: who is told may end it.
+    let until_told = until_told()?;
     progress.log(&format!(
         "Modbus TCP on {}, page on http://{}",
         daemon.modbus, daemon.http
@@ -32,23 +34,34 @@ pub fn run(common: &Common) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Waits for Ctrl-C or SIGTERM.
+/// Listens for Ctrl-C and SIGTERM from now on; the answer waits for one.
 ///
 /// # Errors
 /// If the system does not deliver signals.
-pub fn until_told() -> Result<(), Failure> {
-    runtime()?.block_on(async {
-        let failed = |error| Failure::because(Exit::Software, "wait for a signal", error);
-        #[cfg(unix)]
-        {
-            use tokio::signal::unix::{SignalKind, signal};
-            let mut terminate = signal(SignalKind::terminate()).map_err(failed)?;
-            tokio::select! {
-                told = tokio::signal::ctrl_c() => told.map_err(failed),
-                _ = terminate.recv() => Ok(()),
+pub fn until_told() -> Result<impl FnOnce() -> Result<(), Failure>, Failure> {
+    let failed = |error| Failure::because(Exit::Software, "wait for a signal", error);
+    let runtime = runtime()?;
+    #[cfg(unix)]
+    let (mut interrupt, mut terminate) = {
+        use tokio::signal::unix::{SignalKind, signal};
+        let _inside = runtime.enter();
+        let listen = |kind| signal(kind).map_err(failed);
+        (
+            listen(SignalKind::interrupt())?,
+            listen(SignalKind::terminate())?,
+        )
+    };
+    Ok(move || {
+        runtime.block_on(async {
+            #[cfg(unix)]
+            {
+                tokio::select! {
+                    _ = interrupt.recv() => Ok(()),
+                    _ = terminate.recv() => Ok(()),
+                }
             }
-        }
-        #[cfg(not(unix))]
-        tokio::signal::ctrl_c().await.map_err(failed)
+            #[cfg(not(unix))]
+            tokio::signal::ctrl_c().await.map_err(failed)
+        })
     })
 }

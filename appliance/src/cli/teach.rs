@@ -204,6 +204,7 @@ impl Teach {
             phases,
             heights: &surface.map,
             noise,
+            comparison: None,
         };
         part.recipe(&self.naming()).map_err(|error| wrong(&error))
     }

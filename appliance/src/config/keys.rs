@@ -18,7 +18,7 @@ pub struct Key {
 }
 
 /// The table; a test compares it with the structs.
-pub const KEYS: [Key; 13] = [
+pub const KEYS: [Key; 17] = [
     Key {
         name: "state",
         unit: "folder",
@@ -76,6 +76,20 @@ pub const KEYS: [Key; 13] = [
         meaning: "answer only to this unit id, exception 0x0B to others",
     },
     Key {
+        name: "modbus.readers",
+        unit: "networks",
+        range: "addresses with their prefix, as in 10.1.2.0/24",
+        default: "[127.0.0.0/8, ::1/128, 10.0.0.0/8, 172.16.0.0/12, 192.168.0.0/16, 169.254.0.0/16, fc00::/7, fe80::/10]",
+        meaning: "from where Modbus connections are taken: this machine and private networks",
+    },
+    Key {
+        name: "modbus.writers",
+        unit: "networks",
+        range: "addresses with their prefix, as in 10.1.2.7/32",
+        default: "[127.0.0.0/8, ::1/128]",
+        meaning: "from where writes are taken, so who may trigger; other clients get exception 1. List the PLC here",
+    },
+    Key {
         name: "http.listen",
         unit: "address:port",
         range: "any of this machine",
@@ -109,6 +123,20 @@ pub const KEYS: [Key; 13] = [
         range: "recordings of one head",
         default: "[]",
         meaning: "what the replay head plays, in turn; required with backend = \"replay\"",
+    },
+    Key {
+        name: "history.results",
+        unit: "results",
+        range: "1 to 10000000",
+        default: "100000",
+        meaning: "the most results in the history; the oldest go first",
+    },
+    Key {
+        name: "history.recordings_mib",
+        unit: "MiB",
+        range: "0 to 4294967295",
+        default: "1024",
+        meaning: "the most room for frames of parts that did not pass; the oldest go first; 0 = none are kept",
     },
 ];
 

@@ -6,6 +6,7 @@ pub use keys::{KEYS, Key, table};
 
 use crate::error::{Exit, Failure};
 use crate::modbus::WordOrder;
+use ipnet::IpNet;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -27,6 +28,18 @@ pub struct Config {
     pub http: HttpConfig,
     /// The devices.
     pub head: HeadConfig,
+    /// What is kept of results.
+    pub history: HistoryConfig,
+}
+
+/// What is kept of results; the oldest go first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HistoryConfig {
+    /// The most results.
+    pub results: u32,
+    /// The most MiB of recordings of failed parts; 0 = none are kept.
+    pub recordings_mib: u32,
 }
 
 /// What the station does by itself.
@@ -51,6 +64,10 @@ pub struct ModbusConfig {
     pub word_order: WordOrderConfig,
     /// Answer only to this unit id.
     pub strict_unit_id: Option<u8>,
+    /// Networks from where it may be read.
+    pub readers: Vec<IpNet>,
+    /// Networks from where it may be written.
+    pub writers: Vec<IpNet>,
 }
 
 /// Order of the words of 32- and 64-bit values.
@@ -107,10 +124,13 @@ impl Default for StationConfig {
 
 impl Default for ModbusConfig {
     fn default() -> Self {
+        let defaults = crate::modbus::Options::default();
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 1502)),
             word_order: WordOrderConfig::Normal,
             strict_unit_id: None,
+            readers: defaults.readers,
+            writers: defaults.writers,
         }
     }
 }
@@ -120,6 +140,15 @@ impl Default for HttpConfig {
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
             hosts: Vec::new(),
+        }
+    }
+}
+
+impl Default for HistoryConfig {
+    fn default() -> Self {
+        Self {
+            results: 100_000,
+            recordings_mib: 1024,
         }
     }
 }
@@ -194,6 +223,8 @@ impl Config {
         within("station.recipe", u64::from(self.station.recipe), 1, 9999)?;
         let timeout = u64::from(self.station.plc_timeout_s);
         within("station.plc_timeout_s", timeout, 1, 3600)?;
+        let results = u64::from(self.history.results);
+        within("history.results", results, 1, 10_000_000)?;
         if self.head.backend == Backend::Replay && self.head.recordings.is_empty() {
             return Err(
                 "head.recordings is empty: the replay head needs at least one folder".into(),

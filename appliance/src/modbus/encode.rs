@@ -1,7 +1,7 @@
 //! From a snapshot to the 16-bit words of each block.
 
 use super::map::{self, Block, at};
-use crate::station::{GaugeValue, ResultRecord, Snapshot};
+use crate::station::{GaugeValue, Health, ResultRecord, Snapshot};
 
 /// The order of the words of 32- and 64-bit values; the bytes of a word are always big-endian.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -19,6 +19,8 @@ pub const INVALID_I32: u32 = 0x8000_0000;
 pub const INVALID_F32: u32 = 0x7FC0_0000;
 /// Temperature that is not known.
 pub const UNKNOWN_I16: u16 = 0x8000;
+/// Load, memory or storage that is not known.
+pub const UNKNOWN_U16: u16 = 0xFFFF;
 /// "FRNG".
 pub const MAGIC: u32 = 0x4652_4E47;
 
@@ -119,6 +121,15 @@ pub fn block_words(snapshot: &Snapshot, block: &Block, order: WordOrder) -> Vec<
                     .unwrap_or(&ResultRecord::default()),
             );
         }
+        map::GAUGE_DETAIL => gauge_detail(
+            &mut words,
+            snapshot
+                .result
+                .as_deref()
+                .unwrap_or(&ResultRecord::default()),
+        ),
+        map::HEALTH => health(&mut words, &snapshot.health),
+        map::RECIPE_DIRECTORY => recipe_directory(&mut words, &snapshot.health.system.recipes),
         map::IDENTITY => {
             words.u32(at::identity::MAGIC, MAGIC);
             words.ascii32(at::identity::SERIAL, &snapshot.identity.serial);
@@ -224,6 +235,66 @@ fn result(words: &mut Words, record: &ResultRecord) {
         );
     }
     words.u32(a::SEQ_AGAIN, record.seq);
+}
+
+fn gauge_detail(words: &mut Words, record: &ResultRecord) {
+    use at::gauge_detail as a;
+    words.u32(a::SEQ, record.seq);
+    for k in 0..map::GAUGES {
+        let gauge = record.inspection.gauges.get(usize::from(k));
+        let sigma = gauge
+            .filter(|gauge| gauge.decision.valid)
+            .and_then(|gauge| gauge.sigma);
+        words.u32(a::GAUGE_SIGMA + 2 * k, f32_bits(sigma));
+        words.u16(
+            a::GAUGE_UNIT + k,
+            gauge.map_or(0, |gauge| gauge.unit.number()),
+        );
+    }
+    words.u32(a::SEQ_AGAIN, record.seq);
+}
+
+fn health(words: &mut Words, health: &Health) {
+    use at::health as a;
+    let (pace, system) = (&health.pace, &health.system);
+    let lag = i32::try_from(pace.lag_us).unwrap_or(i32::MAX);
+    words.u32(a::CAMERA_FPS, pace.camera_centihertz);
+    words.u32(a::PROJECTOR_REFRESH, pace.refresh_millihertz);
+    words.u32(a::SYNC_ERROR, lag.cast_unsigned());
+    words.u32(a::DROPPED_FRAMES, pace.dropped);
+    words.u32(a::MISSED_FLIPS, pace.missed_flips);
+    words.u32(a::PROCESSING_TIME, health.processing_us);
+    words.u32(a::PROCESSING_TIME_MAX, health.processing_max_us);
+    words.u32(a::STORAGE_ERRORS, health.storage_errors);
+    words.u32(a::BOOTS, system.boots);
+    words.u32(a::UNCLEAN_BOOTS, system.unclean_boots);
+    // No watchdog restarts this version of the program.
+    words.u32(a::WATCHDOG_RESTARTS, 0);
+    words.u16(a::CPU_LOAD, known(system.cpu_percent.map(u64::from)));
+    words.u16(a::FREE_MEMORY, known(system.free_memory_mib));
+    words.u16(a::FREE_STORAGE, known(system.free_storage_mib));
+    words.u16(a::CPU_TEMPERATURE, tenths(system.cpu_temperature_c));
+    // No head of this version has a thermometer.
+    words.u16(a::CAMERA_TEMPERATURE, UNKNOWN_I16);
+    words.u16(a::PROJECTOR_TEMPERATURE, UNKNOWN_I16);
+    words.u16(a::MODBUS_CLIENTS, system.clients);
+    words.u16(a::WRITER_CONNECTED, u16::from(system.writer_connected));
+}
+
+fn recipe_directory(words: &mut Words, stored: &[u16]) {
+    let first = at::recipe_directory::STORED_RECIPES;
+    for register in 0..=map::RECIPE_DIRECTORY.last - map::RECIPE_DIRECTORY.first {
+        let bits = (0..16).filter(|bit| stored.binary_search(&(16 * register + bit + 1)).is_ok());
+        words.u16(first + register, bits.fold(0, |word, bit| word | 1 << bit));
+    }
+}
+
+/// A number that saturates below the one that means "not known".
+fn known(value: Option<u64>) -> u16 {
+    let most = UNKNOWN_U16 - 1;
+    value.map_or(UNKNOWN_U16, |value| {
+        u16::try_from(value).unwrap_or(most).min(most)
+    })
 }
 
 /// A value in register steps, to nearest; saturates at ±(2³¹ − 1), 0x80000000 if there is none.

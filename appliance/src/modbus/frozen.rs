@@ -1,6 +1,6 @@
 //! Version 1.0 of the map, word for word. If this test fails, do not change the test: the map is append-only.
 
-use super::map::registers;
+use super::map::{BLOCKS, registers};
 use super::render::registers_csv;
 
 /// Address, name, type and block of every row of version 1.0.
@@ -107,6 +107,33 @@ const VERSION_1: &str = "\
 918 VERSION ascii32 IDENTITY
 936 TEST_U32 u32 IDENTITY
 938 TEST_F32 f32 IDENTITY";
+
+/// Name, first and last address of every block of version 1.0, and whether it can be written. All of them are served.
+const BLOCKS_1: [(&str, u16, u16, bool); 8] = [
+    ("CONTROL", 0, 31, true),
+    ("STATUS", 100, 131, false),
+    ("RESULT", 200, 319, false),
+    ("OLDEST", 400, 519, false),
+    ("GAUGE_DETAIL", 520, 583, false),
+    ("HEALTH", 600, 639, false),
+    ("RECIPE_DIRECTORY", 700, 763, false),
+    ("IDENTITY", 900, 939, false),
+];
+
+#[test]
+fn every_block_of_version_1_is_served_where_it_was() {
+    for (name, first, last, writable) in BLOCKS_1 {
+        let (block, _) = BLOCKS
+            .iter()
+            .find(|(block, _)| block.name == name)
+            .expect(name);
+        assert_eq!(
+            (block.first, block.last, block.writable, block.served),
+            (first, last, writable, true),
+            "{name}"
+        );
+    }
+}
 
 #[test]
 fn version_1_of_the_map_is_frozen_word_for_word() {

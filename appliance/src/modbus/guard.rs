@@ -13,9 +13,9 @@ use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::sync::OwnedSemaphorePermit;
 use tokio::time::{Instant, Sleep};
 
+use super::places::Place;
 use super::service::{FrameFlaw, MAX_READ_WRITE, MAX_WRITE, MAX_WRITE_BITS};
 
 /// Transaction, protocol and length: what must be there to know the rest.
@@ -39,8 +39,8 @@ enum Waiting {
 /// A transport that reads whole frames and gives up on time.
 pub struct Guard<T> {
     stream: T,
-    /// Held as long as the connection is open.
-    _permit: OwnedSemaphorePermit,
+    /// Held as long as the connection is open; may be taken away.
+    place: Place,
     flaw: FrameFlaw,
     idle: Duration,
     frame: Duration,
@@ -55,16 +55,10 @@ pub struct Guard<T> {
 
 impl<T> Guard<T> {
     /// Guards `stream`: `idle` between two requests, `frame` to finish a started frame or to take an answer.
-    pub fn new(
-        stream: T,
-        permit: OwnedSemaphorePermit,
-        flaw: FrameFlaw,
-        idle: Duration,
-        frame: Duration,
-    ) -> Self {
+    pub fn new(stream: T, place: Place, flaw: FrameFlaw, idle: Duration, frame: Duration) -> Self {
         Self {
             stream,
-            _permit: permit,
+            place,
             flaw,
             idle,
             frame,
@@ -90,8 +84,11 @@ impl<T> Guard<T> {
         }
     }
 
-    /// Pending, or an error if the time of this wait is over.
+    /// Pending, or an error if the time of this wait is over or the place is somebody else's.
     fn poll_deadline<R>(&mut self, context: &mut Context<'_>) -> Poll<io::Result<R>> {
+        if self.place.poll_gone(context).is_ready() {
+            return Poll::Ready(Err(io::Error::from(io::ErrorKind::ConnectionAborted)));
+        }
         ready!(self.deadline.as_mut().poll(context));
         Poll::Ready(Err(io::Error::from(io::ErrorKind::TimedOut)))
     }
@@ -111,6 +108,7 @@ impl<T> Guard<T> {
 
     /// Puts the complete frame, or its empty stand-in, where the library fetches it.
     fn hand_on(&mut self) {
+        self.place.spoke();
         let frame = self.input.get(..self.filled).unwrap_or_default();
         let (head, pdu) = frame.split_at_checked(HEADER + 1).unwrap_or_default();
         let stand_in = check(pdu).err();

@@ -167,14 +167,14 @@ registers! {
     }
     gauge_detail GAUGE_DETAIL_ROWS {
         520 SEQ U32 x 1, "number of the result";
-        522 GAUGE_SIGMA F32 x 16, "1 sigma of each gauge, in its unit";
+        522 GAUGE_SIGMA F32 x 16, "1 sigma of each gauge, in mm, deg, mm3, share 0-1; NaN (0x7FC00000) not known";
         554 GAUGE_UNIT U16 x 16, "0 none, 1 length, 2 angle, 3 volume, 4 share";
         582 SEQ_AGAIN U32 x 1, "equals SEQ unless two reads were mixed";
     }
     health HEALTH_ROWS {
-        600 CAMERA_FPS U32 x 1, "frames per second x 100";
+        600 CAMERA_FPS U32 x 1, "frames per second x 100, last sequence";
         602 PROJECTOR_REFRESH U32 x 1, "mHz";
-        604 SYNC_ERROR I32 x 1, "us";
+        604 SYNC_ERROR I32 x 1, "us, longest time in the last sequence from a pattern in view to its exposure";
         606 DROPPED_FRAMES U32 x 1, "since the start";
         608 MISSED_FLIPS U32 x 1, "since the start";
         610 PROCESSING_TIME U32 x 1, "us, last cycle";
@@ -182,10 +182,10 @@ registers! {
         614 STORAGE_ERRORS U32 x 1, "write errors";
         616 BOOTS U32 x 1, "starts";
         618 UNCLEAN_BOOTS U32 x 1, "starts after a crash or power loss";
-        620 WATCHDOG_RESTARTS U32 x 1, "restarts by the watchdog";
-        622 CPU_LOAD U16 x 1, "%";
-        623 FREE_MEMORY U16 x 1, "MiB";
-        624 FREE_STORAGE U16 x 1, "MiB, saturating";
+        620 WATCHDOG_RESTARTS U32 x 1, "restarts by the watchdog; 0 in this version";
+        622 CPU_LOAD U16 x 1, "%, 65535 not known";
+        623 FREE_MEMORY U16 x 1, "MiB, saturating at 65534, 65535 not known";
+        624 FREE_STORAGE U16 x 1, "MiB, saturating at 65534, 65535 not known";
         625 CPU_TEMPERATURE I16 x 1, "0.1 degC, 0x8000 not known";
         626 CAMERA_TEMPERATURE I16 x 1, "0.1 degC, 0x8000 not known";
         627 PROJECTOR_TEMPERATURE I16 x 1, "0.1 degC, 0x8000 not known";
@@ -229,11 +229,11 @@ pub const RESULT: Block = read_only("RESULT", 200, 319, true);
 /// OLDEST: RESULT's twin with the oldest unacknowledged result.
 pub const OLDEST: Block = read_only("OLDEST", 400, 519, true);
 /// Gauge detail.
-pub const GAUGE_DETAIL: Block = read_only("GAUGE_DETAIL", 520, 583, false);
+pub const GAUGE_DETAIL: Block = read_only("GAUGE_DETAIL", 520, 583, true);
 /// Health.
-pub const HEALTH: Block = read_only("HEALTH", 600, 639, false);
+pub const HEALTH: Block = read_only("HEALTH", 600, 639, true);
 /// Recipe directory.
-pub const RECIPE_DIRECTORY: Block = read_only("RECIPE_DIRECTORY", 700, 763, false);
+pub const RECIPE_DIRECTORY: Block = read_only("RECIPE_DIRECTORY", 700, 763, true);
 /// Identity.
 pub const IDENTITY: Block = read_only("IDENTITY", 900, 939, true);
 
@@ -310,6 +310,7 @@ mod tests {
         assert_eq!(served(32, 1), None);
         assert_eq!(served(u16::MAX, 2), None);
         assert_eq!(served(0, 0), None);
-        assert_eq!(served(600, 1), None, "not served yet");
+        assert_eq!(served(600, 40), Some(HEALTH));
+        assert_eq!(served(639, 2), None);
     }
 }

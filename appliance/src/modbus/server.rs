@@ -2,19 +2,35 @@
 
 use std::future::Future;
 use std::io;
-use std::net::SocketAddr;
-use std::sync::{Arc, Mutex};
+use std::net::{IpAddr, SocketAddr};
+use std::sync::Mutex;
 use std::time::Duration;
 
+use ipnet::IpNet;
 use thiserror::Error;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::Semaphore;
 use tokio_modbus::server::tcp::Server;
 
 use super::encode::WordOrder;
 use super::guard::Guard;
+use super::places::Clients;
+use super::refusals::{Refusals, Refused};
 use super::service::{FrameFlaw, PlcService};
 use crate::station::{ConnectionEdges, StationHandle};
+
+/// Most connections at a time.
+pub const CONNECTIONS: usize = 8;
+/// This machine.
+pub const LOOPBACK: [&str; 2] = ["127.0.0.0/8", "::1/128"];
+/// Networks that are nobody else's: RFC 1918, 3927, 4193 and 4291.
+pub const PRIVATE: [&str; 6] = [
+    "10.0.0.0/8",
+    "172.16.0.0/12",
+    "192.168.0.0/16",
+    "169.254.0.0/16",
+    "fc00::/7",
+    "fe80::/10",
+];
 
 /// How the server behaves.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -23,8 +39,10 @@ pub struct Options {
     pub word_order: WordOrder,
     /// Answer only to this unit id, exception 0x0B to others.
     pub strict_unit_id: Option<u8>,
-    /// Most connections at a time; a further one is closed at once.
-    pub connections: usize,
+    /// From where connections are taken.
+    pub readers: Vec<IpNet>,
+    /// From where writes are taken.
+    pub writers: Vec<IpNet>,
     /// A connection without a request for this long is closed.
     pub idle: Duration,
     /// A started frame must be finished, and an answer be taken, in this time.
@@ -36,7 +54,12 @@ impl Default for Options {
         Self {
             word_order: WordOrder::Normal,
             strict_unit_id: None,
-            connections: 8,
+            readers: LOOPBACK
+                .iter()
+                .chain(&PRIVATE)
+                .filter_map(|net| net.parse().ok())
+                .collect(),
+            writers: LOOPBACK.iter().filter_map(|net| net.parse().ok()).collect(),
             idle: Duration::from_secs(300),
             frame: Duration::from_secs(10),
         }
@@ -88,17 +111,36 @@ pub async fn bind(address: SocketAddr) -> Result<TcpListener, ModbusError> {
         })
 }
 
-/// Serves the station on `listener` until `shutdown`; then every connection is closed.
+/// Whether one of the networks holds an address. An IPv4 address that comes through an IPv6 socket is an IPv4 address.
+fn holds(networks: &[IpNet], address: IpAddr) -> bool {
+    let address = address.to_canonical();
+    networks.iter().any(|network| network.contains(&address))
+}
+
+/// Serves the station on `listener` to `clients` until `shutdown`; then every connection is closed.
 pub async fn serve(
     listener: TcpListener,
     handle: StationHandle,
     options: Options,
+    clients: Clients,
+    refusals: Refusals,
     shutdown: impl Future<Output = ()>,
 ) {
     let server = Server::new(listener);
-    let permits = Arc::new(Semaphore::new(options.connections));
-    let on_connected = |stream: TcpStream, _peer: SocketAddr| {
-        let connection = permits.clone().try_acquire_owned().ok().map(|permit| {
+    let admit = |peer: IpAddr| {
+        if !holds(&options.readers, peer) {
+            refusals.note(Refused::Connection, peer);
+            return None;
+        }
+        let may_write = holds(&options.writers, peer);
+        let place = clients.admit(may_write);
+        if place.is_none() {
+            refusals.note(Refused::Full, peer);
+        }
+        place.map(|place| (place, may_write))
+    };
+    let on_connected = |stream: TcpStream, peer: SocketAddr| {
+        let connection = admit(peer.ip()).map(|(place, may_write)| {
             // Answers are small and awaited: Nagle's algorithm would only delay them. Without it the connection still works.
             let _ = stream.set_nodelay(true);
             let flaw = FrameFlaw::default();
@@ -108,10 +150,13 @@ pub async fn serve(
                 strict_unit_id: options.strict_unit_id,
                 flaw: flaw.clone(),
                 edges: Mutex::new(ConnectionEdges::default()),
+                peer: peer.ip(),
+                may_write,
+                refusals: refusals.clone(),
             };
             (
                 service,
-                Guard::new(stream, permit, flaw, options.idle, options.frame),
+                Guard::new(stream, place, flaw, options.idle, options.frame),
             )
         });
         std::future::ready(Ok(connection))

@@ -1,6 +1,7 @@
 //! One request of one connection: checks it, reads one snapshot or applies one write, answers.
 
 use std::future::{Ready, ready};
+use std::net::IpAddr;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -10,6 +11,7 @@ use tokio_modbus::{ExceptionCode, Request, Response, SlaveRequest};
 use super::decode::{coil_write, control_write};
 use super::encode::{WordOrder, block_words};
 use super::map;
+use super::refusals::{Refusals, Refused};
 use crate::station::{ConnectionEdges, ControlWrite, Identity, Snapshot, StationHandle};
 
 /// Most registers of one read.
@@ -35,6 +37,9 @@ pub struct PlcService {
     pub(super) strict_unit_id: Option<u8>,
     pub(super) flaw: FrameFlaw,
     pub(super) edges: Mutex<ConnectionEdges>,
+    pub(super) peer: IpAddr,
+    pub(super) may_write: bool,
+    pub(super) refusals: Refusals,
 }
 
 impl Service for PlcService {
@@ -55,6 +60,10 @@ impl PlcService {
     ) -> Result<Response, ExceptionCode> {
         if self.strict_unit_id.is_some_and(|unit| unit != slave) {
             return Err(ExceptionCode::GatewayTargetDevice);
+        }
+        if !self.may_write && writes(&request) {
+            self.refusals.note(Refused::Write, self.peer);
+            return Err(ExceptionCode::IllegalFunction);
         }
         // A flawed frame was replaced by an empty one of its function, which must not be carried out.
         match self.flaw.load(Ordering::Relaxed) {
@@ -153,6 +162,18 @@ impl PlcService {
             .write(&mut edges, write)
             .map_err(|_| ExceptionCode::IllegalDataValue)
     }
+}
+
+/// Whether a request would change something.
+fn writes(request: &Request<'_>) -> bool {
+    matches!(
+        request,
+        Request::WriteSingleCoil(..)
+            | Request::WriteMultipleCoils(..)
+            | Request::WriteSingleRegister(..)
+            | Request::WriteMultipleRegisters(..)
+            | Request::ReadWriteMultipleRegisters(..)
+    )
 }
 
 fn quantity(count: usize) -> Result<u16, ExceptionCode> {

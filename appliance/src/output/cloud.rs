@@ -3,13 +3,46 @@
 use crate::measure::Surface;
 use algo::units::Height;
 
+/// One point of a cloud.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vertex {
+    /// x, y, z in mm.
+    pub point: [f32; 3],
+    /// How bright it is.
+    pub intensity: u8,
+    /// σ_z in mm, NaN where not known.
+    pub sigma: f32,
+}
+
 /// A binary little-endian PLY: one vertex per resolved pixel with float x, y, z in mm, uchar
 /// intensity and float sigma (σ_z in mm, NaN where not known).
 ///
 /// `intensity` is one value per pixel, row-major like the heights.
 pub fn ply(surface: &Surface, intensity: &[u8]) -> Vec<u8> {
     let Surface { map, triangulator } = surface;
-    let count = map.height.iter().filter(|height| height.is_known()).count();
+    let known = |(_, height): &(usize, &Height)| height.is_known();
+    let vertices: Vec<Vertex> = map
+        .height
+        .iter()
+        .enumerate()
+        .filter(known)
+        .map(|(at, height)| {
+            let point = triangulator
+                .point(at % map.width, at / map.width, *height)
+                .unwrap_or_default();
+            Vertex {
+                point: [point.x as f32, point.y as f32, point.z as f32],
+                intensity: intensity.get(at).copied().unwrap_or(0),
+                sigma: map.sigma[at],
+            }
+        })
+        .collect();
+    binary_ply(&vertices)
+}
+
+/// The same of any points.
+pub fn binary_ply(vertices: &[Vertex]) -> Vec<u8> {
+    let count = vertices.len();
     let mut ply = format!(
         "ply\nformat binary_little_endian 1.0\ncomment heights above the plane z = 0, units mm\n\
          element vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
@@ -17,16 +50,12 @@ pub fn ply(surface: &Surface, intensity: &[u8]) -> Vec<u8> {
     )
     .into_bytes();
     ply.reserve(count * VERTEX_BYTES);
-    let known = |(_, height): &(usize, &Height)| height.is_known();
-    for (at, height) in map.height.iter().enumerate().filter(known) {
-        let point = triangulator
-            .point(at % map.width, at / map.width, *height)
-            .unwrap_or_default();
-        for coordinate in [point.x, point.y, point.z] {
-            ply.extend_from_slice(&(coordinate as f32).to_le_bytes());
+    for vertex in vertices {
+        for coordinate in vertex.point {
+            ply.extend_from_slice(&coordinate.to_le_bytes());
         }
-        ply.push(intensity.get(at).copied().unwrap_or(0));
-        ply.extend_from_slice(&map.sigma[at].to_le_bytes());
+        ply.push(vertex.intensity);
+        ply.extend_from_slice(&vertex.sigma.to_le_bytes());
     }
     ply
 }

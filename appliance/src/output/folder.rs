@@ -59,17 +59,30 @@ pub fn write_whole(target: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let temporary = PathBuf::from(temporary);
     let written = fs::File::create(&temporary)
         .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
-        .and_then(|()| fs::rename(&temporary, target));
-    if let Err(error) = written {
+        .and_then(|()| rename_whole(&temporary, target));
+    if written.is_err() {
         // What cannot be finished is not left behind; there may be nothing to remove.
         let _ = fs::remove_file(&temporary);
-        return Err(error);
     }
-    if let Some(folder) = target
+    written
+}
+
+/// Gives a synced file its name, and syncs the folder.
+///
+/// # Errors
+/// Whatever the file system answers.
+pub fn rename_whole(from: &Path, target: &Path) -> std::io::Result<()> {
+    fs::rename(from, target)?;
+    sync_folder_of(target)
+}
+
+/// Syncs the folder that a file lies in, so that its name is there after a loss of power, or gone.
+///
+/// # Errors
+/// Whatever the file system answers.
+pub fn sync_folder_of(file: &Path) -> std::io::Result<()> {
+    let folder = file
         .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-    {
-        fs::File::open(folder)?.sync_all()?;
-    }
-    Ok(())
+        .filter(|folder| !folder.as_os_str().is_empty());
+    fs::File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
 }

@@ -1,4 +1,4 @@
-//! The part as taught, in the form that production needs. Arrays are dropped as soon as they are used up.
+//! The part as taught, in the form that production needs.
 
 use crate::recipe::archive::Arrays;
 use crate::recipe::{RecipeFile, SequenceKind, safe};
@@ -8,51 +8,52 @@ use algo::inspect::Taught;
 use algo::phase::Decoder;
 use algo::pipeline::{self, KnownSurface};
 use algo::units::{AbsolutePhase, Height, Modulation};
-use std::mem::take;
+use std::ops::Range;
 
 /// Where the part is compared, and how certain its taught heights are.
-pub(super) fn taught(file: &RecipeFile, arrays: &mut Arrays, decoder: &Decoder) -> Taught {
-    take(&mut arrays.height_curvature);
+pub(super) fn taught(file: &RecipeFile, arrays: &Arrays, decoder: &Decoder) -> Taught {
     let full_scale = f64::from(decoder.full_scale());
-    let noises = take(&mut arrays.modulation)
-        .into_iter()
-        .zip(take(&mut arrays.height_slope));
-    let sigmas = noises.map(|(counts, slope)| {
+    let noises = arrays.modulation.iter().zip(&arrays.height_slope);
+    let sigmas = noises.map(|(&counts, &slope)| {
         let share = (f64::from(counts) / full_scale * 65_535.0).round() as u16;
         let turns = decoder.phase_noise(Modulation::from_bits(share), file.noise_counts);
         turns * f64::from(slope).abs()
     });
-    let valid = take(&mut arrays.valid).into_iter();
-    let compared = valid
+    let compared = arrays
+        .valid
+        .iter()
         .zip(&arrays.golden_height)
-        .map(|(valid, height)| valid == 1 && height.is_finite());
+        .map(|(&valid, height)| valid == 1 && height.is_finite());
     Taught::new(compared.zip(sigmas))
 }
 
-/// The surface that production's phases are unwrapped about and its heights counted from: golden. A sequence of limited
-/// reach knows nothing where the placement could move the phase further. The full one also looks
-/// where golden has nothing, an opening say, at the height of the surface around: material where
-/// there should be none must be seen.
+/// The phase that a sequence of limited reach is unwrapped about: golden, but where the placement could move it further.
+pub(super) fn safe_map(arrays: &Arrays, kind: SequenceKind) -> Option<Vec<AbsolutePhase>> {
+    let limit = kind.reach()?;
+    let phase: Vec<_> = arrays
+        .golden_phase
+        .iter()
+        .copied()
+        .map(AbsolutePhase::from_turns)
+        .collect();
+    Some(safe(&phase, &arrays.phase_reach, limit))
+}
+
+/// The surface that heights are counted from: golden. Where golden has nothing, an opening say, it is at the height of the
+/// surface around: material where there should be none must be seen, by the full sequence at least.
 pub(super) fn surface(
     file: &RecipeFile,
-    mut arrays: Arrays,
-    kind: SequenceKind,
+    arrays: &Arrays,
     triangulator: &Triangulator,
 ) -> KnownSurface {
     let width = file.camera.width as usize;
-    let mut phase: Vec<_> = take(&mut arrays.golden_phase)
-        .into_iter()
+    let mut phase: Vec<_> = arrays
+        .golden_phase
+        .iter()
+        .copied()
         .map(AbsolutePhase::from_turns)
         .collect();
-    let heights = take(&mut arrays.golden_height).into_iter().map(f64::from);
-    if let Some(limit) = kind.reach() {
-        return KnownSurface {
-            width,
-            phase: safe(&phase, &arrays.phase_reach, limit),
-            height: heights.map(Height::from_mm).collect(),
-        };
-    }
-    take(&mut arrays.phase_reach);
+    let heights = arrays.golden_height.iter().copied().map(f64::from);
     let mut surface = Field {
         columns: width,
         values: heights.collect(),
@@ -70,5 +71,19 @@ pub(super) fn surface(
         width,
         phase,
         height,
+    }
+}
+
+/// Widens a window by what parts are compared with: their motion is found from all of it.
+pub(super) fn widen(window: &mut [Range<usize>], arrays: &Arrays, width: usize) {
+    for (seen, valid) in window.iter_mut().zip(arrays.valid.chunks(width.max(1))) {
+        let first = valid.iter().position(|&valid| valid == 1);
+        let last = valid.iter().rposition(|&valid| valid == 1);
+        if let Some((first, last)) = first.zip(last) {
+            *seen = match seen.start == seen.end {
+                true => first..last + 1,
+                false => seen.start.min(first)..seen.end.max(last + 1),
+            };
+        }
     }
 }

@@ -2,36 +2,42 @@
 
 mod golden;
 mod judge;
+mod layers;
+mod run;
 mod window;
 
+pub use layers::Layers;
+
 use crate::calibration::Calibration;
-use crate::recipe::{GaugeKind, Recipe, RecipeFile, SequenceKind, short};
+use crate::recipe::{AlignmentKind, Recipe, RecipeFile, SequenceKind, short};
 use crate::seam;
 use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
 use crate::station::{Inspection, StageTime, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
-use algo::inspect::{Measure, Production, Strip};
+use algo::inspect::{Production, Strip};
 use algo::pattern::{Sequence, encode};
-use algo::phase::Decoder;
 use algo::pipeline::Rises;
-use algo::units::AbsolutePhase;
+use algo::units::{AbsolutePhase, Height};
 use hal::frame::Frame;
 use hal::projector::Raster;
+use rayon::prelude::*;
+use run::{Run, Shared};
 use std::ops::Range;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 /// A recipe joined with the head's calibration. Of the recipe's arrays only what production needs is kept.
 #[derive(Debug)]
 pub struct Plan {
     file: RecipeFile,
-    sequence: Sequence,
+    /// Ratio and shift of what is projected, each once; first those of the first run.
     frames: Vec<(f64, f64)>,
-    production: Production,
+    /// The sequences in the order in which they are tried; the frames of each are more than those of the one before.
+    runs: Vec<Run>,
     /// The buffers of a cycle, made once.
     strips: Mutex<Vec<Strip>>,
-    flags: u16,
+    simulated: bool,
 }
 
 /// A recipe that cannot be run on this head.
@@ -103,10 +109,8 @@ impl Plan {
             file,
             mut arrays,
             function,
-            kind,
-            production: frames,
-            sequence,
-            regions,
+            gauges,
+            ..
         } = recipe;
         arrays.phase_function = Vec::new();
         let camera = (file.camera.width, file.camera.height, file.camera.bit_depth);
@@ -116,39 +120,44 @@ impl Plan {
                 calibration.camera
             ));
         }
-        let decoder = Decoder::new(&sequence, function.range(), file.camera.bit_depth)
-            .map_err(|error| error.to_string())?;
         let (camera, projector) = calibration.devices()?;
         let [low, high] = file.range_mm;
         let range = Some(HeightRange { low, high });
         let triangulator = Triangulator::new(camera, projector, Reference::Models, function, range)
             .map_err(|error| error.to_string())?;
-        let window = window::of(&file, &regions);
-        let taught = golden::taught(&file, &mut arrays, &decoder);
-        let surface = golden::surface(&file, arrays, kind, &triangulator);
+        let size = (file.camera.width as usize, file.camera.height as usize);
+        let aligned = file.alignment == AlignmentKind::Rigid;
+        let away = match aligned {
+            true => pixels(&triangulator, file.placement_tolerance_mm),
+            false => 0,
+        };
+        let mut window = window::of(&gauges, size, away);
+        if aligned {
+            golden::widen(&mut window, &arrays, size.0);
+        }
+        let surface = golden::surface(&file, &arrays, &triangulator);
         let rises = Rises::new(&triangulator, surface, file.expansion_range_turns, &window);
-        let measures = file.gauges.iter().map(|gauge| match gauge.measures {
-            GaugeKind::Deviation { smoothing_px } => Measure::Deviation { side: smoothing_px },
-            GaugeKind::Coverage => Measure::Coverage,
-        });
-        let production = Production::new(
-            decoder,
-            triangulator,
-            rises,
-            taught,
-            regions.into_iter().zip(measures).collect(),
+        let shared = Shared {
+            file: &file,
+            arrays: &arrays,
+            triangulator: Arc::new(triangulator),
+            rises: Arc::new(rises),
+            gauges,
             window,
-            file.noise_counts,
-        )
-        .map_err(|error| error.to_string())?;
-        let rows = (file.camera.height as usize).div_ceil(STRIPS);
+        };
+        let mut frames = Vec::new();
+        let runs = run::chain(&file)
+            .into_iter()
+            .map(|at| Run::new(&shared, at, &mut frames))
+            .collect::<Result<Vec<_>, _>>()?;
+        let first = runs.first().ok_or("it has no sequence")?;
+        let strips = first.production.strips(size.1.div_ceil(STRIPS));
         Ok(Self {
-            strips: Mutex::new(production.strips(rows)),
-            production,
+            strips: Mutex::new(strips),
             file,
-            sequence,
             frames,
-            flags: sequence_flag(kind) | if simulated { SIMULATED } else { 0 },
+            runs,
+            simulated,
         })
     }
 
@@ -162,47 +171,72 @@ impl Plan {
         short(&self.file.fingerprint)
     }
 
-    /// Levels and shifts of the sequence that is projected.
+    /// Levels and shifts of the sequence that is tried first.
     pub fn sequence(&self) -> &Sequence {
-        &self.sequence
+        &self.runs[0].sequence
+    }
+
+    /// How many sequences there are to try, one after the other until one is good enough.
+    pub fn steps(&self) -> usize {
+        self.runs.len()
+    }
+
+    /// Which of the plan's rasters the frames of a sequence show; none if there is no such sequence.
+    pub fn indices(&self, step: usize) -> &[usize] {
+        self.runs.get(step).map_or(&[], |run| &run.indices)
+    }
+
+    /// Ratio and shift of each frame of the sequence that has `count` frames, in their order; empty if there is none.
+    pub fn shown(&self, count: usize) -> Vec<(f64, f64)> {
+        let run = self.runs.iter().find(|run| run.indices.len() == count);
+        let indices = run.map_or(&[][..], |run| &run.indices);
+        indices.iter().map(|&index| self.frames[index]).collect()
     }
 
     /// The columns of each row that some gauge looks at.
     pub fn window(&self) -> &[Range<usize>] {
-        self.production.window()
+        self.production().window()
     }
 
-    /// The phase as taught, row-major.
+    /// The phase that the first sequence is unwrapped about, row-major: golden's, where it is safe.
     pub fn golden_phase(&self) -> &[AbsolutePhase] {
-        &self.production.rises().surface().phase
+        self.production().map()
     }
 
-    /// From frames to findings.
+    /// From frames of the first sequence to findings.
     pub fn production(&self) -> &Production {
-        &self.production
+        &self.runs[0].production
     }
 
     /// The same, for its own sake.
-    pub fn into_production(self) -> Production {
-        self.production
+    pub fn into_production(mut self) -> Production {
+        self.runs.swap_remove(0).production
     }
 
-    /// The patterns of the sequence, in the order of its frames.
+    /// The patterns of all sequences; those of the first stand first, in the order of its frames.
     pub fn rasters(&self, calibration: &Calibration) -> Result<Vec<Raster>, hal::error::Error> {
         let frames = self.frames.iter().copied();
-        let function = self.production.triangulator().function();
+        let function = self.production().triangulator().function();
         rasters(function, frames, calibration)
     }
 
-    /// Judges a part from the frames of one sequence. Always ends in an inspection; what cannot be
+    /// Judges a part from the frames of one sequence, which their number tells. Always ends in an inspection; what cannot be
     /// measured is INVALID with a reason.
     pub fn inspect(&self, frames: &[Frame], exposed: Instant) -> Inspection {
+        let step = self.step_of(frames);
+        let run = &self.runs[step];
+        let simulated = if self.simulated { SIMULATED } else { 0 };
         let mut inspection = Inspection {
-            flags: self.flags,
+            flags: sequence_flag(run.kind) | simulated,
             ..Inspection::default()
         };
-        match self.run(frames, None) {
-            Ok(findings) => judge::judge(&self.file, &findings, &mut inspection),
+        match self.run(run, frames, None) {
+            Ok(findings) => {
+                judge::judge(&self.file, &findings, &mut inspection);
+                if step + 1 < self.runs.len() {
+                    inspection.step_up = judge::step_up(&self.file, &findings);
+                }
+            }
             Err(reason) => {
                 inspection.judged = Verdict::Invalid;
                 inspection.reason = Some(reason.into());
@@ -215,17 +249,30 @@ impl Plan {
         inspection
     }
 
+    /// The run that frames are of.
+    fn run_of(&self, frames: &[Frame]) -> &Run {
+        &self.runs[self.step_of(frames)]
+    }
+
+    /// The sequence of so many frames; the first if there is none.
+    fn step_of(&self, frames: &[Frame]) -> usize {
+        let fits = |run: &Run| run.indices.len() == frames.len();
+        self.runs.iter().position(fits).unwrap_or(0)
+    }
+
     /// The heights of the part, for somebody who wants to see them; `None` if the frames are not what the recipe was made
     /// for.
     pub fn heights(&self, frames: &[Frame]) -> Option<Maps> {
         let width = self.file.camera.width as usize;
         let mut height_mm = vec![f32::NAN; width * self.file.camera.height as usize];
-        self.run(frames, Some(&mut height_mm)).ok()?;
+        self.run(self.run_of(frames), frames, Some(&mut height_mm))
+            .ok()?;
         Some(Maps { width, height_mm })
     }
 
     fn run(
         &self,
+        run: &Run,
         frames: &[Frame],
         heights: Option<&mut [f32]>,
     ) -> Result<algo::inspect::Findings, String> {
@@ -233,10 +280,20 @@ impl Plan {
         let views = views.map_err(|error| error.to_string())?;
         // A strip is cleared before it is used, whatever was left in it.
         let mut strips = self.strips.lock().unwrap_or_else(PoisonError::into_inner);
-        self.production
+        run.production
             .inspect(&views, &mut strips, heights)
             .map_err(|error| error.to_string())
     }
+}
+
+/// How many pixels a part that is moved by `mm` moves at most, about.
+fn pixels(triangulator: &Triangulator, mm: f64) -> usize {
+    let camera = triangulator.camera();
+    let (u, v) = (camera.width() as f64 / 2.0, camera.height() as f64 / 2.0);
+    let at = |u: f64, v: f64| triangulator.point(u as usize, v as usize, Height::from_nm(0));
+    let pitch = at(u, v).zip(at(u + 1.0, v)).map(|(a, b)| (b - a).length());
+    // A pixel more for the rounding of corners.
+    pitch.map_or(0, |pitch| (mm / pitch).ceil().min(u) as usize + 1)
 }
 
 /// Grey rasters of frames (ratio, shift) of a phase function.
@@ -248,7 +305,9 @@ pub fn rasters(
     frames: impl Iterator<Item = (f64, f64)>,
     calibration: &Calibration,
 ) -> Result<Vec<Raster>, hal::error::Error> {
+    let frames: Vec<_> = frames.collect();
     frames
+        .into_par_iter()
         .map(|(ratio, shift)| {
             let grey = encode(function, ratio, shift, calibration.response.as_ref());
             Raster::new(grey.width as u32, grey.height as u32, grey.pixels)

@@ -1,20 +1,27 @@
 //! The part of the frame that some gauge looks at.
 
-use crate::recipe::{GaugeKind, RecipeFile};
-use algo::inspect::Region;
+use algo::inspect::{Gauge, Measure};
 use std::ops::Range;
 
-/// The columns of each row that some gauge looks at, its smoothing included: nothing else is
-/// computed. `regions` holds one per gauge.
-pub(super) fn of(file: &RecipeFile, regions: &[Region]) -> Vec<Range<usize>> {
-    let (width, height) = (file.camera.width as usize, file.camera.height as usize);
+/// The columns of each row of a frame of (width, height) that some gauge looks at: its region with half its smoothing and
+/// `away` pixels around, how far the part may have been moved. Nothing else is computed.
+pub(super) fn of(
+    gauges: &[Gauge],
+    (width, height): (usize, usize),
+    away: usize,
+) -> Vec<Range<usize>> {
     let mut window = vec![0..0; height];
-    for (gauge, region) in file.gauges.iter().zip(regions) {
-        let margin = match gauge.measures {
-            GaugeKind::Deviation { smoothing_px } => smoothing_px / 2,
-            GaugeKind::Coverage => 0,
-        };
-        for (row, columns) in region.spans() {
+    for gauge in gauges {
+        let margin = away
+            + match gauge.measure {
+                Measure::Deviation { side } => side / 2,
+                _ => 0,
+            };
+        for (row, columns) in [Some(&gauge.region), gauge.from.as_ref()]
+            .into_iter()
+            .flatten()
+            .flat_map(|region| region.spans())
+        {
             let left = columns.start.saturating_sub(margin);
             let right = (columns.end + margin).min(width);
             let near = row.saturating_sub(margin)..(row + margin + 1).min(height);

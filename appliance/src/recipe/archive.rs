@@ -4,6 +4,7 @@ use super::file::{FORMAT, RecipeFile, VERSION};
 use hal::npy;
 use sha2::{Digest, Sha256};
 use std::io::{Cursor, Read, Seek, Write as _};
+use zip::read::ZipFile;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
@@ -155,6 +156,30 @@ pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays
     }
 }
 
+/// Whether the content agrees with the fingerprint, read through a small buffer.
+pub fn is_sound(source: impl Read + Seek) -> bool {
+    let computed = || -> Option<bool> {
+        let mut zip = ZipArchive::new(source).ok()?;
+        let mut names = Vec::new();
+        for at in 0..zip.len() {
+            names.push(zip.by_index(at).ok()?.name().ok()?.into_owned());
+        }
+        names.retain(|name| name != MANIFEST);
+        names.sort();
+        let mut text = String::new();
+        let member = zip.by_name(MANIFEST).ok()?;
+        member.take(MAX_MANIFEST).read_to_string(&mut text).ok()?;
+        let file = parse(&text).ok()?;
+        let zeroed = text.replacen(&file.fingerprint, NO_FINGERPRINT, 1);
+        let mut hash = Fingerprint::new(zeroed.as_bytes());
+        for name in &names {
+            hash.stream(name, zip.by_name(name).ok()?).ok()?;
+        }
+        Some(hash.finish() == file.fingerprint)
+    };
+    computed() == Some(true)
+}
+
 /// A member of at most `size` bytes: they are stored, so none is larger than the file.
 fn content(
     zip: &mut ZipArchive<impl Read + Seek>,
@@ -238,6 +263,20 @@ impl Fingerprint {
         for part in [name.as_bytes(), content] {
             self.0.update((part.len() as u64).to_le_bytes());
             self.0.update(part);
+        }
+    }
+
+    /// As [`Self::add`], without the whole content in memory.
+    fn stream<R: Read>(&mut self, name: &str, mut member: ZipFile<'_, R>) -> std::io::Result<()> {
+        self.0.update((name.len() as u64).to_le_bytes());
+        self.0.update(name.as_bytes());
+        self.0.update(member.size().to_le_bytes());
+        let mut buffer = [0; 1 << 14];
+        loop {
+            match member.read(&mut buffer)? {
+                0 => return Ok(()),
+                count => self.0.update(&buffer[..count]),
+            }
         }
     }
 

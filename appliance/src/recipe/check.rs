@@ -2,9 +2,9 @@
 
 use super::archive::{ArchiveError, Arrays, short, unpack};
 use super::file::{PatternFile, RecipeFile, SequenceKind};
-use algo::inspect::Region;
+use super::gauge::gauges;
+use algo::inspect::Gauge;
 use algo::pattern::{PhaseFunction, Sequence};
-use std::collections::HashMap;
 use std::io::{Cursor, Read, Seek};
 
 /// A recipe whose parts fit each other.
@@ -22,8 +22,8 @@ pub struct Recipe {
     pub production: Vec<(f64, f64)>,
     /// Its levels and shifts.
     pub sequence: Sequence,
-    /// One per gauge.
-    pub regions: Vec<Region>,
+    /// What its gauges measure.
+    pub gauges: Vec<Gauge>,
 }
 
 /// A recipe that cannot be used.
@@ -124,10 +124,16 @@ impl Recipe {
             .map(|&[ratio, shift]| (ratio, shift))
             .collect();
         let sequence = Sequence::from_frames(&production).map_err(|error| error.to_string())?;
-        let regions = Self::regions(&file, width, height)?;
+        let gauges = Self::gauges(&file, (width, height))?;
         let positive = [file.noise_counts, file.expansion_range_turns];
         if !positive.iter().all(|x| x.is_finite() && *x > 0.0) {
             return Err("noise and range of the expansion must be positive".into());
+        }
+        if !(file.placement_tolerance_mm.is_finite() && file.placement_tolerance_mm >= 0.0) {
+            return Err(format!(
+                "a tolerance of placement of {} mm is none",
+                file.placement_tolerance_mm
+            ));
         }
         if !(0.0..=1.0).contains(&file.min_coverage) {
             return Err(format!(
@@ -142,11 +148,11 @@ impl Recipe {
             kind,
             production,
             sequence,
-            regions,
+            gauges,
         })
     }
 
-    fn regions(file: &RecipeFile, width: usize, height: usize) -> Result<Vec<Region>, String> {
+    fn gauges(file: &RecipeFile, size: (usize, usize)) -> Result<Vec<Gauge>, String> {
         if file.gauges.is_empty() || file.gauges.len() > MAX_GAUGES {
             return Err(format!(
                 "{} gauges where 1 to {MAX_GAUGES} are needed",
@@ -159,28 +165,6 @@ impl Recipe {
                 file.regions.len()
             ));
         }
-        let mut named = HashMap::new();
-        for region in &file.regions {
-            let corners: Vec<_> = region.polygon.iter().map(|&[u, v]| (u, v)).collect();
-            let pixels = Region::polygon(&corners, width, height)
-                .map_err(|error| format!("region {:?}: {error}", region.name))?;
-            named.insert(region.name.as_str(), pixels);
-        }
-        let find = |gauge: &super::GaugeFile| {
-            let limits = [gauge.low, gauge.high];
-            if limits.iter().flatten().any(|limit| !limit.is_finite()) {
-                return Err(format!(
-                    "gauge {:?} has a limit that is not finite",
-                    gauge.name
-                ));
-            }
-            named.get(gauge.region.as_str()).cloned().ok_or_else(|| {
-                format!(
-                    "gauge {:?} names a region {:?} that is not there",
-                    gauge.name, gauge.region
-                )
-            })
-        };
-        file.gauges.iter().map(find).collect()
+        gauges(&file.regions, &file.gauges, size)
     }
 }

@@ -1,5 +1,6 @@
 //! `recipe.json` inside a recipe, version 1, as it stands on disk. Frozen: see `docs/formats.md`.
 
+use super::comparison::ComparisonFile;
 use algo::units::AbsolutePhase;
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +43,9 @@ pub struct RecipeFile {
     pub production: usize,
     /// How far a part may lie from where it was taught, in any direction, mm.
     pub placement_tolerance_mm: f64,
+    /// Whether the part's motion is found and taken back before it is gauged.
+    #[serde(default, skip_serializing_if = "AlignmentKind::is_none")]
+    pub alignment: AlignmentKind,
     /// Working range of z in mm.
     pub range_mm: [f64; 2],
     /// Exposure in µs; none where the head has no such setting.
@@ -57,6 +61,9 @@ pub struct RecipeFile {
     pub regions: Vec<RegionFile>,
     /// At most 16.
     pub gauges: Vec<GaugeFile>,
+    /// What teaching gained; none where it was taught from a recording.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub comparison: Option<ComparisonFile>,
 }
 
 /// A camera's frames.
@@ -169,11 +176,12 @@ pub struct RegionFile {
 pub struct GaugeFile {
     /// Its name.
     pub name: String,
-    /// The name of its region.
+    /// The name of its region; only a placement needs none.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub region: String,
     /// What it measures.
     pub measures: GaugeKind,
-    /// Lower limit, inclusive, in mm or as a share.
+    /// Lower limit, inclusive, in mm, degrees, mm³ or as a share.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub low: Option<f64>,
     /// Upper limit, inclusive.
@@ -181,15 +189,106 @@ pub struct GaugeFile {
     pub high: Option<f64>,
 }
 
-/// What a gauge measures.
+/// How parts are brought to where they were taught before they are gauged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AlignmentKind {
+    /// Not at all.
+    #[default]
+    None,
+    /// By a small rigid motion.
+    Rigid,
+}
+
+impl AlignmentKind {
+    /// Whether there is none.
+    pub fn is_none(&self) -> bool {
+        *self == Self::None
+    }
+}
+
+/// An axis of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AxisFile {
+    /// x.
+    X,
+    /// y.
+    Y,
+}
+
+/// A component of a part's motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ComponentFile {
+    /// Shift along x, mm.
+    X,
+    /// Shift along y, mm.
+    Y,
+    /// Shift along z, mm.
+    Z,
+    /// Turn about x, degrees.
+    AboutX,
+    /// Turn about y, degrees.
+    AboutY,
+    /// Turn about z, degrees.
+    AboutZ,
+}
+
+/// What a gauge measures; `docs/formats.md` has the definitions. `smoothing_px` is the side of the square that is averaged
+/// over, in camera pixels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum GaugeKind {
     /// The deviation from golden of largest magnitude, in mm.
     Deviation {
-        /// Side of the square that is averaged over, in camera pixels, odd.
+        /// Odd.
         smoothing_px: usize,
+    },
+    /// The root mean square of the deviation from golden, in mm.
+    RmsDeviation {
+        /// See above.
+        smoothing_px: usize,
+    },
+    /// The share of the region that deviates from golden by more than a tolerance.
+    OutOfTolerance {
+        /// See above.
+        smoothing_px: usize,
+        /// In mm.
+        tolerance_mm: f64,
     },
     /// The share of the region's pixels that is resolved.
     Coverage,
+    /// The mean height, in mm.
+    MeanHeight,
+    /// The mean height less that of another region, in mm.
+    Step {
+        /// The other region's name.
+        from: String,
+    },
+    /// The peak-to-valley flatness about the least-squares plane, in mm.
+    Flatness {
+        /// See above.
+        smoothing_px: usize,
+    },
+    /// The highest less the lowest place, in mm.
+    PeakToValley {
+        /// See above.
+        smoothing_px: usize,
+    },
+    /// The angle of the least-squares plane about an axis, in degrees.
+    Tilt {
+        /// The axis.
+        about: AxisFile,
+    },
+    /// The volume above a plane, in mm³.
+    Volume {
+        /// The plane's z, mm.
+        above_mm: f64,
+    },
+    /// How the part lies, in mm or degrees.
+    Placement {
+        /// Which part of it.
+        component: ComponentFile,
+    },
 }

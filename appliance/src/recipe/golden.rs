@@ -1,10 +1,12 @@
 //! From a golden measurement to a recipe, whether it came from a head or from a recording.
 
 use super::archive::{self, Arrays};
+use super::comparison::ComparisonFile;
 use super::file::{CameraFile, FORMAT, RasterFile, VERSION};
 use super::planner::{self, Choice};
 use super::{
-    GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile, SequenceFile, SequenceKind,
+    AlignmentKind, GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile, SequenceFile,
+    SequenceKind,
 };
 use crate::calibration::Calibration;
 use algo::adaptive::{Surface, phase_reach};
@@ -20,7 +22,7 @@ const MAX_SIGMA_MM: f64 = 0.25;
 /// Deviations are averaged over squares of this many camera pixels.
 const SMOOTHING_PX: usize = 9;
 /// Limit of the deviation, mm.
-const DEVIATION_MM: f64 = 0.25;
+const DEVIATION_MM: f64 = 0.15;
 /// The part's coverage may fall by this share of the frame.
 const COVERAGE_CHANGE: f64 = 0.01;
 /// Least share of the golden surface that must be resolved.
@@ -67,6 +69,8 @@ pub struct GoldenPart<'a> {
     pub heights: &'a HeightMap,
     /// σ of one sample in counts.
     pub noise: f64,
+    /// What its own pattern gained, if a fixed one was measured as well.
+    pub comparison: Option<ComparisonFile>,
 }
 
 /// A finished recipe.
@@ -123,6 +127,7 @@ impl GoldenPart<'_> {
             sequences,
             production: choice.production,
             placement_tolerance_mm: naming.placement_tolerance_mm,
+            alignment: AlignmentKind::Rigid,
             range_mm: [range.low, range.high],
             exposure_us: None,
             noise_counts: self.noise,
@@ -130,6 +135,7 @@ impl GoldenPart<'_> {
             min_coverage: MIN_COVERAGE,
             regions,
             gauges,
+            comparison: self.comparison.clone(),
         };
         let (bytes, _) = archive::pack(&file, &arrays).map_err(|error| error.to_string())?;
         // Read back as it will be after a restart: what was just taught is known to load.

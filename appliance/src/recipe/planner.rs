@@ -18,20 +18,23 @@ pub struct Choice {
     pub reasons: Vec<String>,
 }
 
-/// The largest σ_z, RMS over the surface, that a recipe's deviation limits allow.
+/// The largest σ_z, RMS over the surface, that the limits of a recipe's gauges of single places allow: deviations, flatness,
+/// peak-to-valley. Means over regions are quieter by far.
 pub fn allowed_sigma(gauges: &[GaugeFile]) -> f64 {
     let allowed = gauges.iter().filter_map(|gauge| {
-        let GaugeKind::Deviation { smoothing_px } = gauge.measures else {
-            return None;
+        let side = gauge.measures.smoothing_px()?;
+        let limits = match gauge.measures {
+            GaugeKind::OutOfTolerance { tolerance_mm, .. } => [Some(tolerance_mm), None],
+            _ => [gauge.low, gauge.high],
         };
-        let limits = [gauge.low, gauge.high];
         let limit = limits
             .into_iter()
             .flatten()
             .map(f64::abs)
+            .filter(|limit| *limit > 0.0)
             .reduce(f64::min)?;
         // Golden and measurement are both noisy, hence √2; averaging side² pixels divides by side.
-        Some(limit * smoothing_px as f64 / SIGMAS / std::f64::consts::SQRT_2)
+        Some(limit * side as f64 / SIGMAS / std::f64::consts::SQRT_2)
     });
     allowed.fold(f64::INFINITY, f64::min)
 }

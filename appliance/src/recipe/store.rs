@@ -1,7 +1,7 @@
 //! The recipes of a station: a folder of `NNNN.recipe` files with the generation before each.
 
-use super::{Recipe, archive};
-use crate::output::folder::write_whole;
+use super::{Recipe, RecipeFile, archive};
+use crate::output::folder::{rename_whole, write_whole};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// The folder.
 #[derive(Clone, Debug)]
 pub struct Store {
-    folder: PathBuf,
+    pub(super) folder: PathBuf,
 }
 
 /// A recipe that could not be loaded.
@@ -18,7 +18,7 @@ pub enum LoadError {
     /// There is no such recipe.
     #[error("there is no recipe {0}: teach or import it")]
     Unknown(String),
-    /// Both generations are damaged.
+    /// No generation can be used.
     #[error("recipe file {path}: {reason}", path = path.display())]
     Corrupt {
         /// The newer file.
@@ -26,6 +26,22 @@ pub enum LoadError {
         /// What is wrong with it.
         reason: String,
     },
+}
+
+/// Which file a recipe was loaded from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stamp {
+    number: u16,
+    bytes: u64,
+    modified: std::time::SystemTime,
+    fingerprint: String,
+}
+
+impl Stamp {
+    /// The file's size.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
 }
 
 /// A loaded recipe.
@@ -38,6 +54,13 @@ pub struct Loaded {
 }
 
 impl Store {
+    /// The store in a folder that may not exist yet: then it has no recipes.
+    pub fn at(folder: &Path) -> Self {
+        Self {
+            folder: folder.to_path_buf(),
+        }
+    }
+
     /// Opens the folder, creating it where it does not exist.
     ///
     /// # Errors
@@ -49,11 +72,11 @@ impl Store {
         })
     }
 
-    fn path(&self, number: u16) -> PathBuf {
+    pub(super) fn path(&self, number: u16) -> PathBuf {
         self.folder.join(format!("{number:04}.recipe"))
     }
 
-    fn previous(&self, number: u16) -> PathBuf {
+    pub(super) fn previous(&self, number: u16) -> PathBuf {
         self.folder.join(format!("{number:04}.recipe.previous"))
     }
 
@@ -62,14 +85,32 @@ impl Store {
     /// # Errors
     /// Whatever the file system answers; then the stored recipe is the one before.
     pub fn save(&self, number: u16, bytes: &[u8]) -> io::Result<()> {
-        let path = self.path(number);
-        if let Ok(current) = fs::read(&path)
-            // A damaged file never pushes out the good generation behind it.
-            && Recipe::from_bytes(&current).is_ok()
-        {
-            write_whole(&self.previous(number), &current)?;
+        let _alone = self.lock()?;
+        self.keep_previous(number)?;
+        write_whole(&self.path(number), bytes)
+    }
+
+    /// Makes the current generation the previous one, unless it is damaged: a damaged file never pushes out the good
+    /// generation behind it.
+    pub(super) fn keep_previous(&self, number: u16) -> io::Result<()> {
+        let (path, previous) = (self.path(number), self.previous(number));
+        let sound = |file: fs::File| archive::is_sound(io::BufReader::new(file));
+        if !fs::File::open(&path).is_ok_and(sound) {
+            return Ok(());
         }
-        write_whole(&path, bytes)
+        let second = previous.with_extension("previous.new");
+        // Left by a kill; there may be none.
+        let _ = fs::remove_file(&second);
+        // A second name for the same file where the file system can, so that the current one stands until it is replaced.
+        fs::hard_link(&path, &second).or_else(|_| fs::copy(&path, &second).map(|_| ()))?;
+        rename_whole(&second, &previous)
+    }
+
+    /// Keeps other processes from changing the same recipes, as long as the answer lives.
+    pub(super) fn lock(&self) -> io::Result<fs::File> {
+        let lock = fs::File::create(self.folder.join("lock"))?;
+        lock.lock()?;
+        Ok(lock)
     }
 
     /// Loads a recipe by number. Where the newest generation is damaged, the one before is used,
@@ -103,6 +144,33 @@ impl Store {
         }
     }
 
+    /// Loads that generation of a recipe which has this fingerprint.
+    ///
+    /// # Errors
+    /// If none has it any more.
+    pub fn load_fingerprint(&self, number: u16, fingerprint: &str) -> Result<Recipe, LoadError> {
+        let same = |recipe: &Recipe| recipe.file.fingerprint == fingerprint;
+        [self.path(number), self.previous(number)]
+            .iter()
+            .find_map(|path| Self::read(path, number)?.ok().filter(same))
+            .ok_or_else(|| {
+                let digits = fingerprint.get(..8).unwrap_or(fingerprint);
+                LoadError::Unknown(format!("{number} with fingerprint {digits}"))
+            })
+    }
+
+    /// What loading a recipe depends on: an equal answer means that the files are the same as before.
+    pub fn stamp(&self, number: u16) -> Option<Stamp> {
+        let file = fs::File::open(self.path(number)).ok()?;
+        let found = file.metadata().ok()?;
+        Some(Stamp {
+            number,
+            bytes: found.len(),
+            modified: found.modified().ok()?,
+            fingerprint: archive::manifest(file).ok()?.fingerprint,
+        })
+    }
+
     /// The recipe in a file, if the file exists.
     fn read(path: &Path, number: u16) -> Option<Result<Recipe, String>> {
         let opened = fs::File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
@@ -119,6 +187,24 @@ impl Store {
             )),
             Ok(recipe) => Ok(recipe),
         })
+    }
+
+    /// The manifest of a recipe, without checking the rest: for lists.
+    ///
+    /// # Errors
+    /// In words: there is none, or it cannot be read.
+    pub fn manifest(&self, number: u16) -> Result<RecipeFile, String> {
+        let file = fs::File::open(self.path(number))
+            .map_err(|error| format!("recipe {number}: {error}: teach or import it"))?;
+        archive::manifest(file).map_err(|error| error.to_string())
+    }
+
+    /// The file of a recipe as it is, to be exported.
+    ///
+    /// # Errors
+    /// Whatever the file system answers.
+    pub fn bytes(&self, number: u16) -> io::Result<Vec<u8>> {
+        fs::read(self.path(number))
     }
 
     /// The number of the recipe taught for a part number.

@@ -3,6 +3,7 @@
 pub use super::golden::{Naming, Taught};
 
 use super::PatternFile;
+use super::comparison::ComparisonFile;
 use super::golden::GoldenPart;
 use crate::calibration::Calibration;
 use crate::rig::{About, Measured, Rig, RigError};
@@ -114,6 +115,7 @@ pub fn teach(
         phases,
         heights,
         noise: calibration.noise_counts,
+        comparison: Some(ComparisonFile::of(&first, &golden)),
     };
     let taught = part.recipe(naming).map_err(TeachError::Rig)?;
     progress(1.0, "taught");

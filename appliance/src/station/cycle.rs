@@ -144,6 +144,9 @@ impl Station {
     ) {
         let verdict = inspection.verdict();
         let total = now.since(cycle.accepted);
+        if let Some(exposed) = cycle.exposed {
+            self.health.processed(now.since(exposed).to_u32());
+        }
         self.last_seq = self.last_seq.wrapping_add(1);
         let record = Arc::new(ResultRecord {
             seq: self.last_seq,

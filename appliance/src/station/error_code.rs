@@ -1,5 +1,9 @@
 //! The error codes that the station gives by itself; the worker brings its own (1xx camera … 7xx thermal).
 
+/// There is not enough room left to store results.
+pub const STORAGE_FULL: u16 = 602;
+/// The number of a result could not be stored.
+pub const SEQ_NOT_STORED: u16 = 603;
 /// The station's measuring task did not answer before the deadline of a wait.
 pub const DEADLINE: u16 = 801;
 /// The PLC or a stop ended the cycle before it had a result.

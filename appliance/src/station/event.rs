@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::control::ControlWrite;
+use super::health::{Pace, System};
 use super::result::{Inspection, ResultRecord};
 use super::state::ActiveRecipe;
 
@@ -159,7 +160,26 @@ pub enum Event {
         remedy: Arc<str>,
     },
     /// The broken device works again.
-    Recovered,
+    Recovered {
+        /// What the worker has ready in its hands now.
+        recipe: Option<ActiveRecipe>,
+    },
+    /// The history cannot be written, or can again.
+    History {
+        /// Why not, and the remedy; none if it can.
+        problem: Option<Arc<str>>,
+    },
+    /// A sequence was exposed: how well the head kept time.
+    Paced(Pace),
+    /// A survey of the system.
+    Surveyed(System),
+    /// The answer to [`Effect::PersistSeq`].
+    Stored {
+        /// Which.
+        seq: u32,
+        /// Why it could not be stored.
+        failed: Option<Arc<str>>,
+    },
     /// The worker's sign of life.
     Alive,
     /// Time passes: about every 100 ms.
@@ -176,7 +196,13 @@ impl Event {
     pub fn from_worker(&self) -> bool {
         !matches!(
             self,
-            Self::Write { .. } | Self::Request(_) | Self::Tick { .. } | Self::Stop
+            Self::Write { .. }
+                | Self::Request(_)
+                | Self::History { .. }
+                | Self::Surveyed(_)
+                | Self::Stored { .. }
+                | Self::Tick { .. }
+                | Self::Stop
         )
     }
 }
@@ -220,7 +246,8 @@ pub enum Effect {
         /// The running job.
         job: JobId,
     },
-    /// Store this RESULT_SEQ as used. Always directly before the [`Effect::Publish`] of that result.
+    /// Make sure that this RESULT_SEQ is stored as used, and answer with [`Event::Stored`]. Always directly before the
+    /// [`Effect::Publish`] of that result; again when it could not be stored.
     PersistSeq(u32),
     /// A result is complete: for the history.
     Publish(Arc<ResultRecord>),

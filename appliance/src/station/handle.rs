@@ -14,8 +14,9 @@ use super::snapshot::Snapshot;
 use super::state::Micros;
 use super::step::step;
 
-/// Carries out effects, in order. Called with the station locked: it hands on and returns, at most writing one small file.
-pub type EffectSink = Box<dyn FnMut(Effect) + Send>;
+/// Carries out effects, in order. Called with the station locked: it hands on and returns, at most writing one small file. An
+/// answer that it has at once is taken before anybody sees the effect's snapshot.
+pub type EffectSink = Box<dyn FnMut(Effect) -> Option<Event> + Send>;
 
 struct Guarded {
     station: Station,
@@ -35,7 +36,7 @@ impl StationHandle {
     pub fn new(
         station: Station,
         start: Instant,
-        sink: impl FnMut(Effect) + Send + 'static,
+        sink: impl FnMut(Effect) -> Option<Event> + Send + 'static,
     ) -> Self {
         let (snapshots, _) = watch::channel(Arc::new(station.snapshot()));
         let guarded = Arc::new(Mutex::new(Guarded {
@@ -85,11 +86,15 @@ impl StationHandle {
 
     fn take(&self, event: Event) -> Arc<Snapshot> {
         let mut guarded = self.lock();
-        // Read under the lock, so that events are numbered in the order in which they are taken.
-        let (station, effects) = step(guarded.station.clone(), event, self.now());
-        guarded.station = station;
-        for effect in effects {
-            (guarded.sink)(effect);
+        let mut next = Some(event);
+        while let Some(event) = next.take() {
+            // Read under the lock, so that events are numbered in the order in which they are taken.
+            let (station, effects) = step(guarded.station.clone(), event, self.now());
+            guarded.station = station;
+            for effect in effects {
+                // One event stores at most one number, and nothing else is answered.
+                next = (guarded.sink)(effect).or(next);
+            }
         }
         let snapshot = Arc::new(guarded.station.snapshot());
         self.snapshots.send_replace(snapshot.clone());
@@ -138,7 +143,9 @@ mod tests {
     #[tokio::test]
     async fn ticking_moves_the_heartbeat_and_ends_with_its_shutdown() {
         let handle =
-            StationHandle::new(Station::new(settings(), Micros(0)), Instant::now(), |_| ());
+            StationHandle::new(Station::new(settings(), Micros(0)), Instant::now(), |_| {
+                None
+            });
         let mut snapshots = handle.subscribe();
         let (end, ended) = tokio::sync::oneshot::channel::<()>();
         let ticking = tokio::spawn(tick(handle.clone(), || Some(1), async {
@@ -159,7 +166,8 @@ mod tests {
         let (sink, effects) = channel();
         let station = Station::new(settings(), Micros(0));
         let handle = StationHandle::new(station, Instant::now(), move |effect| {
-            sink.send(effect).unwrap()
+            sink.send(effect).unwrap();
+            None
         });
         handle.event(Event::Started);
         let after = handle.event(Event::Request(Request::Load(RecipeKey::Number(3))));
@@ -176,7 +184,9 @@ mod tests {
     #[test]
     fn a_refused_write_changes_neither_the_station_nor_the_edges() {
         let handle =
-            StationHandle::new(Station::new(settings(), Micros(0)), Instant::now(), |_| ());
+            StationHandle::new(Station::new(settings(), Micros(0)), Instant::now(), |_| {
+                None
+            });
         let mut edges = ConnectionEdges::default();
         let write = ControlWrite {
             control: super::super::Masked::<u16>::all(0x0102),

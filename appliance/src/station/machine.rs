@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::control::{self, ControlRegisters};
 use super::event::{Condition, Effect, Effects, JobId, RecipeResult};
+use super::health::Health;
 use super::result::ResultRecord;
 use super::snapshot::Identity;
 use super::state::{ActiveRecipe, ClearedBy, Fault, Micros, State};
@@ -28,6 +29,8 @@ pub struct Limits {
     pub teaching: Micros,
     /// The worker's signs of life while it waits for orders.
     pub idle: Micros,
+    /// The same, before its silence is a fault.
+    pub silent: Micros,
     /// PLC_HEARTBEAT may stand still for this long.
     pub plc: Micros,
 }
@@ -41,6 +44,7 @@ impl Default for Limits {
             loading: Micros::from_millis(10_000),
             teaching: Micros::from_millis(30_000),
             idle: Micros::from_millis(1_000),
+            silent: Micros::from_millis(10_000),
             plc: Micros::from_millis(5_000),
         }
     }
@@ -86,6 +90,11 @@ pub struct Station {
     /// The last cycle's failure: its code and words.
     pub(super) failure: Option<(u16, Arc<str>)>,
     pub(super) condition: Condition,
+    /// Whether the history cannot be written.
+    pub(super) history_fails: bool,
+    pub(super) health: Health,
+    /// Whether the SEQ of the last result still has to be stored.
+    pub(super) unstored: bool,
     pub(super) heartbeat: u16,
     pub(super) next_beat: Micros,
     pub(super) last_alive: Micros,
@@ -123,6 +132,9 @@ impl Station {
             queue: heapless::Deque::new(),
             failure: None,
             condition: Condition::default(),
+            history_fails: false,
+            health: Health::default(),
+            unstored: false,
             heartbeat: 0,
             next_beat: now.after(BEAT),
             last_alive: now,
@@ -154,7 +166,8 @@ impl Station {
 
     /// Whether a trigger would be accepted.
     pub(super) fn is_ready(&self) -> bool {
-        self.state == State::Ready && self.recipe.is_some() && self.wants_online()
+        let at_rest = self.state == State::Ready && !self.unstored;
+        at_rest && self.recipe.is_some() && self.wants_online()
     }
 
     /// Whether the worker meets its deadlines: that of the wait it is in, else a sign of life now and then.

@@ -19,12 +19,18 @@
 //! - ERROR and ERROR_CODE show a fault, else the last failed cycle until a cycle succeeds or ERROR_RESET.
 //! - EXPOSURE_DONE also rises with a result that never reported its exposure: the head is idle, the part may move.
 //! - The PLC's heartbeat is watched from its first change on; a PLC that never uses it is never reported lost.
+//! - A fault of a lost device, of storage and of an idle worker's silence clears by itself when its cause is gone; only the
+//!   fault of a missed deadline waits for ERROR_RESET, because nobody knows what the worker did meanwhile.
+//! - A lost device ends the cycle in flight as INVALID; after its recovery the recipe is what the worker still holds.
+//! - Full storage is a fault only between two jobs: the cycle in flight still gets its result. A result whose SEQ could not be
+//!   stored is shown, but no further trigger is accepted until that SEQ is stored.
 //! - REJECT_REASON stays until the next rejected request.
 pub mod control;
 pub mod error_code;
 pub mod event;
 pub mod gauge;
 pub mod handle;
+pub mod health;
 pub mod machine;
 pub mod result;
 pub mod snapshot;
@@ -45,8 +51,9 @@ pub use control::{ConnectionEdges, ControlRegisters, ControlWrite, Masked, Refus
 pub use event::{Condition, Effect, Effects, Event, Job, JobId, RecipeKey, RecipeResult, Request};
 pub use gauge::{Decision, GaugeValue, Unit};
 pub use handle::{StationHandle, system_utc_us, tick};
+pub use health::{Health, Pace, System};
 pub use machine::{Limits, Settings, Station};
-pub use result::{Inspection, MAX_GAUGES, ResultRecord, Skipped, StageTime, Verdict};
+pub use result::{Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, StageTime, Verdict};
 pub use snapshot::{Identity, Snapshot, TeachProgress};
 pub use state::{ActiveRecipe, Cycle, Fault, Micros, State};
 pub use step::step;

@@ -15,7 +15,7 @@ pub mod reject {
     pub const NO_RECIPE: u16 = 3;
     /// The config does not let the PLC teach.
     pub const TEACH_NOT_ALLOWED: u16 = 4;
-    /// The station has a fault.
+    /// The station has a fault, or the number of a result is still to be stored.
     pub const FAULT: u16 = 5;
 }
 
@@ -81,7 +81,8 @@ impl Station {
         Some(match self.state {
             _ if !self.wants_online() => reject::OFFLINE,
             State::Fault(_) => reject::FAULT,
-            State::Ready => reject::NO_RECIPE,
+            State::Ready if self.recipe.is_none() => reject::NO_RECIPE,
+            State::Ready => reject::FAULT,
             _ => reject::NOT_READY,
         })
     }

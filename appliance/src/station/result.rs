@@ -87,6 +87,35 @@ pub struct Skipped {
     pub exact: u32,
 }
 
+/// How a part lies against how it was taught.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Placement {
+    /// How far the middle of its surface was shifted, x, y, z.
+    pub shift_mm: [f64; 3],
+    /// The rotation vector about it: about x, y, z.
+    pub turn_deg: [f64; 3],
+    /// Which of the six the part's shape does not determine: they are taken as 0.
+    pub left_out: [bool; 6],
+    /// How far its farthest corner went.
+    pub reach_mm: f64,
+    /// Share of the points looked at that do not fit: they lie on defects, or their fringe order is wrong.
+    pub outliers: f64,
+}
+
+impl Placement {
+    /// Names of the six components: shifts, then turns.
+    pub const COMPONENTS: [&str; 6] = ["x", "y", "z", "about x", "about y", "about z"];
+
+    /// The names of the components that the part's shape does not determine.
+    pub fn undetermined(&self) -> Vec<&'static str> {
+        let pairs = Self::COMPONENTS.into_iter().zip(self.left_out);
+        pairs
+            .filter(|(_, out)| *out)
+            .map(|(name, _)| name)
+            .collect()
+    }
+}
+
 /// What the worker found in one cycle.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Inspection {
@@ -114,6 +143,13 @@ pub struct Inspection {
     pub skipped: Skipped,
     /// Times of the stages, in their order.
     pub stages: heapless::Vec<StageTime, MAX_STAGES>,
+    /// Processor time of all stages on all computing threads, µs: unlike the times above it does not grow when somebody else
+    /// has the processor.
+    pub cpu_us: u32,
+    /// How the part lies, if it was aligned.
+    pub placement: Option<Placement>,
+    /// Why the part should be measured again with the next longer sequence, where there is one.
+    pub step_up: Option<&'static str>,
 }
 
 impl Inspection {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::control::ControlRegisters;
 use super::event::RecipeResult;
+use super::health::Health;
 use super::machine::Station;
 use super::result::ResultRecord;
 use super::state::{ActiveRecipe, Fault, Micros, State};
@@ -154,6 +155,8 @@ pub struct Snapshot {
     pub oldest: Option<Arc<ResultRecord>>,
     /// While teaching.
     pub teach: Option<TeachProgress>,
+    /// What system, head and clients say of themselves.
+    pub health: Health,
 }
 
 impl Snapshot {
@@ -217,6 +220,7 @@ impl Station {
             result: self.result.clone(),
             oldest: self.queue.front().cloned(),
             teach,
+            health: self.health.clone(),
         }
     }
 
@@ -227,12 +231,27 @@ impl Station {
         } else {
             0
         };
+        let unwritten = if self.history_fails {
+            warning::STORAGE
+        } else {
+            0
+        };
         let unsynced = if self.utc_at_zero.is_none() {
             warning::CLOCK_UNSYNCED
         } else {
             0
         };
-        (self.condition.warnings & !own & 0x00FF) | lost | unsynced
+        let storage = if self.unstored || self.health.storage_is_low() {
+            warning::STORAGE
+        } else {
+            0
+        };
+        let hot = if self.health.processor_is_hot() {
+            warning::TEMPERATURE
+        } else {
+            0
+        };
+        (self.condition.warnings & !own & 0x00FF) | lost | unsynced | storage | unwritten | hot
     }
 
     fn status(&self, warnings: u16, error_code: u16) -> u16 {

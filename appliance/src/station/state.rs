@@ -67,6 +67,10 @@ pub enum ClearedBy {
     SignOfLife,
     /// The worker reported a broken device: clears by itself when the worker reports its recovery.
     Recovery,
+    /// Results cannot be stored: clears by itself when they can.
+    Storage,
+    /// The worker was silent while it had nothing to do: clears by itself with its next sign of life.
+    Life,
 }
 
 /// A lasting condition that keeps the station from measuring.

@@ -2,7 +2,7 @@
 
 use super::event::{Effect, Effects, Event, JobId, RecipeResult, Request};
 use super::machine::{BEAT, Station, log, push};
-use super::state::{ClearedBy, Fault, Micros, State};
+use super::state::{ActiveRecipe, ClearedBy, Fault, Micros, State};
 
 /// Takes one event. Every state takes every event; an event that makes no sense in a state changes nothing and is logged.
 ///
@@ -13,6 +13,7 @@ pub fn step(mut station: Station, event: Event, now: Micros) -> (Station, Effect
     station.now = now;
     if event.from_worker() {
         station.last_alive = now;
+        station.lives(&mut effects);
     }
     match event {
         Event::Write { write, rising } => station.plc_write(&write, rising, now, &mut effects),
@@ -128,17 +129,11 @@ pub fn step(mut station: Station, event: Event, now: Micros) -> (Station, Effect
                 &mut effects,
             );
         }
-        Event::Recovered => {
-            if let State::Fault(fault) = &station.state
-                && fault.cleared_by == ClearedBy::Recovery
-            {
-                log(
-                    &mut effects,
-                    format!("recovered from error {}: {}", fault.code, fault.cause),
-                );
-                station.state = station.rest();
-            }
-        }
+        Event::Recovered { recipe } => station.recovered(recipe, &mut effects),
+        Event::Paced(pace) => station.health.paced(pace),
+        Event::Surveyed(system) => station.surveyed(system, now, &mut effects),
+        Event::Stored { seq, failed } => station.stored(seq, failed, now, &mut effects),
+        Event::History { problem } => station.history_told(problem, &mut effects),
         Event::Alive => {}
         Event::Tick { utc_us } => station.tick(utc_us, now, &mut effects),
         Event::Stop => station.stop(&mut effects),
@@ -165,6 +160,31 @@ impl Station {
                 self.state = self.rest();
             }
             _ => log(effects, "the measuring task started twice; ignored"),
+        }
+    }
+
+    /// A lost device is back, and the worker holds `recipe`.
+    fn recovered(&mut self, recipe: Option<ActiveRecipe>, effects: &mut Effects) {
+        let State::Fault(fault) = &self.state else {
+            return;
+        };
+        if fault.cleared_by == ClearedBy::Recovery {
+            log(
+                effects,
+                format!("recovered from error {}: {}", fault.code, fault.cause),
+            );
+            self.recipe = recipe;
+            self.state = self.rest();
+        }
+    }
+
+    /// The worker gave a sign of life.
+    fn lives(&mut self, effects: &mut Effects) {
+        if let State::Fault(fault) = &self.state
+            && fault.cleared_by == ClearedBy::Life
+        {
+            log(effects, "the measuring task lives again");
+            self.state = self.rest();
         }
     }
 
@@ -227,7 +247,11 @@ impl Station {
             }
             State::Loading { deadline, .. } => (deadline, "load a recipe", limits.loading),
             State::Teaching { deadline, .. } => (deadline, "get on with teaching", limits.teaching),
-            State::Ready | State::Offline | State::Fault(_) | State::Stopping { .. } => return,
+            State::Ready | State::Offline => {
+                self.watch_idle(now, effects);
+                return;
+            }
+            State::Fault(_) | State::Stopping { .. } => return,
         };
         if now > *deadline {
             let job = self.state.job();
@@ -236,6 +260,34 @@ impl Station {
             if let Some(job) = job {
                 push(effects, Effect::Abort { job });
             }
+        }
+    }
+
+    /// The history fails or works again: a warning, no fault. Verdicts go on.
+    fn history_told(&mut self, problem: Option<std::sync::Arc<str>>, effects: &mut Effects) {
+        self.history_fails = problem.is_some();
+        let works = || "the history is written again".into();
+        log(effects, problem.unwrap_or_else(works));
+    }
+
+    /// A worker without orders that gives no sign of life would not take one either.
+    fn watch_idle(&mut self, now: Micros, effects: &mut Effects) {
+        let silent = now.since(self.last_alive);
+        if silent > self.settings.limits.silent {
+            let fault = Fault {
+                code: super::error_code::DEADLINE,
+                cause: format!(
+                    "the measuring task gave no sign of life for {} ms",
+                    silent.0 / 1000
+                )
+                .into(),
+                remedy:
+                    "it clears by itself with the next sign of life; if it stays, restart fringed"
+                        .into(),
+                since: now,
+                cleared_by: ClearedBy::Life,
+            };
+            self.fault(fault, now, effects);
         }
     }
 

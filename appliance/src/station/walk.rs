@@ -66,7 +66,7 @@ fn any_event(random: &mut Random, edges: &mut ConnectionEdges, last: JobId) -> E
     };
     let words: Arc<str> = "w".into();
     let number = random.word(9) + 1;
-    match random.below(40) {
+    match random.below(43) {
         0..10 => plc_write(random, edges),
         10..14 => Event::ExposureDone { job },
         14..20 => Event::Finished {
@@ -106,7 +106,17 @@ fn any_event(random: &mut Random, edges: &mut ConnectionEdges, last: JobId) -> E
             cause: words.clone(),
             remedy: words,
         },
-        30 => Event::Recovered,
+        30 => Event::Recovered {
+            recipe: (random.below(3) != 0).then(|| recipe(number)),
+        },
+        40 => Event::Surveyed(System {
+            free_storage_mib: Some(if random.below(50) == 0 { 0 } else { 1000 }),
+            ..System::default()
+        }),
+        41 => Event::Paced(Pace {
+            dropped: 1,
+            ..Pace::default()
+        }),
         31 if random.below(4) == 0 => Event::Request(Request::Load(RecipeKey::Number(number))),
         32 if random.below(9) == 0 => Event::Request(Request::Teach { number }),
         33 => Event::Started,
@@ -130,6 +140,8 @@ fn a_hundred_thousand_random_events_break_no_promise() {
     let mut next_seq = settings.next_seq;
     let mut station = Station::new(settings, Micros(0));
     let (mut now, mut measures, mut results, mut most) = (Micros(0), 0_u32, 0_u32, 0);
+    // While the storage is broken no number is stored; the answer comes before anything else happens.
+    let (mut broken, mut answers) = (false, Vec::new());
     for count in 0..EVENTS {
         // Now and then long enough for a deadline.
         let pause = if random.below(500) == 0 {
@@ -139,7 +151,12 @@ fn a_hundred_thousand_random_events_break_no_promise() {
         };
         now = now.after(Micros::from_millis(pause));
         let before = station.snapshot();
-        let event = any_event(&mut random, &mut edges, station.last_job);
+        if random.below(if broken { 20 } else { 1000 }) == 0 {
+            broken = !broken;
+        }
+        let event = answers
+            .pop()
+            .unwrap_or_else(|| any_event(&mut random, &mut edges, station.last_job));
         let (next, effects) = step(station, event.clone(), now);
         station = next;
         let after = station.snapshot();
@@ -158,7 +175,13 @@ fn a_hundred_thousand_random_events_break_no_promise() {
                         "{count}: measured with another recipe"
                     );
                 }
-                Effect::PersistSeq(seq) => persisted = Some(*seq),
+                Effect::PersistSeq(seq) => {
+                    persisted = Some(*seq);
+                    answers.push(Event::Stored {
+                        seq: *seq,
+                        failed: broken.then(|| "no room".into()),
+                    });
+                }
                 Effect::Publish(record) => {
                     results += 1;
                     assert_eq!(
@@ -186,6 +209,7 @@ fn a_hundred_thousand_random_events_break_no_promise() {
         );
         let may = after.state == 1
             && after.recipe.is_some()
+            && !station.unstored
             && after.control.control & control::ONLINE != 0;
         assert_eq!(after.is(status::READY), may, "{count}: READY");
         assert!(
@@ -198,6 +222,10 @@ fn a_hundred_thousand_random_events_break_no_promise() {
         );
         assert_eq!(after.is(status::ERROR), after.error_code != 0);
         assert_eq!(after.fault.is_some(), after.state == 7);
+        assert!(
+            !station.unstored || !after.is(status::READY),
+            "{count}: READY while a result's number is not stored"
+        );
         assert!(after.missed >= before.missed && after.triggers >= before.triggers);
     }
     assert!(measures > 2_000, "the walk measured only {measures} times");

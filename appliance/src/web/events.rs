@@ -3,10 +3,15 @@
 use std::convert::Infallible;
 use std::time::Duration;
 
+use axum::extract::State;
+use axum::http::StatusCode;
 use axum::response::sse::{Event, Sse};
-use tokio::sync::{OwnedSemaphorePermit, mpsc};
+use axum::response::{IntoResponse, Response};
+use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
+use super::problem::Problem;
+use super::site::{MAX_FOLLOWERS, Site};
 use super::view;
 use crate::station::{Micros, Snapshot, StationHandle};
 
@@ -15,20 +20,22 @@ pub const HEARTBEAT: Duration = Duration::from_secs(1);
 /// And at most this often.
 pub const SHORTEST: Duration = Duration::from_millis(200);
 
-/// The stream of one page; ends when the page goes away. Holds `permit` until then.
-pub fn stream(
-    handle: StationHandle,
-    permit: OwnedSemaphorePermit,
-) -> Sse<ReceiverStream<Result<Event, Infallible>>> {
-    let (sender, receiver) = mpsc::channel(1);
+/// The stream of one page; ends when the page goes away.
+pub(super) async fn follow(State(site): State<Site>) -> Response {
+    let Ok(permit) = site.followers.clone().try_acquire_owned() else {
+        let words = format!("{MAX_FOLLOWERS} pages are open already; close one");
+        return Problem::new(StatusCode::SERVICE_UNAVAILABLE, words).into_response();
+    };
+    let (sender, receiver) = mpsc::channel::<Result<Event, Infallible>>(1);
+    let handle = site.station.clone();
     tokio::spawn(async move {
         let _permit = permit;
-        follow(handle, sender).await;
+        send(handle, sender).await;
     });
-    Sse::new(ReceiverStream::new(receiver))
+    Sse::new(ReceiverStream::new(receiver)).into_response()
 }
 
-async fn follow(handle: StationHandle, sender: mpsc::Sender<Result<Event, Infallible>>) {
+async fn send(handle: StationHandle, sender: mpsc::Sender<Result<Event, Infallible>>) {
     let mut snapshots = handle.subscribe();
     loop {
         let shown = snapshots.borrow_and_update().clone();

@@ -1,26 +1,32 @@
-//! The technician's page: one screen that says what the station does and what it found last.
+//! The technician's page and its API: what the station does, what it found, and what may be changed about it.
 //!
-//! [`router`] gives the paths, [`events`] the server-sent events, [`view`] the JSON of a snapshot, [`host`] keeps requests
-//! away that were meant for another name, [`server`] listens. The page itself is three files in `assets/`, compiled in.
-//! It only reads: nothing here changes the station.
-//!
-//! | path | answer |
-//! |---|---|
-//! | `/`, `/page.css`, `/page.js` | the page |
-//! | `/events` | server-sent events: the snapshot as JSON when it changes (at most 5 a second), and once a second anyway |
-//! | `/api/snapshot` | the same JSON, once |
-//! | `/height.png` | picture of the last measured height; 404 with words before the first |
-//! | `/healthz` | 200 while the measuring task meets its deadlines, else 503 |
+//! [`router`] is the table of all paths, described for others in `openapi.json`. Looking needs no login; whatever changes
+//! something passes the gate: Origin, session, record. [`events`] are the server-sent events, [`view`] the JSON of a
+//! snapshot, [`host`] keeps requests away that were meant for another name, [`server`] listens and [`slots`] bounds its
+//! connections. The page itself is a handful of files in `assets/`, compiled in.
+pub mod assets;
+pub mod body;
 pub mod events;
 pub mod host;
+pub mod look;
+pub mod map;
+pub mod problem;
 pub mod router;
 pub mod server;
+pub mod site;
+pub mod slots;
 pub mod view;
 
-#[cfg(test)]
-mod looking;
+mod downloads;
+mod gate;
+mod history;
+mod metrics;
+mod orders;
+mod recipes;
+mod sessions;
+
 #[cfg(test)]
 mod tests;
 
-pub use router::{HeightPicture, Site};
 pub use server::{WebError, bind, serve};
+pub use site::{Parts, Site};

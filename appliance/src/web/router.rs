@@ -1,83 +1,144 @@
-//! The paths of the page and the headers of every answer.
-
-use std::sync::Arc;
+//! The table of all paths, and what holds for every answer.
 
 use axum::Router;
 use axum::extract::{Request, State};
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
-use axum::middleware::{Next, from_fn_with_state};
-use axum::response::{IntoResponse, Json, Response};
-use axum::routing::get;
-use tokio::sync::Semaphore;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::middleware::{Next, from_fn, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{MethodFilter, MethodRouter, get, on};
+use axum::{Extension, handler::Handler};
 
-use super::{events, host, view};
-use crate::station::StationHandle;
-
-/// Gives the PNG of the last measured height, or `None` before the first. May take its time: called on a blocking thread.
-pub type HeightPicture = Arc<dyn Fn() -> Option<Vec<u8>> + Send + Sync>;
-
-/// The most pages that follow the events at a time.
-pub const MAX_FOLLOWERS: usize = 16;
+use super::gate::{Action, own_page_only, signed_in_only};
+use super::problem::Problem;
+use super::site::Site;
+use super::{assets, downloads, events, history, host, look, metrics, orders, recipes, sessions};
 
 /// Only files of this device, nothing inline, in nobody's frame.
 const CONTENT_SECURITY_POLICY: &str =
     "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// What the page shows.
-#[derive(Clone)]
-pub struct Site {
-    handle: StationHandle,
-    height: HeightPicture,
-    hosts: Arc<[String]>,
-    followers: Arc<Semaphore>,
+/// One method of one path.
+pub struct Route {
+    /// GET, POST, PUT or DELETE.
+    pub method: Method,
+    /// With parameters in braces.
+    pub path: &'static str,
+    /// What it is called in the record of changes; none if it changes nothing.
+    pub changes: Option<&'static str>,
+    answer: MethodRouter<Site>,
 }
 
-impl Site {
-    /// The page of a station. `hosts` are the names, besides IP addresses and `localhost`, under which it is reached.
-    pub fn new(handle: StationHandle, height: HeightPicture, hosts: Vec<String>) -> Self {
-        Self {
-            handle,
-            height,
-            hosts: hosts.into(),
-            followers: Arc::new(Semaphore::new(MAX_FOLLOWERS)),
-        }
+fn look<H, T>(path: &'static str, handler: H) -> Route
+where
+    H: Handler<T, Site>,
+    T: 'static,
+{
+    Route {
+        method: Method::GET,
+        path,
+        changes: None,
+        answer: get(handler),
     }
+}
+
+/// A change: only for those who signed in, and recorded as `action`.
+fn change<H, T>(
+    (method, filter): (Method, MethodFilter),
+    path: &'static str,
+    action: &'static str,
+    handler: H,
+) -> Route
+where
+    H: Handler<T, Site>,
+    T: 'static,
+{
+    Route {
+        method,
+        path,
+        changes: Some(action),
+        answer: on(filter, handler),
+    }
+}
+
+/// Every path that is answered, but for the page's own files.
+pub fn routes() -> Vec<Route> {
+    let post = || (Method::POST, MethodFilter::POST);
+    let put = || (Method::PUT, MethodFilter::PUT);
+    vec![
+        look("/events", events::follow),
+        look("/healthz", look::health),
+        look("/readyz", look::readiness),
+        look("/metrics", metrics::metrics),
+        look("/api/openapi.json", look::openapi),
+        look("/api/snapshot", look::snapshot),
+        look("/api/picture/{layer}", look::picture),
+        look("/api/trends", history::trends),
+        look("/api/registers", look::registers),
+        look("/api/log", look::log),
+        look("/api/changes", look::changes),
+        look("/api/last/cloud.ply", downloads::cloud),
+        look("/api/last/recording.zip", downloads::recording),
+        look("/api/last/gauges.csv", downloads::gauges),
+        look("/api/history", history::list),
+        look("/api/history.csv", history::csv),
+        look("/api/history/{seq}/recording.zip", history::recording),
+        look("/api/diagnostics.zip", downloads::diagnostics),
+        look("/api/recipes", recipes::list),
+        look("/api/recipes/{number}", recipes::one),
+        look("/api/recipes/{number}/file", recipes::export),
+        look("/api/recipes/{number}/picture/{layer}", recipes::picture),
+        change(post(), "/api/recipes", "import recipe", recipes::import),
+        change(put(), "/api/recipes/{number}", "edit recipe", recipes::edit),
+        change(
+            post(),
+            "/api/recipes/{number}/load",
+            "load recipe",
+            orders::load,
+        ),
+        change(
+            post(),
+            "/api/recipes/{number}/teach",
+            "teach recipe",
+            orders::teach,
+        ),
+        change(post(), "/api/trigger", "trigger", orders::trigger),
+        change(post(), "/api/reset", "reset errors", orders::reset),
+        look("/api/session", sessions::state),
+        Route {
+            method: Method::POST,
+            path: "/api/session",
+            changes: None,
+            answer: on(MethodFilter::POST, sessions::begin).route_layer(from_fn(own_page_only)),
+        },
+        Route {
+            method: Method::DELETE,
+            path: "/api/session",
+            changes: None,
+            answer: on(MethodFilter::DELETE, sessions::end).route_layer(from_fn(own_page_only)),
+        },
+    ]
 }
 
 /// All paths.
 pub fn router(site: Site) -> Router {
-    Router::new()
-        .route(
-            "/",
-            get(|| {
-                file(
-                    "text/html; charset=utf-8",
-                    include_str!("assets/index.html"),
-                )
-            }),
-        )
-        .route(
-            "/page.css",
-            get(|| file("text/css; charset=utf-8", include_str!("assets/page.css"))),
-        )
-        .route(
-            "/page.js",
-            get(|| {
-                file(
-                    "text/javascript; charset=utf-8",
-                    include_str!("assets/page.js"),
-                )
-            }),
-        )
-        .route(
-            "/icon.svg",
-            get(|| file("image/svg+xml", include_str!("assets/icon.svg"))),
-        )
-        .route("/events", get(follow))
-        .route("/api/snapshot", get(snapshot))
-        .route("/height.png", get(height))
-        .route("/healthz", get(health))
-        .fallback(|| async { (StatusCode::NOT_FOUND, "there is no such page; start at /\n") })
+    let mut router = Router::new();
+    for route in routes() {
+        let answer = match route.changes {
+            None => route.answer,
+            // The last layer is asked first: origin, then session.
+            Some(action) => route
+                .answer
+                .route_layer(from_fn_with_state(site.clone(), signed_in_only))
+                .route_layer(Extension(Action(action)))
+                .route_layer(from_fn(own_page_only)),
+        };
+        router = router.route(route.path, answer);
+    }
+    for asset in assets::ALL {
+        router = router.route(asset.path, get(move || async move { asset.answer() }));
+    }
+    router
+        .fallback(|| async { Problem::missing("there is no such page; start at /") })
         .layer(from_fn_with_state(site.clone(), guarded))
         .with_state(site)
 }
@@ -96,68 +157,20 @@ async fn guarded(
     let mut response = if host::is_allowed(host, &site.hosts) {
         next.run(request).await
     } else {
-        let words = "this device does not go by the name in the Host header; use its IP address, or add the name to the config\n";
-        (StatusCode::MISDIRECTED_REQUEST, words).into_response()
+        let words = "this device does not go by the name in the Host header; use its IP address, or add the name to the config";
+        Problem::new(StatusCode::MISDIRECTED_REQUEST, words).into_response()
     };
-    let fixed: [(HeaderName, &'static str); 3] = [
+    let fixed: [(HeaderName, &'static str); 5] = [
         (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY),
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::X_FRAME_OPTIONS, "DENY"),
         (header::REFERRER_POLICY, "no-referrer"),
+        // A page or picture from yesterday must never look like today's.
+        (header::CACHE_CONTROL, "no-store"),
     ];
     for (name, value) in fixed {
-        response
-            .headers_mut()
-            .insert(name, HeaderValue::from_static(value));
+        let value = HeaderValue::from_static(value);
+        response.headers_mut().insert(name, value);
     }
-    // A page or picture from yesterday must never look like today's.
     response
-        .headers_mut()
-        .insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-    response
-}
-
-async fn file(kind: &'static str, text: &'static str) -> impl IntoResponse {
-    ([(header::CONTENT_TYPE, kind)], text)
-}
-
-async fn follow(State(site): State<Site>) -> Response {
-    match site.followers.clone().try_acquire_owned() {
-        Ok(permit) => events::stream(site.handle, permit).into_response(),
-        Err(_) => {
-            let words = format!("{MAX_FOLLOWERS} pages are open already; close one\n");
-            (StatusCode::SERVICE_UNAVAILABLE, words).into_response()
-        }
-    }
-}
-
-async fn snapshot(State(site): State<Site>) -> impl IntoResponse {
-    Json(view::snapshot(&site.handle.snapshot()))
-}
-
-async fn height(State(site): State<Site>) -> Response {
-    match tokio::task::spawn_blocking(move || (site.height)()).await {
-        Ok(Some(png)) => ([(header::CONTENT_TYPE, "image/png")], png).into_response(),
-        Ok(None) => (
-            StatusCode::NOT_FOUND,
-            "nothing was measured yet; trigger a measurement\n",
-        )
-            .into_response(),
-        Err(_) => (
-            StatusCode::INTERNAL_SERVER_ERROR,
-            "the height picture could not be drawn; see the log\n",
-        )
-            .into_response(),
-    }
-}
-
-async fn health(State(site): State<Site>) -> Response {
-    if site.handle.snapshot().worker_alive {
-        (StatusCode::OK, "ok\n").into_response()
-    } else {
-        (
-            StatusCode::SERVICE_UNAVAILABLE,
-            "the measuring task missed its deadline\n",
-        )
-            .into_response()
-    }
 }

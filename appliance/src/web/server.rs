@@ -3,11 +3,35 @@
 use std::future::Future;
 use std::io;
 use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
+use axum::Router;
+use hyper::Request;
+use hyper::body::Incoming;
+use hyper::server::conn::http1;
+use hyper::service::{Service as _, service_fn};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
 use thiserror::Error;
-use tokio::net::TcpListener;
+use tokio::net::{TcpListener, TcpStream};
+use tokio_io_timeout::TimeoutStream;
 
-use super::router::{Site, router};
+use super::gate::Peer;
+use super::router::router;
+use super::site::Site;
+use super::slots::{Slot, Slots};
+
+/// The most connections at a time: 16 pages of 4.
+const MOST_CONNECTIONS: usize = 64;
+/// A request's header must come within this time; a connection without a request for as long is closed.
+const HEADER_TIME: Duration = Duration::from_secs(10);
+/// A client must take the next bytes of an answer within this time.
+const WRITE_TIME: Duration = Duration::from_secs(15);
+/// The most header lines of a request.
+const MOST_HEADERS: usize = 64;
+/// Pause after a connection that could not be accepted.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 /// Why there is no page.
 #[derive(Debug, Error)]
@@ -38,9 +62,6 @@ pub enum WebError {
         /// What the system said.
         source: io::Error,
     },
-    /// Serving ended by itself.
-    #[error("the page's server ended: {0}; restart fringed")]
-    Ended(io::Error),
 }
 
 /// Opens the socket; the listener's own address tells the port if 0 was asked for.
@@ -57,17 +78,57 @@ pub async fn bind(address: SocketAddr) -> Result<TcpListener, WebError> {
         })
 }
 
-/// Serves the page on `listener` until `shutdown`. Open event streams end with the runtime, not before.
-///
-/// # Errors
-/// Serving ended by itself.
-pub async fn serve(
-    listener: TcpListener,
-    site: Site,
-    shutdown: impl Future<Output = ()>,
-) -> Result<(), WebError> {
+/// Serves the page on `listener` until `shutdown`. Open connections end with the runtime, not before.
+pub async fn serve(listener: TcpListener, site: Site, shutdown: impl Future<Output = ()>) {
+    let router = router(site);
+    let slots = Slots::new(MOST_CONNECTIONS);
+    let accepting = async {
+        for id in 0_u64.. {
+            match listener.accept().await {
+                // Without a place it is closed at once: everybody else is being answered.
+                Ok((stream, peer)) => {
+                    if let Some(slot) = slots.enter(id, Instant::now()) {
+                        tokio::spawn(answer(stream, peer, Arc::new(slot), router.clone()));
+                    }
+                }
+                // Out of file descriptors, or a client that is gone already: others can still be served.
+                Err(_) => tokio::time::sleep(ACCEPT_PAUSE).await,
+            }
+        }
+    };
     tokio::select! {
-        ended = axum::serve(listener, router(site)).into_future() => ended.map_err(WebError::Ended),
-        () = shutdown => Ok(()),
+        () = accepting => {}
+        () = shutdown => {}
+    }
+}
+
+/// Answers the requests of one connection.
+async fn answer(stream: TcpStream, peer: SocketAddr, slot: Arc<Slot>, router: Router) {
+    let mut stream = TimeoutStream::new(stream);
+    stream.set_write_timeout(Some(WRITE_TIME));
+    let asked = slot.clone();
+    let inner = TowerToHyperService::new(router);
+    let service = service_fn(move |mut request: Request<Incoming>| {
+        asked.mark(None);
+        request.extensions_mut().insert(Peer(peer.ip()));
+        let follows = request.uri().path() == "/events";
+        let (answered, answering) = (asked.clone(), inner.call(request));
+        async move {
+            let response = answering.await;
+            if !follows {
+                answered.mark(Some(Instant::now()));
+            }
+            response
+        }
+    });
+    let connection = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(HEADER_TIME)
+        .max_headers(MOST_HEADERS)
+        .serve_connection(TokioIo::new(Box::pin(stream)), service);
+    // A client that breaks off is no failure of ours.
+    tokio::select! {
+        _ = connection => {}
+        () = slot.left() => {}
     }
 }

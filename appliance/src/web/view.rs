@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::station::result::flag;
 use crate::station::snapshot::{status, warning};
-use crate::station::{GaugeValue, ResultRecord, Snapshot, Unit, error_code};
+use crate::station::{GaugeValue, Placement, ResultRecord, Snapshot, Unit, error_code};
 
 /// The whole snapshot.
 pub fn snapshot(snapshot: &Snapshot) -> Value {
@@ -47,7 +47,31 @@ pub fn snapshot(snapshot: &Snapshot) -> Value {
         "identity": {
             "product": snapshot.identity.product, "serial": snapshot.identity.serial, "version": snapshot.identity.version,
         },
+        "health": health(snapshot),
         "result": snapshot.result.as_deref().map(result),
+    })
+}
+
+/// What the device says of itself; null where it is not known.
+fn health(snapshot: &Snapshot) -> Value {
+    let (system, pace) = (&snapshot.health.system, &snapshot.health.pace);
+    json!({
+        "cpu_percent": system.cpu_percent,
+        "free_memory_mib": system.free_memory_mib,
+        "free_storage_mib": system.free_storage_mib,
+        "cpu_temperature_c": system.cpu_temperature_c,
+        "boots": system.boots,
+        "unclean_boots": system.unclean_boots,
+        "modbus_clients": system.clients,
+        "writer_connected": system.writer_connected,
+        "camera_hz": f64::from(pace.camera_centihertz) / 100.0,
+        "projector_hz": f64::from(pace.refresh_millihertz) / 1000.0,
+        "lag_us": pace.lag_us,
+        "dropped_frames": pace.dropped,
+        "missed_flips": pace.missed_flips,
+        "processing_us": snapshot.health.processing_us,
+        "processing_max_us": snapshot.health.processing_max_us,
+        "storage_errors": snapshot.health.storage_errors,
     })
 }
 
@@ -75,6 +99,7 @@ fn result(record: &ResultRecord) -> Value {
         "time_utc_us": record.time_utc_us,
         "exposure_us": record.exposure_us,
         "total_us": record.total_us,
+        "cpu_us": found.cpu_us,
         "valid_points": found.valid_points,
         "coverage_permille": found.coverage_permille,
         "temperature_c": found.temperature_c,
@@ -88,8 +113,23 @@ fn result(record: &ResultRecord) -> Value {
             "dark": found.skipped.dark,
             "exact": found.skipped.exact,
         },
+        "placement": found.placement.as_ref().map(placement),
         "gauges": found.gauges.iter().map(gauge).collect::<Vec<_>>(),
         "stages": found.stages.iter().map(|stage| json!({ "name": stage.name, "us": stage.us })).collect::<Vec<_>>(),
+    })
+}
+
+/// Shifts in mm, turns in degrees; null where the part's shape does not determine them.
+fn placement(placement: &Placement) -> Value {
+    let values = placement.shift_mm.iter().chain(&placement.turn_deg);
+    let determined = values
+        .zip(placement.left_out)
+        .map(|(value, out)| (!out).then_some(*value));
+    json!({
+        "components": Placement::COMPONENTS,
+        "values": determined.collect::<Vec<_>>(),
+        "reach_mm": placement.reach_mm,
+        "outliers": placement.outliers,
     })
 }
 

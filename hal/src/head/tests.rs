@@ -57,6 +57,10 @@ impl Projector for Fake {
         (1, 1)
     }
 
+    fn refresh(&self) -> Duration {
+        Duration::from_nanos(100)
+    }
+
     fn load(&mut self, _: Vec<Raster>) -> Result<(), Error> {
         Ok(())
     }
@@ -105,7 +109,11 @@ fn frames_exposed_before_their_pattern_was_in_view_are_discarded() {
         Exposure {
             started: Timestamp(100),
             done: Timestamp(230),
-            stale: 4
+            stale: 4,
+            // The fake camera counts by its frames' times: 10, 99, 100, 150, 199, 230.
+            dropped: 88 + 49 + 48 + 30,
+            missed_flips: 0,
+            lag: Duration::from_nanos(30),
         }
     );
 }
@@ -128,4 +136,18 @@ fn the_camera_is_stopped_and_the_projector_blank_also_after_an_error() {
     assert_eq!(error.kind(), ErrorKind::Timeout);
     let log = log.lock().unwrap();
     assert!(!log.running && log.shown.is_none());
+}
+
+#[test]
+fn a_sequence_ends_early_when_nobody_wants_the_rest_and_the_head_is_left_as_always() {
+    let (mut head, log) = head(&[100, 200, 300]);
+    let mut seen = 0;
+    let mut first = |_, _| {
+        seen += 1;
+        false
+    };
+    let exposure = head.acquire_while(&[1, 2, 3], TIMEOUT, &mut first).unwrap();
+    assert_eq!((seen, exposure.done), (1, Timestamp(100)));
+    let log = log.lock().unwrap();
+    assert_eq!((log.frames.len(), log.running, log.shown), (2, false, None));
 }

@@ -7,10 +7,10 @@ use super::parts::Part;
 use super::scenario::{Placement, Scenario};
 use super::scene::SimScene;
 use super::transport::{Transport, Truth};
-use crate::error::Error;
+use crate::error::{Device, Error};
 use crate::head::DynHead;
 use crate::model::DeviceModel;
-use crate::virtual_head::{self, Shared, lock};
+use crate::virtual_head::{self, Scene as _, Shared, lock};
 
 /// Placed parts whose transport is remembered; one of 512 × 512 takes about 20 MB.
 const MAX_REMEMBERED: usize = 8;
@@ -133,6 +133,29 @@ impl Stage {
             placement: *placement,
             transport,
         });
+    }
+
+    /// Pulls a device's cable out: every call of it fails from now on, until it is plugged in and the head opened again.
+    pub fn unplug(&self, device: Device) {
+        let mut bench = lock(&self.bench);
+        bench.plug(device, false);
+        if device == Device::Projector {
+            // Patterns live in the projector's memory. A simulated one refuses no load.
+            let _ = bench.scene.load(Vec::new());
+        }
+    }
+
+    /// Plugs a device in again.
+    pub fn plug(&self, device: Device) {
+        lock(&self.bench).plug(device, true);
+    }
+
+    /// Opens the head again, in front of the same part.
+    ///
+    /// # Errors
+    /// `Disconnected` if camera or projector is pulled out.
+    pub fn reopen(&self) -> Result<DynHead, Error> {
+        virtual_head::reopen(&self.bench)
     }
 
     /// What is true of the part that is in place.

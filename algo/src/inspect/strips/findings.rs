@@ -2,11 +2,18 @@
 
 use super::columns::TRUSTS;
 use super::extreme::Extreme;
+use super::stance::Stance;
 use super::{Measure, Production, Strip};
 use crate::frame::FrameView;
 use crate::inspect::Reading;
+use crate::inspect::align::Placed;
+use crate::inspect::gauge::{
+    Linear, Sum, TaughtCell, cells, flatness, mean, peak_to_valley, rms, share_outside, step, tilt,
+    volume,
+};
 use crate::phase::Trust;
 use crate::pipeline::VARIANCE_UNIT_NM;
+use alloc::vec;
 use alloc::vec::Vec;
 
 /// Everything that is known of a part after one cycle.
@@ -22,6 +29,10 @@ pub struct Findings {
     pub height_noise_mm: f64,
     /// RMS of the taught σ_z over the pixels with a height, mm; 0 if there are none.
     pub taught_noise_mm: f64,
+    /// Share of the pixels that are lit whose levels contradict each other.
+    pub contradicting: f64,
+    /// How the part lies; none if it was not aligned.
+    pub placed: Option<Placed>,
     /// What was not computed.
     pub skipped: Skipped,
 }
@@ -40,7 +51,12 @@ pub struct Skipped {
 }
 
 impl Production {
-    pub(super) fn findings(&self, frames: &[FrameView<'_>], strips: &mut [Strip]) -> Findings {
+    pub(super) fn findings(
+        &self,
+        frames: &[FrameView<'_>],
+        stance: Stance,
+        strips: &mut [Strip],
+    ) -> Findings {
         let mut trusts = [0; TRUSTS];
         let mut tally = crate::pipeline::RowTally::default();
         let mut exact = 0;
@@ -56,14 +72,29 @@ impl Production {
         let rms_mm = |sum: u64, count: u64| {
             libm::sqrt(sum as f64 / count.max(1) as f64) * VARIANCE_UNIT_NM * 1e-6
         };
+        let (height_noise_mm, taught_noise_mm) = (
+            rms_mm(tally.variance, tally.compared),
+            rms_mm(tally.taught_variance, tally.taught),
+        );
+        // How much noisier than as taught the heights are.
+        let noisier = height_noise_mm / taught_noise_mm.max(f64::MIN_POSITIVE);
+        let readings = (0..self.gauges.len())
+            .map(|gauge| match self.patches_of[gauge].is_empty() {
+                true => self.reading(gauge, frames, &stance, strips),
+                false => self.of_cells(gauge, noisier, &stance, strips),
+            })
+            .collect();
+        let count = |trust: Trust| trusts[trust as usize];
+        let contradicting = count(Trust::Residual);
         Findings {
-            readings: (0..self.gauges.len())
-                .map(|gauge| self.reading(gauge, frames, strips))
-                .collect(),
+            readings,
             resolved: trusts[Trust::Resolved as usize],
             coverage: tally.compared as f64 / self.compared.max(1) as f64,
-            height_noise_mm: rms_mm(tally.variance, tally.compared),
-            taught_noise_mm: rms_mm(tally.taught_variance, tally.taught),
+            height_noise_mm,
+            taught_noise_mm,
+            contradicting: contradicting as f64
+                / (contradicting + count(Trust::Resolved)).max(1) as f64,
+            placed: stance.placed,
             skipped: Skipped {
                 outside: pixels - seen,
                 unexpected: trusts[Trust::Unexpected as usize],
@@ -77,14 +108,15 @@ impl Production {
         &self,
         gauge: usize,
         frames: &[FrameView<'_>],
+        stance: &Stance,
         strips: &mut [Strip],
     ) -> Option<Reading> {
-        let (region, measure) = &self.gauges[gauge];
-        match *measure {
+        match self.gauges[gauge].measure {
             Measure::Coverage => {
+                let pixels = stance.region(self, gauge).len();
                 let covered: u64 = strips.iter().map(|strip| strip.found.covered[gauge]).sum();
-                Some(Reading {
-                    value: covered as f64 / region.len().max(1) as f64,
+                (pixels > 0).then(|| Reading {
+                    value: covered as f64 / pixels as f64,
                     sigma: None,
                 })
             }
@@ -95,8 +127,78 @@ impl Production {
                 let best =
                     extremes.reduce(|best, next| if next.reaches(&best) { next } else { best })?;
                 let strip = strips.first_mut()?;
-                Some(self.deviation(best, side, frames, strip))
+                Some(self.deviation(best, side, frames, stance, strip))
             }
+            Measure::Placement(component) => {
+                let (value, sigma) = stance.placed.as_ref()?.component(component)?;
+                Some(Reading {
+                    value,
+                    sigma: Some(sigma),
+                })
+            }
+            _ => None,
+        }
+    }
+
+    /// The reading of a gauge of cells; `noisier` is how many times σ_z is that as taught.
+    fn of_cells(
+        &self,
+        gauge: usize,
+        noisier: f64,
+        stance: &Stance,
+        strips: &[Strip],
+    ) -> Option<Reading> {
+        let measure = self.gauges[gauge].measure;
+        let patches = self.patches_of[gauge].clone();
+        let side = measure.cell_side()?;
+        let measured = |at: usize| {
+            let patch = &self.patches[at];
+            let mut sums = vec![Sum::default(); patch.grid.len()];
+            for strip in strips {
+                for (sum, more) in sums.iter_mut().zip(&strip.found.cells[at]) {
+                    sum.add(more);
+                }
+            }
+            let least = (side > 0).then(|| patch.grid.least());
+            (cells(&sums, &patch.taught, least), &patch.taught)
+        };
+        let (cells, taught) = measured(patches.start);
+        let variance = |taught: &[TaughtCell]| {
+            let pixels: u32 = taught.iter().map(|cell| cell.pixels).sum();
+            let sum: f64 = taught.iter().map(|cell| cell.variance).sum();
+            sum / f64::from(pixels.max(1)) * noisier * noisier
+        };
+        let pixel = variance(taught);
+        let cell = libm::sqrt(pixel) / side.max(1) as f64;
+        let placed = stance.placed.as_ref();
+        let linear = |linear: Option<Linear>| {
+            linear.map(|linear| Reading {
+                value: linear.value,
+                sigma: Some(linear.sigma(&cells, pixel, placed)),
+            })
+        };
+        match measure {
+            Measure::MeanHeight => linear(mean(&cells)),
+            Measure::Tilt(about) => linear(tilt(&cells, about)),
+            Measure::Volume { above } => linear(volume(&cells, above)),
+            Measure::Step => {
+                let (others, other_taught) = measured(patches.end - 1);
+                let step = step(mean(&cells)?, mean(&others)?);
+                // Both regions' cells behind each other: the motion moves them together.
+                let noises = [pixel, variance(other_taught)];
+                let counts = cells.len();
+                let all: Vec<_> = cells.into_iter().chain(others).collect();
+                let noise = |at: usize| noises[usize::from(at >= counts)];
+                Some(Reading {
+                    value: step.value,
+                    sigma: Some(step.sigma_of(&all, noise, placed)),
+                })
+            }
+            Measure::Flatness { .. } => flatness(&cells, cell, placed),
+            Measure::PeakToValley { .. } => peak_to_valley(&cells, cell, placed),
+            Measure::RmsDeviation { .. } => rms(&cells, cell, placed),
+            Measure::OutOfTolerance { tolerance, .. } => share_outside(&cells, cell, tolerance),
+            _ => None,
         }
     }
 
@@ -106,6 +208,7 @@ impl Production {
         best: Extreme,
         side: usize,
         frames: &[FrameView<'_>],
+        stance: &Stance,
         strip: &mut Strip,
     ) -> Reading {
         let half = side / 2;
@@ -116,7 +219,7 @@ impl Production {
             let left = best.column.saturating_sub(half).max(window.start);
             let right = (best.column + half + 1).min(window.end);
             if left < right {
-                variance += strip.variance(self, frames, v, left..right);
+                variance += strip.variance(self, stance, frames, v, left..right);
             }
         }
         let count = best.count as f64;

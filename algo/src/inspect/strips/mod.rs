@@ -5,37 +5,55 @@
 //! except that of the heights when somebody wants to see it. Strips overlap by half a smoothing. All sums are whole
 //! numbers, so the findings do not depend on the number of strips or threads; they are those of
 //! [`Comparison`](super::Comparison), which this is checked against.
+//!
+//! Where the part's motion is wanted, some rows are decoded beforehand and a few points of each kept: the motion is found
+//! from these, in the order of the rows, and the strips then compare every pixel with the place of golden where the part had it.
 
 mod columns;
+mod exact;
 mod extreme;
 mod findings;
+mod spots;
 mod squares;
+mod stance;
 mod strip;
 
 pub use findings::{Findings, Skipped};
 pub use strip::Strip;
 
 use super::Region;
+use super::align::{Alignment, GoldenSurface, Placed, levels};
+use super::gauge::{Grid, Measure, TaughtCell, TooFine, taught_cells};
 use crate::frame::FrameView;
-use crate::geometry::Triangulator;
+use crate::geometry::{Triangulator, Vector};
 use crate::phase::{DecodeError, Decoder};
 use crate::pipeline::{COMPARED, Rises, VARIANCE_UNIT_NM, for_each};
 use crate::simd::Backend;
-use crate::units::Modulation;
+use crate::units::{AbsolutePhase, Modulation};
+use alloc::sync::Arc;
+use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
+use stance::Stance;
 
-/// What a gauge measures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Measure {
-    /// The largest deviation from golden of squares of `side` pixels; see
-    /// [`Comparison::deviation`](super::Comparison::deviation).
-    Deviation {
-        /// Odd; 1 = single pixels.
-        side: usize,
-    },
-    /// The share of the region that has a height.
-    Coverage,
+/// A gauge: where it measures what.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gauge {
+    /// Where; empty for a placement.
+    pub region: Region,
+    /// The region that a step starts from.
+    pub from: Option<Region>,
+    /// What.
+    pub measure: Measure,
+}
+
+/// The cells of a gauge's region.
+#[derive(Debug)]
+struct Patch {
+    /// Which of the regions.
+    region: usize,
+    grid: Grid,
+    taught: Vec<TaughtCell>,
 }
 
 /// The part as taught, as far as parts are compared with it; row-major.
@@ -60,7 +78,8 @@ impl Taught {
         Self(pixels.map(stored).collect())
     }
 
-    fn compared(&self, place: usize) -> bool {
+    /// Whether the part is compared at a place.
+    pub(super) fn compared(&self, place: usize) -> bool {
         self.0[place] & COMPARED != 0
     }
 
@@ -68,16 +87,31 @@ impl Taught {
     fn sigma(&self, place: usize) -> u16 {
         self.0[place] & !COMPARED
     }
+
+    /// σ in mm, 0 where not known.
+    pub(super) fn sigma_mm(&self, place: usize) -> f64 {
+        f64::from(self.sigma(place)) * (Self::SIGMA_UNIT_NM * 1e-6)
+    }
 }
 
 /// Everything that inspecting parts needs, worked out once.
 #[derive(Debug)]
 pub struct Production {
     decoder: Decoder,
-    triangulator: Triangulator,
-    rises: Rises,
+    triangulator: Arc<Triangulator>,
+    rises: Arc<Rises>,
+    /// Φ₀ that phases are unwrapped about, where it is not that of the rises.
+    map: Option<Vec<AbsolutePhase>>,
     taught: Taught,
-    gauges: Vec<(Region, Measure)>,
+    gauges: Vec<Gauge>,
+    /// One per gauge, then those that steps start from.
+    regions: Vec<Region>,
+    /// Cells, and of each gauge which are its: one, two of a step, or none.
+    patches: Vec<Patch>,
+    patches_of: Vec<Range<usize>>,
+    alignment: Option<Alignment>,
+    /// The middle of golden's heights and half their span, mm.
+    levels: (f64, f64),
     /// The sides of the gauges' squares, each once.
     sides: Vec<usize>,
     window: Vec<Range<usize>>,
@@ -88,49 +122,81 @@ pub struct Production {
     noise: f32,
 }
 
-/// A smoothing over so many pixels that sums of heights over them could overflow.
+/// Gauges that cannot be measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TooSmooth {
-    /// Side of the square in pixels.
-    pub side: usize,
+pub enum Unmeasurable {
+    /// A smoothing over so many pixels that sums of heights over them could overflow.
+    TooSmooth {
+        /// Side of the square in pixels.
+        side: usize,
+    },
+    /// More cells than are kept.
+    TooFine(TooFine),
 }
 
-impl core::fmt::Display for TooSmooth {
+impl core::fmt::Display for Unmeasurable {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(
-            f,
-            "a smoothing over {0}x{0} pixels is too wide for the working range",
-            self.side
-        )
+        match self {
+            Self::TooSmooth { side } => write!(
+                f,
+                "a smoothing over {side}x{side} pixels is too wide for the working range"
+            ),
+            Self::TooFine(error) => error.fmt(f),
+        }
     }
 }
 
-impl core::error::Error for TooSmooth {}
+impl core::error::Error for Unmeasurable {}
+
+/// What production is made of.
+#[derive(Debug)]
+pub struct Parts {
+    /// How frames become phases.
+    pub decoder: Decoder,
+    /// Exact heights.
+    pub triangulator: Arc<Triangulator>,
+    /// How phases become heights.
+    pub rises: Arc<Rises>,
+    /// Φ₀ that phases are unwrapped about, row-major, where it is not that of the rises; a part of it.
+    pub map: Option<Vec<AbsolutePhase>>,
+    /// The part as taught.
+    pub taught: Taught,
+    /// What is measured.
+    pub gauges: Vec<Gauge>,
+    /// The columns of each row that are looked at: every gauge's region with half its smoothing and the part's motion around.
+    pub window: Vec<Range<usize>>,
+    /// σ of one sample.
+    pub noise_counts: f64,
+    /// Whether the part's motion is found and taken back.
+    pub aligned: bool,
+}
 
 impl Production {
-    /// Joins what is known of head and part; `noise_counts` is σ of one sample. `window` holds the columns of each row
-    /// that are looked at: every gauge's region with half its smoothing around.
+    /// Joins what is known of head and part.
     ///
     /// # Errors
-    /// If sums of heights over a gauge's squares could overflow.
-    pub fn new(
-        decoder: Decoder,
-        triangulator: Triangulator,
-        rises: Rises,
-        taught: Taught,
-        gauges: Vec<(Region, Measure)>,
-        window: Vec<Range<usize>>,
-        noise_counts: f64,
-    ) -> Result<Self, TooSmooth> {
+    /// If a gauge's squares are so large that sums of heights over them could overflow, or so small that there are too many.
+    pub fn new(parts: Parts) -> Result<Self, Unmeasurable> {
+        let Parts {
+            decoder,
+            triangulator,
+            rises,
+            map,
+            taught,
+            gauges,
+            window,
+            noise_counts,
+            aligned,
+        } = parts;
         let range = triangulator.range();
         let span_nm = (range.high - range.low) * 1e6;
         let mut sides = Vec::new();
-        for (_, measure) in &gauges {
-            if let Measure::Deviation { side } = *measure
+        for gauge in &gauges {
+            if let Measure::Deviation { side } = gauge.measure
                 && !sides.contains(&side)
             {
                 if !extreme::fits(side, span_nm) {
-                    return Err(TooSmooth { side });
+                    return Err(Unmeasurable::TooSmooth { side });
                 }
                 sides.push(side);
             }
@@ -143,18 +209,75 @@ impl Production {
         let compared = compared.sum();
         let turns = decoder.phase_noise(Modulation::from_bits(1), noise_counts) / rises.range();
         let noise = (turns / VARIANCE_UNIT_NM) * (turns / VARIANCE_UNIT_NM);
+        let golden = GoldenSurface {
+            triangulator: &triangulator,
+            surface: rises.surface(),
+            taught: &taught,
+        };
+        let alignment = match aligned {
+            true => Alignment::new(golden, &window),
+            false => None,
+        };
+        let mut regions: Vec<Region> = gauges.iter().map(|gauge| gauge.region.clone()).collect();
+        let (mut patches, mut patches_of) = (Vec::new(), Vec::new());
+        for (at, gauge) in gauges.iter().enumerate() {
+            let first = patches.len();
+            let mut places = vec![at];
+            if let Some(from) = &gauge.from {
+                places.push(regions.len());
+                regions.push(from.clone());
+            }
+            if let Some(side) = gauge.measure.cell_side() {
+                for region in places {
+                    let grid = Grid::over(&regions[region], side).map_err(Unmeasurable::TooFine)?;
+                    let about = alignment
+                        .as_ref()
+                        .map_or((Vector::default(), 1.0), |a| (a.centre, a.radius));
+                    patches.push(Patch {
+                        region,
+                        grid,
+                        taught: taught_cells(&grid, &regions[region], golden, about),
+                    });
+                }
+            }
+            patches_of.push(first..patches.len());
+        }
         Ok(Self {
+            levels: levels(&rises.surface().height, width, &window),
             decoder,
             triangulator,
             rises,
+            map,
             taught,
             gauges,
+            regions,
+            patches,
+            patches_of,
+            alignment,
             sides,
             window,
             compared,
             noise_counts,
             noise: noise as f32,
         })
+    }
+
+    /// The plan of the alignment, if there is one.
+    pub fn alignment(&self) -> Option<&Alignment> {
+        self.alignment.as_ref()
+    }
+
+    /// Columns and rows of the frame.
+    fn size(&self) -> (usize, usize) {
+        (self.rises.surface().width, self.window.len())
+    }
+
+    fn golden(&self) -> GoldenSurface<'_> {
+        GoldenSurface {
+            triangulator: &self.triangulator,
+            surface: self.rises.surface(),
+            taught: &self.taught,
+        }
     }
 
     /// The same on another back-end of this machine, with the same bits.
@@ -214,6 +337,8 @@ impl Production {
                 given,
             });
         }
+        let placed = self.place(frames, strips);
+        let stance = Stance::new(self, placed);
         let mut left = heights;
         let mut work = Vec::with_capacity(strips.len());
         for strip in strips.iter_mut() {
@@ -227,16 +352,37 @@ impl Production {
         for_each(
             work,
             || (),
-            |_, (strip, heights), ()| strip.inspect(self, frames, heights),
+            |_, (strip, heights), ()| strip.inspect(self, &stance, frames, heights),
         );
-        Ok(self.findings(frames, strips))
+        Ok(self.findings(frames, stance, strips))
+    }
+
+    /// How the part lies, from a few rows of each strip; none if that is not asked for, or too little of it is seen.
+    fn place(&self, frames: &[FrameView<'_>], strips: &mut [Strip]) -> Option<Placed> {
+        let alignment = self.alignment.as_ref()?;
+        for_each(
+            strips.iter_mut().collect(),
+            || (),
+            |_, strip, ()| strip.sample(self, alignment, frames),
+        );
+        let (first, others) = strips.split_first_mut()?;
+        for strip in others {
+            first.samples.extend(&strip.samples);
+        }
+        let fitting = alignment.fitting(self.golden());
+        fitting.fit(&first.samples, &mut first.room)
+    }
+
+    /// The map that phases are unwrapped about, row-major.
+    pub fn map(&self) -> &[AbsolutePhase] {
+        self.map.as_ref().unwrap_or(&self.rises.surface().phase)
     }
 
     /// The row of the map that phases are unwrapped about, if the sequence needs one.
-    fn map_row(&self, v: usize) -> &[crate::units::AbsolutePhase] {
+    fn map_row(&self, v: usize) -> &[AbsolutePhase] {
         let width = self.rises.surface().width;
         if self.decoder.unwrapping().needs_map() {
-            &self.rises.surface().phase[v * width..(v + 1) * width]
+            &self.map()[v * width..(v + 1) * width]
         } else {
             &[]
         }

@@ -2,12 +2,15 @@
 
 use super::columns::{TRUSTS, count_known, count_trusts, slide};
 use super::extreme::{Extreme, SquareRow};
+use super::spots::{Seen, Spots};
 use super::squares::{MAX_TAME, Squares};
+use super::stance::Stance;
 use super::{Measure, Production};
 use crate::frame::FrameView;
-use crate::geometry::Solution;
+use crate::inspect::align::{Room, Sample};
+use crate::inspect::gauge::Sum;
 use crate::phase::{PhaseRow, Trust};
-use crate::pipeline::{NO_RISE, Risen, RowTally, Seen, VARIANCE_UNIT_NM, rise_row};
+use crate::pipeline::{NO_RISE, Risen, RowTally, Seen as Decoded, VARIANCE_UNIT_NM, rise_row};
 use crate::units::{AbsolutePhase, Height, Modulation};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -17,12 +20,12 @@ use core::ops::Range;
 #[derive(Debug)]
 pub struct Strip {
     rows: Range<usize>,
-    width: usize,
+    pub(super) width: usize,
     /// The row that is being worked on.
-    phase: Vec<AbsolutePhase>,
-    modulation: Vec<Modulation>,
+    pub(super) phase: Vec<AbsolutePhase>,
+    pub(super) modulation: Vec<Modulation>,
     trust: Vec<Trust>,
-    rise: Vec<i32>,
+    pub(super) rise: Vec<i32>,
     /// Deviations of the last rows, the place of row v is v modulo their number.
     recent: Vec<i32>,
     kept: usize,
@@ -34,6 +37,12 @@ pub struct Strip {
     sums: Vec<Vec<i64>>,
     /// Sums over squares of the row that is being worked on.
     squares: Squares,
+    /// Where the pixels of the row lie on the part as taught.
+    spots: Spots,
+    /// Points that the part's motion is found from; in the first strip those of all in the end.
+    pub(super) samples: Vec<Sample>,
+    /// For finding the motion: the first strip's is used.
+    pub(super) room: Room,
     /// The last row with a rise that sums over squares may not hold.
     wild: Option<usize>,
     pub(super) found: Found,
@@ -51,6 +60,8 @@ pub(super) struct Found {
     pub covered: Vec<u64>,
     /// Per gauge: the square of largest deviation.
     pub extremes: Vec<Option<Extreme>>,
+    /// Per patch: its cells.
+    pub cells: Vec<Vec<Sum>>,
 }
 
 impl Strip {
@@ -74,10 +85,18 @@ impl Strip {
                 .map(|side| vec![0; width + side / 2 * 2])
                 .collect(),
             squares: Squares::new(width + kept),
+            spots: Spots::new(width),
+            samples: Vec::new(),
+            room: Room::default(),
             wild: None,
             found: Found {
                 covered: vec![0; plan.gauges.len()],
                 extremes: vec![None; plan.gauges.len()],
+                cells: plan
+                    .patches
+                    .iter()
+                    .map(|patch| vec![Sum::default(); patch.grid.len()])
+                    .collect(),
                 ..Found::default()
             },
         }
@@ -92,6 +111,7 @@ impl Strip {
     pub(super) fn inspect(
         &mut self,
         plan: &Production,
+        stance: &Stance,
         frames: &[FrameView<'_>],
         mut heights: Option<&mut [f32]>,
     ) {
@@ -103,16 +123,40 @@ impl Strip {
             let own = self.rows.contains(&v);
             if v < bottom {
                 let mut tally = RowTally::default();
-                let exact = self.row(plan, frames, v, plan.window[v].clone(), &mut tally);
+                let columns = plan.window[v].clone();
+                let exact = self.row(plan, frames, v, columns.clone(), &mut tally);
+                self.settle(plan, stance, v, columns);
                 if own {
-                    self.count(plan, v, &tally, exact);
+                    self.count(plan, stance, v, &tally, exact);
                     if let Some(heights) = &mut heights {
                         let row = (v - self.rows.start) * self.width;
                         self.store(plan, v, &mut heights[row..row + self.width]);
                     }
                 }
             }
-            self.smooth(plan, v, first);
+            self.smooth(plan, stance, v, first);
+        }
+    }
+
+    /// Works out where the pixels of row `v`, which has just been worked on, lie on the part as taught.
+    fn settle(&mut self, plan: &Production, stance: &Stance, v: usize, columns: Range<usize>) {
+        if stance.placed.is_none() {
+            if !plan.patches.is_empty() {
+                self.spots.stay(v, columns);
+            }
+            return;
+        }
+        let place = v % self.kept * self.width;
+        let seen = Seen {
+            plan,
+            stance,
+            v,
+            columns: common(&columns, &self.extents[v % self.kept]),
+            rise: &self.rise,
+        };
+        let deviation = &mut self.recent[place..place + self.width];
+        if self.spots.find(&seen, deviation) {
+            self.wild = Some(v);
         }
     }
 
@@ -126,6 +170,9 @@ impl Strip {
         found.trusts = [0; TRUSTS];
         found.exact = 0;
         found.covered.fill(0);
+        for cells in &mut found.cells {
+            cells.fill(Sum::default());
+        }
         found.extremes.fill(None);
     }
 
@@ -157,7 +204,7 @@ impl Strip {
         let decoder = &plan.decoder;
         decoder.row(frames, v, plan.map_row(v), columns.clone(), out);
         let row = v * self.width..(v + 1) * self.width;
-        let seen = Seen {
+        let seen = Decoded {
             phase: &self.phase,
             modulation: &self.modulation,
             trust: &self.trust,
@@ -223,19 +270,34 @@ impl Strip {
         exact
     }
 
-    fn count(&mut self, plan: &Production, v: usize, tally: &RowTally, exact: u64) {
+    fn count(
+        &mut self,
+        plan: &Production,
+        stance: &Stance,
+        v: usize,
+        tally: &RowTally,
+        exact: u64,
+    ) {
         let backend = plan.decoder.backend();
         let found = &mut self.found;
         found.tally.add(tally);
         found.exact += exact;
         let seen = &self.trust[plan.window[v].clone()];
         count_trusts(backend, seen, &mut found.trusts);
-        for ((region, measure), covered) in plan.gauges.iter().zip(&mut found.covered) {
-            if *measure == Measure::Coverage {
-                for (_, columns) in region.row(v) {
-                    let columns = common(columns, &self.extents[v % self.kept]);
-                    count_known(backend, &self.rise[columns], covered);
+        let extent = &self.extents[v % self.kept];
+        for (at, (gauge, covered)) in plan.gauges.iter().zip(&mut found.covered).enumerate() {
+            if gauge.measure == Measure::Coverage {
+                for (_, columns) in stance.region(plan, at).row(v) {
+                    count_known(backend, &self.rise[common(columns, extent)], covered);
                 }
+            }
+        }
+        let place = v % self.kept * self.width;
+        let deviation = &self.recent[place..place + self.width];
+        for (patch, cells) in plan.patches.iter().zip(&mut found.cells) {
+            for (_, columns) in stance.region(plan, patch.region).row(v) {
+                let span = common(columns, extent);
+                self.spots.gather(&patch.grid, deviation, span, cells);
             }
         }
     }
@@ -255,7 +317,7 @@ impl Strip {
 
     /// Slides the sums of each smoothing down to row `v`, and looks at the squares that are complete with it. `first` is
     /// the first row that was worked on.
-    fn smooth(&mut self, plan: &Production, v: usize, first: usize) {
+    fn smooth(&mut self, plan: &Production, stance: &Stance, v: usize, first: usize) {
         let backend = plan.decoder.backend();
         let row = |v: usize| v % self.kept * self.width..(v % self.kept + 1) * self.width;
         let known = |v: usize| match v >= first && v < plan.window.len() {
@@ -285,9 +347,9 @@ impl Strip {
                 self.squares.add(backend, sums, side, seen.clone());
             }
             let gauges = plan.gauges.iter().zip(&mut self.found.extremes);
-            for ((region, measure), best) in gauges {
-                if *measure == (Measure::Deviation { side }) {
-                    for (_, span) in region.row(centre) {
+            for (at, (gauge, best)) in gauges.enumerate() {
+                if gauge.measure == (Measure::Deviation { side }) {
+                    for (_, span) in stance.region(plan, at).row(centre) {
                         let span = common(span, &seen);
                         let row = SquareRow {
                             sums,
@@ -310,20 +372,20 @@ impl Strip {
     pub(super) fn variance(
         &mut self,
         plan: &Production,
+        stance: &Stance,
         frames: &[FrameView<'_>],
         v: usize,
         columns: Range<usize>,
     ) -> f64 {
         let mut tally = RowTally::default();
         self.row(plan, frames, v, columns.clone(), &mut tally);
+        self.settle(plan, stance, v, columns.clone());
         let mut sum = 0.0;
         for u in columns {
             if self.recent[v % self.kept * self.width + u] != NO_RISE {
-                let place = v * self.width + u;
                 let slope = plan.slope((u, v), self.phase[u]);
                 let measured = plan.sigma_nm(self.modulation[u], slope);
-                let taught = f64::from(plan.taught.sigma(place)) * super::Taught::SIGMA_UNIT_NM;
-                sum += measured * measured + taught * taught;
+                sum += measured * measured;
             }
         }
         sum
@@ -342,34 +404,5 @@ fn hull(a: Range<usize>, b: Range<usize>) -> Range<usize> {
         (true, _) => b,
         (_, true) => a,
         _ => a.start.min(b.start)..a.end.max(b.end),
-    }
-}
-
-impl Production {
-    /// The exact height of a phase.
-    fn solve(&self, (u, v): (usize, usize), phase: AbsolutePhase) -> Option<Solution> {
-        let (column, row) = (u as f64, v as f64);
-        let place = v * self.rises.surface().width + u;
-        match self.rises.near(place, phase) {
-            Some(near) => self
-                .triangulator
-                .solve_near(column, row, phase.turns(), near),
-            None => self.triangulator.solve(column, row, phase.turns()),
-        }
-    }
-
-    /// ∂z/∂Φ in mm per turn.
-    fn slope(&self, (u, v): (usize, usize), phase: AbsolutePhase) -> f64 {
-        let place = v * self.rises.surface().width + u;
-        self.rises.slope(place, phase).unwrap_or_else(|| {
-            self.solve((u, v), phase)
-                .map_or(0.0, |solution| 1.0 / solution.slope)
-        })
-    }
-
-    /// σ_z in nm.
-    fn sigma_nm(&self, modulation: Modulation, slope: f64) -> f64 {
-        let turns = self.decoder.phase_noise(modulation, self.noise_counts);
-        libm::fabs(turns * slope) * 1e6
     }
 }

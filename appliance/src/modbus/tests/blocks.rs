@@ -164,3 +164,101 @@ async fn status_bits_are_where_the_map_says() {
         (0xCAFE_F00D, 0xB007_1D00)
     );
 }
+
+#[tokio::test]
+async fn gauge_detail_has_sigma_and_unit_of_the_result_beside_it() {
+    let plant = Plant::new().await;
+    let mut plc = plant.client().await;
+    let before = plc.read_input_registers(520, 64).await.unwrap().unwrap();
+    assert_eq!((u32_at(&before, 0), u32_at(&before, 2)), (0, 0x7FC0_0000));
+    plc.write_single_register(1, 1).await.unwrap().unwrap();
+    plant.work();
+    let words = plc.read_input_registers(520, 64).await.unwrap().unwrap();
+    assert_eq!((u32_at(&words, 0), u32_at(&words, 62)), (1000, 1000));
+    let sigma = |k: usize| f32::from_bits(u32_at(&words, 2 + 2 * k));
+    assert_eq!((sigma(0), sigma(1)), (0.001, 0.01));
+    assert!(sigma(2).is_nan() && sigma(15).is_nan());
+    assert_eq!(words[34..38], [1, 2, 0, 0]);
+    assert_eq!(words[50..62], [0; 12], "reserved registers read 0");
+}
+
+#[tokio::test]
+async fn health_says_what_is_known_and_what_is_not() {
+    let plant = Plant::new().await;
+    let mut plc = plant.client().await;
+    let unknown = plc.read_input_registers(600, 40).await.unwrap().unwrap();
+    assert_eq!(
+        unknown[22..28],
+        [0xFFFF, 0xFFFF, 0xFFFF, 0x8000, 0x8000, 0x8000]
+    );
+    plant.handle.event(Event::Surveyed(System {
+        cpu_percent: Some(37),
+        free_memory_mib: Some(1234),
+        free_storage_mib: Some(1 << 30),
+        cpu_temperature_c: Some(51.24),
+        boots: 0x1_0002,
+        unclean_boots: 3,
+        clients: 2,
+        writer_connected: true,
+        recipes: [1, 2, 17, 1024, 1025].into(),
+    }));
+    let pace = Pace {
+        camera_centihertz: 2000,
+        refresh_millihertz: 60_000,
+        lag_us: 12,
+        dropped: 2,
+        missed_flips: 1,
+    };
+    plant.handle.event(Event::Paced(pace));
+    plant.handle.event(Event::Paced(pace));
+    let words = plc.read_input_registers(600, 40).await.unwrap().unwrap();
+    let long = |k: usize| u32_at(&words, k);
+    assert_eq!((long(0), long(2), long(4)), (2000, 60_000, 12));
+    assert_eq!((long(6), long(8)), (4, 2), "counted since the start");
+    assert_eq!((long(16), long(18), long(20)), (0x1_0002, 3, 0));
+    assert_eq!(words[22..30], [37, 1234, 65534, 512, 0x8000, 0x8000, 2, 1]);
+    assert_eq!(words[30..], [0; 10], "reserved registers read 0");
+    let stored = plc.read_input_registers(700, 64).await.unwrap().unwrap();
+    assert_eq!((stored[0], stored[1], stored[63]), (0b11, 1, 1 << 15));
+    assert_eq!(stored.iter().map(|word| word.count_ones()).sum::<u32>(), 4);
+}
+
+#[tokio::test]
+async fn processing_time_is_that_of_the_last_cycle_and_the_longest() {
+    let plant = Plant::new().await;
+    let mut plc = plant.client().await;
+    plc.write_single_register(1, 1).await.unwrap().unwrap();
+    plant.work();
+    let result = plc.read_input_registers(200, 120).await.unwrap().unwrap();
+    let words = plc.read_input_registers(610, 4).await.unwrap().unwrap();
+    let processing = u32_at(&result, 20) - u32_at(&result, 18);
+    assert_eq!(
+        (u32_at(&words, 0), u32_at(&words, 2)),
+        (processing, processing)
+    );
+}
+
+#[tokio::test]
+async fn the_thirty_third_waiting_result_is_not_queued_and_latches_the_overflow() {
+    let plant = Plant::with(Options::default(), true).await;
+    let mut plc = plant.client().await;
+    plc.write_single_register(0, 0x41).await.unwrap().unwrap();
+    for token in 1..=33 {
+        plc.write_single_register(1, token).await.unwrap().unwrap();
+        plant.work();
+    }
+    let overflow = |words: &[u16]| words[0] & status::BUFFER_OVERFLOW != 0;
+    let full = plc.read_input_registers(100, 32).await.unwrap().unwrap();
+    assert_eq!((overflow(&full), full[17]), (true, 32));
+    let (newest, oldest) = (
+        plc.read_input_registers(200, 3).await.unwrap().unwrap(),
+        plc.read_input_registers(400, 3).await.unwrap().unwrap(),
+    );
+    assert_eq!((newest[2], oldest[2]), (33, 1));
+    plc.write_single_register(0, 0x45).await.unwrap().unwrap();
+    let popped = plc.read_input_registers(100, 32).await.unwrap().unwrap();
+    assert_eq!((overflow(&popped), popped[17]), (true, 31));
+    plc.write_single_register(0, 0x51).await.unwrap().unwrap();
+    let reset = plc.read_input_registers(100, 32).await.unwrap().unwrap();
+    assert_eq!((overflow(&reset), reset[17]), (false, 31));
+}

@@ -79,14 +79,7 @@ async fn idle_connections_and_unfinished_frames_are_closed_in_time() {
 
 #[tokio::test]
 async fn the_connection_over_the_limit_is_closed_and_a_freed_place_is_taken_again() {
-    let plant = Plant::with(
-        Options {
-            connections: 2,
-            ..Default::default()
-        },
-        false,
-    )
-    .await;
+    let plant = Plant::with_places(Options::default(), 2, false).await;
     let mut first = plant.client().await;
     let mut second = plant.client().await;
     for plc in [&mut first, &mut second] {
@@ -116,4 +109,71 @@ async fn a_port_in_use_is_an_error_that_names_the_address_and_the_remedy() {
         words.contains(&plant.address.to_string()) && words.contains("choose another port"),
         "{words}"
     );
+}
+
+#[tokio::test]
+async fn who_may_not_write_reads_everything_and_is_refused_with_exception_1_and_a_line_in_the_log()
+{
+    let options = Options {
+        writers: vec!["127.0.0.2/32".parse().unwrap()],
+        ..Default::default()
+    };
+    let plant = Plant::with(options, false).await;
+    let mut reader = plant.client().await;
+    assert!(reader.read_input_registers(200, 120).await.unwrap().is_ok());
+    for _ in 0..100 {
+        assert_eq!(
+            reader.write_single_register(1, 9).await.unwrap(),
+            Err(Exception::IllegalFunction)
+        );
+    }
+    assert_eq!(
+        reader
+            .read_write_multiple_registers(100, 32, 1, &[9])
+            .await
+            .unwrap(),
+        Err(Exception::IllegalFunction)
+    );
+    assert_eq!(
+        reader.write_single_coil(1, true).await.unwrap(),
+        Err(Exception::IllegalFunction)
+    );
+    assert_eq!((plant.work(), plant.handle.snapshot().missed), (0, 0));
+    let log = plant.log.lock().unwrap().clone();
+    assert_eq!(log.len(), 1, "{log:?}");
+    assert!(
+        log[0].contains("127.0.0.1") && log[0].contains("modbus.writers"),
+        "{log:?}"
+    );
+}
+
+#[tokio::test]
+async fn who_may_not_read_gets_no_connection() {
+    let options = Options {
+        readers: vec!["10.0.0.0/8".parse().unwrap()],
+        ..Default::default()
+    };
+    let plant = Plant::with(options, false).await;
+    let mut stranger = plant.client().await;
+    assert!(stranger.read_input_registers(100, 1).await.is_err());
+    assert!(plant.log.lock().unwrap()[0].contains("modbus.readers"));
+}
+
+#[tokio::test]
+async fn a_mute_crowd_makes_room_for_a_client_that_speaks() {
+    let plant = Plant::with_places(Options::default(), 3, false).await;
+    let mut crowd = Vec::new();
+    for _ in 0..3 {
+        crowd.push(TcpStream::connect(plant.address).await.unwrap());
+    }
+    // As soon as the crowd has been mute for long enough.
+    let mut plc = loop {
+        let mut plc = plant.client().await;
+        if plc.read_input_registers(100, 1).await.is_ok() {
+            break plc;
+        }
+    };
+    let mut rest = Vec::new();
+    assert_eq!(crowd[0].read_to_end(&mut rest).await.unwrap_or(0), 0);
+    assert!(plc.read_input_registers(100, 1).await.unwrap().is_ok());
 }

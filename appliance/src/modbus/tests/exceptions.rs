@@ -11,9 +11,9 @@ async fn what_cannot_be_is_an_exception_and_the_connection_lives_on() {
         (99, 1),
         (131, 2),
         (319, 2),
-        (520, 2),
-        (600, 1),
-        (700, 1),
+        (583, 2),
+        (640, 1),
+        (764, 1),
         (940, 1),
         (65535, 2),
     ] {

@@ -6,8 +6,8 @@ mod exceptions;
 mod handshakes;
 
 use std::net::SocketAddr;
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -26,6 +26,7 @@ struct Plant {
     address: SocketAddr,
     handle: StationHandle,
     orders: Receiver<Effect>,
+    log: Arc<Mutex<Vec<String>>>,
 }
 
 impl Plant {
@@ -34,6 +35,10 @@ impl Plant {
     }
 
     async fn with(options: Options, buffered: bool) -> Self {
+        Self::with_places(options, CONNECTIONS, buffered).await
+    }
+
+    async fn with_places(options: Options, places: usize, buffered: bool) -> Self {
         let identity = Identity {
             vendor: "fringed".into(),
             product: "fringe projection sensor".into(),
@@ -54,20 +59,29 @@ impl Plant {
             move |effect| {
                 // The plant outlives its station's last effect only in tests that have looked at what they wanted.
                 let _ = sink.send(effect);
+                None
             },
         );
+        let log = Arc::new(Mutex::new(Vec::new()));
+        let refusals = {
+            let log = Arc::clone(&log);
+            Refusals::new(move |line: &str| log.lock().unwrap().push(line.to_owned()))
+        };
         let listener = bind("127.0.0.1:0".parse().unwrap()).await.unwrap();
         let address = listener.local_addr().unwrap();
         tokio::spawn(serve(
             listener,
             handle.clone(),
             options,
+            Clients::new(places),
+            refusals,
             std::future::pending(),
         ));
         let plant = Self {
             address,
             handle,
             orders,
+            log,
         };
         plant.handle.event(Event::Started);
         plant

@@ -2,6 +2,10 @@
 
 use super::*;
 
+fn recovered(recipe: Option<ActiveRecipe>) -> Event {
+    Event::Recovered { recipe }
+}
+
 #[test]
 fn every_wait_has_a_deadline_and_a_missed_one_is_a_fault_that_says_how_to_clear_it() {
     type Prepare = fn(&mut Bench);
@@ -95,7 +99,7 @@ fn a_broken_device_is_a_fault_until_it_recovers() {
         "the cycle in flight ended with it"
     );
     assert_eq!(bench.pulse(control::ERROR_RESET).state, 7);
-    let snapshot = bench.event(Event::Recovered);
+    let snapshot = bench.event(recovered(Some(recipe(1))));
     assert!(snapshot.is(status::READY));
 }
 
@@ -196,7 +200,130 @@ fn a_missed_deadline_is_not_cleared_by_the_recovery_of_a_device_and_a_new_worker
     let mut bench = Bench::ready();
     bench.token(1);
     assert_eq!(bench.tick_after(31_000).state, 7);
-    assert_eq!(bench.event(Event::Recovered).state, 7);
+    assert_eq!(bench.event(recovered(None)).state, 7);
     let snapshot = bench.event(Event::Started);
     assert_eq!((snapshot.state, snapshot.recipe), (1, None));
+}
+
+#[test]
+fn a_lost_head_comes_back_with_what_the_worker_still_holds() {
+    let mut bench = Bench::ready();
+    bench.event(Event::Request(Request::Load(RecipeKey::Number(2))));
+    let fault = Event::Faulted {
+        error_code: 201,
+        cause: "projector unplugged".into(),
+        remedy: "plug it in".into(),
+    };
+    let snapshot = bench.event(fault.clone());
+    assert_eq!((snapshot.state, snapshot.recipe), (7, None));
+    let snapshot = bench.event(recovered(Some(recipe(1))));
+    assert!(snapshot.is(status::READY) && !snapshot.is(status::RECIPE_OK));
+    assert_eq!(
+        snapshot.requested_recipe, 2,
+        "the load has to be asked again"
+    );
+    bench.event(fault);
+    let snapshot = bench.event(recovered(None));
+    assert_eq!((snapshot.state, snapshot.is(status::READY)), (1, false));
+}
+
+#[test]
+fn an_idle_worker_that_falls_silent_is_a_fault_that_ends_with_its_silence() {
+    let mut bench = Bench::ready();
+    assert_eq!(bench.tick_after(9_000).state, 1);
+    let snapshot = bench.tick_after(1_100);
+    assert_eq!((snapshot.state, snapshot.error_code), (7, 801));
+    let fault = snapshot.fault.expect("a fault");
+    assert!(fault.remedy.contains("clears by itself"), "{fault:?}");
+    assert_eq!(bench.token(1).reject_reason, reject::FAULT);
+    let snapshot = bench.event(Event::Alive);
+    assert!(snapshot.is(status::READY) && snapshot.error_code == 0);
+}
+
+fn room(mib: u64) -> Event {
+    Event::Surveyed(System {
+        free_storage_mib: Some(mib),
+        ..System::default()
+    })
+}
+
+#[test]
+fn full_storage_is_a_warning_then_a_fault_between_two_jobs_and_clears_by_itself() {
+    let mut bench = Bench::ready();
+    let low = bench.event(room(health::LOW_STORAGE_MIB - 1));
+    assert!(low.warnings & warning::STORAGE != 0 && low.is(status::READY));
+    bench.token(1);
+    let full = room(health::FULL_STORAGE_MIB - 1);
+    assert_eq!(bench.event(full.clone()).state, 2, "the cycle goes on");
+    assert_eq!(bench.finish().result_seq, 41, "and has its result");
+    let snapshot = bench.event(full);
+    assert_eq!(
+        (snapshot.state, snapshot.error_code),
+        (7, error_code::STORAGE_FULL)
+    );
+    let fault = snapshot.fault.expect("a fault");
+    assert!(
+        fault.cause.contains("23 MiB") && fault.remedy.contains("remove"),
+        "{fault:?}"
+    );
+    assert_eq!(bench.pulse(control::ERROR_RESET).state, 7);
+    assert_eq!(
+        bench.event(recovered(None)).state,
+        7,
+        "a device's recovery is another thing"
+    );
+    let snapshot = bench.event(room(10_000));
+    assert!(snapshot.is(status::READY) && snapshot.warnings & warning::STORAGE == 0);
+}
+
+#[test]
+fn a_number_that_was_not_stored_stops_the_station_until_it_is() {
+    let mut bench = Bench::ready();
+    bench.token(1);
+    assert_eq!(bench.finish().result_seq, 41);
+    let stored = |failed: Option<&str>| Event::Stored {
+        seq: 41,
+        failed: failed.map(Arc::from),
+    };
+    let snapshot = bench.event(stored(Some("input/output error")));
+    assert_eq!(
+        (snapshot.state, snapshot.error_code),
+        (7, error_code::SEQ_NOT_STORED)
+    );
+    assert!(snapshot.is(status::RESULT_VALID), "the PLC has its verdict");
+    assert!(snapshot.warnings & warning::STORAGE != 0);
+    assert_eq!(bench.token(2).reject_reason, reject::FAULT);
+    for tried in 1..=2 {
+        bench.effects.clear();
+        assert_eq!(bench.event(room(10_000)).state, 7);
+        assert_eq!(bench.effects, [Effect::PersistSeq(41)], "try {tried}");
+    }
+    bench.event(stored(Some("input/output error")));
+    let snapshot = bench.event(stored(None));
+    assert!(snapshot.is(status::READY), "{snapshot:?}");
+    assert_eq!(
+        (snapshot.error_code, snapshot.health.storage_errors),
+        (0, 2)
+    );
+}
+
+#[test]
+fn a_fault_of_storage_gives_way_to_a_lost_head_and_comes_again_after_it() {
+    let mut bench = Bench::ready();
+    bench.event(room(0));
+    let fault = Event::Faulted {
+        error_code: 101,
+        cause: "camera unplugged".into(),
+        remedy: "plug it in".into(),
+    };
+    assert_eq!(bench.event(fault).error_code, 101);
+    assert_eq!(bench.event(room(0)).error_code, 101);
+    assert_eq!(
+        bench.event(room(1000)).error_code,
+        101,
+        "the head is still lost"
+    );
+    bench.event(room(0));
+    bench.event(recovered(Some(recipe(1))));
+    assert_eq!(bench.event(room(0)).error_code, error_code::STORAGE_FULL);
 }

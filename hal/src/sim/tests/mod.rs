@@ -1,5 +1,6 @@
 //! Promises of the simulated head: the contract, any number of threads, scenarios, speed; the rest by topic.
 
+mod cables;
 mod light;
 mod staging;
 mod surfaces;

@@ -1,0 +1,117 @@
+//! The golden surface as alignment sees it: heights between pixels, and which way it faces.
+
+use crate::geometry::{Triangulator, Vector};
+use crate::inspect::Taught;
+use crate::pipeline::KnownSurface;
+
+/// The part as taught, where it is compared.
+#[derive(Clone, Copy, Debug)]
+pub struct GoldenSurface<'a> {
+    /// The camera's geometry.
+    pub triangulator: &'a Triangulator,
+    /// Its heights.
+    pub surface: &'a KnownSurface,
+    /// Where they are compared.
+    pub taught: &'a Taught,
+}
+
+/// A place of the surface and the plane through it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facet {
+    /// m: a point that moves by δ rises by m·δ above the surface, both heights taken on the point's own ray. It is the
+    /// normal n, scaled: n / (n·d), d the ray with d_z = 1.
+    pub lift: Vector,
+    /// What a pixel sees of it, as the area in x and y, mm².
+    pub area: f64,
+    /// Error of m's x and y from the noise of the taught heights, 1 σ.
+    pub lift_noise: f64,
+    /// Error of the taught height, mm (1 σ).
+    pub sigma: f64,
+}
+
+/// A normal is that of a plane through the square of this many pixels to each side.
+const REACH: usize = 2;
+/// Step of the camera's derivative, mm: small against the distance, large against rounding.
+const STEP_MM: f64 = 0.01;
+/// Σ i² over that square.
+const SQUARES: f64 = 50.0;
+
+impl GoldenSurface<'_> {
+    fn rows(&self) -> usize {
+        self.surface.height.len() / self.surface.width.max(1)
+    }
+
+    /// The height between four pixels that are all compared, mm, by bilinear interpolation.
+    pub fn height_at(&self, u: f64, v: f64) -> Option<f64> {
+        let width = self.surface.width;
+        let inside = u >= 0.0 && v >= 0.0 && u < (width - 1) as f64 && v < (self.rows() - 1) as f64;
+        if !inside {
+            return None;
+        }
+        let place = v as usize * width + u as usize;
+        let corners = [place, place + 1, place + width, place + width + 1];
+        if !corners.iter().all(|&at| self.taught.compared(at)) {
+            return None;
+        }
+        let (fu, fv) = (u - libm::floor(u), v - libm::floor(v));
+        let [a, b, c, d] = corners.map(|at| self.surface.height[at].mm());
+        let (upper, lower) = (a + (b - a) * fu, c + (d - c) * fu);
+        Some(upper + (lower - upper) * fv)
+    }
+
+    /// How the surface faces about the pixel next to where `point` is seen, (u, v); its whole neighbourhood must be compared.
+    pub fn facet(&self, point: Vector, (u, v): (f64, f64)) -> Option<Facet> {
+        let width = self.surface.width;
+        let inside = |x: f64, end: usize| x >= REACH as f64 && x + REACH as f64 + 1.0 < end as f64;
+        let (u, v) = (libm::rint(u), libm::rint(v));
+        if !(inside(u, width) && inside(v, self.rows())) {
+            return None;
+        }
+        let place = v as usize * width + u as usize;
+        let (mut along, mut down) = (0, 0);
+        for i in 0..=2 * REACH {
+            let start = place + i * width - REACH * width - REACH;
+            for j in 0..=2 * REACH {
+                if !self.taught.compared(start + j) {
+                    return None;
+                }
+                let z = i64::from(self.surface.height[start + j].nm());
+                along += z * (j as i64 - REACH as i64);
+                down += z * (i as i64 - REACH as i64);
+            }
+        }
+        let (along, down) = (along as f64 / SQUARES * 1e-6, down as f64 / SQUARES * 1e-6);
+        let camera = self.triangulator.camera();
+        let here = camera.project(point)?;
+        let beside = |x, y, z| {
+            let (u, v) = camera.project(point + Vector::new(x, y, z) * STEP_MM)?;
+            Some(((u - here.0) / STEP_MM, (v - here.1) / STEP_MM))
+        };
+        let (x, y, z) = (
+            beside(1.0, 0.0, 0.0)?,
+            beside(0.0, 1.0, 0.0)?,
+            beside(0.0, 0.0, 1.0)?,
+        );
+        // m = ẑ − ∇G ∂π/∂p.
+        let slide = |(du, dv): (f64, f64)| along * du + down * dv;
+        let lift = Vector::new(-slide(x), -slide(y), 1.0 - slide(z));
+        let (rise_x, rise_y) = (-lift.x / lift.z, -lift.y / lift.z);
+        let (xu, xv) = (x.0 + z.0 * rise_x, x.1 + z.1 * rise_x);
+        let (yu, yv) = (y.0 + z.0 * rise_y, y.1 + z.1 * rise_y);
+        let area = 1.0 / libm::fabs(xu * yv - xv * yu);
+        let sigma = self.taught.sigma_mm(place);
+        let scale = libm::sqrt(x.0 * x.0 + x.1 * x.1);
+        area.is_finite().then_some(Facet {
+            lift,
+            area,
+            lift_noise: sigma / libm::sqrt(SQUARES) * scale,
+            sigma,
+        })
+    }
+
+    /// How far a point lies above the surface on its own ray, mm.
+    pub fn above(&self, point: Vector) -> Option<f64> {
+        let (u, v) = self.triangulator.camera().project(point)?;
+        Some(point.z - self.height_at(u, v)?)
+    }
+}

@@ -1,0 +1,171 @@
+//! Square cells of pixels, and what was measured in each.
+
+use super::TaughtCell;
+use crate::inspect::Region;
+use alloc::vec::Vec;
+use core::fmt;
+
+/// The cells of a region, over the box around it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Grid {
+    left: usize,
+    top: usize,
+    side: usize,
+    columns: usize,
+    rows: usize,
+}
+
+/// A region with more cells than are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooFine {
+    /// Side of a cell in pixels.
+    pub side: usize,
+    /// How many there would be.
+    pub cells: usize,
+}
+
+impl fmt::Display for TooFine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} squares of {1}x{1} pixels where at most {MAX_CELLS} are kept: smooth over more pixels or make the \
+             region smaller",
+            self.cells, self.side
+        )
+    }
+}
+
+impl core::error::Error for TooFine {}
+
+/// Cells of a region: 3 MB.
+const MAX_CELLS: usize = 1 << 16;
+/// Cells of a gauge that does not ask for a side of its own: about so many.
+const CELLS: usize = 1024;
+/// A cell has at least this share of its square's pixels.
+const MIN_SUPPORT: f64 = 0.5;
+/// Such cells are at least this large.
+const MIN_SIDE: usize = 4;
+/// A region has at least this share of the pixels that it had as taught.
+const MIN_SHARE: f64 = 0.5;
+
+impl Grid {
+    /// Over a region's pixels; a side of 0 leaves it to the grid.
+    ///
+    /// # Errors
+    /// If there are too many cells.
+    pub fn over(region: &Region, side: usize) -> Result<Self, TooFine> {
+        let spans = region.spans();
+        let left = spans.iter().map(|(_, span)| span.start).min().unwrap_or(0);
+        let right = spans.iter().map(|(_, span)| span.end).max().unwrap_or(0);
+        let top = spans.first().map_or(0, |(row, _)| *row);
+        let bottom = spans.last().map_or(0, |(row, _)| row + 1);
+        let (width, height) = (right - left, bottom - top);
+        let side = match side {
+            0 => {
+                let side = libm::ceil(libm::sqrt((width * height) as f64 / CELLS as f64));
+                (side as usize).max(MIN_SIDE)
+            }
+            side => side,
+        };
+        let (columns, rows) = (width.div_ceil(side).max(1), height.div_ceil(side).max(1));
+        let cells = columns.saturating_mul(rows);
+        if cells > MAX_CELLS {
+            return Err(TooFine { side, cells });
+        }
+        Ok(Self {
+            left,
+            top,
+            side,
+            columns,
+            rows,
+        })
+    }
+
+    /// Number of cells.
+    pub fn len(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// Whether there are none; never for a grid that could be made.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Side of a cell in pixels.
+    pub fn side(&self) -> usize {
+        self.side
+    }
+
+    /// The least number of pixels of a cell that stands for its square.
+    pub fn least(&self) -> i64 {
+        libm::ceil(MIN_SUPPORT * (self.side * self.side) as f64) as i64
+    }
+
+    /// The cell of a pixel of golden's frame; the nearest one for pixels beside the box.
+    #[inline(always)]
+    pub fn cell(&self, u: i32, v: i32) -> usize {
+        let along = (u.max(self.left as i32) as usize - self.left) / self.side;
+        let down = (v.max(self.top as i32) as usize - self.top) / self.side;
+        down.min(self.rows - 1) * self.columns + along.min(self.columns - 1)
+    }
+}
+
+/// Sums over the pixels of a cell. Whole numbers: their order is nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sum {
+    /// Pixels.
+    pub count: i64,
+    /// Σ of deviations from golden, nm.
+    pub deviation: i64,
+}
+
+impl Sum {
+    /// Adds another's pixels.
+    pub fn add(&mut self, other: &Self) {
+        self.count += other.count;
+        self.deviation += other.deviation;
+    }
+}
+
+/// The means of a cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell<'a> {
+    /// Pixels that its error follows from.
+    pub pixels: f64,
+    /// Height, mm: as taught, and the mean deviation on top. So it does not depend on which pixels of the cell were measured.
+    pub height: f64,
+    /// Deviation from golden, mm.
+    pub deviation: f64,
+    /// The cell as taught.
+    pub taught: &'a TaughtCell,
+}
+
+/// The cells of a region; none if less than half of what it had as taught was measured. With `least`, those with at least
+/// so many pixels; else all that it had as taught: those that were not measured deviate by as much as the others on the mean,
+/// so that it does not matter which they are.
+pub fn cells<'a>(sums: &[Sum], taught: &'a [TaughtCell], least: Option<i64>) -> Vec<Cell<'a>> {
+    let had: u64 = taught.iter().map(|cell| u64::from(cell.pixels)).sum();
+    let has: i64 = sums.iter().map(|sum| sum.count).sum();
+    if has == 0 || (has as f64) < MIN_SHARE * had as f64 {
+        return Vec::new();
+    }
+    let all: i64 = sums.iter().map(|sum| sum.deviation).sum();
+    let mean = all as f64 / has as f64;
+    let pairs = sums.iter().zip(taught);
+    pairs
+        .filter(|(sum, taught)| taught.pixels > 0 && least.is_none_or(|least| sum.count >= least))
+        .map(|(sum, taught)| {
+            let (pixels, nm) = match sum.count {
+                0 => (f64::from(taught.pixels), mean),
+                count => (count as f64, sum.deviation as f64 / count as f64),
+            };
+            let deviation = nm * 1e-6;
+            Cell {
+                pixels,
+                height: taught.height + deviation,
+                deviation,
+                taught,
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,149 @@
+//! Gauges that are not linear in height: flatness, peak-to-valley, RMS and share of deviations, with models of their errors.
+//!
+//! Cells do not share pixels, so the errors of their means are independent, of σ² = σ_z² / side² each. The models need no
+//! more than the cells' own values; `tests/suite/precision.rs` holds them against simulation.
+
+use super::Cell;
+use super::level::Plane;
+use crate::inspect::Reading;
+use crate::inspect::align::{Placed, form};
+use alloc::vec::Vec;
+use core::f64::consts::{PI, SQRT_2};
+
+/// Peak-to-valley flatness about the least-squares plane, mm (ISO 12781-1: FLTt about LSPL). `sigma` is the error of a
+/// cell's mean, mm. The plane's own error is small against a cell's and left out.
+pub fn flatness(cells: &[Cell<'_>], sigma: f64, placed: Option<&Placed>) -> Option<Reading> {
+    let plane = Plane::of(cells)?;
+    let slope = 1.0 + plane.along * plane.along + plane.down * plane.down;
+    let heights = cells.iter().map(|cell| plane.above(cell));
+    range(cells, heights.collect(), sigma / libm::sqrt(slope), placed)
+}
+
+/// The highest less the lowest cell, mm.
+pub fn peak_to_valley(cells: &[Cell<'_>], sigma: f64, placed: Option<&Placed>) -> Option<Reading> {
+    let heights = cells.iter().map(|cell| cell.height);
+    range(cells, heights.collect(), sigma, placed)
+}
+
+/// Largest less smallest value, one per cell. The errors of both ends are those of the largest of many noisy values, and
+/// what an error of the motion does to the two cells.
+fn range(
+    cells: &[Cell<'_>],
+    mut values: Vec<f64>,
+    sigma: f64,
+    placed: Option<&Placed>,
+) -> Option<Reading> {
+    let by = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
+    let (high, low) = ((0..values.len()).max_by(by)?, (0..values.len()).min_by(by)?);
+    let value = values[high] - values[low];
+    let (upper, lower) = (cells[high].taught.row, cells[low].taught.row);
+    let motion = motion(&core::array::from_fn(|i| upper[i] - lower[i]), placed);
+    let top = spread_of_largest(&values, sigma);
+    for value in &mut values {
+        *value = -*value;
+    }
+    let bottom = spread_of_largest(&values, sigma);
+    Some(Reading {
+        value,
+        sigma: Some(libm::sqrt(top * top + bottom * bottom + motion)),
+    })
+}
+
+/// Variance by the error of the motion of what changes by `row` with it.
+fn motion(row: &[f64; 6], placed: Option<&Placed>) -> f64 {
+    placed.map_or(0.0, |placed| form(row, &placed.covariance, row).max(0.0))
+}
+
+/// Bins per σ, and bins below the largest value that matter.
+const BINS_PER_SIGMA: f64 = 4.0;
+const BINS: usize = 40;
+
+/// Standard deviation of the largest of values that were measured with an error of `sigma` each, if they were measured
+/// again: F(x) = Π Φ((x − mᵢ)/σ), Var = ∫∫ of it. The true values m are the measured ones drawn together so that what
+/// σ explains of their scatter is gone: what they scatter by error must not count twice.
+fn spread_of_largest(values: &[f64], sigma: f64) -> f64 {
+    if !(sigma > 0.0) {
+        return 0.0;
+    }
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let scatter = values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / count;
+    let shrink = libm::sqrt((1.0 - sigma * sigma / scatter.max(f64::MIN_POSITIVE)).max(0.0));
+    let drawn = |value: &f64| mean + (value - mean) * shrink;
+    let top = values.iter().map(drawn).fold(f64::NEG_INFINITY, f64::max);
+    let mut bins = [0.0; BINS];
+    for value in values.iter().map(drawn) {
+        let bin = libm::rint((top - value) / sigma * BINS_PER_SIGMA);
+        if bin < BINS as f64 {
+            bins[bin as usize] += 1.0;
+        }
+    }
+    // From 4 σ below the largest to 6 σ above, in steps of σ/8; the largest of a million reaches 5 σ.
+    const STEP: f64 = 0.125;
+    let (mut first, mut second) = (0.0, 0.0);
+    for i in 0..80 {
+        let x = -4.0 + STEP * (f64::from(i) + 0.5);
+        let mut log = 0.0;
+        for (bin, count) in bins.iter().enumerate().filter(|(_, count)| **count > 0.0) {
+            log += count * libm::log(below(x + bin as f64 / BINS_PER_SIGMA));
+        }
+        let tail = 1.0 - libm::exp(log);
+        first += tail * STEP;
+        second += 2.0 * (x + 4.0) * tail * STEP;
+    }
+    libm::sqrt((second - first * first).max(0.0)) * sigma
+}
+
+/// Φ, the normal distribution.
+fn below(x: f64) -> f64 {
+    (0.5 * libm::erfc(-x / SQRT_2)).max(f64::MIN_POSITIVE)
+}
+
+/// Root of the mean square of the deviations, mm. Var(mean d²) = (4σ² Σd² − 2nσ⁴) / n² + gᵀ C g: the scatter of d² about
+/// fixed true deviations, with d² − σ² for the square of each, and the error of the motion, g = Σ 2dᵢ jᵢ / n.
+pub fn rms(cells: &[Cell<'_>], sigma: f64, placed: Option<&Placed>) -> Option<Reading> {
+    if cells.is_empty() {
+        return None;
+    }
+    let count = cells.len() as f64;
+    let (mut squares, mut row) = (0.0, [0.0; 6]);
+    for cell in cells {
+        squares += cell.deviation * cell.deviation;
+        for (sum, value) in row.iter_mut().zip(cell.taught.row) {
+            *sum += 2.0 * cell.deviation * value / count;
+        }
+    }
+    let variance = sigma * sigma;
+    // Never less than without any true deviation.
+    let least = 2.0 * count * variance * variance;
+    let own = (4.0 * variance * squares - least).max(least) / (count * count);
+    let scatter = own + motion(&row, placed);
+    let value = libm::sqrt(squares / count);
+    Some(Reading {
+        value,
+        sigma: Some(libm::sqrt(scatter) / (2.0 * value.max(sigma).max(f64::MIN_POSITIVE))),
+    })
+}
+
+/// Share of the cells that deviate by more than `tolerance` mm. Each is a coin that falls by how near to the tolerance it
+/// lies: σ² = Σ p(1 − p) / n², p = Φ((|d| − T) / σ). As d itself is noisy, p(1 − p) is taken about d with √2 σ and scaled
+/// so that its integral over all d is σ/√π, what coins of known d have.
+pub fn share_outside(cells: &[Cell<'_>], sigma: f64, tolerance: f64) -> Option<Reading> {
+    if cells.is_empty() {
+        return None;
+    }
+    let count = cells.len() as f64;
+    let sizes = || cells.iter().map(|cell| libm::fabs(cell.deviation));
+    let outside = sizes().filter(|size| *size > tolerance).count() as f64;
+    let coins: f64 = match sigma > 0.0 {
+        true => sizes()
+            .map(|size| (size - tolerance) / sigma)
+            .map(|x| libm::exp(-x * x / 4.0) / (2.0 * PI))
+            .sum(),
+        false => 0.0,
+    };
+    Some(Reading {
+        value: outside / count,
+        sigma: Some(libm::sqrt(coins) / count),
+    })
+}

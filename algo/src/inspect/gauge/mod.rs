@@ -1,0 +1,93 @@
+//! What a gauge measures, and how its value and error follow from cells.
+//!
+//! A region is divided into square cells of pixels in golden's frame. A strip adds each measured pixel to the cell in which
+//! the part has it, after the part's motion was taken back. A cell is then as high as it was taught, and its pixels' mean
+//! deviation on top: whichever of them were measured, on a slope too. The values of all gauges but coverage, deviation and
+//! placement are worked out from these heights and deviations.
+
+mod cells;
+mod extreme;
+mod level;
+mod taught;
+
+pub use cells::{Cell, Grid, Sum, TooFine, cells};
+pub use extreme::{flatness, peak_to_valley, rms, share_outside};
+pub use level::{Linear, mean, step, tilt, volume};
+pub use taught::TaughtCell;
+pub(super) use taught::taught_cells;
+
+/// The axes that a plane may be tilted about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// x.
+    X,
+    /// y.
+    Y,
+}
+
+/// What a gauge measures. Heights are z of the part after its motion was taken back; `side` is that of the squares that
+/// are averaged over, in camera pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Measure {
+    /// The largest deviation from golden of squares of `side` pixels about every pixel, mm; see
+    /// [`Comparison::deviation`](super::Comparison::deviation).
+    Deviation {
+        /// Odd; 1 = single pixels.
+        side: usize,
+    },
+    /// The root of the mean square of the cells' deviations from golden, mm.
+    RmsDeviation {
+        /// Of the cells.
+        side: usize,
+    },
+    /// The share of the cells that deviate from golden by more than a tolerance.
+    OutOfTolerance {
+        /// Of the cells.
+        side: usize,
+        /// In mm.
+        tolerance: f64,
+    },
+    /// The share of the region that has a height.
+    Coverage,
+    /// The mean height, mm.
+    MeanHeight,
+    /// The mean height less that of a second region, mm.
+    Step,
+    /// The distance between the two planes parallel to the least-squares plane that enclose all cells, mm: peak-to-valley
+    /// flatness deviation FLTt about the reference plane LSPL of ISO 12781-1.
+    Flatness {
+        /// Of the cells.
+        side: usize,
+    },
+    /// The highest less the lowest cell, mm.
+    PeakToValley {
+        /// Of the cells.
+        side: usize,
+    },
+    /// The angle of the least-squares plane about an axis, degrees, right-handed; 0 is parallel to the plane z = 0.
+    Tilt(Axis),
+    /// The volume between the surface and the plane z = `above`, mm³, negative below it.
+    Volume {
+        /// In mm.
+        above: f64,
+    },
+    /// A component of the part's motion: 0 to 2 shift along x, y, z, mm; 3 to 5 turn about x, y, z, degrees.
+    Placement(usize),
+}
+
+impl Measure {
+    /// The side of the cells that it needs at least, if it is worked out from cells; 0 if any will do.
+    pub(super) fn cell_side(&self) -> Option<usize> {
+        match *self {
+            Self::RmsDeviation { side }
+            | Self::OutOfTolerance { side, .. }
+            | Self::Flatness { side }
+            | Self::PeakToValley { side } => Some(side.max(1)),
+            Self::MeanHeight | Self::Step | Self::Tilt(_) | Self::Volume { .. } => Some(0),
+            Self::Deviation { .. } | Self::Coverage | Self::Placement(_) => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,97 @@
+//! The cells of a region as they were taught: how large, and how they answer a motion of the part.
+
+use super::Grid;
+use crate::geometry::Vector;
+use crate::inspect::Region;
+use crate::inspect::align::GoldenSurface;
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// A cell as taught.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TaughtCell {
+    /// Pixels that are compared.
+    pub pixels: u32,
+    /// Their mean height, mm.
+    pub height: f64,
+    /// Their mean x, mm.
+    pub x: f64,
+    /// Their mean y, mm.
+    pub y: f64,
+    /// Their area in x and y, mm².
+    pub area: f64,
+    /// What its height loses where the part's motion is taken to be larger: per mm along each axis, and per mm of the way of
+    /// a point at the radius about each.
+    pub row: [f64; 6],
+    /// Σ of the variances of its pixels' heights, mm².
+    pub variance: f64,
+}
+
+/// Pixels of a cell whose facets are looked at, in each direction.
+const LOOKS: usize = 4;
+
+/// The cells of a region. Turns are about `centre`, as ways at `radius`.
+pub(in crate::inspect) fn taught_cells(
+    grid: &Grid,
+    region: &Region,
+    golden: GoldenSurface<'_>,
+    (centre, radius): (Vector, f64),
+) -> Vec<TaughtCell> {
+    let width = golden.surface.width;
+    let mut cells = vec![TaughtCell::default(); grid.len()];
+    let mut looks = vec![0.0; grid.len()];
+    let stride = (grid.side() / LOOKS).max(1);
+    for (v, columns) in region.spans() {
+        for u in columns.clone() {
+            let place = v * width + u;
+            if !golden.taught.compared(place) {
+                continue;
+            }
+            let at = grid.cell(u as i32, *v as i32);
+            let cell = &mut cells[at];
+            cell.pixels += 1;
+            let sigma = golden.taught.sigma_mm(place);
+            cell.variance += sigma * sigma;
+            let height = golden.surface.height[place];
+            let Some(point) = golden.triangulator.point(u, *v, height) else {
+                continue;
+            };
+            cell.height += point.z;
+            cell.x += point.x;
+            cell.y += point.y;
+            if u % stride != 0 || v % stride != 0 {
+                continue;
+            }
+            if let Some(facet) = golden.facet(point, (u as f64, *v as f64)) {
+                let (lift, turning) = (
+                    facet.lift,
+                    (point - centre).cross(facet.lift) * (1.0 / radius),
+                );
+                let row = [lift.x, lift.y, lift.z, turning.x, turning.y, turning.z];
+                for (sum, value) in cell.row.iter_mut().zip(row) {
+                    *sum += value;
+                }
+                cell.area += facet.area;
+                looks[at] += 1.0;
+            }
+        }
+    }
+    let all: f64 = looks.iter().sum();
+    let total = cells.iter().map(|cell| cell.area).sum::<f64>();
+    // A cell without a facet of its own is taken to be as large as the others, and flat.
+    let (mean, flat) = (total / all.max(1.0), [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+    for (cell, looks) in cells.iter_mut().zip(looks) {
+        let pixels = f64::from(cell.pixels);
+        let each = 1.0 / pixels.max(1.0);
+        (cell.height, cell.x, cell.y) = (cell.height * each, cell.x * each, cell.y * each);
+        if looks > 0.0 {
+            cell.row = cell.row.map(|sum| sum / looks);
+            cell.area *= pixels / looks;
+        } else {
+            cell.row = flat;
+            cell.area = pixels * mean;
+        }
+    }
+    cells
+}

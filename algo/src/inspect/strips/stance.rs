@@ -1,0 +1,153 @@
+//! Where each pixel of a cycle lies on the part as it was taught: the part's motion, taken back.
+//!
+//! A pixel that sees height z sees the part's point p; taken back by the motion, p is seen at (u, v) + (du, dv) and lies
+//! dz higher. These are worked out at nodes, for two heights, and interpolated between: over the distance of two nodes and
+//! the heights of a part they are linear next to exactly.
+
+use super::Production;
+use crate::geometry::Vector;
+use crate::inspect::Region;
+use crate::inspect::align::{Motion, Placed};
+use crate::pipeline::map_rows;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// Pixels from node to node.
+pub(super) const SPACING: usize = 32;
+/// Values of a node: du, dv (pixels), dz (mm).
+const VALUES: usize = 3;
+
+/// Values at the middle height, and their change per mm of height.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Node {
+    pub value: [f32; VALUES],
+    pub slope: [f32; VALUES],
+}
+
+impl Node {
+    /// This node at 0 and another at 1.
+    pub fn between(&self, other: &Self, share: f32) -> Self {
+        let mix = |a: [f32; VALUES], b: [f32; VALUES]| {
+            core::array::from_fn(|i| a[i] + (b[i] - a[i]) * share)
+        };
+        Self {
+            value: mix(self.value, other.value),
+            slope: mix(self.slope, other.slope),
+        }
+    }
+}
+
+/// How the part of a cycle lies.
+#[derive(Debug)]
+pub(super) struct Stance {
+    /// None if it is taken to lie as taught.
+    pub placed: Option<Placed>,
+    /// Where the plan's regions are now; none = where they were taught.
+    regions: Option<Vec<Region>>,
+    /// Row-major.
+    nodes: Vec<Node>,
+    columns: usize,
+}
+
+impl Stance {
+    /// Of a part that was found to lie so.
+    pub fn new(plan: &Production, placed: Option<Placed>) -> Self {
+        let (width, height) = plan.size();
+        let columns = (width - 1).div_ceil(SPACING) + 1;
+        let rows = (height - 1).div_ceil(SPACING) + 1;
+        let still = Motion::none(Vector::default());
+        let motion = placed.as_ref().map_or(&still, |placed| &placed.motion);
+        let nodes = map_rows(rows, |row| {
+            let v = (row * SPACING).min(height - 1);
+            (0..columns)
+                .map(|column| plan.node(motion, ((column * SPACING).min(width - 1), v)))
+                .collect::<Vec<_>>()
+        });
+        let regions = placed.as_ref().map(|placed| {
+            let moved = |region: &Region| {
+                region.moved((width, height), |at| plan.moved(&placed.motion, at))
+            };
+            plan.regions.iter().map(moved).collect()
+        });
+        Self {
+            placed,
+            regions,
+            nodes: nodes.into_iter().flatten().collect(),
+            columns,
+        }
+    }
+
+    /// A region of the plan, where it is now.
+    pub fn region<'a>(&'a self, plan: &'a Production, at: usize) -> &'a Region {
+        self.regions
+            .as_ref()
+            .map_or(&plan.regions[at], |regions| &regions[at])
+    }
+
+    /// The nodes of row `v`.
+    pub fn row(&self, v: usize, height: usize, out: &mut Vec<Node>) {
+        let (upper, lower) = (
+            v / SPACING,
+            (v / SPACING + 1).min(self.nodes.len() / self.columns - 1),
+        );
+        let (top, bottom) = (upper * SPACING, (lower * SPACING).min(height - 1));
+        let share = (v - top) as f32 / (bottom - top).max(1) as f32;
+        let row = |at: usize| &self.nodes[at * self.columns..(at + 1) * self.columns];
+        out.clear();
+        out.extend(
+            row(upper)
+                .iter()
+                .zip(row(lower))
+                .map(|(a, b)| a.between(b, share)),
+        );
+    }
+}
+
+/// Room for the nodes of a row.
+pub(super) fn room(width: usize) -> Vec<Node> {
+    vec![Node::default(); width.div_ceil(SPACING) + 1]
+}
+
+impl Production {
+    /// A node at pixel (u, v); not a number where the pixel sees nothing.
+    fn node(&self, motion: &Motion, (u, v): (usize, usize)) -> Node {
+        let (middle, half) = self.levels;
+        let at = |z: f64| {
+            let values = self.seen(u, v, z).and_then(|point| {
+                let back = motion.undo(point);
+                let (column, row) = self.triangulator.camera().project(back)?;
+                let (du, dv) = (column - u as f64, row - v as f64);
+                Some([du, dv, back.z - point.z])
+            });
+            values.unwrap_or([f64::NAN; VALUES])
+        };
+        let (low, high) = (at(middle - half), at(middle + half));
+        Node {
+            value: core::array::from_fn(|i| ((low[i] + high[i]) / 2.0) as f32),
+            slope: core::array::from_fn(|i| ((high[i] - low[i]) / (2.0 * half)) as f32),
+        }
+    }
+
+    /// The point at height `z` that pixel (u, v) sees.
+    fn seen(&self, u: usize, v: usize, z: f64) -> Option<Vector> {
+        self.triangulator
+            .point(u, v, crate::units::Height::from_mm(z))
+    }
+
+    /// Where the place of the taught part that was seen at (u, v) is seen now.
+    fn moved(&self, motion: &Motion, (u, v): (f64, f64)) -> (f64, f64) {
+        let (width, height) = self.size();
+        let column = libm::rint(u.clamp(0.0, (width - 1) as f64));
+        let row = libm::rint(v.clamp(0.0, (height - 1) as f64));
+        let taught = self.rises.surface().height[row as usize * width + column as usize];
+        let z = if taught.is_known() {
+            taught.mm()
+        } else {
+            self.levels.0
+        };
+        let to = self
+            .seen(column as usize, row as usize, z)
+            .and_then(|point| self.triangulator.camera().project(motion.apply(point)));
+        to.map_or((u, v), |to| (u + to.0 - column, v + to.1 - row))
+    }
+}

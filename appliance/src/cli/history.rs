@@ -1,0 +1,132 @@
+//! `fringed history`: stored results as a table, JSON or CSV. Works while the station runs.
+
+use super::Common;
+use crate::error::{Exit, Failure};
+use crate::history::{Entry, Filter, HistoryError, Reader, time};
+use crate::station::Verdict;
+
+/// Show or export stored results, newest first.
+#[derive(Debug, clap::Args)]
+pub struct History {
+    /// As CSV: a line per result, all gauges in columns.
+    #[arg(long, conflicts_with = "json")]
+    csv: bool,
+    /// Only of this recipe.
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u16).range(1..=9999))]
+    recipe: Option<u16>,
+    /// Only with this verdict.
+    #[arg(long, value_parser = verdict, value_name = "pass|fail|invalid")]
+    verdict: Option<Verdict>,
+    /// Only of this PART_ID.
+    #[arg(long, value_name = "PART_ID")]
+    part: Option<u32>,
+    /// Only triggered at or after this time (UTC).
+    #[arg(long, value_parser = time::utc_us, value_name = "TIME")]
+    since: Option<u64>,
+    /// Only triggered before this time (UTC).
+    #[arg(long, value_parser = time::utc_us, value_name = "TIME")]
+    until: Option<u64>,
+    /// At most this many, the newest; as CSV all, unless given.
+    #[arg(long, value_name = "N")]
+    limit: Option<usize>,
+}
+
+/// Rows of a table for a screen.
+const SCREEN: usize = 20;
+
+fn verdict(word: &str) -> Result<Verdict, String> {
+    match word.to_ascii_lowercase().as_str() {
+        "pass" => Ok(Verdict::Pass),
+        "fail" => Ok(Verdict::Fail),
+        "invalid" => Ok(Verdict::Invalid),
+        _ => Err("write pass, fail or invalid".into()),
+    }
+}
+
+impl History {
+    /// Prints the results.
+    ///
+    /// # Errors
+    /// If there is no history (66), or it is damaged (65).
+    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+        let state = common.state_folder()?;
+        let reader = Reader::of(&state);
+        let usual = if self.csv { usize::MAX } else { SCREEN };
+        let filter = Filter {
+            recipe: self.recipe,
+            verdict: self.verdict,
+            part_id: self.part,
+            since_us: self.since,
+            until_us: self.until,
+            before_seq: None,
+            limit: self.limit.unwrap_or(usual),
+        };
+        if self.csv {
+            return self.csv(&reader, &filter);
+        }
+        let results = reader.results(&filter).map_err(failure)?;
+        if common.json {
+            say!("{:#}", serde_json::json!({ "results": results }));
+            return Ok(());
+        }
+        say!(
+            "       seq  time (UTC)           recipe        part  verdict  coverage    result  remarks"
+        );
+        for entry in &results {
+            say!("{}", row(entry));
+        }
+        let counts = reader.counts(&filter).map_err(failure)?;
+        say!(
+            "{} PASS, {} FAIL, {} INVALID in all",
+            counts.pass,
+            counts.fail,
+            counts.invalid
+        );
+        Ok(())
+    }
+
+    fn csv(&self, reader: &Reader, filter: &Filter) -> Result<(), Failure> {
+        let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+        match reader.csv(filter, &mut out) {
+            // Whoever closes the pipe early has read enough.
+            Err(error) if !error.reason.starts_with("write as CSV") => Err(failure(error)),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A history that cannot be read, as an exit code.
+pub fn failure(error: HistoryError) -> Failure {
+    let exit = match (error.path.exists(), error.damaged) {
+        (false, _) => Exit::Missing,
+        (true, true) => Exit::Content,
+        (true, false) => Exit::Unavailable,
+    };
+    Failure::new(exit, error.to_string())
+}
+
+fn row(entry: &Entry) -> String {
+    let utc = entry.time_utc_us.map(time::utc).unwrap_or_default();
+    let outside = entry.gauges.iter().filter(|gauge| gauge.decision & 1 == 0);
+    let mut remarks: Vec<String> = outside
+        .map(|gauge| match gauge.value {
+            Some(value) => format!("{} {value:+.3} {}", gauge.name, gauge.unit)
+                .trim_end()
+                .to_owned(),
+            None => format!("{} not measured", gauge.name),
+        })
+        .collect();
+    remarks.extend(entry.reason.clone());
+    remarks.extend(entry.recording.iter().map(|name| format!("[{name}]")));
+    format!(
+        "{:>10}  {:<19.19}  {:>6}  {:>10}  {:<7}  {:>6.1} %  {:>5} ms  {}",
+        entry.seq,
+        utc,
+        entry.recipe,
+        entry.part_id,
+        entry.verdict.word(),
+        f64::from(entry.coverage_permille) / 10.0,
+        entry.total_us / 1000,
+        remarks.join("; ")
+    )
+}

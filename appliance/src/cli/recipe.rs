@@ -1,0 +1,124 @@
+//! `fringed recipe`: list, export, import and delete the station's recipes. Works while the station runs: it takes up an
+//! imported recipe when it is selected.
+
+use super::Common;
+use crate::backend;
+use crate::error::{Exit, Failure};
+use crate::recipe::exchange::{ImportError, Listed};
+use crate::recipe::{LoadError, Store};
+use std::path::PathBuf;
+
+/// What to do with recipes.
+#[derive(Debug, clap::Subcommand)]
+pub enum RecipeCommand {
+    /// List the stored recipes.
+    List,
+    /// Write a recipe to a file.
+    Export {
+        /// Its number.
+        #[arg(value_parser = clap::value_parser!(u16).range(1..=9999))]
+        number: u16,
+        /// The file; one that is there is replaced.
+        file: PathBuf,
+    },
+    /// Take a recipe from a file; the one of the same number stays as the previous generation.
+    Import {
+        /// The file.
+        file: PathBuf,
+    },
+    /// Delete a recipe with its previous generation.
+    Delete {
+        /// Its number.
+        #[arg(value_parser = clap::value_parser!(u16).range(1..=9999))]
+        number: u16,
+    },
+}
+
+impl RecipeCommand {
+    /// Does it.
+    ///
+    /// # Errors
+    /// If the recipe does not exist (66), is damaged or of another calibration (65), or the store cannot be written (73).
+    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+        let config = common.configuration()?;
+        let folder = common.state_folder()?.join("recipes");
+        let cannot = |error: std::io::Error| {
+            Failure::because(
+                Exit::CannotCreate,
+                format!("use the recipes in {}", folder.display()),
+                error,
+            )
+        };
+        let store = Store::open(&folder).map_err(cannot)?;
+        match self {
+            Self::List => {
+                list(&store.list(), common);
+                Ok(())
+            }
+            Self::Export { number, file } => {
+                store.export(*number, file).map_err(refused)?;
+                tell(common, format!("recipe {number} is in {}", file.display()));
+                Ok(())
+            }
+            Self::Import { file } => {
+                let calibration = backend::calibration(&config.head)?.fingerprint();
+                let imported = store.import(file, Some(&calibration)).map_err(refused)?;
+                let digits = imported.fingerprint.get(..8).unwrap_or_default();
+                tell(
+                    common,
+                    format!(
+                        "imported recipe {} ({}), fingerprint {digits}",
+                        imported.number, imported.name
+                    ),
+                );
+                Ok(())
+            }
+            Self::Delete { number } => {
+                store.delete(*number).map_err(refused)?;
+                tell(common, format!("recipe {number} is deleted"));
+                Ok(())
+            }
+        }
+    }
+}
+
+fn tell(common: &Common, words: String) {
+    if !common.quiet {
+        say!("{words}");
+    }
+}
+
+fn refused(error: ImportError) -> Failure {
+    let exit = match &error {
+        ImportError::Load(LoadError::Unknown(_)) => Exit::Missing,
+        ImportError::Load(LoadError::Corrupt { .. }) | ImportError::Refused { .. } => Exit::Content,
+        ImportError::Missing { .. } => Exit::Missing,
+        ImportError::Write { .. } => Exit::CannotCreate,
+    };
+    Failure::new(exit, error.to_string())
+}
+
+fn list(recipes: &[Listed], common: &Common) {
+    if common.json {
+        say!("{:#}", serde_json::json!({ "recipes": recipes }));
+        return;
+    }
+    say!(
+        "number  part number                       fingerprint  sequence      σ_z mm  gauges  name"
+    );
+    for recipe in recipes {
+        match &recipe.problem {
+            None => say!(
+                "{:>6}  {:<32}  {:<11.8}  {:<12}  {:>6.4}  {:>6}  {}",
+                recipe.number,
+                recipe.part_number,
+                recipe.fingerprint,
+                recipe.sequence,
+                recipe.sigma_mm,
+                recipe.gauges,
+                recipe.name
+            ),
+            Some(problem) => say!("{:>6}  cannot be used: {problem}", recipe.number),
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! The end of the daemon: every thread is told, and none is waited for for ever.
+
+use crate::history::History;
+use crate::progress::Progress;
+use crate::station::StationHandle;
+use crate::worker::Order;
+use std::sync::mpsc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use tokio::sync::watch;
+
+/// What ends the daemon's threads.
+pub(super) struct Stopping {
+    pub(super) orders: mpsc::Sender<Order>,
+    pub(super) sockets: watch::Sender<bool>,
+    pub(super) survey: mpsc::Sender<()>,
+    pub(super) threads: [JoinHandle<()>; 3],
+    pub(super) progress: Progress,
+    pub(super) station: StationHandle,
+    pub(super) history: History,
+    pub(super) writing: JoinHandle<()>,
+}
+
+/// Time between two looks at a thread that ends.
+const LOOKING: Duration = Duration::from_millis(2);
+/// A thread that has not ended after this time is left behind.
+const STOPPING: Duration = Duration::from_secs(3);
+
+impl Stopping {
+    /// Ends measuring, then the sockets, the survey and the history.
+    pub(super) fn stop(self) {
+        // An order that nobody takes, or a runtime that is gone, is what is wanted here.
+        drop(self.orders.send(Order::Stop));
+        let [measuring, serving, surveying] = self.threads;
+        join("measuring", measuring, &self.progress);
+        let _ = self.sockets.send(true);
+        join("sockets", serving, &self.progress);
+        drop(self.survey);
+        join("survey", surveying, &self.progress);
+        // Last: what the others brought to an end is stored.
+        self.history.stop(self.station.snapshot().result_seq);
+        join("history", self.writing, &self.progress);
+    }
+}
+
+/// Waits for a thread to end. One that hangs in a device or in a storage must not keep the program from ending.
+fn join(name: &str, thread: JoinHandle<()>, progress: &Progress) {
+    let began = Instant::now();
+    while !thread.is_finished() {
+        if began.elapsed() > STOPPING {
+            progress.log(&format!(
+                "the thread {name} does not end and is left behind"
+            ));
+            return;
+        }
+        std::thread::sleep(LOOKING);
+    }
+    // One that panicked has said so.
+    drop(thread.join());
+}

@@ -1,0 +1,165 @@
+//! The history as CSV after RFC 4180: one line per result, the gauges in columns of their own.
+
+use super::HistoryError;
+use super::entry::{Entry, Filter};
+use super::reader::{Reader, condition};
+use super::time::utc;
+use rusqlite::params_from_iter;
+use std::fmt::{Display, Write as _};
+use std::io::Write;
+
+/// The columns before the gauges'.
+const COLUMNS: &str = "seq,time_utc,recipe,fingerprint,part_id,press_stroke,token,verdict,error_code,reason,flags,\
+    valid_points,coverage_permille,temperature_c,height_noise_mm,fitness_permille,exposure_us,total_us,stages_us,recording";
+
+impl Reader {
+    /// Writes the results that pass the filter, newest first, with the names of all their gauges in the head line. A
+    /// gauge has five columns: value with its unit, σ, limits and decision bits.
+    ///
+    /// # Errors
+    /// [`HistoryError`], also where `out` takes no more.
+    pub fn csv(&self, filter: &Filter, out: &mut dyn Write) -> Result<(), HistoryError> {
+        let gauges = self.gauges(filter)?;
+        let mut head = COLUMNS.to_owned();
+        for (name, unit) in &gauges {
+            let unit = if unit.is_empty() {
+                String::new()
+            } else {
+                format!(" [{unit}]")
+            };
+            for column in [&unit, " sigma", " low", " high", " decision"] {
+                head.push(',');
+                text(&mut head, &format!("{name}{column}"));
+            }
+        }
+        let write = |out: &mut dyn Write, line: &str| {
+            out.write_all(line.as_bytes())
+                .and_then(|()| out.write_all(b"\r\n"))
+                .map_err(|error| HistoryError {
+                    path: self.path().to_path_buf(),
+                    reason: format!("write as CSV: {error}"),
+                    damaged: false,
+                })
+        };
+        write(out, &head)?;
+        let mut line = String::new();
+        self.each(filter, |entry| {
+            line.clear();
+            one(&mut line, &entry, &gauges);
+            write(out, &line)
+        })
+    }
+
+    /// Name and unit of every gauge of the results that pass the filter.
+    fn gauges(&self, filter: &Filter) -> Result<Vec<(String, String)>, HistoryError> {
+        let connection = self.open()?;
+        let (condition, mut values) = condition(filter);
+        values.push(i64::try_from(filter.limit).unwrap_or(i64::MAX).into());
+        let query = format!(
+            "SELECT DISTINCT name, unit FROM gauge WHERE result IN
+                (SELECT id FROM result WHERE {condition} ORDER BY id DESC LIMIT ?) ORDER BY place, name"
+        );
+        connection
+            .prepare(&query)
+            .and_then(|mut statement| {
+                let row = |row: &rusqlite::Row<'_>| Ok((row.get(0)?, row.get(1)?));
+                statement
+                    .query_map(params_from_iter(values), row)?
+                    .collect()
+            })
+            .map_err(self.failed())
+    }
+}
+
+fn one(line: &mut String, entry: &Entry, gauges: &[(String, String)]) {
+    // Writing to a string cannot fail.
+    let _ = write!(
+        line,
+        "{},{}",
+        entry.seq,
+        entry.time_utc_us.map(utc).unwrap_or_default()
+    );
+    let _ = write!(
+        line,
+        ",{},{},{},{}",
+        entry.recipe, entry.fingerprint, entry.part_id, entry.press_stroke
+    );
+    let _ = write!(
+        line,
+        ",{},{},{},",
+        entry.token,
+        entry.verdict.word(),
+        entry.error_code
+    );
+    text(line, entry.reason.as_deref().unwrap_or_default());
+    let _ = write!(
+        line,
+        ",{},{},{}",
+        entry.flags, entry.valid_points, entry.coverage_permille
+    );
+    number(line, entry.temperature_c);
+    number(line, entry.height_noise_mm);
+    let _ = write!(
+        line,
+        ",{},{},{},",
+        entry.fitness_permille, entry.exposure_us, entry.total_us
+    );
+    let stages: Vec<_> = entry
+        .stages
+        .iter()
+        .map(|stage| format!("{} {}", stage.name, stage.us))
+        .collect();
+    text(line, &stages.join("; "));
+    line.push(',');
+    text(line, entry.recording.as_deref().unwrap_or_default());
+    for (name, unit) in gauges {
+        match entry
+            .gauges
+            .iter()
+            .find(|gauge| gauge.name == *name && gauge.unit == *unit)
+        {
+            Some(gauge) => {
+                for value in [gauge.value, gauge.sigma, gauge.low, gauge.high] {
+                    number(line, value);
+                }
+                number(line, Some(gauge.decision));
+            }
+            None => line.push_str(",,,,,"),
+        }
+    }
+}
+
+fn number(line: &mut String, number: Option<impl Display>) {
+    line.push(',');
+    if let Some(number) = number {
+        let _ = write!(line, "{number}");
+    }
+}
+
+/// A text: quoted where it must be, and never one that a spreadsheet takes for a formula.
+fn text(line: &mut String, text: &str) {
+    let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    let guard = if formula { "'" } else { "" };
+    if formula || text.contains([',', '"', '\r', '\n']) {
+        let _ = write!(line, "\"{guard}{}\"", text.replace('"', "\"\""));
+    } else {
+        line.push_str(text);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_is_quoted_where_it_must_be_and_is_no_formula() {
+        let quoted = |given| {
+            let mut line = String::new();
+            text(&mut line, given);
+            line
+        };
+        assert_eq!(quoted("plain"), "plain");
+        assert_eq!(quoted("a,\"b\""), "\"a,\"\"b\"\"\"");
+        assert_eq!(quoted("=1+1"), "\"'=1+1\"");
+    }
+}

@@ -1,0 +1,212 @@
+//! A result as the history keeps it, and which results somebody wants to see.
+
+use crate::station::result::flag;
+use crate::station::{ResultRecord, Verdict};
+use serde::{Serialize, Serializer};
+
+/// One stored result. Lengths in mm, times in µs; as JSON the keys are the fields' names.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Entry {
+    /// RESULT_SEQ.
+    pub seq: u32,
+    /// Trigger time in µs since 1970 UTC; none if the clock was not synchronised.
+    pub time_utc_us: Option<u64>,
+    /// Recipe number.
+    pub recipe: u16,
+    /// The first 8 hexadecimal digits of the recipe's fingerprint.
+    pub fingerprint: String,
+    /// PART_ID.
+    pub part_id: u32,
+    /// PRESS_STROKE.
+    pub press_stroke: u32,
+    /// The token that triggered, 0 for an edge.
+    pub token: u16,
+    /// PASS, FAIL or INVALID.
+    #[serde(serialize_with = "word")]
+    pub verdict: Verdict,
+    /// 0, or why there is no measurement.
+    pub error_code: u16,
+    /// Why it is INVALID, in words.
+    pub reason: Option<String>,
+    /// RESULT flags, register 231.
+    pub flags: u16,
+    /// Resolved pixels.
+    pub valid_points: u32,
+    /// Share of the regions that is resolved, ‰.
+    pub coverage_permille: u16,
+    /// Head temperature, °C.
+    pub temperature_c: Option<f64>,
+    /// Height noise, 1 σ, mm.
+    pub height_noise_mm: Option<f64>,
+    /// Pattern fitness, ‰.
+    pub fitness_permille: u16,
+    /// Trigger → exposure done, µs.
+    pub exposure_us: u32,
+    /// Trigger → result, µs.
+    pub total_us: u32,
+    /// Times of the stages, in their order.
+    pub stages: Vec<StageEntry>,
+    /// The gauges, in the recipe's order.
+    pub gauges: Vec<GaugeEntry>,
+    /// The folder in `recordings/` that holds the frames, if they were kept.
+    pub recording: Option<String>,
+}
+
+/// The time of one stage.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, serde::Deserialize)]
+pub struct StageEntry {
+    /// The stage's name.
+    pub name: String,
+    /// µs.
+    pub us: u32,
+}
+
+/// One gauge of a stored result, in mm, °, mm³ or as a share.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct GaugeEntry {
+    /// The gauge's name.
+    pub name: String,
+    /// The unit's symbol, empty for shares and bare numbers.
+    pub unit: String,
+    /// None if it could not be measured.
+    pub value: Option<f64>,
+    /// 1 σ, as far as predicted.
+    pub sigma: Option<f64>,
+    /// Lower limit.
+    pub low: Option<f64>,
+    /// Upper limit.
+    pub high: Option<f64>,
+    /// The bits of registers 296–311: 0 pass, 1 valid, 2 low, 3 high, 4 doubtful.
+    pub decision: u16,
+}
+
+/// Which results: all conditions hold together. The default asks for the newest hundred.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Filter {
+    /// Of this recipe.
+    pub recipe: Option<u16>,
+    /// With this verdict.
+    pub verdict: Option<Verdict>,
+    /// Of this PART_ID.
+    pub part_id: Option<u32>,
+    /// Triggered at or after this time, µs since 1970 UTC. Results without a time are then left out.
+    pub since_us: Option<u64>,
+    /// Triggered before this time.
+    pub until_us: Option<u64>,
+    /// Stored before the result of this SEQ: the next page of a list.
+    pub before_seq: Option<u32>,
+    /// At most this many, the newest.
+    pub limit: usize,
+}
+
+impl Default for Filter {
+    fn default() -> Self {
+        Self {
+            recipe: None,
+            verdict: None,
+            part_id: None,
+            since_us: None,
+            until_us: None,
+            before_seq: None,
+            limit: 100,
+        }
+    }
+}
+
+impl Entry {
+    /// What the history keeps of a result.
+    pub fn of(record: &ResultRecord) -> Self {
+        let found = &record.inspection;
+        Self {
+            seq: record.seq,
+            time_utc_us: Some(record.time_utc_us).filter(|&time| time != 0),
+            recipe: record.recipe,
+            fingerprint: format!("{:08x}", record.recipe_crc),
+            part_id: record.part_id,
+            press_stroke: record.press_stroke,
+            token: record.token,
+            verdict: record.verdict,
+            error_code: record.error_code,
+            reason: found.reason.as_deref().map(str::to_owned),
+            flags: record.flags(),
+            valid_points: found.valid_points,
+            coverage_permille: found.coverage_permille,
+            temperature_c: found.temperature_c.filter(|c| c.is_finite()),
+            height_noise_mm: Some(found.height_noise_mm).filter(|mm| mm.is_finite()),
+            fitness_permille: found.fitness_permille,
+            exposure_us: record.exposure_us,
+            total_us: record.total_us,
+            stages: stages(record),
+            gauges: gauges(record),
+            recording: None,
+        }
+    }
+}
+
+fn stages(record: &ResultRecord) -> Vec<StageEntry> {
+    let stages = record.inspection.stages.iter();
+    stages
+        .map(|stage| StageEntry {
+            name: stage.name.into(),
+            us: stage.us,
+        })
+        .collect()
+}
+
+fn gauges(record: &ResultRecord) -> Vec<GaugeEntry> {
+    let finite = |number: Option<f64>| number.filter(|number| number.is_finite());
+    let gauges = record.inspection.gauges.iter();
+    gauges
+        .map(|gauge| GaugeEntry {
+            name: gauge.name.as_ref().into(),
+            unit: gauge.unit.symbol().into(),
+            value: finite(gauge.value),
+            sigma: finite(gauge.sigma),
+            low: finite(gauge.low),
+            high: finite(gauge.high),
+            decision: gauge.decision.bits(),
+        })
+        .collect()
+}
+
+/// Flags that say how a cycle went, not what its frames show.
+const COURSE: u16 = flag::RETRIED | flag::STEPPED_UP | flag::WARM_UP;
+
+/// What a replay found otherwise than the history has it, in words; `None` if it is the same bit by bit. What belongs to
+/// the cycle and not to its frames is not compared: numbers, times, temperature, the flags of its course.
+pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
+    let same = Entry {
+        seq: stored.seq,
+        time_utc_us: stored.time_utc_us,
+        part_id: stored.part_id,
+        press_stroke: stored.press_stroke,
+        token: stored.token,
+        flags: (stored.flags & COURSE) | (replayed.flags & !COURSE),
+        temperature_c: stored.temperature_c,
+        exposure_us: stored.exposure_us,
+        total_us: stored.total_us,
+        stages: stored.stages.clone(),
+        recording: stored.recording.clone(),
+        ..replayed.clone()
+    };
+    if same == *stored {
+        return None;
+    }
+    let mut gauges = stored.gauges.iter().zip(&same.gauges);
+    Some(match gauges.find(|(stored, replayed)| stored != replayed) {
+        Some((stored, replayed)) => format!("a gauge was {stored:?}, is {replayed:?}"),
+        None => format!("it was {stored:?}, is {same:?}"),
+    })
+}
+
+/// The verdict of a number of register 208; anything unknown counts as not judged.
+pub(super) fn verdict_of(number: u16) -> Verdict {
+    [Verdict::Pass, Verdict::Fail, Verdict::Invalid]
+        .into_iter()
+        .find(|verdict| verdict.number() == number)
+        .unwrap_or_default()
+}
+
+fn word<S: Serializer>(verdict: &Verdict, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(verdict.word())
+}

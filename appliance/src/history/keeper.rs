@@ -1,0 +1,139 @@
+//! Writes the frames of failed parts as recordings: a thread beside the history's, because a recording takes as long as
+//! many results.
+
+use super::recordings::{FailedPart, Recordings};
+use super::task::Message;
+use crate::station::{ResultRecord, Verdict};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+/// What the keeper is told: one part at a time, a request for room, the end.
+enum Order {
+    Keep(Box<FailedPart>),
+    MakeRoom,
+    Stop,
+}
+
+/// The way to the keeper; nothing here waits.
+#[derive(Clone)]
+pub(super) struct Keeper {
+    orders: SyncSender<Order>,
+    /// A failed part waits or is being written: its frames are memory that the head cannot use.
+    busy: Arc<AtomicBool>,
+    quota: u64,
+}
+
+/// The keeper's own side.
+pub(super) struct Keeping {
+    orders: Receiver<Order>,
+    busy: Arc<AtomicBool>,
+    recordings: Recordings,
+    told: SyncSender<Message>,
+}
+
+/// Opens the folder of recordings. What happens to them is `told` to the history's thread.
+///
+/// # Errors
+/// Whatever the file system answers.
+pub(super) fn open(
+    folder: &Path,
+    quota: u64,
+    told: SyncSender<Message>,
+) -> std::io::Result<(Keeper, Keeping)> {
+    let recordings = Recordings::open(folder, quota)?;
+    let (sender, orders) = sync_channel(3);
+    let busy = Arc::new(AtomicBool::new(false));
+    let keeper = Keeper {
+        orders: sender,
+        busy: busy.clone(),
+        quota,
+    };
+    let keeping = Keeping {
+        orders,
+        busy,
+        recordings,
+        told,
+    };
+    Ok((keeper, keeping))
+}
+
+impl Keeper {
+    /// Whether the frames of a result are wanted: it did not pass, and none are in hand.
+    pub(super) fn wants(&self, record: &ResultRecord) -> bool {
+        let failed = matches!(record.verdict, Verdict::Fail | Verdict::Invalid);
+        self.quota > 0 && failed && !self.busy.load(Ordering::Acquire)
+    }
+
+    /// Hands over a part, unless another is in hand.
+    pub(super) fn keep(&self, part: FailedPart) {
+        if self.busy.swap(true, Ordering::AcqRel) {
+            return;
+        }
+        if self.orders.try_send(Order::Keep(Box::new(part))).is_err() {
+            self.busy.store(false, Ordering::Release);
+        }
+    }
+
+    /// Asks for the oldest recording to be removed: results are worth more than the frames of old parts.
+    pub(super) fn make_room(&self) {
+        // If it has much to do already it will make room by itself.
+        let _ = self.orders.try_send(Order::MakeRoom);
+    }
+
+    /// Ends the thread when it has done what it has in hand; it says so.
+    pub(super) fn stop(&self) {
+        // One that has its hands full is not waited for.
+        let _ = self.orders.try_send(Order::Stop);
+    }
+}
+
+impl Keeping {
+    /// The recordings that are there.
+    pub(super) fn recordings(&self) -> &Recordings {
+        &self.recordings
+    }
+
+    /// Works until told to stop.
+    pub(super) fn run(mut self) {
+        self.bound();
+        while let Ok(order) = self.orders.recv() {
+            match order {
+                Order::Keep(part) => {
+                    let seq = part.record.seq;
+                    let kept = self
+                        .recordings
+                        .keep(&part)
+                        .map_err(|error| error.to_string());
+                    drop(part);
+                    self.busy.store(false, Ordering::Release);
+                    self.tell(match kept {
+                        Ok(name) => Message::Kept { seq, name },
+                        Err(problem) => Message::NotKept { problem },
+                    });
+                    self.bound();
+                }
+                Order::MakeRoom => {
+                    if let Some(name) = self.recordings.remove_oldest() {
+                        self.tell(Message::Removed { name });
+                    }
+                }
+                Order::Stop => break,
+            }
+        }
+        self.tell(Message::KeeperEnded);
+    }
+
+    /// Removes what is over the quota.
+    fn bound(&mut self) {
+        while let Some(name) = self.recordings.over_quota() {
+            self.tell(Message::Removed { name });
+        }
+    }
+
+    fn tell(&self, message: Message) {
+        // Links that nobody hears of are put right at the next start.
+        let _ = self.told.send(message);
+    }
+}

@@ -1,0 +1,63 @@
+//! The history: every result in an SQLite database, and the frames of failed parts as recordings.
+//!
+//! Threads of its own write ([`Task`]); the station and the measuring task hand over through a bounded queue and never
+//! wait. Whoever wants to read, the page and the command line, opens a [`Reader`]: it sees every committed result, holds
+//! nobody up and is held up by nobody (SQLite's write-ahead log). All of its calls block: call them from
+//! `tokio::task::spawn_blocking` where a socket runtime must go on.
+//!
+//! ```text
+//! station ───result──► queue ──► history's thread ──► history.db       ◄── Reader ◄── page, `fringed history`
+//!                             "         syncing  ──► result-seq       and the card: SEQs in use, reserved ahead
+//! measuring ──frames──► one slot ──► keeper's thread ─► recordings/NAME  ◄── Entry::recording, `fringed replay`
+//! ```
+//!
+//! A result is on its way to the PLC before it is on its way to the card: a card that takes a second makes no verdict late.
+//! The history's thread writes each result at once, which takes no card, only the system's memory: kill -9 costs at most the
+//! result in flight. A loss of power costs what was not synced yet: what came in the time that the card takes for one sync.
+pub mod csv;
+pub mod entry;
+mod keeper;
+pub mod reader;
+mod recordings;
+pub mod schema;
+pub mod seqs;
+mod syncing;
+pub mod task;
+pub mod time;
+pub mod writer;
+
+#[cfg(test)]
+mod tests;
+
+pub use entry::{Entry, Filter, GaugeEntry, StageEntry, difference};
+pub use reader::{Counts, Reader, Trend, TrendPoint};
+pub use recordings::FailedPart;
+pub use task::{Bounds, History, Task, open};
+pub use writer::{Opening, Writer};
+
+/// The database's name in the state folder.
+pub const DATABASE: &str = "history.db";
+/// The folder of recordings in the state folder.
+pub const RECORDINGS: &str = "recordings";
+
+/// A history that could not be read or written: what was attempted with what, and the remedy.
+#[derive(Debug, thiserror::Error)]
+#[error("history {path}: {reason}", path = path.display())]
+pub struct HistoryError {
+    /// The database.
+    pub path: std::path::PathBuf,
+    /// What is wrong.
+    pub reason: String,
+    /// Whether the file is damaged or no history at all.
+    pub damaged: bool,
+}
+
+impl HistoryError {
+    fn of(path: &std::path::Path, error: &rusqlite::Error) -> Self {
+        Self {
+            path: path.to_path_buf(),
+            reason: error.to_string(),
+            damaged: schema::means_damage(error),
+        }
+    }
+}

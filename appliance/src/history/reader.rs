@@ -1,0 +1,314 @@
+//! Reads the history: what the page and the command line ask for. Nothing here can change it.
+
+use super::entry::{Entry, Filter, GaugeEntry, verdict_of};
+use super::{HistoryError, schema};
+use crate::station::Verdict;
+use rusqlite::types::Value;
+use rusqlite::{Connection, Row, params_from_iter};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A way to read one history. Cheap to clone; each call opens the database anew, so that it also sees a new one that was
+/// begun in place of a damaged one. Every call blocks.
+#[derive(Clone, Debug)]
+pub struct Reader {
+    path: PathBuf,
+    recordings: PathBuf,
+}
+
+/// How many results there are of each verdict.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// PASS.
+    pub pass: u64,
+    /// FAIL.
+    pub fail: u64,
+    /// INVALID.
+    pub invalid: u64,
+}
+
+/// The last values of one gauge.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Trend {
+    /// The gauge's name.
+    pub name: String,
+    /// The unit's symbol.
+    pub unit: String,
+    /// The latest lower limit.
+    pub low: Option<f64>,
+    /// The latest upper limit.
+    pub high: Option<f64>,
+    /// Oldest first.
+    pub points: Vec<TrendPoint>,
+}
+
+/// One value of a gauge.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct TrendPoint {
+    /// RESULT_SEQ.
+    pub seq: u32,
+    /// None if it could not be measured.
+    pub value: Option<f64>,
+    /// 1 σ.
+    pub sigma: Option<f64>,
+    /// The bits of registers 296–311.
+    pub decision: u16,
+}
+
+impl Reader {
+    /// A reader of the history in a state folder; nothing is opened yet.
+    pub fn of(state: &Path) -> Self {
+        Self {
+            path: state.join(super::DATABASE),
+            recordings: state.join(super::RECORDINGS),
+        }
+    }
+
+    /// The database.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A new name for a folder that is only needed for a moment; what a kill leaves of it, the next start removes.
+    pub fn scratch(&self) -> PathBuf {
+        static COUNT: AtomicU64 = AtomicU64::new(0);
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        self.recordings.join(format!(".page.partial-{count}"))
+    }
+
+    pub(super) fn open(&self) -> Result<Connection, HistoryError> {
+        if !self.path.exists() {
+            return Err(HistoryError {
+                path: self.path.clone(),
+                reason: "there is none: the station begins it at its first start".into(),
+                damaged: false,
+            });
+        }
+        schema::open_read_only(&self.path)
+    }
+
+    pub(super) fn failed(&self) -> impl Fn(rusqlite::Error) -> HistoryError {
+        |error| HistoryError::of(&self.path, &error)
+    }
+
+    /// The results that pass the filter, newest first.
+    ///
+    /// # Errors
+    /// [`HistoryError`] if the database is missing, busy for seconds, or damaged.
+    pub fn results(&self, filter: &Filter) -> Result<Vec<Entry>, HistoryError> {
+        let mut all = Vec::new();
+        self.each(filter, |entry| {
+            all.push(entry);
+            Ok(())
+        })?;
+        Ok(all)
+    }
+
+    /// The newest result with this SEQ.
+    ///
+    /// # Errors
+    /// As [`Self::results`].
+    pub fn result(&self, seq: u32) -> Result<Option<Entry>, HistoryError> {
+        self.first(
+            "SELECT * FROM result WHERE seq = ?1 ORDER BY id DESC LIMIT 1",
+            seq,
+        )
+    }
+
+    /// The result whose frames are kept under this name.
+    ///
+    /// # Errors
+    /// As [`Self::results`].
+    pub fn recorded_as(&self, name: &str) -> Result<Option<Entry>, HistoryError> {
+        self.first(
+            "SELECT * FROM result WHERE recording = ?1 ORDER BY id DESC LIMIT 1",
+            name,
+        )
+    }
+
+    fn first(&self, query: &str, key: impl rusqlite::ToSql) -> Result<Option<Entry>, HistoryError> {
+        let connection = self.open()?;
+        match connection.query_row(query, [key], |row| with_gauges(&connection, row)) {
+            Ok(entry) => Ok(Some(entry)),
+            Err(rusqlite::Error::QueryReturnedNoRows) => Ok(None),
+            Err(error) => Err(self.failed()(error)),
+        }
+    }
+
+    /// Where the frames of a result are kept, if they are.
+    ///
+    /// # Errors
+    /// As [`Self::results`].
+    pub fn recording(&self, seq: u32) -> Result<Option<PathBuf>, HistoryError> {
+        let found = self.result(seq)?.and_then(|entry| entry.recording);
+        Ok(found.map(|name| self.recordings.join(name)))
+    }
+
+    /// Hands each result that passes the filter to `take`, newest first; stops at its first error.
+    pub(super) fn each(
+        &self,
+        filter: &Filter,
+        mut take: impl FnMut(Entry) -> Result<(), HistoryError>,
+    ) -> Result<(), HistoryError> {
+        let connection = self.open()?;
+        let failed = self.failed();
+        let (condition, mut values) = condition(filter);
+        values.push(Value::from(i64::try_from(filter.limit).unwrap_or(i64::MAX)));
+        let query = format!("SELECT * FROM result WHERE {condition} ORDER BY id DESC LIMIT ?");
+        let mut statement = connection.prepare(&query).map_err(&failed)?;
+        let mut rows = statement.query(params_from_iter(values)).map_err(&failed)?;
+        while let Some(row) = rows.next().map_err(&failed)? {
+            take(with_gauges(&connection, row).map_err(&failed)?)?;
+        }
+        Ok(())
+    }
+
+    /// How many results of each verdict pass the filter; its limit does not count.
+    ///
+    /// # Errors
+    /// As [`Self::results`].
+    pub fn counts(&self, filter: &Filter) -> Result<Counts, HistoryError> {
+        let connection = self.open()?;
+        let failed = self.failed();
+        let (condition, values) = condition(filter);
+        let query =
+            format!("SELECT verdict, count(*) FROM result WHERE {condition} GROUP BY verdict");
+        let mut statement = connection.prepare(&query).map_err(&failed)?;
+        let mut rows = statement.query(params_from_iter(values)).map_err(&failed)?;
+        let mut counts = Counts::default();
+        while let Some(row) = rows.next().map_err(&failed)? {
+            let read = || Ok((row.get::<_, u16>(0)?, row.get::<_, u64>(1)?));
+            let (verdict, count) = read().map_err(&failed)?;
+            match verdict_of(verdict) {
+                Verdict::Pass => counts.pass = count,
+                Verdict::Fail => counts.fail = count,
+                Verdict::Invalid => counts.invalid = count,
+                Verdict::None => {}
+            }
+        }
+        Ok(counts)
+    }
+
+    /// The gauges of a recipe over its last results, in the order in which the newest of them has them.
+    ///
+    /// # Errors
+    /// As [`Self::results`].
+    pub fn trends(&self, recipe: u16, last: usize) -> Result<Vec<Trend>, HistoryError> {
+        let filter = Filter {
+            recipe: Some(recipe),
+            limit: last,
+            ..Filter::default()
+        };
+        let mut trends: Vec<Trend> = Vec::new();
+        self.each(&filter, |entry| {
+            for gauge in entry.gauges {
+                let known = trends.iter().position(|trend| trend.name == gauge.name);
+                let at = known.unwrap_or_else(|| {
+                    trends.push(Trend {
+                        name: gauge.name,
+                        unit: gauge.unit,
+                        low: gauge.low,
+                        high: gauge.high,
+                        points: Vec::new(),
+                    });
+                    trends.len() - 1
+                });
+                trends[at].points.push(TrendPoint {
+                    seq: entry.seq,
+                    value: gauge.value,
+                    sigma: gauge.sigma,
+                    decision: gauge.decision,
+                });
+            }
+            Ok(())
+        })?;
+        for trend in &mut trends {
+            trend.points.reverse();
+        }
+        Ok(trends)
+    }
+
+    /// The pattern fitness of a recipe's last measured results, oldest first: SEQ and ‰.
+    ///
+    /// # Errors
+    /// As [`Self::results`].
+    pub fn fitness(&self, recipe: u16, last: usize) -> Result<Vec<(u32, u16)>, HistoryError> {
+        let connection = self.open()?;
+        let query = "SELECT seq, fitness_permille FROM result
+            WHERE recipe = ?1 AND error_code = 0 ORDER BY id DESC LIMIT ?2";
+        let read = |mut statement: rusqlite::Statement<'_>| {
+            let rows = statement.query_map((recipe, last), |row| Ok((row.get(0)?, row.get(1)?)))?;
+            rows.collect::<rusqlite::Result<Vec<_>>>()
+        };
+        let newest_first = connection.prepare(query).and_then(read);
+        let mut points = newest_first.map_err(self.failed())?;
+        points.reverse();
+        Ok(points)
+    }
+}
+
+/// The condition of a filter in SQL, and the values of its question marks.
+pub(super) fn condition(filter: &Filter) -> (String, Vec<Value>) {
+    let mut conditions = vec!["1"];
+    let mut values = Vec::new();
+    let mut add = |condition, value: Option<i64>| {
+        if let Some(value) = value {
+            conditions.push(condition);
+            values.push(Value::from(value));
+        }
+    };
+    let time = |us: Option<u64>| us.map(|us| i64::try_from(us).unwrap_or(i64::MAX));
+    add("recipe = ?", filter.recipe.map(i64::from));
+    let verdict = filter.verdict.map(|verdict| i64::from(verdict.number()));
+    add("verdict = ?", verdict);
+    add("part_id = ?", filter.part_id.map(i64::from));
+    add("time_utc_us >= ?", time(filter.since_us));
+    add("time_utc_us < ?", time(filter.until_us));
+    let before = "id < (SELECT min(id) FROM result WHERE seq = ?)";
+    add(before, filter.before_seq.map(i64::from));
+    (conditions.join(" AND "), values)
+}
+
+fn with_gauges(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry> {
+    let id: i64 = row.get("id")?;
+    let stages: String = row.get("stages")?;
+    let of_result = "SELECT name, unit, value, sigma, low, high, decision FROM gauge
+        WHERE result = ?1 ORDER BY place";
+    let mut gauges = connection.prepare_cached(of_result)?;
+    let gauges = gauges.query_map([id], |row| {
+        Ok(GaugeEntry {
+            name: row.get(0)?,
+            unit: row.get(1)?,
+            value: row.get(2)?,
+            sigma: row.get(3)?,
+            low: row.get(4)?,
+            high: row.get(5)?,
+            decision: row.get(6)?,
+        })
+    })?;
+    Ok(Entry {
+        seq: row.get("seq")?,
+        time_utc_us: row.get("time_utc_us")?,
+        recipe: row.get("recipe")?,
+        fingerprint: row.get("fingerprint")?,
+        part_id: row.get("part_id")?,
+        press_stroke: row.get("press_stroke")?,
+        token: row.get("token")?,
+        verdict: verdict_of(row.get("verdict")?),
+        error_code: row.get("error_code")?,
+        reason: row.get("reason")?,
+        flags: row.get("flags")?,
+        valid_points: row.get("valid_points")?,
+        coverage_permille: row.get("coverage_permille")?,
+        temperature_c: row.get("temperature_c")?,
+        height_noise_mm: row.get("height_noise_mm")?,
+        fitness_permille: row.get("fitness_permille")?,
+        exposure_us: row.get("exposure_us")?,
+        total_us: row.get("total_us")?,
+        // Times are shown, nothing hangs on them: what cannot be read is left out.
+        stages: serde_json::from_str(&stages).unwrap_or_default(),
+        gauges: gauges.collect::<rusqlite::Result<_>>()?,
+        recording: row.get("recording")?,
+    })
+}

@@ -1,0 +1,139 @@
+//! Brings what was written onto the card: the one thread that waits for it.
+//!
+//! The history's thread only hands bytes to the system, which keeps them whatever happens to this process; so each result
+//! is safe from kill -9 at once, and safe from a loss of power as soon as this thread has synced it.
+
+use super::schema;
+use super::seqs::Seqs;
+use super::task::Message;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::Duration;
+
+/// The log is brought into the database when nothing came for this long ...
+const IDLE: Duration = Duration::from_secs(1);
+/// ... or at the latest after this many syncs; a result is a few pages of 4 KiB.
+const MOST_SYNCS: u32 = 1000;
+
+/// The way to the thread; nothing here waits.
+#[derive(Clone)]
+pub(super) struct Syncer {
+    wake: SyncSender<()>,
+    last_seq: Arc<AtomicU32>,
+    stopping: Arc<AtomicBool>,
+}
+
+/// The thread's own side.
+pub(super) struct Syncing {
+    woken: Receiver<()>,
+    last_seq: Arc<AtomicU32>,
+    stopping: Arc<AtomicBool>,
+    seqs: Seqs,
+    path: PathBuf,
+    told: SyncSender<Message>,
+}
+
+/// For the database at `path`; `last_seq` is the last SEQ in use. Problems are `told` to the history's thread.
+pub(super) fn open(
+    path: &Path,
+    seqs: Seqs,
+    last_seq: u32,
+    told: SyncSender<Message>,
+) -> (Syncer, Syncing) {
+    // One more wake while it syncs is enough: the next sync covers everything written before it.
+    let (wake, woken) = sync_channel(1);
+    let last_seq = Arc::new(AtomicU32::new(last_seq));
+    let stopping = Arc::new(AtomicBool::new(false));
+    let syncer = Syncer {
+        wake,
+        last_seq: last_seq.clone(),
+        stopping: stopping.clone(),
+    };
+    let syncing = Syncing {
+        woken,
+        last_seq,
+        stopping,
+        seqs,
+        path: path.to_path_buf(),
+        told,
+    };
+    (syncer, syncing)
+}
+
+impl Syncer {
+    /// Ends the thread.
+    pub(super) fn stop(&self) {
+        self.stopping.store(true, Ordering::Release);
+        let _ = self.wake.try_send(());
+    }
+
+    /// Something was written; `last_seq` is the last SEQ in use.
+    pub(super) fn wake(&self, last_seq: u32) {
+        self.last_seq.store(last_seq, Ordering::Release);
+        // It is woken already.
+        let _ = self.wake.try_send(());
+    }
+}
+
+impl Syncing {
+    /// Works until told to stop.
+    pub(super) fn run(self) {
+        let mut problem = None;
+        let mut syncs: u32 = 0;
+        loop {
+            let woken = if syncs == 0 {
+                self.woken
+                    .recv()
+                    .map_err(|_| RecvTimeoutError::Disconnected)
+            } else {
+                self.woken.recv_timeout(IDLE)
+            };
+            if self.stopping.load(Ordering::Acquire) {
+                return;
+            }
+            let now = match woken {
+                Ok(()) => {
+                    syncs += 1;
+                    self.sync().err()
+                }
+                Err(RecvTimeoutError::Timeout) => problem.clone(),
+                Err(RecvTimeoutError::Disconnected) => return,
+            };
+            let now = if woken.is_err() || syncs >= MOST_SYNCS {
+                syncs = 0;
+                self.checkpoint().err().or(now)
+            } else {
+                now
+            };
+            if now != problem {
+                problem = now.clone();
+                // Where the queue is full there is a problem already.
+                let _ = self.told.try_send(Message::Synced { problem: now });
+            }
+        }
+    }
+
+    fn checkpoint(&self) -> Result<(), String> {
+        let done = schema::checkpoint(&self.path);
+        done.map_err(|error| format!("sync the history: {error}: free space"))
+    }
+
+    fn sync(&self) -> Result<(), String> {
+        let seq = self.last_seq.load(Ordering::Acquire);
+        let failed =
+            |what: &str, error: &dyn std::fmt::Display| format!("{what}: {error}: free space");
+        self.seqs
+            .refill(seq)
+            .map_err(|error| failed("reserve result numbers", &error))?;
+        let log = schema::log_of(&self.path);
+        let synced = match File::open(&log) {
+            // On a file system without one each commit is synced by itself.
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+            opened => opened.and_then(|file| file.sync_data()),
+        };
+        synced.map_err(|error| failed(&format!("sync {}", log.display()), &error))
+    }
+}

@@ -1,0 +1,360 @@
+//! The history's thread: takes results from a bounded queue and writes them into the database.
+
+use super::entry::Entry;
+use super::keeper::{self, Keeper, Keeping};
+use super::recordings::{FailedPart, seq_of};
+use super::seqs::Seqs;
+use super::syncing::{self, Syncer, Syncing};
+use super::writer::{Opening, Writer};
+use super::{DATABASE, HistoryError, RECORDINGS, Reader};
+use crate::station::{Event, ResultRecord, StationHandle};
+use std::collections::VecDeque;
+use std::path::Path;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, PoisonError, RwLock};
+use std::thread::{Builder, JoinHandle};
+use std::time::{Duration, Instant};
+
+/// Results that may wait for the card before the newest are lost to the history: half a minute of a fast line.
+const MAX_WAITING: usize = 256;
+/// A card that refuses is asked again this often.
+const RETRY: Duration = Duration::from_secs(1);
+/// When the daemon ends, a recording that is being written has this long.
+const LAST_PART: Duration = Duration::from_secs(1);
+
+/// What is kept, and how much of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// The most results.
+    pub results: u64,
+    /// The most bytes of recordings of failed parts; 0 = none are kept.
+    pub recordings: u64,
+}
+
+/// What reaches the thread, from the station and from the keeper of recordings.
+pub(super) enum Message {
+    Result(Arc<ResultRecord>),
+    Kept { seq: u32, name: String },
+    NotKept { problem: String },
+    Removed { name: String },
+    Synced { problem: Option<String> },
+    Stop { last_seq: u32 },
+    KeeperEnded,
+}
+
+/// The way to the history's thread for station and measuring task. Nothing here waits. Cheap to clone.
+#[derive(Clone)]
+pub struct History {
+    queue: SyncSender<Message>,
+    shared: Arc<Shared>,
+    seqs: Seqs,
+    syncer: Syncer,
+    keeper: Keeper,
+    reader: Reader,
+}
+
+#[derive(Default)]
+struct Shared {
+    /// Results that found the queue full.
+    lost: AtomicU32,
+    /// Why the history is not being written, while it is not.
+    problem: RwLock<Option<Arc<str>>>,
+}
+
+/// The thread's own side.
+pub struct Task {
+    inbox: Receiver<Message>,
+    shared: Arc<Shared>,
+    seqs: Seqs,
+    writer: Writer,
+    keeper: Keeper,
+    keeping: Option<Keeping>,
+    syncer: Syncer,
+    syncing: Option<Syncing>,
+    /// Why the card did not take what was written, while it does not.
+    unsynced: Option<String>,
+    /// Results that the database has not taken yet, oldest first.
+    waiting: VecDeque<Entry>,
+    last_seq: u32,
+    lost_before: u32,
+}
+
+/// Opens the history of a state folder, whose next free SEQ by its counter is `next`. Answers with the way to it, its
+/// thread's side, the SEQ of the next result, and what had to be set aside.
+///
+/// # Errors
+/// If database, folder or counter can neither be opened nor begun.
+pub fn open(
+    state: &Path,
+    counter: crate::state::Counter,
+    next: u32,
+    bounds: Bounds,
+) -> Result<(History, Task, u32, Option<String>), HistoryError> {
+    let failed = |what: &str, error: std::io::Error| HistoryError {
+        path: state.join(what),
+        reason: format!("{error}: free space"),
+        damaged: false,
+    };
+    let Opening { writer, complaint } = Writer::open(&state.join(DATABASE), bounds.results)?;
+    // A counter that was lost or taken from an older copy of the folder must not bring back a number.
+    let next = match writer.last_seq()? {
+        Some(last) if last.wrapping_sub(next) as i32 >= 0 => last.wrapping_add(1),
+        _ => next,
+    };
+    let seqs = Seqs::reserve(counter, next).map_err(|error| failed("result-seq", error))?;
+    let (queue, inbox) = sync_channel(MAX_WAITING);
+    let (keeper, keeping) = keeper::open(&state.join(RECORDINGS), bounds.recordings, queue.clone())
+        .map_err(|error| failed(RECORDINGS, error))?;
+    let shared = Arc::new(Shared::default());
+    let (syncer, syncing) = syncing::open(
+        &state.join(DATABASE),
+        seqs.clone(),
+        next.wrapping_sub(1),
+        queue.clone(),
+    );
+    let history = History {
+        queue,
+        shared: shared.clone(),
+        seqs: seqs.clone(),
+        reader: Reader::of(state),
+        syncer: syncer.clone(),
+        keeper: keeper.clone(),
+    };
+    let task = Task {
+        inbox,
+        shared,
+        seqs,
+        writer,
+        keeper,
+        keeping: Some(keeping),
+        syncer,
+        syncing: Some(syncing),
+        unsynced: None,
+        waiting: VecDeque::with_capacity(MAX_WAITING),
+        last_seq: next.wrapping_sub(1),
+        lost_before: 0,
+    };
+    Ok((history, task, next, complaint))
+}
+
+impl History {
+    /// Hands over a result that is being published.
+    pub fn record(&self, record: Arc<ResultRecord>) {
+        if self.queue.try_send(Message::Result(record)).is_err() {
+            self.shared.lost.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Whether the frames of a result are wanted: it did not pass, and none are in hand.
+    pub fn wants(&self, record: &ResultRecord) -> bool {
+        self.keeper.wants(record)
+    }
+
+    /// Hands over the frames of a part that did not pass, after its result. Where those of another are still being
+    /// written these are not kept: the line goes on.
+    pub fn keep(&self, part: FailedPart) {
+        self.keeper.keep(part);
+    }
+
+    /// Whether a SEQ is stored as used, so that its result may be shown. If not, the card is asked once more.
+    pub fn covers(&self, seq: u32) -> bool {
+        let covered = self.seqs.covers(seq);
+        if !covered {
+            self.syncer.wake(seq);
+        }
+        covered
+    }
+
+    /// Results that the history has lost since the start because the card did not keep up.
+    pub fn lost(&self) -> u32 {
+        self.shared.lost.load(Ordering::Relaxed)
+    }
+
+    /// Why the history is not being written, while it is not.
+    pub fn problem(&self) -> Option<Arc<str>> {
+        let problem = self.shared.problem.read();
+        problem.unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// A reader of what is stored.
+    pub fn reader(&self) -> &Reader {
+        &self.reader
+    }
+
+    /// Ends the thread once it has stored what it can; `last_seq` is the last of all.
+    pub fn stop(&self, last_seq: u32) {
+        // A thread that is gone has stopped.
+        let _ = self.queue.send(Message::Stop { last_seq });
+    }
+}
+
+impl Task {
+    /// Works until told to stop. Problems are told to the station, which warns of them.
+    pub fn run(mut self, station: &StationHandle) {
+        let keeping = self.keep_parts();
+        let mut syncing = self.sync();
+        // When it ends, whatever the keeper still writes: half a recording is removed at the next start.
+        let mut stopping: Option<Instant> = None;
+        loop {
+            let message =
+                if self.waiting.is_empty() && self.problem().is_none() && stopping.is_none() {
+                    self.inbox
+                        .recv()
+                        .map_err(|_| RecvTimeoutError::Disconnected)
+                } else {
+                    self.inbox.recv_timeout(RETRY)
+                };
+            let mut next = match message {
+                Ok(message) => Some(message),
+                Err(RecvTimeoutError::Timeout) => None,
+                Err(RecvTimeoutError::Disconnected) => break,
+            };
+            let mut news = Vec::new();
+            while let Some(message) = next {
+                match message {
+                    Message::Result(record) => self.queue(&record),
+                    news_of_parts => news.push(news_of_parts),
+                }
+                next = self.inbox.try_recv().ok();
+            }
+            let mut problem = self.flush();
+            let kept = || keeping.as_ref().is_none_or(JoinHandle::is_finished);
+            let mut ended = stopping.is_some_and(|until| Instant::now() >= until || kept());
+            for message in news {
+                match message {
+                    Message::Kept { seq, name } => problem = problem.or(self.link(seq, name)),
+                    Message::NotKept { problem: words } => problem = problem.or(Some(words)),
+                    // A link to nothing is removed at the next start at the latest.
+                    Message::Removed { name } => drop(self.writer.unlink(&name)),
+                    Message::Stop { last_seq } => {
+                        self.syncer.stop();
+                        drop(syncing.take().map(JoinHandle::join));
+                        // Not settled, the reservation is skipped at the next start: nothing is used twice.
+                        let _ = self.seqs.settle(last_seq);
+                        self.keeper.stop();
+                        stopping = Some(Instant::now() + LAST_PART);
+                    }
+                    Message::Synced { problem } => self.unsynced = problem,
+                    Message::KeeperEnded => ended = true,
+                    Message::Result(_) => {}
+                }
+            }
+            if ended {
+                break;
+            }
+            self.tell(problem, station);
+        }
+    }
+
+    /// Starts the thread that waits for the card.
+    fn sync(&mut self) -> Option<JoinHandle<()>> {
+        let syncing = self.syncing.take()?;
+        let run = move || syncing.run();
+        Builder::new().name("syncing".into()).spawn(run).ok()
+    }
+
+    /// Starts the thread that keeps recordings.
+    fn keep_parts(&mut self) -> Option<JoinHandle<()>> {
+        let keeping = self.keeping.take()?;
+        self.reconcile(&keeping);
+        // A system without threads has not come this far; without this one no frames are kept.
+        Builder::new()
+            .name("recordings".into())
+            .spawn(move || keeping.run())
+            .ok()
+    }
+
+    fn queue(&mut self, record: &ResultRecord) {
+        self.last_seq = record.seq;
+        if self.waiting.len() == MAX_WAITING {
+            self.waiting.pop_front();
+            self.shared.lost.fetch_add(1, Ordering::Relaxed);
+        }
+        self.waiting.push_back(Entry::of(record));
+    }
+
+    /// Stores what waits, and reserves numbers; what did not go, in words.
+    fn flush(&mut self) -> Option<String> {
+        let mut problem = self.unsynced.clone();
+        if !self.waiting.is_empty() {
+            let stored = self.store();
+            // Also where it failed: numbers must be reserved.
+            self.syncer.wake(self.last_seq);
+            match stored {
+                Ok(begun) => {
+                    self.waiting.clear();
+                    problem = begun.or(problem);
+                }
+                Err(error) => problem = Some(format!("{error}: free space")),
+            }
+        }
+        let lost = self.shared.lost.load(Ordering::Relaxed);
+        let more = lost.wrapping_sub(std::mem::replace(&mut self.lost_before, lost));
+        let slow =
+            || format!("{more} results are not in the history: the storage is too slow or full");
+        problem.or_else(|| (more > 0).then(slow))
+    }
+
+    /// Stores what waits, if need be in a new database: then a line that says so.
+    fn store(&mut self) -> Result<Option<String>, HistoryError> {
+        let begun = match self.writer.store(self.waiting.iter()) {
+            Ok(()) => return Ok(None),
+            Err(error) if error.damaged => Some(self.writer.begin_anew(&error)?),
+            Err(error) => {
+                self.keeper.make_room();
+                return Err(error);
+            }
+        };
+        self.writer.store(self.waiting.iter())?;
+        Ok(begun)
+    }
+
+    /// Notes where the frames of a result are; what did not go, in words.
+    fn link(&mut self, seq: u32, name: String) -> Option<String> {
+        if let Some(entry) = self.waiting.iter_mut().find(|entry| entry.seq == seq) {
+            entry.recording = Some(name);
+            return None;
+        }
+        let linked = self.writer.link(seq, &name);
+        linked.err().map(|error| error.to_string())
+    }
+
+    /// Makes links and recordings agree after an end without a stop.
+    fn reconcile(&mut self, keeping: &Keeping) {
+        let linked = self.writer.linked().unwrap_or_default();
+        for name in &linked {
+            if !keeping.recordings().names().any(|kept| kept == name) {
+                let _ = self.writer.unlink(name);
+            }
+        }
+        for name in keeping.recordings().names() {
+            if let Some(seq) = seq_of(name)
+                && !linked.iter().any(|linked| linked == name)
+            {
+                let _ = self.writer.link(seq, name);
+            }
+        }
+    }
+
+    fn problem(&self) -> Option<Arc<str>> {
+        let problem = self.shared.problem.read();
+        problem.unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Tells the station when the history begins to fail and when it works again.
+    fn tell(&mut self, problem: Option<String>, station: &StationHandle) {
+        let problem: Option<Arc<str>> = problem.map(Arc::from);
+        if problem == self.problem() {
+            return;
+        }
+        let mut shown = self
+            .shared
+            .problem
+            .write()
+            .unwrap_or_else(PoisonError::into_inner);
+        *shown = problem.clone();
+        drop(shown);
+        station.event(Event::History { problem });
+    }
+}

@@ -1,0 +1,374 @@
+//! What is stored is read again, bit by bit; filters, bounds, damage.
+
+use super::*;
+use crate::state::StateFolder;
+use crate::station::snapshot::warning;
+use crate::station::{
+    Identity, Inspection, Limits, Micros, ResultRecord, Settings, Station, StationHandle, Verdict,
+};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+const ENOUGH: u64 = 1000;
+
+fn entry(seq: u32, recipe: u16, verdict: Verdict) -> Entry {
+    let gauge = |name: &str, value: f64| GaugeEntry {
+        name: name.into(),
+        unit: "mm".into(),
+        value: Some(value),
+        sigma: None,
+        low: Some(-0.25),
+        high: Some(0.1 + 0.2),
+        decision: 3,
+    };
+    Entry {
+        seq,
+        time_utc_us: Some(1_000_000 * u64::from(seq)),
+        recipe,
+        fingerprint: "00c0ffee".into(),
+        part_id: u32::MAX - seq,
+        verdict,
+        reason: Some("a, \"b\"".into()),
+        height_noise_mm: Some(f64::from(seq) / 3.0),
+        stages: vec![StageEntry {
+            name: "strips".into(),
+            us: 7,
+        }],
+        gauges: vec![
+            gauge("deviation", f64::from(seq).sqrt()),
+            gauge("-step", f64::MIN_POSITIVE),
+        ],
+        ..Entry::default()
+    }
+}
+
+fn some(count: u32) -> Vec<Entry> {
+    let verdicts = [Verdict::Pass, Verdict::Fail, Verdict::Invalid];
+    (1..=count)
+        .map(|seq| entry(seq, (seq % 2) as u16 + 1, verdicts[seq as usize % 3]))
+        .collect()
+}
+
+fn open_writer(state: &Path) -> Writer {
+    bounded(state, ENOUGH)
+}
+
+fn bounded(state: &Path, limit: u64) -> Writer {
+    let opening = Writer::open(&state.join(DATABASE), limit).unwrap();
+    assert_eq!(opening.complaint, None);
+    opening.writer
+}
+
+fn seqs(reader: &Reader, filter: &Filter) -> Vec<u32> {
+    let found = reader.results(filter).unwrap();
+    found.iter().map(|entry| entry.seq).collect()
+}
+
+#[test]
+fn what_was_stored_is_read_again_bit_by_bit_and_while_the_writer_is_open() {
+    let state = tempfile::tempdir().unwrap();
+    let stored = some(3);
+    let mut writer = bounded(state.path(), ENOUGH);
+    writer.store(stored.iter()).unwrap();
+    let reader = Reader::of(state.path());
+    let mut read = reader.results(&Filter::default()).unwrap();
+    read.reverse();
+    assert_eq!(read, stored);
+    assert_eq!(reader.result(2).unwrap().as_ref(), stored.get(1));
+    assert_eq!(reader.result(9).unwrap(), None);
+    assert_eq!(writer.last_seq().unwrap(), Some(3));
+    drop(writer);
+    assert_eq!(bounded(state.path(), ENOUGH).last_seq().unwrap(), Some(3));
+}
+
+#[test]
+fn each_condition_of_a_filter_leaves_out_what_it_says() {
+    let state = tempfile::tempdir().unwrap();
+    bounded(state.path(), ENOUGH)
+        .store(some(12).iter())
+        .unwrap();
+    let reader = Reader::of(state.path());
+    let all = Filter::default();
+    let filter = |change: &dyn Fn(&mut Filter)| {
+        let mut filter = all.clone();
+        change(&mut filter);
+        seqs(&reader, &filter)
+    };
+    assert_eq!(filter(&|f| f.limit = 2), [12, 11]);
+    assert_eq!(filter(&|f| f.recipe = Some(1)), [12, 10, 8, 6, 4, 2]);
+    assert_eq!(filter(&|f| f.verdict = Some(Verdict::Fail)), [10, 7, 4, 1]);
+    assert_eq!(filter(&|f| f.part_id = Some(u32::MAX - 5)), [5]);
+    assert_eq!(filter(&|f| f.since_us = Some(11_000_000)), [12, 11]);
+    assert_eq!(filter(&|f| f.until_us = Some(3_000_000)), [2, 1]);
+    assert_eq!(filter(&|f| f.before_seq = Some(3)), [2, 1]);
+    assert_eq!(
+        reader.counts(&all).unwrap(),
+        Counts {
+            pass: 4,
+            fail: 4,
+            invalid: 4
+        }
+    );
+}
+
+#[test]
+fn a_trend_has_the_last_values_of_a_recipe_oldest_first() {
+    let state = tempfile::tempdir().unwrap();
+    bounded(state.path(), ENOUGH)
+        .store(some(12).iter())
+        .unwrap();
+    let reader = Reader::of(state.path());
+    let trends = reader.trends(2, 3).unwrap();
+    assert_eq!(trends[0].name, "deviation");
+    let points: Vec<_> = trends[0].points.iter().map(|p| (p.seq, p.value)).collect();
+    let root = |seq: u32| (seq, Some(f64::from(seq).sqrt()));
+    assert_eq!(points, [root(7), root(9), root(11)]);
+    assert_eq!(reader.fitness(2, 2).unwrap(), [(9, 0), (11, 0)]);
+}
+
+#[test]
+fn the_oldest_results_go_when_there_are_too_many() {
+    let state = tempfile::tempdir().unwrap();
+    let mut writer = bounded(state.path(), 5);
+    for entry in some(12) {
+        writer.store([entry].iter()).unwrap();
+    }
+    let reader = Reader::of(state.path());
+    assert_eq!(seqs(&reader, &Filter::default()), [12, 11, 10, 9, 8]);
+    // Nothing of those that went stays behind.
+    let connection = reader.open().unwrap();
+    let gauges: u64 = connection
+        .query_row("SELECT count(*) FROM gauge", (), |row| row.get(0))
+        .unwrap();
+    assert_eq!(gauges, 10);
+    drop(writer);
+    bounded(state.path(), 2)
+        .store([entry(13, 1, Verdict::Pass)].iter())
+        .unwrap();
+    assert_eq!(seqs(&reader, &Filter::default()), [13, 12]);
+}
+
+#[test]
+fn recordings_are_linked_to_the_newest_result_of_their_seq() {
+    let state = tempfile::tempdir().unwrap();
+    let mut writer = bounded(state.path(), ENOUGH);
+    writer.store(some(3).iter()).unwrap();
+    writer.link(2, "two").unwrap();
+    let reader = Reader::of(state.path());
+    let place = state.path().join(RECORDINGS).join("two");
+    assert_eq!(reader.recording(2).unwrap(), Some(place));
+    assert_eq!(reader.recording(3).unwrap(), None);
+    assert_eq!(writer.linked().unwrap(), ["two"]);
+    writer.unlink("two").unwrap();
+    assert_eq!(reader.recording(2).unwrap(), None);
+}
+
+#[test]
+fn a_damaged_database_is_set_aside_with_a_message_and_a_new_one_begun() {
+    let state = tempfile::tempdir().unwrap();
+    let path = state.path().join(DATABASE);
+    let mut bytes = {
+        let mut writer = bounded(state.path(), ENOUGH);
+        writer.store(some(300).iter()).unwrap();
+        drop(writer);
+        std::fs::read(&path).unwrap()
+    };
+    let middle = bytes.len() / 2;
+    bytes[middle..middle + 8192].fill(0x5A);
+    for damaged in [
+        bytes,
+        b"no database at all, but long enough to be read".to_vec(),
+    ] {
+        std::fs::write(&path, &damaged).unwrap();
+        let Opening {
+            mut writer,
+            complaint,
+        } = Writer::open(&path, ENOUGH).unwrap();
+        let complaint = complaint.unwrap();
+        assert!(complaint.contains("history.damaged.db"), "{complaint}");
+        assert_eq!(
+            std::fs::read(state.path().join("history.damaged.db")).unwrap(),
+            damaged
+        );
+        writer.store(some(2).iter()).unwrap();
+        assert_eq!(seqs(&Reader::of(state.path()), &Filter::default()), [2, 1]);
+    }
+}
+
+#[test]
+fn csv_has_a_line_per_result_and_a_column_per_gauge() {
+    let state = tempfile::tempdir().unwrap();
+    bounded(state.path(), ENOUGH).store(some(2).iter()).unwrap();
+    let mut bytes = Vec::new();
+    let reader = Reader::of(state.path());
+    reader.csv(&Filter::default(), &mut bytes).unwrap();
+    let text = String::from_utf8(bytes).unwrap();
+    let lines: Vec<_> = text.split("\r\n").collect();
+    assert_eq!(lines.len(), 4, "{text}");
+    assert!(lines[0].contains(",recording,deviation [mm],deviation sigma,deviation low"));
+    assert!(lines[0].contains("\"'-step [mm]\""), "{text}");
+    assert!(
+        lines[2].starts_with("1,1970-01-01T00:00:01.000000Z,2,00c0ffee,4294967294,0,0,FAIL,0,")
+    );
+    assert!(lines[2].contains("\"a, \"\"b\"\"\""), "{text}");
+    assert!(
+        lines[2].contains(",strips 7,,1,,-0.25,0.30000000000000004,3,"),
+        "{text}"
+    );
+}
+
+#[test]
+fn without_a_history_reading_says_so() {
+    let state = tempfile::tempdir().unwrap();
+    let error = Reader::of(state.path())
+        .results(&Filter::default())
+        .unwrap_err();
+    assert!(error.to_string().contains("there is none"), "{error}");
+    assert!(!state.path().join(DATABASE).exists());
+}
+
+#[test]
+fn a_replay_compares_what_the_frames_show_to_the_last_bit_and_not_how_the_cycle_went() {
+    use crate::station::result::flag::{SIMULATED, STEPPED_UP};
+    let stored = Entry {
+        flags: STEPPED_UP | SIMULATED,
+        ..entry(7, 1, Verdict::Fail)
+    };
+    let mut replayed = Entry {
+        seq: 0,
+        total_us: 5,
+        flags: SIMULATED,
+        ..stored.clone()
+    };
+    assert_eq!(difference(&stored, &replayed), None);
+    let value = replayed.gauges[0].value.unwrap();
+    replayed.gauges[0].value = Some(f64::from_bits(value.to_bits() + 1));
+    assert!(
+        difference(&stored, &replayed)
+            .unwrap()
+            .contains("deviation")
+    );
+    replayed.gauges[0].value = Some(value);
+    replayed.flags = 0;
+    assert!(difference(&stored, &replayed).is_some());
+}
+
+/// Longest wait for the history's threads.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// Room for the tables and some results, in pages of 4 KiB.
+const FEW_PAGES: u32 = 24;
+
+fn station() -> StationHandle {
+    let settings = Settings {
+        next_seq: 1,
+        boot_id: 1,
+        teach_allowed: false,
+        identity: Arc::new(Identity {
+            vendor: String::new(),
+            product: String::new(),
+            serial: String::new(),
+            version: String::new(),
+        }),
+        limits: Limits::default(),
+    };
+    StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| None)
+}
+
+fn record(seq: u32) -> Arc<ResultRecord> {
+    Arc::new(ResultRecord {
+        seq,
+        verdict: Verdict::Invalid,
+        inspection: Arc::new(Inspection {
+            reason: Some("x".repeat(2000).into()),
+            ..Inspection::default()
+        }),
+        ..ResultRecord::default()
+    })
+}
+
+fn wait(what: &str, done: impl Fn() -> bool) {
+    let began = Instant::now();
+    while !done() {
+        assert!(began.elapsed() < PATIENCE, "no {what}");
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn a_storage_that_refuses_is_a_warning_and_what_waited_is_stored_when_it_takes_it_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = StateFolder::open(folder.path()).unwrap();
+    let bounds = Bounds {
+        results: ENOUGH,
+        recordings: 0,
+    };
+    let (history, task, next, complaint) = open(state.path(), state.counter(), 1, bounds).unwrap();
+    assert_eq!((next, complaint), (1, None));
+    let station = station();
+    let warned = || station.snapshot().warnings & warning::STORAGE != 0;
+    // Somebody else holds the database for longer than anybody waits.
+    let other = rusqlite::Connection::open(folder.path().join(DATABASE)).unwrap();
+    other.execute_batch("BEGIN IMMEDIATE").unwrap();
+    let running = {
+        let station = station.clone();
+        std::thread::spawn(move || task.run(&station))
+    };
+    for seq in 1..=60 {
+        history.record(record(seq));
+    }
+    wait("warning", warned);
+    assert!(history.problem().unwrap().contains("locked"));
+    let reader = history.reader().clone();
+    assert_eq!(seqs(&reader, &Filter::default()), [0; 0]);
+    other.execute_batch("COMMIT").unwrap();
+    wait("recovery", || !warned());
+    assert_eq!((history.problem(), history.lost()), (None, 0));
+    let expected: Vec<u32> = (1..=60).rev().collect();
+    assert_eq!(seqs(&reader, &Filter::default()), expected);
+    history.stop(60);
+    running.join().unwrap();
+    assert_eq!(state.next_seq().unwrap(), 61);
+}
+
+#[test]
+fn a_full_card_stores_nothing_by_halves_and_everything_when_there_is_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut writer = open_writer(folder.path());
+    // SQLite's own answer of a full card: the database may not grow.
+    writer.bound_pages(FEW_PAGES);
+    let many = some(500);
+    let error = writer.store(many.iter()).unwrap_err();
+    assert!(
+        error.to_string().contains("full") && !error.damaged,
+        "{error}"
+    );
+    let reader = Reader::of(folder.path());
+    assert_eq!(seqs(&reader, &Filter::default()), [0; 0]);
+    writer.store(many[..3].iter()).unwrap();
+    writer.bound_pages(1 << 30);
+    writer.store(many[3..].iter()).unwrap();
+    let all = Filter {
+        limit: usize::MAX,
+        ..Filter::default()
+    };
+    assert_eq!(seqs(&reader, &all).len(), many.len());
+}
+
+#[test]
+fn a_database_that_is_damaged_while_it_is_used_is_set_aside_and_nothing_stops() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut writer = open_writer(folder.path());
+    writer.store(some(300).iter()).unwrap();
+    drop(writer);
+    let mut writer = open_writer(folder.path());
+    let error = HistoryError {
+        path: folder.path().join(DATABASE),
+        reason: "database disk image is malformed".into(),
+        damaged: true,
+    };
+    let said = writer.begin_anew(&error).unwrap();
+    assert!(said.contains("history.damaged.db"), "{said}");
+    writer.store(some(2).iter()).unwrap();
+    assert_eq!(seqs(&Reader::of(folder.path()), &Filter::default()), [2, 1]);
+}

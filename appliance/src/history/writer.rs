@@ -1,0 +1,257 @@
+//! Writes results into the database, bounds their number, and links recordings to them.
+
+use super::entry::{Entry, GaugeEntry};
+use super::{HistoryError, schema};
+use rusqlite::{Connection, Transaction, params};
+use std::path::{Path, PathBuf};
+
+/// The one writer of a database.
+pub struct Writer {
+    connection: Connection,
+    path: PathBuf,
+    /// Results stored.
+    count: u64,
+    /// The most that are kept.
+    limit: u64,
+}
+
+/// What opening a database brought.
+pub struct Opening {
+    /// The writer.
+    pub writer: Writer,
+    /// Why the database that was there was set aside, and where to.
+    pub complaint: Option<String>,
+}
+
+impl Writer {
+    /// Opens the database; a damaged one is set aside and a new one begun. `limit` is the most results that are kept.
+    ///
+    /// # Errors
+    /// If it can be neither opened nor set aside.
+    pub fn open(path: &Path, limit: u64) -> Result<Opening, HistoryError> {
+        match Self::open_sound(path, limit) {
+            Ok(writer) => Ok(Opening {
+                writer,
+                complaint: None,
+            }),
+            Err(error) if error.damaged => {
+                let aside = set_aside(path, &error.reason)?;
+                Ok(Opening {
+                    writer: Self::open_sound(path, limit)?,
+                    complaint: Some(said(&error, &aside)),
+                })
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn open_sound(path: &Path, limit: u64) -> Result<Self, HistoryError> {
+        let connection = schema::open(path)?;
+        if let Some(reason) = schema::complaint(&connection) {
+            return Err(HistoryError {
+                path: path.to_path_buf(),
+                reason,
+                damaged: true,
+            });
+        }
+        let count = connection
+            .query_row("SELECT count(*) FROM result", (), |row| row.get(0))
+            .map_err(|error| HistoryError::of(path, &error))?;
+        schema::begin_log(&connection).map_err(|error| HistoryError::of(path, &error))?;
+        Ok(Self {
+            connection,
+            path: path.to_path_buf(),
+            count,
+            limit: limit.max(1),
+        })
+    }
+
+    /// Sets the database aside, which `why` says is damaged, and begins a new one; answers with a line for the log.
+    ///
+    /// # Errors
+    /// If that is not possible; then nothing can be stored until it is.
+    pub fn begin_anew(&mut self, why: &HistoryError) -> Result<String, HistoryError> {
+        let failed = |error| HistoryError::of(&self.path, &error);
+        // Closed before it is renamed: a log that is still open would go with the new database.
+        self.connection = Connection::open_in_memory().map_err(failed)?;
+        let aside = set_aside(&self.path, &why.reason)?;
+        self.connection = schema::open(&self.path)?;
+        schema::begin_log(&self.connection).map_err(failed)?;
+        self.count = 0;
+        Ok(said(why, &aside))
+    }
+
+    /// The most pages that the database may have.
+    #[cfg(test)]
+    pub(super) fn bound_pages(&self, most: u32) {
+        let pragma = self
+            .connection
+            .pragma_update_and_check(None, "max_page_count", most, |_| Ok(()));
+        assert!(pragma.is_ok());
+    }
+
+    /// The SEQ of the result that was stored last.
+    ///
+    /// # Errors
+    /// [`HistoryError`].
+    pub fn last_seq(&self) -> Result<Option<u32>, HistoryError> {
+        let newest = "SELECT seq FROM result ORDER BY id DESC LIMIT 1";
+        match self.connection.query_row(newest, (), |row| row.get(0)) {
+            Ok(seq) => Ok(Some(seq)),
+            Err(rusqlite::Error::QueryReturnedNoRows) => Ok(None),
+            Err(error) => Err(self.failed(&error)),
+        }
+    }
+
+    /// Stores results in one transaction and removes the oldest above the limit: all of it happens, or nothing.
+    ///
+    /// # Errors
+    /// [`HistoryError`]; then nothing was stored.
+    pub fn store<'a>(
+        &mut self,
+        entries: impl Iterator<Item = &'a Entry>,
+    ) -> Result<(), HistoryError> {
+        let (known, limit) = (self.count, self.limit);
+        let stored = self.connection.transaction().and_then(|transaction| {
+            let mut count = known;
+            for entry in entries {
+                insert(&transaction, entry)?;
+                count += 1;
+            }
+            if count > limit {
+                let oldest =
+                    "DELETE FROM result WHERE id IN (SELECT id FROM result ORDER BY id LIMIT ?1)";
+                count -= transaction
+                    .prepare_cached(oldest)?
+                    .execute([count - limit])? as u64;
+            }
+            transaction.commit()?;
+            Ok(count)
+        });
+        self.count = stored.map_err(|error| self.failed(&error))?;
+        Ok(())
+    }
+
+    /// Notes that the frames of the newest result with this SEQ are kept under `name`.
+    ///
+    /// # Errors
+    /// [`HistoryError`].
+    pub fn link(&mut self, seq: u32, name: &str) -> Result<(), HistoryError> {
+        let newest = "UPDATE result SET recording = ?2
+            WHERE id = (SELECT max(id) FROM result WHERE seq = ?1)";
+        self.change(newest, params![seq, name])
+    }
+
+    /// Notes that a recording is gone.
+    ///
+    /// # Errors
+    /// [`HistoryError`].
+    pub fn unlink(&mut self, name: &str) -> Result<(), HistoryError> {
+        let linked = "UPDATE result SET recording = NULL WHERE recording = ?1";
+        self.change(linked, params![name])
+    }
+
+    /// The recordings that results are linked to.
+    ///
+    /// # Errors
+    /// [`HistoryError`].
+    pub fn linked(&self) -> Result<Vec<String>, HistoryError> {
+        let linked = "SELECT DISTINCT recording FROM result WHERE recording IS NOT NULL";
+        self.connection
+            .prepare(linked)
+            .and_then(|mut names| names.query_map((), |row| row.get(0))?.collect())
+            .map_err(|error| self.failed(&error))
+    }
+
+    fn change(
+        &mut self,
+        statement: &str,
+        values: impl rusqlite::Params,
+    ) -> Result<(), HistoryError> {
+        let changed = self
+            .connection
+            .prepare_cached(statement)
+            .and_then(|mut statement| statement.execute(values));
+        changed.map_err(|error| self.failed(&error))?;
+        Ok(())
+    }
+
+    fn failed(&self, error: &rusqlite::Error) -> HistoryError {
+        HistoryError::of(&self.path, error)
+    }
+}
+
+fn set_aside(path: &Path, reason: &str) -> Result<PathBuf, HistoryError> {
+    schema::set_aside(path).map_err(|failed| HistoryError {
+        path: path.to_path_buf(),
+        reason: format!("{reason}; and it cannot be set aside: {failed}"),
+        damaged: false,
+    })
+}
+
+fn said(error: &HistoryError, aside: &Path) -> String {
+    let aside = aside.display();
+    format!("{error}; it is kept as {aside} and a new history begins")
+}
+
+fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
+    let stages = serde_json::to_string(&entry.stages).unwrap_or_default();
+    transaction
+        .prepare_cached(
+            "INSERT INTO result (seq, time_utc_us, recipe, fingerprint, part_id, press_stroke, token,
+                verdict, error_code, reason, flags, valid_points, coverage_permille, temperature_c,
+                height_noise_mm, fitness_permille, exposure_us, total_us, stages, recording)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18,
+                ?19, ?20)",
+        )?
+        .execute(params![
+            entry.seq,
+            entry.time_utc_us,
+            entry.recipe,
+            entry.fingerprint,
+            entry.part_id,
+            entry.press_stroke,
+            entry.token,
+            entry.verdict.number(),
+            entry.error_code,
+            entry.reason,
+            entry.flags,
+            entry.valid_points,
+            entry.coverage_permille,
+            entry.temperature_c,
+            entry.height_noise_mm,
+            entry.fitness_permille,
+            entry.exposure_us,
+            entry.total_us,
+            stages,
+            entry.recording,
+        ])?;
+    let result = transaction.last_insert_rowid();
+    for (place, gauge) in entry.gauges.iter().enumerate() {
+        insert_gauge(transaction, result, place, gauge)?;
+    }
+    Ok(())
+}
+
+fn insert_gauge(
+    transaction: &Transaction<'_>,
+    result: i64,
+    place: usize,
+    gauge: &GaugeEntry,
+) -> rusqlite::Result<()> {
+    let values = params![
+        result,
+        place,
+        gauge.name,
+        gauge.unit,
+        gauge.value,
+        gauge.sigma,
+        gauge.low,
+        gauge.high,
+        gauge.decision,
+    ];
+    transaction
+        .prepare_cached("INSERT INTO gauge VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)")?
+        .execute(values)?;
+    Ok(())
+}

@@ -1,0 +1,75 @@
+//! The registers with their present values, as a PLC reads them: for the page.
+
+use super::encode::{WordOrder, block_words};
+use super::map::{Kind, Register, registers};
+use crate::station::Snapshot;
+use serde_json::{Value, json};
+
+/// `{"registers": [{"address", "name", "type", "block", "served", "values", "words", "meaning"}]}`; `values` has one text
+/// per item, with the words in the normal order.
+pub fn live(snapshot: &Snapshot) -> Value {
+    let rows: Vec<Value> = registers()
+        .map(|(block, row)| {
+            let words = block_words(snapshot, &block, WordOrder::Normal);
+            let first = usize::from(row.address - block.first);
+            let own = words
+                .get(first..first + usize::from(row.count()))
+                .unwrap_or_default();
+            json!({
+                "address": row.address,
+                "name": row.name,
+                "type": row.kind.word(),
+                "block": block.name,
+                "served": block.served,
+                "values": values(&row, own),
+                "meaning": row.meaning,
+            })
+        })
+        .collect();
+    json!({ "registers": rows })
+}
+
+fn values(row: &Register, words: &[u16]) -> Vec<String> {
+    if row.kind == Kind::Ascii {
+        let bytes = words.iter().flat_map(|word| word.to_be_bytes());
+        let text: Vec<u8> = bytes.take_while(|byte| *byte != 0).collect();
+        return vec![String::from_utf8_lossy(&text).into_owned()];
+    }
+    let items = words.chunks_exact(usize::from(row.kind.width()));
+    items.map(|item| text(row.kind, item)).collect()
+}
+
+fn text(kind: Kind, words: &[u16]) -> String {
+    let wide = words
+        .iter()
+        .fold(0_u64, |wide, word| wide << 16 | u64::from(*word));
+    let low = wide as u32;
+    match kind {
+        Kind::Bits => format!("{wide:#06x}"),
+        Kind::U16 | Kind::U32 | Kind::U64 | Kind::Ascii => wide.to_string(),
+        Kind::I16 => (wide as u16).cast_signed().to_string(),
+        Kind::I32 => low.cast_signed().to_string(),
+        Kind::F32 => f32::from_bits(low).to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::modbus::map::registers;
+
+    #[test]
+    fn words_read_as_what_the_table_says_they_are() {
+        assert_eq!(text(Kind::I16, &[0xFFFF]), "-1");
+        assert_eq!(text(Kind::I32, &[0x8000, 0]), "-2147483648");
+        assert_eq!(text(Kind::U32, &[1, 2]), "65538");
+        assert_eq!(text(Kind::F32, &[0x42F6, 0xE979]), "123.456");
+        assert_eq!(text(Kind::F32, &[0x7FC0, 0]), "NaN");
+        assert_eq!(text(Kind::Bits, &[0x8001]), "0x8001");
+        let part_number = registers()
+            .find(|(_, row)| row.name == "PART_NUMBER")
+            .unwrap()
+            .1;
+        assert_eq!(values(&part_number, &[0x4142, 0x4300, 0x4444]), ["ABC"]);
+    }
+}

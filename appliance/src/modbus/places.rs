@@ -1,0 +1,194 @@
+//! Places: how many connections there are, who may have one, and who makes room for whom.
+//!
+//! One place is kept for a client that may write. Who comes to a full house takes the place of the connection that has been
+//! idle for longest; where nobody is idle, the newcomer is refused. Readers never displace writers.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll};
+use std::time::{Duration, Instant};
+
+use tokio::sync::oneshot;
+
+/// A connection makes room if its last request is older than this: three missed polls of a slow PLC.
+const IDLE: Duration = Duration::from_secs(5);
+/// A connection that never sent a whole request makes room after this: far more than a round trip.
+const MUTE: Duration = Duration::from_millis(250);
+
+/// The places of one server. Cheap to clone.
+#[derive(Clone, Debug)]
+pub struct Clients(Arc<Mutex<Table>>);
+
+#[derive(Debug)]
+struct Table {
+    limit: usize,
+    next: u64,
+    taken: Vec<Taken>,
+}
+
+#[derive(Debug)]
+struct Taken {
+    number: u64,
+    may_write: bool,
+    /// Whether a whole request has come.
+    spoke: bool,
+    /// When the last one came, or the connection.
+    since: Instant,
+    /// Dropped to close it.
+    _open: oneshot::Sender<()>,
+}
+
+impl Table {
+    fn admit(&mut self, may_write: bool, now: Instant) -> Option<(u64, oneshot::Receiver<()>)> {
+        let readers = self.taken.iter().filter(|other| !other.may_write).count();
+        let room = self.taken.len() < self.limit && (may_write || readers + 1 < self.limit);
+        if !room {
+            let leaving = self.idle_longest(may_write, now)?;
+            self.taken.retain(|other| other.number != leaving);
+        }
+        let (open, closed) = oneshot::channel();
+        let number = self.next;
+        self.next += 1;
+        self.taken.push(Taken {
+            number,
+            may_write,
+            spoke: false,
+            since: now,
+            _open: open,
+        });
+        Some((number, closed))
+    }
+
+    /// Who makes room for a newcomer: a reader before a writer, and of those the one that has been idle for longest.
+    fn idle_longest(&self, may_write: bool, now: Instant) -> Option<u64> {
+        let idle = |other: &&Taken| {
+            let patience = if other.spoke { IDLE } else { MUTE };
+            (may_write || !other.may_write) && now.saturating_duration_since(other.since) > patience
+        };
+        let leaving = self.taken.iter().filter(idle);
+        leaving
+            .min_by_key(|other| (other.may_write, other.since))
+            .map(|other| other.number)
+    }
+}
+
+impl Clients {
+    /// Room for `limit` connections.
+    pub fn new(limit: usize) -> Self {
+        Self(Arc::new(Mutex::new(Table {
+            limit,
+            next: 0,
+            taken: Vec::new(),
+        })))
+    }
+
+    /// Open connections, and whether one of them may write.
+    pub fn open(&self) -> (u16, bool) {
+        let table = self.table();
+        let count = u16::try_from(table.taken.len()).unwrap_or(u16::MAX);
+        (count, table.taken.iter().any(|taken| taken.may_write))
+    }
+
+    /// A place for a newcomer, or `None` if nobody makes room.
+    pub(super) fn admit(&self, may_write: bool) -> Option<Place> {
+        let (number, closed) = self.table().admit(may_write, Instant::now())?;
+        Some(Place {
+            clients: self.clone(),
+            number,
+            closed,
+        })
+    }
+
+    fn table(&self) -> MutexGuard<'_, Table> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The place of one connection, given back when it is dropped.
+#[derive(Debug)]
+pub struct Place {
+    clients: Clients,
+    number: u64,
+    closed: oneshot::Receiver<()>,
+}
+
+impl Place {
+    /// A whole request came.
+    pub(super) fn spoke(&self) {
+        let mut table = self.clients.table();
+        let mut taken = table.taken.iter_mut();
+        if let Some(own) = taken.find(|other| other.number == self.number) {
+            own.spoke = true;
+            own.since = Instant::now();
+        }
+    }
+
+    /// Ready when somebody else has got the place.
+    pub(super) fn poll_gone(&mut self, context: &mut Context<'_>) -> Poll<()> {
+        Future::poll(std::pin::Pin::new(&mut self.closed), context).map(|_| ())
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let mut table = self.clients.table();
+        table.taken.retain(|other| other.number != self.number);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(limit: usize) -> Table {
+        Table {
+            limit,
+            next: 0,
+            taken: Vec::new(),
+        }
+    }
+
+    fn numbers(table: &Table) -> Vec<u64> {
+        table.taken.iter().map(|taken| taken.number).collect()
+    }
+
+    #[test]
+    fn readers_leave_one_place_to_a_writer() {
+        let (mut table, now) = (table(3), Instant::now());
+        for reader in 0..2 {
+            assert!(table.admit(false, now).is_some(), "reader {reader}");
+        }
+        assert!(table.admit(false, now).is_none());
+        assert!(table.admit(true, now).is_some());
+        assert!(table.admit(true, now).is_none(), "nobody is idle");
+    }
+
+    #[test]
+    fn the_connection_that_is_idle_for_longest_makes_room() {
+        let (mut table, start) = (table(3), Instant::now());
+        let at = |ms| start + Duration::from_millis(ms);
+        for ms in 0..3 {
+            table.admit(true, at(ms)).unwrap();
+            table.taken[ms as usize].spoke = true;
+        }
+        table.taken[0].since = at(10);
+        assert!(table.admit(true, at(4000)).is_none());
+        table.admit(true, at(5002)).unwrap();
+        assert_eq!(numbers(&table), [0, 2, 3]);
+    }
+
+    #[test]
+    fn who_never_spoke_makes_room_soon_and_a_reader_before_a_writer() {
+        let (mut table, start) = (table(3), Instant::now());
+        let at = |ms| start + Duration::from_millis(ms);
+        table.admit(true, at(0)).unwrap();
+        table.admit(true, at(1)).unwrap();
+        table.admit(false, at(2)).unwrap();
+        assert!(table.admit(true, at(200)).is_none());
+        table.admit(true, at(300)).unwrap();
+        assert_eq!(numbers(&table), [0, 1, 3], "the reader went");
+        assert!(
+            table.admit(false, at(9000)).is_none(),
+            "a reader displaces no writer"
+        );
+    }
+}

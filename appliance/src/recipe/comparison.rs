@@ -1,0 +1,52 @@
+//! What teaching gained: the part with straight fringes and with its own, measured with equally many frames.
+
+use crate::rig::Measured;
+use algo::phase::Trust;
+use serde::{Deserialize, Serialize};
+
+/// Both measurements.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ComparisonFile {
+    /// With straight fringes.
+    pub fixed: QualityFile,
+    /// With the part's own.
+    pub adaptive: QualityFile,
+}
+
+/// What one measurement was worth.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct QualityFile {
+    /// Frames of the sequence.
+    pub frames: usize,
+    /// Predicted σ_z from the measured modulation, RMS over the pixels that both resolve, mm.
+    pub sigma_mm: f64,
+    /// Share of the frame that is resolved.
+    pub coverage: f64,
+}
+
+impl ComparisonFile {
+    /// Compares a measurement with a fixed pattern and one with the part's own.
+    pub fn of(fixed: &Measured, adaptive: &Measured) -> Self {
+        let resolved = |of: &Measured, at: usize| of.phases.trust[at] == Trust::Resolved;
+        let both: Vec<usize> = (0..fixed.phases.trust.len())
+            .filter(|&at| resolved(fixed, at) && resolved(adaptive, at))
+            .collect();
+        let quality = |of: &Measured| {
+            let squares = both
+                .iter()
+                .map(|&at| f64::from(of.heights.sigma[at]).powi(2));
+            QualityFile {
+                frames: of.frames.len(),
+                sigma_mm: (squares.sum::<f64>() / both.len().max(1) as f64).sqrt(),
+                coverage: of.phases.count(Trust::Resolved) as f64
+                    / of.phases.trust.len().max(1) as f64,
+            }
+        };
+        Self {
+            fixed: quality(fixed),
+            adaptive: quality(adaptive),
+        }
+    }
+}

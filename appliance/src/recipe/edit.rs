@@ -1,0 +1,93 @@
+//! Changing what may be changed in a taught recipe: its names, regions and gauges.
+
+use super::archive;
+use super::planner;
+use super::{GaugeFile, LoadError, Recipe, RegionFile, Store};
+use serde::Deserialize;
+use std::collections::HashSet;
+
+/// The longest name of a recipe, region or gauge, in characters.
+const LONGEST_NAME: usize = 48;
+
+/// What shall be different; what is left out stays.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Edit {
+    /// Fingerprint of the recipe that was looked at: somebody else may have changed it since.
+    pub fingerprint: String,
+    /// For people.
+    pub name: Option<String>,
+    /// The key for a PLC.
+    pub part_number: Option<String>,
+    /// Least share of the golden pixels that must be resolved.
+    pub min_coverage: Option<f64>,
+    /// All regions.
+    pub regions: Option<Vec<RegionFile>>,
+    /// All gauges.
+    pub gauges: Option<Vec<GaugeFile>>,
+}
+
+/// An edit that was not made; the recipe is as before.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum EditError {
+    /// There is no such recipe, or it is damaged.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// Somebody else was faster.
+    #[error("recipe {0} was changed by somebody else: load it again and repeat the change")]
+    Outdated(u16),
+    /// The recipe would not be one that can be used.
+    #[error("{0}")]
+    Unfit(String),
+    /// It could not be stored.
+    #[error("store recipe: {0}: free space")]
+    Store(String),
+}
+
+/// Changes a stored recipe; its previous generation stays beside it. Answers with its new fingerprint.
+///
+/// # Errors
+/// The recipe cannot be read, was changed since, would not be usable, or cannot be stored.
+pub fn edit(store: &Store, number: u16, edit: Edit) -> Result<String, EditError> {
+    let Recipe {
+        mut file, arrays, ..
+    } = store.load(number)?.recipe;
+    if file.fingerprint != edit.fingerprint {
+        return Err(EditError::Outdated(number));
+    }
+    file.name = edit.name.map_or(file.name, |name| name.trim().to_owned());
+    file.part_number = edit.part_number.unwrap_or(file.part_number);
+    file.min_coverage = edit.min_coverage.unwrap_or(file.min_coverage);
+    file.regions = edit.regions.unwrap_or(file.regions);
+    file.gauges = edit.gauges.unwrap_or(file.gauges);
+    let regions = file.regions.iter().map(|region| &region.name);
+    let gauges = file.gauges.iter().map(|gauge| &gauge.name);
+    check_names("region", regions)?;
+    check_names("gauge", gauges)?;
+    check_names("recipe", std::iter::once(&file.name))?;
+    // Tighter limits may need more frames, wider ones fewer.
+    file.production = planner::choose(&file.sequences, &file.gauges).production;
+    let checked = Recipe::check(file, arrays).map_err(EditError::Unfit)?;
+    let (bytes, fingerprint) = archive::pack(&checked.file, &checked.arrays)
+        .map_err(|error| EditError::Unfit(error.to_string()))?;
+    let stored = store.save(number, &bytes);
+    stored.map_err(|error| EditError::Store(error.to_string()))?;
+    Ok(fingerprint)
+}
+
+fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a String>) -> Result<(), EditError> {
+    let mut seen = HashSet::new();
+    for name in names {
+        let length = name.chars().count();
+        if name.trim().is_empty() || length > LONGEST_NAME {
+            let words =
+                format!("{what} name {name:?} has {length} characters: write 1 to {LONGEST_NAME}");
+            return Err(EditError::Unfit(words));
+        }
+        if !seen.insert(name) {
+            let words = format!("two of them are called {name:?}: give each {what} its own name");
+            return Err(EditError::Unfit(words));
+        }
+    }
+    Ok(())
+}

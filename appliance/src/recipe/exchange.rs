@@ -1,0 +1,269 @@
+//! Recipes on their way in and out: list, export, import, delete. Nothing damaged or foreign comes in.
+
+use super::archive::{self, ArchiveError};
+use super::store::{LoadError, Store};
+use super::{Recipe, RecipeFile, SequenceKind};
+use crate::output::folder::{rename_whole, sync_folder_of};
+use serde::Serialize;
+use std::fs::{self, File};
+use std::io::{self, BufReader};
+use std::path::{Path, PathBuf};
+
+/// A stored recipe, for lists.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Listed {
+    /// 1–9999.
+    pub number: u16,
+    /// The key that a PLC may select by.
+    pub part_number: String,
+    /// For people.
+    pub name: String,
+    /// SHA-256, 64 hexadecimal digits.
+    pub fingerprint: String,
+    /// Fingerprint of the calibration that it was made for.
+    pub calibration: String,
+    /// When it was taught, in seconds since 1970 UTC; 0 if not known.
+    pub taught_at_unix_s: u64,
+    /// Who or what taught it.
+    pub taught_by: String,
+    /// What its production sequence can unwrap.
+    pub sequence: String,
+    /// Predicted σ_z of that sequence, mm.
+    pub sigma_mm: f64,
+    /// Number of gauges.
+    pub gauges: usize,
+    /// Bytes of the newest generation.
+    pub bytes: u64,
+    /// Whether there is a generation before it.
+    pub previous: bool,
+    /// Why the newest generation cannot be read.
+    pub problem: Option<String>,
+}
+
+/// A recipe that was not taken, given or deleted.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// It is not in the store, or damaged there.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// It must not come in.
+    #[error("import {path}: {reason}", path = path.display())]
+    Refused {
+        /// The file.
+        path: PathBuf,
+        /// Why, with the remedy.
+        reason: String,
+    },
+    /// The file cannot be read.
+    #[error("import {path}: {source}: name a recipe file", path = path.display())]
+    Missing {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The target cannot be written.
+    #[error("write {path}: {source}: free space or name another place", path = path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+impl Store {
+    /// All stored recipes, by their manifests; the fingerprints are checked when a recipe is loaded.
+    pub fn list(&self) -> Vec<Listed> {
+        let numbers = self.numbers().into_iter();
+        numbers.map(|number| self.listed(number)).collect()
+    }
+
+    fn listed(&self, number: u16) -> Listed {
+        let path = self.path(number);
+        let manifest = File::open(&path)
+            .map_err(|error| ArchiveError::Broken(error.to_string()))
+            .and_then(archive::manifest);
+        let previous = self.previous(number).exists();
+        let bytes = fs::metadata(&path).map_or(0, |found| found.len());
+        match manifest {
+            Ok(file) => Listed {
+                number,
+                bytes,
+                previous,
+                ..of_manifest(file)
+            },
+            Err(error) => Listed {
+                number,
+                bytes,
+                previous,
+                problem: Some(error.to_string()),
+                ..Listed::default()
+            },
+        }
+    }
+
+    /// Writes a recipe to a file as it is stored: the newest generation that is whole.
+    ///
+    /// # Errors
+    /// If there is no such recipe, no generation is whole, or the file cannot be written.
+    pub fn export(&self, number: u16, target: &Path) -> Result<(), ImportError> {
+        let failed = |source| ImportError::Write {
+            path: target.to_path_buf(),
+            source,
+        };
+        let whole = self.whole(number)?;
+        let mut temporary = target.as_os_str().to_owned();
+        temporary.push(".new");
+        let temporary = PathBuf::from(temporary);
+        let written =
+            copy_synced(&whole, &temporary).and_then(|()| rename_whole(&temporary, target));
+        if written.is_err() {
+            // There may be nothing to remove.
+            let _ = fs::remove_file(&temporary);
+        }
+        written.map_err(failed)
+    }
+
+    /// The file of the newest generation that is whole, to be read or sent as it is.
+    ///
+    /// # Errors
+    /// If there is no such recipe or no generation is whole.
+    pub fn whole(&self, number: u16) -> Result<PathBuf, LoadError> {
+        let path = self.path(number);
+        let sound = |path: &PathBuf| {
+            File::open(path).is_ok_and(|file| archive::is_sound(BufReader::new(file)))
+        };
+        match [path.clone(), self.previous(number)]
+            .into_iter()
+            .find(sound)
+        {
+            Some(whole) => Ok(whole),
+            None if path.exists() => Err(LoadError::Corrupt {
+                path,
+                reason: "its content does not agree with its fingerprint: teach it again".into(),
+            }),
+            None => Err(LoadError::Unknown(number.to_string())),
+        }
+    }
+
+    /// Takes a recipe from a file, under the number that it has; what had this number before stays as the previous
+    /// generation. `calibration` is the fingerprint of the head's calibration, where it is known: a recipe for another
+    /// head is refused.
+    ///
+    /// # Errors
+    /// If the file is no whole recipe, of a newer version or for another calibration, or the store cannot be written. The
+    /// store is then as it was.
+    pub fn import(
+        &self,
+        source: &Path,
+        calibration: Option<&str>,
+    ) -> Result<RecipeFile, ImportError> {
+        let refused = |reason: String| ImportError::Refused {
+            path: source.to_path_buf(),
+            reason,
+        };
+        let missing = |error| ImportError::Missing {
+            path: source.to_path_buf(),
+            source: error,
+        };
+        // Copied first: what is checked is then what is stored, whatever happens to the source meanwhile.
+        let write = |path: &Path| {
+            let path = path.to_path_buf();
+            move |source| ImportError::Write { path, source }
+        };
+        let folder = self.folder.clone();
+        let _alone = self.lock().map_err(write(&folder))?;
+        let arriving = folder.join("arriving.new");
+        File::open(source).map_err(missing)?;
+        let taken = copy_synced(source, &arriving)
+            .map_err(write(&arriving))
+            .and_then(|()| {
+                let recipe = read(&arriving).map_err(&refused)?;
+                let file = recipe.file;
+                if let Some(present) = calibration.filter(|&present| present != file.calibration) {
+                    return Err(refused(foreign(&file.calibration, present)));
+                }
+                let target = self.path(file.number);
+                self.keep_previous(file.number)
+                    .and_then(|()| rename_whole(&arriving, &target))
+                    .map_err(write(&target))?;
+                Ok(file)
+            });
+        if taken.is_err() {
+            // There may be nothing to remove.
+            let _ = fs::remove_file(&arriving);
+        }
+        taken
+    }
+
+    /// Deletes a recipe with its previous generation. A station that has it active goes on with it until another is
+    /// selected.
+    ///
+    /// # Errors
+    /// If there is no such recipe or it cannot be deleted.
+    pub fn delete(&self, number: u16) -> Result<(), ImportError> {
+        let write = |path: &Path| {
+            let path = path.to_path_buf();
+            move |source| ImportError::Write { path, source }
+        };
+        let _alone = self.lock().map_err(write(&self.folder))?;
+        let (path, previous) = (self.path(number), self.previous(number));
+        let mut gone = false;
+        // The previous one first: a kill in between leaves the newest, not an old one that comes back.
+        for file in [&previous, &path] {
+            match fs::remove_file(file) {
+                Ok(()) => gone = true,
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => return Err(write(file)(error)),
+            }
+        }
+        if !gone {
+            return Err(LoadError::Unknown(number.to_string()).into());
+        }
+        sync_folder_of(&path).map_err(write(&path))
+    }
+}
+
+fn read(path: &Path) -> Result<Recipe, String> {
+    let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
+    let (size, file) = opened.map_err(|error| error.to_string())?;
+    Recipe::read(BufReader::new(file), size).map_err(|error| error.to_string())
+}
+
+fn foreign(made_for: &str, present: &str) -> String {
+    let digits = |fingerprint: &str| fingerprint.get(..8).unwrap_or(fingerprint).to_owned();
+    format!(
+        "it was made for calibration {}, this head has {}: teach it on this head",
+        digits(made_for),
+        digits(present)
+    )
+}
+
+fn copy_synced(source: &Path, target: &Path) -> io::Result<()> {
+    let mut file = File::create(target)?;
+    io::copy(&mut File::open(source)?, &mut file)?;
+    file.sync_all()
+}
+
+fn of_manifest(file: RecipeFile) -> Listed {
+    let production = file.sequences.get(file.production);
+    let sequence = match production.map(|sequence| sequence.kind) {
+        Some(SequenceKind::SingleLevel) => "single level",
+        Some(SequenceKind::TwoLevels) => "two levels",
+        Some(SequenceKind::Full) => "full",
+        None => "none",
+    };
+    Listed {
+        sequence: sequence.into(),
+        sigma_mm: production.map_or(0.0, |sequence| sequence.sigma_mm),
+        part_number: file.part_number,
+        name: file.name,
+        fingerprint: file.fingerprint,
+        calibration: file.calibration,
+        taught_at_unix_s: file.taught_at_unix_s,
+        taught_by: file.taught_by,
+        gauges: file.gauges.len(),
+        ..Listed::default()
+    }
+}

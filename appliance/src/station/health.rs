@@ -1,0 +1,184 @@
+//! Health: what system, head and clients say of themselves, and when storage is too full to go on measuring.
+
+use std::sync::Arc;
+
+use super::error_code;
+use super::event::{Effect, Effects};
+use super::machine::{Station, log, push};
+use super::state::{ClearedBy, Fault, Micros, State};
+
+/// Less free storage than this is a warning, MiB: a day of results and some recordings.
+pub const LOW_STORAGE_MIB: u64 = 256;
+/// Less free storage than this is a fault, MiB: a recipe is written whole beside its two generations, each up to 8 MiB.
+pub const FULL_STORAGE_MIB: u64 = 24;
+/// From here on the processor is a warning, °C: small computers slow themselves down at 80 to 85.
+pub const HOT_PROCESSOR_C: f64 = 80.0;
+
+/// What a survey of the system found; about once a second.
+#[derive(Debug, Clone, PartialEq)]
+pub struct System {
+    /// Load of all processors since the last survey, %.
+    pub cpu_percent: Option<u8>,
+    /// Memory that a program could still get, MiB.
+    pub free_memory_mib: Option<u64>,
+    /// Room in the state folder, MiB.
+    pub free_storage_mib: Option<u64>,
+    /// Processor temperature, °C.
+    pub cpu_temperature_c: Option<f64>,
+    /// Starts of the daemon with this state folder, this one included.
+    pub boots: u32,
+    /// Starts that followed an end without a stop: a crash, a kill, a loss of power.
+    pub unclean_boots: u32,
+    /// Open Modbus connections.
+    pub clients: u16,
+    /// Whether one of them may write.
+    pub writer_connected: bool,
+    /// Numbers of the stored recipes, ascending.
+    pub recipes: Arc<[u16]>,
+}
+
+impl Default for System {
+    fn default() -> Self {
+        Self {
+            cpu_percent: None,
+            free_memory_mib: None,
+            free_storage_mib: None,
+            cpu_temperature_c: None,
+            boots: 0,
+            unclean_boots: 0,
+            clients: 0,
+            writer_connected: false,
+            recipes: Arc::new([]),
+        }
+    }
+}
+
+/// How well camera and projector kept time in one sequence.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Pace {
+    /// Frames per second × 100.
+    pub camera_centihertz: u32,
+    /// Refreshes of the projector, mHz.
+    pub refresh_millihertz: u32,
+    /// Longest time from a pattern in view to its exposure, µs.
+    pub lag_us: u32,
+    /// Frames that never came.
+    pub dropped: u32,
+    /// Refreshes that the projector missed.
+    pub missed_flips: u32,
+}
+
+/// Everything that the HEALTH registers show.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Health {
+    /// The last survey.
+    pub system: System,
+    /// The last sequence; its counts are sums since the start.
+    pub pace: Pace,
+    /// Exposure done → result of the last cycle, µs.
+    pub processing_us: u32,
+    /// The longest of them since the start, µs.
+    pub processing_max_us: u32,
+    /// Writes that failed since the start.
+    pub storage_errors: u32,
+}
+
+impl Health {
+    pub(super) fn paced(&mut self, pace: Pace) {
+        let before = self.pace;
+        self.pace = Pace {
+            dropped: before.dropped.saturating_add(pace.dropped),
+            missed_flips: before.missed_flips.saturating_add(pace.missed_flips),
+            ..pace
+        };
+    }
+
+    pub(super) fn processed(&mut self, us: u32) {
+        self.processing_us = us;
+        self.processing_max_us = self.processing_max_us.max(us);
+    }
+
+    pub(super) fn storage_is_low(&self) -> bool {
+        self.room_is_below(LOW_STORAGE_MIB)
+    }
+
+    fn room_is_below(&self, mib: u64) -> bool {
+        self.system.free_storage_mib.is_some_and(|free| free < mib)
+    }
+
+    pub(super) fn processor_is_hot(&self) -> bool {
+        self.system
+            .cpu_temperature_c
+            .is_some_and(|celsius| celsius >= HOT_PROCESSOR_C)
+    }
+}
+
+impl Station {
+    /// Takes a survey: full storage is a fault between two jobs, and clears by itself when there is room again.
+    pub(super) fn surveyed(&mut self, system: System, now: Micros, effects: &mut Effects) {
+        self.health.system = system;
+        if self.unstored {
+            // Tried until it goes; the answer comes as `Stored`.
+            push(effects, Effect::PersistSeq(self.last_seq));
+        }
+        let full = self.health.room_is_below(FULL_STORAGE_MIB);
+        match &self.state {
+            State::Ready | State::Offline if full => {
+                let room = self.health.system.free_storage_mib.unwrap_or(0);
+                let fault = Fault {
+                    code: error_code::STORAGE_FULL,
+                    cause: format!("{room} MiB of storage are free, {FULL_STORAGE_MIB} are needed").into(),
+                    remedy: "remove recordings or other files from the storage; it clears by itself when there is room".into(),
+                    since: now,
+                    cleared_by: ClearedBy::Storage,
+                };
+                self.fault(fault, now, effects);
+            }
+            State::Fault(_) if !full => self.storage_settled(effects),
+            _ => {}
+        }
+    }
+
+    /// Takes the answer to [`Effect::PersistSeq`].
+    pub(super) fn stored(
+        &mut self,
+        seq: u32,
+        failed: Option<Arc<str>>,
+        now: Micros,
+        effects: &mut Effects,
+    ) {
+        let Some(cause) = failed else {
+            // A number that is stored covers those before it.
+            self.unstored &= seq != self.last_seq;
+            if !self.health.room_is_below(FULL_STORAGE_MIB) {
+                self.storage_settled(effects);
+            }
+            return;
+        };
+        self.health.storage_errors = self.health.storage_errors.saturating_add(1);
+        self.unstored = true;
+        if matches!(self.state, State::Ready | State::Offline) {
+            let fault = Fault {
+                code: error_code::SEQ_NOT_STORED,
+                cause: format!("result number {seq} could not be stored: {cause}").into(),
+                remedy: "free space, or replace the storage if it is broken; it is tried every second and clears by itself".into(),
+                since: now,
+                cleared_by: ClearedBy::Storage,
+            };
+            self.fault(fault, now, effects);
+        }
+    }
+
+    fn storage_settled(&mut self, effects: &mut Effects) {
+        if let State::Fault(fault) = &self.state
+            && fault.cleared_by == ClearedBy::Storage
+            && !self.unstored
+        {
+            log(
+                effects,
+                format!("storage works again after error {}", fault.code),
+            );
+            self.state = self.rest();
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Load, memory, storage and temperature, as the kernel tells them; `None` where it does not.
+
+use std::fs;
+use std::path::Path;
+
+const MIB: u64 = 1 << 20;
+
+/// The processors' load between two questions.
+#[derive(Debug, Default)]
+pub struct Processors {
+    /// Busy and whole time at the last question, in ticks.
+    before: Option<(u64, u64)>,
+}
+
+impl Processors {
+    /// Load since the last question, %; `None` at the first one.
+    pub fn load_percent(&mut self) -> Option<u8> {
+        let now = busy_and_whole(&fs::read_to_string("/proc/stat").ok()?)?;
+        let (busy, whole) = self.before.replace(now)?;
+        let whole = now.1.checked_sub(whole).filter(|&ticks| ticks > 0)?;
+        let percent = 100 * now.0.saturating_sub(busy) / whole;
+        u8::try_from(percent.min(100)).ok()
+    }
+}
+
+/// Ticks of all processors that were work, and all of them: proc_stat(5), first line.
+fn busy_and_whole(stat: &str) -> Option<(u64, u64)> {
+    let line = stat.lines().next()?.strip_prefix("cpu ")?;
+    // user nice system idle iowait irq softirq steal; what follows is contained in the first two.
+    let ticks: Vec<u64> = line
+        .split_whitespace()
+        .take(8)
+        .map_while(|word| word.parse().ok())
+        .collect();
+    let idle = ticks.get(3)?.checked_add(*ticks.get(4)?)?;
+    let whole = ticks.iter().try_fold(0_u64, |sum, &t| sum.checked_add(t))?;
+    Some((whole.checked_sub(idle)?, whole))
+}
+
+/// Memory that a program could get without anything being swapped out, MiB.
+pub fn free_memory_mib() -> Option<u64> {
+    available(&fs::read_to_string("/proc/meminfo").ok()?)
+}
+
+/// MemAvailable of proc_meminfo(5), kB → MiB.
+fn available(meminfo: &str) -> Option<u64> {
+    let line = meminfo
+        .lines()
+        .find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let kilobytes: u64 = line.split_whitespace().next()?.parse().ok()?;
+    Some(kilobytes / 1024)
+}
+
+/// Room for this user on the storage of a folder, MiB.
+pub fn free_storage_mib(folder: &Path) -> Option<u64> {
+    let storage = rustix::fs::statvfs(folder).ok()?;
+    Some(storage.f_bavail.checked_mul(storage.f_frsize)? / MIB)
+}
+
+/// The hottest thermal zone, °C.
+pub fn temperature_c() -> Option<f64> {
+    let zones = fs::read_dir("/sys/class/thermal").ok()?;
+    zones
+        .flatten()
+        .filter_map(|zone| {
+            let millidegrees = fs::read_to_string(zone.path().join("temp")).ok()?;
+            Some(millidegrees.trim().parse::<f64>().ok()? / 1000.0)
+        })
+        .max_by(f64::total_cmp)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_kernels_words_are_understood_and_nonsense_is_not_known() {
+        let stat = "cpu  100 10 40 800 50 0 0 0 7 0\ncpu0 1 1 1\n";
+        assert_eq!(busy_and_whole(stat), Some((150, 1000)));
+        assert_eq!(busy_and_whole("cpu  1 2\n"), None);
+        assert_eq!(busy_and_whole(""), None);
+        let meminfo = "MemTotal: 9 kB\nMemAvailable:    2048000 kB\n";
+        assert_eq!(available(meminfo), Some(2000));
+        assert_eq!(available("MemAvailable: lots\n"), None);
+    }
+
+    #[test]
+    fn a_folder_has_room_and_one_that_is_not_there_is_not_known() {
+        assert!(free_storage_mib(&std::env::temp_dir()).is_some());
+        assert_eq!(free_storage_mib(Path::new("no/such/folder")), None);
+    }
+}

@@ -1,0 +1,33 @@
+// Requests to this device. What goes wrong comes back as words for people.
+export async function ask(method, path, body) {
+  const options = { method, credentials: "same-origin", headers: {} };
+  if (body instanceof Blob) options.body = body;
+  else if (body !== undefined) {
+    options.body = JSON.stringify(body);
+    options.headers["Content-Type"] = "application/json";
+  }
+  let response;
+  try { response = await fetch(path, options); } catch (gone) { throw new Error("the sensor does not answer; check the network"); }
+  const content = await response.json().catch(() => null);
+  if (response.ok) return content;
+  const error = new Error(content && content.error ? content.error : `the sensor answers ${response.status}`);
+  error.status = response.status;
+  throw error;
+}
+
+// A map: its description and its values, NaN where there is none.
+export async function map(path) {
+  const response = await fetch(path, { credentials: "same-origin" });
+  if (!response.ok) {
+    const content = await response.json().catch(() => null);
+    throw new Error(content && content.error ? content.error : `the sensor answers ${response.status}`);
+  }
+  const about = JSON.parse(response.headers.get("x-map"));
+  const view = new DataView(await response.arrayBuffer());
+  const values = new Float32Array(view.byteLength / 2);
+  for (let at = 0; at < values.length; at += 1) {
+    const word = view.getUint16(2 * at, true);
+    values[at] = word === 65535 ? NaN : about.low + about.step * word;
+  }
+  return { about, values };
+}

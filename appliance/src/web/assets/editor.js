@@ -1,0 +1,202 @@
+// Editing a recipe: regions by dragging on the part as taught, limits and names as fields.
+import { $, draw, fill, make, show, text } from "./element.js";
+import { ask, map } from "./api.js";
+import { paint } from "./colour.js";
+import { change, notice } from "./session.js";
+
+const state = { recipe: null, map: null, chosen: [0, 0], drag: null, wide: 1 };
+
+// Factor and symbol of a gauge's limits as people write them.
+function unit(measures) {
+  const kind = measures.kind;
+  if (kind === "coverage" || kind === "out_of_tolerance") return [100, "%"];
+  if (kind === "tilt" || (kind === "placement" && measures.component.startsWith("about"))) return [1, "°"];
+  return [1, kind === "volume" ? "mm³" : "mm"];
+}
+
+// "deviation over 9 px", "step from other region", "tilt about x".
+function words(measures) {
+  const more = [];
+  if (measures.from) more.push(`from ${measures.from}`);
+  if (measures.about) more.push(`about ${measures.about}`);
+  if (measures.component) more.push(measures.component.replace(/_/g, " "));
+  if (measures.above_mm !== undefined) more.push(`above ${measures.above_mm} mm`);
+  if (measures.tolerance_mm !== undefined) more.push(`of ${measures.tolerance_mm} mm`);
+  if (measures.smoothing_px) more.push(`over ${measures.smoothing_px} px`);
+  return [measures.kind.replace(/_/g, " ")].concat(more).join(" ");
+}
+
+export async function edit(number) {
+  try {
+    state.recipe = await ask("GET", `/api/recipes/${number}`);
+    state.map = await map(`/api/recipes/${number}/picture/height`);
+  } catch (error) { notice(error.message, true); return; }
+  const { recipe } = state;
+  text("editor-number", String(number));
+  text("editor-words", "");
+  $("editor-name").value = recipe.name;
+  $("editor-part").value = recipe.part_number;
+  paint($("editor-map"), state.map, "height");
+  state.wide = recipe.camera.width;
+  $("editor-regions").setAttribute("viewBox", `0 0 ${recipe.camera.width} ${recipe.camera.height}`);
+  state.chosen = [0, 0];
+  show("editor", true);
+  drawRegions();
+  drawGauges();
+  $("editor").scrollIntoView();
+}
+
+function drawRegions() {
+  const { recipe, chosen } = state;
+  const radius = state.wide / 60;
+  const parts = [];
+  recipe.regions.forEach((region, at) => {
+    const corners = region.polygon.map(([u, v]) => `${u + 0.5},${v + 0.5}`).join(" ");
+    const own = at === chosen[0] ? " chosen" : "";
+    const inside = draw("polygon", { points: corners, class: `region${own}`, "vector-effect": "non-scaling-stroke" });
+    inside.addEventListener("pointerdown", (event) => begin(event, at, -1));
+    parts.push(inside);
+  });
+  const region = recipe.regions[chosen[0]];
+  if (region) {
+    region.polygon.forEach(([u, v], corner) => {
+      const kind = `handle${corner === chosen[1] ? " chosen" : ""}`;
+      const handle = draw("circle", { cx: u + 0.5, cy: v + 0.5, r: radius, class: kind, tabindex: 0, role: "button", "aria-label": `corner ${corner + 1} of region ${region.name}: column ${u.toFixed(0)}, row ${v.toFixed(0)}` });
+      handle.addEventListener("pointerdown", (event) => begin(event, chosen[0], corner));
+      handle.addEventListener("keydown", (event) => nudge(event, corner));
+      parts.push(handle);
+    });
+    text("editor-cursor", `region ${region.name}, ${region.polygon.length} corners: drag a corner, or the region by its inside; arrow keys move the chosen corner`);
+  }
+  fill($("editor-regions"), ...parts);
+}
+
+function place(event) {
+  const box = $("editor-regions").getBoundingClientRect();
+  const { width, height } = state.recipe.camera;
+  return [(event.clientX - box.left) / box.width * width - 0.5, (event.clientY - box.top) / box.height * height - 0.5];
+}
+
+function begin(event, region, corner) {
+  event.preventDefault();
+  state.chosen = [region, Math.max(0, corner)];
+  state.drag = { region, corner, from: place(event), was: state.recipe.regions[region].polygon.map((point) => point.slice()) };
+  $("editor-regions").setPointerCapture(event.pointerId);
+  drawRegions();
+}
+
+function inside(point) {
+  const { width, height } = state.recipe.camera;
+  const bound = (at, most) => Math.round(10 * Math.min(most - 0.5, Math.max(-0.5, at))) / 10;
+  return [bound(point[0], width), bound(point[1], height)];
+}
+
+function drag(event) {
+  const { drag: held } = state;
+  if (!held) return;
+  const to = place(event);
+  const by = [to[0] - held.from[0], to[1] - held.from[1]];
+  const { polygon } = state.recipe.regions[held.region];
+  held.was.forEach((point, at) => {
+    if (held.corner < 0 || held.corner === at) polygon[at] = inside([point[0] + by[0], point[1] + by[1]]);
+  });
+  drawRegions();
+}
+
+function nudge(event, corner) {
+  const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+  if (!steps) return;
+  event.preventDefault();
+  const far = event.shiftKey ? 10 : 1;
+  const { polygon } = state.recipe.regions[state.chosen[0]];
+  state.chosen = [state.chosen[0], corner];
+  polygon[corner] = inside([polygon[corner][0] + far * steps[0], polygon[corner][1] + far * steps[1]]);
+  drawRegions();
+  $("editor-regions").querySelectorAll(".handle")[corner].focus();
+}
+
+function field(value, label, factor, set) {
+  const input = make("input", "limit");
+  input.type = "number";
+  input.step = "any";
+  input.value = value === null || value === undefined ? "" : String(Number((value * factor).toPrecision(6)));
+  input.placeholder = "none";
+  input.setAttribute("aria-label", label);
+  input.addEventListener("input", () => set(input.value === "" ? null : Number(input.value) / factor));
+  return make("td", "", input);
+}
+
+function drawGauges() {
+  const { recipe } = state;
+  const row = (gauge) => {
+    const [factor, symbol] = unit(gauge.measures);
+    const limit = (key) => (value) => { if (value === null) delete gauge[key]; else gauge[key] = value; };
+    const line = make("tr", "", make("td", "", gauge.name), make("td", "", words(gauge.measures)), make("td", "", gauge.region || "whole part"),
+      field(gauge.low, `lowest ${gauge.name} in ${symbol}`, factor, limit("low")), field(gauge.high, `highest ${gauge.name} in ${symbol}`, factor, limit("high")), make("td", "", symbol));
+    line.addEventListener("focusin", () => {
+      const at = recipe.regions.findIndex((region) => region.name === gauge.region);
+      if (at >= 0 && at !== state.chosen[0]) { state.chosen = [at, 0]; drawRegions(); }
+    });
+    return line;
+  };
+  fill($("editor-gauges"), ...recipe.gauges.map(row));
+}
+
+// A new region in the middle of the part, with a gauge that sees whether the part deviates there.
+function addRegion() {
+  const { recipe } = state;
+  const { width, height } = recipe.camera;
+  const name = (what, taken) => {
+    let number = 1;
+    while (taken.some((other) => other.name === `${what} ${number}`)) number += 1;
+    return `${what} ${number}`;
+  };
+  const region = name("region", recipe.regions);
+  const box = [[0.4, 0.4], [0.6, 0.4], [0.6, 0.6], [0.4, 0.6]].map(([x, y]) => [Math.round(x * width), Math.round(y * height)]);
+  recipe.regions.push({ name: region, polygon: box });
+  const like = recipe.gauges.find((gauge) => gauge.measures.kind === "deviation");
+  recipe.gauges.push({ name: name("deviation", recipe.gauges), region, measures: like ? Object.assign({}, like.measures) : { kind: "deviation", smoothing_px: 9 }, low: like ? like.low : -0.25, high: like ? like.high : 0.25 });
+  state.chosen = [recipe.regions.length - 1, 0];
+  drawRegions();
+  drawGauges();
+}
+
+function addCorner() {
+  const { polygon } = state.recipe.regions[state.chosen[0]];
+  const at = state.chosen[1], next = (at + 1) % polygon.length;
+  polygon.splice(at + 1, 0, inside([(polygon[at][0] + polygon[next][0]) / 2, (polygon[at][1] + polygon[next][1]) / 2]));
+  state.chosen = [state.chosen[0], at + 1];
+  drawRegions();
+}
+
+function removeCorner() {
+  const { polygon } = state.recipe.regions[state.chosen[0]];
+  if (polygon.length <= 3) { text("editor-words", "a region has at least three corners"); return; }
+  polygon.splice(state.chosen[1], 1);
+  state.chosen = [state.chosen[0], 0];
+  drawRegions();
+}
+
+function save(event) {
+  event.preventDefault();
+  const { recipe } = state;
+  const body = { fingerprint: recipe.fingerprint, name: $("editor-name").value, part_number: $("editor-part").value, regions: recipe.regions, gauges: recipe.gauges };
+  change(async () => {
+    const stored = await ask("PUT", `/api/recipes/${recipe.number}`, body);
+    recipe.fingerprint = stored.fingerprint;
+    show("editor", false);
+    notice(`recipe ${recipe.number} is stored${stored.loading ? " and is being loaded" : ""}`);
+    if (!stored.loading) window.dispatchEvent(new Event("recipes"));
+  });
+}
+
+export function start() {
+  const svg = $("editor-regions");
+  svg.addEventListener("pointermove", drag);
+  for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { state.drag = null; });
+  $("region-add").addEventListener("click", addRegion);
+  $("corner-add").addEventListener("click", addCorner);
+  $("corner-remove").addEventListener("click", removeCorner);
+  $("editor-close").addEventListener("click", () => show("editor", false));
+  $("editor-form").addEventListener("submit", save);
+}

@@ -1,0 +1,65 @@
+// Health, event log and the record of changes.
+import { $, fill, make } from "./element.js";
+import { ask } from "./api.js";
+import { count, milliseconds, moment } from "./number.js";
+import { notice } from "./session.js";
+
+let timer = 0;
+
+function line(when, words, kind) {
+  return make("li", kind || "", make("span", "when", when), make("span", "", words));
+}
+
+function known(value, unit, places = 0) {
+  return value === null || value === undefined ? "not known" : count(value.toFixed(places)) + unit;
+}
+
+function condition(now) {
+  const hours = Math.floor(now.uptime_s / 3600), minutes = Math.floor(now.uptime_s / 60) % 60;
+  const { health, result } = now;
+  const pairs = [
+    ["Measuring task", now.worker_alive ? "meets its deadlines" : "missed a deadline"],
+    ["Calibration", now.calibration_valid ? "valid" : "missing or not fitting"],
+    ["Warnings", now.warnings.length ? now.warnings.join(", ") : "none"],
+    ["Head temperature", result && result.temperature_c !== null ? `${result.temperature_c.toFixed(1)} °C` : "not known"],
+    ["Processor", `${known(health.cpu_percent, " %")}, ${known(health.cpu_temperature_c, " °C", 1)}`],
+    ["Free memory", known(health.free_memory_mib, " MiB")],
+    ["Free storage", known(health.free_storage_mib, " MiB")],
+    ["Storage errors", count(health.storage_errors)],
+    ["Camera", `${health.camera_hz.toFixed(1)} frames/s`],
+    ["Projector", `${health.projector_hz.toFixed(2)} Hz`],
+    ["Pattern to exposure", `${count(health.lag_us)} µs at most`],
+    ["Dropped frames", count(health.dropped_frames)],
+    ["Missed flips", count(health.missed_flips)],
+    ["Processing, last", milliseconds(health.processing_us)],
+    ["Processing, longest", milliseconds(health.processing_max_us)],
+    ["Modbus clients", `${health.modbus_clients}${health.writer_connected ? ", one may write" : ""}`],
+    ["Starts", `${count(health.boots)}, ${count(health.unclean_boots)} after a crash`],
+    ["Up for", `${hours} h ${String(minutes).padStart(2, "0")} min`],
+    ["Serial number", now.identity.serial],
+    ["Program", now.identity.version],
+  ];
+  return pairs.map(([name, value]) => make("div", "", make("dt", "", name), make("dd", "", value)));
+}
+
+async function refresh() {
+  try {
+    const [log, changes] = await Promise.all([ask("GET", "/api/log"), ask("GET", "/api/changes")]);
+    fill($("log-lines"), ...log.lines.map((entry) => line(entry.utc_us ? moment(entry.utc_us) : `${entry.uptime_s} s after the start`, entry.words)));
+    if (!log.lines.length) fill($("log-lines"), line("", "nothing happened yet"));
+    fill($("change-lines"), ...changes.changes.map((entry) =>
+      line(moment(entry.utc_us), `${entry.action} (${entry.subject}) from ${entry.from}: ${entry.outcome}`, entry.outcome === "done" ? "" : "refused")));
+    if (!changes.changes.length) fill($("change-lines"), line("", "nothing was changed yet"));
+  } catch (error) { notice(error.message, true); }
+}
+
+export function showDevice(now, visible) {
+  if (visible) fill($("health"), ...condition(now));
+}
+
+export function openDevice(visible) {
+  clearInterval(timer);
+  if (!visible) return;
+  refresh();
+  timer = setInterval(refresh, 2000);
+}

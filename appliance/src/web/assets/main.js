@@ -1,0 +1,105 @@
+// The page: follows the snapshots and shows each one in the view that is open.
+import { $, show, text } from "./element.js";
+import { follow } from "./stale.js";
+import { showVerdict } from "./verdict.js";
+import { showGauges } from "./gauges.js";
+import { showTimes } from "./times.js";
+import { showPicture, start as startPicture } from "./picture.js";
+import { list, showRecipes, start as startRecipes } from "./recipes.js";
+import { start as startEditor } from "./editor.js";
+import { showRegisters, start as startRegisters } from "./registers.js";
+import { openDevice, showDevice } from "./journal.js";
+import { openHistory, start as startHistory } from "./history.js";
+import { change, start as startSession } from "./session.js";
+import { ask } from "./api.js";
+import { count } from "./number.js";
+
+const VIEWS = ["live", "history", "recipes", "registers", "device"];
+const STATES = {
+  boot: ["starting", "wait"], ready: ["ready", "ready"], acquiring: ["exposing", "busy"], processing: ["computing", "busy"],
+  loading: ["loading a recipe", "busy"], teaching: ["teaching", "busy"], offline: ["offline: the PLC does not ask for it", "wait"],
+  fault: ["fault", "fault"], stopping: ["stopping", "wait"],
+};
+let view = "live";
+let last = null;
+let shown = null;
+
+function showCounters(now) {
+  for (const name of ["triggers", "missed", "sequence", "buffered"]) text(name, count(now.counters[name]));
+  $("missed-cell").classList.toggle("latched", now.missed_trigger);
+  const result = now.result;
+  const measured = result && result.valid_points > 0;
+  text("points", measured ? count(result.valid_points) : "–");
+  text("coverage", measured ? `${(result.coverage_permille / 10).toFixed(1)} %` : "–");
+  text("noise", measured ? `${(1000 * result.height_noise_mm).toFixed(1)} µm` : "–");
+  text("fitness", measured ? `${(result.fitness_permille / 10).toFixed(1)} %` : "–");
+  const notes = now.warnings.map((warning) => `warning: ${warning}`);
+  if (now.buffer_overflow) notes.push("a result was not queued: the PLC does not acknowledge");
+  if (now.warming_up) notes.push("warming up");
+  if (now.error && !now.fault) notes.push(`error ${now.error.code}: ${now.error.words}`);
+  text("notes", notes.join(" · "));
+}
+
+function showSnapshot(now) {
+  last = now;
+  const [words, kind] = STATES[now.state] || [now.state, "wait"];
+  const waiting = now.state === "ready" && !now.ready;
+  $("state").dataset.state = waiting ? "wait" : kind;
+  text("state-words", waiting ? "no recipe is active" : words);
+  text("recipe-name", now.recipe ? `recipe ${now.recipe.number} · ${now.recipe.name}` : "no recipe");
+  text("fingerprint", now.recipe ? now.recipe.fingerprint : "");
+  $("trigger").disabled = !now.ready;
+  show("fault", Boolean(now.fault));
+  if (now.fault) {
+    text("fault-code", `${now.fault.code} · ${now.fault.family}`);
+    text("fault-cause", now.fault.cause);
+    text("fault-remedy", now.fault.remedy);
+  }
+  showVerdict(now);
+  showCounters(now);
+  showRecipes(now, view === "recipes");
+  showDevice(now, view === "device");
+  const key = `${now.boot_id}/${now.result ? now.result.seq : "none"}`;
+  if (key !== shown) {
+    shown = key;
+    showGauges(now.result, now.boot_id);
+    showTimes(now.result);
+  }
+  showPicture(now.result, view === "live");
+  text("identity", `${now.identity.product} · ${now.identity.serial} · ${now.identity.version}`);
+  const hours = Math.floor(now.uptime_s / 3600), minutes = Math.floor(now.uptime_s / 60) % 60;
+  text("uptime", `up ${hours} h ${String(minutes).padStart(2, "0")} min · heartbeat ${now.heartbeat}`);
+  document.title = `${now.result && now.state === "ready" ? now.result.verdict : words} · fringed`;
+}
+
+function openView() {
+  const wanted = location.hash.slice(1);
+  if (wanted && !VIEWS.includes(wanted)) return;
+  view = wanted || "live";
+  document.body.dataset.view = view;
+  for (const name of VIEWS) show(`view-${name}`, name === view);
+  for (const link of document.querySelectorAll("nav a")) {
+    if (link.hash === `#${view}`) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current");
+  }
+  if (view === "recipes") list();
+  showRegisters(view === "registers");
+  openDevice(view === "device");
+  openHistory(view === "history");
+  if (last) {
+    showPicture(last.result, view === "live");
+    showDevice(last, view === "device");
+  }
+}
+
+startSession();
+startPicture();
+startRecipes();
+startEditor();
+startRegisters();
+startHistory();
+$("trigger").addEventListener("click", () => change(() => ask("POST", "/api/trigger")));
+$("reset").addEventListener("click", () => change(() => ask("POST", "/api/reset"), "errors are reset"));
+window.addEventListener("hashchange", openView);
+window.addEventListener("recipes", list);
+openView();
+follow(showSnapshot);

@@ -1,0 +1,49 @@
+// Numbers as people read them: always with their unit, with as many digits as mean something.
+const MINUS = "\u2212";
+const THIN = "\u202f";
+
+export function milliseconds(us) {
+  const ms = us / 1000;
+  return ms >= 1000 ? `${(ms / 1000).toFixed(2)} s` : ms >= 10 ? `${ms.toFixed(0)} ms` : `${ms.toFixed(1)} ms`;
+}
+
+export function count(number) {
+  return String(number).replace(/\B(?=(\d{3})+(?!\d))/g, THIN);
+}
+
+export function signed(value, places) {
+  return value.toFixed(places).replace("-", MINUS);
+}
+
+// What a unit needs: a factor, digits and its symbol. A share is shown in per cent.
+function form(unit) {
+  if (unit === "mm") return [1, 3, " mm"];
+  if (unit === "mm³") return [1, 2, " mm³"];
+  if (unit === "°") return [1, 3, "°"];
+  return [100, 2, " %"];
+}
+
+// A value of a gauge; a σ gets one more digit.
+export function quantity(value, unit, more = 0, bare = false) {
+  const [factor, places, symbol] = form(unit);
+  return signed(factor * value, places + more) + (bare ? "" : symbol);
+}
+
+// "0.98 … 1.02 mm", "≤ 0.25 mm" or "no limits".
+export function limits(low, high, unit) {
+  const has = (limit) => limit !== null && limit !== undefined;
+  if (has(low) && has(high)) return `${quantity(low, unit, 0, true)} … ${quantity(high, unit)}`;
+  if (has(low)) return `≥ ${quantity(low, unit)}`;
+  return has(high) ? `≤ ${quantity(high, unit)}` : "no limits";
+}
+
+export function clock(utc_us) {
+  return utc_us ? new Date(utc_us / 1000).toLocaleTimeString("en-GB") : "";
+}
+
+export function moment(utc_us) {
+  if (!utc_us) return "time not known";
+  const date = new Date(utc_us / 1000);
+  const two = (number) => String(number).padStart(2, "0");
+  return `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())} ${date.toLocaleTimeString("en-GB")}`;
+}

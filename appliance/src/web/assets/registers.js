@@ -1,0 +1,52 @@
+// The registers as the PLC reads them, once a second while somebody looks.
+import { $, fill, make } from "./element.js";
+import { ask } from "./api.js";
+import { notice } from "./session.js";
+
+const rows = new Map();
+let timer = 0;
+
+function matches(register, wanted) {
+  return !wanted || register.name.toLowerCase().includes(wanted) || register.block.toLowerCase().includes(wanted) || String(register.address).startsWith(wanted);
+}
+
+function build(registers, wanted) {
+  rows.clear();
+  const lines = [];
+  let block = "";
+  for (const register of registers.filter((one) => matches(one, wanted))) {
+    if (register.block !== block) {
+      block = register.block;
+      const head = make("th", "block", block.replace(/_/g, " ") + (register.served ? "" : " (not served by this version)"));
+      head.colSpan = 5;
+      head.scope = "rowgroup";
+      lines.push(make("tr", "", head));
+    }
+    const value = make("td", "value");
+    rows.set(register.address, value);
+    lines.push(make("tr", register.served ? "" : "quiet", make("td", "", String(register.address)), make("td", "", make("code", "", register.name)), make("td", "", register.type), value, make("td", "quiet", register.meaning)));
+  }
+  fill($("register-rows"), ...lines);
+}
+
+async function refresh(fresh) {
+  let registers;
+  try { ({ registers } = await ask("GET", "/api/registers")); } catch (error) { notice(error.message, true); return; }
+  if (fresh || !rows.size) build(registers, $("register-filter").value.trim().toLowerCase());
+  for (const register of registers) {
+    const cell = rows.get(register.address);
+    const words = register.served ? register.values.join("  ") : "–";
+    if (cell && cell.textContent !== words) cell.textContent = words;
+  }
+}
+
+export function showRegisters(visible) {
+  clearInterval(timer);
+  if (!visible) return;
+  refresh(true);
+  timer = setInterval(() => refresh(false), 1000);
+}
+
+export function start() {
+  $("register-filter").addEventListener("input", () => refresh(true));
+}

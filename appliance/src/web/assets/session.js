@@ -1,0 +1,73 @@
+// Signing in and out. Looking needs neither.
+import { $, show, text } from "./element.js";
+import { ask } from "./api.js";
+
+let signedIn = false;
+let after = null;
+
+function mark(yes) {
+  signedIn = yes;
+  text("sign", yes ? "Sign out" : "Sign in");
+  document.body.classList.toggle("signed-in", yes);
+}
+
+export async function refresh() {
+  try { mark((await ask("GET", "/api/session")).signed_in); } catch (gone) { mark(false); }
+}
+
+export function notice(words, bad = false) {
+  const element = $("notice");
+  element.classList.toggle("bad", bad);
+  text("notice", words);
+  element.hidden = !words;
+  clearTimeout(notice.timer);
+  if (words && !bad) notice.timer = setTimeout(() => { element.hidden = true; }, 8000);
+}
+
+function open(next) {
+  after = next;
+  show("sign-in", true);
+  text("sign-words", next ? "a change needs the secret of this device" : "");
+  $("secret").value = "";
+  $("secret").focus();
+  window.scrollTo(0, 0);
+}
+
+// Does something that needs a session: asks for the secret first where there is none, and says what came of it.
+export async function change(act, done) {
+  const attempt = async () => {
+    try {
+      const answer = await act();
+      if (done) notice(done);
+      return answer;
+    } catch (error) {
+      if (error.status === 401) { mark(false); open(attempt); return undefined; }
+      notice(error.message, true);
+      return undefined;
+    }
+  };
+  return signedIn ? attempt() : (open(attempt), undefined);
+}
+
+export function start() {
+  refresh();
+  $("sign").addEventListener("click", async () => {
+    if (!signedIn) { open(null); return; }
+    try { await ask("DELETE", "/api/session"); } finally { await refresh(); }
+  });
+  $("sign-cancel").addEventListener("click", () => show("sign-in", false));
+  $("sign-in").addEventListener("submit", async (event) => {
+    event.preventDefault();
+    try {
+      await ask("POST", "/api/session", { secret: $("secret").value });
+      mark(true);
+      show("sign-in", false);
+      const next = after;
+      after = null;
+      if (next) await next();
+    } catch (error) {
+      text("sign-words", error.message);
+      $("secret").select();
+    }
+  });
+}

@@ -1,0 +1,117 @@
+//! The gate in front of everything that changes something: Origin, session, and the record of what was done.
+
+use std::net::IpAddr;
+use std::time::Instant;
+
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+
+use super::problem::{Outcome, Problem};
+use super::site::Site;
+use crate::access::{Change, MAX_AGE_S, Token};
+use crate::clock;
+
+/// The session's cookie.
+const COOKIE: &str = "fringed-session";
+
+/// Who asks, put there by the server.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Peer(pub IpAddr);
+
+/// What a changing request is called in the record.
+#[derive(Clone, Copy, Debug)]
+pub struct Action(pub &'static str);
+
+/// The session's token of a request, if it carries one.
+pub fn token(headers: &HeaderMap) -> Option<&str> {
+    let cookies = headers.get_all(header::COOKIE).into_iter();
+    let mut pairs = cookies
+        .filter_map(|line| line.to_str().ok())
+        .flat_map(|line| line.split(';'))
+        .filter_map(|pair| pair.trim().split_once('='));
+    pairs
+        .find(|(name, _)| *name == COOKIE)
+        .map(|(_, value)| value)
+}
+
+/// Whether a request comes from somebody who signed in.
+pub fn is_signed_in(site: &Site, headers: &HeaderMap) -> bool {
+    token(headers).is_some_and(|token| site.access.is_signed_in(token, Instant::now()))
+}
+
+/// The cookie that keeps a session, or that ends one.
+pub fn cookie(token: Option<&Token>) -> Option<HeaderValue> {
+    let (value, age) = token.map_or(("", 0), |token| (token.text(), MAX_AGE_S));
+    let text = format!("{COOKIE}={value}; Path=/; HttpOnly; SameSite=Strict; Max-Age={age}");
+    HeaderValue::from_str(&text).ok()
+}
+
+/// Lets a request through if it comes from this device's own page: a browser names the page that a request comes from,
+/// and no page can choose that name.
+pub async fn own_page_only(request: Request, next: Next) -> Response {
+    if is_own(request.headers()) {
+        return next.run(request).await;
+    }
+    let words =
+        "a change must come from this device's own page: send its address in the Origin header";
+    Problem::new(StatusCode::FORBIDDEN, words).into_response()
+}
+
+fn is_own(headers: &HeaderMap) -> bool {
+    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
+    let origin = text(header::ORIGIN).and_then(|origin| origin.split_once("://"));
+    origin.is_some_and(|(_, place)| Some(place) == text(header::HOST))
+}
+
+/// Lets only those through who signed in, and records what came of it.
+pub async fn signed_in_only(State(site): State<Site>, request: Request, next: Next) -> Response {
+    let peer = request.extensions().get::<Peer>().copied();
+    let action = request.extensions().get::<Action>().copied();
+    let subject = request.uri().path().trim_start_matches("/api/").to_owned();
+    let response = if is_signed_in(&site, request.headers()) {
+        next.run(request).await
+    } else {
+        let words = "sign in first: POST the device's secret to /api/session";
+        Problem::new(StatusCode::UNAUTHORIZED, words).into_response()
+    };
+    let outcome = match response.extensions().get::<Outcome>() {
+        Some(Outcome(words)) => words.clone(),
+        None => "done".to_owned(),
+    };
+    let action = action.map_or("change", |Action(name)| name);
+    record(&site, peer, action, subject, outcome).await;
+    response
+}
+
+/// Writes a line of the record of changes; a record that cannot be written is told to the log.
+pub async fn record(
+    site: &Site,
+    peer: Option<Peer>,
+    action: &'static str,
+    subject: String,
+    outcome: String,
+) {
+    let written = site
+        .change(move |site| {
+            let change = Change {
+                utc_us: clock::utc_us(),
+                from: peer.map_or(IpAddr::from([0, 0, 0, 0]), |Peer(address)| address),
+                action,
+                subject: &subject,
+                outcome: &outcome,
+            };
+            let stored = site.access.changes().add(&change);
+            stored.map_err(|error| Problem::broken(error.to_string()))
+        })
+        .await;
+    if let Err(problem) = written {
+        let line = format!(
+            "record the change {action:?}: {}: free space",
+            problem.words
+        );
+        eprintln!("fringed: {line}");
+        site.log.add(&line);
+    }
+}

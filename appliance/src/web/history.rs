@@ -1,0 +1,129 @@
+//! Stored results: lists, trends, CSV and the frames that were kept.
+
+use axum::extract::{Path, Query, State};
+use axum::response::{Json, Response};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::downloads::{file, zipped};
+use super::problem::Problem;
+use super::site::Site;
+use crate::history::{Filter, HistoryError};
+use crate::station::Verdict;
+
+/// Results of one answer, unless it asks for fewer.
+const PAGE: usize = 100;
+const MAX_PAGE: usize = 1000;
+/// Values of a trend.
+const TREND: usize = 100;
+
+impl From<HistoryError> for Problem {
+    fn from(error: HistoryError) -> Self {
+        Self::broken(error.to_string())
+    }
+}
+
+/// Which results somebody asks for.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Wanted {
+    recipe: Option<u16>,
+    verdict: Option<String>,
+    part_id: Option<u32>,
+    since_us: Option<u64>,
+    until_us: Option<u64>,
+    before_seq: Option<u32>,
+    limit: Option<usize>,
+}
+
+impl Wanted {
+    fn filter(self, most: usize) -> Result<Filter, Problem> {
+        let verdict = match self.verdict.as_deref() {
+            None => None,
+            Some("PASS") => Some(Verdict::Pass),
+            Some("FAIL") => Some(Verdict::Fail),
+            Some("INVALID") => Some(Verdict::Invalid),
+            Some(other) => {
+                let words = format!("verdict={other}: write PASS, FAIL or INVALID");
+                return Err(Problem::unclear(words));
+            }
+        };
+        Ok(Filter {
+            recipe: self.recipe,
+            verdict,
+            part_id: self.part_id,
+            since_us: self.since_us,
+            until_us: self.until_us,
+            before_seq: self.before_seq,
+            limit: self.limit.unwrap_or(most).min(most),
+        })
+    }
+}
+
+pub(super) async fn list(
+    State(site): State<Site>,
+    Query(wanted): Query<Wanted>,
+) -> Result<Json<Value>, Problem> {
+    let limit = wanted.limit.unwrap_or(PAGE);
+    let mut filter = wanted.filter(MAX_PAGE)?;
+    filter.limit = filter.limit.min(limit);
+    let found = site.aside(move |site| {
+        let results = site.history.results(&filter)?;
+        // A page more of a list is still part of the same list.
+        let whole = Filter {
+            before_seq: None,
+            ..filter
+        };
+        Ok(json!({ "results": results, "counts": site.history.counts(&whole)? }))
+    });
+    found.await.map(Json)
+}
+
+/// The most results of one CSV, so that it fits into memory.
+const MAX_CSV: usize = 20_000;
+
+pub(super) async fn csv(
+    State(site): State<Site>,
+    Query(wanted): Query<Wanted>,
+) -> Result<Response, Problem> {
+    let filter = wanted.filter(MAX_CSV)?;
+    file(&site, "text/csv; charset=utf-8", move |site| {
+        let mut bytes = Vec::new();
+        site.history.csv(&filter, &mut bytes)?;
+        Ok(("history.csv".into(), bytes))
+    })
+    .await
+}
+
+pub(super) async fn recording(
+    State(site): State<Site>,
+    Path(seq): Path<u32>,
+) -> Result<Response, Problem> {
+    file(&site, "application/zip", move |site| {
+        let words = format!("the frames of result {seq} were not kept");
+        let folder = site.history.recording(seq)?;
+        let folder = folder.filter(|folder| folder.is_dir());
+        let folder = folder.ok_or_else(|| Problem::missing(words))?;
+        let failed = |error| Problem::broken(format!("pack the recording: {error}"));
+        let zip = zipped(&folder).map_err(failed)?;
+        Ok((format!("{seq}-recording.zip"), zip))
+    })
+    .await
+}
+
+/// The last values of each gauge of the active recipe.
+pub(super) async fn trends(State(site): State<Site>) -> Result<Json<Value>, Problem> {
+    let active = site
+        .station
+        .snapshot()
+        .recipe
+        .as_ref()
+        .map(|recipe| recipe.number);
+    let recipe = active.ok_or_else(|| Problem::missing("no recipe is active: load one"))?;
+    let read = site.aside(move |site| {
+        let gauges = site.history.trends(recipe, TREND)?;
+        let fitness = site.history.fitness(recipe, TREND)?;
+        Ok(json!({ "recipe": recipe, "gauges": gauges, "fitness": fitness }))
+    });
+    read.await.map(Json)
+}

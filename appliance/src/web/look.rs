@@ -1,0 +1,85 @@
+//! Answers that only look: snapshot, pictures, trends, registers, log, and whether all is well.
+
+use axum::extract::{Path, State};
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Json, Response};
+use serde_json::{Value, json};
+
+use super::map::{Map, map};
+use super::problem::Problem;
+use super::site::Site;
+use super::view;
+use crate::station::snapshot::status;
+
+/// The description of this API.
+pub const OPENAPI: &str = include_str!("openapi.json");
+
+pub(super) async fn openapi() -> impl IntoResponse {
+    ([(header::CONTENT_TYPE, "application/json")], OPENAPI)
+}
+
+pub(super) async fn snapshot(State(site): State<Site>) -> Json<Value> {
+    Json(view::snapshot(&site.station.snapshot()))
+}
+
+pub(super) async fn health(State(site): State<Site>) -> Response {
+    if site.station.snapshot().worker_alive {
+        (StatusCode::OK, "ok\n").into_response()
+    } else {
+        let words = "the measuring task missed its deadline\n";
+        (StatusCode::SERVICE_UNAVAILABLE, words).into_response()
+    }
+}
+
+pub(super) async fn readiness(State(site): State<Site>) -> Response {
+    let snapshot = site.station.snapshot();
+    if snapshot.worker_alive && snapshot.is(status::READY) {
+        return (StatusCode::OK, "ready\n").into_response();
+    }
+    let words = format!(
+        "not ready: the station is in state {}\n",
+        snapshot.state_word
+    );
+    (StatusCode::SERVICE_UNAVAILABLE, words).into_response()
+}
+
+pub(super) async fn picture(
+    State(site): State<Site>,
+    Path(layer): Path<String>,
+) -> Result<Map, Problem> {
+    site.aside(move |site| {
+        let found = site.maps.layers(site.last_seq());
+        let words = "nothing was measured yet, or the station is busy; trigger a measurement";
+        let (seq, layers) = found.ok_or_else(|| Problem::missing(words))?;
+        let (values, unit, symmetric) = match layer.as_str() {
+            "height" => (&layers.height_mm, "mm", false),
+            "deviation" => (&layers.deviation_mm, "mm", true),
+            "modulation" => (&layers.modulation, "counts", false),
+            _ => {
+                return Err(Problem::missing(
+                    "there are height, deviation and modulation",
+                ));
+            }
+        };
+        Ok(map(values, layers.width, unit, symmetric, Some(seq)))
+    })
+    .await
+}
+
+pub(super) async fn registers(State(site): State<Site>) -> Json<Value> {
+    Json((site.registers)(&site.station.snapshot()))
+}
+
+pub(super) async fn log(State(site): State<Site>) -> Json<Value> {
+    Json(json!({ "lines": site.log.latest() }))
+}
+
+pub(super) async fn changes(State(site): State<Site>) -> Result<Json<Value>, Problem> {
+    let lines = site
+        .aside(|site| {
+            let read = site.access.changes().latest();
+            read.map_err(|error| Problem::broken(format!("read the record of changes: {error}")))
+        })
+        .await?;
+    Ok(Json(json!({ "changes": lines })))
+}

@@ -1,0 +1,59 @@
+//! An answer that says what went wrong: a status and words with the remedy, as JSON.
+
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Json, Response};
+use serde_json::json;
+
+/// What went wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// The HTTP status.
+    pub status: StatusCode,
+    /// What was attempted, and the remedy.
+    pub words: String,
+}
+
+impl Problem {
+    /// With a status and words.
+    pub fn new(status: StatusCode, words: impl Into<String>) -> Self {
+        let words = words.into();
+        Self { status, words }
+    }
+
+    /// 400: the request cannot be understood.
+    pub fn unclear(words: impl Into<String>) -> Self {
+        Self::new(StatusCode::BAD_REQUEST, words)
+    }
+
+    /// 404: there is no such thing, or not yet.
+    pub fn missing(words: impl Into<String>) -> Self {
+        Self::new(StatusCode::NOT_FOUND, words)
+    }
+
+    /// 409: not now.
+    pub fn busy(words: impl Into<String>) -> Self {
+        Self::new(StatusCode::CONFLICT, words)
+    }
+
+    /// 422: understood, but it cannot be used.
+    pub fn unfit(words: impl Into<String>) -> Self {
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, words)
+    }
+
+    /// 500: this program or its machine is at fault.
+    pub fn broken(words: impl Into<String>) -> Self {
+        Self::new(StatusCode::INTERNAL_SERVER_ERROR, words)
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let mut response = (self.status, Json(json!({ "error": self.words }))).into_response();
+        response.extensions_mut().insert(Outcome(self.words));
+        response
+    }
+}
+
+/// The words of a problem, for the record of changes.
+#[derive(Clone, Debug)]
+pub struct Outcome(pub String);

@@ -1,0 +1,92 @@
+//! Signing in and out.
+
+use std::net::IpAddr;
+use std::time::Instant;
+
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Json, Response};
+use axum::{Extension, extract};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::body;
+use super::gate::{self, Peer};
+use super::problem::Problem;
+use super::site::Site;
+use crate::access::Refused;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SignIn {
+    secret: String,
+}
+
+pub(super) async fn state(State(site): State<Site>, headers: HeaderMap) -> Json<Value> {
+    Json(json!({ "signed_in": gate::is_signed_in(&site, &headers) }))
+}
+
+pub(super) async fn begin(
+    State(site): State<Site>,
+    peer: Option<Extension<Peer>>,
+    request: extract::Request<Body>,
+) -> Response {
+    let peer = peer.map(|Extension(peer)| peer);
+    match enter(&site, peer, request).await {
+        Ok(response) => response,
+        Err(problem) => problem.into_response(),
+    }
+}
+
+async fn enter(
+    site: &Site,
+    peer: Option<Peer>,
+    request: extract::Request<Body>,
+) -> Result<Response, Problem> {
+    let SignIn { secret } = body::json(request.into_body()).await?;
+    let from = peer.map_or(IpAddr::from([0, 0, 0, 0]), |Peer(address)| address);
+    let guess = site.change(move |site| Ok(site.access.sign_in(from, &secret, Instant::now())));
+    let (token, outcome) = match guess.await? {
+        Ok(token) => (Ok(token), "done".to_owned()),
+        Err(refused) => {
+            let words = refused.to_string();
+            (Err(refused), words)
+        }
+    };
+    // Who has to wait is not written down each time: that would be a way to fill the disk.
+    if !matches!(token, Err(Refused::Wait(_))) {
+        gate::record(site, peer, "sign in", "session".into(), outcome).await;
+    }
+    match token {
+        Ok(token) => Ok(with_cookie(gate::cookie(Some(&token)), true)),
+        Err(refused) => {
+            let status = match &refused {
+                Refused::Wrong => StatusCode::FORBIDDEN,
+                Refused::Wait(_) => StatusCode::TOO_MANY_REQUESTS,
+                Refused::Broken(_) => StatusCode::INTERNAL_SERVER_ERROR,
+            };
+            let mut response = Problem::new(status, refused.to_string()).into_response();
+            if let Refused::Wait(time) = refused {
+                let seconds = HeaderValue::from(time.as_secs().max(1));
+                response.headers_mut().insert(header::RETRY_AFTER, seconds);
+            }
+            Ok(response)
+        }
+    }
+}
+
+pub(super) async fn end(State(site): State<Site>, headers: HeaderMap) -> Response {
+    if let Some(token) = gate::token(&headers) {
+        site.access.sign_out(token);
+    }
+    with_cookie(gate::cookie(None), false)
+}
+
+fn with_cookie(cookie: Option<HeaderValue>, signed_in: bool) -> Response {
+    let mut response = Json(json!({ "signed_in": signed_in })).into_response();
+    if let Some(cookie) = cookie {
+        response.headers_mut().insert(header::SET_COOKIE, cookie);
+    }
+    response
+}

@@ -1,0 +1,125 @@
+//! What the page shows and may change: everything that its answers need, in one place.
+
+use std::sync::Arc;
+
+use serde_json::Value;
+use tokio::sync::Semaphore;
+
+use super::problem::Problem;
+use crate::access::Access;
+use crate::history::Reader;
+use crate::latest::LastMaps;
+use crate::logbook::Logbook;
+use crate::recipe::Store;
+use crate::station::{Snapshot, StationHandle};
+use crate::tally::Tally;
+
+/// The most pages that follow the events at a time.
+pub const MAX_FOLLOWERS: usize = 16;
+/// The most pictures, files and recipes that are worked on at a time; the measuring task needs the cores.
+const MAX_ASIDE: usize = 2;
+/// The most sign-ins, changes and records of them at a time: whoever only looks must not keep them waiting.
+const MAX_CHANGES: usize = 2;
+/// The most files that are on their way at a time: each is in memory until its client has taken it.
+const MAX_FILES: usize = 4;
+
+/// What the page is made of, handed in by the daemon.
+pub struct Parts {
+    /// The way to the station.
+    pub station: StationHandle,
+    /// Who may change something.
+    pub access: Access,
+    /// The station's recipes.
+    pub recipes: Store,
+    /// The way to the last cycle.
+    pub maps: LastMaps,
+    /// The stored results.
+    pub history: Reader,
+    /// Results since the start.
+    pub tally: Tally,
+    /// The log.
+    pub log: Logbook,
+    /// The registers with their values, as the PLC reads them.
+    pub registers: fn(&Snapshot) -> Value,
+    /// The configuration as TOML, for the diagnostic bundle.
+    pub configuration: String,
+    /// Names, besides IP addresses and `localhost`, under which the page is asked for.
+    pub hosts: Vec<String>,
+}
+
+/// The same, shared by all requests. Cheap to clone.
+#[derive(Clone)]
+pub struct Site {
+    parts: Arc<Parts>,
+    /// Places for pages that follow the events.
+    pub(super) followers: Arc<Semaphore>,
+    /// Places for files that are being taken along.
+    pub(super) files: Arc<Semaphore>,
+    looking: Arc<Semaphore>,
+    changing: Arc<Semaphore>,
+}
+
+impl std::ops::Deref for Site {
+    type Target = Parts;
+
+    fn deref(&self) -> &Parts {
+        &self.parts
+    }
+}
+
+impl Site {
+    /// The page of a station.
+    pub fn new(parts: Parts) -> Self {
+        Self {
+            parts: Arc::new(parts),
+            followers: Arc::new(Semaphore::new(MAX_FOLLOWERS)),
+            files: Arc::new(Semaphore::new(MAX_FILES)),
+            looking: Arc::new(Semaphore::new(MAX_ASIDE)),
+            changing: Arc::new(Semaphore::new(MAX_CHANGES)),
+        }
+    }
+
+    /// Looks for what takes its time on another thread, a few at a time.
+    ///
+    /// # Errors
+    /// What `work` answers.
+    pub async fn aside<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Self) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        self.queued(self.looking.clone(), work).await
+    }
+
+    /// Changes something on another thread, a few at a time.
+    ///
+    /// # Errors
+    /// What `work` answers.
+    pub async fn change<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Self) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        self.queued(self.changing.clone(), work).await
+    }
+
+    async fn queued<T: Send + 'static>(
+        &self,
+        places: Arc<Semaphore>,
+        work: impl FnOnce(&Self) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let gone = |_| Problem::broken("the page's workers are gone; restart fringed");
+        let permit = places.acquire_owned().await.map_err(gone)?;
+        let site = self.clone();
+        let done = tokio::task::spawn_blocking(move || {
+            let _permit = permit;
+            work(&site)
+        });
+        done.await
+            .map_err(|_| Problem::broken("working it out failed; see the log"))?
+    }
+
+    /// The last result's SEQ, 0 before the first.
+    pub fn last_seq(&self) -> u32 {
+        let snapshot = self.station.snapshot();
+        snapshot.result.as_ref().map_or(0, |result| result.seq)
+    }
+}

@@ -1,0 +1,175 @@
+//! What the API answers.
+
+use super::*;
+use crate::station::Event;
+use std::collections::BTreeSet;
+
+#[tokio::test]
+async fn the_description_names_exactly_the_paths_that_are_answered() {
+    let description: Value = serde_json::from_str(look::OPENAPI).unwrap();
+    assert!(description["openapi"].as_str().unwrap().starts_with("3."));
+    let mut described = BTreeSet::new();
+    for (path, methods) in description["paths"].as_object().unwrap() {
+        for (method, operation) in methods.as_object().unwrap() {
+            if method == "parameters" {
+                continue;
+            }
+            described.insert((path.clone(), method.to_uppercase()));
+            assert!(operation["summary"].is_string(), "{method} {path}");
+            assert!(operation["responses"].is_object(), "{method} {path}");
+        }
+    }
+    let mut answered = BTreeSet::new();
+    for route in router::routes() {
+        answered.insert((route.path.to_owned(), route.method.to_string()));
+        let operation = &description["paths"][route.path][route.method.as_str().to_lowercase()];
+        // Whatever needs a session says so.
+        assert_eq!(
+            operation["security"].is_array(),
+            route.changes.is_some(),
+            "{}",
+            route.path
+        );
+    }
+    assert_eq!(described, answered);
+    assert_eq!(
+        served().await.get("/api/openapi.json").await.json(),
+        description
+    );
+}
+
+#[tokio::test]
+async fn every_answer_has_a_status_that_the_description_names() {
+    let served = served().await;
+    let cookie = served.sign_in().await;
+    let description: Value = serde_json::from_str(look::OPENAPI).unwrap();
+    for route in router::routes()
+        .iter()
+        .filter(|route| route.path != "/events")
+    {
+        let path = route
+            .path
+            .replace("{number}", "1")
+            .replace("{seq}", "1")
+            .replace("{layer}", "height");
+        let method = route.method.as_str();
+        let answer = served.change(method, &path, &cookie, "{}").await;
+        let operation = &description["paths"][route.path][method.to_lowercase()];
+        let named = &operation["responses"][answer.status.to_string()];
+        assert!(
+            named.is_object(),
+            "{method} {path} answers {}: {}",
+            answer.status,
+            answer.body
+        );
+        if answer.status >= 400 && path != "/readyz" && path != "/healthz" {
+            assert!(
+                answer.json()["error"].is_string(),
+                "{method} {path}: {answer:?}"
+            );
+        }
+    }
+}
+
+#[tokio::test]
+async fn the_snapshot_is_json_with_the_state_in_words() {
+    let served = served().await;
+    assert_eq!(served.get("/readyz").await.status, 503);
+    served.handle.event(Event::Started);
+    let json = served.get("/api/snapshot").await.json();
+    assert_eq!(json["state"], "ready");
+    assert_eq!(json["result"], Value::Null);
+    assert_eq!(json["counters"]["sequence"], 4);
+    assert_eq!(served.get("/healthz").await.body, "ok\n");
+    // Ready, but without a recipe.
+    assert_eq!(served.get("/readyz").await.status, 503);
+}
+
+#[tokio::test]
+async fn metrics_are_whole_and_end_as_openmetrics_must() {
+    let served = served().await;
+    let answer = served.get("/metrics").await;
+    let kind = answer.header("content-type").unwrap();
+    assert!(kind.starts_with("application/openmetrics-text"), "{kind}");
+    assert!(answer.body.ends_with("# EOF\n"), "{}", answer.body);
+    let mut family = "";
+    for line in answer.body.lines().filter(|line| *line != "# EOF") {
+        if let Some(rest) = line.strip_prefix("# ") {
+            family = rest.split(' ').nth(1).unwrap();
+        } else {
+            assert!(line.starts_with(family), "{line} stands under {family}");
+            let value = line.rsplit(' ').next().unwrap();
+            assert!(value.parse::<f64>().is_ok(), "{line}");
+        }
+    }
+    assert!(
+        answer
+            .body
+            .contains("fringed_results_total{verdict=\"PASS\"} 0\n")
+    );
+}
+
+#[tokio::test]
+async fn what_is_not_there_yet_says_what_to_do() {
+    let served = served().await;
+    for path in [
+        "/api/last/gauges.csv",
+        "/api/recipes/3",
+        "/api/recipes/3/file",
+    ] {
+        let answer = served.get(path).await;
+        assert_eq!(answer.status, 404, "{path}");
+        assert!(
+            answer.json()["error"].as_str().unwrap().len() > 10,
+            "{path}"
+        );
+    }
+    assert_eq!(served.get("/nowhere").await.status, 404);
+    assert_eq!(served.ask("DELETE", "/metrics", &[], "").await.status, 405);
+}
+
+#[tokio::test]
+async fn a_recipe_that_is_none_is_refused_and_not_stored() {
+    let served = served().await;
+    let cookie = served.sign_in().await;
+    let answer = served
+        .change("POST", "/api/recipes", &cookie, "no recipe")
+        .await;
+    assert_eq!(answer.status, 422);
+    assert!(served.site.recipes.numbers().is_empty());
+    let answer = served
+        .change("PUT", "/api/recipes/1", &cookie, "{\"fingerprint\": 5}")
+        .await;
+    assert_eq!(answer.status, 400);
+}
+
+#[tokio::test]
+async fn the_diagnostic_bundle_holds_no_secret() {
+    let served = served().await;
+    let cookie = served.sign_in().await;
+    let bundle = served.get("/api/diagnostics.zip").await;
+    assert_eq!(bundle.status, 200);
+    for name in [
+        "snapshot.json",
+        "log.json",
+        "recipes.json",
+        "fringed.toml",
+        "metrics.txt",
+    ] {
+        assert!(bundle.body.contains(name), "{name}");
+    }
+    let token = cookie.split('=').next_back().unwrap();
+    for secret in [&*served.secret, token, "$argon2"] {
+        assert!(!bundle.body.contains(secret));
+    }
+}
+
+#[tokio::test]
+async fn a_port_in_use_is_an_error_that_names_the_address_and_the_remedy() {
+    let served = served().await;
+    let words = bind(served.address).await.unwrap_err().to_string();
+    assert!(
+        words.contains(&served.address.to_string()) && words.contains("choose another port"),
+        "{words}"
+    );
+}

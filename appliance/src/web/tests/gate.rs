@@ -1,0 +1,181 @@
+//! Who may change what.
+
+use super::*;
+
+const CHANGES: [(&str, &str); 6] = [
+    ("POST", "/api/trigger"),
+    ("POST", "/api/reset"),
+    ("POST", "/api/recipes"),
+    ("PUT", "/api/recipes/1"),
+    ("POST", "/api/recipes/1/load"),
+    ("POST", "/api/recipes/1/teach"),
+];
+
+#[tokio::test]
+async fn looking_needs_no_login_and_every_change_needs_one() {
+    let served = served().await;
+    let mut guarded = 0;
+    for route in router::routes() {
+        let path = route
+            .path
+            .replace("{number}", "1")
+            .replace("{layer}", "height")
+            .replace("{seq}", "1");
+        let method = route.method.as_str();
+        if route.path == "/events" || route.path == "/api/session" {
+            continue;
+        }
+        let answer = served
+            .change(method, &path, "fringed-session=0", "{}")
+            .await;
+        if route.changes.is_some() {
+            guarded += 1;
+            assert_eq!(answer.status, 401, "{method} {path}: {answer:?}");
+            assert!(answer.body.contains("sign in"), "{answer:?}");
+        } else {
+            assert_eq!(
+                method, "GET",
+                "{path} changes something without being recorded"
+            );
+            assert_ne!(answer.status, 401, "{path}");
+        }
+    }
+    assert_eq!(guarded, CHANGES.len());
+    assert_eq!(served.handle.snapshot().triggers, 0);
+}
+
+#[tokio::test]
+async fn a_change_from_another_site_s_page_is_refused_even_with_the_cookie() {
+    let served = served().await;
+    let cookie = served.sign_in().await;
+    for origin in ["http://evil.example", "null", "", "http://127.0.0.1:1"] {
+        for (method, path) in CHANGES {
+            let headers = [("Origin", origin), ("Cookie", &*cookie)];
+            let answer = served.ask(method, path, &headers, "{}").await;
+            assert_eq!(answer.status, 403, "{method} {path} from {origin:?}");
+        }
+    }
+    let answer = served
+        .ask("POST", "/api/trigger", &[("Cookie", &cookie)], "")
+        .await;
+    assert_eq!(answer.status, 403, "without an Origin");
+    let body = format!("{{\"secret\": \"{}\"}}", served.secret);
+    let elsewhere = [("Origin", "http://evil.example")];
+    assert_eq!(
+        served
+            .ask("POST", "/api/session", &elsewhere, &body)
+            .await
+            .status,
+        403
+    );
+}
+
+#[tokio::test]
+async fn the_cookie_is_kept_from_scripts_and_other_sites_and_ends_with_the_session() {
+    let served = served().await;
+    let body = format!("{{\"secret\": \"{}\"}}", served.secret.to_lowercase());
+    let answer = served.change("POST", "/api/session", "", &body).await;
+    let cookie = answer.header("set-cookie").unwrap().to_owned();
+    assert!(
+        cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"),
+        "{cookie}"
+    );
+    let cookie = cookie.split(';').next().unwrap();
+    let state = served
+        .ask("GET", "/api/session", &[("Cookie", cookie)], "")
+        .await;
+    assert_eq!(state.json()["signed_in"], true);
+    assert_eq!(
+        served.change("POST", "/api/reset", cookie, "").await.status,
+        202
+    );
+    assert_eq!(
+        served
+            .change("DELETE", "/api/session", cookie, "")
+            .await
+            .status,
+        200
+    );
+    assert_eq!(
+        served.change("POST", "/api/reset", cookie, "").await.status,
+        401
+    );
+}
+
+#[tokio::test]
+async fn wrong_secrets_are_refused_and_then_have_to_wait() {
+    let served = served().await;
+    for _ in 0..3 {
+        let answer = served
+            .change("POST", "/api/session", "", "{\"secret\": \"guess\"}")
+            .await;
+        assert_eq!(answer.status, 403);
+        assert!(answer.header("set-cookie").is_none());
+    }
+    let body = format!("{{\"secret\": \"{}\"}}", served.secret);
+    let answer = served.change("POST", "/api/session", "", &body).await;
+    assert_eq!(answer.status, 429);
+    assert!(
+        answer
+            .header("retry-after")
+            .unwrap()
+            .parse::<u64>()
+            .unwrap()
+            >= 1
+    );
+    assert!(answer.body.contains("wait"), "{answer:?}");
+}
+
+#[tokio::test]
+async fn every_change_and_every_refusal_is_recorded_without_secrets() {
+    let served = served().await;
+    served
+        .change("POST", "/api/session", "", "{\"secret\": \"guess\"}")
+        .await;
+    let cookie = served.sign_in().await;
+    served.change("POST", "/api/reset", &cookie, "").await;
+    served.change("POST", "/api/trigger", &cookie, "").await;
+    served.change("POST", "/api/recipes/7/load", "", "").await;
+    let answer = served.get("/api/changes").await;
+    let changes = answer.json();
+    let line = |at: usize, key: &str| changes["changes"][at][key].as_str().unwrap().to_owned();
+    assert_eq!(changes["changes"].as_array().unwrap().len(), 5);
+    assert_eq!(
+        (line(0, "action"), line(0, "subject")),
+        ("load recipe".into(), "recipes/7/load".into())
+    );
+    assert!(line(0, "outcome").contains("sign in first"));
+    assert_eq!(
+        (line(1, "action"), line(2, "action")),
+        ("trigger".into(), "reset errors".into())
+    );
+    assert!(
+        line(1, "outcome").contains("state boot"),
+        "{}",
+        line(1, "outcome")
+    );
+    assert_eq!(line(2, "outcome"), "done");
+    assert_eq!(
+        (line(3, "action"), line(3, "outcome")),
+        ("sign in".into(), "done".into())
+    );
+    assert!(line(4, "outcome").contains("not the secret"));
+    assert_eq!(line(2, "from"), "127.0.0.1");
+    assert!(!answer.body.contains(&served.secret) && !answer.body.contains("guess"));
+}
+
+#[tokio::test]
+async fn a_foreign_host_name_is_turned_away_with_the_remedy() {
+    let served = served().await;
+    let evil = served
+        .ask("GET", "/api/snapshot", &[("Host", "evil.example")], "")
+        .await;
+    assert!(
+        evil.status == 421 && evil.body.contains("IP address"),
+        "{evil:?}"
+    );
+    let configured = served
+        .ask("GET", "/api/snapshot", &[("Host", "sensor.local")], "")
+        .await;
+    assert_eq!(configured.status, 200);
+}

@@ -1,0 +1,145 @@
+//! The page's server over real HTTP on a free port.
+
+mod answers;
+mod connections;
+mod gate;
+mod page;
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Instant;
+
+use serde_json::Value;
+use tempfile::TempDir;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+
+use super::*;
+use crate::access::Access;
+use crate::history::Reader;
+use crate::recipe::Store;
+use crate::station::*;
+
+/// A station whose measuring task is silent, and its page.
+struct Served {
+    address: SocketAddr,
+    handle: StationHandle,
+    site: Site,
+    secret: String,
+    _folder: TempDir,
+}
+
+async fn served() -> Served {
+    let identity = Identity {
+        vendor: "v".into(),
+        product: "sensor".into(),
+        serial: "SN-1".into(),
+        version: "1".into(),
+    };
+    let settings = Settings {
+        next_seq: 5,
+        boot_id: 1,
+        teach_allowed: false,
+        identity: Arc::new(identity),
+        limits: Limits::default(),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let handle = StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| None);
+    let (access, secret) = Access::open(&folder.path().join("access")).unwrap();
+    let site = Site::new(Parts {
+        station: handle.clone(),
+        access,
+        recipes: Store::open(&folder.path().join("recipes")).unwrap(),
+        maps: Default::default(),
+        history: Reader::of(folder.path()),
+        tally: Default::default(),
+        log: Default::default(),
+        registers: |_| serde_json::json!({ "registers": [] }),
+        configuration: "threads = 0\n".into(),
+        hosts: vec!["sensor.local".into()],
+    });
+    let listener = bind("127.0.0.1:0".parse().unwrap()).await.unwrap();
+    let address = listener.local_addr().unwrap();
+    tokio::spawn(serve(listener, site.clone(), std::future::pending()));
+    Served {
+        address,
+        handle,
+        site,
+        secret: secret.unwrap(),
+        _folder: folder,
+    }
+}
+
+/// What came back: status, header lines in small letters, body.
+#[derive(Debug)]
+struct Answer {
+    status: u16,
+    headers: String,
+    body: String,
+}
+
+impl Answer {
+    fn json(&self) -> Value {
+        serde_json::from_str(&self.body).unwrap_or_else(|error| panic!("{error}: {self:?}"))
+    }
+
+    fn header(&self, name: &str) -> Option<&str> {
+        let lines = self.headers.lines();
+        let mut pairs = lines.filter_map(|line| line.split_once(": "));
+        pairs
+            .find(|(found, _)| *found == name)
+            .map(|(_, value)| value)
+    }
+}
+
+impl Served {
+    /// Sends one request with these header lines; the Host is this device's address unless they name one.
+    async fn ask(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &str) -> Answer {
+        let mut stream = TcpStream::connect(self.address).await.unwrap();
+        let mut text = format!("{method} {path} HTTP/1.1\r\nConnection: close\r\n");
+        if !headers.iter().any(|(name, _)| *name == "Host") {
+            text += &format!("Host: {}\r\n", self.address);
+        }
+        for (name, value) in headers {
+            text += &format!("{name}: {value}\r\n");
+        }
+        text += &format!("Content-Length: {}\r\n\r\n{body}", body.len());
+        stream.write_all(text.as_bytes()).await.unwrap();
+        let mut bytes = Vec::new();
+        stream.read_to_end(&mut bytes).await.unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        let (head, body) = text.split_once("\r\n\r\n").unwrap_or((&text, ""));
+        Answer {
+            status: head
+                .get(9..12)
+                .and_then(|status| status.parse().ok())
+                .unwrap_or(0),
+            headers: head.to_owned(),
+            body: body.to_owned(),
+        }
+    }
+
+    async fn get(&self, path: &str) -> Answer {
+        self.ask("GET", path, &[], "").await
+    }
+
+    fn origin(&self) -> String {
+        format!("http://{}", self.address)
+    }
+
+    /// A change as the page asks for it.
+    async fn change(&self, method: &str, path: &str, cookie: &str, body: &str) -> Answer {
+        let origin = self.origin();
+        let headers = [("Origin", &*origin), ("Cookie", cookie)];
+        self.ask(method, path, &headers, body).await
+    }
+
+    /// Signs in; the cookie.
+    async fn sign_in(&self) -> String {
+        let body = format!("{{\"secret\": \"{}\"}}", self.secret);
+        let answer = self.change("POST", "/api/session", "", &body).await;
+        assert_eq!(answer.status, 200, "{answer:?}");
+        let cookie = answer.header("set-cookie").unwrap();
+        cookie.split(';').next().unwrap().to_owned()
+    }
+}

@@ -1,0 +1,126 @@
+//! A cycle of the measuring task: sequence after sequence until one is good enough, then the result.
+
+use super::{ABORTED, DEVICE_TIMEOUT, Worker, code, code_of};
+use crate::benchmark::stopwatch::timed_on;
+use crate::history::FailedPart;
+use crate::plan::Plan;
+use crate::station::result::flag::STEPPED_UP;
+use crate::station::{Event, Inspection, Job, JobId, Pace, ResultRecord, error_code};
+use hal::frame::Frame;
+use hal::head::Exposure;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+impl Worker {
+    /// Runs a cycle; the frames that it was judged by.
+    pub(super) fn measure(&mut self, plan: Option<&Arc<Plan>>, job: &Job) -> Vec<Frame> {
+        let id = job.job;
+        let Some(plan) = plan else {
+            // The station triggers only with an active recipe, and that is this plan's.
+            let message = "measure: no recipe is loaded".into();
+            self.station.event(failed(id, code::RIG, message));
+            return Vec::new();
+        };
+        let (mut step, mut flags, mut cpu) = (0, 0, Duration::ZERO);
+        loop {
+            let Some(frames) = self.take(plan.indices(step), id) else {
+                return Vec::new();
+            };
+            let exposed = Instant::now();
+            step += 1;
+            let last = step >= plan.steps();
+            // The part must stay while another sequence may follow.
+            if last {
+                self.station.event(Event::ExposureDone { job: id });
+            }
+            let (mut inspection, spent) = timed_on(&self.pool, || plan.inspect(&frames, exposed));
+            cpu += spent;
+            if let Some(reason) = inspection.step_up.filter(|_| !last) {
+                self.progress
+                    .log(&format!("measuring again with more frames: {reason}"));
+                flags = STEPPED_UP;
+                continue;
+            }
+            if !last {
+                self.station.event(Event::ExposureDone { job: id });
+            }
+            inspection.flags |= flags;
+            inspection.cpu_us = u32::try_from(cpu.as_micros()).unwrap_or(u32::MAX);
+            self.publish(id, inspection, plan, &frames);
+            return frames;
+        }
+    }
+
+    /// The frames of some of the patterns; none if there are not all of them, and then the station knows why.
+    fn take(&mut self, indices: &[usize], job: JobId) -> Option<Vec<Frame>> {
+        let mut frames: Vec<Frame> = Vec::with_capacity(indices.len());
+        let (station, aborts) = (&self.station, &self.aborts);
+        let mut keep = |_, frame| {
+            frames.push(frame);
+            station.event(Event::Alive);
+            !aborts.has(job)
+        };
+        let head = &mut self.opened.head;
+        match head.acquire_while(indices, DEVICE_TIMEOUT, &mut keep) {
+            Ok(_) if frames.len() < indices.len() => {
+                let message = format!("measure: {ABORTED}");
+                self.station
+                    .event(failed(job, error_code::ABORTED, message));
+                None
+            }
+            Ok(exposure) => {
+                self.paced(indices.len(), &exposure);
+                Some(frames)
+            }
+            Err(error) => {
+                let failed = failed(job, code_of(&error), error.to_string());
+                self.fail(error, failed);
+                None
+            }
+        }
+    }
+
+    /// Hands the result to the station, and the frames of a part that did not pass to the history.
+    fn publish(&self, job: JobId, inspection: Inspection, plan: &Arc<Plan>, frames: &[Frame]) {
+        let inspection = Arc::new(inspection);
+        let after = self.station.event(Event::Finished {
+            job,
+            inspection: inspection.clone(),
+        });
+        // Not where the station no longer waited for it.
+        let published = |record: &Arc<ResultRecord>| Arc::ptr_eq(&record.inspection, &inspection);
+        if let Some(record) = after.result.clone().filter(published)
+            && self.history.wants(&record)
+        {
+            self.history.keep(FailedPart {
+                record,
+                frames: frames.to_vec(),
+                plan: plan.clone(),
+                calibration: self.opened.calibration.clone(),
+            });
+        }
+    }
+
+    /// Says how well the head kept time.
+    fn paced(&self, frames: usize, exposure: &Exposure) {
+        let us = |time: Duration| u32::try_from(time.as_micros()).unwrap_or(u32::MAX);
+        let span = exposure.done.since(exposure.started).as_secs_f64();
+        let refresh = self.opened.head.refresh().as_secs_f64();
+        // Saturating casts; a span of 0 gives the largest number.
+        self.station.event(Event::Paced(Pace {
+            camera_centihertz: (frames.saturating_sub(1) as f64 / span * 100.0) as u32,
+            refresh_millihertz: (1000.0 / refresh).round() as u32,
+            lag_us: us(exposure.lag),
+            dropped: exposure.dropped,
+            missed_flips: exposure.missed_flips,
+        }));
+    }
+}
+
+fn failed(job: JobId, error_code: u16, message: String) -> Event {
+    Event::MeasureFailed {
+        job,
+        error_code,
+        message: message.into(),
+    }
+}

@@ -1,0 +1,68 @@
+// The daemon under test: the real program on a small simulated head, with a state folder of its own.
+import { spawn } from "node:child_process";
+import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+
+const PATIENCE_MS = 60000;
+
+const head = (pixels) => `sub_rays = 2
+[rig.camera]
+width = ${pixels}
+height = ${pixels}
+`;
+
+const DENT = `[part]
+kind = "sheet_metal"
+defects = [{ kind = "dent", x = 0.0, y = -8.0, depth_mm = 0.6, diameter_mm = 14.0 }]
+`;
+
+export class Place {
+  // A head with frames of so many pixels square.
+  constructor(pixels = 256) {
+    this.folder = mkdtempSync(join(tmpdir(), "fringed-page-"));
+    this.put("good", head(pixels));
+    this.put("dented", head(pixels) + DENT);
+  }
+
+  put(name, scenario) {
+    writeFileSync(join(this.folder, `${name}-part.toml`), scenario);
+    writeFileSync(join(this.folder, `${name}.toml`), `state = "state"\n[head]\nscenario = "${name}-part.toml"\n`);
+  }
+
+  remove() { rmSync(this.folder, { recursive: true, force: true }); }
+}
+
+export class Daemon {
+  // Starts the program and waits until it says where it serves. `part` is what lies in front of the head.
+  static async start(program, place, part = "good", http = "127.0.0.1:0") {
+    const child = spawn(program, ["serve", "--config", join(place.folder, `${part}.toml`), "--modbus", "127.0.0.1:0", "--http", http], { stdio: ["ignore", "ignore", "pipe"] });
+    const daemon = new Daemon();
+    daemon.child = child;
+    daemon.log = "";
+    child.stderr.setEncoding("utf8");
+    await new Promise((resolve, reject) => {
+      const late = setTimeout(() => reject(new Error(`it does not serve:\n${daemon.log}`)), PATIENCE_MS);
+      child.on("exit", (code) => reject(new Error(`it ended with ${code}:\n${daemon.log}`)));
+      child.stderr.on("data", (text) => {
+        daemon.log += text;
+        const secret = /shown this once: (\S+)/.exec(daemon.log);
+        if (secret) daemon.secret = secret[1];
+        const page = /page on (http:\S+)/.exec(daemon.log);
+        if (page) { daemon.url = page[1]; clearTimeout(late); resolve(); }
+      });
+    });
+    return daemon;
+  }
+
+  signal(name) { this.child.kill(name); }
+
+  async end(name = "SIGTERM") {
+    if (this.child.exitCode !== null || this.child.signalCode !== null) return;
+    const gone = new Promise((resolve) => this.child.once("exit", resolve));
+    // A stopped process hears nothing but SIGKILL and SIGCONT.
+    this.child.kill("SIGCONT");
+    this.child.kill(name);
+    await gone;
+  }
+}

@@ -1,0 +1,246 @@
+// Drives the page in a real headless Chromium, as a technician would: node drive.js PROGRAM CHROMIUM [PICTURES]
+//
+// With a third argument it also takes the pictures of the README into that folder.
+import { strict as assert } from "node:assert";
+import { chromium } from "playwright-core";
+import { Daemon, Place } from "./daemon.js";
+import { pictures } from "./pictures.js";
+
+const [program, browserPath, folder] = process.argv.slice(2);
+// Longest wait for anything that must happen; nothing waits for so long when all is well.
+const PATIENCE = 30000;
+// Shift of the page's content by Chromium's measure; 0.1 is what is called good.
+const JUMPS = 0.02;
+// Two missed beats of one second, what the network may be late by, and one check of the page.
+const STALE_WITHIN = 4000;
+
+const place = new Place();
+const browser = await chromium.launch({ executablePath: browserPath, args: ["--no-sandbox"] });
+let daemon = await Daemon.start(program, place);
+const page = await (await browser.newContext({ viewport: { width: 1280, height: 800 } })).newPage();
+page.setDefaultTimeout(PATIENCE);
+// Lets a test hold the measuring task's heartbeat still, and sums up how far things on the page jump.
+await page.addInitScript(() => {
+  const parse = JSON.parse;
+  JSON.parse = (text) => {
+    const value = parse(text);
+    if (window.heldStill && value && value.heartbeat !== undefined) value.heartbeat = 7;
+    return value;
+  };
+  window.jumped = 0;
+  new PerformanceObserver((list) => list.getEntries().forEach((entry) => { window.jumped += entry.value; })).observe({ type: "layout-shift" });
+});
+const complaints = [];
+page.on("pageerror", (error) => complaints.push(error.message));
+page.on("console", (message) => {
+  // What the network says while the daemon is away, and refusals that are tested, are no faults of the page.
+  if (message.type() === "error" && !/Failed to load resource|ERR_/.test(message.text())) complaints.push(message.text());
+});
+
+async function step(name, run) {
+  const began = Date.now();
+  await run();
+  console.log(`${name}: ${Date.now() - began} ms`);
+}
+
+const verdict = (word) => page.waitForFunction((wanted) => document.querySelector("#verdict").dataset.verdict === wanted && !document.body.classList.contains("stale"), word);
+const number = async () => Number((await page.textContent("#sequence")).replace(/\D/g, ""));
+
+async function trigger() {
+  const before = await number();
+  await page.waitForSelector("#trigger:enabled");
+  await page.click("#trigger");
+  await page.waitForFunction((seq) => Number(document.querySelector("#sequence").textContent.replace(/\D/g, "")) > seq, before);
+}
+
+async function signIn(secret) {
+  await page.fill("#secret", secret);
+  await page.click("#sign-in button[type=submit]");
+}
+
+try {
+  await step("the page shows the station", async () => {
+    await page.goto(daemon.url);
+    await page.waitForSelector("#state[data-state=ready]");
+    assert.equal(await page.textContent("#word"), "NO RESULT");
+  });
+
+  await step("a change asks for the secret, a wrong one is refused, the right one is accepted", async () => {
+    await page.click("#trigger");
+    await page.waitForSelector("#sign-in:not([hidden])");
+    await signIn("AAAAA-AAAAA-AAAAA-AAAAA");
+    await page.waitForFunction(() => document.querySelector("#sign-words").textContent.includes("not the secret"));
+    assert.equal(await page.textContent("#word"), "NO RESULT");
+    await signIn(daemon.secret);
+    await verdict("PASS");
+    assert.equal(await page.textContent("#sign"), "Sign out");
+    const cookies = await page.context().cookies();
+    assert.ok(cookies[0].httpOnly && cookies[0].sameSite === "Strict", JSON.stringify(cookies));
+  });
+
+  await step("pictures, gauges, times and trends are there", async () => {
+    await trigger();
+    await verdict("PASS");
+    for (const layer of ["deviation", "modulation", "height"]) {
+      await page.click(`[data-layer=${layer}]`);
+      await page.waitForFunction(() => document.querySelector("#no-picture").hidden);
+      await page.hover("#map");
+      const unit = layer === "modulation" ? "counts" : "mm";
+      const words = await page.textContent("#cursor");
+      assert.ok(words.includes(unit) || words.includes("nothing measured"), words);
+    }
+    assert.ok(await page.locator("#gauge-rows tr").count() >= 2);
+    assert.ok(await page.locator("#gauge-rows .trend path.line").count() >= 2);
+    assert.match(await page.textContent("#total"), /\d+ m?s/);
+    assert.ok(await page.locator("#stages li").count() >= 2);
+  });
+
+  await step("nothing jumps when results come", async () => {
+    await page.evaluate(() => { window.jumped = 0; });
+    for (let cycle = 0; cycle < 3; cycle += 1) {
+      const before = await number();
+      await page.evaluate(() => fetch("/api/trigger", { method: "POST" }));
+      await page.waitForFunction((seq) => Number(document.querySelector("#sequence").textContent.replace(/\D/g, "")) > seq, before);
+      await page.waitForSelector("#state[data-state=ready]");
+    }
+    const jumped = await page.evaluate(() => window.jumped);
+    assert.ok(jumped < JUMPS, `the page jumped by ${jumped}`);
+  });
+
+  await step("a limit that is edited on the page changes the verdict", async () => {
+    await page.click("nav a[href='#recipes']");
+    await page.click("#recipe-rows tr button:has-text('Edit')");
+    await page.waitForSelector("#editor-regions .handle");
+    const limits = page.locator("#editor-gauges input[aria-label^='lowest deviation']");
+    await limits.first().fill("0.2");
+    await page.click("#editor-form button[type=submit]");
+    await page.waitForFunction(() => document.querySelector("#notice").textContent.includes("stored"));
+    await page.click("nav a[href='#live']");
+    await page.waitForSelector("#state[data-state=ready]");
+    await trigger();
+    await verdict("FAIL");
+    assert.match(await page.textContent("#sentence"), /deviation .* mm too low/);
+    assert.ok(await page.locator("#outlines .fail").count() >= 1, "the failing region is outlined");
+  });
+
+  await step("a region is dragged on the picture", async () => {
+    await page.click("nav a[href='#recipes']");
+    await page.click("#recipe-rows tr button:has-text('Edit')");
+    await page.waitForSelector("#editor-regions .handle");
+    await page.click("#region-add");
+    const handle = page.locator("#editor-regions .handle").first();
+    const box = await handle.boundingBox();
+    const label = await handle.getAttribute("aria-label");
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    await page.mouse.down();
+    await page.mouse.move(box.x - 40, box.y - 30, { steps: 4 });
+    await page.mouse.up();
+    const moved = await page.locator("#editor-regions .handle").first().getAttribute("aria-label");
+    assert.notEqual(moved, label);
+    await page.locator("#editor-regions .handle").first().focus();
+    await page.keyboard.press("ArrowLeft");
+    assert.notEqual(await page.locator("#editor-regions .handle").first().getAttribute("aria-label"), moved);
+    await page.click("#editor-form button[type=submit]");
+    await page.waitForFunction(() => document.querySelector("#editor").hidden);
+    await page.waitForSelector("#state[data-state=ready]");
+    await page.click("nav a[href='#live']");
+    await trigger();
+    await page.waitForFunction(() => document.querySelector("#gauge-rows").textContent.includes("deviation 1"));
+  });
+
+  await step("teaching shows its progress and what it gained", async () => {
+    await page.click("nav a[href='#recipes']");
+    await page.fill("#teach-as", "7");
+    await page.click("#teach button");
+    await page.waitForSelector("#teaching:not([hidden])");
+    await page.waitForFunction(() => document.querySelector("#teach-bar").value > 0.2);
+    await page.waitForSelector("#comparison:not([hidden])");
+    const rows = await page.locator("#comparison-rows tr").allTextContents();
+    assert.equal(rows.length, 2);
+    assert.match(rows.join(), /µm.*%/);
+    await page.waitForFunction(() => document.querySelector("#recipe-name").textContent.includes("recipe 7"));
+    await page.click("nav a[href='#live']");
+    await trigger();
+    await verdict("PASS");
+  });
+
+  await step("registers, history, log and changes are shown", async () => {
+    await page.click("nav a[href='#registers']");
+    await page.waitForFunction(() => document.querySelector("#register-rows").textContent.includes("RESULT_SEQ"));
+    await page.click("nav a[href='#device']");
+    await page.waitForFunction(() => document.querySelector("#change-lines").textContent.includes("teach recipe"));
+    assert.ok((await page.textContent("#log-lines")).includes("taught recipe 7"));
+    await page.click("nav a[href='#history']");
+    await page.waitForFunction(() => /\d+ FAIL/.test(document.querySelector("#history-counts").textContent));
+    await page.selectOption("#filter-verdict", "FAIL");
+    await page.click("#filter button");
+    await page.waitForFunction(() => {
+      const tags = Array.from(document.querySelectorAll("#history-rows .tag"));
+      return tags.length > 0 && tags.every((tag) => tag.textContent === "FAIL");
+    });
+    await page.click("nav a[href='#live']");
+  });
+
+  await step("files can be taken along", async () => {
+    for (const [selector, name] of [["a[href='/api/last/cloud.ply']", /\.ply$/], ["a[href='/api/last/gauges.csv']", /\.csv$/]]) {
+      const [download] = await Promise.all([page.waitForEvent("download"), page.click(selector)]);
+      assert.match(download.suggestedFilename(), name);
+    }
+  });
+
+  await step("a daemon that hangs makes the verdict STALE, and fresh again when it goes on", async () => {
+    await verdict("PASS");
+    daemon.signal("SIGSTOP");
+    await page.waitForSelector("body.stale", { timeout: STALE_WITHIN });
+    const opacity = await page.evaluate(() => getComputedStyle(document.querySelector("#stale")).opacity);
+    assert.equal(opacity, "1");
+    assert.match(await page.title(), /STALE/);
+    daemon.signal("SIGCONT");
+    await page.waitForSelector("body:not(.stale)");
+    await verdict("PASS");
+  });
+
+  await step("a measuring task whose heartbeat stands still makes the verdict STALE", async () => {
+    await page.evaluate(() => { window.heldStill = true; });
+    await page.waitForSelector("body.stale", { timeout: STALE_WITHIN });
+    assert.match(await page.textContent("#stale-words"), /heartbeat stands still/);
+    await page.evaluate(() => { window.heldStill = false; });
+    await page.waitForSelector("body:not(.stale)");
+  });
+
+  await step("the cover comes by itself when the scripts hang", async () => {
+    // Nothing of the page runs any more: only the browser's own animation is left.
+    await page.evaluate(() => { for (let id = 0; id < 10000; id += 1) clearInterval(id); });
+    daemon.signal("SIGSTOP");
+    await page.waitForFunction(() => getComputedStyle(document.querySelector("#stale")).opacity === "1", null, { timeout: STALE_WITHIN });
+    assert.equal(await page.evaluate(() => document.body.classList.contains("stale")), false);
+    daemon.signal("SIGCONT");
+    await page.reload();
+    await page.waitForSelector("#state[data-state=ready]");
+    await verdict("PASS");
+  });
+
+  await step("a daemon that is gone makes the verdict STALE, and the page finds the next one", async () => {
+    const address = new URL(daemon.url).host;
+    await daemon.end("SIGKILL");
+    await page.waitForSelector("body.stale", { timeout: STALE_WITHIN });
+    daemon = await Daemon.start(program, place, "dented", address);
+    assert.equal(daemon.secret, undefined, "the secret is shown once");
+    await page.waitForSelector("body:not(.stale)");
+    await page.waitForSelector("#state[data-state=ready]");
+    assert.equal(await page.textContent("#word"), "NO RESULT", "results of before the restart are no verdict");
+  });
+
+  assert.deepEqual(complaints, [], "the browser complains");
+  if (folder) await step("pictures", () => pictures(browser, program, folder));
+  console.log("the page does what it promises");
+} catch (error) {
+  console.error(daemon.log);
+  await page.screenshot({ path: `${place.folder}.png` }).catch(() => {});
+  console.error(`a picture of the page lies at ${place.folder}.png; the browser said: ${complaints.join("; ")}`);
+  throw error;
+} finally {
+  await browser.close();
+  await daemon.end("SIGKILL");
+  place.remove();
+}

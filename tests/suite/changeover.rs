@@ -1,0 +1,202 @@
+//! A line that changes its part between triggers: the verdict is always that of the recipe that was asked for.
+
+use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, long, trigger};
+use appliance::recipe::{Recipe, Store, archive};
+use std::fs;
+use std::time::{Duration, Instant};
+use tests::random::Random;
+
+/// Good recipes.
+const RECIPES: u16 = 20;
+/// Recipes that must not become active, and what RECIPE_RESULT says of them.
+const UNKNOWN: (u16, u16) = (21, 1);
+const CORRUPT: (u16, u16) = (22, 2);
+const FOREIGN: (u16, u16) = (23, 3);
+/// CONTROL.
+const ONLINE: u16 = 1;
+const RECIPE_LOAD: u16 = 1 << 3;
+const RECIPE_LOADING: u16 = 1 << 8;
+/// RECIPE_SELECT: by PART_NUMBER.
+const BY_PART_NUMBER: u16 = 0xFFFF;
+/// Words of VERDICT.
+const PASS: u16 = 1;
+const FAIL: u16 = 2;
+/// Switching at 1456 × 1088 pixels.
+const SWITCHING: Duration = Duration::from_secs(1);
+
+/// What a recipe must judge the good part as: known from its limits, and far from the noise of any measurement.
+fn expected(number: u16) -> u16 {
+    [PASS, FAIL][usize::from(number % 2)]
+}
+
+/// A recipe as taught, under another number and with limits that lead to its verdict.
+fn changed(
+    bytes: &[u8],
+    number: u16,
+    change: impl Fn(&mut appliance::recipe::RecipeFile),
+) -> Vec<u8> {
+    let Recipe {
+        mut file, arrays, ..
+    } = Recipe::from_bytes(bytes).unwrap();
+    file.number = number;
+    file.part_number = part_number(number);
+    if expected(number) == FAIL {
+        // The deviation of a good part is far below.
+        file.gauges[0].low = Some(0.2);
+    }
+    change(&mut file);
+    archive::pack(&file, &arrays).unwrap().0
+}
+
+fn part_number(number: u16) -> String {
+    format!("LINE-{number}")
+}
+
+/// A station with twenty recipes for the part in front of it, and three that it must refuse.
+fn place() -> Place {
+    let place = Place::new();
+    Daemon::start(&place).terminate();
+    let taught = fs::read(place.recipe()).unwrap();
+    let store = Store::open(&place.path("state/recipes")).unwrap();
+    for number in 1..=RECIPES {
+        store
+            .save(number, &changed(&taught, number, |_| ()))
+            .unwrap();
+    }
+    let mut damaged = changed(&taught, CORRUPT.0, |_| ());
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 1;
+    store.save(CORRUPT.0, &damaged).unwrap();
+    let foreign = changed(&taught, FOREIGN.0, |file| file.calibration = "0".repeat(64));
+    store.save(FOREIGN.0, &foreign).unwrap();
+    place
+}
+
+/// Selects a recipe, by number or by part number, and waits for the answer: RECIPE_RESULT.
+fn select(plc: &mut Plc, number: u16, by_part_number: bool) -> u16 {
+    let mut fields = vec![ONLINE | RECIPE_LOAD, 0, number, 0, 0, 0, 0, 0];
+    if by_part_number {
+        fields[2] = BY_PART_NUMBER;
+        let mut text = part_number(number).into_bytes();
+        text.resize(32, 0);
+        fields.extend(
+            text.chunks(2)
+                .map(|pair| u16::from_be_bytes([pair[0], pair[1]])),
+        );
+    }
+    plc.write(0, &fields);
+    plc.write(0, &[ONLINE]);
+    let done = plc.wait("RECIPE_LOADING to fall", |status| {
+        !status.has(RECIPE_LOADING)
+    });
+    done.recipe_result()
+}
+
+/// Changes the recipe at random between `cycles` triggers.
+fn change_over(cycles: u16) {
+    let place = place();
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    plc.wait("READY", |status| status.has(READY | RECIPE_OK));
+    plc.write(0, &[ONLINE]);
+    // Unhurried: each recipe once, in order.
+    let mut token = 0;
+    let mut crcs = Vec::new();
+    for number in 1..=RECIPES {
+        assert_eq!(select(&mut plc, number, false), 0);
+        token += 1;
+        let words = plc.measure(token);
+        assert_eq!((words[3], words[8]), (number, expected(number)));
+        crcs.push(long(&words, 4));
+    }
+    let mut random = Random::new(0x11E_C4A6);
+    let mut active = RECIPES;
+    let mut times = Vec::new();
+    for _ in 0..cycles {
+        let wanted = 1 + random.below(usize::from(RECIPES) + 3) as u16;
+        let began = Instant::now();
+        let answer = select(&mut plc, wanted, random.below(2) == 0 && wanted <= RECIPES);
+        times.push(began.elapsed());
+        let refused = [UNKNOWN, CORRUPT, FOREIGN]
+            .iter()
+            .find(|(number, _)| *number == wanted);
+        assert_eq!(
+            answer,
+            refused.map_or(0, |(_, answer)| *answer),
+            "recipe {wanted}"
+        );
+        if refused.is_none() {
+            active = wanted;
+        }
+        // After a refusal the recipe before goes on as if nothing had been.
+        for _ in 0..=random.below(2) {
+            token += 1;
+            let words = plc.measure(token);
+            assert_eq!(words[3], active);
+            assert_eq!(
+                long(&words, 4),
+                crcs[usize::from(active) - 1],
+                "recipe {active}"
+            );
+            assert_eq!(words[8], expected(active), "recipe {active}");
+        }
+    }
+    times.sort();
+    println!(
+        "{cycles} changes between {RECIPES} recipes: every verdict as unhurried; {:?} median, {:?} longest",
+        times[times.len() / 2],
+        times[times.len() - 1]
+    );
+}
+
+#[test]
+fn verdicts_on_a_line_that_changes_over_are_those_of_an_unhurried_run() {
+    change_over(15);
+}
+
+#[test]
+#[ignore = "minutes: `.ci/run full` does it"]
+fn verdicts_of_five_hundred_changes_are_those_of_an_unhurried_run() {
+    change_over(500);
+}
+
+#[test]
+#[ignore = "minutes: `.ci/run full` does it"]
+fn recipes_at_full_resolution_are_switched_within_a_second() {
+    let place = Place::new();
+    fs::write(
+        place.path("small.toml"),
+        "sub_rays = 1\n[rig.camera]\nwidth = 1456\nheight = 1088\n",
+    )
+    .unwrap();
+    let taught = tests::program::Program::at(env!("CARGO_BIN_EXE_fringed-under-test"));
+    let config = place.path("fringed.toml");
+    taught
+        .run(&[
+            "teach",
+            "--number",
+            "1",
+            "--config",
+            config.to_str().unwrap(),
+        ])
+        .succeeded();
+    let bytes = fs::read(place.recipe()).unwrap();
+    let store = Store::open(&place.path("state/recipes")).unwrap();
+    store.save(2, &changed(&bytes, 2, |_| ())).unwrap();
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    plc.wait("READY", |status| status.has(READY | RECIPE_OK));
+    plc.write(0, &[ONLINE]);
+    let mut times = Vec::new();
+    for at in 0..6 {
+        let number = 2 - at % 2;
+        let began = Instant::now();
+        assert_eq!(select(&mut plc, number, false), 0);
+        times.push(began.elapsed());
+        plc.write(1, &trigger(at + 1));
+        assert_eq!(plc.measure(at + 1)[3], number);
+    }
+    println!("switching at 1456 × 1088: {times:?}");
+    // Of a machine that others use as well only the shortest says what the work takes.
+    assert!(times.iter().min().unwrap() < &SWITCHING, "{times:?}");
+}

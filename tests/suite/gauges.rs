@@ -1,0 +1,432 @@
+//! Gauges, alignment and the choice of sequence on parts in front of the simulated head.
+
+use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
+use super::station_plc::{Daemon, Place, Plc, READY, SMALL_HEAD};
+use algo::inspect::{Findings, Production};
+use algo::simd::Backend;
+use appliance::plan::Plan;
+use appliance::recipe::archive::{Arrays, pack};
+use appliance::recipe::{
+    AlignmentKind, AxisFile, ComponentFile, GaugeFile, GaugeKind, Recipe, RecipeFile, RegionFile,
+};
+use appliance::seam;
+use appliance::station::{Inspection, Unit, Verdict};
+use hal::frame::Frame;
+use hal::sim::parts::{Cone, Plane, SheetMetal};
+use hal::sim::{Part, Placement, Scenario};
+use std::fs;
+use std::time::Instant;
+
+/// Mean heights are off the true ones by at most this: 8-bit rounding without other noise is below 0.01 mm per pixel, and
+/// golden is measured alike.
+const EXACT_MM: f64 = 0.01;
+/// The same after a motion was taken back: its own error comes on top.
+const ALIGNED_MM: f64 = 0.015;
+
+/// A region of the plate and one on the bead, in pixels of 256 × 256.
+const PLATE: [[f64; 2]; 4] = [[82.0, 95.0], [130.0, 95.0], [130.0, 145.0], [82.0, 145.0]];
+const BEAD: [[f64; 2]; 4] = [[90.0, 160.0], [150.0, 160.0], [150.0, 168.0], [90.0, 168.0]];
+
+pub(crate) fn gauge(name: &str, region: &str, measures: GaugeKind) -> GaugeFile {
+    GaugeFile {
+        name: name.into(),
+        region: region.into(),
+        measures,
+        low: None,
+        high: None,
+    }
+}
+
+/// A gauge of every kind but coverage, of two regions `plate` and `bead`.
+pub(crate) fn all_kinds(side: usize, tolerance_mm: f64) -> Vec<GaugeFile> {
+    let smoothing_px = side;
+    let component = |component| GaugeKind::Placement { component };
+    vec![
+        gauge(
+            "deviation",
+            "plate",
+            GaugeKind::Deviation {
+                smoothing_px: side | 1,
+            },
+        ),
+        gauge("mean", "plate", GaugeKind::MeanHeight),
+        gauge(
+            "step",
+            "bead",
+            GaugeKind::Step {
+                from: "plate".into(),
+            },
+        ),
+        gauge("tilt x", "plate", GaugeKind::Tilt { about: AxisFile::X }),
+        gauge("tilt y", "plate", GaugeKind::Tilt { about: AxisFile::Y }),
+        gauge("volume", "bead", GaugeKind::Volume { above_mm: 8.0 }),
+        gauge("z", "", component(ComponentFile::Z)),
+        gauge("x", "", component(ComponentFile::X)),
+        gauge("y", "", component(ComponentFile::Y)),
+        gauge("about x", "", component(ComponentFile::AboutX)),
+        gauge("about y", "", component(ComponentFile::AboutY)),
+        gauge("flatness", "plate", GaugeKind::Flatness { smoothing_px }),
+        gauge("range", "bead", GaugeKind::PeakToValley { smoothing_px }),
+        gauge("rms", "plate", GaugeKind::RmsDeviation { smoothing_px }),
+        gauge(
+            "share",
+            "plate",
+            GaugeKind::OutOfTolerance {
+                smoothing_px,
+                tolerance_mm,
+            },
+        ),
+    ]
+}
+
+pub(crate) fn regions(plate: [[f64; 2]; 4], bead: [[f64; 2]; 4]) -> Vec<RegionFile> {
+    [("plate", plate), ("bead", bead)]
+        .map(|(name, polygon)| RegionFile {
+            name: name.into(),
+            polygon: polygon.to_vec(),
+        })
+        .to_vec()
+}
+
+pub(crate) fn plan(bed: &Bed, file: &RecipeFile, arrays: &Arrays) -> Plan {
+    let (bytes, _) = pack(file, arrays).unwrap();
+    Plan::new(Recipe::from_bytes(&bytes).unwrap(), &bed.calibration, true).unwrap()
+}
+
+/// Frames of a step of a plan whose patterns are loaded.
+pub(crate) fn frames(bed: &mut Bed, plan: &Plan, step: usize) -> Vec<Frame> {
+    let mut frames = Vec::new();
+    let mut keep = |_, frame| frames.push(frame);
+    bed.head
+        .acquire(plan.indices(step), TIMEOUT, &mut keep)
+        .unwrap();
+    frames
+}
+
+fn inspect(bed: &mut Bed, plan: &Plan, step: usize) -> Inspection {
+    bed.head
+        .load(plan.rasters(&bed.calibration).unwrap())
+        .unwrap();
+    let frames = frames(bed, plan, step);
+    plan.inspect(&frames, Instant::now())
+}
+
+fn value(inspection: &Inspection, name: &str) -> f64 {
+    let gauge = inspection.gauges.iter().find(|gauge| &*gauge.name == name);
+    gauge
+        .unwrap()
+        .value
+        .unwrap_or_else(|| panic!("{name} has no value: {:?}", inspection.reason))
+}
+
+/// Mean of the true heights inside an upright box of pixels.
+fn true_mean(bed: &Bed, corners: [[f64; 2]; 4]) -> f64 {
+    let truth = bed.stage.truth();
+    let (mut sum, mut count) = (0.0, 0.0);
+    for v in corners[0][1] as usize..corners[2][1] as usize {
+        for u in corners[0][0] as usize..corners[2][0] as usize {
+            let z = f64::from(truth.height[v * 256 + u]);
+            if z.is_finite() {
+                sum += z;
+                count += 1.0;
+            }
+        }
+    }
+    sum / count
+}
+
+#[test]
+fn gauges_give_what_is_true_of_the_part_wherever_it_lies_within_its_tolerance() {
+    let part = Part::SheetMetal(SheetMetal::default());
+    let mut scene = scenario(part.clone());
+    scene.noise.noise_counts = 0.0;
+    let mut bed = bed(&scene);
+    let taught = taught(&mut bed).unwrap();
+    let (mean, bead) = (true_mean(&bed, PLATE), true_mean(&bed, BEAD));
+    let file = RecipeFile {
+        regions: regions(PLATE, BEAD),
+        gauges: all_kinds(5, 0.1),
+        placement_tolerance_mm: 3.0,
+        ..taught.recipe.file.clone()
+    };
+    let plan = plan(&bed, &file, &taught.recipe.arrays);
+    let places = [
+        (Placement::default(), EXACT_MM),
+        (
+            Placement {
+                shift_mm: [0.8, -0.7, 0.6],
+                tilt_deg: [0.4, -0.3],
+                rotation_deg: 0.2,
+            },
+            ALIGNED_MM,
+        ),
+    ];
+    let mut volumes = Vec::new();
+    for (place, exact) in places {
+        bed.stage.place(&part, &place).unwrap();
+        let found = inspect(&mut bed, &plan, 0);
+        assert_eq!(found.verdict(), Verdict::Pass, "{:?}", found.reason);
+        let off = |name: &str, expected: f64, tolerance: f64| {
+            let value = value(&found, name);
+            assert!(
+                (value - expected).abs() <= tolerance,
+                "{name}: {value}, true {expected}, {place:?}"
+            );
+        };
+        off("mean", mean, exact);
+        off("step", bead - mean, exact);
+        // A millimetre of error over the region of 40 mm would be 1.4 degrees.
+        off("tilt x", 0.0, exact * 1.4);
+        off("tilt y", 0.0, exact * 1.4);
+        off("deviation", 0.0, 4.0 * exact);
+        off("rms", 0.0, exact);
+        off("share", 0.0, 0.0);
+        off("flatness", 0.0, 4.0 * exact);
+        off("about x", place.tilt_deg[0], 0.02);
+        off("about y", place.tilt_deg[1], 0.02);
+        // The part turns about the origin and the motion about the middle of its surface.
+        off("x", place.shift_mm[0], 0.1);
+        off("y", place.shift_mm[1], 0.1);
+        off("z", place.shift_mm[2], 0.1);
+        // The bead's region is 8 pixels of 0.83 mm wide, its top 2.2 mm over the plate and falling to the sides.
+        let range = value(&found, "range");
+        assert!((0.1..2.2).contains(&range), "{range}");
+        volumes.push(value(&found, "volume"));
+        let units: Vec<Unit> = found.gauges.iter().map(|gauge| gauge.unit).collect();
+        assert_eq!(
+            units[1..6],
+            [
+                Unit::Length,
+                Unit::Length,
+                Unit::Angle,
+                Unit::Angle,
+                Unit::Volume
+            ]
+        );
+        let undetermined = found.placement.unwrap().undetermined();
+        assert!(undetermined.is_empty(), "{undetermined:?}");
+    }
+    // 60 × 8 pixels of 0.83 mm, foreshortened along u by cos 20°, under 1.9 mm on the mean.
+    let expected = (bead - 8.0) * 60.0 * 8.0 * 0.83 * 0.83 / 20_f64.to_radians().cos();
+    assert!(
+        (volumes[0] / expected - 1.0).abs() < 0.05,
+        "{volumes:?} {expected}"
+    );
+    assert!((volumes[1] / volumes[0] - 1.0).abs() < 0.02, "{volumes:?}");
+}
+
+#[test]
+fn findings_of_a_moved_part_depend_neither_on_strips_nor_on_threads_nor_on_the_back_end() {
+    let part = Part::SheetMetal(SheetMetal::default());
+    let mut bed = bed(&scenario(part.clone()));
+    let taught = taught(&mut bed).unwrap();
+    let mut gauges = all_kinds(5, 0.02);
+    gauges.push(gauge("coverage", "plate", GaugeKind::Coverage));
+    let file = RecipeFile {
+        regions: regions(PLATE, BEAD),
+        gauges,
+        ..taught.recipe.file.clone()
+    };
+    let plan = plan(&bed, &file, &taught.recipe.arrays);
+    let place = Placement {
+        shift_mm: [-0.6, 0.5, 0.7],
+        tilt_deg: [-0.2, 0.3],
+        rotation_deg: 0.1,
+    };
+    bed.stage.place(&part, &place).unwrap();
+    bed.head
+        .load(plan.rasters(&bed.calibration).unwrap())
+        .unwrap();
+    let frames = frames(&mut bed, &plan, 0);
+    let views: Vec<_> = frames
+        .iter()
+        .map(|frame| seam::view(frame).unwrap())
+        .collect();
+    let mut production = plan.into_production();
+    let find = |production: &Production, threads: usize, rows: usize| -> Findings {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        let mut strips = production.strips(rows);
+        let mut found = || production.inspect(&views, &mut strips, None).unwrap();
+        let first = pool.install(&mut found);
+        // Buffers that were used before change nothing.
+        assert_eq!(pool.install(&mut found), first);
+        first
+    };
+    let expected = find(&production, 1, 256);
+    assert!(
+        expected.readings.iter().all(Option::is_some),
+        "{:?}",
+        expected.readings
+    );
+    assert!(expected.placed.as_ref().unwrap().reach > 0.8);
+    for backend in Backend::available() {
+        production = production.with_backend(backend);
+        for (threads, rows) in [(1, 1), (2, 7), (2, 64)] {
+            let found = find(&production, threads, rows);
+            assert_eq!(
+                found,
+                expected,
+                "{threads} threads, {rows} rows, {}",
+                backend.name()
+            );
+        }
+    }
+}
+
+#[test]
+fn a_part_outside_its_tolerance_is_invalid_and_says_how_far() {
+    let part = Part::SheetMetal(SheetMetal::default());
+    let mut bed = bed(&scenario(part.clone()));
+    let taught = taught(&mut bed).unwrap();
+    let plan = plan(&bed, &taught.recipe.file, &taught.recipe.arrays);
+    for (x, verdict) in [(0.8, Verdict::Pass), (1.6, Verdict::Invalid)] {
+        let place = Placement {
+            shift_mm: [x, 0.0, 0.0],
+            ..Placement::default()
+        };
+        bed.stage.place(&part, &place).unwrap();
+        let found = inspect(&mut bed, &plan, 0);
+        assert_eq!(
+            found.verdict(),
+            verdict,
+            "{x}: {:?} {:?}",
+            found.reason,
+            found.gauges
+        );
+        let reach = found.placement.unwrap().reach_mm;
+        assert!((reach - x).abs() < 0.1, "{x}: {reach}");
+        if verdict == Verdict::Invalid {
+            let reason = found.reason.unwrap();
+            assert!(
+                reason.contains("off its place") && reason.contains("1.00 mm"),
+                "{reason}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_component_that_the_shape_does_not_determine_is_invalid_and_is_named() {
+    let mut bed = bed(&scenario(Part::Plane(Plane::default())));
+    let taught = taught(&mut bed).unwrap();
+    let file = RecipeFile {
+        gauges: vec![
+            gauge(
+                "z",
+                "",
+                GaugeKind::Placement {
+                    component: ComponentFile::Z,
+                },
+            ),
+            gauge(
+                "x",
+                "",
+                GaugeKind::Placement {
+                    component: ComponentFile::X,
+                },
+            ),
+        ],
+        ..taught.recipe.file.clone()
+    };
+    let plan = plan(&bed, &file, &taught.recipe.arrays);
+    let found = inspect(&mut bed, &plan, 0);
+    assert_eq!(
+        found.placement.unwrap().undetermined(),
+        ["x", "y", "about z"]
+    );
+    assert!(found.gauges[0].value.is_some() && found.gauges[1].value.is_none());
+    assert_eq!(found.verdict(), Verdict::Invalid);
+    let reason = found.reason.unwrap();
+    assert!(reason.contains("x, y, about z"), "{reason}");
+}
+
+#[test]
+fn the_shortest_sequence_will_do_for_a_part_in_place_and_not_for_one_out_of_it() {
+    let part = Part::Cone(Cone::default());
+    let mut bed = bed(&scenario(part.clone()));
+    let taught = taught(&mut bed).unwrap();
+    let file = RecipeFile {
+        production: 0,
+        ..taught.recipe.file.clone()
+    };
+    let plan = plan(&bed, &file, &taught.recipe.arrays);
+    assert_eq!(plan.steps(), 3);
+    let counts: Vec<usize> = (0..3).map(|step| plan.indices(step).len()).collect();
+    assert_eq!(counts, [3, 6, 12]);
+    let place = |bed: &Bed, z: f64| {
+        let placement = Placement {
+            shift_mm: [0.0, 0.0, z],
+            ..Placement::default()
+        };
+        bed.stage.place(&part, &placement).unwrap();
+    };
+    let flags = |found: &Inspection| found.flags & 0b1110;
+    place(&bed, 0.3);
+    let found: Vec<Inspection> = (0..3).map(|step| inspect(&mut bed, &plan, step)).collect();
+    assert_eq!(
+        [0, 1, 2].map(|step| flags(&found[step])),
+        [0b10, 0b100, 0b1000]
+    );
+    let z = |found: &Inspection| found.placement.unwrap().shift_mm[2];
+    for found in &found[1..] {
+        assert_eq!(found.step_up, None);
+        assert!((z(found) - 0.3).abs() < 0.02, "{}", z(found));
+    }
+    // Beyond the tolerance short sequences may lie: the full one measures how far, and it is the last.
+    place(&bed, 2.0);
+    let short = inspect(&mut bed, &plan, 1);
+    assert!(short.step_up.is_some());
+    let full = inspect(&mut bed, &plan, 2);
+    assert_eq!(full.step_up, None);
+    assert!((z(&full) - 2.0).abs() < 0.05, "{}", z(&full));
+    assert_eq!(full.verdict(), Verdict::Invalid);
+}
+
+#[test]
+fn a_recipe_without_the_key_is_not_aligned() {
+    let mut bed = bed(&scenario(Part::SheetMetal(SheetMetal::default())));
+    let taught = taught(&mut bed).unwrap();
+    let mut manifest = serde_json::to_value(&taught.recipe.file).unwrap();
+    assert_eq!(manifest["alignment"], "rigid");
+    manifest.as_object_mut().unwrap().remove("alignment");
+    let file: RecipeFile = serde_json::from_value(manifest).unwrap();
+    assert_eq!(file.alignment, AlignmentKind::None);
+    let plan = plan(&bed, &file, &taught.recipe.arrays);
+    let found = inspect(&mut bed, &plan, 0);
+    assert_eq!(found.verdict(), Verdict::Pass);
+    assert!(found.placement.is_none());
+}
+
+#[test]
+fn a_part_that_the_short_sequence_cannot_vouch_for_is_measured_again_within_the_same_cycle() {
+    let scene = format!("{SMALL_HEAD}\n[part]\nkind = \"cone\"\n");
+    let scenario = Scenario::from_toml(&scene, "scene").unwrap();
+    let taught = taught(&mut bed(&scenario)).unwrap();
+    let file = RecipeFile {
+        production: 2,
+        ..taught.recipe.file.clone()
+    };
+    let place = Place::new();
+    fs::create_dir_all(place.recipe().parent().unwrap()).unwrap();
+    let (bytes, _) = pack(&file, &taught.recipe.arrays).unwrap();
+    fs::write(place.recipe(), bytes).unwrap();
+    // Twice as far as the recipe's tolerance.
+    let away = format!("{scene}\n[placement]\nshift_mm = [0.0, 0.0, 2.0]\n");
+    fs::write(place.path("small.toml"), away).unwrap();
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    plc.wait("READY", |status| status.has(READY));
+    let words = plc.measure(7);
+    let status = plc.status();
+    assert_eq!(
+        (status.seq(), status.triggers()),
+        (1, 1),
+        "one trigger, one result"
+    );
+    // Full sequence, stepped up, simulated head; the part is found to lie outside.
+    assert_eq!(words[31] & 0b11_1110, 0b11_1000, "{:b}", words[31]);
+    assert_eq!(words[8], Verdict::Invalid.number());
+}

@@ -1,0 +1,290 @@
+//! The history across kill -9, and the way from a failed part to its replay.
+
+use crate::station_plc::{Daemon, Place, Plc, READY, long, trigger};
+use appliance::history::{Filter, Reader, seqs};
+use appliance::station::Verdict;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use tests::program::{Program, Run};
+use tests::random::Random;
+
+/// Words of VERDICT.
+const FAIL: u16 = 2;
+/// Longest wait for the history's own threads.
+const WRITTEN: Duration = Duration::from_secs(30);
+
+fn program() -> Program {
+    Program::at(env!("CARGO_BIN_EXE_fringed-under-test"))
+}
+
+fn reader(place: &Place) -> Reader {
+    Reader::of(&place.path("state"))
+}
+
+fn all() -> Filter {
+    Filter {
+        limit: usize::MAX,
+        ..Filter::default()
+    }
+}
+
+/// Kills a measuring daemon `times` times at random moments; the PLC remembers every SEQ that it was shown.
+fn kills(times: usize) {
+    let place = Place::new();
+    let mut random = Random::new(0x5EED_0019);
+    let mut shown: Vec<u32> = Vec::new();
+    // The last that was shown before each kill: it may have been in flight.
+    let mut in_flight: Vec<u32> = Vec::new();
+    let mut skipped = 0;
+    for _ in 0..times {
+        let daemon = Daemon::start(&place);
+        let mut plc = Plc::connect(&daemon);
+        let before = plc.wait("READY", |status| status.has(READY)).seq();
+        assert!(
+            shown.last().is_none_or(|&last| before >= last),
+            "a SEQ comes back"
+        );
+        skipped += before - shown.last().copied().unwrap_or(0);
+        for token in 1..=1 + (random.below(4) as u16) {
+            shown.push(long(&plc.measure(token), 0));
+        }
+        // One more is under way, anywhere from its trigger to behind its result.
+        plc.wait("READY", |status| status.has(READY));
+        plc.write(1, &trigger(100));
+        let moment = Duration::from_micros(random.below(20_000) as u64);
+        let triggered = Instant::now();
+        while triggered.elapsed() < moment {
+            let words = plc.read(200, 20).unwrap();
+            if words[2] == 100 && shown.last() != Some(&long(&words, 0)) {
+                shown.push(long(&words, 0));
+            }
+        }
+        daemon.kill();
+        in_flight.extend(shown.last());
+    }
+    let daemon = Daemon::start(&place);
+    assert_eq!(daemon.terminate().code(), Some(0));
+    assert!(
+        shown.is_sorted_by(|a, b| a < b),
+        "a SEQ was used twice: {shown:?}"
+    );
+    let mut stored: Vec<u32> = reader(&place)
+        .results(&all())
+        .unwrap()
+        .iter()
+        .map(|entry| entry.seq)
+        .collect();
+    stored.reverse();
+    assert!(
+        stored.is_sorted_by(|a, b| a < b),
+        "a SEQ is stored twice: {stored:?}"
+    );
+    let missing = |seq: &&u32| !stored.contains(seq);
+    let lost: Vec<_> = shown.iter().filter(missing).collect();
+    assert!(
+        lost.iter().all(|seq| in_flight.contains(seq)),
+        "lost: {lost:?}"
+    );
+    assert!(skipped <= seqs::AHEAD * times as u32);
+    println!(
+        "{times} kills: {} results shown, {} of them in flight and lost, {skipped} SEQs skipped, none used twice",
+        shown.len(),
+        lost.len()
+    );
+}
+
+#[test]
+fn kill_9_loses_at_most_the_result_in_flight_and_no_seq_comes_back() {
+    kills(6);
+}
+
+#[test]
+#[ignore = "minutes: `.ci/run full` does it"]
+fn many_kills_lose_at_most_the_result_in_flight_and_no_seq_comes_back() {
+    kills(200);
+}
+
+/// A station that was taught a good part and then sees one with a dent.
+fn place_with_a_dent() -> Place {
+    let place = Place::new();
+    Daemon::start(&place).terminate();
+    let scenario = fs::read_to_string(place.path("small.toml")).unwrap();
+    let dent = "{ kind = \"dent\", x = 0.0, y = -8.0, depth_mm = 0.9, diameter_mm = 14.0 }";
+    let part = format!("{scenario}\n[part]\nkind = \"sheet_metal\"\ndefects = [{dent}]\n");
+    fs::write(place.path("small.toml"), part).unwrap();
+    place
+}
+
+/// The recording of a result, once it is linked.
+fn recording(place: &Place, seq: u32) -> PathBuf {
+    let started = Instant::now();
+    loop {
+        if let Some(folder) = reader(place).recording(seq).unwrap() {
+            return folder;
+        }
+        assert!(started.elapsed() < WRITTEN, "no recording of result {seq}");
+        std::thread::yield_now();
+    }
+}
+
+fn replay(folder: &Path, more: &[&str]) -> Run {
+    let mut arguments = vec!["replay", folder.to_str().unwrap()];
+    arguments.extend(more);
+    program().run(&arguments)
+}
+
+#[test]
+fn a_failed_part_is_kept_and_replays_bit_by_bit_and_a_difference_is_said() {
+    let place = place_with_a_dent();
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    let words = plc.measure(9);
+    assert_eq!(words[8], FAIL);
+    let folder = recording(&place, long(&words, 0));
+    daemon.kill();
+    let entry = reader(&place).result(long(&words, 0)).unwrap().unwrap();
+    assert_eq!((entry.verdict, entry.part_id), (Verdict::Fail, 0x10009));
+    assert_eq!(entry.gauges.len(), usize::from(words[27]));
+    let first = entry.gauges[0].value.unwrap();
+    assert_eq!(
+        (first as f32).to_bits(),
+        long(&words, 64),
+        "the same value as in the registers"
+    );
+
+    let run = replay(&folder, &[]).succeeded();
+    assert!(
+        run.stdout.contains("FAIL") && run.stdout.contains("bit by bit"),
+        "{}",
+        run.stdout
+    );
+    // With one thread as with many.
+    replay(&folder, &["--threads", "1"]).succeeded();
+
+    // One frame that is another's.
+    fs::copy(folder.join("frames/000.png"), folder.join("frames/003.png")).unwrap();
+    let run = replay(&folder, &[]);
+    assert_eq!(run.code, 70, "{}", run.stderr);
+    assert!(
+        run.stderr.contains("differs from result 1"),
+        "{}",
+        run.stderr
+    );
+
+    // Elsewhere nothing is known of it, but it can be judged.
+    let elsewhere = place.path("elsewhere");
+    fs::rename(&folder, &elsewhere).unwrap();
+    let state = place.path("state");
+    let run = replay(&elsewhere, &["--state", state.to_str().unwrap()]);
+    assert_eq!(run.code, 66, "{}", run.stderr);
+    assert!(
+        run.stdout.contains("FAIL") && run.stderr.contains("compared with nothing"),
+        "{}",
+        run.stderr
+    );
+}
+
+#[test]
+fn the_history_is_shown_and_exported_while_the_station_runs() {
+    let place = place_with_a_dent();
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    let seq = long(&plc.measure(9), 0);
+    recording(&place, seq);
+    let state = place.path("state");
+    let history = |more: &[&str]| {
+        let mut arguments = vec!["history", "--state", state.to_str().unwrap()];
+        arguments.extend(more);
+        program().run(&arguments)
+    };
+    let shown = history(&[]).succeeded().stdout;
+    assert!(
+        shown.contains("FAIL") && shown.contains("deviation -"),
+        "{shown}"
+    );
+    let csv = history(&["--csv", "--verdict", "fail"]).succeeded().stdout;
+    assert_eq!(csv.lines().count(), 2, "{csv}");
+    assert_eq!(
+        history(&["--csv", "--verdict", "pass"])
+            .succeeded()
+            .stdout
+            .lines()
+            .count(),
+        1
+    );
+    let json = history(&["--json", "--recipe", "1"]).succeeded().stdout;
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["results"][0]["verdict"], "FAIL");
+    assert_eq!(json["results"][0]["gauges"][0]["name"], "deviation");
+    assert_eq!(history(&["--verdict", "good"]).code, 64);
+    assert_eq!(daemon.terminate().code(), Some(0));
+    let nothing = place.path("nothing");
+    let run = program().run(&["history", "--state", nothing.to_str().unwrap()]);
+    assert_eq!(run.code, 66, "{}", run.stderr);
+}
+
+#[test]
+fn recipes_are_listed_exported_imported_and_deleted_and_nothing_damaged_or_foreign_comes_in() {
+    let place = Place::new();
+    let daemon = Daemon::start(&place);
+    let config = place.path("fringed.toml");
+    let recipe = |more: &[&str]| {
+        let mut arguments = vec!["recipe", "--config", config.to_str().unwrap()];
+        arguments.extend(more);
+        program().run(&arguments)
+    };
+    let file = place.path("one.recipe");
+    let file = file.to_str().unwrap();
+    recipe(&["export", "1", file]).succeeded();
+    let exported = fs::read(file).unwrap();
+    assert_eq!(exported, fs::read(place.recipe()).unwrap());
+    recipe(&["delete", "1"]).succeeded();
+    assert_eq!(recipe(&["delete", "1"]).code, 66);
+    assert!(!place.recipe().exists());
+    // The station goes on with what it has loaded.
+    let mut plc = Plc::connect(&daemon);
+    assert_eq!(plc.measure(3)[8], 1);
+
+    let mut damaged = exported.clone();
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 1;
+    for (content, words) in [
+        (&damaged[..], "checksum"),
+        (&exported[..999], "recipe"),
+        (b"", "recipe"),
+    ] {
+        fs::write(file, content).unwrap();
+        let run = recipe(&["import", file]);
+        assert_eq!(run.code, 65, "{}", run.stderr);
+        assert!(
+            run.stderr.contains(words) && run.stderr.contains("one.recipe"),
+            "{}",
+            run.stderr
+        );
+    }
+    assert_eq!(recipe(&["import", "/no/such.recipe"]).code, 66);
+    fs::write(file, &exported).unwrap();
+    let foreign = program().run(&[
+        "recipe",
+        "import",
+        file,
+        "--state",
+        place.path("other").to_str().unwrap(),
+    ]);
+    assert_eq!(foreign.code, 65, "{}", foreign.stderr);
+    assert!(foreign.stderr.contains("calibration"), "{}", foreign.stderr);
+    assert!(!place.recipe().exists());
+    recipe(&["import", file]).succeeded();
+    recipe(&["import", file]).succeeded();
+    assert_eq!(fs::read(place.recipe()).unwrap(), exported);
+    let listed = recipe(&["list", "--json"]).succeeded().stdout;
+    let listed: serde_json::Value = serde_json::from_str(&listed).unwrap();
+    let only = &listed["recipes"][0];
+    assert_eq!(
+        (&only["number"], &only["previous"]),
+        (&1.into(), &true.into())
+    );
+    assert_eq!(only["bytes"], exported.len());
+    assert!(recipe(&["list"]).succeeded().stdout.contains("PART-0001"));
+}

@@ -1,0 +1,217 @@
+//! The page's API on the real program: what a technician changes there, the PLC sees.
+
+use crate::station_plc::{Daemon, PATIENCE, Place, Plc};
+use serde_json::{Value, json};
+use std::io::{Read as _, Write as _};
+use std::net::{SocketAddr, TcpStream};
+use std::time::Instant;
+
+const PASS: u16 = 1;
+const FAIL: u16 = 2;
+
+/// A browser without a page: one request per connection, and a cookie.
+struct Browser {
+    address: SocketAddr,
+    cookie: String,
+}
+
+impl Browser {
+    fn new(daemon: &Daemon) -> Self {
+        Self {
+            address: daemon.http,
+            cookie: String::new(),
+        }
+    }
+
+    /// Status and body.
+    fn ask(&mut self, method: &str, path: &str, body: &[u8]) -> (u16, Vec<u8>) {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let head = format!(
+            "{method} {path} HTTP/1.1\r\nHost: {0}\r\nOrigin: http://{0}\r\nCookie: {1}\r\nContent-Length: {2}\r\n\
+             Connection: close\r\n\r\n",
+            self.address,
+            self.cookie,
+            body.len()
+        );
+        stream.write_all(head.as_bytes()).unwrap();
+        // A request that is refused may be answered before its body is read.
+        let _ = stream.write_all(body);
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).unwrap();
+        let end = answer
+            .windows(4)
+            .position(|four| four == b"\r\n\r\n")
+            .unwrap();
+        let head = String::from_utf8_lossy(&answer[..end]).into_owned();
+        for line in head.lines() {
+            if let Some(cookie) = line.strip_prefix("set-cookie: ") {
+                self.cookie = cookie.split(';').next().unwrap().to_owned();
+            }
+        }
+        let status = head[9..12].parse().unwrap();
+        (status, answer[end + 4..].to_vec())
+    }
+
+    fn json(&mut self, method: &str, path: &str, body: &Value) -> (u16, Value) {
+        let (status, answer) = self.ask(method, path, body.to_string().as_bytes());
+        (status, serde_json::from_slice(&answer).unwrap())
+    }
+
+    fn get(&mut self, path: &str) -> Value {
+        let (status, answer) = self.ask("GET", path, &[]);
+        assert_eq!(status, 200, "{path}: {}", String::from_utf8_lossy(&answer));
+        serde_json::from_slice(&answer).unwrap()
+    }
+
+    fn sign_in(&mut self, daemon: &Daemon) {
+        let (_, rest) = daemon.log.split_once("shown this once: ").unwrap();
+        let secret = rest.split(' ').next().unwrap();
+        let body = json!({ "secret": secret });
+        assert_eq!(self.json("POST", "/api/session", &body).0, 200);
+    }
+
+    /// Waits until the station is ready with a recipe whose fingerprint is not `before`.
+    fn wait_for_another(&mut self, before: &str) -> String {
+        let started = Instant::now();
+        loop {
+            let snapshot = self.get("/api/snapshot");
+            let now = snapshot["recipe"]["fingerprint"].as_str().unwrap_or(before);
+            if snapshot["ready"] == true && !before.starts_with(now) {
+                return now.to_owned();
+            }
+            assert!(started.elapsed() < PATIENCE, "{snapshot}");
+        }
+    }
+}
+
+#[test]
+fn limits_that_are_edited_on_the_page_change_the_verdict_and_the_fingerprint() {
+    let place = Place::new();
+    let daemon = Daemon::start(&place);
+    let mut browser = Browser::new(&daemon);
+    let mut plc = Plc::connect(&daemon);
+    assert_eq!(plc.measure(1)[8], PASS);
+    let recipe = browser.get("/api/recipes/1");
+    let mut gauges = recipe["gauges"].clone();
+    gauges[0]["low"] = json!(0.2);
+    let mut edit =
+        json!({ "fingerprint": recipe["fingerprint"], "gauges": gauges, "name": "bracket" });
+    let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
+    assert_eq!(status, 401, "without a login: {answer}");
+    browser.sign_in(&daemon);
+    let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
+    assert_eq!(status, 200, "{answer}");
+    let before = recipe["fingerprint"].as_str().unwrap();
+    let fingerprint = browser.wait_for_another(before);
+    assert!(
+        answer["fingerprint"]
+            .as_str()
+            .unwrap()
+            .starts_with(&fingerprint)
+    );
+    assert_eq!(plc.measure(2)[8], FAIL);
+    // Who looked at the recipe before somebody else changed it does not undo that.
+    edit["name"] = json!("other");
+    let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
+    assert_eq!(status, 409, "{answer}");
+    assert_eq!(browser.get("/api/recipes/1")["name"], "bracket");
+}
+
+#[test]
+fn an_edit_that_makes_no_recipe_is_refused_in_words_and_changes_nothing() {
+    let place = Place::new();
+    let daemon = Daemon::start(&place);
+    let mut browser = Browser::new(&daemon);
+    browser.sign_in(&daemon);
+    let recipe = browser.get("/api/recipes/1");
+    let region = json!({ "name": "line", "polygon": [[1.0, 1.0], [2.0, 2.0]] });
+    for (key, value) in [
+        ("name", json!("")),
+        ("name", json!("x".repeat(100))),
+        ("part_number", json!("ä")),
+        ("min_coverage", json!(1.5)),
+        ("gauges", json!([])),
+        ("regions", json!([])),
+        ("regions", json!([region])),
+        (
+            "regions",
+            json!([recipe["regions"][0], recipe["regions"][0]]),
+        ),
+    ] {
+        let edit = json!({ "fingerprint": recipe["fingerprint"], key: value });
+        let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
+        assert_eq!(status, 422, "{key}: {answer}");
+        assert!(
+            answer["error"].as_str().unwrap().len() > 10,
+            "{key}: {answer}"
+        );
+    }
+    let unknown = json!({ "fingerprint": recipe["fingerprint"], "threads": 4 });
+    assert_eq!(browser.json("PUT", "/api/recipes/1", &unknown).0, 400);
+    assert_eq!(browser.get("/api/recipes/1"), recipe);
+}
+
+#[test]
+fn an_exported_recipe_comes_back_by_import_and_a_damaged_one_does_not() {
+    let place = Place::new();
+    let daemon = Daemon::start(&place);
+    let mut browser = Browser::new(&daemon);
+    browser.sign_in(&daemon);
+    let (status, mut file) = browser.ask("GET", "/api/recipes/1/file", &[]);
+    assert_eq!((status, &file[..2]), (200, &b"PK"[..]));
+    let (status, _) = browser.ask("POST", "/api/recipes", &file);
+    assert_eq!(status, 201);
+    let middle = file.len() / 2;
+    file[middle] ^= 0x10;
+    let (status, answer) = browser.ask("POST", "/api/recipes", &file);
+    let words = String::from_utf8(answer).unwrap();
+    assert!(
+        status == 422 && words.contains("export the recipe again"),
+        "{status} {words}"
+    );
+    let recipes = browser.get("/api/recipes");
+    assert_eq!(recipes["recipes"].as_array().unwrap().len(), 1);
+    assert!(recipes["recipes"][0]["error"].is_null(), "{recipes}");
+}
+
+#[test]
+fn pictures_and_files_of_the_last_part_belong_to_its_result() {
+    let place = Place::new();
+    let daemon = Daemon::start(&place);
+    let mut browser = Browser::new(&daemon);
+    assert_eq!(browser.ask("GET", "/api/picture/height", &[]).0, 404);
+    Plc::connect(&daemon).measure(1);
+    for layer in ["height", "deviation", "modulation"] {
+        let (status, words) = browser.ask("GET", &format!("/api/picture/{layer}"), &[]);
+        assert_eq!((status, words.len()), (200, 2 * 160 * 160), "{layer}");
+        let known = words
+            .chunks(2)
+            .filter(|word| **word != [0xFF, 0xFF])
+            .count();
+        assert!(known > 1000, "{layer}: {known}");
+    }
+    let (status, cloud) = browser.ask("GET", "/api/last/cloud.ply", &[]);
+    assert!(status == 200 && cloud.starts_with(b"ply\n"));
+    let (status, recording) = browser.ask("GET", "/api/last/recording.zip", &[]);
+    assert!(status == 200 && recording.starts_with(b"PK"));
+    let names = String::from_utf8_lossy(&recording);
+    assert!(names.contains("recording.json") && names.contains("frames/000.png"));
+    let started = Instant::now();
+    // The history is written beside the cycle.
+    while browser.get("/api/history")["results"]
+        .as_array()
+        .unwrap()
+        .is_empty()
+    {
+        assert!(
+            started.elapsed() < PATIENCE,
+            "the result is not in the history"
+        );
+    }
+    assert_eq!(browser.get("/api/history")["counts"]["pass"], 1);
+    assert_eq!(
+        browser.get("/api/trends")["gauges"][0]["points"][0]["seq"],
+        1
+    );
+}

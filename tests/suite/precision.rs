@@ -1,0 +1,199 @@
+//! How well gauges repeat against what they say of themselves, and defects against good parts that lie anywhere.
+
+use super::gauges::{all_kinds, frames, gauge, plan, regions};
+use super::placement::{Bed, TIMEOUT, bed};
+use appliance::plan::Plan;
+use appliance::recipe::teach::{Naming, Taught, teach};
+use appliance::recipe::{GaugeKind, RecipeFile};
+use appliance::station::{Inspection, Verdict};
+use hal::sim::parts::{Defect, SheetMetal};
+use hal::sim::{Part, Placement, Scenario};
+use std::time::Instant;
+use tests::random::Random;
+
+/// Repeatability of what is linear in height against the prediction; that of 200 values is known to 5 %.
+const LINEAR: f64 = 0.20;
+/// The same of extremes and shares against their models.
+const OTHERS: f64 = 0.30;
+const REPEATS: usize = 200;
+/// Parts lie up to this much off in each direction, and are tilted about x and y.
+const SHIFT_MM: f64 = 1.0;
+const TILT_DEG: f64 = 0.5;
+/// The farthest corner then goes √3 mm by the shift, and 70 mm from the middle 0.9 mm by the tilts.
+const TOLERANCE_MM: f64 = 3.0;
+/// Deviations are averaged over 7 pixels of 0.66 mm, 4.6 mm: a dent of 0.3 mm and 8 mm is 0.16 mm deep on that mean.
+const SIDE: usize = 7;
+const LIMIT_MM: f64 = 0.1;
+const DEPTH_MM: f64 = 0.3;
+const DIAMETER_MM: f64 = 8.0;
+
+/// 320 × 240 pixels: the study's field of view, and a second for each ten placements.
+fn small() -> (Bed, Taught) {
+    let mut scenario = Scenario::default();
+    let camera = &mut scenario.rig.camera;
+    (camera.width, camera.height, camera.fov_deg) = (320, 240, [20.0, 15.0]);
+    scenario.sub_rays = 2;
+    let mut bed = bed(&scenario);
+    let naming = Naming {
+        number: 1,
+        part_number: "P".into(),
+        name: "part".into(),
+        taught_at_unix_s: 0,
+        placement_tolerance_mm: TOLERANCE_MM,
+    };
+    let taught = teach(
+        &mut bed.head,
+        &bed.calibration,
+        &naming,
+        TIMEOUT,
+        &|_, _| (),
+    )
+    .unwrap();
+    (bed, taught)
+}
+
+fn part(defects: Vec<Defect>) -> Part {
+    Part::SheetMetal(SheetMetal { defects })
+}
+
+fn inspect(bed: &mut Bed, plan: &Plan) -> Inspection {
+    let frames = frames(bed, plan, 0);
+    plan.inspect(&frames, Instant::now())
+}
+
+#[test]
+fn gauges_repeat_as_well_as_they_say() {
+    let (mut bed, taught) = small();
+    let mut gauges = all_kinds(5, 0.012);
+    // The dent beside the hole has the largest deviation of the frame.
+    gauges[0] = gauge(
+        "deviation",
+        "frame",
+        GaugeKind::Deviation { smoothing_px: SIDE },
+    );
+    let plate = [[100.0, 85.0], [165.0, 85.0], [165.0, 145.0], [100.0, 145.0]];
+    let bead = [
+        [105.0, 158.0],
+        [200.0, 158.0],
+        [200.0, 172.0],
+        [105.0, 172.0],
+    ];
+    let mut file = RecipeFile {
+        gauges,
+        ..taught.recipe.file.clone()
+    };
+    file.regions.extend(regions(plate, bead));
+    let plan = plan(&bed, &file, &taught.recipe.arrays);
+    bed.head
+        .load(plan.rasters(&bed.calibration).unwrap())
+        .unwrap();
+    let dent = Defect::Dent {
+        x: 40.0,
+        y: -14.0,
+        depth_mm: DEPTH_MM,
+        diameter_mm: DIAMETER_MM,
+    };
+    let placement = Placement {
+        shift_mm: [0.4, -0.3, 0.2],
+        tilt_deg: [0.2, -0.1],
+        rotation_deg: 0.0,
+    };
+    bed.stage.place(&part(vec![dent]), &placement).unwrap();
+    let found: Vec<Inspection> = (0..REPEATS).map(|_| inspect(&mut bed, &plan)).collect();
+    let mut wrong = Vec::new();
+    for (at, gauge) in file.gauges.iter().enumerate() {
+        let values: Vec<f64> = found.iter().map(|f| f.gauges[at].value.unwrap()).collect();
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let squares: f64 = values.iter().map(|x| (x - mean) * (x - mean)).sum();
+        let scatter = (squares / (count - 1.0)).sqrt();
+        let predicted = found
+            .iter()
+            .map(|f| f.gauges[at].sigma.unwrap())
+            .sum::<f64>()
+            / count;
+        let others = ["deviation", "flatness", "range", "rms", "share"];
+        let allowed = if others.contains(&&*gauge.name) {
+            OTHERS
+        } else {
+            LINEAR
+        };
+        let ratio = scatter / predicted;
+        println!(
+            "{:10} {mean:+9.4} ± {scatter:.6}, predicted {predicted:.6}: {ratio:.3}",
+            gauge.name
+        );
+        if (ratio - 1.0).abs() > allowed {
+            wrong.push(format!("{}: {ratio}", gauge.name));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+/// Good parts that were rejected, and dents that were missed, of so many of each; where the worst of them lay.
+fn rejects(good: usize, dented: usize) {
+    let (mut bed, taught) = small();
+    let mut file = taught.recipe.file.clone();
+    let deviation = &mut file.gauges[0];
+    deviation.measures = GaugeKind::Deviation { smoothing_px: SIDE };
+    (deviation.low, deviation.high) = (Some(-LIMIT_MM), Some(LIMIT_MM));
+    let plan = plan(&bed, &file, &taught.recipe.arrays);
+    bed.head
+        .load(plan.rasters(&bed.calibration).unwrap())
+        .unwrap();
+    let mut random = Random::new(1);
+    let (mut rejected, mut missed) = (Vec::new(), Vec::new());
+    let (mut largest, mut smallest) = (0.0_f64, f64::INFINITY);
+    for at in 0..good + dented {
+        let mut between = |reach: f64| reach * (2.0 * random.share() - 1.0);
+        let placement = Placement {
+            shift_mm: [(); 3].map(|()| between(SHIFT_MM)),
+            tilt_deg: [(); 2].map(|()| between(TILT_DEG)),
+            rotation_deg: 0.0,
+        };
+        // On the plate between bead, slot and the large hole.
+        let dent = Defect::Dent {
+            x: -20.0 + between(22.0),
+            y: 4.0 + between(20.0),
+            depth_mm: DEPTH_MM,
+            diameter_mm: DIAMETER_MM,
+        };
+        let defects = if at < good { Vec::new() } else { vec![dent] };
+        bed.stage.place(&part(defects), &placement).unwrap();
+        let found = inspect(&mut bed, &plan);
+        let deviation = found.gauges[0].value.unwrap_or(f64::NAN).abs();
+        let (verdict, say) = (found.verdict(), || {
+            format!("{placement:?} {dent:?}: {deviation} {:?}", found.reason)
+        });
+        if at < good {
+            largest = largest.max(deviation);
+            rejected.extend((verdict != Verdict::Pass).then(say));
+        } else {
+            smallest = smallest.min(deviation);
+            missed.extend((verdict != Verdict::Fail).then(say));
+        }
+    }
+    println!(
+        "{good} good parts: largest deviation {largest:.4} mm, {} rejected",
+        rejected.len()
+    );
+    println!(
+        "{dented} dented parts: smallest {smallest:.4} mm, {} missed",
+        missed.len()
+    );
+    assert!(
+        rejected.is_empty() && missed.is_empty(),
+        "rejected {rejected:#?}, missed {missed:#?}"
+    );
+}
+
+#[test]
+fn a_dent_is_found_and_good_parts_pass_wherever_they_lie() {
+    rejects(12, 4);
+}
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn a_dent_is_found_and_five_hundred_good_parts_pass_wherever_they_lie() {
+    rejects(500, 50);
+}

@@ -1,0 +1,188 @@
+//! What breaks and comes back while the daemon runs: cables, storage, a PLC that changes its mind.
+
+use crate::station_plc::{
+    Daemon as Program, ONLINE, PATIENCE, Place, Plc, READY, RECIPE_OK, Status, long, trigger,
+};
+use appliance::config::Config;
+use appliance::daemon::Daemon;
+use appliance::history::seqs::AHEAD;
+use appliance::progress::Progress;
+use hal::error::Device;
+use std::fs;
+use std::time::Instant;
+
+/// Words of VERDICT, STATE and REJECT_REASON.
+const PASS: u16 = 1;
+const INVALID: u16 = 3;
+const FAULT: u16 = 7;
+const REJECTED_BY_FAULT: u16 = 5;
+/// ABORT in CONTROL.
+const ABORT: u16 = 1 << 5;
+
+fn start(place: &Place) -> Daemon {
+    let mut config = Config::read(&place.path("fringed.toml")).unwrap();
+    config.modbus.listen = "127.0.0.1:0".parse().unwrap();
+    config.http.listen = config.modbus.listen;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let daemon = Daemon::start(&config, pool.unwrap(), Progress::new(true)).unwrap();
+    daemon.wait_until_ready().unwrap();
+    daemon
+}
+
+fn state(status: &Status) -> u16 {
+    status.0[4]
+}
+
+fn error_code(status: &Status) -> u16 {
+    status.0[2]
+}
+
+#[test]
+fn a_device_that_is_unplugged_is_a_fault_that_names_it_and_ends_when_it_is_plugged_in_again() {
+    let place = Place::new();
+    let daemon = start(&place);
+    let stage = daemon.stage.clone().unwrap();
+    let mut plc = Plc::at(daemon.modbus);
+    assert_eq!(plc.measure(1)[8], PASS);
+    let before = plc.status();
+    for (triggers, device, code) in [(1, Device::Camera, 101), (2, Device::Projector, 201)] {
+        stage.unplug(device);
+        let lost = plc.wait("the fault", |status| state(status) == FAULT);
+        assert_eq!((error_code(&lost), lost.has(READY)), (code, false));
+        let fault = daemon.station.snapshot().fault.clone().unwrap();
+        assert!(fault.cause.contains(device.word()), "{fault:?}");
+        assert!(fault.remedy.contains("cable"), "{fault:?}");
+        let rejected = plc.write_and_read_status(1, &trigger(50));
+        assert_eq!(
+            (rejected.triggers(), rejected.0[20]),
+            (triggers, REJECTED_BY_FAULT)
+        );
+        // The measuring task lives, though its head is gone.
+        let beat = plc.status().0[1];
+        plc.wait("the heartbeat", |status| status.0[1] != beat);
+        stage.plug(device);
+        let back = plc.wait("READY", |status| status.has(READY | RECIPE_OK));
+        assert_eq!((error_code(&back), back.crc()), (0, before.crc()));
+        assert_eq!(plc.measure(code)[8], PASS);
+    }
+    daemon.stop();
+}
+
+#[test]
+fn a_trigger_that_meets_a_dead_camera_ends_in_one_invalid_result_or_is_rejected() {
+    let place = Place::new();
+    let daemon = start(&place);
+    let stage = daemon.stage.clone().unwrap();
+    let mut plc = Plc::at(daemon.modbus);
+    let mut met = 0;
+    for token in 1..=10 {
+        plc.wait("READY", |status| status.has(READY));
+        let before = plc.status();
+        stage.unplug(Device::Camera);
+        plc.write(1, &trigger(token));
+        let lost = plc.wait("the fault", |status| state(status) == FAULT);
+        assert_eq!(
+            lost.seq() - before.seq(),
+            lost.triggers() - before.triggers()
+        );
+        if lost.seq() != before.seq() {
+            let words = plc.read(200, 120).unwrap();
+            assert_eq!((words[2], words[8], words[9]), (token, INVALID, 101));
+            met += 1;
+        }
+        stage.plug(Device::Camera);
+    }
+    assert!(met > 0, "no trigger came before the loss was noticed");
+    assert_eq!(plc.measure(99)[8], PASS);
+    daemon.stop();
+}
+
+#[test]
+fn an_abort_ends_a_sequence_between_two_frames_with_one_invalid_result() {
+    let place = Place::new();
+    let daemon = start(&place);
+    let mut plc = Plc::at(daemon.modbus);
+    plc.write(0, &[ONLINE]);
+    let mut aborted = 0;
+    for token in 1..=20 {
+        plc.wait("READY", |status| status.has(READY));
+        plc.write(1, &trigger(token));
+        plc.write(0, &[ONLINE | ABORT]);
+        plc.write(0, &[ONLINE]);
+        let started = Instant::now();
+        let words = loop {
+            let words = plc.read(200, 120).unwrap();
+            if words[2] == token {
+                break words;
+            }
+            assert!(started.elapsed() < PATIENCE);
+        };
+        assert_eq!(long(&words, 0), u32::from(token));
+        match (words[8], words[9]) {
+            (INVALID, 802) => aborted += 1,
+            (PASS, 0) => {}
+            other => panic!("verdict and error {other:?}"),
+        }
+    }
+    assert!(aborted > 0, "every sequence was faster than its abort");
+    daemon.stop();
+}
+
+#[test]
+fn a_result_counter_that_cannot_be_stored_stops_the_station_until_it_can() {
+    let place = Place::new();
+    let daemon = Program::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    plc.measure(1);
+    // A folder in the place of the counter's file: no write replaces it.
+    let counter = place.path("state/result-seq");
+    fs::remove_file(&counter).unwrap();
+    fs::create_dir_all(counter.join("in the way")).unwrap();
+    // It goes on with the numbers that are reserved, and not one further.
+    let mut last = 1;
+    let broken = loop {
+        let words = plc.measure(last + 1);
+        last += 1;
+        assert_eq!((long(&words, 0), words[8]), (u32::from(last), PASS));
+        assert!(u32::from(last) <= 2 * AHEAD, "no fault");
+        let status = plc.status();
+        if state(&status) == FAULT {
+            break status;
+        }
+    };
+    assert_eq!((error_code(&broken), broken.has(READY)), (603, false));
+    let rejected = plc.write_and_read_status(1, &trigger(last + 1));
+    assert_eq!(rejected.triggers(), u32::from(last));
+    assert!(long(&plc.read(614, 2).unwrap(), 0) > 0, "STORAGE_ERRORS");
+    fs::remove_dir_all(&counter).unwrap();
+    plc.wait("READY", |status| status.has(READY | RECIPE_OK));
+    let reserved: u32 = fs::read_to_string(&counter)
+        .unwrap()
+        .trim()
+        .parse()
+        .unwrap();
+    assert!(reserved >= u32::from(last), "{reserved}");
+    assert_eq!(long(&plc.measure(last + 1), 0), u32::from(last) + 1);
+}
+
+#[test]
+fn starts_are_counted_and_a_kill_is_seen_at_the_next_one() {
+    let place = Place::new();
+    let boots = |program: &Program| {
+        let mut plc = Plc::connect(program);
+        // The survey has a thread of its own.
+        loop {
+            let words = plc.read(616, 4).unwrap();
+            if long(&words, 0) > 0 {
+                break (long(&words, 0), long(&words, 2));
+            }
+        }
+    };
+    let first = Program::start(&place);
+    assert_eq!(boots(&first), (1, 0));
+    first.terminate();
+    let second = Program::start(&place);
+    assert_eq!(boots(&second), (2, 0));
+    second.kill();
+    assert_eq!(boots(&Program::start(&place)), (3, 1));
+}
