@@ -104,11 +104,6 @@ impl Arrived {
         self.levels += 1;
     }
 
-    /// Forgets all levels, for the next measurement.
-    pub fn clear(&mut self) {
-        self.levels = 0;
-    }
-
     /// Row `v` of geometric levels.
     pub(super) fn climbed_row(&self, v: usize) -> Option<ClimbedRow<'_>> {
         let Planes::Climbed(planes) = &self.planes else {

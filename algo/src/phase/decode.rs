@@ -1,4 +1,4 @@
-//! Rows of frames → rows of absolute phase, modulation and trust.
+//! What decoding a sequence needs, worked out once, and which frames fit it.
 
 use super::arrived::Arrived;
 use super::level::Level;

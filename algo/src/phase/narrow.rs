@@ -1,6 +1,7 @@
 //! Rows that are narrower than a block: copied into one that is wide enough.
 
 use super::PhaseRow;
+use super::arrived::{ClimbedRow, ClimbedRowMut, WrappedRow, WrappedRowMut};
 use super::fold::BlockSample;
 use crate::frame::{FrameView, Samples};
 use crate::trust::Trust;
@@ -72,5 +73,81 @@ impl FewResults {
         out.phase[columns.clone()].copy_from_slice(&self.phase[..few]);
         out.modulation[columns.clone()].copy_from_slice(&self.modulation[..few]);
         out.trust[columns].copy_from_slice(&self.trust[..few]);
+    }
+}
+
+/// A padded row of what geometric levels have come to.
+pub(super) struct FewClimbed {
+    pub fraction: [u16; MAX_PIXELS],
+    pub turns: [u16; MAX_PIXELS],
+    pub doubt: [u8; MAX_PIXELS],
+}
+
+impl FewClimbed {
+    pub fn new(row: ClimbedRow<'_>, columns: &Range<usize>) -> Self {
+        Self {
+            fraction: padded(row.fraction, columns),
+            turns: padded(row.turns, columns),
+            doubt: padded(row.doubt, columns),
+        }
+    }
+
+    pub fn row(&self) -> ClimbedRow<'_> {
+        ClimbedRow {
+            fraction: &self.fraction,
+            turns: &self.turns,
+            doubt: &self.doubt,
+        }
+    }
+
+    pub fn row_mut(&mut self) -> ClimbedRowMut<'_> {
+        ClimbedRowMut {
+            fraction: &mut self.fraction,
+            turns: &mut self.turns,
+            doubt: &mut self.doubt,
+        }
+    }
+}
+
+/// A padded row of a level about a known map.
+pub(super) struct FewWrapped {
+    pub phase: [u16; MAX_PIXELS],
+    pub modulation: [u16; MAX_PIXELS],
+    pub doubts: [u8; MAX_PIXELS],
+}
+
+impl Default for FewWrapped {
+    fn default() -> Self {
+        Self {
+            phase: [0; MAX_PIXELS],
+            modulation: [0; MAX_PIXELS],
+            doubts: [0; MAX_PIXELS],
+        }
+    }
+}
+
+impl FewWrapped {
+    pub fn new(row: WrappedRow<'_>, columns: &Range<usize>) -> Self {
+        Self {
+            phase: padded(row.phase, columns),
+            modulation: padded(row.modulation, columns),
+            doubts: padded(row.doubts, columns),
+        }
+    }
+
+    pub fn row(&self) -> WrappedRow<'_> {
+        WrappedRow {
+            phase: &self.phase,
+            modulation: &self.modulation,
+            doubts: &self.doubts,
+        }
+    }
+
+    pub fn row_mut(&mut self) -> WrappedRowMut<'_> {
+        WrappedRowMut {
+            phase: &mut self.phase,
+            modulation: &mut self.modulation,
+            doubts: &mut self.doubts,
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! Decoding row by row: all levels at once, or each when it arrives.
 
-use super::arrived::{Arrived, ArrivingRow, ClimbedRow, ClimbedRowMut, WrappedRow, WrappedRowMut};
+use super::arrived::{Arrived, ArrivingRow, ClimbedRow, WrappedRow};
 use super::kernel::{around, arrive, fused};
-use super::narrow::{FewResults, MAX_PIXELS, RowSample, padded};
+use super::narrow::{FewClimbed, FewResults, FewWrapped, MAX_PIXELS, RowSample, padded};
 use super::unwrap::Unwrapper;
 use super::{Decoder, PhaseRow};
 use crate::frame::FrameView;
@@ -251,80 +251,4 @@ fn few_known(map: &[AbsolutePhase], columns: &Range<usize>) -> [AbsolutePhase; M
         known[..map.len()].copy_from_slice(map);
     }
     known
-}
-
-/// A padded row of what geometric levels have come to.
-struct FewClimbed {
-    fraction: [u16; MAX_PIXELS],
-    turns: [u16; MAX_PIXELS],
-    doubt: [u8; MAX_PIXELS],
-}
-
-impl FewClimbed {
-    fn new(row: ClimbedRow<'_>, columns: &Range<usize>) -> Self {
-        Self {
-            fraction: padded(row.fraction, columns),
-            turns: padded(row.turns, columns),
-            doubt: padded(row.doubt, columns),
-        }
-    }
-
-    fn row(&self) -> ClimbedRow<'_> {
-        ClimbedRow {
-            fraction: &self.fraction,
-            turns: &self.turns,
-            doubt: &self.doubt,
-        }
-    }
-
-    fn row_mut(&mut self) -> ClimbedRowMut<'_> {
-        ClimbedRowMut {
-            fraction: &mut self.fraction,
-            turns: &mut self.turns,
-            doubt: &mut self.doubt,
-        }
-    }
-}
-
-/// A padded row of a level about a known map.
-struct FewWrapped {
-    phase: [u16; MAX_PIXELS],
-    modulation: [u16; MAX_PIXELS],
-    doubts: [u8; MAX_PIXELS],
-}
-
-impl Default for FewWrapped {
-    fn default() -> Self {
-        Self {
-            phase: [0; MAX_PIXELS],
-            modulation: [0; MAX_PIXELS],
-            doubts: [0; MAX_PIXELS],
-        }
-    }
-}
-
-impl FewWrapped {
-    fn new(row: WrappedRow<'_>, columns: &Range<usize>) -> Self {
-        Self {
-            phase: padded(row.phase, columns),
-            modulation: padded(row.modulation, columns),
-            doubts: padded(row.doubts, columns),
-        }
-    }
-
-    fn row(&self) -> WrappedRow<'_> {
-        WrappedRow {
-            phase: &self.phase,
-            modulation: &self.modulation,
-            doubts: &self.doubts,
-        }
-    }
-
-    fn row_mut(&mut self) -> WrappedRowMut<'_> {
-        WrappedRowMut {
-            phase: &mut self.phase,
-            modulation: &mut self.modulation,
-            doubts: &mut self.doubts,
-        }
-    }
 }

@@ -178,7 +178,7 @@ impl<'a, V: Lanes, S: Frames> Rung<'a, V, S> {
     }
 
     #[inline(always)]
-    pub fn land(&self, v: V, below: &Below<V>, phase: [V::W; 2], folded: &Folded<V>) -> Climb<V> {
+    fn land(&self, v: V, below: &Below<V>, phase: [V::W; 2], folded: &Folded<V>) -> Climb<V> {
         let (low, left_low) = self.step.land(v, below.ahead[0], phase[0]);
         let (high, left_high) = self.step.land(v, below.ahead[1], phase[1]);
         let before = &below.doubts;

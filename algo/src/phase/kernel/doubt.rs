@@ -60,6 +60,6 @@ pub(crate) fn none<V: Lanes>(v: V, first: V::B) -> [V::W; 2] {
 /// The first doubts as numbers of [`Trust`].
 #[inline(always)]
 pub(crate) fn trust<V: Lanes>(v: V, first: V::B) -> V::B {
-    // Nothing but `NO_DOUBT` is itself where it is equal to it: what is left is 0.
+    // `NO_DOUBT` becomes 0, which is `Resolved`; every other number stays.
     v.xor8(first, v.eq8(first, v.splat8(NO_DOUBT)))
 }
