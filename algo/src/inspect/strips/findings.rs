@@ -73,7 +73,7 @@ impl Production {
             libm::sqrt(sum as f64 / count.max(1) as f64) * VARIANCE_UNIT_NM * 1e-6
         };
         let (height_noise_mm, taught_noise_mm) = (
-            rms_mm(tally.variance, tally.compared),
+            rms_mm(tally.variance, tally.weighed),
             rms_mm(tally.taught_variance, tally.taught),
         );
         // How much noisier than as taught the heights are.

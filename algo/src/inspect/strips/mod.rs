@@ -10,6 +10,7 @@
 //! from these, in the order of the rows, and the strips then compare every pixel with the place of golden where the part had it.
 
 mod columns;
+mod displaced;
 mod exact;
 mod extreme;
 mod findings;
@@ -27,7 +28,7 @@ use super::gauge::{Grid, Measure, TaughtCell, TooFine, taught_cells};
 use crate::frame::FrameView;
 use crate::geometry::{Triangulator, Vector};
 use crate::phase::{DecodeError, Decoder};
-use crate::pipeline::{COMPARED, Rises, VARIANCE_UNIT_NM, for_each};
+use crate::pipeline::{COMPARED, Rises, SIGMA, SQUARE, VARIANCE_UNIT_NM, for_each};
 use crate::simd::Backend;
 use crate::units::{AbsolutePhase, Modulation};
 use alloc::sync::Arc;
@@ -65,17 +66,27 @@ impl Taught {
     const SIGMA_UNIT_NM: f64 = 32.0;
 
     /// From where the part is compared and σ of its heights in mm, NaN where not known. σ is stored in units of 32 nm, at
-    /// most 1 mm.
+    /// most half a mm.
     pub fn new(pixels: impl Iterator<Item = (bool, f64)>) -> Self {
         let stored = |(compared, mm): (bool, f64)| {
             let units = libm::rint(mm * 1e6 / Self::SIGMA_UNIT_NM);
             let sigma = match units.is_finite() {
-                true => units.clamp(1.0, f64::from(COMPARED - 1)) as u16,
+                true => units.clamp(1.0, f64::from(SIGMA)) as u16,
                 false => 0,
             };
             sigma | if compared { COMPARED } else { 0 }
         };
         Self(pixels.map(stored).collect())
+    }
+
+    /// Marks the places where the four pixels to the right and below are all compared.
+    fn mark_squares(&mut self, width: usize) {
+        for place in 0..self.0.len().saturating_sub(width + 1) {
+            let corners = [place, place + 1, place + width, place + width + 1];
+            if place % width + 1 < width && corners.iter().all(|&at| self.compared(at)) {
+                self.0[place] |= SQUARE;
+            }
+        }
     }
 
     /// Whether the part is compared at a place.
@@ -85,7 +96,7 @@ impl Taught {
 
     /// σ in its units.
     fn sigma(&self, place: usize) -> u16 {
-        self.0[place] & !COMPARED
+        self.0[place] & SIGMA
     }
 
     /// σ in mm, 0 where not known.
@@ -182,12 +193,13 @@ impl Production {
             triangulator,
             rises,
             map,
-            taught,
+            mut taught,
             gauges,
             window,
             noise_counts,
             aligned,
         } = parts;
+        taught.mark_squares(rises.surface().width.max(1));
         let range = triangulator.range();
         let span_nm = (range.high - range.low) * 1e6;
         let mut sides = Vec::new();

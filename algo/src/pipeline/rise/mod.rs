@@ -8,7 +8,8 @@ mod fit;
 mod row;
 
 pub(crate) use row::{
-    COMPARED, RiseRow, Risen, RowTally, Seen, UNKNOWN, VARIANCE_UNIT_NM, rise_row,
+    COMPARED, RiseRow, Risen, RowTally, SIGMA, SQUARE, Seen, UNKNOWN, VARIANCE_UNIT_NM, rise_row,
+    weigh_row,
 };
 
 use super::{Window, for_each};
