@@ -144,11 +144,12 @@ impl Entry {
 }
 
 fn stages(record: &ResultRecord) -> Vec<StageEntry> {
-    let stages = record.inspection.stages.iter();
+    let stages = record.stages();
     stages
-        .map(|stage| StageEntry {
-            name: stage.name.into(),
-            us: stage.us,
+        .iter()
+        .map(|time| StageEntry {
+            name: time.stage.name().into(),
+            us: time.us,
         })
         .collect()
 }

@@ -75,7 +75,7 @@ pub struct Health {
     pub system: System,
     /// The last sequence; its counts are sums since the start.
     pub pace: Pace,
-    /// Exposure done → result of the last cycle, µs.
+    /// Processing of the last cycle that was measured, µs: all stages but waiting and exposure.
     pub processing_us: u32,
     /// The longest of them since the start, µs.
     pub processing_max_us: u32,

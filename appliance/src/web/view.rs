@@ -99,6 +99,7 @@ fn result(record: &ResultRecord) -> Value {
         "time_utc_us": record.time_utc_us,
         "exposure_us": record.exposure_us,
         "total_us": record.total_us,
+        "processing_us": record.stages().processing_us(),
         "cpu_us": found.cpu_us,
         "valid_points": found.valid_points,
         "coverage_permille": found.coverage_permille,
@@ -115,7 +116,7 @@ fn result(record: &ResultRecord) -> Value {
         },
         "placement": found.placement.as_ref().map(placement),
         "gauges": found.gauges.iter().map(gauge).collect::<Vec<_>>(),
-        "stages": found.stages.iter().map(|stage| json!({ "name": stage.name, "us": stage.us })).collect::<Vec<_>>(),
+        "stages": record.stages().iter().map(|time| json!({ "name": time.stage.name(), "us": time.us })).collect::<Vec<_>>(),
     })
 }
 
