@@ -159,6 +159,8 @@ impl Station {
             time_utc_us: self
                 .utc_at_zero
                 .map_or(0, |zero| zero.saturating_add(cycle.accepted.0)),
+            uptime_s: cycle.accepted.seconds(),
+            boot_id: self.settings.boot_id,
             exposure_us: cycle
                 .exposed
                 .map_or(total, |exposed| exposed.since(cycle.accepted))

@@ -178,6 +178,10 @@ pub struct ResultRecord {
     pub error_code: u16,
     /// Trigger time in µs since 1970 UTC, 0 if the clock is not synchronised.
     pub time_utc_us: u64,
+    /// Trigger time since the start of the daemon, s: known whatever the clock says.
+    pub uptime_s: u32,
+    /// Which start that was.
+    pub boot_id: u32,
     /// Trigger → exposure done, µs.
     pub exposure_us: u32,
     /// Trigger → result, µs.

@@ -62,6 +62,7 @@ fn health(snapshot: &Snapshot) -> Value {
         "cpu_temperature_c": system.cpu_temperature_c,
         "boots": system.boots,
         "unclean_boots": system.unclean_boots,
+        "watchdog_restarts": system.watchdog_restarts,
         "modbus_clients": system.clients,
         "writer_connected": system.writer_connected,
         "camera_hz": f64::from(pace.camera_centihertz) / 100.0,
