@@ -121,7 +121,7 @@ fn budget(
         let stages = inspection.stages.iter();
         runs.push(
             stages
-                .map(|stage| (stage.name.to_owned(), f64::from(stage.us) / 1e3))
+                .map(|stage| (stage.stage.name().to_owned(), f64::from(stage.us) / 1e3))
                 .collect(),
         );
     }

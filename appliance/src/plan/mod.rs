@@ -12,7 +12,7 @@ use crate::calibration::Calibration;
 use crate::recipe::{AlignmentKind, Recipe, RecipeFile, SequenceKind, short};
 use crate::seam;
 use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
-use crate::station::{Inspection, StageTime, Verdict};
+use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
 use algo::inspect::{Production, Strip};
@@ -220,7 +220,7 @@ impl Plan {
         rasters(function, frames, calibration)
     }
 
-    /// Judges a part from the frames of one sequence, which their number tells. Always ends in an inspection; what cannot be
+    /// Judges a part from the frames of one sequence, which their number tells; its stages begin at `exposed`. Always ends in an inspection; what cannot be
     /// measured is INVALID with a reason.
     pub fn inspect(&self, frames: &[Frame], exposed: Instant) -> Inspection {
         let step = self.step_of(frames);
@@ -230,7 +230,8 @@ impl Plan {
             flags: sequence_flag(run.kind) | simulated,
             ..Inspection::default()
         };
-        match self.run(run, frames, None) {
+        let mut laps = Laps::since(exposed);
+        match self.run(run, frames, None, &mut laps) {
             Ok(findings) => {
                 judge::judge(&self.file, &findings, &mut inspection);
                 if step + 1 < self.runs.len() {
@@ -243,9 +244,8 @@ impl Plan {
                 inspection.error_code = WRONG_FRAMES;
             }
         }
-        let us = exposed.elapsed().as_micros().min(u128::from(u32::MAX)) as u32;
-        // The first of at most twelve.
-        let _ = inspection.stages.push(StageTime { name: "strips", us });
+        laps.end(Stage::Judgement);
+        inspection.stages = laps.stages;
         inspection
     }
 
@@ -265,7 +265,8 @@ impl Plan {
     pub fn heights(&self, frames: &[Frame]) -> Option<Maps> {
         let width = self.file.camera.width as usize;
         let mut height_mm = vec![f32::NAN; width * self.file.camera.height as usize];
-        self.run(self.run_of(frames), frames, Some(&mut height_mm))
+        let mut laps = Laps::since(Instant::now());
+        self.run(self.run_of(frames), frames, Some(&mut height_mm), &mut laps)
             .ok()?;
         Some(Maps { width, height_mm })
     }
@@ -275,14 +276,41 @@ impl Plan {
         run: &Run,
         frames: &[Frame],
         heights: Option<&mut [f32]>,
+        laps: &mut Laps,
     ) -> Result<algo::inspect::Findings, String> {
         let views: Result<Vec<FrameView<'_>>, _> = frames.iter().map(seam::view).collect();
         let views = views.map_err(|error| error.to_string())?;
         // A strip is cleared before it is used, whatever was left in it.
         let mut strips = self.strips.lock().unwrap_or_else(PoisonError::into_inner);
-        run.production
-            .inspect(&views, &mut strips, heights)
-            .map_err(|error| error.to_string())
+        let production = &run.production;
+        let placed = production.place(&views, &mut strips);
+        laps.end(Stage::Alignment);
+        let findings = placed
+            .and_then(|placed| production.inspect_placed(&views, &mut strips, placed, heights))
+            .map_err(|error| error.to_string());
+        laps.end(Stage::Strips);
+        findings
+    }
+}
+
+/// Stamps the stages of an inspection, each from the end of the one before.
+struct Laps {
+    stages: Stages,
+    since: Instant,
+}
+
+impl Laps {
+    fn since(since: Instant) -> Self {
+        let stages = Stages::default();
+        Self { stages, since }
+    }
+
+    fn end(&mut self, stage: Stage) {
+        let now = Instant::now();
+        let us = (now - self.since).as_micros();
+        self.stages
+            .add(stage, u32::try_from(us).unwrap_or(u32::MAX));
+        self.since = now;
     }
 }
 

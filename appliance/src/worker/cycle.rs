@@ -5,7 +5,9 @@ use crate::benchmark::stopwatch::timed_on;
 use crate::history::FailedPart;
 use crate::plan::Plan;
 use crate::station::result::flag::STEPPED_UP;
-use crate::station::{Event, Inspection, Job, JobId, Pace, ResultRecord, error_code};
+use crate::station::{
+    Event, Inspection, Job, JobId, Pace, ResultRecord, Stage, Stages, error_code,
+};
 use hal::frame::Frame;
 use hal::head::Exposure;
 use std::sync::Arc;
@@ -22,19 +24,25 @@ impl Worker {
             return Vec::new();
         };
         let (mut step, mut flags, mut cpu) = (0, 0, Duration::ZERO);
+        let mut stages = Stages::default();
+        let waited = self.station.now().since(job.accepted);
+        stages.add(Stage::Waiting, waited.to_u32());
         loop {
+            let began = Instant::now();
             let Some(frames) = self.take(plan.indices(step), id) else {
                 return Vec::new();
             };
-            let exposed = Instant::now();
+            stages.add(Stage::Exposure, us(began.elapsed()));
             step += 1;
             let last = step >= plan.steps();
             // The part must stay while another sequence may follow.
             if last {
                 self.station.event(Event::ExposureDone { job: id });
             }
-            let (mut inspection, spent) = timed_on(&self.pool, || plan.inspect(&frames, exposed));
+            let inspect = || plan.inspect(&frames, Instant::now());
+            let (mut inspection, spent) = timed_on(&self.pool, inspect);
             cpu += spent;
+            stages.extend(&inspection.stages);
             if let Some(reason) = inspection.step_up.filter(|_| !last) {
                 self.progress
                     .log(&format!("measuring again with more frames: {reason}"));
@@ -45,7 +53,8 @@ impl Worker {
                 self.station.event(Event::ExposureDone { job: id });
             }
             inspection.flags |= flags;
-            inspection.cpu_us = u32::try_from(cpu.as_micros()).unwrap_or(u32::MAX);
+            inspection.stages = stages;
+            inspection.cpu_us = us(cpu);
             self.publish(id, inspection, plan, &frames);
             return frames;
         }
@@ -103,7 +112,6 @@ impl Worker {
 
     /// Says how well the head kept time.
     fn paced(&self, frames: usize, exposure: &Exposure) {
-        let us = |time: Duration| u32::try_from(time.as_micros()).unwrap_or(u32::MAX);
         let span = exposure.done.since(exposure.started).as_secs_f64();
         let refresh = self.opened.head.refresh().as_secs_f64();
         // Saturating casts; a span of 0 gives the largest number.
@@ -115,6 +123,11 @@ impl Worker {
             missed_flips: exposure.missed_flips,
         }));
     }
+}
+
+/// µs, saturating at about 71 minutes.
+fn us(time: Duration) -> u32 {
+    u32::try_from(time.as_micros()).unwrap_or(u32::MAX)
 }
 
 fn failed(job: JobId, error_code: u16, message: String) -> Event {

@@ -328,7 +328,7 @@ impl Production {
     }
 
     /// Inspects a part, in strips from [`Self::strips`]. Where `heights` is given (as long as a frame, row-major) it gets
-    /// z in mm, NaN where not resolved or not looked at.
+    /// z in mm, NaN where not resolved or not looked at. The same as [`Self::place`] and [`Self::inspect_placed`].
     ///
     /// # Errors
     /// If the frames are not what the decoder was made for. Nothing else can fail.
@@ -338,18 +338,67 @@ impl Production {
         strips: &mut [Strip],
         heights: Option<&mut [f32]>,
     ) -> Result<Findings, DecodeError> {
-        self.decoder.check(frames)?;
-        let width = self.rises.surface().width;
-        let size = (width, self.window.len());
-        let given = (frames[0].width(), frames[0].height());
-        if given != size {
-            return Err(DecodeError::FrameSize {
-                frame: 0,
-                expected: size,
-                given,
-            });
+        let placed = self.place(frames, strips)?;
+        self.inspect_placed(frames, strips, placed, heights)
+    }
+
+    /// The first half: how the part lies, from a few rows of each strip; none if that is not asked for, or too little of it
+    /// is seen.
+    ///
+    /// # Errors
+    /// As [`Self::inspect`].
+    pub fn place(
+        &self,
+        frames: &[FrameView<'_>],
+        strips: &mut [Strip],
+    ) -> Result<Option<Placed>, DecodeError> {
+        self.check(frames)?;
+        let Some(alignment) = &self.alignment else {
+            return Ok(None);
+        };
+        for_each(
+            strips.iter_mut().collect(),
+            || (),
+            |_, strip, ()| strip.sample(self, alignment, frames),
+        );
+        let Some((first, others)) = strips.split_first_mut() else {
+            return Ok(None);
+        };
+        for strip in others {
+            first.samples.extend(&strip.samples);
         }
-        let placed = self.place(frames, strips);
+        let fitting = alignment.fitting(self.golden());
+        Ok(fitting.fit(&first.samples, &mut first.room))
+    }
+
+    /// The frames' number and size.
+    fn check(&self, frames: &[FrameView<'_>]) -> Result<(), DecodeError> {
+        self.decoder.check(frames)?;
+        let expected = self.size();
+        let given = (frames[0].width(), frames[0].height());
+        match given == expected {
+            true => Ok(()),
+            false => Err(DecodeError::FrameSize {
+                frame: 0,
+                expected,
+                given,
+            }),
+        }
+    }
+
+    /// The second half: the readings of a part that lies so, from the frames and strips that it was placed with.
+    ///
+    /// # Errors
+    /// As [`Self::inspect`].
+    pub fn inspect_placed(
+        &self,
+        frames: &[FrameView<'_>],
+        strips: &mut [Strip],
+        placed: Option<Placed>,
+        heights: Option<&mut [f32]>,
+    ) -> Result<Findings, DecodeError> {
+        self.check(frames)?;
+        let width = self.rises.surface().width;
         let stance = Stance::new(self, placed);
         let mut left = heights;
         let mut work = Vec::with_capacity(strips.len());
@@ -367,22 +416,6 @@ impl Production {
             |_, (strip, heights), ()| strip.inspect(self, &stance, frames, heights),
         );
         Ok(self.findings(frames, stance, strips))
-    }
-
-    /// How the part lies, from a few rows of each strip; none if that is not asked for, or too little of it is seen.
-    fn place(&self, frames: &[FrameView<'_>], strips: &mut [Strip]) -> Option<Placed> {
-        let alignment = self.alignment.as_ref()?;
-        for_each(
-            strips.iter_mut().collect(),
-            || (),
-            |_, strip, ()| strip.sample(self, alignment, frames),
-        );
-        let (first, others) = strips.split_first_mut()?;
-        for strip in others {
-            first.samples.extend(&strip.samples);
-        }
-        let fitting = alignment.fitting(self.golden());
-        fitting.fit(&first.samples, &mut first.room)
     }
 
     /// The map that phases are unwrapped about, row-major.
