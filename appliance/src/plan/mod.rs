@@ -16,13 +16,13 @@ use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
 use algo::inspect::{Production, Strip};
-use algo::pattern::{Sequence, encode};
+use algo::pattern::{Encoder, Sequence};
 use algo::pipeline::Rises;
 use algo::units::{AbsolutePhase, Height};
 use hal::frame::Frame;
 use hal::projector::Raster;
 use rayon::prelude::*;
-use run::{Run, Shared};
+use run::{Run, Shared, Unjoined};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -77,6 +77,8 @@ pub struct Maps {
 
 /// A frame is inspected in this many strips: work for four threads, and few rows that two of them need.
 pub const STRIPS: usize = 4;
+/// Heights are planned at least so many pixels around the part as taught: what a part that is not aligned may be moved by.
+const AROUND: usize = 16;
 /// Error code of a cycle whose frames are not what the recipe was made for.
 const WRONG_FRAMES: u16 = 103;
 
@@ -112,7 +114,9 @@ impl Plan {
             gauges,
             ..
         } = recipe;
+        // They are large, and nobody asks for them in production.
         arrays.phase_function = Vec::new();
+        arrays.height_curvature = Vec::new();
         let camera = (file.camera.width, file.camera.height, file.camera.bit_depth);
         if camera != calibration.camera {
             return Err(format!(
@@ -135,21 +139,30 @@ impl Plan {
         if aligned {
             golden::widen(&mut window, &arrays, size.0);
         }
-        let surface = golden::surface(&file, &arrays, &triangulator);
-        let rises = Rises::new(&triangulator, surface, file.expansion_range_turns, &window);
+        let range = triangulator.function().range();
+        let chain = run::chain(&file);
+        let mut frames = Vec::new();
+        let sequences = || {
+            let sequences = chain.into_iter();
+            let sequences =
+                sequences.map(|at| Unjoined::new(&file, &arrays, range, at, &mut frames));
+            sequences.collect::<Result<Vec<_>, _>>()
+        };
+        let (sequences, surface) = rayon::join(sequences, || golden::surface(size.0, &arrays));
+        let sequences = sequences?;
+        // What is left of the recipe is no longer needed where the most memory is.
+        drop(arrays);
+        let range = file.expansion_range_turns;
+        let rises = Rises::new(&triangulator, surface, range, &window, away.max(AROUND));
         let shared = Shared {
             file: &file,
-            arrays: &arrays,
             triangulator: Arc::new(triangulator),
             rises: Arc::new(rises),
             gauges,
             window,
         };
-        let mut frames = Vec::new();
-        let runs = run::chain(&file)
-            .into_iter()
-            .map(|at| Run::new(&shared, at, &mut frames))
-            .collect::<Result<Vec<_>, _>>()?;
+        let runs = sequences.into_iter().map(|sequence| sequence.join(&shared));
+        let runs = runs.collect::<Result<Vec<_>, _>>()?;
         let first = runs.first().ok_or("it has no sequence")?;
         let strips = first.production.strips(size.1.div_ceil(STRIPS));
         Ok(Self {
@@ -169,6 +182,18 @@ impl Plan {
     /// First 32 bits of the recipe's fingerprint.
     pub fn crc(&self) -> u32 {
         short(&self.file.fingerprint)
+    }
+
+    /// Bytes of its maps and of its phase function: nearly all that it takes.
+    pub fn bytes(&self) -> usize {
+        let production = self.production();
+        let function = production.triangulator().function();
+        let samples = match function.is_sampled() {
+            true => function.columns() * function.rows(),
+            false => 0,
+        };
+        let runs: usize = self.runs.iter().map(|run| run.bytes).sum();
+        production.rises().bytes() + samples * size_of::<f64>() + runs
     }
 
     /// Levels and shifts of the sequence that is tried first.
@@ -334,10 +359,11 @@ pub fn rasters(
     calibration: &Calibration,
 ) -> Result<Vec<Raster>, hal::error::Error> {
     let frames: Vec<_> = frames.collect();
+    let encoder = Encoder::new(calibration.response.as_ref());
     frames
         .into_par_iter()
         .map(|(ratio, shift)| {
-            let grey = encode(function, ratio, shift, calibration.response.as_ref());
+            let grey = encoder.raster(function, ratio, shift);
             Raster::new(grey.width as u32, grey.height as u32, grey.pixels)
         })
         .collect()
