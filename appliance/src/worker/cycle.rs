@@ -4,7 +4,7 @@ use super::{ABORTED, DEVICE_TIMEOUT, Worker, code, code_of};
 use crate::benchmark::stopwatch::timed_on;
 use crate::history::FailedPart;
 use crate::plan::Plan;
-use crate::station::result::flag::STEPPED_UP;
+use crate::station::result::flag::{RETRIED, STEPPED_UP};
 use crate::station::{Event, Inspection, Job, JobId, Pace, ResultRecord, error_code};
 use hal::frame::Frame;
 use hal::head::Exposure;
@@ -23,9 +23,12 @@ impl Worker {
         };
         let (mut step, mut flags, mut cpu) = (0, 0, Duration::ZERO);
         loop {
-            let Some(frames) = self.take(plan.indices(step), id) else {
+            let Some((frames, exposure)) = self.take(plan.indices(step), id) else {
                 return Vec::new();
             };
+            if exposure.retaken > 0 {
+                flags |= RETRIED;
+            }
             let exposed = Instant::now();
             step += 1;
             let last = step >= plan.steps();
@@ -38,7 +41,7 @@ impl Worker {
             if let Some(reason) = inspection.step_up.filter(|_| !last) {
                 self.progress
                     .log(&format!("measuring again with more frames: {reason}"));
-                flags = STEPPED_UP;
+                flags |= STEPPED_UP;
                 continue;
             }
             if !last {
@@ -51,8 +54,9 @@ impl Worker {
         }
     }
 
-    /// The frames of some of the patterns; none if there are not all of them, and then the station knows why.
-    fn take(&mut self, indices: &[usize], job: JobId) -> Option<Vec<Frame>> {
+    /// The frames of some of the patterns and how they were taken; none if there are not all of them, and then the station
+    /// knows why.
+    fn take(&mut self, indices: &[usize], job: JobId) -> Option<(Vec<Frame>, Exposure)> {
         let mut frames: Vec<Frame> = Vec::with_capacity(indices.len());
         let (station, aborts) = (&self.station, &self.aborts);
         let mut keep = |_, frame| {
@@ -70,7 +74,7 @@ impl Worker {
             }
             Ok(exposure) => {
                 self.paced(indices.len(), &exposure);
-                Some(frames)
+                Some((frames, exposure))
             }
             Err(error) => {
                 let failed = failed(job, code_of(&error), error.to_string());
@@ -113,6 +117,8 @@ impl Worker {
             lag_us: us(exposure.lag),
             dropped: exposure.dropped,
             missed_flips: exposure.missed_flips,
+            retaken: exposure.retaken,
+            sync_error_us: us(exposure.sync_error),
         }));
     }
 }
