@@ -5,13 +5,51 @@ use std::time::Duration;
 use crate::error::Error;
 use crate::frame::{Frame, FrameFormat};
 
-/// A camera that exposes one frame per trigger.
+/// Who starts an exposure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Starts {
+    /// The trigger of the head: one exposure per pulse. A pulse while the camera is busy is lost.
+    OnTrigger,
+    /// The camera itself, one exposure per period; also one that the projector triggers by wire.
+    ByItself,
+}
+
+/// How a running camera takes its frames. Nothing of it changes between start and stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CameraTiming {
+    /// Who starts an exposure.
+    pub starts: Starts,
+    /// How long one lasts; the same for all rows.
+    pub exposure: Duration,
+    /// From the start of one exposure to the start of the next: the shortest time if it is triggered, the time if it runs by itself.
+    pub period: Duration,
+    /// From the end of an exposure until its frame can be fetched, at the longest when nothing is wrong.
+    pub delivery: Duration,
+}
+
+/// How samples come over the wire.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Encoding {
+    /// The driver's word, as "R16" or "MONO_PISP_COMP1".
+    pub name: String,
+    /// Whether samples are what the sensor counted. Compressed ones are not, and no phase can be trusted that is made of them.
+    pub exact: bool,
+}
+
+/// A camera that stamps and counts its frames.
 ///
-/// Frames come in the order of their exposures, with increasing sequence numbers and timestamps. A frame
-/// that nobody fetched may be dropped; the gap in the sequence numbers shows it.
+/// A frame carries the camera's own count (a gap means a frame that was lost) and the sensor's time on the head's
+/// clock. What moment of the exposure that time marks is known by calibration ([`crate::head::Stamp`]). Frames
+/// may come late, twice or in another order: nobody relies on the order of arrival.
 pub trait Camera: Send {
     /// The format that every frame will have.
     fn format(&self) -> FrameFormat;
+
+    /// How samples come over the wire.
+    fn encoding(&self) -> Encoding;
+
+    /// How it takes its frames.
+    fn timing(&self) -> CameraTiming;
 
     /// Asks whether the camera is still there, without disturbing it. A back-end whose driver cannot say answers that it is.
     ///
@@ -27,11 +65,11 @@ pub trait Camera: Send {
     /// `Protocol` if it is armed already.
     fn start(&mut self) -> Result<(), Error>;
 
-    /// Waits for the next frame.
+    /// The next frame that is there. Does not wait: [`crate::clock::Clock::wait`] does.
     ///
     /// # Errors
-    /// `Timeout` if none came within `timeout`; `Protocol` if the camera is not armed.
-    fn next_frame(&mut self, timeout: Duration) -> Result<Frame, Error>;
+    /// `Protocol` if the camera is not armed; `Disconnected` if it is gone.
+    fn poll_frame(&mut self) -> Result<Option<Frame>, Error>;
 
     /// Disarms the camera and forgets frames that were not fetched. Stopping a stopped camera is fine.
     ///
@@ -45,6 +83,14 @@ impl<C: Camera + ?Sized> Camera for Box<C> {
         (**self).format()
     }
 
+    fn encoding(&self) -> Encoding {
+        (**self).encoding()
+    }
+
+    fn timing(&self) -> CameraTiming {
+        (**self).timing()
+    }
+
     fn present(&self) -> Result<(), Error> {
         (**self).present()
     }
@@ -53,8 +99,8 @@ impl<C: Camera + ?Sized> Camera for Box<C> {
         (**self).start()
     }
 
-    fn next_frame(&mut self, timeout: Duration) -> Result<Frame, Error> {
-        (**self).next_frame(timeout)
+    fn poll_frame(&mut self) -> Result<Option<Frame>, Error> {
+        (**self).poll_frame()
     }
 
     fn stop(&mut self) -> Result<(), Error> {

@@ -5,17 +5,18 @@
 use std::fmt::Display;
 use std::time::{Duration, Instant};
 
-use crate::camera::Camera;
+use crate::camera::{Camera, Starts};
+use crate::clock::Clock;
 use crate::error::{Error, ErrorKind};
 use crate::frame::{Frame, Samples};
-use crate::head::Head;
-use crate::projector::{Projector, Raster};
+use crate::head::{Head, TOLERANCE};
+use crate::projector::{Flip, Projector, Raster};
 use crate::trigger::Trigger;
 use crate::units::Timestamp;
 
 /// Long enough for any device that works.
 const PATIENT: Duration = Duration::from_secs(5);
-/// What a call may take beyond its time-out.
+/// What a call may take that waits for nothing, on a computer that does much else.
 const SLACK: Duration = Duration::from_secs(2);
 /// A head is used all day.
 const RESTARTS: usize = 20;
@@ -41,44 +42,51 @@ fn must<T>(promise: &'static str, result: Result<T, Error>) -> Result<T, Violati
     result.map_err(|error| violated(promise, error))
 }
 
-/// `call` fails with an error of `kind` and returns within `timeout`.
-fn must_fail<T>(
-    promise: &'static str,
-    kind: ErrorKind,
-    timeout: Duration,
-    call: impl FnOnce() -> Result<T, Error>,
-) -> Result<(), Violation> {
+/// What `call` answers, which waits for nothing.
+fn prompt<T>(call: impl FnOnce() -> T) -> Result<T, Violation> {
     let begun = Instant::now();
-    match call() {
-        Ok(_) => return Err(violated(promise, "the call succeeded")),
-        Err(error) if error.kind() != kind => {
-            return Err(violated(
-                promise,
-                format!("{:?} error: {error}", error.kind()),
-            ));
-        }
-        Err(_) => {}
-    }
-    if begun.elapsed() > timeout + SLACK {
+    let answer = call();
+    if begun.elapsed() > SLACK {
         return Err(violated(
-            promise,
+            "devices are asked without waiting",
             format!("the call took {:?}", begun.elapsed()),
         ));
     }
-    Ok(())
+    Ok(answer)
+}
+
+/// `call` fails with an error of `kind`, and at once.
+fn must_fail<T>(
+    promise: &'static str,
+    kind: ErrorKind,
+    call: impl FnOnce() -> Result<T, Error>,
+) -> Result<(), Violation> {
+    match prompt(call)? {
+        Ok(_) => Err(violated(promise, "the call succeeded")),
+        Err(error) if error.kind() != kind => Err(violated(
+            promise,
+            format!("{:?} error: {error}", error.kind()),
+        )),
+        Err(_) => Ok(()),
+    }
 }
 
 /// The promises of a camera by itself.
 ///
 /// # Errors
 /// The first promise that is not kept.
-pub fn check_camera(camera: &mut impl Camera) -> Result<(), Violation> {
-    let short = Duration::from_millis(20);
+pub fn check_camera(camera: &mut impl Camera, clock: &mut impl Clock) -> Result<(), Violation> {
+    let timing = camera.timing();
+    if timing.exposure.is_zero() || timing.period < timing.exposure {
+        return Err(violated(
+            "a camera exposes for some time, and never twice at a time",
+            format!("{timing:?}"),
+        ));
+    }
     must_fail(
         "a stopped camera gives no frame",
         ErrorKind::Protocol,
-        short,
-        || camera.next_frame(short),
+        || camera.poll_frame(),
     )?;
     must("stopping a stopped camera is fine", camera.stop())?;
     for _ in 0..RESTARTS {
@@ -89,23 +97,44 @@ pub fn check_camera(camera: &mut impl Camera) -> Result<(), Violation> {
     must_fail(
         "a running camera is not started twice",
         ErrorKind::Protocol,
-        PATIENT,
         || camera.start(),
     )?;
-    must_fail(
-        "a camera without a trigger times out",
-        ErrorKind::Timeout,
-        short,
-        || camera.next_frame(short),
-    )?;
-    must("a camera stops", camera.stop())
+    let patience = (timing.period + timing.exposure + timing.delivery) * 3;
+    let end = clock.now() + patience;
+    let mut frames = 0;
+    while clock.now() < end {
+        clock.wait(end);
+        while must(
+            "a running camera can be asked",
+            prompt(|| camera.poll_frame())?,
+        )?
+        .is_some()
+        {
+            frames += 1;
+        }
+    }
+    match (timing.starts, frames) {
+        (Starts::OnTrigger, 1..) => Err(violated(
+            "a camera without a trigger gives no frame",
+            format!("{frames} frames within {patience:?}"),
+        )),
+        (Starts::ByItself, 0) => Err(violated(
+            "a camera that runs by itself gives frames",
+            format!("none within {patience:?}"),
+        )),
+        _ => must("a camera stops", camera.stop()),
+    }
 }
 
 /// The promises of a projector by itself, with `patterns` rasters loaded.
 ///
 /// # Errors
 /// The first promise that is not kept.
-pub fn check_projector(projector: &mut impl Projector, patterns: usize) -> Result<(), Violation> {
+pub fn check_projector(
+    projector: &mut impl Projector,
+    clock: &mut impl Clock,
+    patterns: usize,
+) -> Result<(), Violation> {
     let (width, height) = projector.size();
     let raster = |width, height, level| {
         must(
@@ -117,7 +146,6 @@ pub fn check_projector(projector: &mut impl Projector, patterns: usize) -> Resul
     must_fail(
         "a raster of another size is refused",
         ErrorKind::Unsupported,
-        PATIENT,
         || projector.load(vec![wrong; patterns]),
     )?;
     let mut rasters = Vec::new();
@@ -135,58 +163,132 @@ pub fn check_projector(projector: &mut impl Projector, patterns: usize) -> Resul
     must_fail(
         "a pattern that is not loaded is not shown",
         ErrorKind::Protocol,
-        PATIENT,
-        || projector.show(patterns, PATIENT),
+        || projector.queue(patterns),
     )?;
-    must_fail(
-        "showing without any time times out",
-        ErrorKind::Timeout,
-        Duration::ZERO,
-        || projector.show(0, Duration::ZERO),
-    )?;
-    let promise = "flips have increasing times and counts";
-    let mut last = must(promise, projector.show(0, PATIENT))?;
-    for index in (0..patterns).rev() {
-        let flip = must("a loaded pattern is shown", projector.show(index, PATIENT))?;
-        if flip.timestamp <= last.timestamp || flip.sequence <= last.sequence {
-            return Err(violated(promise, format!("{last:?}, then {flip:?}")));
-        }
-        last = flip;
+    let nothing = must("a projector can be asked for flips", projector.poll_flip())?;
+    if nothing.is_some() {
+        return Err(violated(
+            "no flip comes that was not queued",
+            format!("{nothing:?}"),
+        ));
     }
-    must("a projector goes blank", projector.blank())
+    let refresh = projector.refresh();
+    let mut last: Option<Flip> = None;
+    for index in (0..patterns).rev() {
+        let asked = clock.now();
+        must("queueing does not wait", prompt(|| projector.queue(index))?)?;
+        must_fail("one flip waits at a time", ErrorKind::Protocol, || {
+            projector.queue(index)
+        })?;
+        let flip = next_flip(projector, clock)?;
+        if flip.timestamp + TOLERANCE < asked {
+            return Err(violated(
+                "no flip comes before it is queued",
+                format!("queued at {asked}, {flip:?}"),
+            ));
+        }
+        if let Some(last) = last {
+            if flip.timestamp <= last.timestamp || flip.sequence <= last.sequence {
+                return Err(violated(
+                    "flips have increasing times and counts",
+                    format!("{last:?}, then {flip:?}"),
+                ));
+            }
+            let steps = u32::try_from(flip.sequence - last.sequence).unwrap_or(u32::MAX);
+            let (by_time, by_count) = (flip.timestamp.since(last.timestamp), refresh * steps);
+            if by_time.abs_diff(by_count) > refresh / 4 {
+                return Err(violated(
+                    "a flip's count is the count of refreshes",
+                    format!("{steps} counts in {by_time:?} at a period of {refresh:?}"),
+                ));
+            }
+        }
+        last = Some(flip);
+    }
+    must("queueing does not wait", projector.queue(0))?;
+    must("a projector goes blank", projector.blank())?;
+    clock.wait(clock.now() + refresh * 3);
+    let forgotten = must("a blank projector can be asked", projector.poll_flip())?;
+    if forgotten.is_some() {
+        return Err(violated(
+            "blanking forgets the flip that waits",
+            format!("{forgotten:?}"),
+        ));
+    }
+    Ok(())
+}
+
+fn next_flip(projector: &mut impl Projector, clock: &mut impl Clock) -> Result<Flip, Violation> {
+    let end = clock.now() + PATIENT;
+    loop {
+        if let Some(flip) = must("a flip comes", prompt(|| projector.poll_flip())?)? {
+            return Ok(flip);
+        }
+        if clock.now() >= end {
+            return Err(violated(
+                "each queued pattern flips",
+                format!("none within {PATIENT:?}"),
+            ));
+        }
+        clock.wait(end);
+    }
 }
 
 /// The promises of a trigger by itself.
 ///
 /// # Errors
 /// The first promise that is not kept.
-pub fn check_trigger(trigger: &mut impl Trigger) -> Result<(), Violation> {
+pub fn check_trigger(trigger: &mut impl Trigger, clock: &mut impl Clock) -> Result<(), Violation> {
     let mut last = Timestamp(0);
     for _ in 0..3 {
-        let fired = must("a trigger fires", trigger.fire(PATIENT))?;
-        if fired < last {
+        let asked = clock.now();
+        let fired = must("a trigger fires", prompt(|| trigger.fire())?)?;
+        if fired < last || fired < asked || fired > clock.now() {
             return Err(violated(
-                "a trigger's times do not go back",
-                format!("{last}, then {fired}"),
+                "a trigger's times are those of the head's clock and do not go back",
+                format!("{last}, then {fired}, asked at {asked}"),
             ));
         }
         last = fired;
+        clock.wait(clock.now() + Duration::from_millis(1));
     }
     Ok(())
 }
 
-/// All promises of a head that takes sequences of `patterns` patterns, and those of its devices.
+/// The promises of a clock.
 ///
 /// # Errors
 /// The first promise that is not kept.
-pub fn check_head<C: Camera, P: Projector, T: Trigger>(
-    head: &mut Head<C, P, T>,
+pub fn check_clock(clock: &mut impl Clock) -> Result<(), Violation> {
+    for ms in [0, 1, 20] {
+        let (begun, until) = (clock.now(), clock.now() + Duration::from_millis(ms));
+        // It may return early for nothing, but not for ever.
+        for _ in 0..1000 {
+            clock.wait(until);
+        }
+        if clock.now() < until || clock.now() < begun {
+            return Err(violated(
+                "a wait ends when its time has come",
+                format!("{} after waiting from {begun} until {until}", clock.now()),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The promises of a head that takes sequences of `patterns` patterns, and those of its devices.
+///
+/// # Errors
+/// The first promise that is not kept.
+pub fn check_head<C: Camera, P: Projector, T: Trigger, K: Clock>(
+    head: &mut Head<C, P, T, K>,
     patterns: usize,
 ) -> Result<(), Violation> {
-    let (camera, projector, trigger) = head.devices();
-    check_camera(camera)?;
-    check_projector(projector, patterns)?;
-    check_trigger(trigger)?;
+    let devices = head.devices();
+    check_clock(&mut devices.clock)?;
+    check_camera(&mut devices.camera, &mut devices.clock)?;
+    check_projector(&mut devices.projector, &mut devices.clock, patterns)?;
+    check_trigger(&mut devices.trigger, &mut devices.clock)?;
 
     let format = head.camera_format();
     let indices: Vec<usize> = (0..patterns).collect();
@@ -248,15 +350,8 @@ pub fn check_head<C: Camera, P: Projector, T: Trigger>(
     }
 
     must_fail(
-        "a sequence without any time times out",
-        ErrorKind::Timeout,
-        Duration::ZERO,
-        || head.acquire(&indices, Duration::ZERO, &mut |_, _| ()),
-    )?;
-    must_fail(
         "a sequence of no patterns is refused",
         ErrorKind::Protocol,
-        PATIENT,
         || head.acquire(&[], PATIENT, &mut |_, _| ()),
     )?;
     must(

@@ -1,81 +1,133 @@
 //! A head (camera, projector and trigger) and the acquisition of one sequence with it.
+//!
+//! The decisions are the `sequencer`'s, which knows no device; this loop carries them out.
 
+mod count;
+mod failure;
+mod identity;
+mod pacing;
+mod sequencer;
+mod timing;
+
+use std::sync::mpsc;
 use std::time::Duration;
 
-use crate::camera::Camera;
+use crate::camera::{Camera, CameraTiming, Encoding};
+use crate::clock::Clock;
 use crate::error::Error;
 use crate::frame::{Frame, FrameFormat};
-use crate::projector::{Flip, Projector, Raster};
+use crate::projector::{Projector, Raster};
 use crate::trigger::Trigger;
 use crate::units::Timestamp;
-
-/// Frames older than their pattern that are discarded before the sequence is given up.
-const MAX_STALE_FRAMES: u32 = 8;
+use pacing::Pacing;
+use sequencer::{Act, Sequencer};
+pub use timing::{Stamp, TOLERANCE, Timing};
 
 /// A head of any back-end.
-pub type DynHead = Head<Box<dyn Camera>, Box<dyn Projector>, Box<dyn Trigger>>;
+pub type DynHead = Head<Box<dyn Camera>, Box<dyn Projector>, Box<dyn Trigger>, Box<dyn Clock>>;
 
-/// Camera, projector and trigger that look at the same part.
+/// Camera, projector and trigger that look at the same part, and the clock that they share.
 #[derive(Debug)]
-pub struct Head<C, P, T> {
-    camera: C,
-    projector: P,
-    trigger: T,
+pub struct Head<C, P, T, K> {
+    devices: Devices<C, P, T, K>,
+    timing: Timing,
+    sequencer: Sequencer<Frame>,
 }
 
-/// When a sequence was taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Debug)]
+pub(crate) struct Devices<C, P, T, K> {
+    pub camera: C,
+    pub projector: P,
+    pub trigger: T,
+    pub clock: K,
+}
+
+/// How a sequence was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Exposure {
     /// When the first pattern came into view.
     pub started: Timestamp,
     /// When the exposure of the last frame started.
     pub done: Timestamp,
-    /// Frames that were older than their pattern and were discarded.
-    pub stale: u32,
-    /// Frames that were exposed and never came: gaps in the camera's count.
-    pub dropped: u32,
-    /// Refreshes that the projector missed: gaps in its count of flips.
-    pub missed_flips: u32,
     /// Longest time from a pattern's coming into view to the start of its exposure.
     pub lag: Duration,
+    /// Largest departure of a flip from its count, and of an exposure from its trigger.
+    pub sync_error: Duration,
+    /// Shots that gave no frame, and whose pattern was shown again.
+    pub retaken: u32,
+    /// Refreshes by which flips came later than planned.
+    pub missed_flips: u32,
+    /// Frames that were exposed and never came: gaps in the camera's count.
+    pub dropped: u32,
+    /// Frames that came again.
+    pub duplicated: u32,
+    /// Frames that were exposed over a change of patterns.
+    pub straddled: u32,
+    /// Frames that were exposed before the first pattern, or came much too late.
+    pub stale: u32,
+    /// Frames whose exposure started at no trigger.
+    pub unexplained: u32,
+    /// Frames of patterns that had their frame already.
+    pub surplus: u32,
 }
 
-/// The counts of the frame and the flip before.
-#[derive(Clone, Copy, Default)]
-struct Counts {
-    frame: Option<u64>,
-    flip: Option<u64>,
+impl Exposure {
+    /// Frames that came and proved to be no pattern's.
+    fn unfit(&self) -> u32 {
+        [self.straddled, self.stale, self.unexplained]
+            .into_iter()
+            .fold(0, u32::saturating_add)
+    }
 }
 
-/// How many counts are missing between two that follow each other.
-fn gap(before: Option<u64>, now: u64) -> u32 {
-    let missing = before.map_or(0, |before| now.saturating_sub(before).saturating_sub(1));
-    u32::try_from(missing).unwrap_or(u32::MAX)
-}
-
-impl<C: Camera, P: Projector, T: Trigger> Head<C, P, T> {
-    /// A head of these devices.
-    pub fn new(camera: C, projector: P, trigger: T) -> Self {
+impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
+    /// A head of these devices, which stand in this relation of time.
+    pub fn new(camera: C, projector: P, trigger: T, clock: K, timing: Timing) -> Self {
         Self {
-            camera,
-            projector,
-            trigger,
+            devices: Devices {
+                camera,
+                projector,
+                trigger,
+                clock,
+            },
+            timing,
+            sequencer: Sequencer::new(),
         }
     }
 
     /// The format of the frames that [`Head::acquire`] delivers.
     pub fn camera_format(&self) -> FrameFormat {
-        self.camera.format()
+        self.devices.camera.format()
+    }
+
+    /// How the camera's samples come over the wire.
+    pub fn encoding(&self) -> Encoding {
+        self.devices.camera.encoding()
+    }
+
+    /// How the camera takes its frames.
+    pub fn camera_timing(&self) -> CameraTiming {
+        self.devices.camera.timing()
+    }
+
+    /// The measured relation of flips, light and stamps.
+    pub fn timing(&self) -> Timing {
+        self.timing
+    }
+
+    /// Replaces the measured relation of flips, light and stamps.
+    pub fn set_timing(&mut self, timing: Timing) {
+        self.timing = timing;
     }
 
     /// Columns and rows of the rasters that [`Head::load`] takes.
     pub fn projector_size(&self) -> (u32, u32) {
-        self.projector.size()
+        self.devices.projector.size()
     }
 
     /// Time between two refreshes of the projector.
     pub fn refresh(&self) -> Duration {
-        self.projector.refresh()
+        self.devices.projector.refresh()
     }
 
     /// Asks whether camera and projector are still there, without disturbing them.
@@ -83,8 +135,8 @@ impl<C: Camera, P: Projector, T: Trigger> Head<C, P, T> {
     /// # Errors
     /// `Disconnected` of the first one that is gone.
     pub fn present(&self) -> Result<(), Error> {
-        self.camera.present()?;
-        self.projector.present()
+        self.devices.camera.present()?;
+        self.devices.projector.present()
     }
 
     /// Replaces the patterns.
@@ -92,18 +144,20 @@ impl<C: Camera, P: Projector, T: Trigger> Head<C, P, T> {
     /// # Errors
     /// As [`Projector::load`].
     pub fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
-        self.projector.load(rasters)
+        self.devices.projector.load(rasters)
     }
 
     /// Shows the patterns `indices` in this order, exposes one frame of each, and hands each to `sink` with
-    /// its pattern's index as soon as it is there. Every single wait is limited by `timeout`.
+    /// its pattern's index as soon as it and all before it are there, stamped with the start of its exposure.
     ///
-    /// A frame belongs to a pattern if its exposure did not start before the pattern came into view; earlier
-    /// frames are discarded. However it ends, the camera is stopped and the projector blank afterwards.
+    /// A frame is a pattern's if its whole exposure lies within the pattern's time in view, by the times and
+    /// counts of flips and frames and never by the order of arrival. A pattern without such a frame is shown again. The
+    /// sequence ends at the latest `timeout` after it would have without a fault. However it ends, the camera is
+    /// stopped and the projector blank afterwards. `sink` delays no flip: devices are served by another thread while it works.
     ///
     /// # Errors
-    /// The first error of a device; `Protocol` if `indices` is empty or if nothing but stale frames comes.
-    /// `sink` has then seen the frames before it.
+    /// The first error of a device; `Protocol` if `indices` is empty or frames never fit their patterns; `Timeout` if
+    /// time is up, or flips or frames do not come at all. `sink` has then seen the frames before it.
     pub fn acquire(
         &mut self,
         indices: &[usize],
@@ -127,88 +181,105 @@ impl<C: Camera, P: Projector, T: Trigger> Head<C, P, T> {
         timeout: Duration,
         sink: &mut dyn FnMut(usize, Frame) -> bool,
     ) -> Result<Exposure, Error> {
-        let result = self
-            .camera
-            .start()
-            .and_then(|()| self.sequence(indices, timeout, sink));
-        // Both are told, whatever the first one answers; the sequence's own error says more than theirs.
-        let stopped = self.camera.stop();
-        let blanked = self.projector.blank();
-        let exposure = result?;
-        stopped?;
-        blanked?;
-        Ok(exposure)
-    }
-
-    fn sequence(
-        &mut self,
-        indices: &[usize],
-        timeout: Duration,
-        sink: &mut dyn FnMut(usize, Frame) -> bool,
-    ) -> Result<Exposure, Error> {
-        let mut exposure: Option<Exposure> = None;
-        let mut before = Counts::default();
-        for &index in indices {
-            let flip = self.projector.show(index, timeout)?;
-            self.trigger.fire(timeout)?;
-            let (frame, stale, dropped) = self.frame_of(index, flip, timeout, &mut before)?;
-            let so_far = exposure.get_or_insert(Exposure {
-                started: flip.timestamp,
-                done: flip.timestamp,
-                stale: 0,
-                dropped: 0,
-                missed_flips: 0,
-                lag: Duration::ZERO,
-            });
-            so_far.done = frame.timestamp();
-            so_far.stale += stale;
-            so_far.dropped = so_far.dropped.saturating_add(dropped);
-            let missed = gap(before.flip.replace(flip.sequence), flip.sequence);
-            so_far.missed_flips = so_far.missed_flips.saturating_add(missed);
-            so_far.lag = so_far.lag.max(frame.timestamp().since(flip.timestamp));
-            if !sink(index, frame) {
-                break;
-            }
-        }
-        exposure.ok_or_else(|| {
-            Error::protocol(
+        if indices.is_empty() {
+            return Err(Error::protocol(
                 "acquiring a sequence of 0 patterns",
                 "name at least one loaded pattern",
-            )
+            ));
+        }
+        let Self {
+            devices,
+            timing,
+            sequencer,
+        } = self;
+        let camera = devices.camera.timing();
+        let pacing = Pacing::new(devices.projector.refresh(), &camera, timing);
+        let deadline = devices.clock.now() + (pacing.planned(indices.len()) + timeout);
+        sequencer.begin(pacing, indices, deadline);
+        let start_of = |frame: &Frame| timing.exposure_start(&camera, frame.timestamp());
+        devices.exposing(|devices| {
+            if devices.clock.stands_still() {
+                return carry_out(devices, sequencer, timeout, &start_of, sink);
+            }
+            std::thread::scope(|scope| {
+                let (frames, taken) = mpsc::channel();
+                let start_of = &start_of;
+                let served = scope.spawn(move || {
+                    let mut hand = |index, frame| frames.send((index, frame)).is_ok();
+                    carry_out(devices, sequencer, timeout, start_of, &mut hand)
+                });
+                for (index, frame) in taken {
+                    if !sink(index, frame) {
+                        break;
+                    }
+                }
+                served
+                    .join()
+                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            })
         })
     }
 
-    /// The first frame that was exposed with pattern `index` in view, how many older ones came before it, and how many
-    /// are missing in the camera's count.
-    fn frame_of(
-        &mut self,
-        index: usize,
-        flip: Flip,
-        timeout: Duration,
-        before: &mut Counts,
-    ) -> Result<(Frame, u32, u32), Error> {
-        let mut dropped = 0_u32;
-        for stale in 0..=MAX_STALE_FRAMES {
-            let frame = self.camera.next_frame(timeout)?;
-            let missing = gap(before.frame.replace(frame.sequence()), frame.sequence());
-            dropped = dropped.saturating_add(missing);
-            if frame.timestamp() >= flip.timestamp {
-                return Ok((frame, stale, dropped));
-            }
-        }
-        Err(Error::protocol(
-            format!(
-                "waiting for the frame of pattern {index}, in view since {}: {} frames were exposed before that, which",
-                flip.timestamp,
-                MAX_STALE_FRAMES + 1
-            ),
-            "check that camera and projector stamp by the same clock and that the camera is triggered",
-        ))
+    /// The devices, for the contract checks and for looking at a head without a sequence.
+    pub(crate) fn devices(&mut self) -> &mut Devices<C, P, T, K> {
+        &mut self.devices
     }
+}
 
-    /// The devices, for the contract checks.
-    pub(crate) fn devices(&mut self) -> (&mut C, &mut P, &mut T) {
-        (&mut self.camera, &mut self.projector, &mut self.trigger)
+impl<C: Camera, P: Projector, T: Trigger, K: Clock> Devices<C, P, T, K> {
+    /// Does `work` with a running camera. However it ends, the camera is stopped and the projector blank afterwards.
+    pub fn exposing<R>(
+        &mut self,
+        work: impl FnOnce(&mut Self) -> Result<R, Error>,
+    ) -> Result<R, Error> {
+        let result = match self.camera.start() {
+            Ok(()) => work(self),
+            Err(error) => Err(error),
+        };
+        // Both are told, whatever the first one answers; the work's own error says more than theirs.
+        let stopped = self.camera.stop();
+        let blanked = self.projector.blank();
+        let result = result?;
+        stopped?;
+        blanked?;
+        Ok(result)
+    }
+}
+
+/// Tells the sequencer what happens and does what it answers, until the sequence ends or `hand` answers `false`.
+fn carry_out<C: Camera, P: Projector, T: Trigger, K: Clock>(
+    devices: &mut Devices<C, P, T, K>,
+    sequencer: &mut Sequencer<Frame>,
+    timeout: Duration,
+    start_of: &(dyn Fn(&Frame) -> Timestamp + Sync),
+    hand: &mut dyn FnMut(usize, Frame) -> bool,
+) -> Result<Exposure, Error> {
+    let Devices {
+        camera,
+        projector,
+        trigger,
+        clock,
+    } = devices;
+    loop {
+        while let Some(flip) = projector.poll_flip()? {
+            sequencer.flipped(flip);
+        }
+        while let Some(frame) = camera.poll_frame()? {
+            let (start, count) = (start_of(&frame), frame.sequence());
+            sequencer.frame(start, count, frame.restamped(start, count));
+        }
+        match sequencer.act(clock.now()) {
+            Act::Queue(index) => projector.queue(index)?,
+            Act::Fire => sequencer.fired(trigger.fire()?),
+            Act::Hand(index, frame) => {
+                if !hand(index, frame) {
+                    return Ok(sequencer.so_far());
+                }
+            }
+            Act::Wait(until) => clock.wait(until),
+            Act::Done => return Ok(sequencer.so_far()),
+            Act::Fail(failure) => return Err(failure.error(timeout)),
+        }
     }
 }
 

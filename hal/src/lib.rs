@@ -5,6 +5,7 @@
 //! crate that decodes them.
 
 pub mod camera;
+pub mod clock;
 pub mod contract;
 pub mod error;
 pub mod frame;

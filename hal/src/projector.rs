@@ -63,16 +63,19 @@ impl Raster {
     }
 }
 
-/// The moment a pattern came into view.
+/// The refresh at which a pattern was taken up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Flip {
-    /// When the pattern's light was there; no frame exposed earlier can show it.
+    /// When that refresh began. The pattern's light is there a while later, by the head's [`crate::head::Timing::flip_to_light`].
     pub timestamp: Timestamp,
-    /// The projector's own count of flips; a gap means a missed refresh.
+    /// The projector's own count of refreshes; a step above the planned one means a missed refresh.
     pub sequence: u64,
 }
 
 /// A projector that holds patterns and shows one of them at a time.
+///
+/// A flip is queued without waiting and comes with the next refresh; its time and count follow when it has come. At most
+/// one flip waits at a time.
 pub trait Projector: Send {
     /// Columns and rows.
     fn size(&self) -> (u32, u32);
@@ -88,19 +91,25 @@ pub trait Projector: Send {
         Ok(())
     }
 
-    /// Replaces the patterns; nothing is shown until [`Projector::show`].
+    /// Replaces the patterns; nothing is shown until [`Projector::queue`].
     ///
     /// # Errors
     /// `Unsupported` if a raster does not have the projector's size.
     fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error>;
 
-    /// Shows pattern `index` and waits until it is in view.
+    /// Queues pattern `index` for the next refresh and returns at once.
     ///
     /// # Errors
-    /// `Timeout` if the refresh did not come within `timeout`, `Protocol` if no such pattern is loaded.
-    fn show(&mut self, index: usize, timeout: Duration) -> Result<Flip, Error>;
+    /// `Protocol` if no such pattern is loaded or another one still waits for its refresh.
+    fn queue(&mut self, index: usize) -> Result<(), Error>;
 
-    /// Shows nothing.
+    /// The flip that has come since the last call: one for each queued pattern. Does not wait.
+    ///
+    /// # Errors
+    /// `Disconnected` if the projector is gone.
+    fn poll_flip(&mut self) -> Result<Option<Flip>, Error>;
+
+    /// Shows nothing; a flip that still waits is forgotten and never reported.
     ///
     /// # Errors
     /// What the device says.
@@ -124,8 +133,12 @@ impl<P: Projector + ?Sized> Projector for Box<P> {
         (**self).load(rasters)
     }
 
-    fn show(&mut self, index: usize, timeout: Duration) -> Result<Flip, Error> {
-        (**self).show(index, timeout)
+    fn queue(&mut self, index: usize) -> Result<(), Error> {
+        (**self).queue(index)
+    }
+
+    fn poll_flip(&mut self) -> Result<Option<Flip>, Error> {
+        (**self).poll_flip()
     }
 
     fn blank(&mut self) -> Result<(), Error> {

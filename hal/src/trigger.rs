@@ -1,21 +1,22 @@
 //! The trigger of a head: what starts one exposure of the camera.
 
-use std::time::Duration;
-
 use crate::error::Error;
 use crate::units::Timestamp;
 
 /// Starts one camera exposure per call.
 pub trait Trigger: Send {
-    /// Starts one exposure and returns when it started.
+    /// Begins one pulse and answers when it began, without waiting for its end.
+    ///
+    /// Whether the camera took it shows in its frames only: a pulse on an open wire, or to a camera that is
+    /// stopped or busy, is lost.
     ///
     /// # Errors
-    /// `Timeout` if the exposure could not start within `timeout`.
-    fn fire(&mut self, timeout: Duration) -> Result<Timestamp, Error>;
+    /// What the device says.
+    fn fire(&mut self) -> Result<Timestamp, Error>;
 }
 
 impl<T: Trigger + ?Sized> Trigger for Box<T> {
-    fn fire(&mut self, timeout: Duration) -> Result<Timestamp, Error> {
-        (**self).fire(timeout)
+    fn fire(&mut self) -> Result<Timestamp, Error> {
+        (**self).fire()
     }
 }

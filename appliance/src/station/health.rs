@@ -69,6 +69,10 @@ pub struct Pace {
     pub dropped: u32,
     /// Refreshes that the projector missed.
     pub missed_flips: u32,
+    /// Patterns that were shown again because no frame was wholly theirs.
+    pub retaken: u32,
+    /// Largest departure of a flip from its count and of an exposure from its trigger, µs.
+    pub sync_error_us: u32,
 }
 
 /// Everything that the HEALTH registers show.
@@ -92,6 +96,7 @@ impl Health {
         self.pace = Pace {
             dropped: before.dropped.saturating_add(pace.dropped),
             missed_flips: before.missed_flips.saturating_add(pace.missed_flips),
+            retaken: before.retaken.saturating_add(pace.retaken),
             ..pace
         };
     }

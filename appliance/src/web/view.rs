@@ -70,6 +70,8 @@ fn health(snapshot: &Snapshot) -> Value {
         "lag_us": pace.lag_us,
         "dropped_frames": pace.dropped,
         "missed_flips": pace.missed_flips,
+        "retaken_patterns": pace.retaken,
+        "sync_error_us": pace.sync_error_us,
         "processing_us": snapshot.health.processing_us,
         "processing_max_us": snapshot.health.processing_max_us,
         "storage_errors": snapshot.health.storage_errors,

@@ -4,7 +4,7 @@ use super::{ABORTED, DEVICE_TIMEOUT, Worker, code, code_of};
 use crate::benchmark::stopwatch::timed_on;
 use crate::history::FailedPart;
 use crate::plan::Plan;
-use crate::station::result::flag::STEPPED_UP;
+use crate::station::result::flag::{RETRIED, STEPPED_UP};
 use crate::station::{
     Event, Inspection, Job, JobId, Pace, ResultRecord, Stage, Stages, error_code,
 };
@@ -29,10 +29,13 @@ impl Worker {
         stages.add(Stage::Waiting, waited.to_u32());
         loop {
             let began = Instant::now();
-            let Some(frames) = self.take(plan.indices(step), id) else {
+            let Some((frames, exposure)) = self.take(plan.indices(step), id) else {
                 return Vec::new();
             };
             stages.add(Stage::Exposure, us(began.elapsed()));
+            if exposure.retaken > 0 {
+                flags |= RETRIED;
+            }
             step += 1;
             let last = step >= plan.steps();
             // The part must stay while another sequence may follow.
@@ -46,7 +49,7 @@ impl Worker {
             if let Some(reason) = inspection.step_up.filter(|_| !last) {
                 self.progress
                     .log(&format!("measuring again with more frames: {reason}"));
-                flags = STEPPED_UP;
+                flags |= STEPPED_UP;
                 continue;
             }
             if !last {
@@ -60,8 +63,9 @@ impl Worker {
         }
     }
 
-    /// The frames of some of the patterns; none if there are not all of them, and then the station knows why.
-    fn take(&mut self, indices: &[usize], job: JobId) -> Option<Vec<Frame>> {
+    /// The frames of some of the patterns and how they were taken; none if there are not all of them, and then the station
+    /// knows why.
+    fn take(&mut self, indices: &[usize], job: JobId) -> Option<(Vec<Frame>, Exposure)> {
         let mut frames: Vec<Frame> = Vec::with_capacity(indices.len());
         let (station, aborts) = (&self.station, &self.aborts);
         let mut keep = |_, frame| {
@@ -79,7 +83,7 @@ impl Worker {
             }
             Ok(exposure) => {
                 self.paced(indices.len(), &exposure);
-                Some(frames)
+                Some((frames, exposure))
             }
             Err(error) => {
                 let failed = failed(job, code_of(&error), error.to_string());
@@ -121,6 +125,8 @@ impl Worker {
             lag_us: us(exposure.lag),
             dropped: exposure.dropped,
             missed_flips: exposure.missed_flips,
+            retaken: exposure.retaken,
+            sync_error_us: us(exposure.sync_error),
         }));
     }
 }

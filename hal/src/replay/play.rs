@@ -8,10 +8,12 @@ use crate::frame::{Frame, FrameFormat};
 use crate::head::DynHead;
 use crate::projector::Raster;
 use crate::units::Timestamp;
-use crate::virtual_head::{self, Scene};
+use crate::virtual_head::{self, Mechanics, Scene};
 
 /// Refresh period of the replayed projector, 60 Hz.
 const REFRESH: Duration = Duration::from_nanos(16_666_667);
+/// Exposure of the replayed camera.
+const EXPOSURE_REFRESHES: u32 = 2;
 
 /// A head that plays `recordings` one after the other, then from the first again.
 ///
@@ -66,7 +68,7 @@ pub fn head(recordings: Vec<Recording>) -> Result<DynHead, Error> {
         played,
         loaded: 0,
     };
-    Ok(virtual_head::head(scene, REFRESH).0)
+    Ok(virtual_head::head(scene, Mechanics::plain(REFRESH, EXPOSURE_REFRESHES)).0)
 }
 
 struct Played {
@@ -108,15 +110,18 @@ impl Scene for Played {
 
     fn expose(
         &mut self,
-        shown: Option<usize>,
+        seen: &[(Option<usize>, f32)],
         timestamp: Timestamp,
         sequence: u64,
     ) -> Result<Frame, Error> {
-        let Some(index) = shown.filter(|index| *index < self.played.len()) else {
-            return Err(Error::protocol(
-                "replaying a frame with no pattern in view",
-                "show a pattern before triggering; nothing else was recorded",
-            ));
+        let index = match seen {
+            [(Some(index), _)] if *index < self.played.len() => *index,
+            _ => {
+                return Err(Error::protocol(
+                    "replaying a frame with no pattern in view, or several",
+                    "show a pattern before triggering; nothing else was recorded",
+                ));
+            }
         };
         let frame = self.recordings[self.current].frames[index]
             .frame

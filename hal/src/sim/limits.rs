@@ -52,6 +52,7 @@ impl Scenario {
         )?;
         within("optics.gamma", self.optics.gamma, 0.1, 10.0)?;
         within("optics.gain", self.optics.gain, 0.0, 100.0)?;
+        self.check_timing()?;
         self.placement.check()?;
         self.part.check()
     }

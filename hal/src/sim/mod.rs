@@ -10,12 +10,15 @@ pub mod parts;
 pub mod scenario;
 mod scene;
 mod stage;
+pub mod timing;
 mod trace;
 pub mod transport;
 
+pub use crate::virtual_head::Faults;
 pub use parts::Part;
 pub use scenario::{Placement, Scenario};
 pub use stage::{Stage, head, head_with_progress};
+pub use timing::Timing;
 pub use transport::Truth;
 
 #[cfg(test)]

@@ -5,7 +5,9 @@
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::parts::Part;
+use super::timing::Timing;
 use crate::model::DeviceModel;
+use crate::virtual_head::Faults;
 
 /// A whole simulated head. Keys that are left out of the TOML have the defaults of the study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,6 +31,10 @@ pub struct Scenario {
     pub part: Part,
     /// Where it lies.
     pub placement: Placement,
+    /// Exposure, readout and delays.
+    pub timing: Timing,
+    /// What goes wrong with flips, triggers and frames.
+    pub faults: Faults,
 }
 
 /// The two devices. Each looks at the world's origin from the xz plane, image x along +x, image y along −y.
@@ -118,6 +124,8 @@ impl Default for Scenario {
             optics: Optics::default(),
             part: Part::default(),
             placement: Placement::default(),
+            timing: Timing::default(),
+            faults: Faults::default(),
         }
     }
 }

@@ -28,6 +28,8 @@ pub(crate) struct SimScene {
     rasters: Vec<Vec<f32>>,
     /// The light on the camera, used again for each frame.
     picture: Vec<f32>,
+    /// The light of one of several patterns on the camera.
+    part: Vec<f32>,
     pool: Pool,
     seed: u64,
     exposed: u64,
@@ -41,6 +43,7 @@ impl SimScene {
             transport,
             rasters: Vec::new(),
             picture: vec![0.0; format.samples()],
+            part: vec![0.0; format.samples()],
             pool: Pool::new(format, MAX_KEPT_FRAMES),
             seed: scenario.noise.seed,
             exposed: 0,
@@ -106,14 +109,25 @@ impl Scene for SimScene {
 
     fn expose(
         &mut self,
-        shown: Option<usize>,
+        seen: &[(Option<usize>, f32)],
         timestamp: Timestamp,
         sequence: u64,
     ) -> Result<Frame, Error> {
-        let raster = shown
-            .and_then(|index| self.rasters.get(index))
-            .map(Vec::as_slice);
-        self.transport.light(raster, &mut self.picture);
+        let raster = |shown: Option<usize>| {
+            let raster = shown.and_then(|index| self.rasters.get(index));
+            raster.map(Vec::as_slice)
+        };
+        match seen {
+            [(shown, _)] => self.transport.light(raster(*shown), &mut self.picture),
+            several => {
+                self.picture.fill(0.0);
+                for (shown, share) in several {
+                    self.transport.light(raster(*shown), &mut self.part);
+                    let parts = self.picture.iter_mut().zip(&self.part);
+                    parts.for_each(|(sum, light)| *sum += share * light);
+                }
+            }
+        }
         let camera = &self.scenario.rig.camera;
         blur::gaussian(
             &mut self.picture,

@@ -61,9 +61,8 @@ pub fn head_with_progress(
         placement: scenario.placement,
         transport: Arc::clone(&transport),
     };
-    let refresh = Duration::from_secs_f64(1.0 / scenario.refresh_hz);
-    let (head, bench) =
-        virtual_head::head(SimScene::new(Arc::clone(&scenario), transport), refresh);
+    let scene = SimScene::new(Arc::clone(&scenario), transport);
+    let (head, bench) = virtual_head::head(scene, scenario.mechanics());
     let stage = Stage {
         bench,
         scenario,
@@ -191,6 +190,6 @@ impl Stage {
     /// Refresh period of the projector.
     #[must_use]
     pub fn refresh(&self) -> Duration {
-        Duration::from_secs_f64(1.0 / self.scenario.refresh_hz)
+        self.scenario.refresh()
     }
 }

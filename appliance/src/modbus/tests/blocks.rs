@@ -209,6 +209,8 @@ async fn health_says_what_is_known_and_what_is_not() {
         lag_us: 12,
         dropped: 2,
         missed_flips: 1,
+        retaken: 3,
+        sync_error_us: 7,
     };
     plant.handle.event(Event::Paced(pace));
     plant.handle.event(Event::Paced(pace));

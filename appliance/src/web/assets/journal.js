@@ -32,6 +32,7 @@ function condition(now) {
     ["Pattern to exposure", `${count(health.lag_us)} µs at most`],
     ["Dropped frames", count(health.dropped_frames)],
     ["Missed flips", count(health.missed_flips)],
+    ["Patterns taken again", count(health.retaken_patterns)],
     ["Processing, last", milliseconds(health.processing_us)],
     ["Processing, longest", milliseconds(health.processing_max_us)],
     ["Modbus clients", `${health.modbus_clients}${health.writer_connected ? ", one may write" : ""}`],

@@ -1,0 +1,73 @@
+//! Why a sequence ended without all its frames: the counts, as an error with its remedy.
+
+use std::time::Duration;
+
+use super::Exposure;
+use crate::error::Error;
+
+/// What the sequence waited for in vain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Blocked {
+    /// The projector never flipped.
+    NoFlip,
+    /// The camera gave no frame at all.
+    NoFrame,
+    /// A pattern was shown as often as allowed, and no frame was wholly its.
+    Retakes,
+    /// Time was up.
+    Late,
+}
+
+/// A sequence that was given up.
+#[derive(Clone, Debug)]
+pub(super) struct Failure {
+    pub blocked: Blocked,
+    /// The pattern that has no frame.
+    pub index: usize,
+    pub shots: u32,
+    pub taken: usize,
+    pub of: usize,
+    pub so_far: Exposure,
+}
+
+impl Failure {
+    /// The error; `timeout` is what the caller allowed beyond the plan.
+    pub fn error(self, timeout: Duration) -> Error {
+        let Self {
+            index,
+            shots,
+            taken,
+            of,
+            so_far,
+            ..
+        } = self;
+        let attempt = format!("acquiring pattern {index} ({taken} of {of} taken)");
+        let counts = format!(
+            "{} frames straddled two patterns, {} were older, {} began at no trigger, {} were lost, {} refreshes were missed",
+            so_far.straddled, so_far.stale, so_far.unexplained, so_far.dropped, so_far.missed_flips
+        );
+        match self.blocked {
+            Blocked::NoFlip => Error::timeout(
+                format!("{attempt}: no flip came, which"),
+                timeout,
+                "check the projector's connection and mode",
+            ),
+            Blocked::NoFrame => Error::timeout(
+                format!("{attempt}: shown {shots} times, no frame came, which"),
+                timeout,
+                "check the trigger's wire and the camera's trigger mode",
+            ),
+            Blocked::Retakes => Error::protocol(
+                format!(
+                    "{attempt}: shown {shots} times, no frame was wholly exposed in its view ({counts}), which"
+                ),
+                "check the flip-to-light delay, what the camera's stamp marks, and the load of the processor",
+            ),
+            Blocked::Late => Error::timeout(
+                format!("{attempt} after {shots} tries ({counts})"),
+                timeout,
+                "check the load of the processor and the cables",
+            ),
+        }
+    }
+}

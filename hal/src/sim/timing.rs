@@ -1,0 +1,143 @@
+//! How time goes on a simulated head: exposure, readout and delays, and what its calibration believes of them.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use super::limits::within;
+use super::scenario::Scenario;
+use crate::head::Stamp;
+use crate::virtual_head::Mechanics;
+
+/// Times of a simulated head. By default the camera is triggered, exposes two refreshes and is read out in no time, and a
+/// pattern's light is there with its flip.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Timing {
+    /// Exposure, refreshes of the projector, 0.01…100. A micromirror device makes grey levels over whole refreshes.
+    pub exposure_refreshes: f64,
+    /// From the end of an exposure to its frame, 0…1 000 000 µs.
+    pub readout_us: u64,
+    /// From a flip to its pattern's light, 0…1 000 000 µs.
+    pub flip_to_light_us: u64,
+    /// What the head's calibration believes of that; left out: the truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibrated_flip_to_light_us: Option<u64>,
+    /// Period of a camera that runs by itself, at least exposure or readout, up to 10 000 000 µs; 0: the camera is triggered.
+    pub camera_period_us: u64,
+    /// From the start of a camera that runs by itself to its first exposure, 0…10 000 000 µs.
+    pub camera_phase_us: u64,
+    /// What the camera's stamps mark: "exposure_start", "exposure_end" or "readout_end".
+    pub stamp: Stamp,
+}
+
+impl Default for Timing {
+    fn default() -> Self {
+        Self {
+            exposure_refreshes: 2.0,
+            readout_us: 0,
+            flip_to_light_us: 0,
+            calibrated_flip_to_light_us: None,
+            camera_period_us: 0,
+            camera_phase_us: 0,
+            stamp: Stamp::default(),
+        }
+    }
+}
+
+impl Scenario {
+    /// Time from one refresh of the projector to the next.
+    #[must_use]
+    pub fn refresh(&self) -> Duration {
+        Duration::from_secs_f64(1.0 / self.refresh_hz)
+    }
+
+    /// The times and faults as the virtual devices have them.
+    pub(super) fn mechanics(&self) -> Mechanics {
+        let (timing, refresh) = (&self.timing, self.refresh());
+        let us = Duration::from_micros;
+        let believed = timing.calibrated_flip_to_light_us;
+        Mechanics {
+            refresh,
+            flip_to_light: us(timing.flip_to_light_us),
+            calibrated_flip_to_light: us(believed.unwrap_or(timing.flip_to_light_us)),
+            exposure: self.exposure(),
+            readout: us(timing.readout_us),
+            free_running: (timing.camera_period_us > 0)
+                .then(|| (us(timing.camera_period_us), us(timing.camera_phase_us))),
+            stamp: timing.stamp,
+            faults: self.faults.clone(),
+        }
+    }
+
+    /// Whole refreshes are exact; a float's rounding would let an exposure end after the flip that is due at its end.
+    fn exposure(&self) -> Duration {
+        let refreshes = self.timing.exposure_refreshes;
+        if refreshes.fract() == 0.0 {
+            return self.refresh() * refreshes as u32;
+        }
+        self.refresh().mul_f64(refreshes)
+    }
+
+    /// What is wrong with the times and faults, if anything.
+    pub(super) fn check_timing(&self) -> Result<(), String> {
+        let (timing, faults) = (&self.timing, &self.faults);
+        within(
+            "timing.exposure_refreshes",
+            timing.exposure_refreshes,
+            0.01,
+            100.0,
+        )?;
+        let believed = timing.calibrated_flip_to_light_us.unwrap_or(0);
+        for (key, us, most) in [
+            ("timing.readout_us", timing.readout_us, 1e6),
+            ("timing.flip_to_light_us", timing.flip_to_light_us, 1e6),
+            ("timing.calibrated_flip_to_light_us", believed, 1e6),
+            ("timing.camera_period_us", timing.camera_period_us, 1e7),
+            ("timing.camera_phase_us", timing.camera_phase_us, 1e7),
+            ("faults.flip_jitter_us", faults.flip_jitter_us, 1e6),
+            ("faults.late_news_us", faults.late_news_us, 1e7),
+            ("faults.late_frame_us", faults.late_frame_us, 1e7),
+            ("faults.stamp_jitter_us", faults.stamp_jitter_us, 1e6),
+            ("faults.trigger_jitter_us", faults.trigger_jitter_us, 1e6),
+            ("faults.stall_us", faults.stall_us, 1e7),
+        ] {
+            within(key, us as f64, 0.0, most)?;
+        }
+        let busy = self
+            .exposure()
+            .max(Duration::from_micros(timing.readout_us));
+        if timing.camera_period_us > 0 && Duration::from_micros(timing.camera_period_us) < busy {
+            return Err(format!(
+                "timing.camera_period_us is {}: write at least {}, its exposure or readout, or 0 for a triggered camera",
+                timing.camera_period_us,
+                busy.as_nanos().div_ceil(1000)
+            ));
+        }
+        for (key, chance) in [
+            ("faults.late_flip", faults.late_flip),
+            ("faults.late_news", faults.late_news),
+            ("faults.wrong_stamp", faults.wrong_stamp),
+            ("faults.dropped", faults.dropped),
+            ("faults.duplicated", faults.duplicated),
+            ("faults.swapped", faults.swapped),
+            ("faults.late_frame", faults.late_frame),
+            ("faults.lost_trigger", faults.lost_trigger),
+            ("faults.stall", faults.stall),
+        ] {
+            within(key, chance, 0.0, 1.0)?;
+        }
+        within(
+            "faults.late_refreshes",
+            f64::from(faults.late_refreshes),
+            0.0,
+            1000.0,
+        )?;
+        within(
+            "faults.drift_ppm",
+            f64::from(faults.drift_ppm),
+            -100_000.0,
+            100_000.0,
+        )
+    }
+}

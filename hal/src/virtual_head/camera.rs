@@ -1,0 +1,235 @@
+//! The virtual camera: exposures start by trigger or by themselves, and their frames come after the readout.
+//!
+//! A frame is worked out when it is fetched, so what nobody fetches costs nothing and moves no noise.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use super::faults::{Dice, Kind};
+use super::timing::Mechanics;
+use super::{Bench, Device, Scene, lock};
+use crate::camera::{Camera, CameraTiming, Encoding};
+use crate::error::Error;
+use crate::frame::{Frame, FrameFormat};
+use crate::head::Stamp;
+use crate::units::Timestamp;
+
+/// Frames that wait to be fetched; when one more comes the oldest is lost, as in a real driver.
+const MAX_WAITING: usize = 4;
+
+/// The exposures of a camera.
+pub(super) struct Sensor {
+    armed: bool,
+    /// A triggered camera takes no trigger before this.
+    busy_until: Timestamp,
+    /// When a camera that runs by itself was started, and its exposures since.
+    started: Timestamp,
+    since: u64,
+    count: u64,
+    /// In the order of their frames' arrival.
+    exposures: VecDeque<Exposure>,
+    /// The frame that came last, if it comes once more.
+    again: Option<Frame>,
+}
+
+#[derive(Clone, Copy)]
+struct Exposure {
+    start: Timestamp,
+    count: u64,
+    ready: Timestamp,
+    twice: bool,
+}
+
+impl Sensor {
+    pub fn new() -> Self {
+        Self {
+            armed: false,
+            busy_until: Timestamp(0),
+            started: Timestamp(0),
+            since: 0,
+            count: 0,
+            exposures: VecDeque::with_capacity(2 * MAX_WAITING),
+            again: None,
+        }
+    }
+
+    pub fn stop(&mut self) {
+        self.armed = false;
+        self.exposures.clear();
+        self.again = None;
+    }
+
+    /// A trigger's pulse. It is lost on an open wire and on a camera that is stopped or busy.
+    pub fn fire(&mut self, now: Timestamp, mechanics: &Mechanics, dice: Dice) {
+        let faults = &mechanics.faults;
+        let lost = !self.armed
+            || mechanics.free_running.is_some()
+            || now < self.busy_until
+            || faults.wire_open
+            || dice.happens(Kind::LostTrigger, self.count ^ now.0, faults.lost_trigger);
+        if lost {
+            return;
+        }
+        let jitter = Duration::from_micros(faults.trigger_jitter_us);
+        let start = now + dice.up_to(Kind::TriggerJitter, self.count, 1.0, jitter);
+        self.busy_until = start + (mechanics.exposure + mechanics.readout);
+        self.expose(start, mechanics, dice);
+    }
+
+    fn expose(&mut self, start: Timestamp, mechanics: &Mechanics, dice: Dice) {
+        let faults = &mechanics.faults;
+        let n = self.count;
+        if faults.frames_until_stuck > 0 && n >= faults.frames_until_stuck {
+            return;
+        }
+        self.count += 1;
+        if dice.happens(Kind::Dropped, n, faults.dropped) {
+            return;
+        }
+        let late = Duration::from_micros(faults.late_frame_us);
+        let late = dice.up_to(Kind::LateFrame, n, faults.late_frame, late);
+        let mut ready = start + (mechanics.exposure + mechanics.readout + late);
+        if dice.happens(Kind::Swapped, n, faults.swapped) {
+            ready = ready + (mechanics.camera().period + mechanics.exposure / 4);
+        }
+        let exposure = Exposure {
+            start,
+            count: n,
+            ready,
+            twice: dice.happens(Kind::Duplicated, n, faults.duplicated),
+        };
+        let place = self
+            .exposures
+            .iter()
+            .take_while(|other| other.ready <= ready)
+            .count();
+        self.exposures.insert(place, exposure);
+    }
+
+    /// The start of the next exposure of a camera that runs by itself.
+    fn next_start(&self, mechanics: &Mechanics) -> Option<Timestamp> {
+        let (period, phase) = mechanics.free_running.filter(|_| self.armed)?;
+        let drifted =
+            period.as_nanos() as f64 * (1.0 + f64::from(mechanics.faults.drift_ppm) * 1e-6);
+        Some(self.started + phase + Duration::from_nanos((drifted * self.since as f64) as u64))
+    }
+
+    /// Lets a camera that runs by itself expose until `now`.
+    fn run(&mut self, now: Timestamp, mechanics: &Mechanics, dice: Dice) {
+        let jitter = Duration::from_micros(mechanics.faults.trigger_jitter_us);
+        while let Some(start) = self
+            .next_start(mechanics)
+            .filter(|start| *start + jitter <= now)
+        {
+            self.since += 1;
+            let off = dice.up_to(Kind::TriggerJitter, self.count, 1.0, jitter);
+            self.expose(start + off, mechanics, dice);
+        }
+        // What nobody fetched in time is lost.
+        while self.exposures.len() > MAX_WAITING && self.exposures[MAX_WAITING].ready <= now {
+            self.exposures.pop_front();
+        }
+    }
+
+    /// When the next frame can be fetched, or something else happens on the way to it.
+    pub fn next(&self, mechanics: &Mechanics) -> Option<Timestamp> {
+        let jitter = Duration::from_micros(mechanics.faults.trigger_jitter_us);
+        let start = self.next_start(mechanics).map(|start| start + jitter);
+        let frame = self.exposures.front().map(|exposure| exposure.ready);
+        [start, frame].into_iter().flatten().min()
+    }
+
+    /// The start of the oldest exposure that may still be asked for its light.
+    pub fn oldest(&self, now: Timestamp, mechanics: &Mechanics) -> Timestamp {
+        let starts = self.exposures.iter().map(|exposure| exposure.start);
+        starts
+            .chain(self.next_start(mechanics))
+            .fold(now, Timestamp::min)
+    }
+}
+
+impl<S: Scene> Bench<S> {
+    fn frame(&mut self) -> Result<Option<Frame>, Error> {
+        self.sensor.run(self.now, &self.mechanics, self.dice);
+        if let Some(frame) = self.sensor.again.take() {
+            return Ok(Some(frame));
+        }
+        let now = self.now;
+        let Some(exposure) = self
+            .sensor
+            .exposures
+            .front()
+            .copied()
+            .filter(|e| e.ready <= now)
+        else {
+            return Ok(None);
+        };
+        self.sensor.exposures.pop_front();
+        let mechanics = &self.mechanics;
+        let end = exposure.start + mechanics.exposure;
+        let seen = self.light.seen(exposure.start, end);
+        let marked = match mechanics.stamp {
+            Stamp::ExposureStart => exposure.start,
+            Stamp::ExposureEnd => end,
+            Stamp::ReadoutEnd => end + mechanics.readout,
+        };
+        let jitter = Duration::from_micros(mechanics.faults.stamp_jitter_us);
+        let off = self
+            .dice
+            .up_to(Kind::StampJitter, exposure.count, 1.0, 2 * jitter);
+        let frame = self
+            .scene
+            .expose(seen, marked + off - jitter, exposure.count)?;
+        if exposure.twice {
+            self.sensor.again = Some(frame.clone());
+        }
+        Ok(Some(frame))
+    }
+}
+
+impl<S: Scene> Camera for Device<S> {
+    fn format(&self) -> FrameFormat {
+        lock(&self.bench).scene.format()
+    }
+
+    fn encoding(&self) -> Encoding {
+        lock(&self.bench).mechanics.encoding()
+    }
+
+    fn timing(&self) -> CameraTiming {
+        lock(&self.bench).mechanics.camera()
+    }
+
+    fn present(&self) -> Result<(), Error> {
+        self.as_camera("looking for the camera").map(|_| ())
+    }
+
+    fn start(&mut self) -> Result<(), Error> {
+        let mut bench = self.as_camera("starting the camera")?;
+        if bench.sensor.armed {
+            return Err(Error::protocol(
+                "starting a camera that is running",
+                "stop it first",
+            ));
+        }
+        bench.sensor.armed = true;
+        (bench.sensor.started, bench.sensor.since) = (bench.now, 0);
+        Ok(())
+    }
+
+    fn poll_frame(&mut self) -> Result<Option<Frame>, Error> {
+        let mut bench = self.as_camera("waiting for a frame")?;
+        if !bench.sensor.armed {
+            return Err(Error::protocol(
+                "waiting for a frame of a stopped camera",
+                "start it first",
+            ));
+        }
+        bench.frame()
+    }
+
+    fn stop(&mut self) -> Result<(), Error> {
+        self.as_camera("stopping the camera")?.sensor.stop();
+        Ok(())
+    }
+}

@@ -1,0 +1,119 @@
+//! What may go wrong on a virtual head, and the dice that decide when.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+/// Faults of a simulated head. Chances are 0…1 per event, times are the longest that may happen; all are 0 by default.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Faults {
+    /// Seed of all that follows.
+    pub seed: u64,
+    /// Chance that a flip comes 1…`late_refreshes` refreshes late.
+    pub late_flip: f64,
+    /// Refreshes that a late flip misses, at most.
+    pub late_refreshes: u32,
+    /// Jitter of the flips' stamps, ± µs.
+    pub flip_jitter_us: u64,
+    /// Chance that the news of a flip comes late, by up to `late_news_us`. Its stamp stays true.
+    pub late_news: f64,
+    /// How late, at most, µs.
+    pub late_news_us: u64,
+    /// Chance that the projector's driver stamps a flip one refresh late; never two in a row, which nothing could tell from
+    /// a longer flip-to-light delay.
+    pub wrong_stamp: f64,
+    /// Chance that a frame is lost on its way.
+    pub dropped: f64,
+    /// Chance that a frame comes twice.
+    pub duplicated: f64,
+    /// Chance that a frame comes after the next one.
+    pub swapped: f64,
+    /// Chance that a frame comes late, by up to `late_frame_us`.
+    pub late_frame: f64,
+    /// How late, at most, µs.
+    pub late_frame_us: u64,
+    /// Jitter of the frames' stamps, ± µs.
+    pub stamp_jitter_us: u64,
+    /// Chance that a trigger is lost.
+    pub lost_trigger: f64,
+    /// An exposure starts up to so much after its trigger, or off its period, µs.
+    pub trigger_jitter_us: u64,
+    /// A camera that runs by itself is so much slower than it says, parts per million.
+    pub drift_ppm: i32,
+    /// Chance that a wait lasts too long, by up to `stall_us`: the computer was busy.
+    pub stall: f64,
+    /// How long, at most, µs.
+    pub stall_us: u64,
+    /// The trigger's wire is open: no pulse arrives.
+    pub wire_open: bool,
+    /// The projector stops flipping after so many flips; 0 = never.
+    pub flips_until_stuck: u64,
+    /// The camera stops exposing after so many exposures; 0 = never.
+    pub frames_until_stuck: u64,
+    /// The camera grants a compressed format only.
+    pub compressed: bool,
+}
+
+/// What the dice are thrown for: each kind has its own.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Kind {
+    LateFlip = 1,
+    FlipJitter,
+    LateNews,
+    WrongStamp,
+    Dropped,
+    Duplicated,
+    Swapped,
+    LateFrame,
+    StampJitter,
+    LostTrigger,
+    TriggerJitter,
+    Stall,
+}
+
+/// Dice whose n-th throw of a kind depends on the seed, the kind and n alone.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Dice {
+    seed: u64,
+}
+
+impl Dice {
+    pub fn new(seed: u64) -> Self {
+        Self { seed }
+    }
+
+    /// Two independent numbers, 0 ≤ x < 1.
+    fn throw(self, kind: Kind, n: u64) -> (f64, f64) {
+        // SplitMix64 (Steele, Lea, Flood 2014) of all three.
+        let mut state = self
+            .seed
+            .wrapping_add((kind as u64) << 56)
+            .wrapping_add(n.wrapping_mul(0x2545_f491_4f6c_dd1d));
+        let mut next = || {
+            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let z = (state ^ state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ z >> 31) >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (next(), next())
+    }
+
+    /// Whether the n-th event of a kind happens.
+    pub fn happens(self, kind: Kind, n: u64, chance: f64) -> bool {
+        chance > 0.0 && self.throw(kind, n).0 < chance
+    }
+
+    /// A time up to `most` if the n-th event of a kind happens, else none.
+    pub fn up_to(self, kind: Kind, n: u64, chance: f64, most: Duration) -> Duration {
+        if chance <= 0.0 || most.is_zero() {
+            return Duration::ZERO;
+        }
+        let (happens, share) = self.throw(kind, n);
+        if happens < chance {
+            most.mul_f64(share)
+        } else {
+            Duration::ZERO
+        }
+    }
+}

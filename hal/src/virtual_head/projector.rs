@@ -1,0 +1,158 @@
+//! The virtual projector: flips come with its refreshes, their news and their light with their delays.
+
+use std::time::Duration;
+
+use super::faults::Kind;
+use super::{Bench, Device, Scene, lock};
+use crate::error::Error;
+use crate::projector::{Flip, Projector, Raster};
+use crate::units::Timestamp;
+
+/// What the projector is about to do.
+#[derive(Default)]
+pub(super) struct Screen {
+    waiting: Option<Waiting>,
+    flips: u64,
+}
+
+/// A flip that has not been reported.
+#[derive(Clone, Copy)]
+struct Waiting {
+    flip: Flip,
+    /// When it can be fetched; none if it never comes.
+    news: Option<Timestamp>,
+}
+
+impl Screen {
+    /// When the next flip can be fetched.
+    pub fn next(&self) -> Option<Timestamp> {
+        self.waiting.and_then(|waiting| waiting.news)
+    }
+}
+
+impl<S: Scene> Bench<S> {
+    /// Shows nothing from now on.
+    pub(super) fn blank(&mut self) {
+        self.screen.waiting = None;
+        self.light.change(self.now, None, self.now);
+    }
+
+    /// The flip that a pattern queued now comes with.
+    fn flip(&mut self, index: usize) {
+        let (faults, dice) = (&self.mechanics.faults, self.dice);
+        self.screen.flips += 1;
+        let n = self.screen.flips;
+        if faults.flips_until_stuck > 0 && n > faults.flips_until_stuck {
+            let flip = Flip {
+                timestamp: self.now,
+                sequence: 0,
+            };
+            self.screen.waiting = Some(Waiting { flip, news: None });
+            return;
+        }
+        let period = u64::try_from(self.mechanics.refresh.as_nanos())
+            .unwrap_or(u64::MAX)
+            .max(1);
+        let mut sequence = self.now.0 / period + 1;
+        if dice.happens(Kind::LateFlip, n, faults.late_flip) {
+            let more = dice.up_to(
+                Kind::LateFlip,
+                n ^ 1 << 40,
+                1.0,
+                Duration::from_nanos(1 << 20),
+            );
+            sequence += 1 + ((more.as_nanos() as u64 * u64::from(faults.late_refreshes)) >> 20);
+        }
+        let at = Timestamp(sequence.saturating_mul(period));
+        let news = dice.up_to(
+            Kind::LateNews,
+            n,
+            faults.late_news,
+            Duration::from_micros(faults.late_news_us),
+        );
+        let jitter = Duration::from_micros(faults.flip_jitter_us);
+        let mut timestamp = at + dice.up_to(Kind::FlipJitter, n, 1.0, 2 * jitter) - jitter;
+        let wrong = |n| dice.happens(Kind::WrongStamp, n, faults.wrong_stamp);
+        if wrong(n) && !wrong(n - 1) {
+            timestamp = timestamp + self.mechanics.refresh;
+        }
+        self.screen.waiting = Some(Waiting {
+            flip: Flip {
+                timestamp,
+                sequence,
+            },
+            news: Some(at + news),
+        });
+        let needed = self.sensor.oldest(self.now, &self.mechanics);
+        self.light
+            .change(at + self.mechanics.flip_to_light, Some(index), needed);
+    }
+}
+
+impl<S: Scene> Projector for Device<S> {
+    fn size(&self) -> (u32, u32) {
+        lock(&self.bench).scene.projector_size()
+    }
+
+    fn refresh(&self) -> Duration {
+        lock(&self.bench).mechanics.refresh
+    }
+
+    fn present(&self) -> Result<(), Error> {
+        self.as_projector("looking for the projector").map(|_| ())
+    }
+
+    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
+        let mut bench = self.as_projector("loading patterns")?;
+        let (width, height) = bench.scene.projector_size();
+        for (index, raster) in rasters.iter().enumerate() {
+            if (raster.width(), raster.height()) != (width, height) {
+                return Err(Error::unsupported(
+                    format!(
+                        "loading raster {index} of {}×{}",
+                        raster.width(),
+                        raster.height()
+                    ),
+                    format!("make it {width}×{height}, the projector's size"),
+                ));
+            }
+        }
+        bench.blank();
+        bench.scene.load(rasters)
+    }
+
+    fn queue(&mut self, index: usize) -> Result<(), Error> {
+        let mut bench = self.as_projector("showing a pattern")?;
+        let loaded = bench.scene.loaded();
+        if index >= loaded {
+            return Err(Error::protocol(
+                format!("showing pattern {index} of {loaded} loaded (counted from 0)"),
+                "load the patterns first",
+            ));
+        }
+        if bench.screen.waiting.is_some() {
+            return Err(Error::protocol(
+                format!("showing pattern {index} while another one waits for its refresh"),
+                "fetch its flip first",
+            ));
+        }
+        bench.flip(index);
+        Ok(())
+    }
+
+    fn poll_flip(&mut self) -> Result<Option<Flip>, Error> {
+        let mut bench = self.as_projector("waiting for a flip")?;
+        let now = bench.now;
+        let came = bench.screen.next().is_some_and(|news| news <= now);
+        Ok(if came {
+            bench.screen.waiting.take().map(|waiting| waiting.flip)
+        } else {
+            None
+        })
+    }
+
+    fn blank(&mut self) -> Result<(), Error> {
+        self.as_projector("blanking the projector")?.blank();
+        Ok(())
+    }
+}
