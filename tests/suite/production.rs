@@ -11,9 +11,11 @@ use appliance::recipe::archive::pack;
 use appliance::recipe::teach::Taught;
 use appliance::recipe::{AlignmentKind, Recipe};
 use appliance::seam;
+use appliance::station::{Inspection, Stages};
 use hal::frame::Frame;
 use hal::sim::parts::{Cone, Sawtooth, SheetMetal};
 use hal::sim::{Part, Placement};
+use std::time::Instant;
 
 /// Heights by the production path are off the exact ones by at most this, mm: the noise of one level of four frames is
 /// a hundred times the RMS.
@@ -374,6 +376,45 @@ fn findings_depend_neither_on_strips_nor_on_threads_nor_on_the_back_end() {
                     backend.name()
                 );
             }
+        }
+    }
+}
+
+#[test]
+fn levels_decoded_on_arrival_give_the_same_inspection() {
+    let mut bed = bed(&scenario(Part::SheetMetal(SheetMetal::default())));
+    let taught = taught(&mut bed).unwrap();
+    for sequence in 0..taught.recipe.file.sequences.len() {
+        let (plan, _) = plan_with(&bed, &taught, sequence, AlignmentKind::Rigid);
+        let frames = frames(&mut bed, &plan);
+        let levels = plan.sequence().levels().len();
+        let inspected = |wanted: usize| {
+            let (mut arriving, mut arrived) = (plan.arriving(0), 0);
+            for count in 1..=frames.len() {
+                while arrived < wanted && plan.can_arrive(&arriving, count) {
+                    plan.arrive(&mut arriving, &frames[..count]);
+                    arrived += 1;
+                }
+            }
+            let inspection = plan.inspect_arrived(&frames, Some(arriving), Instant::now());
+            let stages = Stages::default();
+            (
+                Inspection {
+                    stages,
+                    ..inspection
+                },
+                arrived,
+            )
+        };
+        let expected = inspected(0).0;
+        assert!(expected.valid_points > 5000);
+        // Rooms are used again, and whoever comes late decodes everything at the end.
+        for wanted in [levels - 1, levels - 1, usize::from(levels > 2), levels - 1] {
+            assert_eq!(
+                inspected(wanted),
+                (expected.clone(), wanted),
+                "sequence {sequence}"
+            );
         }
     }
 }

@@ -1,11 +1,13 @@
 //! A recipe made ready to run: from frames to an inspection without anything that can fail.
 
+mod arriving;
 mod golden;
 mod judge;
 mod layers;
 mod run;
 mod window;
 
+pub use arriving::Arriving;
 pub use layers::Layers;
 
 use crate::calibration::Calibration;
@@ -15,8 +17,9 @@ use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_L
 use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
-use algo::inspect::{Production, Strip};
+use algo::inspect::{Findings, Light, Production, Strip};
 use algo::pattern::{Encoder, Sequence};
+use algo::phase::Arrived;
 use algo::pipeline::Rises;
 use algo::units::{AbsolutePhase, Height};
 use hal::frame::Frame;
@@ -245,9 +248,19 @@ impl Plan {
         rasters(function, frames, calibration)
     }
 
-    /// Judges a part from the frames of one sequence, which their number tells; its stages begin at `exposed`. Always ends in an inspection; what cannot be
-    /// measured is INVALID with a reason.
+    /// Judges a part from the frames of one sequence, which their number tells; its stages begin at `exposed`. Always ends in
+    /// an inspection; what cannot be measured is INVALID with a reason.
     pub fn inspect(&self, frames: &[Frame], exposed: Instant) -> Inspection {
+        self.inspect_arrived(frames, None, exposed)
+    }
+
+    /// The same, with the levels that were decoded on arrival.
+    pub fn inspect_arrived(
+        &self,
+        frames: &[Frame],
+        arriving: Option<Arriving>,
+        exposed: Instant,
+    ) -> Inspection {
         let step = self.step_of(frames);
         let run = &self.runs[step];
         let simulated = if self.simulated { SIMULATED } else { 0 };
@@ -256,7 +269,10 @@ impl Plan {
             ..Inspection::default()
         };
         let mut laps = Laps::since(exposed);
-        match self.run(run, frames, None, &mut laps) {
+        let found = self.arrived(arriving, frames, |finest| {
+            self.run(run, frames, finest, None, &mut laps)
+        });
+        match found {
             Ok(findings) => {
                 judge::judge(&self.file, &findings, &mut inspection);
                 if step + 1 < self.runs.len() {
@@ -291,8 +307,14 @@ impl Plan {
         let width = self.file.camera.width as usize;
         let mut height_mm = vec![f32::NAN; width * self.file.camera.height as usize];
         let mut laps = Laps::since(Instant::now());
-        self.run(self.run_of(frames), frames, Some(&mut height_mm), &mut laps)
-            .ok()?;
+        self.run(
+            self.run_of(frames),
+            frames,
+            None,
+            Some(&mut height_mm),
+            &mut laps,
+        )
+        .ok()?;
         Some(Maps { width, height_mm })
     }
 
@@ -300,18 +322,23 @@ impl Plan {
         &self,
         run: &Run,
         frames: &[Frame],
+        finest: Option<(&Arrived, &[FrameView<'_>])>,
         heights: Option<&mut [f32]>,
         laps: &mut Laps,
-    ) -> Result<algo::inspect::Findings, String> {
+    ) -> Result<Findings, String> {
         let views: Result<Vec<FrameView<'_>>, _> = frames.iter().map(seam::view).collect();
         let views = views.map_err(|error| error.to_string())?;
+        let light = match finest {
+            Some((arrived, last)) => Light::Finest(arrived, last),
+            None => Light::Frames(&views),
+        };
         // A strip is cleared before it is used, whatever was left in it.
         let mut strips = self.strips.lock().unwrap_or_else(PoisonError::into_inner);
         let production = &run.production;
-        let placed = production.place(&views, &mut strips);
+        let placed = production.place(light, &mut strips);
         laps.end(Stage::Alignment);
         let findings = placed
-            .and_then(|placed| production.inspect_placed(&views, &mut strips, placed, heights))
+            .and_then(|placed| production.inspect_placed(light, &mut strips, placed, heights))
             .map_err(|error| error.to_string());
         laps.end(Stage::Strips);
         findings

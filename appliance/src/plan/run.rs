@@ -6,11 +6,11 @@ use crate::recipe::{AlignmentKind, RecipeFile, SequenceFile, SequenceKind};
 use algo::geometry::Triangulator;
 use algo::inspect::{Gauge, Parts, Production, Taught};
 use algo::pattern::{PhaseRange, Sequence};
-use algo::phase::Decoder;
+use algo::phase::{Arrived, Decoder};
 use algo::pipeline::Rises;
 use algo::units::AbsolutePhase;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// A sequence that the part can be measured with.
 #[derive(Debug)]
@@ -20,6 +20,8 @@ pub(super) struct Run {
     /// Which of the plan's rasters its frames show.
     pub indices: Vec<usize>,
     pub production: Production,
+    /// Room for the levels that are decoded on arrival, since there first were some.
+    pub arrived: Mutex<Option<Arrived>>,
     /// Bytes of its maps.
     pub bytes: usize,
 }
@@ -119,6 +121,7 @@ impl Unjoined {
             indices: self.indices,
             bytes: bytes + shared.rises.surface().phase.len() * TAUGHT_BYTES,
             production: production.map_err(|error| error.to_string())?,
+            arrived: Mutex::new(None),
         })
     }
 }

@@ -3,7 +3,7 @@
 use super::{ABORTED, DEVICE_TIMEOUT, Worker, code, code_of};
 use crate::benchmark::stopwatch::timed_on;
 use crate::history::FailedPart;
-use crate::plan::Plan;
+use crate::plan::{Arriving, Plan};
 use crate::station::result::flag::{RETRIED, STEPPED_UP};
 use crate::station::{
     Event, Inspection, Job, JobId, Pace, ResultRecord, Stage, Stages, error_code,
@@ -12,6 +12,14 @@ use hal::frame::Frame;
 use hal::head::Exposure;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+
+/// The frames of a sequence.
+struct Taken {
+    frames: Vec<Frame>,
+    exposure: Exposure,
+    /// Processor time of what was decoded meanwhile.
+    spent: Duration,
+}
 
 impl Worker {
     /// Runs a cycle; the frames that it was judged by.
@@ -29,9 +37,16 @@ impl Worker {
         stages.add(Stage::Waiting, waited.to_u32());
         loop {
             let began = Instant::now();
-            let Some((frames, exposure)) = self.take(plan.indices(step), id) else {
+            let mut arriving = plan.arriving(step);
+            let Some(taken) = self.take(plan, step, &mut arriving, id) else {
                 return Vec::new();
             };
+            let Taken {
+                frames,
+                exposure,
+                spent,
+            } = taken;
+            cpu += spent;
             stages.add(Stage::Exposure, us(began.elapsed()));
             if exposure.retaken > 0 {
                 flags |= RETRIED;
@@ -42,7 +57,7 @@ impl Worker {
             if last {
                 self.station.event(Event::ExposureDone { job: id });
             }
-            let inspect = || plan.inspect(&frames, Instant::now());
+            let inspect = || plan.inspect_arrived(&frames, Some(arriving), Instant::now());
             let (mut inspection, spent) = timed_on(&self.pool, inspect);
             cpu += spent;
             stages.extend(&inspection.stages);
@@ -63,14 +78,25 @@ impl Worker {
         }
     }
 
-    /// The frames of some of the patterns and how they were taken; none if there are not all of them, and then the station
-    /// knows why.
-    fn take(&mut self, indices: &[usize], job: JobId) -> Option<(Vec<Frame>, Exposure)> {
+    /// The frames of a sequence, each level decoded as soon as it is there; none if there are not all of them, and then the
+    /// station knows why.
+    fn take(
+        &mut self,
+        plan: &Plan,
+        step: usize,
+        arriving: &mut Arriving,
+        job: JobId,
+    ) -> Option<Taken> {
+        let indices = plan.indices(step);
         let mut frames: Vec<Frame> = Vec::with_capacity(indices.len());
-        let (station, aborts) = (&self.station, &self.aborts);
+        let mut spent = Duration::ZERO;
+        let (station, aborts, pool) = (&self.station, &self.aborts, &self.pool);
         let mut keep = |_, frame| {
             frames.push(frame);
             station.event(Event::Alive);
+            while plan.can_arrive(arriving, frames.len()) {
+                spent += timed_on(pool, || plan.arrive(arriving, &frames)).1;
+            }
             !aborts.has(job)
         };
         let head = &mut self.opened.head;
@@ -83,7 +109,11 @@ impl Worker {
             }
             Ok(exposure) => {
                 self.paced(indices.len(), &exposure);
-                Some((frames, exposure))
+                Some(Taken {
+                    frames,
+                    exposure,
+                    spent,
+                })
             }
             Err(error) => {
                 let failed = failed(job, code_of(&error), error.to_string());

@@ -1,7 +1,6 @@
 //! Heights and errors of single pixels, and the points that a part's motion is found from.
 
-use super::{Production, Strip};
-use crate::frame::FrameView;
+use super::{Light, Production, Strip};
 use crate::geometry::Solution;
 use crate::inspect::align::{Alignment, Sample};
 use crate::pipeline::{NO_RISE, RowTally};
@@ -9,12 +8,7 @@ use crate::units::{AbsolutePhase, Height, Modulation};
 
 impl Strip {
     /// Keeps the points of its rows that the part's motion is found from.
-    pub(super) fn sample(
-        &mut self,
-        plan: &Production,
-        alignment: &Alignment,
-        frames: &[FrameView<'_>],
-    ) {
+    pub(super) fn sample(&mut self, plan: &Production, alignment: &Alignment, light: Light<'_>) {
         self.samples.clear();
         let (first, spots) = alignment.spots(self.rows());
         let mut decoded = None;
@@ -22,7 +16,7 @@ impl Strip {
             let (u, v) = (spot.u, spot.v);
             if decoded != Some(v) {
                 let columns = plan.window[v].clone();
-                self.row(plan, frames, v, columns, &mut RowTally::default());
+                self.row(plan, light, v, columns, &mut RowTally::default());
                 decoded = Some(v);
             }
             if self.rise[u] == NO_RISE {

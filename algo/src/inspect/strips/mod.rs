@@ -14,12 +14,14 @@ mod displaced;
 mod exact;
 mod extreme;
 mod findings;
+mod light;
 mod spots;
 mod squares;
 mod stance;
 mod strip;
 
 pub use findings::{Findings, Skipped};
+pub use light::Light;
 pub use strip::Strip;
 
 use super::Region;
@@ -338,8 +340,9 @@ impl Production {
         strips: &mut [Strip],
         heights: Option<&mut [f32]>,
     ) -> Result<Findings, DecodeError> {
-        let placed = self.place(frames, strips)?;
-        self.inspect_placed(frames, strips, placed, heights)
+        let light = Light::Frames(frames);
+        let placed = self.place(light, strips)?;
+        self.inspect_placed(light, strips, placed, heights)
     }
 
     /// The first half: how the part lies, from a few rows of each strip; none if that is not asked for, or too little of it
@@ -349,17 +352,17 @@ impl Production {
     /// As [`Self::inspect`].
     pub fn place(
         &self,
-        frames: &[FrameView<'_>],
+        light: Light<'_>,
         strips: &mut [Strip],
     ) -> Result<Option<Placed>, DecodeError> {
-        self.check(frames)?;
+        self.check(light)?;
         let Some(alignment) = &self.alignment else {
             return Ok(None);
         };
         for_each(
             strips.iter_mut().collect(),
             || (),
-            |_, strip, ()| strip.sample(self, alignment, frames),
+            |_, strip, ()| strip.sample(self, alignment, light),
         );
         let Some((first, others)) = strips.split_first_mut() else {
             return Ok(None);
@@ -371,33 +374,18 @@ impl Production {
         Ok(fitting.fit(&first.samples, &mut first.room))
     }
 
-    /// The frames' number and size.
-    fn check(&self, frames: &[FrameView<'_>]) -> Result<(), DecodeError> {
-        self.decoder.check(frames)?;
-        let expected = self.size();
-        let given = (frames[0].width(), frames[0].height());
-        match given == expected {
-            true => Ok(()),
-            false => Err(DecodeError::FrameSize {
-                frame: 0,
-                expected,
-                given,
-            }),
-        }
-    }
-
-    /// The second half: the readings of a part that lies so, from the frames and strips that it was placed with.
+    /// The second half: the readings of a part that lies so, from the light and strips that it was placed with.
     ///
     /// # Errors
     /// As [`Self::inspect`].
     pub fn inspect_placed(
         &self,
-        frames: &[FrameView<'_>],
+        light: Light<'_>,
         strips: &mut [Strip],
         placed: Option<Placed>,
         heights: Option<&mut [f32]>,
     ) -> Result<Findings, DecodeError> {
-        self.check(frames)?;
+        self.check(light)?;
         let width = self.rises.surface().width;
         let stance = Stance::new(self, placed);
         let mut left = heights;
@@ -413,9 +401,9 @@ impl Production {
         for_each(
             work,
             || (),
-            |_, (strip, heights), ()| strip.inspect(self, &stance, frames, heights),
+            |_, (strip, heights), ()| strip.inspect(self, &stance, light, heights),
         );
-        Ok(self.findings(frames, stance, strips))
+        Ok(self.findings(light, stance, strips))
     }
 
     /// The map that phases are unwrapped about, row-major.

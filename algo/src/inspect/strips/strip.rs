@@ -5,8 +5,7 @@ use super::extreme::{Extreme, SquareRow};
 use super::spots::{Seen, Spots};
 use super::squares::{MAX_TAME, Squares};
 use super::stance::Stance;
-use super::{Measure, Production};
-use crate::frame::FrameView;
+use super::{Light, Measure, Production};
 use crate::inspect::align::{Room, Sample};
 use crate::inspect::gauge::Sum;
 use crate::phase::{PhaseRow, Trust};
@@ -114,7 +113,7 @@ impl Strip {
         &mut self,
         plan: &Production,
         stance: &Stance,
-        frames: &[FrameView<'_>],
+        light: Light<'_>,
         mut heights: Option<&mut [f32]>,
     ) {
         self.clear();
@@ -126,7 +125,7 @@ impl Strip {
             if v < bottom {
                 let mut tally = RowTally::default();
                 let columns = plan.window[v].clone();
-                let exact = self.row(plan, frames, v, columns.clone(), &mut tally);
+                let exact = self.row(plan, light, v, columns.clone(), &mut tally);
                 self.settle(plan, stance, v, columns);
                 if own {
                     self.count(plan, stance, v, &tally, exact);
@@ -182,7 +181,7 @@ impl Strip {
     pub(super) fn row(
         &mut self,
         plan: &Production,
-        frames: &[FrameView<'_>],
+        light: Light<'_>,
         v: usize,
         columns: Range<usize>,
         tally: &mut RowTally,
@@ -203,9 +202,7 @@ impl Strip {
             modulation: &mut self.modulation,
             trust: &mut self.trust,
         };
-        let decoder = &plan.decoder;
-        let map = plan.map_row(v);
-        decoder.row(frames, v, map, columns.clone(), out);
+        plan.decode(light, v, columns.clone(), out);
         let row = v * self.width..(v + 1) * self.width;
         let seen = Decoded {
             phase: &self.phase,
@@ -220,15 +217,17 @@ impl Strip {
             tally,
             extent,
         };
+        let backend = plan.decoder.backend();
         let mut rises = plan.rises.row(v);
+        let map = plan.map_row(v);
         if !map.is_empty() {
             // The same wherever a pixel can be resolved, and in the cache.
             rises.base = map;
         }
-        rise_row(decoder.backend(), rises, seen, columns.clone(), risen);
+        rise_row(backend, rises, seen, columns.clone(), risen);
         if weighed(v) {
             let spread = self.extents[v % self.kept].clone();
-            weigh_row(decoder.backend(), rises, seen, spread, &self.rise, tally);
+            weigh_row(backend, rises, seen, spread, &self.rise, tally);
         }
         if tally.resolved == tally.measured {
             return 0;
@@ -390,12 +389,12 @@ impl Strip {
         &mut self,
         plan: &Production,
         stance: &Stance,
-        frames: &[FrameView<'_>],
+        light: Light<'_>,
         v: usize,
         columns: Range<usize>,
     ) -> f64 {
         let mut tally = RowTally::default();
-        self.row(plan, frames, v, columns.clone(), &mut tally);
+        self.row(plan, light, v, columns.clone(), &mut tally);
         self.settle(plan, stance, v, columns.clone());
         let mut sum = 0.0;
         for u in columns {
