@@ -163,8 +163,8 @@ fn a_failed_part_is_kept_and_replays_bit_by_bit_and_a_difference_is_said() {
     // With one thread as with many.
     replay(&folder, &["--threads", "1"]).succeeded();
 
-    // One frame that is another's.
-    fs::copy(folder.join("frames/000.png"), folder.join("frames/003.png")).unwrap();
+    // One frame of the finest level that is another's.
+    fs::copy(folder.join("frames/008.png"), folder.join("frames/011.png")).unwrap();
     let run = replay(&folder, &[]);
     assert_eq!(run.code, 70, "{}", run.stderr);
     assert!(
