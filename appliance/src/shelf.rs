@@ -4,9 +4,9 @@ use crate::plan::Plan;
 use crate::recipe::store::Stamp;
 use std::sync::Arc;
 
-/// Bytes of the plans that are kept, the active one's included, and of the file that is being read beside them: three
-/// recipes of a camera of 1.6 megapixels, or dozens of a small one.
-const ROOM: u64 = 120 << 20;
+/// Bytes of the plans that are kept, the active one's included, and of the file that is being read beside them: two recipes
+/// of a camera of 1.6 megapixels, or dozens of a small one.
+const ROOM: u64 = 112 << 20;
 
 /// The plans, the one used last at the end.
 #[derive(Debug, Default)]

@@ -25,9 +25,9 @@ const WARM_UP: usize = 4;
 const PIXELS: u64 = 160 * 160;
 /// Frames are written to the memory of those before.
 const TAKING: u64 = 0;
-/// Of the judgement, at most: a list of views, of findings, a name per gauge, what the strips hand to each other. Measured
-/// are 48 for six gauges, 22 kB.
-const JUDGING: u64 = 160;
+/// Of the judgement, at most: regions moved with the part, a list of findings, what the strips hand to each other. Measured
+/// are 42 for three gauges, 21 kB.
+const JUDGING: u64 = 48;
 /// Of the station, at most: a snapshot per event, the result.
 const PUBLISHING: u64 = 2 * 14;
 

@@ -211,22 +211,23 @@ fn recipes_at_full_resolution_are_switched_within_a_second() {
         number = number % MANY + 1;
         cold.push(switch(number));
     }
-    let warm: Vec<_> = (0..6).map(|at| switch(number - at % 2)).collect();
+    let warm: Vec<_> = (0..6).map(|at| switch([MANY, number][at % 2])).collect();
     println!(
         "switching at 1456 x 1088, trigger in between: {cold:?} where the recipe is read, {warm:?} where it is ready"
     );
     // Of a machine that others use as well only the shortest says what the work takes.
-    assert!(cold.iter().min().unwrap() < &SWITCHING, "{cold:?}");
     assert!(warm.iter().min().unwrap() < &SWITCHING, "{warm:?}");
 }
 
-/// Prints what the parts of a switch to a recipe take, three times.
+/// Prints what the parts of a switch to a recipe take, three times. What it takes of all processors together is within the
+/// second, so that a machine with nothing else to do switches within it.
 fn stages(store: &Store, bytes: usize) {
     let scenario = Scenario::from_toml(FULL_HEAD, "full").unwrap();
     let (mut head, stage) = hal::sim::head(&scenario).unwrap();
     let calibration = Calibration::of_stage(&stage);
+    let mut works = Vec::new();
     for number in 1..=3 {
-        let began = Instant::now();
+        let (began, worked) = (Instant::now(), processor_time());
         let mut last = began;
         let mut lap = || {
             let took = last.elapsed();
@@ -243,9 +244,22 @@ fn stages(store: &Store, bytes: usize) {
         let shown = lap();
         println!(
             "a recipe of {bytes} bytes, a plan of {}: read and checked in {read:?}, planned in {planned:?}, rasters \
-             encoded in {encoded:?}, loaded in {shown:?}: {:?}",
+             encoded in {encoded:?}, loaded in {shown:?}: {:?}, {:?} of processors",
             plan.bytes(),
-            began.elapsed()
+            began.elapsed(),
+            processor_time() - worked
         );
+        works.push(processor_time() - worked);
     }
+    assert!(works.iter().min().unwrap() < &SWITCHING, "{works:?}");
+}
+
+/// What all threads of this process have worked, in steps of 10 ms.
+fn processor_time() -> Duration {
+    let stat = fs::read_to_string("/proc/self/stat").unwrap();
+    // Behind the name, which may hold blanks: state, ten numbers, then hundredths of a second in user and system.
+    let (_, fields) = stat.rsplit_once(')').unwrap();
+    let fields = fields.split_whitespace().skip(11).take(2);
+    let ticks: u64 = fields.map(|ticks| ticks.parse::<u64>().unwrap()).sum();
+    Duration::from_millis(10 * ticks)
 }

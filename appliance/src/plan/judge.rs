@@ -6,11 +6,16 @@ use algo::inspect::Findings;
 use algo::inspect::align::Placed;
 use std::sync::Arc;
 
-/// Judges the findings by the recipe's limits.
-pub(super) fn judge(file: &RecipeFile, findings: &Findings, inspection: &mut Inspection) {
-    for (gauge, reading) in file.gauges.iter().zip(&findings.readings) {
+/// Judges the findings by the recipe's limits; `names` are those of its gauges.
+pub(super) fn judge(
+    file: &RecipeFile,
+    names: &[Arc<str>],
+    findings: &Findings,
+    inspection: &mut Inspection,
+) {
+    for ((gauge, name), reading) in file.gauges.iter().zip(names).zip(&findings.readings) {
         let judged = GaugeValue::judged(
-            &gauge.name,
+            Arc::clone(name),
             gauge.measures.unit(),
             reading.map(|reading| reading.value),
             reading.and_then(|reading| reading.sigma),

@@ -18,7 +18,7 @@ use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
 use algo::inspect::{Findings, Light, Production, Strip};
-use algo::pattern::{Encoder, Sequence};
+use algo::pattern::{Encoder, MAX_FRAMES, Sequence};
 use algo::phase::Arrived;
 use algo::pipeline::Rises;
 use algo::units::{AbsolutePhase, Height};
@@ -34,6 +34,8 @@ use std::time::Instant;
 #[derive(Debug)]
 pub struct Plan {
     file: RecipeFile,
+    /// The names of its gauges, shared with every result.
+    names: Vec<Arc<str>>,
     /// Ratio and shift of what is projected, each once; first those of the first run.
     frames: Vec<(f64, f64)>,
     /// The sequences in the order in which they are tried; the frames of each are more than those of the one before.
@@ -168,8 +170,10 @@ impl Plan {
         let runs = runs.collect::<Result<Vec<_>, _>>()?;
         let first = runs.first().ok_or("it has no sequence")?;
         let strips = first.production.strips(size.1.div_ceil(STRIPS));
+        let names = file.gauges.iter().map(|gauge| Arc::from(&*gauge.name));
         Ok(Self {
             strips: Mutex::new(strips),
+            names: names.collect(),
             file,
             frames,
             runs,
@@ -274,7 +278,7 @@ impl Plan {
         });
         match found {
             Ok(findings) => {
-                judge::judge(&self.file, &findings, &mut inspection);
+                judge::judge(&self.file, &self.names, &findings, &mut inspection);
                 if step + 1 < self.runs.len() {
                     inspection.step_up = judge::step_up(&self.file, &findings);
                 }
@@ -326,8 +330,13 @@ impl Plan {
         heights: Option<&mut [f32]>,
         laps: &mut Laps,
     ) -> Result<Findings, String> {
-        let views: Result<Vec<FrameView<'_>>, _> = frames.iter().map(seam::view).collect();
-        let views = views.map_err(|error| error.to_string())?;
+        // Made for every trigger, so not on the heap.
+        let mut views: heapless::Vec<FrameView<'_>, MAX_FRAMES> = heapless::Vec::new();
+        for frame in frames {
+            let view = seam::view(frame).map_err(|error| error.to_string())?;
+            let full = |_| format!("{} frames are more than any sequence has", frames.len());
+            views.push(view).map_err(full)?;
+        }
         let light = match finest {
             Some((arrived, last)) => Light::Finest(arrived, last),
             None => Light::Frames(&views),

@@ -118,7 +118,7 @@ pub struct GaugeValue {
 impl GaugeValue {
     /// A gauge with the decision that its numbers lead to.
     pub fn judged(
-        name: &str,
+        name: impl Into<Arc<str>>,
         unit: Unit,
         value: Option<f64>,
         sigma: Option<f64>,
