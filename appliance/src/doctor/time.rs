@@ -280,6 +280,8 @@ pub(super) fn delay(head: &mut DynHead, pictures: &Pictures) -> Result<Finding, 
             json!({ "calibrated_ms": believed * 1e3 }),
         ));
     };
+    // To a microsecond; adding 0 turns a negative zero into 0.
+    let delay = (delay * 1e6).round() * 1e-6 + 0.0;
     let measured = json!({
         "delay_ms": delay * 1e3, "off_ms": off * 1e3, "calibrated_ms": believed * 1e3,
         "off_refreshes": (delay - believed) / refresh,
