@@ -7,7 +7,7 @@
 use algo::frame::{FrameView, Samples};
 use algo::geometry::{Pinhole, PinholeModel, Reference, Triangulator};
 use algo::inspect::{Comparison, Golden, Region};
-use algo::pattern::{PhaseFunction, Sequence, encode};
+use algo::pattern::{Encoder, PhaseFunction, Sequence};
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{HeightMap, PhaseMap, decode, triangulate};
 use algo::units::AbsolutePhase;
@@ -195,5 +195,5 @@ fn pattern_raster(bencher: Bencher<'_, '_>) {
     let counter = ItemsCount::new(1024_usize * 768);
     bencher
         .counter(counter)
-        .bench(|| encode(&function, 1.0, 0.25, None));
+        .bench(|| Encoder::new(None).raster(&function, 1.0, 0.25));
 }

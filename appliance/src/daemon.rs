@@ -10,7 +10,7 @@ use stopping::Stopping;
 use crate::access::Access;
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
-use crate::history::{self, Bounds, History, Reader};
+use crate::history::{self, Bounds, History, Numbering, Reader};
 use crate::latest::LastMaps;
 use crate::progress::Progress;
 use crate::shelf::Shelf;
@@ -94,7 +94,7 @@ impl Daemon {
         };
         let maps = LastMaps::default();
         let (sockets, stopped) = watch::channel(false);
-        let clients = modbus::Clients::new(modbus::CONNECTIONS);
+        let clients = modbus::Clients::new(usize::from(config.modbus.connections));
         let serving = {
             let site = web::Site::new(web::Parts {
                 station: station.clone(),
@@ -293,7 +293,14 @@ fn open_history(
         results: u64::from(config.history.results),
         recordings: u64::from(config.history.recordings_mib) << 20,
     };
-    history::open(state.path(), state.counter(), state.next_seq()?, bounds)
+    let numbering = Numbering {
+        counted: state.counted()?,
+        counter: state.counter(),
+        serial: state.serial()?,
+        // 0 is nobody's.
+        run: random()?.max(1),
+    };
+    history::open(state.path(), numbering, bounds)
         .map_err(|error| Failure::new(Exit::CannotCreate, error.to_string()))
 }
 
@@ -333,7 +340,7 @@ fn effects(
             Effect::Teach { job, number } => order(Order::Teach(job, number)),
             Effect::PersistSeq(seq) => {
                 let unanswered = || "the storage does not answer".into();
-                let failed = (!history.covers(seq)).then(unanswered);
+                let failed = (!history.take(seq)).then(unanswered);
                 return Some(Event::Stored { seq, failed });
             }
             Effect::Log(line) => progress.log(&line),

@@ -4,9 +4,9 @@ use crate::plan::Plan;
 use crate::recipe::store::Stamp;
 use std::sync::Arc;
 
-/// Bytes of recipe files whose plans are kept, the active one's included; a plan takes less than its file. Two recipes of a
-/// camera of 1.6 megapixels, or a dozen of a small one.
-const ROOM: u64 = 112 << 20;
+/// Bytes of the plans that are kept, the active one's included, and of the file that is being read beside them: three
+/// recipes of a camera of 1.6 megapixels, or dozens of a small one.
+const ROOM: u64 = 120 << 20;
 
 /// The plans, the one used last at the end.
 #[derive(Debug, Default)]
@@ -22,6 +22,12 @@ struct Ready {
     plan: Arc<Plan>,
 }
 
+impl Ready {
+    fn bytes(&self) -> u64 {
+        self.plan.bytes() as u64
+    }
+}
+
 impl Shelf {
     /// The plan of a recipe file as it is now, joined with this calibration, if it is there.
     pub fn take(&mut self, stamp: &Stamp, calibration: &str) -> Option<Arc<Plan>> {
@@ -33,9 +39,9 @@ impl Shelf {
         Some(plan)
     }
 
-    /// Drops the plans used longest ago until another file of `bytes` has room.
+    /// Drops the plans used longest ago until another `bytes` have room.
     pub fn make_room(&mut self, bytes: u64) {
-        let taken = |ready: &[Ready]| ready.iter().map(|ready| ready.stamp.bytes()).sum::<u64>();
+        let taken = |ready: &[Ready]| ready.iter().map(Ready::bytes).sum::<u64>();
         while !self.ready.is_empty() && taken(&self.ready).saturating_add(bytes) > ROOM {
             self.ready.remove(0);
         }
@@ -43,7 +49,7 @@ impl Shelf {
 
     /// Keeps a plan that was just made.
     pub fn put(&mut self, stamp: Stamp, calibration: String, plan: Arc<Plan>) {
-        self.make_room(stamp.bytes());
+        self.make_room(plan.bytes() as u64);
         self.ready.push(Ready {
             stamp,
             calibration,

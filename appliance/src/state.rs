@@ -16,7 +16,7 @@ pub struct StateFolder {
     _lock: File,
 }
 
-/// The counter's file: the last SEQ that may be in use, in decimal.
+/// The counter's file: the last SEQ that may be in use, in decimal, and behind it the run that says so, in hexadecimal.
 const COUNTER: &str = "result-seq";
 /// The serial's file.
 const SERIAL: &str = "serial";
@@ -87,33 +87,32 @@ impl StateFolder {
         self.path.join(name)
     }
 
-    /// The SEQ of the next result.
+    /// What the counter's file says: the last SEQ that may be in use, and which run says so; 0 without a file.
     ///
     /// # Errors
-    /// If the counter's file is damaged: guessing would let a SEQ be used twice.
-    pub fn next_seq(&self) -> Result<u32, Failure> {
+    /// If it is damaged: guessing would let a SEQ be used twice.
+    pub fn counted(&self) -> Result<Counted, Failure> {
         let file = self.path.join(COUNTER);
         let text = match fs::read_to_string(&file) {
             Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(1),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return Ok(Counted::default());
+            }
             Err(error) => {
                 let what = format!("read {}", file.display());
                 return Err(Failure::because(Exit::CannotCreate, what, error));
             }
         };
-        text.trim()
-            .parse::<u32>()
-            .map(|last| last.wrapping_add(1))
-            .map_err(|_| {
-                Failure::new(
-                    Exit::CannotCreate,
-                    format!(
-                        "read {}: {:?} is no number: write the SEQ of the last result there",
-                        file.display(),
-                        text.trim()
-                    ),
-                )
-            })
+        Counted::read(&text).ok_or_else(|| {
+            Failure::new(
+                Exit::CannotCreate,
+                format!(
+                    "read {}: {:?} is no number: write the SEQ of the last result there",
+                    file.display(),
+                    text.trim()
+                ),
+            )
+        })
     }
 
     /// A writer of the counter.
@@ -146,6 +145,31 @@ impl StateFolder {
     }
 }
 
+/// The last SEQ that may be in use, and which run of the daemon says so.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counted {
+    /// The SEQ.
+    pub last: u32,
+    /// Random per start; 0 where a person or an older program wrote the number.
+    pub run: u32,
+}
+
+impl Counted {
+    /// From text; none if it is not that.
+    pub fn read(text: &str) -> Option<Self> {
+        let mut words = text.split_whitespace();
+        let last = words.next()?.parse().ok()?;
+        let run = words.next().map(|word| u32::from_str_radix(word, 16).ok());
+        let run = run.unwrap_or(Some(0))?;
+        words.next().is_none().then_some(Self { last, run })
+    }
+
+    /// As text, always as long: whoever writes it over another needs no more room.
+    pub fn text(self) -> String {
+        format!("{:010} {:08x}\n", self.last, self.run)
+    }
+}
+
 /// Stores which SEQs may be in use, before anybody sees their results, so that none is used twice.
 #[derive(Clone, Debug)]
 pub struct Counter {
@@ -153,13 +177,13 @@ pub struct Counter {
 }
 
 impl Counter {
-    /// Stores that SEQs up to this one may be in use. Written in place, ten digits in one sector: it needs no room on a
-    /// full card, and whoever pulls the plug finds the old number or the new one.
+    /// Stores that SEQs up to this one may be in use. Written in place, a few digits in one sector: it needs no room on a
+    /// full card, and whoever pulls the plug finds the old numbers or the new ones.
     ///
     /// # Errors
     /// Whatever the file system answers.
-    pub fn store(&self, seq: u32) -> std::io::Result<()> {
-        let text = format!("{seq:010}\n");
+    pub fn store(&self, counted: Counted) -> std::io::Result<()> {
+        let text = counted.text();
         match OpenOptions::new().write(true).open(&self.file) {
             Ok(mut file) if file.metadata()?.len() == text.len() as u64 => {
                 file.write_all(text.as_bytes())?;
@@ -188,12 +212,13 @@ mod tests {
     fn the_counter_and_the_serial_outlive_a_restart() {
         let folder = tempfile::tempdir().unwrap();
         let first = StateFolder::open(folder.path()).unwrap();
-        assert_eq!(first.next_seq().unwrap(), 1);
-        first.counter().store(41).unwrap();
+        assert_eq!(first.counted().unwrap(), Counted::default());
+        let counted = Counted { last: 41, run: 7 };
+        first.counter().store(counted).unwrap();
         let serial = first.serial().unwrap();
         drop(first);
         let second = StateFolder::open(folder.path()).unwrap();
-        assert_eq!(second.next_seq().unwrap(), 42);
+        assert_eq!(second.counted().unwrap(), counted);
         assert_eq!(second.serial().unwrap(), serial);
     }
 
@@ -210,7 +235,12 @@ mod tests {
     fn a_damaged_counter_is_not_guessed() {
         let folder = tempfile::tempdir().unwrap();
         let state = StateFolder::open(folder.path()).unwrap();
-        fs::write(folder.path().join(COUNTER), "4x").unwrap();
-        assert!(state.next_seq().unwrap_err().message.contains("result-seq"));
+        for damaged in ["4x", "", "4 y", "4 5 6", "-4", "4294967296"] {
+            fs::write(folder.path().join(COUNTER), damaged).unwrap();
+            let refused = state.counted().unwrap_err();
+            assert!(refused.message.contains("result-seq"), "{damaged}");
+        }
+        fs::write(folder.path().join(COUNTER), "4\n").unwrap();
+        assert_eq!(state.counted().unwrap(), Counted { last: 4, run: 0 });
     }
 }

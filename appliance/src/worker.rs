@@ -10,7 +10,7 @@ use crate::latest::{LastCycle, LastMaps};
 use crate::plan::{Plan, PlanError};
 use crate::progress::Progress;
 use crate::recipe::store::Stamp;
-use crate::recipe::teach::{Naming, TeachError, teach};
+use crate::recipe::teach::{Naming, TeachError, teach_while};
 use crate::recipe::{LoadError, Store};
 use crate::shelf::Shelf;
 use crate::station::{
@@ -21,7 +21,7 @@ use hal::error::{Device, Error};
 use hal::frame::Frame;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::time::Duration;
 
 /// What the worker is told to do.
@@ -116,10 +116,18 @@ impl Worker {
         let mut plan: Option<Arc<Plan>> = None;
         let mut frames = Vec::new();
         loop {
-            if self.maps.wanted() {
-                self.tell(plan.as_ref(), &frames);
-            }
-            match orders.recv_timeout(SIGN_OF_LIFE) {
+            // A trigger that is there already waits for no picture.
+            let order = match orders.try_recv() {
+                Err(TryRecvError::Empty) => {
+                    if self.maps.wanted() {
+                        self.tell(plan.as_ref(), &frames);
+                    }
+                    orders.recv_timeout(SIGN_OF_LIFE)
+                }
+                Err(TryRecvError::Disconnected) => Err(RecvTimeoutError::Disconnected),
+                Ok(order) => Ok(order),
+            };
+            match order {
                 Ok(Order::Measure(job)) => {
                     // The memory of the frames before is what these are written to.
                     drop(frames);
@@ -262,6 +270,7 @@ impl Worker {
             placement_tolerance_mm: PLACEMENT_TOLERANCE_MM,
         };
         let (station, bar) = (self.station.clone(), self.progress.clone());
+        let aborts = self.aborts.clone();
         let progress = |fraction: f64, words: &str| {
             bar.tell(fraction, words);
             station.event(Event::Progress {
@@ -269,26 +278,26 @@ impl Worker {
                 fraction: fraction as f32,
                 words: words.into(),
             });
+            !aborts.has(job)
         };
         let Opened {
             head, calibration, ..
         } = &mut self.opened;
         let taught = self
             .pool
-            .install(|| teach(head, calibration, &naming, DEVICE_TIMEOUT, &progress));
+            .install(|| teach_while(head, calibration, &naming, DEVICE_TIMEOUT, &progress));
         self.progress.clear();
-        let aborted = self.aborts.has(job);
         let stored = taught
             .map_err(|error| {
-                let failed = (code_of_teaching(&error), error.to_string());
+                let words = match error {
+                    TeachError::Ended => format!("teach: {ABORTED}"),
+                    _ => error.to_string(),
+                };
+                let failed = (code_of_teaching(&error), words);
                 if let TeachError::Device(error) = error {
                     self.lost = Some(error).filter(recovery::is_lost);
                 }
                 failed
-            })
-            .and_then(|taught| match aborted {
-                true => Err((error_code::ABORTED, format!("teach: {ABORTED}"))),
-                false => Ok(taught),
             })
             .and_then(|taught| {
                 for reason in &taught.choice.reasons {
@@ -359,5 +368,6 @@ fn code_of_teaching(error: &TeachError) -> u16 {
         TeachError::Device(error) => code_of(error),
         TeachError::Scene(_) => code::NOTHING_TO_TEACH,
         TeachError::Rig(_) => code::RIG,
+        TeachError::Ended => error_code::ABORTED,
     }
 }

@@ -1,4 +1,7 @@
-//! How often a trigger allocates, after the first ones: a binary of its own, because it counts every allocation of a thread.
+//! How often a trigger allocates, after the first ones, and what a plan takes: a binary of its own, because it counts every
+//! allocation of a thread.
+
+mod plans;
 
 use allocation_counter::measure;
 use appliance::calibration::Calibration;
@@ -28,6 +31,16 @@ const JUDGING: u64 = 160;
 /// Of the station, at most: a snapshot per event, the result.
 const PUBLISHING: u64 = 2 * 14;
 
+fn naming() -> Naming {
+    Naming {
+        number: 1,
+        part_number: "P".into(),
+        name: "part".into(),
+        taught_at_unix_s: 0,
+        placement_tolerance_mm: 1.0,
+    }
+}
+
 #[test]
 fn a_trigger_allocates_little_and_nothing_of_a_frame_s_size() {
     let scenario = Scenario::from_toml(
@@ -37,14 +50,7 @@ fn a_trigger_allocates_little_and_nothing_of_a_frame_s_size() {
     .unwrap();
     let (mut head, stage) = hal::sim::head(&scenario).unwrap();
     let calibration = Calibration::of_stage(&stage);
-    let naming = Naming {
-        number: 1,
-        part_number: "P".into(),
-        name: "part".into(),
-        taught_at_unix_s: 0,
-        placement_tolerance_mm: 1.0,
-    };
-    let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &|_, _| ()).unwrap();
+    let taught = teach(&mut head, &calibration, &naming(), TIMEOUT, &|_, _| ()).unwrap();
     let plan = Plan::new(
         Recipe::from_bytes(&taught.bytes).unwrap(),
         &calibration,

@@ -92,7 +92,9 @@ try {
     assert.ok(await page.locator("#gauge-rows tr").count() >= 2);
     assert.ok(await page.locator("#gauge-rows .trend path.line").count() >= 2);
     assert.match(await page.textContent("#total"), /\d+ m?s/);
-    assert.ok(await page.locator("#stages li").count() >= 2);
+    const stages = await page.locator("#stages li").allTextContents();
+    assert.deepEqual(stages.map((stage) => stage.replace(/[\d.]+ m?s$/, "")), ["waiting", "exposure", "alignment", "phase, height, gauges", "judgement", "hand-over"]);
+    for (const id of ["#processing", "#processor-time"]) assert.match(await page.textContent(id), /\d+ m?s/);
   });
 
   await step("nothing jumps when results come", async () => {

@@ -33,8 +33,7 @@ async function shoot(browser, url, folder, name, forms = ALL, view = "live", pre
     await page.goto(`${url}/#${view}`);
     await page.waitForSelector("#state:not([data-state=wait])");
     await page.waitForTimeout(900);
-    await prepare(page);
-    await page.evaluate(() => { if (document.querySelector("#editor").hidden) window.scrollTo(0, 0); });
+    if (!await prepare(page)) await page.evaluate(() => { if (document.querySelector("#editor").hidden) window.scrollTo(0, 0); });
     await page.screenshot({ path: join(folder, `${name}-${form}.png`) });
     after();
     await context.close();
@@ -52,6 +51,12 @@ export async function pictures(browser, program, folder) {
     await signIn(page, secret);
     await trigger(page, CYCLES);
     await shoot(browser, daemon.url, folder, "pass");
+    // Keeps the place that it scrolls to.
+    const times = async (page) => {
+      await page.evaluate(() => document.querySelector("#times").scrollIntoView({ block: "center" }));
+      return true;
+    };
+    await shoot(browser, daemon.url, folder, "times", ["desktop-dark", "phone-light"], "live", times);
     const edit = async (page) => {
       await page.click("#recipe-rows tr button:has-text('Before')");
       await page.click("#recipe-rows tr button:has-text('Edit')");

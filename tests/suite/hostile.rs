@@ -19,6 +19,10 @@ use tokio_modbus::prelude::ExceptionCode;
 
 /// The PLC's address; the clients of the load come from 127.0.0.1, which may only read.
 const PLC: &str = "127.0.0.2";
+/// Room for the PLC, ten clients, and the place that is kept for a writer.
+const CONNECTIONS: usize = 12;
+/// Clients that poll.
+const POLLING: usize = 10;
 /// What a load may add to the processing's processor time.
 const ALLOWED: f64 = 1.05;
 const PASS: u16 = 1;
@@ -37,7 +41,7 @@ impl Bed {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("scene.toml"), scenario).unwrap();
         let text = format!(
-            "state = \"state\"\n[modbus]\nlisten = \"127.0.0.1:0\"\nwriters = [\"{PLC}/32\"]\n\
+            "state = \"state\"\n[modbus]\nlisten = \"127.0.0.1:0\"\nconnections = {CONNECTIONS}\nwriters = [\"{PLC}/32\"]\n\
              [http]\nlisten = \"127.0.0.1:0\"\n[head]\nscenario = \"scene.toml\"\n"
         );
         let path = folder.path().join("fringed.toml");
@@ -128,13 +132,15 @@ impl Load {
 /// 20 Hz.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Ten clients that poll at 20 Hz, six the registers and four the page's snapshot, and one page that is open.
+/// Ten clients that poll the registers at 20 Hz, and one page that is open: it follows the events and fetches the picture of
+/// each new result.
 fn polite(daemon: &Daemon, polls: &Arc<AtomicU64>) -> Load {
     let mut load = Load::default();
     let (modbus, http) = (daemon.modbus, daemon.http);
-    for _ in 0..6 {
+    for _ in 0..POLLING {
         let polls = Arc::clone(polls);
         let mut stream = patient(modbus).unwrap();
+        let mut next = Instant::now();
         load.spawn(move || {
             stream
                 .write_all(&[0, 1, 0, 0, 0, 6, 1, 3, 0, 200, 0, 120])
@@ -142,36 +148,37 @@ fn polite(daemon: &Daemon, polls: &Arc<AtomicU64>) -> Load {
             let mut answer = [0; 9 + 240];
             stream.read_exact(&mut answer).unwrap();
             polls.fetch_add(1, Ordering::Relaxed);
-            std::thread::sleep(POLL);
-        });
-    }
-    for _ in 0..4 {
-        let polls = Arc::clone(polls);
-        load.spawn(move || {
-            let mut stream = patient(http).unwrap();
-            write!(
-                stream,
-                "GET /api/snapshot HTTP/1.1\r\nHost: {http}\r\nConnection: close\r\n\r\n"
-            )
-            .unwrap();
-            let mut answer = String::new();
-            stream.read_to_string(&mut answer).unwrap();
-            assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
-            polls.fetch_add(1, Ordering::Relaxed);
-            std::thread::sleep(POLL);
+            next += POLL;
+            std::thread::sleep(next.saturating_duration_since(Instant::now()));
         });
     }
     let mut page = patient(http).unwrap();
     write!(page, "GET /events HTTP/1.1\r\nHost: {http}\r\n\r\n").unwrap();
+    let mut shown = String::new();
     load.spawn(move || {
-        let mut events = [0; 4096];
+        let mut events = [0; 16384];
         // An event comes at least every second.
-        assert!(
-            page.read(&mut events).unwrap() > 0,
-            "the page was left alone"
-        );
+        let count = page.read(&mut events).unwrap();
+        assert!(count > 0, "the page was left alone");
+        let text = String::from_utf8_lossy(&events[..count]);
+        let after = text.split_once("\"sequence\":").map(|(_, after)| after);
+        let number = |text: &str| text.chars().take_while(char::is_ascii_digit).collect();
+        if let Some(result) = after.map(number).filter(|number| *number != shown) {
+            picture(http);
+            shown = result;
+        }
     });
     load
+}
+
+/// Fetches the picture of the last result, if the station has the time to draw one.
+fn picture(http: SocketAddr) {
+    let mut stream = patient(http).unwrap();
+    let head = format!("Host: {http}\r\nConnection: close\r\n\r\n");
+    write!(stream, "GET /api/picture/height HTTP/1.1\r\n{head}").unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).unwrap();
+    assert!(answer.starts_with(b"HTTP/1.1 "));
 }
 
 /// A connection on which nothing takes for ever.

@@ -1,6 +1,6 @@
 //! The page's API on the real program: what a technician changes there, the PLC sees.
 
-use crate::station_plc::{Daemon, PATIENCE, Place, Plc};
+use crate::station_plc::{Daemon, PATIENCE, Place, Plc, long};
 use serde_json::{Value, json};
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -214,4 +214,41 @@ fn pictures_and_files_of_the_last_part_belong_to_its_result() {
         browser.get("/api/trends")["gauges"][0]["points"][0]["seq"],
         1
     );
+}
+
+#[test]
+fn the_stages_of_a_cycle_add_up_to_its_time_and_its_processing_is_that_of_the_register() {
+    let place = Place::new();
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    let words = plc.measure(1);
+    let result = Browser::new(&daemon).get("/api/snapshot")["result"].clone();
+    let stages: Vec<(&str, u64)> = result["stages"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|stage| {
+            (
+                stage["name"].as_str().unwrap(),
+                stage["us"].as_u64().unwrap(),
+            )
+        })
+        .collect();
+    let names: Vec<&str> = stages.iter().map(|stage| stage.0).collect();
+    let expected = [
+        "waiting",
+        "exposure",
+        "alignment",
+        "strips",
+        "judgement",
+        "hand-over",
+    ];
+    assert_eq!(names, expected);
+    let all: u64 = stages.iter().map(|stage| stage.1).sum();
+    assert_eq!(all, u64::from(long(&words, 20)), "{stages:?}");
+    let processing: u64 = stages[2..].iter().map(|stage| stage.1).sum();
+    let register = long(&plc.read(610, 2).unwrap(), 0);
+    assert_eq!(processing, u64::from(register), "{stages:?}");
+    assert!(stages[2].1 > 0 && stages[3].1 > 0, "{stages:?}");
+    assert!(result["cpu_us"].as_u64().unwrap() > 0, "{result}");
 }

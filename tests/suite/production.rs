@@ -11,9 +11,11 @@ use appliance::recipe::archive::pack;
 use appliance::recipe::teach::Taught;
 use appliance::recipe::{AlignmentKind, Recipe};
 use appliance::seam;
+use appliance::station::{Inspection, Stages};
 use hal::frame::Frame;
 use hal::sim::parts::{Cone, Sawtooth, SheetMetal};
 use hal::sim::{Part, Placement};
+use std::time::Instant;
 
 /// Heights by the production path are off the exact ones by at most this, mm: the noise of one level of four frames is
 /// a hundred times the RMS.
@@ -37,9 +39,18 @@ fn parts() -> [(&'static str, Part); 3] {
 
 /// The recipe's plan with one of its sequences and without alignment, and its whole recipe.
 fn plan(bed: &Bed, taught: &Taught, sequence: usize) -> (Plan, Recipe) {
+    plan_with(bed, taught, sequence, AlignmentKind::None)
+}
+
+fn plan_with(
+    bed: &Bed,
+    taught: &Taught,
+    sequence: usize,
+    alignment: AlignmentKind,
+) -> (Plan, Recipe) {
     let mut file = taught.recipe.file.clone();
     file.production = sequence;
-    file.alignment = AlignmentKind::None;
+    file.alignment = alignment;
     let (bytes, _) = pack(&file, &taught.recipe.arrays).unwrap();
     let recipe = Recipe::from_bytes(&bytes).unwrap();
     let plan = Plan::new(recipe.clone(), &bed.calibration, true).unwrap();
@@ -222,13 +233,17 @@ fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]) {
         .filter(|height| height.is_known())
         .count();
     assert_eq!(found.resolved as usize, known, "{name}");
-    let noise = rms(&measured.sigma, &golden.height);
+    let noise = rms(&measured.sigma, &golden.height, measured.width);
     assert!(
         close(found.height_noise_mm, noise, SIGMA_SHARE),
         "{name}: {} {noise}",
         found.height_noise_mm
     );
-    let taught = rms(&golden_sigma(recipe, plan), &measured.height);
+    let taught = rms(
+        &golden_sigma(recipe, plan),
+        &measured.height,
+        measured.width,
+    );
     assert!(
         close(found.taught_noise_mm, taught, SIGMA_SHARE),
         "{name}: {} {taught}",
@@ -290,10 +305,15 @@ fn golden(recipe: &Recipe) -> Golden {
     }
 }
 
-/// RMS of sigma over the places that a map of heights knows.
-fn rms(sigma: &[f32], heights: &[Height]) -> f64 {
-    let pairs = sigma.iter().zip(heights);
+/// Variances are summed on every so many rows.
+const WEIGHED: usize = 4;
+
+/// RMS of sigma over the places that a map of heights knows, on the rows that production looks at for it.
+fn rms(sigma: &[f32], heights: &[Height], width: usize) -> f64 {
+    let weighed = |&(at, _): &(usize, _)| (at / width).is_multiple_of(WEIGHED);
+    let pairs = sigma.iter().zip(heights).enumerate().filter(weighed);
     let known: Vec<f64> = pairs
+        .map(|(_, pair)| pair)
         .filter(|(sigma, height)| height.is_known() && sigma.is_finite())
         .map(|(&sigma, _)| f64::from(sigma))
         .collect();
@@ -304,8 +324,22 @@ fn rms(sigma: &[f32], heights: &[Height]) -> f64 {
 fn findings_depend_neither_on_strips_nor_on_threads_nor_on_the_back_end() {
     let mut bed = bed(&scenario(Part::SheetMetal(SheetMetal::default())));
     let taught = taught(&mut bed).unwrap();
-    for sequence in [1, taught.recipe.file.sequences.len() - 1] {
-        let (plan, _) = plan(&bed, &taught, sequence);
+    let full = taught.recipe.file.sequences.len() - 1;
+    let moved = Placement {
+        shift_mm: [0.7, -0.4, 0.2],
+        rotation_deg: 0.3,
+        ..Placement::default()
+    };
+    for (sequence, alignment) in [
+        (1, AlignmentKind::None),
+        (full, AlignmentKind::None),
+        (full, AlignmentKind::Rigid),
+    ] {
+        if alignment == AlignmentKind::Rigid {
+            let part = Part::SheetMetal(SheetMetal::default());
+            bed.stage.place(&part, &moved).unwrap();
+        }
+        let (plan, _) = plan_with(&bed, &taught, sequence, alignment);
         let frames = frames(&mut bed, &plan);
         let views: Vec<_> = frames
             .iter()
@@ -342,6 +376,45 @@ fn findings_depend_neither_on_strips_nor_on_threads_nor_on_the_back_end() {
                     backend.name()
                 );
             }
+        }
+    }
+}
+
+#[test]
+fn levels_decoded_on_arrival_give_the_same_inspection() {
+    let mut bed = bed(&scenario(Part::SheetMetal(SheetMetal::default())));
+    let taught = taught(&mut bed).unwrap();
+    for sequence in 0..taught.recipe.file.sequences.len() {
+        let (plan, _) = plan_with(&bed, &taught, sequence, AlignmentKind::Rigid);
+        let frames = frames(&mut bed, &plan);
+        let levels = plan.sequence().levels().len();
+        let inspected = |wanted: usize| {
+            let (mut arriving, mut arrived) = (plan.arriving(0), 0);
+            for count in 1..=frames.len() {
+                while arrived < wanted && plan.can_arrive(&arriving, count) {
+                    plan.arrive(&mut arriving, &frames[..count]);
+                    arrived += 1;
+                }
+            }
+            let inspection = plan.inspect_arrived(&frames, Some(arriving), Instant::now());
+            let stages = Stages::default();
+            (
+                Inspection {
+                    stages,
+                    ..inspection
+                },
+                arrived,
+            )
+        };
+        let expected = inspected(0).0;
+        assert!(expected.valid_points > 5000);
+        // Rooms are used again, and whoever comes late decodes everything at the end.
+        for wanted in [levels - 1, levels - 1, usize::from(levels > 2), levels - 1] {
+            assert_eq!(
+                inspected(wanted),
+                (expected.clone(), wanted),
+                "sequence {sequence}"
+            );
         }
     }
 }

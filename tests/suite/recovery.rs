@@ -1,14 +1,20 @@
 //! What breaks and comes back while the daemon runs: cables, storage, a PLC that changes its mind.
 
 use crate::station_plc::{
-    Daemon as Program, ONLINE, PATIENCE, Place, Plc, READY, RECIPE_OK, Status, long, trigger,
+    Daemon as Program, ONLINE, PATIENCE, Place, Plc, READY, RECIPE_OK, SMALL_HEAD, Status, long,
+    trigger,
 };
+use appliance::calibration::Calibration;
 use appliance::config::Config;
 use appliance::daemon::Daemon;
 use appliance::history::seqs::AHEAD;
 use appliance::progress::Progress;
+use appliance::recipe::teach::{Naming, TeachError, teach_while};
+use appliance::station::{Event, Request};
 use hal::error::Device;
+use hal::sim::Scenario;
 use std::fs;
+use std::sync::Mutex;
 use std::time::Instant;
 
 /// Words of VERDICT, STATE and REJECT_REASON.
@@ -129,6 +135,46 @@ fn an_abort_ends_a_sequence_between_two_frames_with_one_invalid_result() {
 }
 
 #[test]
+fn an_abort_ends_a_teach_and_the_recipe_before_it_goes_on() {
+    let place = Place::new();
+    let daemon = start(&place);
+    let mut plc = Plc::at(daemon.modbus);
+    plc.write(0, &[ONLINE]);
+    let before = plc.status();
+    let request = Event::Request(Request::Teach { number: 2 });
+    assert_eq!(daemon.station.event(request).state_word, "teaching");
+    plc.write(0, &[ONLINE | ABORT]);
+    let ended = plc.wait("READY", |status| status.has(READY | RECIPE_OK));
+    assert_eq!((error_code(&ended), ended.crc()), (802, before.crc()));
+    assert!(!place.path("state/recipes/0002.recipe").exists());
+    assert_eq!(plc.measure(1)[8], PASS);
+    daemon.stop();
+}
+
+#[test]
+fn a_teach_that_is_ended_does_no_further_step() {
+    let scenario = Scenario::from_toml(SMALL_HEAD, "small head").unwrap();
+    let (mut head, stage) = hal::sim::head(&scenario).unwrap();
+    let calibration = Calibration::of_stage(&stage);
+    let naming = Naming {
+        number: 1,
+        part_number: "PART".into(),
+        name: "part".into(),
+        taught_at_unix_s: 0,
+        placement_tolerance_mm: 1.0,
+    };
+    let told = Mutex::new(Vec::new());
+    let progress = |share: f64, _: &str| {
+        told.lock().unwrap().push(share);
+        share < 0.35
+    };
+    let ended = teach_while(&mut head, &calibration, &naming, PATIENCE, &progress);
+    assert!(matches!(ended, Err(TeachError::Ended)), "{ended:?}");
+    let told = told.into_inner().unwrap();
+    assert_eq!(told.last(), Some(&0.35), "{told:?}");
+}
+
+#[test]
 fn a_result_counter_that_cannot_be_stored_stops_the_station_until_it_can() {
     let place = Place::new();
     let daemon = Program::start(&place);
@@ -158,7 +204,9 @@ fn a_result_counter_that_cannot_be_stored_stops_the_station_until_it_can() {
     plc.wait("READY", |status| status.has(READY | RECIPE_OK));
     let reserved: u32 = fs::read_to_string(&counter)
         .unwrap()
-        .trim()
+        .split_whitespace()
+        .next()
+        .unwrap()
         .parse()
         .unwrap();
     assert!(reserved >= u32::from(last), "{reserved}");

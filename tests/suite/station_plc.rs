@@ -55,6 +55,15 @@ impl Place {
     }
 }
 
+/// A killed daemon leaves its mark of the last SEQ in shared memory; no later one of this place needs it.
+impl Drop for Place {
+    fn drop(&mut self) {
+        if let Ok(serial) = fs::read_to_string(self.path("state/serial")) {
+            let _ = fs::remove_file(format!("/dev/shm/fringed-{}", serial.trim()));
+        }
+    }
+}
+
 /// A running daemon. Dropped, it is killed.
 pub struct Daemon {
     child: Child,

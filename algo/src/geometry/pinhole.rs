@@ -238,15 +238,24 @@ impl Pinhole {
     /// The pixel (u, v) that sees a point of the world, also outside the frame; `None` behind the
     /// device.
     pub fn project(&self, point: Vector) -> Option<(f64, f64)> {
-        let from = point - self.centre;
-        let depth = self.rows[2].dot(from);
+        self.pixel(self.turned(point - self.centre))
+    }
+
+    /// A direction of the world as the device has it: z along its optical axis.
+    #[inline]
+    pub(super) fn turned(&self, direction: Vector) -> Vector {
+        let [x, y, z] = self.rows.map(|row| row.dot(direction));
+        Vector::new(x, y, z)
+    }
+
+    /// The pixel that sees a point given as the device has it, from its centre; `None` behind it.
+    #[inline]
+    pub(super) fn pixel(&self, from: Vector) -> Option<(f64, f64)> {
+        let depth = from.z;
         if !(depth > 0.0) {
             return None;
         }
-        let (x, y) = (
-            self.rows[0].dot(from) / depth,
-            self.rows[1].dot(from) / depth,
-        );
+        let (x, y) = (from.x / depth, from.y / depth);
         let r2 = x * x + y * y;
         let (xd, yd) = if r2 <= self.radius_square {
             self.distorted(x, y)

@@ -60,9 +60,9 @@ impl core::error::Error for RigError {}
 #[derive(Clone, Debug)]
 pub struct Triangulator {
     camera: Pinhole,
-    projector: Pinhole,
-    reference: Reference,
-    function: PhaseFunction,
+    pub(super) projector: Pinhole,
+    pub(super) reference: Reference,
+    pub(super) function: PhaseFunction,
     range: HeightRange,
     /// The least |∂Φ/∂z| that tells a height, turns per mm.
     slope_min: f64,

@@ -11,4 +11,4 @@ pub use deviation::{Comparison, Golden, Reading};
 pub use gauge::{Axis, Measure};
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
-pub use strips::{Findings, Gauge, Parts, Production, Skipped, Strip, Taught, Unmeasurable};
+pub use strips::{Findings, Gauge, Light, Parts, Production, Skipped, Strip, Taught, Unmeasurable};

@@ -79,47 +79,57 @@ impl GreyResponse {
     }
 }
 
+/// Steps of a turn in which the projected sine is kept.
+const STEPS: f64 = 65_536.0;
+/// 1.5 · 2⁵²: added to a number below 2⁵⁰, it leaves the nearest whole number in the low bits.
+const ROUNDER: f64 = 6_755_399_441_055_744.0;
+
 /// Encodes I(ξ, η) = I_max/2 · (1 + sin 2π(r·Φ_P(ξ, η) + s)), I_max = 255, rounded to grey levels.
 ///
-/// `ratio` is r, `shift` is s in turns; with a `response` the levels are passed through its inverse.
 /// The argument is taken at 1/65536 turn, which moves a level by at most 0.006 before rounding.
-pub fn encode(
-    function: &PhaseFunction,
-    ratio: f64,
-    shift: f64,
-    response: Option<&GreyResponse>,
-) -> GreyRaster {
-    let (width, height) = (function.columns(), function.rows());
-    let sine = grey_sine(response);
-    let grey = |column, row| {
-        let turns = ratio * function.at_pixel(column, row) + shift;
-        let bits = libm::rint((turns - libm::floor(turns)) * 65_536.0) as usize;
-        sine[bits & 0xFFFF]
-    };
-    let mut pixels = Vec::with_capacity(width * height);
-    for row in 0..height {
-        if row > 0 && function.is_vertical() {
-            pixels.extend_from_within(..width);
-        } else {
-            pixels.extend((0..width).map(|column| grey(column, row)));
-        }
-    }
-    GreyRaster {
-        width,
-        height,
-        pixels,
-    }
+#[derive(Clone, Debug)]
+pub struct Encoder {
+    /// One turn of the projected sine.
+    sine: Vec<u8>,
 }
 
-/// One turn of the projected sine in 65536 steps.
-fn grey_sine(response: Option<&GreyResponse>) -> Vec<u8> {
-    (0..65_536_u32)
-        .map(|bits| {
-            let light = 127.5 * (1.0 + libm::sin(TAU * f64::from(bits) / 65_536.0));
+impl Encoder {
+    /// With a `response` the levels are passed through its inverse.
+    pub fn new(response: Option<&GreyResponse>) -> Self {
+        let level = |bits: u32| {
+            let light = 127.5 * (1.0 + libm::sin(TAU * f64::from(bits) / STEPS));
             let level = libm::rint(light) as u8;
             response.map_or(level, |response| response.level_for(level))
-        })
-        .collect()
+        };
+        Self {
+            sine: (0..STEPS as u32).map(level).collect(),
+        }
+    }
+
+    /// The raster of the phase function at ratio r with a shift of s turns.
+    pub fn raster(&self, function: &PhaseFunction, ratio: f64, shift: f64) -> GreyRaster {
+        let (width, height) = (function.columns(), function.rows());
+        let grey = |phase: f64| {
+            let step = ((ratio * phase + shift) * STEPS + ROUNDER).to_bits();
+            self.sine[usize::from(step as u16)]
+        };
+        let mut pixels = Vec::with_capacity(width * height);
+        if let Some(samples) = function.samples() {
+            pixels.extend(samples.iter().map(|&phase| grey(phase)));
+        }
+        for row in pixels.len() / width..height {
+            if row > 0 && function.is_vertical() {
+                pixels.extend_from_within(..width);
+            } else {
+                pixels.extend((0..width).map(|column| grey(function.at_pixel(column, row))));
+            }
+        }
+        GreyRaster {
+            width,
+            height,
+            pixels,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -129,7 +139,7 @@ mod tests {
     #[test]
     fn a_raster_is_the_sine_of_equation_one() {
         let function = PhaseFunction::vertical(64, 3, 4.0).unwrap();
-        let raster = encode(&function, 0.5, 0.25, None);
+        let raster = Encoder::new(None).raster(&function, 0.5, 0.25);
         assert_eq!(raster.pixels.len(), 64 * 3);
         for row in 0..3 {
             for column in 0..64 {
@@ -139,6 +149,10 @@ mod tests {
                 assert!(error.abs() <= 0.507, "row {row} column {column}: {error}");
             }
         }
+        // The same function by its samples, turns below 0 included.
+        let samples = (0..64 * 3).map(|at| f64::from(at % 64) / 16.0 - 2.0);
+        let sampled = PhaseFunction::sampled(64, 3, samples.collect()).unwrap();
+        assert_eq!(Encoder::new(None).raster(&sampled, 0.5, 0.25), raster);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The phase function Φ_P(ξ, η) of a pattern.
 
+use super::interpolate::catmull_rom;
 use alloc::vec::Vec;
 use core::fmt;
 
@@ -184,6 +185,14 @@ impl PhaseFunction {
         matches!(self.shape, Shape::Sampled(_))
     }
 
+    /// The samples, row-major, of a function that is given by them.
+    pub(super) fn samples(&self) -> Option<&[f64]> {
+        match &self.shape {
+            Shape::Sampled(turns) => Some(turns),
+            _ => None,
+        }
+    }
+
     /// Whether all rows are alike, so that one encoded row serves for all.
     pub(super) fn is_vertical(&self) -> bool {
         matches!(self.shape, Shape::Vertical { .. })
@@ -205,23 +214,7 @@ impl PhaseFunction {
         match &self.shape {
             Shape::Vertical { fringes } => fringes * xi / self.columns as f64,
             Shape::Horizontal { fringes } => fringes * eta / self.rows as f64,
-            Shape::Sampled(turns) => {
-                let (column, across) = Cell::new(xi, self.columns);
-                let (row, down) = Cell::new(eta, self.rows);
-                let mut lines = [0.0; 4];
-                for (line, offset) in lines.iter_mut().zip(-1_isize..) {
-                    *line = extended(row + offset, self.rows, |row| {
-                        let start = row * self.columns;
-                        let turns = &turns[start..start + self.columns];
-                        let mut taps = [0.0; 4];
-                        for (tap, offset) in taps.iter_mut().zip(-1_isize..) {
-                            *tap = extended(column + offset, self.columns, |i| turns[i]);
-                        }
-                        across.interpolate(taps)
-                    });
-                }
-                down.interpolate(lines)
-            }
+            Shape::Sampled(turns) => catmull_rom(turns, (self.columns, self.rows), (xi, eta)),
         }
     }
 
@@ -270,58 +263,6 @@ impl PhaseRange {
     /// max − min, in turns.
     pub fn span(&self) -> f64 {
         self.max - self.min
-    }
-}
-
-/// Sample `i` of a line of `count`, going on linearly beyond both ends.
-#[inline]
-fn extended(i: isize, count: usize, sample: impl Fn(usize) -> f64) -> f64 {
-    let last = count as isize - 1;
-    if i < 0 {
-        let (first, second) = (sample(0), sample(1));
-        first + (second - first) * i as f64
-    } else if i > last {
-        let (end, before) = (sample(count - 1), sample(count - 2));
-        end + (end - before) * (i - last) as f64
-    } else {
-        sample(i as usize)
-    }
-}
-
-/// Where a point lies between two samples of a line.
-enum Cell {
-    /// Inside or next to the raster: fraction of the cell, Catmull–Rom.
-    Within(f64),
-    /// Far outside: the distance from the cell's start, linear.
-    Beyond(f64),
-}
-
-impl Cell {
-    /// The sample before `x` on a line of `count` samples, and the place behind it.
-    #[inline]
-    fn new(x: f64, count: usize) -> (isize, Self) {
-        let floor = libm::floor(x);
-        if floor >= -2.0 && floor <= count as f64 {
-            (floor as isize, Cell::Within(x - floor))
-        } else if x < 0.0 {
-            (-2, Cell::Beyond(x + 2.0))
-        } else {
-            // A NaN lands here and stays a NaN.
-            (count as isize, Cell::Beyond(x - count as f64))
-        }
-    }
-
-    /// The value behind taps at −1, 0, 1, 2.
-    #[inline]
-    fn interpolate(&self, [a, b, c, d]: [f64; 4]) -> f64 {
-        match *self {
-            Cell::Within(t) => {
-                let cubic = 3.0 * (b - c) + d - a;
-                let square = 2.0 * a - 5.0 * b + 4.0 * c - d;
-                b + 0.5 * t * ((c - a) + t * (square + t * cubic))
-            }
-            Cell::Beyond(distance) => b + distance * (c - b),
-        }
     }
 }
 

@@ -2,9 +2,10 @@
 
 mod encode;
 mod function;
+mod interpolate;
 mod sequence;
 
-pub use encode::{GreyRaster, GreyResponse, ResponseError, encode};
+pub use encode::{Encoder, GreyRaster, GreyResponse, ResponseError};
 pub use function::{MAX_TURNS, PhaseFunction, PhaseFunctionError, PhaseRange};
 pub use sequence::{
     Level, MAX_DENSE_N, MAX_FRAMES, MAX_LEVELS, MAX_SHIFTS, MAX_STEP, Sequence, SequenceError,

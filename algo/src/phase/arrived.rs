@@ -99,6 +99,11 @@ impl Arrived {
         (self.width, self.height)
     }
 
+    /// Forgets all levels: those of another measurement may arrive.
+    pub fn restart(&mut self) {
+        self.levels = 0;
+    }
+
     /// One more has been written.
     pub(crate) fn add_level(&mut self) {
         self.levels += 1;

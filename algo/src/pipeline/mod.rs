@@ -8,7 +8,8 @@ mod rows;
 pub use measure::{Guess, HeightMap, PhaseMap, Window, arrive, decode, decode_last, triangulate};
 pub use noise::sample_noise;
 pub(crate) use rise::{
-    COMPARED, Risen, RowTally, Seen, UNKNOWN as NO_RISE, VARIANCE_UNIT_NM, rise_row,
+    COMPARED, Risen, RowTally, SIGMA, SQUARE, Seen, UNKNOWN as NO_RISE, VARIANCE_UNIT_NM, rise_row,
+    weigh_row,
 };
 pub use rise::{KnownSurface, Rises};
 pub use rows::for_each_row;

@@ -17,6 +17,10 @@ const SHOWN_BYTES: u64 = 64 << 10;
 pub struct Change<'a> {
     /// When, in µs since 1970 UTC; none if the clock is not synchronised.
     pub utc_us: Option<u64>,
+    /// When, in s since the start of the daemon.
+    pub uptime_s: u32,
+    /// Which start that was.
+    pub boot_id: u32,
     /// From where.
     pub from: IpAddr,
     /// What was done, e.g. `"edit recipe"`.
@@ -49,8 +53,8 @@ impl Changes {
     /// Whatever the file system answers.
     pub fn add(&self, change: &Change<'_>) -> std::io::Result<()> {
         let line = json!({
-            "utc_us": change.utc_us, "from": change.from, "action": change.action, "subject": change.subject,
-            "outcome": change.outcome,
+            "utc_us": change.utc_us, "uptime_s": change.uptime_s, "boot_id": format!("{:08x}", change.boot_id),
+            "from": change.from, "action": change.action, "subject": change.subject, "outcome": change.outcome,
         });
         let _one = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         if fs::metadata(&self.path).is_ok_and(|file| file.len() >= FULL_BYTES) {
@@ -106,6 +110,8 @@ mod tests {
     fn change(subject: &str) -> Change<'_> {
         Change {
             utc_us: Some(1),
+            uptime_s: 7,
+            boot_id: 0xB007,
             from: IpAddr::from([127, 0, 0, 1]),
             action: "edit recipe",
             subject,
@@ -131,6 +137,10 @@ mod tests {
         assert_eq!(latest.len(), 2);
         assert_eq!(latest[0]["subject"], "recipe 2 \"x\"\n{");
         assert_eq!(latest[1]["from"], "127.0.0.1");
+        assert_eq!(
+            (&latest[1]["uptime_s"], &latest[1]["boot_id"]),
+            (&json!(7), &json!("0000b007"))
+        );
         changes.add(&change("recipe 3")).unwrap();
         assert_eq!(changes.latest().unwrap()[0]["subject"], "recipe 3");
     }

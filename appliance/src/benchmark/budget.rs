@@ -7,7 +7,7 @@ use super::stopwatch::median;
 use crate::calibration::Calibration;
 use crate::plan::Plan;
 use crate::recipe::teach::{Naming, teach};
-use crate::recipe::{Recipe, archive};
+use crate::recipe::{AlignmentKind, Recipe, archive};
 use hal::frame::Frame;
 use hal::head::DynHead;
 use hal::sim::Scenario;
@@ -30,9 +30,11 @@ pub struct Budget {
     pub height: u32,
     /// Frames of the production sequence.
     pub frames: usize,
+    /// Whether the part's motion is found and taken back.
+    pub aligned: bool,
     /// From the trigger to the end of the last exposure at the projector's refresh rate, ms.
     pub exposure_ms: f64,
-    /// Stage and wall time on all threads, ms, medians.
+    /// Stage and wall time on all threads, ms, medians; without what is decoded on arrival.
     pub stages: Vec<(String, f64)>,
     /// From the last frame to the verdict, ms: all stages.
     pub verdict_ms: f64,
@@ -46,7 +48,8 @@ pub struct Budget {
     pub x_kernel: f64,
 }
 
-/// Budgets of a camera of this size: with four frames of one level about the golden map, and with the full sequence.
+/// Budgets of a camera of this size: with four frames of one level about the golden map, and with the full sequence; each
+/// for a part that lies as taught, and for one whose motion is taken back.
 ///
 /// # Errors
 /// If something cannot be simulated or taught.
@@ -77,13 +80,16 @@ pub fn budgets(
         .iter()
         .position(|sequence| sequence.frames.len() == 4);
     let mut found = Vec::new();
-    for production in four.into_iter().chain([full]) {
+    let cycles = four.into_iter().chain([full]);
+    let kinds = [AlignmentKind::None, AlignmentKind::Rigid];
+    for (production, alignment) in cycles.flat_map(|at| kinds.map(|kind| (at, kind))) {
         progress(
             0.8,
             &format!("{about}: {} frames", sequences[production].frames.len()),
         );
         let mut file = taught.recipe.file.clone();
         file.production = production;
+        file.alignment = alignment;
         let (bytes, _) = archive::pack(&file, &taught.recipe.arrays).map_err(words)?;
         let recipe = Recipe::from_bytes(&bytes).map_err(words)?;
         let plan = Plan::new(recipe, &calibration, true).map_err(words)?;
@@ -117,11 +123,15 @@ fn budget(
     let exposure_ms = ms(shown + 2 * refresh);
     let mut runs: Vec<Vec<(String, f64)>> = Vec::new();
     for _ in 0..effort.rounds {
-        let inspection = plan.inspect(&frames, Instant::now());
+        let mut arriving = plan.arriving(0);
+        while plan.can_arrive(&arriving, frames.len()) {
+            plan.arrive(&mut arriving, &frames);
+        }
+        let inspection = plan.inspect_arrived(&frames, Some(arriving), Instant::now());
         let stages = inspection.stages.iter();
         runs.push(
             stages
-                .map(|stage| (stage.name.to_owned(), f64::from(stage.us) / 1e3))
+                .map(|stage| (stage.stage.name().to_owned(), f64::from(stage.us) / 1e3))
                 .collect(),
         );
     }
@@ -141,6 +151,7 @@ fn budget(
         width,
         height,
         frames: frames.len(),
+        aligned: plan.file().alignment == AlignmentKind::Rigid,
         exposure_ms,
         stages,
         verdict_ms,

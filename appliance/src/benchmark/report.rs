@@ -133,11 +133,18 @@ fn budget(budgets: &[Budget]) -> Value {
         });
         let size = format!("{}x{}", budget.width, budget.height);
         let sizes = all.entry(size).or_insert_with(|| json!({}));
-        sizes[budget.frames.to_string()] = values;
+        if budget.aligned {
+            sizes[budget.frames.to_string()] = values;
+        }
         let per_px =
             |ms: f64| json!(ms * 1e6 / (f64::from(budget.width) * f64::from(budget.height)));
         let key = |of: &str| format!("{of}_golden_{}", budget.frames);
-        sizes[key("production")] = json!({
+        let cycle = if budget.aligned {
+            "aligned"
+        } else {
+            "production"
+        };
+        sizes[key(cycle)] = json!({
             "ns_per_px": per_px(budget.one_thread_ms),
             "x_kernel": budget.x_kernel,
         });
@@ -222,8 +229,8 @@ fn budget_table(text: &mut String, budgets: &[Budget]) {
     text.push_str(
         "\n### From trigger to verdict\n\nMilliseconds; stages in wall time on all threads, the last three columns in \
          processor time on one.\n\n\
-         | camera | frames | exposure | stages | frames → verdict | trigger → verdict | frames → verdict, one thread | phase kernel alone | ratio |\n\
-         |---|---:|---:|---|---:|---:|---:|---:|---:|\n",
+         | camera | frames | motion | exposure | stages | frames → verdict | trigger → verdict | frames → verdict, one thread | phase kernel alone | ratio |\n\
+         |---|---:|---|---:|---|---:|---:|---:|---:|---:|\n",
     );
     for budget in budgets {
         let stages: Vec<String> = budget
@@ -233,10 +240,11 @@ fn budget_table(text: &mut String, budgets: &[Budget]) {
             .collect();
         let _ = writeln!(
             text,
-            "| {}×{} | {} | {:.0} | {} | {:.1} | {:.0} | {:.1} | {:.2} | {:.2} |",
+            "| {}×{} | {} | {} | {:.0} | {} | {:.1} | {:.0} | {:.1} | {:.2} | {:.2} |",
             budget.width,
             budget.height,
             budget.frames,
+            if budget.aligned { "taken back" } else { "none" },
             budget.exposure_ms,
             stages.join(", "),
             budget.verdict_ms,

@@ -130,7 +130,7 @@ impl Teach {
         progress.clear();
         taught.map_err(|error| {
             let exit = match error {
-                TeachError::Device(_) => Exit::Unavailable,
+                TeachError::Device(_) | TeachError::Ended => Exit::Unavailable,
                 TeachError::Scene(_) | TeachError::Rig(_) => Exit::Content,
             };
             Failure::new(exit, error.to_string())

@@ -18,7 +18,7 @@ pub struct Key {
 }
 
 /// The table; a test compares it with the structs.
-pub const KEYS: [Key; 17] = [
+pub const KEYS: [Key; 18] = [
     Key {
         name: "state",
         unit: "folder",
@@ -74,6 +74,13 @@ pub const KEYS: [Key; 17] = [
         range: "0 to 255",
         default: "any",
         meaning: "answer only to this unit id, exception 0x0B to others",
+    },
+    Key {
+        name: "modbus.connections",
+        unit: "connections",
+        range: "2 to 64",
+        default: "8",
+        meaning: "the most at a time; one of them is kept for a client that may write",
     },
     Key {
         name: "modbus.readers",

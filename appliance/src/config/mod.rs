@@ -5,7 +5,7 @@ mod keys;
 pub use keys::{KEYS, Key, table};
 
 use crate::error::{Exit, Failure};
-use crate::modbus::WordOrder;
+use crate::modbus::{CONNECTIONS, WordOrder};
 use ipnet::IpNet;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -64,6 +64,8 @@ pub struct ModbusConfig {
     pub word_order: WordOrderConfig,
     /// Answer only to this unit id.
     pub strict_unit_id: Option<u8>,
+    /// The most connections at a time.
+    pub connections: u16,
     /// Networks from where it may be read.
     pub readers: Vec<IpNet>,
     /// Networks from where it may be written.
@@ -129,6 +131,7 @@ impl Default for ModbusConfig {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 1502)),
             word_order: WordOrderConfig::Normal,
             strict_unit_id: None,
+            connections: CONNECTIONS as u16,
             readers: defaults.readers,
             writers: defaults.writers,
         }
@@ -223,6 +226,8 @@ impl Config {
         within("station.recipe", u64::from(self.station.recipe), 1, 9999)?;
         let timeout = u64::from(self.station.plc_timeout_s);
         within("station.plc_timeout_s", timeout, 1, 3600)?;
+        let connections = u64::from(self.modbus.connections);
+        within("modbus.connections", connections, 2, 64)?;
         let results = u64::from(self.history.results);
         within("history.results", results, 1, 10_000_000)?;
         if self.head.backend == Backend::Replay && self.head.recordings.is_empty() {
@@ -256,6 +261,7 @@ mod tests {
             ("threats = 2", "threats"),
             ("[modbus]\nport = 5", "port"),
             ("[station]\nrecipe = 0", "station.recipe"),
+            ("[modbus]\nconnections = 1", "modbus.connections"),
             ("[head]\nbackend = \"replay\"", "head.recordings"),
             ("[modbus]\nlisten = \"nowhere\"", "listen"),
             ("= 5", "TOML"),

@@ -4,7 +4,7 @@ use super::methods::Method;
 use super::runner::Run;
 use super::shade;
 use crate::output::canvas::{Canvas, LINE};
-use algo::pattern::encode;
+use algo::pattern::Encoder;
 use hal::frame::Samples;
 
 /// What a method showed, saw and measured.
@@ -24,7 +24,7 @@ const LEVELS: u8 = 16;
 impl View {
     /// Of a run.
     pub fn of(method: Method, run: &Run) -> Self {
-        let raster = encode(&run.function, 1.0, 0.0, None);
+        let raster = Encoder::new(None).raster(&run.function, 1.0, 0.0);
         let frame = &run.measured.frames[run.finest];
         let format = frame.format();
         let bytes: Vec<u8> = match frame.samples() {

@@ -11,6 +11,10 @@ pub struct Entry {
     pub seq: u32,
     /// Trigger time in µs since 1970 UTC; none if the clock was not synchronised.
     pub time_utc_us: Option<u64>,
+    /// Trigger time since the start of the daemon, s; none in results of older programs.
+    pub uptime_s: Option<u32>,
+    /// Which start that was: BOOT_ID as 8 hexadecimal digits.
+    pub boot_id: Option<String>,
     /// Recipe number.
     pub recipe: u16,
     /// The first 8 hexadecimal digits of the recipe's fingerprint.
@@ -120,6 +124,8 @@ impl Entry {
         Self {
             seq: record.seq,
             time_utc_us: Some(record.time_utc_us).filter(|&time| time != 0),
+            uptime_s: Some(record.uptime_s),
+            boot_id: Some(format!("{:08x}", record.boot_id)),
             recipe: record.recipe,
             fingerprint: format!("{:08x}", record.recipe_crc),
             part_id: record.part_id,
@@ -144,11 +150,12 @@ impl Entry {
 }
 
 fn stages(record: &ResultRecord) -> Vec<StageEntry> {
-    let stages = record.inspection.stages.iter();
+    let stages = record.stages();
     stages
-        .map(|stage| StageEntry {
-            name: stage.name.into(),
-            us: stage.us,
+        .iter()
+        .map(|time| StageEntry {
+            name: time.stage.name().into(),
+            us: time.us,
         })
         .collect()
 }
@@ -178,6 +185,8 @@ pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
     let same = Entry {
         seq: stored.seq,
         time_utc_us: stored.time_utc_us,
+        uptime_s: stored.uptime_s,
+        boot_id: stored.boot_id.clone(),
         part_id: stored.part_id,
         press_stroke: stored.press_stroke,
         token: stored.token,

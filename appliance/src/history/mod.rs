@@ -17,6 +17,7 @@
 pub mod csv;
 pub mod entry;
 mod keeper;
+mod mark;
 pub mod reader;
 mod recordings;
 pub mod schema;
@@ -32,6 +33,7 @@ mod tests;
 pub use entry::{Entry, Filter, GaugeEntry, StageEntry, difference};
 pub use reader::{Counts, Reader, Trend, TrendPoint};
 pub use recordings::FailedPart;
+pub use seqs::Numbering;
 pub use task::{Bounds, History, Task, open};
 pub use writer::{Opening, Writer};
 

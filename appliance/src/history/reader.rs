@@ -290,6 +290,9 @@ fn with_gauges(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry
     Ok(Entry {
         seq: row.get("seq")?,
         time_utc_us: row.get("time_utc_us")?,
+        // Columns that a database of an older program has not got yet.
+        uptime_s: row.get("uptime_s").unwrap_or_default(),
+        boot_id: row.get("boot_id").unwrap_or_default(),
         recipe: row.get("recipe")?,
         fingerprint: row.get("fingerprint")?,
         part_id: row.get("part_id")?,

@@ -56,6 +56,9 @@ CREATE TABLE gauge (
 ) WITHOUT ROWID;
 ";
 
+/// Columns of `result` that came later; older databases get them when they are opened for writing.
+const ADDED: [(&str, &str); 2] = [("uptime_s", "INTEGER"), ("boot_id", "TEXT")];
+
 /// Opens the database for writing; makes it where there is none.
 ///
 /// # Errors
@@ -66,13 +69,24 @@ pub(super) fn open(path: &Path) -> Result<Connection, HistoryError> {
     settle(&connection).map_err(failed)?;
     let found = version(&connection).map_err(failed)?;
     match found {
-        (APPLICATION, VERSION) => Ok(connection),
+        (APPLICATION, VERSION) => {}
         (0, 0) if is_empty(&connection).map_err(failed)? => {
             create(&mut connection).map_err(failed)?;
-            Ok(connection)
         }
-        found => Err(strange(path, found)),
+        found => return Err(strange(path, found)),
     }
+    complete(&connection).map_err(failed)?;
+    Ok(connection)
+}
+
+fn complete(connection: &Connection) -> rusqlite::Result<()> {
+    for (name, kind) in ADDED {
+        let known = "SELECT count(*) > 0 FROM pragma_table_info('result') WHERE name = ?1";
+        if !connection.query_row(known, [name], |row| row.get(0))? {
+            connection.execute_batch(&format!("ALTER TABLE result ADD COLUMN {name} {kind}"))?;
+        }
+    }
+    Ok(())
 }
 
 /// Opens the database for reading only.

@@ -2,13 +2,15 @@
 
 use super::entry::Entry;
 use super::keeper::{self, Keeper, Keeping};
+use super::mark::Mark;
 use super::recordings::{FailedPart, seq_of};
-use super::seqs::Seqs;
+use super::seqs::{self, Numbering, Seqs};
 use super::syncing::{self, Syncer, Syncing};
 use super::writer::{Opening, Writer};
 use super::{DATABASE, HistoryError, RECORDINGS, Reader};
 use crate::station::{Event, ResultRecord, StationHandle};
 use std::collections::VecDeque;
+use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -80,15 +82,14 @@ pub struct Task {
     lost_before: u32,
 }
 
-/// Opens the history of a state folder, whose next free SEQ by its counter is `next`. Answers with the way to it, its
-/// thread's side, the SEQ of the next result, and what had to be set aside.
+/// Opens the history of a state folder. Answers with the way to it, its thread's side, the SEQ of the next result, and what
+/// had to be set aside.
 ///
 /// # Errors
 /// If database, folder or counter can neither be opened nor begun.
 pub fn open(
     state: &Path,
-    counter: crate::state::Counter,
-    next: u32,
+    numbering: Numbering,
     bounds: Bounds,
 ) -> Result<(History, Task, u32, Option<String>), HistoryError> {
     let failed = |what: &str, error: std::io::Error| HistoryError {
@@ -97,12 +98,18 @@ pub fn open(
         damaged: false,
     };
     let Opening { writer, complaint } = Writer::open(&state.join(DATABASE), bounds.results)?;
+    let owner = std::fs::metadata(state).map_err(|error| failed("", error))?;
+    let mark = Mark::open(&numbering.serial, owner.uid()).ok();
+    let marked = mark.as_ref().and_then(Mark::read);
+    let next = seqs::next_after(numbering.counted, marked);
     // A counter that was lost or taken from an older copy of the folder must not bring back a number.
     let next = match writer.last_seq()? {
         Some(last) if last.wrapping_sub(next) as i32 >= 0 => last.wrapping_add(1),
         _ => next,
     };
-    let seqs = Seqs::reserve(counter, next).map_err(|error| failed("result-seq", error))?;
+    let Numbering { counter, run, .. } = numbering;
+    let seqs = Seqs::reserve(counter, mark, run, next);
+    let seqs = seqs.map_err(|error| failed("result-seq", error))?;
     let (queue, inbox) = sync_channel(MAX_WAITING);
     let (keeper, keeping) = keeper::open(&state.join(RECORDINGS), bounds.recordings, queue.clone())
         .map_err(|error| failed(RECORDINGS, error))?;
@@ -157,13 +164,14 @@ impl History {
         self.keeper.keep(part);
     }
 
-    /// Whether a SEQ is stored as used, so that its result may be shown. If not, the card is asked once more.
-    pub fn covers(&self, seq: u32) -> bool {
-        let covered = self.seqs.covers(seq);
-        if !covered {
+    /// Takes a SEQ into use: whether it is stored as used, so that its result may be shown. If not, the card is asked once
+    /// more.
+    pub fn take(&self, seq: u32) -> bool {
+        let taken = self.seqs.take(seq);
+        if !taken {
             self.syncer.wake(seq);
         }
-        covered
+        taken
     }
 
     /// Results that the history has lost since the start because the card did not keep up.

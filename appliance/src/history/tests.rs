@@ -303,7 +303,13 @@ fn a_storage_that_refuses_is_a_warning_and_what_waited_is_stored_when_it_takes_i
         results: ENOUGH,
         recordings: 0,
     };
-    let (history, task, next, complaint) = open(state.path(), state.counter(), 1, bounds).unwrap();
+    let numbering = Numbering {
+        counted: state.counted().unwrap(),
+        counter: state.counter(),
+        serial: state.serial().unwrap(),
+        run: 1,
+    };
+    let (history, task, next, complaint) = open(state.path(), numbering, bounds).unwrap();
     assert_eq!((next, complaint), (1, None));
     let station = station();
     let warned = || station.snapshot().warnings & warning::STORAGE != 0;
@@ -328,7 +334,33 @@ fn a_storage_that_refuses_is_a_warning_and_what_waited_is_stored_when_it_takes_i
     assert_eq!(seqs(&reader, &Filter::default()), expected);
     history.stop(60);
     running.join().unwrap();
-    assert_eq!(state.next_seq().unwrap(), 61);
+    let counted = state.counted().unwrap();
+    assert_eq!(seqs::next_after(counted, None), 61);
+}
+
+#[test]
+fn a_database_of_an_older_program_is_read_as_it_is_and_completed_when_it_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    open_writer(folder.path()).store(some(2).iter()).unwrap();
+    let older = rusqlite::Connection::open(folder.path().join(DATABASE)).unwrap();
+    let columns = "ALTER TABLE result DROP COLUMN uptime_s; ALTER TABLE result DROP COLUMN boot_id";
+    older.execute_batch(columns).unwrap();
+    drop(older);
+    let reader = Reader::of(folder.path());
+    let unknown = |entry: &Entry| entry.uptime_s.is_none() && entry.boot_id.is_none();
+    let before = reader.results(&Filter::default()).unwrap();
+    assert!(before.len() == 2 && before.iter().all(unknown));
+    let new = Entry {
+        uptime_s: Some(61),
+        boot_id: Some("0000b007".into()),
+        ..entry(3, 1, Verdict::Pass)
+    };
+    open_writer(folder.path())
+        .store(std::iter::once(&new))
+        .unwrap();
+    let after = reader.results(&Filter::default()).unwrap();
+    assert_eq!(after[0], new);
+    assert_eq!(after[1..], before);
 }
 
 #[test]

@@ -200,9 +200,9 @@ fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> 
         .prepare_cached(
             "INSERT INTO result (seq, time_utc_us, recipe, fingerprint, part_id, press_stroke, token,
                 verdict, error_code, reason, flags, valid_points, coverage_permille, temperature_c,
-                height_noise_mm, fitness_permille, exposure_us, total_us, stages, recording)
+                height_noise_mm, fitness_permille, exposure_us, total_us, stages, recording, uptime_s, boot_id)
              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18,
-                ?19, ?20)",
+                ?19, ?20, ?21, ?22)",
         )?
         .execute(params![
             entry.seq,
@@ -225,6 +225,8 @@ fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> 
             entry.total_us,
             stages,
             entry.recording,
+            entry.uptime_s,
+            entry.boot_id,
         ])?;
     let result = transaction.last_insert_rowid();
     for (place, gauge) in entry.gauges.iter().enumerate() {

@@ -268,8 +268,7 @@ fn health(words: &mut Words, health: &Health) {
     words.u32(a::STORAGE_ERRORS, health.storage_errors);
     words.u32(a::BOOTS, system.boots);
     words.u32(a::UNCLEAN_BOOTS, system.unclean_boots);
-    // No watchdog restarts this version of the program.
-    words.u32(a::WATCHDOG_RESTARTS, 0);
+    words.u32(a::WATCHDOG_RESTARTS, system.watchdog_restarts);
     words.u16(a::CPU_LOAD, known(system.cpu_percent.map(u64::from)));
     words.u16(a::FREE_MEMORY, known(system.free_memory_mib));
     words.u16(a::FREE_STORAGE, known(system.free_storage_mib));

@@ -182,7 +182,7 @@ registers! {
         614 STORAGE_ERRORS U32 x 1, "write errors";
         616 BOOTS U32 x 1, "starts";
         618 UNCLEAN_BOOTS U32 x 1, "starts after a crash or power loss";
-        620 WATCHDOG_RESTARTS U32 x 1, "restarts by the watchdog; 0 in this version";
+        620 WATCHDOG_RESTARTS U32 x 1, "unclean boots after the measuring task had missed its deadlines for 10 s: what a watchdog or a person then ended";
         622 CPU_LOAD U16 x 1, "%, 65535 not known";
         623 FREE_MEMORY U16 x 1, "MiB, saturating at 65534, 65535 not known";
         624 FREE_STORAGE U16 x 1, "MiB, saturating at 65534, 65535 not known";

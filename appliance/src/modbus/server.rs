@@ -18,7 +18,7 @@ use super::refusals::{Refusals, Refused};
 use super::service::{FrameFlaw, PlcService};
 use crate::station::{ConnectionEdges, StationHandle};
 
-/// Most connections at a time.
+/// Most connections at a time, unless configured.
 pub const CONNECTIONS: usize = 8;
 /// This machine.
 pub const LOOPBACK: [&str; 2] = ["127.0.0.0/8", "::1/128"];

@@ -3,11 +3,11 @@
 use crate::recipe::archive::Arrays;
 use crate::recipe::{RecipeFile, SequenceKind, safe};
 use algo::adaptive::Field;
-use algo::geometry::Triangulator;
 use algo::inspect::Taught;
 use algo::phase::Decoder;
 use algo::pipeline::{self, KnownSurface};
 use algo::units::{AbsolutePhase, Height, Modulation};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Where the part is compared, and how certain its taught heights are.
@@ -41,35 +41,23 @@ pub(super) fn safe_map(arrays: &Arrays, kind: SequenceKind) -> Option<Vec<Absolu
 
 /// The surface that heights are counted from: golden. Where golden has nothing, an opening say, it is at the height of the
 /// surface around: material where there should be none must be seen, by the full sequence at least.
-pub(super) fn surface(
-    file: &RecipeFile,
-    arrays: &Arrays,
-    triangulator: &Triangulator,
-) -> KnownSurface {
-    let width = file.camera.width as usize;
-    let mut phase: Vec<_> = arrays
-        .golden_phase
-        .iter()
-        .copied()
-        .map(AbsolutePhase::from_turns)
-        .collect();
-    let heights = arrays.golden_height.iter().copied().map(f64::from);
-    let mut surface = Field {
-        columns: width,
-        values: heights.collect(),
-    };
-    surface.fill_rows(0.0);
-    let height: Vec<_> = surface.values.into_iter().map(Height::from_mm).collect();
-    pipeline::for_each_row(&mut phase, width, |v, row| {
-        for (u, phase) in row.iter_mut().enumerate() {
-            if !phase.is_known() {
-                *phase = triangulator.phase_of(u, v, height[v * width + u].mm());
-            }
+pub(super) fn surface(width: usize, arrays: &Arrays) -> KnownSurface {
+    let turns = arrays.golden_phase.par_iter().copied();
+    let mut height = vec![Height::UNKNOWN; arrays.golden_height.len()];
+    pipeline::for_each_row(&mut height, width, |v, row| {
+        let taught = arrays.golden_height[v * width..].iter().copied();
+        let mut line = Field {
+            columns: width,
+            values: taught.take(width).map(f64::from).collect(),
+        };
+        line.fill_rows(0.0);
+        for (height, mm) in row.iter_mut().zip(line.values) {
+            *height = Height::from_mm(mm);
         }
     });
     KnownSurface {
         width,
-        phase,
+        phase: turns.map(AbsolutePhase::from_turns).collect(),
         height,
     }
 }

@@ -1,28 +1,31 @@
 //! A recipe made ready to run: from frames to an inspection without anything that can fail.
 
+mod arriving;
 mod golden;
 mod judge;
 mod layers;
 mod run;
 mod window;
 
+pub use arriving::Arriving;
 pub use layers::Layers;
 
 use crate::calibration::Calibration;
 use crate::recipe::{AlignmentKind, Recipe, RecipeFile, SequenceKind, short};
 use crate::seam;
 use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
-use crate::station::{Inspection, StageTime, Verdict};
+use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
-use algo::inspect::{Production, Strip};
-use algo::pattern::{Sequence, encode};
+use algo::inspect::{Findings, Light, Production, Strip};
+use algo::pattern::{Encoder, Sequence};
+use algo::phase::Arrived;
 use algo::pipeline::Rises;
 use algo::units::{AbsolutePhase, Height};
 use hal::frame::Frame;
 use hal::projector::Raster;
 use rayon::prelude::*;
-use run::{Run, Shared};
+use run::{Run, Shared, Unjoined};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -77,6 +80,8 @@ pub struct Maps {
 
 /// A frame is inspected in this many strips: work for four threads, and few rows that two of them need.
 pub const STRIPS: usize = 4;
+/// Heights are planned at least so many pixels around the part as taught: what a part that is not aligned may be moved by.
+const AROUND: usize = 16;
 /// Error code of a cycle whose frames are not what the recipe was made for.
 const WRONG_FRAMES: u16 = 103;
 
@@ -112,7 +117,9 @@ impl Plan {
             gauges,
             ..
         } = recipe;
+        // They are large, and nobody asks for them in production.
         arrays.phase_function = Vec::new();
+        arrays.height_curvature = Vec::new();
         let camera = (file.camera.width, file.camera.height, file.camera.bit_depth);
         if camera != calibration.camera {
             return Err(format!(
@@ -135,21 +142,30 @@ impl Plan {
         if aligned {
             golden::widen(&mut window, &arrays, size.0);
         }
-        let surface = golden::surface(&file, &arrays, &triangulator);
-        let rises = Rises::new(&triangulator, surface, file.expansion_range_turns, &window);
+        let range = triangulator.function().range();
+        let chain = run::chain(&file);
+        let mut frames = Vec::new();
+        let sequences = || {
+            let sequences = chain.into_iter();
+            let sequences =
+                sequences.map(|at| Unjoined::new(&file, &arrays, range, at, &mut frames));
+            sequences.collect::<Result<Vec<_>, _>>()
+        };
+        let (sequences, surface) = rayon::join(sequences, || golden::surface(size.0, &arrays));
+        let sequences = sequences?;
+        // What is left of the recipe is no longer needed where the most memory is.
+        drop(arrays);
+        let range = file.expansion_range_turns;
+        let rises = Rises::new(&triangulator, surface, range, &window, away.max(AROUND));
         let shared = Shared {
             file: &file,
-            arrays: &arrays,
             triangulator: Arc::new(triangulator),
             rises: Arc::new(rises),
             gauges,
             window,
         };
-        let mut frames = Vec::new();
-        let runs = run::chain(&file)
-            .into_iter()
-            .map(|at| Run::new(&shared, at, &mut frames))
-            .collect::<Result<Vec<_>, _>>()?;
+        let runs = sequences.into_iter().map(|sequence| sequence.join(&shared));
+        let runs = runs.collect::<Result<Vec<_>, _>>()?;
         let first = runs.first().ok_or("it has no sequence")?;
         let strips = first.production.strips(size.1.div_ceil(STRIPS));
         Ok(Self {
@@ -169,6 +185,18 @@ impl Plan {
     /// First 32 bits of the recipe's fingerprint.
     pub fn crc(&self) -> u32 {
         short(&self.file.fingerprint)
+    }
+
+    /// Bytes of its maps and of its phase function: nearly all that it takes.
+    pub fn bytes(&self) -> usize {
+        let production = self.production();
+        let function = production.triangulator().function();
+        let samples = match function.is_sampled() {
+            true => function.columns() * function.rows(),
+            false => 0,
+        };
+        let runs: usize = self.runs.iter().map(|run| run.bytes).sum();
+        production.rises().bytes() + samples * size_of::<f64>() + runs
     }
 
     /// Levels and shifts of the sequence that is tried first.
@@ -220,9 +248,19 @@ impl Plan {
         rasters(function, frames, calibration)
     }
 
-    /// Judges a part from the frames of one sequence, which their number tells. Always ends in an inspection; what cannot be
-    /// measured is INVALID with a reason.
+    /// Judges a part from the frames of one sequence, which their number tells; its stages begin at `exposed`. Always ends in
+    /// an inspection; what cannot be measured is INVALID with a reason.
     pub fn inspect(&self, frames: &[Frame], exposed: Instant) -> Inspection {
+        self.inspect_arrived(frames, None, exposed)
+    }
+
+    /// The same, with the levels that were decoded on arrival.
+    pub fn inspect_arrived(
+        &self,
+        frames: &[Frame],
+        arriving: Option<Arriving>,
+        exposed: Instant,
+    ) -> Inspection {
         let step = self.step_of(frames);
         let run = &self.runs[step];
         let simulated = if self.simulated { SIMULATED } else { 0 };
@@ -230,7 +268,11 @@ impl Plan {
             flags: sequence_flag(run.kind) | simulated,
             ..Inspection::default()
         };
-        match self.run(run, frames, None) {
+        let mut laps = Laps::since(exposed);
+        let found = self.arrived(arriving, frames, |finest| {
+            self.run(run, frames, finest, None, &mut laps)
+        });
+        match found {
             Ok(findings) => {
                 judge::judge(&self.file, &findings, &mut inspection);
                 if step + 1 < self.runs.len() {
@@ -243,9 +285,8 @@ impl Plan {
                 inspection.error_code = WRONG_FRAMES;
             }
         }
-        let us = exposed.elapsed().as_micros().min(u128::from(u32::MAX)) as u32;
-        // The first of at most twelve.
-        let _ = inspection.stages.push(StageTime { name: "strips", us });
+        laps.end(Stage::Judgement);
+        inspection.stages = laps.stages;
         inspection
     }
 
@@ -265,8 +306,15 @@ impl Plan {
     pub fn heights(&self, frames: &[Frame]) -> Option<Maps> {
         let width = self.file.camera.width as usize;
         let mut height_mm = vec![f32::NAN; width * self.file.camera.height as usize];
-        self.run(self.run_of(frames), frames, Some(&mut height_mm))
-            .ok()?;
+        let mut laps = Laps::since(Instant::now());
+        self.run(
+            self.run_of(frames),
+            frames,
+            None,
+            Some(&mut height_mm),
+            &mut laps,
+        )
+        .ok()?;
         Some(Maps { width, height_mm })
     }
 
@@ -274,15 +322,47 @@ impl Plan {
         &self,
         run: &Run,
         frames: &[Frame],
+        finest: Option<(&Arrived, &[FrameView<'_>])>,
         heights: Option<&mut [f32]>,
-    ) -> Result<algo::inspect::Findings, String> {
+        laps: &mut Laps,
+    ) -> Result<Findings, String> {
         let views: Result<Vec<FrameView<'_>>, _> = frames.iter().map(seam::view).collect();
         let views = views.map_err(|error| error.to_string())?;
+        let light = match finest {
+            Some((arrived, last)) => Light::Finest(arrived, last),
+            None => Light::Frames(&views),
+        };
         // A strip is cleared before it is used, whatever was left in it.
         let mut strips = self.strips.lock().unwrap_or_else(PoisonError::into_inner);
-        run.production
-            .inspect(&views, &mut strips, heights)
-            .map_err(|error| error.to_string())
+        let production = &run.production;
+        let placed = production.place(light, &mut strips);
+        laps.end(Stage::Alignment);
+        let findings = placed
+            .and_then(|placed| production.inspect_placed(light, &mut strips, placed, heights))
+            .map_err(|error| error.to_string());
+        laps.end(Stage::Strips);
+        findings
+    }
+}
+
+/// Stamps the stages of an inspection, each from the end of the one before.
+struct Laps {
+    stages: Stages,
+    since: Instant,
+}
+
+impl Laps {
+    fn since(since: Instant) -> Self {
+        let stages = Stages::default();
+        Self { stages, since }
+    }
+
+    fn end(&mut self, stage: Stage) {
+        let now = Instant::now();
+        let us = (now - self.since).as_micros();
+        self.stages
+            .add(stage, u32::try_from(us).unwrap_or(u32::MAX));
+        self.since = now;
     }
 }
 
@@ -306,10 +386,11 @@ pub fn rasters(
     calibration: &Calibration,
 ) -> Result<Vec<Raster>, hal::error::Error> {
     let frames: Vec<_> = frames.collect();
+    let encoder = Encoder::new(calibration.response.as_ref());
     frames
         .into_par_iter()
         .map(|(ratio, shift)| {
-            let grey = encode(function, ratio, shift, calibration.response.as_ref());
+            let grey = encoder.raster(function, ratio, shift);
             Raster::new(grey.width as u32, grey.height as u32, grey.pixels)
         })
         .collect()

@@ -2,14 +2,15 @@
 
 use super::golden;
 use crate::recipe::archive::Arrays;
-use crate::recipe::{AlignmentKind, RecipeFile, SequenceKind};
+use crate::recipe::{AlignmentKind, RecipeFile, SequenceFile, SequenceKind};
 use algo::geometry::Triangulator;
-use algo::inspect::{Gauge, Parts, Production};
-use algo::pattern::Sequence;
-use algo::phase::Decoder;
+use algo::inspect::{Gauge, Parts, Production, Taught};
+use algo::pattern::{PhaseRange, Sequence};
+use algo::phase::{Arrived, Decoder};
 use algo::pipeline::Rises;
+use algo::units::AbsolutePhase;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// A sequence that the part can be measured with.
 #[derive(Debug)]
@@ -19,12 +20,28 @@ pub(super) struct Run {
     /// Which of the plan's rasters its frames show.
     pub indices: Vec<usize>,
     pub production: Production,
+    /// Room for the levels that are decoded on arrival, since there first were some.
+    pub arrived: Mutex<Option<Arrived>>,
+    /// Bytes of its maps.
+    pub bytes: usize,
+}
+
+/// Of what is kept of a taught pixel.
+const TAUGHT_BYTES: usize = 2;
+
+/// A sequence of a recipe before it is known how phases become heights.
+pub(super) struct Unjoined {
+    kind: SequenceKind,
+    sequence: Sequence,
+    indices: Vec<usize>,
+    decoder: Decoder,
+    taught: Taught,
+    map: Option<Vec<AbsolutePhase>>,
 }
 
 /// What all runs of a recipe share.
 pub(super) struct Shared<'a> {
     pub file: &'a RecipeFile,
-    pub arrays: &'a Arrays,
     pub triangulator: Arc<Triangulator>,
     pub rises: Arc<Rises>,
     pub gauges: Vec<Gauge>,
@@ -49,19 +66,22 @@ pub(super) fn chain(file: &RecipeFile) -> Vec<usize> {
     chain
 }
 
-impl Run {
-    /// The sequence at a place in the recipe's list. `frames` are those of all runs; those of this one are added.
+impl Unjoined {
+    /// The sequence at a place in the recipe's list, for phases of `range`. `frames` are those of all runs; those of this
+    /// one are added.
     pub fn new(
-        shared: &Shared<'_>,
+        file: &RecipeFile,
+        arrays: &Arrays,
+        range: PhaseRange,
         at: usize,
         frames: &mut Vec<(f64, f64)>,
     ) -> Result<Self, String> {
-        let file = shared.file;
-        let sequence = &file.sequences[at];
-        let own: Vec<_> = sequence.frames.iter().map(|&[r, s]| (r, s)).collect();
-        let levels = Sequence::from_frames(&own).map_err(|error| error.to_string())?;
-        let range = shared.triangulator.function().range();
-        let decoder = Decoder::new(&levels, range, file.camera.bit_depth)
+        let SequenceFile {
+            kind, frames: own, ..
+        } = &file.sequences[at];
+        let own: Vec<_> = own.iter().map(|&[r, s]| (r, s)).collect();
+        let sequence = Sequence::from_frames(&own).map_err(|error| error.to_string())?;
+        let decoder = Decoder::new(&sequence, range, file.camera.bit_depth)
             .map_err(|error| error.to_string())?;
         let indices = own.into_iter().map(|frame| {
             let shown = frames.iter().position(|known| *known == frame);
@@ -70,23 +90,38 @@ impl Run {
                 frames.len() - 1
             })
         });
-        let indices = indices.collect();
-        let production = Production::new(Parts {
-            taught: golden::taught(file, shared.arrays, &decoder),
-            map: golden::safe_map(shared.arrays, sequence.kind),
+        Ok(Self {
+            kind: *kind,
+            indices: indices.collect(),
+            sequence,
+            taught: golden::taught(file, arrays, &decoder),
+            map: golden::safe_map(arrays, *kind),
             decoder,
+        })
+    }
+
+    /// Joins it with what all have in common.
+    pub fn join(self, shared: &Shared<'_>) -> Result<Run, String> {
+        let file = shared.file;
+        let bytes = size_of_val(self.map.as_deref().unwrap_or(&[]));
+        let production = Production::new(Parts {
+            decoder: self.decoder,
             triangulator: Arc::clone(&shared.triangulator),
             rises: Arc::clone(&shared.rises),
+            map: self.map,
+            taught: self.taught,
             gauges: shared.gauges.clone(),
             window: shared.window.clone(),
             noise_counts: file.noise_counts,
             aligned: file.alignment == AlignmentKind::Rigid,
         });
-        Ok(Self {
-            kind: sequence.kind,
-            sequence: levels,
-            indices,
+        Ok(Run {
+            kind: self.kind,
+            sequence: self.sequence,
+            indices: self.indices,
+            bytes: bytes + shared.rises.surface().phase.len() * TAUGHT_BYTES,
             production: production.map_err(|error| error.to_string())?,
+            arrived: Mutex::new(None),
         })
     }
 }

@@ -214,17 +214,19 @@ impl GoldenPart<'_> {
         let level = |ratio: f64, steps: u32| {
             (0..steps).map(move |k| [ratio, f64::from(k) / f64::from(steps)])
         };
-        let full: Vec<[f64; 2]> = self
+        let mut full: Vec<[f64; 2]> = self
             .full
             .iter()
             .map(|&(ratio, shift)| [ratio, shift])
             .collect();
+        // The finest last: the others are decoded while it is being exposed.
+        full.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let candidates = [
             (SequenceKind::SingleLevel, level(1.0, 3).collect()),
             (SequenceKind::SingleLevel, level(1.0, 4).collect()),
             (
                 SequenceKind::TwoLevels,
-                level(1.0, 3).chain(level(0.8, 3)).collect(),
+                level(0.8, 3).chain(level(1.0, 3)).collect(),
             ),
             (SequenceKind::Full, full),
         ];

@@ -37,6 +37,9 @@ pub enum TeachError {
     /// The rig or the pattern is impossible.
     #[error("teach: {0}")]
     Rig(String),
+    /// Whoever was told of the progress wanted no more.
+    #[error("teach: it was ended early")]
+    Ended,
 }
 
 impl From<RigError> for TeachError {
@@ -66,6 +69,29 @@ pub fn teach(
     timeout: Duration,
     progress: &dyn Fn(f64, &str),
 ) -> Result<Taught, TeachError> {
+    let all = |share: f64, words: &str| {
+        progress(share, words);
+        true
+    };
+    teach_while(head, calibration, naming, timeout, &all)
+}
+
+/// As [`teach`], but `progress` ends it before the next step by answering `false`.
+///
+/// # Errors
+/// As [`teach`]; [`TeachError::Ended`] where it was ended.
+pub fn teach_while(
+    head: &mut DynHead,
+    calibration: &Calibration,
+    naming: &Naming,
+    timeout: Duration,
+    progress: &dyn Fn(f64, &str) -> bool,
+) -> Result<Taught, TeachError> {
+    let step = |share: f64, words: &str| match progress(share, words) {
+        true => Ok(()),
+        false => Err(TeachError::Ended),
+    };
+    step(0.0, "measuring the part")?;
     let mut rig = Rig {
         head,
         calibration,
@@ -80,10 +106,11 @@ pub fn teach(
         .map_err(|error| TeachError::Rig(error.to_string()))?;
     let frames = Sequence::geometric(preliminary.range(), LEVELS, STEPS);
     let first = rig.measure(&preliminary, &frames, About::Reference, &|share| {
+        // The sequence goes on; the next step does not.
         progress(0.3 * share, "measuring the part");
     })?;
     refuse_empty(&first.phases)?;
-    progress(0.35, "making the part's own pattern");
+    step(0.35, "making the part's own pattern")?;
     let map = ProjectorMap::from_heights(&first.triangulator, &first.heights);
     let optics = noise::Optics {
         projector_blur: blur(&first, &frames, &map, columns as f64)?,
@@ -92,13 +119,14 @@ pub fn teach(
         image_pitch: noise::IMAGE_PITCH,
     };
     let function = noise::adapt(&map, columns, rows, &optics)?;
+    step(0.4, "measuring the part with its own pattern")?;
     let expected = map.expected_phase(&function);
     let full = dense(DENSE_N);
     let golden = rig.measure(&function, &full, About::Map(&expected), &|share| {
         progress(0.4 + 0.3 * share, "measuring the part with its own pattern");
     })?;
     refuse_empty(&golden.phases)?;
-    progress(0.75, "working out the expansion and the safe mask");
+    step(0.75, "working out the expansion and the safe mask")?;
     let Measured {
         phases,
         heights,
@@ -118,7 +146,7 @@ pub fn teach(
         comparison: Some(ComparisonFile::of(&first, &golden)),
     };
     let taught = part.recipe(naming).map_err(TeachError::Rig)?;
-    progress(1.0, "taught");
+    step(1.0, "taught")?;
     Ok(taught)
 }
 

@@ -6,6 +6,7 @@ use super::control;
 use super::event::{Effect, Effects, Job, JobId};
 use super::machine::{Station, log, push};
 use super::result::{Inspection, ResultRecord, Verdict};
+use super::stages::Stages;
 use super::state::{Cycle, Micros, State};
 use super::step::named;
 
@@ -31,6 +32,7 @@ impl Station {
                 part_id,
                 press_stroke,
                 recipe: recipe.clone(),
+                accepted: now,
             }),
         );
         let cycle = Cycle {
@@ -144,9 +146,6 @@ impl Station {
     ) {
         let verdict = inspection.verdict();
         let total = now.since(cycle.accepted);
-        if let Some(exposed) = cycle.exposed {
-            self.health.processed(now.since(exposed).to_u32());
-        }
         self.last_seq = self.last_seq.wrapping_add(1);
         let record = Arc::new(ResultRecord {
             seq: self.last_seq,
@@ -160,6 +159,8 @@ impl Station {
             time_utc_us: self
                 .utc_at_zero
                 .map_or(0, |zero| zero.saturating_add(cycle.accepted.0)),
+            uptime_s: cycle.accepted.seconds(),
+            boot_id: self.settings.boot_id,
             exposure_us: cycle
                 .exposed
                 .map_or(total, |exposed| exposed.since(cycle.accepted))
@@ -167,6 +168,10 @@ impl Station {
             total_us: total.to_u32(),
             inspection,
         });
+        let stages = record.stages();
+        if stages != Stages::default() {
+            self.health.processed(stages.processing_us());
+        }
         push(effects, Effect::PersistSeq(record.seq));
         push(effects, Effect::Publish(record.clone()));
         if self.control.control & control::BUFFERED != 0

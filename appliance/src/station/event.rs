@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::control::ControlWrite;
 use super::health::{Pace, System};
 use super::result::{Inspection, ResultRecord};
-use super::state::ActiveRecipe;
+use super::state::{ActiveRecipe, Micros};
 
 /// Names one order to the worker; the worker quotes it in every answer, so that a late answer is recognised as one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -220,6 +220,8 @@ pub struct Job {
     pub press_stroke: u32,
     /// The recipe to measure with: the active one.
     pub recipe: ActiveRecipe,
+    /// When the trigger was accepted.
+    pub accepted: Micros,
 }
 
 /// Something to be done by those who have threads, files and sockets. Carried out in order.

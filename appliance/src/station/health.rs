@@ -29,6 +29,8 @@ pub struct System {
     pub boots: u32,
     /// Starts that followed an end without a stop: a crash, a kill, a loss of power.
     pub unclean_boots: u32,
+    /// Those of them after an end of a daemon whose measuring task hung.
+    pub watchdog_restarts: u32,
     /// Open Modbus connections.
     pub clients: u16,
     /// Whether one of them may write.
@@ -46,6 +48,7 @@ impl Default for System {
             cpu_temperature_c: None,
             boots: 0,
             unclean_boots: 0,
+            watchdog_restarts: 0,
             clients: 0,
             writer_connected: false,
             recipes: Arc::new([]),
@@ -79,7 +82,7 @@ pub struct Health {
     pub system: System,
     /// The last sequence; its counts are sums since the start.
     pub pace: Pace,
-    /// Exposure done → result of the last cycle, µs.
+    /// Processing of the last cycle that was measured, µs: all stages but waiting and exposure.
     pub processing_us: u32,
     /// The longest of them since the start, µs.
     pub processing_max_us: u32,

@@ -34,6 +34,7 @@ pub mod health;
 pub mod machine;
 pub mod result;
 pub mod snapshot;
+pub mod stages;
 pub mod state;
 pub mod step;
 
@@ -53,7 +54,8 @@ pub use gauge::{Decision, GaugeValue, Unit};
 pub use handle::{StationHandle, system_utc_us, tick};
 pub use health::{Health, Pace, System};
 pub use machine::{Limits, Settings, Station};
-pub use result::{Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, StageTime, Verdict};
+pub use result::{Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, Verdict};
 pub use snapshot::{Identity, Snapshot, TeachProgress};
+pub use stages::{Stage, StageTime, Stages};
 pub use state::{ActiveRecipe, Cycle, Fault, Micros, State};
 pub use step::step;

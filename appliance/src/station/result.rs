@@ -3,11 +3,10 @@
 use std::sync::Arc;
 
 use super::gauge::GaugeValue;
+use super::stages::Stages;
 
 /// The most gauges that a recipe can have: bits and registers of the map.
 pub const MAX_GAUGES: usize = 16;
-/// The most stages whose time is shown.
-pub const MAX_STAGES: usize = 12;
 
 /// The judgement of one cycle: register 208.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -43,15 +42,6 @@ impl Verdict {
             Self::Invalid => "INVALID",
         }
     }
-}
-
-/// How long one stage of a cycle took.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct StageTime {
-    /// The stage's name.
-    pub name: &'static str,
-    /// µs.
-    pub us: u32,
 }
 
 /// RESULT flags, register 231.
@@ -141,10 +131,10 @@ pub struct Inspection {
     pub flags: u16,
     /// What was not computed.
     pub skipped: Skipped,
-    /// Times of the stages, in their order.
-    pub stages: heapless::Vec<StageTime, MAX_STAGES>,
-    /// Processor time of all stages on all computing threads, µs: unlike the times above it does not grow when somebody else
-    /// has the processor.
+    /// What the measuring task knows of its stages' times; [`ResultRecord::stages`] adds the rest.
+    pub stages: Stages,
+    /// Processor time of the processing on all computing threads, µs: unlike the times above it does not grow when somebody
+    /// else has the processor.
     pub cpu_us: u32,
     /// How the part lies, if it was aligned.
     pub placement: Option<Placement>,
@@ -188,6 +178,10 @@ pub struct ResultRecord {
     pub error_code: u16,
     /// Trigger time in µs since 1970 UTC, 0 if the clock is not synchronised.
     pub time_utc_us: u64,
+    /// Trigger time since the start of the daemon, s: known whatever the clock says.
+    pub uptime_s: u32,
+    /// Which start that was.
+    pub boot_id: u32,
     /// Trigger → exposure done, µs.
     pub exposure_us: u32,
     /// Trigger → result, µs.
@@ -197,6 +191,11 @@ pub struct ResultRecord {
 }
 
 impl ResultRecord {
+    /// The stages that trigger → result went into; none where nothing was measured.
+    pub fn stages(&self) -> Stages {
+        self.inspection.stages.of_cycle(self.total_us)
+    }
+
     /// The flags of register 231.
     pub fn flags(&self) -> u16 {
         let doubtful = self

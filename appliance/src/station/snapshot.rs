@@ -214,7 +214,7 @@ impl Station {
             last_token: self.last_token,
             buffered: u16::try_from(self.queue.len()).unwrap_or(u16::MAX),
             reject_reason: self.reject_reason,
-            uptime_s: u32::try_from(now.0 / 1_000_000).unwrap_or(u32::MAX),
+            uptime_s: now.seconds(),
             boot_id: self.settings.boot_id,
             identity: self.settings.identity.clone(),
             result: self.result.clone(),

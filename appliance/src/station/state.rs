@@ -24,6 +24,11 @@ impl Micros {
         Self(self.0.saturating_sub(earlier.0))
     }
 
+    /// Whole seconds; saturates at 136 years.
+    pub fn seconds(self) -> u32 {
+        u32::try_from(self.0 / 1_000_000).unwrap_or(u32::MAX)
+    }
+
     /// The number of µs for a 32-bit register; saturates at about 71 minutes.
     pub fn to_u32(self) -> u32 {
         u32::try_from(self.0).unwrap_or(u32::MAX)

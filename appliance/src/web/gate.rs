@@ -95,8 +95,11 @@ pub async fn record(
 ) {
     let written = site
         .change(move |site| {
+            let snapshot = site.station.snapshot();
             let change = Change {
                 utc_us: clock::utc_us(),
+                uptime_s: snapshot.uptime_s,
+                boot_id: snapshot.boot_id,
                 from: peer.map_or(IpAddr::from([0, 0, 0, 0]), |Peer(address)| address),
                 action,
                 subject: &subject,

@@ -107,13 +107,28 @@ pub(super) fn text(site: &Site) -> String {
             f64::from(us) / 1e6,
         );
     }
-    for stage in &found.stages {
+    out.family(
+        "fringed_stage_seconds",
+        "gauge",
+        "Wall times of the last cycle's stages.",
+    );
+    for time in result.stages().iter() {
         out.sample(
-            "fringed_cycle_seconds",
-            &[("part", stage.name)],
-            f64::from(stage.us) / 1e6,
+            "fringed_stage_seconds",
+            &[("stage", time.stage.name())],
+            f64::from(time.us) / 1e6,
         );
     }
+    out.family(
+        "fringed_processing_cpu_seconds",
+        "gauge",
+        "Processor time of the last cycle's processing on all computing threads.",
+    );
+    out.sample(
+        "fringed_processing_cpu_seconds",
+        &[],
+        f64::from(found.cpu_us) / 1e6,
+    );
     out.family(
         "fringed_coverage_ratio",
         "gauge",

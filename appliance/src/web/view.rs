@@ -62,6 +62,7 @@ fn health(snapshot: &Snapshot) -> Value {
         "cpu_temperature_c": system.cpu_temperature_c,
         "boots": system.boots,
         "unclean_boots": system.unclean_boots,
+        "watchdog_restarts": system.watchdog_restarts,
         "modbus_clients": system.clients,
         "writer_connected": system.writer_connected,
         "camera_hz": f64::from(pace.camera_centihertz) / 100.0,
@@ -101,6 +102,7 @@ fn result(record: &ResultRecord) -> Value {
         "time_utc_us": record.time_utc_us,
         "exposure_us": record.exposure_us,
         "total_us": record.total_us,
+        "processing_us": record.stages().processing_us(),
         "cpu_us": found.cpu_us,
         "valid_points": found.valid_points,
         "coverage_permille": found.coverage_permille,
@@ -117,7 +119,7 @@ fn result(record: &ResultRecord) -> Value {
         },
         "placement": found.placement.as_ref().map(placement),
         "gauges": found.gauges.iter().map(gauge).collect::<Vec<_>>(),
-        "stages": found.stages.iter().map(|stage| json!({ "name": stage.name, "us": stage.us })).collect::<Vec<_>>(),
+        "stages": record.stages().iter().map(|time| json!({ "name": time.stage.name(), "us": time.us })).collect::<Vec<_>>(),
     })
 }
 

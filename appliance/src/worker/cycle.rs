@@ -3,13 +3,23 @@
 use super::{ABORTED, DEVICE_TIMEOUT, Worker, code, code_of};
 use crate::benchmark::stopwatch::timed_on;
 use crate::history::FailedPart;
-use crate::plan::Plan;
+use crate::plan::{Arriving, Plan};
 use crate::station::result::flag::{RETRIED, STEPPED_UP};
-use crate::station::{Event, Inspection, Job, JobId, Pace, ResultRecord, error_code};
+use crate::station::{
+    Event, Inspection, Job, JobId, Pace, ResultRecord, Stage, Stages, error_code,
+};
 use hal::frame::Frame;
 use hal::head::Exposure;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+
+/// The frames of a sequence.
+struct Taken {
+    frames: Vec<Frame>,
+    exposure: Exposure,
+    /// Processor time of what was decoded meanwhile.
+    spent: Duration,
+}
 
 impl Worker {
     /// Runs a cycle; the frames that it was judged by.
@@ -22,22 +32,35 @@ impl Worker {
             return Vec::new();
         };
         let (mut step, mut flags, mut cpu) = (0, 0, Duration::ZERO);
+        let mut stages = Stages::default();
+        let waited = self.station.now().since(job.accepted);
+        stages.add(Stage::Waiting, waited.to_u32());
         loop {
-            let Some((frames, exposure)) = self.take(plan.indices(step), id) else {
+            let began = Instant::now();
+            let mut arriving = plan.arriving(step);
+            let Some(taken) = self.take(plan, step, &mut arriving, id) else {
                 return Vec::new();
             };
+            let Taken {
+                frames,
+                exposure,
+                spent,
+            } = taken;
+            cpu += spent;
+            stages.add(Stage::Exposure, us(began.elapsed()));
             if exposure.retaken > 0 {
                 flags |= RETRIED;
             }
-            let exposed = Instant::now();
             step += 1;
             let last = step >= plan.steps();
             // The part must stay while another sequence may follow.
             if last {
                 self.station.event(Event::ExposureDone { job: id });
             }
-            let (mut inspection, spent) = timed_on(&self.pool, || plan.inspect(&frames, exposed));
+            let inspect = || plan.inspect_arrived(&frames, Some(arriving), Instant::now());
+            let (mut inspection, spent) = timed_on(&self.pool, inspect);
             cpu += spent;
+            stages.extend(&inspection.stages);
             if let Some(reason) = inspection.step_up.filter(|_| !last) {
                 self.progress
                     .log(&format!("measuring again with more frames: {reason}"));
@@ -48,20 +71,32 @@ impl Worker {
                 self.station.event(Event::ExposureDone { job: id });
             }
             inspection.flags |= flags;
-            inspection.cpu_us = u32::try_from(cpu.as_micros()).unwrap_or(u32::MAX);
+            inspection.stages = stages;
+            inspection.cpu_us = us(cpu);
             self.publish(id, inspection, plan, &frames);
             return frames;
         }
     }
 
-    /// The frames of some of the patterns and how they were taken; none if there are not all of them, and then the station
-    /// knows why.
-    fn take(&mut self, indices: &[usize], job: JobId) -> Option<(Vec<Frame>, Exposure)> {
+    /// The frames of a sequence, each level decoded as soon as it is there; none if there are not all of them, and then the
+    /// station knows why.
+    fn take(
+        &mut self,
+        plan: &Plan,
+        step: usize,
+        arriving: &mut Arriving,
+        job: JobId,
+    ) -> Option<Taken> {
+        let indices = plan.indices(step);
         let mut frames: Vec<Frame> = Vec::with_capacity(indices.len());
-        let (station, aborts) = (&self.station, &self.aborts);
+        let mut spent = Duration::ZERO;
+        let (station, aborts, pool) = (&self.station, &self.aborts, &self.pool);
         let mut keep = |_, frame| {
             frames.push(frame);
             station.event(Event::Alive);
+            while plan.can_arrive(arriving, frames.len()) {
+                spent += timed_on(pool, || plan.arrive(arriving, &frames)).1;
+            }
             !aborts.has(job)
         };
         let head = &mut self.opened.head;
@@ -74,7 +109,11 @@ impl Worker {
             }
             Ok(exposure) => {
                 self.paced(indices.len(), &exposure);
-                Some((frames, exposure))
+                Some(Taken {
+                    frames,
+                    exposure,
+                    spent,
+                })
             }
             Err(error) => {
                 let failed = failed(job, code_of(&error), error.to_string());
@@ -107,7 +146,6 @@ impl Worker {
 
     /// Says how well the head kept time.
     fn paced(&self, frames: usize, exposure: &Exposure) {
-        let us = |time: Duration| u32::try_from(time.as_micros()).unwrap_or(u32::MAX);
         let span = exposure.done.since(exposure.started).as_secs_f64();
         let refresh = self.opened.head.refresh().as_secs_f64();
         // Saturating casts; a span of 0 gives the largest number.
@@ -121,6 +159,11 @@ impl Worker {
             sync_error_us: us(exposure.sync_error),
         }));
     }
+}
+
+/// µs, saturating at about 71 minutes.
+fn us(time: Duration) -> u32 {
+    u32::try_from(time.as_micros()).unwrap_or(u32::MAX)
 }
 
 fn failed(job: JobId, error_code: u16, message: String) -> Event {

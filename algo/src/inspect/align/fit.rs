@@ -2,12 +2,16 @@
 //!
 //! A point p that is brought back by a motion lies r = z − G(π(p)) above the golden surface G on its own ray π(p). A
 //! further shift τ and turn ω about c change that by −m·(τ + ω × (p − c)), m the facet's lift (point to plane: Y. Chen,
-//! G. Medioni, 1992). Each step solves the 6 × 6 normal equations along the directions that the shape determines. Weights
-//! are Huber's, then Tukey's (c = 1.345 and 4.685: 95 % efficient for normal errors; P. J. Huber, E. M. Ronchetti,
-//! *Robust Statistics*): a dent does not pull the part. Sums run over the points in their order.
+//! G. Medioni, 1992). About one motion the problem is linear, and is solved by reweighting: 6 × 6 normal equations along the
+//! directions that the shape determines. Only where the solution leads far from there are residuals and lifts worked out
+//! anew; about no motion at all they are known beforehand. Weights are Huber's, then Tukey's (c = 1.345 and 4.685: 95 %
+//! efficient for normal errors; P. J. Huber, E. M. Ronchetti, *Robust Statistics*): a dent does not pull the part. Sums run
+//! over the points in their order.
 
+use super::Spot;
 use super::directions::{Directions, Six};
 use super::motion::Motion;
+use super::normal::{Normal, Weights};
 use super::surface::{Facet, GoldenSurface};
 use crate::geometry::Vector;
 use alloc::vec::Vec;
@@ -19,6 +23,8 @@ pub struct Sample {
     pub point: Vector,
     /// Error of its height, mm (1 σ).
     pub sigma: f64,
+    /// The spot of the plan whose pixel sees it, and how far above the spot it lies, mm.
+    pub over: Option<(usize, f64)>,
 }
 
 /// How a part lies.
@@ -59,52 +65,40 @@ const LEAST_POINTS: usize = 24;
 /// Steps with each kind of weight; a step below this many mm ends them sooner: a fiftieth of the noise of the motion.
 const STEPS: usize = 8;
 const SMALL_STEP_MM: f64 = 1e-4;
-/// Where Huber's weights begin to fall, and where Tukey's are 0, in σ of the residuals.
-const HUBER: f64 = 1.345;
-const TUKEY: f64 = 4.685;
+/// How often residuals and lifts are worked out, and how far from there the linear problem holds: a surface that is bent
+/// as a radius of 2 mm leaves its facet by 0.6 µm there.
+const ROUNDS: usize = 8;
+const NEAR_MM: f64 = 0.05;
 /// From the median of absolute deviations to σ of a normal distribution.
 const MEDIAN_TO_SIGMA: f64 = 1.4826;
 
-#[derive(Clone, Copy, PartialEq)]
-enum Weights {
-    Huber,
-    Tukey,
-}
-
-impl Weights {
-    /// Of a residual in σ.
-    fn of(self, residual: f64) -> f64 {
-        let size = libm::fabs(residual);
-        match self {
-            Self::Huber if size <= HUBER => 1.0,
-            Self::Huber => HUBER / size,
-            Self::Tukey if size >= TUKEY => 0.0,
-            Self::Tukey => {
-                let rest = 1.0 - (size / TUKEY) * (size / TUKEY);
-                rest * rest
-            }
-        }
-    }
-}
-
-/// A point as a step sees it: its residual and how that depends on the motion.
+/// A point of the linear problem.
 #[derive(Debug)]
-struct Row {
-    residual: f64,
-    row: [f64; 6],
+pub(super) struct Row {
+    /// About the motion that the problem is linear about, mm.
+    pub residual: f64,
+    /// What a further motion takes off it, see [`Fitting::row`].
+    pub row: [f64; 6],
     /// Error of the lift, and the lever of the point.
-    lift_noise: f64,
-    lever: Vector,
+    pub lift_noise: f64,
+    pub lever: Vector,
     /// Variance of the point's height, and of that with the surface's, mm².
-    variance: f64,
-    both: f64,
+    pub variance: f64,
+    pub both: f64,
+}
+
+impl Row {
+    /// What a further motion leaves of the residual.
+    pub fn left(&self, further: &[f64; 6]) -> f64 {
+        let taken: f64 = self.row.iter().zip(further).map(|(r, x)| r * x).sum();
+        self.residual - taken
+    }
 }
 
 /// Room for a fit, for the next one to use again.
 #[derive(Debug, Default)]
 pub struct Room {
     rows: Vec<Row>,
-    facets: Vec<Option<Facet>>,
     sizes: Vec<f64>,
 }
 
@@ -119,56 +113,61 @@ pub struct Fitting<'a> {
     pub radius: f64,
     /// Corners of a box around the part.
     pub corners: &'a [Vector],
+    /// Where it is looked at.
+    pub spots: &'a [Spot],
+}
+
+/// A solution of the linear problem.
+struct Solved {
+    further: [f64; 6],
+    directions: Directions,
+    normal: Normal,
+    scale: f64,
 }
 
 impl Fitting<'_> {
     /// The motion; none if too few points lie on the surface.
     pub fn fit(&self, samples: &[Sample], room: &mut Room) -> Option<Placed> {
         let mut motion = Motion::none(self.centre);
-        let Room {
-            rows,
-            facets,
-            sizes,
-        } = room;
-        facets.clear();
-        facets.resize(samples.len(), None);
-        let mut last = None;
-        for weights in [Weights::Huber, Weights::Tukey] {
-            for step in 0..STEPS {
-                if weights == Weights::Huber && step % 3 == 0 || step == 0 {
-                    self.face(samples, &motion, facets);
-                }
-                self.rows(samples, facets, &motion, rows);
-                if rows.len() < LEAST_POINTS {
-                    return None;
-                }
-                let predicted = rows.iter().map(|row| row.both).sum::<f64>() / rows.len() as f64;
-                let predicted = libm::sqrt(predicted);
-                let scale = scale(rows, sizes).max(predicted);
-                let normal = Normal::of(rows, weights, scale);
-                let directions = Directions::of(&normal.matrix, &normal.noise, predicted);
-                let step = directions.solve(&normal.right);
-                let turn = Vector::new(step[3], step[4], step[5]) * (1.0 / self.radius);
-                let shift = Vector::new(step[0], step[1], step[2]);
-                motion = Motion::new(self.centre, motion.shift + shift, motion.turn + turn);
-                let size = libm::sqrt(step.iter().map(|x| x * x).sum::<f64>());
-                last = Some((directions, normal));
-                if size < SMALL_STEP_MM {
-                    break;
-                }
+        for round in 1..=ROUNDS {
+            self.linearise(samples, &motion, round == 1, &mut room.rows);
+            if room.rows.len() < LEAST_POINTS {
+                return None;
+            }
+            let mut solved = solve(Weights::Huber, [0.0; 6], room);
+            let last = round == ROUNDS || is_near(&solved.further);
+            if last {
+                solved = solve(Weights::Tukey, solved.further, room);
+            }
+            motion = self.then(&motion, &solved.further);
+            if round == ROUNDS || last && is_near(&solved.further) {
+                return Some(self.placed(motion, &solved, &room.rows));
             }
         }
-        let (directions, normal) = last?;
+        None
+    }
+
+    /// A motion with a further one on top.
+    fn then(&self, motion: &Motion, further: &[f64; 6]) -> Motion {
+        let [x, y, z, a, b, c] = *further;
+        let turn = Vector::new(a, b, c) * (1.0 / self.radius);
+        let shift = Vector::new(x, y, z);
+        Motion::new(self.centre, motion.shift + shift, motion.turn + turn)
+    }
+
+    fn placed(&self, motion: Motion, solved: &Solved, rows: &[Row]) -> Placed {
+        let spread = Normal::covariance(rows, &solved.further, solved.scale);
         let farthest = |corner: &Vector| (motion.apply(*corner) - *corner).length();
-        Some(Placed {
+        let inside = solved.normal.inside;
+        Placed {
             motion,
-            covariance: directions.covariance(&normal.covariance),
+            covariance: solved.directions.covariance(&spread),
             radius: self.radius,
-            left_out: directions.left_out,
-            points: normal.inside,
-            outliers: 1.0 - normal.inside as f64 / rows.len() as f64,
+            left_out: solved.directions.left_out,
+            points: inside,
+            outliers: 1.0 - inside as f64 / rows.len() as f64,
             reach: self.corners.iter().map(farthest).fold(0.0, f64::max),
-        })
+        }
     }
 
     /// −∂r/∂x of a facet at a point: what a shift and a turn (as the way at the radius) take off its residual.
@@ -177,88 +176,75 @@ impl Fitting<'_> {
         [lift.x, lift.y, lift.z, turning.x, turning.y, turning.z]
     }
 
-    /// How the surface faces where each point is seen.
-    fn face(&self, samples: &[Sample], motion: &Motion, facets: &mut [Option<Facet>]) {
-        for (sample, facet) in samples.iter().zip(facets) {
+    /// The linear problem about a motion; `still` if that is none.
+    fn linearise(&self, samples: &[Sample], motion: &Motion, still: bool, rows: &mut Vec<Row>) {
+        rows.clear();
+        rows.extend(samples.iter().filter_map(|sample| {
+            if let (true, Some((at, above))) = (still, sample.over) {
+                let spot = self.spots.get(at)?;
+                return Some(self.of_facet(sample, &spot.facet, spot.point, above));
+            }
             let point = motion.undo(sample.point);
-            let seen = self.golden.triangulator.camera().project(point);
-            *facet = seen.and_then(|at| self.golden.facet(point, at));
-        }
+            let seen = self.golden.triangulator.camera().project(point)?;
+            let above = point.z - self.golden.height_at(seen.0, seen.1)?;
+            let facet = self.golden.facet(point, seen)?;
+            Some(self.of_facet(sample, &facet, point, above))
+        }));
     }
 
-    fn rows(
-        &self,
-        samples: &[Sample],
-        facets: &[Option<Facet>],
-        motion: &Motion,
-        rows: &mut Vec<Row>,
-    ) {
-        rows.clear();
-        let row = |(sample, facet): (&Sample, &Option<Facet>)| {
-            let facet = (*facet)?;
-            let point = motion.undo(sample.point);
-            let variance = sample.sigma * sample.sigma;
-            Some(Row {
-                residual: self.golden.above(point)?,
-                row: self.row(facet.lift, point),
-                lift_noise: facet.lift_noise,
-                lever: (point - self.centre) * (1.0 / self.radius),
-                variance,
-                both: variance + facet.sigma * facet.sigma,
-            })
-        };
-        rows.extend(samples.iter().zip(facets).filter_map(row));
+    fn of_facet(&self, sample: &Sample, facet: &Facet, point: Vector, above: f64) -> Row {
+        let variance = sample.sigma * sample.sigma;
+        Row {
+            residual: above,
+            row: self.row(facet.lift, point),
+            lift_noise: facet.lift_noise,
+            lever: (point - self.centre) * (1.0 / self.radius),
+            variance,
+            both: variance + facet.sigma * facet.sigma,
+        }
     }
+}
+
+/// Solves the linear problem by reweighting, from a first guess.
+fn solve(weights: Weights, guess: [f64; 6], room: &mut Room) -> Solved {
+    let Room { rows, sizes } = room;
+    let predicted = rows.iter().map(|row| row.both).sum::<f64>() / rows.len() as f64;
+    let predicted = libm::sqrt(predicted);
+    let mut further = guess;
+    let mut left = STEPS;
+    loop {
+        let scale = scale(rows, &further, sizes).max(predicted);
+        let normal = Normal::of(rows, weights, &further, scale);
+        let directions = Directions::of(&normal.matrix, &normal.noise, predicted);
+        let next = directions.solve(&normal.right);
+        let change: f64 = next
+            .iter()
+            .zip(further)
+            .map(|(a, b)| (a - b) * (a - b))
+            .sum();
+        further = next;
+        left -= 1;
+        if left == 0 || libm::sqrt(change) < SMALL_STEP_MM {
+            return Solved {
+                further,
+                directions,
+                normal,
+                scale,
+            };
+        }
+    }
+}
+
+/// Whether the linear problem still holds after a further motion.
+fn is_near(further: &[f64; 6]) -> bool {
+    further.iter().map(|x| x * x).sum::<f64>() < NEAR_MM * NEAR_MM
 }
 
 /// σ of the residuals by their median.
-fn scale(rows: &[Row], sizes: &mut Vec<f64>) -> f64 {
+fn scale(rows: &[Row], further: &[f64; 6], sizes: &mut Vec<f64>) -> f64 {
     sizes.clear();
-    sizes.extend(rows.iter().map(|row| libm::fabs(row.residual)));
+    sizes.extend(rows.iter().map(|row| libm::fabs(row.left(further))));
     let middle = sizes.len() / 2;
     let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
     MEDIAN_TO_SIGMA * *median
-}
-
-/// The normal equations of one step.
-struct Normal {
-    matrix: Six,
-    right: [f64; 6],
-    /// What errors of the lifts add to the matrix.
-    noise: Six,
-    /// Covariance of the right side.
-    covariance: Six,
-    /// Points with a weight.
-    inside: usize,
-}
-
-impl Normal {
-    fn of(rows: &[Row], weights: Weights, scale: f64) -> Self {
-        let mut normal = Self {
-            matrix: [[0.0; 6]; 6],
-            right: [0.0; 6],
-            noise: [[0.0; 6]; 6],
-            covariance: [[0.0; 6]; 6],
-            inside: 0,
-        };
-        for row in rows {
-            let weight = weights.of(row.residual / scale);
-            normal.inside += usize::from(weights.of(row.residual / scale) > 0.0);
-            let noise = weight * row.lift_noise * row.lift_noise;
-            let (q, r) = (row.lever, &row.row);
-            // What m gains in x and in y, as rows.
-            let x = [1.0, 0.0, 0.0, 0.0, q.z, -q.y];
-            let y = [0.0, 1.0, 0.0, -q.z, 0.0, q.x];
-            for i in 0..6 {
-                normal.right[i] += weight * row.residual * r[i];
-                for j in 0..6 {
-                    let square = r[i] * r[j];
-                    normal.matrix[i][j] += weight * square;
-                    normal.covariance[i][j] += weight * weight * row.variance * square;
-                    normal.noise[i][j] += noise * (x[i] * x[j] + y[i] * y[j]);
-                }
-            }
-        }
-        normal
-    }
 }

@@ -108,10 +108,4 @@ impl GoldenSurface<'_> {
             sigma,
         })
     }
-
-    /// How far a point lies above the surface on its own ray, mm.
-    pub fn above(&self, point: Vector) -> Option<f64> {
-        let (u, v) = self.triangulator.camera().project(point)?;
-        Some(point.z - self.height_at(u, v)?)
-    }
 }

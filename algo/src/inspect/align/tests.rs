@@ -89,6 +89,7 @@ impl Made {
                 Sample {
                     point: motion.apply(point),
                     sigma: SIGMA_MM,
+                    over: None,
                 }
             })
             .collect()

@@ -1,7 +1,6 @@
 //! Heights and errors of single pixels, and the points that a part's motion is found from.
 
-use super::{Production, Strip};
-use crate::frame::FrameView;
+use super::{Light, Production, Strip};
 use crate::geometry::Solution;
 use crate::inspect::align::{Alignment, Sample};
 use crate::pipeline::{NO_RISE, RowTally};
@@ -9,28 +8,29 @@ use crate::units::{AbsolutePhase, Height, Modulation};
 
 impl Strip {
     /// Keeps the points of its rows that the part's motion is found from.
-    pub(super) fn sample(
-        &mut self,
-        plan: &Production,
-        alignment: &Alignment,
-        frames: &[FrameView<'_>],
-    ) {
+    pub(super) fn sample(&mut self, plan: &Production, alignment: &Alignment, light: Light<'_>) {
         self.samples.clear();
-        for v in self.rows().filter(|&v| alignment.looks_at(v)) {
-            let columns = plan.window[v].clone();
-            self.row(plan, frames, v, columns.clone(), &mut RowTally::default());
-            for u in columns.filter(|u| u.is_multiple_of(alignment.columns())) {
-                let place = v * self.width + u;
-                let base = plan.rises.surface().height[place];
-                if self.rise[u] == NO_RISE || !base.is_known() {
-                    continue;
-                }
-                let height = Height::from_nm(base.nm().saturating_add(self.rise[u]));
-                let slope = plan.slope((u, v), self.phase[u]);
-                if let Some(point) = plan.triangulator.point(u, v, height) {
-                    let sigma = plan.sigma_nm(self.modulation[u], slope) * 1e-6;
-                    self.samples.push(Sample { point, sigma });
-                }
+        let (first, spots) = alignment.spots(self.rows());
+        let mut decoded = None;
+        for (at, spot) in spots.iter().enumerate() {
+            let (u, v) = (spot.u, spot.v);
+            if decoded != Some(v) {
+                let columns = plan.window[v].clone();
+                self.row(plan, light, v, columns, &mut RowTally::default());
+                decoded = Some(v);
+            }
+            if self.rise[u] == NO_RISE {
+                continue;
+            }
+            let base = plan.rises.surface().height[v * self.width + u];
+            let height = Height::from_nm(base.nm().saturating_add(self.rise[u]));
+            let slope = plan.slope((u, v), self.phase[u]);
+            if let Some(point) = plan.triangulator.point(u, v, height) {
+                self.samples.push(Sample {
+                    point,
+                    sigma: plan.sigma_nm(self.modulation[u], slope) * 1e-6,
+                    over: Some((first + at, f64::from(self.rise[u]) * 1e-6)),
+                });
             }
         }
     }

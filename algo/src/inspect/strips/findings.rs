@@ -3,8 +3,7 @@
 use super::columns::TRUSTS;
 use super::extreme::Extreme;
 use super::stance::Stance;
-use super::{Measure, Production, Strip};
-use crate::frame::FrameView;
+use super::{Light, Measure, Production, Strip};
 use crate::inspect::Reading;
 use crate::inspect::align::Placed;
 use crate::inspect::gauge::{
@@ -53,7 +52,7 @@ pub struct Skipped {
 impl Production {
     pub(super) fn findings(
         &self,
-        frames: &[FrameView<'_>],
+        light: Light<'_>,
         stance: Stance,
         strips: &mut [Strip],
     ) -> Findings {
@@ -73,14 +72,14 @@ impl Production {
             libm::sqrt(sum as f64 / count.max(1) as f64) * VARIANCE_UNIT_NM * 1e-6
         };
         let (height_noise_mm, taught_noise_mm) = (
-            rms_mm(tally.variance, tally.compared),
+            rms_mm(tally.variance, tally.weighed),
             rms_mm(tally.taught_variance, tally.taught),
         );
         // How much noisier than as taught the heights are.
         let noisier = height_noise_mm / taught_noise_mm.max(f64::MIN_POSITIVE);
         let readings = (0..self.gauges.len())
             .map(|gauge| match self.patches_of[gauge].is_empty() {
-                true => self.reading(gauge, frames, &stance, strips),
+                true => self.reading(gauge, light, &stance, strips),
                 false => self.of_cells(gauge, noisier, &stance, strips),
             })
             .collect();
@@ -107,7 +106,7 @@ impl Production {
     fn reading(
         &self,
         gauge: usize,
-        frames: &[FrameView<'_>],
+        light: Light<'_>,
         stance: &Stance,
         strips: &mut [Strip],
     ) -> Option<Reading> {
@@ -127,7 +126,7 @@ impl Production {
                 let best =
                     extremes.reduce(|best, next| if next.reaches(&best) { next } else { best })?;
                 let strip = strips.first_mut()?;
-                Some(self.deviation(best, side, frames, stance, strip))
+                Some(self.deviation(best, side, light, stance, strip))
             }
             Measure::Placement(component) => {
                 let (value, sigma) = stance.placed.as_ref()?.component(component)?;
@@ -207,7 +206,7 @@ impl Production {
         &self,
         best: Extreme,
         side: usize,
-        frames: &[FrameView<'_>],
+        light: Light<'_>,
         stance: &Stance,
         strip: &mut Strip,
     ) -> Reading {
@@ -219,7 +218,7 @@ impl Production {
             let left = best.column.saturating_sub(half).max(window.start);
             let right = (best.column + half + 1).min(window.end);
             if left < right {
-                variance += strip.variance(self, stance, frames, v, left..right);
+                variance += strip.variance(self, stance, light, v, left..right);
             }
         }
         let count = best.count as f64;

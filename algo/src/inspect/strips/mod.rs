@@ -10,15 +10,18 @@
 //! from these, in the order of the rows, and the strips then compare every pixel with the place of golden where the part had it.
 
 mod columns;
+mod displaced;
 mod exact;
 mod extreme;
 mod findings;
+mod light;
 mod spots;
 mod squares;
 mod stance;
 mod strip;
 
 pub use findings::{Findings, Skipped};
+pub use light::Light;
 pub use strip::Strip;
 
 use super::Region;
@@ -27,7 +30,7 @@ use super::gauge::{Grid, Measure, TaughtCell, TooFine, taught_cells};
 use crate::frame::FrameView;
 use crate::geometry::{Triangulator, Vector};
 use crate::phase::{DecodeError, Decoder};
-use crate::pipeline::{COMPARED, Rises, VARIANCE_UNIT_NM, for_each};
+use crate::pipeline::{COMPARED, Rises, SIGMA, SQUARE, VARIANCE_UNIT_NM, for_each};
 use crate::simd::Backend;
 use crate::units::{AbsolutePhase, Modulation};
 use alloc::sync::Arc;
@@ -65,17 +68,27 @@ impl Taught {
     const SIGMA_UNIT_NM: f64 = 32.0;
 
     /// From where the part is compared and σ of its heights in mm, NaN where not known. σ is stored in units of 32 nm, at
-    /// most 1 mm.
+    /// most half a mm.
     pub fn new(pixels: impl Iterator<Item = (bool, f64)>) -> Self {
         let stored = |(compared, mm): (bool, f64)| {
             let units = libm::rint(mm * 1e6 / Self::SIGMA_UNIT_NM);
             let sigma = match units.is_finite() {
-                true => units.clamp(1.0, f64::from(COMPARED - 1)) as u16,
+                true => units.clamp(1.0, f64::from(SIGMA)) as u16,
                 false => 0,
             };
             sigma | if compared { COMPARED } else { 0 }
         };
         Self(pixels.map(stored).collect())
+    }
+
+    /// Marks the places where the four pixels to the right and below are all compared.
+    fn mark_squares(&mut self, width: usize) {
+        for place in 0..self.0.len().saturating_sub(width + 1) {
+            let corners = [place, place + 1, place + width, place + width + 1];
+            if place % width + 1 < width && corners.iter().all(|&at| self.compared(at)) {
+                self.0[place] |= SQUARE;
+            }
+        }
     }
 
     /// Whether the part is compared at a place.
@@ -85,7 +98,7 @@ impl Taught {
 
     /// σ in its units.
     fn sigma(&self, place: usize) -> u16 {
-        self.0[place] & !COMPARED
+        self.0[place] & SIGMA
     }
 
     /// σ in mm, 0 where not known.
@@ -182,12 +195,13 @@ impl Production {
             triangulator,
             rises,
             map,
-            taught,
+            mut taught,
             gauges,
             window,
             noise_counts,
             aligned,
         } = parts;
+        taught.mark_squares(rises.surface().width.max(1));
         let range = triangulator.range();
         let span_nm = (range.high - range.low) * 1e6;
         let mut sides = Vec::new();
@@ -316,7 +330,7 @@ impl Production {
     }
 
     /// Inspects a part, in strips from [`Self::strips`]. Where `heights` is given (as long as a frame, row-major) it gets
-    /// z in mm, NaN where not resolved or not looked at.
+    /// z in mm, NaN where not resolved or not looked at. The same as [`Self::place`] and [`Self::inspect_placed`].
     ///
     /// # Errors
     /// If the frames are not what the decoder was made for. Nothing else can fail.
@@ -326,18 +340,53 @@ impl Production {
         strips: &mut [Strip],
         heights: Option<&mut [f32]>,
     ) -> Result<Findings, DecodeError> {
-        self.decoder.check(frames)?;
-        let width = self.rises.surface().width;
-        let size = (width, self.window.len());
-        let given = (frames[0].width(), frames[0].height());
-        if given != size {
-            return Err(DecodeError::FrameSize {
-                frame: 0,
-                expected: size,
-                given,
-            });
+        let light = Light::Frames(frames);
+        let placed = self.place(light, strips)?;
+        self.inspect_placed(light, strips, placed, heights)
+    }
+
+    /// The first half: how the part lies, from a few rows of each strip; none if that is not asked for, or too little of it
+    /// is seen.
+    ///
+    /// # Errors
+    /// As [`Self::inspect`].
+    pub fn place(
+        &self,
+        light: Light<'_>,
+        strips: &mut [Strip],
+    ) -> Result<Option<Placed>, DecodeError> {
+        self.check(light)?;
+        let Some(alignment) = &self.alignment else {
+            return Ok(None);
+        };
+        for_each(
+            strips.iter_mut().collect(),
+            || (),
+            |_, strip, ()| strip.sample(self, alignment, light),
+        );
+        let Some((first, others)) = strips.split_first_mut() else {
+            return Ok(None);
+        };
+        for strip in others {
+            first.samples.extend(&strip.samples);
         }
-        let placed = self.place(frames, strips);
+        let fitting = alignment.fitting(self.golden());
+        Ok(fitting.fit(&first.samples, &mut first.room))
+    }
+
+    /// The second half: the readings of a part that lies so, from the light and strips that it was placed with.
+    ///
+    /// # Errors
+    /// As [`Self::inspect`].
+    pub fn inspect_placed(
+        &self,
+        light: Light<'_>,
+        strips: &mut [Strip],
+        placed: Option<Placed>,
+        heights: Option<&mut [f32]>,
+    ) -> Result<Findings, DecodeError> {
+        self.check(light)?;
+        let width = self.rises.surface().width;
         let stance = Stance::new(self, placed);
         let mut left = heights;
         let mut work = Vec::with_capacity(strips.len());
@@ -352,25 +401,9 @@ impl Production {
         for_each(
             work,
             || (),
-            |_, (strip, heights), ()| strip.inspect(self, &stance, frames, heights),
+            |_, (strip, heights), ()| strip.inspect(self, &stance, light, heights),
         );
-        Ok(self.findings(frames, stance, strips))
-    }
-
-    /// How the part lies, from a few rows of each strip; none if that is not asked for, or too little of it is seen.
-    fn place(&self, frames: &[FrameView<'_>], strips: &mut [Strip]) -> Option<Placed> {
-        let alignment = self.alignment.as_ref()?;
-        for_each(
-            strips.iter_mut().collect(),
-            || (),
-            |_, strip, ()| strip.sample(self, alignment, frames),
-        );
-        let (first, others) = strips.split_first_mut()?;
-        for strip in others {
-            first.samples.extend(&strip.samples);
-        }
-        let fitting = alignment.fitting(self.golden());
-        fitting.fit(&first.samples, &mut first.room)
+        Ok(self.findings(light, stance, strips))
     }
 
     /// The map that phases are unwrapped about, row-major.

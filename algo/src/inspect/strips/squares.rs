@@ -48,21 +48,27 @@ impl Squares {
         self.first = around.start;
         let sums = &sums[around.start..around.end + side / 2 * 2];
         let length = sums.len();
-        let columns = &mut self.columns[..length];
-        unpack(backend, sums, columns);
+        let Self {
+            columns, some, all, ..
+        } = self;
+        unpack(backend, sums, &mut columns[..length]);
         let side = side | 1;
-        self.all[..length].copy_from_slice(columns);
+        let bits = side.ilog2();
+        if bits == 0 {
+            all[..length].copy_from_slice(&columns[..length]);
+        }
         // From the highest bit of the side down: twice as many columns, and one more where the bit is set.
         let mut wide = 1;
-        for bit in (0..side.ilog2()).rev() {
-            core::mem::swap(&mut self.all, &mut self.some);
+        for bit in (0..bits).rev() {
+            core::mem::swap(all, some);
+            let before = if wide == 1 { &*columns } else { &*some };
             let one = (side >> bit) & 1;
             let reach = 2 * wide + one - 1;
-            let out = &mut self.all[..length - reach];
-            let (left, right) = (&self.some[..], &self.some[wide..]);
+            let out = &mut all[..length - reach];
+            let (left, right) = (&before[..], &before[wide..]);
             match one {
                 0 => add_two(backend, left, right, out),
-                _ => add_three(backend, left, right, &self.columns[2 * wide..], out),
+                _ => add_three(backend, left, right, &columns[2 * wide..], out),
             }
             wide = 2 * wide + one;
         }

@@ -12,8 +12,8 @@ use crate::pipeline::map_rows;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Pixels from node to node.
-pub(super) const SPACING: usize = 32;
+/// Pixels from node to node. A turn by half a degree seen through 22° over 1456 pixels is bent by 0.003 pixels between them.
+pub(super) const SPACING: usize = 64;
 /// Values of a node: du, dv (pixels), dz (mm).
 const VALUES: usize = 3;
 
@@ -44,7 +44,7 @@ pub(super) struct Stance {
     pub placed: Option<Placed>,
     /// Where the plan's regions are now; none = where they were taught.
     regions: Option<Vec<Region>>,
-    /// Row-major.
+    /// Row-major; none if it lies as taught.
     nodes: Vec<Node>,
     columns: usize,
 }
@@ -55,13 +55,14 @@ impl Stance {
         let (width, height) = plan.size();
         let columns = (width - 1).div_ceil(SPACING) + 1;
         let rows = (height - 1).div_ceil(SPACING) + 1;
-        let still = Motion::none(Vector::default());
-        let motion = placed.as_ref().map_or(&still, |placed| &placed.motion);
-        let nodes = map_rows(rows, |row| {
-            let v = (row * SPACING).min(height - 1);
-            (0..columns)
-                .map(|column| plan.node(motion, ((column * SPACING).min(width - 1), v)))
-                .collect::<Vec<_>>()
+        let nodes = placed.as_ref().map_or(Vec::new(), |placed| {
+            map_rows(rows, |row| {
+                let v = (row * SPACING).min(height - 1);
+                let node = |column: usize| {
+                    plan.node(&placed.motion, ((column * SPACING).min(width - 1), v))
+                };
+                (0..columns).map(node).collect::<Vec<_>>()
+            })
         });
         let regions = placed.as_ref().map(|placed| {
             let moved = |region: &Region| {

@@ -5,12 +5,13 @@ use super::extreme::{Extreme, SquareRow};
 use super::spots::{Seen, Spots};
 use super::squares::{MAX_TAME, Squares};
 use super::stance::Stance;
-use super::{Measure, Production};
-use crate::frame::FrameView;
+use super::{Light, Measure, Production};
 use crate::inspect::align::{Room, Sample};
 use crate::inspect::gauge::Sum;
 use crate::phase::{PhaseRow, Trust};
-use crate::pipeline::{NO_RISE, Risen, RowTally, Seen as Decoded, VARIANCE_UNIT_NM, rise_row};
+use crate::pipeline::{
+    NO_RISE, Risen, RowTally, Seen as Decoded, VARIANCE_UNIT_NM, rise_row, weigh_row,
+};
 use crate::units::{AbsolutePhase, Height, Modulation};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -112,7 +113,7 @@ impl Strip {
         &mut self,
         plan: &Production,
         stance: &Stance,
-        frames: &[FrameView<'_>],
+        light: Light<'_>,
         mut heights: Option<&mut [f32]>,
     ) {
         self.clear();
@@ -124,7 +125,7 @@ impl Strip {
             if v < bottom {
                 let mut tally = RowTally::default();
                 let columns = plan.window[v].clone();
-                let exact = self.row(plan, frames, v, columns.clone(), &mut tally);
+                let exact = self.row(plan, light, v, columns.clone(), &mut tally);
                 self.settle(plan, stance, v, columns);
                 if own {
                     self.count(plan, stance, v, &tally, exact);
@@ -180,7 +181,7 @@ impl Strip {
     pub(super) fn row(
         &mut self,
         plan: &Production,
-        frames: &[FrameView<'_>],
+        light: Light<'_>,
         v: usize,
         columns: Range<usize>,
         tally: &mut RowTally,
@@ -201,8 +202,7 @@ impl Strip {
             modulation: &mut self.modulation,
             trust: &mut self.trust,
         };
-        let decoder = &plan.decoder;
-        decoder.row(frames, v, plan.map_row(v), columns.clone(), out);
+        plan.decode(light, v, columns.clone(), out);
         let row = v * self.width..(v + 1) * self.width;
         let seen = Decoded {
             phase: &self.phase,
@@ -217,8 +217,18 @@ impl Strip {
             tally,
             extent,
         };
-        let rises = plan.rises.row(v);
-        rise_row(decoder.backend(), rises, seen, columns.clone(), risen);
+        let backend = plan.decoder.backend();
+        let mut rises = plan.rises.row(v);
+        let map = plan.map_row(v);
+        if !map.is_empty() {
+            // The same wherever a pixel can be resolved, and in the cache.
+            rises.base = map;
+        }
+        rise_row(backend, rises, seen, columns.clone(), risen);
+        if weighed(v) {
+            let spread = self.extents[v % self.kept].clone();
+            weigh_row(backend, rises, seen, spread, &self.rise, tally);
+        }
         if tally.resolved == tally.measured {
             return 0;
         }
@@ -256,12 +266,18 @@ impl Strip {
             }
             self.rise[u] = rise;
             tally.measured += 1;
-            let taught = u64::from(plan.taught.sigma(place));
-            tally.taught += u64::from(taught != 0);
-            tally.taught_variance += (taught * taught + 128) >> 8;
-            if plan.taught.compared(place) {
+            let compared = plan.taught.compared(place);
+            if compared {
                 self.recent[recent + u] = rise;
                 tally.compared += 1;
+            }
+            if weighed(v) {
+                let taught = u64::from(plan.taught.sigma(place));
+                tally.taught += u64::from(taught != 0);
+                tally.taught_variance += (taught * taught + 128) >> 8;
+            }
+            if weighed(v) && compared {
+                tally.weighed += 1;
                 let sigma = plan.sigma_nm(self.modulation[u], 1.0 / solution.slope);
                 let units = sigma / VARIANCE_UNIT_NM;
                 tally.variance += libm::rint((units * units).min(4_000_000.0)) as u64;
@@ -373,12 +389,12 @@ impl Strip {
         &mut self,
         plan: &Production,
         stance: &Stance,
-        frames: &[FrameView<'_>],
+        light: Light<'_>,
         v: usize,
         columns: Range<usize>,
     ) -> f64 {
         let mut tally = RowTally::default();
-        self.row(plan, frames, v, columns.clone(), &mut tally);
+        self.row(plan, light, v, columns.clone(), &mut tally);
         self.settle(plan, stance, v, columns.clone());
         let mut sum = 0.0;
         for u in columns {
@@ -390,6 +406,14 @@ impl Strip {
         }
         sum
     }
+}
+
+/// Every so many rows the variances of the heights are summed: their mean needs no more.
+pub const WEIGHED: usize = 4;
+
+/// Whether the variances of a row are summed.
+fn weighed(v: usize) -> bool {
+    v.is_multiple_of(WEIGHED)
 }
 
 /// The columns of both, possibly none.

@@ -3,6 +3,7 @@
 use super::REACH_UNIT;
 use crate::geometry::{Sight, Triangulator};
 use crate::units::{AbsolutePhase, Height};
+use core::ops::Range;
 
 /// Coefficients of y² and y³ are stored in units of this many nm: their rounding is below 0.05 µm each.
 pub(super) const UNIT_NM: f64 = 100.0;
@@ -13,7 +14,8 @@ const MAX_RISE_MM: f64 = 4.1;
 const MAX_MISS_MM: f64 = 1e-3;
 /// Heights whose phases the cubic is fitted to, as shares of the step that the slope at the known height predicts for the
 /// whole range. The pattern's samples lie closer than the nodes at no pitch above 4 px per turn.
-const NODES: [f64; 8] = [-1.06, -0.82, -0.56, -0.28, 0.28, 0.56, 0.82, 1.06];
+const NODES: [f64; 6] = [-1.06, -0.76, -0.34, 0.34, 0.76, 1.06];
+const LAST: usize = NODES.len() - 1;
 /// Step of the first slope, mm.
 const SLOPE_STEP: f64 = 0.05;
 /// How often the range is halved until a cubic fits.
@@ -41,28 +43,70 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// The cubic about phase and height of pixel (u, v); `None` where neither the range nor a sixteenth of it has one.
+    /// Works out an unknown phase of pixel (u, v) from its height.
+    pub fn complete(&self, (u, v): (usize, usize), phase: &mut AbsolutePhase, height: Height) {
+        if !phase.is_known() {
+            let found = self
+                .sight((u, v), height)
+                .and_then(|sight| sight.phase(height.mm()));
+            *phase = found.map_or(AbsolutePhase::UNKNOWN, AbsolutePhase::from_turns);
+        }
+    }
+
+    /// The phases of some columns of row `v`, none of which is known, in proportion between those of the outermost two.
+    pub fn between(
+        &self,
+        v: usize,
+        columns: Range<usize>,
+        phases: &mut [AbsolutePhase],
+        heights: &[Height],
+    ) {
+        let (first, last) = (columns.start, columns.end - 1);
+        for u in [first, last] {
+            self.complete((u, v), &mut phases[u], heights[u]);
+        }
+        let (from, to) = (phases[first], phases[last]);
+        if !(from.is_known() && to.is_known()) {
+            return;
+        }
+        let rise = i64::from(to.to_bits()) - i64::from(from.to_bits());
+        for (step, phase) in (0..).zip(&mut phases[first..last]) {
+            let along = rise * step / (last - first) as i64;
+            *phase = AbsolutePhase::from_bits((i64::from(from.to_bits()) + along) as i32);
+        }
+    }
+
+    fn sight(&self, (u, v): (usize, usize), height: Height) -> Option<Sight<'_>> {
+        let known = height.is_known();
+        known.then(|| self.triangulator.sight(u as f64, v as f64))?
+    }
+
+    /// The cubic about phase and height of pixel (u, v); `None` where neither the range nor a sixteenth of it has one. An
+    /// unknown phase becomes that of the height.
     pub fn cubic(
         &self,
         (u, v): (usize, usize),
-        phase: AbsolutePhase,
+        phase: &mut AbsolutePhase,
         height: Height,
     ) -> Option<Cubic> {
-        if !(phase.is_known() && height.is_known()) {
+        let sight = self.sight((u, v), height)?;
+        let height = height.mm();
+        if !phase.is_known() {
+            *phase = AbsolutePhase::from_turns(sight.phase(height)?);
+        }
+        if !phase.is_known() {
             return None;
         }
-        let (phase, height) = (phase.turns(), height.mm());
+        let phase = phase.turns();
         let working = self.triangulator.range();
         let room = (working.high - height).min(height - working.low);
-        let sight = self.triangulator.sight(u as f64, v as f64)?;
-        let here = sight.phase(height)?;
-        let slope = (sight.phase(height + SLOPE_STEP)? - here) / SLOPE_STEP;
-        let mut step = (self.range / libm::fabs(slope)).min(room.min(MAX_RISE_MM) / NODES[7]);
+        let slope = (sight.phase(height + SLOPE_STEP)? - phase) / SLOPE_STEP;
+        let mut step = (self.range / libm::fabs(slope)).min(room.min(MAX_RISE_MM) / NODES[LAST]);
         if !(step > 0.0) {
             return None;
         }
         for _ in 0..=HALVINGS {
-            if let Some(cubic) = self.fit(&sight, (phase, height), here, step) {
+            if let Some(cubic) = self.fit(&sight, (phase, height), step) {
                 return Some(cubic);
             }
             step *= 0.5;
@@ -71,46 +115,45 @@ impl<'a> Fitting<'a> {
     }
 
     /// The cubic through the known point that fits heights up to `step` mm away, if it fits them well enough.
-    fn fit(
-        &self,
-        sight: &Sight<'_>,
-        (phase, height): (f64, f64),
-        here: f64,
-        step: f64,
-    ) -> Option<Cubic> {
+    fn fit(&self, sight: &Sight<'_>, (phase, height): (f64, f64), step: f64) -> Option<Cubic> {
+        let share = 1.0 / self.range;
         let mut nodes = [(0.0, 0.0); NODES.len()];
-        for (node, share) in nodes.iter_mut().zip(NODES) {
-            let rise = share * step;
-            *node = ((sight.phase(height + rise)? - phase) / self.range, rise);
+        for (node, part) in nodes.iter_mut().zip(NODES) {
+            let rise = part * step;
+            *node = ((sight.phase(height + rise)? - phase) * share, rise);
         }
-        let ends = [nodes[0].0, nodes[NODES.len() - 1].0];
+        let ends = [nodes[0].0, nodes[LAST].0];
         let rising = ends[1] > ends[0];
         let monotone = nodes
             .windows(2)
             .all(|pair| (pair[1].0 > pair[0].0) == rising && pair[1].0 != pair[0].0);
         let reach = libm::fabs(ends[0]).min(libm::fabs(ends[1])).min(1.0) * self.range;
-        let reach = libm::floor(reach / REACH_UNIT + 1e-9);
-        if !(monotone && ends[0] * ends[1] < 0.0 && reach >= 1.0) {
+        // Positive and below 128: its whole part is what a byte holds.
+        let reach = (reach / REACH_UNIT + 1e-9) as u8;
+        if !(monotone && ends[0] * ends[1] < 0.0 && reach >= 1) {
             return None;
         }
         let [first, second, third] = least_squares(&nodes)?;
-        let stored = |mm: f64| {
-            let units = libm::rint(mm * 1e6 / UNIT_NM);
-            (libm::fabs(units) <= f64::from(i16::MAX)).then_some(units as i16)
-        };
         let cubic = Cubic {
             first: (first * 1e6) as f32,
             second: stored(second)?,
             third: stored(third)?,
-            reach: reach as u8,
+            reach,
         };
-        let known = ((here - phase) / self.range, 0.0);
-        let fits = nodes.iter().chain([&known]).all(|&(y, rise)| {
+        let fits = nodes.iter().all(|&(y, rise)| {
             // Also catches what is not finite.
             libm::fabs(cubic.rise(y) - rise) <= MAX_MISS_MM
         });
         fits.then_some(cubic)
     }
+}
+
+/// A coefficient in its units, if they hold it.
+fn stored(mm: f64) -> Option<i16> {
+    let units = mm * (1e6 / UNIT_NM);
+    let inside = libm::fabs(units) <= f64::from(i16::MAX);
+    // Nearest, ties away from 0.
+    inside.then(|| (units + if units < 0.0 { -0.5 } else { 0.5 }) as i16)
 }
 
 impl Cubic {
@@ -145,6 +188,7 @@ fn least_squares(nodes: &[(f64, f64)]) -> Option<[f64; 3]> {
     ];
     let determinant = a * rows[0][0] + b * rows[0][1] + c * rows[0][2];
     (determinant > 0.0).then(|| {
-        rows.map(|row| (row[0] * right[0] + row[1] * right[1] + row[2] * right[2]) / determinant)
+        let scale = 1.0 / determinant;
+        rows.map(|row| (row[0] * right[0] + row[1] * right[1] + row[2] * right[2]) * scale)
     })
 }

@@ -5,10 +5,12 @@
 //! where there is no such cubic, the height is found by the exact solution. A pixel takes 9 bytes beside Φ₀ and z₀.
 
 mod fit;
+mod near;
 mod row;
 
 pub(crate) use row::{
-    COMPARED, RiseRow, Risen, RowTally, Seen, UNKNOWN, VARIANCE_UNIT_NM, rise_row,
+    COMPARED, RiseRow, Risen, RowTally, SIGMA, SQUARE, Seen, UNKNOWN, VARIANCE_UNIT_NM, rise_row,
+    weigh_row,
 };
 
 use super::{Window, for_each};
@@ -19,13 +21,14 @@ use crate::units::{AbsolutePhase, Height, Modulation};
 use alloc::vec;
 use alloc::vec::Vec;
 use fit::Fitting;
+use near::Near;
 
 /// A surface that is known beforehand, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownSurface {
     /// Pixels per row.
     pub width: usize,
-    /// Φ₀, [`AbsolutePhase::UNKNOWN`] where nothing is known.
+    /// Φ₀, [`AbsolutePhase::UNKNOWN`] where it is not known.
     pub phase: Vec<AbsolutePhase>,
     /// z₀, the height that has this phase.
     pub height: Vec<Height>,
@@ -53,15 +56,20 @@ const MAX_RANGE: f64 = 127.0 * REACH_UNIT;
 
 impl Rises {
     /// Plans the pixels inside `window` for |Φ − Φ₀| up to `range` turns (or a little less than a turn).
+    ///
+    /// Where z₀ is known and Φ₀ is not, Φ₀ is worked out: exactly up to `around` pixels from the next place where it is
+    /// known, further away, where nothing is expected and there is no cubic, for every few pixels.
     pub fn new(
         triangulator: &Triangulator,
         surface: KnownSurface,
         range: f64,
         window: Window<'_>,
+        around: usize,
     ) -> Self {
         let pixels = surface.phase.len();
         let width = surface.width.max(1);
         let range = range.clamp(REACH_UNIT, MAX_RANGE);
+        let near = Near::new(&surface, around);
         let mut rises = Self {
             surface,
             range,
@@ -70,31 +78,49 @@ impl Rises {
             third: vec![0; pixels],
             reach: vec![0; pixels],
         };
+        let fitting = Fitting::new(triangulator, range);
+        let heights = &rises.surface.height;
         let rows = rises
-            .first
+            .surface
+            .phase
             .chunks_mut(width)
+            .zip(rises.first.chunks_mut(width))
             .zip(rises.second.chunks_mut(width))
             .zip(rises.third.chunks_mut(width))
             .zip(rises.reach.chunks_mut(width))
             .collect();
-        let fitting = Fitting::new(triangulator, range);
-        let surface = &rises.surface;
         for_each(
             rows,
             || (),
-            |v, (((first, second), third), reach), ()| {
-                for u in window[v].clone() {
-                    let at = v * width + u;
-                    let (phase, height) = (surface.phase[at], surface.height[at]);
-                    if let Some(cubic) = fitting.cubic((u, v), phase, height) {
-                        first[u] = cubic.first;
-                        (second[u], third[u]) = (cubic.second, cubic.third);
-                        reach[u] = cubic.reach;
+            |v, ((((phases, first), second), third), reach), ()| {
+                let heights = &heights[v * width..(v + 1) * width];
+                for (columns, near) in near.row(v) {
+                    if !near {
+                        fitting.between(v, columns, phases, heights);
+                        continue;
+                    }
+                    for u in columns {
+                        if !window[v].contains(&u) {
+                            fitting.complete((u, v), &mut phases[u], heights[u]);
+                        } else if let Some(cubic) =
+                            fitting.cubic((u, v), &mut phases[u], heights[u])
+                        {
+                            first[u] = cubic.first;
+                            (second[u], third[u]) = (cubic.second, cubic.third);
+                            reach[u] = cubic.reach;
+                        }
                     }
                 }
             },
         );
         rises
+    }
+
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> usize {
+        let surface = size_of_val(&*self.surface.phase) + size_of_val(&*self.surface.height);
+        let cubics = size_of_val(&*self.first) + size_of_val(&*self.second);
+        surface + cubics + size_of_val(&*self.third) + size_of_val(&*self.reach)
     }
 
     /// The known surface.

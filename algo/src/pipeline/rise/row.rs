@@ -11,6 +11,10 @@ use core::ops::Range;
 
 /// The bit of what is taught that says that the part is compared.
 pub(crate) const COMPARED: u16 = 1 << 15;
+/// The bit that says that it is at the pixels to the right, below and right below as well.
+pub(crate) const SQUARE: u16 = 1 << 14;
+/// The bits of σ.
+pub(crate) const SIGMA: u16 = SQUARE - 1;
 /// Variances are summed in units of the square of this many nm, each rounded to nearest.
 pub(crate) const VARIANCE_UNIT_NM: f64 = 512.0;
 /// Standard deviations of the known heights are given in sixteenths of that.
@@ -21,6 +25,8 @@ const HALF: u32 = 1 << (2 * SIGMAS_PER_UNIT_BITS - 1);
 const MAX_VARIANCE: f32 = 4_000_000.0;
 /// Pixels that are skipped together where none is resolved; sums over so many fit into 32 bits.
 const BLOCK: usize = 128;
+/// Pixels that one hint fetches.
+const FETCHED: usize = 32;
 /// 1.5 · 2²³: added to a single below 2²², it leaves the nearest whole number in the low bits.
 const ROUNDER: f32 = 12_582_912.0;
 
@@ -50,8 +56,7 @@ pub(crate) struct Seen<'a> {
     pub modulation: &'a [Modulation],
     /// Which to believe.
     pub trust: &'a [Trust],
-    /// σ of golden's heights in 32 nm, at most 2¹⁵ − 1, 0 where not known; [`COMPARED`] where the part is compared with
-    /// golden.
+    /// σ of golden's heights in 32 nm ([`SIGMA`]), 0 where not known; [`COMPARED`] where the part is compared with golden.
     pub taught: &'a [u16],
     /// σ_z² = `noise` · (∂z/∂y)² / B², in units of [`VARIANCE_UNIT_NM`]².
     pub noise: f32,
@@ -79,9 +84,10 @@ pub(crate) struct RowTally {
     pub measured: u64,
     /// Of these those that are compared.
     pub compared: u64,
-    /// Σ of σ_z² over the compared ones.
+    /// Of these those of the rows whose variances are summed, and Σ of σ_z² over them.
+    pub weighed: u64,
     pub variance: u64,
-    /// Pixels with a height whose golden σ is known.
+    /// Pixels of these rows with a height whose golden σ is known.
     pub taught: u64,
     /// Σ of its square.
     pub taught_variance: u64,
@@ -93,6 +99,7 @@ impl RowTally {
         self.resolved += other.resolved;
         self.measured += other.measured;
         self.compared += other.compared;
+        self.weighed += other.weighed;
         self.variance += other.variance;
         self.taught += other.taught;
         self.taught_variance += other.taught_variance;
@@ -111,15 +118,14 @@ back_end_entry! {
 
 #[inline(always)]
 fn rise_columns<V: Lanes>(
-    _: V,
+    v: V,
     plan: RiseRow<'_>,
     seen: Seen<'_>,
     columns: Range<usize>,
     out: Risen<'_>,
 ) {
-    let scale = (1.0 / (plan.range * 65_536.0)) as f32;
+    let scale = scale(plan.range);
     let tally = &mut *out.tally;
-    let mut slopes = [0.0_f32; BLOCK];
     *out.extent = 0..0;
     let mut start = columns.start;
     while start < columns.end {
@@ -150,53 +156,111 @@ fn rise_columns<V: Lanes>(
         let reach = &plan.reach[start..end][..length];
         let phase = &seen.phase[start..end][..length];
         let taught = &seen.taught[start..end][..length];
-        let slopes = &mut slopes[..length];
+        let mut at = start;
+        while at < end {
+            v.fetch_ahead(plan.first, at);
+            v.fetch_ahead(plan.second, at);
+            v.fetch_ahead(plan.third, at);
+            v.fetch_ahead(plan.reach, at);
+            v.fetch_ahead(seen.taught, at);
+            at += FETCHED;
+        }
+        let (mut measured, mut compared) = (0_u32, 0_u32);
         for i in 0..length {
             let delta = phase[i].to_bits().wrapping_sub(base[i].to_bits());
             let far = i32::from(reach[i]) << 9;
             let known = trust[i] as u8 == Trust::Resolved as u8;
             let inside = known & (delta < far) & (delta > -far);
             let y = delta as f32 * scale;
-            let (a, b, c) = (
-                first[i],
-                f32::from(second[i]) * UNIT_NM as f32,
-                f32::from(third[i]) * UNIT_NM as f32,
-            );
-            let nm = rounded(y * (a + y * (b + y * c)));
+            let (b, c) = (coefficient(second[i]), coefficient(third[i]));
+            let nm = rounded(y * (first[i] + y * (b + y * c)));
             let compare = inside & (taught[i] >= COMPARED);
             rises[i] = if inside { nm } else { UNKNOWN };
             deviations[i] = if compare { nm } else { UNKNOWN };
-            slopes[i] = a + y * ((b + b) + y * (3.0 * c));
+            measured += u32::from(inside);
+            compared += u32::from(compare);
         }
+        tally.measured += u64::from(measured);
+        tally.compared += u64::from(compared);
+        start = end;
+    }
+}
+
+back_end_entry! {
+    /// Adds the variances of a row's rises to its tally.
+    fn weigh_row [] = weigh_columns(
+        plan: RiseRow<'_>,
+        seen: Seen<'_>,
+        columns: Range<usize>,
+        rise: &[i32],
+        tally: &mut RowTally,
+    )
+}
+
+#[inline(always)]
+fn weigh_columns<V: Lanes>(
+    _: V,
+    plan: RiseRow<'_>,
+    seen: Seen<'_>,
+    columns: Range<usize>,
+    rise: &[i32],
+    tally: &mut RowTally,
+) {
+    let scale = scale(plan.range);
+    let mut start = columns.start;
+    while start < columns.end {
+        let end = (start + BLOCK).min(columns.end);
+        let length = end - start;
+        let base = &plan.base[start..end][..length];
+        let first = &plan.first[start..end][..length];
+        let second = &plan.second[start..end][..length];
+        let third = &plan.third[start..end][..length];
+        let phase = &seen.phase[start..end][..length];
+        let taught = &seen.taught[start..end][..length];
         let modulation = &seen.modulation[start..end][..length];
-        let (mut measured, mut counted, mut variances) = (0_u32, 0_u32, 0_u32);
-        let (mut taught_count, mut taught_variances) = (0_u32, 0_u32);
+        let rises = &rise[start..end][..length];
+        let (mut compared, mut variances) = (0_u32, 0_u32);
+        let (mut known, mut taught_variances) = (0_u32, 0_u32);
         for i in 0..length {
             let inside = rises[i] != UNKNOWN;
-            let compare = deviations[i] != UNKNOWN;
+            let compare = inside & (taught[i] >= COMPARED);
+            let delta = phase[i].to_bits().wrapping_sub(base[i].to_bits());
+            let y = delta as f32 * scale;
+            let (b, c) = (coefficient(second[i]), coefficient(third[i]));
+            let slope = first[i] + y * ((b + b) + y * (3.0 * c));
             let counts = f32::from(modulation[i].to_bits());
-            let variance = seen.noise * (slopes[i] * slopes[i]) / (counts * counts);
+            let variance = seen.noise * (slope * slope) / (counts * counts);
             let variance = if variance < MAX_VARIANCE {
                 variance
             } else {
                 MAX_VARIANCE
             };
             let variance = rounded(variance) as u32;
-            measured += u32::from(inside);
-            counted += u32::from(compare);
+            compared += u32::from(compare);
             variances = variances.wrapping_add(if compare { variance } else { 0 });
-            let sigma = u32::from(taught[i] & !COMPARED);
+            let sigma = u32::from(taught[i] & SIGMA);
             let square = (sigma * sigma + HALF) >> (2 * SIGMAS_PER_UNIT_BITS);
-            taught_count += u32::from(inside & (sigma != 0));
+            known += u32::from(inside & (sigma != 0));
             taught_variances = taught_variances.wrapping_add(if inside { square } else { 0 });
         }
-        tally.measured += u64::from(measured);
-        tally.compared += u64::from(counted);
+        tally.weighed += u64::from(compared);
         tally.variance += u64::from(variances);
-        tally.taught += u64::from(taught_count);
+        tally.taught += u64::from(known);
         tally.taught_variance += u64::from(taught_variances);
         start = end;
     }
+}
+
+/// y of one unit of a phase's bits.
+#[inline(always)]
+fn scale(range: f64) -> f32 {
+    (1.0 / (range * 65_536.0)) as f32
+}
+
+/// A stored coefficient in nm.
+#[inline(always)]
+fn coefficient(units: i16) -> f32 {
+    f32::from(units) * UNIT_NM as f32
 }
 
 /// "No height" among rises.

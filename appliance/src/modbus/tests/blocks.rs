@@ -198,6 +198,7 @@ async fn health_says_what_is_known_and_what_is_not() {
         cpu_temperature_c: Some(51.24),
         boots: 0x1_0002,
         unclean_boots: 3,
+        watchdog_restarts: 1,
         clients: 2,
         writer_connected: true,
         recipes: [1, 2, 17, 1024, 1025].into(),
@@ -217,7 +218,7 @@ async fn health_says_what_is_known_and_what_is_not() {
     let long = |k: usize| u32_at(&words, k);
     assert_eq!((long(0), long(2), long(4)), (2000, 60_000, 12));
     assert_eq!((long(6), long(8)), (4, 2), "counted since the start");
-    assert_eq!((long(16), long(18), long(20)), (0x1_0002, 3, 0));
+    assert_eq!((long(16), long(18), long(20)), (0x1_0002, 3, 1));
     assert_eq!(words[22..30], [37, 1234, 65534, 512, 0x8000, 0x8000, 2, 1]);
     assert_eq!(words[30..], [0; 10], "reserved registers read 0");
     let stored = plc.read_input_registers(700, 64).await.unwrap().unwrap();
@@ -226,14 +227,15 @@ async fn health_says_what_is_known_and_what_is_not() {
 }
 
 #[tokio::test]
-async fn processing_time_is_that_of_the_last_cycle_and_the_longest() {
+async fn processing_time_is_that_of_the_stages_after_the_exposure_and_the_longest_is_kept() {
     let plant = Plant::new().await;
     let mut plc = plant.client().await;
     plc.write_single_register(1, 1).await.unwrap().unwrap();
     plant.work();
     let result = plc.read_input_registers(200, 120).await.unwrap().unwrap();
     let words = plc.read_input_registers(610, 4).await.unwrap().unwrap();
-    let processing = u32_at(&result, 20) - u32_at(&result, 18);
+    // What is left of the cycle is the hand-over; this plant is faster than its stages.
+    let processing = u32_at(&result, 20).max(1_740);
     assert_eq!(
         (u32_at(&words, 0), u32_at(&words, 2)),
         (processing, processing)

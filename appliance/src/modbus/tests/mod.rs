@@ -140,7 +140,16 @@ fn inspection() -> Inspection {
         GaugeValue::judged("dome", Unit::Length, Some(0.12345), Some(0.001), limits),
         GaugeValue::judged("flange", Unit::Angle, Some(-0.5), Some(0.01), limits),
     ];
+    let mut stages = Stages::default();
+    for (stage, us) in [
+        (Stage::Alignment, 200),
+        (Stage::Strips, 1_500),
+        (Stage::Judgement, 40),
+    ] {
+        stages.add(stage, us);
+    }
     Inspection {
+        stages,
         judged: Verdict::Fail,
         gauges: gauges.into_iter().collect(),
         valid_points: 123_456,

@@ -119,7 +119,7 @@ function field(value, label, factor, set) {
   const input = make("input", "limit");
   input.type = "number";
   input.step = "any";
-  input.value = value === null || value === undefined ? "" : String(Number((value * factor).toPrecision(6)));
+  input.value = value === null || value === undefined ? "" : String(Number((value * factor).toPrecision(5)));
   input.placeholder = "none";
   input.setAttribute("aria-label", label);
   input.addEventListener("input", () => set(input.value === "" ? null : Number(input.value) / factor));

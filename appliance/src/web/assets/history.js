@@ -6,6 +6,7 @@ import { count, milliseconds, moment, quantity } from "./number.js";
 const PAGE = 50;
 const PASS = 1, VALID = 2, LOW = 4;
 let oldest = null;
+let boot = "";
 
 function filter() {
   const wanted = new URLSearchParams();
@@ -31,7 +32,7 @@ function row(entry) {
     frames.append(link);
   }
   const verdict = make("span", `tag ${entry.verdict.toLowerCase()}`, entry.verdict);
-  return make("tr", "", make("td", "", String(entry.seq)), make("td", "nowrap", moment(entry.time_utc_us)), make("td", "", `${entry.recipe}`), make("td", "", String(entry.part_id)),
+  return make("tr", "", make("td", "", String(entry.seq)), make("td", "nowrap", moment(entry, boot)), make("td", "", `${entry.recipe}`), make("td", "", String(entry.part_id)),
     make("td", "", verdict), make("td", "nowrap", milliseconds(entry.total_us)), make("td", "", outside(entry)), frames);
 }
 
@@ -56,7 +57,10 @@ async function load(more) {
   }
 }
 
-export function openHistory(visible) { if (visible) load(false); }
+export function openHistory(visible, now) {
+  boot = now.boot_id;
+  if (visible) load(false);
+}
 
 export function start() {
   $("filter").addEventListener("submit", (event) => { event.preventDefault(); load(false); });

@@ -1,10 +1,11 @@
 // Health, event log and the record of changes.
 import { $, fill, make } from "./element.js";
 import { ask } from "./api.js";
-import { count, milliseconds, moment } from "./number.js";
+import { count, duration, milliseconds, moment } from "./number.js";
 import { notice } from "./session.js";
 
 let timer = 0;
+let boot = "";
 
 function line(when, words, kind) {
   return make("li", kind || "", make("span", "when", when), make("span", "", words));
@@ -15,14 +16,14 @@ function known(value, unit, places = 0) {
 }
 
 function condition(now) {
-  const hours = Math.floor(now.uptime_s / 3600), minutes = Math.floor(now.uptime_s / 60) % 60;
   const { health, result } = now;
   const pairs = [
     ["Measuring task", now.worker_alive ? "meets its deadlines" : "missed a deadline"],
     ["Calibration", now.calibration_valid ? "valid" : "missing or not fitting"],
     ["Warnings", now.warnings.length ? now.warnings.join(", ") : "none"],
     ["Head temperature", result && result.temperature_c !== null ? `${result.temperature_c.toFixed(1)} °C` : "not known"],
-    ["Processor", `${known(health.cpu_percent, " %")}, ${known(health.cpu_temperature_c, " °C", 1)}`],
+    ["Processor load", known(health.cpu_percent, " %")],
+    ["Processor temperature", known(health.cpu_temperature_c, " °C", 1)],
     ["Free memory", known(health.free_memory_mib, " MiB")],
     ["Free storage", known(health.free_storage_mib, " MiB")],
     ["Storage errors", count(health.storage_errors)],
@@ -35,8 +36,10 @@ function condition(now) {
     ["Processing, last", milliseconds(health.processing_us)],
     ["Processing, longest", milliseconds(health.processing_max_us)],
     ["Modbus clients", `${health.modbus_clients}${health.writer_connected ? ", one may write" : ""}`],
-    ["Starts", `${count(health.boots)}, ${count(health.unclean_boots)} after a crash`],
-    ["Up for", `${hours} h ${String(minutes).padStart(2, "0")} min`],
+    ["Starts", count(health.boots)],
+    ["after a crash or a kill", count(health.unclean_boots)],
+    ["of these because it hung", count(health.watchdog_restarts)],
+    ["Up for", duration(now.uptime_s)],
     ["Serial number", now.identity.serial],
     ["Program", now.identity.version],
   ];
@@ -46,10 +49,10 @@ function condition(now) {
 async function refresh() {
   try {
     const [log, changes] = await Promise.all([ask("GET", "/api/log"), ask("GET", "/api/changes")]);
-    fill($("log-lines"), ...log.lines.map((entry) => line(entry.utc_us ? moment(entry.utc_us) : `${entry.uptime_s} s after the start`, entry.words)));
+    fill($("log-lines"), ...log.lines.map((entry) => line(moment(entry, boot), entry.words)));
     if (!log.lines.length) fill($("log-lines"), line("", "nothing happened yet"));
     fill($("change-lines"), ...changes.changes.map((entry) =>
-      line(moment(entry.utc_us), `${entry.action} (${entry.subject}) from ${entry.from}: ${entry.outcome}`, entry.outcome === "done" ? "" : "refused")));
+      line(moment(entry, boot), `${entry.action} (${entry.subject}) from ${entry.from}: ${entry.outcome}`, entry.outcome === "done" ? "" : "refused")));
     if (!changes.changes.length) fill($("change-lines"), line("", "nothing was changed yet"));
   } catch (error) { notice(error.message, true); }
 }
@@ -58,8 +61,9 @@ export function showDevice(now, visible) {
   if (visible) fill($("health"), ...condition(now));
 }
 
-export function openDevice(visible) {
+export function openDevice(visible, now) {
   clearInterval(timer);
+  boot = now.boot_id;
   if (!visible) return;
   refresh();
   timer = setInterval(refresh, 2000);

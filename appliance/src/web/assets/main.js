@@ -12,7 +12,7 @@ import { openDevice, showDevice } from "./journal.js";
 import { openHistory, start as startHistory } from "./history.js";
 import { change, start as startSession } from "./session.js";
 import { ask } from "./api.js";
-import { count } from "./number.js";
+import { count, duration } from "./number.js";
 
 const VIEWS = ["live", "history", "recipes", "registers", "device"];
 const STATES = {
@@ -41,6 +41,7 @@ function showCounters(now) {
 }
 
 function showSnapshot(now) {
+  const restarted = !last || last.boot_id !== now.boot_id;
   last = now;
   const [words, kind] = STATES[now.state] || [now.state, "wait"];
   const waiting = now.state === "ready" && !now.ready;
@@ -59,6 +60,8 @@ function showSnapshot(now) {
   showCounters(now);
   showRecipes(now, view === "recipes");
   showDevice(now, view === "device");
+  // Times without a clock are told from the start, so lists are read again when that is known.
+  if (restarted) { openHistory(view === "history", now); openDevice(view === "device", now); }
   const key = `${now.boot_id}/${now.result ? now.result.seq : "none"}`;
   if (key !== shown) {
     shown = key;
@@ -67,8 +70,7 @@ function showSnapshot(now) {
   }
   showPicture(now.result, view === "live");
   text("identity", `${now.identity.product} · ${now.identity.serial} · ${now.identity.version}`);
-  const hours = Math.floor(now.uptime_s / 3600), minutes = Math.floor(now.uptime_s / 60) % 60;
-  text("uptime", `up ${hours} h ${String(minutes).padStart(2, "0")} min · heartbeat ${now.heartbeat}`);
+  text("uptime", `up ${duration(now.uptime_s)} · heartbeat ${now.heartbeat}`);
   document.title = `${now.result && now.state === "ready" ? now.result.verdict : words} · fringed`;
 }
 
@@ -83,9 +85,9 @@ function openView() {
   }
   if (view === "recipes") list();
   showRegisters(view === "registers");
-  openDevice(view === "device");
-  openHistory(view === "history");
   if (last) {
+    openHistory(view === "history", last);
+    openDevice(view === "device", last);
     showPicture(last.result, view === "live");
     showDevice(last, view === "device");
   }

@@ -41,8 +41,20 @@ export function clock(utc_us) {
   return utc_us ? new Date(utc_us / 1000).toLocaleTimeString("en-GB") : "";
 }
 
-export function moment(utc_us) {
-  if (!utc_us) return "time not known";
+export function duration(s) {
+  const hours = Math.floor(s / 3600), minutes = Math.floor(s / 60) % 60;
+  return `${hours} h ${String(minutes).padStart(2, "0")} min`;
+}
+
+// When something happened; where the clock was not synchronised, how long after which start of the device.
+export function moment(entry, boot) {
+  const utc_us = entry.utc_us || entry.time_utc_us;
+  if (!utc_us) {
+    if (entry.uptime_s === null || entry.uptime_s === undefined) return "time not known";
+    const two = (number) => String(Math.floor(number)).padStart(2, "0");
+    const since = `${Math.floor(entry.uptime_s / 3600)}:${two(entry.uptime_s / 60 % 60)}:${two(entry.uptime_s % 60)}`;
+    return `${since} after ${!entry.boot_id || entry.boot_id === boot ? "the" : "an earlier"} start`;
+  }
   const date = new Date(utc_us / 1000);
   const two = (number) => String(number).padStart(2, "0");
   return `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())} ${date.toLocaleTimeString("en-GB")}`;

@@ -37,38 +37,66 @@ function drawScale() {
   fill($("scale"), ...parts);
 }
 
+// The gauges of the result that failed or could not be measured, as the recipe has them.
+function failing() {
+  const { recipe, result } = state;
+  if (!recipe || !result) return [];
+  return recipe.gauges.flatMap((gauge) => {
+    const found = result.gauges.find((value) => value.name === gauge.name);
+    return !found || (found.valid && found.pass) ? [] : [{ gauge, kind: found.valid ? "fail" : "invalid" }];
+  });
+}
+
 // Regions in camera pixels; those of failed gauges are drawn strongly.
 function drawOutlines() {
   const svg = $("outlines");
   if (!state.map) { fill(svg); return; }
   const { width, height, stride } = state.map.about;
   svg.setAttribute("viewBox", `0 0 ${width * stride} ${height * stride}`);
-  const recipe = state.recipe, result = state.result;
-  if (!recipe || !result) { fill(svg); return; }
+  if (!state.recipe || !state.result) { fill(svg); return; }
   const bad = new Map();
-  for (const gauge of recipe.gauges) {
-    const found = result.gauges.find((value) => value.name === gauge.name);
-    if (!found || (found.valid && found.pass)) continue;
-    const names = [gauge.region, gauge.measures.from];
-    for (const name of names) if (name) bad.set(name, found.valid ? "fail" : "invalid");
+  for (const { gauge, kind } of failing()) {
+    for (const name of [gauge.region, gauge.measures.from]) if (name && bad.get(name) !== "fail") bad.set(name, kind);
   }
   const outline = (region, kind) => {
     const corners = region.polygon.map(([u, v]) => `${u + 0.5},${v + 0.5}`).join(" ");
     return draw("polygon", { points: corners, class: kind, "vector-effect": "non-scaling-stroke" });
   };
-  const quiet = recipe.regions.filter((region) => !bad.has(region.name)).map((region) => outline(region, "quiet"));
-  const failing = recipe.regions.filter((region) => bad.has(region.name));
-  const loud = failing.map((region) => outline(region, `under`)).concat(failing.map((region) => outline(region, bad.get(region.name))));
-  fill(svg, ...quiet, ...loud, ...(state.deviation ? most(state.deviation) : []));
+  const { regions } = state.recipe;
+  const quiet = regions.filter((region) => !bad.has(region.name)).map((region) => outline(region, "quiet"));
+  const loud = regions.filter((region) => bad.has(region.name));
+  fill(svg, ...quiet, ...loud.map((region) => outline(region, "under")), ...loud.map((region) => outline(region, bad.get(region.name))), ...(state.deviation ? most(state.deviation) : []));
 }
 
-// A ring around the place that deviates most, averaged over squares of some pixels so that no single one decides.
+// Measures that compare the part with golden, pixel by pixel: where they fail, a place of the picture says why.
+const COMPARING = ["deviation", "rms_deviation", "out_of_tolerance"];
+
+// The regions in which a gauge failed that compares the part with golden.
+function deviating() {
+  const names = failing().filter(({ gauge, kind }) => kind === "fail" && COMPARING.includes(gauge.measures.kind)).map(({ gauge }) => gauge.region);
+  return state.recipe ? state.recipe.regions.filter((region) => names.includes(region.name)) : [];
+}
+
+// Whether a place lies inside a polygon: an odd number of its edges lies to the left.
+function inside(polygon, u, v) {
+  let within = false;
+  polygon.forEach(([u1, v1], at) => {
+    const [u0, v0] = polygon[(at || polygon.length) - 1];
+    if ((v1 > v) !== (v0 > v) && u < u1 + (u0 - u1) * (v - v1) / (v0 - v1)) within = !within;
+  });
+  return within;
+}
+
+// A ring around the place of the failing regions that deviates most, averaged over squares of some pixels so that no single
+// one decides.
 function most(map) {
   const { width, height, stride } = map.about;
+  const regions = deviating();
   const half = Math.max(1, Math.round(4 / stride)), least = (2 * half + 1) * (2 * half + 1) / 2;
   let best = 0, at = null;
   for (let v = half; v < height - half; v += half) {
     for (let u = half; u < width - half; u += half) {
+      if (!regions.some((region) => inside(region.polygon, u * stride, v * stride))) continue;
       let sum = 0, count = 0;
       for (let row = v - half; row <= v + half; row += 1) {
         for (let column = u - half; column <= u + half; column += 1) {
@@ -123,8 +151,10 @@ async function load() {
     return;
   }
   if (turn !== state.asked) return;
+  await loadRecipe(result);
+  if (turn !== state.asked) return;
   let deviation = null;
-  if (result.gauges.some((gauge) => gauge.valid && !gauge.pass && gauge.name.startsWith("deviation"))) {
+  if (deviating().length) {
     try { deviation = layer === "deviation" ? loaded : await map(`/api/picture/deviation?seq=${result.seq}`); } catch (none) { /* No ring then. */ }
     if (turn !== state.asked) return;
   }
@@ -148,17 +178,16 @@ function empty(words) {
   drawOutlines();
 }
 
+// The recipe of a result; none where it was changed since: its regions say nothing about this result.
 async function loadRecipe(result) {
   const key = `${result.recipe}/${result.fingerprint}`;
   if (key === state.recipeKey) return;
-  state.recipeKey = key;
   state.recipe = null;
-  try {
-    const recipe = await ask("GET", `/api/recipes/${result.recipe}`);
-    // Regions of a recipe that was changed since say nothing about this result.
-    if (recipe.fingerprint.startsWith(result.fingerprint)) state.recipe = recipe;
-  } catch (none) { state.recipeKey = ""; }
-  drawOutlines();
+  state.recipeKey = "";
+  let recipe;
+  try { recipe = await ask("GET", `/api/recipes/${result.recipe}`); } catch (none) { return; }
+  state.recipeKey = key;
+  state.recipe = recipe.fingerprint.startsWith(result.fingerprint) ? recipe : null;
 }
 
 // Shows the maps of a new result.
@@ -168,7 +197,6 @@ export function showPicture(result, visible) {
   const key = `${state.layer}/${result ? result.seq : "none"}`;
   if (key === state.key) return;
   state.key = key;
-  if (result) loadRecipe(result);
   load();
 }
 

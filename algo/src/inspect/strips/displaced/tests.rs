@@ -1,0 +1,88 @@
+//! Blocks of pixels against single ones.
+
+use super::*;
+use crate::simd::Backend;
+use std::vec;
+use std::vec::Vec;
+
+const WIDTH: usize = 150;
+const ROWS: usize = 24;
+
+/// Numbers without a pattern.
+fn scatter(seed: usize) -> i32 {
+    (seed as u32).wrapping_mul(2_654_435_761).rotate_left(13) as i32
+}
+
+#[test]
+fn blocks_have_the_bits_of_one_pixel_after_the_other() {
+    let places = 0..WIDTH * ROWS;
+    let steep = |at: usize| scatter(at) >> if at % 500 < 400 { 14 } else { 8 };
+    let height: Vec<_> = places
+        .clone()
+        .map(|at| Height::from_nm(steep(at)))
+        .collect();
+    let taught: Vec<_> = places
+        .clone()
+        .map(|at| if scatter(at) % 9 == 0 { 0 } else { SQUARE })
+        .collect();
+    let golden = Golden {
+        height: &height,
+        taught: &taught,
+        width: WIDTH,
+    };
+    let mut kinds = [0; 2];
+    for (shift, bend) in [
+        (0.0, 0.0),
+        (0.4, 0.3),
+        (-2.6, 0.02),
+        (1.5, 6.0),
+        (-40.0, 1.0),
+    ] {
+        let node = |at: usize| Node {
+            value: [shift + bend * at as f32, bend - shift * 0.5, 0.01],
+            slope: [0.02, -0.03, 0.001],
+        };
+        let nodes: Vec<_> = (0..WIDTH.div_ceil(SPACING) + 1).map(node).collect();
+        for v in 0..ROWS {
+            let rise: Vec<_> = (0..WIDTH)
+                .map(|u| match scatter(u + v) % 5 {
+                    0 => NO_RISE,
+                    _ => scatter(7 * u + v) >> 12,
+                })
+                .collect();
+            let row = Row {
+                v,
+                rise: &rise,
+                nodes: &nodes,
+                middle: 0.3,
+            };
+            let found = |backend, columns: Range<usize>| {
+                let mut deviation = vec![NO_RISE; WIDTH];
+                let (mut column, mut line) = (vec![0; WIDTH], vec![0; WIDTH]);
+                let mut wild = false;
+                let out = Found {
+                    deviation: &mut deviation,
+                    column: &mut column,
+                    row: &mut line,
+                    wild: &mut wild,
+                };
+                find_row(backend, golden, row, columns, out);
+                (deviation, column, line, wild)
+            };
+            for backend in Backend::available() {
+                let whole = found(backend, 0..WIDTH);
+                let mut wild = false;
+                for u in 0..WIDTH {
+                    // A single pixel has the neighbours of no other.
+                    let one = found(backend, u..u + 1);
+                    assert_eq!(one.0[u], whole.0[u], "{shift} {bend}, {v} {u}");
+                    assert_eq!((one.1[u], one.2[u]), (whole.1[u], whole.2[u]));
+                    wild |= one.3;
+                    kinds[usize::from(whole.0[u] == NO_RISE)] += 1;
+                }
+                assert_eq!(wild, whole.3);
+            }
+        }
+    }
+    assert!(kinds.iter().all(|count| *count > 1000), "{kinds:?}");
+}

@@ -1,0 +1,70 @@
+//! What a plan takes, and what making one takes for a while: counted, so that no other thread and no system blurs it.
+
+use super::{TIMEOUT, naming};
+use allocation_counter::measure;
+use appliance::calibration::Calibration;
+use appliance::plan::Plan;
+use appliance::recipe::teach::teach;
+use appliance::recipe::{Recipe, archive};
+use hal::sim::Scenario;
+
+const PIXELS: usize = 320 * 240;
+/// Samples of the phase function, in f64.
+const FUNCTION: usize = 512 * 384 * 8;
+/// A plan's bytes per pixel: Φ₀ and z₀ 8, its cubic 9, what is taught 2.
+const PLAN: usize = 19;
+/// With two shorter sequences in front: each has what is taught for its noise, and a map of its own.
+const LONG_PLAN: usize = PLAN + 2 * (2 + 4);
+/// At most so many bytes per pixel while it is made: 29 of the recipe's file without the 4 of the curvature, 8 of the surface
+/// and, of each sequence, 2 and 4; another 4 while a map is made.
+const MAKING: usize = 25 + 8 + 3 * 2 + 2 * 4 + 4;
+/// And the phase function, once as it was read and once as it is used.
+const FUNCTIONS: usize = 2;
+/// Whatever does not grow with the frame: strips of rows, cells and spans of regions, the manifest.
+const BESIDE: usize = 1 << 20;
+
+#[test]
+fn a_plan_keeps_nothing_twice_and_making_it_takes_little_more_than_its_file() {
+    let scenario = Scenario::from_toml(
+        "sub_rays = 1\n[rig.camera]\nwidth = 320\nheight = 240\n[rig.projector]\nwidth = 512\nheight = 384\n",
+        "small",
+    )
+    .unwrap();
+    let (mut head, stage) = hal::sim::head(&scenario).unwrap();
+    let calibration = Calibration::of_stage(&stage);
+    let taught = teach(&mut head, &calibration, &naming(), TIMEOUT, &|_, _| ()).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .unwrap();
+    let last = taught.recipe.file.sequences.len() - 1;
+    for (production, each) in [(last, PLAN), (0, LONG_PLAN)] {
+        let mut file = taught.recipe.file.clone();
+        file.production = production;
+        let (bytes, _) = archive::pack(&file, &taught.recipe.arrays).unwrap();
+        let (plan, taken) = pool.install(|| {
+            let mut plan = None;
+            let taken = measure(|| {
+                let recipe = Recipe::from_bytes(&bytes).unwrap();
+                plan = Some(Plan::new(recipe, &calibration, true).unwrap());
+            });
+            (plan.unwrap(), taken)
+        });
+        println!(
+            "a file of {} bytes, a plan of {} steps with maps of {}: {} bytes kept, {} at most while it was made",
+            bytes.len(),
+            plan.steps(),
+            plan.bytes(),
+            taken.bytes_current,
+            taken.bytes_max
+        );
+        assert_eq!(plan.bytes(), FUNCTION + each * PIXELS);
+        let kept = usize::try_from(taken.bytes_current).unwrap();
+        assert!(
+            kept >= plan.bytes() && kept <= plan.bytes() + BESIDE,
+            "{taken:?}"
+        );
+        let most = FUNCTIONS * FUNCTION + MAKING * PIXELS + BESIDE;
+        assert!(taken.bytes_max as usize <= most, "{taken:?}, not {most}");
+    }
+}
