@@ -42,6 +42,27 @@ impl Opened {
 /// # Errors
 /// If a file of the head is missing or wrong, or a device is not there.
 pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
+    let opened = open_as_it_is(config, progress)?;
+    let encoding = opened.head.encoding();
+    if !encoding.exact {
+        let message = format!(
+            "open the camera: it grants {} only, which is compressed, and no phase can be trusted that is made of it: \
+             ask for a raw format; `fringed doctor` says more",
+            encoding.name
+        );
+        return Err(Failure::new(Exit::Unavailable, message));
+    }
+    Ok(opened)
+}
+
+/// Opens the configured head even if nothing can be measured with it. `progress` is told the share done, from any thread.
+///
+/// # Errors
+/// If a file of the head is missing or wrong, or a device is not there.
+pub fn open_as_it_is(
+    config: &HeadConfig,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<Opened, Failure> {
     match config.backend {
         Backend::Sim => simulated(config.scenario.as_deref(), progress),
         Backend::Replay => replayed(&config.recordings),

@@ -12,6 +12,7 @@ mod adapt;
 mod bench;
 mod config;
 mod demo;
+mod doctor;
 mod experiment;
 mod history;
 mod measure;
@@ -77,6 +78,8 @@ enum Command {
     Measure(measure::Measure),
     /// Make a pattern for the part of a preliminary recording.
     Adapt(adapt::Adapt),
+    /// Examine the head step by step.
+    Doctor(doctor::Doctor),
     /// Record a sequence from the configured head.
     Record(record::Record),
     /// Repeat the paper's experiments on the simulated head.
@@ -129,6 +132,7 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Command::Demo(command) => command.run(&common),
         Command::Measure(command) => command.run(&common),
         Command::Adapt(command) => command.run(&common),
+        Command::Doctor(command) => command.run(&common),
         Command::Record(command) => command.run(&common),
         Command::Experiment(command) => command.run(&common),
         Command::Bench(command) => command.run(&common),

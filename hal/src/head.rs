@@ -8,6 +8,7 @@ mod identity;
 mod pacing;
 mod sequencer;
 mod timing;
+mod watch;
 
 use std::sync::mpsc;
 use std::time::Duration;
@@ -22,6 +23,7 @@ use crate::units::Timestamp;
 use pacing::Pacing;
 use sequencer::{Act, Sequencer};
 pub use timing::{Stamp, TOLERANCE, Timing};
+pub use watch::{Seen, Showing, Watched};
 
 /// A head of any back-end.
 pub type DynHead = Head<Box<dyn Camera>, Box<dyn Projector>, Box<dyn Trigger>, Box<dyn Clock>>;

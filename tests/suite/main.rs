@@ -6,6 +6,7 @@ mod bench;
 mod cases;
 mod changeover;
 mod cli;
+mod doctor;
 mod experiment;
 mod formats;
 mod fuzz;

@@ -72,7 +72,7 @@ impl Sensor {
         }
         let jitter = Duration::from_micros(faults.trigger_jitter_us);
         let start = now + dice.up_to(Kind::TriggerJitter, self.count, 1.0, jitter);
-        self.busy_until = start + (mechanics.exposure + mechanics.readout);
+        self.busy_until = now + mechanics.camera().period;
         self.expose(start, mechanics, dice);
     }
 

@@ -1,0 +1,88 @@
+//! `fringed doctor`: examines the head step by step, with a verdict and a remedy for each.
+
+use super::Common;
+use crate::backend;
+use crate::config::Backend;
+use crate::doctor::{Step, Verdict, examine};
+use crate::error::{Exit, Failure};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// Examine the head: devices, format, mode, flips, trigger, light, exposure, delay, contrast, grey response.
+#[derive(Debug, clap::Args)]
+pub struct Doctor {
+    /// Examine a simulated head of this scenario instead of the configured head.
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+}
+
+impl Doctor {
+    /// Opens the head, examines it and prints what was found.
+    ///
+    /// # Errors
+    /// If the head cannot be opened, or a step failed (69).
+    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+        let mut config = common.configuration()?;
+        if let Some(scenario) = &self.scenario {
+            (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
+        }
+        if config.head.backend == Backend::Replay {
+            return Err(Failure::new(
+                Exit::Usage,
+                "doctor: a recording cannot be examined: configure another head or name a scenario with --scenario",
+            ));
+        }
+        let progress = common.progress();
+        let told = |share: f64| progress.tell(0.5 * share, "working out the light of the scene");
+        let pool = super::pool(config.threads)?;
+        let mut opened = pool.install(|| backend::open_as_it_is(&config.head, &told))?;
+        let steps = pool.install(|| {
+            examine(&mut opened.head, &opened.calibration, &|share, name| {
+                progress.tell(0.5 + 0.5 * share, name);
+            })
+        });
+        progress.clear();
+        let failed: Vec<&str> = failed(&steps).collect();
+        if common.json {
+            say!("{:#}", as_json(&steps));
+        } else if !common.quiet {
+            say!("{}", table(&steps).trim_end());
+        }
+        if failed.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::new(
+            Exit::Unavailable,
+            format!("doctor: the head is not well: {}", failed.join(", ")),
+        ))
+    }
+}
+
+fn failed(steps: &[Step]) -> impl Iterator<Item = &str> {
+    let failed = steps.iter().filter(|step| step.verdict == Verdict::Fail);
+    failed.map(|step| step.name)
+}
+
+fn as_json(steps: &[Step]) -> Value {
+    let rows: Vec<Value> = steps
+        .iter()
+        .map(|step| {
+            json!({
+                "step": step.name, "verdict": step.verdict.word(), "found": step.found,
+                "remedy": step.remedy, "measured": step.measured,
+            })
+        })
+        .collect();
+    json!({ "healthy": failed(steps).next().is_none(), "steps": rows })
+}
+
+fn table(steps: &[Step]) -> String {
+    let mut lines = String::new();
+    for step in steps {
+        lines += &format!("{:9} {:8} {}\n", step.name, step.verdict.word(), step.found);
+        if !step.remedy.is_empty() {
+            lines += &format!("{:18} → {}\n", "", step.remedy);
+        }
+    }
+    lines
+}

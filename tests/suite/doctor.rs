@@ -1,0 +1,162 @@
+//! `fringed doctor` on the simulated head: a well head passes, each single fault is named and nothing else.
+
+use serde_json::Value;
+use std::path::Path;
+use tests::program::{Program, Run};
+
+/// A head whose camera sees the projector's pixels one by one, as the default one does, on a small part of its picture.
+const HEAD: &str = "sub_rays = 2
+part = { kind = \"plane\" }
+[rig.camera]
+width = 128
+height = 96
+fov_deg = [5.0, 3.75]
+";
+
+fn doctor(folder: &Path, scenario: &str) -> Run {
+    let path = folder.join("scenario.toml");
+    std::fs::write(&path, scenario).unwrap();
+    Program::at(env!("CARGO_BIN_EXE_fringed-under-test")).run(&[
+        "doctor",
+        "--quiet",
+        "--json",
+        "--scenario",
+        path.to_str().unwrap(),
+    ])
+}
+
+/// The names of the steps with this verdict.
+fn with(report: &Value, verdict: &str) -> Vec<String> {
+    let steps = report["steps"].as_array().unwrap().iter();
+    let steps = steps.filter(|step| step["verdict"] == verdict);
+    steps
+        .map(|step| step["step"].as_str().unwrap().to_owned())
+        .collect()
+}
+
+fn step<'a>(report: &'a Value, name: &str) -> &'a Value {
+    let mut steps = report["steps"].as_array().unwrap().iter();
+    steps.find(|step| step["step"] == name).unwrap()
+}
+
+#[test]
+fn a_head_that_is_well_passes_every_step_whatever_its_timing() {
+    let folder = tempfile::tempdir().unwrap();
+    for timing in [
+        "",
+        "[timing]\nflip_to_light_us = 16667\nexposure_refreshes = 1.0\nreadout_us = 16000\nstamp = \"exposure_end\"\n",
+        "[timing]\nflip_to_light_us = 41234\nexposure_refreshes = 1.0\nreadout_us = 11000\ncamera_period_us = 33333\ncamera_phase_us = 5000\n",
+        "[faults]\nflip_jitter_us = 50\nstamp_jitter_us = 50\ntrigger_jitter_us = 50\n",
+    ] {
+        let run = doctor(folder.path(), &format!("{HEAD}{timing}")).succeeded();
+        let report: Value = serde_json::from_str(&run.stdout).unwrap();
+        assert_eq!(report["healthy"], true, "{report:#}");
+        assert_eq!(with(&report, "pass").len(), 10, "{report:#}");
+    }
+}
+
+#[test]
+fn each_single_fault_is_named_with_a_remedy_and_nothing_else_is() {
+    let folder = tempfile::tempdir().unwrap();
+    for (fault, named, word) in [
+        ("[light]\ndiffuse = 0.0\n", "light", "lamp"),
+        (
+            "[timing]\nflip_to_light_us = 33334\ncalibrated_flip_to_light_us = 16667\n",
+            "delay",
+            "1.0 refreshes",
+        ),
+        (
+            "[timing]\nflip_to_light_us = 16667\ncalibrated_flip_to_light_us = 33334\n",
+            "delay",
+            "-1.0 refreshes",
+        ),
+        ("[optics]\ngamma = 2.2\n", "response", "gamma"),
+        ("[optics]\nprojector_blur_px = 4.0\n", "contrast", "focus"),
+        ("[optics]\ngain = 3.0\n", "exposure", "gain"),
+        ("[optics]\ngain = 0.15\n", "exposure", "aperture"),
+        ("[faults]\nwire_open = true\n", "trigger", "wire"),
+        (
+            "[faults]\nlost_trigger = 0.3\nseed = 3\n",
+            "trigger",
+            "lost",
+        ),
+        ("[faults]\ncompressed = true\n", "format", "R16"),
+        (
+            "[faults]\nlate_flip = 0.2\nlate_refreshes = 1\n",
+            "cadence",
+            "load",
+        ),
+        (
+            "[timing]\nexposure_refreshes = 1.5\n",
+            "mode",
+            "whole refreshes",
+        ),
+    ] {
+        let run = doctor(folder.path(), &format!("{HEAD}{fault}"));
+        assert_eq!(run.code, 69, "{fault}: {}", run.stderr);
+        let report: Value = serde_json::from_str(&run.stdout).unwrap();
+        assert_eq!(with(&report, "fail"), [named], "{fault}: {report:#}");
+        let remedy = step(&report, named)["remedy"].as_str().unwrap();
+        assert!(remedy.contains(word), "{fault}: {remedy}");
+        assert!(run.stderr.contains(named), "{}", run.stderr);
+    }
+}
+
+#[test]
+fn the_doctor_measures_what_it_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let faults = "[optics]\ngamma = 2.2\n[timing]\nflip_to_light_us = 41234\n";
+    let run = doctor(folder.path(), &format!("{HEAD}{faults}"));
+    let report: Value = serde_json::from_str(&run.stdout).unwrap();
+    let number = |name: &str, key: &str| step(&report, name)["measured"][key].as_f64().unwrap();
+    // Within the accuracy that the doctor states.
+    let off = number("delay", "off_ms").max(0.5);
+    assert!(
+        (number("delay", "delay_ms") - 41.234).abs() < off,
+        "{report:#}"
+    );
+    assert!(
+        (number("response", "gamma") - 2.2).abs() < 0.1,
+        "{report:#}"
+    );
+    assert!((number("cadence", "period_ms") - 1000.0 / 60.0).abs() < 0.01);
+}
+
+#[test]
+fn a_compressed_format_is_examined_and_not_measured_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = folder.path().join("scenario.toml");
+    std::fs::write(&scenario, format!("{HEAD}[faults]\ncompressed = true\n")).unwrap();
+    let config = folder.path().join("fringed.toml");
+    std::fs::write(
+        &config,
+        format!("[head]\nbackend = \"sim\"\nscenario = {scenario:?}\n"),
+    )
+    .unwrap();
+    let run = Program::at(env!("CARGO_BIN_EXE_fringed-under-test")).run(&[
+        "record",
+        folder.path().join("out").to_str().unwrap(),
+        "--config",
+        config.to_str().unwrap(),
+    ]);
+    assert_eq!(run.code, 69, "{}", run.stderr);
+    assert!(run.stderr.contains("compressed"), "{}", run.stderr);
+}
+
+#[test]
+fn a_recording_cannot_be_examined() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("fringed.toml");
+    std::fs::write(
+        &config,
+        "[head]\nbackend = \"replay\"\nrecordings = [\"somewhere\"]\n",
+    )
+    .unwrap();
+    let run = Program::at(env!("CARGO_BIN_EXE_fringed-under-test")).run(&[
+        "doctor",
+        "--config",
+        config.to_str().unwrap(),
+    ]);
+    assert_eq!(run.code, 64, "{}", run.stderr);
+    assert!(run.stderr.contains("--scenario"), "{}", run.stderr);
+}
