@@ -23,7 +23,7 @@ use crate::station::{
 use crate::survey::Survey;
 use crate::tally::Tally;
 use crate::worker::{Aborts, Order, Worker};
-use crate::{backend, clock, modbus, web};
+use crate::{backend, clock, modbus, socket, web};
 use hal::sim::Stage;
 use std::net::SocketAddr;
 use std::sync::{Arc, mpsc};
@@ -270,12 +270,12 @@ fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> Result<JoinHandle<(
 }
 
 async fn listen(config: &Config) -> Result<(TcpListener, TcpListener), Failure> {
-    let plc = modbus::bind(config.modbus.listen)
-        .await
-        .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
-    let page = web::bind(config.http.listen)
-        .await
-        .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+    let bind = async |what, address| {
+        let bound = socket::bind(what, address).await;
+        bound.map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))
+    };
+    let plc = bind("Modbus TCP", config.modbus.listen).await?;
+    let page = bind("the page", config.http.listen).await?;
     Ok((plc, page))
 }
 

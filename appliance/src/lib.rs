@@ -25,6 +25,7 @@ pub mod recipe;
 pub mod rig;
 pub mod seam;
 pub mod shelf;
+pub mod socket;
 pub mod state;
 pub mod station;
 pub mod survey;

@@ -1,6 +1,6 @@
 // The daemon under test: the real program on a small simulated head, with a state folder of its own.
 import { spawn } from "node:child_process";
-import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 
@@ -30,7 +30,12 @@ export class Place {
     writeFileSync(join(this.folder, `${name}.toml`), `state = "state"\n[head]\nscenario = "${name}-part.toml"\n`);
   }
 
-  remove() { rmSync(this.folder, { recursive: true, force: true }); }
+  remove() {
+    // A daemon that was killed leaves its mark of the last SEQ in shared memory.
+    const serial = join(this.folder, "state", "serial");
+    if (existsSync(serial)) rmSync(`/dev/shm/fringed-${readFileSync(serial, "utf8").trim()}`, { force: true });
+    rmSync(this.folder, { recursive: true, force: true });
+  }
 }
 
 export class Daemon {

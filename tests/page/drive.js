@@ -93,7 +93,7 @@ try {
     assert.ok(await page.locator("#gauge-rows .trend path.line").count() >= 2);
     assert.match(await page.textContent("#total"), /\d+ m?s/);
     const stages = await page.locator("#stages li").allTextContents();
-    assert.deepEqual(stages.map((stage) => stage.replace(/[\d.]+ m?s$/, "")), ["waiting", "exposure", "alignment", "phase, height, gauges", "judgement", "hand-over"]);
+    assert.deepEqual(stages.map((stage) => stage.replace(/[\d.]+ [mµ]?s$/, "")), ["waiting", "exposure", "alignment", "phase, height, gauges", "judgement", "hand-over"]);
     for (const id of ["#processing", "#processor-time"]) assert.match(await page.textContent(id), /\d+ m?s/);
   });
 
@@ -122,7 +122,9 @@ try {
     await trigger();
     await verdict("FAIL");
     assert.match(await page.textContent("#sentence"), /deviation .* mm too low/);
-    assert.ok(await page.locator("#outlines .fail").count() >= 1, "the failing region is outlined");
+    // The region of the gauge that failed, and the worst place in it.
+    await page.waitForSelector("#outlines polygon.fail", { state: "attached" });
+    await page.waitForSelector("#outlines circle.most", { state: "attached" });
   });
 
   await step("a region is dragged on the picture", async () => {

@@ -1,7 +1,7 @@
 //! Gauges, alignment and the choice of sequence on parts in front of the simulated head.
 
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
-use super::station_plc::{Daemon, Place, Plc, READY, SMALL_HEAD};
+use super::station_plc::{Daemon, Place, Plc, READY, SMALL_HEAD, long};
 use algo::inspect::{Findings, Production};
 use algo::simd::Backend;
 use appliance::plan::Plan;
@@ -429,4 +429,8 @@ fn a_part_that_the_short_sequence_cannot_vouch_for_is_measured_again_within_the_
     // Full sequence, stepped up, simulated head; the part is found to lie outside.
     assert_eq!(words[31] & 0b11_1110, 0b11_1000, "{:b}", words[31]);
     assert_eq!(words[8], Verdict::Invalid.number());
+    // What was judged before the longer sequence is processing too, though EXPOSURE_DONE came after it.
+    let processing = long(&plc.read(610, 2).unwrap(), 0);
+    let after_exposure = long(&words, 20) - long(&words, 18);
+    assert!(processing > after_exposure, "{processing} {after_exposure}");
 }

@@ -65,11 +65,20 @@ impl Seqs {
         })
     }
 
-    /// Takes a SEQ into use: whether it may be shown. It is reserved on the card, and marked.
+    /// Takes a SEQ into use, and answers whether it is reserved on the card.
     pub fn take(&self, seq: u32) -> bool {
-        let run = self.run;
-        let marked = |mark: &Arc<Mark>| mark.write(Counted { last: seq, run }).is_ok();
-        self.left_after(seq) >= 0 && self.mark.as_ref().is_none_or(marked)
+        // Also where it is not reserved: the station shows that result and takes no further trigger.
+        let counted = Counted {
+            last: seq,
+            run: self.run,
+        };
+        if let Some(mark) = &self.mark
+            && mark.write(counted).is_err()
+        {
+            // None is better than an old one.
+            mark.remove();
+        }
+        self.left_after(seq) >= 0
     }
 
     /// Numbers left behind a SEQ; negative where it is not reserved. Numbers start anew after 2³² − 1.
@@ -148,6 +157,10 @@ mod tests {
         let own = mark(folder.path(), &state);
         let seqs = Seqs::reserve(state.counter(), own, 9, next).unwrap();
         assert!(seqs.take(next + AHEAD - 1) && !seqs.take(next + AHEAD));
+        // What was shown without being reserved does not come back either.
+        let marked = mark(folder.path(), &state).and_then(|mark| mark.read());
+        let after = next_after(state.counted().unwrap(), marked);
+        assert_eq!(after, next + AHEAD + 1);
         seqs.settle(next).unwrap();
         let marked = mark(folder.path(), &state).and_then(|mark| mark.read());
         assert_eq!(next_after(state.counted().unwrap(), marked), next + 1);

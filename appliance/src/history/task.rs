@@ -164,8 +164,7 @@ impl History {
         self.keeper.keep(part);
     }
 
-    /// Takes a SEQ into use: whether it is stored as used, so that its result may be shown. If not, the card is asked once
-    /// more.
+    /// Takes a SEQ into use, and answers whether it is stored as used. If not, the card is asked once more.
     pub fn take(&self, seq: u32) -> bool {
         let taken = self.seqs.take(seq);
         if !taken {

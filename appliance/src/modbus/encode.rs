@@ -160,10 +160,7 @@ fn status(words: &mut Words, snapshot: &Snapshot) {
     words.u16(a::ERROR_CODE, snapshot.error_code);
     words.u16(a::WARNING, snapshot.warnings);
     words.u16(a::STATE, snapshot.state);
-    words.u16(
-        a::ACTIVE_RECIPE,
-        snapshot.recipe.as_ref().map_or(0, |recipe| recipe.number),
-    );
+    words.u16(a::ACTIVE_RECIPE, snapshot.active().unwrap_or(0));
     words.u32(
         a::RECIPE_CRC32,
         snapshot.recipe.as_ref().map_or(0, |recipe| recipe.crc),

@@ -35,4 +35,4 @@ pub use live::live;
 pub use places::Clients;
 pub use refusals::Refusals;
 pub use render::{registers_csv, registers_json};
-pub use server::{CONNECTIONS, ModbusError, Options, bind, serve};
+pub use server::{CONNECTIONS, Options, serve};

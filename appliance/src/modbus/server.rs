@@ -1,13 +1,11 @@
 //! The server: connections, their number and their time, on top of `tokio-modbus`.
 
 use std::future::Future;
-use std::io;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Mutex;
 use std::time::Duration;
 
 use ipnet::IpNet;
-use thiserror::Error;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_modbus::server::tcp::Server;
 
@@ -64,51 +62,6 @@ impl Default for Options {
             frame: Duration::from_secs(10),
         }
     }
-}
-
-/// Why there is no Modbus server.
-#[derive(Debug, Error)]
-pub enum ModbusError {
-    /// Something else listens there.
-    #[error(
-        "could not listen for Modbus TCP on {address}: the port is in use; end the other program or choose another port"
-    )]
-    InUse {
-        /// What was attempted.
-        address: SocketAddr,
-    },
-    /// Ports below 1024 belong to the system.
-    #[error(
-        "could not listen for Modbus TCP on {address}: not permitted; choose a port from 1024 on or grant CAP_NET_BIND_SERVICE"
-    )]
-    NotPermitted {
-        /// What was attempted.
-        address: SocketAddr,
-    },
-    /// Anything else.
-    #[error(
-        "could not listen for Modbus TCP on {address}: {source}; check that the address belongs to this machine"
-    )]
-    Bind {
-        /// What was attempted.
-        address: SocketAddr,
-        /// What the system said.
-        source: io::Error,
-    },
-}
-
-/// Opens the socket; the listener's own address tells the port if 0 was asked for.
-///
-/// # Errors
-/// The address is in use, not permitted, or not of this machine.
-pub async fn bind(address: SocketAddr) -> Result<TcpListener, ModbusError> {
-    TcpListener::bind(address)
-        .await
-        .map_err(|source| match source.kind() {
-            io::ErrorKind::AddrInUse => ModbusError::InUse { address },
-            io::ErrorKind::PermissionDenied => ModbusError::NotPermitted { address },
-            _ => ModbusError::Bind { address, source },
-        })
 }
 
 /// Whether one of the networks holds an address. An IPv4 address that comes through an IPv6 socket is an IPv4 address.

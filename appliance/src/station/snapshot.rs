@@ -160,6 +160,11 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
+    /// ACTIVE_RECIPE, if there is one.
+    pub fn active(&self) -> Option<u16> {
+        self.recipe.as_ref().map(|recipe| recipe.number)
+    }
+
     /// Whether a STATUS bit is set.
     pub fn is(&self, bit: u16) -> bool {
         self.status & bit != 0

@@ -113,12 +113,7 @@ pub(super) async fn recording(
 
 /// The last values of each gauge of the active recipe.
 pub(super) async fn trends(State(site): State<Site>) -> Result<Json<Value>, Problem> {
-    let active = site
-        .station
-        .snapshot()
-        .recipe
-        .as_ref()
-        .map(|recipe| recipe.number);
+    let active = site.station.snapshot().active();
     let recipe = active.ok_or_else(|| Problem::missing("no recipe is active: load one"))?;
     let read = site.aside(move |site| {
         let gauges = site.history.trends(recipe, TREND)?;

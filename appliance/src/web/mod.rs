@@ -28,5 +28,5 @@ mod sessions;
 #[cfg(test)]
 mod tests;
 
-pub use server::{WebError, bind, serve};
+pub use server::serve;
 pub use site::{Parts, Site};

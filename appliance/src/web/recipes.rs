@@ -104,12 +104,7 @@ pub(super) async fn edit(
     let wanted: Edit = body::json(request.into_body()).await?;
     let edited = site.change(move |site| Ok(edit::edit(&site.recipes, number, wanted)?));
     let fingerprint = edited.await?;
-    let active = site
-        .station
-        .snapshot()
-        .recipe
-        .as_ref()
-        .map(|recipe| recipe.number);
+    let active = site.station.snapshot().active();
     let loading = active == Some(number) && orders::begin_load(&site, number).is_ok();
     Ok(Json(
         json!({ "fingerprint": fingerprint, "loading": loading }),

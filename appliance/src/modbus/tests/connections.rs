@@ -100,18 +100,6 @@ async fn the_connection_over_the_limit_is_closed_and_a_freed_place_is_taken_agai
 }
 
 #[tokio::test]
-async fn a_port_in_use_is_an_error_that_names_the_address_and_the_remedy() {
-    let plant = Plant::new().await;
-    let error = bind(plant.address).await.unwrap_err();
-    assert!(matches!(error, ModbusError::InUse { .. }));
-    let words = error.to_string();
-    assert!(
-        words.contains(&plant.address.to_string()) && words.contains("choose another port"),
-        "{words}"
-    );
-}
-
-#[tokio::test]
 async fn who_may_not_write_reads_everything_and_is_refused_with_exception_1_and_a_line_in_the_log()
 {
     let options = Options {

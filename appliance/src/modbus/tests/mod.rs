@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
-use tokio::net::TcpStream;
+use tokio::net::{TcpListener, TcpStream};
 use tokio_modbus::ExceptionCode as Exception;
 use tokio_modbus::client::{Context, Reader, Writer, tcp};
 use tokio_modbus::slave::Slave;
@@ -67,7 +67,7 @@ impl Plant {
             let log = Arc::clone(&log);
             Refusals::new(move |line: &str| log.lock().unwrap().push(line.to_owned()))
         };
-        let listener = bind("127.0.0.1:0".parse().unwrap()).await.unwrap();
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
         tokio::spawn(serve(
             listener,

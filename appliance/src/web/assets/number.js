@@ -3,6 +3,7 @@ const MINUS = "\u2212";
 const THIN = "\u202f";
 
 export function milliseconds(us) {
+  if (us < 100) return `${us} µs`;
   const ms = us / 1000;
   return ms >= 1000 ? `${(ms / 1000).toFixed(2)} s` : ms >= 10 ? `${ms.toFixed(0)} ms` : `${ms.toFixed(1)} ms`;
 }

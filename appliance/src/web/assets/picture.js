@@ -146,12 +146,10 @@ async function load() {
   if (!result || !result.valid_points) { empty(result ? "no height was measured" : "no picture yet"); return; }
   const layer = state.layer;
   let loaded;
-  try { loaded = await map(`/api/picture/${layer}?seq=${result.seq}`); } catch (error) {
+  try { [loaded] = await Promise.all([map(`/api/picture/${layer}?seq=${result.seq}`), loadRecipe(result)]); } catch (error) {
     if (turn === state.asked) empty(error.message);
     return;
   }
-  if (turn !== state.asked) return;
-  await loadRecipe(result);
   if (turn !== state.asked) return;
   let deviation = null;
   if (deviating().length) {
@@ -180,12 +178,15 @@ function empty(words) {
 
 // The recipe of a result; none where it was changed since: its regions say nothing about this result.
 async function loadRecipe(result) {
-  const key = `${result.recipe}/${result.fingerprint}`;
+  const keyOf = (of) => `${of.recipe}/${of.fingerprint}`;
+  const key = keyOf(result);
   if (key === state.recipeKey) return;
   state.recipe = null;
   state.recipeKey = "";
   let recipe;
   try { recipe = await ask("GET", `/api/recipes/${result.recipe}`); } catch (none) { return; }
+  // Meanwhile there may be a result of another one.
+  if (!state.result || keyOf(state.result) !== key) return;
   state.recipeKey = key;
   state.recipe = recipe.fingerprint.startsWith(result.fingerprint) ? recipe : null;
 }

@@ -163,13 +163,3 @@ async fn the_diagnostic_bundle_holds_no_secret() {
         assert!(!bundle.body.contains(secret));
     }
 }
-
-#[tokio::test]
-async fn a_port_in_use_is_an_error_that_names_the_address_and_the_remedy() {
-    let served = served().await;
-    let words = bind(served.address).await.unwrap_err().to_string();
-    assert!(
-        words.contains(&served.address.to_string()) && words.contains("choose another port"),
-        "{words}"
-    );
-}

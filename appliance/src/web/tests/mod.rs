@@ -12,7 +12,7 @@ use std::time::Instant;
 use serde_json::Value;
 use tempfile::TempDir;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
-use tokio::net::TcpStream;
+use tokio::net::{TcpListener, TcpStream};
 
 use super::*;
 use crate::access::Access;
@@ -58,7 +58,7 @@ async fn served() -> Served {
         configuration: "threads = 0\n".into(),
         hosts: vec!["sensor.local".into()],
     });
-    let listener = bind("127.0.0.1:0".parse().unwrap()).await.unwrap();
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
     tokio::spawn(serve(listener, site.clone(), std::future::pending()));
     Served {
