@@ -48,6 +48,9 @@ pub(crate) trait Lanes: Copy + Debug {
     /// Has what lies some blocks after `at` fetched, where waiting for it would cost. Rows follow one another in memory, so
     /// past the end of one lies the next.
     fn fetch_ahead<T>(self, row: &[T], at: usize);
+    /// Has what the next row holds at the same place fetched, where only some columns are looked at: between the end of one
+    /// row's and the start of the next one's lies what nobody needs. `row` is a whole row.
+    fn fetch_below<T>(self, row: &[T], at: usize);
     /// The same for what is going to be written.
     fn claim_ahead<T>(self, row: &[T], at: usize);
     /// Into the block of `to` that starts at `at`.

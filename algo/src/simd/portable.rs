@@ -87,6 +87,8 @@ impl Lanes for Portable {
     #[inline(always)]
     fn fetch_ahead<T>(self, _row: &[T], _at: usize) {}
     #[inline(always)]
+    fn fetch_below<T>(self, _row: &[T], _at: usize) {}
+    #[inline(always)]
     fn claim_ahead<T>(self, _row: &[T], _at: usize) {}
     #[inline(never)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {

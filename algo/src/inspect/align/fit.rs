@@ -11,7 +11,7 @@
 use super::Spot;
 use super::directions::{Directions, Six};
 use super::motion::Motion;
-use super::normal::{Normal, Weights};
+use super::normal::{Normal, TUKEY, Weights};
 use super::surface::{Facet, GoldenSurface};
 use crate::geometry::Vector;
 use alloc::vec::Vec;
@@ -69,6 +69,8 @@ const SMALL_STEP_MM: f64 = 1e-4;
 /// as a radius of 2 mm leaves its facet by 0.6 µm there.
 const ROUNDS: usize = 8;
 const NEAR_MM: f64 = 0.05;
+/// With a larger share of points that disagree, the motion is doubted.
+const SUSPICIOUS: f64 = 0.05;
 /// From the median of absolute deviations to σ of a normal distribution.
 const MEDIAN_TO_SIGMA: f64 = 1.4826;
 
@@ -117,6 +119,12 @@ pub struct Fitting<'a> {
     pub spots: &'a [Spot],
 }
 
+/// Where a descent ended, and the largest residual of a point that agrees, mm.
+struct Descended {
+    placed: Placed,
+    limit: f64,
+}
+
 /// A solution of the linear problem.
 struct Solved {
     further: [f64; 6],
@@ -127,21 +135,55 @@ struct Solved {
 
 impl Fitting<'_> {
     /// The motion; none if too few points lie on the surface.
+    ///
+    /// Where many points disagree, a bent part may have been taken for a moved one: what then agrees better with a part that
+    /// lies about as it was taught is taken to lie so.
     pub fn fit(&self, samples: &[Sample], room: &mut Room) -> Option<Placed> {
+        let moved = self.descend(Weights::Huber, samples, room)?;
+        if moved.placed.outliers <= SUSPICIOUS {
+            return Some(moved.placed);
+        }
+        let Some(bent) = self.descend(Weights::Tukey, samples, room) else {
+            return Some(moved.placed);
+        };
+        let limit = moved.limit.min(bent.limit);
+        let mut agreeing = |motion: &Motion| {
+            self.linearise(samples, motion, false, &mut room.rows);
+            let agrees = |row: &&Row| libm::fabs(row.residual) < limit;
+            room.rows.iter().filter(agrees).count()
+        };
+        let found = match agreeing(&bent.placed.motion) > agreeing(&moved.placed.motion) {
+            true => bent,
+            false => moved,
+        };
+        Some(found.placed)
+    }
+
+    /// The motion that is found from none at all, beginning with these weights.
+    fn descend(
+        &self,
+        mut weights: Weights,
+        samples: &[Sample],
+        room: &mut Room,
+    ) -> Option<Descended> {
         let mut motion = Motion::none(self.centre);
         for round in 1..=ROUNDS {
             self.linearise(samples, &motion, round == 1, &mut room.rows);
             if room.rows.len() < LEAST_POINTS {
                 return None;
             }
-            let mut solved = solve(Weights::Huber, [0.0; 6], room);
-            let last = round == ROUNDS || is_near(&solved.further);
-            if last {
-                solved = solve(Weights::Tukey, solved.further, room);
+            let mut solved = solve(weights, [0.0; 6], room);
+            if weights == Weights::Huber && (is_near(&solved.further) || 2 * round >= ROUNDS) {
+                weights = Weights::Tukey;
+                solved = solve(weights, solved.further, room);
             }
             motion = self.then(&motion, &solved.further);
-            if round == ROUNDS || last && is_near(&solved.further) {
-                return Some(self.placed(motion, &solved, &room.rows));
+            let found = weights == Weights::Tukey && is_near(&solved.further);
+            if found || round == ROUNDS {
+                return Some(Descended {
+                    placed: self.placed(motion, &solved, &room.rows),
+                    limit: TUKEY * solved.scale,
+                });
             }
         }
         None

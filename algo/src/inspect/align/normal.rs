@@ -5,7 +5,7 @@ use super::fit::Row;
 
 /// Where Huber's weights begin to fall, and where Tukey's are 0, in σ of the residuals.
 const HUBER: f64 = 1.345;
-const TUKEY: f64 = 4.685;
+pub(super) const TUKEY: f64 = 4.685;
 
 /// How much points off the surface weigh.
 #[derive(Clone, Copy, PartialEq)]

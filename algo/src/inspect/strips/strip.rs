@@ -409,7 +409,7 @@ impl Strip {
 }
 
 /// Every so many rows the variances of the heights are summed: their mean needs no more.
-pub const WEIGHED: usize = 4;
+const WEIGHED: usize = 4;
 
 /// Whether the variances of a row are summed.
 fn weighed(v: usize) -> bool {

@@ -158,11 +158,11 @@ fn rise_columns<V: Lanes>(
         let taught = &seen.taught[start..end][..length];
         let mut at = start;
         while at < end {
-            v.fetch_ahead(plan.first, at);
-            v.fetch_ahead(plan.second, at);
-            v.fetch_ahead(plan.third, at);
-            v.fetch_ahead(plan.reach, at);
-            v.fetch_ahead(seen.taught, at);
+            v.fetch_below(plan.first, at);
+            v.fetch_below(plan.second, at);
+            v.fetch_below(plan.third, at);
+            v.fetch_below(plan.reach, at);
+            v.fetch_below(seen.taught, at);
             at += FETCHED;
         }
         let (mut measured, mut compared) = (0_u32, 0_u32);

@@ -4,8 +4,8 @@ use super::BYTES;
 use crate::simd::rows::{block, block_mut};
 use core::arch::x86_64::*;
 
-/// Rows are fetched at least this many samples ahead: some 300 ns of work.
-const AHEAD: usize = 512;
+/// Rows are fetched this many samples ahead: some 500 ns of work.
+pub(super) const AHEAD: usize = 512;
 /// A line of the cache, bytes.
 const LINE: usize = 64;
 
@@ -33,19 +33,16 @@ pub(super) fn store_halves<T>(to: &mut [T], at: usize, low: usize, high: usize, 
     }
 }
 
-/// Hints at the lines of the block below the one at `at`, a row later: there are more rows than the processor follows by
-/// itself, and where only some columns are looked at these are what the next row needs.
+/// Hints at the lines of the block `after` samples behind the one at `at`: there are more rows than the processor follows by
+/// itself.
 #[inline(always)]
-pub(super) fn hint_ahead<T, const HINT: i32>(row: &[T], at: usize) {
+pub(super) fn hint<T, const HINT: i32>(row: &[T], at: usize, after: usize) {
     let lines = BYTES * size_of::<T>() / LINE;
     // Two blocks of bytes are one line.
     if lines == 0 && !(at / BYTES).is_multiple_of(2) {
         return;
     }
-    let ahead = row
-        .as_ptr()
-        .wrapping_add(at + row.len().max(AHEAD))
-        .cast::<i8>();
+    let ahead = row.as_ptr().wrapping_add(at + after).cast::<i8>();
     let mut line = 0;
     while line < lines.max(1) {
         // SAFETY: a hint, which no address makes fail.

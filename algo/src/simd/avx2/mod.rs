@@ -8,7 +8,7 @@ mod memory;
 use super::lanes::{Lanes, Scaled};
 use super::rows::{Four, block, block_mut};
 use core::arch::x86_64::*;
-use memory::{hint_ahead, load_halves, store_halves};
+use memory::{AHEAD, hint, load_halves, store_halves};
 
 /// AVX2 is there: only [`Avx2::detect`] makes one.
 #[derive(Clone, Copy, Debug)]
@@ -69,11 +69,15 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     fn fetch_ahead<T>(self, row: &[T], at: usize) {
-        hint_ahead::<T, _MM_HINT_T0>(row, at);
+        hint::<T, _MM_HINT_T0>(row, at, AHEAD);
+    }
+    #[inline(always)]
+    fn fetch_below<T>(self, row: &[T], at: usize) {
+        hint::<T, _MM_HINT_T0>(row, at, row.len());
     }
     #[inline(always)]
     fn claim_ahead<T>(self, row: &[T], at: usize) {
-        hint_ahead::<T, _MM_HINT_ET0>(row, at);
+        hint::<T, _MM_HINT_ET0>(row, at, AHEAD);
     }
     #[inline(always)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
