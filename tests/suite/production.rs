@@ -324,22 +324,8 @@ fn rms(sigma: &[f32], heights: &[Height], width: usize) -> f64 {
 fn findings_depend_neither_on_strips_nor_on_threads_nor_on_the_back_end() {
     let mut bed = bed(&scenario(Part::SheetMetal(SheetMetal::default())));
     let taught = taught(&mut bed).unwrap();
-    let full = taught.recipe.file.sequences.len() - 1;
-    let moved = Placement {
-        shift_mm: [0.7, -0.4, 0.2],
-        rotation_deg: 0.3,
-        ..Placement::default()
-    };
-    for (sequence, alignment) in [
-        (1, AlignmentKind::None),
-        (full, AlignmentKind::None),
-        (full, AlignmentKind::Rigid),
-    ] {
-        if alignment == AlignmentKind::Rigid {
-            let part = Part::SheetMetal(SheetMetal::default());
-            bed.stage.place(&part, &moved).unwrap();
-        }
-        let (plan, _) = plan_with(&bed, &taught, sequence, alignment);
+    for sequence in [1, taught.recipe.file.sequences.len() - 1] {
+        let (plan, _) = plan(&bed, &taught, sequence);
         let frames = frames(&mut bed, &plan);
         let views: Vec<_> = frames
             .iter()

@@ -1,3 +1,4 @@
 //! Small exact arithmetic.
 
+pub(crate) mod nearest;
 pub mod solve;

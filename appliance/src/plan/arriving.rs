@@ -51,8 +51,8 @@ impl Plan {
         }
     }
 
-    /// The run that all but the finest level of have arrived, with what they said; the room goes back to it.
-    pub(super) fn arrived<R>(
+    /// Inspects with what the levels said that have arrived, if these are all but the finest; their room goes back to its run.
+    pub(super) fn with_arrived<R>(
         &self,
         arriving: Option<Arriving>,
         frames: &[Frame],

@@ -273,7 +273,7 @@ impl Plan {
             ..Inspection::default()
         };
         let mut laps = Laps::since(exposed);
-        let found = self.arrived(arriving, frames, |finest| {
+        let found = self.with_arrived(arriving, frames, |finest| {
             self.run(run, frames, finest, None, &mut laps)
         });
         match found {

@@ -5,8 +5,8 @@
 //! G. Medioni, 1992). About one motion the problem is linear, and is solved by reweighting: 6 × 6 normal equations along the
 //! directions that the shape determines. Only where the solution leads far from there are residuals and lifts worked out
 //! anew; about no motion at all they are known beforehand. Weights are Huber's, then Tukey's (c = 1.345 and 4.685: 95 %
-//! efficient for normal errors; P. J. Huber, E. M. Ronchetti, *Robust Statistics*): a dent does not pull the part. Sums run
-//! over the points in their order.
+//! efficient for normal errors; P. J. Huber, E. M. Ronchetti, *Robust Statistics*): a dent does not pull the part, and a bend
+//! is told from a motion by how many points agree with either. Sums run over the points in their order.
 
 use super::Spot;
 use super::directions::{Directions, Six};

@@ -4,6 +4,7 @@
 //! so that the bits are the same everywhere.
 
 use super::fit::UNIT_NM;
+use crate::math::nearest::whole;
 use crate::phase::Trust;
 use crate::simd::{Lanes, back_end_entry};
 use crate::units::{AbsolutePhase, Height, Modulation};
@@ -27,8 +28,6 @@ const MAX_VARIANCE: f32 = 4_000_000.0;
 const BLOCK: usize = 128;
 /// Pixels that one hint fetches.
 const FETCHED: usize = 32;
-/// 1.5 · 2²³: added to a single below 2²², it leaves the nearest whole number in the low bits.
-const ROUNDER: f32 = 12_582_912.0;
 
 /// A row of the plan.
 #[derive(Clone, Copy, Debug)]
@@ -173,7 +172,7 @@ fn rise_columns<V: Lanes>(
             let inside = known & (delta < far) & (delta > -far);
             let y = delta as f32 * scale;
             let (b, c) = (coefficient(second[i]), coefficient(third[i]));
-            let nm = rounded(y * (first[i] + y * (b + y * c)));
+            let nm = whole(y * (first[i] + y * (b + y * c)));
             let compare = inside & (taught[i] >= COMPARED);
             rises[i] = if inside { nm } else { UNKNOWN };
             deviations[i] = if compare { nm } else { UNKNOWN };
@@ -235,7 +234,7 @@ fn weigh_columns<V: Lanes>(
             } else {
                 MAX_VARIANCE
             };
-            let variance = rounded(variance) as u32;
+            let variance = whole(variance) as u32;
             compared += u32::from(compare);
             variances = variances.wrapping_add(if compare { variance } else { 0 });
             let sigma = u32::from(taught[i] & SIGMA);
@@ -265,9 +264,3 @@ fn coefficient(units: i16) -> f32 {
 
 /// "No height" among rises.
 pub(crate) const UNKNOWN: i32 = Height::UNKNOWN.nm();
-
-/// The nearest whole number, ties to even; |x| below 2²².
-#[inline(always)]
-fn rounded(x: f32) -> i32 {
-    ((x + ROUNDER).to_bits() as i32).wrapping_sub(ROUNDER.to_bits() as i32)
-}

@@ -6,6 +6,7 @@
 
 use super::squares::MAX_TAME;
 use super::stance::{Node, SPACING};
+use crate::math::nearest::{nearest, whole};
 use crate::pipeline::{NO_RISE, SQUARE};
 use crate::simd::{Lanes, back_end_entry};
 use crate::units::Height;
@@ -44,8 +45,6 @@ pub(super) struct Found<'a> {
 const BLOCK: usize = 32;
 /// No displacement reaches so many pixels: others are none.
 const MAX_AWAY: f32 = 4096.0;
-/// 1.5 · 2²³: added to a single below 2²², it leaves the nearest whole number in the low bits.
-const ROUNDER: f32 = 12_582_912.0;
 
 back_end_entry! {
     /// The spots and deviations of columns of a row.
@@ -91,7 +90,7 @@ impl Displaced {
     fn split(&mut self) {
         for i in 0..BLOCK {
             let pixels = self.share[i];
-            let nearest = (pixels + ROUNDER) - ROUNDER;
+            let nearest = nearest(pixels);
             let below = if nearest > pixels {
                 nearest - 1.0
             } else {
@@ -378,12 +377,6 @@ fn mix(a: f32, b: f32, share: f32) -> f32 {
 #[inline(always)]
 fn is_near(pixels: f32) -> bool {
     (pixels > -MAX_AWAY) & (pixels < MAX_AWAY)
-}
-
-/// The nearest whole number of a single below 2²².
-#[inline(always)]
-fn whole(x: f32) -> i32 {
-    ((x + ROUNDER).to_bits() as i32).wrapping_sub(ROUNDER.to_bits() as i32)
 }
 
 #[cfg(test)]
