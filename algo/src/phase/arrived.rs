@@ -1,7 +1,7 @@
 //! What the levels of a measurement say that were decoded when they arrived, while the next was being exposed.
 //!
 //! Geometric levels climb: of each pixel only what the finest level so far says of the next is kept, in place. Levels about a known map
-//! need one another at the end: wrapped phase, modulation and doubts of each are kept.
+//! need one another at the end: wrapped phase and doubts of each are kept.
 
 use super::level::Demodulated;
 use crate::pattern::MAX_LEVELS;
@@ -46,8 +46,6 @@ pub(super) const NO_DOUBT: u8 = u8::MAX;
 pub(crate) struct Wrapped {
     /// φ in 1/65536 turn.
     pub phase: Vec<u16>,
-    /// Modulation in units of full scale / 32767.5; 0 where weak.
-    pub modulation: Vec<u16>,
     /// [`WEAK`] and [`SATURATED`].
     pub doubts: Vec<u8>,
 }
@@ -78,7 +76,6 @@ impl Arrived {
         let pixels = width * height;
         let level = Wrapped {
             phase: vec![0; pixels],
-            modulation: vec![0; pixels],
             doubts: vec![0; pixels],
         };
         Self {
@@ -148,7 +145,7 @@ impl Arrived {
                     width: self.width,
                 };
                 let planes: PlanesMut<'_> = match rest.first_mut() {
-                    Some(next) => (&mut next.phase, &mut next.modulation, &mut next.doubts),
+                    Some(next) => (&mut next.phase, &mut [], &mut next.doubts),
                     None => (&mut [], &mut [], &mut []),
                 };
                 (level, planes)
@@ -160,9 +157,11 @@ impl Arrived {
     pub(crate) fn rows(&mut self) -> impl Iterator<Item = ArrivingRow<'_>> {
         let width = self.width.max(1);
         let (level, (first, second, third)) = self.arriving();
-        let words = first.chunks_mut(width).zip(second.chunks_mut(width));
-        let rows = words.zip(third.chunks_mut(width)).enumerate();
-        rows.map(move |(v, ((first, second), third))| level.row(v, (first, second, third)))
+        let mut seconds = second.chunks_mut(width);
+        let rows = first.chunks_mut(width).zip(third.chunks_mut(width));
+        rows.enumerate().map(move |(v, (first, third))| {
+            level.row(v, (first, seconds.next().unwrap_or_default(), third))
+        })
     }
 }
 
@@ -171,13 +170,12 @@ impl Wrapped {
         let row = v * width..(v + 1) * width;
         WrappedRow {
             phase: &self.phase[row.clone()],
-            modulation: &self.modulation[row.clone()],
             doubts: &self.doubts[row],
         }
     }
 }
 
-/// Three maps, or a row of each: fraction, turns, doubt, or phase, modulation, doubts.
+/// Three maps, or a row of each: fraction, turns, doubt, or phase, nothing, doubts.
 pub(crate) type PlanesMut<'a> = (&'a mut [u16], &'a mut [u16], &'a mut [u8]);
 
 /// The level that is to be written next.
@@ -209,7 +207,6 @@ impl<'a> ArrivingLevel<'a> {
                 coarsest: coarsest.map(|level| level.row(width, v)),
                 row: WrappedRowMut {
                     phase: first,
-                    modulation: second,
                     doubts: third,
                 },
             },
@@ -260,7 +257,6 @@ impl ClimbedRowMut<'_> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WrappedRow<'a> {
     pub phase: &'a [u16],
-    pub modulation: &'a [u16],
     pub doubts: &'a [u8],
 }
 
@@ -268,7 +264,6 @@ pub(crate) struct WrappedRow<'a> {
 #[derive(Debug)]
 pub(crate) struct WrappedRowMut<'a> {
     pub phase: &'a mut [u16],
-    pub modulation: &'a mut [u16],
     pub doubts: &'a mut [u8],
 }
 
@@ -286,7 +281,6 @@ impl WrappedRow<'_> {
         let doubts = v.load8(self.doubts, at);
         Demodulated {
             phase: v.load16(self.phase, at),
-            modulation: v.load16(self.modulation, at),
             strong: self.strong(v, at),
             brightest: v.eq8(v.and8(doubts, saturated), saturated),
         }
@@ -296,16 +290,7 @@ impl WrappedRow<'_> {
 impl WrappedRowMut<'_> {
     #[inline(always)]
     pub fn store<V: Lanes>(&mut self, v: V, at: usize, block: &Demodulated<V>) {
-        let strong = v.widen(block.strong, block.strong);
         v.store16(self.phase, at, block.phase);
-        v.store16(
-            self.modulation,
-            at,
-            [
-                v.and(strong[0], block.modulation[0]),
-                v.and(strong[1], block.modulation[1]),
-            ],
-        );
         let weak = v.pick8(block.strong, v.splat8(0), v.splat8(WEAK));
         let saturated = v.eq8(block.brightest, v.splat8(u8::MAX));
         let doubts = v.or8(weak, v.and8(saturated, v.splat8(SATURATED)));
@@ -315,9 +300,7 @@ impl WrappedRowMut<'_> {
     /// A block of which nothing is known but that it is weak.
     #[inline(always)]
     pub fn store_weak<V: Lanes>(&mut self, v: V, at: usize) {
-        let zero = v.splat16(0);
-        v.store16(self.phase, at, [zero; 2]);
-        v.store16(self.modulation, at, [zero; 2]);
+        v.store16(self.phase, at, [v.splat16(0); 2]);
         v.store8(self.doubts, at, v.splat8(WEAK));
     }
 }

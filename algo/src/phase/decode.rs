@@ -163,7 +163,7 @@ impl Decoder {
         ((1_u32 << self.bit_depth) - 1) as u16
     }
 
-    /// σ_Φ in turns of a resolved pixel: σ_I / 2π · √(2 / Σ N_i r_i² B_i²).
+    /// σ_Φ in turns of a resolved pixel: σ_I / 2π · √(2 / Σ N_i r_i² B²), B of the finest level, whose modulation is the least.
     ///
     /// `noise` is σ_I, the noise of one sample in counts.
     pub fn phase_noise(&self, modulation: Modulation, noise: f64) -> f64 {

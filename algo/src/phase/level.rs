@@ -65,8 +65,6 @@ pub(crate) enum Samples {
 pub(crate) struct Demodulated<V: Lanes> {
     /// Wrapped phase, 1/65536 turn.
     pub phase: [V::W; 2],
-    /// Modulation in units of full scale / 32767.5. Only where it was asked for, and meaningless where weak.
-    pub modulation: [V::W; 2],
     /// Mask: the modulation is at least the trusted minimum.
     pub strong: V::B,
     /// 255 where a sample is at full scale and that matters.
@@ -168,7 +166,8 @@ impl<'a, V: Lanes> LevelLanes<'a, V> {
         }
     }
 
-    /// Phase and modulation of a folded block; `doubled` where the plan may say so of the modulation.
+    /// Phase of a folded block, and modulation in units of full scale / 32767.5, meaningless where weak; `doubled` where the plan
+    /// may say so of the modulation.
     #[inline(always)]
     pub fn fine(
         &self,
@@ -176,7 +175,7 @@ impl<'a, V: Lanes> LevelLanes<'a, V> {
         angle: &AngleLanes<V>,
         folded: &Folded<V>,
         doubled: bool,
-    ) -> Demodulated<V> {
+    ) -> (Demodulated<V>, [V::W; 2]) {
         let (low, t_low) = angle.fine(v, folded, 0);
         let (high, t_high) = angle.fine(v, folded, 1);
         let mut modulation = [
@@ -189,12 +188,12 @@ impl<'a, V: Lanes> LevelLanes<'a, V> {
                 v.shl_by(modulation[1], self.doubled),
             ];
         }
-        Demodulated {
+        let block = Demodulated {
             phase: [low, high],
-            modulation,
             strong: folded.strong,
             brightest: folded.brightest,
-        }
+        };
+        (block, modulation)
     }
 }
 

@@ -8,7 +8,6 @@ mod fold;
 mod geometric;
 mod kernel;
 mod level;
-mod mean;
 mod narrow;
 mod rows;
 mod source;

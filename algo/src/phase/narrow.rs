@@ -112,7 +112,6 @@ impl FewClimbed {
 /// A padded row of a level about a known map.
 pub(super) struct FewWrapped {
     pub phase: [u16; MAX_PIXELS],
-    pub modulation: [u16; MAX_PIXELS],
     pub doubts: [u8; MAX_PIXELS],
 }
 
@@ -120,7 +119,6 @@ impl Default for FewWrapped {
     fn default() -> Self {
         Self {
             phase: [0; MAX_PIXELS],
-            modulation: [0; MAX_PIXELS],
             doubts: [0; MAX_PIXELS],
         }
     }
@@ -130,7 +128,6 @@ impl FewWrapped {
     pub fn new(row: WrappedRow<'_>, columns: &Range<usize>) -> Self {
         Self {
             phase: padded(row.phase, columns),
-            modulation: padded(row.modulation, columns),
             doubts: padded(row.doubts, columns),
         }
     }
@@ -138,7 +135,6 @@ impl FewWrapped {
     pub fn row(&self) -> WrappedRow<'_> {
         WrappedRow {
             phase: &self.phase,
-            modulation: &self.modulation,
             doubts: &self.doubts,
         }
     }
@@ -146,7 +142,6 @@ impl FewWrapped {
     pub fn row_mut(&mut self) -> WrappedRowMut<'_> {
         WrappedRowMut {
             phase: &mut self.phase,
-            modulation: &mut self.modulation,
             doubts: &mut self.doubts,
         }
     }

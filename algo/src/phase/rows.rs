@@ -157,7 +157,6 @@ impl Decoder {
                 };
                 self.arrive(level, &rows, MAX_PIXELS, row);
                 out.phase.copy_from_slice(&few.phase[..width]);
-                out.modulation.copy_from_slice(&few.modulation[..width]);
                 out.doubts.copy_from_slice(&few.doubts[..width]);
             }
         }

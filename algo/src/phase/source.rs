@@ -13,8 +13,9 @@ pub(crate) trait Frames: Copy {
 
     /// The first columns: rows of one length are checked together.
     fn first(self, columns: usize) -> Self;
-    /// The block at `at`, folded.
-    fn fold<V: Lanes>(&self, v: V, level: &LevelLanes<'_, V>, at: usize) -> Folded<V>;
+    /// The block at `at`, folded; what lies `after` samples behind it is fetched.
+    fn fold<V: Lanes>(&self, v: V, level: &LevelLanes<'_, V>, at: usize, after: usize)
+    -> Folded<V>;
 }
 
 impl<T: BlockSample> Frames for Four<'_, T> {
@@ -26,9 +27,15 @@ impl<T: BlockSample> Frames for Four<'_, T> {
     }
 
     #[inline(always)]
-    fn fold<V: Lanes>(&self, v: V, level: &LevelLanes<'_, V>, at: usize) -> Folded<V> {
+    fn fold<V: Lanes>(
+        &self,
+        v: V,
+        level: &LevelLanes<'_, V>,
+        at: usize,
+        after: usize,
+    ) -> Folded<V> {
         for row in self.rows() {
-            v.fetch_ahead(row, at);
+            v.fetch(row, at, after);
         }
         T::four(v, level, self, at)
     }
@@ -43,7 +50,13 @@ impl<T: BlockSample> Frames for &[&[T]] {
     }
 
     #[inline(always)]
-    fn fold<V: Lanes>(&self, v: V, level: &LevelLanes<'_, V>, at: usize) -> Folded<V> {
+    fn fold<V: Lanes>(
+        &self,
+        v: V,
+        level: &LevelLanes<'_, V>,
+        at: usize,
+        _after: usize,
+    ) -> Folded<V> {
         fold(v, level, self, at)
     }
 }
@@ -77,7 +90,7 @@ impl<V: Lanes> Block<V> {
         }
     }
 
-    /// Its phases and modulations.
+    /// Its phases.
     #[inline(always)]
     pub fn fine(
         &self,
@@ -87,7 +100,7 @@ impl<V: Lanes> Block<V> {
         doubled: bool,
     ) -> Demodulated<V> {
         match self {
-            Self::Folded(folded) => level.fine(v, angle, folded, doubled),
+            Self::Folded(folded) => level.fine(v, angle, folded, doubled).0,
             Self::Demodulated(block) => *block,
         }
     }
@@ -103,7 +116,7 @@ impl<S: Frames> Source for S {
 
     #[inline(always)]
     fn block<V: Lanes>(&self, v: V, level: &LevelLanes<'_, V>, at: usize) -> Block<V> {
-        Block::Folded(self.fold(v, level, at))
+        Block::Folded(self.fold(v, level, at, V::AHEAD))
     }
 }
 
@@ -114,7 +127,6 @@ impl Source for WrappedRow<'_> {
     fn first(self, columns: usize) -> Self {
         Self {
             phase: &self.phase[..columns],
-            modulation: &self.modulation[..columns],
             doubts: &self.doubts[..columns],
         }
     }

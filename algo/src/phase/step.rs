@@ -101,6 +101,13 @@ impl<V: Lanes> Turns<V> {
         }
     }
 
+    /// The turns of half a block of phases in 1/65536 turn.
+    #[inline(always)]
+    pub fn of(v: V, x: [V::D; 2]) -> Self {
+        let (phase, order) = v.split(x);
+        Self { order, phase }
+    }
+
     /// Whole turns next to the phase, of which it is −½…½ away.
     #[inline(always)]
     pub fn nearest(self, v: V) -> V::W {

@@ -30,7 +30,7 @@ pub(crate) fn for_each_item<T: Send>(items: &mut [T], each: impl Fn(usize, &mut 
     });
 }
 
-/// Calls `each` with every row of three maps (row-major, rows of `width`).
+/// Calls `each` with every row of three maps (row-major, rows of `width`), of which the second may be empty.
 pub(crate) fn for_each_row_of(
     (first, second, third): PlanesMut<'_>,
     width: usize,
@@ -38,17 +38,24 @@ pub(crate) fn for_each_row_of(
 ) {
     let width = width.max(1);
     #[cfg(feature = "parallel")]
-    first
-        .par_chunks_mut(width)
-        .zip(second.par_chunks_mut(width))
-        .zip(third.par_chunks_mut(width))
-        .enumerate()
-        .for_each(|(v, ((first, second), third))| each(v, (first, second, third)));
+    {
+        let rows = first
+            .par_chunks_mut(width)
+            .zip(third.par_chunks_mut(width))
+            .enumerate();
+        if second.is_empty() {
+            rows.for_each(|(v, (first, third))| each(v, (first, &mut [], third)));
+        } else {
+            rows.zip(second.par_chunks_mut(width))
+                .for_each(|((v, (first, third)), second)| each(v, (first, second, third)));
+        }
+    }
     #[cfg(not(feature = "parallel"))]
     {
-        let words = first.chunks_mut(width).zip(second.chunks_mut(width));
-        for (v, ((first, second), third)) in words.zip(third.chunks_mut(width)).enumerate() {
-            each(v, (first, second, third));
+        let mut seconds = second.chunks_mut(width);
+        let rows = first.chunks_mut(width).zip(third.chunks_mut(width));
+        for (v, (first, third)) in rows.enumerate() {
+            each(v, (first, seconds.next().unwrap_or_default(), third));
         }
     }
 }

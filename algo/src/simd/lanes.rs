@@ -26,6 +26,8 @@ pub(crate) struct Scaled<W> {
 pub(crate) trait Lanes: Copy + Debug {
     /// Pixels of a block.
     const PIXELS: usize;
+    /// Samples that a block is fetched before it is needed.
+    const AHEAD: usize;
     /// A byte per pixel of a block.
     type B: Copy;
     /// A word per pixel of half a block.
@@ -45,13 +47,11 @@ pub(crate) trait Lanes: Copy + Debug {
     fn load8(self, from: &[u8], at: usize) -> Self::B;
     /// The blocks of four rows that start at `at`.
     fn load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [Self::B; 4];
-    /// Has what lies some blocks after `at` fetched, where waiting for it would cost. Rows follow one another in memory, so
-    /// past the end of one lies the next.
-    fn fetch_ahead<T>(self, row: &[T], at: usize);
-    /// Has what the next row holds at the same place fetched, where only some columns are looked at: between the end of one
-    /// row's and the start of the next one's lies what nobody needs. `row` is a whole row.
-    fn fetch_below<T>(self, row: &[T], at: usize);
-    /// The same for what is going to be written.
+    /// Has what lies `after` samples behind the block at `at` fetched, where waiting for it would cost: [`Self::AHEAD`] where all
+    /// of a row is looked at, as rows follow one another in memory; else the length of a row, which is the same place in the
+    /// next one: between the end of one row's columns and the start of the next one's lies what nobody needs.
+    fn fetch<T>(self, row: &[T], at: usize, after: usize);
+    /// The same, ahead, for what is going to be written.
     fn claim_ahead<T>(self, row: &[T], at: usize);
     /// Into the block of `to` that starts at `at`.
     fn store8(self, to: &mut [u8], at: usize, x: Self::B);
@@ -176,30 +176,20 @@ pub(crate) trait Lanes: Copy + Debug {
     fn store32(self, to: &mut [i32], at: usize, x: [[Self::D; 2]; 2]);
     /// a + b.
     fn add32(self, a: Self::D, b: Self::D) -> Self::D;
-    /// a − b.
-    fn sub32(self, a: Self::D, b: Self::D) -> Self::D;
     /// x / 2ⁿ rounded down, signed, n below 32.
     fn sar32_by(self, x: Self::D, n: u8) -> Self::D;
     /// Mask: a > b, signed.
     fn gt32(self, a: Self::D, b: Self::D) -> Self::D;
-    /// Mask: a = b.
-    fn eq32(self, a: Self::D, b: Self::D) -> Self::D;
     /// a where the mask is set, else b.
     fn pick32(self, mask: Self::D, a: Self::D, b: Self::D) -> Self::D;
     /// The single next to x.
     fn to_single(self, x: Self::D) -> Self::F;
     /// The whole number next to x, ties to even; |x| below 2²².
     fn to_whole(self, x: Self::F) -> Self::D;
-    /// The bits of x as a whole number.
-    fn bits(self, x: Self::F) -> Self::D;
-    /// The single of these bits.
-    fn with_bits(self, x: Self::D) -> Self::F;
     /// Every pixel `x`.
     fn splat_single(self, x: f32) -> Self::F;
     /// a + b.
     fn add_single(self, a: Self::F, b: Self::F) -> Self::F;
-    /// a − b.
-    fn sub_single(self, a: Self::F, b: Self::F) -> Self::F;
     /// a · b.
     fn mul_single(self, a: Self::F, b: Self::F) -> Self::F;
     /// Mask: a < b.

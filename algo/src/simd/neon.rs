@@ -21,6 +21,8 @@ macro_rules! neon {
 
 impl Lanes for Neon {
     const PIXELS: usize = BYTES;
+    /// Nothing is fetched.
+    const AHEAD: usize = 0;
     type B = uint8x16_t;
     type W = int16x8_t;
     type D = int32x4_t;
@@ -44,9 +46,7 @@ impl Lanes for Neon {
         unsafe { [vld1q_u8(a), vld1q_u8(b), vld1q_u8(c), vld1q_u8(d)] }
     }
     #[inline(always)]
-    fn fetch_ahead<T>(self, _row: &[T], _at: usize) {}
-    #[inline(always)]
-    fn fetch_below<T>(self, _row: &[T], _at: usize) {}
+    fn fetch<T>(self, _row: &[T], _at: usize, _after: usize) {}
     #[inline(always)]
     fn claim_ahead<T>(self, _row: &[T], _at: usize) {}
     #[inline(always)]
@@ -351,20 +351,12 @@ impl Lanes for Neon {
         neon!(vaddq_s32(a, b))
     }
     #[inline(always)]
-    fn sub32(self, a: Self::D, b: Self::D) -> Self::D {
-        neon!(vsubq_s32(a, b))
-    }
-    #[inline(always)]
     fn sar32_by(self, x: Self::D, n: u8) -> Self::D {
         neon!(vshlq_s32(x, vdupq_n_s32(-i32::from(n))))
     }
     #[inline(always)]
     fn gt32(self, a: Self::D, b: Self::D) -> Self::D {
         neon!(vreinterpretq_s32_u32(vcgtq_s32(a, b)))
-    }
-    #[inline(always)]
-    fn eq32(self, a: Self::D, b: Self::D) -> Self::D {
-        neon!(vreinterpretq_s32_u32(vceqq_s32(a, b)))
     }
     #[inline(always)]
     fn pick32(self, mask: Self::D, a: Self::D, b: Self::D) -> Self::D {
@@ -379,24 +371,12 @@ impl Lanes for Neon {
         neon!(vcvtnq_s32_f32(x))
     }
     #[inline(always)]
-    fn bits(self, x: Self::F) -> Self::D {
-        neon!(vreinterpretq_s32_f32(x))
-    }
-    #[inline(always)]
-    fn with_bits(self, x: Self::D) -> Self::F {
-        neon!(vreinterpretq_f32_s32(x))
-    }
-    #[inline(always)]
     fn splat_single(self, x: f32) -> Self::F {
         neon!(vdupq_n_f32(x))
     }
     #[inline(always)]
     fn add_single(self, a: Self::F, b: Self::F) -> Self::F {
         neon!(vaddq_f32(a, b))
-    }
-    #[inline(always)]
-    fn sub_single(self, a: Self::F, b: Self::F) -> Self::F {
-        neon!(vsubq_f32(a, b))
     }
     #[inline(always)]
     fn mul_single(self, a: Self::F, b: Self::F) -> Self::F {

@@ -66,6 +66,8 @@ fn mask32(set: bool) -> i32 {
 
 impl Lanes for Portable {
     const PIXELS: usize = BYTES;
+    /// Nothing is fetched.
+    const AHEAD: usize = 0;
     type B = [u8; BYTES];
     type W = [i16; WORDS];
     type D = [i32; DOUBLES];
@@ -85,9 +87,7 @@ impl Lanes for Portable {
         from.rows().map(|row| self.load8(row, at))
     }
     #[inline(always)]
-    fn fetch_ahead<T>(self, _row: &[T], _at: usize) {}
-    #[inline(always)]
-    fn fetch_below<T>(self, _row: &[T], _at: usize) {}
+    fn fetch<T>(self, _row: &[T], _at: usize, _after: usize) {}
     #[inline(always)]
     fn claim_ahead<T>(self, _row: &[T], _at: usize) {}
     #[inline(never)]
@@ -357,20 +357,12 @@ impl Lanes for Portable {
         pairs(a, b, i32::wrapping_add)
     }
     #[inline(never)]
-    fn sub32(self, a: Self::D, b: Self::D) -> Self::D {
-        pairs(a, b, i32::wrapping_sub)
-    }
-    #[inline(never)]
     fn sar32_by(self, x: Self::D, n: u8) -> Self::D {
         lanes(x, |x| x >> n)
     }
     #[inline(never)]
     fn gt32(self, a: Self::D, b: Self::D) -> Self::D {
         pairs(a, b, |a, b| mask32(a > b))
-    }
-    #[inline(never)]
-    fn eq32(self, a: Self::D, b: Self::D) -> Self::D {
-        pairs(a, b, |a, b| mask32(a == b))
     }
     #[inline(never)]
     fn pick32(self, mask: Self::D, a: Self::D, b: Self::D) -> Self::D {
@@ -392,24 +384,12 @@ impl Lanes for Portable {
         })
     }
     #[inline(never)]
-    fn bits(self, x: Self::F) -> Self::D {
-        lanes(x, |x| x.to_bits().cast_signed())
-    }
-    #[inline(never)]
-    fn with_bits(self, x: Self::D) -> Self::F {
-        lanes(x, |x| f32::from_bits(x.cast_unsigned()))
-    }
-    #[inline(never)]
     fn splat_single(self, x: f32) -> Self::F {
         [x; DOUBLES]
     }
     #[inline(never)]
     fn add_single(self, a: Self::F, b: Self::F) -> Self::F {
         pairs(a, b, |a, b| a + b)
-    }
-    #[inline(never)]
-    fn sub_single(self, a: Self::F, b: Self::F) -> Self::F {
-        pairs(a, b, |a, b| a - b)
     }
     #[inline(never)]
     fn mul_single(self, a: Self::F, b: Self::F) -> Self::F {

@@ -25,7 +25,7 @@ pub struct PhaseTwin {
     pub form: Form,
     /// Φ in turns, NaN where rejected.
     pub phase: Vec<f64>,
-    /// Σ N r² B² behind the phase, counts².
+    /// Σ N r² · B² behind the phase, B of the finest level, counts².
     pub information: Vec<f64>,
     /// Resolved or why not; heights have not been looked at yet.
     pub reason: Vec<Reason>,

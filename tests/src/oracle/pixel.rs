@@ -9,7 +9,7 @@ use super::{Level, Reason};
 pub struct PixelTwin {
     /// Φ in turns, NaN where rejected.
     pub phase: f64,
-    /// Σ N r² B² behind the phase, counts².
+    /// Σ N r² · B² behind the phase, B of the finest level, counts².
     pub information: f64,
     /// Resolved or why not; heights have not been looked at.
     pub reason: Reason,
@@ -68,9 +68,8 @@ impl PixelTwin {
             .map(|(level, seen)| Wrapped {
                 ratio: level.ratio,
                 turns: seen.turns,
-                information: level.shifts.len() as f64
-                    * level.ratio.powi(2)
-                    * seen.modulation.powi(2),
+                weight: level.shifts.len() as f64 * level.ratio.powi(2),
+                modulation: seen.modulation,
             })
             .collect();
         let (found, doubt) = unwrap_with_doubt(form, &wrapped, map);

@@ -58,8 +58,17 @@ pub struct Wrapped {
     pub ratio: f64,
     /// φ in turns.
     pub turns: f64,
-    /// N r² B², in counts².
-    pub information: f64,
+    /// N r².
+    pub weight: f64,
+    /// B, in counts.
+    pub modulation: f64,
+}
+
+impl Wrapped {
+    /// N r² B², in counts², of levels that weigh as much together.
+    fn information(&self, weight: f64) -> f64 {
+        weight * self.modulation * self.modulation
+    }
 }
 
 /// How near a pixel came to another answer.
@@ -101,8 +110,8 @@ impl Doubt {
     }
 }
 
-/// Φ in turns and the information Σ N r² B² behind it, or none where a rounding step leaves more than
-/// 0.40 turn over. `levels` go from coarse to fine; `map` is Φ₀ for the forms that need one.
+/// Φ in turns and the information Σ N r² · B² behind it, B that of the finest level, or none where a rounding step leaves more
+/// than 0.40 turn over. `levels` go from coarse to fine; `map` is Φ₀ for the forms that need one.
 pub fn unwrap(form: Form, levels: &[Wrapped], map: f64) -> Option<(f64, f64)> {
     unwrap_with_doubt(form, levels, map).0
 }
@@ -136,7 +145,7 @@ fn about(form: Form, levels: &[Wrapped], map: f64, doubt: &mut Doubt) -> Option<
         _ => {
             let only = levels[0];
             let delta = doubt.wrap(q(only), 1.0) / only.ratio;
-            Some((map + delta, only.information))
+            Some((map + delta, only.information(only.weight)))
         }
     }
 }
@@ -153,7 +162,8 @@ fn geometric(levels: &[Wrapped], lowest: f64, doubt: &mut Doubt) -> Option<(f64,
         phase = level.turns + doubt.order(n * phase - level.turns, n + 1.0)?;
         ratio = level.ratio;
     }
-    Some((phase / ratio, levels[levels.len() - 1].information))
+    let finest = levels[levels.len() - 1];
+    Some((phase / ratio, finest.information(finest.weight)))
 }
 
 /// q = φ − frac(r Φ₀).
@@ -161,7 +171,7 @@ fn relative(level: Wrapped, map: f64) -> f64 {
     level.turns - (level.ratio * map).rem_euclid(1.0)
 }
 
-/// D_i = (q_i + round(r_i D − q_i)) / r_i for each level in turn, D the weighted mean of those so far.
+/// D_i = (q_i + round(r_i D − q_i)) / r_i for each level in turn, the finest first, D the mean of those so far with weights N r².
 /// `gain` is what an error of the wrapped phases becomes in `start`.
 fn average(
     levels: &[Wrapped],
@@ -177,8 +187,8 @@ fn average(
         let q = relative(*level, map);
         let order = doubt.order(level.ratio * delta - q, level.ratio * gain + 1.0)?;
         let here = (q + order) / level.ratio;
-        sum += level.information * here;
-        weights += level.information;
+        sum += level.weight * here;
+        weights += level.weight;
         delta = sum / weights;
         (low, high) = (low.min(here), high.max(here));
         doubt.spread = high - low;
@@ -186,7 +196,7 @@ fn average(
         let own = 1.0 / level.ratio;
         gain = if low == high { own } else { gain.max(own) };
     }
-    Some((map + delta, weights))
+    Some((map + delta, levels[0].information(weights)))
 }
 
 #[cfg(test)]
@@ -197,7 +207,8 @@ mod tests {
         let level = |&ratio: &f64| Wrapped {
             ratio,
             turns: ratio * phase - (ratio * phase).round(),
-            information: ratio * ratio,
+            weight: ratio * ratio,
+            modulation: 1.0,
         };
         ratios.iter().map(level).collect()
     }

@@ -181,7 +181,7 @@ impl Tally {
                 self.squares += error * error;
                 self.squared += 1;
             }
-            check_modulation(found.modulation[pixel], &levels, twin, full_scale);
+            check_modulation(found.modulation[pixel], twin, full_scale);
         }
     }
 
@@ -217,19 +217,9 @@ fn error(found: AbsolutePhase, truth: f64) -> f64 {
     (found.turns() - truth).abs()
 }
 
-/// The modulation behind a resolved phase, Σ N r² B² = (Σ N r²) · B².
-fn check_modulation(found: Modulation, levels: &[Level], twin: &PixelTwin, full_scale: u16) {
-    let weight = |level: &Level| level.shifts.len() as f64 * level.ratio * level.ratio;
-    let of_one = levels.last().map_or(0.0, weight);
-    let all: f64 = levels.iter().map(weight).sum();
-    let finest = &twin.levels[twin.levels.len() - 1];
-    // Of the finest level alone where the information is.
-    let alone = of_one * finest.modulation * finest.modulation;
-    let truth = if (twin.information / alone - 1.0).abs() < 1e-9 {
-        finest.modulation
-    } else {
-        (twin.information / all).sqrt()
-    };
+/// The modulation of the finest level.
+fn check_modulation(found: Modulation, twin: &PixelTwin, full_scale: u16) {
+    let truth = twin.levels[twin.levels.len() - 1].modulation;
     let off = found.counts(full_scale) / truth - 1.0;
     assert!(off.abs() <= MODULATION, "{found:?} where B is {truth}");
 }

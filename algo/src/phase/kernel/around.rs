@@ -9,6 +9,7 @@ use crate::phase::arrived::{Arrived, ArrivingRow, WrappedRow, WrappedRowMut};
 use crate::phase::fold::BlockSample;
 use crate::phase::level::{Demodulated, Level, LevelLanes};
 use crate::phase::source::{Frames, Source};
+use crate::phase::step::Turns;
 use crate::simd::{Backend, Four, Lanes, Results, back_end_entry, plain};
 use crate::trust::Trust;
 use crate::units::AbsolutePhase;
@@ -153,6 +154,7 @@ impl<V: Lanes> Light<V> {
 struct Known<V: Lanes> {
     /// Φ₀, 1/65536 turn.
     phase: [[V::D; 2]; 2],
+    turns: [Turns<V>; 2],
     /// Mask: nothing is known.
     unexpected: V::B,
 }
@@ -160,14 +162,17 @@ struct Known<V: Lanes> {
 impl<V: Lanes> Known<V> {
     #[inline(always)]
     fn new(v: V, map: &[i32], at: usize) -> Self {
-        let unknown = v.splat32(AbsolutePhase::UNKNOWN.to_bits());
-        v.fetch_ahead(map, at);
+        v.fetch(map, at, V::AHEAD);
         let phase = v.load32(map, at);
-        let unexpected = v.narrow_mask([
-            v.narrow_mask32([v.eq32(phase[0][0], unknown), v.eq32(phase[0][1], unknown)]),
-            v.narrow_mask32([v.eq32(phase[1][0], unknown), v.eq32(phase[1][1], unknown)]),
-        ]);
-        Self { phase, unexpected }
+        // No other phase has as many turns.
+        let unknown = v.splat16((AbsolutePhase::UNKNOWN.to_bits() >> 16) as i16);
+        let (low, high) = (Turns::of(v, phase[0]), Turns::of(v, phase[1]));
+        let unexpected = v.narrow_mask([v.eq(low.order, unknown), v.eq(high.order, unknown)]);
+        Self {
+            phase,
+            turns: [low, high],
+            unexpected,
+        }
     }
 
     /// The first doubts of a block, where it has been looked at at all.
@@ -178,19 +183,21 @@ impl<V: Lanes> Known<V> {
     }
 }
 
-/// Stores a block unwrapped about the map.
+/// Stores a block unwrapped about the map; the modulation is the finest level's.
 #[inline(always)]
+#[allow(clippy::too_many_arguments)]
 fn store<V: Lanes>(
     v: V,
     about: &AboutLanes<V>,
     known: &Known<V>,
     levels: &Around<V>,
     light: &Light<V>,
+    modulation: [V::W; 2],
     at: usize,
     out: &mut Results<'_>,
 ) {
-    let low = about.unwrap(v, known.phase[0], levels, 0);
-    let high = about.unwrap(v, known.phase[1], levels, 1);
+    let low = about.unwrap(v, known.phase[0], known.turns[0], levels, 0);
+    let high = about.unwrap(v, known.phase[1], known.turns[1], levels, 1);
     let doubts: Doubts<V> = Doubts {
         strong: light.strong,
         brightest: light.brightest,
@@ -198,8 +205,8 @@ fn store<V: Lanes>(
     };
     if doubts.none(v, light.strong) {
         let modulation = [
-            v.add(low.modulation, low.modulation),
-            v.add(high.modulation, high.modulation),
+            v.add(modulation[0], modulation[0]),
+            v.add(modulation[1], modulation[1]),
         ];
         let resolved = v.splat8(Trust::Resolved as u8);
         out.store(v, at, [low.phase, high.phase], modulation, resolved);
@@ -222,7 +229,7 @@ fn store<V: Lanes>(
             v.pick32(masks_high[1], high.phase[1], unknown),
         ],
     ];
-    let modulation = doubled_where(v, trusted, [low.modulation, high.modulation]);
+    let modulation = doubled_where(v, trusted, modulation);
     out.store(v, at, phase, modulation, trust(v, first));
 }
 
@@ -251,7 +258,7 @@ fn single_columns<V: Lanes, S: Frames>(
             out.store_unknown(v, at, v.splat8(Trust::Unexpected as u8));
             continue;
         }
-        let folded = frames.fold(v, &level, at);
+        let folded = frames.fold(v, &level, at, V::AHEAD);
         let light = Light {
             lit: folded.strong,
             strong: v.pick8(known.unexpected, v.splat8(0), folded.strong),
@@ -261,13 +268,13 @@ fn single_columns<V: Lanes, S: Frames>(
             out.store_unknown(v, at, known.first(v, light.lit, light.strong));
             continue;
         }
-        let finest = level.fine(v, &angle, &folded, S::DOUBLED);
+        let (finest, modulation) = level.fine(v, &angle, &folded, S::DOUBLED);
         let around = Around {
             first: finest,
             second: finest,
             finest,
         };
-        store(v, &about, &known, &around, &light, at, &mut out);
+        store(v, &about, &known, &around, &light, modulation, at, &mut out);
     }
 }
 
@@ -298,7 +305,7 @@ fn dense_columns<V: Lanes, S: Source, F: Frames, const OTHERS: usize>(
     };
     let first = Part::new(v, one, source.first(columns.end));
     let second = Part::new(v, two, other.first(columns.end));
-    let finest = Part::new(v, last, Frames::first(finest, columns.end));
+    let (level, finest) = (LevelLanes::new(v, last), Frames::first(finest, columns.end));
     let mut out = out.first(columns.end);
     let angle = AngleLanes::new(v);
     let map = &plain::phase_bits(map)[..columns.end];
@@ -328,14 +335,15 @@ fn dense_columns<V: Lanes, S: Source, F: Frames, const OTHERS: usize>(
             two = second.fine(v, &angle, at);
             light.add(v, &two);
         }
-        let last = finest.fine(v, &angle, at);
+        let folded = finest.fold(v, &level, at, V::AHEAD);
+        let (last, modulation) = level.fine(v, &angle, &folded, F::DOUBLED);
         light.add(v, &last);
         let around = Around {
             first: one,
             second: two,
             finest: last,
         };
-        store(v, &about, &known, &around, &light, at, &mut out);
+        store(v, &about, &known, &around, &light, modulation, at, &mut out);
     }
 }
 

@@ -112,7 +112,7 @@ fn start_columns<V: Lanes, S: Frames>(
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
-        let folded = frames.fold(v, &level, at);
+        let folded = frames.fold(v, &level, at, V::AHEAD);
         if v.none8(folded.strong) {
             // Where it stands nobody asks any more.
             v.store8(out.doubt, at, v.splat8(Trust::Dark as u8));
@@ -153,7 +153,7 @@ fn up_columns<V: Lanes, S: Frames>(
         if all_dark(v, doubt) {
             continue;
         }
-        let climb = rung.rough(v, &ground, &below, at);
+        let climb = rung.rough(v, &ground, &below, at, V::AHEAD);
         let doubt = v.min8(doubt, climb.doubts.first(v));
         out.store(v, at, &climb.ahead(v, &next), doubt);
     }
@@ -184,7 +184,7 @@ fn top_columns<V: Lanes, S: Frames>(
             out.store_unknown(v, at, doubt);
             continue;
         }
-        let (climb, modulation) = finest.fine(v, &ground, &before.below(v, at), at);
+        let (climb, modulation) = finest.fine(v, &ground, &before.below(v, at), at, V::AHEAD);
         ground.store(v, &climb, doubt, modulation, at, &mut out);
     }
 }

@@ -155,10 +155,17 @@ impl<'a, V: Lanes, S: Frames> Rung<'a, V, S> {
         }
     }
 
-    /// Up to this level, roughly.
+    /// Up to this level, roughly; `after` as in [`Frames::fold`].
     #[inline(always)]
-    pub fn rough(&self, v: V, ground: &Ground<V>, below: &Below<V>, at: usize) -> Climb<V> {
-        let folded = self.frames.fold(v, &self.level, at);
+    pub fn rough(
+        &self,
+        v: V,
+        ground: &Ground<V>,
+        below: &Below<V>,
+        at: usize,
+        after: usize,
+    ) -> Climb<V> {
+        let folded = self.frames.fold(v, &self.level, at, after);
         self.land(v, below, ground.rough(v, &folded), &folded)
     }
 
@@ -170,11 +177,11 @@ impl<'a, V: Lanes, S: Frames> Rung<'a, V, S> {
         ground: &Ground<V>,
         below: &Below<V>,
         at: usize,
+        after: usize,
     ) -> (Climb<V>, [V::W; 2]) {
-        let folded = self.frames.fold(v, &self.level, at);
-        let block = (self.level).fine(v, &ground.angle, &folded, S::DOUBLED);
-        let climb = self.land(v, below, block.phase, &folded);
-        (climb, block.modulation)
+        let folded = self.frames.fold(v, &self.level, at, after);
+        let (block, modulation) = (self.level).fine(v, &ground.angle, &folded, S::DOUBLED);
+        (self.land(v, below, block.phase, &folded), modulation)
     }
 
     #[inline(always)]

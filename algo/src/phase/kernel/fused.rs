@@ -28,11 +28,17 @@ pub(crate) fn climb_row<T: BlockSample>(
         .take(3)
         .collect();
     let out = &mut out;
+    let width = rows
+        .iter()
+        .flat_map(|rows| rows.iter())
+        .map(|row| row.len())
+        .next()
+        .unwrap_or(0);
     match (rows, &fours[..]) {
         (&[a], _) => single(backend, plan, levels, a, columns, out),
-        (&[_, _], &[a, b]) => fused(backend, plan, levels, (a, [], b), columns, out),
-        (&[_, _, _], &[a, b, c]) => fused(backend, plan, levels, (a, [b], c), columns, out),
-        (&[a, b, c], _) => fused(backend, plan, levels, (a, [b], c), columns, out),
+        (&[_, _], &[a, b]) => fused(backend, plan, levels, (a, [], b), width, columns, out),
+        (&[_, _, _], &[a, b, c]) => fused(backend, plan, levels, (a, [b], c), width, columns, out),
+        (&[a, b, c], _) => fused(backend, plan, levels, (a, [b], c), width, columns, out),
         _ => in_turn(backend, plan, levels, rows, columns, out),
     }
     plan.finish(&mut out.phase[part]);
@@ -79,6 +85,7 @@ back_end_entry! {
         plan: &Geometric,
         levels: &[Level],
         frames: (S, [S; BETWEEN], S),
+        width: usize,
         columns: Range<usize>,
         out: &mut Results<'_>,
     )
@@ -100,11 +107,11 @@ fn single_columns<V: Lanes, S: Frames>(
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
-        let folded = frames.fold(v, &level, at);
-        let block = level.fine(v, &ground.angle, &folded, S::DOUBLED);
+        let folded = frames.fold(v, &level, at, V::AHEAD);
+        let (block, modulation) = level.fine(v, &ground.angle, &folded, S::DOUBLED);
         let climb = ground.start(v, block.phase, &folded);
         let before = unless_dark(v, folded.strong);
-        ground.store(v, &climb, before, block.modulation, at, &mut out);
+        ground.store(v, &climb, before, modulation, at, &mut out);
     }
 }
 
@@ -114,6 +121,7 @@ fn fused_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
     plan: &Geometric,
     levels: &[Level],
     (coarsest, between, finest): (S, [S; BETWEEN], S),
+    width: usize,
     columns: Range<usize>,
     out: &mut Results<'_>,
 ) {
@@ -132,12 +140,15 @@ fn fused_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
         *rung = Rung::new(v, step, level, frames.first(columns.end));
     }
     let mut start = columns.start;
+    let mut after = V::AHEAD;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
-        let folded = coarsest.fold(v, &level, at);
+        let folded = coarsest.fold(v, &level, at, V::AHEAD);
         let lit = folded.strong;
         if v.none8(lit) {
             out.store_unknown(v, at, v.splat8(Trust::Dark as u8));
+            // Only some columns are lit, most likely those that will be in the next row.
+            after = width;
             continue;
         }
         let climb = ground.start(v, ground.rough(v, &folded), &folded);
@@ -146,11 +157,11 @@ fn fused_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
             None => climb.ahead_of_start(v, &finest.step),
             Some(rung) => {
                 let below = climb.ahead_of_start(v, &rung.step);
-                let climb = rung.rough(v, &ground, &below, at);
+                let climb = rung.rough(v, &ground, &below, at, after);
                 climb.ahead(v, &finest.step)
             }
         };
-        let (climb, modulation) = finest.fine(v, &ground, &below, at);
+        let (climb, modulation) = finest.fine(v, &ground, &below, at, after);
         ground.store(v, &climb, unless_dark(v, lit), modulation, at, &mut out);
     }
 }

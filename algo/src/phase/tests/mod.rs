@@ -3,11 +3,14 @@
 mod backends;
 mod eight_bit;
 mod textbook;
+mod weights;
 
-use super::Decoder;
 use super::arrived::{Arrived, ArrivingRow, WrappedRow};
+use super::{Decoder, PhaseRow};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence};
+use crate::trust::Trust;
+use crate::units::{AbsolutePhase, Modulation};
 use core::f64::consts::TAU;
 use std::vec::Vec;
 
@@ -19,12 +22,17 @@ fn level(shifts: &[f64], depth: u8) -> Decoder {
     Decoder::new(&Sequence::from_frames(&frames).unwrap(), ONE_TURN, depth).unwrap()
 }
 
-/// One demodulated row.
-struct Wrapped(Arrived);
+/// One demodulated row, and the modulations of its pixels that are trusted.
+struct Wrapped(Arrived, Vec<Modulation>);
 
 impl Wrapped {
     fn row(&self) -> WrappedRow<'_> {
         self.0.wrapped_rows(0)[0]
+    }
+
+    /// In counts; 0 where not trusted.
+    fn modulation(&self, u: usize, full_scale: f64) -> f64 {
+        f64::from(self.1[u].to_bits()) * full_scale / 65_535.0
     }
 }
 
@@ -48,7 +56,17 @@ fn wrap(decoder: &Decoder, depth: u8, rows: &[Vec<u16>]) -> Wrapped {
         assert!(matches!(row, ArrivingRow::Wrapping { .. }));
         decoder.arrive_row(0, &frames, v, row);
     }
-    Wrapped(arrived)
+    let mut phase = std::vec![AbsolutePhase::from_bits(0); width];
+    let mut modulation = std::vec![Modulation::default(); width];
+    let mut trust = std::vec![Trust::default(); width];
+    let map = phase.clone();
+    let out = PhaseRow {
+        phase: &mut phase,
+        modulation: &mut modulation,
+        trust: &mut trust,
+    };
+    decoder.row(&frames, 0, &map, 0..width, out);
+    Wrapped(arrived, modulation)
 }
 
 /// Samples of at most 8 bits as bytes.

@@ -41,7 +41,7 @@ fn any_number_of_steps_at_any_depth_agrees_with_the_definition() {
                         error <= PHASE_BOUND,
                         "{depth} bit, N = {steps}, start {start}: {error:e}"
                     );
-                    let modulation = f64::from(found.row().modulation[u]) * full / 32_767.5;
+                    let modulation = found.modulation(u, full);
                     assert!(
                         (modulation - counts).abs() <= counts * MODULATION_SHARE,
                         "{depth} bit, N = {steps}: {modulation} for {counts}"

@@ -157,11 +157,11 @@ fn rise_columns<V: Lanes>(
         let taught = &seen.taught[start..end][..length];
         let mut at = start;
         while at < end {
-            v.fetch_below(plan.first, at);
-            v.fetch_below(plan.second, at);
-            v.fetch_below(plan.third, at);
-            v.fetch_below(plan.reach, at);
-            v.fetch_below(seen.taught, at);
+            v.fetch(plan.first, at, plan.first.len());
+            v.fetch(plan.second, at, plan.second.len());
+            v.fetch(plan.third, at, plan.third.len());
+            v.fetch(plan.reach, at, plan.reach.len());
+            v.fetch(seen.taught, at, seen.taught.len());
             at += FETCHED;
         }
         let (mut measured, mut compared) = (0_u32, 0_u32);

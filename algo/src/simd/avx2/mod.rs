@@ -38,6 +38,7 @@ macro_rules! avx2 {
 
 impl Lanes for Avx2 {
     const PIXELS: usize = BYTES;
+    const AHEAD: usize = AHEAD;
     type B = __m256i;
     type W = __m256i;
     type D = __m256i;
@@ -68,12 +69,8 @@ impl Lanes for Avx2 {
         }
     }
     #[inline(always)]
-    fn fetch_ahead<T>(self, row: &[T], at: usize) {
-        hint::<T, _MM_HINT_T0>(row, at, AHEAD);
-    }
-    #[inline(always)]
-    fn fetch_below<T>(self, row: &[T], at: usize) {
-        hint::<T, _MM_HINT_T0>(row, at, row.len());
+    fn fetch<T>(self, row: &[T], at: usize, after: usize) {
+        hint::<T, _MM_HINT_T0>(row, at, after);
     }
     #[inline(always)]
     fn claim_ahead<T>(self, row: &[T], at: usize) {
@@ -380,20 +377,12 @@ impl Lanes for Avx2 {
         avx2!(_mm256_add_epi32(a, b))
     }
     #[inline(always)]
-    fn sub32(self, a: Self::D, b: Self::D) -> Self::D {
-        avx2!(_mm256_sub_epi32(a, b))
-    }
-    #[inline(always)]
     fn sar32_by(self, x: Self::D, n: u8) -> Self::D {
         avx2!(_mm256_sra_epi32(x, _mm_cvtsi32_si128(i32::from(n))))
     }
     #[inline(always)]
     fn gt32(self, a: Self::D, b: Self::D) -> Self::D {
         avx2!(_mm256_cmpgt_epi32(a, b))
-    }
-    #[inline(always)]
-    fn eq32(self, a: Self::D, b: Self::D) -> Self::D {
-        avx2!(_mm256_cmpeq_epi32(a, b))
     }
     #[inline(always)]
     fn pick32(self, mask: Self::D, a: Self::D, b: Self::D) -> Self::D {
@@ -408,24 +397,12 @@ impl Lanes for Avx2 {
         avx2!(_mm256_cvtps_epi32(x))
     }
     #[inline(always)]
-    fn bits(self, x: Self::F) -> Self::D {
-        avx2!(_mm256_castps_si256(x))
-    }
-    #[inline(always)]
-    fn with_bits(self, x: Self::D) -> Self::F {
-        avx2!(_mm256_castsi256_ps(x))
-    }
-    #[inline(always)]
     fn splat_single(self, x: f32) -> Self::F {
         avx2!(_mm256_set1_ps(x))
     }
     #[inline(always)]
     fn add_single(self, a: Self::F, b: Self::F) -> Self::F {
         avx2!(_mm256_add_ps(a, b))
-    }
-    #[inline(always)]
-    fn sub_single(self, a: Self::F, b: Self::F) -> Self::F {
-        avx2!(_mm256_sub_ps(a, b))
     }
     #[inline(always)]
     fn mul_single(self, a: Self::F, b: Self::F) -> Self::F {

@@ -190,7 +190,7 @@ fn find_columns<V: Lanes>(
         let left = node * SPACING;
         let end = ((start / BLOCK + 1) * BLOCK).min(columns.end);
         let length = end - start;
-        v.fetch_below(bases, start);
+        v.fetch(bases, start, bases.len());
         let nodes = (row.nodes[node], row.nodes[(node + 1).min(last)]);
         let unit = 1.0 / ((left + SPACING).min(width - 1) - left).max(1) as f32;
         let seen = (&bases[start..end], &row.rise[start..end]);
