@@ -14,6 +14,7 @@ pub mod model;
 pub mod npy;
 pub mod projector;
 pub mod replay;
+pub mod setup;
 pub mod sim;
 pub mod trigger;
 pub mod units;
