@@ -9,7 +9,10 @@ pub mod clock;
 pub mod contract;
 pub mod error;
 pub mod frame;
+#[cfg(feature = "gpio")]
+pub mod gpio;
 pub mod head;
+pub mod lines;
 pub mod model;
 pub mod npy;
 pub mod projector;
