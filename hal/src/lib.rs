@@ -9,7 +9,12 @@ pub mod clock;
 pub mod contract;
 pub mod error;
 pub mod frame;
+#[cfg(feature = "gpio")]
+pub mod gpio;
 pub mod head;
+#[cfg(feature = "kms")]
+pub mod kms;
+pub mod lines;
 pub mod model;
 pub mod npy;
 pub mod projector;
