@@ -12,6 +12,8 @@ pub mod frame;
 #[cfg(feature = "gpio")]
 pub mod gpio;
 pub mod head;
+#[cfg(feature = "kms")]
+pub mod kms;
 pub mod lines;
 pub mod model;
 pub mod npy;
