@@ -392,9 +392,8 @@ fn a_wait_ends_with_a_frame_or_in_time_and_polling_never_waits() {
     let mut clock = clock_of(&camera);
     camera.start().unwrap();
     let begun = clock.now();
-    clock.wait(begun + PATIENT);
+    next(&mut camera, &mut clock);
     let woken = clock.now().since(begun);
-    assert!(camera.poll_frame().unwrap().is_some());
     assert!(woken < Duration::from_secs(1), "{woken:?}");
     camera.stop().unwrap();
     drop((camera, clock));
