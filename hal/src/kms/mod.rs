@@ -9,6 +9,7 @@
 mod canvas;
 mod card;
 mod faithful;
+mod find;
 mod modes;
 mod output;
 
