@@ -35,7 +35,11 @@ impl Opened {
                     .reopen()
                     .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
             }
-            None => *self = open(config, &|_| ())?,
+            None => {
+                // Who holds a device cannot open it again.
+                self.head = self.head.closed();
+                *self = open(config, &|_| ())?;
+            }
         }
         Ok(())
     }
@@ -47,6 +51,9 @@ impl Opened {
 /// If a file of the head is missing or wrong, or a device is not there.
 pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
     let opened = open_as_it_is(config, progress)?;
+    if config.backend == Backend::Rpi {
+        return Err(devices::uncalibrated());
+    }
     let encoding = opened.head.encoding();
     if !encoding.exact {
         let message = format!(

@@ -2,6 +2,7 @@
 //!
 //! The decisions are the `sequencer`'s, which knows no device; this loop carries them out.
 
+mod closed;
 mod count;
 mod failure;
 mod identity;

@@ -1,15 +1,23 @@
 //! Real devices: what this build has of their libraries, and how they are opened.
 
+#[cfg(all(feature = "kms", feature = "libcamera"))]
+mod rpi;
+
 use super::Opened;
+use crate::calibration::Calibration;
 use crate::config::{Backend, Config, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::lines::Wires;
-use hal::setup::LinesSetup;
+use hal::frame::FrameFormat;
+use hal::head::DynHead;
+use hal::model::DeviceModel;
+use hal::setup::{LinesSetup, TriggerSetup};
+use hal::trigger::{NoTrigger, Trigger};
 
 /// The libraries of devices, and whether this build has them.
 const LIBRARIES: [(&str, bool); 3] = [
-    ("libcamera", false),
-    ("kms", false),
+    ("libcamera", cfg!(feature = "libcamera")),
+    ("kms", cfg!(feature = "kms")),
     ("gpio", cfg!(feature = "gpio")),
 ];
 
@@ -51,13 +59,69 @@ fn built_with(key: &str, needed: &[&str], feature: &str) -> Result<(), Failure> 
     Err(Failure::new(Exit::Configuration, message))
 }
 
-/// Opens camera, projector and trigger.
+/// Opens camera, projector and trigger. What is known of them is nominal, so nothing may be measured with it.
 ///
 /// # Errors
-/// If this build has no such devices, or one of them is not there.
+/// If this build has no such devices (78), or one of them is not there (69).
 pub(super) fn rpi(config: &HeadConfig) -> Result<Opened, Failure> {
     built_for_head(config)?;
+    let head = head(config, trigger(&config.trigger)?)?;
+    let calibration = nominal(head.camera_format(), head.projector_size());
+    Ok(Opened {
+        head,
+        calibration,
+        stage: None,
+    })
+}
+
+#[cfg(all(feature = "kms", feature = "libcamera"))]
+fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<DynHead, Failure> {
+    rpi::head(config, trigger).map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))
+}
+
+/// [`built_for_head`] has refused it before.
+#[cfg(not(all(feature = "kms", feature = "libcamera")))]
+fn head(_: &HeadConfig, _: Box<dyn Trigger>) -> Result<DynHead, Failure> {
     Err(uncalibrated())
+}
+
+#[cfg(feature = "gpio")]
+fn trigger(setup: &TriggerSetup) -> Result<Box<dyn Trigger>, Failure> {
+    let Some(line) = &setup.line else {
+        return Ok(Box::new(NoTrigger));
+    };
+    match hal::gpio::Pulse::open(setup, line) {
+        Ok(pulse) => Ok(Box::new(pulse)),
+        Err(error) => Err(Failure::new(Exit::Unavailable, error.to_string())),
+    }
+}
+
+/// None is named: [`built_for_head`] has refused one.
+#[cfg(not(feature = "gpio"))]
+fn trigger(_: &TriggerSetup) -> Result<Box<dyn Trigger>, Failure> {
+    Ok(Box::new(NoTrigger))
+}
+
+/// Something that can be worked with until the head is calibrated: lenses and places like those of the reference head. No height may be made of it.
+fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Calibration {
+    let model = |width: u32, height: u32, aside_mm: f64| DeviceModel {
+        fx: 1.6 * f64::from(width),
+        fy: 1.6 * f64::from(width),
+        cx: 0.5 * (f64::from(width) - 1.0),
+        cy: 0.5 * (f64::from(height) - 1.0),
+        distortion: [0.0; 5],
+        // Looking down at the plane z = 0.
+        rotation: [1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0],
+        translation_mm: [aside_mm, 0.0, 600.0],
+    };
+    Calibration {
+        camera: (camera.width, camera.height, camera.bit_depth),
+        camera_model: model(camera.width, camera.height, 0.0),
+        projector,
+        projector_model: model(projector.0, projector.1, 250.0),
+        noise_counts: 1.0,
+        response: None,
+    }
 }
 
 /// The failure of a head of which nothing is known yet.
