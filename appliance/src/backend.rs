@@ -1,5 +1,9 @@
 //! The head that the configuration names: the one place that knows which back-ends there are.
 
+mod devices;
+
+pub use devices::{built_for, lines};
+
 use crate::calibration::Calibration;
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
@@ -66,6 +70,7 @@ pub fn open_as_it_is(
     match config.backend {
         Backend::Sim => simulated(config.scenario.as_deref(), progress),
         Backend::Replay => replayed(&config.recordings),
+        Backend::Rpi => devices::rpi(config),
     }
 }
 
@@ -86,6 +91,7 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
                 .map(|folder| Recording::open(folder));
             calibration_of(&config.recordings, &first.collect::<Result<Vec<_>, _>>()?)
         }
+        Backend::Rpi => Err(devices::uncalibrated()),
     }
 }
 

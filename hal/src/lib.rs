@@ -14,6 +14,8 @@ pub mod gpio;
 pub mod head;
 #[cfg(feature = "kms")]
 pub mod kms;
+#[cfg(any(test, feature = "libcamera"))]
+pub mod libcamera;
 pub mod lines;
 pub mod model;
 pub mod npy;

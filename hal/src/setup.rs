@@ -78,13 +78,13 @@ pub struct TriggerSetup {
 }
 
 impl Default for TriggerSetup {
-    /// The reference head: a low pulse of 16 653 µs exposes for 16 667 µs.
+    /// The reference head: a pulse of 16 653 µs exposes for 16 667 µs. A transistor turns it over for the camera.
     fn default() -> Self {
         Self {
             chip: "pinctrl-rp1".into(),
             line: None,
             pulse_us: 16_653,
-            active_low: true,
+            active_low: false,
         }
     }
 }
