@@ -36,9 +36,6 @@ impl<K: Clock + ?Sized> Clock for Box<K> {
     }
 }
 
-/// Some devices go without a word to their descriptor: they are asked at least so often.
-const LONGEST: Duration = Duration::from_millis(100);
-
 /// The clock of real devices: `CLOCK_MONOTONIC`, waiting for any of their descriptors.
 ///
 /// A descriptor is readable as long as its device has a flip or a frame that was not fetched, or an error to tell. It may be a
@@ -62,7 +59,7 @@ impl Clock for Monotonic {
     }
 
     fn wait(&mut self, until: Timestamp) {
-        let left = until.since(monotonic()).min(LONGEST);
+        let left = until.since(monotonic());
         if left.is_zero() {
             return;
         }
@@ -118,17 +115,8 @@ mod tests {
 
     /// A wait that nothing ends.
     const LONG: Duration = Duration::from_secs(60);
-
-    /// The shortest wait of several: a computer that does much else makes some of them longer.
-    fn shortest(mut clock: impl FnMut() -> Monotonic) -> Duration {
-        let waited = (0..10).map(|_| {
-            let mut clock = clock();
-            let begun = Instant::now();
-            clock.wait(clock.now() + LONG);
-            begun.elapsed()
-        });
-        waited.min().unwrap()
-    }
+    /// Far less than that, on a computer that does much else.
+    const SOON: Duration = Duration::from_secs(10);
 
     #[test]
     fn the_real_clock_keeps_the_promises_of_a_clock() {
@@ -148,17 +136,11 @@ mod tests {
     fn a_wait_ends_when_a_device_has_something_to_fetch() {
         let (idle, _writer) = pipe().unwrap();
         let (device, news) = pipe().unwrap();
+        let mut clock = Monotonic::new(vec![idle, device]);
         write(&news, b"!").unwrap();
-        let waited =
-            shortest(|| Monotonic::new([&idle, &device].map(|fd| fd.try_clone().unwrap()).into()));
-        assert!(waited < LONGEST, "{waited:?}");
-    }
-
-    #[test]
-    fn a_device_that_says_nothing_is_asked_again_soon() {
-        let (idle, _writer) = pipe().unwrap();
-        let waited = shortest(|| Monotonic::new(vec![idle.try_clone().unwrap()]));
-        assert!(waited >= LONGEST && waited < LONG, "{waited:?}");
+        let begun = Instant::now();
+        clock.wait(clock.now() + LONG);
+        assert!(begun.elapsed() < SOON, "{:?}", begun.elapsed());
     }
 
     #[test]
@@ -166,8 +148,9 @@ mod tests {
         let (device, news) = pipe().unwrap();
         let mut clock = Monotonic::new(vec![device]);
         drop(news);
+        let begun = Instant::now();
         clock.wait(clock.now() + LONG);
-        assert!(clock.devices.is_empty(), "it is not waited for again");
+        assert!(begun.elapsed() < SOON, "{:?}", begun.elapsed());
         let until = clock.now() + Duration::from_millis(20);
         clock.wait(until);
         assert!(clock.now() >= until, "the second wait spun");

@@ -10,13 +10,13 @@ mod crc;
 mod eye;
 
 use std::collections::HashMap;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use chip::Chip;
 use eye::{Eye, MIXED, NO_PATTERN, View};
 use hal::clock::Monotonic;
 use hal::contract::check_head;
-use hal::error::Error;
+use hal::error::{Error, ErrorKind};
 use hal::gpio::Pulse;
 use hal::head::{Exposure, Head, Timing};
 use hal::kms::{self, Display};
@@ -65,6 +65,10 @@ impl Projector for Late {
             std::thread::sleep(self.by);
         }
         self.display.queue(index)
+    }
+
+    fn present(&self) -> Result<(), Error> {
+        self.display.present()
     }
 
     fn poll_flip(&mut self) -> Result<Option<Flip>, Error> {
@@ -233,4 +237,30 @@ fn a_pattern_whose_flip_came_late_is_taken_again_and_never_mislabelled() {
             "{what}: nobody noticed that flips were late"
         );
     }
+}
+
+#[test]
+fn a_projector_that_goes_in_the_middle_of_a_sequence_ends_it_at_once() {
+    if !in_the_machine() {
+        return;
+    }
+    let chip = Chip::new();
+    let mut rig = rig(&chip, Kind::default(), false);
+    let unplug = || std::fs::write("/sys/module/vkms/parameters/plugged", "0").unwrap();
+    let (begun, mut taken) = (Instant::now(), 0);
+    let gone = rig.acquire(&[0; 64], PATIENT, &mut |_, _| {
+        taken += 1;
+        if taken == 3 {
+            unplug();
+        }
+    });
+    let gone = gone.unwrap_err();
+    println!(
+        "{gone}, said after {:?} and {taken} frames",
+        begun.elapsed()
+    );
+    assert_eq!((gone.kind(), taken < 64), (ErrorKind::Disconnected, true));
+    assert!(begun.elapsed() < Duration::from_secs(1));
+    drop(rig);
+    std::fs::write("/sys/module/vkms/parameters/plugged", "1").unwrap();
 }

@@ -5,8 +5,7 @@
 #
 # Nothing is installed and nothing of the machine changes, so no root is needed: apt resolves and downloads with lists of its own,
 # from the machine's sources; what the machine already has is used from there. DIR/kernel keeps a kernel and its modules, DIR/root
-# programs; a second call only looks whether `pins` and this script are still those of the first. Ends with 69 (EX_UNAVAILABLE) and the
-# reason where it cannot be had.
+# programs; a second call only looks whether it is complete. Ends with 69 (EX_UNAVAILABLE) and the reason where it cannot be had.
 set -euo pipefail
 shopt -s inherit_errexit nullglob
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -19,7 +18,7 @@ unavailable() {
     exit 69
 }
 
-wanted=$(cat "$here/machine.sh" "$here/pins" "$here/vkms.patch" | sha256sum)
+wanted=$({ cat "$here/machine.sh" "$here/vkms.patch" && echo "$kernel $kernel_revision"; } | sha256sum)
 [[ $(cat "$dir/complete" 2>/dev/null) == "$wanted" ]] && exit 0
 [[ $(dpkg --print-architecture 2>/dev/null) == amd64 ]] || unavailable "this is no Debian on x86-64"
 [[ $dir != *[[:space:]]* ]] || unavailable "a kernel is not built in a folder with a space: $dir"
