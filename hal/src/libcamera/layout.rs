@@ -2,14 +2,11 @@
 //!
 //! Nothing here knows the library: formats are its words for them ("R16", "NV12").
 
-use serde::{Deserialize, Serialize};
-
 use crate::error::Error;
 use crate::frame::{FrameFormat, Pixels};
 
 /// What is taken of a camera's images.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reading {
     /// What a monochrome sensor counted, as it is.
     #[default]
