@@ -1,5 +1,9 @@
 //! The head that the configuration names: the one place that knows which back-ends there are.
 
+mod devices;
+
+pub use devices::{built_for, lines};
+
 use crate::calibration::Calibration;
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
@@ -31,7 +35,11 @@ impl Opened {
                     .reopen()
                     .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
             }
-            None => *self = open(config, &|_| ())?,
+            None => {
+                // Who holds a device cannot open it again.
+                self.head = self.head.closed();
+                *self = open(config, &|_| ())?;
+            }
         }
         Ok(())
     }
@@ -43,6 +51,9 @@ impl Opened {
 /// If a file of the head is missing or wrong, or a device is not there.
 pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
     let opened = open_as_it_is(config, progress)?;
+    if config.backend == Backend::Rpi {
+        return Err(devices::uncalibrated());
+    }
     let encoding = opened.head.encoding();
     if !encoding.exact {
         let message = format!(
@@ -66,6 +77,7 @@ pub fn open_as_it_is(
     match config.backend {
         Backend::Sim => simulated(config.scenario.as_deref(), progress),
         Backend::Replay => replayed(&config.recordings),
+        Backend::Rpi => devices::rpi(config),
     }
 }
 
@@ -86,6 +98,7 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
                 .map(|folder| Recording::open(folder));
             calibration_of(&config.recordings, &first.collect::<Result<Vec<_>, _>>()?)
         }
+        Backend::Rpi => Err(devices::uncalibrated()),
     }
 }
 

@@ -23,7 +23,7 @@ use crate::station::{
 use crate::survey::Survey;
 use crate::tally::Tally;
 use crate::worker::{Aborts, Order, Worker};
-use crate::{backend, clock, modbus, socket, web};
+use crate::{backend, clock, lines, modbus, socket, web};
 use hal::sim::Stage;
 use std::net::SocketAddr;
 use std::sync::{Arc, mpsc};
@@ -69,6 +69,7 @@ impl Daemon {
         crate::memory::give_back();
         let state = StateFolder::open(&path)?;
         let access = open_access(&state)?;
+        let wires = backend::lines(&config.lines)?;
         let runtime = runtime()?;
         let (plc, page) = runtime.block_on(listen(config))?;
         let (modbus, http) = (address_of(&plc)?, address_of(&page)?);
@@ -94,6 +95,16 @@ impl Daemon {
         };
         let maps = LastMaps::default();
         let (sockets, stopped) = watch::channel(false);
+        let wiring = {
+            let (station, progress, stopped) = (station.clone(), progress.clone(), stopped.clone());
+            let setup = config.lines.clone();
+            let open: lines::Open = Box::new(move || backend::lines(&setup));
+            spawn("lines", move || {
+                if let Err(failure) = lines::serve(wires, &open, &station, &progress, stopped) {
+                    progress.log(&failure.message);
+                }
+            })?
+        };
         let clients = modbus::Clients::new(usize::from(config.modbus.connections));
         let serving = {
             let site = web::Site::new(web::Parts {
@@ -163,7 +174,7 @@ impl Daemon {
             orders,
             sockets,
             survey,
-            threads: [measuring, serving, surveying],
+            threads: [measuring, serving, surveying, wiring],
             progress,
             station: station.clone(),
             history,

@@ -14,6 +14,7 @@ pub mod error;
 pub mod experiment;
 pub mod history;
 pub mod latest;
+pub mod lines;
 pub mod logbook;
 pub mod measure;
 pub mod memory;

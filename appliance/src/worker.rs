@@ -51,6 +51,7 @@ mod code {
     pub const PROJECTOR_LOST: u16 = 201;
     pub const TIMEOUT: u16 = 301;
     pub const PROTOCOL: u16 = 302;
+    pub const LINES_LOST: u16 = 303;
     pub const NOTHING_TO_TEACH: u16 = 401;
     pub const RIG: u16 = 501;
     pub const NOT_STORED: u16 = 601;
@@ -357,6 +358,7 @@ fn code_of(error: &Error) -> u16 {
         Error::Disconnected { device, .. } => match device {
             Device::Camera => code::CAMERA_LOST,
             Device::Projector => code::PROJECTOR_LOST,
+            Device::Lines => code::LINES_LOST,
         },
         Error::Unsupported { .. } => code::UNSUPPORTED,
         Error::Protocol { .. } => code::PROTOCOL,

@@ -1,5 +1,11 @@
 //! The clock of a head: what time it is for all its devices, and how to wait for them.
 
+use std::os::fd::OwnedFd;
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::time::{ClockId, clock_gettime};
+
 use crate::units::Timestamp;
 
 /// The clock by which flips, triggers and frames are stamped.
@@ -27,5 +33,126 @@ impl<K: Clock + ?Sized> Clock for Box<K> {
 
     fn stands_still(&self) -> bool {
         (**self).stands_still()
+    }
+}
+
+/// The clock of real devices: `CLOCK_MONOTONIC`, waiting for any of their descriptors.
+///
+/// A descriptor is readable as long as its device has a flip or a frame that was not fetched, or an error to tell. It may be a
+/// duplicate (`BorrowedFd::try_clone_to_owned`): the device keeps its own.
+#[derive(Debug, Default)]
+pub struct Monotonic {
+    devices: Vec<OwnedFd>,
+}
+
+impl Monotonic {
+    /// A clock whose waits end when one of these has something to fetch.
+    #[must_use]
+    pub fn new(devices: Vec<OwnedFd>) -> Self {
+        Self { devices }
+    }
+}
+
+impl Clock for Monotonic {
+    fn now(&self) -> Timestamp {
+        monotonic()
+    }
+
+    fn wait(&mut self, until: Timestamp) {
+        let left = until.since(monotonic());
+        if left.is_zero() {
+            return;
+        }
+        let mut waiting: Vec<PollFd<'_>> = self
+            .devices
+            .iter()
+            .map(|device| PollFd::new(device, PollFlags::IN))
+            .collect();
+        // A signal ends it early, as the promise allows; nothing else can fail with descriptors that are ours.
+        let _ = poll(&mut waiting, Some(&timespec(left)));
+        let hung_up: Vec<bool> = waiting
+            .iter()
+            .map(|device| {
+                let came = device.revents();
+                !came.is_empty() && !came.contains(PollFlags::IN)
+            })
+            .collect();
+        // A device that is gone ends one wait: then it says so itself, and no later wait spins on it.
+        let mut hung_up = hung_up.into_iter();
+        self.devices.retain(|_| hung_up.next() != Some(true));
+    }
+}
+
+/// Now, on `CLOCK_MONOTONIC`.
+#[must_use]
+pub fn monotonic() -> Timestamp {
+    let now = clock_gettime(ClockId::Monotonic);
+    // It starts at 0 with the system and never goes back.
+    let seconds = u64::try_from(now.tv_sec).unwrap_or(0);
+    let nanoseconds = u64::try_from(now.tv_nsec).unwrap_or(0);
+    Timestamp(
+        seconds
+            .saturating_mul(1_000_000_000)
+            .saturating_add(nanoseconds),
+    )
+}
+
+/// A span as the kernel takes it.
+pub(crate) fn timespec(span: Duration) -> Timespec {
+    Timespec {
+        tv_sec: i64::try_from(span.as_secs()).unwrap_or(i64::MAX),
+        tv_nsec: span.subsec_nanos().into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contract::check_clock;
+    use rustix::io::write;
+    use rustix::pipe::pipe;
+    use std::time::Instant;
+
+    /// A wait that nothing ends.
+    const LONG: Duration = Duration::from_secs(60);
+    /// Far less than that, on a computer that does much else.
+    const SOON: Duration = Duration::from_secs(10);
+
+    #[test]
+    fn the_real_clock_keeps_the_promises_of_a_clock() {
+        check_clock(&mut Monotonic::default()).unwrap();
+    }
+
+    #[test]
+    fn a_wait_does_not_end_before_its_time_for_nothing() {
+        let (idle, _writer) = pipe().unwrap();
+        let mut clock = Monotonic::new(vec![idle]);
+        let until = clock.now() + Duration::from_millis(20);
+        clock.wait(until);
+        assert!(clock.now() >= until, "{} before {until}", clock.now());
+    }
+
+    #[test]
+    fn a_wait_ends_when_a_device_has_something_to_fetch() {
+        let (idle, _writer) = pipe().unwrap();
+        let (device, news) = pipe().unwrap();
+        let mut clock = Monotonic::new(vec![idle, device]);
+        write(&news, b"!").unwrap();
+        let begun = Instant::now();
+        clock.wait(clock.now() + LONG);
+        assert!(begun.elapsed() < SOON, "{:?}", begun.elapsed());
+    }
+
+    #[test]
+    fn a_device_that_is_gone_ends_one_wait_and_no_other() {
+        let (device, news) = pipe().unwrap();
+        let mut clock = Monotonic::new(vec![device]);
+        drop(news);
+        let begun = Instant::now();
+        clock.wait(clock.now() + LONG);
+        assert!(begun.elapsed() < SOON, "{:?}", begun.elapsed());
+        let until = clock.now() + Duration::from_millis(20);
+        clock.wait(until);
+        assert!(clock.now() >= until, "the second wait spun");
     }
 }

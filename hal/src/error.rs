@@ -22,6 +22,8 @@ pub enum Device {
     Camera,
     /// The projector.
     Projector,
+    /// The chip of the trigger line and of the lines to whoever starts a cycle.
+    Lines,
 }
 
 impl Device {
@@ -31,6 +33,7 @@ impl Device {
         match self {
             Self::Camera => "camera",
             Self::Projector => "projector",
+            Self::Lines => "GPIO chip",
         }
     }
 }

@@ -89,11 +89,23 @@ impl Pixels {
     }
 }
 
+/// Samples in memory that belongs to a camera, lent until the last frame in them is dropped.
+pub trait Lent: std::fmt::Debug + Send + Sync {
+    /// The samples; the same at every call.
+    fn samples(&self) -> Samples<'_>;
+}
+
+#[derive(Clone, Debug)]
+enum Memory {
+    Own(Arc<Pixels>),
+    Lent(Arc<dyn Lent>),
+}
+
 /// One camera image. Cloning shares the samples; a frame may be kept while others arrive.
 #[derive(Clone, Debug)]
 pub struct Frame {
     format: FrameFormat,
-    pixels: Arc<Pixels>,
+    memory: Memory,
     timestamp: Timestamp,
     sequence: u64,
 }
@@ -110,11 +122,39 @@ impl Frame {
         timestamp: Timestamp,
         sequence: u64,
     ) -> Result<Self, Error> {
+        let fits = pixels.fits(&format);
+        Self::of(format, fits, Memory::Own(pixels), timestamp, sequence)
+    }
+
+    /// As [`Frame::new`], in memory that a camera lends and gets back with the last clone of this frame.
+    ///
+    /// # Errors
+    /// As [`Frame::new`].
+    pub fn lent(
+        format: FrameFormat,
+        lent: Arc<dyn Lent>,
+        timestamp: Timestamp,
+        sequence: u64,
+    ) -> Result<Self, Error> {
+        let fits = match lent.samples() {
+            Samples::Eight(samples) => format.bit_depth == 8 && samples.len() == format.samples(),
+            Samples::Sixteen(samples) => format.bit_depth != 8 && samples.len() == format.samples(),
+        };
+        Self::of(format, fits, Memory::Lent(lent), timestamp, sequence)
+    }
+
+    fn of(
+        format: FrameFormat,
+        fits: bool,
+        memory: Memory,
+        timestamp: Timestamp,
+        sequence: u64,
+    ) -> Result<Self, Error> {
         let sane = format.width > 0
             && format.height > 0
             && format.stride >= format.width as usize
             && (8..=16).contains(&format.bit_depth);
-        if !sane || !pixels.fits(&format) {
+        if !sane || !fits {
             return Err(Error::unsupported(
                 format!(
                     "a frame of {} with {} samples per row",
@@ -126,7 +166,7 @@ impl Frame {
         }
         Ok(Self {
             format,
-            pixels,
+            memory,
             timestamp,
             sequence,
         })
@@ -141,9 +181,12 @@ impl Frame {
     /// The samples, without a copy.
     #[must_use]
     pub fn samples(&self) -> Samples<'_> {
-        match &*self.pixels {
-            Pixels::Eight(samples) => Samples::Eight(samples),
-            Pixels::Sixteen(samples) => Samples::Sixteen(samples),
+        match &self.memory {
+            Memory::Own(pixels) => match &**pixels {
+                Pixels::Eight(samples) => Samples::Eight(samples),
+                Pixels::Sixteen(samples) => Samples::Sixteen(samples),
+            },
+            Memory::Lent(lent) => lent.samples(),
         }
     }
 
@@ -164,7 +207,7 @@ impl Frame {
     pub fn restamped(&self, timestamp: Timestamp, sequence: u64) -> Self {
         Self {
             format: self.format,
-            pixels: Arc::clone(&self.pixels),
+            memory: self.memory.clone(),
             timestamp,
             sequence,
         }

@@ -2,6 +2,7 @@
 //!
 //! The decisions are the `sequencer`'s, which knows no device; this loop carries them out.
 
+mod closed;
 mod count;
 mod failure;
 mod identity;
@@ -24,6 +25,9 @@ use pacing::Pacing;
 use sequencer::{Act, Sequencer};
 pub use timing::{Stamp, TOLERANCE, Timing};
 pub use watch::{Seen, Showing, Watched};
+
+/// A device may go without a word to whoever waits for it; on a real clock it is asked at least so often.
+const UNNOTICED: Duration = Duration::from_millis(100);
 
 /// A head of any back-end.
 pub type DynHead = Head<Box<dyn Camera>, Box<dyn Projector>, Box<dyn Trigger>, Box<dyn Clock>>;
@@ -278,11 +282,21 @@ fn carry_out<C: Camera, P: Projector, T: Trigger, K: Clock>(
                     return Ok(sequencer.so_far());
                 }
             }
-            Act::Wait(until) => clock.wait(until),
+            Act::Wait(until) => wait(clock, until),
             Act::Done => return Ok(sequencer.so_far()),
             Act::Fail(failure) => return Err(failure.error(timeout)),
         }
     }
+}
+
+/// Waits for a flip or a frame, but not longer than a device that is gone may stay unnoticed.
+fn wait(clock: &mut impl Clock, until: Timestamp) {
+    let soon = clock.now() + UNNOTICED;
+    clock.wait(if clock.stands_still() {
+        until
+    } else {
+        until.min(soon)
+    });
 }
 
 #[cfg(test)]

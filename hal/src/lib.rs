@@ -9,11 +9,19 @@ pub mod clock;
 pub mod contract;
 pub mod error;
 pub mod frame;
+#[cfg(feature = "gpio")]
+pub mod gpio;
 pub mod head;
+#[cfg(feature = "kms")]
+pub mod kms;
+#[cfg(any(test, feature = "libcamera"))]
+pub mod libcamera;
+pub mod lines;
 pub mod model;
 pub mod npy;
 pub mod projector;
 pub mod replay;
+pub mod setup;
 pub mod sim;
 pub mod trigger;
 pub mod units;

@@ -20,3 +20,18 @@ impl<T: Trigger + ?Sized> Trigger for Box<T> {
         (**self).fire()
     }
 }
+
+/// No trigger: of a camera that runs by itself.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoTrigger;
+
+impl Trigger for NoTrigger {
+    /// # Errors
+    /// Always `Unsupported`.
+    fn fire(&mut self) -> Result<Timestamp, Error> {
+        Err(Error::unsupported(
+            "triggering the camera without a trigger line",
+            "name the line in head.trigger.line",
+        ))
+    }
+}

@@ -15,8 +15,9 @@ unavailable() {
     exit 69
 }
 
-# The folder may have been copied from elsewhere: its files name their place.
-[[ $(cat "$dir/complete" 2>/dev/null) == "$dir" ]] && exit 0
+# The folder may have been copied from elsewhere, and its files name their place; or an older script has made it.
+made="$dir $(cksum <"${BASH_SOURCE[0]}")"
+[[ $(cat "$dir/complete" 2>/dev/null) == "$made" ]] && exit 0
 [[ $(dpkg --print-architecture 2>/dev/null) == amd64 ]] || unavailable "this is no Debian on x86-64"
 [[ $dir != *[[:space:]]* ]] || unavailable "the linker's scripts cannot name a folder with a space: $dir"
 if [[ ! -f $dir/.toolchain && -n $(ls -A "$dir") ]]; then
@@ -69,6 +70,7 @@ END
 wrapper rustc "$dir/root/usr/bin/rustc"
 wrapper rustdoc "$dir/root/usr/bin/rustdoc"
 wrapper cc aarch64-linux-gnu-gcc
+wrapper ar aarch64-linux-gnu-ar
 libc=$(realpath "$("$dir/bin/cc" -print-file-name=libc.so.6)") || unavailable "the C compiler does not run"
 wrapper qemu-aarch64 qemu-aarch64 -U LD_LIBRARY_PATH -L "${libc%/lib/*}"
 wrapper qemu-x86_64 qemu-x86_64 -U LD_LIBRARY_PATH -cpu max
@@ -89,4 +91,4 @@ echo 'fn main() { assert!(cfg!(target_arch = "aarch64")); }' >"$dir/proof.rs"
 "$dir/bin/rustc" --target aarch64-unknown-linux-gnu -C linker="$dir/bin/cc" -o "$dir/proof" "$dir/proof.rs" &&
     "$dir/bin/qemu-aarch64" "$dir/proof" || unavailable "what was unpacked does not work on this machine"
 rm "$dir/proof" "$dir/proof.rs"
-echo "$dir" >"$dir/complete"
+echo "$made" >"$dir/complete"

@@ -2,7 +2,7 @@
 
 use super::Common;
 use crate::backend;
-use crate::config::{Backend, Config, KEYS, table};
+use crate::config::{Backend, Config, keys, table};
 use crate::error::{Exit, Failure};
 use hal::replay::Recording;
 use std::path::PathBuf;
@@ -27,8 +27,7 @@ impl ConfigCommand {
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         match self {
             Self::Keys if common.json => {
-                let keys: Vec<_> = KEYS
-                    .iter()
+                let keys: Vec<_> = keys()
                     .map(|key| {
                         serde_json::json!({
                             "name": key.name, "unit": key.unit, "range": key.range,
@@ -57,6 +56,7 @@ impl ConfigCommand {
 }
 
 fn check_named_files(config: &Config) -> Result<(), Failure> {
+    backend::built_for(config)?;
     match config.head.backend {
         Backend::Sim => drop(backend::scenario(config.head.scenario.as_deref())?),
         Backend::Replay => {
@@ -64,6 +64,8 @@ fn check_named_files(config: &Config) -> Result<(), Failure> {
                 Recording::open(folder)?;
             }
         }
+        // It names no files. Its devices are not opened: a station that runs may hold them.
+        Backend::Rpi => {}
     }
     Ok(())
 }

@@ -1,5 +1,7 @@
 //! Every configuration key with its unit, range, default and meaning.
 
+mod devices;
+
 use std::fmt::Write as _;
 
 /// One key.
@@ -17,8 +19,8 @@ pub struct Key {
     pub meaning: &'static str,
 }
 
-/// The table; a test compares it with the structs.
-pub const KEYS: [Key; 18] = [
+/// The table's part beside the devices; a test compares the whole with the structs.
+const KEYS: [Key; 18] = [
     Key {
         name: "state",
         unit: "folder",
@@ -113,9 +115,9 @@ pub const KEYS: [Key; 18] = [
     Key {
         name: "head.backend",
         unit: "word",
-        range: "sim, replay",
+        range: "sim, replay, rpi",
         default: "sim",
-        meaning: "which head: simulated light, or recordings",
+        meaning: "which head: simulated light, recordings, or the camera, the projector and the trigger line of the keys below",
     },
     Key {
         name: "head.scenario",
@@ -147,11 +149,16 @@ pub const KEYS: [Key; 18] = [
     },
 ];
 
+/// Every key.
+pub fn keys() -> impl Iterator<Item = &'static Key> {
+    KEYS.iter().chain(&devices::KEYS)
+}
+
 /// All keys as a table in Markdown, as `docs/configuration.md` has it.
 pub fn table() -> String {
     let mut table =
         String::from("| key | unit | range | default | meaning |\n|---|---|---|---|---|\n");
-    for key in KEYS {
+    for key in keys() {
         let Key {
             name,
             unit,
@@ -172,10 +179,12 @@ pub fn table() -> String {
 mod tests {
     use super::*;
     use crate::config::{Config, HeadConfig, ModbusConfig};
+    use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
     use std::collections::BTreeMap;
 
     /// A configuration in which nothing is left out.
     fn full() -> Config {
+        let word = || Some("word".to_owned());
         Config {
             state: Some("state".into()),
             modbus: ModbusConfig {
@@ -184,38 +193,57 @@ mod tests {
             },
             head: HeadConfig {
                 scenario: Some("scenario".into()),
+                camera: CameraSetup {
+                    id: word(),
+                    width: Some(1),
+                    height: Some(1),
+                    ..CameraSetup::default()
+                },
+                projector: ProjectorSetup {
+                    card: Some("card".into()),
+                    connector: word(),
+                    width: Some(1),
+                    height: Some(1),
+                    refresh_hz: Some(1.0),
+                },
+                trigger: TriggerSetup {
+                    line: word(),
+                    ..TriggerSetup::default()
+                },
                 ..HeadConfig::default()
+            },
+            lines: LinesSetup {
+                start: word(),
+                busy: word(),
+                ok: word(),
+                fault: word(),
+                ..LinesSetup::default()
             },
             ..Config::default()
         }
     }
 
     fn flat(config: &Config) -> BTreeMap<String, String> {
-        let toml::Value::Table(sections) = toml::Value::try_from(config).unwrap() else {
-            panic!("no table");
-        };
         let mut keys = BTreeMap::new();
-        for (section, value) in sections {
-            match value {
-                toml::Value::Table(values) => {
-                    keys.extend(values.into_iter().map(|(key, value)| {
-                        (
-                            format!("{section}.{key}"),
-                            value.to_string().replace('"', ""),
-                        )
-                    }))
-                }
-                value => {
-                    keys.insert(section, value.to_string().replace('"', ""));
-                }
-            }
-        }
+        gather("", &toml::Value::try_from(config).unwrap(), &mut keys);
         keys
+    }
+
+    /// Every value below `value` under its whole name.
+    fn gather(name: &str, value: &toml::Value, keys: &mut BTreeMap<String, String>) {
+        let toml::Value::Table(values) = value else {
+            keys.insert(name.to_owned(), value.to_string().replace('"', ""));
+            return;
+        };
+        for (key, value) in values {
+            let name = [name, key].join(".");
+            gather(name.trim_start_matches('.'), value, keys);
+        }
     }
 
     #[test]
     fn the_table_has_every_key_of_the_code_and_no_other() {
-        let mut documented: Vec<_> = KEYS.iter().map(|key| key.name.to_owned()).collect();
+        let mut documented: Vec<_> = keys().map(|key| key.name.to_owned()).collect();
         documented.sort();
         assert_eq!(documented, flat(&full()).into_keys().collect::<Vec<_>>());
     }
@@ -223,7 +251,7 @@ mod tests {
     #[test]
     fn the_documented_defaults_are_the_code_s() {
         let defaults = flat(&Config::default());
-        for key in KEYS {
+        for key in keys() {
             // What has no default value in the code is described in words.
             if let Some(value) = defaults.get(key.name) {
                 assert_eq!(key.default, value, "{}", key.name);

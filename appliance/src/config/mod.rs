@@ -1,11 +1,14 @@
 //! The configuration: one TOML file, every key optional.
 
+mod devices;
 mod keys;
 
-pub use keys::{KEYS, Key, table};
+use devices::within;
+pub use keys::{Key, keys, table};
 
 use crate::error::{Exit, Failure};
 use crate::modbus::{CONNECTIONS, WordOrder};
+use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
 use ipnet::IpNet;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -28,6 +31,8 @@ pub struct Config {
     pub http: HttpConfig,
     /// The devices.
     pub head: HeadConfig,
+    /// Wires to whoever starts the station without a network.
+    pub lines: LinesSetup,
     /// What is kept of results.
     pub history: HistoryConfig,
 }
@@ -102,6 +107,12 @@ pub struct HeadConfig {
     pub scenario: Option<PathBuf>,
     /// Recordings that the replay head plays.
     pub recordings: Vec<PathBuf>,
+    /// The camera of the head `rpi`.
+    pub camera: CameraSetup,
+    /// The projector of the head `rpi`.
+    pub projector: ProjectorSetup,
+    /// The camera's trigger line of the head `rpi`.
+    pub trigger: TriggerSetup,
 }
 
 /// The kinds of head.
@@ -112,6 +123,8 @@ pub enum Backend {
     Sim,
     /// Recordings.
     Replay,
+    /// A camera through libcamera, a projector on a display connector, a trigger on a GPIO line.
+    Rpi,
 }
 
 impl Default for StationConfig {
@@ -162,6 +175,9 @@ impl Default for HeadConfig {
             backend: Backend::Sim,
             scenario: None,
             recordings: Vec::new(),
+            camera: CameraSetup::default(),
+            projector: ProjectorSetup::default(),
+            trigger: TriggerSetup::default(),
         }
     }
 }
@@ -215,13 +231,6 @@ impl Config {
     /// # Errors
     /// Naming the key and its range.
     pub fn check(&self) -> Result<(), String> {
-        let within = |key: &str, value: u64, low: u64, high: u64| {
-            if (low..=high).contains(&value) {
-                Ok(())
-            } else {
-                Err(format!("{key} = {value}: write {low} to {high}"))
-            }
-        };
         within("threads", self.threads as u64, 0, 256)?;
         within("station.recipe", u64::from(self.station.recipe), 1, 9999)?;
         let timeout = u64::from(self.station.plc_timeout_s);
@@ -230,6 +239,7 @@ impl Config {
         within("modbus.connections", connections, 2, 64)?;
         let results = u64::from(self.history.results);
         within("history.results", results, 1, 10_000_000)?;
+        devices::check(self)?;
         if self.head.backend == Backend::Replay && self.head.recordings.is_empty() {
             return Err(
                 "head.recordings is empty: the replay head needs at least one folder".into(),
@@ -264,6 +274,14 @@ mod tests {
             ("[modbus]\nconnections = 1", "modbus.connections"),
             ("[head]\nbackend = \"replay\"", "head.recordings"),
             ("[modbus]\nlisten = \"nowhere\"", "listen"),
+            ("[head.camera]\nexposure_us = 0", "head.camera.exposure_us"),
+            ("[head.camera]\nperiod_us = 9", "head.camera.period_us"),
+            ("[head.camera]\ngain = nan", "head.camera.gain"),
+            ("[head.camera]\nwidth = 9", "head.camera.height"),
+            ("[head.projector]\nrefresh_hz = 0", "refresh_hz"),
+            ("[head.trigger]\npulse_us = 0", "head.trigger.pulse_us"),
+            ("[lines]\nok = \"A\"\nbusy = \"A\"", "lines.ok"),
+            ("[lines]\nnok = \"A\"", "nok"),
             ("= 5", "TOML"),
         ] {
             let failure = read(text).unwrap_err();
@@ -278,5 +296,33 @@ mod tests {
         let config = read("[head]\nscenario = \"parts/cone.toml\"").unwrap();
         let scenario = config.head.scenario.unwrap();
         assert!(scenario.is_absolute() && scenario.ends_with("parts/cone.toml"));
+    }
+
+    /// A page or file of the documentation.
+    fn document(name: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../docs")
+            .join(name)
+    }
+
+    #[test]
+    fn the_example_of_the_reference_head_is_right_and_wired_as_documented() {
+        let config = Config::read(&document("fringed.toml")).unwrap();
+        assert_eq!(config.head.backend, Backend::Rpi);
+        let (trigger, lines) = (&config.head.trigger, &config.lines);
+        let wiring = fs::read_to_string(document("hardware.md")).unwrap();
+        for (signal, line) in [
+            ("camera trigger", &trigger.line),
+            ("start", &lines.start),
+            ("busy", &lines.busy),
+            ("ok", &lines.ok),
+            ("fault", &lines.fault),
+        ] {
+            let row = format!("| {signal} | {} |", line.as_deref().unwrap());
+            assert!(wiring.contains(&row), "no wire for {row}");
+        }
+        // The camera exposes for its pulse and 14.26 µs more, and that is what it is said to expose.
+        let exposed = f64::from(trigger.pulse_us) + 14.26;
+        assert!((exposed - f64::from(config.head.camera.exposure_us)).abs() < 1.0);
     }
 }

@@ -14,7 +14,7 @@ pub(super) struct Stopping {
     pub(super) orders: mpsc::Sender<Order>,
     pub(super) sockets: watch::Sender<bool>,
     pub(super) survey: mpsc::Sender<()>,
-    pub(super) threads: [JoinHandle<()>; 3],
+    pub(super) threads: [JoinHandle<()>; 4],
     pub(super) progress: Progress,
     pub(super) station: StationHandle,
     pub(super) history: History,
@@ -31,10 +31,11 @@ impl Stopping {
     pub(super) fn stop(self) {
         // An order that nobody takes, or a runtime that is gone, is what is wanted here.
         drop(self.orders.send(Order::Stop));
-        let [measuring, serving, surveying] = self.threads;
+        let [measuring, serving, surveying, wiring] = self.threads;
         join("measuring", measuring, &self.progress);
         let _ = self.sockets.send(true);
         join("sockets", serving, &self.progress);
+        join("lines", wiring, &self.progress);
         drop(self.survey);
         join("survey", surveying, &self.progress);
         // Last: what the others brought to an end is stored.

@@ -165,6 +165,11 @@ impl Snapshot {
         self.recipe.as_ref().map(|recipe| recipe.number)
     }
 
+    /// Whether it is at work, so that it would be ready for a trigger by itself after a while: every state but ready, offline and fault.
+    pub fn is_working(&self) -> bool {
+        !matches!(self.state, 1 | 6 | 7)
+    }
+
     /// Whether a STATUS bit is set.
     pub fn is(&self, bit: u16) -> bool {
         self.status & bit != 0

@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use super::Head;
+use super::{Head, wait};
 use crate::camera::{Camera, Starts};
 use crate::clock::Clock;
 use crate::error::Error;
@@ -119,7 +119,7 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
                     }
                     next = next.min(due);
                 }
-                devices.clock.wait(next.min(deadline));
+                wait(&mut devices.clock, next.min(deadline));
             }
         })?;
         Ok(seen)

@@ -1,0 +1,219 @@
+//! The lines with a start line and lamps of this process, and a real station.
+
+use super::*;
+use crate::station::{
+    ActiveRecipe, Effect, GaugeValue, Identity, Inspection, JobId, Limits, Micros, RecipeKey,
+    Request, Settings, Station, Unit, Verdict,
+};
+use rustix::io::{read, write};
+use rustix::pipe::{PipeFlags, pipe_with};
+use std::os::fd::{AsFd, BorrowedFd};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+/// Far more than anything here takes.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+pub(super) fn settings() -> Settings {
+    Settings {
+        next_seq: 41,
+        boot_id: 7,
+        teach_allowed: false,
+        identity: Arc::new(Identity {
+            vendor: "v".into(),
+            product: "p".into(),
+            serial: "s".into(),
+            version: "1".into(),
+        }),
+        limits: Limits::default(),
+    }
+}
+
+/// A start line that is a pipe: each byte is a start.
+struct Button(OwnedFd);
+
+impl AsFd for Button {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.0.as_fd()
+    }
+}
+
+impl StartLine for Button {
+    fn poll_start(&mut self) -> Result<Option<Timestamp>, Error> {
+        Ok(read(&self.0, &mut [0; 1])
+            .is_ok_and(|n| n == 1)
+            .then(monotonic))
+    }
+
+    fn settles(&self) -> Option<Timestamp> {
+        None
+    }
+}
+
+/// What was put on the lines, in turn.
+#[derive(Clone, Default)]
+struct Panel {
+    told: Arc<Mutex<Vec<(&'static str, bool)>>>,
+    broken: Arc<AtomicBool>,
+}
+
+struct Lamp(&'static str, Panel);
+
+impl OutputLine for Lamp {
+    fn set(&mut self, on: bool) -> Result<(), Error> {
+        if self.1.broken.load(Ordering::Relaxed) {
+            return Err(Error::disconnected(hal::error::Device::Lines, "a lamp"));
+        }
+        self.1.told.lock().unwrap().push((self.0, on));
+        Ok(())
+    }
+}
+
+impl Panel {
+    fn wires(&self) -> Wires {
+        let lamp =
+            |name| -> Option<Box<dyn OutputLine>> { Some(Box::new(Lamp(name, self.clone()))) };
+        Wires {
+            start: None,
+            busy: lamp("busy"),
+            ok: lamp("ok"),
+            fault: lamp("fault"),
+        }
+    }
+
+    /// The changes of the lamps that come before `last`, all off at first, as "+busy -busy +ok".
+    fn until(&self, last: &str) -> String {
+        let begun = Instant::now();
+        loop {
+            let mut lit = [("busy", false), ("ok", false), ("fault", false)];
+            let mut words = Vec::new();
+            for (name, on) in self.told.lock().unwrap().iter() {
+                let lamp = lit.iter_mut().find(|lamp| lamp.0 == *name).unwrap();
+                if std::mem::replace(&mut lamp.1, *on) != *on {
+                    words.push(format!("{}{name}", if *on { '+' } else { '-' }));
+                }
+            }
+            let words = words.join(" ");
+            if words.ends_with(last) || begun.elapsed() > PATIENCE {
+                return words;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
+
+/// A station that is ready, and the orders to its worker.
+fn ready() -> (StationHandle, Receiver<JobId>) {
+    let (told, orders) = channel();
+    let station = Station::new(settings(), Micros(0));
+    let station = StationHandle::new(station, Instant::now(), move |effect| match effect {
+        Effect::Load { job, .. } => Some(Event::RecipeLoaded {
+            job,
+            recipe: ActiveRecipe {
+                number: 1,
+                crc: 1,
+                name: "part".into(),
+            },
+        }),
+        Effect::Measure(job) => {
+            told.send(job.job).unwrap();
+            None
+        }
+        Effect::PersistSeq(seq) => Some(Event::Stored { seq, failed: None }),
+        _ => None,
+    });
+    station.event(Event::Started);
+    station.event(Event::Request(Request::Load(RecipeKey::Number(1))));
+    (station, orders)
+}
+
+fn good() -> Arc<Inspection> {
+    let limits = (Some(-1.0), Some(1.0));
+    let gauge = GaugeValue::judged("height", Unit::Length, Some(0.1), Some(0.01), limits);
+    Arc::new(Inspection {
+        judged: Verdict::Pass,
+        gauges: [gauge].into_iter().collect(),
+        ..Inspection::default()
+    })
+}
+
+/// Serves `wires` while `course` runs.
+fn serving(wires: Wires, open: Open, station: &StationHandle, course: impl FnOnce()) {
+    let (stop, stopped) = watch::channel(false);
+    std::thread::scope(|scope| {
+        let served = scope.spawn(|| serve(wires, &open, station, &Progress::new(true), stopped));
+        course();
+        stop.send(true).unwrap();
+        served.join().unwrap().unwrap();
+    });
+}
+
+fn never() -> Open {
+    Box::new(|| panic!("nothing is to be opened again"))
+}
+
+#[test]
+fn a_start_by_wire_measures_one_part_and_the_lamps_follow() {
+    let (station, orders) = ready();
+    let panel = Panel::default();
+    let (line, finger) = pipe_with(PipeFlags::NONBLOCK).unwrap();
+    let wires = Wires {
+        start: Some(Box::new(Button(line))),
+        ..panel.wires()
+    };
+    serving(wires, never(), &station, || {
+        write(&finger, b"!").unwrap();
+        let job = orders.recv_timeout(PATIENCE).unwrap();
+        assert_eq!(panel.until("+busy"), "+busy");
+        station.event(Event::Finished {
+            job,
+            inspection: good(),
+        });
+        // Whoever waits for the end of busy finds ok.
+        assert_eq!(panel.until("-busy"), "+busy +ok -busy");
+        write(&finger, b"!").unwrap();
+        orders.recv_timeout(PATIENCE).unwrap();
+        assert_eq!(panel.until("+busy"), "+busy +ok -busy -ok +busy");
+    });
+    assert_eq!(station.snapshot().triggers, 2);
+}
+
+#[test]
+fn a_start_while_busy_is_counted_as_missed() {
+    let (station, orders) = ready();
+    let (line, finger) = pipe_with(PipeFlags::NONBLOCK).unwrap();
+    let wires = Wires {
+        start: Some(Box::new(Button(line))),
+        ..Wires::default()
+    };
+    serving(wires, never(), &station, || {
+        write(&finger, b"!!").unwrap();
+        orders.recv_timeout(PATIENCE).unwrap();
+        let begun = Instant::now();
+        while station.snapshot().missed == 0 && begun.elapsed() < PATIENCE {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    });
+    let snapshot = station.snapshot();
+    assert_eq!((snapshot.triggers, snapshot.missed), (1, 1));
+}
+
+#[test]
+fn lines_that_went_are_opened_again_and_say_what_is_true_then() {
+    let (station, _orders) = ready();
+    let (panel, again) = (Panel::default(), Panel::default());
+    let found = again.clone();
+    let open: Open = Box::new(move || Ok(found.wires()));
+    serving(panel.wires(), open, &station, || {
+        panel.broken.store(true, Ordering::Relaxed);
+        let message = "on purpose".into();
+        station.event(Event::Faulted {
+            error_code: 101,
+            cause: message,
+            remedy: "none".into(),
+        });
+        assert_eq!(again.until("+fault"), "+fault");
+    });
+}

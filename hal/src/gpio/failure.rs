@@ -1,0 +1,204 @@
+//! What can be wrong with a line, each with its own remedy.
+
+use crate::error::{Device, Error};
+use nix::errno::Errno;
+use std::error::Error as _;
+
+/// A line that cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LineError {
+    /// No chip has that label.
+    #[error(
+        "open line {line}: no GPIO chip is labelled \"{chip}\", only {}: name one of these, or connect it",
+        listed(found)
+    )]
+    NoChip {
+        /// The label asked for.
+        chip: String,
+        /// The line asked for.
+        line: String,
+        /// Labels of the chips that are there.
+        found: Vec<String>,
+    },
+    /// The chip has no line of that name.
+    #[error(
+        "open line {line}: GPIO chip \"{chip}\" has no line of that name, only {}: name one of these",
+        listed(found)
+    )]
+    NoLine {
+        /// Label of the chip.
+        chip: String,
+        /// The line asked for.
+        line: String,
+        /// Names of its lines.
+        found: Vec<String>,
+    },
+    /// More than one line has that name.
+    #[error(
+        "open line {line}: {lines} lines of chips labelled \"{chip}\" have that name: give them different names in the device tree"
+    )]
+    Ambiguous {
+        /// Label of the chip.
+        chip: String,
+        /// The line asked for.
+        line: String,
+        /// How many.
+        lines: usize,
+    },
+    /// Somebody else holds the line.
+    #[error(
+        "open line {line}: {} uses it: end that program, remove the overlay that takes the line, or use another line", user.as_deref().unwrap_or("somebody else")
+    )]
+    Busy {
+        /// The line asked for.
+        line: String,
+        /// Who holds it, as far as the kernel says.
+        user: Option<String>,
+    },
+    /// The kernel speaks only version 2 of the interface.
+    #[error(
+        "open line {line}: this kernel has no version 1 of the GPIO interface: use one that is built with CONFIG_GPIO_CDEV_V1=y, as those of Raspberry Pi and of Debian 13 are"
+    )]
+    NoVersion1 {
+        /// The line asked for.
+        line: String,
+    },
+    /// This user may not.
+    #[error(
+        "open line {line}: this user may not open {path}: add the user to the group that owns it (`gpio` on a Raspberry Pi)"
+    )]
+    Denied {
+        /// The line asked for.
+        line: String,
+        /// The chip's device file.
+        path: String,
+    },
+    /// The chip is gone while its line was in use.
+    #[error("use line {line}: its GPIO chip is gone: connect it again")]
+    Removed {
+        /// The line.
+        line: String,
+    },
+    /// Anything else that the system says.
+    #[error(
+        "use line {line}: {cause}: look into the kernel's log, and whether `gpioinfo` shows the line"
+    )]
+    Failed {
+        /// The line.
+        line: String,
+        /// The system's words.
+        cause: String,
+    },
+}
+
+/// What a list of names is cut to, so that a message stays readable.
+const LISTED: usize = 32;
+
+fn listed(names: &[String]) -> String {
+    match names {
+        [] => "none at all".into(),
+        names if names.len() > LISTED => format!("{} and more", names[..LISTED].join(", ")),
+        names => names.join(", "),
+    }
+}
+
+impl From<LineError> for Error {
+    /// For those who know devices only. What can be wrong with a line that is open is that it is gone; the rest keeps its words.
+    fn from(error: LineError) -> Self {
+        match error {
+            LineError::Removed { line } => {
+                Self::disconnected(Device::Lines, format!("using line {line}"))
+            }
+            other => Self::unsupported(
+                "a line of the GPIO chip as it is set up".to_string(),
+                other.to_string(),
+            ),
+        }
+    }
+}
+
+/// What an error of the library means for `line`, whose holder is `user`.
+pub(super) fn means(error: &gpio_cdev::Error, line: &str, user: Option<String>) -> LineError {
+    let line = line.to_owned();
+    match errno(error) {
+        Some(Errno::EBUSY) => LineError::Busy { line, user },
+        Some(Errno::ENODEV) => LineError::Removed { line },
+        _ => LineError::Failed {
+            line,
+            cause: error.to_string(),
+        },
+    }
+}
+
+/// The system's number in an error of the library, which shows it as a source only.
+pub(super) fn errno(error: &gpio_cdev::Error) -> Option<Errno> {
+    let source = error.source()?;
+    if let Some(errno) = source.downcast_ref::<Errno>() {
+        return Some(*errno);
+    }
+    let number = source.downcast_ref::<std::io::Error>()?.raw_os_error()?;
+    Some(Errno::from_i32(number))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::ErrorKind;
+
+    #[test]
+    fn each_thing_that_can_be_wrong_has_its_own_words_and_remedy() {
+        let line = || "GPIO17".to_owned();
+        let chip = || "pinctrl-rp1".to_owned();
+        let all = [
+            LineError::NoChip {
+                chip: chip(),
+                line: line(),
+                found: vec!["gpio-sim".into()],
+            },
+            LineError::NoLine {
+                chip: chip(),
+                line: line(),
+                found: Vec::new(),
+            },
+            LineError::Ambiguous {
+                chip: chip(),
+                line: line(),
+                lines: 2,
+            },
+            LineError::Busy {
+                line: line(),
+                user: Some("spi0 CS0".into()),
+            },
+            LineError::NoVersion1 { line: line() },
+            LineError::Denied {
+                line: line(),
+                path: "/dev/gpiochip0".into(),
+            },
+            LineError::Removed { line: line() },
+            LineError::Failed {
+                line: line(),
+                cause: "EIO".into(),
+            },
+        ];
+        let words: Vec<String> = all.iter().map(ToString::to_string).collect();
+        for (at, message) in words.iter().enumerate() {
+            assert!(
+                message.contains("GPIO17") && message.matches(": ").count() >= 2,
+                "{message}"
+            );
+            assert!(!words[..at].contains(message), "{message}");
+        }
+    }
+
+    #[test]
+    fn only_a_chip_that_is_gone_has_to_be_opened_again() {
+        let means = |number| {
+            let error = gpio_cdev::Error::from(std::io::Error::from_raw_os_error(number));
+            Error::from(means(&error, "GPIO17", None)).kind()
+        };
+        assert_eq!(means(Errno::ENODEV as i32), ErrorKind::Disconnected);
+        for other in [Errno::EBUSY, Errno::EINVAL, Errno::EIO] {
+            assert_eq!(means(other as i32), ErrorKind::Unsupported, "{other}");
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! A head whose devices are closed: it remembers what they were like, and every call says that they are gone.
+//!
+//! A device can be held once only, so who opens a lost head again has to let go of it first.
+
+use std::time::Duration;
+
+use super::{DynHead, Head};
+use crate::camera::{Camera, CameraTiming, Encoding};
+use crate::clock::{Clock, Monotonic};
+use crate::error::{Device, Error};
+use crate::frame::{Frame, FrameFormat};
+use crate::projector::{Flip, Projector, Raster};
+use crate::trigger::{NoTrigger, Trigger};
+
+/// What the devices were like.
+#[derive(Clone, Debug)]
+struct Closed {
+    format: FrameFormat,
+    encoding: Encoding,
+    timing: CameraTiming,
+    size: (u32, u32),
+    refresh: Duration,
+}
+
+impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
+    /// What is left of this head when its devices are closed.
+    pub fn closed(&self) -> DynHead {
+        let like = Closed {
+            format: self.camera_format(),
+            encoding: self.encoding(),
+            timing: self.camera_timing(),
+            size: self.projector_size(),
+            refresh: self.refresh(),
+        };
+        Head::new(
+            Box::new(like.clone()),
+            Box::new(like),
+            Box::new(NoTrigger),
+            Box::new(Monotonic::default()),
+            self.timing(),
+        )
+    }
+}
+
+fn gone<T>(device: Device) -> Result<T, Error> {
+    Err(Error::disconnected(device, "using a head that is closed"))
+}
+
+impl Camera for Closed {
+    fn format(&self) -> FrameFormat {
+        self.format
+    }
+
+    fn encoding(&self) -> Encoding {
+        self.encoding.clone()
+    }
+
+    fn timing(&self) -> CameraTiming {
+        self.timing
+    }
+
+    fn present(&self) -> Result<(), Error> {
+        gone(Device::Camera)
+    }
+
+    fn start(&mut self) -> Result<(), Error> {
+        gone(Device::Camera)
+    }
+
+    fn poll_frame(&mut self) -> Result<Option<Frame>, Error> {
+        gone(Device::Camera)
+    }
+
+    fn stop(&mut self) -> Result<(), Error> {
+        Ok(())
+    }
+}
+
+impl Projector for Closed {
+    fn size(&self) -> (u32, u32) {
+        self.size
+    }
+
+    fn refresh(&self) -> Duration {
+        self.refresh
+    }
+
+    fn present(&self) -> Result<(), Error> {
+        gone(Device::Projector)
+    }
+
+    fn load(&mut self, _: Vec<Raster>) -> Result<(), Error> {
+        gone(Device::Projector)
+    }
+
+    fn queue(&mut self, _: usize) -> Result<(), Error> {
+        gone(Device::Projector)
+    }
+
+    fn poll_flip(&mut self) -> Result<Option<Flip>, Error> {
+        gone(Device::Projector)
+    }
+
+    fn blank(&mut self) -> Result<(), Error> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::error::ErrorKind;
+    use crate::sim::{Scenario, head_with_progress};
+    use std::time::Duration;
+
+    #[test]
+    fn a_closed_head_is_what_it_was_like_and_measures_nothing() {
+        let (head, _stage) = head_with_progress(&Scenario::default(), &|_| ()).unwrap();
+        let mut closed = head.closed();
+        assert_eq!(
+            (closed.camera_format(), closed.projector_size()),
+            (head.camera_format(), head.projector_size())
+        );
+        assert_eq!(closed.timing(), head.timing());
+        let answers = [
+            closed.present(),
+            closed.load(Vec::new()),
+            closed
+                .acquire(&[0], Duration::ZERO, &mut |_, _| ())
+                .map(|_| ()),
+        ];
+        for answer in answers {
+            assert_eq!(answer.unwrap_err().kind(), ErrorKind::Disconnected);
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! A display card of the kernel: opening it, asking it, and what its refusals mean.
+
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+
+use drm::control::{
+    Device as ControlDevice, PlaneType, RawResourceHandle, ResourceHandle, property,
+};
+use drm::{ClientCapability, Device, DriverCapability};
+use rustix::fs::OFlags;
+use rustix::io::Errno;
+
+use crate::error::{self, Error};
+
+/// Where the kernel lists its cards.
+const CARDS: &str = "/dev/dri";
+
+/// A card on which this program may set modes.
+#[derive(Debug)]
+pub(super) struct Card {
+    file: File,
+    pub path: PathBuf,
+}
+
+impl AsFd for Card {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.file.as_fd()
+    }
+}
+
+impl Device for Card {}
+impl ControlDevice for Card {}
+
+impl Card {
+    /// Opens a card with all its planes, for atomic commits. None if it displays nothing, as the 3-D part of a processor.
+    pub fn open(path: &Path) -> Result<Option<Self>, Error> {
+        let attempt = || format!("opening the display card {}", path.display());
+        let flags = OFlags::NONBLOCK | OFlags::CLOEXEC;
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .custom_flags(flags.bits().cast_signed())
+            .open(path)
+            .map_err(|error| match error.kind() {
+                io::ErrorKind::NotFound => Error::unsupported(
+                    attempt(),
+                    format!("there is no such card; there {}", listed(&paths())),
+                ),
+                _ => refused(attempt(), &error),
+            })?;
+        let card = Self {
+            file,
+            path: path.to_owned(),
+        };
+        let displays = card
+            .resource_handles()
+            .is_ok_and(|all| !all.crtcs().is_empty() && !all.connectors().is_empty());
+        if !displays {
+            return Ok(None);
+        }
+        card.set_client_capability(ClientCapability::UniversalPlanes, true)
+            .and_then(|()| card.set_client_capability(ClientCapability::Atomic, true))
+            .map_err(|_| {
+                Error::unsupported(
+                    format!("{}: atomic mode setting", attempt()),
+                    "use a driver that has it, as vc4-kms-v3d on a Raspberry Pi (not fkms)",
+                )
+            })?;
+        let monotonic = card.get_driver_capability(DriverCapability::MonotonicTimestamp);
+        if monotonic.unwrap_or(0) != 1 {
+            return Err(Error::unsupported(
+                format!("{}: stamping flips by CLOCK_MONOTONIC", attempt()),
+                "remove drm.timestamp_monotonic from the kernel's command line",
+            ));
+        }
+        Ok(Some(card))
+    }
+
+    /// Makes this program the one that sets modes; with it the console is off.
+    pub fn own(&self) -> Result<(), Error> {
+        self.acquire_master_lock().map_err(|_| {
+            Error::unsupported(
+                format!(
+                    "setting a mode on {} while another program does",
+                    self.path.display()
+                ),
+                "stop the desktop, display manager or other program that shows something there",
+            )
+        })
+    }
+
+    /// A duplicate of the descriptor: readable when a flip has come.
+    pub fn descriptor(&self) -> Result<OwnedFd, Error> {
+        let duplicate = self.as_fd().try_clone_to_owned();
+        duplicate.map_err(|error| {
+            refused(
+                format!("duplicating the descriptor of {}", self.path.display()),
+                &error,
+            )
+        })
+    }
+
+    /// The properties of an object.
+    pub fn properties<H: ResourceHandle>(&self, of: H) -> Result<Properties, Error> {
+        let failed = |error| {
+            refused(
+                format!("reading the properties of {}", self.path.display()),
+                &error,
+            )
+        };
+        let values = self.get_properties(of).map_err(failed)?;
+        let mut all = Vec::new();
+        for (&handle, &value) in &values {
+            let info = self.get_property(handle).map_err(failed)?;
+            let name = info.name().to_string_lossy().into_owned();
+            all.push(Property { name, info, value });
+        }
+        Ok(Properties {
+            object: of.into(),
+            all,
+        })
+    }
+}
+
+/// A property of an object and the value that it has.
+#[derive(Clone, Debug)]
+pub(super) struct Property {
+    pub name: String,
+    pub info: property::Info,
+    pub value: u64,
+}
+
+/// The properties of a connector, CRTC or plane.
+#[derive(Clone, Debug)]
+pub(super) struct Properties {
+    pub object: RawResourceHandle,
+    pub all: Vec<Property>,
+}
+
+impl Properties {
+    /// The property of this name.
+    pub fn named(&self, name: &str) -> Result<property::Handle, Error> {
+        let found = self.all.iter().find(|property| property.name == name);
+        found.map(|property| property.info.handle()).ok_or_else(|| {
+            Error::unsupported(
+                format!("setting the display property {name}"),
+                "use a driver that has it",
+            )
+        })
+    }
+
+    /// Whether this is a plane of this type.
+    pub fn is(&self, plane: PlaneType) -> bool {
+        let kind = self.all.iter().find(|property| property.name == "type");
+        kind.is_some_and(|kind| kind.value == u64::from(plane as u32))
+    }
+}
+
+/// The cards that there are, in the order of their numbers.
+pub(super) fn paths() -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(CARDS) else {
+        return Vec::new();
+    };
+    let is_card = |path: &PathBuf| {
+        path.file_name()
+            .is_some_and(|name| name.to_string_lossy().starts_with("card"))
+    };
+    let mut all: Vec<PathBuf> = entries
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(is_card)
+        .collect();
+    all.sort();
+    all
+}
+
+/// "is a, b", or "are none".
+pub(super) fn listed(things: &[impl AsRef<Path>]) -> String {
+    if things.is_empty() {
+        return "are none".into();
+    }
+    let names: Vec<String> = things
+        .iter()
+        .map(|thing| thing.as_ref().display().to_string())
+        .collect();
+    format!("is {}", names.join(", "))
+}
+
+/// What a refusal of the kernel means.
+pub(super) fn refused(attempt: impl Into<String>, why: &io::Error) -> Error {
+    let attempt = attempt.into();
+    match Errno::from_io_error(why) {
+        Some(Errno::NODEV | Errno::NXIO | Errno::IO) => {
+            Error::disconnected(error::Device::Projector, attempt)
+        }
+        Some(Errno::ACCESS | Errno::PERM) => Error::unsupported(
+            attempt,
+            "let the user belong to the group \"video\", and stop other programs that show something there",
+        ),
+        Some(Errno::BUSY) => Error::protocol(attempt, "another flip still waits: fetch it first"),
+        Some(Errno::NOMEM | Errno::NOSPC) => Error::unsupported(
+            attempt,
+            "there is not enough memory for display buffers: give more (on a Raspberry Pi \"dtoverlay=vc4-kms-v3d,cma-512\")",
+        ),
+        _ => Error::unsupported(attempt, format!("the kernel says: {why}")),
+    }
+}

@@ -1,0 +1,65 @@
+//! What a display driver may do to grey levels, and the setting with which it does not.
+//!
+//! A pattern is measured, not looked at: 0…255 must reach the projector as 0…255, every pixel on its own. Drivers offer what
+//! pictures need instead. Each property is set only where the driver has it and has it otherwise.
+
+use drm::control::property::ValueType;
+
+/// The value of this name of a list of names, or the number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Wanted {
+    Named(&'static str),
+    Number(u64),
+}
+
+/// Properties of a connector by the kernel's names of them, in the order of the drivers that have them.
+const CONNECTOR: [(&str, Wanted); 11] = [
+    // Black is 0 and white is 255, also on television modes.
+    ("Broadcast RGB", Wanted::Named("Full")),
+    ("output_csc", Wanted::Named("bypass")),
+    // No dots instead of grey levels.
+    ("dithering mode", Wanted::Named("off")),
+    ("dither", Wanted::Named("off")),
+    // No borders and no scaling: pixel for pixel.
+    ("left margin", Wanted::Number(0)),
+    ("right margin", Wanted::Number(0)),
+    ("top margin", Wanted::Number(0)),
+    ("bottom margin", Wanted::Number(0)),
+    ("underscan", Wanted::Named("off")),
+    ("scaling mode", Wanted::Named("None")),
+    ("Colorspace", Wanted::Named("Default")),
+];
+
+/// Properties of a CRTC: no tables and matrices between buffer and connector, and refreshes at even times.
+const CRTC: [(&str, Wanted); 4] = [
+    ("DEGAMMA_LUT", Wanted::Number(0)),
+    ("CTM", Wanted::Number(0)),
+    ("GAMMA_LUT", Wanted::Number(0)),
+    ("VRR_ENABLED", Wanted::Number(0)),
+];
+
+/// The value that a connector's property should have; none if it does not matter or the driver has no such value.
+pub(super) fn of_connector(name: &str, kind: &ValueType) -> Option<u64> {
+    find(&CONNECTOR, name, kind)
+}
+
+/// The value that a CRTC's property should have; none if it does not matter.
+pub(super) fn of_crtc(name: &str, kind: &ValueType) -> Option<u64> {
+    find(&CRTC, name, kind)
+}
+
+fn find(known: &[(&str, Wanted)], name: &str, kind: &ValueType) -> Option<u64> {
+    let (_, wanted) = known.iter().find(|(known, _)| *known == name)?;
+    match (wanted, kind) {
+        (Wanted::Number(number), _) => Some(*number),
+        (Wanted::Named(wanted), ValueType::Enum(values)) => {
+            let (numbers, names) = values.values();
+            let is_it = |name: &str| name.eq_ignore_ascii_case(wanted);
+            let at = names
+                .iter()
+                .position(|value| value.name().to_str().is_ok_and(is_it))?;
+            numbers.get(at).copied()
+        }
+        (Wanted::Named(_), _) => None,
+    }
+}

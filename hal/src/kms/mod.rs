@@ -1,0 +1,333 @@
+//! A projector on a display connector of this computer, through the kernel's mode setting (KMS).
+//!
+//! [`open`] finds card, connector and mode, takes the console and everything else off the connector, and shows black. Patterns are drawn
+//! into the card's memory when they are loaded; a flip copies nothing. Each flip is one atomic commit that does not wait; its
+//! event brings the kernel's count and time of the refresh at which the pattern was taken up.
+//!
+//! Whoever drops it switches the connector off and leaves the card to the console again.
+
+mod canvas;
+mod card;
+mod faithful;
+mod find;
+mod modes;
+mod output;
+
+use std::io;
+use std::os::fd::OwnedFd;
+use std::time::Duration;
+
+use drm::Device as _;
+use drm::control::{Device as _, Event, PageFlipEvent};
+use rustix::event::{PollFd, PollFlags, poll};
+
+use crate::clock::{monotonic, timespec};
+use crate::error::Error;
+use crate::projector::{Flip, Projector, Raster};
+use crate::setup::ProjectorSetup;
+use crate::units::Timestamp;
+use canvas::Canvas;
+use output::Output;
+
+/// A flip that has not come after so many refreshes does not come any more.
+const PATIENCE: u32 = 10;
+
+/// A display that shows patterns by the refresh.
+#[derive(Debug)]
+pub struct Display {
+    output: Output,
+    black: Canvas,
+    /// In the order of the patterns, and more from a longer sequence before.
+    canvases: Vec<Canvas>,
+    loaded: usize,
+    shown: Picture,
+    /// The commit whose event has not come.
+    waiting: Option<Commit>,
+    /// The pattern to be committed once black has come.
+    next: Option<usize>,
+    /// Has come and was not fetched.
+    came: Option<Flip>,
+    /// The kernel's count of refreshes, which has 32 bits, continued.
+    count: Option<u64>,
+    missed: u64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Picture {
+    Black,
+    Pattern(usize),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Commit {
+    picture: Picture,
+    asked: Timestamp,
+}
+
+/// Opens the display of a setup in its mode and shows black.
+///
+/// # Errors
+/// `Unsupported` if card, connector or mode is not there, or another program shows something on the card; `Disconnected` if nothing is
+/// plugged in. The message lists what there is.
+pub fn open(setup: &ProjectorSetup) -> Result<Display, Error> {
+    let output = Output::find(setup)?;
+    let size = (output.timings.width, output.timings.height);
+    let mut black = Canvas::new(&output.card, size)?;
+    black.draw(&output.card, &Raster::uniform(size.0, size.1, 0)?)?;
+    output.switch_on(&black)?;
+    Ok(Display {
+        output,
+        black,
+        canvases: Vec::new(),
+        loaded: 0,
+        shown: Picture::Black,
+        waiting: None,
+        next: None,
+        came: None,
+        count: None,
+        missed: 0,
+    })
+}
+
+impl Display {
+    /// A duplicate of its descriptor, which is readable when a flip has come.
+    ///
+    /// # Errors
+    /// What the kernel says.
+    pub fn descriptor(&self) -> Result<OwnedFd, Error> {
+        self.output.card.descriptor()
+    }
+
+    /// Refreshes that the driver missed: those that passed between asking for a flip and its coming. A quarter of a refresh, in which
+    /// a commit may be too late for the next one, is no miss. Refreshes for which nobody asked in time are in the count of the flips.
+    #[must_use]
+    pub fn missed(&self) -> u64 {
+        self.missed
+    }
+
+    fn commit(&mut self, picture: Picture) -> Result<(), Error> {
+        let canvas = match picture {
+            Picture::Black => &self.black,
+            Picture::Pattern(index) => &self.canvases[index],
+        };
+        let asked = monotonic();
+        self.output
+            .flip(canvas)
+            .map_err(|error| card::refused("asking for a flip", &error))?;
+        self.waiting = Some(Commit { picture, asked });
+        Ok(())
+    }
+
+    /// Takes the events that have come.
+    fn take_events(&mut self) -> Result<(), Error> {
+        loop {
+            let events = match self.output.card.receive_events() {
+                Ok(events) => events,
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => return Err(card::refused("reading flips", &error)),
+            };
+            for event in events {
+                if let Event::PageFlip(event) = event
+                    && event.crtc == self.output.crtc
+                {
+                    self.flipped(&event)?;
+                }
+            }
+        }
+    }
+
+    fn flipped(&mut self, event: &PageFlipEvent) -> Result<(), Error> {
+        let count = continued(self.count, event.frame);
+        self.count = Some(count);
+        let Some(commit) = self.waiting.take() else {
+            return Ok(());
+        };
+        self.shown = commit.picture;
+        if let Picture::Pattern(_) = commit.picture {
+            // Called a duration by the crate, it is the time.
+            let timestamp = Timestamp(0) + event.duration;
+            let beyond = timestamp
+                .since(commit.asked)
+                .saturating_sub(self.refresh() / 4);
+            let missed = beyond.as_nanos() / self.refresh().as_nanos();
+            self.missed += u64::try_from(missed).unwrap_or(u64::MAX);
+            self.came = Some(Flip {
+                timestamp,
+                sequence: count,
+            });
+        }
+        match self.next.take() {
+            Some(index) => self.commit(Picture::Pattern(index)),
+            None => Ok(()),
+        }
+    }
+
+    /// Waits for the commit that is on its way: up to a refresh, if all is well.
+    fn settle(&mut self) -> Result<(), Error> {
+        let patience = self.refresh() * PATIENCE;
+        let end = monotonic() + patience;
+        loop {
+            self.take_events()?;
+            if self.waiting.is_none() {
+                return Ok(());
+            }
+            self.output.present("waiting for a flip")?;
+            let left = end.since(monotonic()).min(self.refresh());
+            if left.is_zero() {
+                return Err(Error::timeout(
+                    "waiting for a flip",
+                    patience,
+                    "check the display's mode; if it stays so, start the computer again",
+                ));
+            }
+            let mut news = [PollFd::new(&self.output.card, PollFlags::IN)];
+            // A signal ends it early, and nothing else is wrong with a descriptor of ours.
+            let _ = poll(&mut news, Some(&timespec(left)));
+        }
+    }
+}
+
+impl Projector for Display {
+    fn size(&self) -> (u32, u32) {
+        (self.output.timings.width, self.output.timings.height)
+    }
+
+    fn refresh(&self) -> Duration {
+        self.output.timings.period
+    }
+
+    fn present(&self) -> Result<(), Error> {
+        self.output.present("looking for the projector")
+    }
+
+    /// Waits until black is shown, at most a few refreshes: nothing is drawn that is in view.
+    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
+        let (width, height) = self.size();
+        for (index, raster) in rasters.iter().enumerate() {
+            if (raster.width(), raster.height()) != (width, height) {
+                return Err(Error::unsupported(
+                    format!(
+                        "loading raster {index} of {}×{}",
+                        raster.width(),
+                        raster.height()
+                    ),
+                    format!("make it {width}×{height}, the projector's size"),
+                ));
+            }
+        }
+        self.blank()?;
+        self.settle()?;
+        self.loaded = 0;
+        let card = &self.output.card;
+        for spare in self
+            .canvases
+            .drain(rasters.len().min(self.canvases.len())..)
+        {
+            spare.free(card);
+        }
+        for (index, raster) in rasters.iter().enumerate() {
+            if index == self.canvases.len() {
+                self.canvases.push(Canvas::new(card, (width, height))?);
+            }
+            self.canvases[index].draw(card, raster)?;
+        }
+        self.loaded = rasters.len();
+        Ok(())
+    }
+
+    fn queue(&mut self, index: usize) -> Result<(), Error> {
+        self.output.present("showing a pattern")?;
+        if index >= self.loaded {
+            return Err(Error::protocol(
+                format!(
+                    "showing pattern {index} of {} loaded (counted from 0)",
+                    self.loaded
+                ),
+                "load the patterns first",
+            ));
+        }
+        self.take_events()?;
+        let black = matches!(
+            self.waiting,
+            Some(Commit {
+                picture: Picture::Black,
+                ..
+            })
+        );
+        if self.came.is_some() || self.next.is_some() || self.waiting.is_some() && !black {
+            return Err(Error::protocol(
+                format!("showing pattern {index} while another one waits for its refresh"),
+                "fetch its flip first",
+            ));
+        }
+        if black {
+            self.next = Some(index);
+            return Ok(());
+        }
+        self.commit(Picture::Pattern(index))
+    }
+
+    fn poll_flip(&mut self) -> Result<Option<Flip>, Error> {
+        self.take_events()?;
+        let flip = self.came.take();
+        if flip.is_none() && self.waiting.is_some() {
+            // Of a display that is gone no event ever comes.
+            self.output.present("waiting for a flip")?;
+        }
+        Ok(flip)
+    }
+
+    /// A pattern that is on its way is waited for, at most a few refreshes: the kernel takes back no commit.
+    fn blank(&mut self) -> Result<(), Error> {
+        self.next = None;
+        if !matches!(
+            self.waiting,
+            Some(Commit {
+                picture: Picture::Black,
+                ..
+            })
+        ) {
+            self.settle()?;
+            if self.shown != Picture::Black {
+                self.commit(Picture::Black)?;
+            }
+        }
+        self.came = None;
+        Ok(())
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        let _ = self.output.switch_off();
+        let card = &self.output.card;
+        for canvas in self.canvases.drain(..) {
+            canvas.free(card);
+        }
+        self.black.free(card);
+        // Descriptors that were handed out would keep the card for this program.
+        let _ = card.release_master_lock();
+    }
+}
+
+/// The count that goes on where the kernel's starts again, after 2³² refreshes.
+fn continued(last: Option<u64>, counted: u32) -> u64 {
+    last.map_or(u64::from(counted), |last| {
+        // Truncation is the point: the low 32 bits are the kernel's.
+        last + u64::from(counted.wrapping_sub(last as u32))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_count_of_refreshes_goes_on_where_the_kernels_starts_again() {
+        assert_eq!(continued(None, 7), 7);
+        assert_eq!(continued(Some(7), 9), 9);
+        let last = continued(Some(u64::from(u32::MAX) - 1), u32::MAX);
+        assert_eq!(continued(Some(last), 1), (1 << 32) + 1);
+    }
+}

@@ -1,0 +1,228 @@
+//! The way from a buffer to the projector: a connector, the CRTC that drives it and the plane that it shows.
+
+use std::fs::File;
+use std::io;
+use std::os::unix::fs::FileExt;
+use std::path::PathBuf;
+
+use drm::control::atomic::AtomicModeReq;
+use drm::control::{AtomicCommitFlags, Device, Mode, crtc, property};
+
+use super::card::{Card, Properties, refused};
+use super::find::{crtc_for, no_mode, primary_plane, the_connector};
+use super::modes::{Timings, choose};
+use super::{canvas, faithful};
+use crate::error::{self, Error};
+use crate::setup::ProjectorSetup;
+
+/// Where the kernel tells the state of its connectors.
+const CONNECTORS: &str = "/sys/class/drm";
+
+/// A connector in its mode.
+#[derive(Debug)]
+pub(super) struct Output {
+    pub card: Card,
+    pub crtc: crtc::Handle,
+    pub timings: Timings,
+    /// The kernel's name of the connector.
+    name: String,
+    mode: Mode,
+    connector: Properties,
+    driver: Properties,
+    plane: Properties,
+    picture: property::Handle,
+    /// Tells whether something is plugged in, without asking the display; none where the kernel does not.
+    status: Option<File>,
+}
+
+impl Output {
+    /// Finds the card, connector and mode of a setup, and owns the card. Sets nothing yet.
+    pub fn find(setup: &ProjectorSetup) -> Result<Self, Error> {
+        let (card, connector) = the_connector(setup)?;
+        card.own()?;
+        let name = connector.to_string();
+        let timings: Vec<Timings> = connector.modes().iter().map(Timings::of).collect();
+        let chosen = choose(&timings, setup).ok_or_else(|| no_mode(&name, &timings, setup))?;
+        let failed = |error| refused(format!("looking for a way to {name}"), &error);
+        let all = card.resource_handles().map_err(failed)?;
+        let crtc = crtc_for(&card, &all, &connector)
+            .map_err(failed)?
+            .ok_or_else(|| {
+                Error::unsupported(
+                    format!("driving {name}"),
+                    "unplug other displays of this card",
+                )
+            })?;
+        let plane = primary_plane(&card, &all, crtc)?.ok_or_else(|| {
+            Error::unsupported(
+                format!("showing {} on {name}", canvas::FORMAT),
+                "use a driver that has it",
+            )
+        })?;
+        let status = card.path.file_name().and_then(|number| {
+            let folder = format!("{}-{name}", number.to_string_lossy());
+            File::open(PathBuf::from(CONNECTORS).join(folder).join("status")).ok()
+        });
+        let plane = card.properties(plane)?;
+        Ok(Self {
+            crtc,
+            timings: timings[chosen],
+            mode: connector.modes()[chosen],
+            connector: card.properties(connector.handle())?,
+            driver: card.properties(crtc)?,
+            picture: plane.named("FB_ID")?,
+            plane,
+            status,
+            name,
+            card,
+        })
+    }
+
+    /// Whether the projector is plugged in; asks the kernel only, which knows.
+    pub fn present(&self, attempt: &str) -> Result<(), Error> {
+        let Some(status) = &self.status else {
+            return Ok(());
+        };
+        let mut text = [0; 16];
+        let attempt = || format!("{attempt} on {}", self.name);
+        match status.read_at(&mut text, 0) {
+            Ok(_) if text.starts_with(b"disconnected") => {
+                Err(Error::disconnected(error::Device::Projector, attempt()))
+            }
+            Ok(_) => Ok(()),
+            Err(error) => Err(refused(attempt(), &error)),
+        }
+    }
+
+    /// Switches the mode on and shows `canvas`. Waits for the display.
+    pub fn switch_on(&self, canvas: &canvas::Canvas) -> Result<(), Error> {
+        let attempt = format!("setting {} on {}", self.timings, self.name);
+        let failed = |error| refused(attempt.clone(), &error);
+        let mode = self.card.create_property_blob(&self.mode).map_err(failed)?;
+        let request = self.mode_request(mode.into(), canvas)?;
+        let set = self.commit(AtomicCommitFlags::ALLOW_MODESET, request);
+        if let property::Value::Blob(mode) = mode {
+            let _ = self.card.destroy_property_blob(mode);
+        }
+        set.map_err(failed)
+    }
+
+    /// Shows another canvas with the next refresh, whose event follows. Does not wait.
+    pub fn flip(&self, canvas: &canvas::Canvas) -> io::Result<()> {
+        let mut request = AtomicModeReq::new();
+        request.add_raw_property(
+            self.plane.object,
+            self.picture,
+            u32::from(canvas.shown_as).into(),
+        );
+        self.commit(
+            AtomicCommitFlags::NONBLOCK | AtomicCommitFlags::PAGE_FLIP_EVENT,
+            request,
+        )
+    }
+
+    /// Switches the connector off.
+    pub fn switch_off(&self) -> Result<(), Error> {
+        let mut request = AtomicModeReq::new();
+        for (object, name) in [
+            (&self.plane, "FB_ID"),
+            (&self.plane, "CRTC_ID"),
+            (&self.connector, "CRTC_ID"),
+            (&self.driver, "MODE_ID"),
+            (&self.driver, "ACTIVE"),
+        ] {
+            request.add_raw_property(object.object, object.named(name)?, 0);
+        }
+        let off = self.commit(AtomicCommitFlags::ALLOW_MODESET, request);
+        off.map_err(|error| refused(format!("switching {} off", self.name), &error))
+    }
+
+    fn commit(&self, flags: AtomicCommitFlags, request: AtomicModeReq) -> io::Result<()> {
+        self.card.atomic_commit(flags, request)
+    }
+
+    /// All that the mode needs, with the settings under which grey levels stay what they are, and nobody else on the CRTC.
+    fn mode_request(&self, mode: u64, canvas: &canvas::Canvas) -> Result<AtomicModeReq, Error> {
+        let mut request = AtomicModeReq::new();
+        let (width, height) = (
+            u64::from(self.timings.width),
+            u64::from(self.timings.height),
+        );
+        let crtc = u64::from(u32::from(self.crtc));
+        // The part of the buffer in 1/65536 pixels, the place on the display in pixels.
+        for (name, value) in [
+            ("FB_ID", u32::from(canvas.shown_as).into()),
+            ("CRTC_ID", crtc),
+            ("SRC_X", 0),
+            ("SRC_Y", 0),
+            ("SRC_W", width << 16),
+            ("SRC_H", height << 16),
+            ("CRTC_X", 0),
+            ("CRTC_Y", 0),
+            ("CRTC_W", width),
+            ("CRTC_H", height),
+        ] {
+            request.add_raw_property(self.plane.object, self.plane.named(name)?, value);
+        }
+        request.add_raw_property(
+            self.connector.object,
+            self.connector.named("CRTC_ID")?,
+            crtc,
+        );
+        request.add_raw_property(self.driver.object, self.driver.named("MODE_ID")?, mode);
+        request.add_raw_property(self.driver.object, self.driver.named("ACTIVE")?, 1);
+        self.be_faithful(&mut request);
+        self.be_alone(&mut request)?;
+        Ok(request)
+    }
+
+    fn be_faithful(&self, request: &mut AtomicModeReq) {
+        for (object, wanted) in [
+            (
+                &self.connector,
+                faithful::of_connector as fn(&str, &property::ValueType) -> Option<u64>,
+            ),
+            (&self.driver, faithful::of_crtc),
+        ] {
+            for property in object.all.iter().filter(|property| property.info.mutable()) {
+                let value = wanted(&property.name, property.info.value_type());
+                if let Some(value) = value.filter(|value| *value != property.value) {
+                    request.add_raw_property(object.object, property.info.handle(), value);
+                }
+            }
+        }
+    }
+
+    /// Takes cursors, overlays and other connectors off this CRTC.
+    fn be_alone(&self, request: &mut AtomicModeReq) -> Result<(), Error> {
+        let failed = |error| {
+            refused(
+                format!("looking for what else shows on {}", self.name),
+                &error,
+            )
+        };
+        let crtc = u64::from(u32::from(self.crtc));
+        let planes = self.card.plane_handles().map_err(failed)?;
+        let all = self.card.resource_handles().map_err(failed)?;
+        let mut others = Vec::new();
+        for plane in planes {
+            others.push((self.card.properties(plane)?, &["FB_ID", "CRTC_ID"][..]));
+        }
+        for connector in all.connectors() {
+            others.push((self.card.properties(*connector)?, &["CRTC_ID"][..]));
+        }
+        for (other, names) in others {
+            let ours = other.object == self.plane.object || other.object == self.connector.object;
+            let here = other
+                .all
+                .iter()
+                .any(|property| property.name == "CRTC_ID" && property.value == crtc);
+            if here && !ours {
+                for name in names {
+                    request.add_raw_property(other.object, other.named(name)?, 0);
+                }
+            }
+        }
+        Ok(())
+    }
+}

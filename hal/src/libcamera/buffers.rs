@@ -1,0 +1,116 @@
+//! The memory of a camera's buffers: mapped once, lent with a frame, given back when the last of its clones is dropped.
+
+use std::os::fd::{AsRawFd, OwnedFd};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::Sender;
+
+use ::libcamera::framebuffer::{AsFrameBuffer, FrameBufferPlane, OwnedFrameBuffer};
+use ::libcamera::framebuffer_map::MemoryMappedFrameBuffer;
+use bytes::Bytes;
+use filedescriptor::FileDescriptor;
+
+use super::owner::Order;
+use crate::error::Error;
+use crate::frame::{Lent, Samples};
+
+/// Maps the first `length` bytes of the first plane of a buffer, for as long as the answer or a clone of it lives.
+///
+/// The mapping has descriptors of its own, so it outlives buffer, camera and library.
+///
+/// # Errors
+/// `Protocol` if the plane is shorter or cannot be mapped.
+pub(super) fn map(buffer: &impl AsFrameBuffer, length: usize) -> Result<Bytes, Error> {
+    let failed = |cause: String| {
+        Error::protocol(
+            format!("mapping {length} bytes of a camera's buffer: {cause}"),
+            "this is a defect of the camera's driver or a lack of memory: see the system's log",
+        )
+    };
+    let planes = buffer.planes();
+    let plane = planes
+        .get(0)
+        .ok_or_else(|| failed("it has no plane".into()))?;
+    let offset = plane.offset().and_then(|offset| u32::try_from(offset).ok());
+    let (Some(offset), true, Ok(length)) = (offset, plane.len() >= length, u32::try_from(length))
+    else {
+        return Err(failed(format!(
+            "its first plane is of {} bytes",
+            plane.len()
+        )));
+    };
+    let own = || -> Result<OwnedFd, filedescriptor::Error> {
+        Ok(FileDescriptor::dup(&plane.fd())?.as_file()?.into())
+    };
+    let fd = own().map_err(|cause| failed(cause.to_string()))?;
+    let given = fd.as_raw_fd();
+    let planes = vec![FrameBufferPlane { fd, offset, length }];
+    let own = OwnedFrameBuffer::new(planes, None).map_err(|cause| failed(cause.to_string()))?;
+    // libcamera 0.7.0 of Rust says that it takes the descriptor, gives a duplicate of it to the library, and loses it.
+    if own.planes().get(0).is_some_and(|plane| plane.fd() != given) {
+        let _ = nix::unistd::close(given);
+    }
+    let mapped = MemoryMappedFrameBuffer::new(own).map_err(|cause| failed(cause.to_string()))?;
+    Ok(Bytes::from_owner(FirstPlane(mapped)))
+}
+
+struct FirstPlane(MemoryMappedFrameBuffer<OwnedFrameBuffer>);
+
+impl AsRef<[u8]> for FirstPlane {
+    fn as_ref(&self) -> &[u8] {
+        self.0.data().first().copied().unwrap_or_default()
+    }
+}
+
+/// A buffer in use: the camera does not write into it while this lives.
+#[derive(Debug)]
+pub(super) struct Lease {
+    index: usize,
+    bytes: Bytes,
+    wide: bool,
+    home: Sender<Order>,
+    out: Arc<AtomicUsize>,
+}
+
+impl Lease {
+    /// Takes buffer `index`, whose memory is `bytes`, of words if `wide`; it goes back to `home`. `out` counts the buffers in use.
+    pub fn new(
+        index: usize,
+        bytes: Bytes,
+        wide: bool,
+        home: Sender<Order>,
+        out: &Arc<AtomicUsize>,
+    ) -> Self {
+        out.fetch_add(1, Ordering::Relaxed);
+        Self {
+            index,
+            bytes,
+            wide,
+            home,
+            out: Arc::clone(out),
+        }
+    }
+
+    /// The buffer as it is.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+}
+
+impl Lent for Lease {
+    fn samples(&self) -> Samples<'_> {
+        if !self.wide {
+            return Samples::Eight(&self.bytes);
+        }
+        // A mapping starts at a page and a plane at an even offset; where not, the frame is refused as one of another size.
+        Samples::Sixteen(bytemuck::try_cast_slice(&self.bytes).unwrap_or_default())
+    }
+}
+
+impl Drop for Lease {
+    fn drop(&mut self) {
+        self.out.fetch_sub(1, Ordering::Relaxed);
+        // Without its camera a buffer has nowhere to go.
+        let _ = self.home.send(Order::Free(self.index));
+    }
+}

@@ -1,0 +1,302 @@
+//! The camera as the head sees it: it gives orders to the thread that owns the library, and fetches what comes.
+
+use std::os::fd::OwnedFd;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
+use std::thread;
+use std::time::Duration;
+
+use ::libcamera::properties;
+use rustix::event::{EventfdFlags, eventfd};
+
+use super::open::Configured;
+use super::owner::{Arrived, Event, Order, Wires, own, with_manager};
+use super::report::Count;
+use super::{Reading, Settings};
+use crate::camera::{Camera, CameraTiming, Encoding};
+use crate::error::{Device, Error};
+use crate::frame::{Frame, FrameFormat, Pool};
+
+/// The longest that opening, starting and stopping a camera may take: its sensor is powered up and programmed over I²C. Beyond,
+/// its driver hangs.
+const PATIENCE: Duration = Duration::from_secs(15);
+/// Buffers that the camera needs to write without a gap: one being written, one waiting in the driver, one on its way there.
+const IN_FLIGHT: usize = 3;
+/// Copied frames whose memory is used again.
+const COPIES: usize = 64;
+
+/// A camera that libcamera knows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Listed {
+    /// Its id, for [`Settings::id`].
+    pub id: String,
+    /// The sensor's or the device's name, where it has one.
+    pub model: Option<String>,
+}
+
+/// A camera through libcamera. One can be open at a time.
+#[derive(Debug)]
+pub struct LibCamera {
+    id: String,
+    settings: Settings,
+    configured: Configured,
+    orders: Sender<Order>,
+    events: Receiver<Event>,
+    ready: Arc<OwnedFd>,
+    gone: Arc<AtomicBool>,
+    out: Arc<AtomicUsize>,
+    ended: Receiver<()>,
+    copies: Pool,
+    count: Count,
+    running: bool,
+}
+
+impl LibCamera {
+    /// The cameras that are there, in no particular order.
+    ///
+    /// # Errors
+    /// `Protocol` if a camera is open in this program or the library does not start.
+    pub fn list() -> Result<Vec<Listed>, Error> {
+        with_manager(|manager| {
+            let cameras = manager.cameras();
+            let listed = cameras.iter().map(|camera| Listed {
+                id: camera.id().to_owned(),
+                model: camera
+                    .properties()
+                    .get::<properties::Model>()
+                    .ok()
+                    .map(|model| model.0),
+            });
+            Ok(listed.collect())
+        })
+    }
+
+    /// Opens a camera: finds it by its id, agrees on a format, and maps its buffers.
+    ///
+    /// # Errors
+    /// `Disconnected` if there is no camera of that id; `Unsupported` if it cannot do what is set, with what it can; `Protocol`
+    /// if another program uses it, one is open in this program, or the library refuses; `Timeout` if its driver hangs.
+    pub fn open(settings: Settings) -> Result<Self, Error> {
+        let system = |cause: &dyn std::fmt::Display| {
+            Error::protocol(
+                format!("opening a camera: {cause}"),
+                "the system is out of descriptors or threads: see its log",
+            )
+        };
+        let ready = eventfd(
+            0,
+            EventfdFlags::SEMAPHORE | EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC,
+        )
+        .map_err(|cause| system(&cause))?;
+        let (ready, gone, out) = (Arc::new(ready), Arc::default(), Arc::default());
+        let (orders, ordered) = mpsc::channel();
+        let (told, events) = mpsc::channel();
+        let (answer, opened) = mpsc::channel();
+        let (end, ended) = mpsc::channel();
+        let wires = Wires {
+            settings: settings.clone(),
+            orders: ordered,
+            home: orders.clone(),
+            events: told,
+            ready: Arc::clone(&ready),
+            gone: Arc::clone(&gone),
+            out: Arc::clone(&out),
+        };
+        thread::Builder::new()
+            .name("libcamera".into())
+            .spawn(move || {
+                own(wires, &answer);
+                drop(end);
+            })
+            .map_err(|cause| system(&cause))?;
+        let attempt = match &settings.id {
+            Some(id) => format!("opening the camera `{id}`"),
+            None => "opening a camera".into(),
+        };
+        let (id, configured) = answered(&opened, attempt)?;
+        Ok(Self {
+            copies: Pool::new(configured.format, COPIES),
+            id,
+            settings,
+            configured,
+            orders,
+            events,
+            ready,
+            gone,
+            out,
+            ended,
+            count: Count::default(),
+            running: false,
+        })
+    }
+
+    /// A descriptor that is readable as long as there is a frame that was not fetched, or an error to tell.
+    ///
+    /// # Errors
+    /// `Protocol` if the system is out of descriptors.
+    pub fn ready(&self) -> Result<OwnedFd, Error> {
+        self.ready.try_clone().map_err(|cause| {
+            Error::protocol(
+                format!(
+                    "duplicating a descriptor of the camera `{}`: {cause}",
+                    self.id
+                ),
+                "the system is out of descriptors: see its log",
+            )
+        })
+    }
+
+    /// The library's id of it.
+    #[must_use]
+    pub fn id(&self) -> &str {
+        &self.id
+    }
+
+    /// Buffers that the camera has; three less can be kept without a copy.
+    #[must_use]
+    pub fn buffers(&self) -> usize {
+        self.configured.buffers
+    }
+
+    fn ask(
+        &self,
+        attempt: &str,
+        order: impl FnOnce(Sender<Result<(), Error>>) -> Order,
+    ) -> Result<(), Error> {
+        let (answer, answers) = mpsc::channel();
+        // If the thread has ended, nobody answers.
+        let _ = self.orders.send(order(answer));
+        answered(&answers, format!("{attempt} the camera `{}`", self.id))
+    }
+
+    /// Takes the next event and its stroke of the bell.
+    fn fetch(&mut self) -> Result<Option<Event>, Error> {
+        match self.events.try_recv() {
+            Ok(event) => {
+                let _ = rustix::io::read(&*self.ready, &mut [0_u8; 8]);
+                Ok(Some(event))
+            }
+            Err(TryRecvError::Empty) => Ok(None),
+            Err(TryRecvError::Disconnected) => Err(self.lost()),
+        }
+    }
+
+    fn lost(&self) -> Error {
+        let attempt = format!("waiting for a frame of the camera `{}`", self.id);
+        Error::disconnected(Device::Camera, attempt)
+    }
+
+    /// Lends the buffer, or copies it if the camera would be left without room to write.
+    fn frame(&mut self, arrived: Arrived) -> Result<Frame, Error> {
+        let Configured {
+            readable,
+            format,
+            stride,
+            buffers,
+        } = self.configured;
+        let count = self.count.of(arrived.sequence);
+        if readable.is_plain() && self.out.load(Ordering::Relaxed) + IN_FLIGHT <= buffers {
+            return Frame::lent(format, Arc::new(arrived.lease), arrived.stamp, count);
+        }
+        self.copies.frame(arrived.stamp, count, |pixels| {
+            readable.copy(arrived.lease.bytes(), stride, &format, pixels);
+        })
+    }
+}
+
+/// What the thread answers to `attempt`, within [`PATIENCE`].
+fn answered<T>(answers: &Receiver<Result<T, Error>>, attempt: String) -> Result<T, Error> {
+    match answers.recv_timeout(PATIENCE) {
+        Ok(answer) => answer,
+        Err(mpsc::RecvTimeoutError::Timeout) => Err(Error::timeout(
+            attempt,
+            PATIENCE,
+            "its driver hangs: see the system's log, and restart the computer",
+        )),
+        Err(mpsc::RecvTimeoutError::Disconnected) => {
+            Err(Error::disconnected(Device::Camera, attempt))
+        }
+    }
+}
+
+impl Camera for LibCamera {
+    fn format(&self) -> FrameFormat {
+        self.configured.format
+    }
+
+    fn encoding(&self) -> Encoding {
+        Encoding {
+            name: self.configured.readable.name.into(),
+            exact: self.configured.readable.reading == Reading::Raw,
+        }
+    }
+
+    fn timing(&self) -> CameraTiming {
+        CameraTiming {
+            starts: self.settings.starts,
+            exposure: self.settings.exposing.exposure,
+            period: self.settings.exposing.period,
+            delivery: self.settings.delivery,
+        }
+    }
+
+    fn present(&self) -> Result<(), Error> {
+        if self.gone.load(Ordering::Relaxed) {
+            return Err(self.lost());
+        }
+        Ok(())
+    }
+
+    fn start(&mut self) -> Result<(), Error> {
+        self.present()?;
+        if self.running {
+            return Err(Error::protocol(
+                format!("starting the camera `{}` that runs", self.id),
+                "stop it first",
+            ));
+        }
+        self.count.restart();
+        self.ask("starting", Order::Start).inspect_err(|_| {
+            // It may run without a queue.
+            let _ = self.ask("stopping", Order::Stop);
+        })?;
+        self.running = true;
+        Ok(())
+    }
+
+    fn poll_frame(&mut self) -> Result<Option<Frame>, Error> {
+        if !self.running {
+            return Err(Error::protocol(
+                format!(
+                    "fetching a frame of the camera `{}` that is stopped",
+                    self.id
+                ),
+                "start it first",
+            ));
+        }
+        match self.fetch()? {
+            Some(Event::Frame(arrived)) => self.frame(arrived).map(Some),
+            Some(Event::Refused(error)) => Err(error),
+            None => self.present().map(|()| None),
+        }
+    }
+
+    fn stop(&mut self) -> Result<(), Error> {
+        if !self.running {
+            return Ok(());
+        }
+        self.running = false;
+        let stopped = self.ask("stopping", Order::Stop);
+        while let Ok(Some(_)) = self.fetch() {}
+        stopped
+    }
+}
+
+impl Drop for LibCamera {
+    fn drop(&mut self) {
+        let _ = self.orders.send(Order::Close);
+        // Until the library is closed no other camera can be opened; a driver that hangs is left behind.
+        let _ = self.ended.recv_timeout(PATIENCE);
+    }
+}

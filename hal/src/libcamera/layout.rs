@@ -1,0 +1,286 @@
+//! Which pixel format to take of a camera, which to refuse and why, and how its samples lie in a buffer.
+//!
+//! Nothing here knows the library: formats are its words for them ("R16", "NV12").
+
+use crate::error::Error;
+use crate::frame::{FrameFormat, Pixels};
+
+/// What is taken of a camera's images.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reading {
+    /// What a monochrome sensor counted, as it is.
+    #[default]
+    Raw,
+    /// The same, or else the luma plane of a YUV format: what an image processor made of it.
+    Luma,
+    /// The green samples of an RGB format. For trials with a camera that has nothing else.
+    Green,
+}
+
+/// How the samples of a row lie in a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Layout {
+    /// A byte each.
+    Bytes,
+    /// Two bytes each, the lower one first.
+    Words,
+    /// Likewise, but only so many upper bits are the sensor's.
+    UpperBits(u8),
+    /// Four of 10 bits in five bytes: four upper bytes, then the lower bits of all four.
+    FourInFive,
+    /// Two of 12 bits in three bytes: two upper bytes, then the lower bits of both.
+    TwoInThree,
+    /// The middle one of every three bytes.
+    MiddleOfThree,
+}
+
+/// A pixel format that can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Readable {
+    /// The library's word for it.
+    pub name: &'static str,
+    pub reading: Reading,
+    pub layout: Layout,
+    pub bits: u8,
+}
+
+const fn readable(name: &'static str, reading: Reading, layout: Layout, bits: u8) -> Readable {
+    Readable {
+        name,
+        reading,
+        layout,
+        bits,
+    }
+}
+
+/// Every format that can be read, the best of each reading first: more bits, then those that need no unpacking.
+const FORMATS: [Readable; 19] = [
+    readable("R16", Reading::Raw, Layout::Words, 16),
+    readable("R14", Reading::Raw, Layout::Words, 14),
+    readable("R12", Reading::Raw, Layout::Words, 12),
+    readable("R12_CSI2P", Reading::Raw, Layout::TwoInThree, 12),
+    readable("R10", Reading::Raw, Layout::Words, 10),
+    readable("R10_CSI2P", Reading::Raw, Layout::FourInFive, 10),
+    readable("R8", Reading::Raw, Layout::Bytes, 8),
+    readable("YUV444", Reading::Luma, Layout::Bytes, 8),
+    readable("YVU444", Reading::Luma, Layout::Bytes, 8),
+    readable("YUV422", Reading::Luma, Layout::Bytes, 8),
+    readable("YVU422", Reading::Luma, Layout::Bytes, 8),
+    readable("YUV420", Reading::Luma, Layout::Bytes, 8),
+    readable("YVU420", Reading::Luma, Layout::Bytes, 8),
+    readable("NV24", Reading::Luma, Layout::Bytes, 8),
+    readable("NV16", Reading::Luma, Layout::Bytes, 8),
+    readable("NV12", Reading::Luma, Layout::Bytes, 8),
+    readable("NV21", Reading::Luma, Layout::Bytes, 8),
+    readable("BGR888", Reading::Green, Layout::MiddleOfThree, 8),
+    readable("RGB888", Reading::Green, Layout::MiddleOfThree, 8),
+];
+
+/// What a camera granted when it was asked for a format.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Granted {
+    /// The library's word for the format.
+    pub name: String,
+    /// Columns and rows.
+    pub size: (u32, u32),
+}
+
+/// The formats to ask a camera for. It may grant another one, so all of them are asked for before one is chosen.
+pub(crate) fn worth_asking(reading: Reading) -> impl Iterator<Item = &'static Readable> {
+    FORMATS.iter().filter(move |f| reading.takes(f.reading))
+}
+
+/// The best of what a camera granted, by its place among `granted`, and how to read it.
+///
+/// # Errors
+/// `Unsupported` if none can be read, or none has the wanted size; it names what is wrong with each.
+pub(crate) fn choose(
+    camera: &str,
+    reading: Reading,
+    size: Option<(u32, u32)>,
+    granted: &[Granted],
+) -> Result<(usize, Readable), Error> {
+    let fits = |g: &Granted| size.is_none_or(|size| size == g.size);
+    let best = worth_asking(reading).find_map(|format| {
+        let at = granted
+            .iter()
+            .position(|g| g.name == format.name && fits(g))?;
+        Some((at, *format))
+    });
+    best.ok_or_else(|| {
+        let mut offers: Vec<String> = granted
+            .iter()
+            .map(|g| match objection(reading, &g.name) {
+                Some(objection) => format!("{} ({objection})", g.name),
+                None => format!("{} of {}×{}", g.name, g.size.0, g.size.1),
+            })
+            .collect();
+        offers.sort();
+        offers.dedup();
+        let offers = match &offers[..] {
+            [] => "nothing".to_owned(),
+            offers => offers.join(", "),
+        };
+        let wanted = size.map_or(String::new(), |(w, h)| format!(" of {w}×{h} pixels"));
+        Error::unsupported(
+            format!("taking {} frames{wanted} with the camera `{camera}`", reading.word()),
+            format!("it grants {offers}; set head.camera.width and height to a size that it has, head.camera.luma for a YUV format, or take a camera with a raw monochrome one"),
+        )
+    })
+}
+
+/// The bits of a monochrome sensor, by the raw formats that its camera lists: those of its deepest mode.
+pub(crate) fn sensor_bits<'a>(listed: impl Iterator<Item = &'a str>) -> Option<u8> {
+    let bits = |name: &str| {
+        FORMATS
+            .iter()
+            .find(|f| f.name == name && f.reading == Reading::Raw)
+            .map(|f| f.bits)
+    };
+    listed.filter_map(bits).max()
+}
+
+/// Why a format is not taken; none if it can be.
+pub(crate) fn objection(reading: Reading, name: &str) -> Option<String> {
+    if let Some(format) = FORMATS.iter().find(|format| format.name == name) {
+        return (!reading.takes(format.reading))
+            .then(|| format!("only where {} is to be read", format.reading.word()));
+    }
+    let compressed = name.contains("_COMP") || name.contains("JPEG") || name.starts_with("IPU");
+    let coloured = [
+        "SBGGR", "SGBRG", "SGRBG", "SRGGB", "BGGR", "GBRG", "GRBG", "RGGB",
+    ];
+    Some(if compressed {
+        "compressed: its samples are not what the sensor counted".into()
+    } else if coloured.iter().any(|order| name.starts_with(order)) {
+        "of a colour sensor: neighbouring pixels see different light".into()
+    } else {
+        "unknown here".into()
+    })
+}
+
+impl Reading {
+    fn takes(self, format: Self) -> bool {
+        self == format || (self, format) == (Self::Luma, Self::Raw)
+    }
+
+    /// The word for it.
+    fn word(self) -> &'static str {
+        match self {
+            Self::Raw => "raw",
+            Self::Luma => "luma",
+            Self::Green => "green",
+        }
+    }
+}
+
+impl Readable {
+    /// The same for a sensor of `bits`. Where a format has more, as a Pi 5's R16, samples are its upper ones; left there, full scale
+    /// would not be 2^bits − 1, and nobody would see that a pixel is saturated.
+    pub fn of_sensor(self, bits: Option<u8>) -> Self {
+        match (self.layout, bits) {
+            (Layout::Words, Some(bits)) if (9..self.bits).contains(&bits) => Self {
+                layout: Layout::UpperBits(bits),
+                bits,
+                ..self
+            },
+            _ => self,
+        }
+    }
+
+    /// Whether samples lie as a frame has them, so that it can borrow them.
+    pub fn is_plain(&self) -> bool {
+        matches!(self.layout, Layout::Bytes | Layout::Words)
+    }
+
+    /// The format of frames from buffers with `stride` bytes from row to row, and the bytes that a frame takes there.
+    ///
+    /// # Errors
+    /// `Protocol` if a row does not fit into `stride` bytes or `stride` holds no whole number of samples.
+    pub fn frames(
+        &self,
+        (width, height): (u32, u32),
+        stride: usize,
+    ) -> Result<(FrameFormat, usize), Error> {
+        let columns = width as usize;
+        let (row, samples) = match self.layout {
+            Layout::Bytes => (columns, Some(stride)),
+            Layout::Words => (columns * 2, stride.is_multiple_of(2).then_some(stride / 2)),
+            Layout::UpperBits(_) => (columns * 2, Some(columns)),
+            Layout::FourInFive => (columns.div_ceil(4) * 5, Some(columns)),
+            Layout::TwoInThree => (columns.div_ceil(2) * 3, Some(columns)),
+            Layout::MiddleOfThree => (columns * 3, Some(columns)),
+        };
+        match samples {
+            Some(samples) if row <= stride && columns > 0 && height > 0 => Ok((
+                FrameFormat {
+                    width,
+                    height,
+                    stride: samples,
+                    bit_depth: self.bits,
+                },
+                stride * height as usize,
+            )),
+            _ => Err(Error::protocol(
+                format!(
+                    "{width}×{height} pixels of {} in rows of {stride} bytes",
+                    self.name
+                ),
+                "this is a defect of the camera's driver: report it, or take another format",
+            )),
+        }
+    }
+
+    /// Copies the samples of a whole frame of `format` out of a buffer with `stride` bytes from row to row.
+    pub fn copy(&self, buffer: &[u8], stride: usize, format: &FrameFormat, pixels: &mut Pixels) {
+        let (columns, width) = (format.width as usize, format.stride);
+        let rows = buffer.chunks(stride.max(1));
+        match pixels {
+            Pixels::Eight(samples) => {
+                for (row, into) in rows.zip(samples.chunks_exact_mut(width)) {
+                    match self.layout {
+                        Layout::MiddleOfThree => {
+                            for (from, into) in row.chunks_exact(3).zip(&mut into[..columns]) {
+                                *into = from[1];
+                            }
+                        }
+                        _ => into.copy_from_slice(&row[..width]),
+                    }
+                }
+            }
+            Pixels::Sixteen(samples) => {
+                for (row, into) in rows.zip(samples.chunks_exact_mut(width)) {
+                    match self.layout {
+                        Layout::FourInFive => unpack::<5>(row, &mut into[..columns], 2),
+                        Layout::TwoInThree => unpack::<3>(row, &mut into[..columns], 4),
+                        Layout::UpperBits(bits) => {
+                            words(row, &mut into[..columns], 16 - u32::from(bits))
+                        }
+                        _ => words(row, into, 0),
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn words(row: &[u8], into: &mut [u16], unused: u32) {
+    for (from, into) in row.chunks_exact(2).zip(into) {
+        *into = u16::from_le_bytes([from[0], from[1]]) >> unused;
+    }
+}
+
+/// Unpacks groups of `BYTES`: one upper byte per sample, then one byte with the lower `bits` of each, the first one's lowest
+/// (MIPI CSI-2, "RAW10" and "RAW12").
+fn unpack<const BYTES: usize>(row: &[u8], into: &mut [u16], bits: usize) {
+    for (group, into) in row.chunks_exact(BYTES).zip(into.chunks_mut(BYTES - 1)) {
+        let lower = u16::from(group[BYTES - 1]);
+        for (at, (upper, into)) in group.iter().zip(into).enumerate() {
+            *into = u16::from(*upper) << bits | lower >> (bits * at) & ((1 << bits) - 1);
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "layout_tests.rs"]
+mod tests;

@@ -1,0 +1,266 @@
+//! Opening a camera: found by its id, acquired, asked for formats, configured, its buffers allocated and mapped.
+
+use std::io;
+
+use ::libcamera::camera::{ActiveCamera, Camera, CameraConfiguration};
+use ::libcamera::camera_manager::CameraManager;
+use ::libcamera::control::ControlEntry;
+use ::libcamera::controls;
+use ::libcamera::framebuffer_allocator::{FrameBuffer, FrameBufferAllocator};
+use ::libcamera::geometry::Size;
+use ::libcamera::pixel_format::PixelFormat;
+use ::libcamera::request::Request;
+use ::libcamera::stream::{Stream, StreamRole};
+use bytes::Bytes;
+
+use super::layout::{Granted, Readable, Reading, choose, sensor_bits, worth_asking};
+use super::{Settings, buffers};
+use crate::error::{Device, Error};
+use crate::frame::FrameFormat;
+
+/// What is known of a camera once it is configured.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Configured {
+    pub readable: Readable,
+    pub format: FrameFormat,
+    /// Bytes from row to row of a buffer.
+    pub stride: usize,
+    /// Buffers that the camera has.
+    pub buffers: usize,
+}
+
+/// A request with its buffer, and the memory of that.
+pub(super) struct Slot {
+    /// None while the library has it.
+    pub request: Option<Request>,
+    pub bytes: Bytes,
+    /// Whether a frame is in it that somebody keeps.
+    pub lent: bool,
+}
+
+/// A configured camera. Its parts are dropped in this order, the manager of all cameras after them.
+pub(super) struct Opened {
+    pub slots: Vec<Slot>,
+    pub stream: Stream,
+    _allocator: FrameBufferAllocator,
+    pub camera: ActiveCamera<'static>,
+    pub id: String,
+    pub configured: Configured,
+}
+
+/// The error for what the library refused.
+pub(super) fn refused(id: &str, attempt: &str, cause: &io::Error) -> Error {
+    let attempt = format!("{attempt} the camera `{id}`");
+    // EBUSY and its kin.
+    match cause.kind() {
+        io::ErrorKind::ResourceBusy => Error::protocol(
+            format!("{attempt}: another program uses it"),
+            "stop that program",
+        ),
+        io::ErrorKind::PermissionDenied => Error::protocol(
+            format!("{attempt}: {cause}"),
+            "let the user of this program into the group `video`",
+        ),
+        _ if cause.raw_os_error() == Some(rustix::io::Errno::NODEV.raw_os_error()) => {
+            Error::disconnected(Device::Camera, attempt)
+        }
+        _ => Error::protocol(
+            format!("{attempt}: {cause}"),
+            "see what libcamera says on the standard error output",
+        ),
+    }
+}
+
+/// Opens the camera as set.
+///
+/// # Errors
+/// `Disconnected` if there is no camera of that id; `Unsupported` if it cannot do what is set; `Protocol` if it is in use or
+/// the library refuses.
+pub(super) fn open(manager: &CameraManager, settings: &Settings) -> Result<Opened, Error> {
+    let found = find(manager, settings.id.as_deref())?;
+    let id = found.id();
+    let mut camera = found
+        .acquire()
+        .map_err(|cause| refused(id, "acquiring", &cause))?;
+    if settings.controlled {
+        must_be_settable(&camera, id)?;
+    }
+    let (mut configuration, readable) = agree(&camera, id, settings)?;
+    camera
+        .configure(&mut configuration)
+        .map_err(|cause| refused(id, "configuring", &cause))?;
+    let granted = configuration.get(0).ok_or_else(|| no_stream(id))?;
+    let size = (granted.get_size().width, granted.get_size().height);
+    let stride = granted.get_stride() as usize;
+    let (format, length) = readable.frames(size, stride)?;
+    let stream = granted.stream().ok_or_else(|| no_stream(id))?;
+
+    let mut allocator = FrameBufferAllocator::new(&camera);
+    let allocated = allocator
+        .alloc(&stream)
+        .map_err(|cause| refused(id, "allocating buffers of", &cause))?;
+    let mut slots = Vec::with_capacity(allocated.len());
+    for (index, buffer) in allocated.into_iter().enumerate() {
+        slots.push(slot(&mut camera, id, index, buffer, length, &stream)?);
+    }
+    let configured = Configured {
+        readable,
+        format,
+        stride,
+        buffers: slots.len(),
+    };
+    Ok(Opened {
+        slots,
+        stream,
+        _allocator: allocator,
+        camera,
+        id: id.to_owned(),
+        configured,
+    })
+}
+
+fn slot(
+    camera: &mut ActiveCamera<'static>,
+    id: &str,
+    index: usize,
+    buffer: FrameBuffer,
+    length: usize,
+    stream: &Stream,
+) -> Result<Slot, Error> {
+    let bytes = buffers::map(&buffer, length)?;
+    let mut request = camera
+        .create_request(Some(index as u64))
+        .ok_or_else(|| no_stream(id))?;
+    request
+        .add_buffer(stream, buffer)
+        .map_err(|cause| refused(id, "adding a buffer of", &cause))?;
+    Ok(Slot {
+        request: Some(request),
+        bytes,
+        lent: false,
+    })
+}
+
+/// The camera of this id, or the only one.
+fn find(manager: &CameraManager, id: Option<&str>) -> Result<Camera<'static>, Error> {
+    let cameras = manager.cameras();
+    let mut all: Vec<Camera<'static>> =
+        cameras.iter().filter_map(|c| manager.get(c.id())).collect();
+    let there: Vec<String> = all
+        .iter()
+        .map(|camera| format!("`{}`", camera.id()))
+        .collect();
+    let there = there.join(", ");
+    if let Some(at) = all
+        .iter()
+        .position(|camera| id.is_none_or(|id| id == camera.id()))
+    {
+        if id.is_none() && all.len() > 1 {
+            return Err(Error::unsupported(
+                format!("choosing among the cameras {there}"),
+                "set head.camera.id to one of them",
+            ));
+        }
+        return Ok(all.swap_remove(at));
+    }
+    Err(Error::Disconnected {
+        device: Device::Camera,
+        attempt: id.map_or("opening a camera".into(), |id| {
+            format!("opening the camera `{id}`")
+        }),
+        remedy: if all.is_empty() {
+            "libcamera finds no camera at all: check cable and overlay, and that this user may open /dev/media* (group `video`)".into()
+        } else {
+            format!("check its cable, or set head.camera.id to one that is there: {there}")
+        },
+    })
+}
+
+fn no_stream(id: &str) -> Error {
+    Error::protocol(
+        format!("configuring the camera `{id}`: the library gave no stream"),
+        "see what libcamera says on the standard error output",
+    )
+}
+
+fn must_be_settable(camera: &Camera<'_>, id: &str) -> Result<(), Error> {
+    let all = camera.controls();
+    let missing: Vec<&str> = [
+        ("exposure", controls::ExposureTime::ID),
+        ("gain", controls::AnalogueGain::ID),
+        ("frame length", controls::FrameDurationLimits::ID),
+    ]
+    .into_iter()
+    .filter_map(|(name, control)| all.find(control).is_err().then_some(name))
+    .collect();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    Err(Error::unsupported(
+        format!("setting the {} of the camera `{id}`", missing.join(", ")),
+        "take a camera that has these controls: nothing can be measured with an exposure that nobody knows",
+    ))
+}
+
+/// Asks for every format that can be read that way, and returns the configuration of the best that was granted.
+fn agree(
+    camera: &Camera<'_>,
+    id: &str,
+    settings: &Settings,
+) -> Result<(CameraConfiguration, Readable), Error> {
+    let mut offers = Vec::new();
+    for role in [StreamRole::Raw, StreamRole::VideoRecording] {
+        let raw = matches!(role, StreamRole::Raw);
+        for asked in worth_asking(settings.reading).filter(|f| (f.reading == Reading::Raw) == raw) {
+            // A camera need not have both roles.
+            let Some(configuration) = camera.generate_configuration(&[role]) else {
+                break;
+            };
+            let format = PixelFormat::parse(asked.name);
+            offers.extend(format.and_then(|format| ask(configuration, Some(format), settings)));
+        }
+    }
+    if offers.is_empty() {
+        // For the words of the refusal: what it gives unasked.
+        let unasked = camera.generate_configuration(&[StreamRole::VideoRecording]);
+        offers.extend(unasked.and_then(|configuration| ask(configuration, None, settings)));
+    }
+    let granted: Vec<Granted> = offers.iter().map(|(granted, _)| granted.clone()).collect();
+    let (best, readable) = choose(id, settings.reading, settings.size, &granted)?;
+    let configuration = offers.swap_remove(best).1;
+    let listed: Vec<String> = configuration.get(0).map_or_else(Vec::new, |stream| {
+        let formats = stream.formats().pixel_formats();
+        formats
+            .into_iter()
+            .map(|format| format.to_string())
+            .collect()
+    });
+    let bits = sensor_bits(listed.iter().map(String::as_str));
+    Ok((configuration, readable.of_sensor(bits)))
+}
+
+/// Asks for a format; the camera may grant another one, or none.
+fn ask(
+    mut configuration: CameraConfiguration,
+    format: Option<PixelFormat>,
+    settings: &Settings,
+) -> Option<(Granted, CameraConfiguration)> {
+    let mut stream = configuration.get_mut(0)?;
+    if let Some(format) = format {
+        stream.set_pixel_format(format);
+    }
+    if let Some((width, height)) = settings.size {
+        stream.set_size(Size { width, height });
+    }
+    stream.set_buffer_count(settings.buffers);
+    if configuration.validate().is_invalid() {
+        return None;
+    }
+    let stream = configuration.get(0)?;
+    let size = stream.get_size();
+    let granted = Granted {
+        name: stream.get_pixel_format().to_string(),
+        size: (size.width, size.height),
+    };
+    Some((granted, configuration))
+}

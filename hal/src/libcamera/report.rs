@@ -1,0 +1,226 @@
+//! What a request's metadata must say: the exposure, gain and frame length that were set, and a time on the head's clock.
+
+use std::time::Duration;
+
+use crate::error::Error;
+use crate::units::Timestamp;
+
+/// Sensors set their gain in steps; the coarsest common ones are of 0.3 dB, 3.5 %, and drivers round to the next one.
+const GAIN_STEP: f32 = 0.035;
+/// Metadata counts whole microseconds.
+const MICROSECOND: Duration = Duration::from_micros(1);
+/// No frame that is fetched can be older: libcamera would have given the camera up.
+const OLDEST: Duration = Duration::from_secs(60);
+
+/// How a camera is set before it starts. Nothing of it changes until it stops.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exposing {
+    /// How long a frame is exposed.
+    pub exposure: Duration,
+    /// Gain of the sensor's amplifier; 1 is none.
+    pub gain: f32,
+    /// From the start of one exposure to the next.
+    pub period: Duration,
+}
+
+/// What a request's metadata says of its frame, in its units; none where it says nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Reported {
+    /// µs.
+    pub exposure: Option<i32>,
+    pub gain: Option<f32>,
+    /// µs.
+    pub period: Option<i64>,
+}
+
+impl Exposing {
+    /// Checks that a frame of `rows` rows was taken as set.
+    ///
+    /// A sensor exposes for a whole number of lines, and a line lasts at most the frame's length over its rows: times may differ by
+    /// one line.
+    ///
+    /// # Errors
+    /// `Protocol` if metadata says something else, or nothing.
+    pub(crate) fn verify(&self, rows: u32, reported: &Reported) -> Result<(), Error> {
+        let line = self.period / rows.max(1) + MICROSECOND;
+        let time = |us: i64| Duration::from_micros(u64::try_from(us).unwrap_or(0));
+        let exposure = reported.exposure.map(|us| time(us.into()));
+        let period = reported.period.map(time);
+        let near = |set: Duration, found: Option<Duration>| {
+            found.is_some_and(|found| set.abs_diff(found) <= line)
+        };
+        let gain_off = reported.gain.map(|gain| (gain / self.gain - 1.0).abs());
+        let wrong = |what: &str, set: String, found: Option<String>| {
+            let found = found.map_or("says nothing of it".into(), |found| format!("says {found}"));
+            Err(Error::protocol(
+                format!("a frame whose {what} was set to {set} and whose metadata {found}"),
+                "set head.camera.exposure_us, gain and period_us to what the sensor can do",
+            ))
+        };
+        if !near(self.exposure, exposure) {
+            let found = exposure.map(|found| format!("{found:?}"));
+            return wrong("exposure", format!("{:?}", self.exposure), found);
+        }
+        if !near(self.period, period) {
+            let found = period.map(|found| format!("{found:?}"));
+            return wrong("frame length", format!("{:?}", self.period), found);
+        }
+        // Not a number is wrong, too.
+        if !gain_off.is_some_and(|off| off <= GAIN_STEP) {
+            let found = reported.gain.map(|found| found.to_string());
+            return wrong("gain", self.gain.to_string(), found);
+        }
+        Ok(())
+    }
+}
+
+/// A stamp on the head's clock. Libcamera documents `CLOCK_BOOTTIME`; most drivers stamp with `CLOCK_MONOTONIC`.
+///
+/// The two differ by the time that the computer was suspended. A frame is stamped before it is fetched, so a stamp that is later
+/// than `monotonic` is one of the other clock: the difference of the clocks is then more than a frame's way. `monotonic` and
+/// `boot` are what the clocks say when it is fetched.
+///
+/// # Errors
+/// `Protocol` if the stamp fits neither.
+pub(crate) fn on_the_heads_clock(
+    stamp: u64,
+    monotonic: Timestamp,
+    boot: Timestamp,
+) -> Result<Timestamp, Error> {
+    let suspended = boot.since(monotonic);
+    let stamp = Timestamp(stamp);
+    [stamp, stamp - suspended]
+        .into_iter()
+        .find(|stamp| *stamp <= monotonic && monotonic.since(*stamp) <= OLDEST)
+        .ok_or_else(|| {
+            Error::protocol(
+                format!("a frame stamped {stamp}, fetched at {monotonic} of CLOCK_MONOTONIC and {boot} of CLOCK_BOOTTIME"),
+                "the camera's driver stamps with a clock of its own: take a camera whose driver does not",
+            )
+        })
+}
+
+/// The count of a camera that starts at 0 each time, going on over all its starts.
+#[derive(Debug, Default)]
+pub(crate) struct Count {
+    base: u64,
+    next: u64,
+}
+
+impl Count {
+    /// The camera starts again.
+    pub fn restart(&mut self) {
+        self.base = self.next;
+    }
+
+    /// The count of the frame that the camera counts `sequence` since its start.
+    pub fn of(&mut self, sequence: u32) -> u64 {
+        let count = self.base + u64::from(sequence);
+        self.next = self.next.max(count + 1);
+        count
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::ErrorKind;
+
+    /// The reference head: one whole refresh of 60 Hz in a frame of two.
+    const SET: Exposing = Exposing {
+        exposure: Duration::from_micros(16_667),
+        gain: 2.0,
+        period: Duration::from_micros(33_333),
+    };
+    const ROWS: u32 = 1088;
+
+    fn reported(exposure: i32, gain: f32, period: i64) -> Reported {
+        Reported {
+            exposure: Some(exposure),
+            gain: Some(gain),
+            period: Some(period),
+        }
+    }
+
+    #[test]
+    fn a_frame_taken_as_set_is_one_within_a_line_and_a_step_of_gain() {
+        for (exposure, gain, period) in [
+            (16_667, 2.0, 33_333),
+            (16_652, 1.98, 33_318), // A line of the IMX296 less: 14.8 µs; 0.1 dB.
+            (16_682, 2.06, 33_348),
+        ] {
+            SET.verify(ROWS, &reported(exposure, gain, period)).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_frame_taken_otherwise_is_refused_with_both_values() {
+        for (word, found, reported) in [
+            ("exposure", "16.6ms", reported(16_600, 2.0, 33_333)),
+            ("exposure", "5ms", reported(5_000, 2.0, 33_333)),
+            ("gain", "2.1", reported(16_667, 2.1, 33_333)),
+            ("gain", "NaN", reported(16_667, f32::NAN, 33_333)),
+            ("frame length", "16.667ms", reported(16_667, 2.0, 16_667)),
+            ("exposure", "0ns", reported(-5, 2.0, 33_333)),
+        ] {
+            let error = SET.verify(ROWS, &reported).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::Protocol);
+            let words = error.to_string();
+            assert!(words.contains(word) && words.contains(found), "{words}");
+        }
+    }
+
+    #[test]
+    fn metadata_that_says_nothing_proves_nothing() {
+        let all = reported(16_667, 2.0, 33_333);
+        for silent in [
+            Reported {
+                exposure: None,
+                ..all
+            },
+            Reported { gain: None, ..all },
+            Reported {
+                period: None,
+                ..all
+            },
+        ] {
+            let error = SET.verify(ROWS, &silent).unwrap_err();
+            assert!(error.to_string().contains("says nothing"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_stamp_is_understood_on_either_clock_and_refused_on_any_other() {
+        let s = |seconds: u64| Timestamp(seconds * 1_000_000_000);
+        let monotonic = s(100_000);
+        // Suspended for an hour, not at all, and for three seconds.
+        for boot in [s(103_600), s(100_000), s(100_003)] {
+            let suspended = boot.since(monotonic);
+            let exposed = monotonic - Duration::from_millis(40);
+            for stamp in [exposed, exposed + suspended] {
+                assert_eq!(
+                    on_the_heads_clock(stamp.0, monotonic, boot).unwrap(),
+                    exposed
+                );
+            }
+        }
+        let boot = s(103_600);
+        // A device's own clock, the time of day, nothing, and the future.
+        for stamp in [s(500), s(1_700_000_000), s(0), s(103_601)] {
+            let error = on_the_heads_clock(stamp.0, monotonic, boot).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::Protocol);
+        }
+    }
+
+    #[test]
+    fn counts_go_on_over_a_restart_and_keep_their_gaps() {
+        let mut count = Count::default();
+        let first: Vec<u64> = [0, 1, 4, 3].map(|n| count.of(n)).into();
+        count.restart();
+        let second: Vec<u64> = [2, 3].map(|n| count.of(n)).into();
+        count.restart();
+        count.restart();
+        assert_eq!((first, second), (vec![0, 1, 4, 3], vec![7, 8]));
+        assert_eq!(count.of(0), 9);
+    }
+}

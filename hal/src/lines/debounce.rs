@@ -1,0 +1,139 @@
+//! A line that bounces: which of its edges is a start.
+//!
+//! A level counts once the line has kept it for a while, so neither the bounces of a contact nor the spike of a press's motor
+//! start anything. The kernel queues 16 edges and drops the rest without a sign; so what the edges say is believed only if the
+//! line is found at that level when it has settled.
+
+use std::time::Duration;
+
+use crate::units::Timestamp;
+
+/// What is known of a line from its edges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Debounce {
+    quiet: Duration,
+    settled: bool,
+    /// The last edge since then, and the level after it.
+    moved: Option<(Timestamp, bool)>,
+}
+
+impl Debounce {
+    /// A line at rest at `active`, which counts once it has been still for `quiet`.
+    #[must_use]
+    pub fn new(quiet: Duration, active: bool) -> Self {
+        Self {
+            quiet,
+            settled: active,
+            moved: None,
+        }
+    }
+
+    /// An edge, after which the line was at `active`.
+    pub fn edge(&mut self, at: Timestamp, active: bool) {
+        self.moved = Some((at, active));
+    }
+
+    /// When the line will have settled if no other edge comes.
+    #[must_use]
+    pub fn due(&self) -> Option<Timestamp> {
+        self.moved.map(|(at, _)| at + self.quiet)
+    }
+
+    /// The line is found at `active` now, after all its edges. Answers since when it is active, if that is a start.
+    pub fn found(&mut self, now: Timestamp, active: bool) -> Option<Timestamp> {
+        let (at, told) = self.moved?;
+        if now < at + self.quiet {
+            return None;
+        }
+        if told != active {
+            // An edge was lost. When it came is not known: the line has to be still from now on.
+            self.moved = Some((now, active));
+            return None;
+        }
+        self.moved = None;
+        let rose = active && !self.settled;
+        self.settled = active;
+        rose.then_some(at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const QUIET: Duration = Duration::from_millis(5);
+
+    fn ms(ms: u64) -> Timestamp {
+        Timestamp(ms * 1_000_000)
+    }
+
+    /// The starts of a line with these edges (ms, level after it), asked every millisecond; it ends at its last level.
+    fn starts(edges: &[(u64, bool)]) -> Vec<u64> {
+        let mut line = Debounce::new(QUIET, false);
+        let mut found = Vec::new();
+        let mut level = false;
+        for now in 0..200 {
+            for (at, active) in edges.iter().filter(|(at, _)| *at == now) {
+                line.edge(ms(*at), *active);
+                level = *active;
+            }
+            found.extend(line.found(ms(now), level).map(|at| at.0 / 1_000_000));
+        }
+        found
+    }
+
+    #[test]
+    fn a_clean_press_is_one_start_at_its_edge() {
+        assert_eq!(starts(&[(10, true), (60, false), (100, true)]), [10, 100]);
+    }
+
+    #[test]
+    fn bounces_of_press_and_release_start_nothing_more() {
+        let edges = [
+            (10, true),
+            (11, false),
+            (12, true),
+            (14, false),
+            (15, true),
+            (60, false),
+            (62, true),
+            (63, false),
+        ];
+        assert_eq!(starts(&edges), [15]);
+    }
+
+    #[test]
+    fn a_spike_starts_nothing() {
+        assert!(starts(&[(10, true), (12, false)]).is_empty());
+    }
+
+    #[test]
+    fn edges_that_the_kernel_names_alike_are_still_edges() {
+        // Both are named by the level at which the kernel found the line afterwards.
+        assert_eq!(starts(&[(10, true), (13, true)]), [13]);
+    }
+
+    #[test]
+    fn a_lost_edge_is_found_by_the_level_and_waited_for_again() {
+        let mut line = Debounce::new(QUIET, false);
+        line.edge(ms(10), false);
+        assert_eq!(line.found(ms(15), true), None);
+        assert_eq!(line.due(), Some(ms(20)));
+        assert_eq!(line.found(ms(20), true), Some(ms(15)));
+        assert_eq!(line.due(), None);
+    }
+
+    #[test]
+    fn a_line_that_is_active_from_the_first_has_not_started_anything() {
+        let mut line = Debounce::new(QUIET, true);
+        line.edge(ms(10), true);
+        assert_eq!(line.found(ms(30), true), None);
+    }
+
+    #[test]
+    fn without_a_quiet_time_an_edge_counts_at_once() {
+        let mut line = Debounce::new(Duration::ZERO, false);
+        line.edge(ms(10), true);
+        assert_eq!(line.found(ms(10), true), Some(ms(10)));
+    }
+}

@@ -1,0 +1,151 @@
+//! What a head of real devices is made of, by name: which camera, which projector, which lines.
+//!
+//! Each back-end opens its device from one of these: `libcamera` from [`CameraSetup`], `kms` from [`ProjectorSetup`], `gpio` from
+//! [`TriggerSetup`] and [`LinesSetup`]. They are plain values, known in every build, so that a configuration can be read and
+//! checked on a computer that has none of the devices.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+/// Which camera, and how it exposes. Nothing of it changes while it runs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CameraSetup {
+    /// libcamera's id; none = the only camera that is there.
+    pub id: Option<String>,
+    /// Pixels per row; none = the sensor's.
+    pub width: Option<u32>,
+    /// Rows; none = the sensor's.
+    pub height: Option<u32>,
+    /// Exposure, µs: whole refreshes of the projector.
+    pub exposure_us: u32,
+    /// From the start of one exposure to the start of the next, µs: the shortest time if it is triggered, the time if it runs by itself.
+    pub period_us: u32,
+    /// Gain, 1 = none.
+    pub gain: f64,
+    /// From the end of an exposure until its frame can be fetched, at the longest, µs.
+    pub delivery_us: u32,
+    /// Whether the luminance of a YUV format will do where the camera offers no raw one.
+    pub luma: bool,
+}
+
+impl Default for CameraSetup {
+    /// The reference head: two refreshes of 60 Hz per frame, one of them exposed.
+    fn default() -> Self {
+        Self {
+            id: None,
+            width: None,
+            height: None,
+            exposure_us: 16_667,
+            period_us: 33_333,
+            gain: 1.0,
+            delivery_us: 50_000,
+            luma: false,
+        }
+    }
+}
+
+/// Which projector, and in which mode.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ProjectorSetup {
+    /// The card's device file, as "/dev/dri/card1"; none = the only one with a connector that fits.
+    pub card: Option<PathBuf>,
+    /// The kernel's name of the connector, as "HDMI-A-1" or "DPI-1"; none = the only one that is connected.
+    pub connector: Option<String>,
+    /// Columns of the mode; none = the preferred mode's.
+    pub width: Option<u32>,
+    /// Rows of the mode; none = the preferred mode's.
+    pub height: Option<u32>,
+    /// Refreshes per second; none = the preferred mode's.
+    pub refresh_hz: Option<f64>,
+}
+
+/// The line that starts an exposure of the camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TriggerSetup {
+    /// Label of the GPIO chip.
+    pub chip: String,
+    /// Name of the line; none = the camera runs by itself.
+    pub line: Option<String>,
+    /// How long a pulse lasts, µs. For many cameras this is the exposure.
+    pub pulse_us: u32,
+    /// Whether a pulse is low and idle is high.
+    pub active_low: bool,
+}
+
+impl Default for TriggerSetup {
+    /// The reference head: a pulse of 16 653 µs exposes for 16 667 µs. A transistor turns it over for the camera.
+    fn default() -> Self {
+        Self {
+            chip: "pinctrl-rp1".into(),
+            line: None,
+            pulse_us: 16_653,
+            active_low: false,
+        }
+    }
+}
+
+impl TriggerSetup {
+    /// How long a pulse lasts.
+    #[must_use]
+    pub fn pulse(&self) -> Duration {
+        Duration::from_micros(u64::from(self.pulse_us))
+    }
+}
+
+/// The lines between the station and whoever starts it by wire. Each is used only if it is named.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LinesSetup {
+    /// Label of the GPIO chip.
+    pub chip: String,
+    /// In: starts a cycle.
+    pub start: Option<String>,
+    /// Whether the start line is low when it starts.
+    pub start_active_low: bool,
+    /// The start line counts once it has been still for so long, ms.
+    pub debounce_ms: u32,
+    /// Out: the station works.
+    pub busy: Option<String>,
+    /// Out: the last part passed.
+    pub ok: Option<String>,
+    /// Out: the station cannot measure.
+    pub fault: Option<String>,
+    /// Whether busy, ok and fault are low when they are on.
+    pub outputs_active_low: bool,
+}
+
+impl Default for LinesSetup {
+    fn default() -> Self {
+        Self {
+            chip: "pinctrl-rp1".into(),
+            start: None,
+            start_active_low: true,
+            debounce_ms: 5,
+            busy: None,
+            ok: None,
+            fault: None,
+            outputs_active_low: false,
+        }
+    }
+}
+
+impl LinesSetup {
+    /// Whether any line is named.
+    #[must_use]
+    pub fn any(&self) -> bool {
+        [&self.start, &self.busy, &self.ok, &self.fault]
+            .into_iter()
+            .any(Option::is_some)
+    }
+
+    /// The start line counts once it has been still for so long.
+    #[must_use]
+    pub fn debounce(&self) -> Duration {
+        Duration::from_millis(u64::from(self.debounce_ms))
+    }
+}

@@ -1,0 +1,146 @@
+//! What the virtual display shows, read back pixel by pixel through the client that shows it.
+
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::thread::sleep;
+use std::time::Duration;
+
+use drm::buffer::{Buffer, DrmFourcc};
+use drm::control::atomic::AtomicModeReq;
+use drm::control::connector::{self, Interface};
+use drm::control::{AtomicCommitFlags, Device as ControlDevice, RawResourceHandle, property};
+use drm::{ClientCapability, Device};
+
+/// Longer than the virtual display composes a picture.
+const COMPOSED: Duration = Duration::from_secs(2);
+
+/// The client of a display: what it did to the card can be asked, and what it shows read back.
+pub struct Client(OwnedFd);
+
+impl AsFd for Client {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.0.as_fd()
+    }
+}
+
+impl Device for Client {}
+impl ControlDevice for Client {}
+
+impl Client {
+    pub fn of(descriptor: OwnedFd) -> Self {
+        let client = Self(descriptor);
+        client
+            .set_client_capability(ClientCapability::WritebackConnectors, true)
+            .unwrap();
+        client
+    }
+
+    fn connector(&self, writeback: bool) -> connector::Info {
+        let all = self.resource_handles().unwrap();
+        let mut infos = all
+            .connectors()
+            .iter()
+            .map(|handle| self.get_connector(*handle, false).unwrap());
+        infos
+            .find(|info| (info.interface() == Interface::Writeback) == writeback)
+            .unwrap()
+    }
+
+    fn of_object(&self, object: connector::Handle) -> Vec<(String, property::Handle, u64)> {
+        let values = self.get_properties(object).unwrap();
+        let named = values.iter().map(|(handle, value)| {
+            let name = self
+                .get_property(*handle)
+                .unwrap()
+                .name()
+                .to_str()
+                .unwrap()
+                .to_owned();
+            (name, *handle, *value)
+        });
+        named.collect()
+    }
+
+    /// The value of a property of the display's connector.
+    pub fn property(&self, name: &str) -> u64 {
+        let all = self.of_object(self.connector(false).handle());
+        all.into_iter().find(|(known, ..)| known == name).unwrap().2
+    }
+
+    /// Gives a property of the display's connector another value.
+    pub fn set(&self, name: &str, value: u64) {
+        let connector = self.connector(false).handle();
+        let all = self.of_object(connector);
+        let (_, handle, _) = all.into_iter().find(|(known, ..)| known == name).unwrap();
+        let mut request = AtomicModeReq::new();
+        request.add_raw_property(connector.into(), handle, value);
+        self.atomic_commit(AtomicCommitFlags::ALLOW_MODESET, request)
+            .unwrap();
+    }
+
+    /// Buffers that are shown or could be.
+    pub fn framebuffers(&self) -> usize {
+        self.resource_handles().unwrap().framebuffers().len()
+    }
+
+    /// Which refreshes the display gives its CRTC: none if it is off.
+    pub fn is_on(&self) -> bool {
+        let all = self.resource_handles().unwrap();
+        all.crtcs()
+            .iter()
+            .any(|crtc| self.get_crtc(*crtc).unwrap().mode().is_some())
+    }
+
+    /// The picture that is shown now, as grey levels; fails where red, green and blue differ.
+    pub fn picture(&self, (width, height): (u32, u32)) -> Vec<u8> {
+        let connector = self.connector(true).handle();
+        let crtc: RawResourceHandle = self.resource_handles().unwrap().crtcs()[0].into();
+        let mut buffer = self
+            .create_dumb_buffer((width, height), DrmFourcc::Xrgb8888, 32)
+            .unwrap();
+        self.map_dumb_buffer(&mut buffer).unwrap().fill(0xEE);
+        let shown_as = self.add_framebuffer(&buffer, 24, 32).unwrap();
+        let mut request = AtomicModeReq::new();
+        for (name, handle, _) in self.of_object(connector) {
+            match name.as_str() {
+                "CRTC_ID" => {
+                    request.add_raw_property(connector.into(), handle, u32::from(crtc).into())
+                }
+                "WRITEBACK_FB_ID" => {
+                    request.add_raw_property(connector.into(), handle, u32::from(shown_as).into());
+                }
+                _ => (),
+            }
+        }
+        self.atomic_commit(AtomicCommitFlags::ALLOW_MODESET, request)
+            .unwrap();
+        sleep(COMPOSED);
+        let pitch = buffer.pitch() as usize;
+        let memory = self.map_dumb_buffer(&mut buffer).unwrap();
+        let rows = memory.chunks(pitch).take(height as usize);
+        let pixels = rows.flat_map(|row| row[..width as usize * 4].chunks(4));
+        let grey = pixels.map(|pixel| {
+            assert!(
+                pixel[0] == pixel[1] && pixel[1] == pixel[2],
+                "coloured: {pixel:?}"
+            );
+            pixel[0]
+        });
+        let grey = grey.collect();
+        drop(memory);
+        self.detach(connector);
+        self.destroy_framebuffer(shown_as).unwrap();
+        self.destroy_dumb_buffer(buffer).unwrap();
+        grey
+    }
+
+    fn detach(&self, connector: connector::Handle) {
+        let mut request = AtomicModeReq::new();
+        for (name, handle, _) in self.of_object(connector) {
+            if name == "CRTC_ID" {
+                request.add_raw_property(connector.into(), handle, 0);
+            }
+        }
+        self.atomic_commit(AtomicCommitFlags::ALLOW_MODESET, request)
+            .unwrap();
+    }
+}

@@ -1,0 +1,266 @@
+//! A whole head in the machine of `tests/vm`: the display shows, the trigger fires, the wire exposes, the frame has its pattern.
+
+#![allow(clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
+
+#[path = "rig/chip.rs"]
+mod chip;
+#[path = "kms/crc.rs"]
+mod crc;
+#[path = "rig/eye.rs"]
+mod eye;
+
+use std::collections::HashMap;
+use std::time::{Duration, Instant};
+
+use chip::Chip;
+use eye::{Eye, MIXED, NO_PATTERN, View};
+use hal::clock::Monotonic;
+use hal::contract::check_head;
+use hal::error::{Error, ErrorKind};
+use hal::gpio::Pulse;
+use hal::head::{Exposure, Head, Timing};
+use hal::kms::{self, Display};
+use hal::projector::{Flip, Projector, Raster};
+use hal::setup::{ProjectorSetup, TriggerSetup};
+
+const PATTERNS: usize = 8;
+const PATIENT: Duration = Duration::from_secs(5);
+
+type Rig = Head<Eye, Late, Pulse, Monotonic>;
+
+/// Whether this runs in the machine of `tests/vm`.
+fn in_the_machine() -> bool {
+    let there = std::env::var_os("VM_HAL").is_some_and(|set| set == "1");
+    if !there {
+        println!("skipped: needs the virtual machine of tests/vm/run");
+    }
+    there
+}
+
+/// A display whose commits come late now and then, as those of a busy computer.
+struct Late {
+    display: Display,
+    /// Every so many flips; 0 = never.
+    every: u32,
+    by: Duration,
+    queued: u32,
+}
+
+impl Projector for Late {
+    fn size(&self) -> (u32, u32) {
+        self.display.size()
+    }
+
+    fn refresh(&self) -> Duration {
+        self.display.refresh()
+    }
+
+    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
+        self.display.load(rasters)
+    }
+
+    fn queue(&mut self, index: usize) -> Result<(), Error> {
+        self.queued += 1;
+        if self.every > 0 && self.queued.is_multiple_of(self.every) {
+            std::thread::sleep(self.by);
+        }
+        self.display.queue(index)
+    }
+
+    fn present(&self) -> Result<(), Error> {
+        self.display.present()
+    }
+
+    fn poll_flip(&mut self) -> Result<Option<Flip>, Error> {
+        self.display.poll_flip()
+    }
+
+    fn blank(&mut self) -> Result<(), Error> {
+        self.display.blank()
+    }
+}
+
+/// How a rig differs from one that is well.
+#[derive(Clone, Copy, Default)]
+struct Kind {
+    by_itself: bool,
+    /// Refreshes from a flip to its light.
+    lag: u32,
+    late_every: u32,
+}
+
+fn rig(chip: &Chip, kind: Kind, knows_patterns: bool) -> Rig {
+    let setup = ProjectorSetup {
+        width: Some(160),
+        height: Some(120),
+        ..ProjectorSetup::default()
+    };
+    let mut display = kms::open(&setup).unwrap();
+    let raster = |k: u32| {
+        let level = |at: u32| ((at % 160) * (k + 1) + at / 160 * 7 + k * 31) as u8;
+        Raster::new(160, 120, (0..160 * 120).map(level).collect()).unwrap()
+    };
+    let rasters: Vec<Raster> = (0..PATTERNS as u32).map(raster).collect();
+    let patterns: HashMap<u32, u8> = rasters.iter().map(crc::of).zip(0..).collect();
+    assert_eq!(patterns.len(), PATTERNS);
+    display.load(rasters).unwrap();
+    let camera = Eye::new(View {
+        display: display.descriptor().unwrap(),
+        patterns: if knows_patterns {
+            patterns
+        } else {
+            HashMap::new()
+        },
+        refresh: display.refresh(),
+        lag: kind.lag.into(),
+        wire: (!kind.by_itself).then(|| chip.level()),
+    });
+    let trigger = TriggerSetup {
+        chip: chip::LABEL.into(),
+        line: Some(chip::LINE.into()),
+        pulse_us: 2_000,
+        active_low: false,
+    };
+    let clock = Monotonic::new(vec![display.descriptor().unwrap(), camera.descriptor()]);
+    let timing = Timing {
+        flip_to_light: display.refresh() * kind.lag,
+        ..Timing::default()
+    };
+    let by = display.refresh() * 3 / 2;
+    let projector = Late {
+        display,
+        every: kind.late_every,
+        by,
+        queued: 0,
+    };
+    Head::new(
+        camera,
+        projector,
+        Pulse::open(&trigger, chip::LINE).unwrap(),
+        clock,
+        timing,
+    )
+}
+
+/// Takes sequences of all patterns, each in another order; every frame must be of the pattern that it is said to be. The sums.
+fn take(rig: &mut Rig, sequences: usize) -> Exposure {
+    let mut sum = Exposure::default();
+    for start in 0..sequences {
+        // 3 and 8 have no common divisor, so all patterns come.
+        let wanted: Vec<usize> = (0..PATTERNS).map(|k| (start + 3 * k) % PATTERNS).collect();
+        let mut got = Vec::new();
+        let exposure = rig.acquire(&wanted, PATIENT, &mut |index, frame| {
+            let hal::frame::Samples::Eight(samples) = frame.samples() else {
+                panic!("the camera has 8 bits");
+            };
+            let seen = samples[0];
+            assert_ne!(
+                seen, MIXED,
+                "pattern {index} of sequence {start} is mixed with another"
+            );
+            assert_ne!(
+                seen, NO_PATTERN,
+                "nothing known was in view of pattern {index} of sequence {start}"
+            );
+            assert_eq!(
+                usize::from(seen),
+                index,
+                "a frame of sequence {start} is mislabelled"
+            );
+            got.push(index);
+        });
+        let exposure = exposure.unwrap();
+        assert_eq!(got, wanted);
+        sum.missed_flips += exposure.missed_flips;
+        sum.retaken += exposure.retaken;
+        sum.straddled += exposure.straddled;
+        sum.stale += exposure.stale;
+        sum.surplus += exposure.surplus;
+        sum.sync_error = sum.sync_error.max(exposure.sync_error);
+    }
+    sum
+}
+
+#[test]
+fn a_head_of_display_trigger_and_camera_keeps_the_promises_of_a_head() {
+    if !in_the_machine() {
+        return;
+    }
+    let chip = Chip::new();
+    check_head(&mut rig(&chip, Kind::default(), false), 4).unwrap();
+}
+
+#[test]
+fn each_frame_is_of_the_pattern_that_was_in_view_and_nothing_is_taken_twice() {
+    if !in_the_machine() {
+        return;
+    }
+    let chip = Chip::new();
+    let sum = take(&mut rig(&chip, Kind::default(), true), 5);
+    println!("{sum:?}");
+    assert_eq!((sum.missed_flips, sum.retaken), (0, 0));
+}
+
+#[test]
+fn a_pattern_whose_flip_came_late_is_taken_again_and_never_mislabelled() {
+    if !in_the_machine() {
+        return;
+    }
+    let chip = Chip::new();
+    let late = Kind {
+        late_every: 3,
+        ..Kind::default()
+    };
+    for (what, kind) in [
+        ("triggered", late),
+        ("triggered, light a refresh later", Kind { lag: 1, ..late }),
+        (
+            "by itself",
+            Kind {
+                by_itself: true,
+                ..late
+            },
+        ),
+        (
+            "by itself, light a refresh later",
+            Kind {
+                by_itself: true,
+                lag: 1,
+                ..late
+            },
+        ),
+    ] {
+        let sum = take(&mut rig(&chip, kind, true), 5);
+        println!("{what}: {sum:?}");
+        assert!(
+            sum.missed_flips > 0,
+            "{what}: nobody noticed that flips were late"
+        );
+    }
+}
+
+#[test]
+fn a_projector_that_goes_in_the_middle_of_a_sequence_ends_it_at_once() {
+    if !in_the_machine() {
+        return;
+    }
+    let chip = Chip::new();
+    let mut rig = rig(&chip, Kind::default(), false);
+    let unplug = || std::fs::write("/sys/module/vkms/parameters/plugged", "0").unwrap();
+    let (begun, mut taken) = (Instant::now(), 0);
+    let gone = rig.acquire(&[0; 64], PATIENT, &mut |_, _| {
+        taken += 1;
+        if taken == 3 {
+            unplug();
+        }
+    });
+    let gone = gone.unwrap_err();
+    println!(
+        "{gone}, said after {:?} and {taken} frames",
+        begun.elapsed()
+    );
+    assert_eq!((gone.kind(), taken < 64), (ErrorKind::Disconnected, true));
+    assert!(begun.elapsed() < Duration::from_secs(1));
+    drop(rig);
+    std::fs::write("/sys/module/vkms/parameters/plugged", "1").unwrap();
+}

@@ -1,0 +1,275 @@
+//! A camera that looks at the virtual display: it exposes when the wire goes high, or by itself, and its frames say which pattern was
+//! really in view.
+//!
+//! What was in view it knows from the kernel alone: the count of refreshes when an exposure begins and ends, and the checksum of
+//! what the display showed in each. It shares nothing with the back-ends that show, count and trigger.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{JoinHandle, sleep, spawn};
+use std::time::Duration;
+
+use drm::{Device, VblankWaitFlags, VblankWaitTarget};
+use hal::camera::{Camera, CameraTiming, Encoding, Starts};
+use hal::clock::monotonic;
+use hal::error::Error;
+use hal::frame::{Frame, FrameFormat, Pixels};
+use hal::head::TOLERANCE;
+use hal::units::Timestamp;
+use rustix::io::{read, write};
+use rustix::pipe::{PipeFlags, pipe_with};
+
+use crate::chip::is_high;
+use crate::crc::Checksums;
+
+/// What a frame says where more than one picture was in view.
+pub const MIXED: u8 = 255;
+/// What a frame says where the picture is none of the patterns.
+pub const NO_PATTERN: u8 = 254;
+
+/// How often the wire is looked at: well within the tolerance of an exposure's start.
+const LOOK: Duration = Duration::from_micros(50);
+/// Leaves two thirds of a refresh for the checksums, which keep the processor from everybody else.
+const EXPOSURE: Duration = Duration::from_millis(5);
+const PERIOD: Duration = Duration::from_millis(30);
+/// From the end of an exposure to its frame: longer than the display takes for a checksum.
+const READOUT: Duration = Duration::from_millis(8);
+
+/// The display's count of refreshes, asked of the kernel.
+struct Refreshes(OwnedFd);
+
+impl AsFd for Refreshes {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.0.as_fd()
+    }
+}
+
+impl Device for Refreshes {}
+
+impl Refreshes {
+    /// The count at a time that is not long ago.
+    fn at(&self, time: Timestamp, period: Duration) -> u64 {
+        let newest = self.wait_vblank(
+            VblankWaitTarget::Relative(0),
+            VblankWaitFlags::empty(),
+            0,
+            0,
+        );
+        let newest = newest.unwrap();
+        let after = (Timestamp(0) + newest.time().unwrap()).since(time);
+        u64::from(newest.frame()) - after.as_nanos().div_ceil(period.as_nanos()) as u64
+    }
+}
+
+/// What the camera looks at.
+pub struct View {
+    /// A descriptor of the display's card.
+    pub display: OwnedFd,
+    /// The pattern of a checksum.
+    pub patterns: HashMap<u32, u8>,
+    /// Time between its refreshes.
+    pub refresh: Duration,
+    /// Refreshes from a flip to its light.
+    pub lag: u64,
+    /// The wire; none = the camera runs by itself.
+    pub wire: Option<File>,
+}
+
+/// The camera; a thread of its own is the sensor.
+pub struct Eye {
+    starts: Starts,
+    armed: Arc<AtomicBool>,
+    /// How often it was started: frames of another start are forgotten.
+    start: Arc<AtomicU64>,
+    frames: Receiver<Frame>,
+    news: OwnedFd,
+    over: Arc<AtomicBool>,
+    sensor: Option<JoinHandle<()>>,
+}
+
+impl Eye {
+    pub fn new(view: View) -> Self {
+        let (armed, start, over) = (Arc::default(), Arc::default(), Arc::default());
+        let (send, frames) = channel();
+        let (news, tell) = pipe_with(PipeFlags::NONBLOCK).unwrap();
+        let sensor = Sensor {
+            armed: Arc::clone(&armed),
+            start: Arc::clone(&start),
+            over: Arc::clone(&over),
+            refreshes: Refreshes(view.display.try_clone().unwrap()),
+            checksums: (!view.patterns.is_empty()).then(Checksums::record),
+            send,
+            tell,
+            count: 0,
+            view,
+        };
+        Self {
+            starts: if sensor.view.wire.is_some() {
+                Starts::OnTrigger
+            } else {
+                Starts::ByItself
+            },
+            armed,
+            start,
+            frames,
+            news,
+            over,
+            sensor: Some(spawn(|| sensor.run())),
+        }
+    }
+
+    /// Readable when a frame has come.
+    pub fn descriptor(&self) -> OwnedFd {
+        self.news.try_clone().unwrap()
+    }
+
+    fn forget(&mut self) {
+        let _ = read(&self.news, &mut [0; 64]);
+        while self.frames.try_recv().is_ok() {}
+    }
+}
+
+impl Camera for Eye {
+    fn format(&self) -> FrameFormat {
+        FrameFormat::packed(1, 1, 8)
+    }
+
+    fn encoding(&self) -> Encoding {
+        Encoding {
+            name: "Y8".into(),
+            exact: true,
+        }
+    }
+
+    fn timing(&self) -> CameraTiming {
+        CameraTiming {
+            starts: self.starts,
+            exposure: EXPOSURE,
+            period: PERIOD,
+            delivery: READOUT * 2,
+        }
+    }
+
+    fn start(&mut self) -> Result<(), Error> {
+        if self.armed.load(Ordering::SeqCst) {
+            return Err(Error::protocol("starting the camera", "stop it first"));
+        }
+        self.forget();
+        self.start.fetch_add(1, Ordering::SeqCst);
+        self.armed.store(true, Ordering::SeqCst);
+        Ok(())
+    }
+
+    fn poll_frame(&mut self) -> Result<Option<Frame>, Error> {
+        if !self.armed.load(Ordering::SeqCst) {
+            return Err(Error::protocol(
+                "fetching a frame",
+                "start the camera first",
+            ));
+        }
+        let frame = self.frames.try_recv().ok();
+        if frame.is_some() {
+            let _ = read(&self.news, &mut [0; 1]);
+        }
+        Ok(frame)
+    }
+
+    fn stop(&mut self) -> Result<(), Error> {
+        self.armed.store(false, Ordering::SeqCst);
+        self.forget();
+        Ok(())
+    }
+}
+
+impl Drop for Eye {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::SeqCst);
+        let sensor = self.sensor.take().map(JoinHandle::join);
+        assert!(
+            std::thread::panicking() || sensor.is_none_or(|sensor| sensor.is_ok()),
+            "the sensor panicked"
+        );
+    }
+}
+
+struct Sensor {
+    armed: Arc<AtomicBool>,
+    start: Arc<AtomicU64>,
+    over: Arc<AtomicBool>,
+    refreshes: Refreshes,
+    checksums: Option<Checksums>,
+    send: Sender<Frame>,
+    tell: OwnedFd,
+    count: u64,
+    view: View,
+}
+
+impl Sensor {
+    fn run(mut self) {
+        let (mut high, mut next) = (false, monotonic());
+        while !self.over.load(Ordering::SeqCst) {
+            let begins = match &self.view.wire {
+                Some(wire) => {
+                    let was = std::mem::replace(&mut high, is_high(wire));
+                    high && !was
+                }
+                None => monotonic() >= next,
+            };
+            if begins {
+                next = monotonic() + PERIOD;
+            }
+            if begins && self.armed.load(Ordering::SeqCst) {
+                self.expose();
+            }
+            sleep(LOOK);
+        }
+    }
+
+    fn expose(&mut self) {
+        let (start, began) = (self.start.load(Ordering::SeqCst), monotonic());
+        sleep_until(began + EXPOSURE);
+        let first = self.refreshes.at(began + TOLERANCE, self.view.refresh);
+        let last = self
+            .refreshes
+            .at(began + (EXPOSURE - TOLERANCE), self.view.refresh);
+        sleep_until(began + (EXPOSURE + READOUT));
+        let seen = self.in_view(first, last);
+        self.count += 1;
+        if start != self.start.load(Ordering::SeqCst) || !self.armed.load(Ordering::SeqCst) {
+            return;
+        }
+        let pixels = Arc::new(Pixels::Eight(vec![seen]));
+        let frame = Frame::new(FrameFormat::packed(1, 1, 8), pixels, began, self.count).unwrap();
+        if self.send.send(frame).is_ok() {
+            write(&self.tell, b"!").unwrap();
+        }
+    }
+
+    /// The pattern whose light was there from one refresh to the other.
+    fn in_view(&mut self, first: u64, last: u64) -> u8 {
+        let Some(checksums) = &mut self.checksums else {
+            return NO_PATTERN;
+        };
+        checksums.take();
+        let pattern = |count| {
+            let sum = checksums.seen.get(&(count - self.view.lag));
+            sum.and_then(|sum| self.view.patterns.get(sum))
+                .copied()
+                .unwrap_or(NO_PATTERN)
+        };
+        let seen = pattern(first);
+        if (first..=last).all(|count| pattern(count) == seen) {
+            seen
+        } else {
+            MIXED
+        }
+    }
+}
+
+fn sleep_until(end: Timestamp) {
+    sleep(end.since(monotonic()));
+}
