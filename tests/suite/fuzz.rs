@@ -7,7 +7,7 @@ use appliance::measure::measure;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
 use std::fs;
-use std::panic::catch_unwind;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use tests::files;
 use tests::random::Random;
@@ -250,7 +250,9 @@ fn frames_of_any_content_never_panic() {
                     ..Scene::new(40.0, frames.clone())
                 };
                 let recording = scene.record();
-                let outcome = catch_unwind(|| measure(&recording, Path::new("noise")).is_ok());
+                let outcome = catch_unwind(AssertUnwindSafe(|| {
+                    measure(&recording, Path::new("noise")).is_ok()
+                }));
                 assert!(outcome.unwrap_or(false), "{bit_depth} bit, {frames:?}");
             }
         }

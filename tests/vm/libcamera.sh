@@ -43,6 +43,11 @@ if ! dpkg-query --show "${tools[@]}" >/dev/null 2>&1; then
         unavailable "apt cannot install ${tools[*]} (the reason stands above)"
 fi
 
+# Where this machine's own packages come from, its newest suite is as well.
+archive=$(apt-get indextargets --format '$(SITE) $(RELEASE) $(CREATED_BY)' |
+    awk '$3 == "Packages" && $2 !~ /security/ { print $1; exit }')
+[[ -n $archive ]] || unavailable "apt knows of no Debian archive"
+
 cat >"$dir/apt/apt.conf" <<END_OF_CONF
 APT::Sandbox::User "$(id -un)";
 APT::Update::Post-Invoke { "true"; };
@@ -53,7 +58,7 @@ Dir::Cache::pkgcache "";
 Dir::Cache::srcpkgcache "";
 Debug::NoLocking "true";
 END_OF_CONF
-echo "deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] http://deb.debian.org/debian $libcamera_suite main" >"$dir/apt/sources.list"
+echo "deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] $archive $libcamera_suite main" >"$dir/apt/sources.list"
 export APT_CONFIG=$dir/apt/apt.conf
 apt-get update -qq || unavailable "apt cannot read the sources of Debian $libcamera_suite (the reason stands above)"
 (cd "$dir/apt" && apt-get source -qq --download-only "libcamera=$libcamera") ||
