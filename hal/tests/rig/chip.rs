@@ -1,11 +1,17 @@
-//! A GPIO chip of one line that the kernel simulates: the wire between trigger and camera.
+//! A GPIO chip of one line that the kernel simulates, and the wire at that line: when it went high, by the kernel's own record.
 
-use std::fs::{self, File};
-use std::os::unix::fs::FileExt;
+use std::fs::{self, File, OpenOptions};
+use std::io::Read;
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::PathBuf;
+
+use hal::units::Timestamp;
+use rustix::fs::OFlags;
 
 /// Where such chips are made.
 const MADE: &str = "/sys/kernel/config/gpio-sim/rig";
+/// Where the kernel records.
+const TRACING: &str = "/sys/kernel/debug/tracing";
 
 /// The label of the chip.
 pub const LABEL: &str = "rig";
@@ -13,9 +19,7 @@ pub const LABEL: &str = "rig";
 pub const LINE: &str = "trigger";
 
 /// Made in its life, gone with it.
-pub struct Chip {
-    level: File,
-}
+pub struct Chip;
 
 impl Chip {
     pub fn new() -> Self {
@@ -26,24 +30,8 @@ impl Chip {
         fs::write(bank.join("label"), LABEL).unwrap();
         fs::write(bank.join("line0/name"), LINE).unwrap();
         fs::write(chip.join("live"), "1").unwrap();
-        let word = |path: PathBuf| fs::read_to_string(path).unwrap().trim().to_owned();
-        let device = PathBuf::from("/sys/devices/platform").join(word(chip.join("dev_name")));
-        let line = device.join(word(bank.join("chip_name"))).join("sim_gpio0");
-        Self {
-            level: File::open(line.join("value")).unwrap(),
-        }
+        Self
     }
-
-    /// The level on the wire, to be watched.
-    pub fn level(&self) -> File {
-        self.level.try_clone().unwrap()
-    }
-}
-
-/// Whether the wire is high.
-pub fn is_high(level: &File) -> bool {
-    let mut text = [0; 4];
-    level.read_at(&mut text, 0).is_ok() && text[0] == b'1'
 }
 
 impl Drop for Chip {
@@ -53,5 +41,42 @@ impl Drop for Chip {
         for folder in ["bank0/line0", "bank0", ""] {
             let _ = fs::remove_dir(chip.join(folder));
         }
+    }
+}
+
+/// The wire at the only line that is set meanwhile.
+pub struct Wire(File);
+
+impl Wire {
+    pub fn new() -> Self {
+        let set = |file: &str, value: &str| fs::write(format!("{TRACING}/{file}"), value).unwrap();
+        set("trace_clock", "mono");
+        set("trace", "");
+        set("events/gpio/gpio_value/enable", "1");
+        let mut options = OpenOptions::new();
+        options
+            .read(true)
+            .custom_flags(OFlags::NONBLOCK.bits().cast_signed());
+        Self(options.open(format!("{TRACING}/trace_pipe")).unwrap())
+    }
+
+    /// When it last went high, if it has since the last call; to the µs.
+    pub fn pulse(&mut self) -> Option<Timestamp> {
+        let mut record = [0; 4096];
+        let length = self.0.read(&mut record).ok()?;
+        let text = String::from_utf8_lossy(&record[..length]);
+        let mut high = text.lines().filter_map(|line| {
+            let (before, after) = line.split_once(": gpio_value: ")?;
+            let (seconds, micros) = before.rsplit(' ').next()?.split_once('.')?;
+            let at: u64 = format!("{seconds}{micros}").parse().ok()?;
+            after.ends_with("set 1").then_some(Timestamp(at * 1000))
+        });
+        high.next_back()
+    }
+}
+
+impl Drop for Wire {
+    fn drop(&mut self) {
+        let _ = fs::write(format!("{TRACING}/events/gpio/gpio_value/enable"), "0");
     }
 }

@@ -5,7 +5,6 @@
 //! what the display showed in each. It shares nothing with the back-ends that show, count and trigger.
 
 use std::collections::HashMap;
-use std::fs::File;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -23,7 +22,7 @@ use hal::units::Timestamp;
 use rustix::io::{read, write};
 use rustix::pipe::{PipeFlags, pipe_with};
 
-use crate::chip::is_high;
+use crate::chip::Wire;
 use crate::crc::Checksums;
 
 /// What a frame says where more than one picture was in view.
@@ -31,10 +30,11 @@ pub const MIXED: u8 = 255;
 /// What a frame says where the picture is none of the patterns.
 pub const NO_PATTERN: u8 = 254;
 
-/// How often the wire is looked at: well within the tolerance of an exposure's start.
-const LOOK: Duration = Duration::from_micros(50);
-/// Leaves two thirds of a refresh for the checksums, which keep the processor from everybody else.
-const EXPOSURE: Duration = Duration::from_millis(5);
+/// How often the wire is looked at, which is seldom late for the end of an exposure.
+const LOOK: Duration = Duration::from_micros(500);
+/// Within a refresh, and room for the ways into the kernel and out of it.
+const EXPOSURE: Duration = Duration::from_millis(10);
+/// A little less than two refreshes, so that a triggered camera keeps up with every second one.
 const PERIOD: Duration = Duration::from_millis(30);
 /// From the end of an exposure to its frame: longer than the display takes for a checksum.
 const READOUT: Duration = Duration::from_millis(8);
@@ -76,7 +76,7 @@ pub struct View {
     /// Refreshes from a flip to its light.
     pub lag: u64,
     /// The wire; none = the camera runs by itself.
-    pub wire: Option<File>,
+    pub wire: Option<Wire>,
 }
 
 /// The camera; a thread of its own is the sensor.
@@ -210,34 +210,34 @@ struct Sensor {
 
 impl Sensor {
     fn run(mut self) {
-        let (mut high, mut next) = (false, monotonic());
+        let (mut free, mut last) = (monotonic(), 0);
         while !self.over.load(Ordering::SeqCst) {
-            let begins = match &self.view.wire {
-                Some(wire) => {
-                    let was = std::mem::replace(&mut high, is_high(wire));
-                    high && !was
-                }
-                None => monotonic() >= next,
+            let began = match &mut self.view.wire {
+                Some(wire) => wire.pulse(),
+                None => (monotonic() >= free).then(monotonic),
             };
-            if begins {
-                next = monotonic() + PERIOD;
-            }
-            if begins && self.armed.load(Ordering::SeqCst) {
-                self.expose();
+            let start = self.start.load(Ordering::SeqCst);
+            // A pulse while it is busy is lost; started again, it is not.
+            if let Some(began) = began.filter(|began| *began >= free || start != last)
+                && self.armed.load(Ordering::SeqCst)
+            {
+                (free, last) = (began + PERIOD, start);
+                self.expose(began);
             }
             sleep(LOOK);
         }
     }
 
-    fn expose(&mut self) {
-        let (start, began) = (self.start.load(Ordering::SeqCst), monotonic());
+    fn expose(&mut self, began: Timestamp) {
+        let start = self.start.load(Ordering::SeqCst);
         sleep_until(began + EXPOSURE);
-        let first = self.refreshes.at(began + TOLERANCE, self.view.refresh);
-        let last = self
-            .refreshes
-            .at(began + (EXPOSURE - TOLERANCE), self.view.refresh);
+        // Without checksums nothing is to be known, also of a display that is gone.
+        let seen = self.checksums.is_some().then(|| {
+            [TOLERANCE, EXPOSURE - TOLERANCE]
+                .map(|into| self.refreshes.at(began + into, self.view.refresh))
+        });
         sleep_until(began + (EXPOSURE + READOUT));
-        let seen = self.in_view(first, last);
+        let seen = seen.map_or(NO_PATTERN, |[first, last]| self.in_view(first, last));
         self.count += 1;
         if start != self.start.load(Ordering::SeqCst) || !self.armed.load(Ordering::SeqCst) {
             return;
