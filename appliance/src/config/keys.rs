@@ -18,7 +18,7 @@ pub struct Key {
 }
 
 /// The table; a test compares it with the structs.
-pub const KEYS: [Key; 18] = [
+pub const KEYS: [Key; 19] = [
     Key {
         name: "state",
         unit: "folder",
@@ -132,6 +132,13 @@ pub const KEYS: [Key; 18] = [
         meaning: "what the replay head plays, in turn; required with backend = \"replay\"",
     },
     Key {
+        name: "head.calibration",
+        unit: "file",
+        range: "a calibration.json",
+        default: "calibration/calibration.json in the state folder",
+        meaning: "what is known of the head; `fringed calibrate` writes it, and keeps the one before beside it",
+    },
+    Key {
         name: "history.results",
         unit: "results",
         range: "1 to 10000000",
@@ -184,6 +191,7 @@ mod tests {
             },
             head: HeadConfig {
                 scenario: Some("scenario".into()),
+                calibration: Some("calibration.json".into()),
                 ..HeadConfig::default()
             },
             ..Config::default()

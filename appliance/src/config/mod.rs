@@ -4,6 +4,7 @@ mod keys;
 
 pub use keys::{KEYS, Key, table};
 
+use crate::calibration::place::IN_STATE;
 use crate::error::{Exit, Failure};
 use crate::modbus::{CONNECTIONS, WordOrder};
 use ipnet::IpNet;
@@ -102,6 +103,8 @@ pub struct HeadConfig {
     pub scenario: Option<PathBuf>,
     /// Recordings that the replay head plays.
     pub recordings: Vec<PathBuf>,
+    /// The head's `calibration.json`; none = in the state folder.
+    pub calibration: Option<PathBuf>,
 }
 
 /// The kinds of head.
@@ -162,6 +165,7 @@ impl Default for HeadConfig {
             backend: Backend::Sim,
             scenario: None,
             recordings: Vec::new(),
+            calibration: None,
         }
     }
 }
@@ -204,10 +208,18 @@ impl Config {
         let folder = path.parent().unwrap_or(Path::new(""));
         let head = &mut config.head;
         let paths = head.scenario.iter_mut().chain(&mut head.recordings);
+        let paths = paths.chain(&mut head.calibration);
         for path in paths.chain(&mut config.state) {
             *path = folder.join(&*path);
         }
         Ok(config)
+    }
+
+    /// The devices, with the calibration in this state folder unless another one is named.
+    pub fn head_in(&self, state: &Path) -> HeadConfig {
+        let mut head = self.head.clone();
+        head.calibration.get_or_insert_with(|| state.join(IN_STATE));
+        head
     }
 
     /// Checks the ranges that the types do not hold.
