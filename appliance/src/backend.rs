@@ -5,6 +5,7 @@ mod devices;
 pub use devices::{built_for, lines};
 
 use crate::calibration::Calibration;
+use crate::calibration::place::{Loaded, Place};
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
 use hal::head::DynHead;
@@ -21,6 +22,10 @@ pub struct Opened {
     pub calibration: Calibration,
     /// Where parts are placed in front of a simulated head.
     pub stage: Option<Stage>,
+    /// Why the stored calibration cannot be used. Then nothing must be measured, whatever else is known.
+    pub problem: Option<String>,
+    /// Why the newest calibration could not be used and the one before is.
+    pub fallback: Option<String>,
 }
 
 impl Opened {
@@ -34,6 +39,7 @@ impl Opened {
                 self.head = stage
                     .reopen()
                     .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+                self.adopt(config);
             }
             None => {
                 // Who holds a device cannot open it again.
@@ -43,6 +49,37 @@ impl Opened {
         }
         Ok(())
     }
+
+    /// Whether what is known of the head can be trusted.
+    ///
+    /// # Errors
+    /// Why not (exit code 65).
+    pub fn calibrated(&self) -> Result<(), Failure> {
+        match &self.problem {
+            None => Ok(()),
+            Some(problem) => Err(Failure::new(Exit::Content, problem.clone())),
+        }
+    }
+
+    /// Goes by the stored calibration, where there is one.
+    fn adopt(&mut self, config: &HeadConfig) {
+        self.fallback = None;
+        self.problem = match stored(config) {
+            // Of real devices nothing is known but this.
+            Ok(None) => (config.backend == Backend::Rpi).then(|| devices::uncalibrated().message),
+            Ok(Some((loaded, calibration))) => {
+                let before = self.calibration.clone();
+                let misfit = misfit(config, &before, &calibration);
+                if misfit.is_none() {
+                    self.head.set_timing(loaded.file.timing(self.head.timing()));
+                    self.calibration = calibration;
+                    self.fallback = loaded.fallback;
+                }
+                misfit
+            }
+            Err(problem) => Some(problem),
+        };
+    }
 }
 
 /// Opens the configured head. `progress` is told the share done, from any thread.
@@ -51,9 +88,6 @@ impl Opened {
 /// If a file of the head is missing or wrong, or a device is not there.
 pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
     let opened = open_as_it_is(config, progress)?;
-    if config.backend == Backend::Rpi {
-        return Err(devices::uncalibrated());
-    }
     let encoding = opened.head.encoding();
     if !encoding.exact {
         let message = format!(
@@ -74,11 +108,48 @@ pub fn open_as_it_is(
     config: &HeadConfig,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<Opened, Failure> {
-    match config.backend {
-        Backend::Sim => simulated(config.scenario.as_deref(), progress),
-        Backend::Replay => replayed(&config.recordings),
-        Backend::Rpi => devices::rpi(config),
+    let mut opened = match config.backend {
+        Backend::Sim => simulated(config.scenario.as_deref(), progress)?,
+        Backend::Replay => replayed(&config.recordings)?,
+        Backend::Rpi => devices::rpi(config)?,
+    };
+    opened.adopt(config);
+    Ok(opened)
+}
+
+/// The stored calibration of the configured head, if there is one. Recordings carry their own.
+fn stored(config: &HeadConfig) -> Result<Option<(Loaded, Calibration)>, String> {
+    let place = config
+        .calibration
+        .as_deref()
+        .filter(|_| config.backend != Backend::Replay);
+    let Some(loaded) = place.map_or(Ok(None), |place| Place::at(place).load())? else {
+        return Ok(None);
+    };
+    let calibration = loaded.file.calibration()?;
+    Ok(Some((loaded, calibration)))
+}
+
+/// Why a stored calibration is not this head's, if it is not.
+fn misfit(config: &HeadConfig, head: &Calibration, stored: &Calibration) -> Option<String> {
+    let sizes = |calibration: &Calibration| (calibration.camera, calibration.projector);
+    if sizes(head) == sizes(stored) {
+        return None;
     }
+    let place = config.calibration.as_deref().unwrap_or(Path::new(""));
+    let describe = |calibration: &Calibration| {
+        let ((width, height, bits), projector) = sizes(calibration);
+        format!(
+            "a camera of {width}×{height} pixels of {bits} bit and a projector of {}×{}",
+            projector.0, projector.1
+        )
+    };
+    Some(format!(
+        "calibration {} is of another head: it is for {}, this is {}: calibrate anew, or name this head's with head.calibration",
+        place.display(),
+        describe(stored),
+        describe(head)
+    ))
 }
 
 /// What is known of the configured head, without opening it.
@@ -86,10 +157,16 @@ pub fn open_as_it_is(
 /// # Errors
 /// If a file of the head is missing or wrong.
 pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
+    let wrong = |problem| Failure::new(Exit::Content, problem);
     match config.backend {
-        Backend::Sim => Ok(Calibration::of_scenario(&scenario(
-            config.scenario.as_deref(),
-        )?)),
+        Backend::Sim => {
+            let exact = Calibration::of_scenario(&scenario(config.scenario.as_deref())?);
+            match stored(config).map_err(wrong)? {
+                None => Ok(exact),
+                Some((_, calibration)) => misfit(config, &exact, &calibration)
+                    .map_or(Ok(calibration), |why| Err(wrong(why))),
+            }
+        }
         Backend::Replay => {
             let first = config
                 .recordings
@@ -98,7 +175,10 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
                 .map(|folder| Recording::open(folder));
             calibration_of(&config.recordings, &first.collect::<Result<Vec<_>, _>>()?)
         }
-        Backend::Rpi => Err(devices::uncalibrated()),
+        Backend::Rpi => match stored(config).map_err(wrong)? {
+            Some((_, calibration)) => Ok(calibration),
+            None => Err(devices::uncalibrated()),
+        },
     }
 }
 
@@ -132,6 +212,8 @@ fn simulated(path: Option<&Path>, progress: &(dyn Fn(f64) + Sync)) -> Result<Ope
         head,
         calibration,
         stage: Some(stage),
+        problem: None,
+        fallback: None,
     })
 }
 
@@ -147,6 +229,8 @@ fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened, Failure> {
         head,
         calibration,
         stage: None,
+        problem: None,
+        fallback: None,
     })
 }
 

@@ -10,6 +10,7 @@ macro_rules! say {
 
 mod adapt;
 mod bench;
+mod calibrate;
 mod config;
 mod demo;
 mod doctor;
@@ -22,7 +23,7 @@ mod replay;
 mod serve;
 mod teach;
 
-use crate::config::Config;
+use crate::config::{Config, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::modbus::{registers_csv, registers_json};
 use crate::progress::Progress;
@@ -80,6 +81,8 @@ enum Command {
     Adapt(adapt::Adapt),
     /// Examine the head step by step.
     Doctor(doctor::Doctor),
+    /// Calibrate the head: import its models, measure the rest.
+    Calibrate(calibrate::Calibrate),
     /// Record a sequence from the configured head.
     Record(record::Record),
     /// Repeat the paper's experiments on the simulated head.
@@ -133,6 +136,7 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Command::Measure(command) => command.run(&common),
         Command::Adapt(command) => command.run(&common),
         Command::Doctor(command) => command.run(&common),
+        Command::Calibrate(command) => command.run(&common),
         Command::Record(command) => command.run(&common),
         Command::Experiment(command) => command.run(&common),
         Command::Bench(command) => command.run(&common),
@@ -192,6 +196,14 @@ impl Common {
         match self.configuration()?.state {
             Some(path) => Ok(path),
             None => crate::state::StateFolder::default_path(),
+        }
+    }
+
+    /// The devices, with the calibration in the state folder unless the configuration names another.
+    fn head(&self, config: &Config) -> HeadConfig {
+        match self.state_folder() {
+            Ok(state) => config.head_in(&state),
+            Err(_) => config.head.clone(),
         }
     }
 

@@ -144,10 +144,11 @@ impl Daemon {
         let awaited = first.is_some();
         let measuring = {
             let (station, recipes) = (station.clone(), state.recipes().clone());
-            let (config, progress, history) = (config.clone(), progress.clone(), history.clone());
+            let (config, progress, history) =
+                (config.head_in(&path), progress.clone(), history.clone());
             spawn("measuring", move || {
                 let told = |share: f64| progress.tell(share, "working out the light of the scene");
-                match pool.install(|| backend::open(&config.head, &told)) {
+                match pool.install(|| backend::open(&config, &told)) {
                     Err(failure) => drop(opened.send(Err(failure))),
                     Ok(head) => {
                         // Nobody waits any more only if the start was given up.
@@ -160,7 +161,7 @@ impl Daemon {
                             maps,
                             history,
                             progress,
-                            config: config.head,
+                            config,
                             aborts,
                             lost: None,
                             shelf: Shelf::default(),

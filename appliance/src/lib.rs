@@ -11,6 +11,7 @@ pub mod config;
 pub mod daemon;
 pub mod doctor;
 pub mod error;
+pub mod examine;
 pub mod experiment;
 pub mod history;
 pub mod latest;

@@ -54,6 +54,7 @@ mod code {
     pub const LINES_LOST: u16 = 303;
     pub const NOTHING_TO_TEACH: u16 = 401;
     pub const RIG: u16 = 501;
+    pub const NOT_CALIBRATED: u16 = 502;
     pub const NOT_STORED: u16 = 601;
 }
 
@@ -105,11 +106,8 @@ impl Worker {
     /// Works until told to stop, or until nobody can tell it anything any more. `first` is asked of the
     /// station as soon as it is ready for it.
     pub fn run(mut self, orders: &Receiver<Order>, first: Option<Request>) {
-        self.station.event(Event::Condition(Condition {
-            calibration_valid: true,
-            ..Condition::default()
-        }));
         self.progress.clear();
+        self.tell_condition();
         self.station.event(Event::Started);
         if let Some(first) = first {
             self.station.event(Event::Request(first));
@@ -155,6 +153,20 @@ impl Worker {
                 }
             }
         }
+    }
+
+    /// Says whether the head's calibration can be trusted.
+    fn tell_condition(&self) {
+        let Opened {
+            problem, fallback, ..
+        } = &self.opened;
+        for words in [problem, fallback].into_iter().flatten() {
+            self.progress.log(words);
+        }
+        self.station.event(Event::Condition(Condition {
+            calibration_valid: self.opened.problem.is_none(),
+            ..Condition::default()
+        }));
     }
 
     /// Answers those who want to know more of the last cycle.
@@ -219,6 +231,9 @@ impl Worker {
         &mut self,
         key: &RecipeKey,
     ) -> Result<(Arc<Plan>, Option<String>), (RecipeResult, String)> {
+        if let Some(problem) = &self.opened.problem {
+            return Err((RecipeResult::OtherCalibration, problem.clone()));
+        }
         let refuse = |error: LoadError| {
             let result = match error {
                 LoadError::Unknown(_) => RecipeResult::Unknown,
@@ -281,12 +296,16 @@ impl Worker {
             });
             !aborts.has(job)
         };
+        let problem = self.opened.problem.clone();
         let Opened {
             head, calibration, ..
         } = &mut self.opened;
-        let taught = self
-            .pool
-            .install(|| teach_while(head, calibration, &naming, DEVICE_TIMEOUT, &progress));
+        let taught = match problem {
+            Some(problem) => Err(TeachError::NotCalibrated(problem)),
+            None => self
+                .pool
+                .install(|| teach_while(head, calibration, &naming, DEVICE_TIMEOUT, &progress)),
+        };
         self.progress.clear();
         let stored = taught
             .map_err(|error| {
@@ -370,6 +389,7 @@ fn code_of_teaching(error: &TeachError) -> u16 {
         TeachError::Device(error) => code_of(error),
         TeachError::Scene(_) => code::NOTHING_TO_TEACH,
         TeachError::Rig(_) => code::RIG,
+        TeachError::NotCalibrated(_) => code::NOT_CALIBRATED,
         TeachError::Ended => error_code::ABORTED,
     }
 }

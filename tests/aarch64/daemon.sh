@@ -10,8 +10,9 @@ features=kms,gpio
 # SQLite is written in C.
 export CC_aarch64_unknown_linux_gnu=$dir/bin/cc AR_aarch64_unknown_linux_gnu=$dir/bin/ar
 
-"$dir/bin/cargo" build --release -p appliance --features "$features"
-fringed=("$dir/bin/qemu-aarch64" "$dir/build/aarch64-unknown-linux-gnu/release/fringed")
+# As its tests are built, so that nothing is built twice.
+"$dir/bin/cargo" build --profile test -p appliance --features "$features"
+fringed=("$dir/bin/qemu-aarch64" "$dir/build/aarch64-unknown-linux-gnu/debug/fringed")
 "${fringed[@]}" --version
 
 # This build has no camera, and says so with the remedy.

@@ -209,3 +209,97 @@ fn the_documented_scenario_is_the_default_one() {
     let read = hal::sim::Scenario::from_toml(scenario, "docs/formats.md").unwrap();
     assert_eq!(read, hal::sim::Scenario::default());
 }
+
+/// Keys of `calibration.json`, version 1. If this fails, do not change the test: old files must stay readable.
+const CALIBRATION: [&str; 63] = [
+    "camera",
+    "camera.bit_depth",
+    "camera.height",
+    "camera.model",
+    "camera.model.cx",
+    "camera.model.cy",
+    "camera.model.distortion",
+    "camera.model.fx",
+    "camera.model.fy",
+    "camera.model.rotation",
+    "camera.model.translation_mm",
+    "camera.width",
+    "checksum",
+    "contrast",
+    "contrast.modulation_counts",
+    "contrast.pitches",
+    "contrast.pitches.contrast",
+    "contrast.pitches.pitch_px",
+    "fingerprint",
+    "format",
+    "made_at_unix_s",
+    "made_by",
+    "models_from",
+    "noise",
+    "noise.counts",
+    "noise.levels",
+    "noise.levels.counts",
+    "noise.levels.level",
+    "noise.read_counts",
+    "noise.shot",
+    "projector",
+    "projector.height",
+    "projector.model",
+    "projector.model.cx",
+    "projector.model.cy",
+    "projector.model.distortion",
+    "projector.model.fx",
+    "projector.model.fy",
+    "projector.model.rotation",
+    "projector.model.translation_mm",
+    "projector.width",
+    "reference",
+    "reference.horizontal",
+    "reference.horizontal.file",
+    "reference.horizontal.filled",
+    "reference.horizontal.noise_turns",
+    "reference.horizontal.residual_turns",
+    "reference.horizontal.sha256",
+    "reference.models_off_px",
+    "reference.pitch_px",
+    "reference.vertical",
+    "reference.vertical.file",
+    "reference.vertical.filled",
+    "reference.vertical.noise_turns",
+    "reference.vertical.residual_turns",
+    "reference.vertical.sha256",
+    "response",
+    "timing",
+    "timing.flip_to_light_ns",
+    "timing.readout_ns",
+    "timing.sigma_ns",
+    "timing.stamp",
+    "version",
+];
+
+#[test]
+fn a_calibration_has_exactly_the_documented_keys() {
+    let place = Place::new();
+    let config = place.path("fringed.toml");
+    Program::at(env!("CARGO_BIN_EXE_fringed-under-test"))
+        .run(&["calibrate", "--quiet", "--config", config.to_str().unwrap()])
+        .succeeded();
+    let text = fs::read_to_string(place.path("state/calibration/calibration.json")).unwrap();
+    let file: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(
+        (&file["format"], &file["version"]),
+        (&"fringed-calibration".into(), &1.into())
+    );
+    let mut keys = BTreeSet::new();
+    collect(&file, "", &mut keys);
+    let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
+    assert_eq!(keys, CALIBRATION);
+    let documented = document("formats.md");
+    for key in CALIBRATION.iter().chain(&["temperature_c"]) {
+        let name = key.rsplit('.').next().unwrap();
+        assert!(
+            documented.contains(&format!("`{name}`")),
+            "docs/formats.md names no `{name}`"
+        );
+    }
+}

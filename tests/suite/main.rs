@@ -3,6 +3,8 @@
 mod adapt;
 mod bad_input;
 mod bench;
+mod calibrate;
+mod calibrated_station;
 mod cases;
 mod changeover;
 mod cli;

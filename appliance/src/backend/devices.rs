@@ -71,6 +71,8 @@ pub(super) fn rpi(config: &HeadConfig) -> Result<Opened, Failure> {
         head,
         calibration,
         stage: None,
+        problem: None,
+        fallback: None,
     })
 }
 

@@ -23,8 +23,11 @@ impl Doctor {
     /// If the head cannot be opened, or a step failed (69).
     pub fn run(&self, common: &Common) -> Result<(), Failure> {
         let mut config = common.configuration()?;
+        config.head = common.head(&config);
         if let Some(scenario) = &self.scenario {
             (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
+            // The stored one is the configured head's.
+            config.head.calibration = None;
         }
         if config.head.backend == Backend::Replay {
             return Err(Failure::new(

@@ -61,7 +61,7 @@ impl RecipeCommand {
                 Ok(())
             }
             Self::Import { file } => {
-                let calibration = backend::calibration(&config.head)?.fingerprint();
+                let calibration = backend::calibration(&common.head(&config))?.fingerprint();
                 let imported = store.import(file, Some(&calibration)).map_err(refused)?;
                 let digits = imported.fingerprint.get(..8).unwrap_or_default();
                 tell(

@@ -40,7 +40,8 @@ impl Record {
         let progress = common.progress();
         let told = |share: f64| progress.tell(0.8 * share, "working out the light of the scene");
         let pool = super::pool(config.threads)?;
-        let mut opened = pool.install(|| backend::open(&config.head, &told))?;
+        let mut opened = pool.install(|| backend::open(&common.head(&config), &told))?;
+        opened.calibrated()?;
         let taken = self.take(&mut opened, &|share| {
             progress.tell(0.8 + 0.2 * share, "recording")
         });
@@ -60,6 +61,7 @@ impl Record {
             head,
             calibration,
             stage,
+            ..
         } = opened;
         let (columns, rows) = calibration.projector;
         let fringes = self.fringes.unwrap_or(f64::from(columns) / 12.0);

@@ -3,12 +3,14 @@
 use super::Common;
 use super::history::failure;
 use crate::calibration::Calibration;
+use crate::calibration::place::Place;
 use crate::error::{Exit, Failure};
 use crate::history::{Entry, Reader, difference};
 use crate::plan::{Plan, PlanError};
 use crate::recipe::{LoadError, Recipe, Store};
 use crate::station::result::flag::SIMULATED;
 use crate::station::{Inspection, ResultRecord};
+use algo::pattern::GreyResponse;
 use hal::replay::Recording;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -48,8 +50,10 @@ impl Replay {
         let noise = recording
             .noise_counts
             .ok_or_else(|| wrong("camera.noise_counts"))?;
-        let calibration = Calibration::of(&recording, noise).map_err(wrong)?;
+        let mut calibration = Calibration::of(&recording, noise).map_err(wrong)?;
         let recipe = self.recipe(&state, reference.number, &reference.fingerprint)?;
+        let place = config.head_in(&state).calibration;
+        calibration.response = place.and_then(|place| response(&place, &recipe));
         let stored = self.stored(&state)?;
         let flags = stored.as_ref().map_or(0, |entry| entry.flags);
         let frames: Vec<_> = recording
@@ -171,6 +175,15 @@ impl Replay {
             _ => Ok(None),
         }
     }
+}
+
+/// The grey response that the recipe was made with, which recordings do not say: of the calibration that it names.
+fn response(place: &Path, recipe: &Recipe) -> Option<GreyResponse> {
+    let place = Place::at(place);
+    let newest = place.load().ok().flatten().map(|loaded| loaded.file);
+    let generations = newest.into_iter().chain(place.load_previous());
+    let mut same = generations.filter(|file| file.fingerprint == recipe.file.calibration);
+    same.find_map(|file| file.calibration().ok()?.response)
 }
 
 fn entry(inspection: Inspection, recipe: u32, fingerprint: &str) -> Entry {

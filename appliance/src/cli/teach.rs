@@ -119,11 +119,13 @@ impl Teach {
         let config = common.configuration()?;
         let progress = common.progress();
         let told = |share: f64| progress.tell(share, "working out the light of the scene");
+        let opened = pool.install(|| backend::open(&common.head(&config), &told))?;
+        opened.calibrated()?;
         let Opened {
             mut head,
             calibration,
             ..
-        } = pool.install(|| backend::open(&config.head, &told))?;
+        } = opened;
         let told = |share: f64, words: &str| progress.tell(share, words);
         let naming = self.naming();
         let taught = pool.install(|| teach(&mut head, &calibration, &naming, TIMEOUT, &told));
@@ -131,7 +133,9 @@ impl Teach {
         taught.map_err(|error| {
             let exit = match error {
                 TeachError::Device(_) | TeachError::Ended => Exit::Unavailable,
-                TeachError::Scene(_) | TeachError::Rig(_) => Exit::Content,
+                TeachError::Scene(_) | TeachError::Rig(_) | TeachError::NotCalibrated(_) => {
+                    Exit::Content
+                }
             };
             Failure::new(exit, error.to_string())
         })

@@ -20,7 +20,7 @@ pub struct Key {
 }
 
 /// The table's part beside the devices; a test compares the whole with the structs.
-const KEYS: [Key; 18] = [
+const KEYS: [Key; 19] = [
     Key {
         name: "state",
         unit: "folder",
@@ -134,6 +134,13 @@ const KEYS: [Key; 18] = [
         meaning: "what the replay head plays, in turn; required with backend = \"replay\"",
     },
     Key {
+        name: "head.calibration",
+        unit: "file",
+        range: "a calibration.json",
+        default: "calibration/calibration.json in the state folder",
+        meaning: "what is known of the head; `fringed calibrate` writes it, and keeps the one before beside it",
+    },
+    Key {
         name: "history.results",
         unit: "results",
         range: "1 to 10000000",
@@ -210,6 +217,7 @@ mod tests {
                     line: word(),
                     ..TriggerSetup::default()
                 },
+                calibration: Some("calibration.json".into()),
                 ..HeadConfig::default()
             },
             lines: LinesSetup {

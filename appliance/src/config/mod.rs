@@ -6,6 +6,7 @@ mod keys;
 use devices::within;
 pub use keys::{Key, keys, table};
 
+use crate::calibration::place::IN_STATE;
 use crate::error::{Exit, Failure};
 use crate::modbus::{CONNECTIONS, WordOrder};
 use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
@@ -113,6 +114,8 @@ pub struct HeadConfig {
     pub projector: ProjectorSetup,
     /// The camera's trigger line of the head `rpi`.
     pub trigger: TriggerSetup,
+    /// The head's `calibration.json`; none = in the state folder.
+    pub calibration: Option<PathBuf>,
 }
 
 /// The kinds of head.
@@ -178,6 +181,7 @@ impl Default for HeadConfig {
             camera: CameraSetup::default(),
             projector: ProjectorSetup::default(),
             trigger: TriggerSetup::default(),
+            calibration: None,
         }
     }
 }
@@ -220,10 +224,18 @@ impl Config {
         let folder = path.parent().unwrap_or(Path::new(""));
         let head = &mut config.head;
         let paths = head.scenario.iter_mut().chain(&mut head.recordings);
+        let paths = paths.chain(&mut head.calibration);
         for path in paths.chain(&mut config.state) {
             *path = folder.join(&*path);
         }
         Ok(config)
+    }
+
+    /// The devices, with the calibration in this state folder unless another one is named.
+    pub fn head_in(&self, state: &Path) -> HeadConfig {
+        let mut head = self.head.clone();
+        head.calibration.get_or_insert_with(|| state.join(IN_STATE));
+        head
     }
 
     /// Checks the ranges that the types do not hold.

@@ -6,15 +6,13 @@
 mod light;
 mod time;
 
+pub use light::{LEAST_BRIGHT, LEAST_LIT, MOST_SATURATED};
+
 use crate::calibration::Calibration;
+use crate::examine::{Lit, SETTLE};
 use hal::error::Error;
 use hal::head::DynHead;
-use light::Pictures;
 use serde_json::{Value, json};
-use std::time::Duration;
-
-/// Longest wait beyond the plan for flips and frames that do not come.
-const PATIENCE: Duration = Duration::from_millis(500);
 
 /// How a step went.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,7 +97,7 @@ pub fn examine(
     progress: &dyn Fn(f64, &str),
 ) -> Vec<Step> {
     let mut steps: Vec<Step> = Vec::with_capacity(STEPS.len());
-    let mut pictures: Option<Result<Pictures, Error>> = None;
+    let mut lit: Option<Result<Lit, Error>> = None;
     for (at, (name, needs)) in STEPS.into_iter().enumerate() {
         progress(at as f64 / STEPS.len() as f64, name);
         let missing = needs.iter().find(|need| {
@@ -124,14 +122,14 @@ pub fn examine(
             "cadence" => time::cadence(head),
             "trigger" => time::trigger(head),
             _ => {
-                let taken = pictures.get_or_insert_with(|| Pictures::take(head, calibration));
-                match (name, taken) {
+                let lit = lit.get_or_insert_with(|| Lit::take(head, SETTLE));
+                match (name, lit) {
                     (_, Err(error)) => Err(error.clone()),
-                    ("light", Ok(pictures)) => Ok(pictures.light()),
-                    ("exposure", Ok(pictures)) => Ok(pictures.exposure()),
-                    ("delay", Ok(pictures)) => time::delay(head, pictures),
-                    ("contrast", Ok(pictures)) => Ok(pictures.contrast()),
-                    (_, Ok(pictures)) => Ok(pictures.response()),
+                    ("light", Ok(lit)) => Ok(light::light(lit)),
+                    ("exposure", Ok(lit)) => Ok(light::exposure(lit)),
+                    ("delay", Ok(lit)) => time::delay(head, lit),
+                    ("contrast", Ok(lit)) => light::contrast(head, calibration, lit),
+                    (_, Ok(lit)) => light::response(head, calibration, lit),
                 }
             }
         };

@@ -1,7 +1,7 @@
 //! The doctor's steps about devices and time: there, right format and mode, flips, triggers, flip-to-light delay.
 
-use super::light::{BLACK, Pictures, WHITE};
-use super::{Finding, PATIENCE};
+use super::Finding;
+use crate::examine::{Delay, Lit, PATIENCE};
 use hal::camera::Starts;
 use hal::error::Error;
 use hal::head::{DynHead, Showing, TOLERANCE, Watched};
@@ -15,11 +15,10 @@ const FLIPS: u32 = 60;
 const PERIOD_TOLERANCE: f64 = 2e-3;
 /// Refreshes over which the trigger is judged.
 const TRIGGERED: u32 = 24;
-/// Refreshes of black before white, and of white; twice, off by one refresh, so that once the change falls into an exposure.
-const BEFORE: [u32; 2] = [12, 13];
-const AFTER: u32 = 12;
-/// A mean between these shares of black and white tells that the change fell into the exposure.
-const BETWEEN: std::ops::Range<f64> = 0.05..0.95;
+/// The patterns that are loaded for it.
+const WHITE: usize = 1;
+/// How far the delay may be off even where it was measured well, ms: what one round of a small camera leaves.
+const LEAST_OFF_MS: f64 = 0.05;
 
 fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
@@ -225,80 +224,35 @@ fn by_itself(seen: &Watched<()>, nominal: Duration) -> Finding {
     Finding::pass(found, measured)
 }
 
-/// The time from a flip from black to white to its light, by how bright the frames around it are.
-pub(super) fn delay(head: &mut DynHead, pictures: &Pictures) -> Result<Finding, Error> {
-    load(head)?;
-    let exposure = head.camera_timing().exposure.as_secs_f64();
-    // The time, and how far it may be off, s.
-    let mut best: Option<(f64, f64)> = None;
-    for before in BEFORE {
-        let showing = |index, refreshes| Showing {
-            index,
-            refreshes,
-            settle: 0,
-        };
-        let showings = [showing(BLACK, before), showing(WHITE, AFTER)];
-        let seen = head.watch(&showings, PATIENCE, &mut |frame| {
-            pictures.share_of_white(frame)
-        })?;
-        let Some(flip) = seen.flips.get(1) else {
-            continue;
-        };
-        let mut dark_until = None;
-        for frame in &seen.frames {
-            let start = frame.start.0 as f64 * 1e-9 - flip.timestamp.0 as f64 * 1e-9;
-            let white = frame.measured;
-            if white < BETWEEN.start {
-                dark_until = Some(start + exposure);
-                continue;
-            }
-            // Light that came in the middle of an exposure tells when; between two exposures it may have come any time.
-            let estimate = match dark_until {
-                _ if BETWEEN.contains(&white) => {
-                    Some((start + exposure * (1.0 - white), 0.01 * exposure))
-                }
-                Some(dark) => Some((
-                    (dark + start) / 2.0,
-                    (start - dark).abs() / 2.0 + BETWEEN.start * exposure,
-                )),
-                None => None,
-            };
-            if let Some(estimate) =
-                estimate.filter(|(_, off)| best.is_none_or(|(_, least)| *off < least))
-            {
-                best = Some(estimate);
-            }
-            break;
-        }
-    }
+/// The time from a flip to its light, by how bright the frames around many flips are.
+pub(super) fn delay(head: &mut DynHead, lit: &Lit) -> Result<Finding, Error> {
     let believed = head.timing().flip_to_light.as_secs_f64();
     let refresh = head.refresh().as_secs_f64();
-    let Some((delay, off)) = best else {
+    let Some(measured) = Delay::measure(head, lit, 1)? else {
         return Ok(Finding::fail(
-            format!("no light within {AFTER} refreshes after a flip from black to white"),
+            "no light follows the flips from black to white",
             "check the projector's input: it may show another source",
             json!({ "calibrated_ms": believed * 1e3 }),
         ));
     };
-    // To a microsecond; adding 0 turns a negative zero into 0.
-    let delay = (delay * 1e6).round() * 1e-6 + 0.0;
-    let measured = json!({
-        "delay_ms": delay * 1e3, "off_ms": off * 1e3, "calibrated_ms": believed * 1e3,
+    let delay = measured.seconds;
+    let off_ms = (3.0 * measured.error * 1e3).max(LEAST_OFF_MS);
+    let numbers = json!({
+        "delay_ms": delay * 1e3, "off_ms": off_ms, "calibrated_ms": believed * 1e3,
         "off_refreshes": (delay - believed) / refresh,
     });
     let found = format!(
-        "light comes {:.2} ± {:.2} ms after its flip, the calibration says {:.2} ms",
+        "light comes {:.2} ± {off_ms:.2} ms after its flip, the calibration says {:.2} ms",
         delay * 1e3,
-        off * 1e3,
         believed * 1e3
     );
-    // Finer than this the calibration measures it, with many flips.
-    if (delay - believed).abs() > off.max(refresh / 8.0) {
+    // Finer than this the calibration measures it, with more flips.
+    if (delay - believed).abs() > (off_ms * 1e-3).max(refresh / 8.0) {
         let remedy = format!(
             "the calibration is off by {:.1} refreshes: switch off the projector's picture processing, or calibrate anew",
             (delay - believed) / refresh
         );
-        return Ok(Finding::fail(found, remedy, measured));
+        return Ok(Finding::fail(found, remedy, numbers));
     }
-    Ok(Finding::pass(found, measured))
+    Ok(Finding::pass(found, numbers))
 }

@@ -37,6 +37,9 @@ pub enum TeachError {
     /// The rig or the pattern is impossible.
     #[error("teach: {0}")]
     Rig(String),
+    /// The head's calibration cannot be used.
+    #[error("teach: {0}")]
+    NotCalibrated(String),
     /// Whoever was told of the progress wanted no more.
     #[error("teach: it was ended early")]
     Ended,

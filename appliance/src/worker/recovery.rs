@@ -50,6 +50,7 @@ impl Worker {
             let problem = match self.opened.reopen(&self.config) {
                 Err(failure) => failure.message,
                 Ok(()) => {
+                    self.tell_condition();
                     if self.opened.calibration.fingerprint() != before && plan.take().is_some() {
                         self.progress.log("the head that came back has another calibration: load or teach a recipe for it");
                     }

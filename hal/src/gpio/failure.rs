@@ -9,7 +9,7 @@ use std::error::Error as _;
 pub enum LineError {
     /// No chip has that label.
     #[error(
-        "open line {line}: no GPIO chip is labelled \"{chip}\", only {}: name one of these, or connect it",
+        "open line {line}: no GPIO chip is labelled \"{chip}\"; there is {}: name one of these, or connect it",
         listed(found)
     )]
     NoChip {
@@ -22,7 +22,7 @@ pub enum LineError {
     },
     /// The chip has no line of that name.
     #[error(
-        "open line {line}: GPIO chip \"{chip}\" has no line of that name, only {}: name one of these",
+        "open line {line}: GPIO chip \"{chip}\" has no line of that name; there is {}: name one of these",
         listed(found)
     )]
     NoLine {

@@ -41,6 +41,8 @@ pub struct Watched<M> {
 pub struct Seen<M> {
     /// Start of the exposure, as its stamp is understood.
     pub start: Timestamp,
+    /// When the frame was there to be fetched, at the latest.
+    pub arrived: Timestamp,
     /// The camera's count.
     pub count: u64,
     /// What was measured.
@@ -87,6 +89,7 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
                 while let Some(frame) = devices.camera.poll_frame()? {
                     seen.frames.push(Seen {
                         start: timing.exposure_start(&camera, frame.timestamp()),
+                        arrived: devices.clock.now(),
                         count: frame.sequence(),
                         measured: measure(&frame),
                     });

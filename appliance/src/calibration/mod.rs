@@ -1,4 +1,9 @@
-//! What is known of a head: geometry, noise, grey response.
+//! What is known of a head: geometry, noise, grey response; how it is measured, imported and kept.
+
+pub mod file;
+pub mod make;
+pub mod opencv;
+pub mod place;
 
 use crate::recipe::archive::hex;
 use crate::seam;
@@ -84,6 +89,13 @@ impl Calibration {
             for number in numbers {
                 hash.update(number.to_le_bytes());
             }
+        }
+        // What is linear by itself is projected as it was before anybody measured it.
+        if let Some(response) = &self.response {
+            let levels: Vec<u8> = (0..=u8::MAX)
+                .map(|level| response.level_for(level))
+                .collect();
+            hash.update(levels);
         }
         hex(&hash.finalize())
     }

@@ -1,0 +1,289 @@
+//! `calibration.json`, version 1: its keys, its checks, its fingerprint and its checksum.
+
+use super::Calibration;
+use crate::recipe::archive::hex;
+use algo::pattern::GreyResponse;
+use hal::head::{Stamp, Timing};
+use hal::model::DeviceModel;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::time::Duration;
+
+/// The name of the format.
+pub const FORMAT: &str = "fringed-calibration";
+/// Its version.
+pub const VERSION: u32 = 1;
+/// A checksum is worked out with this in its place.
+const NO_CHECKSUM: &str = "0000000000000000000000000000000000000000000000000000000000000000";
+/// Longest flip-to-light delay and readout, s: beyond it the file is wrong.
+const LONGEST: Duration = Duration::from_secs(10);
+
+/// The file. docs/formats.md lists the keys.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CalibrationFile {
+    /// [`FORMAT`].
+    pub format: String,
+    /// [`VERSION`].
+    pub version: u32,
+    /// Of what heights depend on: recipes carry it.
+    pub fingerprint: String,
+    /// Of the whole file.
+    pub checksum: String,
+    /// The program.
+    pub made_by: String,
+    /// When, 0 if the clock was not synchronised.
+    pub made_at_unix_s: u64,
+    /// How warm the head was, if somebody said it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<f64>,
+    /// Where the models come from.
+    pub models_from: String,
+    /// The camera.
+    pub camera: CameraFile,
+    /// The projector.
+    pub projector: ProjectorFile,
+    /// Flips, light and stamps.
+    pub timing: TimingFile,
+    /// The camera's noise.
+    pub noise: NoiseFile,
+    /// The light of each of the 256 grey levels, 0 for black, 255 for white.
+    pub response: Vec<f64>,
+    /// What fringes keep of their modulation.
+    pub contrast: ContrastFile,
+    /// The reference phase maps, if a plate was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<ReferenceFile>,
+}
+
+/// Size and geometry of the camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraFile {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Bits per sample.
+    pub bit_depth: u8,
+    /// MODEL.
+    pub model: DeviceModel,
+}
+
+/// Size and geometry of the projector.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProjectorFile {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// MODEL.
+    pub model: DeviceModel,
+}
+
+/// How flips, light and stamps follow each other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TimingFile {
+    /// From a flip to its light.
+    pub flip_to_light_ns: u64,
+    /// 1 σ of it.
+    pub sigma_ns: u64,
+    /// What the camera's stamps mark.
+    pub stamp: Stamp,
+    /// From the end of an exposure to the end of its readout.
+    pub readout_ns: u64,
+}
+
+/// The camera's noise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseFile {
+    /// σ of one sample at half the light of white, counts.
+    pub counts: f64,
+    /// σ in the dark, counts.
+    pub read_counts: f64,
+    /// Variance that light adds, counts² per count.
+    pub shot: f64,
+    /// As measured.
+    pub levels: Vec<LevelFile>,
+}
+
+/// Noise at one level.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LevelFile {
+    /// Mean sample, counts.
+    pub level: f64,
+    /// σ of one sample, counts.
+    pub counts: f64,
+}
+
+/// Contrast against pitch.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContrastFile {
+    /// Median modulation of the coarsest pitch, counts.
+    pub modulation_counts: f64,
+    /// The coarsest first.
+    pub pitches: Vec<PitchFile>,
+}
+
+/// Contrast of one pitch.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PitchFile {
+    /// Projector pixels per fringe.
+    pub pitch_px: u32,
+    /// Modulation relative to that of the coarsest.
+    pub contrast: f64,
+}
+
+/// The reference phase maps of the plane z = 0.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReferenceFile {
+    /// Projector pixels per fringe.
+    pub pitch_px: f64,
+    /// How far the models are off the measured plane, RMS, projector pixels.
+    pub models_off_px: f64,
+    /// Under vertical fringes.
+    pub vertical: MapFile,
+    /// Under horizontal fringes.
+    pub horizontal: MapFile,
+}
+
+/// One reference phase map.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MapFile {
+    /// The array beside this file: f64, turns, the smooth fit over the whole frame.
+    pub file: String,
+    /// SHA-256 of that file.
+    pub sha256: String,
+    /// How far the fit is off the plate, RMS.
+    pub residual_turns: f64,
+    /// Scatter of the pixels about the fit.
+    pub noise_turns: f64,
+    /// Share of the frame that told it.
+    pub filled: f64,
+}
+
+impl CalibrationFile {
+    /// Reads and checks one.
+    ///
+    /// # Errors
+    /// In words: what is wrong, and what to do.
+    pub fn read(bytes: &[u8]) -> Result<Self, String> {
+        #[derive(Deserialize)]
+        struct Header {
+            format: String,
+            version: u32,
+        }
+        let damaged = |error: serde_json::Error| format!("it is damaged: {error}: calibrate anew");
+        let header: Header = serde_json::from_slice(bytes).map_err(damaged)?;
+        if header.format != FORMAT {
+            return Err(format!(
+                "its format is {:?}, expected {FORMAT:?}",
+                header.format
+            ));
+        }
+        if header.version != VERSION {
+            return Err(format!(
+                "it has version {}, this program reads {VERSION}: update the program, or calibrate anew",
+                header.version
+            ));
+        }
+        let file: Self = serde_json::from_slice(bytes).map_err(damaged)?;
+        if file.checksum != file.checksummed() {
+            return Err(
+                "it does not agree with its checksum: it is damaged, or was edited; calibrate anew"
+                    .into(),
+            );
+        }
+        file.check()?;
+        Ok(file)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let calibration = self.calibration()?;
+        calibration.devices()?;
+        if calibration.fingerprint() != self.fingerprint {
+            return Err("its fingerprint is not that of its content: calibrate anew".into());
+        }
+        let times = [self.timing.flip_to_light_ns, self.timing.readout_ns];
+        if times.iter().any(|ns| u128::from(*ns) > LONGEST.as_nanos()) {
+            return Err("a time in it is over ten seconds: calibrate anew".into());
+        }
+        if !(self.noise.counts > 0.0 && self.noise.counts.is_finite()) {
+            return Err(format!(
+                "noise.counts is {}: calibrate anew",
+                self.noise.counts
+            ));
+        }
+        Ok(())
+    }
+
+    /// What is known of the head.
+    ///
+    /// # Errors
+    /// If the response cannot be inverted.
+    pub fn calibration(&self) -> Result<Calibration, String> {
+        let (camera, projector) = (&self.camera, &self.projector);
+        Ok(Calibration {
+            camera: (camera.width, camera.height, camera.bit_depth),
+            camera_model: camera.model.clone(),
+            projector: (projector.width, projector.height),
+            projector_model: projector.model.clone(),
+            noise_counts: self.noise.counts,
+            response: inverted(&self.response)?,
+        })
+    }
+
+    /// How the head's time goes, by this; what is no matter of calibration stays as it is.
+    pub fn timing(&self, before: Timing) -> Timing {
+        Timing {
+            flip_to_light: Duration::from_nanos(self.timing.flip_to_light_ns),
+            stamp: self.timing.stamp,
+            readout: Duration::from_nanos(self.timing.readout_ns),
+            ..before
+        }
+    }
+
+    /// The file's bytes, with fingerprint and checksum.
+    ///
+    /// # Errors
+    /// If a number in it is not finite or the response cannot be inverted.
+    pub fn sealed(mut self) -> Result<(Self, Vec<u8>), String> {
+        self.fingerprint = self.calibration()?.fingerprint();
+        self.checksum = self.checksummed();
+        let mut bytes = serde_json::to_vec_pretty(&self).map_err(|error| error.to_string())?;
+        bytes.push(b'\n');
+        // What cannot be read again is not written.
+        let again = Self::read(&bytes)?;
+        Ok((again, bytes))
+    }
+
+    fn checksummed(&self) -> String {
+        let mut bare = self.clone();
+        bare.checksum = NO_CHECKSUM.into();
+        // Numbers and strings in structs: writing them cannot fail.
+        hex(&Sha256::digest(
+            serde_json::to_vec(&bare).unwrap_or_default(),
+        ))
+    }
+}
+
+/// The inverse of a response; none if it is linear already.
+///
+/// # Errors
+/// If it has not 256 levels, or falls.
+pub fn inverted(response: &[f64]) -> Result<Option<GreyResponse>, String> {
+    let levels: &[f64; 256] = response
+        .try_into()
+        .map_err(|_| format!("response has {} levels, expected 256", response.len()))?;
+    let inverse = GreyResponse::new(levels).map_err(|error| error.to_string())?;
+    let linear = (0..=u8::MAX).all(|level| inverse.level_for(level) == level);
+    Ok((!linear).then_some(inverse))
+}

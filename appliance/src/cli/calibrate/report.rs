@@ -1,0 +1,116 @@
+//! What `fringed calibrate` says: a table for people, JSON for programs.
+
+use crate::calibration::file::{CalibrationFile, MapFile};
+use hal::head::Stamp;
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// A calibration that was written, and what to say of it.
+pub(super) struct Report<'a> {
+    pub file: &'a CalibrationFile,
+    /// Fingerprint of the calibration before.
+    pub before: Option<&'a str>,
+    pub place: &'a Path,
+    pub notes: &'a [String],
+}
+
+impl Report<'_> {
+    /// Whether recipes that were made before still fit.
+    fn recipes_stay(&self) -> bool {
+        self.before
+            .is_none_or(|before| before == self.file.fingerprint)
+    }
+
+    pub fn json(&self) -> Value {
+        json!({
+            "calibration": self.file, "file": self.place.display().to_string(), "notes": self.notes,
+            "fingerprint_before": self.before,
+        })
+    }
+
+    pub fn table(&self) -> String {
+        let file = self.file;
+        let mut lines = String::new();
+        let mut line = |name: &str, found: String| {
+            // Writing to a string cannot fail.
+            let _ = writeln!(lines, "{name:9} {found}");
+        };
+        line("models", format!("of {}", file.models_from));
+        let timing = &file.timing;
+        let marks = match timing.stamp {
+            Stamp::ExposureStart => "start of the exposure",
+            Stamp::ExposureEnd => "end of the exposure",
+            Stamp::ReadoutEnd => "end of the readout",
+        };
+        line("stamps", format!("the camera's mark the {marks}"));
+        line(
+            "delay",
+            format!(
+                "light comes {:.3} ms after its flip (1 σ {:.2} µs)",
+                timing.flip_to_light_ns as f64 * 1e-6,
+                timing.sigma_ns as f64 * 1e-3
+            ),
+        );
+        let off = file.response.iter().enumerate();
+        let off = off.map(|(grey, light)| (light - grey as f64).abs());
+        line(
+            "response",
+            format!(
+                "off proportion by {:.1} of 255 levels at most; patterns are corrected for it",
+                off.fold(0.0, f64::max)
+            ),
+        );
+        let noise = &file.noise;
+        line(
+            "noise",
+            format!(
+                "{:.2} counts at half of white; {:.2} in the dark, and {:.4} counts² per count of light",
+                noise.counts, noise.read_counts, noise.shot
+            ),
+        );
+        let pitches = file.contrast.pitches.iter();
+        let pitches: Vec<String> = pitches
+            .map(|one| format!("{:.0} % at {} px", one.contrast * 100.0, one.pitch_px))
+            .collect();
+        line("contrast", pitches.join(", "));
+        if let Some(maps) = &file.reference {
+            let told = |name: &str, map: &MapFile| {
+                format!(
+                    "{name} {:.5} turn (noise {:.4})",
+                    map.residual_turns, map.noise_turns
+                )
+            };
+            line(
+                "plane",
+                format!(
+                    "residual {}, {}; the models are off it by {:.3} px",
+                    told("vertical", &maps.vertical),
+                    told("horizontal", &maps.horizontal),
+                    maps.models_off_px
+                ),
+            );
+        }
+        for note in self.notes {
+            line("note", note.clone());
+        }
+        let digits = |fingerprint: &str| fingerprint.get(..8).unwrap_or_default().to_owned();
+        let recipes = match self.before {
+            Some(before) if !self.recipes_stay() => format!(
+                "was {}: recipes made for that one are refused, teach them again",
+                digits(before)
+            ),
+            Some(_) => "as before: recipes stay valid".into(),
+            None => "the first one here".into(),
+        };
+        line(
+            "written",
+            format!(
+                "{}, fingerprint {}, {recipes}",
+                self.place.display(),
+                digits(&file.fingerprint)
+            ),
+        );
+        lines
+    }
+}

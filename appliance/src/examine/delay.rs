@@ -1,0 +1,245 @@
+//! The time from a flip to its light, from how bright frames are while black and white change at random.
+//!
+//! A frame exposed from s to s + T sees white for a share p(d) of its time, if light comes d after its flip: p is known from
+//! the flips' times. Its mean is b + a·p(d). The three are found by least squares over all frames: d coarsely by trial first (black
+//! and white change after random times, so one d fits alone), then all by Gauss–Newton. Each change inside an exposure tells d;
+//! noise of a mean moves it by T times its share of white, less with the root of the changes seen.
+
+use super::PATIENCE;
+use super::pictures::{Lit, counts};
+use hal::error::Error;
+use hal::head::{DynHead, Showing};
+use hal::projector::Raster;
+use std::time::Duration;
+
+/// Changes between black and white in a round.
+const CHANGES: u32 = 80;
+/// Longest delay that is looked for, refreshes.
+const LONGEST: u32 = 16;
+/// Steps of the trial in the shorter of refresh and exposure.
+const TRIALS: f64 = 8.0;
+/// Steps of Gauss–Newton; the share of white is linear but for kinks.
+const STEPS: usize = 12;
+/// Rounds end when the delay is known so well, s: its microsecond is certain then (3.3 σ to half of one).
+const GOAL_S: f64 = 0.15e-6;
+/// White must lie so many times the scatter of the means above black, else there is no light to be seen.
+const LEAST_SIGNAL: f64 = 5.0;
+
+/// When light comes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Delay {
+    /// After its flip, s, rounded to a microsecond; below zero if the stamps of flips or frames do not mean what is believed.
+    pub seconds: f64,
+    /// 1 σ of it, s.
+    pub error: f64,
+    /// Scatter of the frames' means about what the delay says, share of white.
+    pub scatter: f64,
+    /// Frames that were looked at.
+    pub frames: usize,
+}
+
+/// What the frames of one round saw.
+struct Round {
+    /// Each change: its flip after the first one, s, and whether it is to white.
+    changes: Vec<(f64, bool)>,
+    /// Each frame: start of its exposure after the first flip, s, and its mean, counts.
+    frames: Vec<(f64, f64)>,
+}
+
+impl Delay {
+    /// Measures it in at most so many rounds of about four seconds each; none if no light follows the flips. The meaning of
+    /// the camera's stamps is the head's.
+    ///
+    /// # Errors
+    /// Of a device.
+    pub fn measure(head: &mut DynHead, lit: &Lit, rounds: u32) -> Result<Option<Self>, Error> {
+        let (columns, rows) = head.projector_size();
+        head.load(vec![
+            Raster::uniform(columns, rows, 0)?,
+            Raster::uniform(columns, rows, u8::MAX)?,
+        ])?;
+        let exposure = head.camera_timing().exposure.as_secs_f64();
+        let refresh = head.refresh().as_secs_f64();
+        let mut seen = Vec::new();
+        let mut found = None;
+        for round in 0..rounds.max(1) {
+            seen.push(Round::take(head, lit, round)?);
+            found = fit(&seen, exposure, refresh);
+            if found.is_none_or(|delay: Self| delay.error <= GOAL_S) {
+                break;
+            }
+        }
+        Ok(found)
+    }
+
+    /// As a duration; zero if it is below.
+    pub fn duration(&self) -> Duration {
+        Duration::from_micros((self.seconds * 1e6).round().max(0.0) as u64)
+    }
+}
+
+impl Round {
+    fn take(head: &mut DynHead, lit: &Lit, round: u32) -> Result<Self, Error> {
+        let (exposure, refresh) = (head.camera_timing().exposure, head.refresh());
+        let whole = exposure.as_nanos().div_ceil(refresh.as_nanos().max(1));
+        let whole = u32::try_from(whole).unwrap_or(1).clamp(1, 100);
+        let mut state = u64::from(round).wrapping_add(1);
+        let mut showings: Vec<Showing> = (0..CHANGES)
+            .map(|change| Showing {
+                index: change as usize % 2,
+                refreshes: whole + random(&mut state) % 3,
+                settle: 0,
+            })
+            .collect();
+        // Black at both ends; at the last one until the longest delay has passed.
+        showings.push(Showing {
+            index: 0,
+            refreshes: whole + LONGEST,
+            settle: 0,
+        });
+        let seen = head.watch(&showings, PATIENCE, &mut |frame| lit.mean(&counts(frame)))?;
+        let Some(first) = seen.flips.first() else {
+            return Ok(Self {
+                changes: Vec::new(),
+                frames: Vec::new(),
+            });
+        };
+        // Differences of a few seconds are exact to far below a nanosecond.
+        let after = |at: hal::units::Timestamp| {
+            (i128::from(at.0) - i128::from(first.timestamp.0)) as f64 * 1e-9
+        };
+        let flips = seen.flips.iter().zip(&showings).skip(1);
+        Ok(Self {
+            changes: flips
+                .map(|(flip, showing)| (after(flip.timestamp), showing.index == 1))
+                .collect(),
+            frames: seen
+                .frames
+                .iter()
+                .map(|frame| (after(frame.start), frame.measured))
+                .collect(),
+        })
+    }
+
+    /// Of each frame its mean, the share of its exposure in which white is in view if light comes `delay` after its flip, and
+    /// the share's derivative by the delay.
+    fn shares(&self, exposure: f64, delay: f64) -> impl Iterator<Item = (f64, f64, f64)> {
+        self.frames.iter().map(move |(start, mean)| {
+            let (mut share, mut slope) = (0.0, 0.0);
+            for (flip, white) in &self.changes {
+                // White from a change on counts for what is left of the exposure, black takes it away again.
+                let left = start + exposure - (flip + delay);
+                let sign = if *white { 1.0 } else { -1.0 };
+                share += sign * (left / exposure).clamp(0.0, 1.0);
+                if left > 0.0 && left < exposure {
+                    slope -= sign / exposure;
+                }
+            }
+            (*mean, share, slope)
+        })
+    }
+}
+
+/// The delay that explains the rounds best; none if no light follows the flips.
+fn fit(rounds: &[Round], exposure: f64, refresh: f64) -> Option<Delay> {
+    let shares = |delay: f64| {
+        rounds
+            .iter()
+            .flat_map(move |round| round.shares(exposure, delay))
+    };
+    let step = exposure.min(refresh) / TRIALS;
+    let lowest = -2.0 * (exposure + refresh);
+    let trials = ((f64::from(LONGEST) * refresh - lowest) / step) as u32;
+    let trial = |at: u32| lowest + f64::from(at) * step;
+    let best = (0..=trials)
+        .map(trial)
+        .filter_map(|delay| Some((delay, straight(shares(delay))?.2)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let mut delay = best.0;
+    let mut known = None;
+    for _ in 0..STEPS {
+        let (black, white, _) = straight(shares(delay))?;
+        let mut normal = [[0.0; 3]; 3];
+        let mut right = [0.0; 3];
+        let (mut squares, mut frames) = (0.0, 0);
+        for (mean, share, slope) in shares(delay) {
+            let off = mean - (black + white * share);
+            let by = [1.0, share, white * slope];
+            for (row, a) in by.iter().enumerate() {
+                right[row] += a * off;
+                for (column, b) in by.iter().enumerate() {
+                    normal[row][column] += a * b;
+                }
+            }
+            squares += off * off;
+            frames += 1;
+        }
+        // Black and white are at their best already: right is nought but for the delay.
+        let inverse = corner_of_inverse(&normal)?;
+        delay += (inverse * right[2]).clamp(-step, step);
+        let scatter = (squares / f64::from((frames - 3).max(1))).sqrt();
+        known = Some((black, white, scatter, scatter * inverse.sqrt(), frames));
+    }
+    let (_, white, scatter, error, frames) = known?;
+    // Adding 0 turns a negative zero into 0.
+    let seconds = (delay * 1e6).round() * 1e-6 + 0.0;
+    (white > LEAST_SIGNAL * scatter).then_some(Delay {
+        seconds,
+        error,
+        scatter: scatter / white,
+        frames: frames as usize,
+    })
+}
+
+/// Black, white above black, and the sum of squares that is left, of means against shares.
+fn straight(shares: impl Iterator<Item = (f64, f64, f64)>) -> Option<(f64, f64, f64)> {
+    let (mut n, mut x, mut y, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for (mean, share, _) in shares {
+        n += 1.0;
+        x += share;
+        y += mean;
+        xx += share * share;
+        xy += share * mean;
+        yy += mean * mean;
+    }
+    let spread = xx - x * x / n;
+    if !(n > 3.0 && spread > 0.0) {
+        return None;
+    }
+    let white = (xy - x * y / n) / spread;
+    let black = (y - white * x) / n;
+    let left = (yy - y * y / n) - white * (xy - x * y / n);
+    Some((black, white, left))
+}
+
+/// The last element of the inverse of a symmetric matrix; none if it has none.
+fn corner_of_inverse(m: &[[f64; 3]; 3]) -> Option<f64> {
+    let minor = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+    let determinant = m[2][2] * minor - m[0][2] * (m[0][2] * m[1][1] - m[0][1] * m[1][2])
+        + m[1][2] * (m[0][2] * m[0][1] - m[0][0] * m[1][2]);
+    let corner = minor / determinant;
+    (corner.is_finite() && corner > 0.0).then_some(corner)
+}
+
+/// Numbers without an order (SplitMix64: Steele, Lea, Flood 2014).
+fn random(state: &mut u64) -> u32 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let z = (*state ^ *state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ z >> 31) >> 33) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_element_of_an_inverse() {
+        // Two blocks: the inverse's corner is 1 / 4; then a full matrix, by hand: 1.5 (determinant 2, minor 3).
+        let blocks = [[2.0, 1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 4.0]];
+        assert_eq!(corner_of_inverse(&blocks), Some(0.25));
+        let full = [[2.0, 1.0, 1.0], [1.0, 2.0, 1.0], [1.0, 1.0, 4.0 / 3.0]];
+        assert!((corner_of_inverse(&full).unwrap() - 1.5).abs() < 1e-12);
+        assert_eq!(corner_of_inverse(&[[1.0; 3]; 3]), None);
+    }
+}

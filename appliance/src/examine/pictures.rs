@@ -1,0 +1,210 @@
+//! Pictures of patterns, each exposed after the light of its flip has settled, and what of them the projector lights.
+
+use super::PATIENCE;
+use hal::error::Error;
+use hal::frame::{Frame, Samples};
+use hal::head::{DynHead, Showing};
+use hal::projector::Raster;
+
+/// After so many refreshes the light of a flip has come and stays, on any head that can be used.
+pub const SETTLE: u32 = 12;
+/// Patterns that are loaded at a time: a projector's memory holds a sequence, not 256 greys.
+const BATCH: usize = 8;
+/// A pixel is lit if white is this share of full scale above black.
+const LIT: f64 = 0.05;
+
+/// The samples of a frame without padding.
+pub fn counts(frame: &Frame) -> Vec<f32> {
+    let format = frame.format();
+    let (width, stride) = (format.width as usize, format.stride);
+    match frame.samples() {
+        Samples::Eight(all) => rows(all, width, stride),
+        Samples::Sixteen(all) => rows(all, width, stride),
+    }
+}
+
+fn rows<T: Copy + Into<f32>>(all: &[T], width: usize, stride: usize) -> Vec<f32> {
+    let rows = all.chunks(stride).flat_map(|row| row.iter().take(width));
+    rows.map(|sample| (*sample).into()).collect()
+}
+
+/// Shows each pattern until its light has stood for `settle` refreshes, and hands a picture of it to `keep`, in order, in counts.
+///
+/// # Errors
+/// Of a device, or `Timeout` if the picture of a pattern did not come.
+pub fn pictures(
+    head: &mut DynHead,
+    settle: u32,
+    patterns: impl IntoIterator<Item = Result<Raster, Error>>,
+    keep: &mut dyn FnMut(Vec<f32>),
+) -> Result<(), Error> {
+    let mut patterns = patterns.into_iter();
+    loop {
+        let batch = patterns
+            .by_ref()
+            .take(BATCH)
+            .collect::<Result<Vec<_>, _>>()?;
+        if batch.is_empty() {
+            return Ok(());
+        }
+        take(head, settle, batch, keep)?;
+    }
+}
+
+fn take(
+    head: &mut DynHead,
+    settle: u32,
+    patterns: Vec<Raster>,
+    keep: &mut dyn FnMut(Vec<f32>),
+) -> Result<(), Error> {
+    let count = patterns.len();
+    head.load(patterns)?;
+    let (camera, refresh) = (head.camera_timing(), head.refresh());
+    // Wherever a camera that runs by itself stands, one whole exposure fits behind the settled light.
+    let room = (camera.exposure + camera.period)
+        .as_nanos()
+        .div_ceil(refresh.as_nanos().max(1));
+    let most = u32::MAX / 64;
+    let refreshes = settle + 1 + u32::try_from(room).unwrap_or(most).min(most);
+    let showing = |index| Showing {
+        index,
+        refreshes,
+        settle,
+    };
+    let showings: Vec<Showing> = (0..count).map(showing).collect();
+    let seen = head.watch(&showings, PATIENCE, &mut |frame| frame.clone())?;
+    for at in 0..count {
+        let inside = |start| {
+            let from = seen.flips.get(at)?.timestamp + refresh * settle;
+            let until = seen.flips.get(at + 1).map(|next| next.timestamp);
+            let ends = until.is_none_or(|until| start + camera.exposure <= until);
+            (start >= from && ends).then_some(())
+        };
+        let frame = seen
+            .frames
+            .iter()
+            .find(|frame| inside(frame.start).is_some());
+        let frame = frame.ok_or_else(|| {
+            Error::timeout(
+                "taking a picture of a pattern",
+                PATIENCE,
+                "check the cables of camera and projector",
+            )
+        })?;
+        keep(counts(&frame.measured));
+    }
+    Ok(())
+}
+
+/// The pixels that the projector lights, and what they see of black and white.
+#[derive(Clone, Debug)]
+pub struct Lit {
+    /// Row-major places of the lit pixels.
+    places: Vec<usize>,
+    /// The pictures of black and white, counts.
+    black: Vec<f32>,
+    white: Vec<f32>,
+    black_mean: f64,
+    white_mean: f64,
+    full_scale: f64,
+}
+
+impl Lit {
+    /// Looks at black and white.
+    ///
+    /// # Errors
+    /// As [`pictures`].
+    pub fn take(head: &mut DynHead, settle: u32) -> Result<Self, Error> {
+        let mut taken = Vec::with_capacity(2);
+        pictures(
+            head,
+            settle,
+            greys(head.projector_size(), [0, 255]),
+            &mut |counts| {
+                taken.push(counts);
+            },
+        )?;
+        let white = taken.pop().unwrap_or_default();
+        let black = taken.pop().unwrap_or_default();
+        let full_scale = f64::from(head.camera_format().full_scale());
+        let pairs = black.iter().zip(&white).enumerate();
+        let places = pairs
+            .filter(|(_, (black, white))| f64::from(**white - **black) > LIT * full_scale)
+            .map(|(at, _)| at)
+            .collect();
+        let mut lit = Self {
+            places,
+            black,
+            white,
+            black_mean: 0.0,
+            white_mean: 0.0,
+            full_scale,
+        };
+        (lit.black_mean, lit.white_mean) = (lit.mean(&lit.black), lit.mean(&lit.white));
+        Ok(lit)
+    }
+
+    /// Row-major places of the lit pixels.
+    pub fn places(&self) -> &[usize] {
+        &self.places
+    }
+
+    /// Share of the picture that is lit.
+    pub fn share(&self) -> f64 {
+        self.places.len() as f64 / self.white.len().max(1) as f64
+    }
+
+    /// What the lit pixels see of white, counts.
+    pub fn white(&self) -> impl Iterator<Item = f64> {
+        self.places.iter().map(|at| f64::from(self.white[*at]))
+    }
+
+    /// Share of the lit pixels that are saturated under white.
+    pub fn saturated(&self) -> f64 {
+        let saturated = self.white().filter(|count| *count >= self.full_scale);
+        saturated.count() as f64 / self.places.len().max(1) as f64
+    }
+
+    /// Median of white over the lit pixels, counts.
+    pub fn bright(&self) -> f64 {
+        median(self.white().collect())
+    }
+
+    /// What each pixel sees of a light between black and white, counts, row-major.
+    pub fn levels(&self, share: f64) -> impl Iterator<Item = f64> {
+        let pairs = self.black.iter().zip(&self.white);
+        pairs.map(move |(black, white)| {
+            f64::from(*black) + share * (f64::from(*white) - f64::from(*black))
+        })
+    }
+
+    /// The largest sample.
+    pub fn full_scale(&self) -> f64 {
+        self.full_scale
+    }
+
+    /// Mean over the lit pixels of a picture of this size, counts.
+    pub fn mean(&self, picture: &[f32]) -> f64 {
+        let sum: f64 = self.places.iter().map(|at| f64::from(picture[*at])).sum();
+        sum / self.places.len().max(1) as f64
+    }
+
+    /// How light a mean over the lit pixels is, 0 as black, 1 as white.
+    pub fn share_of_white(&self, mean: f64) -> f64 {
+        (mean - self.black_mean) / (self.white_mean - self.black_mean)
+    }
+}
+
+/// Rasters of one grey level each.
+pub(super) fn greys(
+    (columns, rows): (u32, u32),
+    levels: impl IntoIterator<Item = u8>,
+) -> impl Iterator<Item = Result<Raster, Error>> {
+    let levels = levels.into_iter();
+    levels.map(move |level| Raster::uniform(columns, rows, level))
+}
+
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}

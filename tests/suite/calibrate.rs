@@ -1,0 +1,372 @@
+//! `fringed calibrate` on simulated heads: what is measured is what the scenario says, and what is written survives.
+
+use appliance::calibration::place::Place;
+use hal::sim::Scenario;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use tests::program::{Program, Run};
+
+/// A head whose camera sees the projector's pixels one by one on a small part of its picture; both lenses distort.
+const HEAD: &str = "sub_rays = 2
+part = { kind = \"plane\" }
+[rig.camera]
+width = 128
+height = 96
+fov_deg = [5.0, 3.75]
+";
+/// What the response may be off, levels of 255.
+const RESPONSE_TOLERANCE: f64 = 1.0;
+/// What the noise may be off, share of it.
+const NOISE_TOLERANCE: f64 = 0.05;
+/// What the reference plane may be off, turns.
+const RESIDUAL_TOLERANCE: f64 = 5e-4;
+
+fn program() -> Program {
+    Program::at(env!("CARGO_BIN_EXE_fringed-under-test"))
+}
+
+/// Calibrates a head of this scenario into the folder's state.
+fn calibrate(folder: &Path, scenario: &str, more: &[&str]) -> Run {
+    let path = folder.join("scenario.toml");
+    fs::write(&path, scenario).unwrap();
+    let state = folder.join("state");
+    let mut arguments = vec![
+        "calibrate",
+        "--json",
+        "--state",
+        state.to_str().unwrap(),
+        "--scenario",
+        path.to_str().unwrap(),
+    ];
+    arguments.extend(more);
+    program().run(&arguments)
+}
+
+fn calibrated(folder: &Path, scenario: &str, more: &[&str]) -> Value {
+    let run = calibrate(folder, scenario, more).succeeded();
+    serde_json::from_str(&run.stdout).unwrap()
+}
+
+/// What everything that was measured is off the scenario.
+fn check(text: &str, report: &Value) {
+    let scenario = Scenario::from_toml(text, "here").unwrap();
+    let found = &report["calibration"];
+    let delay = found["timing"]["flip_to_light_ns"].as_u64().unwrap();
+    assert_eq!(delay, scenario.timing.flip_to_light_us * 1000, "{text}");
+    let marks = serde_json::to_value(scenario.timing.stamp).unwrap();
+    assert_eq!(found["timing"]["stamp"], marks, "{text}");
+    let response = found["response"].as_array().unwrap();
+    assert_eq!(response.len(), 256);
+    for (grey, light) in response.iter().enumerate() {
+        let truth = 255.0 * (grey as f64 / 255.0).powf(scenario.optics.gamma);
+        let off = light.as_f64().unwrap() - truth;
+        assert!(off.abs() < RESPONSE_TOLERANCE, "{text}\n{grey}: {off}");
+    }
+    let noise = found["noise"]["counts"].as_f64().unwrap() / scenario.noise_sigma_counts();
+    assert!((noise - 1.0).abs() < NOISE_TOLERANCE, "{text}\n{noise}");
+    for map in ["vertical", "horizontal"] {
+        let residual = found["reference"][map]["residual_turns"].as_f64().unwrap();
+        assert!(residual <= RESIDUAL_TOLERANCE, "{text}\n{map} {residual}");
+    }
+    // The truth itself: the models of a simulated head are exact, and this is how far both maps are off them.
+    let pitch = found["reference"]["pitch_px"].as_f64().unwrap();
+    let off = found["reference"]["models_off_px"].as_f64().unwrap() / pitch;
+    let most = RESIDUAL_TOLERANCE * 2_f64.sqrt();
+    assert!(off <= most, "{text}\n{off} turns");
+}
+
+#[test]
+fn delay_response_noise_and_plane_are_those_of_the_scenario() {
+    let folder = tempfile::tempdir().unwrap();
+    for rest in [
+        "",
+        "[timing]\nflip_to_light_us = 16667\n[optics]\ngamma = 1.4\n[noise]\nnoise_counts = 2.0\n",
+        "[timing]\nflip_to_light_us = 33333\nstamp = \"exposure_end\"\nreadout_us = 9000\n[optics]\ngamma = 1.8\n[noise]\nnoise_counts = 10.0\n",
+        "[timing]\nflip_to_light_us = 50001\nstamp = \"readout_end\"\nreadout_us = 16000\nexposure_refreshes = 1.0\n[optics]\ngamma = 2.2\nprojector_blur_px = 1.0\n",
+        "[timing]\nflip_to_light_us = 41234\nexposure_refreshes = 1.0\nreadout_us = 11000\ncamera_period_us = 33333\ncamera_phase_us = 5000\n",
+    ] {
+        let scenario = format!("{HEAD}{rest}");
+        check(&scenario, &calibrated(folder.path(), &scenario, &[]));
+    }
+}
+
+#[test]
+fn the_default_head_is_calibrated_on_a_plate_that_lies_there_by_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = "sub_rays = 2\n[timing]\nflip_to_light_us = 25000\n[optics]\ngamma = 1.3\n[rig.camera]\nwidth = 256\nheight = 256\n";
+    let report = calibrated(folder.path(), scenario, &["--temperature", "31.5"]);
+    check(scenario, &report);
+    assert_eq!(report["calibration"]["temperature_c"], 31.5);
+    let notes = report["notes"].as_array().unwrap();
+    assert!(
+        notes
+            .iter()
+            .any(|note| note.as_str().unwrap().contains("plate"))
+    );
+    for map in ["vertical", "horizontal"] {
+        let name = report["calibration"]["reference"][map]["file"]
+            .as_str()
+            .unwrap();
+        let bytes = fs::read(folder.path().join("state/calibration").join(name)).unwrap();
+        let turns = hal::npy::read::<f64>(&bytes).unwrap();
+        assert_eq!((turns.rows, turns.columns), (256, 256));
+        assert!(turns.elements.iter().all(|turns| turns.is_finite()));
+    }
+}
+
+#[test]
+fn a_tilted_plate_saturation_darkness_and_a_recording_are_refused_with_the_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    for (rest, word) in [
+        ("[placement]\nshift_mm = [0.0, 0.0, 8.0]\n", "plane z = 0"),
+        ("[optics]\ngain = 3.0\n", "expose less"),
+        ("[optics]\ngain = 0.15\n", "expose more"),
+        ("[light]\ndiffuse = 0.0\n", "lamp"),
+        ("[faults]\nwire_open = true\n", "trigger"),
+        ("[faults]\ncompressed = true\n", "compressed"),
+    ] {
+        let run = calibrate(folder.path(), &format!("{HEAD}{rest}"), &[]);
+        assert!([65, 69].contains(&run.code), "{rest}: {}", run.code);
+        assert!(run.stderr.contains(word), "{rest}: {}", run.stderr);
+    }
+    let json = folder.path().join("state/calibration/calibration.json");
+    assert!(!json.exists(), "nothing was written");
+    let config = folder.path().join("fringed.toml");
+    fs::write(
+        &config,
+        "[head]\nbackend = \"replay\"\nrecordings = [\"somewhere\"]\n",
+    )
+    .unwrap();
+    let run = program().run(&["calibrate", "--config", config.to_str().unwrap()]);
+    assert_eq!(run.code, 64, "{}", run.stderr);
+    assert!(run.stderr.contains("--scenario"), "{}", run.stderr);
+}
+
+/// A configuration of a head of this scenario, with a state folder beside it.
+fn configured(folder: &Path, scenario: &str) -> String {
+    fs::write(folder.join("scenario.toml"), scenario).unwrap();
+    let config = folder.join("fringed.toml");
+    let text = "state = \"state\"\n[head]\nbackend = \"sim\"\nscenario = \"scenario.toml\"\n";
+    fs::write(&config, text).unwrap();
+    config.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn what_the_doctor_complained_of_is_well_once_it_is_calibrated() {
+    let folder = tempfile::tempdir().unwrap();
+    let ill = "[optics]\ngamma = 2.2\n[timing]\nflip_to_light_us = 41234\ncalibrated_flip_to_light_us = 8000\n";
+    let config = configured(folder.path(), &format!("{HEAD}{ill}"));
+    let doctor = || program().run(&["doctor", "--json", "--config", &config]);
+    let before = doctor();
+    assert_eq!(before.code, 69);
+    assert!(
+        before.stderr.contains("delay, response"),
+        "{}",
+        before.stderr
+    );
+    program()
+        .run(&["calibrate", "--quiet", "--config", &config])
+        .succeeded();
+    let after: Value = serde_json::from_str(&doctor().succeeded().stdout).unwrap();
+    assert_eq!(after["healthy"], true, "{after:#}");
+}
+
+#[test]
+fn models_made_with_opencv_are_imported_and_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = format!("{HEAD}[timing]\nflip_to_light_us = 16667\n");
+    let rig = Scenario::from_toml(&scenario, "here").unwrap().rig;
+    let write = |name: &str, model: &hal::model::DeviceModel, metres: f64| {
+        let row = |numbers: &[f64]| format!("{numbers:?}");
+        let matrix = |name: &str, rows: usize, numbers: &[f64]| {
+            let columns = numbers.len() / rows;
+            format!(
+                "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: {}\n",
+                row(numbers)
+            )
+        };
+        let k = [
+            model.fx, 0.0, model.cx, 0.0, model.fy, model.cy, 0.0, 0.0, 1.0,
+        ];
+        let t = model.translation_mm.map(|mm| mm * metres);
+        let text = [
+            "%YAML:1.0\n---\n".to_owned(),
+            matrix("K", 3, &k),
+            matrix("D", 1, &model.distortion),
+            matrix("R", 3, &model.rotation),
+            matrix("T", 3, &t),
+        ]
+        .concat();
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let camera = write("camera.yml", &rig.camera.model(), 1e-3);
+    let projector = write("projector.yml", &rig.projector.model(), 1e-3);
+    let import = ["--camera", &camera, "--projector", &projector];
+    let with = |more: &[&str]| calibrate(folder.path(), &scenario, &[&import, more].concat());
+
+    let run = with(&[]);
+    assert_eq!(
+        (run.code, run.stderr.contains("--unit")),
+        (65, true),
+        "{}",
+        run.stderr
+    );
+    // A z that is turned looks from below.
+    let run = with(&["--unit", "m", "--z-away"]);
+    assert_eq!(run.code, 65, "{}", run.stderr);
+    assert!(run.stderr.contains("not above the plane"), "{}", run.stderr);
+    let run = with(&["--unit", "m", "--models", "x"]);
+    assert_eq!(run.code, 64, "{}", run.stderr);
+    // Models of another projector: the plate shows it.
+    let mut other = rig.projector.model();
+    other.cx += 4.0;
+    let other = write("other.yml", &other, 1e-3);
+    let import = ["--camera", &camera, "--projector", &other];
+    let run = calibrate(
+        folder.path(),
+        &scenario,
+        &[&import[..], &["--unit", "m"]].concat(),
+    );
+    assert_eq!(run.code, 65, "{}", run.stderr);
+    assert!(
+        run.stderr.contains("off the measured plate"),
+        "{}",
+        run.stderr
+    );
+    let run = calibrate(folder.path(), &scenario, &["--models", "/no/such.yml"]);
+    assert_eq!(run.code, 66, "{}", run.stderr);
+    assert!(
+        !folder
+            .path()
+            .join("state/calibration/calibration.json")
+            .exists()
+    );
+
+    let first: Value = serde_json::from_str(&with(&["--unit", "m"]).succeeded().stdout).unwrap();
+    check(&scenario, &first);
+    let from = first["calibration"]["models_from"].as_str().unwrap();
+    assert!(from.contains("camera.yml") && from.contains("projector.yml"));
+    let again = calibrated(folder.path(), &scenario, &[]);
+    for key in ["camera", "projector", "models_from", "fingerprint"] {
+        assert_eq!(
+            first["calibration"][key], again["calibration"][key],
+            "{key}"
+        );
+    }
+}
+
+/// Each generation that can be read is whole, with its maps; the newest one's fingerprint of the file.
+fn whole(folder: &Path) -> String {
+    let json = folder.join("state/calibration/calibration.json");
+    let loaded = Place::at(&json).load().unwrap().expect("a calibration");
+    assert_eq!(loaded.fallback, None);
+    let maps = loaded.file.reference.as_ref().expect("a plate");
+    for map in [&maps.vertical, &maps.horizontal] {
+        let bytes = fs::read(json.with_file_name(&map.file)).unwrap();
+        let (name, sum) = Place::name_of_map(map.file.rsplit_once('-').unwrap().0, &bytes);
+        assert_eq!((&name, &sum), (&map.file, &map.sha256));
+    }
+    loaded.file.checksum
+}
+
+#[test]
+fn kill_9_while_it_is_written_leaves_the_old_calibration_or_the_new_one() {
+    let folder = tempfile::tempdir().unwrap();
+    calibrated(folder.path(), HEAD, &[]);
+    let mut last = whole(folder.path());
+    let place = folder.path().join("state/calibration");
+    let names = || -> Vec<_> {
+        let entries = fs::read_dir(&place).unwrap().flatten();
+        let mut names: Vec<_> = entries
+            .map(|entry| {
+                (
+                    entry.file_name(),
+                    entry.metadata().ok().map(|found| found.len()),
+                )
+            })
+            .collect();
+        names.sort();
+        names
+    };
+    let mut kept = 0;
+    for changes in 1..=8 {
+        // Another noise each time, so that every file changes.
+        let scenario = format!("{HEAD}[noise]\nseed = {changes}\n");
+        fs::write(folder.path().join("scenario.toml"), scenario).unwrap();
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_fringed-under-test"))
+            .args(["calibrate", "--quiet", "--state"])
+            .arg(folder.path().join("state"))
+            .arg("--scenario")
+            .arg(folder.path().join("scenario.toml"))
+            .spawn()
+            .unwrap();
+        let (mut before, mut seen) = (names(), 0);
+        while seen < changes && child.try_wait().unwrap().is_none() {
+            let now = names();
+            if now != before {
+                (before, seen) = (now, seen + 1);
+            }
+            std::thread::yield_now();
+        }
+        // SIGKILL; it may have ended already.
+        let _ = child.kill();
+        child.wait().unwrap();
+        let now = whole(folder.path());
+        kept += u32::from(now == last);
+        last = now;
+    }
+    println!("8 kills while writing: {kept} left the old calibration, the others the new one");
+    assert!(kept > 0, "no kill came before the new one counted");
+    // What kills have left does not stay.
+    calibrated(folder.path(), HEAD, &[]);
+    whole(folder.path());
+    assert!(names().len() <= 6, "{:?}", names());
+}
+
+#[test]
+fn a_damaged_calibration_gives_way_to_the_one_before_and_is_never_guessed() {
+    let folder = tempfile::tempdir().unwrap();
+    calibrated(folder.path(), HEAD, &[]);
+    let first = whole(folder.path());
+    calibrated(folder.path(), &format!("{HEAD}[noise]\nseed = 9\n"), &[]);
+    let json = folder.path().join("state/calibration/calibration.json");
+    let text = fs::read_to_string(&json).unwrap();
+    let load = |text: &str| {
+        fs::write(&json, text).unwrap();
+        Place::at(&json).load()
+    };
+    let digit = text.replacen("\"counts\": 3.", "\"counts\": 4.", 1);
+    let newer = text.replacen("\"version\": 1", "\"version\": 2", 1);
+    let unknown = text.replacen("\"version\"", "\"vesion\": 1, \"version\"", 1);
+    for (damaged, words) in [
+        (&text[..text.len() / 2], "damaged"),
+        ("", "damaged"),
+        ("[]", "damaged"),
+        (&*digit, "checksum"),
+        (&*newer, "version 2"),
+        (&*unknown, "vesion"),
+    ] {
+        assert_ne!(damaged, text);
+        let loaded = load(damaged).unwrap().unwrap();
+        assert_eq!(loaded.file.checksum, first);
+        let fallback = loaded.fallback.unwrap();
+        assert!(
+            fallback.contains(words) && fallback.contains("one before"),
+            "{fallback}"
+        );
+    }
+    fs::write(json.with_extension("json.previous"), "neither").unwrap();
+    let problem = load(&digit).unwrap_err();
+    assert!(
+        problem.contains("calibrate anew") && problem.contains("calibration.json"),
+        "{problem}"
+    );
+    // Calibrating again does not need it.
+    let report = calibrated(folder.path(), HEAD, &[]);
+    let notes = report["notes"].to_string();
+    assert!(notes.contains("left behind"), "{notes}");
+    whole(folder.path());
+}
