@@ -133,7 +133,7 @@ impl<'a> Comparison<'a> {
             .max_by(|a, b| libm::fabs(a.value).total_cmp(&libm::fabs(b.value)))
     }
 
-    /// The share of a region's pixels that the measurement resolves. Exact: its σ is 0.
+    /// The share of a region's pixels that the measurement resolves. What noise does to it is not known here.
     pub fn coverage(&self, region: &Region) -> Reading {
         let resolved = region
             .places(self.golden.width)

@@ -11,4 +11,6 @@ pub use deviation::{Comparison, Golden, Reading};
 pub use gauge::{Axis, Measure};
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
-pub use strips::{Findings, Gauge, Light, Parts, Production, Skipped, Strip, Taught, Unmeasurable};
+pub use strips::{
+    Findings, Gauge, Light, MAX_GAUGES, Parts, Production, Skipped, Strips, Taught, Unmeasurable,
+};

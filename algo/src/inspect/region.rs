@@ -78,15 +78,18 @@ impl Region {
         })
     }
 
-    /// The region with its corners carried elsewhere; it may hold no pixel of the frame (width, height) then.
-    pub fn moved(
-        &self,
+    /// Becomes another region with its corners carried elsewhere; it may hold no pixel of the frame (width, height) then.
+    pub(super) fn become_moved(
+        &mut self,
+        other: &Self,
         (width, height): (usize, usize),
         to: impl Fn((f64, f64)) -> (f64, f64),
-    ) -> Self {
-        let corners: Vec<_> = self.corners.iter().map(|&corner| to(corner)).collect();
-        let spans = polygon_spans(&corners, width, height);
-        Self { corners, spans }
+        crossings: &mut Vec<f64>,
+    ) {
+        self.corners.clear();
+        self.corners
+            .extend(other.corners.iter().map(|&corner| to(corner)));
+        fill_spans(&self.corners, width, height, crossings, &mut self.spans);
     }
 
     /// Number of pixels.
@@ -127,14 +130,29 @@ pub fn polygon_spans(
     width: usize,
     height: usize,
 ) -> Vec<(usize, Range<usize>)> {
+    let mut spans = Vec::new();
+    fill_spans(corners, width, height, &mut Vec::new(), &mut spans);
+    spans
+}
+
+/// As [`polygon_spans`], in place of what was in `spans`; `crossings` is room.
+fn fill_spans(
+    corners: &[(f64, f64)],
+    width: usize,
+    height: usize,
+    crossings: &mut Vec<f64>,
+    spans: &mut Vec<(usize, Range<usize>)>,
+) {
     let (mut top, mut bottom) = (height as f64, 0.0_f64);
     for (_, v) in corners {
         (top, bottom) = (top.min(*v), bottom.max(*v));
     }
-    // A span per row, mostly.
+    spans.clear();
+    // A span per row, mostly, and room for a part that moves by some rows.
     let rows = ((bottom - top).max(0.0) as usize).min(height) + 1;
-    let mut spans = Vec::with_capacity(rows);
-    let mut crossings = Vec::with_capacity(corners.len());
+    if spans.capacity() < rows {
+        spans.reserve(rows + rows / 8);
+    }
     for row in 0..height {
         let v = row as f64;
         crossings.clear();
@@ -144,7 +162,7 @@ pub fn polygon_spans(
                 crossings.push(u0 + (u1 - u0) * ((v - v0) / (v1 - v0)));
             }
         }
-        crossings.sort_by(f64::total_cmp);
+        crossings.sort_unstable_by(f64::total_cmp);
         for pair in crossings.chunks_exact(2) {
             let column = |u: f64| libm::ceil(u).clamp(0.0, width as f64) as usize;
             let (start, end) = (column(pair[0]), column(pair[1]));
@@ -153,7 +171,6 @@ pub fn polygon_spans(
             }
         }
     }
-    spans
 }
 
 #[cfg(test)]

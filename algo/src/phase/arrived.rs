@@ -43,7 +43,7 @@ pub(super) const NO_DOUBT: u8 = u8::MAX;
 
 /// One demodulated level, row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Wrapped {
+pub(crate) struct Wrapped {
     /// φ in 1/65536 turn.
     pub phase: Vec<u16>,
     /// Modulation in units of full scale / 32767.5; 0 where weak.
@@ -133,36 +133,36 @@ impl Arrived {
         }
     }
 
-    /// Every row, for the next level to be written to.
-    pub(crate) fn rows(&mut self) -> Vec<ArrivingRow<'_>> {
-        let width = self.width.max(1);
+    /// Where the next level is to be written to: what it is, and its maps; empty if there is no room for another.
+    pub(crate) fn arriving(&mut self) -> (ArrivingLevel<'_>, PlanesMut<'_>) {
         match &mut self.planes {
-            Planes::Climbed(planes) => planes
-                .fraction
-                .chunks_mut(width)
-                .zip(planes.turns.chunks_mut(width))
-                .zip(planes.doubt.chunks_mut(width))
-                .map(|((fraction, turns), doubt)| {
-                    ArrivingRow::Climbing(ClimbedRowMut {
-                        fraction,
-                        turns,
-                        doubt,
-                    })
-                })
-                .collect(),
+            Planes::Climbed(planes) => (
+                ArrivingLevel::Climbing,
+                (&mut planes.fraction, &mut planes.turns, &mut planes.doubt),
+            ),
             Planes::Wrapped(levels) => {
                 let there = self.levels.min(levels.len());
                 let (before, rest) = levels.split_at_mut(there);
-                let (coarsest, rest) = (before.first(), rest.first_mut());
-                let rows = rest.into_iter().flat_map(|level| level.rows_mut(width));
-                rows.enumerate()
-                    .map(|(v, row)| ArrivingRow::Wrapping {
-                        coarsest: coarsest.map(|level| level.row(width, v)),
-                        row,
-                    })
-                    .collect()
+                let level = ArrivingLevel::Wrapping {
+                    coarsest: before.first(),
+                    width: self.width,
+                };
+                let planes: PlanesMut<'_> = match rest.first_mut() {
+                    Some(next) => (&mut next.phase, &mut next.modulation, &mut next.doubts),
+                    None => (&mut [], &mut [], &mut []),
+                };
+                (level, planes)
             }
         }
+    }
+
+    /// Every row, for the next level to be written to.
+    pub(crate) fn rows(&mut self) -> impl Iterator<Item = ArrivingRow<'_>> {
+        let width = self.width.max(1);
+        let (level, (first, second, third)) = self.arriving();
+        let words = first.chunks_mut(width).zip(second.chunks_mut(width));
+        let rows = words.zip(third.chunks_mut(width)).enumerate();
+        rows.map(move |(v, ((first, second), third))| level.row(v, (first, second, third)))
     }
 }
 
@@ -175,17 +175,45 @@ impl Wrapped {
             doubts: &self.doubts[row],
         }
     }
+}
 
-    fn rows_mut(&mut self, width: usize) -> impl Iterator<Item = WrappedRowMut<'_>> {
-        self.phase
-            .chunks_mut(width)
-            .zip(self.modulation.chunks_mut(width))
-            .zip(self.doubts.chunks_mut(width))
-            .map(|((phase, modulation), doubts)| WrappedRowMut {
-                phase,
-                modulation,
-                doubts,
-            })
+/// Three maps, or a row of each: fraction, turns, doubt, or phase, modulation, doubts.
+pub(crate) type PlanesMut<'a> = (&'a mut [u16], &'a mut [u16], &'a mut [u8]);
+
+/// The level that is to be written next.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum ArrivingLevel<'a> {
+    /// A geometric one.
+    Climbing,
+    /// One about a known map.
+    Wrapping {
+        /// The first of them, if it is there already.
+        coarsest: Option<&'a Wrapped>,
+        width: usize,
+    },
+}
+
+impl<'a> ArrivingLevel<'a> {
+    /// Row `v` of its maps.
+    pub fn row<'b>(&self, v: usize, (first, second, third): PlanesMut<'b>) -> ArrivingRow<'b>
+    where
+        'a: 'b,
+    {
+        match *self {
+            Self::Climbing => ArrivingRow::Climbing(ClimbedRowMut {
+                fraction: first,
+                turns: second,
+                doubt: third,
+            }),
+            Self::Wrapping { coarsest, width } => ArrivingRow::Wrapping {
+                coarsest: coarsest.map(|level| level.row(width, v)),
+                row: WrappedRowMut {
+                    phase: first,
+                    modulation: second,
+                    doubts: third,
+                },
+            },
+        }
     }
 }
 

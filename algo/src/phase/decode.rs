@@ -6,7 +6,7 @@ use super::unwrap::{Unwrapper, information};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence, SequenceError, Unwrapping};
 use crate::simd::Backend;
-use crate::trust::Trust;
+use crate::trust::{MIN_MODULATION_8_BIT, Trust};
 use crate::units::{AbsolutePhase, Modulation};
 use alloc::vec::Vec;
 use core::fmt;
@@ -170,6 +170,17 @@ impl Decoder {
         let counts = modulation.counts(self.full_scale());
         let information = self.information * counts * counts;
         noise / core::f64::consts::TAU * libm::sqrt(2.0 / information)
+    }
+
+    /// The smallest modulation that is trusted, in counts.
+    pub fn least_modulation(&self) -> f64 {
+        MIN_MODULATION_8_BIT * f64::from(self.full_scale()) / 255.0
+    }
+
+    /// σ_B in counts, where samples have a noise of `noise` counts: σ_I · √(2 / N) of the finest level's N.
+    pub fn modulation_noise(&self, noise: f64) -> f64 {
+        let shifts = self.levels.last().map_or(1, |level| level.frames.len());
+        noise * libm::sqrt(2.0 / shifts as f64)
     }
 
     /// Checks that `frames` are what this decoder was made for: count, equal size, sample type.

@@ -17,6 +17,7 @@ mod unwrap;
 
 pub use crate::trust::{MIN_MODULATION_8_BIT, Trust};
 pub use arrived::Arrived;
+pub(crate) use arrived::PlanesMut;
 pub use decode::{DecodeError, Decoder, PhaseRow};
 pub use level::FULL_TRUST_STEPS;
 

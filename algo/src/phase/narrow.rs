@@ -1,4 +1,4 @@
-//! Rows that are narrower than a block: copied into one that is wide enough.
+//! Fewer columns than a block: a block around them, of rows that are narrower a copy that is wide enough.
 
 use super::PhaseRow;
 use super::arrived::{ClimbedRow, ClimbedRowMut, WrappedRow, WrappedRowMut};
@@ -67,12 +67,12 @@ impl FewResults {
         }
     }
 
-    /// To the columns that they were computed for.
-    pub fn copy_to(&self, out: PhaseRow<'_>, columns: Range<usize>) {
-        let few = columns.len();
-        out.phase[columns.clone()].copy_from_slice(&self.phase[..few]);
-        out.modulation[columns.clone()].copy_from_slice(&self.modulation[..few]);
-        out.trust[columns].copy_from_slice(&self.trust[..few]);
+    /// To the columns that they were computed for; the first pixel is that of column `start`.
+    pub fn copy_to(&self, out: PhaseRow<'_>, columns: Range<usize>, start: usize) {
+        let few = columns.start - start..columns.end - start;
+        out.phase[columns.clone()].copy_from_slice(&self.phase[few.clone()]);
+        out.modulation[columns.clone()].copy_from_slice(&self.modulation[few.clone()]);
+        out.trust[columns].copy_from_slice(&self.trust[few]);
     }
 }
 

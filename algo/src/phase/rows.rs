@@ -87,12 +87,13 @@ impl Decoder {
         if columns.len() >= MAX_PIXELS {
             return self.columns(&rows, map, columns, out);
         }
-        let rows: Vec<_> = rows.iter().map(|row| padded(row, &columns)).collect();
-        let rows: Vec<&[T]> = rows.iter().map(|row| &row[..]).collect();
+        let near = near(&columns, width(&rows));
+        let padded = padded_rows(&rows, &near);
+        let rows: heapless::Vec<&[T], MAX_FRAMES> = near_rows(&rows, &padded, &near);
         let mut few = FewResults::new();
-        let map = few_known(map, &columns);
+        let map = few_known(map, &near);
         self.columns(&rows, &map, 0..MAX_PIXELS, few.row());
-        few.copy_to(out, columns);
+        few.copy_to(out, columns, near.start);
     }
 
     /// From the rows of all frames, level by level.
@@ -128,13 +129,13 @@ impl Decoder {
         row: ArrivingRow<'_>,
     ) {
         let rows = level_rows::<T>(frames, v);
-        let width = rows.first().map_or(0, |row| row.len());
+        let width = width(&rows);
         if width >= MAX_PIXELS {
             return self.arrive(level, &rows, width, row);
         }
         let columns = 0..width;
-        let rows: Vec<_> = rows.iter().map(|row| padded(row, &columns)).collect();
-        let rows: Vec<&[T]> = rows.iter().map(|row| &row[..]).collect();
+        let padded = padded_rows(&rows, &columns);
+        let rows: heapless::Vec<&[T], MAX_SHIFTS> = near_rows(&rows, &padded, &columns);
         match row {
             ArrivingRow::Climbing(out) => {
                 let mut few = FewClimbed::new(out.as_row(), &columns);
@@ -190,19 +191,18 @@ impl Decoder {
         if columns.len() >= MAX_PIXELS {
             return self.last(&rows, climbed, &wrapped, map, columns, out);
         }
-        let rows: Vec<_> = rows.iter().map(|row| padded(row, &columns)).collect();
-        let rows: Vec<&[T]> = rows.iter().map(|row| &row[..]).collect();
-        let climbed = climbed.map(|row| FewClimbed::new(row, &columns));
-        let wrapped: Vec<_> = wrapped
-            .iter()
-            .map(|row| FewWrapped::new(*row, &columns))
-            .collect();
-        let wrapped: Vec<_> = wrapped.iter().map(FewWrapped::row).collect();
+        let near = near(&columns, width(&rows));
+        let padded = padded_rows(&rows, &near);
+        let rows: heapless::Vec<&[T], MAX_SHIFTS> = near_rows(&rows, &padded, &near);
+        let climbed = climbed.map(|row| FewClimbed::new(row, &near));
+        let wrapped = wrapped.iter().map(|row| FewWrapped::new(*row, &near));
+        let wrapped: heapless::Vec<_, MAX_LEVELS> = wrapped.collect();
+        let wrapped: heapless::Vec<_, MAX_LEVELS> = wrapped.iter().map(FewWrapped::row).collect();
         let climbed = climbed.as_ref().map(FewClimbed::row);
         let mut few = FewResults::new();
-        let map = few_known(map, &columns);
+        let map = few_known(map, &near);
         self.last(&rows, climbed, &wrapped, &map, 0..MAX_PIXELS, few.row());
-        few.copy_to(out, columns);
+        few.copy_to(out, columns, near.start);
     }
 
     fn last<T: RowSample>(
@@ -243,6 +243,35 @@ fn level_rows<'a, T: RowSample>(
     v: usize,
 ) -> heapless::Vec<&'a [T], MAX_SHIFTS> {
     frames.iter().map(|&frame| T::row(frame, v)).collect()
+}
+
+/// Pixels of a row.
+fn width<T>(rows: &[&[T]]) -> usize {
+    rows.first().map_or(0, |row| row.len())
+}
+
+/// A block of columns around a few; the whole row if it is narrower.
+fn near(columns: &Range<usize>, width: usize) -> Range<usize> {
+    let start = columns.start.min(width.saturating_sub(MAX_PIXELS));
+    start..(start + MAX_PIXELS).min(width)
+}
+
+/// Copies of rows that are narrower than a block, none of others.
+fn padded_rows<T: RowSample>(rows: &[&[T]], near: &Range<usize>) -> Vec<[T; MAX_PIXELS]> {
+    let narrow = rows.iter().filter(|_| near.len() < MAX_PIXELS);
+    narrow.map(|row| padded(row, near)).collect()
+}
+
+/// The rows' columns, or the copies that are wide enough.
+fn near_rows<'a, T, const N: usize>(
+    rows: &[&'a [T]],
+    padded: &'a [[T; MAX_PIXELS]],
+    near: &Range<usize>,
+) -> heapless::Vec<&'a [T], N> {
+    match padded {
+        [] => rows.iter().map(|row| &row[near.clone()]).collect(),
+        padded => padded.iter().map(|row| &row[..]).collect(),
+    }
 }
 
 fn few_known(map: &[AbsolutePhase], columns: &Range<usize>) -> [AbsolutePhase; MAX_PIXELS] {

@@ -1,6 +1,6 @@
 //! Whole frames: frames → phase map → height map.
 
-use super::for_each;
+use super::{for_each, for_each_row_of};
 use crate::frame::FrameView;
 use crate::geometry::Triangulator;
 use crate::phase::{Arrived, DecodeError, Decoder, PhaseRow, Trust};
@@ -102,13 +102,11 @@ pub fn arrive(
 ) -> Result<(), DecodeError> {
     let level = arrived.levels();
     decoder.check_arrival(frames, arrived)?;
-    for_each(
-        arrived.rows(),
-        || (),
-        |v, row, ()| {
-            decoder.arrive_row(level, frames, v, row);
-        },
-    );
+    let width = arrived.size().0;
+    let (arriving, planes) = arrived.arriving();
+    for_each_row_of(planes, width, |v, row| {
+        decoder.arrive_row(level, frames, v, arriving.row(v, row));
+    });
     arrived.add_level();
     Ok(())
 }

@@ -13,4 +13,4 @@ pub(crate) use rise::{
 };
 pub use rise::{KnownSurface, Rises};
 pub use rows::for_each_row;
-pub(crate) use rows::{for_each, map_rows};
+pub(crate) use rows::{for_each, for_each_item, for_each_row_of, map_rows};

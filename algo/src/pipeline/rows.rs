@@ -1,5 +1,6 @@
 //! The walk over rows, serial or parallel.
 
+use crate::phase::PlanesMut;
 use alloc::vec::Vec;
 #[cfg(feature = "parallel")]
 use rayon::prelude::*;
@@ -10,8 +11,46 @@ pub fn for_each_row<T: Send>(
     width: usize,
     each: impl Fn(usize, &mut [T]) + Sync + Send,
 ) {
-    let rows = map.chunks_mut(width.max(1)).collect();
-    for_each(rows, || (), |v, row, ()| each(v, row));
+    #[cfg(feature = "parallel")]
+    map.par_chunks_mut(width.max(1))
+        .enumerate()
+        .for_each(|(v, row)| each(v, row));
+    #[cfg(not(feature = "parallel"))]
+    for (v, row) in map.chunks_mut(width.max(1)).enumerate() {
+        each(v, row);
+    }
+}
+
+/// Calls `each` with every item.
+pub(crate) fn for_each_item<T: Send>(items: &mut [T], each: impl Fn(usize, &mut T) + Sync + Send) {
+    for_each_row(items, 1, |at, items| {
+        for item in items {
+            each(at, item);
+        }
+    });
+}
+
+/// Calls `each` with every row of three maps (row-major, rows of `width`).
+pub(crate) fn for_each_row_of(
+    (first, second, third): PlanesMut<'_>,
+    width: usize,
+    each: impl Fn(usize, PlanesMut<'_>) + Sync + Send,
+) {
+    let width = width.max(1);
+    #[cfg(feature = "parallel")]
+    first
+        .par_chunks_mut(width)
+        .zip(second.par_chunks_mut(width))
+        .zip(third.par_chunks_mut(width))
+        .enumerate()
+        .for_each(|(v, ((first, second), third))| each(v, (first, second, third)));
+    #[cfg(not(feature = "parallel"))]
+    {
+        let words = first.chunks_mut(width).zip(second.chunks_mut(width));
+        for (v, ((first, second), third)) in words.zip(third.chunks_mut(width)).enumerate() {
+            each(v, (first, second, third));
+        }
+    }
 }
 
 /// Calls `each` with every row (and its place), and with a scratch buffer that is reused from row to

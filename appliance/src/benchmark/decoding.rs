@@ -4,7 +4,7 @@ use super::frames::{FrameSet, Output};
 use super::kernel::Kernel;
 use super::stopwatch::timed;
 use crate::plan::STRIPS;
-use algo::inspect::{Production, Strip};
+use algo::inspect::{Production, Strips};
 use algo::phase::{Arrived, Decoder, PhaseRow};
 use algo::pipeline::arrive;
 use std::hint::black_box;
@@ -58,7 +58,7 @@ impl Decoding {
 /// Production from frames to the readings of gauges, on as many threads as the pool has that it is run in.
 pub struct Inspecting<'a> {
     production: &'a Production,
-    strips: Vec<Strip>,
+    strips: Strips,
 }
 
 impl<'a> Inspecting<'a> {

@@ -4,6 +4,7 @@ use super::Plan;
 use super::run::Run;
 use crate::seam;
 use algo::frame::FrameView;
+use algo::pattern::MAX_SHIFTS;
 use algo::phase::Arrived;
 use algo::pipeline::arrive;
 use hal::frame::Frame;
@@ -108,7 +109,10 @@ impl Run {
 }
 
 /// Some of the frames as computation takes them; none if one is not there or not what it says.
-fn views<'a>(places: &[usize], frames: &'a [Frame]) -> Option<Vec<FrameView<'a>>> {
+fn views<'a>(
+    places: &[usize],
+    frames: &'a [Frame],
+) -> Option<heapless::Vec<FrameView<'a>, MAX_SHIFTS>> {
     let view = |&at: &usize| seam::view(frames.get(at)?).ok();
     places.iter().map(view).collect()
 }

@@ -17,7 +17,7 @@ use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_L
 use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
-use algo::inspect::{Findings, Light, Production, Strip};
+use algo::inspect::{Findings, Light, Production, Strips};
 use algo::pattern::{Encoder, MAX_FRAMES, Sequence};
 use algo::phase::Arrived;
 use algo::pipeline::Rises;
@@ -41,7 +41,7 @@ pub struct Plan {
     /// The sequences in the order in which they are tried; the frames of each are more than those of the one before.
     runs: Vec<Run>,
     /// The buffers of a cycle, made once.
-    strips: Mutex<Vec<Strip>>,
+    strips: Mutex<Strips>,
     simulated: bool,
 }
 

@@ -6,7 +6,7 @@ use super::gauge::GaugeValue;
 use super::stages::Stages;
 
 /// The most gauges that a recipe can have: bits and registers of the map.
-pub const MAX_GAUGES: usize = 16;
+pub use algo::inspect::MAX_GAUGES;
 
 /// The judgement of one cycle: register 208.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -129,7 +129,7 @@ impl Sum {
 
 /// The means of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cell<'a> {
+pub struct Cell {
     /// Pixels that its error follows from.
     pub pixels: f64,
     /// Height, mm: as taught, and the mean deviation on top. So it does not depend on which pixels of the cell were measured.
@@ -137,35 +137,34 @@ pub struct Cell<'a> {
     /// Deviation from golden, mm.
     pub deviation: f64,
     /// The cell as taught.
-    pub taught: &'a TaughtCell,
+    pub taught: TaughtCell,
 }
 
-/// The cells of a region; none if less than half of what it had as taught was measured. With `least`, those with at least
-/// so many pixels; else all that it had as taught: those that were not measured deviate by as much as the others on the mean,
-/// so that it does not matter which they are.
-pub fn cells<'a>(sums: &[Sum], taught: &'a [TaughtCell], least: Option<i64>) -> Vec<Cell<'a>> {
+/// Appends the cells of a region to `out`; none if less than half of what it had as taught was measured. With `least`, those
+/// with at least so many pixels; else all that it had as taught: those that were not measured deviate by as much as the
+/// others on the mean, so that it does not matter which they are.
+pub fn cells(sums: &[Sum], taught: &[TaughtCell], least: Option<i64>, out: &mut Vec<Cell>) {
     let had: u64 = taught.iter().map(|cell| u64::from(cell.pixels)).sum();
     let has: i64 = sums.iter().map(|sum| sum.count).sum();
     if has == 0 || (has as f64) < MIN_SHARE * had as f64 {
-        return Vec::new();
+        return;
     }
     let all: i64 = sums.iter().map(|sum| sum.deviation).sum();
     let mean = all as f64 / has as f64;
     let pairs = sums.iter().zip(taught);
-    pairs
-        .filter(|(sum, taught)| taught.pixels > 0 && least.is_none_or(|least| sum.count >= least))
-        .map(|(sum, taught)| {
-            let (pixels, nm) = match sum.count {
-                0 => (f64::from(taught.pixels), mean),
-                count => (count as f64, sum.deviation as f64 / count as f64),
-            };
-            let deviation = nm * 1e-6;
-            Cell {
-                pixels,
-                height: taught.height + deviation,
-                deviation,
-                taught,
-            }
-        })
-        .collect()
+    let pairs = pairs
+        .filter(|(sum, taught)| taught.pixels > 0 && least.is_none_or(|least| sum.count >= least));
+    out.extend(pairs.map(|(sum, &taught)| {
+        let (pixels, nm) = match sum.count {
+            0 => (f64::from(taught.pixels), mean),
+            count => (count as f64, sum.deviation as f64 / count as f64),
+        };
+        let deviation = nm * 1e-6;
+        Cell {
+            pixels,
+            height: taught.height + deviation,
+            deviation,
+            taught,
+        }
+    }));
 }

@@ -11,25 +11,38 @@ use alloc::vec::Vec;
 use core::f64::consts::{PI, SQRT_2};
 
 /// Peak-to-valley flatness about the least-squares plane, mm (ISO 12781-1: FLTt about LSPL). `sigma` is the error of a
-/// cell's mean, mm. The plane's own error is small against a cell's and left out.
-pub fn flatness(cells: &[Cell<'_>], sigma: f64, placed: Option<&Placed>) -> Option<Reading> {
+/// cell's mean, mm. The plane's own error is small against a cell's and left out. `room` is for a value per cell.
+pub fn flatness(
+    cells: &[Cell],
+    sigma: f64,
+    placed: Option<&Placed>,
+    room: &mut Vec<f64>,
+) -> Option<Reading> {
     let plane = Plane::of(cells)?;
     let slope = 1.0 + plane.along * plane.along + plane.down * plane.down;
     let heights = cells.iter().map(|cell| plane.above(cell));
-    range(cells, heights.collect(), sigma / libm::sqrt(slope), placed)
+    room.clear();
+    room.extend(heights);
+    range(cells, room, sigma / libm::sqrt(slope), placed)
 }
 
-/// The highest less the lowest cell, mm.
-pub fn peak_to_valley(cells: &[Cell<'_>], sigma: f64, placed: Option<&Placed>) -> Option<Reading> {
-    let heights = cells.iter().map(|cell| cell.height);
-    range(cells, heights.collect(), sigma, placed)
+/// The highest less the lowest cell, mm. `room` is for a value per cell.
+pub fn peak_to_valley(
+    cells: &[Cell],
+    sigma: f64,
+    placed: Option<&Placed>,
+    room: &mut Vec<f64>,
+) -> Option<Reading> {
+    room.clear();
+    room.extend(cells.iter().map(|cell| cell.height));
+    range(cells, room, sigma, placed)
 }
 
 /// Largest less smallest value, one per cell. The errors of both ends are those of the largest of many noisy values, and
 /// what an error of the motion does to the two cells.
 fn range(
-    cells: &[Cell<'_>],
-    mut values: Vec<f64>,
+    cells: &[Cell],
+    values: &mut [f64],
     sigma: f64,
     placed: Option<&Placed>,
 ) -> Option<Reading> {
@@ -38,11 +51,11 @@ fn range(
     let value = values[high] - values[low];
     let (upper, lower) = (cells[high].taught.row, cells[low].taught.row);
     let motion = motion(&core::array::from_fn(|i| upper[i] - lower[i]), placed);
-    let top = spread_of_largest(&values, sigma);
-    for value in &mut values {
+    let top = spread_of_largest(values, sigma);
+    for value in values.iter_mut() {
         *value = -*value;
     }
-    let bottom = spread_of_largest(&values, sigma);
+    let bottom = spread_of_largest(values, sigma);
     Some(Reading {
         value,
         sigma: Some(libm::sqrt(top * top + bottom * bottom + motion)),
@@ -101,7 +114,7 @@ fn below(x: f64) -> f64 {
 
 /// Root of the mean square of the deviations, mm. Var(mean d²) = (4σ² Σd² − 2nσ⁴) / n² + gᵀ C g: the scatter of d² about
 /// fixed true deviations, with d² − σ² for the square of each, and the error of the motion, g = Σ 2dᵢ jᵢ / n.
-pub fn rms(cells: &[Cell<'_>], sigma: f64, placed: Option<&Placed>) -> Option<Reading> {
+pub fn rms(cells: &[Cell], sigma: f64, placed: Option<&Placed>) -> Option<Reading> {
     if cells.is_empty() {
         return None;
     }
@@ -128,7 +141,7 @@ pub fn rms(cells: &[Cell<'_>], sigma: f64, placed: Option<&Placed>) -> Option<Re
 /// Share of the cells that deviate by more than `tolerance` mm. Each is a coin that falls by how near to the tolerance it
 /// lies: σ² = Σ p(1 − p) / n², p = Φ((|d| − T) / σ). As d itself is noisy, p(1 − p) is taken about d with √2 σ and scaled
 /// so that its integral over all d is σ/√π, what coins of known d have.
-pub fn share_outside(cells: &[Cell<'_>], sigma: f64, tolerance: f64) -> Option<Reading> {
+pub fn share_outside(cells: &[Cell], sigma: f64, tolerance: f64) -> Option<Reading> {
     if cells.is_empty() {
         return None;
     }

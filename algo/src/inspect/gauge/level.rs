@@ -4,67 +4,56 @@ use super::{Axis, Cell};
 use crate::inspect::align::{Placed, form};
 use alloc::vec::Vec;
 
-/// A value and how it changes with the mean height of each cell.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Linear {
-    /// The value.
-    pub value: f64,
-    /// Its derivatives.
-    pub weights: Vec<f64>,
-}
+/// How a value changes with the mean height of each cell: its derivatives.
+pub type Weights = Vec<f64>;
 
-impl Linear {
-    /// Error of the value (1 σ): σ² = Σ wᵢ² σ_z² / nᵢ + gᵀ C g, n a cell's pixels, `variance` σ_z² of one of them,
-    /// g = Σ wᵢ jᵢ how the value follows the motion and C the motion's covariance. That the pixels of the motion are some of
-    /// the gauge's is left out: they are one in some dozens.
-    pub fn sigma(&self, cells: &[Cell<'_>], variance: f64, placed: Option<&Placed>) -> f64 {
-        self.sigma_of(cells, |_| variance, placed)
-    }
-
-    /// The same with a variance per cell.
-    pub fn sigma_of(
-        &self,
-        cells: &[Cell<'_>],
-        variance: impl Fn(usize) -> f64,
-        placed: Option<&Placed>,
-    ) -> f64 {
-        let pairs = || self.weights.iter().zip(cells);
-        let each = |(at, (w, cell)): (usize, (&f64, &Cell<'_>))| w * w * variance(at) / cell.pixels;
-        let pixels: f64 = pairs().enumerate().map(each).sum();
-        let motion = placed.map_or(0.0, |placed| {
-            let mut g = [0.0; 6];
-            for (w, cell) in pairs() {
-                for (g, row) in g.iter_mut().zip(cell.taught.row) {
-                    *g += w * row;
-                }
+/// Error (1 σ) of a value with these weights: σ² = Σ wᵢ² σ_z² / nᵢ + gᵀ C g, n a cell's pixels, `variance` σ_z² of one of
+/// the pixels of each cell, g = Σ wᵢ jᵢ how the value follows the motion and C the motion's covariance. That the pixels of the
+/// motion are some of the gauge's is left out: they are one in some dozens.
+pub fn sigma(
+    weights: &[f64],
+    cells: &[Cell],
+    variance: impl Fn(usize) -> f64,
+    placed: Option<&Placed>,
+) -> f64 {
+    let pairs = || weights.iter().zip(cells);
+    let each = |(at, (w, cell)): (usize, (&f64, &Cell))| w * w * variance(at) / cell.pixels;
+    let pixels: f64 = pairs().enumerate().map(each).sum();
+    let motion = placed.map_or(0.0, |placed| {
+        let mut g = [0.0; 6];
+        for (w, cell) in pairs() {
+            for (g, row) in g.iter_mut().zip(cell.taught.row) {
+                *g += w * row;
             }
-            form(&g, &placed.covariance, &g)
-        });
-        libm::sqrt(pixels + motion.max(0.0))
-    }
+        }
+        form(&g, &placed.covariance, &g)
+    });
+    libm::sqrt(pixels + motion.max(0.0))
 }
 
 /// What a cell counts: as much as it had pixels when it was taught, so that it is always the same.
-fn weight(cell: &Cell<'_>) -> f64 {
+fn weight(cell: &Cell) -> f64 {
     f64::from(cell.taught.pixels)
 }
 
-/// The mean height, mm; each pixel as taught counts the same.
-pub fn mean(cells: &[Cell<'_>]) -> Option<Linear> {
+/// The mean height, mm; each pixel as taught counts the same. Its weights are appended to `out`.
+pub fn mean(cells: &[Cell], out: &mut Weights) -> Option<f64> {
     let all: f64 = cells.iter().map(weight).sum();
     let sum: f64 = cells.iter().map(|cell| weight(cell) * cell.height).sum();
-    (all > 0.0).then(|| Linear {
-        value: sum / all,
-        weights: cells.iter().map(|cell| weight(cell) / all).collect(),
-    })
+    if all <= 0.0 {
+        return None;
+    }
+    out.extend(cells.iter().map(|cell| weight(cell) / all));
+    Some(sum / all)
 }
 
-/// A mean less another; the second one's cells behind the first one's.
-pub fn step(mut of: Linear, from: Linear) -> Linear {
-    of.value -= from.value;
-    of.weights
-        .extend(from.weights.into_iter().map(|weight| -weight));
-    of
+/// The mean of cells less that of others, mm; the weights of the others behind those of the first.
+pub fn step(of: &[Cell], from: &[Cell], out: &mut Weights) -> Option<f64> {
+    let value = mean(of, out)? - mean(from, out)?;
+    for weight in out.iter_mut().rev().take(from.len()) {
+        *weight = -*weight;
+    }
+    Some(value)
 }
 
 /// The least-squares plane z = z₀ + p·(x − x₀) + q·(y − y₀) of cells, each weighing as its pixels as taught.
@@ -79,9 +68,9 @@ pub(super) struct Plane {
 
 impl Plane {
     /// None where the cells lie on a line.
-    pub fn of(cells: &[Cell<'_>]) -> Option<Self> {
-        let pixels: f64 = cells.iter().map(|cell| weight(cell)).sum();
-        let mean = |value: fn(&Cell<'_>) -> f64| {
+    pub fn of(cells: &[Cell]) -> Option<Self> {
+        let pixels: f64 = cells.iter().map(weight).sum();
+        let mean = |value: fn(&Cell) -> f64| {
             cells
                 .iter()
                 .map(|cell| weight(cell) * value(cell))
@@ -117,7 +106,7 @@ impl Plane {
     }
 
     /// How far a cell lies above it along its normal, mm.
-    pub fn above(&self, cell: &Cell<'_>) -> f64 {
+    pub fn above(&self, cell: &Cell) -> f64 {
         let (dx, dy) = (
             cell.taught.x - self.centre[0],
             cell.taught.y - self.centre[1],
@@ -127,8 +116,8 @@ impl Plane {
     }
 }
 
-/// The angle of the least-squares plane about an axis, degrees, right-handed.
-pub fn tilt(cells: &[Cell<'_>], about: Axis) -> Option<Linear> {
+/// The angle of the least-squares plane about an axis, degrees, right-handed. Its weights are appended to `out`.
+pub fn tilt(cells: &[Cell], about: Axis, out: &mut Weights) -> Option<f64> {
     let plane = Plane::of(cells)?;
     let [xx, xy, yy] = plane.squares;
     let determinant = xx * yy - xy * xy;
@@ -138,7 +127,7 @@ pub fn tilt(cells: &[Cell<'_>], about: Axis) -> Option<Linear> {
         Axis::Y => (plane.along, -1.0),
     };
     let degrees = f64::to_degrees(sign) / (1.0 + slope * slope);
-    let change = |cell: &Cell<'_>| {
+    let change = |cell: &Cell| {
         let (dx, dy) = (
             cell.taught.x - plane.centre[0],
             cell.taught.y - plane.centre[1],
@@ -149,17 +138,14 @@ pub fn tilt(cells: &[Cell<'_>], about: Axis) -> Option<Linear> {
         };
         degrees * weight(cell) * lever / determinant
     };
-    Some(Linear {
-        value: (sign * libm::atan(slope)).to_degrees(),
-        weights: cells.iter().map(change).collect(),
-    })
+    out.extend(cells.iter().map(change));
+    Some((sign * libm::atan(slope)).to_degrees())
 }
 
 /// The volume between the surface and the plane z = `above`, mm³: each cell's area in x and y as taught times its height.
-pub fn volume(cells: &[Cell<'_>], above: f64) -> Option<Linear> {
-    let each = |cell: &Cell<'_>| cell.taught.area * (cell.height - above);
-    (!cells.is_empty()).then(|| Linear {
-        value: cells.iter().map(each).sum(),
-        weights: cells.iter().map(|cell| cell.taught.area).collect(),
-    })
+/// Its weights are appended to `out`.
+pub fn volume(cells: &[Cell], above: f64, out: &mut Weights) -> Option<f64> {
+    let each = |cell: &Cell| cell.taught.area * (cell.height - above);
+    out.extend(cells.iter().map(|cell| cell.taught.area));
+    (!cells.is_empty()).then(|| cells.iter().map(each).sum())
 }

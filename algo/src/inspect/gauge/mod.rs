@@ -12,7 +12,7 @@ mod taught;
 
 pub use cells::{Cell, Grid, Sum, TooFine, cells};
 pub use extreme::{flatness, peak_to_valley, rms, share_outside};
-pub use level::{Linear, mean, step, tilt, volume};
+pub use level::{Weights, mean, sigma, step, tilt, volume};
 pub use taught::TaughtCell;
 pub(super) use taught::taught_cells;
 

@@ -1,25 +1,24 @@
 //! What the strips of a frame found together.
 
+use super::coins;
 use super::columns::TRUSTS;
 use super::extreme::Extreme;
 use super::stance::Stance;
-use super::{Light, Measure, Production, Strip};
+use super::{CellRoom, Light, MAX_GAUGES, Measure, Production, Strip, Strips};
 use crate::inspect::Reading;
 use crate::inspect::align::Placed;
 use crate::inspect::gauge::{
-    Linear, Sum, TaughtCell, cells, flatness, mean, peak_to_valley, rms, share_outside, step, tilt,
+    Sum, TaughtCell, cells, flatness, mean, peak_to_valley, rms, share_outside, sigma, step, tilt,
     volume,
 };
 use crate::phase::Trust;
 use crate::pipeline::VARIANCE_UNIT_NM;
-use alloc::vec;
-use alloc::vec::Vec;
 
 /// Everything that is known of a part after one cycle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Findings {
     /// Per gauge; `None` where there was nothing to measure.
-    pub readings: Vec<Option<Reading>>,
+    pub readings: heapless::Vec<Option<Reading>, MAX_GAUGES>,
     /// Pixels with a height.
     pub resolved: u64,
     /// Share of the compared surface inside the window that has a height.
@@ -50,12 +49,13 @@ pub struct Skipped {
 }
 
 impl Production {
-    pub(super) fn findings(
-        &self,
-        light: Light<'_>,
-        stance: Stance,
-        strips: &mut [Strip],
-    ) -> Findings {
+    pub(super) fn findings(&self, light: Light<'_>, strips: &mut Strips) -> Findings {
+        let Strips {
+            strips,
+            stance,
+            cells,
+            ..
+        } = strips;
         let mut trusts = [0; TRUSTS];
         let mut tally = crate::pipeline::RowTally::default();
         let mut exact = 0;
@@ -79,8 +79,8 @@ impl Production {
         let noisier = height_noise_mm / taught_noise_mm.max(f64::MIN_POSITIVE);
         let readings = (0..self.gauges.len())
             .map(|gauge| match self.patches_of[gauge].is_empty() {
-                true => self.reading(gauge, light, &stance, strips),
-                false => self.of_cells(gauge, noisier, &stance, strips),
+                true => self.reading(gauge, light, stance, strips),
+                false => self.of_cells(gauge, noisier, stance, strips, cells),
             })
             .collect();
         let count = |trust: Trust| trusts[trust as usize];
@@ -93,7 +93,7 @@ impl Production {
             taught_noise_mm,
             contradicting: contradicting as f64
                 / (contradicting + count(Trust::Resolved)).max(1) as f64,
-            placed: stance.placed,
+            placed: stance.placed.clone(),
             skipped: Skipped {
                 outside: pixels - seen,
                 unexpected: trusts[Trust::Unexpected as usize],
@@ -113,10 +113,14 @@ impl Production {
         match self.gauges[gauge].measure {
             Measure::Coverage => {
                 let pixels = stance.region(self, gauge).len();
-                let covered: u64 = strips.iter().map(|strip| strip.found.covered[gauge]).sum();
+                let (mut covered, mut coins) = (0, 0);
+                for strip in strips {
+                    covered += strip.found.covered[gauge];
+                    coins += strip.found.coins[gauge];
+                }
                 (pixels > 0).then(|| Reading {
                     value: covered as f64 / pixels as f64,
-                    sigma: None,
+                    sigma: Some(coins::sigma(coins, pixels)),
                 })
             }
             Measure::Deviation { side } => {
@@ -146,22 +150,21 @@ impl Production {
         noisier: f64,
         stance: &Stance,
         strips: &[Strip],
+        room: &mut CellRoom,
     ) -> Option<Reading> {
         let measure = self.gauges[gauge].measure;
         let patches = self.patches_of[gauge].clone();
         let side = measure.cell_side()?;
-        let measured = |at: usize| {
-            let patch = &self.patches[at];
-            let mut sums = vec![Sum::default(); patch.grid.len()];
-            for strip in strips {
-                for (sum, more) in sums.iter_mut().zip(&strip.found.cells[at]) {
-                    sum.add(more);
-                }
-            }
-            let least = (side > 0).then(|| patch.grid.least());
-            (cells(&sums, &patch.taught, least), &patch.taught)
-        };
-        let (cells, taught) = measured(patches.start);
+        room.cells.clear();
+        room.weights.clear();
+        let taught = &self.patches[patches.start].taught;
+        self.gather(patches.start, side, strips, room);
+        let count = room.cells.len();
+        if measure == Measure::Step {
+            // Both regions' cells behind each other: the motion moves them together.
+            self.gather(patches.end - 1, side, strips, room);
+        }
+        let CellRoom { cells, weights, .. } = room;
         let variance = |taught: &[TaughtCell]| {
             let pixels: u32 = taught.iter().map(|cell| cell.pixels).sum();
             let sum: f64 = taught.iter().map(|cell| cell.variance).sum();
@@ -170,35 +173,43 @@ impl Production {
         let pixel = variance(taught);
         let cell = libm::sqrt(pixel) / side.max(1) as f64;
         let placed = stance.placed.as_ref();
-        let linear = |linear: Option<Linear>| {
-            linear.map(|linear| Reading {
-                value: linear.value,
-                sigma: Some(linear.sigma(&cells, pixel, placed)),
-            })
-        };
-        match measure {
-            Measure::MeanHeight => linear(mean(&cells)),
-            Measure::Tilt(about) => linear(tilt(&cells, about)),
-            Measure::Volume { above } => linear(volume(&cells, above)),
-            Measure::Step => {
-                let (others, other_taught) = measured(patches.end - 1);
-                let step = step(mean(&cells)?, mean(&others)?);
-                // Both regions' cells behind each other: the motion moves them together.
-                let noises = [pixel, variance(other_taught)];
-                let counts = cells.len();
-                let all: Vec<_> = cells.into_iter().chain(others).collect();
-                let noise = |at: usize| noises[usize::from(at >= counts)];
-                Some(Reading {
-                    value: step.value,
-                    sigma: Some(step.sigma_of(&all, noise, placed)),
-                })
+        // Of those that are linear in height.
+        let value = match measure {
+            Measure::Flatness { .. } => return flatness(cells, cell, placed, weights),
+            Measure::PeakToValley { .. } => return peak_to_valley(cells, cell, placed, weights),
+            Measure::RmsDeviation { .. } => return rms(cells, cell, placed),
+            Measure::OutOfTolerance { tolerance, .. } => {
+                return share_outside(cells, cell, tolerance);
             }
-            Measure::Flatness { .. } => flatness(&cells, cell, placed),
-            Measure::PeakToValley { .. } => peak_to_valley(&cells, cell, placed),
-            Measure::RmsDeviation { .. } => rms(&cells, cell, placed),
-            Measure::OutOfTolerance { tolerance, .. } => share_outside(&cells, cell, tolerance),
-            _ => None,
+            Measure::MeanHeight => mean(cells, weights)?,
+            Measure::Tilt(about) => tilt(cells, about, weights)?,
+            Measure::Volume { above } => volume(cells, above, weights)?,
+            Measure::Step => step(&cells[..count], &cells[count..], weights)?,
+            _ => return None,
+        };
+        let noises = [pixel, variance(&self.patches[patches.end - 1].taught)];
+        let noise = |at: usize| noises[usize::from(at >= count)];
+        Some(Reading {
+            value,
+            sigma: Some(sigma(weights, cells, noise, placed)),
+        })
+    }
+
+    /// Appends the cells of a patch.
+    fn gather(&self, at: usize, side: usize, strips: &[Strip], room: &mut CellRoom) {
+        let patch = &self.patches[at];
+        let CellRoom {
+            sums, cells: out, ..
+        } = room;
+        sums.clear();
+        sums.resize(patch.grid.len(), Sum::default());
+        for strip in strips {
+            for (sum, more) in sums.iter_mut().zip(&strip.found.cells[at]) {
+                sum.add(more);
+            }
         }
+        let least = (side > 0).then(|| patch.grid.least());
+        cells(sums, &patch.taught, least, out);
     }
 
     /// The reading of a square; its σ is worked out here, for this one square alone.

@@ -9,6 +9,7 @@
 //! Where the part's motion is wanted, some rows are decoded beforehand and a few points of each kept: the motion is found
 //! from these, in the order of the rows, and the strips then compare every pixel with the place of golden where the part had it.
 
+mod coins;
 mod columns;
 mod displaced;
 mod exact;
@@ -19,25 +20,28 @@ mod spots;
 mod squares;
 mod stance;
 mod strip;
+mod taught;
 
 pub use findings::{Findings, Skipped};
 pub use light::Light;
-pub use strip::Strip;
+pub use taught::Taught;
 
 use super::Region;
-use super::align::{Alignment, GoldenSurface, Placed, levels};
-use super::gauge::{Grid, Measure, TaughtCell, TooFine, taught_cells};
+use super::align::{Alignment, GoldenSurface, Placed, Room, Sample, levels};
+use super::gauge::{Cell, Grid, Measure, Sum, TaughtCell, TooFine, Weights, taught_cells};
 use crate::frame::FrameView;
 use crate::geometry::{Triangulator, Vector};
 use crate::phase::{DecodeError, Decoder};
-use crate::pipeline::{COMPARED, Rises, SIGMA, SQUARE, VARIANCE_UNIT_NM, for_each};
+use crate::pipeline::{Rises, VARIANCE_UNIT_NM, for_each, for_each_item};
 use crate::simd::Backend;
 use crate::units::{AbsolutePhase, Modulation};
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
+use coins::Threshold;
 use core::ops::Range;
 use stance::Stance;
+use strip::Strip;
 
 /// A gauge: where it measures what.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,54 +61,6 @@ struct Patch {
     region: usize,
     grid: Grid,
     taught: Vec<TaughtCell>,
-}
-
-/// The part as taught, as far as parts are compared with it; row-major.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Taught(Vec<u16>);
-
-impl Taught {
-    /// Unit of σ in nm.
-    const SIGMA_UNIT_NM: f64 = 32.0;
-
-    /// From where the part is compared and σ of its heights in mm, NaN where not known. σ is stored in units of 32 nm, at
-    /// most half a mm.
-    pub fn new(pixels: impl Iterator<Item = (bool, f64)>) -> Self {
-        let stored = |(compared, mm): (bool, f64)| {
-            let units = libm::rint(mm * 1e6 / Self::SIGMA_UNIT_NM);
-            let sigma = match units.is_finite() {
-                true => units.clamp(1.0, f64::from(SIGMA)) as u16,
-                false => 0,
-            };
-            sigma | if compared { COMPARED } else { 0 }
-        };
-        Self(pixels.map(stored).collect())
-    }
-
-    /// Marks the places where the four pixels to the right and below are all compared.
-    fn mark_squares(&mut self, width: usize) {
-        for place in 0..self.0.len().saturating_sub(width + 1) {
-            let corners = [place, place + 1, place + width, place + width + 1];
-            if place % width + 1 < width && corners.iter().all(|&at| self.compared(at)) {
-                self.0[place] |= SQUARE;
-            }
-        }
-    }
-
-    /// Whether the part is compared at a place.
-    pub(super) fn compared(&self, place: usize) -> bool {
-        self.0[place] & COMPARED != 0
-    }
-
-    /// σ in its units.
-    fn sigma(&self, place: usize) -> u16 {
-        self.0[place] & SIGMA
-    }
-
-    /// σ in mm, 0 where not known.
-    pub(super) fn sigma_mm(&self, place: usize) -> f64 {
-        f64::from(self.sigma(place)) * (Self::SIGMA_UNIT_NM * 1e-6)
-    }
 }
 
 /// Everything that inspecting parts needs, worked out once.
@@ -131,13 +87,46 @@ pub struct Production {
     /// Pixels inside the window that are compared.
     compared: u64,
     noise_counts: f64,
+    /// What coverage hangs on.
+    threshold: Threshold,
     /// See [`crate::pipeline::Seen`].
     noise: f32,
 }
 
+/// The strips of a frame, with room for all that an inspection needs. Reused from cycle to cycle, so that a cycle allocates
+/// nothing.
+#[derive(Debug)]
+pub struct Strips {
+    strips: Vec<Strip>,
+    /// Of each but the last.
+    rows: usize,
+    stance: Stance,
+    /// Points of all strips that the part's motion is found from.
+    samples: Vec<Sample>,
+    fitting: Room,
+    /// For one gauge after the other.
+    cells: CellRoom,
+}
+
+/// Room for the cells of a gauge.
+#[derive(Debug, Default)]
+struct CellRoom {
+    sums: Vec<Sum>,
+    cells: Vec<Cell>,
+    weights: Weights,
+}
+
+/// Gauges that a recipe may have.
+pub const MAX_GAUGES: usize = 16;
+
 /// Gauges that cannot be measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unmeasurable {
+    /// More than [`MAX_GAUGES`].
+    TooMany {
+        /// How many.
+        gauges: usize,
+    },
     /// A smoothing over so many pixels that sums of heights over them could overflow.
     TooSmooth {
         /// Side of the square in pixels.
@@ -150,6 +139,9 @@ pub enum Unmeasurable {
 impl core::fmt::Display for Unmeasurable {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
+            Self::TooMany { gauges } => {
+                write!(f, "{gauges} gauges where at most {MAX_GAUGES} are measured")
+            }
             Self::TooSmooth { side } => write!(
                 f,
                 "a smoothing over {side}x{side} pixels is too wide for the working range"
@@ -188,7 +180,8 @@ impl Production {
     /// Joins what is known of head and part.
     ///
     /// # Errors
-    /// If a gauge's squares are so large that sums of heights over them could overflow, or so small that there are too many.
+    /// If there are too many gauges, or one's squares are so large that sums of heights over them could overflow, or so small
+    /// that there are too many.
     pub fn new(parts: Parts) -> Result<Self, Unmeasurable> {
         let Parts {
             decoder,
@@ -201,6 +194,10 @@ impl Production {
             noise_counts,
             aligned,
         } = parts;
+        if gauges.len() > MAX_GAUGES {
+            let gauges = gauges.len();
+            return Err(Unmeasurable::TooMany { gauges });
+        }
         taught.mark_squares(rises.surface().width.max(1));
         let range = triangulator.range();
         let span_nm = (range.high - range.low) * 1e6;
@@ -258,6 +255,7 @@ impl Production {
         }
         Ok(Self {
             levels: levels(&rises.surface().height, width, &window),
+            threshold: Threshold::new(&decoder, noise_counts),
             decoder,
             triangulator,
             rises,
@@ -321,12 +319,19 @@ impl Production {
     }
 
     /// Room for strips of `rows` rows that cover the frame.
-    pub fn strips(&self, rows: usize) -> Vec<Strip> {
-        let height = self.window.len();
-        (0..height)
-            .step_by(rows.max(1))
-            .map(|top| Strip::new(self, top..(top + rows.max(1)).min(height)))
-            .collect()
+    pub fn strips(&self, rows: usize) -> Strips {
+        let (height, rows) = (self.window.len(), rows.max(1));
+        let tops = (0..height).step_by(rows);
+        Strips {
+            strips: tops
+                .map(|top| Strip::new(self, top..(top + rows).min(height)))
+                .collect(),
+            rows,
+            stance: Stance::new(self),
+            samples: Vec::new(),
+            fitting: Room::default(),
+            cells: CellRoom::default(),
+        }
     }
 
     /// Inspects a part, in strips from [`Self::strips`]. Where `heights` is given (as long as a frame, row-major) it gets
@@ -337,7 +342,7 @@ impl Production {
     pub fn inspect(
         &self,
         frames: &[FrameView<'_>],
-        strips: &mut [Strip],
+        strips: &mut Strips,
         heights: Option<&mut [f32]>,
     ) -> Result<Findings, DecodeError> {
         let light = Light::Frames(frames);
@@ -353,25 +358,21 @@ impl Production {
     pub fn place(
         &self,
         light: Light<'_>,
-        strips: &mut [Strip],
+        strips: &mut Strips,
     ) -> Result<Option<Placed>, DecodeError> {
         self.check(light)?;
         let Some(alignment) = &self.alignment else {
             return Ok(None);
         };
-        for_each(
-            strips.iter_mut().collect(),
-            || (),
-            |_, strip, ()| strip.sample(self, alignment, light),
-        );
-        let Some((first, others)) = strips.split_first_mut() else {
-            return Ok(None);
-        };
-        for strip in others {
-            first.samples.extend(&strip.samples);
+        for_each_item(&mut strips.strips, |_, strip| {
+            strip.sample(self, alignment, light);
+        });
+        strips.samples.clear();
+        for strip in &strips.strips {
+            strips.samples.extend(&strip.samples);
         }
         let fitting = alignment.fitting(self.golden());
-        Ok(fitting.fit(&first.samples, &mut first.room))
+        Ok(fitting.fit(&strips.samples, &mut strips.fitting))
     }
 
     /// The second half: the readings of a part that lies so, from the light and strips that it was placed with.
@@ -381,29 +382,28 @@ impl Production {
     pub fn inspect_placed(
         &self,
         light: Light<'_>,
-        strips: &mut [Strip],
+        strips: &mut Strips,
         placed: Option<Placed>,
         heights: Option<&mut [f32]>,
     ) -> Result<Findings, DecodeError> {
         self.check(light)?;
-        let width = self.rises.surface().width;
-        let stance = Stance::new(self, placed);
-        let mut left = heights;
-        let mut work = Vec::with_capacity(strips.len());
-        for strip in strips.iter_mut() {
-            let mine = left.take().map(|map| {
-                let (mine, rest) = map.split_at_mut(strip.rows().len() * width);
-                left = Some(rest);
-                mine
-            });
-            work.push((strip, mine));
+        strips.stance.place(self, placed);
+        let (stance, width) = (&strips.stance, self.size().0);
+        match heights {
+            None => for_each_item(&mut strips.strips, |_, strip| {
+                strip.inspect(self, stance, light, None);
+            }),
+            Some(map) => {
+                let maps = map.chunks_mut((strips.rows * width).max(1));
+                let work = strips.strips.iter_mut().zip(maps).collect();
+                for_each(
+                    work,
+                    || (),
+                    |_, (strip, map), ()| strip.inspect(self, stance, light, Some(map)),
+                );
+            }
         }
-        for_each(
-            work,
-            || (),
-            |_, (strip, heights), ()| strip.inspect(self, &stance, light, heights),
-        );
-        Ok(self.findings(light, stance, strips))
+        Ok(self.findings(light, strips))
     }
 
     /// The map that phases are unwrapped about, row-major.

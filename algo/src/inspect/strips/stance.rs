@@ -8,7 +8,7 @@ use super::Production;
 use crate::geometry::Vector;
 use crate::inspect::Region;
 use crate::inspect::align::{Motion, Placed};
-use crate::pipeline::map_rows;
+use crate::pipeline::for_each_row;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -42,47 +42,58 @@ impl Node {
 pub(super) struct Stance {
     /// None if it is taken to lie as taught.
     pub placed: Option<Placed>,
-    /// Where the plan's regions are now; none = where they were taught.
-    regions: Option<Vec<Region>>,
-    /// Row-major; none if it lies as taught.
+    /// Where the plan's regions are now, if it was placed.
+    regions: Vec<Region>,
+    crossings: Vec<f64>,
+    /// Row-major; of use if it was placed.
     nodes: Vec<Node>,
     columns: usize,
 }
 
 impl Stance {
-    /// Of a part that was found to lie so.
-    pub fn new(plan: &Production, placed: Option<Placed>) -> Self {
+    /// As taught.
+    pub fn new(plan: &Production) -> Self {
         let (width, height) = plan.size();
         let columns = (width - 1).div_ceil(SPACING) + 1;
         let rows = (height - 1).div_ceil(SPACING) + 1;
-        let nodes = placed.as_ref().map_or(Vec::new(), |placed| {
-            map_rows(rows, |row| {
-                let v = (row * SPACING).min(height - 1);
-                let node = |column: usize| {
-                    plan.node(&placed.motion, ((column * SPACING).min(width - 1), v))
-                };
-                (0..columns).map(node).collect::<Vec<_>>()
-            })
-        });
-        let regions = placed.as_ref().map(|placed| {
-            let moved = |region: &Region| {
-                region.moved((width, height), |at| plan.moved(&placed.motion, at))
-            };
-            plan.regions.iter().map(moved).collect()
-        });
+        let (regions, nodes) = match plan.alignment {
+            Some(_) => (plan.regions.clone(), vec![Node::default(); columns * rows]),
+            None => Default::default(),
+        };
         Self {
-            placed,
+            placed: None,
             regions,
-            nodes: nodes.into_iter().flatten().collect(),
+            crossings: Vec::new(),
+            nodes,
             columns,
+        }
+    }
+
+    /// The part was found to lie so; none if it is taken to lie as taught.
+    pub fn place(&mut self, plan: &Production, placed: Option<Placed>) {
+        let (width, height) = plan.size();
+        // Of a plan that does not align, parts lie as taught.
+        self.placed = placed.filter(|_| plan.alignment.is_some());
+        if let Some(Placed { motion, .. }) = &self.placed {
+            for_each_row(&mut self.nodes, self.columns, |row, nodes| {
+                let v = (row * SPACING).min(height - 1);
+                for (column, node) in nodes.iter_mut().enumerate() {
+                    *node = plan.node(motion, ((column * SPACING).min(width - 1), v));
+                }
+            });
+            for (region, taught) in self.regions.iter_mut().zip(&plan.regions) {
+                let to = |at| plan.moved(motion, at);
+                region.become_moved(taught, (width, height), to, &mut self.crossings);
+            }
         }
     }
 
     /// A region of the plan, where it is now.
     pub fn region<'a>(&'a self, plan: &'a Production, at: usize) -> &'a Region {
-        self.regions
-            .as_ref()
-            .map_or(&plan.regions[at], |regions| &regions[at])
+        match self.placed {
+            Some(_) => &self.regions[at],
+            None => &plan.regions[at],
+        }
     }
 
     /// The nodes of row `v`.

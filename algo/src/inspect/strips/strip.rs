@@ -6,7 +6,7 @@ use super::spots::{Seen, Spots};
 use super::squares::{MAX_TAME, Squares};
 use super::stance::Stance;
 use super::{Light, Measure, Production};
-use crate::inspect::align::{Room, Sample};
+use crate::inspect::align::Sample;
 use crate::inspect::gauge::Sum;
 use crate::phase::{PhaseRow, Trust};
 use crate::pipeline::{
@@ -17,9 +17,9 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// A strip of rows, with room for all that it needs and what it found. Reused from cycle to cycle.
+/// A strip of rows, with room for all that it needs and what it found.
 #[derive(Debug)]
-pub struct Strip {
+pub(super) struct Strip {
     rows: Range<usize>,
     pub(super) width: usize,
     /// The row that is being worked on.
@@ -40,10 +40,8 @@ pub struct Strip {
     squares: Squares,
     /// Where the pixels of the row lie on the part as taught.
     spots: Spots,
-    /// Points that the part's motion is found from; in the first strip those of all in the end.
+    /// Points that the part's motion is found from.
     pub(super) samples: Vec<Sample>,
-    /// For finding the motion: the first strip's is used.
-    pub(super) room: Room,
     /// The last row with a rise that sums over squares may not hold.
     wild: Option<usize>,
     pub(super) found: Found,
@@ -59,6 +57,8 @@ pub(super) struct Found {
     pub exact: u64,
     /// Per gauge: pixels with a height.
     pub covered: Vec<u64>,
+    /// Per gauge: Σ of what its pixels' coins count.
+    pub coins: Vec<u64>,
     /// Per gauge: the square of largest deviation.
     pub extremes: Vec<Option<Extreme>>,
     /// Per patch: its cells.
@@ -88,10 +88,10 @@ impl Strip {
             squares: Squares::new(width + kept),
             spots: Spots::new(width),
             samples: Vec::new(),
-            room: Room::default(),
             wild: None,
             found: Found {
                 covered: vec![0; plan.gauges.len()],
+                coins: vec![0; plan.gauges.len()],
                 extremes: vec![None; plan.gauges.len()],
                 cells: plan
                     .patches
@@ -171,6 +171,7 @@ impl Strip {
         found.trusts = [0; TRUSTS];
         found.exact = 0;
         found.covered.fill(0);
+        found.coins.fill(0);
         for cells in &mut found.cells {
             cells.fill(Sum::default());
         }
@@ -301,10 +302,18 @@ impl Strip {
         let seen = &self.trust[plan.window[v].clone()];
         count_trusts(backend, seen, &mut found.trusts);
         let extent = &self.extents[v % self.kept];
-        for (at, (gauge, covered)) in plan.gauges.iter().zip(&mut found.covered).enumerate() {
-            if gauge.measure == Measure::Coverage {
-                for (_, columns) in stance.region(plan, at).row(v) {
-                    count_known(backend, &self.rise[common(columns, extent)], covered);
+        for (at, gauge) in plan.gauges.iter().enumerate() {
+            if gauge.measure != Measure::Coverage {
+                continue;
+            }
+            for (_, columns) in stance.region(plan, at).row(v) {
+                let span = common(columns, extent);
+                count_known(backend, &self.rise[span.clone()], &mut found.covered[at]);
+                let (rises, modulations) = (&self.rise[span.clone()], &self.modulation[span]);
+                for (&rise, &modulation) in rises.iter().zip(modulations) {
+                    if plan.threshold.unsure(modulation) && rise != NO_RISE {
+                        found.coins[at] += plan.threshold.coin(modulation);
+                    }
                 }
             }
         }

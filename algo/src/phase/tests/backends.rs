@@ -97,7 +97,7 @@ fn decode(decoder: &Decoder, samples: &[Vec<u16>], depth: u8, map: &[AbsolutePha
     let (last, coarser) = levels.split_last().unwrap();
     let mut arrived = decoder.arrived(WIDTH, HEIGHT);
     for (at, level) in coarser.iter().enumerate() {
-        for (v, row) in arrived.rows().into_iter().enumerate() {
+        for (v, row) in arrived.rows().enumerate() {
             decoder.arrive_row(at, level, v, row);
         }
         arrived.add_level();

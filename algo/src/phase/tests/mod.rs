@@ -44,7 +44,7 @@ fn wrap(decoder: &Decoder, depth: u8, rows: &[Vec<u16>]) -> Wrapped {
         })
         .collect();
     let mut arrived = Arrived::wrapping(width, 1, 1);
-    for (v, row) in arrived.rows().into_iter().enumerate() {
+    for (v, row) in arrived.rows().enumerate() {
         assert!(matches!(row, ArrivingRow::Wrapping { .. }));
         decoder.arrive_row(0, &frames, v, row);
     }
