@@ -22,7 +22,8 @@ pub struct Opened {
     pub calibration: Calibration,
     /// Where parts are placed in front of a simulated head.
     pub stage: Option<Stage>,
-    /// Why the stored calibration cannot be used. Then nothing must be measured, whatever else is known.
+    /// Why what is known of it cannot be trusted: it is nominal only, or the stored calibration cannot be used. Then nothing must be
+    /// measured.
     pub problem: Option<String>,
     /// Why the newest calibration could not be used and the one before is.
     pub fallback: Option<String>,
@@ -39,6 +40,7 @@ impl Opened {
                 self.head = stage
                     .reopen()
                     .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+                self.problem = None;
                 self.adopt(config);
             }
             None => {
@@ -61,15 +63,14 @@ impl Opened {
         }
     }
 
-    /// Goes by the stored calibration, where there is one.
+    /// Goes by the stored calibration, where there is one; else by what the back-end knows.
     fn adopt(&mut self, config: &HeadConfig) {
         self.fallback = None;
         self.problem = match stored(config) {
             // Of real devices nothing is known but this.
             Ok(None) => (config.backend == Backend::Rpi).then(|| devices::uncalibrated().message),
             Ok(Some((loaded, calibration))) => {
-                let before = self.calibration.clone();
-                let misfit = misfit(config, &before, &calibration);
+                let misfit = misfit(config, &self.calibration, &calibration);
                 if misfit.is_none() {
                     self.head.set_timing(loaded.file.timing(self.head.timing()));
                     self.calibration = calibration;

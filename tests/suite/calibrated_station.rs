@@ -8,10 +8,12 @@ use tests::program::Program;
 const CALIBRATION_VALID: u16 = 1 << 15;
 const OTHER_CALIBRATION: u16 = 3;
 const PASS: u16 = 1;
+const FAIL: u16 = 2;
 
 #[test]
 fn the_station_measures_by_the_stored_calibration_and_by_no_other() {
     let place = Place::new();
+    let program = Program::at(env!("CARGO_BIN_EXE_fringed-under-test"));
     let config = place.path("fringed.toml");
     let scenario = place.path("small.toml");
     let head = fs::read_to_string(&scenario).unwrap();
@@ -22,12 +24,7 @@ fn the_station_measures_by_the_stored_calibration_and_by_no_other() {
         fs::write(&scenario, format!("{head}{more}")).unwrap();
     };
     let calibrate = || {
-        let run = Program::at(env!("CARGO_BIN_EXE_fringed-under-test")).run(&[
-            "calibrate",
-            "--json",
-            "--config",
-            config.to_str().unwrap(),
-        ]);
+        let run = program.run(&["calibrate", "--json", "--config", config.to_str().unwrap()]);
         let report: serde_json::Value = serde_json::from_str(&run.succeeded().stdout).unwrap();
         report["calibration"]["fingerprint"]
             .as_str()
@@ -53,6 +50,25 @@ fn the_station_measures_by_the_stored_calibration_and_by_no_other() {
     light(1.8, 2);
     assert_eq!(calibrate(), first);
     passes(&Daemon::start(&place));
+    // A part that fails is kept, and judged again by the calibration of its recipe, which recordings do not hold.
+    let good = fs::read_to_string(&scenario).unwrap();
+    let dent = "[part]\nkind = \"sheet_metal\"\ndefects = [{ kind = \"dent\", x = 0.0, y = -8.0, depth_mm = 1.5, diameter_mm = 20.0 }]\n";
+    fs::write(&scenario, format!("{good}{dent}")).unwrap();
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    assert_eq!(plc.measure(8)[8], FAIL);
+    daemon.terminate();
+    let kept = fs::read_dir(place.path("state/recordings")).unwrap();
+    let kept: Vec<_> = kept.map(|entry| entry.unwrap().path()).collect();
+    assert_eq!(kept.len(), 1);
+    program
+        .run(&[
+            "replay",
+            kept[0].to_str().unwrap(),
+            "--config",
+            config.to_str().unwrap(),
+        ])
+        .succeeded();
     // Another projector: the recipe is refused with the reason.
     light(1.5, 2);
     let second = calibrate();

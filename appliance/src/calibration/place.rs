@@ -119,7 +119,10 @@ impl Place {
         // A second name for the same file where the file system can, so that the current one stands until it is replaced.
         fs::hard_link(&self.path, &second)
             .or_else(|_| fs::copy(&self.path, &second).map(|_| ()))?;
-        rename_whole(&second, &self.previous())
+        rename_whole(&second, &self.previous())?;
+        // Two names of one file are not renamed: a kill may have made it the previous one already.
+        let _ = fs::remove_file(&second);
+        Ok(())
     }
 
     /// Removes maps that no generation names, and what a kill has left. What cannot be removed only takes room.

@@ -141,6 +141,10 @@ impl Calibrate {
             models_from = file.models_from.clone();
             calibration.camera_model = stored.camera_model.clone();
             calibration.projector_model = stored.projector_model.clone();
+        } else if opened.problem.is_some() {
+            let words = "calibrate: the models of camera and projector are not known yet: import them with --camera and --projector, \
+                         or with --models";
+            return Err(Failure::new(Exit::Usage, words));
         }
         if models_from == OF_SCENARIO && opened.stage.is_none() {
             let message = "calibrate: the models of this head are not known: make them with OpenCV and name them with --camera and --projector";

@@ -2,6 +2,7 @@
 
 use super::Common;
 use crate::backend;
+use crate::calibration::place::Place;
 use crate::config::{Backend, Config, keys, table};
 use crate::error::{Exit, Failure};
 use hal::replay::Recording;
@@ -57,6 +58,11 @@ impl ConfigCommand {
 
 fn check_named_files(config: &Config) -> Result<(), Failure> {
     backend::built_for(config)?;
+    if let Some(calibration) = &config.head.calibration {
+        let wrong = |problem| Failure::new(Exit::Content, problem);
+        // It need not be there yet.
+        Place::at(calibration).load().map_err(wrong)?;
+    }
     match config.head.backend {
         Backend::Sim => drop(backend::scenario(config.head.scenario.as_deref())?),
         Backend::Replay => {

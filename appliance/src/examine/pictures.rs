@@ -10,6 +10,8 @@ use hal::projector::Raster;
 pub const SETTLE: u32 = 12;
 /// Patterns that are loaded at a time: a projector's memory holds a sequence, not 256 greys.
 const BATCH: usize = 8;
+/// A lost frame loses a picture: so often all of a batch are taken.
+const ATTEMPTS: u32 = 3;
 /// A pixel is lit if white is this share of full scale above black.
 const LIT: f64 = 0.05;
 
@@ -72,28 +74,26 @@ fn take(
         settle,
     };
     let showings: Vec<Showing> = (0..count).map(showing).collect();
-    let seen = head.watch(&showings, PATIENCE, &mut |frame| frame.clone())?;
-    for at in 0..count {
-        let inside = |start| {
+    for _ in 0..ATTEMPTS {
+        let seen = head.watch(&showings, PATIENCE, &mut |frame| frame.clone())?;
+        let picture = |at: usize| {
             let from = seen.flips.get(at)?.timestamp + refresh * settle;
             let until = seen.flips.get(at + 1).map(|next| next.timestamp);
-            let ends = until.is_none_or(|until| start + camera.exposure <= until);
-            (start >= from && ends).then_some(())
+            let inside =
+                |start| start >= from && until.is_none_or(|until| start + camera.exposure <= until);
+            seen.frames.iter().find(|frame| inside(frame.start))
         };
-        let frame = seen
-            .frames
-            .iter()
-            .find(|frame| inside(frame.start).is_some());
-        let frame = frame.ok_or_else(|| {
-            Error::timeout(
-                "taking a picture of a pattern",
-                PATIENCE,
-                "check the cables of camera and projector",
-            )
-        })?;
-        keep(counts(&frame.measured));
+        let taken: Option<Vec<_>> = (0..count).map(picture).collect();
+        if let Some(taken) = taken {
+            taken.iter().for_each(|frame| keep(counts(&frame.measured)));
+            return Ok(());
+        }
     }
-    Ok(())
+    Err(Error::timeout(
+        "taking a picture of a pattern",
+        PATIENCE,
+        "check the cables of camera and projector",
+    ))
 }
 
 /// The pixels that the projector lights, and what they see of black and white.

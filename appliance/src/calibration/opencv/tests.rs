@@ -381,7 +381,7 @@ fn what_is_broken_is_refused_with_the_node_and_the_remedy() {
         (XML.replace("</R>", "</S>"), &["no XML", "FileStorage"]),
         (
             JSON.replace("\"T\": {", "\"T\": {{"),
-            &["line 34", "no word"],
+            &["no word", "FileStorage"],
         ),
         (
             JSON.replacen("1451.8499999999999", ".Nan", 1),

@@ -104,7 +104,11 @@ fn yaml(text: &str) -> Result<Node, String> {
             Some(Open::List(all)) => all.push(done),
             Some(Open::Map(all, waiting)) => match (waiting.take(), done) {
                 (None, Node::Value(name)) => *waiting = Some(name),
-                (None, _) => return Err(format!("line {line}: a name that is no word")),
+                (None, _) => {
+                    return Err(format!(
+                        "line {line}: a name that is no word: write it with cv2.FileStorage"
+                    ));
+                }
                 (Some(name), done) => put(all, name, done, line)?,
             },
         }
