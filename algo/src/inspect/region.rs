@@ -9,8 +9,16 @@ use core::ops::Range;
 pub struct Region {
     /// Corners (u, v).
     corners: Vec<(f64, f64)>,
+    spans: Spans,
+}
+
+/// Spans of pixels from the top row down.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Spans {
     /// Row and columns.
-    spans: Vec<(usize, Range<usize>)>,
+    all: Vec<(usize, Range<usize>)>,
+    /// The first of each row of the frame, and the end.
+    firsts: Vec<usize>,
 }
 
 /// A polygon that encloses nothing.
@@ -68,8 +76,9 @@ impl Region {
         if let Some(corner) = corners.iter().position(bad) {
             return Err(RegionError::NotFinite { corner });
         }
-        let spans = polygon_spans(corners, width, height);
-        if spans.is_empty() {
+        let mut spans = Spans::default();
+        spans.fill(corners, (width, height), &mut Vec::new());
+        if spans.all.is_empty() {
             return Err(RegionError::Empty);
         }
         Ok(Self {
@@ -78,49 +87,50 @@ impl Region {
         })
     }
 
-    /// Becomes another region with its corners carried elsewhere; it may hold no pixel of the frame (width, height) then.
+    /// Becomes another region with its corners carried elsewhere; it may hold no pixel of the frame of this size (width, height) then.
     pub(super) fn become_moved(
         &mut self,
         other: &Self,
-        (width, height): (usize, usize),
+        size: (usize, usize),
         to: impl Fn((f64, f64)) -> (f64, f64),
         crossings: &mut Vec<f64>,
     ) {
         self.corners.clear();
         self.corners
             .extend(other.corners.iter().map(|&corner| to(corner)));
-        fill_spans(&self.corners, width, height, crossings, &mut self.spans);
+        self.spans.fill(&self.corners, size, crossings);
     }
 
     /// Number of pixels.
     pub fn len(&self) -> usize {
-        self.spans.iter().map(|(_, columns)| columns.len()).sum()
+        self.spans().iter().map(|(_, columns)| columns.len()).sum()
     }
 
     /// Whether there are no pixels: so it is with the default, for gauges that look at none, and where a region was moved out
     /// of the frame.
     pub fn is_empty(&self) -> bool {
-        self.spans.is_empty()
+        self.spans().is_empty()
     }
 
     /// The pixels as places in a row-major map of rows of `width`.
     pub fn places(&self, width: usize) -> impl Iterator<Item = usize> + '_ {
-        self.spans
+        self.spans()
             .iter()
             .flat_map(move |(row, columns)| row * width + columns.start..row * width + columns.end)
     }
 
     /// The rows and columns of the region's spans.
     pub fn spans(&self) -> &[(usize, Range<usize>)] {
-        &self.spans
+        &self.spans.all
     }
 
     /// The spans of one row.
     pub(super) fn row(&self, v: usize) -> &[(usize, Range<usize>)] {
-        // From the top row down.
-        let first = self.spans.partition_point(|(row, _)| *row < v);
-        let end = self.spans.partition_point(|(row, _)| *row <= v);
-        &self.spans[first..end]
+        let Spans { all, firsts } = &self.spans;
+        match firsts.get(v..v + 2) {
+            Some(&[first, end]) => &all[first..end],
+            _ => &[],
+        }
     }
 }
 
@@ -130,46 +140,51 @@ pub fn polygon_spans(
     width: usize,
     height: usize,
 ) -> Vec<(usize, Range<usize>)> {
-    let mut spans = Vec::new();
-    fill_spans(corners, width, height, &mut Vec::new(), &mut spans);
-    spans
+    let mut spans = Spans::default();
+    spans.fill(corners, (width, height), &mut Vec::new());
+    spans.all
 }
 
-/// As [`polygon_spans`], in place of what was in `spans`; `crossings` is room.
-fn fill_spans(
-    corners: &[(f64, f64)],
-    width: usize,
-    height: usize,
-    crossings: &mut Vec<f64>,
-    spans: &mut Vec<(usize, Range<usize>)>,
-) {
-    let (mut top, mut bottom) = (height as f64, 0.0_f64);
-    for (_, v) in corners {
-        (top, bottom) = (top.min(*v), bottom.max(*v));
-    }
-    spans.clear();
-    // A span per row, mostly, and room for a part that moves by some rows.
-    let rows = ((bottom - top).max(0.0) as usize).min(height) + 1;
-    if spans.capacity() < rows {
-        spans.reserve(rows + rows / 8);
-    }
-    for row in 0..height {
-        let v = row as f64;
-        crossings.clear();
-        for (at, &(u0, v0)) in corners.iter().enumerate() {
-            let (u1, v1) = corners[(at + 1) % corners.len()];
-            if (v0 <= v) != (v1 <= v) {
-                crossings.push(u0 + (u1 - u0) * ((v - v0) / (v1 - v0)));
+impl Spans {
+    /// Becomes those of a polygon in a frame (width, height); `crossings` is room.
+    fn fill(
+        &mut self,
+        corners: &[(f64, f64)],
+        (width, height): (usize, usize),
+        crossings: &mut Vec<f64>,
+    ) {
+        let (mut top, mut bottom) = (height as f64, 0.0_f64);
+        for (_, v) in corners {
+            (top, bottom) = (top.min(*v), bottom.max(*v));
+        }
+        let Self { all: spans, firsts } = self;
+        spans.clear();
+        firsts.clear();
+        // A span per row, mostly, and room for a part that moves by some rows.
+        let rows = ((bottom - top).max(0.0) as usize).min(height) + 1;
+        if spans.capacity() < rows {
+            spans.reserve(rows + rows / 8);
+        }
+        for row in 0..height {
+            firsts.push(spans.len());
+            let v = row as f64;
+            crossings.clear();
+            for (at, &(u0, v0)) in corners.iter().enumerate() {
+                let (u1, v1) = corners[(at + 1) % corners.len()];
+                if (v0 <= v) != (v1 <= v) {
+                    crossings.push(u0 + (u1 - u0) * ((v - v0) / (v1 - v0)));
+                }
+            }
+            crossings.sort_unstable_by(f64::total_cmp);
+            for pair in crossings.chunks_exact(2) {
+                let column = |u: f64| libm::ceil(u).clamp(0.0, width as f64) as usize;
+                let (start, end) = (column(pair[0]), column(pair[1]));
+                if start < end {
+                    spans.push((row, start..end));
+                }
             }
         }
-        crossings.sort_unstable_by(f64::total_cmp);
-        for pair in crossings.chunks_exact(2) {
-            let column = |u: f64| libm::ceil(u).clamp(0.0, width as f64) as usize;
-            let (start, end) = (column(pair[0]), column(pair[1]));
-            if start < end {
-                spans.push((row, start..end));
-            }
-        }
+        firsts.push(spans.len());
     }
 }
 

@@ -1,6 +1,8 @@
 //! How uncertain a coverage is: pixels whose modulation lies within its noise of the trusted minimum are coins.
 
 use crate::phase::Decoder;
+use crate::pipeline::NO_RISE;
+use crate::simd::{Lanes, back_end_entry};
 use crate::units::Modulation;
 use core::f64::consts::PI;
 
@@ -27,24 +29,61 @@ impl Threshold {
         Self {
             least,
             sigma,
-            // A modulation is below full scale, and not a number is no noise.
+            // Not a number is no noise.
             sure: (least + SURE * sigma) as u16,
         }
     }
 
-    /// Whether a resolved pixel could as well not be.
+    /// Whether a resolved pixel could as well not be. Others have no modulation.
     #[inline(always)]
-    pub fn unsure(&self, modulation: Modulation) -> bool {
-        modulation.to_bits() < self.sure
+    fn unsure(&self, modulation: Modulation) -> bool {
+        modulation.to_bits().wrapping_sub(1) < self.sure
     }
 
     /// The variance of the number of resolved pixels that one resolved pixel stands for. Of p(1 − p), p = Φ(x), only x is
     /// known, with an error of its own: so it is taken about x with √2 σ, as that of
     /// [`share_outside`](crate::inspect::gauge::share_outside), and twice, for the pixel as far below the minimum of which
     /// nothing is kept.
-    pub fn coin(&self, modulation: Modulation) -> u64 {
+    fn coin(&self, modulation: Modulation) -> u64 {
         let x = (f64::from(modulation.to_bits()) - self.least) / self.sigma;
         libm::rint(ONE * libm::exp(-x * x / 4.0) / PI) as u64
+    }
+}
+
+/// Pixels that are looked at together: mostly there is no coin among them.
+const BLOCK: usize = 64;
+
+back_end_entry! {
+    /// Adds what the coins of a row count.
+    fn add_coins [] = coins(
+        threshold: &Threshold,
+        rises: &[i32],
+        modulations: &[Modulation],
+        sum: &mut u64,
+    )
+}
+
+#[inline(always)]
+fn coins<V: Lanes>(
+    _: V,
+    threshold: &Threshold,
+    rises: &[i32],
+    modulations: &[Modulation],
+    sum: &mut u64,
+) {
+    for (rises, modulations) in rises.chunks(BLOCK).zip(modulations.chunks(BLOCK)) {
+        let mut unsure = false;
+        for &modulation in modulations {
+            unsure |= threshold.unsure(modulation);
+        }
+        if !unsure {
+            continue;
+        }
+        for (&rise, &modulation) in rises.iter().zip(modulations) {
+            if rise != NO_RISE && threshold.unsure(modulation) {
+                *sum += threshold.coin(modulation);
+            }
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! One strip of rows: its buffers, and the walk down its rows.
 
+use super::coins::add_coins;
 use super::columns::{TRUSTS, count_known, count_trusts, slide};
 use super::extreme::{Extreme, SquareRow};
 use super::spots::{Seen, Spots};
@@ -308,13 +309,10 @@ impl Strip {
             }
             for (_, columns) in stance.region(plan, at).row(v) {
                 let span = common(columns, extent);
-                count_known(backend, &self.rise[span.clone()], &mut found.covered[at]);
                 let (rises, modulations) = (&self.rise[span.clone()], &self.modulation[span]);
-                for (&rise, &modulation) in rises.iter().zip(modulations) {
-                    if plan.threshold.unsure(modulation) && rise != NO_RISE {
-                        found.coins[at] += plan.threshold.coin(modulation);
-                    }
-                }
+                count_known(backend, rises, &mut found.covered[at]);
+                let coins = &mut found.coins[at];
+                add_coins(backend, &plan.threshold, rises, modulations, coins);
             }
         }
         let place = v % self.kept * self.width;
