@@ -145,3 +145,22 @@ impl<P: Projector + ?Sized> Projector for Box<P> {
         (**self).blank()
     }
 }
+
+/// Checks that a projector of this size (width, height) can show all of these.
+///
+/// # Errors
+/// Naming the first that it cannot.
+pub(crate) fn all_of_size(rasters: &[Raster], (width, height): (u32, u32)) -> Result<(), Error> {
+    let wrong = |raster: &&Raster| (raster.width(), raster.height()) != (width, height);
+    let Some((index, raster)) = rasters.iter().enumerate().find(|(_, raster)| wrong(raster)) else {
+        return Ok(());
+    };
+    Err(Error::unsupported(
+        format!(
+            "loading raster {index} of {}×{}",
+            raster.width(),
+            raster.height()
+        ),
+        format!("make it {width}×{height}, the projector's size"),
+    ))
+}

@@ -23,7 +23,7 @@ use rustix::event::{PollFd, PollFlags, poll};
 
 use crate::clock::{monotonic, timespec};
 use crate::error::Error;
-use crate::projector::{Flip, Projector, Raster};
+use crate::projector::{Flip, Projector, Raster, all_of_size};
 use crate::setup::ProjectorSetup;
 use crate::units::Timestamp;
 use canvas::Canvas;
@@ -203,19 +203,8 @@ impl Projector for Display {
 
     /// Waits until black is shown, at most a few refreshes: nothing is drawn that is in view.
     fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
-        let (width, height) = self.size();
-        for (index, raster) in rasters.iter().enumerate() {
-            if (raster.width(), raster.height()) != (width, height) {
-                return Err(Error::unsupported(
-                    format!(
-                        "loading raster {index} of {}×{}",
-                        raster.width(),
-                        raster.height()
-                    ),
-                    format!("make it {width}×{height}, the projector's size"),
-                ));
-            }
-        }
+        let size = self.size();
+        all_of_size(&rasters, size)?;
         self.blank()?;
         self.settle()?;
         self.loaded = 0;
@@ -228,7 +217,7 @@ impl Projector for Display {
         }
         for (index, raster) in rasters.iter().enumerate() {
             if index == self.canvases.len() {
-                self.canvases.push(Canvas::new(card, (width, height))?);
+                self.canvases.push(Canvas::new(card, size)?);
             }
             self.canvases[index].draw(card, raster)?;
         }

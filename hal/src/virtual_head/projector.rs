@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::faults::Kind;
 use super::{Bench, Device, Scene, lock};
 use crate::error::Error;
-use crate::projector::{Flip, Projector, Raster};
+use crate::projector::{Flip, Projector, Raster, all_of_size};
 use crate::units::Timestamp;
 
 /// What the projector is about to do.
@@ -104,19 +104,7 @@ impl<S: Scene> Projector for Device<S> {
 
     fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
         let mut bench = self.as_projector("loading patterns")?;
-        let (width, height) = bench.scene.projector_size();
-        for (index, raster) in rasters.iter().enumerate() {
-            if (raster.width(), raster.height()) != (width, height) {
-                return Err(Error::unsupported(
-                    format!(
-                        "loading raster {index} of {}×{}",
-                        raster.width(),
-                        raster.height()
-                    ),
-                    format!("make it {width}×{height}, the projector's size"),
-                ));
-            }
-        }
+        all_of_size(&rasters, bench.scene.projector_size())?;
         bench.blank();
         bench.scene.load(rasters)
     }
