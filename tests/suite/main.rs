@@ -16,6 +16,7 @@ mod gauges;
 mod history;
 mod hostile;
 mod house;
+mod licences;
 mod measured;
 mod outputs;
 mod page;
