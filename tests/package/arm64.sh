@@ -1,32 +1,29 @@
 #!/usr/bin/env bash
-# Makes the package for arm64, unpacks it, and runs its binary under qemu: its version, and a recording measured.
+# Makes the package for a Raspberry Pi, unpacks it, and runs its binary under qemu: its version, and a recording measured.
 #
-#     tests/package/arm64.sh DIR OUT [BINARY [LIBRARIES]]
-#
-# DIR as tests/aarch64/toolchain.sh made it. Without BINARY it is built here, with the devices that need no library; one that
-# needs some is run with those in LIBRARIES.
+#     tests/package/arm64.sh DIR OUT      DIR as tests/aarch64/toolchain.sh and libcamera.sh made it
 set -euo pipefail
 shopt -s inherit_errexit
-usage='usage: arm64.sh DIR OUT [BINARY [LIBRARIES]]'
+usage='usage: arm64.sh DIR OUT'
 dir=$(cd "${1:?$usage}" && pwd)
 mkdir -p "${2:?$usage}"
 out=$(cd "$2" && pwd)
-binary=${3:-$dir/build/aarch64-unknown-linux-gnu/release/fringed}
-libraries=${4:-}
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
-if [[ -z ${3:-} ]]; then
-    CC_aarch64_unknown_linux_gnu=$dir/bin/cc AR_aarch64_unknown_linux_gnu=$dir/bin/ar \
-        "$dir/bin/cargo" build --release -p appliance --features kms,gpio
-fi
-package=$(PATH=$PATH:$dir/root/usr/bin LD_LIBRARY_PATH=$dir/root/usr/lib/x86_64-linux-gnu debian/make "$binary" "$out")
+"$dir/bin/cargo-rpi" build --release -p appliance --features rpi
+package=$(PATH=$PATH:$dir/root/usr/bin LD_LIBRARY_PATH=$dir/root/usr/lib/x86_64-linux-gnu \
+    debian/make "$dir/build/aarch64-unknown-linux-gnu/release/fringed" "$out")
 tests/package/check.sh "$package"
-[[ $(dpkg-deb --field "$package" Architecture) == arm64 ]]
+depends=$(dpkg-deb --field "$package" Depends)
+if [[ $depends != *libcamera0.* ]]; then
+    echo "the package for a Raspberry Pi does not ask for libcamera: $depends" >&2
+    exit 1
+fi
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 dpkg-deb --extract "$package" "$work/root"
-fringed=("$dir/bin/qemu-aarch64" ${libraries:+-E "LD_LIBRARY_PATH=$libraries"} "$work/root/usr/bin/fringed")
+fringed=("$dir/bin/qemu-rpi" "$work/root/usr/bin/fringed")
 "${fringed[@]}" --version
 "${fringed[@]}" config check "$work/root/etc/fringed/fringed.toml"
 printf '[rig.camera]\nwidth = 128\nheight = 128\n' >"$work/scenario.toml"

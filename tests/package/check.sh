@@ -30,7 +30,12 @@ stray=$(cd "$work" && find . -type f -not -path './DEBIAN/*' -not -path './usr/b
 [[ -z $stray ]] || broken "nobody asked for $stray"
 
 [[ $(cat "$work/DEBIAN/conffiles") == /etc/fringed/fringed.toml ]] || broken "the configuration is not a file of the user's"
-cmp -s debian/fringed.toml "$work/etc/fringed/fringed.toml" || broken "the configuration is not the one of this source"
+case $(dpkg-deb --field "$package" Architecture) in
+amd64) configuration=debian/fringed.toml ;;
+arm64) configuration=docs/fringed.toml ;;
+esac
+cmp -s "$configuration" "$work/etc/fringed/fringed.toml" || broken "the configuration is not $configuration"
+grep -q '^writers = \["127.0.0.0/8"[^.]*\]' "$work/etc/fringed/fringed.toml" || broken "others than this machine may trigger"
 for step in 'postinst deb-systemd-helper enable' 'postinst systemd-sysusers' 'postinst systemd-tmpfiles' 'prerm deb-systemd-invoke stop' \
     'postrm rm -rf /var/lib/fringed'; do
     grep -q -- "${step#* }" "$work/DEBIAN/${step%% *}" || broken "${step%% *} has no ${step#* }"
