@@ -25,6 +25,7 @@ mod teach;
 
 use crate::config::{Config, HeadConfig};
 use crate::error::{Exit, Failure};
+use crate::journal::{self, Severity};
 use crate::modbus::{registers_csv, registers_json};
 use crate::progress::Progress;
 use clap::{Parser, Subcommand};
@@ -122,7 +123,7 @@ pub fn main() -> ExitCode {
     match run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("fringed: {failure}");
+            journal::write(Severity::Error, &failure.to_string());
             failure.exit.into()
         }
     }

@@ -27,6 +27,7 @@ mod production;
 mod promises_own;
 mod promises_shared;
 mod recovery;
+mod service;
 mod station;
 mod station_plc;
 mod stress;
