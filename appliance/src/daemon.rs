@@ -418,7 +418,7 @@ fn effects(
             Effect::Abort { job } => aborts.abort(job),
             Effect::Publish(result) => {
                 tally.add(result.verdict);
-                history.record(result);
+                history.record(&result);
             }
         }
         None
