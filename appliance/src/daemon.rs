@@ -3,8 +3,11 @@
 //! One OS thread measures ([`crate::worker`]), one serves sockets on a current-thread runtime, and
 //! the station is plain values behind a handle that both use.
 
+mod caller;
+mod settling;
 mod stopping;
 
+pub use caller::Caller;
 use stopping::Stopping;
 
 use crate::access::Access;
@@ -13,18 +16,15 @@ use crate::error::{Exit, Failure};
 use crate::history::{self, Bounds, History, Numbering, Reader};
 use crate::journal::{self, Severity};
 use crate::latest::LastMaps;
-use crate::notify::Notify;
 use crate::progress::Progress;
 use crate::shelf::Shelf;
 use crate::state::{StateFolder, random};
-use crate::station::snapshot::status;
 use crate::station::{
-    Effect, Event, Identity, Limits, Micros, RecipeKey, RecipeResult, Request, Settings, Snapshot,
-    Station, StationHandle, tick,
+    Effect, Event, Identity, Limits, Micros, RecipeKey, Request, Settings, Station, StationHandle,
+    tick,
 };
 use crate::survey::Survey;
 use crate::tally::Tally;
-use crate::told::Told;
 use crate::worker::opening::Opening;
 use crate::worker::{Aborts, Order, Worker};
 use crate::{backend, clock, lines, modbus, socket, web};
@@ -37,15 +37,6 @@ use std::time::Instant;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
-
-/// Who started the daemon; by default nobody who listens or ends it.
-#[derive(Clone, Debug, Default)]
-pub struct Caller {
-    /// The service manager.
-    pub notify: Notify,
-    /// Whether the end was asked for.
-    pub told: Told,
-}
 
 /// Time between two looks at whether a start is to be given up.
 const LOOKING: std::time::Duration = std::time::Duration::from_millis(20);
@@ -245,49 +236,6 @@ impl Daemon {
                 stopping.stop();
                 Err(failure)
             }
-        }
-    }
-
-    /// Waits until the station is READY, or says why it will not be.
-    ///
-    /// # Errors
-    /// The station's fault, or that its recipe could be neither loaded nor taught.
-    pub fn wait_until_ready(&self) -> Result<Arc<Snapshot>, Failure> {
-        runtime()?.block_on(self.settled())
-    }
-
-    /// The same, for those who wait for something else as well.
-    ///
-    /// # Errors
-    /// As [`Daemon::wait_until_ready`].
-    pub async fn settled(&self) -> Result<Arc<Snapshot>, Failure> {
-        if !self.awaited {
-            let message =
-                "there is no recipe yet: load or teach one, or import it with `fringed teach`";
-            return Err(Failure::new(Exit::Unavailable, message));
-        }
-        let mut snapshots = self.station.subscribe();
-        let refused = |snapshot: &Snapshot| snapshot.recipe_result != RecipeResult::Ok;
-        let settled = |snapshot: &Arc<Snapshot>| {
-            let broken = snapshot.fault.is_some() || snapshot.error.is_some();
-            snapshot.is(status::READY) || broken || refused(snapshot)
-        };
-        let snapshot = snapshots.wait_for(settled).await.map(|found| found.clone());
-        let snapshot = snapshot
-            .map_err(|_| Failure::new(Exit::Software, "the station ended before it was ready"))?;
-        match (&snapshot.fault, &snapshot.error) {
-            (Some(fault), _) => {
-                let message = format!("{}: {}", fault.cause, fault.remedy);
-                Err(Failure::new(Exit::Unavailable, message))
-            }
-            (None, Some(error)) if !snapshot.is(status::READY) => {
-                Err(Failure::new(Exit::Unavailable, error.to_string()))
-            }
-            (None, None) if refused(&snapshot) => {
-                let message = "the recipe was not loaded: load another, or teach it again";
-                Err(Failure::new(Exit::Content, message))
-            }
-            _ => Ok(snapshot),
         }
     }
 
