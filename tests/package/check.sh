@@ -44,7 +44,8 @@ done
 binary=$work/usr/bin/fringed
 size=$(stat --format %s "$binary")
 ((size <= largest)) || broken "the binary has $size bytes, more than $largest"
-readelf --section-headers --wide "$binary" | grep -q '\.symtab\|\.debug_info' && broken "the binary is not stripped"
+sections=$(readelf --section-headers --wide "$binary")
+[[ $sections != *.symtab* && $sections != *.debug_info* ]] || broken "the binary is not stripped"
 depends=$(dpkg-deb --field "$package" Depends)
 [[ $depends == *'libc6 (>= 2.'* ]] || broken "it depends on $depends, on no C library"
 loads=$(readelf --dynamic --wide "$binary" | sed -n 's/.*(NEEDED).*\[libcamera\.so\.\(.*\)\]/libcamera\1/p')
