@@ -44,7 +44,7 @@ const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
 /// Longest wait for one flip, one pulse or one frame.
 const DEVICE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Error codes of the worker; the README has the table.
+/// Error codes of the worker; `docs/operations.md` has the table.
 mod code {
     pub const CAMERA_LOST: u16 = 101;
     pub const UNSUPPORTED: u16 = 102;

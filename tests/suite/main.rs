@@ -13,6 +13,7 @@ mod experiment;
 mod formats;
 mod fuzz;
 mod gauges;
+mod guide;
 mod history;
 mod hostile;
 mod house;
