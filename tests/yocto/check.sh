@@ -127,6 +127,8 @@ broken parse $recipe 's/"rev-parse", "--verify", "HEAD"/"hash-object", "README.m
 broken lint $recipe 's/^SYSTEMD_SERVICE:/SYSTEMD_SERVICE_/'
 broken lint $recipe '/^SUMMARY/d'
 broken lint $recipe 's/^LICENSE = /LICENCE = /'
+broken parse $recipe '/^export FRINGED_COMMIT/d'
+broken parse 'yocto/meta-fringed/recipes-core/systemd/systemd_%.bbappend' 's/ vconsole//'
 image=$recipes/image/fringed-image.bb
 broken parse $image 's/"read-only-rootfs /&ssh-server-dropbear /'
 broken parse $image '/^    rauc-mark-good /d'
