@@ -42,7 +42,7 @@ apt() { APT_CONFIG=$dir/apt/apt.conf apt-get -qq "$@"; }
 # A source that does not answer need not be the one with these packages.
 apt update || true
 # Debian's newest Rust; apt finds the names that carry its version. The dynamic qemu, because only it takes plugins.
-apt install --download-only --yes --no-install-recommends gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user rustc-web ||
+apt install --download-only --yes --no-install-recommends g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user rustc-web ||
     unavailable "apt cannot download the packages (the reason stands above)"
 # The target's library alone: its dependencies are the target's compiler.
 (cd "$dir/apt/archives" && apt download libstd-rust-web-dev:arm64) || unavailable "apt cannot download Rust's library"
@@ -70,6 +70,7 @@ END
 wrapper rustc "$dir/root/usr/bin/rustc"
 wrapper rustdoc "$dir/root/usr/bin/rustdoc"
 wrapper cc aarch64-linux-gnu-gcc
+wrapper c++ aarch64-linux-gnu-g++
 wrapper ar aarch64-linux-gnu-ar
 libc=$(realpath "$("$dir/bin/cc" -print-file-name=libc.so.6)") || unavailable "the C compiler does not run"
 wrapper qemu-aarch64 qemu-aarch64 -U LD_LIBRARY_PATH -L "${libc%/lib/*}"
