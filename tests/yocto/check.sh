@@ -71,7 +71,7 @@ broken() {
     mkdir -p "$copy"/{appliance,docs}
     cp -r "$workspace"/{yocto,systemd,Cargo.lock,Cargo.toml,LICENSE-MIT,LICENSE-APACHE,README.md} "$copy"
     cp "$workspace/appliance/Cargo.toml" "$copy/appliance"
-    cp "$workspace"/docs/{hardware.md,fringed.toml} "$copy/docs"
+    cp "$workspace"/docs/{hardware.md,fringed.toml,licences.txt} "$copy/docs"
     git -C "$copy" init --quiet
     git -C "$copy" -c user.name=check -c user.email=check@localhost commit --quiet --allow-empty --message copy
     if [[ -n $file ]]; then
