@@ -46,8 +46,11 @@ units() {
     printf '[Service]\nType=notify\nStateDirectory=fringed\nExecStart=/bin/true\n' >"$to/fringed.service"
     cp "$from/system/files/fringed-service.conf" "$to/fringed.service.d/20-image.conf"
     cp "$from/system/files/networkd.conf" "$to/systemd-networkd.service.d/20-data.conf"
+    mkdir "$to/systemd-networkd-wait-online.service.d"
+    cp "$from/system/files/wait-online.conf" "$to/systemd-networkd-wait-online.service.d/20-timeout.conf"
     cp "$from/system/files/boot-complete.conf" "$to/boot-complete.target.d/20-fringed.conf"
-    SYSTEMD_UNIT_PATH=$to: systemd-analyze verify "$to"/*.mount "$to/fringed.service" boot-complete.target
+    SYSTEMD_UNIT_PATH=$to: systemd-analyze verify "$to"/*.mount "$to/fringed.service" boot-complete.target \
+        systemd-networkd-wait-online.service systemd-networkd.service
 }
 
 echo "crates, recipes, machines, slots"
@@ -149,6 +152,14 @@ broken parse systemd/fringed.service 's/^Type=notify/Type=simple/'
 broken parse yocto/meta-fringed/recipes-kernel/linux/files/fringed.cfg 's/^CONFIG_GPIO_CDEV_V1=y/# &/'
 broken parse yocto/meta-fringed/conf/distro/fringed-appliance.conf '/^INIT_MANAGER/d'
 broken parse yocto/meta-fringed/conf/distro/fringed-appliance.conf 's/create-spdx/create-sbom/'
+
+# A unit, and what is added to one.
+if command -v systemd-analyze >/dev/null; then
+    broken units "" ""
+    broken units $recipes/system/files/data.mount 's/^Where=.*/Where=\/dat/'
+    broken units $recipes/system/files/wait-online.conf 's/^ExecStart=.usr.*/ExecStart=bin\/wait/'
+    broken units $recipes/system/files/boot-complete.conf 's/^Requires=fringed/Requires=fring_/'
+fi
 
 # The choice of the slot.
 broken slots $recipes/slots/files/boot-slot 's/set-primary)/set-primry)/'
