@@ -46,8 +46,11 @@ units() {
     printf '[Service]\nType=notify\nStateDirectory=fringed\nExecStart=/bin/true\n' >"$to/fringed.service"
     cp "$from/system/files/fringed-service.conf" "$to/fringed.service.d/20-image.conf"
     cp "$from/system/files/networkd.conf" "$to/systemd-networkd.service.d/20-data.conf"
+    mkdir "$to/systemd-networkd-wait-online.service.d"
+    cp "$from/system/files/wait-online.conf" "$to/systemd-networkd-wait-online.service.d/20-timeout.conf"
     cp "$from/system/files/boot-complete.conf" "$to/boot-complete.target.d/20-fringed.conf"
-    SYSTEMD_UNIT_PATH=$to: systemd-analyze verify "$to"/*.mount "$to/fringed.service" boot-complete.target
+    SYSTEMD_UNIT_PATH=$to: systemd-analyze verify "$to"/*.mount "$to/fringed.service" boot-complete.target \
+        systemd-networkd-wait-online.service systemd-networkd.service
 }
 
 echo "crates, recipes, machines, slots"
@@ -71,7 +74,7 @@ broken() {
     mkdir -p "$copy"/{appliance,docs}
     cp -r "$workspace"/{yocto,systemd,Cargo.lock,Cargo.toml,LICENSE-MIT,LICENSE-APACHE,README.md} "$copy"
     cp "$workspace/appliance/Cargo.toml" "$copy/appliance"
-    cp "$workspace"/docs/{hardware.md,fringed.toml} "$copy/docs"
+    cp "$workspace"/docs/{hardware.md,fringed.toml,licences.txt} "$copy/docs"
     git -C "$copy" init --quiet
     git -C "$copy" -c user.name=check -c user.email=check@localhost commit --quiet --allow-empty --message copy
     if [[ -n $file ]]; then
@@ -127,6 +130,8 @@ broken parse $recipe 's/"rev-parse", "--verify", "HEAD"/"hash-object", "README.m
 broken lint $recipe 's/^SYSTEMD_SERVICE:/SYSTEMD_SERVICE_/'
 broken lint $recipe '/^SUMMARY/d'
 broken lint $recipe 's/^LICENSE = /LICENCE = /'
+broken parse $recipe '/^export FRINGED_COMMIT/d'
+broken parse 'yocto/meta-fringed/recipes-core/systemd/systemd_%.bbappend' 's/ vconsole//'
 image=$recipes/image/fringed-image.bb
 broken parse $image 's/"read-only-rootfs /&ssh-server-dropbear /'
 broken parse $image '/^    rauc-mark-good /d'
@@ -147,6 +152,14 @@ broken parse systemd/fringed.service 's/^Type=notify/Type=simple/'
 broken parse yocto/meta-fringed/recipes-kernel/linux/files/fringed.cfg 's/^CONFIG_GPIO_CDEV_V1=y/# &/'
 broken parse yocto/meta-fringed/conf/distro/fringed-appliance.conf '/^INIT_MANAGER/d'
 broken parse yocto/meta-fringed/conf/distro/fringed-appliance.conf 's/create-spdx/create-sbom/'
+
+# A unit, and what is added to one.
+if command -v systemd-analyze >/dev/null; then
+    broken units "" ""
+    broken units $recipes/system/files/data.mount 's/^Where=.*/Where=\/dat/'
+    broken units $recipes/system/files/wait-online.conf 's/^ExecStart=.usr.*/ExecStart=bin\/wait/'
+    broken units $recipes/system/files/boot-complete.conf 's/^Requires=fringed/Requires=fring_/'
+fi
 
 # The choice of the slot.
 broken slots $recipes/slots/files/boot-slot 's/set-primary)/set-primry)/'

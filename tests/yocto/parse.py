@@ -8,6 +8,7 @@ parsed and says what it should, not that it builds.
 """
 
 import json
+import logging
 import os
 import sys
 import types
@@ -78,7 +79,11 @@ class Layer:
 def main() -> None:
     """The command line."""
     workspace, folder, configuration = map(Path, sys.argv[1:])
-    layer = Layer(workspace.resolve(), folder.resolve(), json.loads(configuration.read_text()))
+    logging.basicConfig(level=logging.WARNING, format="%(message)s")
+    try:
+        layer = Layer(workspace.resolve(), folder.resolve(), json.loads(configuration.read_text()))
+    except (bb.BBHandledException, bb.parse.ParseError, bb.data_smart.ExpansionError, SyntaxError) as error:
+        sys.exit(f"BitBake does not parse the layer: {error}")
     broken = 0
     for promise in promises.ALL:
         for message in promise(layer):

@@ -65,6 +65,8 @@ def source_is_the_checked_out_commit(layer):
     revision = layer.text("fringed", "SRCREV")
     if (paths, revision) != ([str(layer.workspace)], head):
         yield f"{paths} at {revision} instead of {layer.workspace} at {head}"
+    if layer.text("fringed", "FRINGED_COMMIT") != head[:12]:
+        yield f"--version says {layer.text('fringed', 'FRINGED_COMMIT')}"
 
 
 def licence_texts_are_those_of_the_workspace(layer):
@@ -146,6 +148,8 @@ def the_image_has_what_it_needs(layer):
     units = ["getty.target", "serial-getty@.service", "getty@.service", "debug-shell.service", "emergency.service", "rescue.service"]
     yield from missing(units, layer.text("fringed-image", "fringed_no_logins"))
     yield from missing(["fringed_no_logins"], layer.words("fringed-image", "ROOTFS_POSTPROCESS_COMMAND"))
+    if layer.words("systemd", "PACKAGECONFIG") != ["logind", "networkd", "timesyncd"]:
+        yield f"systemd comes with {layer.text('systemd', 'PACKAGECONFIG')}"
     yield from missing(["ext4", "wic.xz"], layer.words("fringed-image", "IMAGE_FSTYPES"))
 
 

@@ -25,6 +25,9 @@ PACKAGECONFIG[rpi] = "--features rpi,,clang-native libcamera,libcamera"
 
 CARGO_BUILD_FLAGS += "--package appliance --bin fringed"
 
+# What --version says.
+export FRINGED_COMMIT = "${@d.getVar('SRCREV')[:12]}"
+
 # bindgen, which makes the bindings of libcamera, reads the headers with clang, for the target.
 export LIBCLANG_PATH = "${STAGING_LIBDIR_NATIVE}"
 export BINDGEN_EXTRA_CLANG_ARGS = "--sysroot=${STAGING_DIR_HOST} --target=${TARGET_SYS}"
@@ -36,7 +39,7 @@ do_install() {
     install -D -m 0644 ${S}/systemd/fringed.tmpfiles ${D}${nonarch_libdir}/tmpfiles.d/fringed.conf
     install -D -m 0644 ${S}/systemd/60-fringed.rules ${D}${nonarch_base_libdir}/udev/rules.d/60-fringed.rules
     install -D -m 0644 ${S}/docs/fringed.toml ${D}${sysconfdir}/fringed/fringed.toml
-    install -D -m 0644 ${S}/README.md ${D}${docdir}/fringed/README.md
+    install -D -m 0644 ${S}/docs/licences.txt ${D}${datadir}/fringed/licences.txt
     install -d -m 0750 -o fringed -g fringed ${D}${localstatedir}/lib/fringed
 }
 # The configuration is that of a Pi 5; the lines of a Pi 4 are on another chip.

@@ -16,6 +16,7 @@ SRC_URI = "\
     file://journald.conf \
     file://networkd.conf \
     file://var-lib-fringed.mount \
+    file://wait-online.conf \
     file://watchdog.conf \
 "
 S = "${UNPACKDIR}"
@@ -39,6 +40,7 @@ do_install() {
     install -D -m 0644 ${S}/var-lib-fringed.mount $units/var-lib-fringed.mount
     install -D -m 0644 ${S}/fringed-service.conf $units/fringed.service.d/20-image.conf
     install -D -m 0644 ${S}/networkd.conf $units/systemd-networkd.service.d/20-data.conf
+    install -D -m 0644 ${S}/wait-online.conf $units/systemd-networkd-wait-online.service.d/20-timeout.conf
     install -D -m 0644 ${S}/boot-complete.conf $units/boot-complete.target.d/20-fringed.conf
     install -D -m 0644 ${S}/journald.conf $manager/journald.conf.d/20-fringed.conf
     install -D -m 0644 ${S}/watchdog.conf $manager/system.conf.d/20-fringed.conf
