@@ -25,6 +25,7 @@ mod teach;
 
 use crate::config::{Config, HeadConfig};
 use crate::error::{Exit, Failure};
+use crate::journal::{self, Severity};
 use crate::modbus::{registers_csv, registers_json};
 use crate::progress::Progress;
 use clap::{Parser, Subcommand};
@@ -34,7 +35,7 @@ use std::process::ExitCode;
 
 /// The open 3-D smart sensor.
 #[derive(Debug, Parser)]
-#[command(name = "fringed", version, about)]
+#[command(name = "fringed", version = env!("FRINGED_VERSION"), about)]
 struct Arguments {
     /// What to do; without a command: serve.
     #[command(subcommand)]
@@ -122,7 +123,7 @@ pub fn main() -> ExitCode {
     match run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("fringed: {failure}");
+            journal::write(Severity::Error, &failure.to_string());
             failure.exit.into()
         }
     }

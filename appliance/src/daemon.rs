@@ -3,35 +3,43 @@
 //! One OS thread measures ([`crate::worker`]), one serves sockets on a current-thread runtime, and
 //! the station is plain values behind a handle that both use.
 
+mod caller;
+mod settling;
 mod stopping;
 
+pub use caller::Caller;
 use stopping::Stopping;
 
 use crate::access::Access;
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
 use crate::history::{self, Bounds, History, Numbering, Reader};
+use crate::journal::{self, Severity};
 use crate::latest::LastMaps;
 use crate::progress::Progress;
 use crate::shelf::Shelf;
 use crate::state::{StateFolder, random};
-use crate::station::snapshot::status;
 use crate::station::{
-    Effect, Event, Identity, Limits, Micros, RecipeKey, RecipeResult, Request, Settings, Snapshot,
-    Station, StationHandle, tick,
+    Effect, Event, Identity, Limits, Micros, RecipeKey, Request, Settings, Station, StationHandle,
+    tick,
 };
 use crate::survey::Survey;
 use crate::tally::Tally;
+use crate::worker::opening::Opening;
 use crate::worker::{Aborts, Order, Worker};
 use crate::{backend, clock, lines, modbus, socket, web};
 use hal::sim::Stage;
 use std::net::SocketAddr;
+use std::path::Path;
 use std::sync::{Arc, mpsc};
 use std::thread::JoinHandle;
 use std::time::Instant;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
+
+/// Time between two looks at whether a start is to be given up.
+const LOOKING: std::time::Duration = std::time::Duration::from_millis(20);
 
 /// A running daemon.
 pub struct Daemon {
@@ -62,6 +70,20 @@ impl Daemon {
         pool: rayon::ThreadPool,
         progress: Progress,
     ) -> Result<Self, Failure> {
+        Self::start_for(config, pool, progress, &Caller::default())
+    }
+
+    /// The same for a caller. For a service manager it also returns when the head is not there, and waits for it as for one that was
+    /// lost. It returns at once when it is told to end: then only [`Daemon::stop`] makes sense.
+    ///
+    /// # Errors
+    /// As [`Daemon::start`].
+    pub fn start_for(
+        config: &Config,
+        pool: rayon::ThreadPool,
+        progress: Progress,
+        caller: &Caller,
+    ) -> Result<Self, Failure> {
         let path = match &config.state {
             Some(path) => path.clone(),
             None => StateFolder::default_path()?,
@@ -76,7 +98,7 @@ impl Daemon {
         let (orders, inbox) = mpsc::channel();
         let (history, task, next_seq, complaint) = open_history(config, &state)?;
         if let Some(complaint) = complaint {
-            progress.log(&complaint);
+            progress.warn(&complaint);
         }
         let tally = Tally::default();
         let aborts = Aborts::default();
@@ -101,7 +123,7 @@ impl Daemon {
             let open: lines::Open = Box::new(move || backend::lines(&setup));
             spawn("lines", move || {
                 if let Err(failure) = lines::serve(wires, &open, &station, &progress, stopped) {
-                    progress.log(&failure.message);
+                    progress.warn(&failure.message);
                 }
             })?
         };
@@ -124,7 +146,7 @@ impl Daemon {
             let plc = PlcSide {
                 listener: plc,
                 clients: clients.clone(),
-                refusals: modbus::Refusals::new(move |line| log.log(line)),
+                refusals: modbus::Refusals::new(move |line| log.warn(line)),
             };
             let serve = move || {
                 runtime.block_on(serve(plc, page, station, site, &config, stopped));
@@ -146,29 +168,34 @@ impl Daemon {
             let (station, recipes) = (station.clone(), state.recipes().clone());
             let (config, progress, history) =
                 (config.head_in(&path), progress.clone(), history.clone());
+            let (patient, pulse) = (caller.notify.is_listened_to(), caller.notify.pulse());
             spawn("measuring", move || {
-                let told = |share: f64| progress.tell(share, "working out the light of the scene");
-                match pool.install(|| backend::open(&config, &told)) {
-                    Err(failure) => drop(opened.send(Err(failure))),
-                    Ok(head) => {
-                        // Nobody waits any more only if the start was given up.
-                        drop(opened.send(Ok(head.stage.clone())));
-                        let worker = Worker {
-                            opened: head,
-                            pool,
-                            recipes,
-                            station,
-                            maps,
-                            history,
-                            progress,
-                            config,
-                            aborts,
-                            lost: None,
-                            shelf: Shelf::default(),
-                        };
-                        worker.run(&inbox, first);
-                    }
-                }
+                let opening = Opening {
+                    config: &config,
+                    pool: &pool,
+                    progress: &progress,
+                    station: &station,
+                    pulse: &pulse,
+                    patient,
+                };
+                let Some((head, begin)) = opening.run(&inbox, &opened) else {
+                    return;
+                };
+                let worker = Worker {
+                    opened: head,
+                    pool,
+                    recipes,
+                    station,
+                    maps,
+                    history,
+                    progress,
+                    config,
+                    aborts,
+                    lost: None,
+                    shelf: Shelf::default(),
+                    pulse,
+                };
+                worker.run(&inbox, begin, first);
             })?
         };
         let stopping = Stopping {
@@ -187,7 +214,15 @@ impl Daemon {
                 "the measuring task ended before its head was open",
             )
         };
-        match opening.recv().unwrap_or_else(|_| Err(gone())) {
+        let outcome = loop {
+            match opening.recv_timeout(LOOKING) {
+                Ok(outcome) => break outcome,
+                Err(mpsc::RecvTimeoutError::Timeout) if caller.told.already() => break Ok(None),
+                Err(mpsc::RecvTimeoutError::Timeout) => {}
+                Err(mpsc::RecvTimeoutError::Disconnected) => break Err(gone()),
+            }
+        };
+        match outcome {
             Ok(stage) => Ok(Self {
                 station,
                 modbus,
@@ -204,41 +239,6 @@ impl Daemon {
         }
     }
 
-    /// Waits until the station is READY, or says why it will not be.
-    ///
-    /// # Errors
-    /// The station's fault, or that its recipe could be neither loaded nor taught.
-    pub fn wait_until_ready(&self) -> Result<Arc<Snapshot>, Failure> {
-        if !self.awaited {
-            let message =
-                "there is no recipe yet: load or teach one, or import it with `fringed teach`";
-            return Err(Failure::new(Exit::Unavailable, message));
-        }
-        let mut snapshots = self.station.subscribe();
-        let refused = |snapshot: &Snapshot| snapshot.recipe_result != RecipeResult::Ok;
-        let settled = |snapshot: &Arc<Snapshot>| {
-            let broken = snapshot.fault.is_some() || snapshot.error.is_some();
-            snapshot.is(status::READY) || broken || refused(snapshot)
-        };
-        let snapshot = runtime()?
-            .block_on(async { snapshots.wait_for(settled).await.map(|found| found.clone()) })
-            .map_err(|_| Failure::new(Exit::Software, "the station ended before it was ready"))?;
-        match (&snapshot.fault, &snapshot.error) {
-            (Some(fault), _) => {
-                let message = format!("{}: {}", fault.cause, fault.remedy);
-                Err(Failure::new(Exit::Unavailable, message))
-            }
-            (None, Some(error)) if !snapshot.is(status::READY) => {
-                Err(Failure::new(Exit::Unavailable, error.to_string()))
-            }
-            (None, None) if refused(&snapshot) => {
-                let message = "the recipe was not loaded: load another, or teach it again";
-                Err(Failure::new(Exit::Content, message))
-            }
-            _ => Ok(snapshot),
-        }
-    }
-
     /// Ends everything: the cycle in flight ends with its result, INVALID if it was still exposing, then the sockets close.
     pub fn stop(self) {
         self.station.event(Event::Stop);
@@ -246,17 +246,23 @@ impl Daemon {
     }
 }
 
+/// The credential that gives the secret of this device.
+const SECRET: &str = "fringed.secret";
+
 /// Opens the way in; the secret of a new device is shown here and never again.
 fn open_access(state: &StateFolder) -> Result<Access, Failure> {
     let folder = state.place("access");
-    let (access, secret) = Access::open(&folder)?;
+    let given =
+        std::env::var_os("CREDENTIALS_DIRECTORY").map(|given| Path::new(&given).join(SECRET));
+    let (access, secret) = Access::open_given(&folder, given.as_deref())?;
     if let Some(secret) = secret {
         // Whatever is quiet: without it nobody could ever sign in.
-        eprintln!(
-            "fringed: the secret of this device, shown this once: {secret} (sign in on the page with it; for another one \
+        let words = format!(
+            "the secret of this device, shown this once: {secret} (sign in on the page with it; for another one \
              delete {} and start again)",
             folder.join("secret").display()
         );
+        journal::write(Severity::Notice, &words);
     }
     Ok(access)
 }
@@ -356,10 +362,11 @@ fn effects(
                 return Some(Event::Stored { seq, failed });
             }
             Effect::Log(line) => progress.log(&line),
+            Effect::Alarm(line) => progress.report(Severity::Error, &line),
             Effect::Abort { job } => aborts.abort(job),
             Effect::Publish(result) => {
                 tally.add(result.verdict);
-                history.record(result);
+                history.record(&result);
             }
         }
         None

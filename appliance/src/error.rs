@@ -30,6 +30,8 @@ pub struct Failure {
     pub exit: Exit,
     /// What was attempted with what, and the remedy.
     pub message: String,
+    /// ERROR_CODE of the device that is at fault, if one is.
+    pub code: Option<u16>,
 }
 
 impl Failure {
@@ -38,6 +40,15 @@ impl Failure {
         Self {
             exit,
             message: message.into(),
+            code: None,
+        }
+    }
+
+    /// A device that cannot be opened.
+    pub fn of_device(error: &hal::error::Error) -> Self {
+        Self {
+            code: Some(crate::worker::code_of(error)),
+            ..Self::new(Exit::Unavailable, error.to_string())
         }
     }
 

@@ -1,5 +1,6 @@
 //! Progress of anything longer than a second: on stderr, only on a terminal, not with `--quiet`.
 
+use crate::journal::{self, Severity};
 use crate::logbook::Logbook;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -53,11 +54,21 @@ impl Progress {
         }
     }
 
-    /// A line for the log, above the bar.
+    /// An everyday line for the log, above the bar.
     pub fn log(&self, line: &str) {
+        self.report(Severity::Info, line);
+    }
+
+    /// A line for the log that somebody should look at.
+    pub fn warn(&self, line: &str) {
+        self.report(Severity::Warning, line);
+    }
+
+    /// A line for the log, above the bar.
+    pub fn report(&self, severity: Severity, line: &str) {
         self.logbook.add(line);
         if !self.quiet {
-            self.bar.suspend(|| eprintln!("fringed: {line}"));
+            self.bar.suspend(|| journal::write(severity, line));
         }
     }
 

@@ -1,12 +1,14 @@
 //! The measuring task: one thread that owns the head, the plan and the computing threads.
 
 mod cycle;
+pub mod opening;
 mod recovery;
 
 use crate::backend::Opened;
 use crate::config::HeadConfig;
 use crate::history::History;
 use crate::latest::{LastCycle, LastMaps};
+use crate::notify::Pulse;
 use crate::plan::{Plan, PlanError};
 use crate::progress::Progress;
 use crate::recipe::store::Stamp;
@@ -44,7 +46,7 @@ const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
 /// Longest wait for one flip, one pulse or one frame.
 const DEVICE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Error codes of the worker; the README has the table.
+/// Error codes of the worker; `docs/operations.md` has the table.
 mod code {
     pub const CAMERA_LOST: u16 = 101;
     pub const UNSUPPORTED: u16 = 102;
@@ -100,21 +102,24 @@ pub struct Worker {
     pub lost: Option<Error>,
     /// Recipes made ready.
     pub shelf: Shelf,
+    /// What the service manager's watchdog is fed by.
+    pub pulse: Pulse,
 }
 
 impl Worker {
-    /// Works until told to stop, or until nobody can tell it anything any more. `first` is asked of the
-    /// station as soon as it is ready for it.
-    pub fn run(mut self, orders: &Receiver<Order>, first: Option<Request>) {
+    /// Works until told to stop, or until nobody can tell it anything any more. `begin` tells the station that it can, and
+    /// `first` is asked of the station then.
+    pub fn run(mut self, orders: &Receiver<Order>, begin: Event, first: Option<Request>) {
         self.progress.clear();
         self.tell_condition();
-        self.station.event(Event::Started);
+        self.station.event(begin);
         if let Some(first) = first {
             self.station.event(Event::Request(first));
         }
         let mut plan: Option<Arc<Plan>> = None;
         let mut frames = Vec::new();
         loop {
+            self.pulse.beat();
             // A trigger that is there already waits for no picture.
             let order = match orders.try_recv() {
                 Err(TryRecvError::Empty) => {
@@ -161,7 +166,7 @@ impl Worker {
             problem, fallback, ..
         } = &self.opened;
         for words in [problem, fallback].into_iter().flatten() {
-            self.progress.log(words);
+            self.progress.warn(words);
         }
         self.station.event(Event::Condition(Condition {
             calibration_valid: self.opened.problem.is_none(),
@@ -191,7 +196,7 @@ impl Worker {
                 let recipe = active(&ready);
                 *plan = Some(ready);
                 if let Some(fallback) = fallback {
-                    self.progress.log(&fallback);
+                    self.progress.warn(&fallback);
                 }
                 self.station.event(Event::RecipeLoaded { job, recipe });
                 return;
@@ -221,7 +226,7 @@ impl Worker {
             Ok(()) => {}
             Err(error) if recovery::is_lost(&error) => self.lost = Some(error),
             Err(error) => {
-                self.progress.log(&error.to_string());
+                self.progress.warn(&error.to_string());
                 *plan = None;
             }
         }
@@ -286,8 +291,9 @@ impl Worker {
             placement_tolerance_mm: PLACEMENT_TOLERANCE_MM,
         };
         let (station, bar) = (self.station.clone(), self.progress.clone());
-        let aborts = self.aborts.clone();
+        let (aborts, pulse) = (self.aborts.clone(), &self.pulse);
         let progress = |fraction: f64, words: &str| {
+            pulse.beat();
             bar.tell(fraction, words);
             station.event(Event::Progress {
                 job,
@@ -371,7 +377,8 @@ fn active(plan: &Plan) -> ActiveRecipe {
     }
 }
 
-fn code_of(error: &Error) -> u16 {
+/// ERROR_CODE of a device's error.
+pub(crate) fn code_of(error: &Error) -> u16 {
     match error {
         Error::Timeout { .. } => code::TIMEOUT,
         Error::Disconnected { device, .. } => match device {

@@ -64,6 +64,18 @@ impl Drop for Place {
     }
 }
 
+/// What starts the daemon of a place.
+pub fn command(place: &Place) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fringed-under-test"));
+    command
+        .args(["serve", "--modbus", "127.0.0.1:0", "--http", "127.0.0.1:0"])
+        .arg("--config")
+        .arg(place.path("fringed.toml"))
+        .stdin(Stdio::null())
+        .stdout(Stdio::null());
+    command
+}
+
 /// A running daemon. Dropped, it is killed.
 pub struct Daemon {
     child: Child,
@@ -78,15 +90,12 @@ pub struct Daemon {
 impl Daemon {
     /// Starts the program and waits until it says where it serves.
     pub fn start(place: &Place) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_fringed-under-test"))
-            .args(["serve", "--modbus", "127.0.0.1:0", "--http", "127.0.0.1:0"])
-            .arg("--config")
-            .arg(place.path("fringed.toml"))
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        Self::of(command(place))
+    }
+
+    /// The same of a command that somebody has added to.
+    pub fn of(mut command: Command) -> Self {
+        let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
         // Read by a thread of its own, so that the daemon can go on logging and nothing waits for ever.
         let lines = BufReader::new(child.stderr.take().unwrap()).lines();
         let (said, hear) = mpsc::channel();

@@ -1,7 +1,7 @@
 //! Who may change something: the device's secret, sessions, patience with wrong guesses, and the record of what was changed.
 //!
-//! Looking needs no login. Changing needs a session, which [`Access::sign_in`] gives for the secret that was shown once
-//! at the first start. Everything of it lies in the folder `access` of the state folder: `secret`, the argon2id hash, and
+//! Looking needs no login. Changing needs a session, which [`Access::sign_in`] gives for the secret that was given to the
+//! device, or else was shown once at the first start. Everything of it lies in the folder `access` of the state folder: `secret`, the argon2id hash, and
 //! `changes.jsonl`, the record. Whoever can delete `secret` owns the device anyway: the next start makes a new one.
 
 mod changes;
@@ -44,7 +44,7 @@ struct Doors {
 pub enum Refused {
     /// Not the secret.
     #[error(
-        "this is not the secret of this device; it was shown once at its first start, in the journal"
+        "this is not the secret of this device: the one that was given to it, or else was shown once at its first start, in the journal"
     )]
     Wrong,
     /// Too many wrong guesses from this address.
@@ -62,12 +62,28 @@ impl Access {
     /// # Errors
     /// If the folder cannot be read or written (exit code 73).
     pub fn open(folder: &Path) -> Result<(Self, Option<String>), Failure> {
+        Self::open_given(folder, None)
+    }
+
+    /// The same, with the secret that a file gives, if it exists; then none is made and none is stored.
+    ///
+    /// # Errors
+    /// As [`Access::open`]; if the given secret cannot be used (exit code 78).
+    pub fn open_given(
+        folder: &Path,
+        given: Option<&Path>,
+    ) -> Result<(Self, Option<String>), Failure> {
         let failed = |error: String| {
             let what = format!("open {}", folder.display());
             Failure::because(Exit::CannotCreate, what, error)
         };
         std::fs::create_dir_all(folder).map_err(|error| failed(error.to_string()))?;
-        let (hash, shown) = secret::open(&folder.join("secret")).map_err(failed)?;
+        let given = given.map_or(Ok(None), secret::given);
+        let given = given.map_err(|error| Failure::new(Exit::Configuration, error))?;
+        let (hash, shown) = match given {
+            Some(hash) => (hash, None),
+            None => secret::open(&folder.join("secret")).map_err(failed)?,
+        };
         let changes = Changes::open(&folder.join("changes.jsonl"));
         let inside = Inside {
             hash,
@@ -143,6 +159,22 @@ mod tests {
         // As people write it down: without dashes, in small letters.
         let typed = secret.replace('-', " ").to_lowercase();
         assert!(access.sign_in(HERE, &typed, now).is_ok());
+    }
+
+    #[test]
+    fn a_secret_that_was_given_goes_before_the_stored_one_and_leaves_it_alone() {
+        let (folder, given) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let file = given.path().join("secret");
+        let open = || Access::open_given(folder.path(), Some(&file)).unwrap();
+        let now = Instant::now();
+        std::fs::write(&file, "0123A-BCDEF-GHJKM").unwrap();
+        let (access, shown) = open();
+        assert!(shown.is_none() && !folder.path().join("secret").exists());
+        assert!(access.sign_in(HERE, "0123A-BCDEF-GHJKM", now).is_ok());
+        std::fs::remove_file(&file).unwrap();
+        let (access, shown) = open();
+        assert!(access.sign_in(HERE, &shown.unwrap(), now).is_ok());
+        assert!(access.sign_in(HERE, "0123A-BCDEF-GHJKM", now).is_err());
     }
 
     #[test]

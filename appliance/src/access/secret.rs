@@ -1,4 +1,4 @@
-//! The device's secret: made at the first start, kept as an argon2id hash.
+//! The device's secret: given to it, or made at the first start and kept as an argon2id hash.
 
 use crate::output::folder::write_whole;
 use argon2::Argon2;
@@ -14,6 +14,34 @@ const LENGTH: usize = 20;
 const GROUP: usize = 5;
 /// Nobody types more; longer text is not hashed.
 const LONGEST: usize = 64;
+/// Letters and digits of the shortest secret that may be given: 60 bits where they are random.
+const SHORTEST: usize = 12;
+
+/// The hash of the secret that this file gives, as such or as its argon2id hash; none if there is no such file.
+///
+/// # Errors
+/// In words, with the remedy.
+pub(super) fn given(file: &Path) -> Result<Option<String>, String> {
+    let text = match std::fs::read_to_string(file) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        read => read.map_err(|error| format!("read the secret that was given: {error}"))?,
+    };
+    let text = text.trim();
+    if text.starts_with('$') {
+        return match PasswordHash::new(text) {
+            Ok(_) => Ok(Some(text.to_owned())),
+            Err(error) => Err(format!(
+                "the secret that was given is no hash ({error}): give a new one"
+            )),
+        };
+    }
+    if plain(text).len() < SHORTEST || text.len() > LONGEST {
+        return Err(format!(
+            "the secret that was given must have {SHORTEST} letters and digits at least and {LONGEST} characters at most: give a new one"
+        ));
+    }
+    hash(text).map(Some)
+}
 
 /// The stored hash, and the secret itself if it was made just now.
 ///
@@ -108,6 +136,31 @@ mod tests {
         }
         for typed in ["", "0123A-BCDEF-GHJKM-NPQR2", "0123A", &"0".repeat(1000)] {
             assert!(!is_right(typed, &stored).unwrap(), "{typed}");
+        }
+    }
+
+    #[test]
+    fn a_secret_is_given_as_such_or_as_its_hash_and_a_weak_or_broken_one_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("given");
+        assert_eq!(given(&file), Ok(None));
+        let hashed = hash("0123A-BCDEF-GHJKM").unwrap();
+        for text in ["0123a-bcdef-ghjkm\n", hashed.as_str()] {
+            std::fs::write(&file, text).unwrap();
+            let stored = given(&file).unwrap().unwrap();
+            assert!(is_right("0123A BCDEF GHJKM", &stored).unwrap(), "{text}");
+            assert!(!is_right(&hashed, &stored).unwrap(), "{text}");
+        }
+        for text in [
+            "",
+            "0123A-BCDEF",
+            "-------------",
+            "$argon2id$broken",
+            &"0".repeat(65),
+        ] {
+            std::fs::write(&file, text).unwrap();
+            let refused = given(&file).unwrap_err();
+            assert!(refused.contains("give a new one"), "{text}: {refused}");
         }
     }
 

@@ -78,7 +78,7 @@ pub(super) fn rpi(config: &HeadConfig) -> Result<Opened, Failure> {
 
 #[cfg(all(feature = "kms", feature = "libcamera"))]
 fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<DynHead, Failure> {
-    rpi::head(config, trigger).map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))
+    rpi::head(config, trigger).map_err(|error| Failure::of_device(&error))
 }
 
 /// [`built_for_head`] has refused it before.
@@ -180,7 +180,7 @@ mod tests {
         if cfg!(feature = "gpio") {
             assert_eq!(failure, Ok(()));
         } else {
-            let Failure { exit, message } = failure.unwrap_err();
+            let Failure { exit, message, .. } = failure.unwrap_err();
             assert_eq!(exit, Exit::Configuration);
             assert!(message.starts_with("lines: this fringed was built without gpio: "));
             assert!(message.ends_with("--features gpio`"), "{message}");

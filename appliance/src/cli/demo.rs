@@ -5,11 +5,11 @@ mod plc;
 mod table;
 
 use super::Common;
-use super::serve::until_told;
 use crate::config::Backend;
 use crate::daemon::{Daemon, runtime};
 use crate::error::{Exit, Failure};
 use crate::state::StateFolder;
+use crate::told::Told;
 use parts::{PARTS, Placed};
 use plc::{Plc, PlcResult};
 use std::io::IsTerminal;
@@ -68,7 +68,7 @@ impl Demo {
         }
         if !self.exit && std::io::stdout().is_terminal() {
             say!("\nThe page stays on http://{} until Ctrl-C.", daemon.http);
-            until_told()?()?;
+            runtime()?.block_on(Told::listen()?.wait());
         }
         daemon.stop();
         let wrong = rows.iter().filter(|row| row.is_wrong()).count();

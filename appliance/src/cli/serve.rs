@@ -1,8 +1,18 @@
 //! `fringed serve`: the station, until it is told to end.
 
 use super::Common;
-use crate::daemon::{Daemon, runtime};
-use crate::error::{Exit, Failure};
+use crate::daemon::{Caller, Daemon, runtime};
+use crate::error::Failure;
+use crate::journal::Severity;
+use crate::notify::Notify;
+use crate::progress::Progress;
+use crate::station::Snapshot;
+use crate::station::snapshot::status;
+use crate::told::Told;
+use std::time::Duration;
+
+/// READY waits so long for devices that are switched on together with the computer.
+const TOGETHER: Duration = Duration::from_secs(20);
 
 /// Runs the daemon until Ctrl-C or SIGTERM.
 ///
@@ -11,57 +21,77 @@ use crate::error::{Exit, Failure};
 pub fn run(common: &Common) -> Result<(), Failure> {
     let config = common.configuration()?;
     let progress = common.progress();
-    let daemon = Daemon::start(&config, super::pool(config.threads)?, progress.clone())?;
-    match daemon.wait_until_ready() {
-        Ok(snapshot) => {
-            let recipe = snapshot.recipe.as_ref().map_or(String::new(), |recipe| {
-                format!(", recipe {} ({})", recipe.number, recipe.name)
-            });
-            progress.log(&format!("ready{recipe}"));
+    let caller = Caller {
+        notify: Notify::from_environment(),
+        // Before anything is done: whatever it does then, the end that is asked for is clean.
+        told: Told::listen()?,
+    };
+    caller.notify.status("starting");
+    let pool = super::pool(config.threads)?;
+    let daemon = Daemon::start_for(&config, pool, progress.clone(), &caller)?;
+    runtime()?.block_on(async {
+        tokio::select! {
+            () = caller.told.wait() => {}
+            () = serve(&daemon, &caller.notify, &progress) => {}
         }
-        // Without a recipe the station still serves: the PLC loads or teaches one.
-        Err(failure) => progress.log(&failure.message),
-    }
-    // Before anybody is told that it serves: who is told may end it.
-    let until_told = until_told()?;
-    progress.log(&format!(
-        "Modbus TCP on {}, page on http://{}",
-        daemon.modbus, daemon.http
-    ));
-    until_told()?;
-    progress.log("stopping");
+    });
+    caller.notify.stopping();
+    progress.report(Severity::Notice, "stopping");
     daemon.stop();
     Ok(())
 }
 
-/// Listens for Ctrl-C and SIGTERM from now on; the answer waits for one.
-///
-/// # Errors
-/// If the system does not deliver signals.
-pub fn until_told() -> Result<impl FnOnce() -> Result<(), Failure>, Failure> {
-    let failed = |error| Failure::because(Exit::Software, "wait for a signal", error);
-    let runtime = runtime()?;
-    #[cfg(unix)]
-    let (mut interrupt, mut terminate) = {
-        use tokio::signal::unix::{SignalKind, signal};
-        let _inside = runtime.enter();
-        let listen = |kind| signal(kind).map_err(failed);
-        (
-            listen(SignalKind::interrupt())?,
-            listen(SignalKind::terminate())?,
-        )
-    };
-    Ok(move || {
-        runtime.block_on(async {
-            #[cfg(unix)]
-            {
-                tokio::select! {
-                    _ = interrupt.recv() => Ok(()),
-                    _ = terminate.recv() => Ok(()),
-                }
-            }
-            #[cfg(not(unix))]
-            tokio::signal::ctrl_c().await.map_err(failed)
-        })
-    })
+/// Says how the start ended, and from then on how things stand.
+async fn serve(daemon: &Daemon, notify: &Notify, progress: &Progress) {
+    let mut settled = daemon.settled().await;
+    let faulted = || daemon.station.snapshot().fault.is_some();
+    if notify.is_listened_to() && settled.is_err() && faulted() {
+        notify.status(&standing(&daemon.station.snapshot()));
+        let there = async {
+            let mut snapshots = daemon.station.subscribe();
+            drop(snapshots.wait_for(|now| now.fault.is_none()).await);
+        };
+        drop(tokio::time::timeout(TOGETHER, there).await);
+        settled = daemon.settled().await;
+    }
+    match settled {
+        Ok(snapshot) => {
+            let recipe = snapshot.recipe.as_ref().map_or(String::new(), |recipe| {
+                format!(", recipe {} ({})", recipe.number, recipe.name)
+            });
+            progress.report(Severity::Notice, &format!("ready{recipe}"));
+        }
+        // Without a recipe the station still serves: the PLC loads or teaches one.
+        Err(failure) => progress.warn(&failure.message),
+    }
+    progress.log(&format!(
+        "Modbus TCP on {}, page on http://{}",
+        daemon.modbus, daemon.http
+    ));
+    notify.ready();
+    let mut snapshots = daemon.station.subscribe();
+    let mut said = String::new();
+    loop {
+        let words = standing(&snapshots.borrow_and_update());
+        if words != said {
+            notify.status(&words);
+            said = words;
+        }
+        // The daemon holds the other end as long as this runs.
+        if snapshots.changed().await.is_err() {
+            return;
+        }
+    }
+}
+
+/// How things stand, in one line; the same from cycle to cycle.
+fn standing(snapshot: &Snapshot) -> String {
+    match (&snapshot.fault, &snapshot.recipe) {
+        (Some(fault), _) => format!("fault {}: {}; {}", fault.code, fault.cause, fault.remedy),
+        (None, Some(recipe)) => format!("recipe {} ({})", recipe.number, recipe.name),
+        (None, None) if !snapshot.is(status::CALIBRATION_VALID) => {
+            "the head is not calibrated: calibrate it with `fringed calibrate`".into()
+        }
+        (None, None) => "no recipe: load or teach one".into(),
+    }
 }

@@ -23,33 +23,36 @@ pub(super) struct Stopping {
 
 /// Time between two looks at a thread that ends.
 const LOOKING: Duration = Duration::from_millis(2);
-/// A thread that has not ended after this time is left behind.
-const STOPPING: Duration = Duration::from_secs(3);
+/// A measuring task that has not ended after this time is left behind: each wait for a device ends after 2 s.
+const MEASURING: Duration = Duration::from_secs(3);
+/// What has not ended after this time is left behind, whatever hangs: who stops a station waits at most 5 s.
+const STOPPING: Duration = Duration::from_millis(4500);
 
 impl Stopping {
     /// Ends measuring, then the sockets, the survey and the history.
     pub(super) fn stop(self) {
+        let began = Instant::now();
+        let until = began + STOPPING;
         // An order that nobody takes, or a runtime that is gone, is what is wanted here.
         drop(self.orders.send(Order::Stop));
         let [measuring, serving, surveying, wiring] = self.threads;
-        join("measuring", measuring, &self.progress);
+        join("measuring", measuring, began + MEASURING, &self.progress);
         let _ = self.sockets.send(true);
-        join("sockets", serving, &self.progress);
-        join("lines", wiring, &self.progress);
+        join("sockets", serving, until, &self.progress);
+        join("lines", wiring, until, &self.progress);
         drop(self.survey);
-        join("survey", surveying, &self.progress);
+        join("survey", surveying, until, &self.progress);
         // Last: what the others brought to an end is stored.
         self.history.stop(self.station.snapshot().result_seq);
-        join("history", self.writing, &self.progress);
+        join("history", self.writing, until, &self.progress);
     }
 }
 
 /// Waits for a thread to end. One that hangs in a device or in a storage must not keep the program from ending.
-fn join(name: &str, thread: JoinHandle<()>, progress: &Progress) {
-    let began = Instant::now();
+fn join(name: &str, thread: JoinHandle<()>, until: Instant, progress: &Progress) {
     while !thread.is_finished() {
-        if began.elapsed() > STOPPING {
-            progress.log(&format!(
+        if Instant::now() > until {
+            progress.warn(&format!(
                 "the thread {name} does not end and is left behind"
             ));
             return;

@@ -2,10 +2,10 @@
 
 use crate::station::result::flag;
 use crate::station::{ResultRecord, Verdict};
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// One stored result. Lengths in mm, times in µs; as JSON the keys are the fields' names.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     /// RESULT_SEQ.
     pub seq: u32,
@@ -26,7 +26,7 @@ pub struct Entry {
     /// The token that triggered, 0 for an edge.
     pub token: u16,
     /// PASS, FAIL or INVALID.
-    #[serde(serialize_with = "word")]
+    #[serde(serialize_with = "word", deserialize_with = "of_word")]
     pub verdict: Verdict,
     /// 0, or why there is no measurement.
     pub error_code: u16,
@@ -57,7 +57,7 @@ pub struct Entry {
 }
 
 /// The time of one stage.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StageEntry {
     /// The stage's name.
     pub name: String,
@@ -66,7 +66,7 @@ pub struct StageEntry {
 }
 
 /// One gauge of a stored result, in mm, °, mm³ or as a share.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GaugeEntry {
     /// The gauge's name.
     pub name: String,
@@ -218,4 +218,19 @@ pub(super) fn verdict_of(number: u16) -> Verdict {
 
 fn word<S: Serializer>(verdict: &Verdict, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(verdict.word())
+}
+
+fn of_word<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Verdict, D::Error> {
+    let word = String::deserialize(deserializer)?;
+    let mut verdicts = [
+        Verdict::None,
+        Verdict::Pass,
+        Verdict::Fail,
+        Verdict::Invalid,
+    ]
+    .into_iter();
+    let unknown = || serde::de::Error::custom(format!("{word:?} is no verdict"));
+    verdicts
+        .find(|verdict| verdict.word() == word)
+        .ok_or_else(unknown)
 }

@@ -24,13 +24,7 @@ impl Mark {
     /// # Errors
     /// Whatever the system answers; `PermissionDenied` where it is somebody else's.
     pub fn open(serial: &str, owner: u32) -> io::Result<Self> {
-        let plain: String = serial.chars().filter(char::is_ascii_alphanumeric).collect();
-        let name = format!("/fringed-{plain}");
-        let flags = OFlags::CREATE | OFlags::RDWR;
-        let file = File::from(shm::open(&name, flags, Mode::RUSR | Mode::WUSR)?);
-        if file.metadata()?.uid() != owner {
-            return Err(io::Error::from(io::ErrorKind::PermissionDenied));
-        }
+        let (file, name) = open_shared(serial, owner)?;
         Ok(Self { file, name })
     }
 
@@ -52,9 +46,30 @@ impl Mark {
 
     /// Takes it away: the card knows the number.
     pub fn remove(&self) {
-        // Whatever is left of it belongs to no later run.
-        let _ = shm::unlink(&self.name);
+        remove_shared(&self.name);
     }
+}
+
+/// Opens shared memory of a device, or begins it: the memory, and its name in the system.
+///
+/// # Errors
+/// Whatever the system answers; `PermissionDenied` where it does not belong to `owner`.
+pub(super) fn open_shared(name: &str, owner: u32) -> io::Result<(File, String)> {
+    let plain = |c: &char| c.is_ascii_alphanumeric() || *c == '-';
+    let plain: String = name.chars().filter(plain).collect();
+    let name = format!("/fringed-{plain}");
+    let flags = OFlags::CREATE | OFlags::RDWR;
+    let file = File::from(shm::open(&name, flags, Mode::RUSR | Mode::WUSR)?);
+    if file.metadata()?.uid() != owner {
+        return Err(io::Error::from(io::ErrorKind::PermissionDenied));
+    }
+    Ok((file, name))
+}
+
+/// Removes shared memory by its name.
+pub(super) fn remove_shared(name: &str) {
+    // Whatever is left of it belongs to no later run.
+    let _ = shm::unlink(name);
 }
 
 #[cfg(test)]

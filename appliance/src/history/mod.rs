@@ -6,14 +6,15 @@
 //! `tokio::task::spawn_blocking` where a socket runtime must go on.
 //!
 //! ```text
-//! station ───result──► queue ──► history's thread ──► history.db       ◄── Reader ◄── page, `fringed history`
-//!                             "         syncing  ──► result-seq       and the card: SEQs in use, reserved ahead
+//! station ───result──► spool     in memory that kill -9 does not touch
+//!                     queue ──► history's thread ──► history.db       ◄── Reader ◄── page, `fringed history`
+//!                       "         syncing        ──► result-seq       and the card: SEQs in use, reserved ahead
 //! measuring ──frames──► one slot ──► keeper's thread ─► recordings/NAME  ◄── Entry::recording, `fringed replay`
 //! ```
 //!
 //! A result is on its way to the PLC before it is on its way to the card: a card that takes a second makes no verdict late.
-//! The history's thread writes each result at once, which takes no card, only the system's memory: kill -9 costs at most the
-//! result in flight. A loss of power costs what was not synced yet: what came in the time that the card takes for one sync.
+//! Each result is put into memory of the system as it is shown, and the next start stores what the database lacks: kill -9
+//! costs at most the result in flight, however busy the card was. A loss of power costs what was not synced yet: what came in the time that the card takes for one sync.
 pub mod csv;
 pub mod entry;
 mod keeper;
@@ -22,6 +23,7 @@ pub mod reader;
 mod recordings;
 pub mod schema;
 pub mod seqs;
+mod spool;
 mod syncing;
 pub mod task;
 pub mod time;

@@ -5,6 +5,7 @@ use super::keeper::{self, Keeper, Keeping};
 use super::mark::Mark;
 use super::recordings::{FailedPart, seq_of};
 use super::seqs::{self, Numbering, Seqs};
+use super::spool::Spool;
 use super::syncing::{self, Syncer, Syncing};
 use super::writer::{Opening, Writer};
 use super::{DATABASE, HistoryError, RECORDINGS, Reader};
@@ -36,7 +37,7 @@ pub struct Bounds {
 
 /// What reaches the thread, from the station and from the keeper of recordings.
 pub(super) enum Message {
-    Result(Arc<ResultRecord>),
+    Result(Box<Entry>),
     Kept { seq: u32, name: String },
     NotKept { problem: String },
     Removed { name: String },
@@ -50,6 +51,8 @@ pub(super) enum Message {
 pub struct History {
     queue: SyncSender<Message>,
     shared: Arc<Shared>,
+    spool: Option<Arc<Spool>>,
+    run: u32,
     seqs: Seqs,
     syncer: Syncer,
     keeper: Keeper,
@@ -68,6 +71,7 @@ struct Shared {
 pub struct Task {
     inbox: Receiver<Message>,
     shared: Arc<Shared>,
+    spool: Option<Arc<Spool>>,
     seqs: Seqs,
     writer: Writer,
     keeper: Keeper,
@@ -97,7 +101,10 @@ pub fn open(
         reason: format!("{error}: free space"),
         damaged: false,
     };
-    let Opening { writer, complaint } = Writer::open(&state.join(DATABASE), bounds.results)?;
+    let Opening {
+        mut writer,
+        complaint,
+    } = Writer::open(&state.join(DATABASE), bounds.results)?;
     let owner = std::fs::metadata(state).map_err(|error| failed("", error))?;
     let mark = Mark::open(&numbering.serial, owner.uid()).ok();
     let marked = mark.as_ref().and_then(Mark::read);
@@ -107,7 +114,18 @@ pub fn open(
         Some(last) if last.wrapping_sub(next) as i32 >= 0 => last.wrapping_add(1),
         _ => next,
     };
-    let Numbering { counter, run, .. } = numbering;
+    let Numbering {
+        counter,
+        run,
+        counted,
+        serial,
+    } = numbering;
+    let spool = Spool::open(&serial, owner.uid()).ok().map(Arc::new);
+    let waiting = match (&spool, counted.run) {
+        // Nobody's run is no run.
+        (None, _) | (_, 0) => VecDeque::new(),
+        (Some(spool), before) => recover(&mut writer, spool, (before, run))?,
+    };
     let seqs = Seqs::reserve(counter, mark, run, next);
     let seqs = seqs.map_err(|error| failed("result-seq", error))?;
     let (queue, inbox) = sync_channel(MAX_WAITING);
@@ -123,6 +141,8 @@ pub fn open(
     let history = History {
         queue,
         shared: shared.clone(),
+        spool: spool.clone(),
+        run,
         seqs: seqs.clone(),
         reader: Reader::of(state),
         syncer: syncer.clone(),
@@ -131,6 +151,7 @@ pub fn open(
     let task = Task {
         inbox,
         shared,
+        spool,
         seqs,
         writer,
         keeper,
@@ -138,17 +159,41 @@ pub fn open(
         syncer,
         syncing: Some(syncing),
         unsynced: None,
-        waiting: VecDeque::with_capacity(MAX_WAITING),
+        waiting,
         last_seq: next.wrapping_sub(1),
         lost_before: 0,
     };
     Ok((history, task, next, complaint))
 }
 
+/// Stores what the run before showed and the database lacks, where it ended without a stop. The answer is what the database
+/// does not take yet; it is handed on to the next run.
+fn recover(
+    writer: &mut Writer,
+    spool: &Spool,
+    (before, run): (u32, u32),
+) -> Result<VecDeque<Entry>, HistoryError> {
+    let left = spool.left(before, writer.last_seq()?);
+    if left.is_empty() || writer.store(left.iter()).is_ok() {
+        return Ok(VecDeque::new());
+    }
+    for entry in &left {
+        // A system without memory loses what it would have lost without a spool.
+        let _ = spool.put(run, entry);
+    }
+    Ok(left.into())
+}
+
 impl History {
     /// Hands over a result that is being published.
-    pub fn record(&self, record: Arc<ResultRecord>) {
-        if self.queue.try_send(Message::Result(record)).is_err() {
+    pub fn record(&self, record: &ResultRecord) {
+        let entry = Entry::of(record);
+        if let Some(spool) = &self.spool {
+            // A result that did not go in is as safe as its way to the database.
+            let _ = spool.put(self.run, &entry);
+        }
+        let message = Message::Result(Box::new(entry));
+        if self.queue.try_send(message).is_err() {
             self.shared.lost.fetch_add(1, Ordering::Relaxed);
         }
     }
@@ -220,7 +265,7 @@ impl Task {
             let mut news = Vec::new();
             while let Some(message) = next {
                 match message {
-                    Message::Result(record) => self.queue(&record),
+                    Message::Result(entry) => self.queue(*entry),
                     news_of_parts => news.push(news_of_parts),
                 }
                 next = self.inbox.try_recv().ok();
@@ -239,6 +284,10 @@ impl Task {
                         drop(syncing.take().map(JoinHandle::join));
                         // Not settled, the reservation is skipped at the next start: nothing is used twice.
                         let _ = self.seqs.settle(last_seq);
+                        if let Some(spool) = self.spool.as_ref().filter(|_| self.waiting.is_empty())
+                        {
+                            spool.remove();
+                        }
                         self.keeper.stop();
                         stopping = Some(Instant::now() + LAST_PART);
                     }
@@ -272,13 +321,13 @@ impl Task {
             .ok()
     }
 
-    fn queue(&mut self, record: &ResultRecord) {
-        self.last_seq = record.seq;
+    fn queue(&mut self, entry: Entry) {
+        self.last_seq = entry.seq;
         if self.waiting.len() == MAX_WAITING {
             self.waiting.pop_front();
             self.shared.lost.fetch_add(1, Ordering::Relaxed);
         }
-        self.waiting.push_back(Entry::of(record));
+        self.waiting.push_back(entry);
     }
 
     /// Stores what waits, and reserves numbers; what did not go, in words.

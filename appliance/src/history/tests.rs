@@ -321,7 +321,7 @@ fn a_storage_that_refuses_is_a_warning_and_what_waited_is_stored_when_it_takes_i
         std::thread::spawn(move || task.run(&station))
     };
     for seq in 1..=60 {
-        history.record(record(seq));
+        history.record(&record(seq));
     }
     wait("warning", warned);
     assert!(history.problem().unwrap().contains("locked"));
@@ -403,4 +403,43 @@ fn a_database_that_is_damaged_while_it_is_used_is_set_aside_and_nothing_stops() 
     assert!(said.contains("history.damaged.db"), "{said}");
     writer.store(some(2).iter()).unwrap();
     assert_eq!(seqs(&Reader::of(folder.path()), &Filter::default()), [2, 1]);
+}
+
+#[test]
+fn what_was_shown_and_not_stored_before_a_kill_is_stored_once_by_the_next_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = StateFolder::open(folder.path()).unwrap();
+    let opened = |run| {
+        let bounds = Bounds {
+            results: ENOUGH,
+            recordings: 0,
+        };
+        let numbering = Numbering {
+            counted: state.counted().unwrap(),
+            counter: state.counter(),
+            serial: state.serial().unwrap(),
+            run,
+        };
+        open(state.path(), numbering, bounds).unwrap()
+    };
+    let stored = || seqs(&Reader::of(state.path()), &Filter::default());
+    // Its thread never comes to write, as where the card is busy.
+    let (killed, never, next, _) = opened(1);
+    for seq in next..next + 3 {
+        assert!(killed.take(seq));
+        killed.record(&record(seq));
+    }
+    drop((killed, never));
+    assert_eq!(stored(), [0; 0]);
+    let (killed, never, next, _) = opened(2);
+    assert_eq!((stored(), next), (vec![3, 2, 1], 4));
+    killed.take(next);
+    killed.record(&record(next));
+    drop((killed, never));
+    let (history, task, next, _) = opened(3);
+    assert_eq!((stored(), next), (vec![4, 3, 2, 1], 5));
+    history.stop(4);
+    task.run(&station());
+    let (_, _, next, _) = opened(4);
+    assert_eq!((stored(), next), (vec![4, 3, 2, 1], 5));
 }

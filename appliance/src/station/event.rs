@@ -255,6 +255,8 @@ pub enum Effect {
     Publish(Arc<ResultRecord>),
     /// For the log.
     Log(Arc<str>),
+    /// For the log: nothing is measured until this has ended.
+    Alarm(Arc<str>),
 }
 
 /// The most effects that one event can cause (held by the random walk test).

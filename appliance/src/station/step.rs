@@ -202,10 +202,8 @@ impl Station {
 
     /// Enters a fault; what was under way ends here.
     pub(super) fn fault(&mut self, fault: Fault, now: Micros, effects: &mut Effects) {
-        log(
-            effects,
-            format!("fault {}: {}; {}", fault.code, fault.cause, fault.remedy),
-        );
+        let words = format!("fault {}: {}; {}", fault.code, fault.cause, fault.remedy);
+        push(effects, Effect::Alarm(words.into()));
         match std::mem::replace(&mut self.state, State::Offline) {
             State::Acquiring { cycle, .. } | State::Processing { cycle, .. } => {
                 self.fail_cycle(cycle, fault.code, fault.cause.clone(), now, effects);

@@ -277,7 +277,7 @@ fn an_answer_of_another_job_changes_no_state() {
                 let (station, effects) = step(bench.station.clone(), event.clone(), bench.now);
                 let only_logged = effects
                     .iter()
-                    .all(|effect| matches!(effect, Effect::Log(_)));
+                    .all(|effect| matches!(effect, Effect::Log(_) | Effect::Alarm(_)));
                 // A sign of life is all that it is, and that ends an idle worker's silence.
                 let as_before = station.state == bench.station.state || state == SILENT;
                 assert!(as_before && only_logged, "state {state}, {event:?}");

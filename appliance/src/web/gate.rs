@@ -12,6 +12,7 @@ use super::problem::{Outcome, Problem};
 use super::site::Site;
 use crate::access::{Change, MAX_AGE_S, Token};
 use crate::clock;
+use crate::journal::{self, Severity};
 
 /// The session's cookie.
 const COOKIE: &str = "fringed-session";
@@ -114,7 +115,7 @@ pub async fn record(
             "record the change {action:?}: {}: free space",
             problem.words
         );
-        eprintln!("fringed: {line}");
+        journal::write(Severity::Warning, &line);
         site.log.add(&line);
     }
 }

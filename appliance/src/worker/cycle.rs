@@ -91,9 +91,11 @@ impl Worker {
         let mut frames: Vec<Frame> = Vec::with_capacity(indices.len());
         let mut spent = Duration::ZERO;
         let (station, aborts, pool) = (&self.station, &self.aborts, &self.pool);
+        let pulse = &self.pulse;
         let mut keep = |_, frame| {
             frames.push(frame);
             station.event(Event::Alive);
+            pulse.beat();
             while plan.can_arrive(arriving, frames.len()) {
                 spent += timed_on(pool, || plan.arrive(arriving, &frames)).1;
             }

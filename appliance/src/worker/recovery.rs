@@ -9,8 +9,10 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
 /// Waits before the head is opened again, in signs of life: doubled after each attempt, from the first to the last.
-const FIRST_WAIT: u32 = 1;
-const LONGEST_WAIT: u32 = 16;
+pub(super) const FIRST_WAIT: u32 = 1;
+pub(super) const LONGEST_WAIT: u32 = 16;
+/// What to do about a head that is not there.
+pub(super) const REMEDY: &str = "the head is opened again by itself as soon as it is there; the cable and the power of camera and projector are what to check";
 
 /// Whether the head has to be opened again: a device is gone, or one did not answer in time and nobody knows in what state
 /// it is.
@@ -39,7 +41,7 @@ impl Worker {
         self.station.event(Event::Faulted {
             error_code: code_of(error),
             cause: error.to_string().into(),
-            remedy: "the head is opened again by itself as soon as it is there; the cable and the power of camera and projector are what to check".into(),
+            remedy: REMEDY.into(),
         });
         let before = self.opened.calibration.fingerprint();
         let mut wait = FIRST_WAIT;
@@ -52,7 +54,7 @@ impl Worker {
                 Ok(()) => {
                     self.tell_condition();
                     if self.opened.calibration.fingerprint() != before && plan.take().is_some() {
-                        self.progress.log("the head that came back has another calibration: load or teach a recipe for it");
+                        self.progress.warn("the head that came back has another calibration: load or teach a recipe for it");
                     }
                     self.restore(plan);
                     match self.lost.take() {
@@ -63,7 +65,7 @@ impl Worker {
             };
             if problem != said {
                 self.progress
-                    .log(&format!("the head cannot be opened yet: {problem}"));
+                    .warn(&format!("the head cannot be opened yet: {problem}"));
                 said = problem;
             }
         }
@@ -81,6 +83,7 @@ impl Worker {
                 }
                 Ok(_) | Err(RecvTimeoutError::Timeout) => {
                     self.station.event(Event::Alive);
+                    self.pulse.beat();
                 }
             }
         }

@@ -1,0 +1,82 @@
+//! Tells the program which commit it was built from.
+//!
+//! In this order: what `FRINGED_COMMIT` says, for whoever packages; the name that `git archive` wrote into the file
+//! `commit` of a tarball; git itself; nothing. Only optimised builds ask git, so that a commit costs development and
+//! tests no new compilation.
+
+use std::path::Path;
+use std::process::Command;
+
+/// What goes into the program; elsewhere a change is none of its own.
+const SOURCES: [&str; 5] = ["algo", "hal", "appliance", "Cargo.toml", "Cargo.lock"];
+/// Digits of a commit's name: enough for one of many.
+const DIGITS: usize = 12;
+
+fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=commit");
+    println!("cargo::rerun-if-env-changed=FRINGED_COMMIT");
+    let version = std::env::var("CARGO_PKG_VERSION").unwrap_or_default();
+    let version = match commit() {
+        Some(commit) => format!("{version} ({commit})"),
+        None => version,
+    };
+    println!("cargo::rustc-env=FRINGED_VERSION={version}");
+}
+
+fn commit() -> Option<String> {
+    told().or_else(archived).or_else(asked)
+}
+
+fn told() -> Option<String> {
+    let told = std::env::var("FRINGED_COMMIT").ok()?;
+    Some(told.trim().to_owned()).filter(|told| !told.is_empty())
+}
+
+fn archived() -> Option<String> {
+    let name = std::fs::read_to_string("commit").ok()?;
+    // In a working copy it still is the placeholder.
+    let name = name.trim().get(..DIGITS)?;
+    let is_one = name.chars().all(|c| c.is_ascii_hexdigit());
+    is_one.then(|| name.to_owned())
+}
+
+fn asked() -> Option<String> {
+    if std::env::var("PROFILE").as_deref() != Ok("release") {
+        return None;
+    }
+    let root = Path::new("..").canonicalize().ok()?;
+    // A tarball that was unpacked inside another project's repository is none of its commits.
+    let top = git(&root, &["rev-parse", "--show-toplevel"])?;
+    if Path::new(&top).canonicalize().ok()? != root {
+        return None;
+    }
+    let commit = git(&root, &["rev-parse", "HEAD"])?
+        .get(..DIGITS)?
+        .to_owned();
+    // Every commit and every checkout adds a line there; a file that is not there would be new each time.
+    let moves = root.join(git(&root, &["rev-parse", "--git-path", "logs/HEAD"])?);
+    if moves.exists() {
+        println!("cargo::rerun-if-changed={}", moves.display());
+    }
+    for source in SOURCES {
+        println!("cargo::rerun-if-changed=../{source}");
+    }
+    let differences = [
+        &["status", "--porcelain", "--untracked-files=no", "--"],
+        &SOURCES[..],
+    ];
+    let changed = git(&root, &differences.concat())?;
+    Some(match changed.is_empty() {
+        true => commit,
+        false => format!("{commit}, changed"),
+    })
+}
+
+/// What git answers, unless it fails or is not there.
+fn git(root: &Path, arguments: &[&str]) -> Option<String> {
+    let mut command = Command::new("git");
+    let output = command.current_dir(root).args(arguments).output().ok()?;
+    let answer = String::from_utf8(output.stdout).ok()?;
+    output.status.success().then(|| answer.trim().to_owned())
+}

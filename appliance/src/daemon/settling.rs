@@ -1,0 +1,52 @@
+//! How a start ends: READY, or why not.
+
+use super::{Daemon, runtime};
+use crate::error::{Exit, Failure};
+use crate::station::snapshot::status;
+use crate::station::{RecipeResult, Snapshot};
+use std::sync::Arc;
+
+impl Daemon {
+    /// Waits until the station is READY, or says why it will not be.
+    ///
+    /// # Errors
+    /// The station's fault, or that its recipe could be neither loaded nor taught.
+    pub fn wait_until_ready(&self) -> Result<Arc<Snapshot>, Failure> {
+        runtime()?.block_on(self.settled())
+    }
+
+    /// The same, for those who wait for something else as well.
+    ///
+    /// # Errors
+    /// As [`Daemon::wait_until_ready`].
+    pub async fn settled(&self) -> Result<Arc<Snapshot>, Failure> {
+        if !self.awaited {
+            let message =
+                "there is no recipe yet: load or teach one, or import it with `fringed teach`";
+            return Err(Failure::new(Exit::Unavailable, message));
+        }
+        let mut snapshots = self.station.subscribe();
+        let refused = |snapshot: &Snapshot| snapshot.recipe_result != RecipeResult::Ok;
+        let settled = |snapshot: &Arc<Snapshot>| {
+            let broken = snapshot.fault.is_some() || snapshot.error.is_some();
+            snapshot.is(status::READY) || broken || refused(snapshot)
+        };
+        let snapshot = snapshots.wait_for(settled).await.map(|found| found.clone());
+        let snapshot = snapshot
+            .map_err(|_| Failure::new(Exit::Software, "the station ended before it was ready"))?;
+        match (&snapshot.fault, &snapshot.error) {
+            (Some(fault), _) => {
+                let message = format!("{}: {}", fault.cause, fault.remedy);
+                Err(Failure::new(Exit::Unavailable, message))
+            }
+            (None, Some(error)) if !snapshot.is(status::READY) => {
+                Err(Failure::new(Exit::Unavailable, error.to_string()))
+            }
+            (None, None) if refused(&snapshot) => {
+                let message = "the recipe was not loaded: load another, or teach it again";
+                Err(Failure::new(Exit::Content, message))
+            }
+            _ => Ok(snapshot),
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Lines on stderr: for people with the program's name in front, for a journal with their priority, which notes name and time itself.
+
+use std::sync::OnceLock;
+
+/// How much a line matters, as syslog numbers it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// Nothing is measured until somebody does something.
+    Error = 3,
+    /// Somebody should look.
+    Warning = 4,
+    /// Rare, and to be found again: the device's secret, a start, an end.
+    Notice = 5,
+    /// Everyday.
+    Info = 6,
+}
+
+/// Writes words of one or more lines.
+pub fn write(severity: Severity, words: &str) {
+    static JOURNAL: OnceLock<bool> = OnceLock::new();
+    let journal = *JOURNAL.get_or_init(stderr_is_a_journal);
+    eprint!("{}", form(journal, severity, words));
+}
+
+/// Each line of the words as it is written.
+fn form(journal: bool, severity: Severity, words: &str) -> String {
+    let lines = words.lines().map(|line| match journal {
+        true => format!("<{}>{line}\n", severity as u8),
+        false => format!("fringed: {line}\n"),
+    });
+    lines.collect()
+}
+
+/// Whether stderr is the stream that systemd.exec(5) describes.
+fn stderr_is_a_journal() -> bool {
+    let named = std::env::var("JOURNAL_STREAM").unwrap_or_default();
+    rustix::fs::fstat(std::io::stderr())
+        .is_ok_and(|stream| is_named(&named, stream.st_dev, stream.st_ino))
+}
+
+/// Whether the text names this file as `device:inode`.
+fn is_named(text: &str, device: u64, inode: u64) -> bool {
+    let number = |text: &str| text.parse().ok();
+    let named = text
+        .split_once(':')
+        .map(|(device, inode)| (number(device), number(inode)));
+    named == Some((Some(device), Some(inode)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_journal_gets_the_priority_of_every_line_and_people_get_none() {
+        let words = "fault 101: gone\nplug it in";
+        let journal = form(true, Severity::Error, words);
+        assert_eq!(journal, "<3>fault 101: gone\n<3>plug it in\n");
+        let people = form(false, Severity::Error, words);
+        assert_eq!(people, "fringed: fault 101: gone\nfringed: plug it in\n");
+    }
+
+    #[test]
+    fn only_the_stream_that_is_named_is_a_journal() {
+        assert!(is_named("8:15", 8, 15));
+        for other in ["8:16", "9:15", "", "8", "8:", ":15", "8:15:1", "x:y"] {
+            assert!(!is_named(other, 8, 15), "{other}");
+        }
+    }
+}

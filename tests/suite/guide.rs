@@ -1,0 +1,72 @@
+//! The operations guide: it knows every error code, and speaks of no line that the program does not write.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tests::files;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap()
+        .to_path_buf()
+}
+
+/// The first cells of the rows of the table below a heading.
+fn first_cells(heading: &str) -> Vec<String> {
+    let guide = fs::read_to_string(root().join("docs/operations.md")).unwrap();
+    let (_, below) = guide.split_once(&format!("\n## {heading}\n")).unwrap();
+    let section = below.split("\n## ").next().unwrap();
+    let rows = section
+        .lines()
+        .filter_map(|line| line.strip_prefix("| "))
+        .filter_map(|row| row.split(" | ").next());
+    // Without the table's head.
+    rows.skip(1).map(str::to_owned).collect()
+}
+
+/// The text of all Rust files below a folder, with single spaces.
+fn source(folder: &Path) -> String {
+    let mut all = String::new();
+    for name in files::names(folder) {
+        let path = folder.join(name);
+        if path.is_dir() {
+            all += &source(&path);
+        } else if path.extension().is_some_and(|end| end == "rs") {
+            let text = fs::read_to_string(&path).unwrap();
+            all.extend(text.split_whitespace().flat_map(|word| [word, " "]));
+        }
+    }
+    all
+}
+
+#[test]
+fn the_guide_knows_exactly_the_error_codes_that_there_are() {
+    let mut defined = BTreeSet::new();
+    for file in ["station/error_code.rs", "worker.rs", "plan/mod.rs"] {
+        let text = fs::read_to_string(root().join("appliance/src").join(file)).unwrap();
+        let numbers = text
+            .lines()
+            .filter_map(|line| line.split_once(": u16 = ")?.1.strip_suffix(';'));
+        defined.extend(
+            numbers
+                .filter(|number| number.len() == 3)
+                .map(str::to_owned),
+        );
+    }
+    assert!(defined.len() > 10, "{defined:?}");
+    let told: BTreeSet<_> = first_cells("Error codes").into_iter().collect();
+    assert_eq!(told, defined);
+}
+
+#[test]
+fn every_line_of_the_log_in_the_guide_is_one_that_the_program_writes() {
+    let source = source(&root().join("appliance/src")) + &source(&root().join("hal/src"));
+    let lines = first_cells("Lines of the log");
+    assert!(lines.len() > 20);
+    for line in lines {
+        for words in line.split(['…', ':']).map(str::trim) {
+            assert!(source.contains(words), "{words:?} of {line:?}");
+        }
+    }
+}

@@ -1,0 +1,2 @@
+# Stands in for the class of this name, which builds beside the sources.
+B = "${WORKDIR}/build"

@@ -1,0 +1,2 @@
+PACKAGECONFIG ?= ""
+PACKAGECONFIG[raspberrypi] = ",,libpisp"

@@ -1,0 +1,8 @@
+PACKAGECONFIG ?= "backlight hostnamed logind machined networkd timesyncd vconsole"
+PACKAGECONFIG[backlight] = "-Dbacklight=true"
+PACKAGECONFIG[hostnamed] = "-Dhostnamed=true"
+PACKAGECONFIG[logind] = "-Dlogind=true"
+PACKAGECONFIG[machined] = "-Dmachined=true"
+PACKAGECONFIG[networkd] = "-Dnetworkd=true"
+PACKAGECONFIG[timesyncd] = "-Dtimesyncd=true"
+PACKAGECONFIG[vconsole] = "-Dvconsole=true"

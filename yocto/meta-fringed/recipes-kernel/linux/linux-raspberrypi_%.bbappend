@@ -1,0 +1,3 @@
+FILESEXTRAPATHS:prepend:fringed-appliance := "${THISDIR}/files:"
+
+SRC_URI:append:fringed-appliance = " file://fringed.cfg"
