@@ -49,11 +49,11 @@ fn in_the_machine() -> bool {
 
 /// Describes the virtual cameras and draws what they replay.
 fn set_up() {
-    let folder = std::path::Path::new(CAMERAS).parent().unwrap();
-    fs::create_dir_all(folder).unwrap();
-    fs::create_dir_all(IMAGE_FOLDER).unwrap();
+    // The folder that is the root of an emulated program (tests/aarch64/rpi.sh); the machine has its own.
+    let root = std::env::var("VM_ROOT").unwrap_or_default();
+    fs::create_dir_all(format!("{root}{IMAGE_FOLDER}")).unwrap();
     for image in 0..IMAGES {
-        let path = format!("{IMAGE_FOLDER}{image}.jpg");
+        let path = format!("{root}{IMAGE_FOLDER}{image}.jpg");
         let jpeg = jpeg_encoder::Encoder::new_file(path, 100).unwrap();
         let (width, height) = (SIZE.0 as u16, SIZE.1 as u16);
         jpeg.encode(
@@ -64,7 +64,7 @@ fn set_up() {
         )
         .unwrap();
     }
-    fs::write(CAMERAS, include_str!("virtual.yaml")).unwrap();
+    fs::write(format!("{root}{CAMERAS}"), include_str!("virtual.yaml")).unwrap();
 }
 
 /// Fringes of 40 pixels, the `image`-th shifted by as many quarters of a turn.
