@@ -90,7 +90,9 @@ impl Opened {
 pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
     let opened = open_as_it_is(config, progress)?;
     let encoding = opened.head.encoding();
-    if !encoding.exact {
+    // Luma is what an image processor made of the light; who asks for it gets it.
+    let luma = config.backend == Backend::Rpi && config.camera.luma;
+    if !(encoding.exact || luma) {
         let message = format!(
             "open the camera: it grants {} only, which is compressed, and no phase can be trusted that is made of it: \
              ask for a raw format; `fringed doctor` says more",

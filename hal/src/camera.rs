@@ -23,7 +23,7 @@ pub struct CameraTiming {
     pub exposure: Duration,
     /// From the start of one exposure to the start of the next: the shortest time if it is triggered, the time if it runs by itself.
     pub period: Duration,
-    /// From the end of an exposure until its frame can be fetched, at the longest when nothing is wrong.
+    /// From the end of an exposure until its frame can be fetched when nothing is late.
     pub delivery: Duration,
 }
 

@@ -257,6 +257,9 @@ fn whatever_would_change_grey_levels_is_switched_off_where_the_driver_has_it() {
         return;
     }
     const FULL: u64 = 1;
+    // As the kernel counts its bits: not turned, and by half a turn.
+    const UPRIGHT: u64 = 1;
+    const UPSIDE_DOWN: u64 = 4;
     let margins = ["left margin", "right margin", "top margin", "bottom margin"];
     let (display, _) = open(&setup(1280, 720, 60.0));
     let client = Client::of(display.descriptor().unwrap());
@@ -270,9 +273,14 @@ fn whatever_would_change_grey_levels_is_switched_off_where_the_driver_has_it() {
     for margin in margins {
         client.set(margin, 24);
     }
-    drop((client, display));
+    client.set("rotation", UPSIDE_DOWN);
+    // The card stays open, so that the console does not come back and set it right.
+    drop(display);
+    let before = client;
     let (display, _) = open(&setup(1280, 720, 60.0));
     let client = Client::of(display.descriptor().unwrap());
+    drop(before);
+    assert_eq!(client.property("rotation"), UPRIGHT);
     assert_eq!(client.property("Broadcast RGB"), FULL);
     assert_eq!(margins.map(|margin| client.property(margin)), [0; 4]);
 }

@@ -2,6 +2,7 @@
 //!
 //! - [`oracle`]: the textbook in `f64`, from frames to heights.
 //! - [`rig`], [`render`]: small recordings of our own, with their truth.
+//! - [`small_head`]: a simulated head that is quick to examine and to calibrate.
 //! - [`shared`]: the recordings that lie beside the project, where they are.
 //! - [`program`]: runs the binary and keeps what it says.
 //! - [`files`]: reads what it writes, [`score`]: compares it with the truth, [`plane`]: fits planes.
@@ -16,3 +17,4 @@ pub mod render;
 pub mod rig;
 pub mod score;
 pub mod shared;
+pub mod small_head;

@@ -6,15 +6,8 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use tests::program::{Program, Run};
+use tests::small_head::SMALL_HEAD as HEAD;
 
-/// A head whose camera sees the projector's pixels one by one on a small part of its picture; both lenses distort.
-const HEAD: &str = "sub_rays = 2
-part = { kind = \"plane\" }
-[rig.camera]
-width = 128
-height = 96
-fov_deg = [5.0, 3.75]
-";
 /// What the response may be off, levels of 255.
 const RESPONSE_TOLERANCE: f64 = 1.0;
 /// What the noise may be off, share of it.

@@ -1,17 +1,13 @@
 //! `fringed doctor` on the simulated head: a well head passes, each single fault is named and nothing else.
 
+use appliance::calibration::Calibration;
+use appliance::doctor::{Verdict, examine};
+use hal::head::Timing;
+use hal::sim::Scenario;
 use serde_json::Value;
 use std::path::Path;
 use tests::program::{Program, Run};
-
-/// A head whose camera sees the projector's pixels one by one, as the default one does, on a small part of its picture.
-const HEAD: &str = "sub_rays = 2
-part = { kind = \"plane\" }
-[rig.camera]
-width = 128
-height = 96
-fov_deg = [5.0, 3.75]
-";
+use tests::small_head::SMALL_HEAD as HEAD;
 
 fn doctor(folder: &Path, scenario: &str) -> Run {
     let path = folder.join("scenario.toml");
@@ -99,6 +95,24 @@ fn each_single_fault_is_named_with_a_remedy_and_nothing_else_is() {
         let remedy = step(&report, named)["remedy"].as_str().unwrap();
         assert!(remedy.contains(word), "{fault}: {remedy}");
         assert!(run.stderr.contains(named), "{}", run.stderr);
+    }
+}
+
+#[test]
+fn a_head_that_nobody_has_calibrated_fails_in_nothing_but_what_calibration_measures() {
+    // As a Raspberry Pi's camera does: it stamps when the readout begins. Nothing is known of that yet, and nothing of the delay.
+    let timing = "[timing]\nflip_to_light_us = 33333\nstamp = \"exposure_end\"\nreadout_us = 16000\nexposure_refreshes = 1.0\n";
+    let scenario = Scenario::from_toml(&format!("{HEAD}{timing}"), "here").unwrap();
+    for calibrated in [false, true] {
+        let (mut head, stage) = hal::sim::head_with_progress(&scenario, &|_| ()).unwrap();
+        head.set_timing(Timing::default());
+        let known = Calibration::of_stage(&stage);
+        let steps = examine(&mut head, &known, calibrated, &|_, _| ());
+        let failed = steps.iter().filter(|step| step.verdict == Verdict::Fail);
+        let failed: Vec<&str> = failed.map(|step| step.name).collect();
+        // Where it is said to be calibrated, and so, its stamps are wrong.
+        let wrong = if calibrated { "trigger" } else { "delay" };
+        assert_eq!(failed, [wrong], "{steps:#?}");
     }
 }
 

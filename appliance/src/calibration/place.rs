@@ -1,7 +1,7 @@
 //! Where a head's calibration lies: `calibration.json`, the generation before it, and the phase maps beside them.
 
 use super::file::CalibrationFile;
-use crate::output::folder::{rename_whole, sync_folder_of, write_whole};
+use crate::output::folder::{name_also, sync_folder_of, write_whole};
 use crate::recipe::archive::hex;
 use sha2::{Digest, Sha256};
 use std::fs;
@@ -113,16 +113,8 @@ impl Place {
         if !matches!(read(&self.path), Some(Ok(_))) {
             return Ok(());
         }
-        let second = self.path.with_extension("json.previous.new");
-        // Left by a kill; there may be none.
-        let _ = fs::remove_file(&second);
-        // A second name for the same file where the file system can, so that the current one stands until it is replaced.
-        fs::hard_link(&self.path, &second)
-            .or_else(|_| fs::copy(&self.path, &second).map(|_| ()))?;
-        rename_whole(&second, &self.previous())?;
-        // Two names of one file are not renamed: a kill may have made it the previous one already.
-        let _ = fs::remove_file(&second);
-        Ok(())
+        // The current one stands until it is replaced.
+        name_also(&self.path, &self.previous())
     }
 
     /// Removes maps that no generation names, and what a kill has left. What cannot be removed only takes room.

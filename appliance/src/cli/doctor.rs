@@ -39,11 +39,10 @@ impl Doctor {
         let told = |share: f64| progress.tell(0.5 * share, "working out the light of the scene");
         let pool = super::pool(config.threads)?;
         let mut opened = pool.install(|| backend::open_as_it_is(&config.head, &told))?;
-        let steps = pool.install(|| {
-            examine(&mut opened.head, &opened.calibration, &|share, name| {
-                progress.tell(0.5 + 0.5 * share, name);
-            })
-        });
+        let calibrated = opened.problem.is_none();
+        let told = |share: f64, name: &str| progress.tell(0.5 + 0.5 * share, name);
+        let steps =
+            pool.install(|| examine(&mut opened.head, &opened.calibration, calibrated, &told));
         progress.clear();
         let failed: Vec<&str> = failed(&steps).collect();
         if common.json {

@@ -72,6 +72,13 @@ pub(super) fn check(config: &Config) -> Result<(), String> {
     }
     let TriggerSetup { pulse_us, .. } = trigger;
     within("head.trigger.pulse_us", (*pulse_us).into(), 1, 1_000_000)?;
+    if trigger.line.is_some() && pulse_us > exposure_us {
+        // Such a frame may show two patterns, and nothing in it would tell.
+        return Err(format!(
+            "head.trigger.pulse_us = {pulse_us}: write at most head.camera.exposure_us = {exposure_us}: a camera that exposes while the pulse \
+             lasts would expose longer than it is said to"
+        ));
+    }
     let lines = &config.lines;
     within("lines.debounce_ms", lines.debounce_ms.into(), 0, 1000)?;
     let mut named: Vec<(&str, &str, &str)> = Vec::new();

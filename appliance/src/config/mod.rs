@@ -292,6 +292,10 @@ mod tests {
             ("[head.camera]\nwidth = 9", "head.camera.height"),
             ("[head.projector]\nrefresh_hz = 0", "refresh_hz"),
             ("[head.trigger]\npulse_us = 0", "head.trigger.pulse_us"),
+            (
+                "[head.trigger]\nline = \"A\"\npulse_us = 16668",
+                "at most head.camera.exposure_us = 16667",
+            ),
             ("[lines]\nok = \"A\"\nbusy = \"A\"", "lines.ok"),
             ("[lines]\nnok = \"A\"", "nok"),
             ("= 5", "TOML"),

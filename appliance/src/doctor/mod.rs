@@ -90,10 +90,12 @@ const STEPS: [(&str, &[&str]); 10] = [
     ("response", &["devices", "trigger", "light", "exposure"]),
 ];
 
-/// Examines a head in front of any part, best a flat bright one. `progress` is told the share done.
+/// Examines a head in front of any part, best a flat bright one. `progress` is told the share done. What the stamps of a head that is not
+/// `calibrated` mark is measured first, and told to the head.
 pub fn examine(
     head: &mut DynHead,
     calibration: &Calibration,
+    calibrated: bool,
     progress: &dyn Fn(f64, &str),
 ) -> Vec<Step> {
     let mut steps: Vec<Step> = Vec::with_capacity(STEPS.len());
@@ -120,7 +122,7 @@ pub fn examine(
             "format" => Ok(time::format(head)),
             "mode" => Ok(time::mode(head)),
             "cadence" => time::cadence(head),
-            "trigger" => time::trigger(head),
+            "trigger" => time::trigger(head, calibrated),
             _ => {
                 let lit = lit.get_or_insert_with(|| Lit::take(head, SETTLE));
                 match (name, lit) {

@@ -1,10 +1,10 @@
 //! The doctor's steps about devices and time: there, right format and mode, flips, triggers, flip-to-light delay.
 
 use super::Finding;
-use crate::examine::{Delay, Lit, PATIENCE};
+use crate::examine::{Delay, Lit, PATIENCE, Stamps};
 use hal::camera::Starts;
 use hal::error::Error;
-use hal::head::{DynHead, Showing, TOLERANCE, Watched};
+use hal::head::{DynHead, Showing, TOLERANCE, Timing, Watched};
 use hal::projector::{Flip, Raster};
 use serde_json::json;
 use std::time::Duration;
@@ -50,7 +50,7 @@ pub(super) fn format(head: &DynHead) -> Finding {
     }
     Finding::fail(
         format!(
-            "the camera grants {} only, which is compressed",
+            "the camera grants {} only: its samples are not what the sensor counted, but compressed or processed",
             encoding.name
         ),
         "ask for an uncompressed raw format (R16 on a Raspberry Pi 5, R10_CSI2P on a Pi 4)",
@@ -141,14 +141,25 @@ pub(super) fn cadence(head: &mut DynHead) -> Result<Finding, Error> {
     Ok(Finding::fail(found, remedy, measured))
 }
 
-pub(super) fn trigger(head: &mut DynHead) -> Result<Finding, Error> {
+pub(super) fn trigger(head: &mut DynHead, calibrated: bool) -> Result<Finding, Error> {
     load(head)?;
     let showing = Showing {
         index: WHITE,
         refreshes: TRIGGERED,
         settle: 0,
     };
-    let seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
+    let mut seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
+    if !calibrated && !seen.frames.is_empty() {
+        // Calibrating comes after the doctor: what it will find is what frames are judged by here.
+        let Stamps { stamp, readout } = Stamps::measure(head)?;
+        head.set_timing(Timing {
+            stamp,
+            readout,
+            ..head.timing()
+        });
+        load(head)?;
+        seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
+    }
     Ok(match head.camera_timing().starts {
         Starts::OnTrigger => triggered(&seen),
         Starts::ByItself => by_itself(&seen, head.camera_timing().period),

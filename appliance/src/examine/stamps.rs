@@ -1,34 +1,34 @@
 //! What moment of the exposure the camera's stamps mark: its start, its end, or the end of the readout.
 //!
-//! A frame can be fetched once its exposure and its readout have ended, so the time from its stamp until then tells which: exposure
-//! and readout, the readout, or nothing. Where the camera is triggered, its triggers must confirm it.
+//! Where the camera is triggered, its triggers tell: a stamp comes as long after its trigger as what it marks. Where it runs by itself, only
+//! the time from a stamp until its frame can be fetched is known: exposure and readout, the readout, or nothing. How long a readout
+//! takes is then believed as configured, and a time that fits none of the three is no answer.
 
 use super::PATIENCE;
 use hal::camera::{CameraTiming, Starts};
 use hal::error::Error;
-use hal::head::{DynHead, Showing, Stamp, TOLERANCE, Timing};
+use hal::head::{DynHead, Seen, Showing, Stamp, TOLERANCE, Timing};
 use hal::projector::Raster;
+use hal::units::Timestamp;
 use std::time::Duration;
 
-/// Refreshes over which frames are taken.
-const REFRESHES: u32 = 24;
+/// Showings over which frames are taken.
+const SHOWINGS: usize = 6;
 
 /// What the stamps mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamps {
     /// The moment.
     pub stamp: Stamp,
-    /// From the end of an exposure to the end of its readout.
+    /// From the end of an exposure to the end of its readout, or to its frame's being there.
     pub readout: Duration,
-    /// How far an exposure started from its trigger, at most; zero for a camera that runs by itself.
-    pub off: Duration,
 }
 
 impl Stamps {
     /// Takes frames of whatever stands there. What the head is told of its time is not used, and is the same afterwards.
     ///
     /// # Errors
-    /// Of a device; `Protocol` if no frame comes or the triggers contradict every meaning.
+    /// Of a device; `Protocol` if no frame comes or no meaning explains the stamps.
     pub fn measure(head: &mut DynHead) -> Result<Self, Error> {
         let (columns, rows) = head.projector_size();
         head.load(vec![Raster::uniform(columns, rows, u8::MAX)?])?;
@@ -38,88 +38,233 @@ impl Stamps {
             stamp: Stamp::ExposureStart,
             ..told
         });
-        let showing = Showing {
-            index: 0,
-            refreshes: REFRESHES,
-            settle: 0,
-        };
-        let seen = head.watch(&[showing], PATIENCE, &mut |_| ());
+        let camera = head.camera_timing();
+        let seen = head.watch(&showings(&camera, head.refresh()), PATIENCE, &mut |_| ());
         head.set_timing(told);
         let seen = seen?;
-        let camera = head.camera_timing();
-        let waits = seen.frames.iter();
-        let wait = waits.map(|frame| frame.arrived.since(frame.start)).min();
-        let wait = wait.ok_or_else(|| {
-            Error::protocol(
+        if seen.frames.is_empty() {
+            return Err(Error::protocol(
                 "looking at the camera's stamps when no frame comes",
                 "check the wire of the trigger; `fringed doctor` says more",
-            )
-        })?;
-        let (stamp, before) = meaning(&camera, wait);
-        let mut stamps = Self {
-            stamp,
-            readout: camera.delivery,
-            off: Duration::ZERO,
-        };
-        if camera.starts == Starts::OnTrigger {
-            for frame in &seen.frames {
-                let start = frame.start - before;
-                let off = |at: &hal::units::Timestamp| Duration::from_nanos(at.0.abs_diff(start.0));
-                let off = seen.triggers.iter().map(off).min().unwrap_or(Duration::MAX);
-                stamps.off = stamps.off.max(off);
-            }
-            if stamps.off > TOLERANCE {
-                return Err(Error::protocol(
-                    format!(
-                        "a camera whose stamps are off its triggers by {:.3} ms, be they starts or ends of exposures,",
-                        stamps.off.as_secs_f64() * 1e3
-                    ),
-                    "check that the camera is in trigger mode, and that its exposure is what it says",
-                ));
-            }
+            ));
         }
-        Ok(stamps)
+        match camera.starts {
+            Starts::OnTrigger => by_triggers(&camera, &seen.triggers, &seen.frames),
+            Starts::ByItself => by_waiting(&camera, &seen.frames),
+        }
     }
 }
 
-/// The meaning that explains the time from stamp to frame best, and how long before its stamp an exposure starts then.
-fn meaning(camera: &CameraTiming, wait: Duration) -> (Stamp, Duration) {
-    let (exposure, readout) = (camera.exposure, camera.delivery);
-    let all = [
-        (Stamp::ExposureStart, Duration::ZERO),
-        (Stamp::ExposureEnd, exposure),
-        (Stamp::ReadoutEnd, exposure + readout),
-    ];
+/// One or two triggers for each, and then none for longer than the camera needs: one that runs by itself does not keep such a pace.
+fn showings(camera: &CameraTiming, refresh: Duration) -> [Showing; SHOWINGS] {
+    let whole = camera.period.as_nanos().div_ceil(refresh.as_nanos().max(1));
+    let whole = u32::try_from(whole).unwrap_or(1).clamp(1, 1000);
+    [Showing {
+        index: 0,
+        refreshes: 2 * whole + 1,
+        settle: whole + 1,
+    }; SHOWINGS]
+}
+
+/// From the time that the stamps come after their triggers.
+fn by_triggers(
+    camera: &CameraTiming,
+    triggers: &[Timestamp],
+    frames: &[Seen<()>],
+) -> Result<Stamps, Error> {
+    let tolerance = TOLERANCE.min(camera.exposure / 4);
+    // The latest trigger before the stamp whose exposure had ended when the frame was there.
+    let trigger_of = |frame: &Seen<()>| {
+        let own = triggers.iter().rev().find(|at| {
+            **at <= frame.start + tolerance && **at + camera.exposure <= frame.arrived + tolerance
+        });
+        own.map(|at| i128::from(frame.start.0) - i128::from(at.0))
+    };
+    let wrong = |found: String| {
+        Err(Error::protocol(
+            found,
+            "check that the camera is in trigger mode, and that its exposure is what it says",
+        ))
+    };
+    let Some(mut after) = frames.iter().map(trigger_of).collect::<Option<Vec<_>>>() else {
+        return wrong("a camera with frames that no trigger explains".into());
+    };
+    after.sort_unstable();
+    let middle = after[after.len() / 2];
+    let off = (middle - after[0]).max(after[after.len() - 1] - middle);
+    let ms = |nanoseconds: i128| nanoseconds as f64 * 1e-6;
+    let (slack, exposure) = (nanoseconds(tolerance), nanoseconds(camera.exposure));
+    if off > slack {
+        return wrong(format!(
+            "a camera whose stamps are {:.3} to {:.3} ms off its triggers",
+            ms(after[0]),
+            ms(after[after.len() - 1])
+        ));
+    }
+    let fetched = |stamp: Stamp, before: Duration| {
+        let waits = frames.iter().map(|frame| frame.arrived.since(frame.start));
+        Ok(Stamps {
+            stamp,
+            readout: waits.min().unwrap_or_default().saturating_sub(before),
+        })
+    };
+    if middle.abs() <= slack {
+        return fetched(Stamp::ExposureStart, camera.exposure);
+    }
+    if (middle - exposure).abs() <= slack {
+        return fetched(Stamp::ExposureEnd, Duration::ZERO);
+    }
+    match u64::try_from(middle - exposure) {
+        Ok(readout) if readout <= camera.delivery.as_nanos() as u64 + slack as u64 => Ok(Stamps {
+            stamp: Stamp::ReadoutEnd,
+            readout: Duration::from_nanos(readout),
+        }),
+        _ => wrong(format!(
+            "a camera that exposes for {:.3} ms and stamps {:.3} ms after its triggers",
+            ms(exposure),
+            ms(middle)
+        )),
+    }
+}
+
+fn nanoseconds(time: Duration) -> i128 {
+    i128::try_from(time.as_nanos()).unwrap_or(i128::MAX)
+}
+
+/// From the time that frames take from their stamp until they are there.
+fn by_waiting(camera: &CameraTiming, frames: &[Seen<()>]) -> Result<Stamps, Error> {
+    let (exposure, delivery) = (camera.exposure, camera.delivery);
+    let waits = frames.iter().map(|frame| frame.arrived.since(frame.start));
+    let wait = waits.min().unwrap_or_default();
     // The first of equals: a readout in no time ends with the exposure.
-    let off = |before: Duration| wait.abs_diff((exposure + readout).saturating_sub(before));
-    let best = all.into_iter().min_by_key(|(_, before)| off(*before));
-    best.unwrap_or((Stamp::ExposureStart, Duration::ZERO))
+    let all = [
+        (Stamp::ExposureStart, exposure + delivery, exposure),
+        (Stamp::ExposureEnd, delivery, Duration::ZERO),
+        (Stamp::ReadoutEnd, Duration::ZERO, Duration::ZERO),
+    ];
+    let best = all
+        .into_iter()
+        .min_by_key(|(_, expected, _)| wait.abs_diff(*expected));
+    match best {
+        Some((stamp, expected, before)) if wait.abs_diff(expected) <= exposure / 3 => Ok(Stamps {
+            stamp,
+            readout: match stamp {
+                Stamp::ReadoutEnd => delivery,
+                _ => wait.saturating_sub(before),
+            },
+        }),
+        _ => Err(Error::protocol(
+            format!(
+                "a camera that runs by itself and whose frames are there {:.1} ms after their stamps, which fits neither start nor end of an exposure of \
+                 {:.1} ms nor the end of a readout of {:.1} ms",
+                wait.as_secs_f64() * 1e3,
+                exposure.as_secs_f64() * 1e3,
+                delivery.as_secs_f64() * 1e3
+            ),
+            "set head.camera.delivery_us to what its readout takes (where stamps mark the end of the exposure, as on a Raspberry Pi, to the first number)",
+        )),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn the_wait_from_stamp_to_frame_tells_what_the_stamp_marks() {
-        let ms = Duration::from_millis;
-        let camera = |exposure, delivery| CameraTiming {
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    fn camera(exposure: u64, delivery: u64) -> CameraTiming {
+        CameraTiming {
             starts: Starts::ByItself,
             exposure: ms(exposure),
-            period: ms(40),
+            period: ms(exposure + delivery),
             delivery: ms(delivery),
-        };
-        let slow = camera(33, 16);
-        for (wait, stamp, before) in [
-            (49, Stamp::ExposureStart, 0),
-            (53, Stamp::ExposureStart, 0),
-            (16, Stamp::ExposureEnd, 33),
-            (12, Stamp::ExposureEnd, 33),
-            (0, Stamp::ReadoutEnd, 49),
-            (3, Stamp::ReadoutEnd, 49),
-        ] {
-            assert_eq!(meaning(&slow, ms(wait)), (stamp, ms(before)), "{wait}");
         }
-        assert_eq!(meaning(&camera(33, 0), ms(0)).0, Stamp::ExposureEnd);
+    }
+
+    /// Frames stamped and there at these times, ms.
+    fn frames(times: &[(u64, u64)]) -> Vec<Seen<()>> {
+        let frame = |(start, arrived): &(u64, u64)| Seen {
+            start: Timestamp(0) + ms(*start),
+            arrived: Timestamp(0) + ms(*arrived),
+            count: 0,
+            measured: (),
+        };
+        times.iter().map(frame).collect()
+    }
+
+    fn at(times: &[u64]) -> Vec<Timestamp> {
+        times.iter().map(|at| Timestamp(0) + ms(*at)).collect()
+    }
+
+    #[test]
+    fn the_wait_from_stamp_to_frame_tells_what_the_stamp_marks() {
+        for (wait, stamp) in [
+            (49, Stamp::ExposureStart),
+            (53, Stamp::ExposureStart),
+            (16, Stamp::ExposureEnd),
+            (12, Stamp::ExposureEnd),
+            (0, Stamp::ReadoutEnd),
+            (3, Stamp::ReadoutEnd),
+        ] {
+            let found = by_waiting(&camera(33, 16), &frames(&[(100, 100 + wait)]));
+            assert_eq!(found.unwrap().stamp, stamp, "{wait}");
+        }
+        let found = by_waiting(&camera(33, 0), &frames(&[(100, 100)])).unwrap();
+        assert_eq!(found.stamp, Stamp::ExposureEnd);
+    }
+
+    #[test]
+    fn a_wait_that_nothing_explains_is_told_and_not_guessed_at() {
+        // It delivers within 50 ms, but takes 20: neither is the readout.
+        let error = by_waiting(&camera(17, 50), &frames(&[(100, 120), (133, 154)])).unwrap_err();
+        let words = error.to_string();
+        assert!(
+            words.contains("20.0 ms") && words.contains("delivery_us"),
+            "{words}"
+        );
+    }
+
+    #[test]
+    fn triggers_tell_what_the_stamps_mark_however_soon_the_frames_are_there() {
+        // Exposed for 17 ms, read out for 16, and said to be there after 50.
+        let (camera, triggers) = (camera(17, 50), at(&[100, 133, 183, 216]));
+        for (mark, readout, stamp) in [
+            (0, 18, Stamp::ExposureStart),
+            (17, 18, Stamp::ExposureEnd),
+            (33, 16, Stamp::ReadoutEnd),
+            (18, 1, Stamp::ReadoutEnd),
+        ] {
+            // The second was lost.
+            let seen: Vec<_> = [100, 183, 216].map(|at| (at + mark, at + 35)).into();
+            let found = by_triggers(&camera, &triggers, &frames(&seen)).unwrap();
+            assert_eq!(
+                found,
+                Stamps {
+                    stamp,
+                    readout: ms(readout)
+                },
+                "{mark} ms after the trigger"
+            );
+        }
+    }
+
+    #[test]
+    fn stamps_that_no_trigger_explains_are_refused() {
+        let (camera, triggers) = (camera(17, 50), at(&[100, 133, 183, 216]));
+        for seen in [
+            // By itself, every 33 ms.
+            &[(117, 135), (150, 168), (183, 201), (216, 234)][..],
+            // In the middle of the exposure.
+            &[(108, 135), (141, 168)],
+            // Before any trigger.
+            &[(50, 90)],
+            // So late that it is none of this camera's.
+            &[(220, 240), (303, 310)],
+        ] {
+            let error = by_triggers(&camera, &triggers, &frames(seen)).unwrap_err();
+            assert!(error.to_string().contains("trigger mode"), "{error}");
+        }
     }
 }

@@ -44,8 +44,8 @@ impl Follower {
         if finished {
             self.passed = verdict == Some(Verdict::Pass);
         }
-        let stands = finished || !snapshot.is_working();
-        self.passed &= stands && !missed;
+        // Whatever it works at by now comes after that part.
+        self.passed &= !snapshot.is_working() && !missed;
         (self.seq, self.missed) = (snapshot.result_seq, snapshot.missed);
         // A whole cycle between two looks: whoever waits for busy must see it.
         let unseen = (finished && !self.said.busy).then_some(Signals {
@@ -164,6 +164,15 @@ mod tests {
             ];
             assert_eq!(said(&course), [BUSY, OK, shown, NOT_OK]);
         }
+    }
+
+    #[test]
+    fn ok_does_not_come_back_where_the_end_of_the_cycle_and_the_change_of_recipe_were_one_look() {
+        let course = [
+            snapshot(LOADING, 8, Verdict::Pass, 0),
+            snapshot(READY, 8, Verdict::Pass, 0),
+        ];
+        assert_eq!(said(&course), [BUSY, BUSY, NOT_OK]);
     }
 
     #[test]

@@ -76,6 +76,30 @@ pub fn rename_whole(from: &Path, target: &Path) -> std::io::Result<()> {
     sync_folder_of(target)
 }
 
+/// Gives a file a second name, in place of whatever had it; the first one stays. Whoever pulls the plug finds what had the name
+/// before, or this file.
+///
+/// # Errors
+/// Whatever the file system answers.
+pub fn name_also(file: &Path, second: &Path) -> std::io::Result<()> {
+    let mut temporary = second.as_os_str().to_owned();
+    temporary.push(".new");
+    let temporary = PathBuf::from(temporary);
+    // Left by a kill; there may be none.
+    let _ = fs::remove_file(&temporary);
+    let copied = |_| {
+        fs::copy(file, &temporary)?;
+        fs::File::open(&temporary)?.sync_all()
+    };
+    // Not every file system gives a file two names.
+    let named = fs::hard_link(file, &temporary)
+        .or_else(copied)
+        .and_then(|()| rename_whole(&temporary, second));
+    // Two names of one file are not renamed, and a kill may have made this file the second one already.
+    let _ = fs::remove_file(&temporary);
+    named
+}
+
 /// Syncs the folder that a file lies in, so that its name is there after a loss of power, or gone.
 ///
 /// # Errors
@@ -85,4 +109,28 @@ pub fn sync_folder_of(file: &Path) -> std::io::Result<()> {
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty());
     fs::File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_name_replaces_another_file_and_leaves_nothing_else_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::write(path("new"), "new").unwrap();
+        fs::write(path("old"), "old").unwrap();
+        fs::write(path("old.new"), "left by a kill").unwrap();
+        // Again, as after a kill behind the first time.
+        for _ in 0..2 {
+            name_also(&path("new"), &path("old")).unwrap();
+            assert_eq!(fs::read(path("old")).unwrap(), b"new");
+            assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+        }
+        fs::remove_file(path("new")).unwrap();
+        assert!(name_also(&path("new"), &path("old")).is_err());
+        assert_eq!(fs::read(path("old")).unwrap(), b"new");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
 }

@@ -1,7 +1,7 @@
 //! The recipes of a station: a folder of `NNNN.recipe` files with the generation before each.
 
 use super::{Recipe, RecipeFile, archive};
-use crate::output::folder::{rename_whole, write_whole};
+use crate::output::folder::{name_also, write_whole};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -98,12 +98,8 @@ impl Store {
         if !fs::File::open(&path).is_ok_and(sound) {
             return Ok(());
         }
-        let second = previous.with_extension("previous.new");
-        // Left by a kill; there may be none.
-        let _ = fs::remove_file(&second);
-        // A second name for the same file where the file system can, so that the current one stands until it is replaced.
-        fs::hard_link(&path, &second).or_else(|_| fs::copy(&path, &second).map(|_| ()))?;
-        rename_whole(&second, &previous)
+        // The current one stands until it is replaced.
+        name_also(&path, &previous)
     }
 
     /// Keeps other processes from changing the same recipes, as long as the answer lives.

@@ -38,6 +38,13 @@ const CRTC: [(&str, Wanted); 4] = [
     ("VRR_ENABLED", Wanted::Number(0)),
 ];
 
+/// Properties of a plane: as it lies in memory and nothing of what lies behind it, whatever a program before has left.
+const PLANE: [(&str, Wanted); 2] = [
+    // The bit of no rotation.
+    ("rotation", Wanted::Number(1)),
+    ("alpha", Wanted::Number(0xffff)),
+];
+
 /// The value that a connector's property should have; none if it does not matter or the driver has no such value.
 pub(super) fn of_connector(name: &str, kind: &ValueType) -> Option<u64> {
     find(&CONNECTOR, name, kind)
@@ -46,6 +53,11 @@ pub(super) fn of_connector(name: &str, kind: &ValueType) -> Option<u64> {
 /// The value that a CRTC's property should have; none if it does not matter.
 pub(super) fn of_crtc(name: &str, kind: &ValueType) -> Option<u64> {
     find(&CRTC, name, kind)
+}
+
+/// The value that a plane's property should have; none if it does not matter.
+pub(super) fn of_plane(name: &str, kind: &ValueType) -> Option<u64> {
+    find(&PLANE, name, kind)
 }
 
 fn find(known: &[(&str, Wanted)], name: &str, kind: &ValueType) -> Option<u64> {

@@ -183,6 +183,7 @@ impl Output {
                 faithful::of_connector as fn(&str, &property::ValueType) -> Option<u64>,
             ),
             (&self.driver, faithful::of_crtc),
+            (&self.plane, faithful::of_plane),
         ] {
             for property in object.all.iter().filter(|property| property.info.mutable()) {
                 let value = wanted(&property.name, property.info.value_type());

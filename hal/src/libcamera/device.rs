@@ -46,6 +46,7 @@ pub struct LibCamera {
     ready: Arc<OwnedFd>,
     gone: Arc<AtomicBool>,
     out: Arc<AtomicUsize>,
+    in_flight: Arc<AtomicUsize>,
     ended: Receiver<()>,
     copies: Pool,
     count: Count,
@@ -89,7 +90,8 @@ impl LibCamera {
             EventfdFlags::SEMAPHORE | EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC,
         )
         .map_err(|cause| system(&cause))?;
-        let (ready, gone, out) = (Arc::new(ready), Arc::default(), Arc::default());
+        let (ready, gone) = (Arc::new(ready), Arc::default());
+        let (out, in_flight) = (Arc::default(), Arc::default());
         let (orders, ordered) = mpsc::channel();
         let (told, events) = mpsc::channel();
         let (answer, opened) = mpsc::channel();
@@ -102,6 +104,7 @@ impl LibCamera {
             ready: Arc::clone(&ready),
             gone: Arc::clone(&gone),
             out: Arc::clone(&out),
+            in_flight: Arc::clone(&in_flight),
         };
         thread::Builder::new()
             .name("libcamera".into())
@@ -125,6 +128,7 @@ impl LibCamera {
             ready,
             gone,
             out,
+            in_flight,
             ended,
             count: Count::default(),
             running: false,
@@ -288,8 +292,20 @@ impl Camera for LibCamera {
         }
         self.running = false;
         let stopped = self.ask("stopping", Order::Stop);
+        let in_flight = self.in_flight.load(Ordering::Relaxed);
         while let Ok(Some(_)) = self.fetch() {}
-        stopped
+        stopped?;
+        if in_flight > 0 {
+            // Whatever they bring would count as the next sequence's.
+            return Err(Error::protocol(
+                format!(
+                    "stopping the camera `{}` that keeps {in_flight} requests",
+                    self.id
+                ),
+                "this is a defect of fringed or of libcamera: report it",
+            ));
+        }
+        Ok(())
     }
 }
 

@@ -24,7 +24,7 @@ pub(crate) enum Layout {
     Bytes,
     /// Two bytes each, the lower one first.
     Words,
-    /// Likewise, but only so many upper bits are the sensor's.
+    /// Likewise, but only so many upper bits are the sensor's: 8 to 15.
     UpperBits(u8),
     /// Four of 10 bits in five bytes: four upper bytes, then the lower bits of all four.
     FourInFive,
@@ -129,15 +129,16 @@ pub(crate) fn choose(
     })
 }
 
-/// The bits of a monochrome sensor, by the raw formats that its camera lists: those of its deepest mode.
-pub(crate) fn sensor_bits<'a>(listed: impl Iterator<Item = &'a str>) -> Option<u8> {
-    let bits = |name: &str| {
+/// The bits of a monochrome sensor in frames of `size`, by the raw formats that its camera lists with their sizes: those of its deepest
+/// mode of that size, which is the one that a camera takes when it is asked for 16.
+pub(crate) fn sensor_bits(listed: &[(String, Vec<(u32, u32)>)], size: (u32, u32)) -> Option<u8> {
+    let format = |name: &str| {
         FORMATS
             .iter()
             .find(|f| f.name == name && f.reading == Reading::Raw)
-            .map(|f| f.bits)
     };
-    listed.filter_map(bits).max()
+    let modes = listed.iter().filter(|(_, sizes)| sizes.contains(&size));
+    modes.filter_map(|(name, _)| Some(format(name)?.bits)).max()
 }
 
 /// Why a format is not taken; none if it can be.
@@ -179,7 +180,7 @@ impl Readable {
     /// would not be 2^bits − 1, and nobody would see that a pixel is saturated.
     pub fn of_sensor(self, bits: Option<u8>) -> Self {
         match (self.layout, bits) {
-            (Layout::Words, Some(bits)) if (9..self.bits).contains(&bits) => Self {
+            (Layout::Words, Some(bits)) if (8..self.bits).contains(&bits) => Self {
                 layout: Layout::UpperBits(bits),
                 bits,
                 ..self
@@ -241,6 +242,11 @@ impl Readable {
                     match self.layout {
                         Layout::MiddleOfThree => {
                             for (from, into) in row.chunks_exact(3).zip(&mut into[..columns]) {
+                                *into = from[1];
+                            }
+                        }
+                        Layout::UpperBits(_) => {
+                            for (from, into) in row.chunks_exact(2).zip(into) {
                                 *into = from[1];
                             }
                         }

@@ -161,10 +161,27 @@ fn rows_that_do_not_fit_their_stride_are_refused() {
 #[test]
 fn the_upper_bits_of_a_wider_format_are_the_sensors() {
     let format = |name| *FORMATS.iter().find(|f| f.name == name).unwrap();
-    // As a Pi 5 lists them for an OV9281, an IMX296, and a colour sensor.
-    assert_eq!(sensor_bits(["R8", "R10_CSI2P"].into_iter()), Some(10));
-    assert_eq!(sensor_bits(["R10_CSI2P"].into_iter()), Some(10));
-    assert_eq!(sensor_bits(["SRGGB12_CSI2P", "NV12"].into_iter()), None);
+    // As a Pi 5 lists them for an OV9281, an IMX296, and a colour sensor; and for one whose largest mode has 8 bits only.
+    let (small, large) = ((640, 400), (1280, 800));
+    let bits = |listed: &[(&str, &[(u32, u32)])], size| {
+        let listed: Vec<_> = listed
+            .iter()
+            .map(|(name, sizes)| ((*name).to_owned(), sizes.to_vec()))
+            .collect();
+        sensor_bits(&listed, size)
+    };
+    let both: &[_] = &[small, large];
+    assert_eq!(bits(&[("R8", both), ("R10_CSI2P", both)], large), Some(10));
+    assert_eq!(bits(&[("R10_CSI2P", &[IMX296])], IMX296), Some(10));
+    assert_eq!(
+        bits(&[("SRGGB12_CSI2P", both), ("NV12", both)], large),
+        None
+    );
+    let mixed: &[(&str, &[_])] = &[("R8", &[large]), ("R10_CSI2P", &[small])];
+    assert_eq!(
+        (bits(mixed, large), bits(mixed, small)),
+        (Some(8), Some(10))
+    );
 
     let upper = format("R16").of_sensor(Some(10));
     assert!(!upper.is_plain());
@@ -181,5 +198,13 @@ fn the_upper_bits_of_a_wider_format_are_the_sensors() {
     // What has as many bits as its sensor, or is not known, is left as it is.
     assert_eq!(format("R10").of_sensor(Some(10)), format("R10"));
     assert_eq!(format("R16").of_sensor(None), format("R16"));
-    assert_eq!(format("R16").of_sensor(Some(8)), format("R16"));
+
+    // A saturated pixel of 8 bits is 255 of 255, and not 65 280 of 65 535.
+    let upper = format("R16").of_sensor(Some(8));
+    let (frames, bytes) = upper.frames((2, 2), 6).unwrap();
+    assert_eq!((frames, bytes), (FrameFormat::packed(2, 2, 8), 12));
+    let mut pixels = Pixels::zeroed(&frames);
+    let buffer = [0, 255, 0, 1, 7, 7, 0, 0, 0, 128, 7, 7];
+    upper.copy(&buffer, 6, &frames, &mut pixels);
+    assert_eq!(pixels, Pixels::Eight(vec![255, 1, 0, 128]));
 }

@@ -47,7 +47,7 @@ pub struct Settings {
     /// Whether these are set, and verified in each frame's metadata. Only for trials with a camera that has no such controls:
     /// then they are taken on trust.
     pub controlled: bool,
-    /// From the end of an exposure until its frame can be fetched, at the longest when nothing is wrong.
+    /// From the end of an exposure until its frame can be fetched when nothing is late.
     pub delivery: Duration,
     /// Buffers to ask for. A camera may grant less, and what is kept beyond them is copied.
     pub buffers: u32,

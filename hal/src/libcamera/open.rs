@@ -61,6 +61,10 @@ pub(super) fn refused(id: &str, attempt: &str, cause: &io::Error) -> Error {
             format!("{attempt}: {cause}"),
             "let the user of this program into the group `video`",
         ),
+        io::ErrorKind::OutOfMemory => Error::unsupported(
+            attempt,
+            "there is not enough memory for its buffers: give more (on a Raspberry Pi \"dtoverlay=vc4-kms-v3d,cma-512\")",
+        ),
         _ if cause.raw_os_error() == Some(rustix::io::Errno::NODEV.raw_os_error()) => {
             Error::disconnected(Device::Camera, attempt)
         }
@@ -228,14 +232,19 @@ fn agree(
     let granted: Vec<Granted> = offers.iter().map(|(granted, _)| granted.clone()).collect();
     let (best, readable) = choose(id, settings.reading, settings.size, &granted)?;
     let configuration = offers.swap_remove(best).1;
-    let listed: Vec<String> = configuration.get(0).map_or_else(Vec::new, |stream| {
-        let formats = stream.formats().pixel_formats();
-        formats
+    let listed: Vec<_> = configuration.get(0).map_or_else(Vec::new, |stream| {
+        let formats = stream.formats();
+        let sizes = |format| {
+            let sizes = formats.sizes(format);
+            sizes.iter().map(|size| (size.width, size.height)).collect()
+        };
+        let listed = formats.pixel_formats();
+        listed
             .into_iter()
-            .map(|format| format.to_string())
+            .map(|format| (format.to_string(), sizes(format)))
             .collect()
     });
-    let bits = sensor_bits(listed.iter().map(String::as_str));
+    let bits = sensor_bits(&listed, granted[best].size);
     Ok((configuration, readable.of_sensor(bits)))
 }
 

@@ -18,7 +18,7 @@ use super::Settings;
 use super::buffers::Lease;
 use super::layout::Layout;
 use super::open::{Configured, Opened, open, refused};
-use super::report::{Reported, on_the_heads_clock};
+use super::report::{Clocks, Reported, on_the_heads_clock};
 use crate::clock::monotonic;
 use crate::error::{Device, Error};
 use crate::units::Timestamp;
@@ -67,7 +67,10 @@ pub(super) struct Wires {
     /// Counts the events that were not fetched, so that it is readable as long as there is one.
     pub ready: Arc<OwnedFd>,
     pub gone: Arc<AtomicBool>,
+    /// Buffers with frames that were not dropped.
     pub out: Arc<AtomicUsize>,
+    /// Requests that the library has.
+    pub in_flight: Arc<AtomicUsize>,
 }
 
 /// Does `work` with the manager of all cameras; two at a time would end the process.
@@ -101,7 +104,13 @@ pub(super) fn with_manager<R>(
 pub(super) fn own(wires: Wires, answer: &Sender<Result<(String, Configured), Error>>) {
     let served = with_manager(|manager| {
         let mut opened = open(manager, &wires.settings)?;
-        let _ = answer.send(Ok((opened.id.clone(), opened.configured)));
+        if answer
+            .send(Ok((opened.id.clone(), opened.configured)))
+            .is_err()
+        {
+            // Nobody waited so long, and nobody would ever close it.
+            return Ok(());
+        }
         let home = wires.home.clone();
         opened.camera.on_request_completed(move |request| {
             let _ = home.send(Order::Done(request));
@@ -115,6 +124,7 @@ pub(super) fn own(wires: Wires, answer: &Sender<Result<(String, Configured), Err
             opened,
             wires: &wires,
             running: false,
+            closing: false,
         };
         owner.serve();
         Ok(())
@@ -133,11 +143,14 @@ struct Owner<'a> {
     opened: Opened,
     wires: &'a Wires,
     running: bool,
+    closing: bool,
 }
 
 impl Owner<'_> {
     fn serve(&mut self) {
-        while let Ok(order) = self.wires.orders.recv() {
+        while !self.closing
+            && let Ok(order) = self.wires.orders.recv()
+        {
             match order {
                 Order::Start(answer) => {
                     let started = self.start();
@@ -149,7 +162,7 @@ impl Owner<'_> {
                 }
                 Order::Done(request) => self.done(request),
                 Order::Free(index) => self.free(index),
-                Order::Close => break,
+                Order::Close => self.closing = true,
             }
         }
         // A request must not outlive its camera: neither one that the library has nor one that comes back unread.
@@ -200,8 +213,9 @@ impl Owner<'_> {
                     self.keep(request);
                 }
                 Ok(Order::Free(index)) => self.free(index),
-                // Its other half waits for this one's answer.
-                Ok(_) => {}
+                // Its other half did not wait for this one's answer.
+                Ok(Order::Close) => self.closing = true,
+                Ok(Order::Start(_) | Order::Stop(_)) => {}
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
                     return Err(Error::timeout(
                         format!(
@@ -218,6 +232,7 @@ impl Owner<'_> {
     }
 
     fn keep(&mut self, request: Request) -> Option<usize> {
+        self.wires.in_flight.fetch_sub(1, Ordering::Relaxed);
         let index = usize::try_from(request.cookie()).ok()?;
         self.opened.slots.get_mut(index)?.request = Some(request);
         Some(index)
@@ -244,8 +259,11 @@ impl Owner<'_> {
             return Ok(());
         };
         request.reuse(ReuseFlag::REUSE_BUFFERS);
+        // Before it is queued: it may be back before that returns.
+        self.wires.in_flight.fetch_add(1, Ordering::Relaxed);
         let queued = self.opened.camera.queue_request(request);
         queued.map_err(|(request, cause)| {
+            self.wires.in_flight.fetch_sub(1, Ordering::Relaxed);
             slot.request = Some(request);
             refused(&self.opened.id, "queueing a request to", &cause)
         })
@@ -282,7 +300,7 @@ impl Owner<'_> {
 
     /// What a completed request holds; none if its frame is no good.
     fn read(&self, index: usize) -> Option<Event> {
-        let (boot, now) = (boot(), monotonic());
+        let clocks = Clocks::of(&[(); 3].map(|()| (monotonic(), boot(), monotonic())));
         let slot = &self.opened.slots[index];
         let request = slot.request.as_ref()?;
         let buffer: &FrameBuffer = request.buffer(&self.opened.stream)?;
@@ -305,7 +323,7 @@ impl Owner<'_> {
         } else {
             Ok(())
         };
-        let stamp = verified.and_then(|()| on_the_heads_clock(stamp, now, boot));
+        let stamp = verified.and_then(|()| on_the_heads_clock(stamp, clocks));
         Some(match stamp {
             Ok(stamp) => Event::Frame(Arrived {
                 lease: Lease::new(

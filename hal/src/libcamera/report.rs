@@ -74,27 +74,47 @@ impl Exposing {
     }
 }
 
+/// What `CLOCK_MONOTONIC` says, and how far `CLOCK_BOOTTIME` is ahead of it: the time that the computer was suspended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Clocks {
+    pub monotonic: Timestamp,
+    pub suspended: Duration,
+}
+
+impl Clocks {
+    /// Out of readings of the monotonic clock, the other one, and the first again. Whoever reads may be interrupted in between, so the
+    /// closest reading counts.
+    pub fn of(readings: &[(Timestamp, Timestamp, Timestamp)]) -> Self {
+        let spread = |(before, _, after): &&(Timestamp, Timestamp, Timestamp)| after.since(*before);
+        let closest = readings.iter().min_by_key(spread);
+        let suspended = closest.map_or(Duration::ZERO, |(before, boot, _)| boot.since(*before));
+        let latest = readings.last().map_or(Timestamp(0), |(.., after)| *after);
+        Self {
+            monotonic: latest,
+            suspended,
+        }
+    }
+}
+
 /// A stamp on the head's clock. Libcamera documents `CLOCK_BOOTTIME`; most drivers stamp with `CLOCK_MONOTONIC`.
 ///
-/// The two differ by the time that the computer was suspended. A frame is stamped before it is fetched, so a stamp that is later
-/// than `monotonic` is one of the other clock: the difference of the clocks is then more than a frame's way. `monotonic` and
-/// `boot` are what the clocks say when it is fetched.
+/// A frame is stamped before it is fetched, so a stamp that is later than the monotonic clock is one of the other: the
+/// difference of the clocks is then more than a frame's way. `clocks` are what they say when it is fetched.
 ///
 /// # Errors
 /// `Protocol` if the stamp fits neither.
-pub(crate) fn on_the_heads_clock(
-    stamp: u64,
-    monotonic: Timestamp,
-    boot: Timestamp,
-) -> Result<Timestamp, Error> {
-    let suspended = boot.since(monotonic);
+pub(crate) fn on_the_heads_clock(stamp: u64, clocks: Clocks) -> Result<Timestamp, Error> {
+    let Clocks {
+        monotonic,
+        suspended,
+    } = clocks;
     let stamp = Timestamp(stamp);
     [stamp, stamp - suspended]
         .into_iter()
         .find(|stamp| *stamp <= monotonic && monotonic.since(*stamp) <= OLDEST)
         .ok_or_else(|| {
             Error::protocol(
-                format!("a frame stamped {stamp}, fetched at {monotonic} of CLOCK_MONOTONIC and {boot} of CLOCK_BOOTTIME"),
+                format!("a frame stamped {stamp}, fetched at {monotonic} of CLOCK_MONOTONIC and {} of CLOCK_BOOTTIME", monotonic + suspended),
                 "the camera's driver stamps with a clock of its own: take a camera whose driver does not",
             )
         })
@@ -193,23 +213,37 @@ mod tests {
     fn a_stamp_is_understood_on_either_clock_and_refused_on_any_other() {
         let s = |seconds: u64| Timestamp(seconds * 1_000_000_000);
         let monotonic = s(100_000);
-        // Suspended for an hour, not at all, and for three seconds.
-        for boot in [s(103_600), s(100_000), s(100_003)] {
-            let suspended = boot.since(monotonic);
+        let suspended_for = |seconds| Clocks {
+            monotonic,
+            suspended: Duration::from_secs(seconds),
+        };
+        for clocks in [3600, 0, 3].map(suspended_for) {
             let exposed = monotonic - Duration::from_millis(40);
-            for stamp in [exposed, exposed + suspended] {
-                assert_eq!(
-                    on_the_heads_clock(stamp.0, monotonic, boot).unwrap(),
-                    exposed
-                );
+            for stamp in [exposed, exposed + clocks.suspended] {
+                assert_eq!(on_the_heads_clock(stamp.0, clocks).unwrap(), exposed);
             }
         }
-        let boot = s(103_600);
+        let clocks = suspended_for(3600);
         // A device's own clock, the time of day, nothing, and the future.
         for stamp in [s(500), s(1_700_000_000), s(0), s(103_601)] {
-            let error = on_the_heads_clock(stamp.0, monotonic, boot).unwrap_err();
+            let error = on_the_heads_clock(stamp.0, clocks).unwrap_err();
             assert_eq!(error.kind(), ErrorKind::Protocol);
         }
+    }
+
+    #[test]
+    fn whoever_is_interrupted_between_two_clocks_still_tells_their_difference() {
+        let at = Timestamp;
+        // Suspended for 5000; interrupted for 900 before and after the other clock was read, and not at all.
+        let readings = [
+            (at(1000), at(6905), at(1910)),
+            (at(2000), at(7005), at(2910)),
+            (at(3000), at(8005), at(3010)),
+        ];
+        let clocks = Clocks::of(&readings);
+        assert_eq!(clocks.monotonic, at(3010));
+        assert_eq!(clocks.suspended, Duration::from_nanos(5005));
+        assert_eq!(Clocks::of(&readings[2..]), clocks);
     }
 
     #[test]

@@ -7,7 +7,9 @@ use std::time::Duration;
 use drm::buffer::{Buffer, DrmFourcc};
 use drm::control::atomic::AtomicModeReq;
 use drm::control::connector::{self, Interface};
-use drm::control::{AtomicCommitFlags, Device as ControlDevice, RawResourceHandle, property};
+use drm::control::{
+    AtomicCommitFlags, Device as ControlDevice, RawResourceHandle, ResourceHandle, property,
+};
 use drm::{ClientCapability, Device};
 
 /// Longer than the virtual display composes a picture.
@@ -45,7 +47,7 @@ impl Client {
             .unwrap()
     }
 
-    fn of_object(&self, object: connector::Handle) -> Vec<(String, property::Handle, u64)> {
+    fn of_object<H: ResourceHandle>(&self, object: H) -> Vec<(String, property::Handle, u64)> {
         let values = self.get_properties(object).unwrap();
         let named = values.iter().map(|(handle, value)| {
             let name = self
@@ -60,19 +62,30 @@ impl Client {
         named.collect()
     }
 
-    /// The value of a property of the display's connector.
-    pub fn property(&self, name: &str) -> u64 {
-        let all = self.of_object(self.connector(false).handle());
-        all.into_iter().find(|(known, ..)| known == name).unwrap().2
+    /// The object that has a property of this name, the property and its value: the display's connector or its plane.
+    fn named(&self, name: &str) -> (RawResourceHandle, property::Handle, u64) {
+        let connector = self.connector(false).handle();
+        let planes = self.plane_handles().unwrap();
+        let of_connector = self.of_object(connector).into_iter();
+        let of_plane = self.of_object(planes[0]).into_iter();
+        let all = of_connector
+            .map(|found| (connector.into(), found))
+            .chain(of_plane.map(|found| (planes[0].into(), found)));
+        let mut all = all.filter(|(_, (known, ..))| known == name);
+        let (object, (_, handle, value)) = all.next().unwrap();
+        (object, handle, value)
     }
 
-    /// Gives a property of the display's connector another value.
+    /// The value of a property of the display's connector or plane.
+    pub fn property(&self, name: &str) -> u64 {
+        self.named(name).2
+    }
+
+    /// Gives a property of the display's connector or plane another value.
     pub fn set(&self, name: &str, value: u64) {
-        let connector = self.connector(false).handle();
-        let all = self.of_object(connector);
-        let (_, handle, _) = all.into_iter().find(|(known, ..)| known == name).unwrap();
+        let (object, handle, _) = self.named(name);
         let mut request = AtomicModeReq::new();
-        request.add_raw_property(connector.into(), handle, value);
+        request.add_raw_property(object, handle, value);
         self.atomic_commit(AtomicCommitFlags::ALLOW_MODESET, request)
             .unwrap();
     }

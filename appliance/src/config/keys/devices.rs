@@ -50,15 +50,15 @@ pub(super) const KEYS: [Key; 25] = [
         name: "head.camera.delivery_us",
         unit: "µs",
         range: "0 to 1000000",
-        default: "50000",
-        meaning: "from the end of an exposure until its frame is there, at the longest",
+        default: "20000",
+        meaning: "from the end of an exposure until its frame is there when nothing is late: what the readout takes, and a few ms",
     },
     Key {
         name: "head.camera.luma",
         unit: "true or false",
         range: "true, false",
         default: "false",
-        meaning: "take the luminance of a YUV format where the camera has no raw one; then nobody checks exposure and gain",
+        meaning: "take the luminance of a YUV format where the camera has no raw one, although an image processor has been at it: `fringed doctor` complains",
     },
     Key {
         name: "head.projector.card",
