@@ -109,7 +109,8 @@ impl<'a> Traced<'a> {
             let [x, y, z] = along(origin, direction, t);
             z - self.surface.height(x, y)
         };
-        let rate = direction[2].abs() + self.slope * direction[0].hypot(direction[1]);
+        let steepest = self.slope * direction[0].hypot(direction[1]);
+        let rate = direction[2].abs() + steepest;
         let mut t = start;
         let mut value = over(t);
         if let Some(above) = side
@@ -120,6 +121,10 @@ impl<'a> Traced<'a> {
             if self.surface.present(x, y) {
                 return Some((t, above));
             }
+        }
+        // Away from the surface, and steeper than it is anywhere: nothing follows. So are most rays to the projector.
+        if direction[2] * value.signum() > steepest {
+            return None;
         }
         for _ in 0..MAX_STEPS {
             if t >= end {
