@@ -19,6 +19,6 @@ command -v mmdebstrap >/dev/null || unavailable "mmdebstrap is not installed"
 # shellcheck source=/dev/null
 . /etc/os-release
 [[ $ID == debian ]] || unavailable "this is no Debian"
-mmdebstrap --quiet --mode=root --variant=minbase --include=systemd "$VERSION_CODENAME" "$dir/root.tar.part" ||
+mmdebstrap --quiet --mode=root --format=tar --variant=minbase --include=systemd "$VERSION_CODENAME" "$dir/root.tar.part" ||
     unavailable "mmdebstrap cannot make it (the reason stands above)"
 mv "$dir/root.tar.part" "$dir/root.tar"
