@@ -295,10 +295,8 @@ fn wait(what: &str, done: impl Fn() -> bool) {
     }
 }
 
-#[test]
-fn a_storage_that_refuses_is_a_warning_and_what_waited_is_stored_when_it_takes_it_again() {
-    let folder = tempfile::tempdir().unwrap();
-    let state = StateFolder::open(folder.path()).unwrap();
+/// Opens the history of a state folder that keeps no recordings, for a run.
+fn opened(state: &StateFolder, run: u32) -> (History, Task, u32, Option<String>) {
     let bounds = Bounds {
         results: ENOUGH,
         recordings: 0,
@@ -307,9 +305,16 @@ fn a_storage_that_refuses_is_a_warning_and_what_waited_is_stored_when_it_takes_i
         counted: state.counted().unwrap(),
         counter: state.counter(),
         serial: state.serial().unwrap(),
-        run: 1,
+        run,
     };
-    let (history, task, next, complaint) = open(state.path(), numbering, bounds).unwrap();
+    open(state.path(), numbering, bounds).unwrap()
+}
+
+#[test]
+fn a_storage_that_refuses_is_a_warning_and_what_waited_is_stored_when_it_takes_it_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = StateFolder::open(folder.path()).unwrap();
+    let (history, task, next, complaint) = opened(&state, 1);
     assert_eq!((next, complaint), (1, None));
     let station = station();
     let warned = || station.snapshot().warnings & warning::STORAGE != 0;
@@ -409,37 +414,24 @@ fn a_database_that_is_damaged_while_it_is_used_is_set_aside_and_nothing_stops() 
 fn what_was_shown_and_not_stored_before_a_kill_is_stored_once_by_the_next_start() {
     let folder = tempfile::tempdir().unwrap();
     let state = StateFolder::open(folder.path()).unwrap();
-    let opened = |run| {
-        let bounds = Bounds {
-            results: ENOUGH,
-            recordings: 0,
-        };
-        let numbering = Numbering {
-            counted: state.counted().unwrap(),
-            counter: state.counter(),
-            serial: state.serial().unwrap(),
-            run,
-        };
-        open(state.path(), numbering, bounds).unwrap()
-    };
     let stored = || seqs(&Reader::of(state.path()), &Filter::default());
     // Its thread never comes to write, as where the card is busy.
-    let (killed, never, next, _) = opened(1);
+    let (killed, never, next, _) = opened(&state, 1);
     for seq in next..next + 3 {
         assert!(killed.take(seq));
         killed.record(&record(seq));
     }
     drop((killed, never));
     assert_eq!(stored(), [0; 0]);
-    let (killed, never, next, _) = opened(2);
+    let (killed, never, next, _) = opened(&state, 2);
     assert_eq!((stored(), next), (vec![3, 2, 1], 4));
     killed.take(next);
     killed.record(&record(next));
     drop((killed, never));
-    let (history, task, next, _) = opened(3);
+    let (history, task, next, _) = opened(&state, 3);
     assert_eq!((stored(), next), (vec![4, 3, 2, 1], 5));
     history.stop(4);
     task.run(&station());
-    let (_, _, next, _) = opened(4);
+    let (_, _, next, _) = opened(&state, 4);
     assert_eq!((stored(), next), (vec![4, 3, 2, 1], 5));
 }
