@@ -1,7 +1,7 @@
 //! The head at the start: opened once, or, where a service manager started the program, until it is there.
 
-use super::recovery::{FIRST_WAIT, LONGEST_WAIT, REMEDY};
-use super::{Order, SIGN_OF_LIFE};
+use super::Order;
+use super::recovery::{FIRST_WAIT, LONGEST_WAIT, REMEDY, wait};
 use crate::backend::{self, Opened};
 use crate::config::HeadConfig;
 use crate::error::{Exit, Failure};
@@ -9,7 +9,7 @@ use crate::notify::Pulse;
 use crate::progress::Progress;
 use crate::station::{Event, StationHandle, error_code};
 use hal::sim::Stage;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
+use std::sync::mpsc::{Receiver, Sender};
 
 /// What opens the head.
 pub struct Opening<'a> {
@@ -41,7 +41,7 @@ impl Opening<'_> {
             self.progress
                 .tell(share, "working out the light of the scene");
         };
-        let mut wait = FIRST_WAIT;
+        let mut pause = FIRST_WAIT;
         let mut said = String::new();
         loop {
             self.pulse.beat();
@@ -70,8 +70,10 @@ impl Opening<'_> {
                     return None;
                 }
             }
-            self.wait(wait, orders)?;
-            wait = (2 * wait).min(LONGEST_WAIT);
+            if wait(pause, orders, self.station, self.pulse).is_break() {
+                return None;
+            }
+            pause = (2 * pause).min(LONGEST_WAIT);
         }
     }
 
@@ -81,19 +83,5 @@ impl Opening<'_> {
             cause: failure.message.as_str().into(),
             remedy: REMEDY.into(),
         });
-    }
-
-    /// Waits, giving signs of life; none if the daemon ends. Without a head the station orders nothing else.
-    fn wait(&self, signs: u32, orders: &Receiver<Order>) -> Option<()> {
-        for _ in 0..signs {
-            match orders.recv_timeout(SIGN_OF_LIFE) {
-                Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return None,
-                Ok(_) | Err(RecvTimeoutError::Timeout) => {
-                    self.station.event(Event::Alive);
-                    self.pulse.beat();
-                }
-            }
-        }
-        Some(())
     }
 }

@@ -1,8 +1,9 @@
 //! Recovery of a lost head: a fault that says what to do, and opening it again until it is there.
 
 use super::{Order, SIGN_OF_LIFE, Worker, active, code_of};
+use crate::notify::Pulse;
 use crate::plan::Plan;
-use crate::station::Event;
+use crate::station::{Event, StationHandle};
 use hal::error::Error;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -44,11 +45,11 @@ impl Worker {
             remedy: REMEDY.into(),
         });
         let before = self.opened.calibration.fingerprint();
-        let mut wait = FIRST_WAIT;
+        let mut pause = FIRST_WAIT;
         let mut said = String::new();
         loop {
-            self.wait(wait, orders)?;
-            wait = (2 * wait).min(LONGEST_WAIT);
+            wait(pause, orders, &self.station, &self.pulse)?;
+            pause = (2 * pause).min(LONGEST_WAIT);
             let problem = match self.opened.reopen(&self.config) {
                 Err(failure) => failure.message,
                 Ok(()) => {
@@ -73,22 +74,28 @@ impl Worker {
         self.station.event(Event::Recovered { recipe });
         ControlFlow::Continue(())
     }
+}
 
-    /// Waits, giving signs of life. Orders that come are dropped: the fault has ended their jobs.
-    fn wait(&self, signs: u32, orders: &Receiver<Order>) -> ControlFlow<()> {
-        for _ in 0..signs {
-            match orders.recv_timeout(SIGN_OF_LIFE) {
-                Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => {
-                    return ControlFlow::Break(());
-                }
-                Ok(_) | Err(RecvTimeoutError::Timeout) => {
-                    self.station.event(Event::Alive);
-                    self.pulse.beat();
-                }
+/// Waits for a head, giving signs of life, until it is time to try again; `Break` when the daemon ends. Orders that come are
+/// dropped: the fault has ended their jobs.
+pub(super) fn wait(
+    signs: u32,
+    orders: &Receiver<Order>,
+    station: &StationHandle,
+    pulse: &Pulse,
+) -> ControlFlow<()> {
+    for _ in 0..signs {
+        match orders.recv_timeout(SIGN_OF_LIFE) {
+            Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => {
+                return ControlFlow::Break(());
+            }
+            Ok(_) | Err(RecvTimeoutError::Timeout) => {
+                station.event(Event::Alive);
+                pulse.beat();
             }
         }
-        ControlFlow::Continue(())
     }
+    ControlFlow::Continue(())
 }
 
 #[cfg(test)]
