@@ -7,6 +7,8 @@
 # its own, from the machine's sources; what the machine already has is used from there. DIR keeps everything: a second
 # call only looks whether it is complete. Ends with 69 (EX_UNAVAILABLE) and the reason where it cannot be had.
 set -euo pipefail
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+source "$here/../apt.sh"
 mkdir -p "${1:?usage: toolchain.sh DIR}"
 dir=$(cd "$1" && pwd)
 
@@ -16,7 +18,7 @@ unavailable() {
 }
 
 # The folder may have been copied from elsewhere, and its files name their place; or an older script has made it.
-made="$dir $(cksum <"${BASH_SOURCE[0]}")"
+made="$dir $(cat "$here"/{toolchain.sh,../apt.sh} | cksum)"
 [[ $(cat "$dir/complete" 2>/dev/null) == "$made" ]] && exit 0
 [[ $(dpkg --print-architecture 2>/dev/null) == amd64 ]] || unavailable "this is no Debian on x86-64"
 [[ $dir != *[[:space:]]* ]] || unavailable "the linker's scripts cannot name a folder with a space: $dir"
@@ -25,27 +27,17 @@ if [[ ! -f $dir/.toolchain && -n $(ls -A "$dir") ]]; then
     exit 64
 fi
 rm -rf "$dir"
-mkdir -p "$dir"/{apt/lists/partial,apt/archives/partial,bin,root}
+mkdir -p "$dir"/{bin,root}
 touch "$dir/.toolchain"
 
-cat >"$dir/apt/apt.conf" <<END
-APT::Architectures { "amd64"; "arm64"; };
-APT::Sandbox::User "$(id -un)";
-APT::Update::Post-Invoke { "true"; };
-Dir::State::Lists "$dir/apt/lists";
-Dir::Cache::Archives "$dir/apt/archives";
-Dir::Cache::pkgcache "";
-Dir::Cache::srcpkgcache "";
-Debug::NoLocking "true";
-END
-apt() { APT_CONFIG=$dir/apt/apt.conf apt-get -qq "$@"; }
+apt_of_its_own "$dir/apt" 'APT::Architectures { "amd64"; "arm64"; };'
 # A source that does not answer need not be the one with these packages.
-apt update || true
+apt-get -qq update || true
 # Debian's newest Rust; apt finds the names that carry its version. The dynamic qemu, because only it takes plugins.
-apt install --download-only --yes --no-install-recommends g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user rustc-web ||
+apt-get -qq install --download-only --yes --no-install-recommends g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user rustc-web ||
     unavailable "apt cannot download the packages (the reason stands above)"
 # The target's library alone: its dependencies are the target's compiler.
-(cd "$dir/apt/archives" && apt download libstd-rust-web-dev:arm64) || unavailable "apt cannot download Rust's library"
+(cd "$dir/apt/archives" && apt-get -qq download libstd-rust-web-dev:arm64) || unavailable "apt cannot download Rust's library"
 # A C library newer than the machine's would meet the machine's loader.
 rm -f "$dir"/apt/archives/libc6_*
 for package in "$dir"/apt/archives/*.deb; do

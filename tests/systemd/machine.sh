@@ -11,28 +11,18 @@ shopt -s inherit_errexit nullglob
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 mkdir -p "${1:?usage: machine.sh DIR}"
 dir=$(cd "$1" && pwd)
+source "$here/../apt.sh"
 
 unavailable() {
     echo "no machine with systemd: $1" >&2
     exit 69
 }
 
-wanted=$(sha256sum <"$here/machine.sh")
+wanted=$(cat "$here"/{machine.sh,../apt.sh} | sha256sum)
 [[ $(cat "$dir/complete" 2>/dev/null) == "$wanted" ]] && exit 0
 [[ $(dpkg --print-architecture 2>/dev/null) == amd64 ]] || unavailable "this is no Debian on x86-64"
 rm -rf "$dir"/{complete,apt,root}
-mkdir -p "$dir"/{apt/lists/partial,apt/archives/partial}
-cat >"$dir/apt/apt.conf" <<END
-APT::Sandbox::User "$(id -un)";
-APT::Update::Post-Invoke { "true"; };
-Dir::State::Lists "$dir/apt/lists";
-Dir::State::status "/dev/null";
-Dir::Cache::Archives "$dir/apt/archives";
-Dir::Cache::pkgcache "";
-Dir::Cache::srcpkgcache "";
-Debug::NoLocking "true";
-END
-export APT_CONFIG=$dir/apt/apt.conf
+apt_of_its_own "$dir/apt" 'Dir::State::status "/dev/null";'
 # A source that does not answer need not be the one with these packages.
 apt-get -qq update || true
 apt-get -qq install --download-only --yes --no-install-recommends systemd udev mbpoll busybox-static ||

@@ -12,41 +12,33 @@ here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 mkdir -p "${1:?usage: machine.sh DIR}"
 dir=$(cd "$1" && pwd)
 source "$here/pins"
+source "$here/../apt.sh"
 
 unavailable() {
     echo "no virtual machine: $1" >&2
     exit 69
 }
 
-wanted=$({ cat "$here/machine.sh" "$here/vkms.patch" && echo "$kernel $kernel_revision"; } | sha256sum)
+wanted=$({ cat "$here"/{machine.sh,vkms.patch,../apt.sh} && echo "$kernel $kernel_revision"; } | sha256sum)
 [[ $(cat "$dir/complete" 2>/dev/null) == "$wanted" ]] && exit 0
 [[ $(dpkg --print-architecture 2>/dev/null) == amd64 ]] || unavailable "this is no Debian on x86-64"
 [[ $dir != *[[:space:]]* ]] || unavailable "a kernel is not built in a folder with a space: $dir"
 rm -rf "$dir"/{complete,apt,build,kernel,root}
-mkdir -p "$dir"/{apt/lists/partial,apt/archives/partial,build,kernel/modules,root}
+mkdir -p "$dir"/{build,kernel/modules,root}
 
-cat >"$dir/apt/apt.conf" <<END
-APT::Sandbox::User "$(id -un)";
-APT::Update::Post-Invoke { "true"; };
-Dir::State::Lists "$dir/apt/lists";
-Dir::Cache::Archives "$dir/apt/archives";
-Dir::Cache::pkgcache "";
-Dir::Cache::srcpkgcache "";
-Debug::NoLocking "true";
-END
-apt() { APT_CONFIG=$dir/apt/apt.conf "apt-$1" -qq "${@:2}"; }
+apt_of_its_own "$dir/apt"
 # A source that does not answer need not be the one with these packages.
-apt get update || true
-if ! apt cache show "linux-source-6.12=$kernel_revision" >/dev/null 2>&1; then
+apt-get -qq update || true
+if ! apt-cache -qq show "linux-source-6.12=$kernel_revision" >/dev/null 2>&1; then
     echo "kernels that there are:" >&2
-    apt cache madison linux-source-6.12 >&2
+    apt-cache -qq madison linux-source-6.12 >&2
     unavailable "its kernel $kernel_revision is not in the archives: name another one in tests/vm/pins"
 fi
 # With the headers come the compiler and the tools that modules need.
-apt get install --download-only --yes --no-install-recommends qemu-system-x86 busybox-static cpio kmod make patch xz-utils \
+apt-get -qq install --download-only --yes --no-install-recommends qemu-system-x86 busybox-static cpio kmod make patch xz-utils \
     "linux-headers-$kernel-amd64=$kernel_revision" || unavailable "apt cannot download the packages (the reason stands above)"
 # Without their dependencies: they are not installed.
-(cd "$dir/apt/archives" && apt get download "linux-image-$kernel-amd64-unsigned=$kernel_revision" \
+(cd "$dir/apt/archives" && apt-get -qq download "linux-image-$kernel-amd64-unsigned=$kernel_revision" \
     "linux-source-6.12=$kernel_revision") || unavailable "apt cannot download the kernel (the reason stands above)"
 # A C library newer than the machine's would meet the machine's loader.
 rm -f "$dir"/apt/archives/libc6_*
