@@ -111,12 +111,28 @@ pub fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2]) -> f64 {
         .max(coarsest);
     let ratio = libm::pow(finest / coarsest, 1.0 / TRIED as f64);
     let tried = |i: usize| coarsest * libm::pow(ratio, i as f64);
-    let worth = |g: f64| g * contrast(optics, g, [g * ju, g * jv]);
-    let best = (0..=TRIED).map(|i| worth(tried(i))).fold(0.0, f64::max);
-    (0..=TRIED)
-        .map(tried)
-        .find(|&g| worth(g) >= ENOUGH * best)
-        .unwrap_or(finest)
+    let worth = |i: usize| {
+        let g = tried(i);
+        g * contrast(optics, g, [g * ju, g * jv])
+    };
+    // The logarithms of g, of each sinc and of each Gaussian are concave, so g·M(g) rises to one peak and falls.
+    let peak = first(TRIED, |i| worth(i) >= worth(i + 1));
+    let enough = ENOUGH * worth(peak);
+    tried(first(peak, |i| worth(i) >= enough))
+}
+
+/// The first of 0…`last` that `holds`, where all behind it do as well; `last` if none before it does.
+fn first(last: usize, holds: impl Fn(usize) -> bool) -> usize {
+    let (mut low, mut high) = (0, last);
+    while low < high {
+        let middle = low.midpoint(high);
+        if holds(middle) {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    low
 }
 
 /// Makes the phase function for a part, over a projector of `columns` × `rows` pixels.
@@ -193,6 +209,36 @@ mod tests {
         // Steep: 8 projector pixels per camera pixel, so that only the camera limits.
         let pitch = 1.0 / (best_frequency(&FREE, [8.0, 0.0]) * 8.0);
         assert!((2.1..2.6).contains(&pitch), "{pitch}");
+    }
+
+    #[test]
+    fn the_best_frequency_is_the_one_that_trying_all_of_them_finds() {
+        for blur in [0.0, 0.7, 2.0, 5.0] {
+            for at in 0..400 {
+                let optics = Optics {
+                    projector_blur: blur,
+                    camera_blur: f64::from(at % 3),
+                    ..SHARP
+                };
+                let angle = f64::from(at);
+                let slope = 0.01 * libm::pow(1.02, angle);
+                let [ju, jv] = [slope * libm::cos(angle), slope * libm::sin(angle)];
+                let coarsest = 1.0 / MAX_PITCH;
+                let finest = (1.0 / PROJECTOR_PITCH)
+                    .min(1.0 / (IMAGE_PITCH * libm::hypot(ju, jv)))
+                    .max(coarsest);
+                let ratio = libm::pow(finest / coarsest, 1.0 / TRIED as f64);
+                let all = || (0..=TRIED).map(|i| coarsest * libm::pow(ratio, i as f64));
+                let worth = |g: f64| g * contrast(&optics, g, [g * ju, g * jv]);
+                let best = all().map(worth).fold(0.0, f64::max);
+                let found = all().find(|&g| worth(g) >= ENOUGH * best).unwrap();
+                let searched = best_frequency(&optics, [ju, jv]);
+                assert!(
+                    (searched / found - 1.0).abs() < 1e-12,
+                    "{optics:?} {ju} {jv}"
+                );
+            }
+        }
     }
 
     #[test]
