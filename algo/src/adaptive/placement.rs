@@ -27,6 +27,9 @@ const DIRECTIONS: usize = 26;
 /// way to the full move counts as well.
 const SHARES: [f64; 2] = [1.0, 0.5];
 
+/// Rows whose moved points are kept at a time: work for all threads, and little memory.
+const BAND: usize = 64;
+
 /// The largest |ΔΦ| in turns that each pixel can see when the part is moved by up to `tolerance` mm
 /// in any direction; infinite where golden knows nothing within reach of the move.
 ///
@@ -41,24 +44,25 @@ pub fn phase_reach(triangulator: &Triangulator, golden: Surface<'_>, tolerance: 
     let mut reach = vec![0.0_f32; golden.height.len()];
     let mut furthest = 1_usize;
     for step in moves(tolerance) {
-        let seen = map_rows(rows, |v| {
-            let row = points[v * width..(v + 1) * width].iter().enumerate();
-            row.filter_map(|(u, point)| {
-                let moved = (*point)? + step;
-                let (column, line) = triangulator.camera().project(moved)?;
-                let (xi, eta) = triangulator.projector_point(moved)?;
-                Some(Moved {
-                    from: (u, v),
-                    to: (column, line),
-                    phase: triangulator.function().at(xi, eta),
-                    gradient: gradient(golden, u, v),
-                })
+        let moved = |v: usize, u: usize| {
+            let moved = points[v * width + u]? + step;
+            let (xi, eta) = triangulator.projector_point(moved)?;
+            Some(Moved {
+                from: (u, v),
+                to: triangulator.camera().project(moved)?,
+                phase: triangulator.function().at(xi, eta),
+                gradient: gradient(golden, u, v),
             })
-            .collect::<Vec<_>>()
-        });
-        for moved in seen.into_iter().flatten() {
-            furthest = furthest.max(moved.distance() + 1);
-            moved.raise(&mut reach, golden);
+        };
+        for first in (0..rows).step_by(BAND) {
+            let seen = map_rows(BAND.min(rows - first), |v| {
+                let row = (0..width).filter_map(|u| moved(first + v, u));
+                row.collect::<Vec<_>>()
+            });
+            for moved in seen.into_iter().flatten() {
+                furthest = furthest.max(moved.distance() + 1);
+                moved.raise(&mut reach, golden);
+            }
         }
     }
     let known: Vec<bool> = golden.phase.iter().map(|phase| phase.is_known()).collect();

@@ -107,9 +107,9 @@ pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), Arc
     members.insert(0, (MANIFEST, manifest.into_bytes()));
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
-    for (name, bytes) in &members {
-        zip.start_file(*name, stored).map_err(broken)?;
-        zip.write_all(bytes).map_err(broken)?;
+    for (name, bytes) in members {
+        zip.start_file(name, stored).map_err(broken)?;
+        zip.write_all(&bytes).map_err(broken)?;
     }
     let bytes = zip.finish().map_err(broken)?.into_inner();
     Ok((bytes, fingerprint))

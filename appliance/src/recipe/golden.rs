@@ -138,6 +138,7 @@ impl GoldenPart<'_> {
             comparison: self.comparison.clone(),
         };
         let (bytes, _) = archive::pack(&file, &arrays).map_err(|error| error.to_string())?;
+        drop(arrays);
         // Read back as it will be after a restart: what was just taught is known to load.
         let recipe = Recipe::from_bytes(&bytes).map_err(|error| error.to_string())?;
         Ok(Taught {

@@ -130,6 +130,9 @@ pub fn teach_while(
     })?;
     refuse_empty(&golden.phases)?;
     step(0.75, "working out the expansion and the safe mask")?;
+    let comparison = ComparisonFile::of(&first, &golden);
+    // Before the recipe's arrays take their place.
+    drop((first, map, expected));
     let Measured {
         phases,
         heights,
@@ -146,7 +149,7 @@ pub fn teach_while(
         phases,
         heights,
         noise: calibration.noise_counts,
-        comparison: Some(ComparisonFile::of(&first, &golden)),
+        comparison: Some(comparison),
     };
     let taught = part.recipe(naming).map_err(TeachError::Rig)?;
     step(1.0, "taught")?;
