@@ -35,7 +35,7 @@ use std::process::ExitCode;
 
 /// The open 3-D smart sensor.
 #[derive(Debug, Parser)]
-#[command(name = "fringed", version = env!("FRINGED_VERSION"), about)]
+#[command(name = "fringed", version = env!("FRINGED_VERSION"))]
 struct Arguments {
     /// What to do; without a command: serve.
     #[command(subcommand)]

@@ -18,7 +18,7 @@ broken() {
 
 dpkg-deb --raw-extract "$package" "$work"
 for file in usr/bin/fringed usr/lib/systemd/system/fringed.service usr/lib/sysusers.d/fringed.conf usr/lib/tmpfiles.d/fringed.conf \
-    usr/lib/udev/rules.d/60-fringed.rules usr/share/doc/fringed/{README.md,licences.txt,copyright,examples/fringed.toml}; do
+    usr/lib/udev/rules.d/60-fringed.rules usr/share/man/man1/fringed.1.gz usr/share/doc/fringed/{README.md,licences.txt,copyright,examples/fringed.toml}; do
     [[ -s $work/$file ]] || broken "there is no $file"
 done
 for file in fringed.service 60-fringed.rules; do
@@ -26,7 +26,7 @@ for file in fringed.service 60-fringed.rules; do
 done
 # What is neither the program's nor its documentation's would be there after its removal as well.
 stray=$(cd "$work" && find . -type f -not -path './DEBIAN/*' -not -path './usr/bin/fringed' -not -path './usr/share/doc/fringed/*' \
-    -not -path './usr/lib/s*' -not -path './usr/lib/tmpfiles.d/*' -not -path './usr/lib/udev/*' -not -path ./etc/fringed/fringed.toml)
+    -not -path ./usr/share/man/man1/fringed.1.gz -not -path './usr/lib/s*' -not -path './usr/lib/tmpfiles.d/*' -not -path './usr/lib/udev/*' -not -path ./etc/fringed/fringed.toml)
 [[ -z $stray ]] || broken "nobody asked for $stray"
 
 [[ $(cat "$work/DEBIAN/conffiles") == /etc/fringed/fringed.toml ]] || broken "the configuration is not a file of the user's"

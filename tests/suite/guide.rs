@@ -1,9 +1,10 @@
-//! The operations guide: it knows every error code, and speaks of no line that the program does not write.
+//! The operations guide knows every error code and speaks of no line that the program does not write; the manual page knows what there is.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tests::files;
+use tests::program::Program;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -69,4 +70,47 @@ fn every_line_of_the_log_in_the_guide_is_one_that_the_program_writes() {
             assert!(source.contains(words), "{words:?} of {line:?}");
         }
     }
+}
+
+#[test]
+fn the_manual_page_has_exactly_the_commands_options_and_exit_codes_that_there_are() {
+    let page = fs::read_to_string(root().join("debian/fringed.1")).unwrap();
+    let items = |kind: &str| -> BTreeSet<_> {
+        let of_kind = page.lines().filter_map(|line| line.strip_prefix(kind));
+        of_kind
+            .map(|item| item.split(' ').next().unwrap().to_owned())
+            .collect()
+    };
+    let help = Program::at(env!("CARGO_BIN_EXE_fringed-under-test"))
+        .run(&["--help"])
+        .stdout;
+    let (commands, options) = help.split_once("\nOptions:\n").unwrap();
+    let (_, commands) = commands.split_once("\nCommands:\n").unwrap();
+    let first_words = commands
+        .lines()
+        .filter_map(|line| line.split_whitespace().next());
+    let commands: BTreeSet<_> = first_words.map(str::to_owned).collect();
+    let mut told = items(".It Cm ");
+    assert!(told.insert("help".to_owned()) && told.len() > 10);
+    assert_eq!(told, commands);
+    let long = options.lines().filter_map(|line| line.split_once(" --"));
+    let options: BTreeSet<_> = long
+        .map(|(_, option)| format!("-{}", option.split(' ').next().unwrap()))
+        .collect();
+    let mut told = items(".It Fl ");
+    assert!(told.insert("-version".to_owned()));
+    assert_eq!(told, options);
+    let readme = fs::read_to_string(root().join("README.md")).unwrap();
+    let (_, codes) = readme.split_once("\n## Exit codes\n").unwrap();
+    let codes = codes.split("\n## ").next().unwrap();
+    let rows = codes.lines().filter_map(|line| line.strip_prefix("| "));
+    let codes: BTreeSet<_> = rows
+        .filter_map(|row| row.split(' ').next()?.parse::<u8>().ok())
+        .collect();
+    assert!(codes.contains(&78));
+    let told: BTreeSet<u8> = items(".It ")
+        .iter()
+        .filter_map(|item| item.parse().ok())
+        .collect();
+    assert_eq!(told, codes);
 }
