@@ -1,8 +1,11 @@
 //! A line out that starts exposures: a pulse of a given width.
 //!
 //! The caller begins a pulse, a thread of its own ends it. A camera may expose for as long as the pulse lasts, so the width must
-//! not wander with the time that a sleeping thread takes to wake: the thread wakes a little early and watches the clock.
+//! not wander with the time that a sleeping thread takes to wake: the thread wakes a little early and watches the clock. Either
+//! may still be interrupted by whatever else the computer does, so the clock is read around both edges, and a pulse that did not
+//! last as long as it should is told.
 
+use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -14,7 +17,7 @@ use super::failure::{LineError, means};
 use crate::clock::monotonic;
 use crate::error::Error;
 use crate::setup::TriggerSetup;
-use crate::trigger::Trigger;
+use crate::trigger::{Edges, REMEMBERED, Spoiled, Trigger};
 use crate::units::Timestamp;
 
 /// How much too early the thread wakes: more than what it usually takes to, and little processor time to watch the clock for.
@@ -25,7 +28,6 @@ const EARLY: Duration = Duration::from_micros(200);
 pub struct Pulse {
     line: Arc<Pulsed>,
     ending: Option<JoinHandle<()>>,
-    width: Duration,
 }
 
 /// The line and what both threads know of it.
@@ -33,14 +35,18 @@ pub struct Pulse {
 struct Pulsed {
     handle: LineHandle,
     name: String,
+    width: Duration,
+    /// Locked from before an edge until what is known of it is written down: whoever locks it later knows it.
     state: Mutex<State>,
     changed: Condvar,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct State {
-    /// When the pulse that is on has to end.
-    ends: Option<Timestamp>,
+    /// The clock before and after the rise of the pulse that is on.
+    rise: Option<(Timestamp, Timestamp)>,
+    /// Pulses that nobody has asked about.
+    spoiled: VecDeque<Spoiled>,
     /// Why the last one could not be ended.
     failed: Option<LineError>,
     /// Nobody fires any more.
@@ -56,7 +62,13 @@ impl Pulse {
         let line = Arc::new(Pulsed {
             handle: find(&setup.chip, name)?.output(setup.active_low, false)?,
             name: name.into(),
-            state: Mutex::default(),
+            width: setup.pulse(),
+            state: Mutex::new(State {
+                rise: None,
+                spoiled: VecDeque::with_capacity(REMEMBERED),
+                failed: None,
+                over: false,
+            }),
             changed: Condvar::new(),
         });
         let ended = Arc::clone(&line);
@@ -70,7 +82,6 @@ impl Pulse {
         Ok(Self {
             line,
             ending: Some(ending),
-            width: setup.pulse(),
         })
     }
 }
@@ -82,12 +93,19 @@ impl Trigger for Pulse {
         if let Some(failed) = &state.failed {
             return Err(failed.clone().into());
         }
-        if state.ends.is_none() {
-            self.line.put(true)?;
-            state.ends = Some(monotonic() + self.width);
-            self.line.changed.notify_one();
+        if state.rise.is_some() {
+            return Ok(monotonic());
         }
-        Ok(monotonic())
+        let before = monotonic();
+        self.line.put(true)?;
+        let after = monotonic();
+        state.rise = Some((before, after));
+        self.line.changed.notify_one();
+        Ok(after)
+    }
+
+    fn poll_spoiled(&mut self) -> Option<Spoiled> {
+        self.line.lock().spoiled.pop_front()
     }
 }
 
@@ -118,25 +136,43 @@ impl Pulsed {
     fn end_pulses(&self) {
         let mut state = self.lock();
         while !state.over {
-            let Some(ends) = state.ends else {
+            let Some(rise) = state.rise else {
                 state = self.wait(state, Duration::MAX);
                 continue;
             };
+            // From the reading before the rise to the one before the fall, so that the way into the kernel counts for neither.
+            let ends = rise.0 + self.width;
             let left = ends.since(monotonic());
             if left > EARLY {
                 state = self.wait(state, left - EARLY);
                 continue;
             }
-            while monotonic() < ends {
+            let mut before = monotonic();
+            while before < ends {
                 std::hint::spin_loop();
+                before = monotonic();
             }
             state.failed = self.put(false).err();
-            state.ends = None;
+            let fall = (before, monotonic());
+            state.rise = None;
+            state.judge(&Edges { rise, fall }, self.width);
         }
     }
 
     fn wait<'a>(&self, state: MutexGuard<'a, State>, time: Duration) -> MutexGuard<'a, State> {
         let woken = self.changed.wait_timeout(state, time);
         woken.unwrap_or_else(PoisonError::into_inner).0
+    }
+}
+
+impl State {
+    /// Remembers a pulse that did not last as long as it should.
+    fn judge(&mut self, edges: &Edges, width: Duration) {
+        if let Some(spoiled) = Spoiled::by(edges, width) {
+            if self.spoiled.len() == REMEMBERED {
+                self.spoiled.pop_front();
+            }
+            self.spoiled.push_back(spoiled);
+        }
     }
 }

@@ -11,10 +11,11 @@ use std::time::Duration;
 use super::Timing;
 use crate::camera::{CameraTiming, Starts};
 use crate::projector::Flip;
+use crate::trigger::{REMEMBERED, Spoiled};
 use crate::units::Timestamp;
 
 /// Triggers that are remembered; a frame that comes later than so many others is nobody's.
-const TRIGGERS: usize = 16;
+const TRIGGERS: usize = REMEMBERED;
 
 /// One showing of a pattern.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +51,9 @@ pub(super) struct Pacing {
     /// The latest triggers, and how many there were.
     triggers: [Timestamp; TRIGGERS],
     count: usize,
+    /// The latest of their pulses that were spoiled, and how many there were.
+    spoiled: [Option<Spoiled>; TRIGGERS],
+    spoils: usize,
     /// An exposure starts this soon after its trigger, or never.
     promptness: Duration,
     /// The start of the latest exposure of a camera that runs by itself.
@@ -70,6 +74,8 @@ impl Pacing {
             free: Timestamp(0),
             triggers: [Timestamp(0); TRIGGERS],
             count: 0,
+            spoiled: [None; TRIGGERS],
+            spoils: 0,
             promptness: timing.tolerance,
             phase: None,
         }
@@ -121,6 +127,33 @@ impl Pacing {
             || known
                 .filter(|index| *index as u64 >= before)
                 .any(|index| prompt(self.triggers[index % TRIGGERS]))
+    }
+
+    /// A pulse did not last as long as it should. That matters to a camera that exposes for as long as its pulses last; those
+    /// that only start an exposure are shorter than half of it.
+    pub fn spoiled(&mut self, pulse: Spoiled) {
+        if !self.triggered || pulse.width * 2 < self.exposure {
+            return;
+        }
+        // The camera is busy for as much longer.
+        self.free = self.free.max(pulse.fired + (pulse.longer + self.period));
+        self.spoiled[self.spoils % TRIGGERS] = Some(pulse);
+        self.spoils += 1;
+    }
+
+    /// The pulse that spoiled an exposure that seems to have started then, if one did.
+    pub fn spoiled_by(&self, start: Timestamp) -> Option<Spoiled> {
+        let mut known = self.spoiled.iter().flatten();
+        known.find(|pulse| self.spoils(pulse, start)).copied()
+    }
+
+    /// Whether this pulse spoiled an exposure that seems to have started then: its own, whose stamp may mark the end and so be off
+    /// by as much as the pulse; or the next one, if that was triggered while the camera was busy for longer than planned.
+    pub fn spoils(&self, pulse: &Spoiled, start: Timestamp) -> bool {
+        let from = pulse.fired - (pulse.shorter + self.promptness);
+        let busy = self.period.saturating_sub(self.promptness);
+        let until = pulse.fired + (pulse.longer + busy.max(self.promptness));
+        (from..=until).contains(&start)
     }
 
     pub fn exposed(&mut self, start: Timestamp) {
