@@ -218,12 +218,14 @@ fn a_frame_whose_pulse_was_too_long_is_taken_again_once() {
         long_pulse_us,
         ..Faults::default()
     };
-    let readout = Duration::from_millis(16);
+    // So short that the camera is free again long before the next light.
+    let (exposure, readout) = (REFRESH / 2, Duration::from_millis(4));
     for stamp in [Stamp::ExposureStart, Stamp::ExposureEnd, Stamp::ReadoutEnd] {
         // Below the tolerance of time stamps, above it, and on into the next patterns.
         for longest in [180, 2_000, 50_000] {
             let mechanics = Mechanics {
                 stamp,
+                exposure,
                 readout,
                 faults: pulses(longest),
                 ..plain()
