@@ -82,12 +82,14 @@ impl Failure {
                 ),
                 "check the flip-to-light delay, what the camera's stamp marks, and the load of the processor",
             ),
-            Blocked::Pulses => Error::protocol(
+            // A pulse that ended too late, so it is one of time; another time it may do better.
+            Blocked::Pulses => Error::timeout(
                 format!(
                     "{attempt}: shown {shots} times, pulses of the trigger were up to {:.2} ms off their length, \
-                     and with them the brightness of the frames ({counts}), which",
+                     and with them the brightness of frames ({counts}), which",
                     so_far.pulse_error.as_secs_f64() * 1e3
                 ),
+                timeout,
                 "stop what else loads the computer, or give fringed a real-time priority",
             ),
             Blocked::Late => Error::timeout(

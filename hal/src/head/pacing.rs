@@ -129,10 +129,9 @@ impl Pacing {
                 .any(|index| prompt(self.triggers[index % TRIGGERS]))
     }
 
-    /// A pulse did not last as long as it should. That matters to a camera that exposes for as long as its pulses last; those
-    /// that only start an exposure are shorter than half of it.
+    /// A pulse did not last as long as it should. That matters to a camera that exposes for as long as its pulses last.
     pub fn spoiled(&mut self, pulse: Spoiled) {
-        if !self.triggered || pulse.width * 2 < self.exposure {
+        if !self.triggered || !pulse.decides(self.exposure) {
             return;
         }
         // The camera is busy for as much longer.
@@ -250,5 +249,66 @@ impl Pacing {
         let passed = now.since(shot.flip.timestamp).as_nanos() / self.refresh.as_nanos();
         let steps = u32::try_from(passed + 1).unwrap_or(u32::MAX);
         shot.flip.timestamp + self.refresh.saturating_mul(steps)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn us(us: u64) -> Duration {
+        Duration::from_micros(us)
+    }
+
+    /// The reference head: a camera that exposes for 16 667 µs and then is read out.
+    fn pacing(starts: Starts) -> Pacing {
+        let camera = CameraTiming {
+            starts,
+            exposure: us(16_667),
+            period: us(33_333),
+            delivery: us(20_000),
+        };
+        Pacing::new(us(16_667), &camera, &Timing::default())
+    }
+
+    fn pulse(fired: Timestamp, width: Duration, longer: Duration) -> Spoiled {
+        Spoiled {
+            fired,
+            width,
+            shorter: us(2),
+            longer,
+        }
+    }
+
+    #[test]
+    fn a_long_pulse_spoils_its_frame_whatever_its_stamp_marks_and_the_next_one_that_came_too_soon()
+    {
+        let (fired, longer) = (Timestamp(1_000_000_000), us(40_000));
+        let mut pacing = pacing(Starts::OnTrigger);
+        pacing.fired(fired);
+        pacing.spoiled(pulse(fired, us(16_653), longer));
+        let free = fired + (us(33_333) + longer);
+        assert_eq!(pacing.free, free, "no trigger while the camera is busy");
+        for (start, spoiled) in [
+            (fired - us(33_133), false),
+            (fired, true),
+            (fired + longer, true),
+            // Triggered when the camera should have been free.
+            (fired + us(33_333), true),
+            (free - us(300), true),
+            (free - us(100), false),
+        ] {
+            assert_eq!(pacing.spoiled_by(start).is_some(), spoiled, "{start}");
+        }
+    }
+
+    #[test]
+    fn pulses_that_do_not_decide_the_exposure_spoil_nothing() {
+        let fired = Timestamp(1_000_000_000);
+        for (starts, width) in [(Starts::ByItself, us(16_653)), (Starts::OnTrigger, us(100))] {
+            let mut pacing = pacing(starts);
+            pacing.spoiled(pulse(fired, width, us(5_000)));
+            assert_eq!(pacing.spoiled_by(fired), None);
+        }
     }
 }

@@ -66,6 +66,12 @@ impl Spoiled {
         (pulse.off() > (width / SHARE).max(LEAST)).then_some(pulse)
     }
 
+    /// Whether it decided an exposure of this length. A pulse that only starts one is shorter than half of it.
+    #[must_use]
+    pub fn decides(&self, exposure: Duration) -> bool {
+        self.width * 2 >= exposure
+    }
+
     /// By how much it may have been off.
     #[must_use]
     pub fn off(&self) -> Duration {

@@ -269,7 +269,7 @@ fn pulses_that_never_last_as_long_as_they_should_end_a_sequence_with_the_remedy(
     let error = take(&mut labelled(mechanics, COUNT), &[0, 1, 2])
         .1
         .unwrap_err();
-    assert_eq!(error.kind(), ErrorKind::Protocol);
+    assert_eq!(error.kind(), ErrorKind::Timeout);
     let words = error.to_string();
     for word in ["pulses of the trigger", "brightness", "loads the computer"] {
         assert!(words.contains(word), "{words}");
