@@ -10,8 +10,6 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use gpio_cdev::LineHandle;
-
 use super::chip::find;
 use super::failure::{LineError, means};
 use crate::clock::monotonic;
@@ -24,24 +22,23 @@ use crate::units::Timestamp;
 const EARLY: Duration = Duration::from_micros(200);
 
 /// A trigger of pulses. Dropped, its line is idle, also in the middle of a pulse.
-#[derive(Debug)]
 pub struct Pulse {
     line: Arc<Pulsed>,
     ending: Option<JoinHandle<()>>,
 }
 
+/// Begins a pulse, or ends it.
+type Put = dyn Fn(bool) -> Result<(), LineError> + Send + Sync;
+
 /// The line and what both threads know of it.
-#[derive(Debug)]
 struct Pulsed {
-    handle: LineHandle,
-    name: String,
+    put: Box<Put>,
     width: Duration,
     /// Locked from before an edge until what is known of it is written down: whoever locks it later knows it.
     state: Mutex<State>,
     changed: Condvar,
 }
 
-#[derive(Debug)]
 struct State {
     /// The clock before and after the rise of the pulse that is on.
     rise: Option<(Timestamp, Timestamp)>,
@@ -59,10 +56,22 @@ impl Pulse {
     /// # Errors
     /// Why it cannot be taken.
     pub fn open(setup: &TriggerSetup, name: &str) -> Result<Self, LineError> {
+        let handle = find(&setup.chip, name)?.output(setup.active_low, false)?;
+        let line: Box<str> = name.into();
+        let put = move |on| {
+            let put = handle.set_value(u8::from(on));
+            put.map_err(|error| means(&error, &line, None))
+        };
+        Self::of(Box::new(put), setup.pulse()).map_err(|error| LineError::Failed {
+            line: name.into(),
+            cause: error.to_string(),
+        })
+    }
+
+    fn of(put: Box<Put>, width: Duration) -> std::io::Result<Self> {
         let line = Arc::new(Pulsed {
-            handle: find(&setup.chip, name)?.output(setup.active_low, false)?,
-            name: name.into(),
-            width: setup.pulse(),
+            put,
+            width,
             state: Mutex::new(State {
                 rise: None,
                 spoiled: VecDeque::with_capacity(REMEMBERED),
@@ -74,11 +83,7 @@ impl Pulse {
         let ended = Arc::clone(&line);
         let ending = std::thread::Builder::new()
             .name("pulse".into())
-            .spawn(move || ended.end_pulses())
-            .map_err(|error| LineError::Failed {
-                line: name.into(),
-                cause: error.to_string(),
-            })?;
+            .spawn(move || ended.end_pulses())?;
         Ok(Self {
             line,
             ending: Some(ending),
@@ -97,7 +102,7 @@ impl Trigger for Pulse {
             return Ok(monotonic());
         }
         let before = monotonic();
-        self.line.put(true)?;
+        (self.line.put)(true)?;
         let after = monotonic();
         state.rise = Some((before, after));
         self.line.changed.notify_one();
@@ -118,18 +123,13 @@ impl Drop for Pulse {
             let _ = ending.join();
         }
         // Nobody is left to be told.
-        let _ = self.line.put(false);
+        let _ = (self.line.put)(false);
     }
 }
 
 impl Pulsed {
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn put(&self, on: bool) -> Result<(), LineError> {
-        let put = self.handle.set_value(u8::from(on));
-        put.map_err(|error| means(&error, &self.name, None))
     }
 
     /// Ends every pulse in its time, until nobody fires any more.
@@ -152,7 +152,7 @@ impl Pulsed {
                 std::hint::spin_loop();
                 before = monotonic();
             }
-            state.failed = self.put(false).err();
+            state.failed = (self.put)(false).err();
             let fall = (before, monotonic());
             state.rise = None;
             state.judge(&Edges { rise, fall }, self.width);
@@ -174,5 +174,66 @@ impl State {
             }
             self.spoiled.push_back(spoiled);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WIDTH: Duration = Duration::from_millis(20);
+    /// How long an edge is interrupted.
+    const STALL: Duration = Duration::from_millis(5);
+
+    /// The first pulse of a line whose edges take so long, if it was spoiled; asked as soon as its end has begun.
+    fn first(rise: Duration, fall: Duration) -> (Timestamp, Option<Spoiled>) {
+        let (ends, ended) = std::sync::mpsc::channel();
+        let put = move |on: bool| {
+            if !on {
+                // The last one, of the drop, is awaited by nobody.
+                let _ = ends.send(());
+            }
+            std::thread::sleep(if on { rise } else { fall });
+            Ok(())
+        };
+        let mut pulse = Pulse::of(Box::new(put), WIDTH).unwrap();
+        let fired = pulse.fire().unwrap();
+        ended.recv().unwrap();
+        let told = pulse.poll_spoiled();
+        assert_eq!(pulse.poll_spoiled(), None, "told twice");
+        (fired, told)
+    }
+
+    #[test]
+    fn a_pulse_with_an_interrupted_edge_is_told_once_it_ended_and_by_how_much_it_was_off() {
+        // Whatever else this computer does can only make it worse.
+        let (fired, told) = first(STALL, Duration::ZERO);
+        let told = told.expect("an interrupted rise");
+        assert_eq!((told.fired, told.width), (fired, WIDTH));
+        assert!(told.shorter >= STALL || told.longer >= STALL, "{told:?}");
+        let (fired, told) = first(Duration::ZERO, STALL);
+        let told = told.expect("an interrupted fall");
+        assert_eq!((told.fired, told.width), (fired, WIDTH));
+        assert!(told.longer >= STALL, "{told:?}");
+    }
+
+    #[test]
+    fn a_trigger_that_nobody_asks_remembers_its_latest_spoiled_pulses_only() {
+        let fall = Duration::from_millis(1);
+        let put = move |on| {
+            std::thread::sleep(if on { Duration::ZERO } else { fall });
+            Ok(())
+        };
+        let mut pulse = Pulse::of(Box::new(put), Duration::from_micros(1)).unwrap();
+        let mut fired = Vec::new();
+        for _ in 0..REMEMBERED + 3 {
+            fired.push(pulse.fire().unwrap());
+            while pulse.line.lock().rise.is_some() {
+                std::thread::yield_now();
+            }
+        }
+        let told: Vec<_> = std::iter::from_fn(|| pulse.poll_spoiled()).collect();
+        let told: Vec<_> = told.iter().map(|spoiled| spoiled.fired).collect();
+        assert_eq!(told, fired[3..]);
     }
 }
