@@ -161,9 +161,10 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
     /// its pattern's index as soon as it and all before it are there, stamped with the start of its exposure.
     ///
     /// A frame is a pattern's if its whole exposure lies within the pattern's time in view, by the times and
-    /// counts of flips and frames and never by the order of arrival, and if no pulse of the trigger spoiled it. A pattern without such a frame is shown again. The
-    /// sequence ends at the latest `timeout` after it would have without a fault. However it ends, the camera is
-    /// stopped and the projector blank afterwards. `sink` delays no flip: devices are served by another thread while it works.
+    /// counts of flips and frames and never by the order of arrival, and if no pulse of the trigger spoiled it. A pattern
+    /// without such a frame is shown again. The sequence ends at the latest `timeout` after it would have without a fault.
+    /// However it ends, the camera is stopped and the projector blank afterwards. `sink` delays no flip: devices are served by
+    /// another thread while it works.
     ///
     /// # Errors
     /// The first error of a device; `Protocol` if `indices` is empty or frames never fit their patterns; `Timeout` if

@@ -46,7 +46,8 @@ pub(crate) trait Scene: Send {
     fn loaded(&self) -> usize;
 
     /// The frame of an exposure. `seen` says which patterns (or none) were in view, in turn, for which share of the planned
-    /// exposure; it is not empty, and its shares sum to 1, or to more if the exposure lasted longer. `timestamp` and `sequence` are the frame's.
+    /// exposure; it is not empty, and its shares sum to 1, or to more if the exposure lasted longer. `timestamp` and
+    /// `sequence` are the frame's.
     fn expose(
         &mut self,
         seen: &[(Option<usize>, f32)],
