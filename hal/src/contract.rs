@@ -239,7 +239,8 @@ fn next_flip(projector: &mut impl Projector, clock: &mut impl Clock) -> Result<F
 /// # Errors
 /// The first promise that is not kept.
 pub fn check_trigger(trigger: &mut impl Trigger, clock: &mut impl Clock) -> Result<(), Violation> {
-    let mut last = Timestamp(0);
+    while trigger.poll_spoiled().is_some() {}
+    let (begun, mut last) = (clock.now(), Timestamp(0));
     for _ in 0..3 {
         let asked = clock.now();
         let fired = must("a trigger fires", prompt(|| trigger.fire())?)?;
@@ -251,6 +252,16 @@ pub fn check_trigger(trigger: &mut impl Trigger, clock: &mut impl Clock) -> Resu
         }
         last = fired;
         clock.wait(clock.now() + Duration::from_millis(1));
+    }
+    let mut told = begun;
+    while let Some(spoiled) = prompt(|| trigger.poll_spoiled())? {
+        if spoiled.fired < told || spoiled.fired > last {
+            return Err(violated(
+                "a trigger tells of pulses that it fired, in order and once",
+                format!("{spoiled:?} after {told}, the last one fired at {last}"),
+            ));
+        }
+        told = spoiled.fired + Duration::from_nanos(1);
     }
     Ok(())
 }

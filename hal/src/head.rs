@@ -75,12 +75,16 @@ pub struct Exposure {
     pub unexplained: u32,
     /// Frames of patterns that had their frame already.
     pub surplus: u32,
+    /// Frames that were exposed for too long or too short, by a pulse of the trigger that was spoiled.
+    pub spoiled: u32,
+    /// By how much such a pulse may have been off, at most.
+    pub pulse_error: Duration,
 }
 
 impl Exposure {
     /// Frames that came and proved to be no pattern's.
     fn unfit(&self) -> u32 {
-        [self.straddled, self.stale, self.unexplained]
+        [self.straddled, self.stale, self.unexplained, self.spoiled]
             .into_iter()
             .fold(0, u32::saturating_add)
     }
@@ -157,9 +161,10 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
     /// its pattern's index as soon as it and all before it are there, stamped with the start of its exposure.
     ///
     /// A frame is a pattern's if its whole exposure lies within the pattern's time in view, by the times and
-    /// counts of flips and frames and never by the order of arrival. A pattern without such a frame is shown again. The
-    /// sequence ends at the latest `timeout` after it would have without a fault. However it ends, the camera is
-    /// stopped and the projector blank afterwards. `sink` delays no flip: devices are served by another thread while it works.
+    /// counts of flips and frames and never by the order of arrival, and if no pulse of the trigger spoiled it. A pattern
+    /// without such a frame is shown again. The sequence ends at the latest `timeout` after it would have without a fault.
+    /// However it ends, the camera is stopped and the projector blank afterwards. `sink` delays no flip: devices are served by
+    /// another thread while it works.
     ///
     /// # Errors
     /// The first error of a device; `Protocol` if `indices` is empty or frames never fit their patterns; `Timeout` if
@@ -273,6 +278,10 @@ fn carry_out<C: Camera, P: Projector, T: Trigger, K: Clock>(
         while let Some(frame) = camera.poll_frame()? {
             let (start, count) = (start_of(&frame), frame.sequence());
             sequencer.frame(start, count, frame.restamped(start, count));
+        }
+        // After the frames and before anything is decided: the pulse of a frame that is there has ended.
+        while let Some(pulse) = trigger.poll_spoiled() {
+            sequencer.spoiled(pulse);
         }
         match sequencer.act(clock.now()) {
             Act::Queue(index) => projector.queue(index)?,

@@ -71,7 +71,7 @@ pub struct TriggerSetup {
     pub chip: String,
     /// Name of the line; none = the camera runs by itself.
     pub line: Option<String>,
-    /// How long a pulse lasts, µs. For many cameras this is the exposure.
+    /// How long a pulse lasts, µs. For many cameras this is the exposure; one of less than half of it is taken for its start only.
     pub pulse_us: u32,
     /// Whether a pulse is low and idle is high.
     pub active_low: bool,

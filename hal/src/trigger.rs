@@ -1,7 +1,13 @@
 //! The trigger of a head: what starts one exposure of the camera.
 
+mod spoiled;
+
 use crate::error::Error;
 use crate::units::Timestamp;
+pub use spoiled::{Edges, Spoiled};
+
+/// Spoiled pulses that a trigger remembers until it is asked. Whoever asks looks at no frame that is older than so many triggers.
+pub const REMEMBERED: usize = 16;
 
 /// Starts one camera exposure per call.
 pub trait Trigger: Send {
@@ -13,11 +19,23 @@ pub trait Trigger: Send {
     /// # Errors
     /// What the device says.
     fn fire(&mut self) -> Result<Timestamp, Error>;
+
+    /// The next pulse that was spoiled and has not been told; at most the latest [`REMEMBERED`] are.
+    ///
+    /// It can be told as soon as the pulse has ended. So whoever fetches a frame and then asks here knows of the pulse that
+    /// exposed it. A trigger that knows nothing of its pulses tells none.
+    fn poll_spoiled(&mut self) -> Option<Spoiled> {
+        None
+    }
 }
 
 impl<T: Trigger + ?Sized> Trigger for Box<T> {
     fn fire(&mut self) -> Result<Timestamp, Error> {
         (**self).fire()
+    }
+
+    fn poll_spoiled(&mut self) -> Option<Spoiled> {
+        (**self).poll_spoiled()
     }
 }
 

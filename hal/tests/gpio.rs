@@ -19,6 +19,8 @@ use std::time::Duration;
 /// By how much a pulse may be off by the kernel's record: the way into the kernel and out of it, some 10 000 instructions of 2 ns, and a µs of
 /// the record's resolution.
 const PULSE_TOLERANCE: Duration = Duration::from_micros(21);
+/// A pulse that is long enough to measure by: half a percent of it is far more than what its edges take.
+const MEASURED: Duration = Duration::from_millis(10);
 /// How long the line needs to be still in these tests: longer than a change of a simulated line takes.
 const QUIET_MS: u32 = 5;
 /// Long enough for a start that comes, and for one that must not.
@@ -226,10 +228,11 @@ fn a_pulse_has_its_width_and_begins_when_it_says() {
         let width = Duration::from_micros(u64::from(width_us));
         let mut pulse = Pulse::open(&chip.trigger(width_us, false), "trigger").unwrap();
         let trace = Trace::begin();
-        let mut fired = Vec::new();
+        let (mut fired, mut spoiled) = (Vec::new(), Vec::new());
         for _ in 0..count {
             fired.push(pulse.fire().unwrap());
             thread::sleep(width * 2);
+            spoiled.extend(std::iter::from_fn(|| pulse.poll_spoiled()));
         }
         let settings = trace.settings();
         assert_eq!(settings.len(), 2 * count, "{settings:?}");
@@ -243,6 +246,9 @@ fn a_pulse_has_its_width_and_begins_when_it_says() {
         }
         println!("{count} pulses of {width:?}: begun within {begun:?}, width within {off:?}");
         assert!(begun < PULSE_TOLERANCE && off < PULSE_TOLERANCE);
+        println!("{} of them spoiled: {spoiled:?}", spoiled.len());
+        // Shorter ones may not be off by much more than what edges take here.
+        assert!(spoiled.is_empty() || width < MEASURED, "{spoiled:?}");
     }
 }
 

@@ -76,6 +76,11 @@ fn each_single_fault_is_named_with_a_remedy_and_nothing_else_is() {
             "trigger",
             "lost",
         ),
+        (
+            "[faults]\nlong_pulse = 0.3\nlong_pulse_us = 5000\nseed = 3\n",
+            "trigger",
+            "loads the computer",
+        ),
         ("[faults]\ncompressed = true\n", "format", "R16"),
         (
             "[faults]\nlate_flip = 0.2\nlate_refreshes = 1\n",

@@ -6,6 +6,7 @@ use hal::camera::Starts;
 use hal::error::Error;
 use hal::head::{DynHead, Showing, TOLERANCE, Timing, Watched};
 use hal::projector::{Flip, Raster};
+use hal::trigger::Spoiled;
 use serde_json::json;
 use std::time::Duration;
 
@@ -173,13 +174,27 @@ fn triggered(seen: &Watched<()>) -> Finding {
         off.min().unwrap_or(u64::MAX)
     };
     let off_us = seen.frames.iter().map(latest).max().unwrap_or(0) / 1000;
-    let measured = json!({ "triggers": pulses, "frames": frames, "off_us": off_us });
+    let spoiled = seen.spoiled.len();
+    let pulse_off = seen.spoiled.iter().map(Spoiled::off).max();
+    let measured = json!({
+        "triggers": pulses, "frames": frames, "off_us": off_us, "spoiled": spoiled,
+    });
     let found =
         format!("{frames} frames for {pulses} triggers, exposed {off_us} µs from them at most");
     if frames == 0 {
         return Finding::fail(
             format!("no frame for {pulses} triggers"),
             "check the wire from the trigger output to the camera's trigger input, and that the camera is in trigger mode",
+            measured,
+        );
+    }
+    if let Some(off) = pulse_off {
+        return Finding::fail(
+            format!(
+                "{spoiled} of {pulses} pulses were not as long as they should be, by up to {:.2} ms: so far off is the exposure",
+                ms(off)
+            ),
+            "stop what else loads the computer, and give fringed a real-time priority",
             measured,
         );
     }

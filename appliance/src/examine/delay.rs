@@ -116,6 +116,7 @@ impl Round {
             frames: seen
                 .frames
                 .iter()
+                .filter(|frame| !seen.spoiled_near(frame.start))
                 .map(|frame| (after(frame.start), frame.measured))
                 .collect(),
         })

@@ -10,7 +10,7 @@ use hal::projector::Raster;
 pub const SETTLE: u32 = 12;
 /// Patterns that are loaded at a time: a projector's memory holds a sequence, not 256 greys.
 const BATCH: usize = 8;
-/// A lost frame loses a picture: so often all of a batch are taken.
+/// A lost frame loses a picture, and so does a pulse of the wrong length: so often all of a batch are taken.
 const ATTEMPTS: u32 = 3;
 /// A pixel is lit if white is this share of full scale above black.
 const LIT: f64 = 0.05;
@@ -81,7 +81,8 @@ fn take(
             let until = seen.flips.get(at + 1).map(|next| next.timestamp);
             let inside =
                 |start| start >= from && until.is_none_or(|until| start + camera.exposure <= until);
-            seen.frames.iter().find(|frame| inside(frame.start))
+            let fits = |start| inside(start) && !seen.spoiled_near(start);
+            seen.frames.iter().find(|frame| fits(frame.start))
         };
         let taken: Option<Vec<_>> = (0..count).map(picture).collect();
         if let Some(taken) = taken {
@@ -92,7 +93,7 @@ fn take(
     Err(Error::timeout(
         "taking a picture of a pattern",
         PATIENCE,
-        "check the cables of camera and projector",
+        "check the cables of camera and projector, and the load of the computer",
     ))
 }
 

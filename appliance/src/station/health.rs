@@ -69,7 +69,7 @@ pub struct Pace {
     pub dropped: u32,
     /// Refreshes that the projector missed.
     pub missed_flips: u32,
-    /// Patterns that were shown again because no frame was wholly theirs.
+    /// Patterns that were shown again because no frame was wholly theirs, or a spoiled one.
     pub retaken: u32,
     /// Largest departure of a flip from its count and of an exposure from its trigger, µs.
     pub sync_error_us: u32,

@@ -14,8 +14,21 @@ pub(super) enum Blocked {
     NoFrame,
     /// A pattern was shown as often as allowed, and no frame was wholly its.
     Retakes,
+    /// A pattern was shown as often as allowed, and most frames were spoiled by the trigger's pulses.
+    Pulses,
     /// Time was up.
     Late,
+}
+
+impl Blocked {
+    /// Why frames that came were not what was wanted: mostly the one thing, or the other.
+    pub fn misfit(so_far: &Exposure) -> Self {
+        if so_far.spoiled > so_far.unfit() / 2 {
+            Self::Pulses
+        } else {
+            Self::Retakes
+        }
+    }
 }
 
 /// A sequence that was given up.
@@ -43,8 +56,14 @@ impl Failure {
         } = self;
         let attempt = format!("acquiring pattern {index} ({taken} of {of} taken)");
         let counts = format!(
-            "{} frames straddled two patterns, {} were older, {} began at no trigger, {} were lost, {} refreshes were missed",
-            so_far.straddled, so_far.stale, so_far.unexplained, so_far.dropped, so_far.missed_flips
+            "{} frames straddled two patterns, {} were older, {} began at no trigger, {} were spoiled by their pulses, {} were lost, \
+             {} refreshes were missed",
+            so_far.straddled,
+            so_far.stale,
+            so_far.unexplained,
+            so_far.spoiled,
+            so_far.dropped,
+            so_far.missed_flips
         );
         match self.blocked {
             Blocked::NoFlip => Error::timeout(
@@ -62,6 +81,16 @@ impl Failure {
                     "{attempt}: shown {shots} times, no frame was wholly exposed in its view ({counts}), which"
                 ),
                 "check the flip-to-light delay, what the camera's stamp marks, and the load of the processor",
+            ),
+            // A pulse that ended too late, so it is one of time; another time it may do better.
+            Blocked::Pulses => Error::timeout(
+                format!(
+                    "{attempt}: shown {shots} times, pulses of the trigger were up to {:.2} ms off their length, \
+                     and with them the brightness of frames ({counts}), which",
+                    so_far.pulse_error.as_secs_f64() * 1e3
+                ),
+                timeout,
+                "stop what else loads the computer, or give fringed a real-time priority",
             ),
             Blocked::Late => Error::timeout(
                 format!("{attempt} after {shots} tries ({counts})"),

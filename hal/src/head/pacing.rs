@@ -11,10 +11,11 @@ use std::time::Duration;
 use super::Timing;
 use crate::camera::{CameraTiming, Starts};
 use crate::projector::Flip;
+use crate::trigger::{REMEMBERED, Spoiled};
 use crate::units::Timestamp;
 
 /// Triggers that are remembered; a frame that comes later than so many others is nobody's.
-const TRIGGERS: usize = 16;
+const TRIGGERS: usize = REMEMBERED;
 
 /// One showing of a pattern.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +51,9 @@ pub(super) struct Pacing {
     /// The latest triggers, and how many there were.
     triggers: [Timestamp; TRIGGERS],
     count: usize,
+    /// The latest of their pulses that were spoiled, and how many there were.
+    spoiled: [Option<Spoiled>; TRIGGERS],
+    spoils: usize,
     /// An exposure starts this soon after its trigger, or never.
     promptness: Duration,
     /// The start of the latest exposure of a camera that runs by itself.
@@ -70,6 +74,8 @@ impl Pacing {
             free: Timestamp(0),
             triggers: [Timestamp(0); TRIGGERS],
             count: 0,
+            spoiled: [None; TRIGGERS],
+            spoils: 0,
             promptness: timing.tolerance,
             phase: None,
         }
@@ -121,6 +127,32 @@ impl Pacing {
             || known
                 .filter(|index| *index as u64 >= before)
                 .any(|index| prompt(self.triggers[index % TRIGGERS]))
+    }
+
+    /// A pulse did not last as long as it should. That matters to a camera that exposes for as long as its pulses last.
+    pub fn spoiled(&mut self, pulse: Spoiled) {
+        if !self.triggered || !pulse.decides(self.exposure) {
+            return;
+        }
+        // The camera is busy for as much longer.
+        self.free = self.free.max(pulse.fired + (pulse.longer + self.period));
+        self.spoiled[self.spoils % TRIGGERS] = Some(pulse);
+        self.spoils += 1;
+    }
+
+    /// The pulse that spoiled an exposure that seems to have started then, if one did.
+    pub fn spoiled_by(&self, start: Timestamp) -> Option<Spoiled> {
+        let mut known = self.spoiled.iter().flatten();
+        known.find(|pulse| self.spoils(pulse, start)).copied()
+    }
+
+    /// Whether this pulse spoiled an exposure that seems to have started then: its own, whose stamp may mark the end and so be off
+    /// by as much as the pulse; or the next one, if that was triggered while the camera was busy for longer than planned.
+    pub fn spoils(&self, pulse: &Spoiled, start: Timestamp) -> bool {
+        let from = pulse.fired - (pulse.shorter + self.promptness);
+        let busy = self.period.saturating_sub(self.promptness);
+        let until = pulse.fired + (pulse.longer + busy.max(self.promptness));
+        (from..=until).contains(&start)
     }
 
     pub fn exposed(&mut self, start: Timestamp) {
@@ -217,5 +249,66 @@ impl Pacing {
         let passed = now.since(shot.flip.timestamp).as_nanos() / self.refresh.as_nanos();
         let steps = u32::try_from(passed + 1).unwrap_or(u32::MAX);
         shot.flip.timestamp + self.refresh.saturating_mul(steps)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn us(us: u64) -> Duration {
+        Duration::from_micros(us)
+    }
+
+    /// The reference head: a camera that exposes for 16 667 µs and then is read out.
+    fn pacing(starts: Starts) -> Pacing {
+        let camera = CameraTiming {
+            starts,
+            exposure: us(16_667),
+            period: us(33_333),
+            delivery: us(20_000),
+        };
+        Pacing::new(us(16_667), &camera, &Timing::default())
+    }
+
+    fn pulse(fired: Timestamp, width: Duration, longer: Duration) -> Spoiled {
+        Spoiled {
+            fired,
+            width,
+            shorter: us(2),
+            longer,
+        }
+    }
+
+    #[test]
+    fn a_long_pulse_spoils_its_frame_whatever_its_stamp_marks_and_the_next_one_that_came_too_soon()
+    {
+        let (fired, longer) = (Timestamp(1_000_000_000), us(40_000));
+        let mut pacing = pacing(Starts::OnTrigger);
+        pacing.fired(fired);
+        pacing.spoiled(pulse(fired, us(16_653), longer));
+        let free = fired + (us(33_333) + longer);
+        assert_eq!(pacing.free, free, "no trigger while the camera is busy");
+        for (start, spoiled) in [
+            (fired - us(33_133), false),
+            (fired, true),
+            (fired + longer, true),
+            // Triggered when the camera should have been free.
+            (fired + us(33_333), true),
+            (free - us(300), true),
+            (free - us(100), false),
+        ] {
+            assert_eq!(pacing.spoiled_by(start).is_some(), spoiled, "{start}");
+        }
+    }
+
+    #[test]
+    fn pulses_that_do_not_decide_the_exposure_spoil_nothing() {
+        let fired = Timestamp(1_000_000_000);
+        for (starts, width) in [(Starts::ByItself, us(16_653)), (Starts::OnTrigger, us(100))] {
+            let mut pacing = pacing(starts);
+            pacing.spoiled(pulse(fired, width, us(5_000)));
+            assert_eq!(pacing.spoiled_by(fired), None);
+        }
     }
 }

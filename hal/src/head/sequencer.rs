@@ -1,6 +1,7 @@
 //! The sequencer: which pattern to show when, when to trigger, and whose each frame is. Decisions only.
 //!
-//! It gets what happened and the time as arguments ([`Sequencer::flipped`], [`Sequencer::fired`], [`Sequencer::frame`]) and answers
+//! It gets what happened and the time as arguments ([`Sequencer::flipped`], [`Sequencer::fired`], [`Sequencer::frame`],
+//! [`Sequencer::spoiled`]) and answers
 //! what to do next ([`Sequencer::act`]); the head's loop carries it out. What comes in one after the other is called so:
 //! a *position* is a place in the sequence and has one pattern; a *shot* is one showing of it. A position whose shot gave no
 //! frame is shown again, before the positions that come after it. Frames are handed over in the order of the sequence.
@@ -13,6 +14,7 @@ use super::failure::{Blocked, Failure};
 use super::identity::{Identity, Views};
 use super::pacing::{Pacing, Shot};
 use crate::projector::Flip;
+use crate::trigger::Spoiled;
 use crate::units::Timestamp;
 
 /// Shows of one pattern before the sequence is given up.
@@ -181,6 +183,11 @@ impl<F> Sequencer<F> {
         self.pacing.fired(at);
     }
 
+    /// This pulse of the trigger was spoiled: to be told before the next question what to do, so that its frame is not decided yet.
+    pub fn spoiled(&mut self, pulse: Spoiled) {
+        self.pacing.spoiled(pulse);
+    }
+
     /// A frame came whose exposure started then, under this count of the camera.
     pub fn frame(&mut self, start: Timestamp, count: u64, frame: F) {
         if !self.count.see(count) {
@@ -258,6 +265,12 @@ impl<F> Sequencer<F> {
             };
             let start = exposed.start;
             let end = self.pacing.end(start);
+            if let Some(pulse) = self.pacing.spoiled_by(start) {
+                self.so_far.spoiled = self.so_far.spoiled.saturating_add(1);
+                self.so_far.pulse_error = self.so_far.pulse_error.max(pulse.off());
+                self.retake_the_shot_spoiled_by(&pulse);
+                continue;
+            }
             if !self
                 .pacing
                 .explains(start, self.count.before(exposed.count))
@@ -320,6 +333,15 @@ impl<F> Sequencer<F> {
             expected.is_some_and(|at| at.since(start).max(start.since(at)) < near)
         });
         if let Some(at) = meant {
+            self.retake(at);
+        }
+    }
+
+    /// The frame of a spoiled pulse came: its shot is taken again at once, if nobody does that already.
+    fn retake_the_shot_spoiled_by(&mut self, pulse: &Spoiled) {
+        let spoiled = |at| self.pacing.spoils(pulse, at);
+        let meant = |shot: &Shot| !shot.done && shot.fired.is_some_and(spoiled);
+        if let Some(at) = self.shots.iter().position(meant) {
             self.retake(at);
         }
     }
@@ -393,9 +415,9 @@ impl<F> Sequencer<F> {
         let blocked = match (self.exhausted, self.queued, self.count.any()) {
             (_, Some(_), _) if self.shots.is_empty() => Blocked::NoFlip,
             (_, _, false) => Blocked::NoFrame,
-            (Some(_), ..) => Blocked::Retakes,
-            // Frames come, and not one fits: more time would not help.
-            _ if self.started.is_none() && self.so_far.unfit() > 0 => Blocked::Retakes,
+            // Or frames come, and not one fits: more time would not help.
+            (Some(_), ..) => Blocked::misfit(&self.so_far),
+            _ if self.started.is_none() && self.so_far.unfit() > 0 => Blocked::misfit(&self.so_far),
             _ => Blocked::Late,
         };
         let position = self.exhausted.or(open).unwrap_or(0);

@@ -11,7 +11,7 @@ use crate::clock::Clock;
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::projector::{Flip, Projector};
-use crate::trigger::Trigger;
+use crate::trigger::{Spoiled, Trigger};
 use crate::units::Timestamp;
 
 /// A pattern and how long it is shown.
@@ -32,6 +32,8 @@ pub struct Watched<M> {
     pub flips: Vec<Flip>,
     /// When the trigger fired.
     pub triggers: Vec<Timestamp>,
+    /// Pulses of the trigger that did not last as long as they should, and decided an exposure.
+    pub spoiled: Vec<Spoiled>,
     /// The frames in the order of their arrival.
     pub frames: Vec<Seen<M>>,
 }
@@ -47,6 +49,18 @@ pub struct Seen<M> {
     pub count: u64,
     /// What was measured.
     pub measured: M,
+}
+
+impl<M> Watched<M> {
+    /// Whether a spoiled pulse may have had a part in an exposure that seems to have started then: its own or a neighbour's, as stamps
+    /// of ends are off by as much as the pulse.
+    pub fn spoiled_near(&self, start: Timestamp) -> bool {
+        let near = |pulse: &Spoiled| {
+            let reach = u128::from(start.0.abs_diff(pulse.fired.0));
+            reach <= (pulse.width + pulse.off()).as_nanos()
+        };
+        self.spoiled.iter().any(near)
+    }
 }
 
 impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
@@ -66,6 +80,7 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
         let mut seen = Watched {
             flips: Vec::new(),
             triggers: Vec::new(),
+            spoiled: Vec::new(),
             frames: Vec::new(),
         };
         let refreshes: u32 = showings.iter().map(|showing| showing.refreshes + 1).sum();
@@ -94,6 +109,12 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
                         measured: measure(&frame),
                     });
                 }
+                // One of before is nobody's any more.
+                let fired = |pulse: &Spoiled| {
+                    pulse.decides(camera.exposure) && seen.triggers.contains(&pulse.fired)
+                };
+                let told = std::iter::from_fn(|| devices.trigger.poll_spoiled());
+                seen.spoiled.extend(told.filter(fired));
                 let now = devices.clock.now();
                 let shown = seen.flips.len() == showings.len();
                 let end = next_flip + (refresh + timing.flip_to_light);

@@ -118,7 +118,10 @@ impl Scene for SimScene {
             raster.map(Vec::as_slice)
         };
         match seen {
-            [(shown, _)] => self.transport.light(raster(*shown), &mut self.picture),
+            [(shown, share)] => {
+                self.transport.light(raster(*shown), &mut self.picture);
+                self.picture.iter_mut().for_each(|light| *light *= share);
+            }
             several => {
                 self.picture.fill(0.0);
                 for (shown, share) in several {

@@ -100,6 +100,7 @@ impl Scenario {
             ("faults.late_frame_us", faults.late_frame_us, 1e7),
             ("faults.stamp_jitter_us", faults.stamp_jitter_us, 1e6),
             ("faults.trigger_jitter_us", faults.trigger_jitter_us, 1e6),
+            ("faults.long_pulse_us", faults.long_pulse_us, 1e6),
             ("faults.stall_us", faults.stall_us, 1e7),
         ] {
             within(key, us as f64, 0.0, most)?;
@@ -123,6 +124,7 @@ impl Scenario {
             ("faults.swapped", faults.swapped),
             ("faults.late_frame", faults.late_frame),
             ("faults.lost_trigger", faults.lost_trigger),
+            ("faults.long_pulse", faults.long_pulse),
             ("faults.stall", faults.stall),
         ] {
             within(key, chance, 0.0, 1.0)?;

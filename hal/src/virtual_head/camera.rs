@@ -35,6 +35,7 @@ pub(super) struct Sensor {
 #[derive(Clone, Copy)]
 struct Exposure {
     start: Timestamp,
+    length: Duration,
     count: u64,
     ready: Timestamp,
     twice: bool,
@@ -59,8 +60,8 @@ impl Sensor {
         self.again = None;
     }
 
-    /// A trigger's pulse. It is lost on an open wire and on a camera that is stopped or busy.
-    pub fn fire(&mut self, now: Timestamp, mechanics: &Mechanics, dice: Dice) {
+    /// A trigger's pulse of this length. It is lost on an open wire and on a camera that is stopped or busy.
+    pub fn fire(&mut self, now: Timestamp, length: Duration, mechanics: &Mechanics, dice: Dice) {
         let faults = &mechanics.faults;
         let lost = !self.armed
             || mechanics.free_running.is_some()
@@ -72,11 +73,12 @@ impl Sensor {
         }
         let jitter = Duration::from_micros(faults.trigger_jitter_us);
         let start = now + dice.up_to(Kind::TriggerJitter, self.count, 1.0, jitter);
-        self.busy_until = now + mechanics.camera().period;
-        self.expose(start, mechanics, dice);
+        let longer = length.saturating_sub(mechanics.exposure);
+        self.busy_until = now + (mechanics.camera().period + longer);
+        self.expose(start, length, mechanics, dice);
     }
 
-    fn expose(&mut self, start: Timestamp, mechanics: &Mechanics, dice: Dice) {
+    fn expose(&mut self, start: Timestamp, length: Duration, mechanics: &Mechanics, dice: Dice) {
         let faults = &mechanics.faults;
         let n = self.count;
         if faults.frames_until_stuck > 0 && n >= faults.frames_until_stuck {
@@ -88,12 +90,13 @@ impl Sensor {
         }
         let late = Duration::from_micros(faults.late_frame_us);
         let late = dice.up_to(Kind::LateFrame, n, faults.late_frame, late);
-        let mut ready = start + (mechanics.exposure + mechanics.readout + late);
+        let mut ready = start + (length + mechanics.readout + late);
         if dice.happens(Kind::Swapped, n, faults.swapped) {
             ready = ready + (mechanics.camera().period + mechanics.exposure / 4);
         }
         let exposure = Exposure {
             start,
+            length,
             count: n,
             ready,
             twice: dice.happens(Kind::Duplicated, n, faults.duplicated),
@@ -123,7 +126,7 @@ impl Sensor {
         {
             self.since += 1;
             let off = dice.up_to(Kind::TriggerJitter, self.count, 1.0, jitter);
-            self.expose(start + off, mechanics, dice);
+            self.expose(start + off, mechanics.exposure, mechanics, dice);
         }
         // What nobody fetched in time is lost.
         while self.exposures.len() > MAX_WAITING && self.exposures[MAX_WAITING].ready <= now {
@@ -166,8 +169,9 @@ impl<S: Scene> Bench<S> {
         };
         self.sensor.exposures.pop_front();
         let mechanics = &self.mechanics;
-        let end = exposure.start + mechanics.exposure;
-        let seen = self.light.seen(exposure.start, end);
+        let end = exposure.start + exposure.length;
+        let (start, length) = (exposure.start, exposure.length);
+        let seen = self.light.seen(start, length, mechanics.exposure);
         let marked = match mechanics.stamp {
             Stamp::ExposureStart => exposure.start,
             Stamp::ExposureEnd => end,

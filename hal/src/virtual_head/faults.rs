@@ -39,6 +39,10 @@ pub struct Faults {
     pub lost_trigger: f64,
     /// An exposure starts up to so much after its trigger, or off its period, µs.
     pub trigger_jitter_us: u64,
+    /// Chance that a trigger's pulse, and so the exposure, lasts too long, by up to `long_pulse_us`: the computer was busy.
+    pub long_pulse: f64,
+    /// How much too long, at most, µs.
+    pub long_pulse_us: u64,
     /// A camera that runs by itself is so much slower than it says, parts per million.
     pub drift_ppm: i32,
     /// Chance that a wait lasts too long, by up to `stall_us`: the computer was busy.
@@ -70,6 +74,7 @@ pub(super) enum Kind {
     LostTrigger,
     TriggerJitter,
     Stall,
+    LongPulse,
 }
 
 /// Dice whose n-th throw of a kind depends on the seed, the kind and n alone.

@@ -1,6 +1,7 @@
 //! Which pattern's light was in view when, and what an exposure saw of it.
 
 use std::collections::VecDeque;
+use std::time::Duration;
 
 use crate::units::Timestamp;
 
@@ -34,10 +35,16 @@ impl Light {
         self.changes.push_back((at, pattern));
     }
 
-    /// Which patterns were in view from `start` to `end`, in turn, each for which share of that time.
-    pub fn seen(&mut self, start: Timestamp, end: Timestamp) -> &[(Option<usize>, f32)] {
+    /// Which patterns were in view for `length` from `start` on, in turn, each for which share of the time `planned`.
+    pub fn seen(
+        &mut self,
+        start: Timestamp,
+        length: Duration,
+        planned: Duration,
+    ) -> &[(Option<usize>, f32)] {
         self.seen.clear();
-        let whole = end.since(start).as_nanos().max(1) as f64;
+        let end = start + length;
+        let whole = planned.as_nanos().max(1) as f64;
         let last = self.changes.len() - 1;
         for (at, (from, pattern)) in self.changes.iter().enumerate() {
             // What came first was always there, what came last stays.
@@ -56,7 +63,7 @@ impl Light {
             }
         }
         if let [(_, share)] = self.seen.as_mut_slice() {
-            *share = 1.0;
+            *share = (length.as_nanos().max(1) as f64 / whole) as f32;
         }
         &self.seen
     }
@@ -67,12 +74,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_exposure_sees_each_pattern_for_its_share_and_one_alone_for_all() {
+    fn an_exposure_sees_each_pattern_for_its_share_of_the_planned_time_and_one_alone_for_all() {
         let mut light = Light::new();
         light.change(Timestamp(100), Some(3), Timestamp(0));
         light.change(Timestamp(200), Some(4), Timestamp(0));
         light.change(Timestamp(300), Some(4), Timestamp(0));
-        let mut seen = |start, end| light.seen(Timestamp(start), Timestamp(end)).to_vec();
+        let ns = Duration::from_nanos;
+        let mut seen = |start, end| {
+            let length = ns(end - start);
+            light.seen(Timestamp(start), length, length).to_vec()
+        };
         assert_eq!(seen(20, 90), [(None, 1.0)]);
         assert_eq!(seen(100, 200), [(Some(3), 1.0)]);
         assert_eq!(
@@ -80,6 +91,9 @@ mod tests {
             [(None, 0.25), (Some(3), 0.5), (Some(4), 0.25)]
         );
         assert_eq!(seen(210, 900), [(Some(4), 1.0)]);
+        let mut longer = |start, length| light.seen(Timestamp(start), length, ns(80)).to_vec();
+        assert_eq!(longer(210, ns(100)), [(Some(4), 1.25)]);
+        assert_eq!(longer(120, ns(100)), [(Some(3), 1.0), (Some(4), 0.25)]);
     }
 
     #[test]
@@ -94,7 +108,11 @@ mod tests {
         }
         assert!(light.changes.len() < 8, "{}", light.changes.len());
         assert_eq!(
-            light.seen(Timestamp(99_650), Timestamp(99_660)),
+            light.seen(
+                Timestamp(99_650),
+                Duration::from_nanos(10),
+                Duration::from_nanos(10)
+            ),
             [(Some(996), 1.0)]
         );
     }

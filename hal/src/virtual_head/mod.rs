@@ -9,6 +9,7 @@ mod camera;
 mod faults;
 mod light;
 mod projector;
+mod pulse;
 mod timing;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -19,7 +20,7 @@ use crate::error::Error;
 use crate::frame::{Frame, FrameFormat};
 use crate::head::{DynHead, Head};
 use crate::projector::Raster;
-use crate::trigger::Trigger;
+use crate::trigger::{Spoiled, Trigger};
 use crate::units::Timestamp;
 use cables::Line;
 use camera::Sensor;
@@ -27,6 +28,7 @@ use faults::Dice;
 pub use faults::Faults;
 use light::Light;
 use projector::Screen;
+use pulse::Pulses;
 pub(crate) use timing::Mechanics;
 
 /// What the virtual devices look at.
@@ -43,8 +45,9 @@ pub(crate) trait Scene: Send {
     /// Patterns loaded.
     fn loaded(&self) -> usize;
 
-    /// The frame of an exposure. `seen` says which patterns (or none) were in view, in turn, for which share of it; it
-    /// is not empty and its shares sum to 1. `timestamp` and `sequence` are the frame's.
+    /// The frame of an exposure. `seen` says which patterns (or none) were in view, in turn, for which share of the planned
+    /// exposure; it is not empty, and its shares sum to 1, or to more if the exposure lasted longer. `timestamp` and
+    /// `sequence` are the frame's.
     fn expose(
         &mut self,
         seen: &[(Option<usize>, f32)],
@@ -62,6 +65,7 @@ pub(crate) struct Bench<S> {
     screen: Screen,
     light: Light,
     sensor: Sensor,
+    pulses: Pulses,
     waits: u64,
     camera: Line,
     projector: Line,
@@ -79,6 +83,7 @@ pub(crate) fn head<S: Scene + 'static>(scene: S, mechanics: Mechanics) -> (DynHe
         screen: Screen::default(),
         light: Light::new(),
         sensor: Sensor::new(),
+        pulses: Pulses::new(),
         waits: 0,
         camera: Line::default(),
         projector: Line::default(),
@@ -163,7 +168,16 @@ impl<S: Scene> Trigger for Device<S> {
     fn fire(&mut self) -> Result<Timestamp, Error> {
         let mut bench = lock(&self.bench);
         let bench = &mut *bench;
-        bench.sensor.fire(bench.now, &bench.mechanics, bench.dice);
-        Ok(bench.now)
+        let (now, mechanics, dice) = (bench.now, &bench.mechanics, bench.dice);
+        if let Some(length) = bench.pulses.begin(now, mechanics, dice) {
+            bench.sensor.fire(now, length, mechanics, dice);
+        }
+        Ok(now)
+    }
+
+    fn poll_spoiled(&mut self) -> Option<Spoiled> {
+        let mut bench = lock(&self.bench);
+        let now = bench.now;
+        bench.pulses.poll(now)
     }
 }

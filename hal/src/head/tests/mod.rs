@@ -13,8 +13,10 @@ use crate::virtual_head::{self, Faults, Mechanics, Scene};
 const REFRESH: Duration = Duration::from_micros(16_667);
 const TIMEOUT: Duration = Duration::from_millis(500);
 const SHARES: f32 = 65535.0;
+/// By as much an exposure may be too long, and the rounding of a label.
+const HALF_A_PERCENT: f32 = 0.005 + 1.0 / SHARES;
 
-/// A scene whose frames say in their samples which pattern they show, and how much of others.
+/// A scene whose frames say in their samples which pattern they show, how much of others, and for how much too long.
 ///
 /// That is told from the light alone, so it judges the sequencer without its stamps and counts.
 #[derive(Default)]
@@ -25,9 +27,9 @@ struct Labels {
 }
 
 const FORMAT: FrameFormat = FrameFormat {
-    width: 2,
+    width: 3,
     height: 1,
-    stride: 2,
+    stride: 3,
     bit_depth: 16,
 };
 
@@ -60,19 +62,32 @@ impl Scene for Labels {
         }
         let (shown, share) = *seen.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         let label = shown.map_or(0, |index| index as u16 + 1);
-        let others = ((1.0 - share) * SHARES).round() as u16;
-        let pixels = Pixels::Sixteen(vec![label, others]);
+        let sum: f32 = seen.iter().map(|(_, share)| share).sum();
+        // Saturating: a share of more than all is all that needs to be told.
+        let told = |share: f32| (share * SHARES).round() as u16;
+        let pixels = Pixels::Sixteen(vec![label, told(sum - share), told(sum - 1.0)]);
         Frame::new(FORMAT, Arc::new(pixels), timestamp, sequence)
     }
 }
 
-/// The pattern that a frame shows, and for how much of its exposure it shows others.
-fn label(frame: &Frame) -> (Option<usize>, f32) {
+/// What a frame says of itself.
+#[derive(Debug, PartialEq)]
+struct Label {
+    /// The pattern that it shows.
+    shown: Option<usize>,
+    /// For which share of the planned exposure it shows others.
+    others: f32,
+    /// By which share its exposure was too long.
+    longer: f32,
+}
+
+fn label(frame: &Frame) -> Label {
     match frame.samples() {
-        Samples::Sixteen(&[label, others]) => (
-            usize::from(label).checked_sub(1),
-            f32::from(others) / SHARES,
-        ),
+        Samples::Sixteen(&[label, others, longer]) => Label {
+            shown: usize::from(label).checked_sub(1),
+            others: f32::from(others) / SHARES,
+            longer: f32::from(longer) / SHARES,
+        },
         other => panic!("{other:?}"),
     }
 }
@@ -93,14 +108,13 @@ fn plain() -> Mechanics {
     Mechanics::plain(REFRESH, 1)
 }
 
-/// The label and the index of each frame of a sequence, and how it went.
-type Taken = (Vec<(usize, Option<usize>, f32)>, Result<Exposure, Error>);
+/// The index and the label of each frame of a sequence, and how it went.
+type Taken = (Vec<(usize, Label)>, Result<Exposure, Error>);
 
 fn take(head: &mut DynHead, indices: &[usize]) -> Taken {
     let mut frames = Vec::new();
     let result = head.acquire(indices, TIMEOUT, &mut |index, frame| {
-        let (shown, others) = label(&frame);
-        frames.push((index, shown, others));
+        frames.push((index, label(&frame)));
     });
     (frames, result)
 }

@@ -10,11 +10,31 @@ const COUNT: usize = 12;
 fn all_right(head: &mut DynHead) -> Exposure {
     let indices: Vec<usize> = (0..COUNT).collect();
     let (frames, result) = take(head, &indices);
+    let wholly = |index: &usize| Label {
+        shown: Some(*index),
+        others: 0.0,
+        longer: 0.0,
+    };
     let expected: Vec<_> = indices
         .iter()
-        .map(|index| (*index, Some(*index), 0.0))
+        .map(|index| (*index, wholly(index)))
         .collect();
     assert_eq!(frames, expected);
+    result.unwrap()
+}
+
+/// As [`all_right`], but for pulses of the trigger that are off by less than what spoils a frame, and for stamps of their ends.
+fn all_but_half_a_percent(head: &mut DynHead) -> Exposure {
+    let indices: Vec<usize> = (0..COUNT).collect();
+    let (frames, result) = take(head, &indices);
+    assert_eq!(frames.len(), COUNT, "{result:?}");
+    for ((index, label), wanted) in frames.iter().zip(indices) {
+        assert_eq!((*index, label.shown), (wanted, Some(wanted)));
+        assert!(
+            label.others.max(label.longer) <= HALF_A_PERCENT,
+            "{label:?}"
+        );
+    }
     result.unwrap()
 }
 
@@ -191,6 +211,72 @@ fn a_stuck_device_ends_in_a_timeout_that_names_it() {
 }
 
 #[test]
+fn a_frame_whose_pulse_was_too_long_is_taken_again_once() {
+    let pulses = |long_pulse_us| Faults {
+        seed: 1,
+        long_pulse: 0.3,
+        long_pulse_us,
+        ..Faults::default()
+    };
+    // So short that the camera is free again long before the next light.
+    let (exposure, readout) = (REFRESH / 2, Duration::from_millis(4));
+    for stamp in [Stamp::ExposureStart, Stamp::ExposureEnd, Stamp::ReadoutEnd] {
+        // Below the tolerance of time stamps, above it, and on into the next patterns.
+        for longest in [180, 2_000, 50_000] {
+            let mechanics = Mechanics {
+                stamp,
+                exposure,
+                readout,
+                faults: pulses(longest),
+                ..plain()
+            };
+            let exposure = all_but_half_a_percent(&mut labelled(mechanics, COUNT));
+            assert!(exposure.spoiled > 0, "{stamp:?} {longest}: {exposure:?}");
+            assert!(
+                exposure.pulse_error <= Duration::from_micros(longest),
+                "{exposure:?}"
+            );
+            if longest < 10_000 {
+                assert_eq!(
+                    exposure.retaken, exposure.spoiled,
+                    "{stamp:?}: {exposure:?}"
+                );
+            }
+        }
+    }
+    // A camera that runs by itself has no pulses.
+    let mechanics = Mechanics {
+        free_running: Some((2 * REFRESH, Duration::ZERO)),
+        faults: pulses(2_000),
+        ..plain()
+    };
+    assert_eq!(all_right(&mut labelled(mechanics, COUNT)).spoiled, 0);
+}
+
+#[test]
+fn pulses_that_never_last_as_long_as_they_should_end_a_sequence_with_the_remedy() {
+    let faults = Faults {
+        long_pulse: 1.0,
+        long_pulse_us: 2_000,
+        ..Faults::default()
+    };
+    let readout = Duration::from_millis(16);
+    let mechanics = Mechanics {
+        readout,
+        faults,
+        ..plain()
+    };
+    let error = take(&mut labelled(mechanics, COUNT), &[0, 1, 2])
+        .1
+        .unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Timeout);
+    let words = error.to_string();
+    for word in ["pulses of the trigger", "brightness", "loads the computer"] {
+        assert!(words.contains(word), "{words}");
+    }
+}
+
+#[test]
 fn the_camera_is_stopped_and_the_projector_blank_also_after_an_error() {
     let faults = Faults {
         frames_until_stuck: 2,
@@ -227,7 +313,7 @@ fn a_pattern_may_be_taken_several_times_in_a_sequence() {
     result.unwrap();
     let shown: Vec<_> = frames
         .iter()
-        .map(|(index, shown, _)| (*index, *shown))
+        .map(|(index, label)| (*index, label.shown))
         .collect();
     assert_eq!(
         shown,
@@ -274,7 +360,7 @@ fn devices_are_served_while_the_sink_works() {
                 exposures.recv_timeout(Duration::from_secs(20)).unwrap();
             }
         }
-        frames.push((index, label(&frame).0));
+        frames.push((index, label(&frame).shown));
     });
     assert_eq!(refreshes(&exposure.unwrap()).round(), 11.0);
     let all: Vec<_> = indices.iter().map(|index| (*index, Some(*index))).collect();

@@ -1,6 +1,7 @@
 //! Light and noise: brightness, darkness, gain, response, blur, and the statistics of the noise.
 
 use super::{PATIENT, counts, frames, small};
+use crate::head::Showing;
 use crate::projector::Raster;
 use crate::sim::optics::normalised;
 use crate::sim::parts::Plane;
@@ -27,6 +28,46 @@ fn a_lit_plane_is_as_bright_as_its_angle_to_the_projector_says() {
             "{found} instead of {expected}"
         );
     }
+}
+
+#[test]
+fn a_long_pulse_makes_a_frame_brighter_and_is_told() {
+    let mut scenario = small(Part::Plane(Plane::default()));
+    scenario.noise.noise_counts = 0.0;
+    (scenario.faults.long_pulse, scenario.faults.long_pulse_us) = (0.5, 20_000);
+    let (mut head, _) = head(&scenario).unwrap();
+    let (width, height) = head.projector_size();
+    head.load(vec![Raster::uniform(width, height, 100).unwrap()])
+        .unwrap();
+    let showing = Showing {
+        index: 0,
+        refreshes: 100,
+        settle: 0,
+    };
+    let middle = 24 * 64 + 32;
+    let seen = head
+        .watch(&[showing], PATIENT, &mut |frame| counts(frame)[middle])
+        .unwrap();
+    let (mut good, mut spoiled) = (0, 0);
+    let planned = 255.0 * (0.04 + 0.86 * 7.0_f64.to_radians().cos() * 100.0 / 255.0);
+    for frame in &seen.frames {
+        let pulse = seen.spoiled.iter().find(|pulse| pulse.fired == frame.start);
+        let longer = pulse.map_or(0.0, |pulse| {
+            pulse.longer.as_secs_f64() / pulse.width.as_secs_f64()
+        });
+        let expected = planned * (1.0 + longer);
+        // Rounding, and what spoils no frame.
+        assert!(
+            (frame.measured - expected).abs() <= 1.0 + 0.005 * planned,
+            "{} instead of {expected}",
+            frame.measured
+        );
+        (good, spoiled) = match pulse {
+            Some(_) => (good, spoiled + 1),
+            None => (good + 1, spoiled),
+        };
+    }
+    assert!(good > 5 && spoiled > 5, "{good} and {spoiled} spoiled");
 }
 
 #[test]
