@@ -176,6 +176,8 @@ fn take(rig: &mut Rig, sequences: usize) -> Exposure {
         sum.straddled += exposure.straddled;
         sum.stale += exposure.stale;
         sum.surplus += exposure.surplus;
+        sum.spoiled += exposure.spoiled;
+        sum.pulse_error = sum.pulse_error.max(exposure.pulse_error);
         sum.sync_error = sum.sync_error.max(exposure.sync_error);
     }
     sum

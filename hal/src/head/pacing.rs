@@ -103,13 +103,10 @@ impl Pacing {
         start + self.exposure
     }
 
-    /// How much of the tolerance a plan may use. The start of a camera that runs by itself is foretold, and may be off by jitter.
+    /// How much of the tolerance a plan may use. The rest is for a trigger that fires a little late, and for the jitter of a camera that
+    /// runs by itself.
     fn slack(&self) -> Duration {
-        if self.triggered {
-            self.tolerance
-        } else {
-            self.tolerance / 2
-        }
+        self.tolerance / 2
     }
 
     pub fn fired(&mut self, at: Timestamp) {

@@ -1,10 +1,10 @@
 //! The sequencer: which pattern to show when, when to trigger, and whose each frame is. Decisions only.
 //!
-//! It gets what happened and the time as arguments ([`Sequencer::flipped`], [`Sequencer::fired`], [`Sequencer::frame`],
-//! [`Sequencer::spoiled`]) and answers
-//! what to do next ([`Sequencer::act`]); the head's loop carries it out. What comes in one after the other is called so:
-//! a *position* is a place in the sequence and has one pattern; a *shot* is one showing of it. A position whose shot gave no
-//! frame is shown again, before the positions that come after it. Frames are handed over in the order of the sequence.
+//! It gets what happened and the time as arguments ([`Sequencer::flipped`], [`Sequencer::fired`], [`Sequencer::spoiled`],
+//! [`Sequencer::frame`]) and answers what to do next ([`Sequencer::act`]); the head's loop carries it out. What comes in one after
+//! the other is called so: a *position* is a place in the sequence and has one pattern; a *shot* is one showing of it. A position
+//! whose shot gave no frame is shown again, before the positions that come after it. Frames are handed over in the order of the
+//! sequence.
 
 use std::collections::VecDeque;
 
