@@ -2,6 +2,8 @@
 
 #![allow(clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
 
+mod machine;
+
 use hal::clock::{Clock, Monotonic, monotonic};
 use hal::contract::{check_clock, check_trigger};
 use hal::error::ErrorKind;
@@ -10,6 +12,7 @@ use hal::lines::{OutputLine, StartLine};
 use hal::setup::{LinesSetup, TriggerSetup};
 use hal::trigger::Trigger;
 use hal::units::Timestamp;
+use machine::in_the_machine;
 use std::fs;
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
@@ -25,15 +28,6 @@ const MEASURED: Duration = Duration::from_millis(10);
 const QUIET_MS: u32 = 5;
 /// Long enough for a start that comes, and for one that must not.
 const PATIENCE: Duration = Duration::from_millis(200);
-
-/// Whether devices can be simulated here.
-fn simulated() -> bool {
-    let can = std::env::var_os("VM_HAL").is_some_and(|value| value == "1");
-    if !can {
-        println!("skipped: simulated GPIO chips are in the virtual machine of tests/vm (VM_HAL=1)");
-    }
-    can
-}
 
 /// A chip that the kernel simulates.
 struct Chip {
@@ -134,7 +128,7 @@ fn next_start(start: &mut Start, patience: Duration) -> Option<Timestamp> {
 
 #[test]
 fn each_reason_why_a_line_cannot_be_used_is_an_error_of_its_own() {
-    if !simulated() {
+    if !in_the_machine() {
         return;
     }
     let chip = Chip::new("errors", &["busy", "twice", "twice", "spare"]);
@@ -164,7 +158,7 @@ fn each_reason_why_a_line_cannot_be_used_is_an_error_of_its_own() {
 
 #[test]
 fn a_trigger_and_the_clock_keep_their_promises() {
-    if !simulated() {
+    if !in_the_machine() {
         return;
     }
     let chip = Chip::new("promises", &["trigger"]);
@@ -219,7 +213,7 @@ impl Drop for Trace {
 
 #[test]
 fn a_pulse_has_its_width_and_begins_when_it_says() {
-    if !simulated() {
+    if !in_the_machine() {
         return;
     }
     let chip = Chip::new("pulses", &["trigger"]);
@@ -254,7 +248,7 @@ fn a_pulse_has_its_width_and_begins_when_it_says() {
 
 #[test]
 fn a_pulse_while_one_is_on_is_lost_and_makes_it_no_longer() {
-    if !simulated() {
+    if !in_the_machine() {
         return;
     }
     let chip = Chip::new("overlap", &["trigger"]);
@@ -269,7 +263,7 @@ fn a_pulse_while_one_is_on_is_lost_and_makes_it_no_longer() {
 
 #[test]
 fn a_trigger_is_idle_after_it_is_dropped_and_after_a_panic_also_in_a_pulse() {
-    if !simulated() {
+    if !in_the_machine() {
         return;
     }
     let chip = Chip::new("idle", &["trigger"]);
@@ -296,7 +290,7 @@ fn a_trigger_is_idle_after_it_is_dropped_and_after_a_panic_also_in_a_pulse() {
 
 #[test]
 fn a_line_out_is_set_and_is_idle_before_and_after() {
-    if !simulated() {
+    if !in_the_machine() {
         return;
     }
     let chip = Chip::new("outputs", &["fault"]);
@@ -318,7 +312,7 @@ fn a_line_out_is_set_and_is_idle_before_and_after() {
 
 #[test]
 fn a_start_has_the_kernels_stamp_on_the_clock_of_the_head() {
-    if !simulated() {
+    if !in_the_machine() {
         return;
     }
     let chip = Chip::new("start", &["start"]);
@@ -345,7 +339,7 @@ fn a_start_has_the_kernels_stamp_on_the_clock_of_the_head() {
 
 #[test]
 fn bounces_and_spikes_start_nothing_more() {
-    if !simulated() {
+    if !in_the_machine() {
         return;
     }
     let chip = Chip::new("bounces", &["start"]);
@@ -367,7 +361,7 @@ fn bounces_and_spikes_start_nothing_more() {
 
 #[test]
 fn edges_that_the_kernel_dropped_are_made_up_for_by_the_level() {
-    if !simulated() {
+    if !in_the_machine() {
         return;
     }
     let chip = Chip::new("burst", &["start"]);
@@ -394,7 +388,7 @@ fn edges_that_the_kernel_dropped_are_made_up_for_by_the_level() {
 
 #[test]
 fn a_line_that_is_active_when_it_is_opened_has_started_nothing() {
-    if !simulated() {
+    if !in_the_machine() {
         return;
     }
     let chip = Chip::new("held", &["start"]);
@@ -405,7 +399,7 @@ fn a_line_that_is_active_when_it_is_opened_has_started_nothing() {
 
 #[test]
 fn a_chip_that_goes_is_said_by_every_line_of_it_and_ends_a_wait() {
-    if !simulated() {
+    if !in_the_machine() {
         return;
     }
     let chip = Chip::new("removed", &["trigger", "busy", "start"]);
@@ -434,7 +428,7 @@ fn a_chip_that_goes_is_said_by_every_line_of_it_and_ends_a_wait() {
 
 #[test]
 fn a_line_is_opened_all_day_without_a_descriptor_left_behind() {
-    if !simulated() {
+    if !in_the_machine() {
         return;
     }
     let chip = Chip::new("reopened", &["trigger", "start"]);

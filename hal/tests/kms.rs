@@ -4,10 +4,12 @@
 
 #[path = "kms/crc.rs"]
 mod crc;
+mod machine;
 #[path = "kms/readback.rs"]
 mod readback;
 
 use crc::Checksums;
+use machine::in_the_machine;
 use readback::Client;
 use std::time::Duration;
 
@@ -22,15 +24,6 @@ use hal::setup::ProjectorSetup;
 const STAMP: Duration = Duration::from_micros(1);
 /// Longer than anything takes that works.
 const PATIENT: Duration = Duration::from_secs(5);
-
-/// Whether this runs in the machine of `tests/vm`.
-fn in_the_machine() -> bool {
-    let there = std::env::var_os("VM_HAL").is_some_and(|set| set == "1");
-    if !there {
-        println!("skipped: needs the virtual machine of tests/vm/run");
-    }
-    there
-}
 
 fn setup(width: u32, height: u32, hertz: f64) -> ProjectorSetup {
     ProjectorSetup {

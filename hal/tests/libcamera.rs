@@ -5,6 +5,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic)]
 
+mod machine;
+
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::fs;
@@ -17,6 +19,7 @@ use hal::error::ErrorKind;
 use hal::frame::{Frame, FrameFormat, Samples};
 use hal::libcamera::{LibCamera, Reading, Settings};
 use hal::setup::CameraSetup;
+use machine::in_the_machine;
 
 const SIZE: (u32, u32) = (640, 400);
 /// Images that the virtual camera replays, and how often each comes before the next.
@@ -34,17 +37,13 @@ const A_FRAME: Duration = Duration::from_secs(8);
 const CAMERAS: &str = "/usr/share/libcamera/pipeline/virtual/virtual.yaml";
 const IMAGE_FOLDER: &str = "/replay/";
 
-/// Whether this runs in the machine of `tests/vm`, whose cameras are then set up.
-fn in_the_machine() -> bool {
-    let there = std::env::var_os("VM_HAL").is_some_and(|set| set == "1");
-    if !there {
-        println!("skipped: needs the virtual machine of tests/vm/run");
-        return false;
-    }
-    if !fs::exists(CAMERAS).unwrap() {
+/// Whether this runs in the machine, whose cameras are then set up.
+fn with_cameras() -> bool {
+    let there = in_the_machine();
+    if there && !fs::exists(CAMERAS).unwrap() {
         set_up();
     }
-    true
+    there
 }
 
 /// Describes the virtual cameras and draws what they replay.
@@ -145,7 +144,7 @@ fn descriptors() -> usize {
 
 #[test]
 fn cameras_are_listed_and_opened_by_their_ids_in_any_order() {
-    if !in_the_machine() {
+    if !with_cameras() {
         return;
     }
     let all = LibCamera::list().unwrap();
@@ -177,7 +176,7 @@ fn cameras_are_listed_and_opened_by_their_ids_in_any_order() {
 
 #[test]
 fn without_any_camera_opening_says_so() {
-    if !in_the_machine() {
+    if !with_cameras() {
         return;
     }
     // What the library finds at its first start it keeps in mind, so this wants a process of its own.
@@ -206,7 +205,7 @@ fn where_the_library_knows_no_camera() {
 
 #[test]
 fn what_a_camera_adjusts_is_taken_only_if_it_is_what_was_wanted() {
-    if !in_the_machine() {
+    if !with_cameras() {
         return;
     }
     let refused = |settings: Settings| {
@@ -239,7 +238,7 @@ fn what_a_camera_adjusts_is_taken_only_if_it_is_what_was_wanted() {
 
 #[test]
 fn replayed_fringes_come_in_order_without_a_gap_in_memory_that_is_not_copied() {
-    if !in_the_machine() {
+    if !with_cameras() {
         return;
     }
     let mut camera = open("Replay", Reading::Luma);
@@ -284,7 +283,7 @@ fn replayed_fringes_come_in_order_without_a_gap_in_memory_that_is_not_copied() {
 
 #[test]
 fn kept_frames_stay_what_they_are_and_outlive_their_camera() {
-    if !in_the_machine() {
+    if !with_cameras() {
         return;
     }
     let mut camera = open("Replay", Reading::Luma);
@@ -310,7 +309,7 @@ fn kept_frames_stay_what_they_are_and_outlive_their_camera() {
 
 #[test]
 fn stopping_takes_back_the_requests_in_flight_and_starting_again_works() {
-    if !in_the_machine() {
+    if !with_cameras() {
         return;
     }
     let mut camera = open("Replay", Reading::Luma);
@@ -343,7 +342,7 @@ fn stopping_takes_back_the_requests_in_flight_and_starting_again_works() {
 
 #[test]
 fn twenty_starts_and_stops_and_five_openings_leak_no_descriptor() {
-    if !in_the_machine() {
+    if !with_cameras() {
         return;
     }
     // What the library keeps for good is there from now on.
@@ -372,7 +371,7 @@ fn twenty_starts_and_stops_and_five_openings_leak_no_descriptor() {
 
 #[test]
 fn one_camera_is_open_at_a_time() {
-    if !in_the_machine() {
+    if !with_cameras() {
         return;
     }
     let camera = open("Replay", Reading::Luma);
@@ -385,7 +384,7 @@ fn one_camera_is_open_at_a_time() {
 
 #[test]
 fn a_wait_ends_with_a_frame_or_in_time_and_polling_never_waits() {
-    if !in_the_machine() {
+    if !with_cameras() {
         return;
     }
     let mut camera = open("Replay", Reading::Luma);
@@ -413,7 +412,7 @@ fn a_wait_ends_with_a_frame_or_in_time_and_polling_never_waits() {
 
 #[test]
 fn a_real_driver_gives_frames_with_times_and_counts_that_increase() {
-    if !in_the_machine() {
+    if !with_cameras() {
         return;
     }
     let mut camera = vimc();
@@ -440,7 +439,7 @@ fn a_real_driver_gives_frames_with_times_and_counts_that_increase() {
 
 #[test]
 fn the_contract_of_a_camera_is_kept() {
-    if !in_the_machine() {
+    if !with_cameras() {
         return;
     }
     let mut camera = open("Replay", Reading::Luma);

@@ -8,6 +8,7 @@ mod chip;
 mod crc;
 #[path = "rig/eye.rs"]
 mod eye;
+mod machine;
 
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
@@ -22,20 +23,12 @@ use hal::head::{Exposure, Head, Timing};
 use hal::kms::{self, Display};
 use hal::projector::{Flip, Projector, Raster};
 use hal::setup::{ProjectorSetup, TriggerSetup};
+use machine::in_the_machine;
 
 const PATTERNS: usize = 8;
 const PATIENT: Duration = Duration::from_secs(5);
 
 type Rig = Head<Eye, Late, Pulse, Monotonic>;
-
-/// Whether this runs in the machine of `tests/vm`.
-fn in_the_machine() -> bool {
-    let there = std::env::var_os("VM_HAL").is_some_and(|set| set == "1");
-    if !there {
-        println!("skipped: needs the virtual machine of tests/vm/run");
-    }
-    there
-}
 
 /// A display whose commits come late now and then, as those of a busy computer.
 struct Late {
