@@ -51,8 +51,8 @@ const MINIMUM_REACH: usize = 1;
 const SMOOTHING: f64 = 3.0;
 /// Share of the best g·M(g) that is good enough.
 const ENOUGH: f64 = 0.985;
-/// Frequencies that are tried, from the coarsest to the finest.
-const TRIED: usize = 160;
+/// Steps from the coarsest frequency to the finest, of equal ratio.
+const STEPS: usize = 160;
 
 /// The contrast M of a sine of frequency `g` (turns per projector pixel) that the camera sees with
 /// gradient `[a, b]` (turns per camera pixel along u and v): the projector's bilinear pixels and
@@ -109,16 +109,16 @@ pub fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2]) -> f64 {
     let finest = (1.0 / optics.projector_pitch)
         .min(1.0 / (optics.image_pitch * slope.max(1e-6)))
         .max(coarsest);
-    let ratio = libm::pow(finest / coarsest, 1.0 / TRIED as f64);
-    let tried = |i: usize| coarsest * libm::pow(ratio, i as f64);
+    let ratio = libm::pow(finest / coarsest, 1.0 / STEPS as f64);
+    let frequency = |i: usize| coarsest * libm::pow(ratio, i as f64);
     let worth = |i: usize| {
-        let g = tried(i);
+        let g = frequency(i);
         g * contrast(optics, g, [g * ju, g * jv])
     };
     // The logarithms of g, of each sinc and of each Gaussian are concave, so g·M(g) rises to one peak and falls.
-    let peak = first(TRIED, |i| worth(i) >= worth(i + 1));
+    let peak = first(STEPS, |i| worth(i) >= worth(i + 1));
     let enough = ENOUGH * worth(peak);
-    tried(first(peak, |i| worth(i) >= enough))
+    frequency(first(peak, |i| worth(i) >= enough))
 }
 
 /// The first of 0…`last` that `holds`, where all behind it do as well; `last` if none before it does.
@@ -227,8 +227,8 @@ mod tests {
                 let finest = (1.0 / PROJECTOR_PITCH)
                     .min(1.0 / (IMAGE_PITCH * libm::hypot(ju, jv)))
                     .max(coarsest);
-                let ratio = libm::pow(finest / coarsest, 1.0 / TRIED as f64);
-                let all = || (0..=TRIED).map(|i| coarsest * libm::pow(ratio, i as f64));
+                let ratio = libm::pow(finest / coarsest, 1.0 / STEPS as f64);
+                let all = || (0..=STEPS).map(|i| coarsest * libm::pow(ratio, i as f64));
                 let worth = |g: f64| g * contrast(&optics, g, [g * ju, g * jv]);
                 let best = all().map(worth).fold(0.0, f64::max);
                 let found = all().find(|&g| worth(g) >= ENOUGH * best).unwrap();

@@ -53,7 +53,7 @@ pub(super) struct Pacing {
     count: usize,
     /// The latest of their pulses that were spoiled, and how many there were.
     spoiled: [Option<Spoiled>; TRIGGERS],
-    spoils: usize,
+    told: usize,
     /// An exposure starts this soon after its trigger, or never.
     promptness: Duration,
     /// The start of the latest exposure of a camera that runs by itself.
@@ -75,7 +75,7 @@ impl Pacing {
             triggers: [Timestamp(0); TRIGGERS],
             count: 0,
             spoiled: [None; TRIGGERS],
-            spoils: 0,
+            told: 0,
             promptness: timing.tolerance,
             phase: None,
         }
@@ -133,8 +133,8 @@ impl Pacing {
         }
         // The camera is busy for as much longer.
         self.free = self.free.max(pulse.fired + (pulse.longer + self.period));
-        self.spoiled[self.spoils % TRIGGERS] = Some(pulse);
-        self.spoils += 1;
+        self.spoiled[self.told % TRIGGERS] = Some(pulse);
+        self.told += 1;
     }
 
     /// The pulse that spoiled an exposure that seems to have started then, if one did.
