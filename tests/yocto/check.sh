@@ -66,7 +66,7 @@ else
     echo "units: SKIPPED, there is no systemd-analyze (Debian package systemd)"
 fi
 
-# broken CHECK FILE SED: a copy with one file changed; CHECK must find that.
+# broken CHECK FILE CHANGE: a copy with one file changed by sed, or moved with "mv TO"; CHECK must find that.
 found=0
 broken() {
     local check=$1 file=$2 change=$3 copy=$dir/copy
@@ -78,7 +78,12 @@ broken() {
     git -C "$copy" init --quiet
     git -C "$copy" -c user.name=check -c user.email=check@localhost commit --quiet --allow-empty --message copy
     if [[ -n $file ]]; then
-        sed -i "$change" "$copy/$file"
+        if [[ $change == "mv "* ]]; then
+            mkdir -p "$(dirname "$copy/${change#mv }")"
+            mv "$copy/$file" "$copy/${change#mv }"
+        else
+            sed -i "$change" "$copy/$file"
+        fi
         if cmp --quiet "$workspace/$file" "$copy/$file"; then
             echo "$file: nothing to break with $change" >&2
             exit 1
@@ -125,6 +130,7 @@ broken parse $recipe 's/systemd\/fringed.service /systemd\/fringed.servce /'
 broken parse $recipe 's/^SYSTEMD_SERVICE.*/SYSTEMD_SERVICE:${PN} = "fringe.service"/'
 broken parse $recipe 's/md5=146/md5=147/'
 broken parse $recipe 's/--groups video,render/--groups video/'
+broken parse $recipe 's/ --system render;//'
 broken parse $recipe 's/^def fringed_commit/def fringed_comit/'
 broken parse $recipe 's/"rev-parse", "--verify", "HEAD"/"hash-object", "README.md"/'
 broken lint $recipe 's/^SYSTEMD_SERVICE:/SYSTEMD_SERVICE_/'
@@ -140,11 +146,17 @@ broken lint $image 's/^IMAGE_INSTALL = /IMAGE_INSTAL = /'
 
 # What has to fit together: releases, partitions, updates, the head, the kernel, state.
 broken parse yocto/meta-fringed/conf/layer.conf 's/"wrynose"/"scarthgap"/'
-broken parse yocto/meta-fringed/wic/fringed.wks.in 's/root-b/root-c/'
+broken parse yocto/meta-fringed/files/wic/fringed.wks.in 's/root-b/root-c/'
+broken parse yocto/meta-fringed/files/wic/fringed.wks.in "mv yocto/meta-fringed/wic/fringed.wks.in"
+broken parse yocto/meta-fringed/recipes-core/rauc/rauc-conf.bbappend 's/{nonarch_libdir}/{sysconfdir}/'
+broken parse yocto/meta-fringed/recipes-core/rauc/files/system.conf 's/^path=.usr.lib/path=\/etc/'
 broken parse yocto/meta-fringed/recipes-core/rauc/files/system.conf 's/boot-b/boot-c/'
 broken parse $recipes/bundle/fringed-bundle_1.0.bb 's/"boot rootfs"/"rootfs"/'
 broken parse $recipes/boot/files/config.txt '/imx296,cam0/d'
 broken parse $recipes/boot/files/config.txt 's/boot_partition=3/boot_partition=4/'
+broken parse $recipes/boot/files/config.txt '/^\[pi4\]/,/^\[all\]/{/^\[all\]/d}'
+broken parse $recipes/boot/files/config.txt '/^\[pi5\]/d'
+broken parse $recipes/boot/fringed-boot_1.0.bb 's/ cgroup_enable=memory//'
 broken parse $recipes/system/files/boot-complete.conf '/^After/d'
 broken parse $recipes/system/files/var-lib-fringed.mount 's/^What=.*/What=\/data\/fring/'
 broken parse $recipes/system/files/journald.conf '/^RuntimeMaxUse/d'
@@ -166,6 +178,9 @@ broken slots $recipes/slots/files/boot-slot 's/set-primary)/set-primry)/'
 broken slots $recipes/slots/files/boot-slot 's/then other "$slot"; else/then echo "$slot"; else/'
 broken slots $recipes/slots/files/boot-slot '/bad) if/s/rm -f "$next"/make_good "$2"/'
 broken slots $recipes/slots/files/boot-slot 's/^    mount -o remount,ro.*/    :/'
+broken slots $recipes/slots/files/boot-slot 's/ 1<>"$file"/ | dd of="$file" conv=notrunc,fsync/'
+broken slots $recipes/slots/files/boot-slot 's/ 1<>"$file"/ | install -m 0644 \/dev\/stdin "$file"/'
+broken slots $recipes/slots/files/boot-slot '/^    sync$/d'
 
 # A key of kas.
 broken kas yocto/kas.yml 's/^machine:/machin:/'
@@ -175,6 +190,12 @@ broken kas yocto/kas.yml 's/^    branch: wrynose/    brnch: wrynose/'
 broken machine yocto/kas.yml '0,/branch: wrynose/s//branch: scarthgap/'
 broken machine yocto/kas.yml 's/^distro: .*/distro: poky/'
 broken machine yocto/kas.yml '/meta-multimedia:/d'
+broken machine yocto/kas.yml '/commit: f62c/d'
+broken machine yocto/kas.yml 's/commit: \(ef022bf82d\).*/commit: \1/'
+
+# What yocto-check-layer asks of a layer.
+broken parse yocto/meta-fringed/README.md "mv yocto/meta-fringed/notes.md"
+broken parse yocto/meta-fringed/README.md 's/<maintainers@.*>//'
 
 rm -rf "$dir/copy"
 echo "broken on purpose: $found, all found"

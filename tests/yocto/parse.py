@@ -10,6 +10,8 @@ parsed and says what it should, not that it builds.
 import json
 import logging
 import os
+import shutil
+import subprocess
 import sys
 import types
 from pathlib import Path
@@ -70,6 +72,22 @@ class Layer:
     def words(self, recipe: str, variable: str) -> list[str]:
         """The same as a list."""
         return self.text(recipe, variable).split()
+
+    def run(self, recipe: str, task: str, variable: str) -> Path:
+        """Runs a shell task on the recipe's own files, as BitBake would; the folder that `variable` names after it."""
+        sources, result = Path(self.text(recipe, "UNPACKDIR")), Path(self.text(recipe, variable))
+        for folder in (sources, result):
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir(parents=True)
+        for uri in self.words(recipe, "SRC_URI"):
+            path = Path(bb.fetch2.Fetch([uri], self.recipes[recipe]).localpath(uri))
+            # The certificate is made by yocto/keys.sh, for each product its own.
+            (sources / path.name).write_bytes(path.read_bytes() if path.exists() else b"certificate\n")
+        shell = f"set -eu\n{self.text(recipe, task)}"
+        ended = subprocess.run(["sh", "-c", shell], cwd=sources, capture_output=True, text=True, check=False)
+        if ended.returncode != 0:
+            sys.exit(f"{recipe}: {task} ends with {ended.returncode}: {ended.stderr.strip()}")
+        return result
 
     def file(self, path: str) -> str:
         """The text of a file of the layer."""

@@ -9,9 +9,14 @@ from pathlib import Path
 
 import bb.fetch2
 
+import firmware
+
 SYSTEM = "recipes-fringed/system/files"
 SLOTS = "recipes-fringed/slots/files"
 BOOT = "recipes-fringed/boot/files"
+WKS = "files/wic"
+# Groups that openembedded-core's base-passwd always has, of those that the service needs.
+BASE_GROUPS = {"video"}
 
 
 def missing(wanted, found):
@@ -118,10 +123,12 @@ def services_are_installed(layer):
 
 
 def the_user_is_that_of_sysusers(layer):
-    """The user that the image is made with is the one that systemd/fringed.sysusers asks for."""
+    """The user that the image is made with is the one that systemd/fringed.sysusers asks for, and its groups are there."""
     parameters = layer.text("fringed", "USERADD_PARAM:fringed")
     home = re.search(r"--home-dir (\S+)", parameters)
     groups = re.search(r"--groups (\S+)", parameters)
+    made = set(re.findall(r"--system (\S+)(?:;|$)", layer.text("fringed", "GROUPADD_PARAM:fringed")))
+    yield from missing(sorted(set(groups[1].split(",")) | {"fringed"}), made | BASE_GROUPS)
     found = {("u", "fringed", home and home[1])} | {("m", "fringed", one) for one in groups[1].split(",")}
     wanted = set()
     for line in (layer.workspace / "systemd/fringed.sysusers").read_text().splitlines():
@@ -177,28 +184,48 @@ def layers_and_branches_are_of_one_release(layer):
         branch = {"bitbake": "2.18", "fringed": None}.get(name, series)
         if repository.get("branch") != branch:
             yield f"{name}: branch {repository.get('branch')} instead of {branch}"
+        if branch and not re.fullmatch("[0-9a-f]{40}|38da0e5866", repository.get("commit", "")):
+            yield f"{name}: its commit is {repository.get('commit')}, which pins nothing"
     for collection in layer.data.getVar("LAYERDEPENDS_fringed").split():
         if collection not in layer.data.getVar("BBFILE_COLLECTIONS").split():
             yield f"depends on {collection}, which no layer is"
     yield from (f"{append} is appended to nothing" for append in layer.dangling)
 
 
+def the_layer_says_whom_to_ask(layer):
+    """The layer's README has what yocto-check-layer asks for: maintainers, dependencies, how to build."""
+    readme = layer.root / "README.md"
+    text = readme.read_text() if readme.exists() else ""
+    yield from missing(["Maintainer", "@", "patch", "## Dependencies", "## Build"], text)
+    for repository in layer.configuration["repos"].values():
+        if repository.get("url"):
+            yield from missing([repository["url"], (repository.get("commit") or "no commit")[:10]], text)
+
+
 def partitions_have_one_name_everywhere(layer):
     """Partitions have the same names in the image, for RAUC, in the mounts and on the command lines."""
-    parts = [line for line in layer.file("wic/fringed.wks.in").splitlines() if line.startswith("part ")]
+    # BitBake refuses to start where a layer has a folder `wic`, as before wrynose.
+    if (layer.root / "wic").exists() or not (layer.root / WKS / layer.text("fringed-image", "WKS_FILE")).is_file():
+        yield f"{layer.text('fringed-image', 'WKS_FILE')} is not in {WKS}"
+        return
+    parts = [line for line in layer.file(f"{WKS}/fringed.wks.in").splitlines() if line.startswith("part ")]
     names = [re.search(r"--part-name (\S+)", part)[1] for part in parts]
     if names != ["select", "boot-a", "boot-b", "root-a", "root-b", "data"]:
         yield f"the image has {names}"
     rauc = layer.file("recipes-core/rauc/files/system.conf")
     mounts = layer.file(f"{SYSTEM}/data.mount") + layer.file(f"{SLOTS}/boot-select.mount")
-    lines = layer.text("fringed-boot", "do_compile")
+    built = layer.run("fringed-boot", "do_compile", "B")
+    lines = "".join((built / f"cmdline-{slot}.txt").read_text() for slot in "ab")
     named = re.findall(r"by-partlabel/([\w-]+)$", rauc + mounts, re.M) + re.findall(r"PARTLABEL=([\w-]+)", lines)
     if set(named) != set(names):
         yield f"{sorted(set(named) ^ set(names))} is named in one place only"
     for slot in "ab":
         yield from missing([f"root=PARTLABEL=root-{slot} rauc.slot={slot.upper()}"], lines)
         number = names.index(f"boot-{slot}") + 1
-        yield from missing([f"[boot_partition={number}]\ncmdline=cmdline-{slot}.txt"], layer.file(f"{BOOT}/config.txt"))
+        for model in firmware.MODELS:
+            line = firmware.settings((built / "config.txt").read_text(), model, number).get("cmdline")
+            if line != [f"cmdline-{slot}.txt"]:
+                yield f"{model}: the slot of partition {number} starts with the command line {line}"
 
 
 def updates_fit_the_device(layer):
@@ -207,19 +234,23 @@ def updates_fit_the_device(layer):
     compatible = rauc["system"]["compatible"].replace("@MACHINE@", layer.configuration["machine"])
     if layer.text("fringed-bundle", "RAUC_BUNDLE_COMPATIBLE") != compatible:
         yield f"bundle for {layer.text('fringed-bundle', 'RAUC_BUNDLE_COMPATIBLE')}, device {compatible}"
-    yield from missing(["s/@MACHINE@/" + layer.configuration["machine"]], layer.text("rauc-conf", "do_install"))
+    device = layer.run("rauc-conf", "do_install", "D")
+    rauc = ini((device / "usr/lib/rauc/system.conf").read_text())
+    if rauc["system"]["compatible"] != compatible:
+        yield f"a device is {rauc['system']['compatible']} instead of {compatible}"
     slots = {section.split(".")[1] for section in rauc.sections() if section.startswith("slot.")}
     if slots != set(layer.words("fringed-bundle", "RAUC_BUNDLE_SLOTS")):
         yield f"bundle with {layer.text('fringed-bundle', 'RAUC_BUNDLE_SLOTS')}, device with {slots}"
     backend = rauc["handlers"]["bootloader-custom-backend"]
-    yield from missing([backend], layer.text("fringed-slots", "do_install"))
+    if not (layer.run("fringed-slots", "do_install", "D") / backend.lstrip("/")).is_file():
+        yield f"no {backend} is installed"
     if layer.text("fringed-bundle", "RAUC_BUNDLE_FORMAT") != "verity":
         yield "the bundle is not verified while it is read"
     for variable in ("RAUC_KEY_FILE", "RAUC_CERT_FILE"):
         if not layer.text("fringed-bundle", variable).startswith(layer.data.getVar("FRINGED_KEYS")):
             yield f"{variable} is {layer.text('fringed-bundle', variable)}"
     keyring = layer.text("rauc-conf", "RAUC_KEYRING_FILE")
-    if rauc["keyring"]["path"] != f"/etc/rauc/{keyring}" or keyring == "ca.cert.pem":
+    if not (device / rauc["keyring"]["path"].lstrip("/")).is_file() or keyring == "ca.cert.pem":
         yield f"the keyring is {keyring}, and the device looks for {rauc['keyring']['path']}"
     yield from missing([f"file://{keyring}"], layer.words("rauc-conf", "SRC_URI"))
     yield from missing([layer.data.getVar("FRINGED_KEYS")], layer.text("rauc-conf", "FILESEXTRAPATHS").split(":"))
@@ -257,12 +288,27 @@ def the_kernel_has_the_devices(layer):
     yield from missing(["overlays/imx296.dtbo"], overlays)
 
 
+def limits_of_memory_hold(layer):
+    """The service's limits of memory hold: the Pi's kernel counts memory by service only when it is asked to."""
+    service = ini((layer.workspace / "systemd/fringed.service").read_text())["Service"]
+    if any(key.startswith("Memory") for key in service):
+        yield from missing(["cgroup_enable=memory"], layer.words("fringed-boot", "FRINGED_CMDLINE"))
+
+
 def the_head_is_that_of_the_hardware_guide(layer):
     """config.txt, the command line and the camera's trigger are those of docs/hardware.md."""
     guide = (layer.workspace / "docs/hardware.md").read_text()
     blocks = re.findall(r"^```\n(.*?)^```", guide, re.M | re.S)
     config = next(block for block in blocks if "camera_auto_detect" in block)
-    yield from missing(config.split(), layer.file(f"{BOOT}/config.txt").splitlines())
+    cameras = {"pi4": "imx296", "pi5": "imx296,cam0"}
+    for model, camera in cameras.items():
+        found = firmware.settings(layer.file(f"{BOOT}/config.txt"), model, 2)
+        for line in config.replace(f"={cameras['pi5']}\n", f"={camera}\n").split():
+            key, _, value = line.partition("=")
+            if value not in found.get(key, []):
+                yield f"{model}: {line} is not in force"
+        if (others := set(found["dtoverlay"]) & (set(cameras.values()) - {camera})):
+            yield f"{model}: {others} of another model is in force"
     line = next(block for block in blocks if block.startswith("video="))
     yield from missing(line.split(), layer.words("fringed-boot", "FRINGED_CMDLINE"))
     trigger = next(block for block in blocks if block.startswith("options imx296"))
@@ -286,10 +332,12 @@ ALL = [
     the_image_has_what_it_needs,
     the_distribution_is_an_appliances,
     layers_and_branches_are_of_one_release,
+    the_layer_says_whom_to_ask,
     partitions_have_one_name_everywhere,
     updates_fit_the_device,
     a_slot_is_good_when_fringed_is_ready,
     state_is_on_the_data_partition,
     the_kernel_has_the_devices,
+    limits_of_memory_hold,
     the_head_is_that_of_the_hardware_guide,
 ]

@@ -20,13 +20,13 @@ unavailable() {
 
 if [[ ! -f $dir/complete ]]; then
     command -v apt-get >/dev/null || unavailable "this is no Debian"
-    (cd "$dir" && apt-get download -qq -o APT::Sandbox::User=root rauc libjson-glib-1.0-0 libfdisk1 dbus-daemon squashfs-tools) ||
+    (cd "$dir" && apt-get download -qq -o APT::Sandbox::User=root rauc libjson-glib-1.0-0 libfdisk1 dbus-daemon liblzo2-2 squashfs-tools) ||
         unavailable "apt cannot download the packages (the reason stands above)"
     for package in "$dir"/*.deb; do dpkg -x "$package" "$dir/root"; done
     rm "$dir"/*.deb
     touch "$dir/complete"
 fi
-export PATH=$dir/root/usr/bin:$PATH LD_LIBRARY_PATH=$dir/root/usr/lib/x86_64-linux-gnu DBUS_SYSTEM_BUS_ADDRESS=unix:path=$dir/bus
+export PATH=$dir/root/usr/bin:$PATH LD_LIBRARY_PATH=$dir/root/usr/lib/x86_64-linux-gnu:$dir/root/lib/x86_64-linux-gnu DBUS_SYSTEM_BUS_ADDRESS=unix:path=$dir/bus
 rauc --version >/dev/null || unavailable "RAUC does not run here"
 
 stop() { for one in "${service:-}" "${bus:-}"; do [[ -z $one ]] || kill "$one" 2>/dev/null || true; done; }
@@ -46,7 +46,7 @@ printf '#!/bin/sh\nFRINGED_ROOT=%s PATH=%s:$PATH exec sh %s "$@"\n' \
     "$device" "$device/bin" "$layer/recipes-fringed/slots/files/boot-slot" >"$device/boot-slot"
 chmod +x "$device/bin/mount" "$device/boot-slot"
 sed "s#@MACHINE@#raspberrypi5#; s#/dev/disk/by-partlabel/#$device/#; s#/data/rauc#$device/data#; s#/usr/lib/rauc/boot-slot#$device/boot-slot#
-    s#/etc/rauc/#$keys/#" "$layer/recipes-core/rauc/files/system.conf" >"$device/system.conf"
+    s#/usr/lib/rauc/fringed-ca#$keys/fringed-ca#" "$layer/recipes-core/rauc/files/system.conf" >"$device/system.conf"
 
 is() {
     if [[ $2 != "$3" ]]; then

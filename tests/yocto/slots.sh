@@ -16,16 +16,25 @@ cp "$(dirname "$script")/../../boot/files/autoboot.txt" "$root/boot/select"
 cat >"$root/bin/mount" <<END
 #!/bin/sh
 case "\$2" in
-remount,rw) chmod u+w '$root/boot/select/autoboot.txt' ;;
-remount,ro) chmod u-w '$root/boot/select/autoboot.txt' ;;
+remount,rw) $(command -v chmod) u+w '$root/boot/select/autoboot.txt' ;;
+remount,ro) $(command -v chmod) u-w '$root/boot/select/autoboot.txt' ;;
 *) exit 1 ;;
 esac
 echo "\$2" >>'$root/mounts'
 END
-chmod +x "$root/bin/mount"
+# As busybox has it in the image: built without FEATURE_DD_IBS_OBS, which `conv=` belongs to.
+cat >"$root/bin/dd" <<END
+#!/bin/sh
+case " \$*" in *" conv="*) echo "dd: invalid argument 'conv'" >&2; exit 1 ;; esac
+exec $(command -v dd) "\$@"
+END
+printf '#!/bin/sh\necho sync >>%s\n' "'$root/mounts'" >"$root/bin/sync"
+chmod +x "$root/bin"/*
+# Nothing but what the image's busybox has.
+for applet in grep head rm sed sh; do ln -s "$(command -v "$applet")" "$root/bin"; done
 before=$(stat -c %s "$root/boot/select/autoboot.txt")
 
-rauc() { FRINGED_ROOT=$root PATH=$root/bin:$PATH sh "$script" "$@"; }
+rauc() { FRINGED_ROOT=$root PATH=$root/bin sh "$script" "$@"; }
 partition() { sed -n "/^\[$1\]/,/^\[/s/^boot_partition=//p" "$root/boot/select/autoboot.txt"; }
 
 # Starts the machine: with the flag after a restart, without it after the plug was pulled.
@@ -74,7 +83,7 @@ is "also without a flag" "$started" B
 is "its primary" "$(rauc get-primary)" B
 rauc set-state B good
 is "the file has its length" "$(stat -c %s "$root/boot/select/autoboot.txt")" "$before"
-is "the partition was opened and closed once" "$(tr '\n' ' ' <"$root/mounts")" "remount,rw remount,ro "
+is "the partition was opened, written through and closed once" "$(tr '\n' ' ' <"$root/mounts")" "remount,rw sync remount,ro "
 
 rauc set-primary A
 rauc set-primary B

@@ -7,5 +7,5 @@ RAUC_KEYRING_FILE:fringed-appliance = "fringed-ca.cert.pem"
 PACKAGE_ARCH:fringed-appliance = "${MACHINE_ARCH}"
 
 do_install:append:fringed-appliance() {
-    sed -i 's/@MACHINE@/${MACHINE}/' ${D}${sysconfdir}/rauc/system.conf
+    sed -i 's/@MACHINE@/${MACHINE}/' ${D}${nonarch_libdir}/rauc/system.conf
 }

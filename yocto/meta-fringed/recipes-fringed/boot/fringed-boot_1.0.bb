@@ -23,8 +23,9 @@ PACKAGE_ARCH = "${MACHINE_ARCH}"
 SLOT_SIZE = "131072"
 SELECT_SIZE = "16384"
 
-# The projector's mode, and nothing that draws on it; a kernel that stops restarts, which ends a trial.
-FRINGED_CMDLINE ?= "video=HDMI-A-1:1280x720@60D consoleblank=0 vt.global_cursor_default=0 console=serial0,115200 panic=10 quiet"
+# The projector's mode, and nothing that draws on it; memory can be limited by service, which the Pi's kernel leaves off;
+# a kernel that stops restarts, which ends a trial.
+FRINGED_CMDLINE ?= "video=HDMI-A-1:1280x720@60D consoleblank=0 vt.global_cursor_default=0 console=serial0,115200 cgroup_enable=memory panic=10 quiet"
 ROOT_CMDLINE = "ro rootfstype=ext4 rootwait"
 
 do_configure[noexec] = "1"

@@ -60,7 +60,8 @@ CONFFILES:${PN} = "${sysconfdir}/fringed/fringed.toml"
 SYSTEMD_SERVICE:${PN} = "fringed.service"
 
 USERADD_PACKAGES = "${PN}"
-GROUPADD_PARAM:${PN} = "--system gpio; --system fringed"
+# Of the groups below only video is always there; those that another recipe makes as well are not made twice.
+GROUPADD_PARAM:${PN} = "--system gpio; --system render; --system fringed"
 USERADD_PARAM:${PN} = "--system --no-create-home --home-dir ${localstatedir}/lib/fringed --shell ${base_sbindir}/nologin --gid fringed --groups video,render,gpio fringed"
 
 # The commit that FRINGED_REPOSITORY has checked out.
