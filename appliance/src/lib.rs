@@ -2,6 +2,7 @@
 
 pub mod access;
 pub mod adapt;
+pub mod archive;
 pub mod backend;
 pub mod benchmark;
 pub mod calibration;

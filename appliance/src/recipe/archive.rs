@@ -1,15 +1,18 @@
 //! A recipe as one file: a ZIP (stored) of `recipe.json` and NumPy arrays, with a fingerprint.
 
 use super::file::{FORMAT, RecipeFile, VERSION};
+use crate::archive::Members;
 use hal::npy;
 use sha2::{Digest, Sha256};
 use std::io::{Cursor, Read, Seek, Write as _};
 use zip::read::ZipFile;
 use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, ZipArchive, ZipWriter};
+use zip::{CompressionMethod, ZipWriter};
 
 /// The manifest's name in the archive.
 const MANIFEST: &str = "recipe.json";
+/// The manifest and eight arrays.
+const MAX_MEMBERS: usize = 9;
 /// The largest manifest that is read, in bytes.
 const MAX_MANIFEST: u64 = 1 << 20;
 /// The fingerprint's value while it is computed.
@@ -115,33 +118,24 @@ pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), Arc
     Ok((bytes, fingerprint))
 }
 
-/// Unpacks a recipe of at most `size` bytes and checks its fingerprint. No more than one member is in memory beside what
+/// Unpacks a recipe of `size` bytes and checks its fingerprint. No more than one member is in memory beside what
 /// has been read from the others.
 ///
 /// # Errors
 /// If it is no recipe, of a newer version, or not what was written.
 pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays), ArchiveError> {
-    let mut zip = ZipArchive::new(source).map_err(broken)?;
-    let mut members = Vec::new();
-    for at in 0..zip.len() {
-        let member = zip.by_index(at).map_err(broken)?;
-        members.push((member.name().map_err(broken)?.into_owned(), at));
-    }
-    members.sort();
-    let found = members.iter().position(|(name, _)| name == MANIFEST);
-    let (_, at) = members.remove(found.ok_or_else(|| broken("it holds no recipe.json"))?);
-    let text = String::from_utf8(content(&mut zip, at, size).map_err(broken)?).map_err(broken)?;
-    let file = parse(&text)?;
-    let zeroed = text.replacen(&file.fingerprint, NO_FINGERPRINT, 1);
+    let mut zip = Members::open(source, MAX_MEMBERS).map_err(broken)?;
+    let (file, zeroed) = read_manifest(&mut zip)?;
     let mut hash = Fingerprint::new(zeroed.as_bytes());
     let mut arrays = Arrays::default();
     let mut problem = None;
-    for (name, at) in &members {
-        let content = content(&mut zip, *at, size)
+    for name in arrays_of(&zip) {
+        let content = zip
+            .content(&name, size)
             .map_err(|error| broken(format!("member {name}: {error}")))?;
-        hash.add(name, &content);
+        hash.add(&name, &content);
         // That the file was damaged explains more than what the damage broke.
-        problem = problem.or(read_array(&mut arrays, name, &content).err());
+        problem = problem.or(read_array(&mut arrays, &name, &content).err());
     }
     let computed = hash.finish();
     if computed != file.fingerprint {
@@ -159,37 +153,33 @@ pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays
 /// Whether the content agrees with the fingerprint, read through a small buffer.
 pub fn is_sound(source: impl Read + Seek) -> bool {
     let computed = || -> Option<bool> {
-        let mut zip = ZipArchive::new(source).ok()?;
-        let mut names = Vec::new();
-        for at in 0..zip.len() {
-            names.push(zip.by_index(at).ok()?.name().ok()?.into_owned());
-        }
-        names.retain(|name| name != MANIFEST);
-        names.sort();
-        let mut text = String::new();
-        let member = zip.by_name(MANIFEST).ok()?;
-        member.take(MAX_MANIFEST).read_to_string(&mut text).ok()?;
-        let file = parse(&text).ok()?;
-        let zeroed = text.replacen(&file.fingerprint, NO_FINGERPRINT, 1);
+        let mut zip = Members::open(source, MAX_MEMBERS).ok()?;
+        let (file, zeroed) = read_manifest(&mut zip).ok()?;
         let mut hash = Fingerprint::new(zeroed.as_bytes());
-        for name in &names {
-            hash.stream(name, zip.by_name(name).ok()?).ok()?;
+        for name in arrays_of(&zip) {
+            hash.stream(&name, zip.member(&name).ok()?).ok()?;
         }
         Some(hash.finish() == file.fingerprint)
     };
     computed() == Some(true)
 }
 
-/// A member of at most `size` bytes: they are stored, so none is larger than the file.
-fn content(
-    zip: &mut ZipArchive<impl Read + Seek>,
-    at: usize,
-    size: u64,
-) -> std::io::Result<Vec<u8>> {
-    let member = zip.by_index(at)?;
-    let mut content = Vec::with_capacity(member.size().min(size) as usize);
-    member.take(size).read_to_end(&mut content)?;
-    Ok(content)
+/// The manifest, and its text with the fingerprint replaced by zeros.
+fn read_manifest(
+    zip: &mut Members<impl Read + Seek>,
+) -> Result<(RecipeFile, String), ArchiveError> {
+    let text = zip.content(MANIFEST, MAX_MANIFEST);
+    let text = text.map_err(|error| broken(format!("{MANIFEST}: {error}")))?;
+    let text = String::from_utf8(text).map_err(broken)?;
+    let file = parse(&text)?;
+    let zeroed = text.replacen(&file.fingerprint, NO_FINGERPRINT, 1);
+    Ok((file, zeroed))
+}
+
+/// The names of all members but the manifest, in order.
+fn arrays_of<R: Read + Seek>(zip: &Members<R>) -> Vec<String> {
+    let names = zip.names().filter(|name| *name != MANIFEST);
+    names.map(str::to_owned).collect()
 }
 
 /// Reads only the manifest of a recipe, without checking the fingerprint: for lists.
@@ -197,12 +187,8 @@ fn content(
 /// # Errors
 /// If it is no recipe or of a newer version.
 pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, ArchiveError> {
-    let mut zip = ZipArchive::new(file).map_err(broken)?;
-    let member = zip.by_name(MANIFEST).map_err(broken)?;
-    let mut text = String::new();
-    let read = member.take(MAX_MANIFEST).read_to_string(&mut text);
-    read.map_err(broken)?;
-    parse(&text)
+    let mut zip = Members::open(file, MAX_MEMBERS).map_err(broken)?;
+    Ok(read_manifest(&mut zip)?.0)
 }
 
 fn parse(text: &str) -> Result<RecipeFile, ArchiveError> {

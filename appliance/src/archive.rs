@@ -1,0 +1,228 @@
+//! A ZIP that came from elsewhere: its directory is checked before any member is read.
+//!
+//! A directory of a few kilobytes can name the same bytes thousands of times. Here a ZIP has no more members than its
+//! format needs, no two members share a byte, and all are stored without compression: reading all of them costs as much
+//! as reading the file once.
+
+use std::io::{self, Read, Seek, SeekFrom};
+use zip::read::ZipFile;
+use zip::{CompressionMethod, ZipArchive};
+
+/// Bytes of the record that ends a ZIP without a comment (APPNOTE 6.3.10, section 4.3.16).
+const END_BYTES: usize = 22;
+const END_MAGIC: &[u8; 4] = b"PK\x05\x06";
+
+/// The members of a ZIP, by name; folders are left out.
+#[derive(Debug)]
+pub struct Members<R> {
+    zip: ZipArchive<R>,
+    /// Names in ascending order, each with its place in the directory.
+    places: Vec<(String, usize)>,
+}
+
+impl<R: Read + Seek> Members<R> {
+    /// Opens a ZIP of at most `most` members (folders count). Takes memory for the directory only.
+    ///
+    /// # Errors
+    /// In words: it is no ZIP, has too many members, two of one name or two that share bytes, or one is compressed.
+    pub fn open(mut source: R, most: usize) -> Result<Self, String> {
+        let listed = listed(&mut source).map_err(|error| format!("read its end: {error}"))?;
+        let listed = listed.ok_or("it is no ZIP, or was cut off")?;
+        if listed > most {
+            return Err(format!(
+                "it lists {listed} members where at most {most} belong in it"
+            ));
+        }
+        let mut zip = ZipArchive::new(source).map_err(|error| error.to_string())?;
+        // Of two members with one name the library keeps the last.
+        if zip.len() != listed {
+            return Err("two of its members have the same name".into());
+        }
+        if zip
+            .has_overlapping_entries()
+            .map_err(|error| error.to_string())?
+        {
+            return Err("its members overlap: it was made by hand or damaged".into());
+        }
+        let mut places = Vec::with_capacity(listed);
+        for place in 0..listed {
+            let entry = zip
+                .by_index_data(place)
+                .map_err(|error| error.to_string())?;
+            let name = entry
+                .name()
+                .map_err(|error| error.to_string())?
+                .into_owned();
+            let stored = entry.compression() == CompressionMethod::Stored
+                && entry.size() == entry.compressed_size();
+            if !stored || entry.encrypted() {
+                return Err(format!(
+                    "member {name:?} is compressed or encrypted: pack it without compression (zip -0)"
+                ));
+            }
+            if entry.is_file() {
+                places.push((name, place));
+            }
+        }
+        places.sort();
+        Ok(Self { zip, places })
+    }
+
+    /// The names, ascending.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.places.iter().map(|(name, _)| name.as_str())
+    }
+
+    /// A member, to be read; its size is that of its content.
+    ///
+    /// # Errors
+    /// There is no such member, or the file cannot be read.
+    pub fn member(&mut self, name: &str) -> io::Result<ZipFile<'_, R>> {
+        let absent = || io::Error::new(io::ErrorKind::NotFound, format!("it holds no {name}"));
+        let found = self
+            .places
+            .binary_search_by(|(known, _)| known.as_str().cmp(name));
+        let (_, place) = &self.places[found.map_err(|_| absent())?];
+        Ok(self.zip.by_index(*place)?)
+    }
+
+    /// The whole content of a member.
+    ///
+    /// # Errors
+    /// There is no such member, it has more than `most` bytes, or it was cut off or damaged.
+    pub fn content(&mut self, name: &str, most: u64) -> io::Result<Vec<u8>> {
+        let mut member = self.member(name)?;
+        let size = member.size();
+        if size > most {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                format!("it has {size} bytes where at most {most} are read"),
+            ));
+        }
+        let mut content = Vec::with_capacity(usize::try_from(size).unwrap_or(0));
+        member.read_to_end(&mut content)?;
+        Ok(content)
+    }
+}
+
+/// How many members the record at the end says that there are; none if the file does not end in such a record with the
+/// directory right before it. A ZIP with a comment or with 64-bit sizes is none here: no file of ours is one.
+fn listed(source: &mut (impl Read + Seek)) -> io::Result<Option<usize>> {
+    let size = source.seek(SeekFrom::End(0))?;
+    let Some(start) = size.checked_sub(END_BYTES as u64) else {
+        return Ok(None);
+    };
+    source.seek(SeekFrom::Start(start))?;
+    let mut end = [0; END_BYTES];
+    source.read_exact(&mut end)?;
+    let short = |at: usize| u16::from_le_bytes([end[at], end[at + 1]]);
+    let long = |at: usize| u64::from(short(at)) | u64::from(short(at + 2)) << 16;
+    let one_disk = long(4) == 0 && short(8) == short(10);
+    let plain = end.starts_with(END_MAGIC) && one_disk && short(20) == 0;
+    // Otherwise the library would look for another record further up.
+    let abuts = long(12) + long(16) == start;
+    Ok((plain && abuts).then_some(usize::from(short(8))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{Cursor, Write as _};
+    use std::time::{Duration, Instant};
+    use zip::ZipWriter;
+    use zip::write::SimpleFileOptions;
+
+    fn stored(members: &[(&str, &[u8])]) -> Vec<u8> {
+        let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+        for (name, content) in members {
+            zip.start_file(*name, options).unwrap();
+            zip.write_all(content).unwrap();
+        }
+        zip.finish().unwrap().into_inner()
+    }
+
+    /// A ZIP of one member, listed `count` times under names of its own.
+    fn overlapping(bytes: usize, count: u16) -> Vec<u8> {
+        let one = stored(&[("m00000.npy", &vec![0; bytes])]);
+        let start = one.len() - END_BYTES - 46 - 10;
+        let (members, entry) = (&one[..start], &one[start..one.len() - END_BYTES]);
+        let mut zip = members.to_vec();
+        for at in 0..count {
+            zip.extend_from_slice(&entry[..46]);
+            zip.extend_from_slice(format!("m{at:05}.npy").as_bytes());
+        }
+        let directory = (zip.len() - start) as u32;
+        zip.extend_from_slice(END_MAGIC);
+        zip.extend_from_slice(&[0; 4]);
+        zip.extend_from_slice(&count.to_le_bytes());
+        zip.extend_from_slice(&count.to_le_bytes());
+        zip.extend_from_slice(&directory.to_le_bytes());
+        zip.extend_from_slice(&(start as u32).to_le_bytes());
+        zip.extend_from_slice(&[0; 2]);
+        zip
+    }
+
+    fn refused(zip: &[u8], most: usize) -> String {
+        Members::open(Cursor::new(zip), most).unwrap_err()
+    }
+
+    #[test]
+    fn members_are_read_whole_by_name_and_folders_are_none() {
+        let zip = stored(&[("b/2", b"two"), ("a", b"one"), ("b/", b"")]);
+        let mut members = Members::open(Cursor::new(zip), 3).unwrap();
+        assert_eq!(members.names().collect::<Vec<_>>(), ["a", "b/2"]);
+        assert_eq!(members.content("b/2", 3).unwrap(), b"two");
+        let long = members.content("a", 2).unwrap_err().to_string();
+        assert!(long.contains("3 bytes"), "{long}");
+        let absent = members.content("c", 9).unwrap_err();
+        assert_eq!(absent.kind(), io::ErrorKind::NotFound);
+    }
+
+    #[test]
+    fn four_megabytes_of_overlapping_members_are_refused_at_once() {
+        for count in [2, 9, 2000, 60_000] {
+            let zip = overlapping(4_000_000 - 56 * usize::from(count), count);
+            let began = Instant::now();
+            let most = if count < 10 { 9 } else { usize::MAX };
+            let words = refused(&zip, most);
+            assert!(words.contains("overlap"), "{words}");
+            assert!(began.elapsed() < Duration::from_millis(200), "{count}");
+        }
+        let words = refused(&overlapping(1000, 10), 9);
+        assert!(words.contains("10 members"), "{words}");
+    }
+
+    #[test]
+    fn what_ends_in_another_way_than_a_zip_is_refused_and_any_cut_of_one_too() {
+        let zip = stored(&[("a", b"one"), ("b", b"two")]);
+        for length in 0..zip.len() {
+            Members::open(Cursor::new(&zip[..length]), 2).unwrap_err();
+        }
+        let mut commented = zip.clone();
+        let end = commented.len() - 2;
+        commented[end] = 4;
+        commented.extend_from_slice(b"note");
+        assert!(refused(&commented, 2).contains("no ZIP"));
+        let in_front = [b"#!/bin/sh\n", &zip[..]].concat();
+        assert!(refused(&in_front, 2).contains("no ZIP"));
+    }
+
+    #[test]
+    fn changed_bytes_of_a_zip_never_panic() {
+        let zip = stored(&[("a", b"one"), ("b", b"two")]);
+        for at in 0..zip.len() {
+            for value in [0, 1, 0x7F, 0x80, 0xFF] {
+                let mut changed = zip.clone();
+                changed[at] = value;
+                if let Ok(mut members) = Members::open(Cursor::new(changed), 2) {
+                    let names: Vec<String> = members.names().map(str::to_owned).collect();
+                    for name in names {
+                        // A member that was damaged is an error of its checksum.
+                        drop(members.content(&name, 1 << 20));
+                    }
+                }
+            }
+        }
+    }
+}
