@@ -140,6 +140,7 @@ impl Daemon {
                 registers: modbus::live,
                 configuration: toml::to_string(config).unwrap_or_default(),
                 hosts: config.http.hosts.clone(),
+                proxies: config.http.proxies.clone(),
             });
             let (station, config) = (station.clone(), config.clone());
             let log = progress.clone();

@@ -1,7 +1,8 @@
-//! Listening on a TCP port, and why that is not possible.
+//! Listening on a TCP port, why that is not possible, and which addresses belong together.
 
+use ipnet::IpNet;
 use std::io;
-use std::net::SocketAddr;
+use std::net::{IpAddr, Ipv6Addr, SocketAddr};
 use thiserror::Error;
 use tokio::net::TcpListener;
 
@@ -56,6 +57,23 @@ pub async fn bind(what: &'static str, address: SocketAddr) -> Result<TcpListener
                 source,
             },
         })
+}
+
+/// Whether one of the networks holds an address. An IPv4 address that comes through an IPv6 socket is an IPv4 address.
+pub fn holds(networks: &[IpNet], address: IpAddr) -> bool {
+    let address = address.to_canonical();
+    networks.iter().any(|network| network.contains(&address))
+}
+
+/// What one host has: an IPv4 address, or the /64 of an IPv6 address.
+pub fn network(address: IpAddr) -> IpAddr {
+    match address.to_canonical() {
+        IpAddr::V6(six) => {
+            let [a, b, c, d, ..] = six.segments();
+            Ipv6Addr::new(a, b, c, d, 0, 0, 0, 0).into()
+        }
+        four => four,
+    }
 }
 
 #[cfg(test)]

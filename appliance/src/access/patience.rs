@@ -1,6 +1,7 @@
 //! Patience with wrong guesses: each address may guess a few times, then waits, twice as long each time.
 
-use std::net::{IpAddr, Ipv6Addr};
+use crate::socket::network;
+use std::net::IpAddr;
 use std::time::{Duration, Instant};
 
 /// Wrong guesses before the first wait.
@@ -68,20 +69,10 @@ impl Patience {
     }
 }
 
-/// Whoever has an IPv6 address has a whole /64 of them.
-fn network(address: IpAddr) -> IpAddr {
-    match address.to_canonical() {
-        IpAddr::V6(six) => {
-            let [a, b, c, d, ..] = six.segments();
-            Ipv6Addr::new(a, b, c, d, 0, 0, 0, 0).into()
-        }
-        four => four,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::net::Ipv6Addr;
 
     #[test]
     fn each_wrong_guess_doubles_the_wait_up_to_five_minutes() {

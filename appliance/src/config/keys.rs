@@ -20,7 +20,7 @@ pub struct Key {
 }
 
 /// The table's part beside the devices; a test compares the whole with the structs.
-const KEYS: [Key; 19] = [
+const KEYS: [Key; 20] = [
     Key {
         name: "state",
         unit: "folder",
@@ -111,6 +111,13 @@ const KEYS: [Key; 19] = [
         range: "host names",
         default: "[]",
         meaning: "names by which the page may be asked for, beside IP addresses and localhost",
+    },
+    Key {
+        name: "http.proxies",
+        unit: "networks",
+        range: "addresses with their prefix, as in 127.0.0.1/32",
+        default: "[]",
+        meaning: "proxies in front of the page, behind which there are many: any other address has at most 16 of the page's 64 connections",
     },
     Key {
         name: "head.backend",

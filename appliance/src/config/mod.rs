@@ -96,6 +96,8 @@ pub struct HttpConfig {
     pub listen: SocketAddr,
     /// Names by which the page is asked for, beside IP addresses and localhost.
     pub hosts: Vec<String>,
+    /// Networks of proxies in front of the page.
+    pub proxies: Vec<IpNet>,
 }
 
 /// The devices.
@@ -159,6 +161,7 @@ impl Default for HttpConfig {
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
             hosts: Vec::new(),
+            proxies: Vec::new(),
         }
     }
 }

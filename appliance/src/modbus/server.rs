@@ -14,6 +14,7 @@ use super::guard::Guard;
 use super::places::Clients;
 use super::refusals::{Refusals, Refused};
 use super::service::{FrameFlaw, PlcService};
+use crate::socket::holds;
 use crate::station::{ConnectionEdges, StationHandle};
 
 /// Most connections at a time, unless configured.
@@ -62,12 +63,6 @@ impl Default for Options {
             frame: Duration::from_secs(10),
         }
     }
-}
-
-/// Whether one of the networks holds an address. An IPv4 address that comes through an IPv6 socket is an IPv4 address.
-fn holds(networks: &[IpNet], address: IpAddr) -> bool {
-    let address = address.to_canonical();
-    networks.iter().any(|network| network.contains(&address))
 }
 
 /// Serves the station on `listener` to `clients` until `shutdown`; then every connection is closed.

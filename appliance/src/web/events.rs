@@ -1,17 +1,22 @@
 //! Server-sent events: the snapshot when it changes, and a heartbeat that shows that the page is not looking at the past.
+//!
+//! The connection of a follower ends with its stream, and that of a refused one with the refusal: its place is free again.
 
 use std::convert::Infallible;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use axum::Extension;
 use axum::extract::State;
-use axum::http::StatusCode;
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::sse::{Event, Sse};
 use axum::response::{IntoResponse, Response};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
+use super::gate::Peer;
 use super::problem::Problem;
-use super::site::{MAX_FOLLOWERS, Site};
+use super::site::{MAX_FOLLOWERS, MAX_FOLLOWERS_EACH, Site};
+use super::slots::Slot;
 use super::view;
 use crate::station::{Micros, Snapshot, StationHandle};
 
@@ -20,19 +25,40 @@ pub const HEARTBEAT: Duration = Duration::from_secs(1);
 /// And at most this often.
 pub const SHORTEST: Duration = Duration::from_millis(200);
 
-/// The stream of one page; ends when the page goes away.
-pub(super) async fn follow(State(site): State<Site>) -> Response {
-    let Ok(permit) = site.followers.clone().try_acquire_owned() else {
-        let words = format!("{MAX_FOLLOWERS} pages are open already; close one");
-        return Problem::new(StatusCode::SERVICE_UNAVAILABLE, words).into_response();
+/// Put into an answer that goes on until its page goes away.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Following;
+
+/// The stream of one page; ends when the page goes away, or when another address gets its place.
+pub(super) async fn follow(
+    State(site): State<Site>,
+    Extension(Peer(address)): Extension<Peer>,
+) -> Response {
+    let mut response = match site.followers.enter(site.holder(address), Instant::now()) {
+        Some(slot) => stream(site.station.clone(), slot),
+        None => {
+            let words = format!(
+                "{MAX_FOLLOWERS} pages are open already, or {MAX_FOLLOWERS_EACH} from this address; close one"
+            );
+            Problem::new(StatusCode::SERVICE_UNAVAILABLE, words).into_response()
+        }
     };
+    let close = HeaderValue::from_static("close");
+    response.headers_mut().insert(header::CONNECTION, close);
+    response
+}
+
+fn stream(handle: StationHandle, slot: Slot) -> Response {
+    slot.mark(None);
     let (sender, receiver) = mpsc::channel::<Result<Event, Infallible>>(1);
-    let handle = site.station.clone();
     tokio::spawn(async move {
-        let _permit = permit;
-        send(handle, sender).await;
+        tokio::select! {
+            () = send(handle, sender) => {}
+            () = slot.left() => {}
+        }
     });
-    Sse::new(ReceiverStream::new(receiver)).into_response()
+    let events = Sse::new(ReceiverStream::new(receiver));
+    (Extension(Following), events).into_response()
 }
 
 async fn send(handle: StationHandle, sender: mpsc::Sender<Result<Event, Infallible>>) {

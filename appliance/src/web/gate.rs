@@ -8,6 +8,7 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
+use super::host::only;
 use super::problem::{Outcome, Problem};
 use super::site::Site;
 use crate::access::{Change, MAX_AGE_S, Token};
@@ -61,9 +62,8 @@ pub async fn own_page_only(request: Request, next: Next) -> Response {
 }
 
 fn is_own(headers: &HeaderMap) -> bool {
-    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
-    let origin = text(header::ORIGIN).and_then(|origin| origin.split_once("://"));
-    origin.is_some_and(|(_, place)| Some(place) == text(header::HOST))
+    let origin = only(headers, &header::ORIGIN).and_then(|origin| origin.split_once("://"));
+    origin.is_some_and(|(_, place)| Some(place) == only(headers, &header::HOST))
 }
 
 /// Lets only those through who signed in, and records what came of it.

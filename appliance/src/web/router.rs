@@ -2,7 +2,7 @@
 
 use axum::Router;
 use axum::extract::{Request, State};
-use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::http::{HeaderName, HeaderValue, Method, header};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{MethodFilter, MethodRouter, get, on};
@@ -143,22 +143,11 @@ pub fn router(site: Site) -> Router {
         .with_state(site)
 }
 
-/// Refuses foreign Host headers and puts the headers that every answer has.
-async fn guarded(
-    State(site): State<Site>,
-    headers: HeaderMap,
-    request: Request,
-    next: Next,
-) -> Response {
-    let host = headers
-        .get(header::HOST)
-        .and_then(|host| host.to_str().ok())
-        .unwrap_or("");
-    let mut response = if host::is_allowed(host, &site.hosts) {
-        next.run(request).await
-    } else {
-        let words = "this device does not go by the name in the Host header; use its IP address, or add the name to the config";
-        Problem::new(StatusCode::MISDIRECTED_REQUEST, words).into_response()
+/// Refuses requests without one Host of this device, and puts the headers that every answer has.
+async fn guarded(State(site): State<Site>, request: Request, next: Next) -> Response {
+    let mut response = match host::check(request.uri(), request.headers(), &site.hosts) {
+        Ok(()) => next.run(request).await,
+        Err(problem) => problem.into_response(),
     };
     let fixed: [(HeaderName, &'static str); 5] = [
         (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY),

@@ -1,5 +1,6 @@
 //! The socket of the page.
 
+use std::convert::Infallible;
 use std::future::Future;
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -15,13 +16,16 @@ use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_io_timeout::TimeoutStream;
 
+use super::events::Following;
 use super::gate::Peer;
 use super::router::router;
 use super::site::Site;
 use super::slots::{Slot, Slots};
 
-/// The most connections at a time: 16 pages of 4.
+/// The most connections at a time.
 const MOST_CONNECTIONS: usize = 64;
+/// The most of them from one address: a browser opens 6.
+const MOST_EACH: usize = 16;
 /// A request's header must come within this time; a connection without a request for as long is closed.
 const HEADER_TIME: Duration = Duration::from_secs(10);
 /// A client must take the next bytes of an answer within this time.
@@ -33,14 +37,14 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 /// Serves the page on `listener` until `shutdown`. Open connections end with the runtime, not before.
 pub async fn serve(listener: TcpListener, site: Site, shutdown: impl Future<Output = ()>) {
-    let router = router(site);
-    let slots = Slots::new(MOST_CONNECTIONS);
+    let router = router(site.clone());
+    let slots = Slots::new(MOST_CONNECTIONS, MOST_EACH);
     let accepting = async {
-        for id in 0_u64.. {
+        loop {
             match listener.accept().await {
                 // Without a place it is closed at once: everybody else is being answered.
                 Ok((stream, peer)) => {
-                    if let Some(slot) = slots.enter(id, Instant::now()) {
+                    if let Some(slot) = slots.enter(site.holder(peer.ip()), Instant::now()) {
                         tokio::spawn(answer(stream, peer, Arc::new(slot), router.clone()));
                     }
                 }
@@ -64,14 +68,13 @@ async fn answer(stream: TcpStream, peer: SocketAddr, slot: Arc<Slot>, router: Ro
     let service = service_fn(move |mut request: Request<Incoming>| {
         asked.mark(None);
         request.extensions_mut().insert(Peer(peer.ip()));
-        let follows = request.uri().path() == "/events";
         let (answered, answering) = (asked.clone(), inner.call(request));
         async move {
-            let response = answering.await;
-            if !follows {
+            let Ok(response) = answering.await;
+            if response.extensions().get::<Following>().is_none() {
                 answered.mark(Some(Instant::now()));
             }
-            response
+            Ok::<_, Infallible>(response)
         }
     });
     let connection = http1::Builder::new()

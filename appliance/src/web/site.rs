@@ -1,21 +1,27 @@
 //! What the page shows and may change: everything that its answers need, in one place.
 
+use std::net::IpAddr;
 use std::sync::Arc;
 
+use ipnet::IpNet;
 use serde_json::Value;
 use tokio::sync::Semaphore;
 
 use super::problem::Problem;
+use super::slots::Slots;
 use crate::access::Access;
 use crate::history::Reader;
 use crate::latest::LastMaps;
 use crate::logbook::Logbook;
 use crate::recipe::Store;
+use crate::socket;
 use crate::station::{Snapshot, StationHandle};
 use crate::tally::Tally;
 
 /// The most pages that follow the events at a time.
 pub const MAX_FOLLOWERS: usize = 16;
+/// The most of them from one address: half of its connections stay for requests.
+pub const MAX_FOLLOWERS_EACH: usize = 8;
 /// The most pictures, files and recipes that are worked on at a time; the measuring task needs the cores.
 const MAX_ASIDE: usize = 2;
 /// The most sign-ins, changes and records of them at a time: whoever only looks must not keep them waiting.
@@ -45,6 +51,8 @@ pub struct Parts {
     pub configuration: String,
     /// Names, besides IP addresses and `localhost`, under which the page is asked for.
     pub hosts: Vec<String>,
+    /// Networks of proxies: there are many behind one address.
+    pub proxies: Vec<IpNet>,
 }
 
 /// The same, shared by all requests. Cheap to clone.
@@ -52,7 +60,7 @@ pub struct Parts {
 pub struct Site {
     parts: Arc<Parts>,
     /// Places for pages that follow the events.
-    pub(super) followers: Arc<Semaphore>,
+    pub(super) followers: Slots,
     /// Places for files that are being taken along.
     pub(super) files: Arc<Semaphore>,
     looking: Arc<Semaphore>,
@@ -72,11 +80,16 @@ impl Site {
     pub fn new(parts: Parts) -> Self {
         Self {
             parts: Arc::new(parts),
-            followers: Arc::new(Semaphore::new(MAX_FOLLOWERS)),
+            followers: Slots::new(MAX_FOLLOWERS, MAX_FOLLOWERS_EACH),
             files: Arc::new(Semaphore::new(MAX_FILES)),
             looking: Arc::new(Semaphore::new(MAX_ASIDE)),
             changing: Arc::new(Semaphore::new(MAX_CHANGES)),
         }
+    }
+
+    /// Who holds the places of connections from this address; none for a proxy.
+    pub(super) fn holder(&self, address: IpAddr) -> Option<IpAddr> {
+        (!socket::holds(&self.proxies, address)).then(|| socket::network(address))
     }
 
     /// Looks for what takes its time on another thread, a few at a time.

@@ -1,8 +1,11 @@
-//! The places for connections: bounded, and whoever has been waiting for longest gives way to a newcomer.
+//! The places for connections and for pages that follow the events: bounded, and shared fairly between addresses.
 //!
-//! A connection waits until its next request has come; while it is being answered or follows the events nobody takes its
-//! place. So a crowd of silent connections only pushes out itself.
+//! A connection waits until its next request has come; then it is being answered. One address holds only some of the places.
+//! Where they are taken, the place that has been waiting for longest goes to the newcomer, so a crowd of silent connections
+//! only pushes out itself. Where none waits, the address that holds most gives one up to an address that holds fewer, so
+//! nobody can keep another address out.
 
+use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -15,12 +18,23 @@ pub struct Slots(Arc<Inside>);
 #[derive(Debug)]
 struct Inside {
     most: usize,
-    open: Mutex<Vec<Open>>,
+    each: usize,
+    table: Mutex<Table>,
+}
+
+#[derive(Debug, Default)]
+struct Table {
+    /// The number of the next place.
+    next: u64,
+    /// Oldest first.
+    taken: Vec<Taken>,
 }
 
 #[derive(Debug)]
-struct Open {
-    id: u64,
+struct Taken {
+    number: u64,
+    /// The address that holds it; none for a proxy, behind which there are many.
+    holder: Option<IpAddr>,
     /// Since when it has been waiting for a request; none while it is being answered.
     waiting: Option<Instant>,
     leave: Arc<Notify>,
@@ -29,46 +43,84 @@ struct Open {
 /// One place, held until it is dropped.
 #[derive(Debug)]
 pub struct Slot {
-    id: u64,
+    number: u64,
     slots: Slots,
     leave: Arc<Notify>,
 }
 
-impl Slots {
-    /// So many places.
-    pub fn new(most: usize) -> Self {
-        let open = Mutex::default();
-        Self(Arc::new(Inside { most, open }))
+impl Table {
+    fn held_by(&self, holder: Option<IpAddr>) -> usize {
+        let held = self.taken.iter().filter(|taken| taken.holder == holder);
+        holder.map_or(0, |_| held.count())
     }
 
-    /// A place for connection `id`; none if every other is being answered.
-    pub fn enter(&self, id: u64, now: Instant) -> Option<Slot> {
-        let mut open = self.open();
-        if open.len() >= self.0.most {
-            let waiting = (0..open.len()).filter(|&at| open[at].waiting.is_some());
-            let longest = waiting.min_by_key(|&at| open[at].waiting)?;
-            open.swap_remove(longest).leave.notify_one();
+    /// Whose place a newcomer gets: the one that has been waiting for longest, of those that `may` leave.
+    fn waiting_longest(&self, may: impl Fn(&Taken) -> bool) -> Option<u64> {
+        let waiting = self.taken.iter().filter(|taken| may(taken));
+        let longest = waiting.filter_map(|taken| Some((taken.waiting?, taken.number)));
+        longest.min().map(|(_, number)| number)
+    }
+
+    /// The newest place of the address that holds most, if that is more than a newcomer would hold who has `held` now.
+    fn of_the_largest(&self, held: usize) -> Option<u64> {
+        let counted = self.taken.iter().map(|taken| self.held_by(taken.holder));
+        let (most, at) = counted.zip(0..).max()?;
+        (most > held + 1).then(|| self.taken[at].number)
+    }
+}
+
+impl Slots {
+    /// So many places, and so many of them for each address.
+    pub fn new(most: usize, each: usize) -> Self {
+        let table = Mutex::default();
+        Self(Arc::new(Inside { most, each, table }))
+    }
+
+    /// A place for `holder`, which waits from `now` on; none for a proxy, behind which there are many. There is no place if
+    /// every one that could be given up is being answered.
+    pub fn enter(&self, holder: Option<IpAddr>, now: Instant) -> Option<Slot> {
+        let mut table = self.table();
+        let held = table.held_by(holder);
+        let leaving = if held >= self.0.each {
+            Some(table.waiting_longest(|taken| taken.holder == holder)?)
+        } else if table.taken.len() >= self.0.most {
+            let longest = table.waiting_longest(|_| true);
+            Some(longest.or_else(|| table.of_the_largest(held))?)
+        } else {
+            None
+        };
+        let left = |taken: &mut Taken| Some(taken.number) == leaving;
+        for taken in table.taken.extract_if(.., left) {
+            taken.leave.notify_one();
         }
         let leave = Arc::new(Notify::new());
-        open.push(Open {
-            id,
+        let number = table.next;
+        table.next += 1;
+        table.taken.push(Taken {
+            number,
+            holder,
             waiting: Some(now),
             leave: leave.clone(),
         });
         let slots = self.clone();
-        Some(Slot { id, slots, leave })
+        Some(Slot {
+            number,
+            slots,
+            leave,
+        })
     }
 
-    fn open(&self) -> MutexGuard<'_, Vec<Open>> {
-        self.0.open.lock().unwrap_or_else(PoisonError::into_inner)
+    fn table(&self) -> MutexGuard<'_, Table> {
+        self.0.table.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Slot {
     /// Its request has come, or it waits for the next one since `waiting`.
     pub fn mark(&self, waiting: Option<Instant>) {
-        let mut open = self.slots.open();
-        if let Some(own) = open.iter_mut().find(|open| open.id == self.id) {
+        let mut table = self.slots.table();
+        let mut taken = table.taken.iter_mut();
+        if let Some(own) = taken.find(|taken| taken.number == self.number) {
             own.waiting = waiting;
         }
     }
@@ -81,7 +133,8 @@ impl Slot {
 
 impl Drop for Slot {
     fn drop(&mut self) {
-        self.slots.open().retain(|open| open.id != self.id);
+        let mut table = self.slots.table();
+        table.taken.retain(|taken| taken.number != self.number);
     }
 }
 
@@ -90,20 +143,66 @@ mod tests {
     use super::*;
     use std::time::Duration;
 
+    fn host(number: u8) -> Option<IpAddr> {
+        Some(IpAddr::from([10, 0, 0, number]))
+    }
+
+    /// A place that is being answered.
+    fn answered(slots: &Slots, holder: Option<IpAddr>) -> Option<Slot> {
+        let slot = slots.enter(holder, Instant::now())?;
+        slot.mark(None);
+        Some(slot)
+    }
+
     #[tokio::test]
-    async fn a_newcomer_takes_the_place_of_who_waited_longest_and_of_nobody_who_is_answered() {
-        let slots = Slots::new(2);
+    async fn a_newcomer_takes_the_place_that_waited_longest_and_none_that_is_being_answered() {
+        let slots = Slots::new(2, 2);
         let now = Instant::now();
-        let first = slots.enter(1, now).unwrap();
-        let second = slots.enter(2, now + Duration::from_secs(1)).unwrap();
+        let first = slots.enter(host(1), now).unwrap();
+        let second = slots.enter(host(1), now + Duration::from_secs(1)).unwrap();
         first.mark(None);
-        let third = slots.enter(3, now + Duration::from_secs(2)).unwrap();
+        let third = slots.enter(host(1), now + Duration::from_secs(2)).unwrap();
         second.left().await;
         third.mark(None);
-        assert!(slots.enter(4, now).is_none());
+        assert!(slots.enter(host(1), now).is_none());
         drop(second);
-        assert!(slots.enter(5, now).is_none());
+        assert!(slots.enter(host(1), now).is_none());
         drop(first);
-        assert!(slots.enter(6, now).is_some());
+        assert!(slots.enter(host(1), now).is_some());
+    }
+
+    #[tokio::test]
+    async fn an_address_holds_no_more_than_its_share_and_a_proxy_all() {
+        let slots = Slots::new(8, 2);
+        let other = slots.enter(host(2), Instant::now()).unwrap();
+        let own = [(); 2].map(|()| slots.enter(host(1), Instant::now()).unwrap());
+        let newest = answered(&slots, host(1)).unwrap();
+        own[0].left().await;
+        own[1].mark(None);
+        assert!(answered(&slots, host(1)).is_none());
+        let through: Vec<_> = (0..5).filter_map(|_| answered(&slots, None)).collect();
+        assert_eq!(through.len(), 5);
+        // All eight are taken; the one that waits leaves.
+        assert!(answered(&slots, None).is_some());
+        other.left().await;
+        drop(newest);
+    }
+
+    #[tokio::test]
+    async fn no_address_keeps_another_one_out() {
+        let slots = Slots::new(8, 4);
+        let crowd: Vec<_> = (0..8_u8)
+            .map(|at| answered(&slots, host(at % 2)).unwrap())
+            .collect();
+        // Places are given up until both hold as many as the newcomer.
+        let mut late = Vec::new();
+        for _ in 0..8 {
+            late.extend(answered(&slots, host(9)));
+        }
+        let held = |number| slots.table().held_by(host(number));
+        assert_eq!([held(0), held(1), held(9)], [3, 3, 2]);
+        // The newest of an address goes first.
+        crowd[7].left().await;
+        crowd[6].left().await;
     }
 }

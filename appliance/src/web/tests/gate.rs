@@ -179,3 +179,33 @@ async fn a_foreign_host_name_is_turned_away_with_the_remedy() {
         .await;
     assert_eq!(configured.status, 200);
 }
+
+#[tokio::test]
+async fn a_request_that_names_two_hosts_is_refused() {
+    let served = served().await;
+    for hosts in [
+        ["localhost", "evil.example"],
+        ["evil.example", "localhost"],
+        ["localhost", "localhost"],
+    ] {
+        let headers = hosts.map(|host| ("Host", host));
+        let answer = served.ask("GET", "/api/snapshot", &headers, "").await;
+        assert_eq!(answer.status, 400, "{hosts:?}: {answer:?}");
+        assert!(answer.body.contains("one Host header"), "{answer:?}");
+    }
+    for (target, status) in [
+        ("http://evil.example/api/snapshot", 400),
+        ("http://localhost:80/api/snapshot", 400),
+        ("http://localhost/api/snapshot", 200),
+    ] {
+        let answer = served
+            .ask("GET", target, &[("Host", "localhost")], "")
+            .await;
+        assert_eq!(answer.status, status, "{target}: {answer:?}");
+    }
+    // The same of the page that a change comes from.
+    let origin = served.origin();
+    let two = [("Origin", &*origin), ("Origin", "http://evil.example")];
+    let answer = served.ask("POST", "/api/session", &two, "{}").await;
+    assert_eq!(answer.status, 403, "{answer:?}");
+}

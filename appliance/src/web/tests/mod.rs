@@ -57,6 +57,7 @@ async fn served() -> Served {
         registers: |_| serde_json::json!({ "registers": [] }),
         configuration: "threads = 0\n".into(),
         hosts: vec!["sensor.local".into()],
+        proxies: vec!["127.9.9.9/32".parse().unwrap()],
     });
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
