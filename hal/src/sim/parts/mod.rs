@@ -2,6 +2,7 @@
 //!
 //! Sizes of the study's parts are those of its `parts.toml`; a part in a scenario may change them.
 
+mod dented;
 mod shapes;
 mod sheet_metal;
 mod spline;
@@ -99,7 +100,17 @@ impl Part {
                 positive("bottom_diameter", part.bottom_diameter)?;
                 positive("depth", part.depth)?;
                 let least = part.bottom_diameter + 0.05 * part.depth;
-                within("part.rim_diameter", part.rim_diameter, least, 1000.0)
+                within("part.rim_diameter", part.rim_diameter, least, 1000.0)?;
+                part.defects.iter().try_for_each(|defect| {
+                    match defect {
+                    Defect::Dent { .. } => defect.check_dent(),
+                    Defect::MissingHole { .. } | Defect::BentFlange { .. } => Err(
+                        "part.defects of a flowerpot has another kind of defect than a dent: write \
+                         kind = \"dent\""
+                            .into(),
+                    ),
+                }
+                })
             }
             Self::Spline(part) => part.check(),
             Self::Plane(part) => positive("half_size", part.half_size),
@@ -115,7 +126,7 @@ impl Part {
             Self::Sawtooth(part) => Box::new(part.clone()),
             Self::Sphere(part) => Box::new(part.clone()),
             Self::Tube(part) => Box::new(part.clone()),
-            Self::Flowerpot(part) => Box::new(part.clone()),
+            Self::Flowerpot(part) => Box::new(dented::Dented::new(part.clone(), &part.defects)),
             Self::Spline(part) => Box::new((**part).clone()),
             Self::Plane(part) => Box::new(part.clone()),
             Self::SheetMetal(part) => Box::new(sheet_metal::Stamping::new(part)),

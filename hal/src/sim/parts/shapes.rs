@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Surface;
+use super::{Defect, Surface};
 use crate::sim::optics::Vector;
 
 /// A lying cylinder is vertical at its sides; what is steeper than this is left away.
@@ -218,6 +218,9 @@ pub struct Flowerpot {
     pub bottom_diameter: f64,
     /// Height of the wall.
     pub depth: f64,
+    /// Dents of its wall, each as deep along the wall's normal and as wide across the wall as it says.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub defects: Vec<Defect>,
 }
 
 impl Default for Flowerpot {
@@ -226,6 +229,7 @@ impl Default for Flowerpot {
             rim_diameter: 198.0,
             bottom_diameter: 120.0,
             depth: 149.0,
+            defects: Vec::new(),
         }
     }
 }

@@ -48,11 +48,11 @@ pub struct SheetMetal {
     pub defects: Vec<Defect>,
 }
 
-/// One defect of the bracket.
+/// One defect of a part; the bracket has all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Defect {
-    /// A round, smooth dent.
+    /// A round, smooth dent. The bracket is stamped from above: its dents go down in z, also where the flange slopes.
     Dent {
         /// Centre, mm.
         x: f64,
@@ -75,27 +75,32 @@ pub enum Defect {
     },
 }
 
+impl Defect {
+    /// What is wrong with the measures of a dent, if anything; nothing of other defects.
+    pub(super) fn check_dent(&self) -> Result<(), String> {
+        let Self::Dent {
+            x,
+            y,
+            depth_mm,
+            diameter_mm,
+        } = *self
+        else {
+            return Ok(());
+        };
+        within("part.defects.x", x, -100.0, 100.0)?;
+        within("part.defects.y", y, -100.0, 100.0)?;
+        within("part.defects.diameter_mm", diameter_mm, 0.5, 200.0)?;
+        let deepest = diameter_mm / 2.0;
+        within("part.defects.depth_mm", depth_mm, -deepest, deepest)
+    }
+}
+
 impl SheetMetal {
     pub(super) fn check(&self) -> Result<(), String> {
         let mut degrees_more = 0.0;
         for defect in &self.defects {
             match *defect {
-                Defect::Dent {
-                    x,
-                    y,
-                    depth_mm,
-                    diameter_mm,
-                } => {
-                    within("part.defects.x", x, -100.0, 100.0)?;
-                    within("part.defects.y", y, -100.0, 100.0)?;
-                    within("part.defects.diameter_mm", diameter_mm, 0.5, 200.0)?;
-                    within(
-                        "part.defects.depth_mm",
-                        depth_mm,
-                        -diameter_mm / 2.0,
-                        diameter_mm / 2.0,
-                    )?;
-                }
+                Defect::Dent { .. } => defect.check_dent()?,
                 Defect::MissingHole { index } => {
                     if index >= HOLES.len() {
                         return Err(format!(
@@ -200,7 +205,7 @@ impl Stamping {
 }
 
 /// cos² from 1 in the middle to 0 at `half_width`: smooth at both; its slope is at most π / (2 · half_width).
-fn bump(distance: f64, half_width: f64) -> f64 {
+pub(super) fn bump(distance: f64, half_width: f64) -> f64 {
     if distance >= half_width {
         return 0.0;
     }
@@ -208,7 +213,8 @@ fn bump(distance: f64, half_width: f64) -> f64 {
     cos * cos
 }
 
-const BUMP_SLOPE: f64 = std::f64::consts::FRAC_PI_2;
+/// Of [`bump`], times the half-width.
+pub(super) const BUMP_SLOPE: f64 = std::f64::consts::FRAC_PI_2;
 
 impl Surface for Stamping {
     fn height(&self, x: f64, y: f64) -> f64 {

@@ -49,8 +49,22 @@ fn all_parts() -> Vec<Part> {
                 Defect::BentFlange { degrees: 6.0 },
             ],
         }),
+        Part::Flowerpot(Flowerpot {
+            defects: [1.5, -0.6].map(wall_dent).to_vec(),
+            ..Flowerpot::default()
+        }),
         Part::Empty {},
     ]
+}
+
+/// A dent in the middle of the flowerpot's wall.
+fn wall_dent(depth_mm: f64) -> Defect {
+    Defect::Dent {
+        x: -60.0,
+        y: 52.0,
+        depth_mm,
+        diameter_mm: 8.0,
+    }
 }
 
 /// One frame per level, each level shown uniformly.

@@ -1,7 +1,8 @@
 //! Surfaces and rays: slopes stay in their bounds, and rays meet what small steps meet.
 
-use super::all_parts;
+use super::{all_parts, wall_dent};
 use crate::sim::optics::{Lens, Vector, along};
+use crate::sim::parts::Flowerpot;
 use crate::sim::trace::Traced;
 use crate::sim::{Part, Scenario};
 
@@ -38,6 +39,35 @@ fn no_height_has_a_slope_above_its_bound() {
                     );
                 }
             }
+        }
+    }
+}
+
+#[test]
+fn a_dent_of_a_wall_is_as_deep_along_its_normal_and_as_wide_across_it_as_it_says() {
+    let [good, dented] = [vec![], vec![wall_dent(0.3)]].map(|defects| {
+        let pot = Flowerpot {
+            defects,
+            ..Flowerpot::default()
+        };
+        Part::Flowerpot(pot).surface().unwrap()
+    });
+    let centre = [-60.0_f64, 52.0];
+    let normal_z = 1.0 / good.slope_bound().hypot(1.0);
+    let depth = |x: f64, y: f64| (good.height(x, y) - dented.height(x, y)) * normal_z;
+    assert!((depth(centre[0], centre[1]) - 0.3).abs() < 1e-6);
+    // Up the wall and along it: half as deep at a quarter of the diameter, none beyond its half.
+    let radius = centre[0].hypot(centre[1]);
+    let [outwards, around] = [
+        [centre[0] / radius, centre[1] / radius],
+        [-centre[1] / radius, centre[0] / radius],
+    ];
+    for ([x, y], per_mm) in [(outwards, normal_z), (around, 1.0)] {
+        let at = |mm: f64| depth(centre[0] + x * mm * per_mm, centre[1] + y * mm * per_mm);
+        for side in [-1.0, 1.0] {
+            // The wall is bent: over 2 mm along it, it leaves its tangent by 0.02 mm, and falls by 0.1 mm in z.
+            assert!((at(2.0 * side) - 0.15).abs() < 0.005, "{}", at(2.0 * side));
+            assert_eq!(at(4.01 * side), 0.0);
         }
     }
 }

@@ -1,0 +1,86 @@
+//! A surface with round, smooth dents along its normal, however steep it is where they are.
+//!
+//! A dent of depth d and diameter D about the point c of the surface lowers it by d/n_z · cos²(π/2 · r / (D/2)), r the distance in
+//! space from c to the undented surface and n its unit normal at c: d is measured along the normal, and D across the surface.
+
+use super::Surface;
+use super::sheet_metal::{BUMP_SLOPE, Defect, bump};
+use crate::sim::optics::Vector;
+
+/// Half the step of the derivative that a normal is worked out from, mm.
+const STEP_MM: f64 = 1e-3;
+
+/// A surface and its dents.
+pub(super) struct Dented<S> {
+    surface: S,
+    dents: Vec<Dent>,
+}
+
+struct Dent {
+    centre: Vector,
+    /// How far it goes down in z.
+    drop: f64,
+    half_width: f64,
+}
+
+impl<S: Surface> Dented<S> {
+    /// The surface with those of the defects that are dents.
+    pub fn new(surface: S, defects: &[Defect]) -> Self {
+        let dent = |defect: &Defect| match *defect {
+            Defect::Dent {
+                x,
+                y,
+                depth_mm,
+                diameter_mm,
+            } => {
+                let along = surface.height(x + STEP_MM, y) - surface.height(x - STEP_MM, y);
+                let down = surface.height(x, y + STEP_MM) - surface.height(x, y - STEP_MM);
+                let slope = along.hypot(down) / (2.0 * STEP_MM);
+                Some(Dent {
+                    centre: [x, y, surface.height(x, y)],
+                    drop: depth_mm * slope.hypot(1.0),
+                    half_width: diameter_mm / 2.0,
+                })
+            }
+            Defect::MissingHole { .. } | Defect::BentFlange { .. } => None,
+        };
+        let dents = defects.iter().filter_map(dent).collect();
+        Self { surface, dents }
+    }
+}
+
+impl<S: Surface> Surface for Dented<S> {
+    fn height(&self, x: f64, y: f64) -> f64 {
+        let z = self.surface.height(x, y);
+        let drop = |dent: &Dent| {
+            let [cx, cy, cz] = dent.centre;
+            let (dx, dy) = (x - cx, y - cy);
+            // Most rays are far away, and need no root.
+            match dx.abs().max(dy.abs()) < dent.half_width {
+                true => dent.drop * bump(dx.hypot(dy).hypot(z - cz), dent.half_width),
+                false => 0.0,
+            }
+        };
+        z - self.dents.iter().map(drop).sum::<f64>()
+    }
+
+    fn present(&self, x: f64, y: f64) -> bool {
+        self.surface.present(x, y)
+    }
+
+    fn slope_bound(&self) -> f64 {
+        let slope = self.surface.slope_bound();
+        // The distance in space changes by up to √(1 + slope²) per mm in x and y.
+        let steepest = |dent: &Dent| dent.drop.abs() * BUMP_SLOPE / dent.half_width;
+        slope + self.dents.iter().map(steepest).sum::<f64>() * slope.hypot(1.0)
+    }
+
+    fn bounds(&self) -> [Vector; 2] {
+        let [mut low, mut high] = self.surface.bounds();
+        for dent in &self.dents {
+            low[2] -= dent.drop.max(0.0);
+            high[2] += (-dent.drop).max(0.0);
+        }
+        [low, high]
+    }
+}
