@@ -115,6 +115,10 @@ try {
     await page.waitForSelector("#editor-regions .handle");
     const limits = page.locator("#editor-gauges input[aria-label^='lowest deviation']");
     await limits.first().fill("0.2");
+    // Above the other limit: no part would pass. The field says so, and nothing is sent.
+    await page.click("#editor-form button[type=submit]");
+    assert.match(await limits.first().evaluate((field) => field.validationMessage), /above/);
+    await page.locator("#editor-gauges input[aria-label^='highest deviation']").first().fill("0.3");
     await page.click("#editor-form button[type=submit]");
     await page.waitForFunction(() => document.querySelector("#notice").textContent.includes("stored"));
     await page.click("nav a[href='#live']");

@@ -45,7 +45,7 @@ fn changed(
     file.part_number = part_number(number);
     if expected(number) == FAIL {
         // The deviation of a good part is far below.
-        file.gauges[0].low = Some(0.2);
+        (file.gauges[0].low, file.gauges[0].high) = (Some(0.2), Some(0.3));
     }
     change(&mut file);
     archive::pack(&file, &arrays).unwrap().0

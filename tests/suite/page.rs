@@ -1,6 +1,8 @@
 //! The page's API on the real program: what a technician changes there, the PLC sees.
 
+use super::written::program;
 use crate::station_plc::{Daemon, PATIENCE, Place, Plc, long};
+use appliance::recipe::{Recipe, Store, archive};
 use serde_json::{Value, json};
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -95,6 +97,7 @@ fn limits_that_are_edited_on_the_page_change_the_verdict_and_the_fingerprint() {
     let recipe = browser.get("/api/recipes/1");
     let mut gauges = recipe["gauges"].clone();
     gauges[0]["low"] = json!(0.2);
+    gauges[0]["high"] = json!(0.3);
     let mut edit =
         json!({ "fingerprint": recipe["fingerprint"], "gauges": gauges, "name": "bracket" });
     let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
@@ -147,9 +150,66 @@ fn an_edit_that_makes_no_recipe_is_refused_in_words_and_changes_nothing() {
             "{key}: {answer}"
         );
     }
+    for (low, high) in [(0.5, -0.5), (-1e6, 0.15), (-0.15, 1e6)] {
+        let mut gauges = recipe["gauges"].clone();
+        (gauges[0]["low"], gauges[0]["high"]) = (json!(low), json!(high));
+        let edit = json!({ "fingerprint": recipe["fingerprint"], "gauges": gauges });
+        let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
+        assert_eq!(status, 422, "{low} {high}: {answer}");
+        let words = answer["error"].as_str().unwrap();
+        assert!(words.contains("gauge \"deviation\""), "{words}");
+    }
     let unknown = json!({ "fingerprint": recipe["fingerprint"], "threads": 4 });
     assert_eq!(browser.json("PUT", "/api/recipes/1", &unknown).0, 400);
     assert_eq!(browser.get("/api/recipes/1"), recipe);
+}
+
+#[test]
+fn a_recipe_with_inverted_limits_is_refused_by_the_gauges_name_wherever_it_comes_from_and_can_be_mended()
+ {
+    let place = Place::new();
+    let daemon = Daemon::start(&place);
+    let mut browser = Browser::new(&daemon);
+    browser.sign_in(&daemon);
+    let taught = std::fs::read(place.recipe()).unwrap();
+    let recipe = Recipe::from_bytes(&taught).unwrap();
+    let mut file = recipe.file;
+    let limits = file.gauges.clone();
+    (file.gauges[0].low, file.gauges[0].high) = (Some(0.5), Some(-0.5));
+    let (inverted, fingerprint) = archive::pack(&file, &recipe.arrays).unwrap();
+    let names = |words: &str| {
+        let named = words.contains("deviation") && words.contains("passes no part");
+        assert!(named, "{words}");
+    };
+    // Through the page, and as a file.
+    let (status, answer) = browser.ask("POST", "/api/recipes", &inverted);
+    assert_eq!(status, 422);
+    names(&String::from_utf8(answer).unwrap());
+    let path = place.path("inverted.recipe");
+    std::fs::write(&path, &inverted).unwrap();
+    let (path, config) = (path.to_str().unwrap(), place.path("fringed.toml"));
+    let config = config.to_str().unwrap();
+    let run = program().run(&["recipe", "import", path, "--config", config]);
+    assert_eq!(run.code, 65, "{}", run.stderr);
+    names(&run.stderr);
+    assert_eq!(std::fs::read(place.recipe()).unwrap(), taught);
+    // In the store since before limits were checked: the generation before does not stand in for it, and it can be mended.
+    let store = Store::at(&place.path("state/recipes"));
+    store.save(1, &inverted).unwrap();
+    names(&store.load(1).unwrap_err().to_string());
+    names(
+        &store
+            .load_fingerprint(1, &fingerprint)
+            .unwrap_err()
+            .to_string(),
+    );
+    assert_eq!(browser.get("/api/recipes/1")["gauges"][0]["low"], 0.5);
+    let (status, _) = browser.ask("GET", "/api/recipes/1/picture/height", &[]);
+    assert_eq!(status, 200);
+    let edit = json!({ "fingerprint": fingerprint, "gauges": limits });
+    let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
+    assert_eq!(status, 200, "{answer}");
+    assert!(store.load(1).is_ok());
 }
 
 #[test]

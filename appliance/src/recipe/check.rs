@@ -2,7 +2,7 @@
 
 use super::archive::{ArchiveError, Arrays, short, unpack};
 use super::file::{PatternFile, RecipeFile, SequenceKind};
-use super::gauge::gauges;
+use super::gauge::{check_limits, gauges};
 use algo::inspect::Gauge;
 use algo::pattern::{PhaseFunction, Sequence};
 use std::io::{Cursor, Read, Seek};
@@ -35,6 +35,9 @@ pub enum RecipeError {
     /// Its parts do not fit each other.
     #[error("{0}: teach it again")]
     Inconsistent(String),
+    /// A gauge has limits that it cannot have.
+    #[error("{0}: change the limits")]
+    Limits(String),
 }
 
 /// Gauges of a recipe: bits and registers of the Modbus map.
@@ -56,8 +59,18 @@ impl Recipe {
     /// # Errors
     /// As there.
     pub fn read(source: impl Read + Seek, size: u64) -> Result<Self, RecipeError> {
+        let recipe = Self::read_to_edit(source, size)?;
+        check_limits(&recipe.file.gauges).map_err(RecipeError::Limits)?;
+        Ok(recipe)
+    }
+
+    /// As [`Self::read`], but whatever the limits of its gauges are: they may be what is going to be changed.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn read_to_edit(source: impl Read + Seek, size: u64) -> Result<Self, RecipeError> {
         let (file, arrays) = unpack(source, size)?;
-        Self::check(file, arrays).map_err(RecipeError::Inconsistent)
+        Self::fit(file, arrays).map_err(RecipeError::Inconsistent)
     }
 
     /// First 32 bits of the fingerprint.
@@ -65,11 +78,16 @@ impl Recipe {
         short(&self.file.fingerprint)
     }
 
-    /// Checks that manifest and arrays fit each other; the error says what does not.
+    /// Checks that manifest and arrays fit each other, and the limits of the gauges; the error says what does not.
     ///
     /// # Errors
     /// In words.
     pub fn check(file: RecipeFile, arrays: Arrays) -> Result<Self, String> {
+        check_limits(&file.gauges)?;
+        Self::fit(file, arrays)
+    }
+
+    fn fit(file: RecipeFile, arrays: Arrays) -> Result<Self, String> {
         if !(1..=9999).contains(&file.number) {
             return Err(format!("recipe number {} is not 1 to 9999", file.number));
         }

@@ -51,7 +51,7 @@ pub enum EditError {
 pub fn edit(store: &Store, number: u16, edit: Edit) -> Result<String, EditError> {
     let Recipe {
         mut file, arrays, ..
-    } = store.load(number)?.recipe;
+    } = store.load_to_edit(number)?.recipe;
     if file.fingerprint != edit.fingerprint {
         return Err(EditError::Outdated(number));
     }

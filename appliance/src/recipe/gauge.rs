@@ -70,20 +70,76 @@ impl GaugeKind {
         if self.smoothing_px() == Some(0) {
             return Err("averages over squares of 0 pixels: smoothing_px is 1 for none".into());
         }
+        let [_, most] = Unit::Length.range();
         match self {
             Self::OutOfTolerance { tolerance_mm, .. }
-                if !(tolerance_mm.is_finite() && *tolerance_mm > 0.0) =>
+                if !(*tolerance_mm > 0.0 && *tolerance_mm <= most) =>
             {
                 Err(format!(
-                    "has a tolerance of {tolerance_mm} mm: it must be positive"
+                    "has a tolerance of {tolerance_mm} mm: write more than 0, up to {most} mm"
                 ))
             }
-            Self::Volume { above_mm } if !above_mm.is_finite() => {
-                Err("measures a volume above no plane: above_mm must be finite".into())
-            }
+            Self::Volume { above_mm } if !(-most..=most).contains(above_mm) => Err(format!(
+                "measures a volume above z = {above_mm} mm: write {} to {most} mm",
+                -most
+            )),
             _ => Ok(()),
         }
     }
+
+    /// Whether no part can have a value below 0.
+    fn is_never_negative(&self) -> bool {
+        matches!(
+            self,
+            Self::RmsDeviation { .. } | Self::Flatness { .. } | Self::PeakToValley { .. }
+        )
+    }
+}
+
+impl GaugeFile {
+    /// Refuses limits that no part can keep, and those that its unit cannot have.
+    ///
+    /// # Errors
+    /// In words, with the gauge's name.
+    fn check_limits(&self) -> Result<(), String> {
+        let Self {
+            name,
+            measures,
+            low,
+            high,
+            ..
+        } = self;
+        let unit = measures.unit();
+        let [least, most] = unit.range();
+        let symbol = match unit.symbol() {
+            "" => String::new(),
+            symbol => format!(" {symbol}"),
+        };
+        for (which, limit) in [("low", low), ("high", high)] {
+            if let Some(limit) = limit.filter(|limit| !(least..=most).contains(limit)) {
+                return Err(format!(
+                    "gauge {name:?} cannot have the limit {which} = {limit}{symbol}: write {least} to {most}{symbol}"
+                ));
+            }
+        }
+        match (low, high) {
+            (Some(low), Some(high)) if low > high => Err(format!(
+                "gauge {name:?} passes no part: its limit low = {low}{symbol} is above high = {high}{symbol}"
+            )),
+            (_, Some(high)) if *high < 0.0 && measures.is_never_negative() => Err(format!(
+                "gauge {name:?} passes no part: its value is never below 0, its limit high = {high}{symbol} is"
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Refuses gauges with limits that no part can keep, or that their units cannot have.
+///
+/// # Errors
+/// In words, with the name of the first such gauge.
+pub(super) fn check_limits(gauges: &[GaugeFile]) -> Result<(), String> {
+    gauges.iter().try_for_each(GaugeFile::check_limits)
 }
 
 /// The gauges of a recipe as the computation takes them, for a camera of `size` pixels.
@@ -104,10 +160,6 @@ pub(super) fn gauges(
     }
     let gauge = |gauge: &GaugeFile| {
         let name = &gauge.name;
-        let limits = [gauge.low, gauge.high];
-        if limits.iter().flatten().any(|limit| !limit.is_finite()) {
-            return Err(format!("gauge {name:?} has a limit that is not finite"));
-        }
         gauge
             .measures
             .check()
@@ -132,4 +184,90 @@ pub(super) fn gauges(
         })
     };
     gauges.iter().map(gauge).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gauge(measures: &GaugeKind, low: Option<f64>, high: Option<f64>) -> GaugeFile {
+        GaugeFile {
+            name: "the gauge".into(),
+            region: String::new(),
+            measures: measures.clone(),
+            low,
+            high,
+        }
+    }
+
+    #[test]
+    fn limits_that_no_part_can_keep_or_no_unit_has_are_refused_by_the_gauges_name() {
+        let smoothing_px = 9;
+        let tilt = GaugeKind::Tilt { about: AxisFile::X };
+        let component = ComponentFile::AboutZ;
+        let kinds = [
+            (GaugeKind::Deviation { smoothing_px }, 214_748.364_7),
+            (GaugeKind::MeanHeight, 214_748.364_7),
+            (GaugeKind::Volume { above_mm: 0.0 }, 21_474_836.47),
+            (tilt, 180.0),
+            (GaugeKind::Placement { component }, 180.0),
+            (GaugeKind::Coverage, 1.0),
+        ];
+        for (kind, most) in kinds {
+            let least = if kind.unit() == Unit::Share {
+                0.0
+            } else {
+                -most
+            };
+            let check = |low, high| check_limits(&[gauge(&kind, low, high)]);
+            for (low, high) in [
+                (None, None),
+                (Some(least), Some(most)),
+                (Some(0.5), Some(0.5)),
+                (Some(-0.0), None),
+                (None, Some(f64::MIN_POSITIVE / 2.0)),
+            ] {
+                assert_eq!(check(low, high), Ok(()), "{kind:?} {low:?} {high:?}");
+            }
+            for (low, high) in [
+                (Some(0.5), Some(0.4)),
+                (Some(f64::NAN), None),
+                (None, Some(f64::NAN)),
+                (Some(f64::NEG_INFINITY), None),
+                (None, Some(f64::INFINITY)),
+                (Some(least - most.max(1.0) * 1e-9), None),
+                (None, Some(most * (1.0 + 1e-9))),
+            ] {
+                let words = check(low, high).expect_err(&format!("{kind:?} {low:?} {high:?}"));
+                assert!(words.contains("\"the gauge\""), "{words}");
+            }
+        }
+        for kind in [
+            GaugeKind::RmsDeviation { smoothing_px },
+            GaugeKind::Flatness { smoothing_px },
+            GaugeKind::PeakToValley { smoothing_px },
+        ] {
+            assert!(check_limits(&[gauge(&kind, None, Some(-0.1))]).is_err());
+            assert_eq!(check_limits(&[gauge(&kind, Some(-0.1), Some(0.1))]), Ok(()));
+        }
+    }
+
+    #[test]
+    fn a_tolerance_and_a_plane_lie_within_what_a_register_holds() {
+        let tolerance = |tolerance_mm| GaugeKind::OutOfTolerance {
+            smoothing_px: 9,
+            tolerance_mm,
+        };
+        for mm in [0.0, -0.1, f64::NAN, f64::INFINITY, 214_748.365] {
+            assert!(tolerance(mm).check().is_err(), "{mm}");
+        }
+        assert_eq!(tolerance(0.1).check(), Ok(()));
+        for above_mm in [f64::NAN, f64::NEG_INFINITY, 214_748.365, -214_748.365] {
+            assert!(
+                GaugeKind::Volume { above_mm }.check().is_err(),
+                "{above_mm}"
+            );
+        }
+        assert_eq!(GaugeKind::Volume { above_mm: -8.0 }.check(), Ok(()));
+    }
 }

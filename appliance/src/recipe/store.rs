@@ -1,5 +1,6 @@
 //! The recipes of a station: a folder of `NNNN.recipe` files with the generation before each.
 
+use super::gauge::check_limits;
 use super::{Recipe, RecipeFile, archive};
 use crate::output::folder::{name_also, write_whole};
 use std::fs;
@@ -113,8 +114,19 @@ impl Store {
     /// and the answer says so.
     ///
     /// # Errors
-    /// If there is none, or no generation can be used.
+    /// If there is none, no generation can be used, or a gauge has limits that it cannot have: the generation before may
+    /// have other limits, so it does not stand in for that.
     pub fn load(&self, number: u16) -> Result<Loaded, LoadError> {
+        let loaded = self.load_to_edit(number)?;
+        refuse_limits(&self.path(number), &loaded.recipe)?;
+        Ok(loaded)
+    }
+
+    /// As [`Self::load`], but whatever the limits of its gauges are: they may be what is going to be changed.
+    ///
+    /// # Errors
+    /// If there is none, or no generation can be used.
+    pub fn load_to_edit(&self, number: u16) -> Result<Loaded, LoadError> {
         let path = self.path(number);
         let newest = Self::read(&path, number);
         if let Some(Ok(recipe)) = newest {
@@ -146,13 +158,17 @@ impl Store {
     /// If none has it any more.
     pub fn load_fingerprint(&self, number: u16, fingerprint: &str) -> Result<Recipe, LoadError> {
         let same = |recipe: &Recipe| recipe.file.fingerprint == fingerprint;
-        [self.path(number), self.previous(number)]
-            .iter()
-            .find_map(|path| Self::read(path, number)?.ok().filter(same))
-            .ok_or_else(|| {
-                let digits = fingerprint.get(..8).unwrap_or(fingerprint);
-                LoadError::Unknown(format!("{number} with fingerprint {digits}"))
-            })
+        let paths = [self.path(number), self.previous(number)];
+        let found = paths.iter().find_map(|path| {
+            let recipe = Self::read(path, number)?.ok().filter(same)?;
+            Some((path, recipe))
+        });
+        let (path, recipe) = found.ok_or_else(|| {
+            let digits = fingerprint.get(..8).unwrap_or(fingerprint);
+            LoadError::Unknown(format!("{number} with fingerprint {digits}"))
+        })?;
+        refuse_limits(path, &recipe)?;
+        Ok(recipe)
     }
 
     /// What loading a recipe depends on: an equal answer means that the files are the same as before.
@@ -175,7 +191,7 @@ impl Store {
             Err(error) => return Some(Err(error.to_string())),
             Ok(opened) => opened,
         };
-        Some(match Recipe::read(io::BufReader::new(file), size) {
+        Some(match Recipe::read_to_edit(io::BufReader::new(file), size) {
             Err(error) => Err(error.to_string()),
             Ok(recipe) if recipe.file.number != number => Err(format!(
                 "holds recipe {}: rename it to {:04}.recipe",
@@ -236,4 +252,12 @@ impl Store {
         numbers.dedup();
         numbers
     }
+}
+
+/// Refuses a stored recipe whose gauges have limits that they cannot have.
+fn refuse_limits(path: &Path, recipe: &Recipe) -> Result<(), LoadError> {
+    check_limits(&recipe.file.gauges).map_err(|reason| LoadError::Corrupt {
+        path: path.to_path_buf(),
+        reason: format!("{reason}: edit its limits on the page (Recipes, Edit)"),
+    })
 }

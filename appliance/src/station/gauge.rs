@@ -38,6 +38,17 @@ impl Unit {
         }
     }
 
+    /// The smallest and the largest limit: a share is 0 to 1, an angle a half turn either way; anything else is what a
+    /// register holds, ±(2³¹ − 1) of its steps.
+    pub fn range(self) -> [f64; 2] {
+        let most = match self {
+            Self::Share => return [0.0, 1.0],
+            Self::Angle => 180.0,
+            Self::None | Self::Length | Self::Volume => f64::from(i32::MAX) / self.steps(),
+        };
+        [-most, most]
+    }
+
     /// The symbol behind a value.
     pub fn symbol(self) -> &'static str {
         match self {

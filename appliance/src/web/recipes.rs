@@ -85,7 +85,7 @@ pub(super) async fn picture(
     Path((number, layer)): Path<(u16, String)>,
 ) -> Result<Map, Problem> {
     site.aside(move |site| {
-        let Loaded { recipe, .. } = site.recipes.load(number)?;
+        let Loaded { recipe, .. } = site.recipes.load_to_edit(number)?;
         let width = recipe.file.camera.width as usize;
         match layer.as_str() {
             "height" => Ok(map(&recipe.arrays.golden_height, width, "mm", false, None)),

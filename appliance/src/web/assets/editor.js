@@ -6,12 +6,12 @@ import { change, notice } from "./session.js";
 
 const state = { recipe: null, map: null, chosen: [0, 0], drag: null, wide: 1 };
 
-// Factor and symbol of a gauge's limits as people write them.
+// Factor and symbol of a gauge's limits as people write them, and the least and the largest that there are (as the station has them).
 function unit(measures) {
   const kind = measures.kind;
-  if (kind === "coverage" || kind === "out_of_tolerance") return [100, "%"];
-  if (kind === "tilt" || (kind === "placement" && measures.component.startsWith("about"))) return [1, "°"];
-  return [1, kind === "volume" ? "mm³" : "mm"];
+  if (kind === "coverage" || kind === "out_of_tolerance") return [100, "%", 0, 100];
+  if (kind === "tilt" || (kind === "placement" && measures.component.startsWith("about"))) return [1, "°", -180, 180];
+  return kind === "volume" ? [1, "mm³", -21474836.47, 21474836.47] : [1, "mm", -214748.3647, 214748.3647];
 }
 
 // "deviation over 9 px", "step from other region", "tilt about x".
@@ -115,24 +115,30 @@ function nudge(event, corner) {
   $("editor-regions").querySelectorAll(".handle")[corner].focus();
 }
 
-function field(value, label, factor, set) {
+function field(value, label, [factor, symbol, least, most], set) {
   const input = make("input", "limit");
   input.type = "number";
   input.step = "any";
+  input.min = least;
+  input.max = most;
   input.value = value === null || value === undefined ? "" : String(Number((value * factor).toPrecision(5)));
   input.placeholder = "none";
-  input.setAttribute("aria-label", label);
+  input.setAttribute("aria-label", `${label} in ${symbol}`);
   input.addEventListener("input", () => set(input.value === "" ? null : Number(input.value) / factor));
-  return make("td", "", input);
+  return input;
 }
 
 function drawGauges() {
   const { recipe } = state;
   const row = (gauge) => {
-    const [factor, symbol] = unit(gauge.measures);
-    const limit = (key) => (value) => { if (value === null) delete gauge[key]; else gauge[key] = value; };
+    const units = unit(gauge.measures);
+    const limit = (key) => (value) => { if (value === null) delete gauge[key]; else gauge[key] = value; check(); };
+    const low = field(gauge.low, `lowest ${gauge.name}`, units, limit("low"));
+    const high = field(gauge.high, `highest ${gauge.name}`, units, limit("high"));
+    const check = () => low.setCustomValidity(gauge.low > gauge.high ? `the lowest ${gauge.name} is above the highest: no part would pass` : "");
+    check();
     const line = make("tr", "", make("td", "", gauge.name), make("td", "", words(gauge.measures)), make("td", "", gauge.region || "whole part"),
-      field(gauge.low, `lowest ${gauge.name} in ${symbol}`, factor, limit("low")), field(gauge.high, `highest ${gauge.name} in ${symbol}`, factor, limit("high")), make("td", "", symbol));
+      make("td", "", low), make("td", "", high), make("td", "", units[1]));
     line.addEventListener("focusin", () => {
       const at = recipe.regions.findIndex((region) => region.name === gauge.region);
       if (at >= 0 && at !== state.chosen[0]) { state.chosen = [at, 0]; drawRegions(); }
