@@ -18,7 +18,8 @@ broken() {
 
 dpkg-deb --raw-extract "$package" "$work"
 for file in usr/bin/fringed usr/lib/systemd/system/fringed.service usr/lib/sysusers.d/fringed.conf usr/lib/tmpfiles.d/fringed.conf \
-    usr/lib/udev/rules.d/60-fringed.rules usr/share/man/man1/fringed.1.gz usr/share/doc/fringed/{README.md,licences.txt,copyright,examples/fringed.toml}; do
+    usr/lib/udev/rules.d/60-fringed.rules usr/share/{bash-completion/completions/fringed,zsh/vendor-completions/_fringed,fish/vendor_completions.d/fringed.fish} \
+    usr/share/man/man1/fringed.1.gz usr/share/doc/fringed/{README.md,licences.txt,copyright,examples/fringed.toml}; do
     [[ -s $work/$file ]] || broken "there is no $file"
 done
 for file in fringed.service 60-fringed.rules; do
@@ -26,8 +27,19 @@ for file in fringed.service 60-fringed.rules; do
 done
 # What is neither the program's nor its documentation's would be there after its removal as well.
 stray=$(cd "$work" && find . -type f -not -path './DEBIAN/*' -not -path './usr/bin/fringed' -not -path './usr/share/doc/fringed/*' \
-    -not -path ./usr/share/man/man1/fringed.1.gz -not -path './usr/lib/s*' -not -path './usr/lib/tmpfiles.d/*' -not -path './usr/lib/udev/*' -not -path ./etc/fringed/fringed.toml)
+    -not -path ./usr/share/man/man1/fringed.1.gz -not -path './usr/lib/s*' -not -path './usr/lib/tmpfiles.d/*' -not -path './usr/lib/udev/*' -not -path './usr/share/*completions*/*fringed*' -not -path ./etc/fringed/fringed.toml)
 [[ -z $stray ]] || broken "nobody asked for $stray"
+
+# Each shell knows the commands and the options of one of them.
+for completion in bash-completion/completions/fringed zsh/vendor-completions/_fringed fish/vendor_completions.d/fringed.fish; do
+    for word in serve doctor scenario; do
+        grep -q -- "$word" "$work/usr/share/$completion" || broken "$completion does not know $word"
+    done
+done
+bash -n "$work/usr/share/bash-completion/completions/fringed" || broken "the completion for bash is no script"
+completed=$(bash -c 'source "$1"; COMP_WORDS=(fringed doctor --sc); COMP_CWORD=2; COMP_LINE="fringed doctor --sc"; COMP_POINT=19
+    _fringed fringed --sc doctor; echo "${COMPREPLY[*]}"' - "$work/usr/share/bash-completion/completions/fringed")
+[[ $completed == --scenario ]] || broken "bash completes doctor --sc to $completed"
 
 [[ $(cat "$work/DEBIAN/conffiles") == /etc/fringed/fringed.toml ]] || broken "the configuration is not a file of the user's"
 case $(dpkg-deb --field "$package" Architecture) in

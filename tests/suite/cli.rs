@@ -252,6 +252,121 @@ fn what_cannot_be_asked_for_is_usage() {
 }
 
 #[test]
+fn an_option_that_means_nothing_to_a_command_is_refused_by_its_name() {
+    for (arguments, option) in [
+        (
+            &["measure", "r", "--out", "x", "--modbus", "127.0.0.1:0"][..],
+            "--modbus",
+        ),
+        (&["--http", "127.0.0.1:0", "doctor"], "--http"),
+        (&["registers", "--quiet"], "--quiet"),
+        (&["history", "--threads", "2"], "--threads"),
+        (&["recipe", "delete", "2", "--json"], "--json"),
+        (&["serve", "--json"], "--json"),
+        (&["--json"], "--json"),
+    ] {
+        let run = run(arguments);
+        check_refused(&run, 64, &["unexpected argument", option, "Usage: fringed"]);
+    }
+}
+
+#[test]
+fn options_are_read_in_front_of_the_command_and_behind_it() {
+    let place = Place::new();
+    let (config, state) = (place.path("fringed.toml"), place.path("elsewhere"));
+    for arguments in [
+        [
+            "--config",
+            text(&config),
+            "--state",
+            text(&state),
+            "recipe",
+            "list",
+            "--json",
+        ],
+        [
+            "--json",
+            "recipe",
+            "--config",
+            text(&config),
+            "list",
+            "--state",
+            text(&state),
+        ],
+        [
+            "recipe",
+            "list",
+            "--json",
+            "--state",
+            text(&state),
+            "--config",
+            text(&config),
+        ],
+    ] {
+        let listed = run(&arguments).succeeded().stdout;
+        let listed: Value = serde_json::from_str(&listed).unwrap();
+        assert_eq!(listed, serde_json::json!({ "recipes": [] }));
+        fs::remove_dir_all(&state).unwrap();
+    }
+}
+
+#[test]
+fn json_is_one_document_also_where_something_is_wrong() {
+    let place = Place::new();
+    let config = place.path("fringed.toml");
+    let document = |run: &Run| -> Value {
+        serde_json::from_str(&run.stdout).unwrap_or_else(|error| panic!("{error}: {}", run.stdout))
+    };
+    let checked = run(&["config", "check", text(&config), "--json"]).succeeded();
+    let expected = serde_json::json!({ "file": text(&config), "valid": true, "problem": null });
+    assert_eq!(document(&checked), expected);
+    assert!(document(&run(&["config", "keys", "--json"])).is_array());
+    fs::write(&config, "threats = 2\n").unwrap();
+    let wrong = run(&["config", "check", text(&config), "--json"]);
+    assert_eq!(wrong.code, 78);
+    let told = document(&wrong);
+    assert_eq!(told["valid"], false);
+    assert!(
+        told["problem"].as_str().unwrap().contains("threats"),
+        "{told}"
+    );
+    assert!(wrong.stderr.contains("threats"), "{}", wrong.stderr);
+}
+
+#[test]
+fn the_completions_of_each_shell_know_every_command() {
+    let help = run(&["--help"]).succeeded().stdout;
+    let (_, commands) = help.split_once("\nCommands:\n").unwrap();
+    let (commands, _) = commands.split_once("\n\n").unwrap();
+    for shell in ["bash", "zsh", "fish"] {
+        let script = run(&["completions", shell]).succeeded().stdout;
+        for command in commands
+            .lines()
+            .filter_map(|line| line.split_whitespace().next())
+        {
+            assert!(script.contains(command), "{shell} does not know {command}");
+        }
+    }
+    check_refused(&run(&["completions", "dos"]), 64, &["zsh"]);
+}
+
+#[test]
+fn a_pattern_is_not_written_under_the_name_of_a_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("x.png");
+    let run = run(&[
+        "adapt",
+        "a-recording",
+        "--method",
+        "fringed",
+        "--out",
+        text(&out),
+    ]);
+    check_refused(&run, 64, &["x.png", ".npy"]);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
 fn quiet_says_nothing() {
     let place = Place::new();
     let config = place.path("fringed.toml");

@@ -94,11 +94,13 @@ fn the_manual_page_has_exactly_the_commands_options_and_exit_codes_that_there_ar
     assert!(told.insert("help".to_owned()) && told.len() > 10);
     assert_eq!(told, commands);
     let long = options.lines().filter_map(|line| line.split_once(" --"));
-    let options: BTreeSet<_> = long
+    let mut options: BTreeSet<_> = long
         .map(|(_, option)| format!("-{}", option.split(' ').next().unwrap()))
         .collect();
     let mut told = items(".It Fl ");
     assert!(told.insert("-version".to_owned()));
+    // What runs without a command, serve, prints no table.
+    assert!(options.insert("-json".to_owned()));
     assert_eq!(told, options);
     let readme = fs::read_to_string(root().join("README.md")).unwrap();
     let (_, codes) = readme.split_once("\n## Exit codes\n").unwrap();

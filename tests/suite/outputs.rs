@@ -296,3 +296,19 @@ fn results_replace_older_ones_and_leave_no_temporary_files() {
     assert_eq!(files::names(&written.out()), names);
     assert_eq!(files::array(&written.out().join("height.npy")).rows, 96);
 }
+
+#[test]
+fn results_that_a_measurement_has_not_are_not_left_from_the_one_before() {
+    let written = Written::new(&geometric().record());
+    written.measure(&[]).succeeded();
+    // As a recording of two patterns leaves them.
+    for name in ["phase-0.npy", "phase-1.npy"] {
+        fs::write(written.out().join(name), "old").unwrap();
+    }
+    written.edit(|manifest| {
+        let camera = manifest["camera"].as_object_mut().unwrap();
+        camera.remove("model");
+    });
+    let run = written.measure(&[]);
+    check_no_height(&written, &run);
+}

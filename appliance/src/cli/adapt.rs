@@ -1,6 +1,7 @@
 //! `fringed adapt RECORDING --method paper|fringed --out phase.npy`.
 
-use super::Common;
+use super::names;
+use super::options::{Json, Quiet, Threads, answer};
 use crate::adapt::{Choice, Method, adapt};
 use crate::error::{Exit, Failure};
 use crate::output::folder::OutputFolder;
@@ -20,7 +21,7 @@ pub struct Adapt {
     #[arg(long, value_enum)]
     method: Method,
     /// The file for it: f64 turns, projector rows x columns.
-    #[arg(long, value_name = "FILE.npy")]
+    #[arg(long, value_name = "FILE.npy", value_parser = names::file("npy"))]
     out: PathBuf,
     /// σ of the projector's blur, projector pixels.
     #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = blur)]
@@ -34,6 +35,12 @@ pub struct Adapt {
     /// Smallest pitch in camera pixels; if not given 2.2, and 5 for the paper's method.
     #[arg(long, value_name = "PX", value_parser = pitch)]
     image_pitch: Option<f64>,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
+    #[command(flatten)]
+    json: Json,
 }
 
 fn blur(text: &str) -> Result<f64, String> {
@@ -57,25 +64,24 @@ impl Adapt {
     ///
     /// # Errors
     /// If the recording cannot be opened or lacks what the method needs, or the file not be written.
-    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), Failure> {
         let choice = self.choice()?;
         let Some(name) = self.out.file_name().and_then(|name| name.to_str()) else {
             let message = format!("--out {}: name a file", self.out.display());
             return Err(Failure::new(Exit::Usage, message));
         };
         let recording = Recording::open(&self.recording)?;
-        let pool = super::pool(common.threads.unwrap_or(0))?;
+        let pool = self.threads.pool(0)?;
         let adapted = pool.install(|| adapt(&recording, &self.recording, &choice))?;
         let folder = OutputFolder::create(self.out.parent().unwrap_or(Path::new("")))?;
         folder.write(name, &array(&adapted.function))?;
-        if common.json {
-            let json = serde_json::to_string_pretty(&adapted.report)
-                .map_err(|error| Failure::because(Exit::Software, "write the report", error))?;
-            say!("{json}");
-        } else if !common.quiet {
-            say!("{}", adapted.report.table().trim_end());
-            say!("written to {}", self.out.display());
-        }
+        let json = serde_json::to_string_pretty(&adapted.report)
+            .map_err(|error| Failure::because(Exit::Software, "write the report", error))?;
+        let text = || {
+            let table = adapted.report.table();
+            format!("{}\nwritten to {}", table.trim_end(), self.out.display())
+        };
+        answer(self.json, self.quiet, || json, text);
         Ok(())
     }
 

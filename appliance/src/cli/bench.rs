@@ -1,6 +1,7 @@
 //! `fringed bench`: the kernel table, run time against error, and the budget from trigger to verdict.
 
-use super::Common;
+use super::names;
+use super::options::{Json, Quiet, Threads, answer};
 use crate::benchmark::{self, Effort, Machine, Report, Study};
 use crate::error::{Exit, Failure};
 use crate::output::folder::OutputFolder;
@@ -16,12 +17,18 @@ pub struct Bench {
     #[arg(long)]
     quick: bool,
     /// Folder for tables, CSV and plot; made if it does not exist.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = names::folder())]
     out: Option<PathBuf>,
     /// Write the twelve frames that the kernels are timed on to this folder, for other programs to be timed on, and
     /// measure nothing.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["what", "out"])]
+    #[arg(long, value_name = "DIR", value_parser = names::folder(), conflicts_with_all = ["what", "out", "threads", "json"])]
     frames: Option<PathBuf>,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
+    #[command(flatten)]
+    json: Json,
 }
 
 /// A part of the benchmark.
@@ -44,16 +51,16 @@ impl Bench {
     ///
     /// # Errors
     /// If something cannot be simulated or results not be written.
-    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), Failure> {
         if let Some(folder) = &self.frames {
-            return self.write_frames(folder, common);
+            return self.write_frames(folder);
         }
         // Made before the minutes of measuring, not found wanting after them.
         let folder = self.out.as_deref().map(OutputFolder::create);
         let folder = folder.transpose()?;
-        let progress = common.progress();
+        let progress = self.quiet.progress();
         let told = |share: f64, words: &str| progress.tell(share, words);
-        let report = self.measure(common, &told);
+        let report = self.measure(&told);
         progress.clear();
         let report = report?;
         let json = format!("{:#}\n", report.json());
@@ -68,23 +75,15 @@ impl Bench {
                 folder.write(&name, &bytes)?;
             }
         }
-        if common.json {
-            say!("{}", json.trim_end());
-        } else if !common.quiet {
-            say!("{}", tables.trim_end());
-        }
+        answer(self.json, self.quiet, || json, || tables);
         Ok(())
     }
 
-    fn measure(
-        &self,
-        common: &Common,
-        told: &(dyn Fn(f64, &str) + Sync),
-    ) -> Result<Report, Failure> {
+    fn measure(&self, told: &(dyn Fn(f64, &str) + Sync)) -> Result<Report, Failure> {
         let software =
             |what: &'static str| move |error: String| Failure::because(Exit::Software, what, error);
         let wanted = |what| self.what.is_none_or(|asked| asked == what);
-        let pool = super::pool(common.threads.unwrap_or(0))?;
+        let pool = self.threads.pool(0)?;
         let mut report = Report {
             machine: Machine::this(),
             kernel: None,
@@ -129,14 +128,13 @@ impl Bench {
         }
     }
 
-    fn write_frames(&self, folder: &std::path::Path, common: &Common) -> Result<(), Failure> {
+    fn write_frames(&self, folder: &std::path::Path) -> Result<(), Failure> {
         let folder_of_frames = OutputFolder::create(folder)?;
         for (name, bytes) in benchmark::frame_files(self.effort().size) {
             folder_of_frames.write(&name, &bytes)?;
         }
-        if !common.quiet {
-            say!("written to {}", folder.display());
-        }
+        self.quiet
+            .say(|| format!("written to {}", folder.display()));
         Ok(())
     }
 }

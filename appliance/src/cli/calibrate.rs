@@ -2,7 +2,7 @@
 
 mod report;
 
-use super::Common;
+use super::options::{Files, Json, Quiet, Threads, answer};
 use crate::backend::{self, Opened};
 use crate::calibration::Calibration;
 use crate::calibration::file::CalibrationFile;
@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 
 /// Calibrate the head: import its models, measure delay, stamps, grey response, noise, contrast and the reference plane.
 #[derive(Debug, clap::Args)]
+#[command(group = clap::ArgGroup::new("imported").args(["camera", "projector", "models"]).multiple(true))]
 pub struct Calibrate {
     /// Calibrate a simulated head of this scenario instead of the configured head.
     #[arg(long, value_name = "FILE")]
@@ -33,10 +34,10 @@ pub struct Calibrate {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["camera", "projector"])]
     models: Option<PathBuf>,
     /// Unit of lengths in the models' files, where they do not say it.
-    #[arg(long)]
+    #[arg(long, requires = "imported")]
     unit: Option<Unit>,
     /// The world's z in the models' files points away from the head, as on OpenCV's boards.
-    #[arg(long)]
+    #[arg(long, requires = "imported")]
     z_away: bool,
     /// No flat plate lies in the plane z = 0: leave the reference plane to the models.
     #[arg(long)]
@@ -44,6 +45,14 @@ pub struct Calibrate {
     /// How warm the head is, °C: kept in the calibration.
     #[arg(long, value_name = "CELSIUS", allow_negative_numbers = true)]
     temperature: Option<f64>,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
+    #[command(flatten)]
+    json: Json,
 }
 
 /// Where models came from, if not from a file.
@@ -55,8 +64,8 @@ impl Calibrate {
     /// # Errors
     /// If a model cannot be imported (65, 66), the head not be measured (69), or the calibration not be written (73). The
     /// calibration before is then untouched.
-    pub fn run(&self, common: &Common) -> Result<(), Failure> {
-        let mut config = common.configuration()?;
+    pub fn run(&self) -> Result<(), Failure> {
+        let mut config = self.files.configuration()?;
         if let Some(scenario) = &self.scenario {
             (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
         }
@@ -67,7 +76,7 @@ impl Calibrate {
             ));
         }
         // Held until all is written: no station measures meanwhile by what is being replaced.
-        let state = StateFolder::open(&common.state_folder()?)?;
+        let state = StateFolder::open(&self.files.state_folder()?)?;
         let head = config.head_in(state.path());
         let place = Place::at(head.calibration.as_deref().unwrap_or(Path::new("")));
         let mut notes = Vec::new();
@@ -76,9 +85,9 @@ impl Calibrate {
             None
         });
         let before = before.map(|loaded| loaded.file);
-        let progress = common.progress();
+        let progress = self.quiet.progress();
         let told = |share: f64| progress.tell(0.3 * share, "working out the light of the scene");
-        let pool = super::pool(config.threads)?;
+        let pool = self.threads.pool(config.threads)?;
         // As if nothing were known of it.
         let bare = HeadConfig {
             calibration: None,
@@ -109,11 +118,8 @@ impl Calibrate {
             place: place.path(),
             notes: &notes,
         };
-        if common.json {
-            say!("{:#}", report.json());
-        } else if !common.quiet {
-            say!("{}", report.table().trim_end());
-        }
+        let document = || format!("{:#}", report.json());
+        answer(self.json, self.quiet, document, || report.table());
         Ok(())
     }
 

@@ -1,23 +1,30 @@
 //! `fringed config check [FILE]` and `fringed config keys`.
 
-use super::Common;
+use super::options::{Json, Quiet};
 use crate::backend;
 use crate::calibration::place::Place;
 use crate::config::{Backend, Config, keys, table};
 use crate::error::{Exit, Failure};
 use hal::replay::Recording;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Check a configuration, or list its keys.
 #[derive(Debug, clap::Subcommand)]
 pub enum ConfigCommand {
     /// Read a configuration and every file that it names, and say what is wrong.
     Check {
-        /// The file; without it, the one of --config.
-        file: Option<PathBuf>,
+        /// The file.
+        file: PathBuf,
+        #[command(flatten)]
+        quiet: Quiet,
+        #[command(flatten)]
+        json: Json,
     },
     /// List every key with its unit, range and default.
-    Keys,
+    Keys {
+        #[command(flatten)]
+        json: Json,
+    },
 }
 
 impl ConfigCommand {
@@ -25,9 +32,9 @@ impl ConfigCommand {
     ///
     /// # Errors
     /// What is wrong with the configuration.
-    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), Failure> {
         match self {
-            Self::Keys if common.json => {
+            Self::Keys { json } if json.json => {
                 let keys: Vec<_> = keys()
                     .map(|key| {
                         serde_json::json!({
@@ -37,23 +44,35 @@ impl ConfigCommand {
                     })
                     .collect();
                 say!("{:#}", serde_json::Value::from(keys));
+                Ok(())
             }
-            Self::Keys => say!("{}", table().trim_end()),
-            Self::Check { file } => {
-                let Some(path) = file.as_ref().or(common.config.as_ref()) else {
-                    return Err(Failure::new(
-                        Exit::Usage,
-                        "config check: name a file: `fringed config check FILE`",
-                    ));
+            Self::Keys { .. } => {
+                say!("{}", table().trim_end());
+                Ok(())
+            }
+            Self::Check { file, quiet, json } => {
+                let checked = check(file);
+                let problem = checked.as_ref().err();
+                let document = || {
+                    let problem = problem.map(|failure| failure.message.as_str());
+                    let document = serde_json::json!({
+                        "file": file.display().to_string(), "valid": problem.is_none(), "problem": problem,
+                    });
+                    format!("{document:#}")
                 };
-                check_named_files(&Config::read(path)?)?;
-                if !common.quiet {
-                    say!("{} is right", path.display());
+                if json.json {
+                    say!("{}", document());
+                } else if checked.is_ok() {
+                    quiet.say(|| format!("{} is right", file.display()));
                 }
+                checked
             }
         }
-        Ok(())
     }
+}
+
+fn check(file: &Path) -> Result<(), Failure> {
+    check_named_files(&Config::read(file)?)
 }
 
 fn check_named_files(config: &Config) -> Result<(), Failure> {

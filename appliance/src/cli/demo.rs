@@ -4,7 +4,7 @@ mod parts;
 mod plc;
 mod table;
 
-use super::Common;
+use super::options::{Files, Json, Listen, Quiet, Threads, answer};
 use crate::config::Backend;
 use crate::daemon::{Daemon, runtime};
 use crate::error::{Exit, Failure};
@@ -20,6 +20,16 @@ pub struct Demo {
     /// End after the table; the default where stdout is no terminal.
     #[arg(long)]
     exit: bool,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    listen: Listen,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
+    #[command(flatten)]
+    json: Json,
 }
 
 /// Seed of the noise of the demonstration's frames.
@@ -39,20 +49,22 @@ impl Demo {
     ///
     /// # Errors
     /// If the station cannot start or answer, or judges a part wrongly.
-    pub fn run(&self, common: &Common) -> Result<(), Failure> {
-        let mut config = common.configuration()?;
+    pub fn run(&self) -> Result<(), Failure> {
+        let mut config = self.files.configuration()?;
+        self.listen.over(&mut config);
         if config.head.backend != Backend::Sim || config.head.scenario.is_some() {
             return Err(Failure::new(
                 Exit::Usage,
                 "demo: it brings its own parts: leave out head.backend and head.scenario",
             ));
         }
-        if common.state.is_none() && config.state.is_none() {
+        if config.state.is_none() {
             // Recipes that somebody taught stay untouched.
             config.state = Some(StateFolder::default_path()?.join("demo"));
         }
-        let progress = common.progress();
-        let daemon = Daemon::start(&config, super::pool(config.threads)?, progress.clone())?;
+        let progress = self.quiet.progress();
+        let pool = self.threads.pool(config.threads)?;
+        let daemon = Daemon::start(&config, pool, progress.clone())?;
         daemon.wait_until_ready()?;
         progress.log(&format!(
             "page on http://{}, Modbus TCP on {}",
@@ -61,13 +73,12 @@ impl Demo {
         let rows = runtime()?.block_on(play(&daemon, &progress));
         progress.clear();
         let rows = rows?;
-        if common.json {
-            say!("{:#}", table::json(&rows));
-        } else if !common.quiet {
-            say!("{}", table::text(&rows).trim_end());
-        }
+        let document = || format!("{:#}", table::json(&rows));
+        answer(self.json, self.quiet, document, || table::text(&rows));
         if !self.exit && std::io::stdout().is_terminal() {
-            say!("\nThe page stays on http://{} until Ctrl-C.", daemon.http);
+            if !self.json.json {
+                say!("\nThe page stays on http://{} until Ctrl-C.", daemon.http);
+            }
             runtime()?.block_on(Told::listen()?.wait());
         }
         daemon.stop();

@@ -1,6 +1,6 @@
 //! `fringed doctor`: examines the head step by step, with a verdict and a remedy for each.
 
-use super::Common;
+use super::options::{Files, Json, Quiet, Threads, answer};
 use crate::backend;
 use crate::config::Backend;
 use crate::doctor::{Step, Verdict, examine};
@@ -12,8 +12,16 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 pub struct Doctor {
     /// Examine a simulated head of this scenario instead of the configured head.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "state")]
     scenario: Option<PathBuf>,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
+    #[command(flatten)]
+    json: Json,
 }
 
 impl Doctor {
@@ -21,9 +29,9 @@ impl Doctor {
     ///
     /// # Errors
     /// If the head cannot be opened, or a step failed (69).
-    pub fn run(&self, common: &Common) -> Result<(), Failure> {
-        let mut config = common.configuration()?;
-        config.head = common.head(&config);
+    pub fn run(&self) -> Result<(), Failure> {
+        let mut config = self.files.configuration()?;
+        config.head = self.files.head(&config);
         if let Some(scenario) = &self.scenario {
             (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
             // The stored one is the configured head's.
@@ -35,9 +43,9 @@ impl Doctor {
                 "doctor: a recording cannot be examined: configure another head or name a scenario with --scenario",
             ));
         }
-        let progress = common.progress();
+        let progress = self.quiet.progress();
         let told = |share: f64| progress.tell(0.5 * share, "working out the light of the scene");
-        let pool = super::pool(config.threads)?;
+        let pool = self.threads.pool(config.threads)?;
         let mut opened = pool.install(|| backend::open_as_it_is(&config.head, &told))?;
         let calibrated = opened.problem.is_none();
         let told = |share: f64, name: &str| progress.tell(0.5 + 0.5 * share, name);
@@ -45,11 +53,8 @@ impl Doctor {
             pool.install(|| examine(&mut opened.head, &opened.calibration, calibrated, &told));
         progress.clear();
         let failed: Vec<&str> = failed(&steps).collect();
-        if common.json {
-            say!("{:#}", as_json(&steps));
-        } else if !common.quiet {
-            say!("{}", table(&steps).trim_end());
-        }
+        let document = || format!("{:#}", as_json(&steps));
+        answer(self.json, self.quiet, document, || table(&steps));
         if failed.is_empty() {
             return Ok(());
         }

@@ -1,6 +1,7 @@
 //! `fringed experiment --out DIR`: the paper's experiments as tables, plots and pictures.
 
-use super::Common;
+use super::names;
+use super::options::{Json, Quiet, Threads, answer};
 use crate::error::{Exit, Failure};
 use crate::experiment::{Campaign, OpticsKind, PARTS, Results, Row, Scene, csv, figures, means};
 use crate::output::folder::OutputFolder;
@@ -19,8 +20,14 @@ pub struct Experiment {
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=100))]
     seeds: u64,
     /// Folder for tables, plots and pictures; made if it does not exist.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = names::folder())]
     out: PathBuf,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
+    #[command(flatten)]
+    json: Json,
 }
 
 impl Experiment {
@@ -28,15 +35,15 @@ impl Experiment {
     ///
     /// # Errors
     /// If a part is not known, a run fails or the results cannot be written.
-    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), Failure> {
         let campaign = Campaign {
             scenes: self.scenes()?,
             optics: self.optics,
             seeds: self.seeds,
         };
         let folder = OutputFolder::create(&self.out)?;
-        let pool = super::pool(common.threads.unwrap_or(0))?;
-        let progress = common.progress();
+        let pool = self.threads.pool(0)?;
+        let progress = self.quiet.progress();
         let told = |share: f64, words: &str| progress.tell(share, words);
         let results = pool.install(|| campaign.run(&told));
         progress.clear();
@@ -44,14 +51,13 @@ impl Experiment {
             .map_err(|error| Failure::because(Exit::Software, "run the experiments", error))?;
         let means = means(&results.rows);
         write(&folder, &campaign, &results, &means)?;
-        if common.json {
-            let json = serde_json::to_string_pretty(&means)
-                .map_err(|error| Failure::because(Exit::Software, "write the means", error))?;
-            say!("{json}");
-        } else if !common.quiet {
-            say!("{}", tables(&campaign, &means).trim_end());
-            say!("written to {}", self.out.display());
-        }
+        let json = serde_json::to_string_pretty(&means)
+            .map_err(|error| Failure::because(Exit::Software, "write the means", error))?;
+        let text = || {
+            let tables = tables(&campaign, &means);
+            format!("{}\nwritten to {}", tables.trim_end(), self.out.display())
+        };
+        answer(self.json, self.quiet, || json, text);
         Ok(())
     }
 

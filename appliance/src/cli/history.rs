@@ -1,6 +1,6 @@
 //! `fringed history`: stored results as a table, JSON or CSV. Works while the station runs.
 
-use super::Common;
+use super::options::{Files, Json};
 use crate::error::{Exit, Failure};
 use crate::history::{Entry, Filter, HistoryError, Reader, time};
 use crate::station::Verdict;
@@ -29,6 +29,10 @@ pub struct History {
     /// At most this many, the newest; as CSV all, unless given.
     #[arg(long, value_name = "N")]
     limit: Option<usize>,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    json: Json,
 }
 
 /// Rows of a table for a screen.
@@ -48,8 +52,8 @@ impl History {
     ///
     /// # Errors
     /// If there is no history (66), or it is damaged (65).
-    pub fn run(&self, common: &Common) -> Result<(), Failure> {
-        let state = common.state_folder()?;
+    pub fn run(&self) -> Result<(), Failure> {
+        let state = self.files.state_folder()?;
         let reader = Reader::of(&state);
         let usual = if self.csv { usize::MAX } else { SCREEN };
         let filter = Filter {
@@ -65,7 +69,7 @@ impl History {
             return self.csv(&reader, &filter);
         }
         let results = reader.results(&filter).map_err(failure)?;
-        if common.json {
+        if self.json.json {
             say!("{:#}", serde_json::json!({ "results": results }));
             return Ok(());
         }

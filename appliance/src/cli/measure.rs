@@ -1,6 +1,7 @@
 //! `fringed measure RECORDING [--recipe FILE] --out DIR`.
 
-use super::Common;
+use super::names;
+use super::options::{Json, Quiet, Threads, answer};
 use crate::error::{Exit, Failure};
 use crate::measure::{Measurement, measure_with};
 use crate::output::folder::OutputFolder;
@@ -17,11 +18,17 @@ pub struct Measure {
     /// Folder with recording.json and its frames.
     recording: PathBuf,
     /// Folder for the results; made if it does not exist.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = names::folder())]
     out: PathBuf,
     /// Recipe of the part: dense and single levels are unwrapped about its golden map.
     #[arg(long, value_name = "FILE")]
     recipe: Option<PathBuf>,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
+    #[command(flatten)]
+    json: Json,
 }
 
 impl Measure {
@@ -29,10 +36,10 @@ impl Measure {
     ///
     /// # Errors
     /// If the recording cannot be opened or measured, or the results not be written.
-    pub fn run(&self, common: &Common) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), Failure> {
         let recording = Recording::open(&self.recording)?;
         let recipe = self.recipe.as_deref().map(read).transpose()?;
-        let pool = super::pool(common.configuration()?.threads)?;
+        let pool = self.threads.pool(0)?;
         let measured = || measure_with(&recording, &self.recording, recipe.as_ref());
         let measurement = pool.install(measured)?;
         let folder = OutputFolder::create(&self.out)?;
@@ -40,12 +47,11 @@ impl Measure {
         let json = serde_json::to_string_pretty(&measurement.report)
             .map_err(|error| Failure::because(Exit::Software, "write the report", error))?;
         folder.write("report.json", format!("{json}\n").as_bytes())?;
-        if common.json {
-            say!("{json}");
-        } else if !common.quiet {
-            say!("{}", measurement.report.table().trim_end());
-            say!("written to {}", self.out.display());
-        }
+        let text = || {
+            let table = measurement.report.table();
+            format!("{}\nwritten to {}", table.trim_end(), self.out.display())
+        };
+        answer(self.json, self.quiet, || json, text);
         Ok(())
     }
 }
@@ -63,25 +69,43 @@ fn read(path: &Path) -> Result<Recipe, Failure> {
     Recipe::from_bytes(&bytes).map_err(|error| Failure::because(Exit::Content, what(), error))
 }
 
+/// Files of a measurement whose heights are known.
+const SURFACE: [&str; 4] = ["height.npy", "sigma.npy", "height.png", "cloud.ply"];
+
+/// The file of one pattern's phase, where a recording has several.
+fn phase_of(pattern: usize) -> String {
+    format!("phase-{pattern}.npy")
+}
+
 fn write(folder: &OutputFolder, measurement: &Measurement) -> Result<(), Failure> {
     let array = |name: &str, width, values: &[f32]| folder.write(name, &npy::write(width, values));
     let phases = &measurement.phases;
     let primary = &phases[measurement.primary];
     array("phase.npy", primary.width, &turns(primary))?;
-    if phases.len() > 1 {
-        for (at, phase) in phases.iter().enumerate() {
-            array(&format!("phase-{at}.npy"), phase.width, &turns(phase))?;
+    let patterns = if phases.len() > 1 { phases.len() } else { 0 };
+    for (at, phase) in phases[..patterns].iter().enumerate() {
+        array(&phase_of(at), phase.width, &turns(phase))?;
+    }
+    // Results of an earlier measurement that this one does not have would pass for its own.
+    let mut beyond = patterns;
+    while folder.remove(&phase_of(beyond))? {
+        beyond += 1;
+    }
+    if measurement.heights.is_err() {
+        for name in SURFACE {
+            folder.remove(name)?;
         }
     }
     if let Ok(surface) = &measurement.heights {
         let map = &surface.map;
         let mm: Vec<f32> = map.height.iter().map(|height| height.mm() as f32).collect();
-        array("height.npy", map.width, &mm)?;
-        array("sigma.npy", map.width, &map.sigma)?;
+        let [height, sigma, picture_of, points] = SURFACE;
+        array(height, map.width, &mm)?;
+        array(sigma, map.width, &map.sigma)?;
         let rows = mm.len() / map.width.max(1);
         let png = picture::height_png(map.width as u32, rows as u32, &mm);
-        folder.write("height.png", &png)?;
-        folder.write("cloud.ply", &cloud::ply(surface, &measurement.intensity))?;
+        folder.write(picture_of, &png)?;
+        folder.write(points, &cloud::ply(surface, &measurement.intensity))?;
     }
     Ok(())
 }

@@ -1,7 +1,8 @@
 //! `fringed recipe`: list, export, import and delete the station's recipes. Works while the station runs: it takes up an
 //! imported recipe when it is selected.
 
-use super::Common;
+use super::names;
+use super::options::{Files, Json, Quiet};
 use crate::backend;
 use crate::error::{Exit, Failure};
 use crate::recipe::exchange::{ImportError, Listed};
@@ -12,25 +13,43 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Subcommand)]
 pub enum RecipeCommand {
     /// List the stored recipes.
-    List,
+    List {
+        #[command(flatten)]
+        files: Files,
+        #[command(flatten)]
+        json: Json,
+    },
     /// Write a recipe to a file.
     Export {
         /// Its number.
         #[arg(value_parser = clap::value_parser!(u16).range(1..=9999))]
         number: u16,
-        /// The file; one that is there is replaced.
+        /// The file, NAME.recipe; one that is there is replaced.
+        #[arg(value_parser = names::file("recipe"))]
         file: PathBuf,
+        #[command(flatten)]
+        files: Files,
+        #[command(flatten)]
+        quiet: Quiet,
     },
     /// Take a recipe from a file; the one of the same number stays as the previous generation.
     Import {
         /// The file.
         file: PathBuf,
+        #[command(flatten)]
+        files: Files,
+        #[command(flatten)]
+        quiet: Quiet,
     },
     /// Delete a recipe with its previous generation.
     Delete {
         /// Its number.
         #[arg(value_parser = clap::value_parser!(u16).range(1..=9999))]
         number: u16,
+        #[command(flatten)]
+        files: Files,
+        #[command(flatten)]
+        quiet: Quiet,
     },
 }
 
@@ -39,53 +58,56 @@ impl RecipeCommand {
     ///
     /// # Errors
     /// If the recipe does not exist (66), is damaged or of another calibration (65), or the store cannot be written (73).
-    pub fn run(&self, common: &Common) -> Result<(), Failure> {
-        let config = common.configuration()?;
-        let folder = common.state_folder()?.join("recipes");
-        let cannot = |error: std::io::Error| {
-            Failure::because(
-                Exit::CannotCreate,
-                format!("use the recipes in {}", folder.display()),
-                error,
-            )
-        };
-        let store = Store::open(&folder).map_err(cannot)?;
+    pub fn run(&self) -> Result<(), Failure> {
         match self {
-            Self::List => {
-                list(&store.list(), common);
+            Self::List { files, json } => {
+                list(&store(files)?.list(), json.json);
                 Ok(())
             }
-            Self::Export { number, file } => {
-                store.export(*number, file).map_err(refused)?;
-                tell(common, format!("recipe {number} is in {}", file.display()));
+            Self::Export {
+                number,
+                file,
+                files,
+                quiet,
+            } => {
+                store(files)?.export(*number, file).map_err(refused)?;
+                quiet.say(|| format!("recipe {number} is in {}", file.display()));
                 Ok(())
             }
-            Self::Import { file } => {
-                let calibration = backend::calibration(&common.head(&config))?.fingerprint();
+            Self::Import { file, files, quiet } => {
+                let store = store(files)?;
+                let head = files.head(&files.configuration()?);
+                let calibration = backend::calibration(&head)?.fingerprint();
                 let imported = store.import(file, Some(&calibration)).map_err(refused)?;
                 let digits = imported.fingerprint.get(..8).unwrap_or_default();
-                tell(
-                    common,
+                quiet.say(|| {
                     format!(
                         "imported recipe {} ({}), fingerprint {digits}",
                         imported.number, imported.name
-                    ),
-                );
+                    )
+                });
                 Ok(())
             }
-            Self::Delete { number } => {
-                store.delete(*number).map_err(refused)?;
-                tell(common, format!("recipe {number} is deleted"));
+            Self::Delete {
+                number,
+                files,
+                quiet,
+            } => {
+                store(files)?.delete(*number).map_err(refused)?;
+                quiet.say(|| format!("recipe {number} is deleted"));
                 Ok(())
             }
         }
     }
 }
 
-fn tell(common: &Common, words: String) {
-    if !common.quiet {
-        say!("{words}");
-    }
+/// The recipes of the station's state.
+fn store(files: &Files) -> Result<Store, Failure> {
+    let folder = files.state_folder()?.join("recipes");
+    Store::open(&folder).map_err(|error| {
+        let what = format!("use the recipes in {}", folder.display());
+        Failure::because(Exit::CannotCreate, what, error)
+    })
 }
 
 fn refused(error: ImportError) -> Failure {
@@ -98,8 +120,8 @@ fn refused(error: ImportError) -> Failure {
     Failure::new(exit, error.to_string())
 }
 
-fn list(recipes: &[Listed], common: &Common) {
-    if common.json {
+fn list(recipes: &[Listed], json: bool) {
+    if json {
         say!("{:#}", serde_json::json!({ "recipes": recipes }));
         return;
     }

@@ -1,6 +1,7 @@
 //! `fringed record DIR`: a sequence from the configured head as a recording.
 
-use super::Common;
+use super::names;
+use super::options::{Files, Quiet, Threads};
 use crate::backend::{self, Opened};
 use crate::error::{Exit, Failure};
 use crate::plan::rasters;
@@ -15,6 +16,7 @@ use std::time::Duration;
 #[derive(Debug, clap::Args)]
 pub struct Record {
     /// Folder for the recording; must not exist yet.
+    #[arg(value_parser = names::folder())]
     folder: PathBuf,
     /// Fringes over the projector's width; without it, one per 12 pixels.
     #[arg(long)]
@@ -25,6 +27,12 @@ pub struct Record {
     /// Shifts per level.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u8).range(3..=64))]
     steps: u8,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
 }
 
 /// Longest wait for one frame.
@@ -35,12 +43,12 @@ impl Record {
     ///
     /// # Errors
     /// If the head or the folder cannot be had, or the pattern not be shown.
-    pub fn run(&self, common: &Common) -> Result<(), Failure> {
-        let config = common.configuration()?;
-        let progress = common.progress();
+    pub fn run(&self) -> Result<(), Failure> {
+        let config = self.files.configuration()?;
+        let progress = self.quiet.progress();
         let told = |share: f64| progress.tell(0.8 * share, "working out the light of the scene");
-        let pool = super::pool(config.threads)?;
-        let mut opened = pool.install(|| backend::open(&common.head(&config), &told))?;
+        let pool = self.threads.pool(config.threads)?;
+        let mut opened = pool.install(|| backend::open(&self.files.head(&config), &told))?;
         opened.calibrated()?;
         let taken = self.take(&mut opened, &|share| {
             progress.tell(0.8 + 0.2 * share, "recording")
@@ -49,10 +57,9 @@ impl Record {
         let recording = taken?;
         recorder::write(&recording, &self.folder)
             .map_err(|error| Failure::new(Exit::CannotCreate, error.to_string()))?;
-        if !common.quiet {
-            let count = recording.frames.len();
-            say!("recorded {count} frames to {}", self.folder.display());
-        }
+        let count = recording.frames.len();
+        self.quiet
+            .say(|| format!("recorded {count} frames to {}", self.folder.display()));
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! `fringed replay RECORDING`: judges a kept part again and compares with what the history says, bit by bit.
 
-use super::Common;
 use super::history::failure;
+use super::options::{Files, Json, Quiet, Threads, answer};
 use crate::calibration::Calibration;
 use crate::calibration::place::Place;
 use crate::error::{Exit, Failure};
@@ -25,6 +25,14 @@ pub struct Replay {
     /// The recipe it was measured with, where the state folder no longer has that one.
     #[arg(long, value_name = "FILE")]
     recipe: Option<PathBuf>,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
+    #[command(flatten)]
+    json: Json,
 }
 
 impl Replay {
@@ -32,9 +40,9 @@ impl Replay {
     ///
     /// # Errors
     /// If recording, recipe or stored result cannot be had (65, 66), or the result is not the stored one (70).
-    pub fn run(&self, common: &Common) -> Result<(), Failure> {
-        let config = common.configuration()?;
-        let state = self.state(common)?;
+    pub fn run(&self) -> Result<(), Failure> {
+        let config = self.files.configuration()?;
+        let state = self.state()?;
         let recording = Recording::open(&self.recording)?;
         let wrong = |lacks: &str| {
             let place = self.recording.join("recording.json");
@@ -61,33 +69,17 @@ impl Replay {
             .iter()
             .map(|taken| taken.frame.clone())
             .collect();
-        let judged = super::pool(config.threads)?.install(|| {
+        let judged = self.threads.pool(config.threads)?.install(|| {
             let plan = Plan::new(recipe, &calibration, flags & SIMULATED != 0)?;
             Ok::<_, PlanError>(plan.inspect(&frames, Instant::now()))
         });
         let inspection = judged.map_err(|error| Failure::new(Exit::Content, error.to_string()))?;
         let replayed = entry(inspection, reference.number, &reference.fingerprint);
-        if common.json {
-            say!(
-                "{:#}",
-                serde_json::json!({ "replayed": replayed, "stored": stored })
-            );
-        } else if !common.quiet {
-            say!("{}{}", replayed.verdict.word(), because(&replayed));
-            for gauge in &replayed.gauges {
-                let number =
-                    |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:+.4}"));
-                say!(
-                    "{:<20} {:>10} {:<3} σ {:>8}  limits {} to {}",
-                    gauge.name,
-                    number(gauge.value),
-                    gauge.unit,
-                    number(gauge.sigma),
-                    number(gauge.low),
-                    number(gauge.high)
-                );
-            }
-        }
+        let document = || {
+            let both = serde_json::json!({ "replayed": replayed, "stored": stored });
+            format!("{both:#}")
+        };
+        answer(self.json, self.quiet, document, || table(&replayed));
         let Some(stored) = stored else {
             let message = format!(
                 "compare with the history: no stored result names {}: the result above was compared with nothing",
@@ -97,11 +89,13 @@ impl Replay {
         };
         match difference(&stored, &replayed) {
             None => {
-                if !common.quiet && !common.json {
-                    say!(
-                        "the same as result {} in the history, bit by bit",
-                        stored.seq
-                    );
+                if !self.json.json {
+                    self.quiet.say(|| {
+                        format!(
+                            "the same as result {} in the history, bit by bit",
+                            stored.seq
+                        )
+                    });
                 }
                 Ok(())
             }
@@ -116,14 +110,14 @@ impl Replay {
     }
 
     /// The state folder that the recording lies in, else the configured one.
-    fn state(&self, common: &Common) -> Result<PathBuf, Failure> {
+    fn state(&self) -> Result<PathBuf, Failure> {
         let own = self.recording.canonicalize().ok();
         let own = own.and_then(|folder| Some(folder.parent()?.parent()?.to_path_buf()));
         match own {
-            Some(state) if common.state.is_none() && Reader::of(&state).path().exists() => {
+            Some(state) if self.files.state.is_none() && Reader::of(&state).path().exists() => {
                 Ok(state)
             }
-            _ => common.state_folder(),
+            _ => self.files.state_folder(),
         }
     }
 
@@ -195,6 +189,24 @@ fn entry(inspection: Inspection, recipe: u32, fingerprint: &str) -> Entry {
         inspection: Arc::new(inspection),
         ..ResultRecord::default()
     })
+}
+
+/// The verdict, and a line for each gauge.
+fn table(entry: &Entry) -> String {
+    let number = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:+.4}"));
+    let mut lines = vec![format!("{}{}", entry.verdict.word(), because(entry))];
+    lines.extend(entry.gauges.iter().map(|gauge| {
+        format!(
+            "{:<20} {:>10} {:<3} σ {:>8}  limits {} to {}",
+            gauge.name,
+            number(gauge.value),
+            gauge.unit,
+            number(gauge.sigma),
+            number(gauge.low),
+            number(gauge.high)
+        )
+    }));
+    lines.join("\n")
 }
 
 fn because(entry: &Entry) -> String {

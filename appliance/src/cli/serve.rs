@@ -1,6 +1,6 @@
 //! `fringed serve`: the station, until it is told to end.
 
-use super::Common;
+use super::options::{Files, Listen, Quiet, Threads};
 use crate::daemon::{Caller, Daemon, runtime};
 use crate::error::Failure;
 use crate::journal::Severity;
@@ -14,31 +14,47 @@ use std::time::Duration;
 /// READY waits so long for devices that are switched on together with the computer.
 const TOGETHER: Duration = Duration::from_secs(20);
 
-/// Runs the daemon until Ctrl-C or SIGTERM.
-///
-/// # Errors
-/// If it cannot start.
-pub fn run(common: &Common) -> Result<(), Failure> {
-    let config = common.configuration()?;
-    let progress = common.progress();
-    let caller = Caller {
-        notify: Notify::from_environment(),
-        // Before anything is done: whatever it does then, the end that is asked for is clean.
-        told: Told::listen()?,
-    };
-    caller.notify.status("starting");
-    let pool = super::pool(config.threads)?;
-    let daemon = Daemon::start_for(&config, pool, progress.clone(), &caller)?;
-    runtime()?.block_on(async {
-        tokio::select! {
-            () = caller.told.wait() => {}
-            () = serve(&daemon, &caller.notify, &progress) => {}
-        }
-    });
-    caller.notify.stopping();
-    progress.report(Severity::Notice, "stopping");
-    daemon.stop();
-    Ok(())
+/// Run the station.
+#[derive(Debug, clap::Args)]
+pub struct Serve {
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    listen: Listen,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
+}
+
+impl Serve {
+    /// Runs the daemon until Ctrl-C or SIGTERM.
+    ///
+    /// # Errors
+    /// If it cannot start.
+    pub fn run(&self) -> Result<(), Failure> {
+        let mut config = self.files.configuration()?;
+        self.listen.over(&mut config);
+        let progress = self.quiet.progress();
+        let caller = Caller {
+            notify: Notify::from_environment(),
+            // Before anything is done: whatever it does then, the end that is asked for is clean.
+            told: Told::listen()?,
+        };
+        caller.notify.status("starting");
+        let pool = self.threads.pool(config.threads)?;
+        let daemon = Daemon::start_for(&config, pool, progress.clone(), &caller)?;
+        runtime()?.block_on(async {
+            tokio::select! {
+                () = caller.told.wait() => {}
+                () = serve(&daemon, &caller.notify, &progress) => {}
+            }
+        });
+        caller.notify.stopping();
+        progress.report(Severity::Notice, "stopping");
+        daemon.stop();
+        Ok(())
+    }
 }
 
 /// Says how the start ended, and from then on how things stand.

@@ -1,8 +1,10 @@
 //! `fringed teach`: a recipe from the part in front of the head, or from recordings.
 
-use super::Common;
+use super::names;
+use super::options::{Files, Json, Quiet, Threads, answer};
 use crate::backend::{self, Opened};
 use crate::calibration::Calibration;
+use crate::config::Config;
 use crate::error::{Exit, Failure};
 use crate::measure::{measure, measure_after, primary_of};
 use crate::output::folder::write_whole;
@@ -33,15 +35,23 @@ pub struct Teach {
     tolerance: f64,
     /// Recording of the good part with the full sequence; its pattern becomes the recipe's. Without
     /// it, the part in front of the configured head is taught.
-    #[arg(long, value_name = "DIR", requires = "out")]
+    #[arg(long, value_name = "DIR", requires = "out", conflicts_with = "state")]
     golden: Option<PathBuf>,
     /// Recording that tells the golden one's dense levels what phase to expect; without it, the
     /// reference phase map does.
     #[arg(long, value_name = "DIR", requires = "golden")]
     preliminary: Option<PathBuf>,
     /// Write the recipe to this file instead of the state folder.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE.recipe", value_parser = names::file("recipe"))]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
+    #[command(flatten)]
+    json: Json,
 }
 
 /// Longest wait for one frame.
@@ -58,12 +68,12 @@ impl Teach {
     ///
     /// # Errors
     /// If the part cannot be taught or the recipe not be stored; a recipe stored before is untouched.
-    pub fn run(&self, common: &Common) -> Result<(), Failure> {
-        let config = common.configuration()?;
-        let pool = super::pool(config.threads)?;
+    pub fn run(&self) -> Result<(), Failure> {
+        let config = self.files.configuration()?;
+        let pool = self.threads.pool(config.threads)?;
         let taught = match &self.golden {
             Some(golden) => pool.install(|| self.teach_recordings(golden))?,
-            None => self.teach_head(common, &pool)?,
+            None => self.teach_head(&config, &pool)?,
         };
         let place = match &self.out {
             Some(out) => {
@@ -76,7 +86,7 @@ impl Teach {
             None => self.store(config.state, &taught)?,
         };
         let file = &taught.recipe.file;
-        if common.json {
+        let summary = || {
             let summary = serde_json::json!({
                 "number": file.number,
                 "fingerprint": file.fingerprint,
@@ -85,17 +95,18 @@ impl Teach {
                 "reasons": taught.choice.reasons,
                 "file": place,
             });
-            say!("{summary:#}");
-        } else if !common.quiet {
-            for reason in &taught.choice.reasons {
-                say!("{reason}");
-            }
-            say!(
-                "recipe {}, fingerprint {}: {place}",
-                file.number,
-                &file.fingerprint[..8]
-            );
-        }
+            format!("{summary:#}")
+        };
+        let text = || {
+            let mut lines = taught.choice.reasons.clone();
+            let fingerprint = &file.fingerprint[..8];
+            lines.push(format!(
+                "recipe {}, fingerprint {fingerprint}: {place}",
+                file.number
+            ));
+            lines.join("\n")
+        };
+        answer(self.json, self.quiet, summary, text);
         Ok(())
     }
 
@@ -115,11 +126,10 @@ impl Teach {
         }
     }
 
-    fn teach_head(&self, common: &Common, pool: &rayon::ThreadPool) -> Result<Taught, Failure> {
-        let config = common.configuration()?;
-        let progress = common.progress();
+    fn teach_head(&self, config: &Config, pool: &rayon::ThreadPool) -> Result<Taught, Failure> {
+        let progress = self.quiet.progress();
         let told = |share: f64| progress.tell(share, "working out the light of the scene");
-        let opened = pool.install(|| backend::open(&common.head(&config), &told))?;
+        let opened = pool.install(|| backend::open(&self.files.head(config), &told))?;
         opened.calibrated()?;
         let Opened {
             mut head,

@@ -46,6 +46,26 @@ impl OutputFolder {
             )
         })
     }
+
+    /// Removes a file, and answers whether there was one.
+    ///
+    /// # Errors
+    /// If it cannot be removed (exit code 73).
+    pub fn remove(&self, name: &str) -> Result<bool, Failure> {
+        let target = self.path.join(name);
+        match fs::remove_file(&target) {
+            Ok(()) => Ok(true),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(false),
+            Err(error) => {
+                let what = format!(
+                    "remove {}, which is of another measurement",
+                    target.display()
+                );
+                let remedy = format!("{error}: name another folder");
+                Err(Failure::because(Exit::CannotCreate, what, remedy))
+            }
+        }
+    }
 }
 
 /// Writes a file under a temporary name, syncs it, and renames it: whoever pulls the plug finds the

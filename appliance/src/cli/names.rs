@@ -1,0 +1,33 @@
+//! Names of outputs: none that says another kind of content than what is written.
+
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use std::path::{Path, PathBuf};
+
+/// Endings of the files that this program writes.
+const ENDINGS: [&str; 8] = ["csv", "json", "npy", "ply", "png", "recipe", "svg", "zip"];
+
+/// A file whose name ends like its content, `npy` or `recipe`.
+pub fn file(ending: &'static str) -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(move |path| match ends_in(&path, ending) {
+        true => Ok(path),
+        false => Err(format!("name a file that ends in .{ending}")),
+    })
+}
+
+/// A folder, whose name does not end like that of a file.
+pub fn folder() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| {
+        let file = ENDINGS.into_iter().find(|ending| ends_in(&path, ending));
+        match file {
+            None => Ok(path),
+            Some(ending) => Err(format!(
+                "a folder is made under this name: name one that does not end in .{ending}"
+            )),
+        }
+    })
+}
+
+fn ends_in(path: &Path, ending: &str) -> bool {
+    path.extension()
+        .is_some_and(|found| found.eq_ignore_ascii_case(ending))
+}

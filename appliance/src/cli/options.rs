@@ -1,0 +1,198 @@
+//! Options that several commands share, in the groups in which commands take them.
+
+use crate::config::{Config, HeadConfig};
+use crate::error::{Exit, Failure};
+use crate::progress::Progress;
+use crate::state::StateFolder;
+use clap::{Arg, Args, Command};
+use std::ffi::OsString;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+/// Which station it is: its configuration and its state.
+#[derive(Clone, Debug, Args)]
+pub struct Files {
+    /// Configuration file (TOML); `fringed config keys` lists its keys.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// State folder: recipes, history, result counter, serial.
+    #[arg(long, value_name = "DIR")]
+    pub state: Option<PathBuf>,
+}
+
+/// Where the station is served.
+#[derive(Clone, Debug, Args)]
+pub struct Listen {
+    /// Where to serve Modbus TCP.
+    #[arg(long, value_name = "ADDR:PORT")]
+    modbus: Option<SocketAddr>,
+    /// Where to serve the page.
+    #[arg(long, value_name = "ADDR:PORT")]
+    http: Option<SocketAddr>,
+}
+
+/// How much of the computer is used.
+#[derive(Clone, Debug, Args)]
+pub struct Threads {
+    /// Computing threads; 0 = one per core.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=256))]
+    threads: Option<u16>,
+}
+
+/// Whether anything is said on the way.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Quiet {
+    /// No progress, no log, no table.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Whether programs or people read the answer.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Json {
+    /// Print JSON where a table would be printed.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Files {
+    /// The configuration file, if one is named, with the command line's state folder over it.
+    ///
+    /// # Errors
+    /// If the file is missing or wrong.
+    pub fn configuration(&self) -> Result<Config, Failure> {
+        let mut config = match &self.config {
+            Some(path) => Config::read(path)?,
+            None => Config::default(),
+        };
+        if let Some(state) = &self.state {
+            config.state = Some(state.clone());
+        }
+        config
+            .check()
+            .map_err(|error| Failure::new(Exit::Configuration, error))?;
+        Ok(config)
+    }
+
+    /// The state folder as configured, else the platform's.
+    ///
+    /// # Errors
+    /// If the configuration is wrong or the platform has none.
+    pub fn state_folder(&self) -> Result<PathBuf, Failure> {
+        match self.configuration()?.state {
+            Some(path) => Ok(path),
+            None => StateFolder::default_path(),
+        }
+    }
+
+    /// The devices, with the calibration in the state folder unless the configuration names another.
+    pub fn head(&self, config: &Config) -> HeadConfig {
+        match self.state_folder() {
+            Ok(state) => config.head_in(&state),
+            Err(_) => config.head.clone(),
+        }
+    }
+}
+
+impl Listen {
+    /// Puts the command line's addresses over the configured ones.
+    pub fn over(&self, config: &mut Config) {
+        if let Some(listen) = self.modbus {
+            config.modbus.listen = listen;
+        }
+        if let Some(listen) = self.http {
+            config.http.listen = listen;
+        }
+    }
+}
+
+impl Threads {
+    /// A pool of computing threads: as many as the command line says, else as configured; 0 = one per core.
+    ///
+    /// # Errors
+    /// If the system gives no threads (exit code 70).
+    pub fn pool(&self, configured: usize) -> Result<rayon::ThreadPool, Failure> {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(self.threads.map_or(configured, usize::from))
+            .thread_name(|at| format!("computing-{at}"))
+            .build()
+            .map_err(|error| Failure::because(Exit::Software, "start the computing threads", error))
+    }
+}
+
+impl Quiet {
+    /// Progress as the user wants it.
+    pub fn progress(self) -> Progress {
+        Progress::new(self.quiet)
+    }
+
+    /// Prints what was done, unless it is to be quiet.
+    pub fn say(self, words: impl FnOnce() -> String) {
+        if !self.quiet {
+            say!("{}", words().trim_end());
+        }
+    }
+}
+
+/// Prints the answer of a command: as JSON for programs, else as text for people, unless it is to be quiet.
+pub fn answer(
+    json: Json,
+    quiet: Quiet,
+    document: impl FnOnce() -> String,
+    text: impl FnOnce() -> String,
+) {
+    if json.json {
+        say!("{}", document().trim_end());
+    } else {
+        quiet.say(text);
+    }
+}
+
+/// Moves options that stand before a command behind it, where clap takes them: `fringed --state DIR recipe list` is read as
+/// `fringed recipe list --state DIR`. Whether the command has these options is for clap to say.
+pub fn behind_the_command(
+    tree: &Command,
+    arguments: impl Iterator<Item = OsString>,
+) -> Vec<OsString> {
+    let mut arguments = arguments;
+    let mut words: Vec<OsString> = arguments.next().into_iter().collect();
+    let mut options = Vec::new();
+    let mut command = tree;
+    while let Some(argument) = arguments.next() {
+        let text = argument.to_str().unwrap_or_default();
+        if let Some(name) = text.strip_prefix("--")
+            && let (long, value) = name
+                .split_once('=')
+                .map_or((name, None), |(long, value)| (long, Some(value)))
+            && let Some(known) = option(tree, long)
+        {
+            let more = known.get_action().takes_values() && value.is_none();
+            options.push(argument);
+            if more {
+                options.extend(arguments.next());
+            }
+        } else if let Some(found) = command.find_subcommand(text) {
+            words.push(argument);
+            command = found;
+            if !command.has_subcommands() {
+                break;
+            }
+        } else {
+            options.push(argument);
+            break;
+        }
+    }
+    words.extend(options.into_iter().chain(arguments));
+    words
+}
+
+/// The option of this name, of whichever command.
+fn option<'a>(tree: &'a Command, long: &str) -> Option<&'a Arg> {
+    let own = tree
+        .get_arguments()
+        .find(|argument| argument.get_long() == Some(long));
+    own.or_else(|| {
+        tree.get_subcommands()
+            .find_map(|command| option(command, long))
+    })
+}
