@@ -1,5 +1,6 @@
 //! The history across kill -9, and the way from a failed part to its replay.
 
+use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, READY, long, trigger};
 use appliance::history::{Filter, Reader};
 use appliance::station::Verdict;
@@ -184,6 +185,75 @@ fn a_failed_part_is_kept_and_replays_bit_by_bit_and_a_difference_is_said() {
         "{}",
         run.stderr
     );
+}
+
+#[test]
+fn a_kept_part_is_judged_again_by_its_own_recipe_after_that_was_edited_or_deleted_also_from_the_pages_zip()
+ {
+    let place = place_with_a_dent();
+    // A new one is shown at the next start.
+    fs::remove_file(place.path("state/access/secret")).unwrap();
+    let daemon = Daemon::start(&place);
+    let words = Plc::connect(&daemon).measure(9);
+    assert_eq!(words[8], FAIL);
+    let seq = long(&words, 0);
+    let folder = recording(&place, seq);
+    let mut browser = Browser::new(&daemon);
+    let (status, zip) = browser.ask("GET", &format!("/api/history/{seq}/recording.zip"), &[]);
+    assert_eq!(status, 200);
+    let file = place.path("part.zip");
+    fs::write(&file, zip).unwrap();
+    // Limits so wide that the dent passes, twice: no generation is left that judged the part.
+    let taught = fs::read(place.recipe()).unwrap();
+    assert_eq!(taught, fs::read(folder.join("recipe.recipe")).unwrap());
+    browser.sign_in(&daemon);
+    for high in [50.0, 60.0] {
+        let recipe = browser.get("/api/recipes/1");
+        let mut gauges = recipe["gauges"].clone();
+        for gauge in gauges.as_array_mut().unwrap() {
+            (gauge["low"], gauge["high"]) = ((-high).into(), high.into());
+        }
+        let edit = serde_json::json!({ "fingerprint": recipe["fingerprint"], "gauges": gauges });
+        assert_eq!(browser.json("PUT", "/api/recipes/1", &edit).0, 200);
+        browser.wait_for_another(recipe["fingerprint"].as_str().unwrap());
+    }
+    daemon.kill();
+    let own = |run: Run| {
+        let said = run.succeeded().stdout;
+        assert!(said.contains("the recording's own recipe"), "{said}");
+        assert!(
+            said.contains("FAIL") && said.contains("bit by bit"),
+            "{said}"
+        );
+    };
+    let state = place.path("state");
+    let of_zip = ["--state", state.to_str().unwrap()];
+    own(replay(&folder, &[]));
+    own(replay(&file, &of_zip));
+    let run = replay(&folder, &["--recipe", "stored"]).succeeded();
+    assert!(
+        run.stdout.starts_with("PASS") && run.stdout.contains("is FAIL, judged by another recipe"),
+        "{}",
+        run.stdout
+    );
+    for recipe in [
+        place.recipe(),
+        place.path("state/recipes/0001.recipe.previous"),
+    ] {
+        fs::remove_file(recipe).unwrap();
+    }
+    own(replay(&folder, &[]));
+    own(replay(&file, &of_zip));
+    let out = place.path("out");
+    program().measure(&file, &out, &[]).succeeded();
+    assert!(out.join("height.npy").exists());
+    assert_eq!(replay(&folder, &["--recipe", "stored"]).code, 66);
+    // What an older program kept has no recipe of its own: the file that taught it is named.
+    let named = place.path("named.recipe");
+    fs::rename(folder.join("recipe.recipe"), &named).unwrap();
+    assert_eq!(replay(&folder, &[]).code, 66);
+    let run = replay(&folder, &["--recipe", named.to_str().unwrap()]).succeeded();
+    assert!(run.stdout.contains("bit by bit"), "{}", run.stdout);
 }
 
 #[test]

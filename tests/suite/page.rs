@@ -12,13 +12,13 @@ const PASS: u16 = 1;
 const FAIL: u16 = 2;
 
 /// A browser without a page: one request per connection, and a cookie.
-struct Browser {
+pub struct Browser {
     address: SocketAddr,
     cookie: String,
 }
 
 impl Browser {
-    fn new(daemon: &Daemon) -> Self {
+    pub fn new(daemon: &Daemon) -> Self {
         Self {
             address: daemon.http,
             cookie: String::new(),
@@ -26,7 +26,7 @@ impl Browser {
     }
 
     /// Status and body.
-    fn ask(&mut self, method: &str, path: &str, body: &[u8]) -> (u16, Vec<u8>) {
+    pub fn ask(&mut self, method: &str, path: &str, body: &[u8]) -> (u16, Vec<u8>) {
         let mut stream = TcpStream::connect(self.address).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let head = format!(
@@ -52,21 +52,25 @@ impl Browser {
             }
         }
         let status = head[9..12].parse().unwrap();
-        (status, answer[end + 4..].to_vec())
+        let body = &answer[end + 4..];
+        match head.contains("transfer-encoding: chunked") {
+            true => (status, unchunked(body)),
+            false => (status, body.to_vec()),
+        }
     }
 
-    fn json(&mut self, method: &str, path: &str, body: &Value) -> (u16, Value) {
+    pub fn json(&mut self, method: &str, path: &str, body: &Value) -> (u16, Value) {
         let (status, answer) = self.ask(method, path, body.to_string().as_bytes());
         (status, serde_json::from_slice(&answer).unwrap())
     }
 
-    fn get(&mut self, path: &str) -> Value {
+    pub fn get(&mut self, path: &str) -> Value {
         let (status, answer) = self.ask("GET", path, &[]);
         assert_eq!(status, 200, "{path}: {}", String::from_utf8_lossy(&answer));
         serde_json::from_slice(&answer).unwrap()
     }
 
-    fn sign_in(&mut self, daemon: &Daemon) {
+    pub fn sign_in(&mut self, daemon: &Daemon) {
         let (_, rest) = daemon.log.split_once("shown this once: ").unwrap();
         let secret = rest.split(' ').next().unwrap();
         let body = json!({ "secret": secret });
@@ -74,7 +78,7 @@ impl Browser {
     }
 
     /// Waits until the station is ready with a recipe whose fingerprint is not `before`.
-    fn wait_for_another(&mut self, before: &str) -> String {
+    pub fn wait_for_another(&mut self, before: &str) -> String {
         let started = Instant::now();
         loop {
             let snapshot = self.get("/api/snapshot");
@@ -84,6 +88,21 @@ impl Browser {
             }
             assert!(started.elapsed() < PATIENCE, "{snapshot}");
         }
+    }
+}
+
+/// The body of a chunked answer, which must be whole.
+fn unchunked(mut body: &[u8]) -> Vec<u8> {
+    let mut whole = Vec::new();
+    loop {
+        let end = body.windows(2).position(|two| two == b"\r\n").unwrap();
+        let length = usize::from_str_radix(std::str::from_utf8(&body[..end]).unwrap(), 16).unwrap();
+        if length == 0 {
+            return whole;
+        }
+        let from = end + 2;
+        whole.extend_from_slice(&body[from..from + length]);
+        body = &body[from + length + 2..];
     }
 }
 

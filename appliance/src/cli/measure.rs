@@ -3,19 +3,20 @@
 use super::names;
 use super::options::{Json, Quiet, Threads, answer};
 use crate::error::{Exit, Failure};
+use crate::kept;
 use crate::measure::{Measurement, measure_with};
 use crate::output::folder::OutputFolder;
 use crate::output::{cloud, picture};
-use crate::recipe::Recipe;
+use crate::unpack::Unpacked;
 use algo::pipeline::PhaseMap;
 use hal::npy;
 use hal::replay::Recording;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Measure a recording.
 #[derive(Debug, clap::Args)]
 pub struct Measure {
-    /// Folder with recording.json and its frames.
+    /// Folder with recording.json and its frames, or the ZIP that the page gives.
     recording: PathBuf,
     /// Folder for the results; made if it does not exist.
     #[arg(long, value_name = "DIR", value_parser = names::folder())]
@@ -37,10 +38,11 @@ impl Measure {
     /// # Errors
     /// If the recording cannot be opened or measured, or the results not be written.
     pub fn run(&self) -> Result<(), Failure> {
-        let recording = Recording::open(&self.recording)?;
-        let recipe = self.recipe.as_deref().map(read).transpose()?;
+        let unpacked = Unpacked::of(&self.recording)?;
+        let recording = Recording::open(unpacked.folder())?;
+        let recipe = self.recipe.as_deref().map(kept::read).transpose()?;
         let pool = self.threads.pool(0)?;
-        let measured = || measure_with(&recording, &self.recording, recipe.as_ref());
+        let measured = || measure_with(&recording, unpacked.folder(), recipe.as_ref());
         let measurement = pool.install(measured)?;
         let folder = OutputFolder::create(&self.out)?;
         pool.install(|| write(&folder, &measurement))?;
@@ -54,19 +56,6 @@ impl Measure {
         answer(self.json, self.quiet, || json, text);
         Ok(())
     }
-}
-
-/// Reads a recipe by itself: a file may lie anywhere and have any name.
-fn read(path: &Path) -> Result<Recipe, Failure> {
-    let what = || format!("read recipe {}", path.display());
-    let bytes = std::fs::read(path).map_err(|error| match error.kind() {
-        std::io::ErrorKind::NotFound => {
-            let message = format!("{error}: name the .recipe file of the part");
-            Failure::because(Exit::Missing, what(), message)
-        }
-        _ => Failure::because(Exit::Content, what(), error),
-    })?;
-    Recipe::from_bytes(&bytes).map_err(|error| Failure::because(Exit::Content, what(), error))
 }
 
 /// Files of a measurement whose heights are known.

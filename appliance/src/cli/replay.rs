@@ -2,17 +2,14 @@
 
 use super::history::failure;
 use super::options::{Files, Json, Quiet, Threads, answer};
-use crate::calibration::Calibration;
-use crate::calibration::place::Place;
 use crate::error::{Exit, Failure};
-use crate::history::{Entry, Reader, difference};
-use crate::plan::{Plan, PlanError};
-use crate::recipe::{LoadError, Recipe, Store};
+use crate::history::{Entry, Reader, difference, seq_of};
+use crate::kept::{self, Kept, missing};
+use crate::plan::PlanError;
+use crate::recipe::{Recipe, Store};
 use crate::station::result::flag::SIMULATED;
 use crate::station::{Inspection, ResultRecord};
-use algo::pattern::GreyResponse;
-use hal::replay::Recording;
-use std::fs::File;
+use crate::unpack::Unpacked;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -20,10 +17,10 @@ use std::time::Instant;
 /// Judge a kept part again, from its frames.
 #[derive(Debug, clap::Args)]
 pub struct Replay {
-    /// Its folder; `fringed history` names it.
+    /// Its folder, which `fringed history` names, or the ZIP that the page gives.
     recording: PathBuf,
-    /// The recipe it was measured with, where the state folder no longer has that one.
-    #[arg(long, value_name = "FILE")]
+    /// Another recipe than the one that judged it then: a file, or `stored` for the station's of that number.
+    #[arg(long, value_name = "FILE|stored")]
     recipe: Option<PathBuf>,
     #[command(flatten)]
     files: Files,
@@ -35,51 +32,59 @@ pub struct Replay {
     json: Json,
 }
 
+/// What a part is judged by again.
+struct Chosen {
+    recipe: Recipe,
+    /// Where it is from, in words.
+    from: String,
+    /// Whether it is the one that judged the part then.
+    same: bool,
+}
+
 impl Replay {
     /// Judges and compares.
     ///
     /// # Errors
     /// If recording, recipe or stored result cannot be had (65, 66), or the result is not the stored one (70).
     pub fn run(&self) -> Result<(), Failure> {
-        let config = self.files.configuration()?;
+        let unpacked = Unpacked::of(&self.recording)?;
         let state = self.state()?;
-        let recording = Recording::open(&self.recording)?;
-        let wrong = |lacks: &str| {
-            let place = self.recording.join("recording.json");
-            Failure::new(
-                Exit::Content,
-                format!(
-                    "replay {}: it has no {lacks}: replay one that the station kept",
-                    place.display()
-                ),
-            )
-        };
-        let reference = recording.recipe.clone().ok_or_else(|| wrong("recipe"))?;
-        let noise = recording
-            .noise_counts
-            .ok_or_else(|| wrong("camera.noise_counts"))?;
-        let mut calibration = Calibration::of(&recording, noise).map_err(wrong)?;
-        let recipe = self.recipe(&state, reference.number, &reference.fingerprint)?;
-        let place = config.head_in(&state).calibration;
-        calibration.response = place.and_then(|place| response(&place, &recipe));
-        let stored = self.stored(&state)?;
+        let kept = Kept::open(unpacked.folder())?;
+        let Chosen { recipe, from, same } =
+            self.choose(&kept, &Store::at(&state.join("recipes")))?;
+        let (number, fingerprint) = (recipe.file.number, recipe.file.fingerprint.clone());
+        let stored = stored(&state, unpacked.name(), &kept)?;
         let flags = stored.as_ref().map_or(0, |entry| entry.flags);
-        let frames: Vec<_> = recording
-            .frames
-            .iter()
-            .map(|taken| taken.frame.clone())
-            .collect();
-        let judged = self.threads.pool(config.threads)?.install(|| {
-            let plan = Plan::new(recipe, &calibration, flags & SIMULATED != 0)?;
+        let frames = kept.frames();
+        let threads = self.files.configuration()?.threads;
+        let judged = self.threads.pool(threads)?.install(|| {
+            let plan = kept.plan(recipe, flags & SIMULATED != 0)?;
             Ok::<_, PlanError>(plan.inspect(&frames, Instant::now()))
         });
         let inspection = judged.map_err(|error| Failure::new(Exit::Content, error.to_string()))?;
-        let replayed = entry(inspection, reference.number, &reference.fingerprint);
+        let replayed = entry(inspection, number, &fingerprint);
         let document = || {
-            let both = serde_json::json!({ "replayed": replayed, "stored": stored });
-            format!("{both:#}")
+            let recipe = serde_json::json!({
+                "from": from, "number": number, "fingerprint": fingerprint, "same": same,
+            });
+            let all =
+                serde_json::json!({ "replayed": replayed, "stored": stored, "recipe": recipe });
+            format!("{all:#}")
         };
-        answer(self.json, self.quiet, document, || table(&replayed));
+        answer(self.json, self.quiet, document, || table(&replayed, &from));
+        if !same {
+            if let Some(stored) = stored.filter(|_| !self.json.json) {
+                self.quiet.say(|| {
+                    format!(
+                        "result {} in the history is {}{}, judged by another recipe: the two are not compared",
+                        stored.seq,
+                        stored.verdict.word(),
+                        because(&stored)
+                    )
+                });
+            }
+            return Ok(());
+        }
         let Some(stored) = stored else {
             let message = format!(
                 "compare with the history: no stored result names {}: the result above was compared with nothing",
@@ -121,68 +126,50 @@ impl Replay {
         }
     }
 
-    fn recipe(&self, state: &Path, number: u32, fingerprint: &str) -> Result<Recipe, Failure> {
-        let Some(path) = &self.recipe else {
-            let number = u16::try_from(number).unwrap_or(0);
-            let store = Store::at(&state.join("recipes"));
-            return store
-                .load_fingerprint(number, fingerprint)
-                .map_err(|error| {
-                    let exit = match error {
-                        LoadError::Unknown(_) => Exit::Missing,
-                        LoadError::Corrupt { .. } => Exit::Content,
-                    };
-                    Failure::new(exit, format!("{error}; or name its file with --recipe"))
-                });
+    fn choose(&self, kept: &Kept, stored: &Store) -> Result<Chosen, Failure> {
+        let (recipe, from) = match &self.recipe {
+            None => {
+                let (recipe, own) = kept.recipe(stored)?;
+                let from = match own {
+                    true => "the recording's own recipe",
+                    false => "the station's recipe: the recording has none of its own",
+                };
+                (recipe, from.to_owned())
+            }
+            Some(named) if named == Path::new("stored") => {
+                let number = u16::try_from(kept.reference().number).unwrap_or(0);
+                let loaded = stored.load(number).map_err(|error| missing(&error))?;
+                (loaded.recipe, "the station's recipe as it is now".into())
+            }
+            Some(path) => (kept::read(path)?, path.display().to_string()),
         };
-        let read = |what: String| move |error: String| Failure::because(Exit::Content, what, error);
-        let what = format!("read recipe {}", path.display());
-        let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
-        let (size, file) = opened.map_err(|error| Failure::because(Exit::Missing, &what, error))?;
-        let recipe = Recipe::read(std::io::BufReader::new(file), size)
-            .map_err(|error| read(what.clone())(error.to_string()))?;
-        if recipe.file.fingerprint == fingerprint {
-            return Ok(recipe);
-        }
-        let found = recipe
-            .file
-            .fingerprint
-            .get(..8)
-            .unwrap_or_default()
-            .to_owned();
-        let wanted = fingerprint.get(..8).unwrap_or_default();
-        Err(read(what)(format!(
-            "its fingerprint is {found}, the part was judged by {wanted}: name that one"
-        )))
-    }
-
-    /// The stored result that names this recording.
-    fn stored(&self, state: &Path) -> Result<Option<Entry>, Failure> {
-        let folder = self.recording.canonicalize().ok();
-        let name = folder
-            .as_deref()
-            .and_then(Path::file_name)
-            .map(|name| name.to_string_lossy().into_owned());
-        let reader = Reader::of(state);
-        match name {
-            Some(name) if reader.path().exists() => reader.recorded_as(&name).map_err(failure),
-            _ => Ok(None),
-        }
+        let same = recipe.file.fingerprint == kept.reference().fingerprint;
+        Ok(Chosen { recipe, from, same })
     }
 }
 
-/// The grey response that the recipe was made with, which recordings do not say: of the calibration that it names.
-fn response(place: &Path, recipe: &Recipe) -> Option<GreyResponse> {
-    let place = Place::at(place);
-    let newest = place.load().ok().flatten().map(|loaded| loaded.file);
-    let generations = newest.into_iter().chain(place.load_previous());
-    let mut same = generations.filter(|file| file.fingerprint == recipe.file.calibration);
-    same.find_map(|file| file.calibration().ok()?.response)
+/// The stored result of a recording: the one that names it, or that of the SEQ in its name. One of another part is that of
+/// another device.
+fn stored(state: &Path, name: Option<&str>, kept: &Kept) -> Result<Option<Entry>, Failure> {
+    let reader = Reader::of(state);
+    let Some(name) = name.filter(|_| reader.path().exists()) else {
+        return Ok(None);
+    };
+    let mut found = reader.recorded_as(name).map_err(failure)?;
+    if let (None, Some(seq)) = (&found, seq_of(name)) {
+        found = reader.result(seq).map_err(failure)?;
+    }
+    let part = kept.part_id();
+    let same = |entry: &Entry| {
+        kept.reference().fingerprint.starts_with(&entry.fingerprint)
+            && part.is_none_or(|part| part == entry.part_id.to_string())
+    };
+    Ok(found.filter(same))
 }
 
-fn entry(inspection: Inspection, recipe: u32, fingerprint: &str) -> Entry {
+fn entry(inspection: Inspection, recipe: u16, fingerprint: &str) -> Entry {
     Entry::of(&ResultRecord {
-        recipe: u16::try_from(recipe).unwrap_or(0),
+        recipe,
         recipe_crc: crate::recipe::short(fingerprint),
         verdict: inspection.verdict(),
         error_code: inspection.error_code,
@@ -191,10 +178,14 @@ fn entry(inspection: Inspection, recipe: u32, fingerprint: &str) -> Entry {
     })
 }
 
-/// The verdict, and a line for each gauge.
-fn table(entry: &Entry) -> String {
+/// The verdict, the recipe that it comes from, and a line for each gauge.
+fn table(entry: &Entry, from: &str) -> String {
     let number = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:+.4}"));
-    let mut lines = vec![format!("{}{}", entry.verdict.word(), because(entry))];
+    let recipe = format!("recipe {}, fingerprint {}", entry.recipe, entry.fingerprint);
+    let mut lines = vec![
+        format!("{}{}", entry.verdict.word(), because(entry)),
+        format!("judged by {from}: {recipe}"),
+    ];
     lines.extend(entry.gauges.iter().map(|gauge| {
         format!(
             "{:<20} {:>10} {:<3} σ {:>8}  limits {} to {}",

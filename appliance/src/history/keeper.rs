@@ -3,6 +3,7 @@
 
 use super::recordings::{FailedPart, Recordings};
 use super::task::Message;
+use crate::recipe::Store;
 use crate::station::{ResultRecord, Verdict};
 use std::path::Path;
 use std::sync::Arc;
@@ -33,16 +34,18 @@ pub(super) struct Keeping {
     told: SyncSender<Message>,
 }
 
-/// Opens the folder of recordings. What happens to them is `told` to the history's thread.
+/// Opens the folder of recordings; `recipes` are those of the station. What happens to the recordings is `told` to the
+/// history's thread.
 ///
 /// # Errors
 /// Whatever the file system answers.
 pub(super) fn open(
     folder: &Path,
+    recipes: Store,
     quota: u64,
     told: SyncSender<Message>,
 ) -> std::io::Result<(Keeper, Keeping)> {
-    let recordings = Recordings::open(folder, quota)?;
+    let recordings = Recordings::open(folder, recipes, quota)?;
     let (sender, orders) = sync_channel(3);
     let busy = Arc::new(AtomicBool::new(false));
     let keeper = Keeper {

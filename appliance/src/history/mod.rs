@@ -34,7 +34,7 @@ mod tests;
 
 pub use entry::{Entry, Filter, GaugeEntry, StageEntry, difference};
 pub use reader::{Counts, Reader, Trend, TrendPoint};
-pub use recordings::FailedPart;
+pub use recordings::{FailedPart, RECIPE, name_of, seq_of};
 pub use seqs::Numbering;
 pub use task::{Bounds, History, Task, open};
 pub use writer::{Opening, Writer};

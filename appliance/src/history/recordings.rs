@@ -1,17 +1,26 @@
 //! The recordings of failed parts: a folder with a quota, the oldest go first.
+//!
+//! Each holds the recipe that judged it, so that it can be judged again after the recipe was edited or deleted. The file is a
+//! second name (hard link) of the store's, which replaces its files and never changes them: it takes no room while the store
+//! or another recording has it, counts once however many have it, and goes with the last one.
 
 use crate::calibration::Calibration;
+use crate::output::folder::name_also;
 use crate::plan::Plan;
-use crate::recipe::PatternFile;
+use crate::recipe::{PatternFile, Store, archive};
 use crate::station::{ResultRecord, Verdict};
 use hal::frame::Frame;
 use hal::replay::Recording;
 use hal::replay::recorder::{self, RecorderError};
 use hal::replay::recording::{PatternSpec, RecipeReference, RecordedFrame, RecordedProjector};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::{fs, io};
+
+/// The recipe's name in a recording's folder.
+pub const RECIPE: &str = "recipe.recipe";
 
 /// A part that did not pass, and what it was judged by.
 #[derive(Debug)]
@@ -27,30 +36,78 @@ pub struct FailedPart {
 }
 
 impl FailedPart {
-    /// Writes the frames as the new folder `folder`.
+    /// Writes the frames as the new folder `folder`, with the recipe: the first of the files `recipes` that is the one that
+    /// judged the part. Where none is, or recording and recipe would take more than `most` bytes, it is left out.
     ///
     /// # Errors
     /// [`RecorderError`]; nothing of it is left then.
-    pub fn write(&self, folder: &Path) -> Result<(), RecorderError> {
-        recorder::write(&recording(self), folder)
+    pub fn write(
+        &self,
+        folder: &Path,
+        recipes: &[PathBuf],
+        most: u64,
+    ) -> Result<(), RecorderError> {
+        let fingerprint = &self.plan.file().fingerprint;
+        recorder::write_with(&recording(self), folder, |partial| {
+            let room = most.saturating_sub(bytes_in(partial));
+            let fits = |path: &&PathBuf| fs::metadata(path).is_ok_and(|file| file.len() <= room);
+            let own = partial.join(RECIPE);
+            let added = recipes.iter().filter(fits).any(|path| {
+                // Looked at under its new name: the store may give the old one to another file at any time.
+                name_also(path, &own).is_ok() && fingerprint_of(&own).as_ref() == Some(fingerprint)
+            });
+            if !added {
+                // There may be none. A recording without its recipe is judged again by the store's.
+                let _ = fs::remove_file(&own);
+            }
+        })
     }
+}
+
+fn fingerprint_of(recipe: &Path) -> Option<String> {
+    let file = fs::File::open(recipe).ok()?;
+    Some(archive::manifest(file).ok()?.fingerprint)
 }
 
 /// The folder.
 #[derive(Debug)]
 pub(super) struct Recordings {
     folder: PathBuf,
-    /// Name and bytes, oldest first.
-    kept: VecDeque<(String, u64)>,
+    recipes: Store,
+    /// Oldest first.
+    kept: VecDeque<Kept>,
     quota: u64,
 }
 
+/// One recording.
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Kept {
+    name: String,
+    /// Without its recipe.
+    bytes: u64,
+    /// The recipe's file, as the file system numbers it, and its bytes.
+    recipe: Option<(u64, u64)>,
+}
+
+impl Kept {
+    fn at(folder: &Path, name: String) -> Self {
+        let recipe = fs::metadata(folder.join(RECIPE)).ok();
+        let recipe = recipe.map(|file| (file.ino(), file.len()));
+        let bytes = bytes_in(folder).saturating_sub(recipe.map_or(0, |(_, bytes)| bytes));
+        Self {
+            name,
+            bytes,
+            recipe,
+        }
+    }
+}
+
 impl Recordings {
-    /// Opens the folder and removes what a kill left half written. `quota` in bytes.
+    /// Opens the folder and removes what a kill left half written. `recipes` are those of the station, `quota` is in bytes.
     ///
     /// # Errors
     /// Whatever the file system answers.
-    pub(super) fn open(folder: &Path, quota: u64) -> io::Result<Self> {
+    pub(super) fn open(folder: &Path, recipes: Store, quota: u64) -> io::Result<Self> {
         fs::create_dir_all(folder)?;
         let mut kept = Vec::new();
         for entry in fs::read_dir(folder)? {
@@ -59,12 +116,13 @@ impl Recordings {
             if name.starts_with('.') && name.contains(".partial-") {
                 fs::remove_dir_all(entry.path())?;
             } else if seq_of(&name).is_some() {
-                kept.push((name, bytes_in(&entry.path())));
+                kept.push(Kept::at(&entry.path(), name));
             }
         }
         kept.sort();
         Ok(Self {
             folder: folder.to_path_buf(),
+            recipes,
             kept: kept.into(),
             quota,
         })
@@ -72,7 +130,7 @@ impl Recordings {
 
     /// The names of the recordings, oldest first.
     pub(super) fn names(&self) -> impl Iterator<Item = &str> {
-        self.kept.iter().map(|(name, _)| name.as_str())
+        self.kept.iter().map(|kept| kept.name.as_str())
     }
 
     /// Writes the frames of a failed part; answers with the recording's name.
@@ -82,15 +140,21 @@ impl Recordings {
     pub(super) fn keep(&mut self, part: &FailedPart) -> Result<String, RecorderError> {
         let name = name_of(&part.record);
         let folder = self.folder.join(&name);
-        part.write(&folder)?;
-        self.kept.push_back((name.clone(), bytes_in(&folder)));
+        // First the file that the recording before shares, so that a recipe imported twice is kept once.
+        let before = self.kept.back().filter(|kept| kept.recipe.is_some());
+        let before = before.map(|kept| self.folder.join(&kept.name).join(RECIPE));
+        let stored = self.recipes.generations(part.plan.file().number);
+        let recipes: Vec<_> = before.into_iter().chain(stored).collect();
+        part.write(&folder, &recipes, self.quota)?;
+        self.kept.push_back(Kept::at(&folder, name.clone()));
         Ok(name)
     }
 
     /// Removes the oldest recording while all together are over the quota; answers with its name.
     pub(super) fn over_quota(&mut self) -> Option<String> {
-        let all: u64 = self.kept.iter().map(|(_, bytes)| bytes).sum();
-        if all > self.quota {
+        let recipes: BTreeMap<u64, u64> = self.kept.iter().filter_map(|kept| kept.recipe).collect();
+        let frames: u64 = self.kept.iter().map(|kept| kept.bytes).sum();
+        if frames + recipes.values().sum::<u64>() > self.quota {
             self.remove_oldest()
         } else {
             None
@@ -99,7 +163,7 @@ impl Recordings {
 
     /// Removes the oldest recording; answers with its name.
     pub(super) fn remove_oldest(&mut self) -> Option<String> {
-        let (name, _) = self.kept.pop_front()?;
+        let Kept { name, .. } = self.kept.pop_front()?;
         // Whatever stays of it is counted again at the next start.
         let _ = fs::remove_dir_all(self.folder.join(&name));
         Some(name)
@@ -107,16 +171,17 @@ impl Recordings {
 }
 
 /// `0000000042-0003-fail`: SEQ, recipe, verdict. In the order of their names they are in the order of their SEQs.
-fn name_of(record: &ResultRecord) -> String {
+pub fn name_of(record: &ResultRecord) -> String {
     let verdict = match record.verdict {
+        Verdict::Pass => "pass",
         Verdict::Fail => "fail",
-        _ => "invalid",
+        Verdict::None | Verdict::Invalid => "invalid",
     };
     format!("{:010}-{:04}-{verdict}", record.seq, record.recipe)
 }
 
 /// The SEQ in a recording's name.
-pub(super) fn seq_of(name: &str) -> Option<u32> {
+pub fn seq_of(name: &str) -> Option<u32> {
     let (seq, _) = name.split_once('-')?;
     if seq.len() == 10 {
         seq.parse().ok()
@@ -204,5 +269,42 @@ fn pattern(plan: &Plan) -> PatternSpec {
                     .collect(),
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A recording by hand: frames of 100 bytes, and a recipe of 1000, linked to `recipe` or a file of its own.
+    fn put(folder: &Path, seq: u32, recipe: Option<&Path>) {
+        let place = folder.join(format!("{seq:010}-0001-fail"));
+        fs::create_dir_all(&place).unwrap();
+        fs::write(place.join("frame"), [0; 100]).unwrap();
+        match recipe {
+            Some(recipe) => fs::hard_link(recipe, place.join(RECIPE)).unwrap(),
+            None => fs::write(place.join(RECIPE), [0; 1000]).unwrap(),
+        }
+    }
+
+    #[test]
+    fn a_recipe_counts_once_however_many_recordings_have_it_and_goes_with_the_last_of_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let (recordings, recipe) = (folder.path().join("kept"), folder.path().join("recipe"));
+        fs::write(&recipe, [0; 1000]).unwrap();
+        put(&recordings, 1, Some(&recipe));
+        put(&recordings, 2, Some(&recipe));
+        put(&recordings, 3, None);
+        let open = |quota| {
+            let mut recordings = Recordings::open(&recordings, Store::at(folder.path()), quota);
+            std::iter::from_fn(|| recordings.as_mut().unwrap().over_quota()).count()
+        };
+        // Three sets of frames and two recipes.
+        assert_eq!(open(2300), 0);
+        assert_eq!(open(2299), 1);
+        assert_eq!(open(2199), 1);
+        assert_eq!(open(1100), 0);
+        assert_eq!(open(1099), 1);
+        assert_eq!(fs::metadata(&recipe).unwrap().nlink(), 1);
     }
 }

@@ -9,6 +9,7 @@ use super::spool::Spool;
 use super::syncing::{self, Syncer, Syncing};
 use super::writer::{Opening, Writer};
 use super::{DATABASE, HistoryError, RECORDINGS, Reader};
+use crate::recipe::Store;
 use crate::station::{Event, ResultRecord, StationHandle};
 use std::collections::VecDeque;
 use std::os::unix::fs::MetadataExt as _;
@@ -129,8 +130,13 @@ pub fn open(
     let seqs = Seqs::reserve(counter, mark, run, next);
     let seqs = seqs.map_err(|error| failed("result-seq", error))?;
     let (queue, inbox) = sync_channel(MAX_WAITING);
-    let (keeper, keeping) = keeper::open(&state.join(RECORDINGS), bounds.recordings, queue.clone())
-        .map_err(|error| failed(RECORDINGS, error))?;
+    let (keeper, keeping) = keeper::open(
+        &state.join(RECORDINGS),
+        Store::at(&state.join("recipes")),
+        bounds.recordings,
+        queue.clone(),
+    )
+    .map_err(|error| failed(RECORDINGS, error))?;
     let shared = Arc::new(Shared::default());
     let (syncer, syncing) = syncing::open(
         &state.join(DATABASE),

@@ -107,6 +107,21 @@ impl Plan {
                 present: digits(&present),
             });
         }
+        Self::again(recipe, calibration, simulated)
+    }
+
+    /// The same, to judge a part once more: `calibration` is what its recording says of the head. Of a calibration's
+    /// fingerprint the recording lacks the projector's response, which frames are not judged by; so fingerprints are not
+    /// compared, but were when the part was measured.
+    ///
+    /// # Errors
+    /// If the recipe does not fit the frames.
+    pub fn again(
+        recipe: Recipe,
+        calibration: &Calibration,
+        simulated: bool,
+    ) -> Result<Self, PlanError> {
+        let number = recipe.file.number;
         Self::join(recipe, calibration, simulated)
             .map_err(|reason| PlanError::Unfit { number, reason })
     }

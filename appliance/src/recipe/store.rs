@@ -81,6 +81,11 @@ impl Store {
         self.folder.join(format!("{number:04}.recipe.previous"))
     }
 
+    /// Where the generations of a recipe lie, the newest first; there may be none.
+    pub fn generations(&self, number: u16) -> [PathBuf; 2] {
+        [self.path(number), self.previous(number)]
+    }
+
     /// Stores a packed recipe under its number; the one before stays as the previous generation.
     ///
     /// # Errors
@@ -158,7 +163,7 @@ impl Store {
     /// If none has it any more.
     pub fn load_fingerprint(&self, number: u16, fingerprint: &str) -> Result<Recipe, LoadError> {
         let same = |recipe: &Recipe| recipe.file.fingerprint == fingerprint;
-        let paths = [self.path(number), self.previous(number)];
+        let paths = self.generations(number);
         let found = paths.iter().find_map(|path| {
             let recipe = Self::read(path, number)?.ok().filter(same)?;
             Some((path, recipe))

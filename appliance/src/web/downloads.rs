@@ -1,15 +1,15 @@
 //! Files to take along: point cloud, gauges, and everything that a distant colleague needs.
 
-use std::convert::Infallible;
-use std::io::{Cursor, Write as _};
-use std::path::Path;
+use std::fs::File;
+use std::io::{self, Cursor, Write as _};
+use std::path::{Path, PathBuf};
 
 use axum::body::{Body, Bytes};
 use axum::extract::State;
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderName, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::{Value, json};
-use tokio::sync::mpsc;
+use tokio::sync::{OwnedSemaphorePermit, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
 use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
@@ -18,7 +18,7 @@ use zip::{CompressionMethod, ZipWriter};
 use super::problem::Problem;
 use super::site::Site;
 use super::{metrics, view};
-use crate::history::{FailedPart, Filter};
+use crate::history::{FailedPart, Filter, name_of};
 
 /// Bytes of a file that are handed to a connection at a time.
 const CHUNK: usize = 64 << 10;
@@ -32,20 +32,10 @@ pub(super) async fn file(
     kind: &'static str,
     work: impl FnOnce(&Site) -> Result<(String, Vec<u8>), Problem> + Send + 'static,
 ) -> Result<Response, Problem> {
-    let permit = site.files.clone().try_acquire_owned().map_err(|_| {
-        let words = "too many files are being taken along already: wait until one is done";
-        Problem::new(StatusCode::SERVICE_UNAVAILABLE, words)
-    })?;
+    let permit = place(site)?;
     let (name, bytes) = site.aside(work).await?;
-    let headers = [
-        (header::CONTENT_TYPE, kind.to_owned()),
-        (header::CONTENT_LENGTH, bytes.len().to_string()),
-        (
-            header::CONTENT_DISPOSITION,
-            format!("attachment; filename=\"{name}\""),
-        ),
-    ];
-    let (sender, receiver) = mpsc::channel::<Result<Bytes, Infallible>>(1);
+    let length = (header::CONTENT_LENGTH, bytes.len().to_string());
+    let (sender, receiver) = mpsc::channel::<Result<Bytes, io::Error>>(1);
     tokio::spawn(async move {
         // Held until the client has taken the file or is gone.
         let _permit = permit;
@@ -57,7 +47,116 @@ pub(super) async fn file(
             }
         }
     });
-    Ok((headers, Body::from_stream(ReceiverStream::new(receiver))).into_response())
+    let body = Body::from_stream(ReceiverStream::new(receiver));
+    Ok((attached(kind, &name), [length], body).into_response())
+}
+
+/// A place among the files that are on their way.
+fn place(site: &Site) -> Result<OwnedSemaphorePermit, Problem> {
+    site.files.clone().try_acquire_owned().map_err(|_| {
+        let words = "too many files are being taken along already: wait until one is done";
+        Problem::new(StatusCode::SERVICE_UNAVAILABLE, words)
+    })
+}
+
+fn attached(kind: &str, name: &str) -> [(HeaderName, String); 2] {
+    [
+        (header::CONTENT_TYPE, kind.to_owned()),
+        (
+            header::CONTENT_DISPOSITION,
+            format!("attachment; filename=\"{name}\""),
+        ),
+    ]
+}
+
+/// A folder that goes as a ZIP, piece by piece: with its recipe a recording is too large to be in memory for each client.
+pub(super) struct Packed {
+    /// The folder's name in the ZIP.
+    name: String,
+    members: Vec<(PathBuf, File)>,
+}
+
+impl Packed {
+    /// Opens every file in a folder and the folders in it, so that they can be read even if the folder goes meanwhile.
+    ///
+    /// # Errors
+    /// Whatever the file system answers.
+    pub(super) fn of(folder: &Path, name: String) -> io::Result<Self> {
+        let mut members = Vec::new();
+        let mut waiting = vec![folder.to_path_buf()];
+        while let Some(here) = waiting.pop() {
+            for entry in std::fs::read_dir(here)? {
+                let path = entry?.path();
+                if path.is_dir() {
+                    waiting.push(path);
+                } else if let Ok(inside) = path.strip_prefix(folder) {
+                    members.push((inside.to_path_buf(), File::open(&path)?));
+                }
+            }
+        }
+        members.sort_by(|(a, _), (b, _)| a.cmp(b));
+        Ok(Self { name, members })
+    }
+
+    fn write(self, to: ToClient) -> Result<(), ZipError> {
+        let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+        let mut zip = ZipWriter::new_stream(to);
+        for (inside, mut file) in self.members {
+            let parts: Vec<_> = inside.iter().map(|part| part.to_string_lossy()).collect();
+            zip.start_file(format!("{}/{}", self.name, parts.join("/")), stored)?;
+            io::copy(&mut file, &mut zip)?;
+        }
+        zip.finish()?.into_inner().flush()?;
+        Ok(())
+    }
+}
+
+/// Hands the bytes of a file to its client as it takes them.
+struct ToClient {
+    sender: mpsc::Sender<Result<Bytes, io::Error>>,
+    chunk: Vec<u8>,
+}
+
+impl io::Write for ToClient {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.chunk.extend_from_slice(bytes);
+        if self.chunk.len() >= CHUNK {
+            self.flush()?;
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let chunk = Bytes::from(std::mem::take(&mut self.chunk));
+        let sent = self.sender.blocking_send(Ok(chunk));
+        // The client is gone.
+        sent.map_err(|_| io::ErrorKind::BrokenPipe.into())
+    }
+}
+
+/// A folder as a ZIP, as `work` finds it; a few at a time.
+///
+/// # Errors
+/// Too many are on their way, or what `work` answers.
+pub(super) async fn folder(
+    site: &Site,
+    work: impl FnOnce(&Site) -> Result<(String, Packed), Problem> + Send + 'static,
+) -> Result<Response, Problem> {
+    let permit = place(site)?;
+    let (name, packed) = site.aside(work).await?;
+    let (sender, receiver) = mpsc::channel(1);
+    tokio::task::spawn_blocking(move || {
+        // Held until the client has taken the file or is gone.
+        let _permit = permit;
+        let (sender, broken) = (sender.clone(), sender);
+        let chunk = Vec::with_capacity(CHUNK);
+        if let Err(error) = packed.write(ToClient { sender, chunk }) {
+            // The answer breaks off, and the client knows that it is not whole.
+            let _ = broken.blocking_send(Err(io::Error::other(error)));
+        }
+    });
+    let body = Body::from_stream(ReceiverStream::new(receiver));
+    Ok((attached("application/zip", &name), body).into_response())
 }
 
 pub(super) async fn cloud(State(site): State<Site>) -> Result<Response, Problem> {
@@ -76,7 +175,7 @@ const GONE: &str =
     "the frames of the last result are gone, or the station is busy; trigger a measurement";
 
 pub(super) async fn recording(State(site): State<Site>) -> Result<Response, Problem> {
-    file(&site, "application/zip", |site| {
+    folder(&site, |site| {
         let asked = site.maps.ask(|cycle| FailedPart {
             record: cycle.record.clone(),
             frames: cycle.frames.to_vec(),
@@ -84,17 +183,23 @@ pub(super) async fn recording(State(site): State<Site>) -> Result<Response, Prob
             calibration: cycle.calibration.clone(),
         });
         let part = asked.ok_or_else(|| Problem::missing(GONE))?;
-        let folder = site.history.scratch();
-        let written = part.write(&folder);
-        let packed = written.map_err(|error| error.to_string()).and_then(|()| {
-            zipped(&folder).map_err(|error| format!("pack the recording: {error}: free space"))
-        });
-        // Whatever cannot be removed now, the next start removes.
-        let _ = std::fs::remove_dir_all(&folder);
+        let scratch = site.history.scratch();
+        let recipes = site.recipes.generations(part.plan.file().number);
+        let written = part.write(&scratch, &recipes, u64::MAX);
+        let packed = written
+            .map_err(|error| error.to_string())
+            .and_then(|()| Packed::of(&scratch, name_of(&part.record)).map_err(unpacked));
+        // Its files are open. Whatever cannot be removed now, the next start removes.
+        let _ = std::fs::remove_dir_all(&scratch);
         let name = format!("{}-recording.zip", part.record.seq);
         Ok((name, packed.map_err(Problem::broken)?))
     })
     .await
+}
+
+/// A recording that cannot be packed, in words.
+pub(super) fn unpacked(error: io::Error) -> String {
+    format!("pack the recording: {error}: free space")
 }
 
 pub(super) async fn gauges(State(site): State<Site>) -> Result<Response, Problem> {
@@ -128,29 +233,6 @@ fn gauges_csv(site: &Site) -> Result<(String, Vec<u8>), Problem> {
         );
     }
     Ok((format!("{}.csv", result.seq), csv.into_bytes()))
-}
-
-/// A folder and the folders in it as a ZIP.
-///
-/// # Errors
-/// If a file cannot be read.
-pub(super) fn zipped(folder: &Path) -> Result<Vec<u8>, ZipError> {
-    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
-    let mut waiting = vec![folder.to_path_buf()];
-    while let Some(here) = waiting.pop() {
-        for entry in std::fs::read_dir(here)? {
-            let path = entry?.path();
-            if path.is_dir() {
-                waiting.push(path);
-            } else if let Ok(name) = path.strip_prefix(folder) {
-                let parts: Vec<_> = name.iter().map(|part| part.to_string_lossy()).collect();
-                zip.start_file(parts.join("/"), stored)?;
-                zip.write_all(&std::fs::read(&path)?)?;
-            }
-        }
-    }
-    Ok(zip.finish()?.into_inner())
 }
 
 /// A ZIP of everything that explains a device's behaviour; no secrets.

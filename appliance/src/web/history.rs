@@ -5,7 +5,7 @@ use axum::response::{Json, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::downloads::{file, zipped};
+use super::downloads::{Packed, file, folder, unpacked};
 use super::problem::Problem;
 use super::site::Site;
 use crate::history::{Filter, HistoryError};
@@ -99,14 +99,15 @@ pub(super) async fn recording(
     State(site): State<Site>,
     Path(seq): Path<u32>,
 ) -> Result<Response, Problem> {
-    file(&site, "application/zip", move |site| {
+    folder(&site, move |site| {
         let words = format!("the frames of result {seq} were not kept");
-        let folder = site.history.recording(seq)?;
-        let folder = folder.filter(|folder| folder.is_dir());
-        let folder = folder.ok_or_else(|| Problem::missing(words))?;
-        let failed = |error| Problem::broken(format!("pack the recording: {error}"));
-        let zip = zipped(&folder).map_err(failed)?;
-        Ok((format!("{seq}-recording.zip"), zip))
+        let kept = site.history.recording(seq)?;
+        let kept = kept.filter(|folder| folder.is_dir());
+        let kept = kept.ok_or_else(|| Problem::missing(words))?;
+        let name = kept.file_name().unwrap_or_default().to_string_lossy();
+        let packed = Packed::of(&kept, name.into_owned());
+        let packed = packed.map_err(|error| Problem::broken(unpacked(error)))?;
+        Ok((format!("{seq}-recording.zip"), packed))
     })
     .await
 }

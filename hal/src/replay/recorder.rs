@@ -47,6 +47,19 @@ pub enum RecorderError {
 /// # Errors
 /// [`RecorderError`]; the folder is then not there.
 pub fn write(recording: &Recording, folder: &Path) -> Result<(), RecorderError> {
+    write_with(recording, folder, |_| ())
+}
+
+/// The same; `add` may put synced files of its own beside those of the recording, into the folder that it is given, before
+/// the recording gets its name.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_with(
+    recording: &Recording,
+    folder: &Path,
+    add: impl FnOnce(&Path),
+) -> Result<(), RecorderError> {
     if fs::symlink_metadata(folder).is_ok() {
         return Err(RecorderError::Exists {
             path: folder.to_path_buf(),
@@ -60,6 +73,7 @@ pub fn write(recording: &Recording, folder: &Path) -> Result<(), RecorderError> 
     // Made here and not in `fill`: what somebody else made is not ours to remove.
     fs::create_dir(&partial).map_err(|source| create(&partial, source))?;
     let written = fill(recording, &manifest, &partial).and_then(|()| {
+        add(&partial);
         fs::rename(&partial, folder).map_err(|source| create(folder, source))?;
         sync_folder(
             folder
