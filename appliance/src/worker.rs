@@ -190,7 +190,7 @@ impl Worker {
 
     /// Loads a recipe; the one before stays active unless everything went well.
     fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Arc<Plan>>) {
-        let (result, message) = match self.prepare(key) {
+        let (result, message) = match self.prepare(key, plan.as_ref()) {
             Ok(_) if self.aborts.has(job) => (RecipeResult::Busy, format!("load: {ABORTED}")),
             Ok((ready, fallback)) => {
                 let recipe = active(&ready);
@@ -232,9 +232,12 @@ impl Worker {
         }
     }
 
+    /// Makes a recipe ready to measure. `shown` is the plan whose patterns the head holds: if its recipe is asked for and has not
+    /// changed, there is nothing left to do.
     fn prepare(
         &mut self,
         key: &RecipeKey,
+        shown: Option<&Arc<Plan>>,
     ) -> Result<(Arc<Plan>, Option<String>), (RecipeResult, String)> {
         if let Some(problem) = &self.opened.problem {
             return Err((RecipeResult::OtherCalibration, problem.clone()));
@@ -272,6 +275,9 @@ impl Worker {
                 (plan, loaded.fallback)
             }
         };
+        if shown.is_some_and(|shown| Arc::ptr_eq(shown, &plan)) {
+            return Ok((plan, fallback));
+        }
         pool.install(|| plan.rasters(calibration))
             .and_then(|rasters| self.opened.head.load(rasters))
             .map_err(|error| {
@@ -338,7 +344,8 @@ impl Worker {
             });
         let ready = stored.and_then(|()| {
             let key = RecipeKey::Number(number);
-            self.prepare(&key)
+            // Teaching has shown patterns of its own.
+            self.prepare(&key, None)
                 .map_err(|(_, message)| (code::RIG, message))
         });
         match ready {
@@ -373,6 +380,7 @@ fn active(plan: &Plan) -> ActiveRecipe {
     ActiveRecipe {
         number: plan.file().number,
         crc: plan.crc(),
+        part_number: plan.file().part_number.as_str().into(),
         name: plan.file().name.as_str().into(),
     }
 }

@@ -172,6 +172,7 @@ fn publishing() -> allocation_counter::AllocationInfo {
                 let recipe = ActiveRecipe {
                     number: 1,
                     crc: 1,
+                    part_number: "PART-1".into(),
                     name: "part".into(),
                 };
                 station.event(Event::RecipeLoaded { job, recipe });

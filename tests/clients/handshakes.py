@@ -11,9 +11,9 @@ import sys
 import time
 
 from campaign import Campaign
-from plc import (BUSY, EXPOSURE_DONE, MISSED_TRIGGER, ONLINE, PATIENCE_S, PROCESSING, READY, RECIPE_LOAD, RESULT_ACK,
-                 RESULT_TOGGLE, RESULT_VALID, TRIGGER, TRIGGER_ACK, Broken, Plc, check_result, daemon, expect, long,
-                 trigger_fields)
+from plc import (BUSY, EXPOSURE_DONE, MISSED_TRIGGER, ONLINE, PATIENCE_S, PROCESSING, READY, RECIPE, RECIPE_LOAD,
+                 RECIPE_OK, RESULT_ACK, RESULT_TOGGLE, RESULT_VALID, TRIGGER, TRIGGER_ACK, Broken, Plc, check_result,
+                 daemon, expect, long, trigger_fields)
 
 # Cycles of each handshake that are looked at step by step.
 STEPS = 3
@@ -34,7 +34,7 @@ def identity(plc):
     expect(long(words, 36) == 0x12345678, "the test pattern is 0x12345678, high word first")
     value = struct.unpack(">f", struct.pack(">HH", *words[38:40]))[0]
     expect(value == struct.unpack(">f", struct.pack(">f", 123.456))[0], "the test pattern is 123.456")
-    expect(plc.status().map_version == 0x0100, "the map has version 1.0")
+    expect(plc.status().map_version == 0x0101, "the map has version 1.1")
     same = plc.answer(plc.client.read_input_registers(900, count=40)).registers
     expect(same == words, "FC4 reads what FC3 reads")
     expect(plc.read(0, 1) == [ONLINE], "CONTROL starts as ONLINE")
@@ -110,6 +110,31 @@ def missed(plc):
     expect((after.triggers, after.seq) == (before.triggers, before.seq), "nothing was measured")
 
 
+def other_recipe(plc):
+    """No part is measured with a recipe that was not asked for."""
+    before = plc.wait("READY", lambda s: s.has(READY))
+
+    def rejected(status, triggers, how):
+        expect(not status.has(READY), f"READY is 0 {how}")
+        expect((status.missed, status.reject_reason) == (before.missed + triggers, 6), f"reason 6 {how}")
+        expect((status.triggers, status.seq, status.last_token) == (before.triggers, before.seq, before.last_token),
+               f"nothing was measured {how}")
+
+    plc.write(0, [ONLINE])
+    rejected(plc.write_and_read_status(1, trigger_fields(5101, 1, 1, recipe=77)), 1, "by token")
+    edge_write = [ONLINE | TRIGGER, *trigger_fields(0, 1, 1, recipe=77)]
+    rejected(plc.write_and_read_status(0, edge_write), 2, "by edge")
+    failed = plc.load_recipe(77)
+    expect((failed.recipe_result, failed.active_recipe) == (1, RECIPE), "the load failed, the recipe before is active")
+    expect(not failed.bits & (READY | RECIPE_OK), "a failed load takes READY and RECIPE_OK away")
+    # Neither to leave the recipe nor to select the active one is a load.
+    for at, select in enumerate([0, RECIPE]):
+        fields = trigger_fields(5102 + at, 1, 1, recipe=select)
+        rejected(plc.write_and_read_status(1, fields), 3 + at, f"after a failed load, with RECIPE_SELECT {select}")
+    back = plc.load_recipe(RECIPE)
+    expect(back.has(READY | RECIPE_OK) and back.recipe_result == 0, "loading the active recipe makes it ready again")
+
+
 def exceptions(plc):
     def refused(response, code, what):
         expect(response.isError() and getattr(response, "exception_code", 0) == code,
@@ -138,6 +163,7 @@ def main():
                 edge(plc, cycle)
                 token(plc, cycle)
             missed(plc)
+            other_recipe(plc)
             exceptions(plc)
             plc.disconnect()
             told = Campaign(port, SEED).run(cycles)

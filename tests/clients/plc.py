@@ -13,9 +13,12 @@ from pymodbus.client import ModbusTcpClient
 
 ONLINE, TRIGGER, RESULT_ACK, RECIPE_LOAD, BUFFERED = 1 << 0, 1 << 1, 1 << 2, 1 << 3, 1 << 6
 READY, BUSY, PROCESSING, EXPOSURE_DONE = 1 << 1, 1 << 2, 1 << 3, 1 << 4
+RECIPE_LOADING, RECIPE_OK = 1 << 8, 1 << 9
 RESULT_VALID, RESULT_TOGGLE, TRIGGER_ACK = 1 << 5, 1 << 6, 1 << 7
 MISSED_TRIGGER, BUFFER_OVERFLOW = 1 << 12, 1 << 13
 PASS = 1
+# The recipe that the daemon teaches at its first start.
+RECIPE = 1
 PATIENCE_S = 30.0
 # What is tested is the protocol: few pixels, so that nothing waits for light.
 SCENARIO = "sub_rays = 2\n\n[rig.camera]\nwidth = 160\nheight = 160\n"
@@ -41,6 +44,7 @@ class Status:
         self.bits, self.words = words[0], words
         self.error_code, self.state = words[2], words[4]
         self.triggers, self.seq, self.missed = long(words, 10), long(words, 12), long(words, 14)
+        self.active_recipe, self.requested_recipe, self.recipe_result = words[5], words[8], words[9]
         self.last_token, self.buffered = words[16], words[17]
         self.reject_reason, self.map_version = words[20], words[21]
 
@@ -88,6 +92,16 @@ class Plc:
     def status(self):
         return Status(self.read(100, 32))
 
+    def load_recipe(self, number):
+        """A changeover: asks for a recipe and answers with the status when the load has ended."""
+        # The first write of a connection only sets the level that edges are counted from.
+        self.write(0, [ONLINE])
+        self.write(0, [ONLINE | RECIPE_LOAD, 0, number])
+        self.write(0, [ONLINE])
+        ended = self.wait("the end of the load", lambda status: not status.has(RECIPE_LOADING))
+        expect(ended.requested_recipe == number, f"REQUESTED_RECIPE is {number}")
+        return ended
+
     def wait(self, what, condition):
         until = time.monotonic() + PATIENCE_S
         while time.monotonic() < until:
@@ -102,6 +116,7 @@ def check_result(words):
     """What holds for every result of a good part."""
     expect(len(words) == 120, "a result has 120 registers")
     expect(long(words, 0) == long(words, 118), "SEQ is the same at both ends of the block")
+    expect(words[3] == RECIPE, f"it was measured with recipe {RECIPE}, not {words[3]}")
     expect(words[8] == PASS, f"a good part passes (verdict {words[8]}, error {words[9]})")
     gauges = words[27]
     expect(gauges > 0, "the recipe has gauges")
@@ -114,9 +129,12 @@ def check_result(words):
     expect(words[96 + gauges:118] == [0] * (22 - gauges), "what is not used reads 0")
 
 
-def trigger_fields(token, part, stroke):
-    """Registers 1 to 7: TRIGGER_TOKEN, RECIPE_SELECT, PLC_HEARTBEAT, PART_ID, PRESS_STROKE."""
-    return [token, 0, token & 0xFF, part >> 16, part & 0xFFFF, stroke >> 16, stroke & 0xFFFF]
+def trigger_fields(token, part, stroke, recipe=RECIPE):
+    """Registers 1 to 7: TRIGGER_TOKEN, RECIPE_SELECT, PLC_HEARTBEAT, PART_ID, PRESS_STROKE.
+
+    RECIPE_SELECT goes with every trigger: it is rejected where another recipe is active.
+    """
+    return [token, recipe, token & 0xFF, part >> 16, part & 0xFFFF, stroke >> 16, stroke & 0xFFFF]
 
 
 @contextlib.contextmanager

@@ -67,7 +67,7 @@ seq_before=$((before[12] << 16 | before[13]))
 for cycle in $(seq "$cycles"); do
     token=$((cycle + 100))
     # TRIGGER_TOKEN, RECIPE_SELECT, PLC_HEARTBEAT, PART_ID, PRESS_STROKE.
-    trigger=("$token" 0 "$cycle" 1 "$cycle" 2 "$token")
+    trigger=("$token" 1 "$cycle" 1 "$cycle" 2 "$token")
     write_registers 1 "${trigger[@]}"
     # The same write again, as after a lost answer, must not measure again.
     write_registers 1 "${trigger[@]}"

@@ -1,6 +1,6 @@
 //! A line that changes its part between triggers: the verdict is always that of the recipe that was asked for.
 
-use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, long, trigger};
+use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, TRIGGER, long, trigger};
 use appliance::calibration::Calibration;
 use appliance::plan::Plan;
 use appliance::recipe::{Recipe, Store, archive};
@@ -21,6 +21,8 @@ const RECIPE_LOAD: u16 = 1 << 3;
 const RECIPE_LOADING: u16 = 1 << 8;
 /// RECIPE_SELECT: by PART_NUMBER.
 const BY_PART_NUMBER: u16 = 0xFFFF;
+/// REJECT_REASON.
+const ANOTHER_RECIPE: u16 = 6;
 /// Words of VERDICT.
 const PASS: u16 = 1;
 const FAIL: u16 = 2;
@@ -114,7 +116,7 @@ fn change_over(cycles: u16) {
     }
     let mut random = Random::new(0x11E_C4A6);
     let mut active = RECIPES;
-    let mut times = Vec::new();
+    let (mut times, mut back) = (Vec::new(), Vec::new());
     for _ in 0..cycles {
         let wanted = 1 + random.below(usize::from(RECIPES) + 3) as u16;
         let began = Instant::now();
@@ -128,10 +130,15 @@ fn change_over(cycles: u16) {
             refused.map_or(0, |(_, answer)| *answer),
             "recipe {wanted}"
         );
-        if refused.is_none() {
+        if refused.is_some() {
+            token += 1;
+            nothing_is_measured(&mut plc, token);
+            let began = Instant::now();
+            assert_eq!(select(&mut plc, active, random.below(2) == 0), 0);
+            back.push(began.elapsed());
+        } else {
             active = wanted;
         }
-        // After a refusal the recipe before goes on as if nothing had been.
         for _ in 0..=random.below(2) {
             token += 1;
             let words = plc.measure(token);
@@ -146,10 +153,57 @@ fn change_over(cycles: u16) {
     }
     times.sort();
     println!(
-        "{cycles} changes between {RECIPES} recipes: every verdict as unhurried; {:?} median, {:?} longest",
+        "{cycles} changes between {RECIPES} recipes: every verdict as unhurried; {:?} median, {:?} longest; back to the active \
+         one after a refusal: {back:?}",
         times[times.len() / 2],
         times[times.len() - 1]
     );
+}
+
+/// After a load that failed: by token with the selected recipe, with none and with the active one, and by edge.
+fn nothing_is_measured(plc: &mut Plc, token: u16) {
+    let before = plc.status();
+    assert!(!before.has(READY) && !before.has(RECIPE_OK));
+    for select in [None, Some(0), Some(before.active_recipe())] {
+        let mut words = vec![token];
+        words.extend(select);
+        let status = plc.write_and_read_status(1, &words);
+        assert!(!status.has(READY));
+    }
+    let status = plc.write_and_read_status(0, &[ONLINE | TRIGGER]);
+    assert_eq!(
+        (status.missed(), status.0[20]),
+        (before.missed() + 4, ANOTHER_RECIPE)
+    );
+    assert_eq!(
+        (status.triggers(), status.seq(), status.last_token()),
+        (before.triggers(), before.seq(), before.last_token())
+    );
+    plc.write(0, &[ONLINE]);
+}
+
+#[test]
+fn a_client_that_selects_recipe_77_while_1_is_active_gets_reason_6_and_no_verdict() {
+    let place = Place::new();
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    let before = plc.wait("READY", |status| status.has(READY | RECIPE_OK));
+    plc.write(0, &[ONLINE]);
+    let mut fields = trigger(7);
+    fields[1] = 77;
+    let by_token = plc.write_and_read_status(1, &fields);
+    assert_eq!((by_token.missed(), by_token.0[20]), (1, ANOTHER_RECIPE));
+    let by_edge = plc.write_and_read_status(0, &[ONLINE | TRIGGER, 0, 77]);
+    assert_eq!((by_edge.missed(), by_edge.0[20]), (2, ANOTHER_RECIPE));
+    plc.write(0, &[ONLINE]);
+    assert_eq!(select(&mut plc, 77, false), UNKNOWN.1);
+    nothing_is_measured(&mut plc, 7);
+    let after = plc.status();
+    assert_eq!((after.triggers(), after.seq()), (0, before.seq()));
+    assert_eq!(plc.read(208, 1).unwrap(), [0], "no verdict");
+    assert_eq!(select(&mut plc, 1, false), 0);
+    let words = plc.measure(7);
+    assert_eq!((words[3], words[8]), (1, PASS));
 }
 
 #[test]
@@ -212,11 +266,15 @@ fn recipes_at_full_resolution_are_switched_within_a_second() {
         cold.push(switch(number));
     }
     let warm: Vec<_> = (0..6).map(|at| switch([MANY, number][at % 2])).collect();
+    let again: Vec<_> = (0..3).map(|_| switch(number)).collect();
     println!(
-        "switching at 1456 x 1088, trigger in between: {cold:?} where the recipe is read, {warm:?} where it is ready"
+        "switching at 1456 x 1088, trigger in between: {cold:?} where the recipe is read, {warm:?} where it is ready, \
+         {again:?} where it is active"
     );
     // Of a machine that others use as well only the shortest says what the work takes.
-    assert!(warm.iter().min().unwrap() < &SWITCHING, "{warm:?}");
+    let shortest = |times: &[Duration]| times.iter().min().copied().unwrap();
+    assert!(shortest(&warm) < SWITCHING, "{warm:?}");
+    assert!(shortest(&again) < shortest(&warm) / 2, "{again:?}");
 }
 
 /// Prints what the parts of a switch to a recipe take, three times. What it takes of all processors together is within the

@@ -13,10 +13,15 @@ fn root() -> PathBuf {
         .to_path_buf()
 }
 
-/// The first cells of the rows of the table below a heading.
+/// The first cells of the rows of the tables below a heading of the operations guide.
 fn first_cells(heading: &str) -> Vec<String> {
-    let guide = fs::read_to_string(root().join("docs/operations.md")).unwrap();
-    let (_, below) = guide.split_once(&format!("\n## {heading}\n")).unwrap();
+    first_cells_of("operations.md", heading)
+}
+
+/// The same of a document in `docs`.
+fn first_cells_of(document: &str, heading: &str) -> Vec<String> {
+    let text = fs::read_to_string(root().join("docs").join(document)).unwrap();
+    let (_, below) = text.split_once(&format!("\n## {heading}\n")).unwrap();
     let section = below.split("\n## ").next().unwrap();
     let rows = section
         .lines()
@@ -41,8 +46,8 @@ fn source(folder: &Path) -> String {
     all
 }
 
-#[test]
-fn the_guide_knows_exactly_the_error_codes_that_there_are() {
+/// The error codes that the program can show.
+fn error_codes() -> BTreeSet<String> {
     let mut defined = BTreeSet::new();
     for file in ["station/error_code.rs", "worker.rs", "plan/mod.rs"] {
         let text = fs::read_to_string(root().join("appliance/src").join(file)).unwrap();
@@ -56,6 +61,21 @@ fn the_guide_knows_exactly_the_error_codes_that_there_are() {
         );
     }
     assert!(defined.len() > 10, "{defined:?}");
+    defined
+}
+
+#[test]
+fn the_register_map_s_document_knows_exactly_the_error_codes_that_there_are() {
+    let cells = first_cells_of("modbus.md", "Faults");
+    let codes = cells.iter().flat_map(|cell| cell.split(", "));
+    let codes = codes.filter(|code| code.bytes().all(|byte| byte.is_ascii_digit()));
+    let told: BTreeSet<_> = codes.map(str::to_owned).collect();
+    assert_eq!(told, error_codes());
+}
+
+#[test]
+fn the_guide_knows_exactly_the_error_codes_that_there_are() {
+    let defined = error_codes();
     let told: BTreeSet<_> = first_cells("Error codes").into_iter().collect();
     assert_eq!(told, defined);
 }

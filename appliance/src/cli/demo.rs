@@ -70,7 +70,8 @@ impl Demo {
             "page on http://{}, Modbus TCP on {}",
             daemon.http, daemon.modbus
         ));
-        let rows = runtime()?.block_on(play(&daemon, &progress));
+        let recipe = config.station.recipe;
+        let rows = runtime()?.block_on(play(&daemon, recipe, &progress));
         progress.clear();
         let rows = rows?;
         let document = || format!("{:#}", table::json(&rows));
@@ -99,7 +100,11 @@ impl Row {
 }
 
 /// Lets ten parts come by and triggers a measurement of each.
-async fn play(daemon: &Daemon, progress: &crate::progress::Progress) -> Result<Vec<Row>, Failure> {
+async fn play(
+    daemon: &Daemon,
+    recipe: u16,
+    progress: &crate::progress::Progress,
+) -> Result<Vec<Row>, Failure> {
     let Some(stage) = &daemon.stage else {
         return Err(Failure::new(
             Exit::Software,
@@ -108,7 +113,7 @@ async fn play(daemon: &Daemon, progress: &crate::progress::Progress) -> Result<V
     };
     // Other noise than the golden map was taught with.
     stage.reseed(NOISE_SEED);
-    let mut plc = Plc::connect(daemon.modbus).await?;
+    let mut plc = Plc::connect(daemon.modbus, recipe).await?;
     let mut rows = Vec::with_capacity(PARTS.len());
     for (at, placed) in PARTS.iter().enumerate() {
         progress.tell(at as f64 / PARTS.len() as f64, "measuring parts");

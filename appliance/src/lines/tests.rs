@@ -1,9 +1,10 @@
 //! The lines with a start line and lamps of this process, and a real station.
 
 use super::*;
+use crate::station::refusal::reject::OTHER_RECIPE;
 use crate::station::{
-    ActiveRecipe, Effect, GaugeValue, Identity, Inspection, JobId, Limits, Micros, RecipeKey,
-    Request, Settings, Station, Unit, Verdict,
+    ActiveRecipe, ConnectionEdges, Effect, GaugeValue, Identity, Inspection, JobId, Limits, Micros,
+    RecipeKey, Request, Settings, Station, Unit, Verdict,
 };
 use rustix::io::{read, write};
 use rustix::pipe::{PipeFlags, pipe_with};
@@ -114,6 +115,7 @@ fn ready() -> (StationHandle, Receiver<JobId>) {
             recipe: ActiveRecipe {
                 number: 1,
                 crc: 1,
+                part_number: "PART-1".into(),
                 name: "part".into(),
             },
         }),
@@ -198,6 +200,42 @@ fn a_start_while_busy_is_counted_as_missed() {
     });
     let snapshot = station.snapshot();
     assert_eq!((snapshot.triggers, snapshot.missed), (1, 1));
+}
+
+#[test]
+fn a_start_while_another_recipe_is_selected_measures_nothing_and_ok_goes_off() {
+    let (station, orders) = ready();
+    let panel = Panel::default();
+    let (line, finger) = pipe_with(PipeFlags::NONBLOCK).unwrap();
+    let wires = Wires {
+        start: Some(Box::new(Button(line))),
+        ..panel.wires()
+    };
+    serving(wires, never(), &station, || {
+        write(&finger, b"!").unwrap();
+        let job = orders.recv_timeout(PATIENCE).unwrap();
+        station.event(Event::Finished {
+            job,
+            inspection: good(),
+        });
+        assert!(panel.until("-busy").ends_with("+ok -busy"));
+        let select = ControlWrite {
+            recipe_select: Some(77),
+            ..ControlWrite::default()
+        };
+        station
+            .write(&mut ConnectionEdges::default(), select)
+            .unwrap();
+        assert!(panel.until("+fault").ends_with("-ok +fault"));
+        write(&finger, b"!").unwrap();
+        let begun = Instant::now();
+        while station.snapshot().missed == 0 && begun.elapsed() < PATIENCE {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    });
+    let snapshot = station.snapshot();
+    assert_eq!((snapshot.triggers, snapshot.missed), (1, 1));
+    assert_eq!(snapshot.reject_reason, OTHER_RECIPE);
 }
 
 #[test]

@@ -1,7 +1,8 @@
-//! Version 1.0 of the map, word for word. If this test fails, do not change the test: the map is append-only.
+//! The versions of the map, word for word. If this test fails, do not change the test: the map is append-only. A version that
+//! adds something adds a list of its own.
 
-use super::map::{BLOCKS, registers};
-use super::render::registers_csv;
+use super::map::{BLOCKS, Register, VERSION, registers};
+use super::render::{registers_csv, registers_json};
 
 /// Address, name, type and block of every row of version 1.0.
 const VERSION_1: &str = "\
@@ -119,6 +120,46 @@ const BLOCKS_1: [(&str, u16, u16, bool); 8] = [
     ("RECIPE_DIRECTORY", 700, 763, false),
     ("IDENTITY", 900, 939, false),
 ];
+
+/// What version 1.0 said of the rows that later versions say more of.
+const MEANINGS_1: [(u16, &str); 2] = [
+    (2, "1-9999; 0 leave the recipe; 65535 select by PART_NUMBER"),
+    (
+        120,
+        "of the last rejected request: 1 not ready, 2 offline, 3 no recipe, 4 teach not allowed, 5 fault",
+    ),
+];
+
+/// Version 1.1 adds no row. It adds a value of REJECT_REASON, and what RECIPE_SELECT means to a trigger.
+const MEANINGS_1_1: [(u16, &str); 2] = [
+    (
+        2,
+        "; a trigger is accepted only if it is the active recipe, or 0",
+    ),
+    (120, ", 6 another recipe is active"),
+];
+
+fn row(address: u16) -> Register {
+    let mut rows = registers().map(|(_, row)| row);
+    rows.find(|row| row.address == address).expect("a row")
+}
+
+#[test]
+fn version_1_1_says_more_of_two_rows_and_takes_nothing_back() {
+    for ((address, first), (_, added)) in MEANINGS_1.into_iter().zip(MEANINGS_1_1) {
+        let meaning = row(address).meaning;
+        let rest = meaning.strip_prefix(first).expect(meaning);
+        assert!(rest.starts_with(added), "{meaning}");
+    }
+}
+
+#[test]
+fn the_version_is_the_same_wherever_it_is_said() {
+    let (major, minor) = (VERSION >> 8, VERSION & 0xFF);
+    assert_eq!((major, minor), (1, 1));
+    assert_eq!(row(121).meaning, format!("{VERSION:#06x}"));
+    assert_eq!(registers_json()["version"], format!("{major}.{minor}"));
+}
 
 #[test]
 fn every_block_of_version_1_is_served_where_it_was() {

@@ -1,7 +1,7 @@
-//! The register map, version 1.0: one table, append-only, from which everything else is derived.
+//! The register map, version 1.1: one table, append-only, from which everything else is derived.
 
 /// MAP_VERSION, register 121.
-pub const VERSION: u16 = 0x0100;
+pub const VERSION: u16 = 0x0101;
 /// The most gauges of one result.
 pub const GAUGES: u16 = 16;
 
@@ -113,7 +113,7 @@ registers! {
     control CONTROL_ROWS {
         0 CONTROL Bits x 1, "0 ONLINE request, 1 TRIGGER edge, 2 RESULT_ACK edge, 3 RECIPE_LOAD edge, 4 ERROR_RESET edge, 5 ABORT edge, 6 BUFFERED mode, 7 TEACH edge, 8-15 must be 0";
         1 TRIGGER_TOKEN U16 x 1, "a write that changes it to a non-zero value triggers; echoed at 116 and 202";
-        2 RECIPE_SELECT U16 x 1, "1-9999; 0 leave the recipe; 65535 select by PART_NUMBER";
+        2 RECIPE_SELECT U16 x 1, "1-9999; 0 leave the recipe; 65535 select by PART_NUMBER; a trigger is accepted only if it is the active recipe, or 0";
         3 PLC_HEARTBEAT U16 x 1, "any changing value; stale for longer than plc_timeout sets a warning bit";
         4 PART_ID U32 x 1, "the piece's serial, latched at the trigger, returned with the result";
         6 PRESS_STROKE U32 x 1, "stroke or pallet counter, latched at the trigger, returned with the result";
@@ -135,8 +135,8 @@ registers! {
         116 LAST_TOKEN U16 x 1, "last accepted token";
         117 BUFFERED U16 x 1, "results waiting for RESULT_ACK";
         118 UPTIME U32 x 1, "s";
-        120 REJECT_REASON U16 x 1, "of the last rejected request: 1 not ready, 2 offline, 3 no recipe, 4 teach not allowed, 5 fault";
-        121 MAP_VERSION U16 x 1, "0x0100";
+        120 REJECT_REASON U16 x 1, "of the last rejected request: 1 not ready, 2 offline, 3 no recipe, 4 teach not allowed, 5 fault, 6 another recipe is active";
+        121 MAP_VERSION U16 x 1, "0x0101";
         122 BOOT_ID U32 x 1, "random per start: tokens and counters restarted";
     }
     result RESULT_ROWS {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::map::{Block, Kind, Register, registers};
+use super::map::{Block, Kind, Register, VERSION, registers};
 
 fn type_text(row: &Register) -> String {
     match (row.kind, row.items) {
@@ -20,6 +20,11 @@ fn reference(block: &Block, row: &Register) -> u32 {
 
 fn access(block: &Block) -> &'static str {
     if block.writable { "read/write" } else { "read" }
+}
+
+/// MAP_VERSION as people write it.
+fn version() -> String {
+    format!("{}.{}", VERSION >> 8, VERSION & 0xFF)
 }
 
 /// The map as CSV: one header line, one line per row. `reference` is the 3xxxxx/4xxxxx notation of the PDU address.
@@ -60,7 +65,7 @@ pub fn registers_json() -> serde_json::Value {
             })
         })
         .collect();
-    serde_json::json!({ "format": "fringed-registers", "version": "1.0", "registers": rows })
+    serde_json::json!({ "format": "fringed-registers", "version": version(), "registers": rows })
 }
 
 #[cfg(test)]

@@ -151,6 +151,7 @@ impl Station {
             seq: self.last_seq,
             token: cycle.token,
             recipe: cycle.recipe.number,
+            recipe_name: cycle.recipe.name,
             recipe_crc: cycle.recipe.crc,
             part_id: cycle.part_id,
             press_stroke: cycle.press_stroke,

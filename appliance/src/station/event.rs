@@ -47,6 +47,17 @@ impl RecipeResult {
             Self::Busy => 4,
         }
     }
+
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Ok => "it was loaded",
+            Self::Unknown => "there is no such recipe",
+            Self::Corrupt => "it is damaged or does not fit this head",
+            Self::OtherCalibration => "it was made for another calibration",
+            Self::Busy => "a load or teach was refused or interrupted",
+        }
+    }
 }
 
 /// A request from this side of the wall: the daemon's own start, the command line, later the page.

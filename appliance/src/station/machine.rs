@@ -164,12 +164,6 @@ impl Station {
         }
     }
 
-    /// Whether a trigger would be accepted.
-    pub(super) fn is_ready(&self) -> bool {
-        let at_rest = self.state == State::Ready && !self.unstored;
-        at_rest && self.recipe.is_some() && self.wants_online()
-    }
-
     /// Whether the worker meets its deadlines: that of the wait it is in, else a sign of life now and then.
     pub(super) fn worker_meets_deadlines(&self, now: Micros) -> bool {
         match self.state.deadline() {

@@ -3,21 +3,8 @@
 use super::control::{self, BY_PART_NUMBER, ControlWrite};
 use super::event::{Effect, Effects, RecipeKey, RecipeResult};
 use super::machine::{Station, log, push};
+use super::refusal::reject;
 use super::state::{ClearedBy, Micros, State};
-
-/// REJECT_REASON, register 120: why the last rejected request was rejected.
-pub mod reject {
-    /// The station is busy, boots or stops.
-    pub const NOT_READY: u16 = 1;
-    /// The PLC does not ask for ONLINE.
-    pub const OFFLINE: u16 = 2;
-    /// No recipe is active.
-    pub const NO_RECIPE: u16 = 3;
-    /// The config does not let the PLC teach.
-    pub const TEACH_NOT_ALLOWED: u16 = 4;
-    /// The station has a fault, or the number of a result is still to be stored.
-    pub const FAULT: u16 = 5;
-}
 
 impl Station {
     pub(super) fn plc_write(
@@ -73,20 +60,6 @@ impl Station {
         }
     }
 
-    /// Why a trigger would be rejected now.
-    fn refusal(&self) -> Option<u16> {
-        if self.is_ready() {
-            return None;
-        }
-        Some(match self.state {
-            _ if !self.wants_online() => reject::OFFLINE,
-            State::Fault(_) => reject::FAULT,
-            State::Ready if self.recipe.is_none() => reject::NO_RECIPE,
-            State::Ready => reject::FAULT,
-            _ => reject::NOT_READY,
-        })
-    }
-
     /// Why a recipe cannot be loaded or taught now; it can be while offline.
     fn busy(&self) -> Option<u16> {
         match self.state {
@@ -97,35 +70,37 @@ impl Station {
     }
 
     fn plc_load(&mut self, now: Micros, effects: &mut Effects) {
-        let key = match self.control.recipe_select {
+        let select = self.control.recipe_select;
+        let key = match select {
             0 => return,
             BY_PART_NUMBER => RecipeKey::PartNumber(self.control.part_number_text().into()),
             number => RecipeKey::Number(number),
         };
         if let Some(reason) = self.load(key, now, effects) {
+            self.requested_recipe = select;
+            self.recipe_result = RecipeResult::Busy;
             self.reject_reason = reason;
         }
     }
 
-    /// Orders a load; answers with the reason if that cannot be.
+    /// Orders a load; answers with the reason if that cannot be, and then nothing has changed.
     pub(super) fn load(
         &mut self,
         key: RecipeKey,
         now: Micros,
         effects: &mut Effects,
     ) -> Option<u16> {
-        self.requested_recipe = match key {
-            RecipeKey::Number(number) => number,
-            RecipeKey::PartNumber(_) => BY_PART_NUMBER,
-        };
         let refused = self.busy();
         if refused.is_some() {
-            self.recipe_result = RecipeResult::Busy;
             log(
                 effects,
                 format!("a recipe cannot be loaded while {}", self.state.word()),
             );
         } else {
+            self.requested_recipe = match key {
+                RecipeKey::Number(number) => number,
+                RecipeKey::PartNumber(_) => BY_PART_NUMBER,
+            };
             let job = self.next_job();
             push(
                 effects,
@@ -144,14 +119,15 @@ impl Station {
     }
 
     fn plc_teach(&mut self, now: Micros, effects: &mut Effects) {
-        let number = match self.control.recipe_select {
-            0 | BY_PART_NUMBER => self.recipe.as_ref().map(|recipe| recipe.number),
-            number => Some(number),
-        };
-        let reason = match number {
+        let active = self.recipe.as_ref().map(|recipe| recipe.number);
+        let reason = match (self.control.recipe_select, active) {
             _ if !self.settings.teach_allowed => Some(reject::TEACH_NOT_ALLOWED),
-            None => Some(reject::NO_RECIPE),
-            Some(number) => self.teach(number, now, effects),
+            (0 | BY_PART_NUMBER, None) => Some(reject::NO_RECIPE),
+            // It would replace the recipe of another part.
+            (0 | BY_PART_NUMBER, Some(_)) if self.is_other_recipe_asked_for() => {
+                Some(reject::OTHER_RECIPE)
+            }
+            (0 | BY_PART_NUMBER, Some(number)) | (number, _) => self.teach(number, now, effects),
         };
         if let Some(reason) = reason {
             self.reject_reason = reason;

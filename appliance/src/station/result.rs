@@ -166,6 +166,8 @@ pub struct ResultRecord {
     pub token: u16,
     /// Recipe number.
     pub recipe: u16,
+    /// The recipe's name at the trigger.
+    pub recipe_name: Arc<str>,
     /// First 32 bits of the recipe's fingerprint.
     pub recipe_crc: u32,
     /// PART_ID at the trigger.

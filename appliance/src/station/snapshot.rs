@@ -141,8 +141,10 @@ pub struct Snapshot {
     pub last_token: u16,
     /// Results waiting for RESULT_ACK.
     pub buffered: u16,
-    /// REJECT_REASON, see [`super::plc::reject`].
+    /// REJECT_REASON, see [`super::refusal::reject`].
     pub reject_reason: u16,
+    /// Why a trigger would be rejected now, see [`super::refusal::reject`]; `None` exactly while READY.
+    pub refusal: Option<u16>,
     /// Seconds since the start.
     pub uptime_s: u32,
     /// Random per start.
@@ -224,6 +226,7 @@ impl Station {
             last_token: self.last_token,
             buffered: u16::try_from(self.queue.len()).unwrap_or(u16::MAX),
             reject_reason: self.reject_reason,
+            refusal: self.refusal(),
             uptime_s: now.seconds(),
             boot_id: self.settings.boot_id,
             identity: self.settings.identity.clone(),
@@ -269,7 +272,7 @@ impl Station {
         let up = !matches!(state, State::Boot { .. } | State::Stopping { .. });
         let bits = [
             (status::ONLINE, up && self.wants_online()),
-            (status::READY, self.is_ready()),
+            (status::READY, self.refusal().is_none()),
             (status::BUSY, matches!(state, State::Acquiring { .. })),
             (
                 status::PROCESSING,

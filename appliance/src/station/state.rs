@@ -42,6 +42,8 @@ pub struct ActiveRecipe {
     pub number: u16,
     /// First 32 bits of the recipe's fingerprint.
     pub crc: u32,
+    /// What RECIPE_SELECT 65535 selects it by.
+    pub part_number: Arc<str>,
     /// For people.
     pub name: Arc<str>,
 }

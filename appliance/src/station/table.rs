@@ -88,7 +88,15 @@ fn events(job: JobId) -> Vec<(Event, [u16; 12])> {
         write: ControlWrite {
             control: Masked::<u16>::all(bits),
             token: Some(token),
-            recipe_select: Some(2),
+            recipe_select: Some(1),
+            ..Default::default()
+        },
+        rising,
+    };
+    let other_recipe = |rising: u16, token: u16| Event::Write {
+        write: ControlWrite {
+            token: Some(token),
+            recipe_select: Some(77),
             ..Default::default()
         },
         rising,
@@ -104,6 +112,11 @@ fn events(job: JobId) -> Vec<(Event, [u16; 12])> {
             [0, 2, 2, 3, 4, 5, 2, 7, 7, 7, 7, 8],
         ),
         (write(1, 0, 99), [0, 2, 2, 3, 4, 5, 2, 7, 7, 7, 7, 8]),
+        (
+            other_recipe(control::TRIGGER, 0),
+            [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 7, 8],
+        ),
+        (other_recipe(0, 99), [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 7, 8]),
         (
             write(5, control::RESULT_ACK, 0),
             [0, 1, 2, 3, 4, 5, 1, 7, 7, 7, 7, 8],

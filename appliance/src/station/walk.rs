@@ -43,7 +43,8 @@ fn plc_write(random: &mut Random, edges: &mut ConnectionEdges) -> Event {
         write.token = Some(random.word(20));
     }
     if random.below(4) == 0 {
-        write.recipe_select = Some(random.word(4));
+        // Mostly 0, so that the walk measures; else one that may or may not be active.
+        write.recipe_select = Some(random.word(4) * u16::from(random.below(4) == 0));
     }
     if random.below(4) == 0 {
         write.plc_heartbeat = Some(random.word(9));
@@ -128,6 +129,12 @@ fn any_event(random: &mut Random, edges: &mut ConnectionEdges, last: JobId) -> E
     }
 }
 
+/// Whether the active recipe is the selected one and no load has failed since it became active.
+fn asked_for(after: &Snapshot) -> bool {
+    let (select, active) = (after.control.recipe_select, after.active());
+    (select == 0 || Some(select) == active) && after.recipe_result == RecipeResult::Ok
+}
+
 #[test]
 fn a_hundred_thousand_random_events_break_no_promise() {
     let mut random = Random(2024);
@@ -174,6 +181,10 @@ fn a_hundred_thousand_random_events_break_no_promise() {
                         after.recipe.as_ref() == Some(&job.recipe),
                         "{count}: measured with another recipe"
                     );
+                    assert!(
+                        asked_for(&after),
+                        "{count}: measured with a recipe that was not asked for"
+                    );
                 }
                 Effect::PersistSeq(seq) => {
                     persisted = Some(*seq);
@@ -210,6 +221,7 @@ fn a_hundred_thousand_random_events_break_no_promise() {
         let may = after.state == 1
             && after.recipe.is_some()
             && !station.unstored
+            && asked_for(&after)
             && after.control.control & control::ONLINE != 0;
         assert_eq!(after.is(status::READY), may, "{count}: READY");
         assert!(

@@ -36,10 +36,9 @@ pub(super) async fn readiness(State(site): State<Site>) -> Response {
     if snapshot.worker_alive && snapshot.is(status::READY) {
         return (StatusCode::OK, "ready\n").into_response();
     }
-    let words = format!(
-        "not ready: the station is in state {}\n",
-        snapshot.state_word
-    );
+    let words = snapshot.refusal_words();
+    let words = words.unwrap_or_else(|| "the measuring task missed its deadline".into());
+    let words = format!("not ready: {words}\n");
     (StatusCode::SERVICE_UNAVAILABLE, words).into_response()
 }
 

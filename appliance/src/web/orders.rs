@@ -24,6 +24,12 @@ fn not_now(what: &str, snapshot: &Snapshot) -> Problem {
     ))
 }
 
+/// Why a trigger was rejected, from the snapshot after it.
+fn rejected(snapshot: &Snapshot) -> Problem {
+    let words = snapshot.refusal_words();
+    Problem::busy(format!("trigger: {}", words.unwrap_or_default()))
+}
+
 /// An edge without a write: the registers of the PLC stay as it wrote them.
 fn edge(site: &Site, rising: u16) -> std::sync::Arc<Snapshot> {
     let write = ControlWrite::default();
@@ -34,7 +40,7 @@ pub(super) async fn trigger(State(site): State<Site>) -> Result<Accepted, Proble
     let before = site.station.snapshot().triggers;
     let after = edge(&site, TRIGGER);
     if after.triggers == before {
-        return Err(not_now("trigger", &after));
+        return Err(rejected(&after));
     }
     Ok(accepted())
 }

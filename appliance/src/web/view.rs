@@ -31,6 +31,7 @@ pub fn snapshot(snapshot: &Snapshot) -> Value {
         "recipe": snapshot.recipe.as_ref().map(|recipe| json!({
             "number": recipe.number, "fingerprint": format!("{:08x}", recipe.crc), "name": &*recipe.name,
         })),
+        "refusal": snapshot.refusal.map(|reason| json!({ "reason": reason, "words": snapshot.refusal_words() })),
         "requested_recipe": snapshot.requested_recipe,
         "recipe_result": snapshot.recipe_result.number(),
         "counters": {
@@ -93,6 +94,7 @@ fn result(record: &ResultRecord) -> Value {
         "seq": record.seq,
         "token": record.token,
         "recipe": record.recipe,
+        "recipe_name": &*record.recipe_name,
         "fingerprint": format!("{:08x}", record.recipe_crc),
         "part_id": record.part_id,
         "press_stroke": record.press_stroke,

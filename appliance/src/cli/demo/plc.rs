@@ -19,6 +19,8 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// A connected PLC.
 pub struct Plc {
     context: Context,
+    /// The recipe of the parts on this line.
+    recipe: u16,
 }
 
 /// A result as the registers tell it.
@@ -79,13 +81,13 @@ fn lost(error: impl std::fmt::Display) -> Failure {
 }
 
 impl Plc {
-    /// Connects to the station.
+    /// Connects to the station, to measure parts with this recipe.
     ///
     /// # Errors
     /// If nobody answers there.
-    pub async fn connect(address: SocketAddr) -> Result<Self, Failure> {
+    pub async fn connect(address: SocketAddr, recipe: u16) -> Result<Self, Failure> {
         let context = tcp::connect(address).await.map_err(lost)?;
-        Ok(Self { context })
+        Ok(Self { context, recipe })
     }
 
     async fn read(&mut self, address: u16, count: u16) -> Result<Vec<u16>, Failure> {
@@ -93,7 +95,8 @@ impl Plc {
         answer.map_err(lost)?.map_err(lost)
     }
 
-    /// Waits for READY, triggers by token with the token as PART_ID, and waits for the result.
+    /// Waits for READY, triggers by token with the token as PART_ID, and waits for the result. RECIPE_SELECT goes with the
+    /// trigger, so that no part is measured with another recipe.
     ///
     /// # Errors
     /// If the station does not answer in time.
@@ -115,7 +118,7 @@ impl Plc {
             patient("READY")?;
             tokio::time::sleep(POLL).await;
         }
-        let trigger = [token, 0, token, 0, token, 0, token];
+        let trigger = [token, self.recipe, token, 0, token, 0, token];
         let written = self
             .context
             .write_multiple_registers(TRIGGER_TOKEN, &trigger)

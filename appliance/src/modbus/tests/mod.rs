@@ -119,6 +119,7 @@ impl Plant {
                     let recipe = ActiveRecipe {
                         number,
                         crc: 0xCAFE_F00D,
+                        part_number: "BRACKET".into(),
                         name: "bracket".into(),
                     };
                     self.handle.event(Event::RecipeLoaded { job, recipe });

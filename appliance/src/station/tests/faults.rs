@@ -217,11 +217,15 @@ fn a_lost_head_comes_back_with_what_the_worker_still_holds() {
     let snapshot = bench.event(fault.clone());
     assert_eq!((snapshot.state, snapshot.recipe), (7, None));
     let snapshot = bench.event(recovered(Some(recipe(1))));
-    assert!(snapshot.is(status::READY) && !snapshot.is(status::RECIPE_OK));
+    assert!(!snapshot.is(status::READY) && !snapshot.is(status::RECIPE_OK));
+    assert_eq!(snapshot.recipe_result, RecipeResult::Busy);
     assert_eq!(
         snapshot.requested_recipe, 2,
         "the load has to be asked again"
     );
+    assert_eq!(bench.token(1).reject_reason, reject::OTHER_RECIPE);
+    let snapshot = bench.load(1, Ok(()));
+    assert!(snapshot.is(status::READY) && snapshot.is(status::RECIPE_OK));
     bench.event(fault);
     let snapshot = bench.event(recovered(None));
     assert_eq!((snapshot.state, snapshot.is(status::READY)), (1, false));

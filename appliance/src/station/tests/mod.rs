@@ -1,6 +1,7 @@
 //! One named test for each rule of the station.
 
 mod faults;
+mod other_recipe;
 mod recipes;
 mod results;
 mod triggers;
@@ -9,7 +10,7 @@ use std::sync::Arc;
 
 use super::control::{self, BY_PART_NUMBER};
 use super::error_code;
-use super::plc::reject;
+use super::refusal::reject;
 use super::snapshot::{status, warning};
 use super::*;
 
@@ -41,6 +42,7 @@ pub(super) fn recipe(number: u16) -> ActiveRecipe {
     ActiveRecipe {
         number,
         crc: u32::from(number) << 16,
+        part_number: format!("PART-{number}").into(),
         name: "part".into(),
     }
 }
@@ -130,6 +132,24 @@ impl Bench {
             recipe_select: Some(recipe),
             ..Default::default()
         });
+    }
+
+    /// Asks for a recipe as the PLC does, and lets the worker answer.
+    fn load(&mut self, number: u16, answer: Result<(), RecipeResult>) -> Snapshot {
+        self.select(number);
+        self.pulse(control::RECIPE_LOAD);
+        let job = self.job();
+        self.event(match answer {
+            Ok(()) => Event::RecipeLoaded {
+                job,
+                recipe: recipe(number),
+            },
+            Err(result) => Event::LoadFailed {
+                job,
+                result,
+                message: "no".into(),
+            },
+        })
     }
 
     pub(super) fn job(&self) -> JobId {

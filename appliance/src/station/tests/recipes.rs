@@ -79,14 +79,7 @@ fn a_failed_load_keeps_the_old_recipe_and_says_why() {
         (RecipeResult::Corrupt, 2),
         (RecipeResult::OtherCalibration, 3),
     ] {
-        bench.select(12);
-        bench.pulse(control::RECIPE_LOAD);
-        let job = bench.job();
-        let snapshot = bench.event(Event::LoadFailed {
-            job,
-            result,
-            message: "no".into(),
-        });
+        let snapshot = bench.load(12, Err(result));
         assert_eq!(
             (
                 snapshot.recipe_result.number(),
@@ -94,7 +87,7 @@ fn a_failed_load_keeps_the_old_recipe_and_says_why() {
             ),
             (number, Some(1))
         );
-        assert!(!snapshot.is(status::RECIPE_OK) && snapshot.is(status::READY));
+        assert!(!snapshot.is(status::RECIPE_OK) && !snapshot.is(status::READY));
     }
 }
 
