@@ -1,6 +1,7 @@
 // The daemon under test: the real program on a small simulated head, with a state folder of its own.
 import { spawn } from "node:child_process";
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { connect } from "node:net";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 
@@ -53,6 +54,8 @@ export class Daemon {
         daemon.log += text;
         const secret = /shown this once: (\S+)/.exec(daemon.log);
         if (secret) daemon.secret = secret[1];
+        const modbus = /Modbus TCP on ([\d.]+):(\d+)/.exec(daemon.log);
+        if (modbus) daemon.modbus = { host: modbus[1], port: Number(modbus[2]) };
         const page = /page on (http:\S+)/.exec(daemon.log);
         if (page) { daemon.url = page[1]; clearTimeout(late); resolve(); }
       });
@@ -61,6 +64,15 @@ export class Daemon {
   }
 
   signal(name) { this.child.kill(name); }
+
+  // Writes one register of CONTROL (FC6) as a PLC does; resolves with the answer.
+  writeRegister(address, value) {
+    return new Promise((resolve, reject) => {
+      const plc = connect(this.modbus, () => plc.write(Buffer.from([0, 1, 0, 0, 0, 6, 1, 6, address >> 8, address & 0xff, value >> 8, value & 0xff])));
+      plc.on("error", reject);
+      plc.on("data", (answer) => { plc.end(); resolve(answer); });
+    });
+  }
 
   async end(name = "SIGTERM") {
     if (this.child.exitCode !== null || this.child.signalCode !== null) return;

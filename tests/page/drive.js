@@ -166,10 +166,66 @@ try {
     const rows = await page.locator("#comparison-rows tr").allTextContents();
     assert.equal(rows.length, 2);
     assert.match(rows.join(), /µm.*%/);
-    await page.waitForFunction(() => document.querySelector("#recipe-name").textContent.includes("recipe 7"));
+    await page.waitForFunction(() => /recipe 7 · .* is active/.test(document.querySelector("#other-words").textContent));
     await page.click("nav a[href='#live']");
     await trigger();
     await verdict("PASS");
+    assert.match(await page.textContent("#recipe-name"), /^recipe 7 · /);
+  });
+
+  const load = async (number) => {
+    await page.click("nav a[href='#recipes']");
+    await page.click(`[aria-label='Load recipe ${number}']`);
+    await page.waitForFunction((wanted) => document.querySelector("#recipe-rows tr.active td").textContent === wanted, String(number));
+    await page.click("nav a[href='#live']");
+  };
+
+  await step("a verdict of another recipe than the active one names its own and is covered", async () => {
+    const measured = await page.textContent("#recipe");
+    await load(1);
+    await page.waitForSelector("body.other");
+    assert.equal(await page.textContent("#recipe"), measured, "the recipe beside the verdict is the one that measured it");
+    assert.match(await page.textContent("#other-words"), /^PASS no\. \d+ is of recipe 7 · .*; recipe 1 · .* is active$/);
+    assert.equal(await page.evaluate(() => getComputedStyle(document.querySelector("#other")).opacity), "1");
+    assert.doesNotMatch(await page.title(), /PASS/);
+    if (folder) {
+      await page.screenshot({ path: `${folder}/other-desktop-light.png` });
+      await page.setViewportSize({ width: 390, height: 844 });
+      await page.screenshot({ path: `${folder}/other-phone-light.png` });
+      await page.setViewportSize({ width: 1280, height: 800 });
+    }
+    await trigger();
+    await page.waitForSelector("body:not(.other)");
+    assert.match(await page.textContent("#recipe-name"), /^recipe 1 · /);
+    await load(7);
+    await page.waitForSelector("body.other");
+    await trigger();
+    await verdict("PASS");
+    await page.waitForSelector("body:not(.other)");
+  });
+
+  await step("a trigger that would measure with another recipe than the PLC's is refused in words", async () => {
+    await page.waitForSelector("#trigger:enabled");
+    await daemon.writeRegister(2, 77);
+    await page.waitForSelector("#trigger:disabled");
+    assert.equal(await page.textContent("#state-words"), "another recipe is asked for");
+    assert.equal(await page.textContent("#word"), "last: PASS", "no verdict looks live while no part would be measured");
+    assert.match(await page.textContent("#refusal"), /the PLC selects recipe 77, recipe 7 is active: load recipe 77/);
+    const [status, words] = await page.evaluate(async () => {
+      const answer = await fetch("/api/trigger", { method: "POST" });
+      return [answer.status, (await answer.json()).error];
+    });
+    assert.equal(status, 409);
+    assert.match(words, /selects recipe 77/);
+    if (folder) {
+      await page.screenshot({ path: `${folder}/refused-desktop-light.png` });
+      await page.setViewportSize({ width: 390, height: 844 });
+      await page.screenshot({ path: `${folder}/refused-phone-light.png`, fullPage: true });
+      await page.setViewportSize({ width: 1280, height: 800 });
+    }
+    await daemon.writeRegister(2, 0);
+    await page.waitForSelector("#trigger:enabled");
+    assert.ok(await page.locator("#refusal").isHidden());
   });
 
   await step("registers, history, log and changes are shown", async () => {

@@ -1,7 +1,7 @@
 // The page: follows the snapshots and shows each one in the view that is open.
 import { $, show, text } from "./element.js";
 import { follow } from "./stale.js";
-import { showVerdict } from "./verdict.js";
+import { isOfOtherRecipe, showVerdict } from "./verdict.js";
 import { showGauges } from "./gauges.js";
 import { showTimes } from "./times.js";
 import { showPicture, start as startPicture } from "./picture.js";
@@ -20,6 +20,8 @@ const STATES = {
   loading: ["loading a recipe", "busy"], teaching: ["teaching", "busy"], offline: ["offline: the PLC does not ask for it", "wait"],
   fault: ["fault", "fault"], stopping: ["stopping", "wait"],
 };
+// Why a station that waits accepts no trigger, by REJECT_REASON.
+const WAITING = { 3: "no recipe is active", 6: "another recipe is asked for" };
 let view = "live";
 let last = null;
 let shown = null;
@@ -46,9 +48,9 @@ function showSnapshot(now) {
   const [words, kind] = STATES[now.state] || [now.state, "wait"];
   const waiting = now.state === "ready" && !now.ready;
   $("state").dataset.state = waiting ? "wait" : kind;
-  text("state-words", waiting ? "no recipe is active" : words);
-  text("recipe-name", now.recipe ? `recipe ${now.recipe.number} · ${now.recipe.name}` : "no recipe");
-  text("fingerprint", now.recipe ? now.recipe.fingerprint : "");
+  text("state-words", waiting ? WAITING[now.refusal.reason] || "not ready" : words);
+  show("refusal", waiting);
+  text("refusal", waiting ? `No trigger is accepted: ${now.refusal.words}.` : "");
   $("trigger").disabled = !now.ready;
   show("fault", Boolean(now.fault));
   if (now.fault) {
@@ -71,7 +73,8 @@ function showSnapshot(now) {
   showPicture(now.result, view === "live");
   text("identity", `${now.identity.product} · ${now.identity.serial} · ${now.identity.version}`);
   text("uptime", `up ${duration(now.uptime_s)} · heartbeat ${now.heartbeat}`);
-  document.title = `${now.result && now.state === "ready" ? now.result.verdict : words} · fringed`;
+  const live = now.result && now.ready && !isOfOtherRecipe(now);
+  document.title = `${live ? now.result.verdict : words} · fringed`;
 }
 
 function openView() {

@@ -23,12 +23,41 @@ function partWords(result) {
   return words.join(" · ");
 }
 
+const recipeName = (recipe) => (recipe ? `recipe ${recipe.number} · ${recipe.name}` : "no recipe");
+
+// The recipe that a result was measured with, as it was at its trigger.
+const recipeOf = (result) => ({ number: result.recipe, name: result.recipe_name, fingerprint: result.fingerprint });
+
+// Whether the verdict is of another recipe than the active one, or of the same before it was changed.
+export function isOfOtherRecipe(now) {
+  const { recipe, result, state } = now;
+  if (!result || state === "acquiring" || state === "processing") return false;
+  return !recipe || recipe.number !== result.recipe || recipe.fingerprint !== result.fingerprint;
+}
+
+// Covers the verdict of another recipe: the part under the head is to be measured with the active one.
+function coverOther(now, other) {
+  document.body.classList.toggle("other", other);
+  if (!other) { text("other-words", ""); return; }
+  const { recipe, result } = now;
+  const same = recipe && recipe.number === result.recipe;
+  const measured = `${result.verdict} no. ${result.seq} is of ${recipeName(recipeOf(result))}`;
+  const active = !recipe ? "no recipe is active" : same ? "that recipe was changed since" : `${recipeName(recipe)} is active`;
+  text("other-words", `${measured}; ${active}`);
+}
+
 export function showVerdict(now) {
   const panel = $("verdict");
   const result = now.result;
   const measuring = now.state === "acquiring" || now.state === "processing";
+  const other = isOfOtherRecipe(now);
   // An old verdict keeps its words but loses its colour: it says nothing about what lies under the head now.
-  const past = Boolean(result) && !measuring && now.state !== "ready";
+  const past = Boolean(result) && !measuring && (!now.ready || other);
+  // The recipe beside a verdict is the one that measured it.
+  const recipe = result && !measuring ? recipeOf(result) : now.recipe;
+  text("recipe-name", recipeName(recipe));
+  text("fingerprint", recipe ? recipe.fingerprint : "");
+  coverOther(now, other);
   panel.classList.toggle("past", past);
   document.body.classList.toggle("past", past || measuring);
   panel.dataset.verdict = measuring ? "MEASURING" : result ? result.verdict : "NONE";
