@@ -66,6 +66,14 @@ impl Kept {
         taken.map(|taken| taken.frame.clone()).collect()
     }
 
+    /// Ratio and shift of each frame, in turns: which sequence of a recipe they are of.
+    pub fn shown(&self) -> Vec<(f64, f64)> {
+        let taken = self.recording.frames.iter();
+        taken
+            .map(|taken| (taken.ratio, taken.shift_turns))
+            .collect()
+    }
+
     /// The recipe that judged the part: the recording's own, else the generation of the station's that has its fingerprint.
     /// The answer says whether it is the recording's.
     ///

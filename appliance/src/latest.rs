@@ -23,7 +23,9 @@ pub struct LastCycle<'a> {
     pub record: &'a Arc<ResultRecord>,
     /// The recipe that it was judged by.
     pub plan: &'a Arc<Plan>,
-    /// Its frames, in the order of the sequence.
+    /// Which of the recipe's sequences it was judged by: the step of the plan.
+    pub step: usize,
+    /// The frames of that sequence, in its order.
     pub frames: &'a [Frame],
     /// The head's calibration.
     pub calibration: &'a Calibration,
@@ -82,8 +84,12 @@ impl LastMaps {
         {
             return made;
         }
-        let asked =
-            self.ask(|cycle| Some((cycle.seq(), Arc::new(cycle.plan.layers(cycle.frames)?))));
+        let asked = self.ask(|cycle| {
+            Some((
+                cycle.seq(),
+                Arc::new(cycle.plan.layers(cycle.step, cycle.frames)?),
+            ))
+        });
         let newest = asked.flatten().or(made);
         self.inside().layers.clone_from(&newest);
         newest

@@ -19,8 +19,8 @@ use crate::station::{
     ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
     error_code,
 };
+use cycle::JudgedBy;
 use hal::error::{Device, Error};
-use hal::frame::Frame;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
@@ -117,14 +117,14 @@ impl Worker {
             self.station.event(Event::Request(first));
         }
         let mut plan: Option<Arc<Plan>> = None;
-        let mut frames = Vec::new();
+        let mut last = JudgedBy::default();
         loop {
             self.pulse.beat();
             // A trigger that is there already waits for no picture.
             let order = match orders.try_recv() {
                 Err(TryRecvError::Empty) => {
                     if self.maps.wanted() {
-                        self.tell(plan.as_ref(), &frames);
+                        self.tell(plan.as_ref(), &last);
                     }
                     orders.recv_timeout(SIGN_OF_LIFE)
                 }
@@ -134,15 +134,15 @@ impl Worker {
             match order {
                 Ok(Order::Measure(job)) => {
                     // The memory of the frames before is what these are written to.
-                    drop(frames);
-                    frames = self.measure(plan.as_ref(), &job);
+                    drop(last);
+                    last = self.measure(plan.as_ref(), &job);
                 }
                 Ok(Order::Load(job, key)) => {
-                    frames = Vec::new();
+                    last = JudgedBy::default();
                     self.load(job, &key, &mut plan);
                 }
                 Ok(Order::Teach(job, number)) => {
-                    frames = Vec::new();
+                    last = JudgedBy::default();
                     self.teach(job, number, &mut plan);
                 }
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
@@ -152,7 +152,7 @@ impl Worker {
                 }
             }
             if let Some(error) = self.lost.take() {
-                frames = Vec::new();
+                last = JudgedBy::default();
                 if self.recover(&error, &mut plan, orders).is_break() {
                     return;
                 }
@@ -175,14 +175,17 @@ impl Worker {
     }
 
     /// Answers those who want to know more of the last cycle.
-    fn tell(&self, plan: Option<&Arc<Plan>>, frames: &[Frame]) {
+    fn tell(&self, plan: Option<&Arc<Plan>>, last: &JudgedBy) {
         let (maps, calibration) = (&self.maps, &self.opened.calibration);
         let result = self.station.snapshot().result.clone();
-        let measured = plan.filter(|_| !frames.is_empty()).zip(result.as_ref());
+        let measured = plan
+            .filter(|_| !last.frames.is_empty())
+            .zip(result.as_ref());
         let cycle = measured.map(|(plan, record)| LastCycle {
             record,
             plan,
-            frames,
+            step: last.step,
+            frames: &last.frames,
             calibration,
         });
         self.pool.install(|| maps.answer(cycle));

@@ -76,7 +76,7 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
                         plan.arrive(&mut arriving, &frames[..arrived]);
                     }
                 }
-                let inspection = plan.inspect_arrived(&frames, Some(arriving), Instant::now());
+                let inspection = plan.inspect_arrived(&frames, arriving, Instant::now());
                 assert_eq!((inspection.error_code, &inspection.reason), (0, &None));
                 assert!(inspection.placement.is_some());
             })

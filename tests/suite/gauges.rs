@@ -108,7 +108,7 @@ fn inspect(bed: &mut Bed, plan: &Plan, step: usize) -> Inspection {
         .load(plan.rasters(&bed.calibration).unwrap())
         .unwrap();
     let frames = frames(bed, plan, step);
-    plan.inspect(&frames, Instant::now())
+    plan.inspect(step, &frames, Instant::now())
 }
 
 fn value(inspection: &Inspection, name: &str) -> f64 {
@@ -383,6 +383,40 @@ fn the_shortest_sequence_will_do_for_a_part_in_place_and_not_for_one_out_of_it()
     assert_eq!(full.step_up, None);
     assert!((z(&full) - 2.0).abs() < 0.05, "{}", z(&full));
     assert_eq!(full.verdict(), Verdict::Invalid);
+}
+
+#[test]
+fn sequences_of_the_same_length_and_of_different_kinds_are_all_run() {
+    let part = Part::Cone(Cone::default());
+    let mut bed = bed(&scenario(part.clone()));
+    let taught = taught(&mut bed).unwrap();
+    let mut file = RecipeFile {
+        production: 0,
+        ..taught.recipe.file.clone()
+    };
+    // As many shifts of its one level as the two levels behind it have together.
+    file.sequences[0].frames = (0..6).map(|k| [1.0, f64::from(k) / 6.0]).collect();
+    let plan = plan(&bed, &file, &taught.recipe.arrays);
+    let counts: Vec<usize> = (0..plan.steps())
+        .map(|step| plan.indices(step).len())
+        .collect();
+    assert_eq!(counts, [6, 6, 12]);
+    let flags: Vec<u16> = (0..3)
+        .map(|step| inspect(&mut bed, &plan, step).flags & 0b1110)
+        .collect();
+    assert_eq!(flags, [0b10, 0b100, 0b1000]);
+    for step in 0..3 {
+        let shown: Vec<_> = plan.shown(step).collect();
+        assert_eq!(plan.step_that_shows(&shown), Some(step));
+        let frames = frames(&mut bed, &plan, step);
+        let layers = plan.layers(step, &frames).unwrap();
+        let resolved = layers.height_mm.iter().filter(|z| !z.is_nan()).count();
+        assert!(resolved > 5000, "step {step}: {resolved}");
+    }
+    // What is recorded names its frames, so a part that was judged by the second is judged by the second again.
+    assert_eq!(plan.step_that_shows(&[(1.0, 0.0)]), None);
+    let none = plan.inspect(3, &[], Instant::now());
+    assert_eq!((none.verdict(), none.error_code), (Verdict::Invalid, 103));
 }
 
 #[test]

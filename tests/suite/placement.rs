@@ -183,8 +183,8 @@ fn cycle(bed: &mut Bed, file: &RecipeFile, arrays: &Arrays) -> (Vec<f32>, f64) {
     let mut frames = Vec::new();
     let mut keep = |_, frame| frames.push(frame);
     bed.head.acquire(&indices, TIMEOUT, &mut keep).unwrap();
-    let inspection = plan.inspect(&frames, Instant::now());
-    let maps = plan.heights(&frames).unwrap();
+    let inspection = plan.inspect(0, &frames, Instant::now());
+    let maps = plan.heights(0, &frames).unwrap();
     (maps.height_mm, inspection.gauges[0].value.unwrap())
 }
 

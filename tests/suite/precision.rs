@@ -58,7 +58,7 @@ fn part(defects: Vec<Defect>) -> Part {
 
 fn inspect(bed: &mut Bed, plan: &Plan) -> Inspection {
     let frames = frames(bed, plan, 0);
-    plan.inspect(&frames, Instant::now())
+    plan.inspect(0, &frames, Instant::now())
 }
 
 #[test]

@@ -155,7 +155,7 @@ fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]) {
         .collect();
     let mut strips = production.strips(37);
     let found = production.inspect(&views, &mut strips, None).unwrap();
-    let heights = plan.heights(frames).unwrap();
+    let heights = plan.heights(0, frames).unwrap();
     let (decoder, window) = (production.decoder(), Some(production.window()));
     let map = decoder
         .unwrapping()
@@ -382,7 +382,7 @@ fn levels_decoded_on_arrival_give_the_same_inspection() {
                     arrived += 1;
                 }
             }
-            let inspection = plan.inspect_arrived(&frames, Some(arriving), Instant::now());
+            let inspection = plan.inspect_arrived(&frames, arriving, Instant::now());
             let stages = Stages::default();
             (
                 Inspection {

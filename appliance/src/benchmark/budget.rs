@@ -127,7 +127,7 @@ fn budget(
         while plan.can_arrive(&arriving, frames.len()) {
             plan.arrive(&mut arriving, &frames);
         }
-        let inspection = plan.inspect_arrived(&frames, Some(arriving), Instant::now());
+        let inspection = plan.inspect_arrived(&frames, arriving, Instant::now());
         let stages = inspection.stages.iter();
         runs.push(
             stages

@@ -55,13 +55,21 @@ impl Replay {
         let (number, fingerprint) = (recipe.file.number, recipe.file.fingerprint.clone());
         let stored = stored(&state, unpacked.name(), &kept)?;
         let flags = stored.as_ref().map_or(0, |entry| entry.flags);
-        let frames = kept.frames();
+        let (frames, shown) = (kept.frames(), kept.shown());
         let threads = self.files.configuration()?.threads;
         let judged = self.threads.pool(threads)?.install(|| {
             let plan = kept.plan(recipe, flags & SIMULATED != 0)?;
-            Ok::<_, PlanError>(plan.inspect(&frames, Instant::now()))
+            let inspect = |step| plan.inspect(step, &frames, Instant::now());
+            Ok::<_, PlanError>(plan.step_that_shows(&shown).map(inspect))
         });
-        let inspection = judged.map_err(|error| Failure::new(Exit::Content, error.to_string()))?;
+        let judged = judged.map_err(|error| Failure::new(Exit::Content, error.to_string()))?;
+        let inspection = judged.ok_or_else(|| {
+            let words = format!(
+                "replay {}: recipe {number}, fingerprint {fingerprint:.8}, has no sequence with these frames: name the recipe that the part was judged by",
+                self.recording.display()
+            );
+            Failure::new(Exit::Content, words)
+        })?;
         let replayed = entry(inspection, number, &fingerprint);
         let document = || {
             let recipe = serde_json::json!({

@@ -27,7 +27,9 @@ pub const RECIPE: &str = "recipe.recipe";
 pub struct FailedPart {
     /// The result.
     pub record: Arc<ResultRecord>,
-    /// The frames that it was judged by.
+    /// Which of the recipe's sequences it was judged by: the step of the plan.
+    pub step: usize,
+    /// The frames of that sequence.
     pub frames: Vec<Frame>,
     /// What judged it.
     pub plan: Arc<Plan>,
@@ -205,14 +207,14 @@ fn bytes_in(folder: &Path) -> u64 {
 fn recording(part: &FailedPart) -> Recording {
     let FailedPart {
         record,
+        step,
         frames,
         plan,
         calibration,
     } = part;
     let file = plan.file();
     let (width, height, bit_depth) = calibration.camera;
-    let shown = plan.shown(frames.len());
-    let steps = shown.iter().zip(frames);
+    let shown = plan.shown(*step).zip(frames);
     Recording {
         width,
         height,
@@ -232,8 +234,8 @@ fn recording(part: &FailedPart) -> Recording {
             model: Some(calibration.projector_model.clone()),
         },
         patterns: vec![pattern(plan)],
-        frames: steps
-            .map(|(&(ratio, shift_turns), frame)| RecordedFrame {
+        frames: shown
+            .map(|((ratio, shift_turns), frame)| RecordedFrame {
                 ratio,
                 shift_turns,
                 pattern: 0,

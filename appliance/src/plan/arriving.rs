@@ -18,6 +18,19 @@ pub struct Arriving {
     arrived: Option<Arrived>,
 }
 
+impl Arriving {
+    /// A measurement with a sequence of which nothing is decoded on arrival.
+    pub(super) fn none(step: usize) -> Self {
+        let arrived = None;
+        Self { step, arrived }
+    }
+
+    /// Which sequence.
+    pub(super) fn step(&self) -> usize {
+        self.step
+    }
+}
+
 impl Plan {
     /// Begins a measurement with a sequence.
     pub fn arriving(&self, step: usize) -> Arriving {
@@ -55,14 +68,14 @@ impl Plan {
     /// Inspects with what the levels said that have arrived, if these are all but the finest; their room goes back to its run.
     pub(super) fn with_arrived<R>(
         &self,
-        arriving: Option<Arriving>,
+        arriving: Arriving,
         frames: &[Frame],
         inspect: impl FnOnce(Option<(&Arrived, &[FrameView<'_>])>) -> R,
     ) -> R {
-        let Some(Arriving {
+        let Arriving {
             step,
             arrived: Some(arrived),
-        }) = arriving
+        } = arriving
         else {
             return inspect(None);
         };

@@ -38,7 +38,8 @@ pub struct Plan {
     names: Vec<Arc<str>>,
     /// Ratio and shift of what is projected, each once; first those of the first run.
     frames: Vec<(f64, f64)>,
-    /// The sequences in the order in which they are tried; the frames of each are more than those of the one before.
+    /// The sequences in the order in which they are tried; each unwraps further than the one before. Their indices are the
+    /// steps of a cycle.
     runs: Vec<Run>,
     /// The buffers of a cycle, made once.
     strips: Mutex<Strips>,
@@ -233,11 +234,15 @@ impl Plan {
         self.runs.get(step).map_or(&[], |run| &run.indices)
     }
 
-    /// Ratio and shift of each frame of the sequence that has `count` frames, in their order; empty if there is none.
-    pub fn shown(&self, count: usize) -> Vec<(f64, f64)> {
-        let run = self.runs.iter().find(|run| run.indices.len() == count);
-        let indices = run.map_or(&[][..], |run| &run.indices);
-        indices.iter().map(|&index| self.frames[index]).collect()
+    /// Ratio and shift of each frame of a sequence, in their order; none if there is no such sequence.
+    pub fn shown(&self, step: usize) -> impl ExactSizeIterator<Item = (f64, f64)> {
+        let indices = self.indices(step).iter();
+        indices.map(|&index| self.frames[index])
+    }
+
+    /// Which sequence shows these frames, given by ratio and shift; `None` if none does.
+    pub fn step_that_shows(&self, frames: &[(f64, f64)]) -> Option<usize> {
+        (0..self.steps()).find(|&step| self.shown(step).eq(frames.iter().copied()))
     }
 
     /// The columns of each row that some gauge looks at.
@@ -267,29 +272,29 @@ impl Plan {
         rasters(function, frames, calibration)
     }
 
-    /// Judges a part from the frames of one sequence, which their number tells; its stages begin at `exposed`. Always ends in
-    /// an inspection; what cannot be measured is INVALID with a reason.
-    pub fn inspect(&self, frames: &[Frame], exposed: Instant) -> Inspection {
-        self.inspect_arrived(frames, None, exposed)
+    /// Judges a part from the frames of sequence `step`; its stages begin at `exposed`. Always ends in an inspection; what
+    /// cannot be measured is INVALID with a reason.
+    pub fn inspect(&self, step: usize, frames: &[Frame], exposed: Instant) -> Inspection {
+        self.inspect_arrived(frames, Arriving::none(step), exposed)
     }
 
     /// The same, with the levels that were decoded on arrival.
     pub fn inspect_arrived(
         &self,
         frames: &[Frame],
-        arriving: Option<Arriving>,
+        arriving: Arriving,
         exposed: Instant,
     ) -> Inspection {
-        let step = self.step_of(frames);
-        let run = &self.runs[step];
+        let step = arriving.step();
         let simulated = if self.simulated { SIMULATED } else { 0 };
+        let kind = self.runs.get(step).map(|run| run.kind);
         let mut inspection = Inspection {
-            flags: sequence_flag(run.kind) | simulated,
+            flags: kind.map_or(0, sequence_flag) | simulated,
             ..Inspection::default()
         };
         let mut laps = Laps::since(exposed);
         let found = self.with_arrived(arriving, frames, |finest| {
-            self.run(run, frames, finest, None, &mut laps)
+            self.run(step, frames, finest, None, &mut laps)
         });
         match found {
             Ok(findings) => {
@@ -309,42 +314,26 @@ impl Plan {
         inspection
     }
 
-    /// The run that frames are of.
-    fn run_of(&self, frames: &[Frame]) -> &Run {
-        &self.runs[self.step_of(frames)]
-    }
-
-    /// The sequence of so many frames; the first if there is none.
-    fn step_of(&self, frames: &[Frame]) -> usize {
-        let fits = |run: &Run| run.indices.len() == frames.len();
-        self.runs.iter().position(fits).unwrap_or(0)
-    }
-
-    /// The heights of the part, for somebody who wants to see them; `None` if the frames are not what the recipe was made
-    /// for.
-    pub fn heights(&self, frames: &[Frame]) -> Option<Maps> {
+    /// The heights of the part from the frames of sequence `step`, for the page; `None` if the frames are not those.
+    pub fn heights(&self, step: usize, frames: &[Frame]) -> Option<Maps> {
         let width = self.file.camera.width as usize;
         let mut height_mm = vec![f32::NAN; width * self.file.camera.height as usize];
         let mut laps = Laps::since(Instant::now());
-        self.run(
-            self.run_of(frames),
-            frames,
-            None,
-            Some(&mut height_mm),
-            &mut laps,
-        )
-        .ok()?;
+        let heights = Some(&mut height_mm[..]);
+        self.run(step, frames, None, heights, &mut laps).ok()?;
         Some(Maps { width, height_mm })
     }
 
     fn run(
         &self,
-        run: &Run,
+        step: usize,
         frames: &[Frame],
         finest: Option<(&Arrived, &[FrameView<'_>])>,
         heights: Option<&mut [f32]>,
         laps: &mut Laps,
     ) -> Result<Findings, String> {
+        let run = self.runs.get(step);
+        let run = run.ok_or_else(|| format!("the recipe has no sequence {step}"))?;
         // Made for every trigger, so not on the heap.
         let mut views: heapless::Vec<FrameView<'_>, MAX_FRAMES> = heapless::Vec::new();
         for frame in frames {

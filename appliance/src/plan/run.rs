@@ -53,13 +53,8 @@ pub(super) struct Shared<'a> {
 pub(super) fn chain(file: &RecipeFile) -> Vec<usize> {
     let mut chain: Vec<usize> = Vec::new();
     for at in file.production..file.sequences.len() {
-        let sequence = &file.sequences[at];
-        // A set of frames tells by its number which sequence it is of.
-        let further = chain.iter().all(|&before| {
-            let before = &file.sequences[before];
-            before.kind != sequence.kind && before.frames.len() < sequence.frames.len()
-        });
-        if further {
+        let kind = |at: usize| file.sequences[at].kind;
+        if chain.last().is_none_or(|&before| kind(before) < kind(at)) {
             chain.push(at);
         }
     }

@@ -121,8 +121,8 @@ pub struct SequenceFile {
     pub safe_share: f64,
 }
 
-/// The kinds of sequence, by how far from the golden map they can unwrap.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// The kinds of sequence, ordered by how far from the golden map they can unwrap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SequenceKind {
     /// One level: |ΔΦ| < 0.4 turn.

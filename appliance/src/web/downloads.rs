@@ -162,7 +162,7 @@ pub(super) async fn folder(
 pub(super) async fn cloud(State(site): State<Site>) -> Result<Response, Problem> {
     file(&site, "application/octet-stream", |site| {
         let asked = site.maps.ask(|cycle| {
-            let cloud = cycle.plan.cloud(cycle.frames)?;
+            let cloud = cycle.plan.cloud(cycle.step, cycle.frames)?;
             Some((format!("{}.ply", cycle.seq()), cloud))
         });
         asked.flatten().ok_or_else(|| Problem::missing(GONE))
@@ -178,6 +178,7 @@ pub(super) async fn recording(State(site): State<Site>) -> Result<Response, Prob
     folder(&site, |site| {
         let asked = site.maps.ask(|cycle| FailedPart {
             record: cycle.record.clone(),
+            step: cycle.step,
             frames: cycle.frames.to_vec(),
             plan: cycle.plan.clone(),
             calibration: cycle.calibration.clone(),

@@ -13,6 +13,15 @@ use hal::head::Exposure;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// What a part was judged by.
+#[derive(Default)]
+pub(super) struct JudgedBy {
+    /// Which of the recipe's sequences: the step of the plan.
+    pub step: usize,
+    /// Its frames; none if there was no judgement.
+    pub frames: Vec<Frame>,
+}
+
 /// The frames of a sequence.
 struct Taken {
     frames: Vec<Frame>,
@@ -22,14 +31,14 @@ struct Taken {
 }
 
 impl Worker {
-    /// Runs a cycle; the frames that it was judged by.
-    pub(super) fn measure(&mut self, plan: Option<&Arc<Plan>>, job: &Job) -> Vec<Frame> {
+    /// Runs a cycle; the frames that its part was judged by.
+    pub(super) fn measure(&mut self, plan: Option<&Arc<Plan>>, job: &Job) -> JudgedBy {
         let id = job.job;
         let Some(plan) = plan else {
             // The station triggers only with an active recipe, and that is this plan's.
             let message = "measure: no recipe is loaded".into();
             self.station.event(failed(id, code::RIG, message));
-            return Vec::new();
+            return JudgedBy::default();
         };
         let (mut step, mut flags, mut cpu) = (0, 0, Duration::ZERO);
         let mut stages = Stages::default();
@@ -39,7 +48,7 @@ impl Worker {
             let began = Instant::now();
             let mut arriving = plan.arriving(step);
             let Some(taken) = self.take(plan, step, &mut arriving, id) else {
-                return Vec::new();
+                return JudgedBy::default();
             };
             let Taken {
                 frames,
@@ -51,13 +60,12 @@ impl Worker {
             if exposure.retaken > 0 {
                 flags |= RETRIED;
             }
-            step += 1;
-            let last = step >= plan.steps();
+            let last = step + 1 >= plan.steps();
             // The part must stay while another sequence may follow.
             if last {
                 self.station.event(Event::ExposureDone { job: id });
             }
-            let inspect = || plan.inspect_arrived(&frames, Some(arriving), Instant::now());
+            let inspect = || plan.inspect_arrived(&frames, arriving, Instant::now());
             let (mut inspection, spent) = timed_on(&self.pool, inspect);
             cpu += spent;
             stages.extend(&inspection.stages);
@@ -65,6 +73,7 @@ impl Worker {
                 self.progress
                     .log(&format!("measuring again with more frames: {reason}"));
                 flags |= STEPPED_UP;
+                step += 1;
                 continue;
             }
             if !last {
@@ -73,8 +82,9 @@ impl Worker {
             inspection.flags |= flags;
             inspection.stages = stages;
             inspection.cpu_us = us(cpu);
-            self.publish(id, inspection, plan, &frames);
-            return frames;
+            let judged_by = JudgedBy { step, frames };
+            self.publish(id, inspection, plan, &judged_by);
+            return judged_by;
         }
     }
 
@@ -126,7 +136,7 @@ impl Worker {
     }
 
     /// Hands the result to the station, and the frames of a part that did not pass to the history.
-    fn publish(&self, job: JobId, inspection: Inspection, plan: &Arc<Plan>, frames: &[Frame]) {
+    fn publish(&self, job: JobId, inspection: Inspection, plan: &Arc<Plan>, judged_by: &JudgedBy) {
         let inspection = Arc::new(inspection);
         let after = self.station.event(Event::Finished {
             job,
@@ -139,7 +149,8 @@ impl Worker {
         {
             self.history.keep(FailedPart {
                 record,
-                frames: frames.to_vec(),
+                step: judged_by.step,
+                frames: judged_by.frames.clone(),
                 plan: plan.clone(),
                 calibration: self.opened.calibration.clone(),
             });
