@@ -7,8 +7,10 @@
 //! - [`program`]: runs the binary and keeps what it says.
 //! - [`files`]: reads what it writes, [`score`]: compares it with the truth, [`plane`]: fits planes.
 //! - [`random`]: a seeded generator.
+//! - [`fuzz`]: functions of bytes that must not panic.
 
 pub mod files;
+pub mod fuzz;
 pub mod oracle;
 pub mod plane;
 pub mod program;

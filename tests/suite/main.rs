@@ -17,6 +17,7 @@ mod guide;
 mod history;
 mod hostile;
 mod house;
+mod inputs;
 mod licences;
 mod measured;
 mod outputs;

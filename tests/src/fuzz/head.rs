@@ -1,0 +1,94 @@
+//! Targets of what describes a station: calibration, models of OpenCV, scenario, configuration.
+
+use super::bounded;
+use appliance::calibration::Calibration;
+use appliance::calibration::file::CalibrationFile;
+use appliance::calibration::opencv::{self, Declared, Sizes, Unit};
+use appliance::config::Config;
+use hal::model::DeviceModel;
+use hal::sim::Scenario;
+use std::fs;
+use tempfile::TempDir;
+
+/// Memory that reading a text of this length may take.
+fn of_text(data: &[u8]) -> usize {
+    1024 * data.len() + (64 << 20)
+}
+
+/// A calibration: read as it is, and with the checksum that anybody can compute.
+pub fn calibration(data: &[u8]) {
+    bounded(of_text(data), || {
+        if let Ok(file) = CalibrationFile::read(data) {
+            let calibration = file.calibration().expect("a response that can be inverted");
+            calibration.devices().expect("models that can be used");
+        }
+        let parsed = serde_json::from_slice::<CalibrationFile>(data);
+        if let Ok(Ok((file, bytes))) = parsed.map(CalibrationFile::sealed) {
+            let again = CalibrationFile::read(&bytes).expect("what was sealed can be read");
+            assert_eq!(again.fingerprint, file.fingerprint);
+        }
+    });
+}
+
+thread_local! {
+    static MODELS: TempDir = tempfile::tempdir().expect("a folder");
+}
+
+/// Models of OpenCV: the first byte says unit and axis. Every number that comes through is finite.
+pub fn opencv(data: &[u8]) {
+    let Some((declared, text)) = data.split_first() else {
+        return;
+    };
+    let path = MODELS.with(|folder| folder.path().join("models.yml"));
+    fs::write(&path, text).expect("written");
+    let sizes = Sizes {
+        camera: (64, 48),
+        projector: (128, 96),
+    };
+    let declared = Declared {
+        unit: (declared & 1 == 1).then_some(Unit::Mm),
+        z_away: declared & 2 == 2,
+    };
+    bounded(of_text(text), || {
+        let one = opencv::from_one(&path, sizes, declared);
+        let two = opencv::from_two(&path, &path, sizes, declared);
+        for (camera, projector) in [one, two].into_iter().flatten() {
+            finite(&camera);
+            finite(&projector);
+        }
+    });
+}
+
+fn finite(model: &DeviceModel) {
+    let alone = [model.fx, model.fy, model.cx, model.cy].into_iter();
+    let more = model.distortion.into_iter().chain(model.rotation);
+    let mut all = alone.chain(more).chain(model.translation_mm);
+    assert!(all.all(f64::is_finite), "{model:?}");
+}
+
+/// A scenario of a simulated head: what is taken has a calibration that can be used.
+pub fn scenario(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else {
+        return;
+    };
+    bounded(of_text(data), || {
+        if let Ok(scenario) = Scenario::from_toml(text, "scenario.toml") {
+            let calibration = Calibration::of_scenario(&scenario);
+            std::hint::black_box((calibration.devices().is_ok(), calibration.fingerprint()));
+        }
+    });
+}
+
+/// A configuration: what is taken can be written.
+pub fn config(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else {
+        return;
+    };
+    bounded(of_text(data), || {
+        if let Ok(config) = toml::from_str::<Config>(text)
+            && config.check().is_ok()
+        {
+            toml::to_string(&config).expect("written");
+        }
+    });
+}

@@ -1,0 +1,147 @@
+//! The target of what a browser sends: bytes of one connection to the page's server.
+
+use super::part::PART;
+use super::plant::{runtime, settings};
+use appliance::access::Access;
+use appliance::history::Reader;
+use appliance::recipe::Store;
+use appliance::station::{Micros, Station, StationHandle};
+use appliance::web::{Parts, Site, serve};
+use std::cell::RefCell;
+use std::fs;
+use std::future;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::runtime::Runtime;
+use tokio::time::timeout;
+
+const HERE: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
+/// Stands in an input for the token of a session.
+const TOKEN: &[u8] = b"@T@";
+/// Longest wait for a server that neither answers nor closes.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// How long events are followed.
+const FOLLOWED: Duration = Duration::from_millis(20);
+
+/// A station whose measuring task is silent, and its page.
+struct Page {
+    runtime: Runtime,
+    address: SocketAddr,
+    access: Access,
+    secret: String,
+    /// Of the last session.
+    token: RefCell<String>,
+    recipes: PathBuf,
+    _folder: TempDir,
+}
+
+thread_local! {
+    static PAGE: Page = Page::new();
+}
+
+impl Page {
+    fn new() -> Self {
+        let runtime = runtime();
+        let folder = tempfile::tempdir().expect("a folder");
+        let station = Station::new(settings(), Micros(0));
+        let station = StationHandle::new(station, Instant::now(), |_| None);
+        let (access, secret) = Access::open(&folder.path().join("access")).expect("access");
+        let recipes = folder.path().join("recipes");
+        let site = Site::new(Parts {
+            station,
+            access: access.clone(),
+            recipes: Store::open(&recipes).expect("a store"),
+            maps: Default::default(),
+            history: Reader::of(folder.path()),
+            tally: Default::default(),
+            log: Default::default(),
+            registers: |_| serde_json::json!({ "registers": [] }),
+            configuration: "threads = 0\n".into(),
+            hosts: vec!["sensor.local".into()],
+            proxies: Vec::new(),
+        });
+        let address = runtime.block_on(async {
+            let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+            let address = listener.local_addr().expect("an address");
+            tokio::spawn(serve(listener, site, future::pending()));
+            address
+        });
+        Self {
+            runtime,
+            address,
+            access,
+            secret: secret.expect("a new device makes its secret"),
+            token: RefCell::default(),
+            recipes,
+            _folder: folder,
+        }
+    }
+
+    /// Exactly the taught recipe is stored.
+    fn put_back(&self) {
+        for entry in fs::read_dir(&self.recipes).into_iter().flatten().flatten() {
+            // Whoever still reads it keeps it.
+            let _ = fs::remove_file(entry.path());
+        }
+        fs::write(self.recipes.join("0001.recipe"), &PART.bytes).expect("put back");
+    }
+
+    /// The bytes with the token of an open session in them.
+    fn signed(&self, data: &[u8]) -> Vec<u8> {
+        let places: Vec<usize> = (0..data.len())
+            .filter(|&at| data[at..].starts_with(TOKEN))
+            .collect();
+        if places.is_empty() {
+            return data.to_vec();
+        }
+        let now = Instant::now();
+        let mut token = self.token.borrow_mut();
+        if !self.access.is_signed_in(&token, now) {
+            let session = self.access.sign_in(HERE, &self.secret, now);
+            *token = session.expect("the secret is right").text().to_owned();
+        }
+        let mut bytes = Vec::new();
+        let mut at = 0;
+        for place in places {
+            bytes.extend_from_slice(&data[at..place]);
+            bytes.extend_from_slice(token.as_bytes());
+            at = place + TOKEN.len();
+        }
+        bytes.extend_from_slice(&data[at..]);
+        bytes
+    }
+
+    async fn exchange(&self, bytes: &[u8]) -> Vec<u8> {
+        let mut stream = TcpStream::connect(self.address).await.expect("connected");
+        // The server may close before it has read all.
+        let _ = stream.write_all(bytes).await;
+        let _ = stream.shutdown().await;
+        let follows = bytes.windows(7).any(|window| window == b"/events");
+        let wait = if follows { FOLLOWED } else { PATIENCE };
+        let mut answer = Vec::new();
+        let read = timeout(wait, stream.read_to_end(&mut answer)).await;
+        assert!(
+            read.is_ok() || follows,
+            "the page neither answers nor closes"
+        );
+        answer
+    }
+}
+
+/// Bytes of one browser; `@T@` stands for the token of a session. The page answers or closes, and none of its workers panics.
+pub fn http(data: &[u8]) {
+    PAGE.with(|page| {
+        page.put_back();
+        let bytes = page.signed(data);
+        let answer = page.runtime.block_on(page.exchange(&bytes));
+        let answer = String::from_utf8_lossy(&answer);
+        assert!(
+            !(answer.starts_with("HTTP/1.1 500") && answer.contains("working it out failed")),
+            "a worker of the page panicked: {answer}"
+        );
+    });
+}

@@ -1,0 +1,81 @@
+//! A head of few pixels with a part that was taught on it: what the targets of recipes start from.
+
+use appliance::calibration::Calibration;
+use appliance::plan::Plan;
+use appliance::recipe::teach::{Naming, teach};
+use appliance::recipe::{Recipe, archive};
+use hal::frame::Frame;
+use hal::sim::{self, Scenario};
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
+
+/// Longest wait for a frame of the simulated head.
+const TIMEOUT: Duration = Duration::from_secs(5);
+
+const HEAD: &str = "sub_rays = 1
+part = { kind = \"plane\" }
+[rig.camera]
+width = 24
+height = 18
+fov_deg = [5.0, 3.75]
+[rig.projector]
+width = 48
+height = 36
+fov_deg = [8.0, 6.0]
+";
+
+/// The part as taught.
+pub struct Part {
+    /// What is known of the head.
+    pub calibration: Calibration,
+    /// The recipe, number 1.
+    pub recipe: Recipe,
+    /// Its file.
+    pub bytes: Vec<u8>,
+    /// One frame of each of the plan's rasters.
+    frames: Vec<Frame>,
+}
+
+/// Taught once.
+pub static PART: LazyLock<Part> = LazyLock::new(Part::taught);
+
+impl Part {
+    fn taught() -> Self {
+        let scenario = Scenario::from_toml(HEAD, "the fuzz targets' head").expect("a scenario");
+        let (mut head, stage) = sim::head(&scenario).expect("a head");
+        let calibration = Calibration::of_stage(&stage);
+        let naming = Naming {
+            number: 1,
+            part_number: "P-1".into(),
+            name: "plane".into(),
+            taught_at_unix_s: 0,
+            placement_tolerance_mm: 0.5,
+        };
+        let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &|_, _| ());
+        let recipe = taught.expect("a plane can be taught").recipe;
+        let (bytes, _) = archive::pack(&recipe.file, &recipe.arrays).expect("packed");
+        let recipe = Recipe::from_bytes(&bytes).expect("and read again");
+        let plan = Plan::new(recipe.clone(), &calibration, true).expect("a plan");
+        let rasters = plan.rasters(&calibration).expect("rasters");
+        let all: Vec<usize> = (0..rasters.len()).collect();
+        head.load(rasters).expect("loaded");
+        let mut frames = Vec::new();
+        let mut keep = |_, frame| frames.push(frame);
+        head.acquire(&all, TIMEOUT, &mut keep).expect("frames");
+        Self {
+            calibration,
+            recipe,
+            bytes,
+            frames,
+        }
+    }
+
+    /// Judges the part by another recipe: with each of its sequences, as far as there are frames for them.
+    pub fn judge(&self, plan: &Plan) {
+        for step in 0..plan.steps() {
+            if let Some(frames) = self.frames.get(..plan.indices(step).len()) {
+                std::hint::black_box(plan.inspect(step, frames, Instant::now()));
+            }
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Targets of recipes: what somebody imports, and what the page changes.
+
+use super::bounded;
+use super::part::PART;
+use appliance::plan::Plan;
+use appliance::recipe::edit::{self, Edit};
+use appliance::recipe::{Recipe, RecipeFile, Store, archive};
+use std::fs;
+use std::io::Cursor;
+use tempfile::TempDir;
+
+/// A recipe file of any bytes: what is taken can be packed and read again.
+pub fn zip(data: &[u8]) {
+    bounded(16 * data.len() + (16 << 20), || {
+        let _ = archive::manifest(Cursor::new(data));
+        let _ = archive::is_sound(Cursor::new(data));
+        if let Ok(recipe) = Recipe::from_bytes(data) {
+            let (bytes, _) = archive::pack(&recipe.file, &recipe.arrays).expect("packed");
+            let again = Recipe::from_bytes(&bytes).expect("and read again");
+            assert_eq!(again.file.gauges.len(), recipe.file.gauges.len());
+            assert!(archive::is_sound(Cursor::new(&bytes[..])));
+        }
+    });
+}
+
+/// A manifest of any content around the arrays of a taught part: checked, packed, planned, and the part judged by it.
+pub fn json(data: &[u8]) {
+    let part = &*PART;
+    let Ok(mut file) = serde_json::from_slice::<RecipeFile>(data) else {
+        return;
+    };
+    // Anybody can fill these in.
+    file.format.clone_from(&part.recipe.file.format);
+    file.version = part.recipe.file.version;
+    file.fingerprint.clone_from(&part.recipe.file.fingerprint);
+    file.calibration.clone_from(&part.recipe.file.calibration);
+    let Ok(recipe) = Recipe::check(file, part.recipe.arrays.clone()) else {
+        return;
+    };
+    let (bytes, _) = archive::pack(&recipe.file, &recipe.arrays).expect("packed");
+    let recipe = Recipe::from_bytes(&bytes).expect("and read again");
+    if let Ok(plan) = Plan::new(recipe, &part.calibration, true) {
+        plan.rasters(&part.calibration).expect("rasters");
+        part.judge(&plan);
+    }
+}
+
+/// A store with the taught recipe, in a folder of its own.
+struct Stored {
+    folder: TempDir,
+    store: Store,
+}
+
+thread_local! {
+    static STORED: Stored = {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = Store::open(folder.path()).expect("a store");
+        Stored { folder, store }
+    };
+}
+
+/// A change from the page: what is taken can be loaded, planned, and the part judged by it.
+pub fn edit(data: &[u8]) {
+    let part = &*PART;
+    let Ok(mut wanted) = serde_json::from_slice::<Edit>(data) else {
+        return;
+    };
+    wanted.fingerprint.clone_from(&part.recipe.file.fingerprint);
+    STORED.with(|stored| {
+        // Written past the store: a sync for each input would be most of the time.
+        fs::write(stored.folder.path().join("0001.recipe"), &part.bytes).expect("put back");
+        if edit::edit(&stored.store, 1, wanted).is_ok() {
+            let loaded = stored.store.load(1).expect("what was taken can be loaded");
+            assert_eq!(loaded.fallback, None);
+            let plan = Plan::new(loaded.recipe, &part.calibration, true).expect("and planned");
+            part.judge(&plan);
+        }
+    });
+}
