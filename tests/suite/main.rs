@@ -32,6 +32,7 @@ mod service;
 mod station;
 mod station_plc;
 mod stress;
+mod together;
 mod triangulation;
 mod twin;
 mod written;
