@@ -1,13 +1,36 @@
 //! The system clock, and whether it is synchronised.
 
-/// The time in µs since 1970 UTC, or `None` while no time service has synchronised the clock: a
-/// time that may be wrong is worse than none.
+use crate::station::system_utc_us;
+
+/// The beginning of the year 10000, µs since 1970 UTC: dates in HTTP (RFC 9110), in SQLite and in most of what reads a CSV
+/// have four digits for the year. Linux itself sets no clock past 2232.
+const YEAR_10000_US: u64 = 253_402_300_800_000_000;
+/// The beginning of 2026, ms since 1970 UTC: this program is not older.
+const YEAR_2026_MS: u64 = 1_767_225_600_000;
+/// The beginning of 2100.
+const YEAR_2100_MS: u64 = 4_102_444_800_000;
+
+/// The time in µs since 1970 UTC, or `None` while no time service has synchronised the clock, or where it is beyond every
+/// calendar: a time that may be wrong is worse than none.
 pub fn utc_us() -> Option<u64> {
-    if synchronised() {
-        crate::station::system_utc_us()
-    } else {
-        None
-    }
+    in_calendars(system_utc_us()).filter(|_| synchronised())
+}
+
+/// Whether the system clock shows a time for which there is no date in HTTP: before 1970, or from the year 10000 on.
+pub fn is_past_calendars() -> bool {
+    in_calendars(system_utc_us()).is_none()
+}
+
+fn in_calendars(utc_us: Option<u64>) -> Option<u64> {
+    utc_us.filter(|&us| us < YEAR_10000_US)
+}
+
+/// The time in µs of a browser's clock, given in ms since 1970 UTC; `None` before this program was written and from 2100 on,
+/// where that clock is certainly wrong.
+pub fn of_browser(ms: u64) -> Option<u64> {
+    (YEAR_2026_MS..YEAR_2100_MS)
+        .contains(&ms)
+        .then(|| ms * 1000)
 }
 
 /// Whether the kernel says that the clock is disciplined by a time service.
@@ -28,4 +51,28 @@ fn synchronised() -> bool {
 #[cfg(not(target_os = "linux"))]
 fn synchronised() -> bool {
     false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::time::utc;
+
+    #[test]
+    fn bounds_of_believable_times_are_those_of_the_calendar() {
+        assert_eq!(utc(YEAR_10000_US), "+10000-01-01T00:00:00.000000Z");
+        let last = Some(YEAR_10000_US - 1);
+        assert_eq!(in_calendars(last), last);
+        assert_eq!(in_calendars(Some(YEAR_10000_US)), None);
+        assert!(!is_past_calendars(), "of this computer");
+        for (ms, words) in [
+            (YEAR_2026_MS, "2026-01-01T00:00:00.000000Z"),
+            (YEAR_2100_MS - 1, "2099-12-31T23:59:59.999000Z"),
+        ] {
+            assert_eq!(of_browser(ms).map(utc).as_deref(), Some(words));
+        }
+        for wrong in [0, YEAR_2026_MS - 1, YEAR_2100_MS, u64::MAX] {
+            assert_eq!(of_browser(wrong), None);
+        }
+    }
 }

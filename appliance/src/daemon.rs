@@ -129,12 +129,14 @@ impl Daemon {
         };
         let clients = modbus::Clients::new(usize::from(config.modbus.connections));
         let serving = {
+            let (dating, boot_id) = (history.clone(), station.snapshot().boot_id);
             let site = web::Site::new(web::Parts {
                 station: station.clone(),
                 access,
                 recipes: state.recipes().clone(),
                 maps: maps.clone(),
                 history: Reader::of(&path),
+                date: Box::new(move |utc_us| dating.date(boot_id, utc_us)),
                 tally,
                 log: progress.logbook().clone(),
                 registers: modbus::live,

@@ -26,6 +26,7 @@ pub mod modbus;
 pub mod notify;
 pub mod output;
 pub mod plan;
+pub mod priority;
 pub mod progress;
 pub mod recipe;
 pub mod rig;

@@ -245,6 +245,60 @@ try {
     await page.click("nav a[href='#live']");
   });
 
+  await step("a stored result opens with its values and pictures, or says why it has none", async () => {
+    await page.click("nav a[href='#history']");
+    const kept = page.locator("#history-rows tr", { has: page.locator("a[download]") }).first();
+    await kept.locator("button.open").click();
+    await page.waitForSelector("#kept:not([hidden])");
+    for (const layer of ["deviation", "modulation", "height"]) {
+      await page.click(`[data-kept=${layer}]`);
+      await page.waitForFunction(() => document.querySelector("#kept-words").hidden);
+      assert.ok(await page.evaluate(() => document.querySelector("#kept-map").width) > 100, layer);
+    }
+    assert.equal(await page.textContent("#kept-verdict"), "FAIL");
+    assert.ok(await page.locator("#kept-gauges tr").count() >= 2);
+    assert.match(await page.textContent("#kept-gauges"), /± .* mm.*✗ low/);
+    assert.match(await page.textContent("#kept-facts"), /the head is simulated/);
+    await page.click("#kept-close");
+    await page.waitForSelector("#kept", { state: "hidden" });
+    await page.selectOption("#filter-verdict", "PASS");
+    await page.click("#filter button");
+    await page.waitForFunction(() => Array.from(document.querySelectorAll("#history-rows .tag")).every((tag) => tag.textContent === "PASS"));
+    await page.locator("#history-rows button.open").first().click();
+    await page.waitForFunction(() => document.querySelector("#no-frames").textContent.includes("not kept"));
+    assert.ok(await page.locator("#kept-pictures").isHidden());
+    await page.click("#kept-close");
+    await page.selectOption("#filter-verdict", "");
+    await page.click("nav a[href='#live']");
+  });
+
+  await step("results are dated, by the browser that signed in where the clock is not synchronised, and dates filter them", async () => {
+    const unsynced = await page.evaluate(async () => (await (await fetch("/api/snapshot")).json()).warnings.includes("clock not synchronised"));
+    await page.click("nav a[href='#history']");
+    const day = (more) => page.evaluate((more) => {
+      const at = new Date(Date.now() + 86400000 * more);
+      return `${at.getFullYear()}-${String(at.getMonth() + 1).padStart(2, "0")}-${String(at.getDate()).padStart(2, "0")}`;
+    }, more);
+    await page.fill("#filter-from", await day(-1));
+    await page.fill("#filter-to", await day(0));
+    await page.click("#filter button");
+    await page.waitForFunction(() => document.querySelector("#history-csv").href.includes("until_us"));
+    await page.waitForFunction(() => document.querySelectorAll("#history-rows tr").length > 5);
+    const when = page.locator("#history-rows td:nth-child(2)").first();
+    assert.match(await when.textContent(), unsynced ? /^≈ \d{4}-/ : /^\d{4}-/);
+    assert.match(await when.getAttribute("title") || "", unsynced ? /browser of a signed-in user/ : /^$/);
+    const lines = await page.evaluate(async () => (await (await fetch(document.querySelector("#history-csv").href)).text()).trim().split("\r\n"));
+    assert.ok(lines[0].includes("time_source") && lines[1].includes(unsynced ? ",browser," : ",clock,"), lines[1]);
+    await page.fill("#filter-from", await day(1));
+    await page.fill("#filter-to", "");
+    await page.click("#filter button");
+    await page.waitForFunction(() => document.querySelector("#history-counts").textContent.startsWith("no result"));
+    await page.fill("#filter-from", "");
+    await page.click("#filter button");
+    await page.waitForFunction(() => document.querySelectorAll("#history-rows tr").length > 5);
+    await page.click("nav a[href='#live']");
+  });
+
   await step("files can be taken along", async () => {
     for (const [selector, name] of [["a[href='/api/last/cloud.ply']", /\.ply$/], ["a[href='/api/last/gauges.csv']", /\.csv$/]]) {
       const [download] = await Promise.all([page.waitForEvent("download"), page.click(selector)]);

@@ -2,7 +2,7 @@
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, READY, long, trigger};
-use appliance::history::{Filter, Reader};
+use appliance::history::{Entry, Filter, Reader, Writer};
 use appliance::station::Verdict;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -203,19 +203,23 @@ fn a_kept_part_is_judged_again_by_its_own_recipe_after_that_was_edited_or_delete
     assert_eq!(status, 200);
     let file = place.path("part.zip");
     fs::write(&file, zip).unwrap();
-    // Limits so wide that the dent passes, twice: no generation is left that judged the part.
+    // No limits, so that the dent passes, and another name: no generation is left that judged the part.
     let taught = fs::read(place.recipe()).unwrap();
     assert_eq!(taught, fs::read(folder.join("recipe.recipe")).unwrap());
     browser.sign_in(&daemon);
-    for high in [50.0, 60.0] {
+    for name in ["lenient", "renamed"] {
         let recipe = browser.get("/api/recipes/1");
         let mut gauges = recipe["gauges"].clone();
         for gauge in gauges.as_array_mut().unwrap() {
-            (gauge["low"], gauge["high"]) = ((-high).into(), high.into());
+            let gauge = gauge.as_object_mut().unwrap();
+            gauge.retain(|key, _| key != "low" && key != "high");
         }
-        let edit = serde_json::json!({ "fingerprint": recipe["fingerprint"], "gauges": gauges });
-        assert_eq!(browser.json("PUT", "/api/recipes/1", &edit).0, 200);
-        browser.wait_for_another(recipe["fingerprint"].as_str().unwrap());
+        let fingerprint = &recipe["fingerprint"];
+        let edit =
+            serde_json::json!({ "fingerprint": fingerprint, "gauges": gauges, "name": name });
+        let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
+        assert_eq!(status, 200, "{answer}");
+        browser.wait_for_another(fingerprint.as_str().unwrap());
     }
     daemon.kill();
     let own = |run: Run| {
@@ -358,4 +362,150 @@ fn recipes_are_listed_exported_imported_and_deleted_and_nothing_damaged_or_forei
     );
     assert_eq!(only["bytes"], exported.len());
     assert!(recipe(&["list"]).succeeded().stdout.contains("PART-0001"));
+}
+
+#[test]
+fn a_stored_result_opens_with_the_pictures_of_the_live_view_and_one_without_frames_says_why() {
+    let place = place_with_a_dent();
+    let config = fs::read_to_string(place.path("fringed.toml")).unwrap();
+    // Room for two parts with their pattern and one recipe.
+    let bounded = format!("{config}[history]\nrecordings_mib = 24\n");
+    fs::write(place.path("fringed.toml"), bounded).unwrap();
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    let mut browser = Browser::new(&daemon);
+    let seq = long(&plc.measure(1), 0);
+    recording(&place, seq);
+    let one = browser.get(&format!("/api/history/{seq}"));
+    assert!(one["no_frames"].is_null(), "{one}");
+    assert_eq!(one["result"]["gauges"][0]["name"], "deviation");
+    let flags = one["flags"].to_string();
+    assert!(flags.contains("the head is simulated"), "{flags}");
+    for layer in ["height", "deviation", "modulation"] {
+        let (status, live) = browser.ask("GET", &format!("/api/picture/{layer}"), &[]);
+        let (kept_status, kept) =
+            browser.ask("GET", &format!("/api/history/{seq}/picture/{layer}"), &[]);
+        assert_eq!((status, kept_status), (200, 200), "{layer}");
+        assert!(live == kept, "{layer}: not the live view's picture");
+    }
+    assert_eq!(
+        browser
+            .ask("GET", &format!("/api/history/{seq}/picture/x"), &[])
+            .0,
+        404
+    );
+    assert_eq!(browser.ask("GET", "/api/history/99", &[]).0, 404);
+    let mut last = seq;
+    while reader(&place).recording(seq).unwrap().is_some() {
+        assert!(last < seq + 20, "the quota removes nothing");
+        last = long(&plc.measure(last as u16 + 1), 0);
+        // Not faster than they are written.
+        let started = Instant::now();
+        while reader(&place).recording(seq).unwrap().is_some()
+            && reader(&place).recording(last).unwrap().is_none()
+        {
+            assert!(started.elapsed() < WRITTEN, "no recording of result {last}");
+        }
+    }
+    let why = browser.get(&format!("/api/history/{seq}"))["no_frames"].to_string();
+    assert!(why.contains("history.recordings_mib"), "{why}");
+    drop((plc, daemon));
+    fs::write(
+        place.path("fringed.toml"),
+        format!("{config}[history]\nrecordings_mib = 0\n"),
+    )
+    .unwrap();
+    let daemon = Daemon::start(&place);
+    let mut browser = Browser::new(&daemon);
+    let seq = long(&Plc::connect(&daemon).measure(1), 0);
+    let started = Instant::now();
+    loop {
+        let (status, answer) =
+            browser.ask("GET", &format!("/api/history/{seq}/picture/height"), &[]);
+        let words = String::from_utf8(answer).unwrap();
+        assert_eq!(status, 404, "{words}");
+        if words.contains("switched off") {
+            break;
+        }
+        assert!(started.elapsed() < WRITTEN, "{words}");
+    }
+}
+
+#[test]
+fn a_list_by_time_says_how_many_results_it_leaves_out_because_their_time_is_not_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("history.db");
+    let mut writer = Writer::open(&database, 1000).unwrap().writer;
+    let entries: Vec<_> = (1..=3)
+        .map(|seq| Entry {
+            seq,
+            time_utc_us: (seq == 3).then_some(1_790_000_000_000_000),
+            uptime_s: Some(3600),
+            boot_id: Some("0000b007".into()),
+            verdict: Verdict::Pass,
+            ..Entry::default()
+        })
+        .collect();
+    writer.store(entries.iter()).unwrap();
+    let state = folder.path().to_str().unwrap();
+    let history = |more: &[&str]| {
+        let arguments = [&["history", "--state", state][..], more];
+        program().run(&arguments.concat()).succeeded()
+    };
+    let words = "2 results are left out";
+    for more in [&["--csv"][..], &["--json"], &[]] {
+        let run = history(&[&["--since", "2026-01-01"][..], more].concat());
+        assert!(run.stderr.contains(words), "{}", run.stderr);
+        assert!(!run.stdout.contains(words), "{}", run.stdout);
+        assert_eq!(history(more).stderr, "");
+    }
+    let shown = history(&[]).stdout;
+    assert!(shown.contains("1:00:00 after start"), "{shown}");
+    writer.date("0000b007", 1_780_000_000_000_000).unwrap();
+    let run = history(&["--since", "2026-01-01"]);
+    assert_eq!(run.stderr, "");
+    assert!(
+        run.stdout.contains("≈2026-05-28T21:26:40"),
+        "{}",
+        run.stdout
+    );
+}
+
+/// Where TIME is in the registers from 200 on.
+const TIME: usize = 14;
+
+#[test]
+fn the_time_of_a_browser_dates_history_and_log_and_never_the_register() {
+    let place = place_with_a_dent();
+    fs::remove_file(place.path("state/access/secret")).unwrap();
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    let before = long(&plc.measure(1), 0);
+    let mut browser = Browser::new(&daemon);
+    let time_ms = 1_790_000_000_000_u64;
+    let said = browser.sign_in_at(&daemon, time_ms);
+    let words = plc.measure(2);
+    let time = &words[TIME..TIME + 4];
+    let started = Instant::now();
+    let results = loop {
+        let results = browser.get("/api/history")["results"].clone();
+        if results.as_array().unwrap().len() == 2 {
+            break results;
+        }
+        assert!(started.elapsed() < WRITTEN, "{results}");
+    };
+    let log = browser.get("/api/log")["lines"].clone();
+    if said == "not needed" {
+        // The clock of this computer is synchronised.
+        assert!(time != [0; 4] && results[0]["browser_utc_us"].is_null());
+        return;
+    }
+    assert_eq!((said.as_str(), time), ("taken", &[0; 4][..]));
+    // Both of this start, also the one before the sign-in.
+    assert_eq!(results[1]["seq"], before);
+    for result in [&results[0], &results[1], &log[0]] {
+        let us = result["browser_utc_us"].as_u64().unwrap();
+        assert!(us.abs_diff(time_ms * 1000) < 60_000_000, "{result}");
+        assert!(result["time_utc_us"].is_null() && result["utc_us"].is_null());
+    }
 }

@@ -71,10 +71,17 @@ impl Browser {
     }
 
     pub fn sign_in(&mut self, daemon: &Daemon) {
+        self.sign_in_at(daemon, 0);
+    }
+
+    /// Signs in where the clock says so many ms since 1970; answers with what came of that.
+    pub fn sign_in_at(&mut self, daemon: &Daemon, time_ms: u64) -> String {
         let (_, rest) = daemon.log.split_once("shown this once: ").unwrap();
         let secret = rest.split(' ').next().unwrap();
-        let body = json!({ "secret": secret });
-        assert_eq!(self.json("POST", "/api/session", &body).0, 200);
+        let body = json!({ "secret": secret, "time_ms": time_ms });
+        let (status, answer) = self.json("POST", "/api/session", &body);
+        assert_eq!(status, 200, "{answer}");
+        answer["time"].as_str().unwrap().to_owned()
     }
 
     /// Waits until the station is ready with a recipe whose fingerprint is not `before`.

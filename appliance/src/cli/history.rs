@@ -3,6 +3,7 @@
 use super::options::{Files, Json};
 use crate::error::{Exit, Failure};
 use crate::history::{Entry, Filter, HistoryError, Reader, time};
+use crate::journal::{self, Severity};
 use crate::station::Verdict;
 
 /// Show or export stored results, newest first.
@@ -65,19 +66,35 @@ impl History {
             before_seq: None,
             limit: self.limit.unwrap_or(usual),
         };
+        let undated = reader.undated(&filter).map_err(failure)?;
+        if undated > 0 {
+            let words = format!(
+                "{undated} results are left out, of which it is not known when they were: the clock was not synchronised; \
+                 leave out --since and --until to see them"
+            );
+            journal::write(Severity::Warning, &words);
+        }
         if self.csv {
             return self.csv(&reader, &filter);
         }
         let results = reader.results(&filter).map_err(failure)?;
         if self.json.json {
-            say!("{:#}", serde_json::json!({ "results": results }));
+            say!(
+                "{:#}",
+                serde_json::json!({ "results": results, "undated": undated })
+            );
             return Ok(());
         }
         say!(
-            "       seq  time (UTC)           recipe        part  verdict  coverage    result  remarks"
+            "       seq  time (UTC)            recipe        part  verdict  coverage    result  remarks"
         );
         for entry in &results {
             say!("{}", row(entry));
+        }
+        if results.iter().any(|entry| entry.browser_utc_us.is_some()) {
+            say!(
+                "≈ the time is from the browser of a signed-in user: the clock was not synchronised"
+            );
         }
         let counts = reader.counts(&filter).map_err(failure)?;
         say!(
@@ -109,8 +126,20 @@ pub fn failure(error: HistoryError) -> Failure {
     Failure::new(exit, error.to_string())
 }
 
+/// When a result was, to the second: by the clock, by a browser's, or how long after the start of the daemon.
+fn moment(entry: &Entry) -> String {
+    let second = |us| format!("{:.19}", time::utc(us));
+    match (entry.time_utc_us, entry.browser_utc_us, entry.uptime_s) {
+        (Some(us), ..) => second(us),
+        (None, Some(us), _) => format!("≈{}", second(us)),
+        (None, None, Some(s)) => {
+            format!("{}:{:02}:{:02} after start", s / 3600, s / 60 % 60, s % 60)
+        }
+        (None, None, None) => String::new(),
+    }
+}
+
 fn row(entry: &Entry) -> String {
-    let utc = entry.time_utc_us.map(time::utc).unwrap_or_default();
     let outside = entry.gauges.iter().filter(|gauge| gauge.decision & 1 == 0);
     let mut remarks: Vec<String> = outside
         .map(|gauge| match gauge.value {
@@ -123,9 +152,9 @@ fn row(entry: &Entry) -> String {
     remarks.extend(entry.reason.clone());
     remarks.extend(entry.recording.iter().map(|name| format!("[{name}]")));
     format!(
-        "{:>10}  {:<19.19}  {:>6}  {:>10}  {:<7}  {:>6.1} %  {:>5} ms  {}",
+        "{:>10}  {:<20}  {:>6}  {:>10}  {:<7}  {:>6.1} %  {:>5} ms  {}",
         entry.seq,
-        utc,
+        moment(entry),
         entry.recipe,
         entry.part_id,
         entry.verdict.word(),

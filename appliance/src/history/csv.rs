@@ -10,7 +10,7 @@ use std::io::Write;
 
 /// The columns before the gauges'.
 const COLUMNS: &str = "seq,time_utc,recipe,fingerprint,part_id,press_stroke,token,verdict,error_code,reason,flags,\
-    valid_points,coverage_permille,temperature_c,height_noise_mm,fitness_permille,exposure_us,total_us,stages_us,recording";
+    valid_points,coverage_permille,temperature_c,height_noise_mm,fitness_permille,exposure_us,total_us,stages_us,recording,time_source";
 
 impl Reader {
     /// Writes the results that pass the filter, newest first, with the names of all their gauges in the head line. A
@@ -57,7 +57,7 @@ impl Reader {
         values.push(i64::try_from(filter.limit).unwrap_or(i64::MAX).into());
         let query = format!(
             "SELECT DISTINCT name, unit FROM gauge WHERE result IN
-                (SELECT id FROM result WHERE {condition} ORDER BY id DESC LIMIT ?) ORDER BY place, name"
+                (SELECT id FROM dated WHERE {condition} ORDER BY id DESC LIMIT ?) ORDER BY place, name"
         );
         connection
             .prepare(&query)
@@ -73,12 +73,12 @@ impl Reader {
 
 fn one(line: &mut String, entry: &Entry, gauges: &[(String, String)]) {
     // Writing to a string cannot fail.
-    let _ = write!(
-        line,
-        "{},{}",
-        entry.seq,
-        entry.time_utc_us.map(utc).unwrap_or_default()
-    );
+    let (time, source) = match (entry.time_utc_us, entry.browser_utc_us) {
+        (Some(us), _) => (utc(us), "clock"),
+        (None, Some(us)) => (utc(us), "browser"),
+        (None, None) => (String::new(), ""),
+    };
+    let _ = write!(line, "{},{time}", entry.seq);
     let _ = write!(
         line,
         ",{},{},{},{}",
@@ -112,6 +112,7 @@ fn one(line: &mut String, entry: &Entry, gauges: &[(String, String)]) {
     text(line, &stages.join("; "));
     line.push(',');
     text(line, entry.recording.as_deref().unwrap_or_default());
+    let _ = write!(line, ",{source}");
     for (name, unit) in gauges {
         match entry
             .gauges

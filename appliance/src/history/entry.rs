@@ -1,7 +1,7 @@
 //! A result as the history keeps it, and which results somebody wants to see.
 
 use crate::station::result::flag;
-use crate::station::{ResultRecord, Verdict};
+use crate::station::{Placement, ResultRecord, Verdict};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// One stored result. Lengths in mm, times in µs; as JSON the keys are the fields' names.
@@ -15,6 +15,9 @@ pub struct Entry {
     pub uptime_s: Option<u32>,
     /// Which start that was: BOOT_ID as 8 hexadecimal digits.
     pub boot_id: Option<String>,
+    /// Where the clock was not synchronised: the trigger time in µs since 1970 UTC by the clock of a browser whose user
+    /// signed in during the same start.
+    pub browser_utc_us: Option<u64>,
     /// Recipe number.
     pub recipe: u16,
     /// The first 8 hexadecimal digits of the recipe's fingerprint.
@@ -52,8 +55,41 @@ pub struct Entry {
     pub stages: Vec<StageEntry>,
     /// The gauges, in the recipe's order.
     pub gauges: Vec<GaugeEntry>,
+    /// How the part lay; none where it was not aligned, and in results of older programs.
+    pub placement: Option<PlacementEntry>,
     /// The folder in `recordings/` that holds the frames, if they were kept.
     pub recording: Option<String>,
+    /// Why those of a part that did not pass are not kept, as far as known; see [`super::Unkept`].
+    pub unkept: Option<String>,
+}
+
+/// How a part lay against how it was taught.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlacementEntry {
+    /// Shifts along x, y, z in mm and the rotation vector about x, y, z in degrees; none where the part's shape does not
+    /// determine it.
+    pub values: [Option<f64>; 6],
+    /// How far its farthest corner went, mm.
+    pub reach_mm: f64,
+    /// Share of the points looked at that do not fit.
+    pub outliers: f64,
+}
+
+impl PlacementEntry {
+    /// None where it is not finite, which JSON cannot hold.
+    fn of(placement: &Placement) -> Option<Self> {
+        let values = [placement.shift_mm, placement.turn_deg];
+        let mut values = values.as_flattened().iter().zip(placement.left_out);
+        let finite = placement.reach_mm.is_finite() && placement.outliers.is_finite();
+        finite.then(|| Self {
+            values: std::array::from_fn(|_| {
+                let (value, left_out) = values.next()?;
+                (value.is_finite() && !left_out).then_some(*value)
+            }),
+            reach_mm: placement.reach_mm,
+            outliers: placement.outliers,
+        })
+    }
 }
 
 /// The time of one stage.
@@ -126,6 +162,7 @@ impl Entry {
             time_utc_us: Some(record.time_utc_us).filter(|&time| time != 0),
             uptime_s: Some(record.uptime_s),
             boot_id: Some(format!("{:08x}", record.boot_id)),
+            browser_utc_us: None,
             recipe: record.recipe,
             fingerprint: format!("{:08x}", record.recipe_crc),
             part_id: record.part_id,
@@ -144,7 +181,9 @@ impl Entry {
             total_us: record.total_us,
             stages: stages(record),
             gauges: gauges(record),
+            placement: found.placement.as_ref().and_then(PlacementEntry::of),
             recording: None,
+            unkept: None,
         }
     }
 }
@@ -187,6 +226,7 @@ pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
         time_utc_us: stored.time_utc_us,
         uptime_s: stored.uptime_s,
         boot_id: stored.boot_id.clone(),
+        browser_utc_us: stored.browser_utc_us,
         part_id: stored.part_id,
         press_stroke: stored.press_stroke,
         token: stored.token,
@@ -195,7 +235,10 @@ pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
         exposure_us: stored.exposure_us,
         total_us: stored.total_us,
         stages: stored.stages.clone(),
+        // Older programs have not stored it.
+        placement: stored.placement.as_ref().and(replayed.placement.clone()),
         recording: stored.recording.clone(),
+        unkept: stored.unkept.clone(),
         ..replayed.clone()
     };
     if same == *stored {

@@ -3,8 +3,8 @@
 
 use super::recordings::{FailedPart, Recordings};
 use super::task::Message;
+use super::unkept::Unkept;
 use crate::recipe::Store;
-use crate::station::{ResultRecord, Verdict};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -63,20 +63,19 @@ pub(super) fn open(
 }
 
 impl Keeper {
-    /// Whether the frames of a result are wanted: it did not pass, and none are in hand.
-    pub(super) fn wants(&self, record: &ResultRecord) -> bool {
-        let failed = matches!(record.verdict, Verdict::Fail | Verdict::Invalid);
-        self.quota > 0 && failed && !self.busy.load(Ordering::Acquire)
-    }
-
-    /// Hands over a part, unless another is in hand.
-    pub(super) fn keep(&self, part: FailedPart) {
+    /// Hands over a part that did not pass, made by `part`; the error says why its frames are not kept.
+    pub(super) fn keep(&self, part: impl FnOnce() -> FailedPart) -> Result<(), Unkept> {
+        if self.quota == 0 {
+            return Err(Unkept::Off);
+        }
         if self.busy.swap(true, Ordering::AcqRel) {
-            return;
+            return Err(Unkept::Busy);
         }
-        if self.orders.try_send(Order::Keep(Box::new(part))).is_err() {
+        let sent = self.orders.try_send(Order::Keep(Box::new(part())));
+        sent.map_err(|_| {
             self.busy.store(false, Ordering::Release);
-        }
+            Unkept::Busy
+        })
     }
 
     /// Asks for the oldest recording to be removed: results are worth more than the frames of old parts.
@@ -105,21 +104,23 @@ impl Keeping {
             match order {
                 Order::Keep(part) => {
                     let seq = part.record.seq;
-                    let kept = self
-                        .recordings
-                        .keep(&part)
-                        .map_err(|error| error.to_string());
+                    let kept = self.recordings.keep(&part);
                     drop(part);
                     self.busy.store(false, Ordering::Release);
                     self.tell(match kept {
                         Ok(name) => Message::Kept { seq, name },
-                        Err(problem) => Message::NotKept { problem },
+                        Err(error) => Message::NotKept {
+                            seq,
+                            why: Unkept::from(&error),
+                            problem: Some(error.to_string()),
+                        },
                     });
                     self.bound();
                 }
                 Order::MakeRoom => {
                     if let Some(name) = self.recordings.remove_oldest() {
-                        self.tell(Message::Removed { name });
+                        let why = Unkept::Room;
+                        self.tell(Message::Removed { name, why });
                     }
                 }
                 Order::Stop => break,
@@ -131,12 +132,32 @@ impl Keeping {
     /// Removes what is over the quota.
     fn bound(&mut self) {
         while let Some(name) = self.recordings.over_quota() {
-            self.tell(Message::Removed { name });
+            let why = Unkept::Quota;
+            self.tell(Message::Removed { name, why });
         }
     }
 
     fn tell(&self, message: Message) {
         // Links that nobody hears of are put right at the next start.
         let _ = self.told.send(message);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_that_are_not_kept_are_not_even_copied_and_the_reason_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let (told, _) = sync_channel(1);
+        let keeper = |quota| {
+            let recipes = Store::at(folder.path());
+            open(folder.path(), recipes, quota, told.clone()).unwrap().0
+        };
+        assert_eq!(keeper(0).keep(|| unreachable!()), Err(Unkept::Off));
+        let busy = keeper(1);
+        busy.busy.store(true, Ordering::Release);
+        assert_eq!(busy.keep(|| unreachable!()), Err(Unkept::Busy));
     }
 }

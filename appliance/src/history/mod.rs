@@ -19,6 +19,7 @@ pub mod csv;
 pub mod entry;
 mod keeper;
 mod mark;
+mod message;
 pub mod reader;
 mod recordings;
 pub mod schema;
@@ -27,22 +28,33 @@ mod spool;
 mod syncing;
 pub mod task;
 pub mod time;
+mod unkept;
 pub mod writer;
 
 #[cfg(test)]
 mod tests;
 
-pub use entry::{Entry, Filter, GaugeEntry, StageEntry, difference};
+pub use entry::{Entry, Filter, GaugeEntry, PlacementEntry, StageEntry, difference};
 pub use reader::{Counts, Reader, Trend, TrendPoint};
 pub use recordings::{FailedPart, RECIPE, name_of, seq_of};
 pub use seqs::Numbering;
-pub use task::{Bounds, History, Task, open};
+pub use task::{History, Task, open};
+pub use unkept::{Unkept, why_no_frames};
 pub use writer::{Opening, Writer};
 
 /// The database's name in the state folder.
 pub const DATABASE: &str = "history.db";
 /// The folder of recordings in the state folder.
 pub const RECORDINGS: &str = "recordings";
+
+/// What is kept, and how much of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// The most results.
+    pub results: u64,
+    /// The most bytes of recordings of failed parts; 0 = none are kept.
+    pub recordings: u64,
+}
 
 /// A history that could not be read or written: what was attempted with what, and the remedy.
 #[derive(Debug, thiserror::Error)]

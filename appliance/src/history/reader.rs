@@ -6,6 +6,7 @@ use crate::station::Verdict;
 use rusqlite::types::Value;
 use rusqlite::{Connection, Row, params_from_iter};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -111,7 +112,7 @@ impl Reader {
     /// As [`Self::results`].
     pub fn result(&self, seq: u32) -> Result<Option<Entry>, HistoryError> {
         self.first(
-            "SELECT * FROM result WHERE seq = ?1 ORDER BY id DESC LIMIT 1",
+            "SELECT * FROM dated WHERE seq = ?1 ORDER BY id DESC LIMIT 1",
             seq,
         )
     }
@@ -122,7 +123,7 @@ impl Reader {
     /// As [`Self::results`].
     pub fn recorded_as(&self, name: &str) -> Result<Option<Entry>, HistoryError> {
         self.first(
-            "SELECT * FROM result WHERE recording = ?1 ORDER BY id DESC LIMIT 1",
+            "SELECT * FROM dated WHERE recording = ?1 ORDER BY id DESC LIMIT 1",
             name,
         )
     }
@@ -155,7 +156,7 @@ impl Reader {
         let failed = self.failed();
         let (condition, mut values) = condition(filter);
         values.push(Value::from(i64::try_from(filter.limit).unwrap_or(i64::MAX)));
-        let query = format!("SELECT * FROM result WHERE {condition} ORDER BY id DESC LIMIT ?");
+        let query = format!("SELECT * FROM dated WHERE {condition} ORDER BY id DESC LIMIT ?");
         let mut statement = connection.prepare(&query).map_err(&failed)?;
         let mut rows = statement.query(params_from_iter(values)).map_err(&failed)?;
         while let Some(row) = rows.next().map_err(&failed)? {
@@ -173,7 +174,7 @@ impl Reader {
         let failed = self.failed();
         let (condition, values) = condition(filter);
         let query =
-            format!("SELECT verdict, count(*) FROM result WHERE {condition} GROUP BY verdict");
+            format!("SELECT verdict, count(*) FROM dated WHERE {condition} GROUP BY verdict");
         let mut statement = connection.prepare(&query).map_err(&failed)?;
         let mut rows = statement.query(params_from_iter(values)).map_err(&failed)?;
         let mut counts = Counts::default();
@@ -188,6 +189,43 @@ impl Reader {
             }
         }
         Ok(counts)
+    }
+
+    /// How many results a filter by time leaves out because it is not known when they were; 0 for one that asks for no time.
+    ///
+    /// # Errors
+    /// As [`Self::results`].
+    pub fn undated(&self, filter: &Filter) -> Result<u64, HistoryError> {
+        if filter.since_us.is_none() && filter.until_us.is_none() {
+            return Ok(0);
+        }
+        let any_time = Filter {
+            since_us: None,
+            until_us: None,
+            before_seq: None,
+            ..filter.clone()
+        };
+        let (condition, values) = condition(&any_time);
+        let query = format!(
+            "SELECT count(*) FROM dated WHERE {condition} AND coalesce(time_utc_us, browser_utc_us) IS NULL"
+        );
+        let connection = self.open()?;
+        let count = connection.query_row(&query, params_from_iter(values), |row| row.get(0));
+        count.map_err(self.failed())
+    }
+
+    /// When starts of the daemon were, in µs since 1970 UTC by the clock of a signed-in user's browser, by BOOT_ID.
+    ///
+    /// # Errors
+    /// As [`Self::results`], and in a database of an older program.
+    pub fn starts(&self) -> Result<BTreeMap<String, u64>, HistoryError> {
+        let connection = self.open()?;
+        let read = |mut statement: rusqlite::Statement<'_>| {
+            let starts = statement.query_map((), |row| Ok((row.get(0)?, row.get(1)?)))?;
+            starts.collect()
+        };
+        let starts = connection.prepare("SELECT boot_id, browser_utc_us FROM start");
+        starts.and_then(read).map_err(self.failed())
     }
 
     /// The gauges of a recipe over its last results, in the order in which the newest of them has them.
@@ -263,8 +301,14 @@ pub(super) fn condition(filter: &Filter) -> (String, Vec<Value>) {
     let verdict = filter.verdict.map(|verdict| i64::from(verdict.number()));
     add("verdict = ?", verdict);
     add("part_id = ?", filter.part_id.map(i64::from));
-    add("time_utc_us >= ?", time(filter.since_us));
-    add("time_utc_us < ?", time(filter.until_us));
+    add(
+        "coalesce(time_utc_us, browser_utc_us) >= ?",
+        time(filter.since_us),
+    );
+    add(
+        "coalesce(time_utc_us, browser_utc_us) < ?",
+        time(filter.until_us),
+    );
     let before = "id < (SELECT min(id) FROM result WHERE seq = ?)";
     add(before, filter.before_seq.map(i64::from));
     (conditions.join(" AND "), values)
@@ -273,6 +317,7 @@ pub(super) fn condition(filter: &Filter) -> (String, Vec<Value>) {
 fn with_gauges(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry> {
     let id: i64 = row.get("id")?;
     let stages: String = row.get("stages")?;
+    let placement: Option<String> = row.get("placement").unwrap_or_default();
     let of_result = "SELECT name, unit, value, sigma, low, high, decision FROM gauge
         WHERE result = ?1 ORDER BY place";
     let mut gauges = connection.prepare_cached(of_result)?;
@@ -293,6 +338,7 @@ fn with_gauges(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry
         // Columns that a database of an older program has not got yet.
         uptime_s: row.get("uptime_s").unwrap_or_default(),
         boot_id: row.get("boot_id").unwrap_or_default(),
+        browser_utc_us: row.get("browser_utc_us")?,
         recipe: row.get("recipe")?,
         fingerprint: row.get("fingerprint")?,
         part_id: row.get("part_id")?,
@@ -312,6 +358,8 @@ fn with_gauges(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry
         // Times are shown, nothing hangs on them: what cannot be read is left out.
         stages: serde_json::from_str(&stages).unwrap_or_default(),
         gauges: gauges.collect::<rusqlite::Result<_>>()?,
+        placement: placement.and_then(|text| serde_json::from_str(&text).ok()),
         recording: row.get("recording")?,
+        unkept: row.get("unkept").unwrap_or_default(),
     })
 }

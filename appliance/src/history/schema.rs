@@ -57,7 +57,22 @@ CREATE TABLE gauge (
 ";
 
 /// Columns of `result` that came later; older databases get them when they are opened for writing.
-const ADDED: [(&str, &str); 2] = [("uptime_s", "INTEGER"), ("boot_id", "TEXT")];
+const ADDED: [(&str, &str); 4] = [
+    ("uptime_s", "INTEGER"),
+    ("boot_id", "TEXT"),
+    ("unkept", "TEXT"),
+    ("placement", "TEXT"),
+];
+/// A table that came later as well: when a start of the daemon was, by the clock of a signed-in user's browser.
+const STARTS: &str =
+    "CREATE TABLE IF NOT EXISTS start (boot_id TEXT PRIMARY KEY, browser_utc_us INTEGER NOT NULL)";
+/// What a reader sees of a result: also the time of its trigger by that clock, where nothing better is known of it.
+const DATED: &str = "CREATE TEMP VIEW dated AS SELECT result.*, CASE WHEN time_utc_us IS NULL THEN
+    (SELECT browser_utc_us FROM start WHERE start.boot_id = result.boot_id) + uptime_s * 1000000 END
+    AS browser_utc_us FROM result";
+/// The same of a database in which older programs have left that out.
+const UNDATED: &str =
+    "CREATE TEMP VIEW dated AS SELECT result.*, NULL AS browser_utc_us FROM result";
 
 /// Opens the database for writing; makes it where there is none.
 ///
@@ -86,7 +101,15 @@ fn complete(connection: &Connection) -> rusqlite::Result<()> {
             connection.execute_batch(&format!("ALTER TABLE result ADD COLUMN {name} {kind}"))?;
         }
     }
-    Ok(())
+    connection.execute_batch(STARTS)
+}
+
+/// Makes the view that readers read.
+fn date(connection: &Connection) -> rusqlite::Result<()> {
+    let known = "SELECT (SELECT count(*) FROM pragma_table_info('result') WHERE name IN ('uptime_s', 'boot_id')) = 2
+        AND EXISTS (SELECT 1 FROM sqlite_schema WHERE name = 'start')";
+    let known = connection.query_row(known, (), |row| row.get(0))?;
+    connection.execute_batch(if known { DATED } else { UNDATED })
 }
 
 /// Opens the database for reading only.
@@ -102,8 +125,13 @@ pub(super) fn open_read_only(path: &Path) -> Result<Connection, HistoryError> {
         .map_err(failed)?;
     connection.busy_timeout(BUSY).map_err(failed)?;
     let readable = || {
+        let found = version(&connection)?;
+        if found == (APPLICATION, VERSION) {
+            connection.pragma_update(None, "temp_store", "memory")?;
+            date(&connection)?;
+        }
         connection.pragma_update(None, "query_only", true)?;
-        version(&connection)
+        Ok(found)
     };
     match readable().map_err(failed)? {
         (APPLICATION, VERSION) => Ok(connection),

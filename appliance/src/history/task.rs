@@ -3,14 +3,16 @@
 use super::entry::Entry;
 use super::keeper::{self, Keeper, Keeping};
 use super::mark::Mark;
+pub(super) use super::message::Message;
 use super::recordings::{FailedPart, seq_of};
 use super::seqs::{self, Numbering, Seqs};
 use super::spool::Spool;
 use super::syncing::{self, Syncer, Syncing};
+use super::unkept::Unkept;
 use super::writer::{Opening, Writer};
-use super::{DATABASE, HistoryError, RECORDINGS, Reader};
+use super::{Bounds, DATABASE, HistoryError, RECORDINGS, Reader};
 use crate::recipe::Store;
-use crate::station::{Event, ResultRecord, StationHandle};
+use crate::station::{Event, ResultRecord, StationHandle, Verdict};
 use std::collections::VecDeque;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;
@@ -24,28 +26,10 @@ use std::time::{Duration, Instant};
 const MAX_WAITING: usize = 256;
 /// A card that refuses is asked again this often.
 const RETRY: Duration = Duration::from_secs(1);
+/// Longest wait of a sign-in for its time to be stored.
+const DATING: Duration = Duration::from_secs(2);
 /// When the daemon ends, a recording that is being written has this long.
 const LAST_PART: Duration = Duration::from_secs(1);
-
-/// What is kept, and how much of it.
-#[derive(Clone, Copy, Debug)]
-pub struct Bounds {
-    /// The most results.
-    pub results: u64,
-    /// The most bytes of recordings of failed parts; 0 = none are kept.
-    pub recordings: u64,
-}
-
-/// What reaches the thread, from the station and from the keeper of recordings.
-pub(super) enum Message {
-    Result(Box<Entry>),
-    Kept { seq: u32, name: String },
-    NotKept { problem: String },
-    Removed { name: String },
-    Synced { problem: Option<String> },
-    Stop { last_seq: u32 },
-    KeeperEnded,
-}
 
 /// The way to the history's thread for station and measuring task. Nothing here waits. Cheap to clone.
 #[derive(Clone)]
@@ -204,15 +188,29 @@ impl History {
         }
     }
 
-    /// Whether the frames of a result are wanted: it did not pass, and none are in hand.
-    pub fn wants(&self, record: &ResultRecord) -> bool {
-        self.keeper.wants(record)
+    /// Hands over the frames of a part, made by `part`, if it did not pass; after its result. Where those of another are
+    /// still being written these are not kept, and the history says so: the line goes on.
+    pub fn keep(&self, record: &ResultRecord, part: impl FnOnce() -> FailedPart) {
+        let failed = matches!(record.verdict, Verdict::Fail | Verdict::Invalid);
+        if let (true, seq) = (failed, record.seq)
+            && let Err(why) = self.keeper.keep(part)
+        {
+            let problem = None;
+            // A queue that is full has lost results as well, and says so.
+            let _ = self.queue.try_send(Message::NotKept { seq, why, problem });
+        }
     }
 
-    /// Hands over the frames of a part that did not pass, after its result. Where those of another are still being
-    /// written these are not kept: the line goes on.
-    pub fn keep(&self, part: FailedPart) {
-        self.keeper.keep(part);
+    /// Stores when this start of the daemon, BOOT_ID, was by the clock of a signed-in user's browser; waits until that is done
+    /// and answers whether it is.
+    pub fn date(&self, boot_id: u32, utc_us: u64) -> bool {
+        let (stored, done) = sync_channel(1);
+        let dated = Message::Dated {
+            boot_id: format!("{boot_id:08x}"),
+            utc_us,
+            stored,
+        };
+        self.queue.try_send(dated).is_ok() && done.recv_timeout(DATING).is_ok()
     }
 
     /// Takes a SEQ into use, and answers whether it is stored as used. If not, the card is asked once more.
@@ -282,9 +280,22 @@ impl Task {
             for message in news {
                 match message {
                     Message::Kept { seq, name } => problem = problem.or(self.link(seq, name)),
-                    Message::NotKept { problem: words } => problem = problem.or(Some(words)),
+                    Message::NotKept {
+                        seq,
+                        why,
+                        problem: words,
+                    } => problem = problem.or(words).or(self.leave_out(seq, &why)),
                     // A link to nothing is removed at the next start at the latest.
-                    Message::Removed { name } => drop(self.writer.unlink(&name)),
+                    Message::Removed { name, why } => drop(self.writer.unlink(&name, &why)),
+                    Message::Dated {
+                        boot_id,
+                        utc_us,
+                        stored,
+                    } => match self.writer.date(&boot_id, utc_us) {
+                        // Whoever asked may have given up.
+                        Ok(()) => drop(stored.send(())),
+                        Err(error) => problem = problem.or(Some(error.to_string())),
+                    },
                     Message::Stop { last_seq } => {
                         self.syncer.stop();
                         drop(syncing.take().map(JoinHandle::join));
@@ -382,12 +393,22 @@ impl Task {
         linked.err().map(|error| error.to_string())
     }
 
+    /// Notes why the frames of a result are not kept; what did not go, in words.
+    fn leave_out(&mut self, seq: u32, why: &Unkept) -> Option<String> {
+        if let Some(entry) = self.waiting.iter_mut().find(|entry| entry.seq == seq) {
+            entry.unkept = Some(why.to_string());
+            return None;
+        }
+        let noted = self.writer.leave_out(seq, why);
+        noted.err().map(|error| error.to_string())
+    }
+
     /// Makes links and recordings agree after an end without a stop.
     fn reconcile(&mut self, keeping: &Keeping) {
         let linked = self.writer.linked().unwrap_or_default();
         for name in &linked {
             if !keeping.recordings().names().any(|kept| kept == name) {
-                let _ = self.writer.unlink(name);
+                let _ = self.writer.unlink(name, &Unkept::Gone);
             }
         }
         for name in keeping.recordings().names() {

@@ -160,8 +160,127 @@ fn recordings_are_linked_to_the_newest_result_of_their_seq() {
     assert_eq!(reader.recording(2).unwrap(), Some(place));
     assert_eq!(reader.recording(3).unwrap(), None);
     assert_eq!(writer.linked().unwrap(), ["two"]);
-    writer.unlink("two").unwrap();
+    writer.unlink("two", &Unkept::Quota).unwrap();
     assert_eq!(reader.recording(2).unwrap(), None);
+    let entry = reader.result(2).unwrap().unwrap();
+    assert_eq!(entry.unkept.as_deref(), Some("quota"));
+    writer.link(2, "two").unwrap();
+    let entry = reader.result(2).unwrap().unwrap();
+    assert_eq!((entry.unkept.as_ref(), why_no_frames(&entry)), (None, None));
+}
+
+#[test]
+fn each_part_without_frames_says_why() {
+    use hal::replay::recorder::RecorderError;
+    let state = tempfile::tempdir().unwrap();
+    let mut writer = open_writer(state.path());
+    writer.store(some(3).iter()).unwrap();
+    let reader = Reader::of(state.path());
+    let why = |seq| why_no_frames(&reader.result(seq).unwrap().unwrap()).unwrap();
+    assert!(why(3).contains("passes"), "{}", why(3));
+    assert!(why(1).contains("not known"), "{}", why(1));
+    let create = |source| {
+        let path = "frames/000.png".into();
+        Unkept::from(&RecorderError::Create { path, source })
+    };
+    for (unkept, words) in [
+        (Unkept::Off, "switched off"),
+        (Unkept::Busy, "another part"),
+        (Unkept::Quota, "recordings_mib"),
+        (Unkept::Room, "no room left for results"),
+        (Unkept::Gone, "not by the station"),
+        (create(std::io::ErrorKind::StorageFull.into()), "free space"),
+        (
+            create(std::io::ErrorKind::PermissionDenied.into()),
+            "could not be written: write recording: cannot create frames/000.png",
+        ),
+    ] {
+        writer.leave_out(1, &unkept).unwrap();
+        assert!(why(1).contains(words), "{}", why(1));
+    }
+    let nothing = Entry {
+        stages: Vec::new(),
+        ..entry(4, 1, Verdict::Invalid)
+    };
+    assert!(
+        why_no_frames(&nothing)
+            .unwrap()
+            .contains("nothing was measured")
+    );
+}
+
+#[test]
+fn results_without_a_clock_are_dated_by_a_browser_for_the_whole_of_that_start_and_for_no_other() {
+    let state = tempfile::tempdir().unwrap();
+    let mut writer = open_writer(state.path());
+    let of = |seq: u32, boot: &str| Entry {
+        time_utc_us: None,
+        uptime_s: Some(10 * seq),
+        boot_id: Some(boot.into()),
+        ..entry(seq, 1, Verdict::Pass)
+    };
+    let clocked = Entry {
+        time_utc_us: Some(1_800_000_000_000_000),
+        ..of(4, "0000b007")
+    };
+    let stored = [
+        of(1, "0000b007"),
+        of(2, "0000b007"),
+        of(3, "deadbeef"),
+        clocked,
+    ];
+    writer.store(stored.iter()).unwrap();
+    let reader = Reader::of(state.path());
+    const START: u64 = 1_790_000_000_000_000;
+    let since = Filter {
+        since_us: Some(START + 15_000_000),
+        ..Filter::default()
+    };
+    assert_eq!(seqs(&reader, &since), [4]);
+    assert_eq!(reader.undated(&since).unwrap(), 3);
+    assert_eq!(reader.undated(&Filter::default()).unwrap(), 0);
+    // The last sign-in of a start counts.
+    writer.date("0000b007", START + 999).unwrap();
+    writer.date("0000b007", START).unwrap();
+    let times: Vec<_> = reader.results(&Filter::default()).unwrap();
+    let times: Vec<_> = times.iter().map(|entry| entry.browser_utc_us).collect();
+    let ten = 10_000_000;
+    assert_eq!(
+        times,
+        [None, None, Some(START + 2 * ten), Some(START + ten)]
+    );
+    assert_eq!(seqs(&reader, &since), [4, 2]);
+    let until = Filter {
+        since_us: None,
+        until_us: Some(START + 15_000_000),
+        recipe: Some(1),
+        ..since
+    };
+    assert_eq!(seqs(&reader, &until), [1]);
+    assert_eq!(reader.counts(&until).unwrap().pass, 1);
+    assert_eq!(reader.undated(&until).unwrap(), 1);
+    let mut csv = Vec::new();
+    reader.csv(&Filter::default(), &mut csv).unwrap();
+    let csv = String::from_utf8(csv).unwrap();
+    assert!(
+        csv.lines()
+            .next()
+            .unwrap()
+            .contains(",recording,time_source,"),
+        "{csv}"
+    );
+    let sources = [",,clock,", ",,,", ",,browser,", ",,browser,"];
+    for (line, source) in csv.lines().skip(1).zip(sources) {
+        assert!(line.contains(&format!("strips 7{source}")), "{line}");
+    }
+    assert!(csv.contains("\r\n2,2026-09-21T14:13:40.000000Z,"), "{csv}");
+    // A browser's time is no part of what was measured.
+    let dated = reader.result(2).unwrap().unwrap();
+    assert_eq!(difference(&dated, &stored[1]), None);
+    for start in 0..2000 {
+        writer.date(&format!("{start:08x}"), START).unwrap();
+    }
+    assert_eq!(reader.starts().unwrap().len(), 1000);
 }
 
 #[test]
@@ -206,14 +325,16 @@ fn csv_has_a_line_per_result_and_a_column_per_gauge() {
     let text = String::from_utf8(bytes).unwrap();
     let lines: Vec<_> = text.split("\r\n").collect();
     assert_eq!(lines.len(), 4, "{text}");
-    assert!(lines[0].contains(",recording,deviation [mm],deviation sigma,deviation low"));
+    assert!(
+        lines[0].contains(",recording,time_source,deviation [mm],deviation sigma,deviation low")
+    );
     assert!(lines[0].contains("\"'-step [mm]\""), "{text}");
     assert!(
         lines[2].starts_with("1,1970-01-01T00:00:01.000000Z,2,00c0ffee,4294967294,0,0,FAIL,0,")
     );
     assert!(lines[2].contains("\"a, \"\"b\"\"\""), "{text}");
     assert!(
-        lines[2].contains(",strips 7,,1,,-0.25,0.30000000000000004,3,"),
+        lines[2].contains(",strips 7,,clock,1,,-0.25,0.30000000000000004,3,"),
         "{text}"
     );
 }
@@ -348,7 +469,8 @@ fn a_database_of_an_older_program_is_read_as_it_is_and_completed_when_it_is_writ
     let folder = tempfile::tempdir().unwrap();
     open_writer(folder.path()).store(some(2).iter()).unwrap();
     let older = rusqlite::Connection::open(folder.path().join(DATABASE)).unwrap();
-    let columns = "ALTER TABLE result DROP COLUMN uptime_s; ALTER TABLE result DROP COLUMN boot_id";
+    let columns = "ALTER TABLE result DROP COLUMN uptime_s; ALTER TABLE result DROP COLUMN boot_id;
+        ALTER TABLE result DROP COLUMN unkept; ALTER TABLE result DROP COLUMN placement; DROP TABLE start";
     older.execute_batch(columns).unwrap();
     drop(older);
     let reader = Reader::of(folder.path());
@@ -358,11 +480,20 @@ fn a_database_of_an_older_program_is_read_as_it_is_and_completed_when_it_is_writ
     let new = Entry {
         uptime_s: Some(61),
         boot_id: Some("0000b007".into()),
+        placement: Some(PlacementEntry {
+            values: [Some(0.1), None, Some(-1.0 / 3.0), None, None, Some(1e-9)],
+            reach_mm: 0.1 + 0.2,
+            outliers: 0.01,
+        }),
+        unkept: Some("off".into()),
         ..entry(3, 1, Verdict::Pass)
     };
-    open_writer(folder.path())
-        .store(std::iter::once(&new))
-        .unwrap();
+    assert!(reader.starts().is_err());
+    let mut writer = open_writer(folder.path());
+    writer.store(std::iter::once(&new)).unwrap();
+    writer.date("0000b007", 1).unwrap();
+    assert_eq!(reader.starts().unwrap().len(), 1);
+    drop(writer);
     let after = reader.results(&Filter::default()).unwrap();
     assert_eq!(after[0], new);
     assert_eq!(after[1..], before);
@@ -434,4 +565,23 @@ fn what_was_shown_and_not_stored_before_a_kill_is_stored_once_by_the_next_start(
     task.run(&station());
     let (_, _, next, _) = opened(&state, 4);
     assert_eq!((stored(), next), (vec![4, 3, 2, 1], 5));
+}
+
+#[test]
+fn a_part_whose_frames_are_not_wanted_says_so_and_a_start_is_dated_while_the_history_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = StateFolder::open(folder.path()).unwrap();
+    let (history, task, ..) = opened(&state, 1);
+    let station = station();
+    let running = std::thread::spawn(move || task.run(&station));
+    let record = record(1);
+    history.record(&record);
+    history.keep(&record, || unreachable!());
+    assert!(history.date(0xB007, 1));
+    history.stop(1);
+    running.join().unwrap();
+    let reader = Reader::of(folder.path());
+    let entry = reader.result(1).unwrap().unwrap();
+    assert_eq!(entry.unkept.as_deref(), Some("off"));
+    assert_eq!(reader.starts().unwrap().get("0000b007"), Some(&1));
 }

@@ -2,13 +2,14 @@
 
 use rusqlite::Connection;
 
-/// A time in µs since 1970 UTC in words.
+/// A time in µs since 1970 UTC in words. Years behind 9999 have a sign, as ISO 8601 asks for.
 pub fn utc(us: u64) -> String {
     let (days, rest) = (us / 86_400_000_000, us % 86_400_000_000);
     let (year, month, day) = civil(days);
     let (seconds, us) = (rest / 1_000_000, rest % 1_000_000);
     let (hour, minute, second) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
-    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{us:06}Z")
+    let sign = if year > 9999 { "+" } else { "" };
+    format!("{sign}{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{us:06}Z")
 }
 
 /// Year, month and day of a number of days since 1970-01-01 (H. Hinnant, "chrono-compatible low-level date algorithms",
@@ -67,6 +68,11 @@ mod tests {
             utc_us("2026-11-21T14:34:00Z")
         );
         assert_eq!(utc_us("1970-01-02"), Ok(86_400_000_000));
+        assert_eq!(
+            utc(253_402_300_800_000_000),
+            "+10000-01-01T00:00:00.000000Z"
+        );
+        assert!(utc(u64::MAX).starts_with('+'));
         for wrong in ["", "yesterday", "12", "2026-13-01", "1969-12-31"] {
             assert!(utc_us(wrong).is_err(), "{wrong}");
         }

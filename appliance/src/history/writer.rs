@@ -1,9 +1,13 @@
 //! Writes results into the database, bounds their number, and links recordings to them.
 
 use super::entry::{Entry, GaugeEntry};
+use super::unkept::Unkept;
 use super::{HistoryError, schema};
 use rusqlite::{Connection, Transaction, params};
 use std::path::{Path, PathBuf};
+
+/// Starts of the daemon whose time is kept: more than a history of a year has.
+const MOST_STARTS: u32 = 1000;
 
 /// The one writer of a database.
 pub struct Writer {
@@ -137,18 +141,41 @@ impl Writer {
     /// # Errors
     /// [`HistoryError`].
     pub fn link(&mut self, seq: u32, name: &str) -> Result<(), HistoryError> {
-        let newest = "UPDATE result SET recording = ?2
+        let newest = "UPDATE result SET recording = ?2, unkept = NULL
             WHERE id = (SELECT max(id) FROM result WHERE seq = ?1)";
         self.change(newest, params![seq, name])
     }
 
-    /// Notes that a recording is gone.
+    /// Notes why the frames of the newest result with this SEQ are not kept.
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn unlink(&mut self, name: &str) -> Result<(), HistoryError> {
-        let linked = "UPDATE result SET recording = NULL WHERE recording = ?1";
-        self.change(linked, params![name])
+    pub fn leave_out(&mut self, seq: u32, why: &Unkept) -> Result<(), HistoryError> {
+        let newest =
+            "UPDATE result SET unkept = ?2 WHERE id = (SELECT max(id) FROM result WHERE seq = ?1)";
+        self.change(newest, params![seq, why.to_string()])
+    }
+
+    /// Notes that a recording is gone, and why.
+    ///
+    /// # Errors
+    /// [`HistoryError`].
+    pub fn unlink(&mut self, name: &str, why: &Unkept) -> Result<(), HistoryError> {
+        let linked = "UPDATE result SET recording = NULL, unkept = ?2 WHERE recording = ?1";
+        self.change(linked, params![name, why.to_string()])
+    }
+
+    /// Notes when a start of the daemon was by the clock of a signed-in user's browser, in place of what another one said
+    /// before.
+    ///
+    /// # Errors
+    /// [`HistoryError`].
+    pub fn date(&mut self, boot_id: &str, utc_us: u64) -> Result<(), HistoryError> {
+        let start = "INSERT INTO start VALUES (?1, ?2)
+            ON CONFLICT (boot_id) DO UPDATE SET browser_utc_us = excluded.browser_utc_us";
+        self.change(start, params![boot_id, utc_us])?;
+        let oldest = "DELETE FROM start WHERE rowid <= (SELECT max(rowid) FROM start) - ?1";
+        self.change(oldest, params![MOST_STARTS])
     }
 
     /// The recordings that results are linked to.
@@ -196,13 +223,17 @@ fn said(error: &HistoryError, aside: &Path) -> String {
 
 fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
     let stages = serde_json::to_string(&entry.stages).unwrap_or_default();
+    let placement = entry.placement.as_ref().map(serde_json::to_string);
+    // Numbers that are finite are always JSON.
+    let placement = placement.and_then(Result::ok);
     transaction
         .prepare_cached(
             "INSERT INTO result (seq, time_utc_us, recipe, fingerprint, part_id, press_stroke, token,
                 verdict, error_code, reason, flags, valid_points, coverage_permille, temperature_c,
-                height_noise_mm, fitness_permille, exposure_us, total_us, stages, recording, uptime_s, boot_id)
+                height_noise_mm, fitness_permille, exposure_us, total_us, stages, recording, uptime_s, boot_id,
+                unkept, placement)
              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18,
-                ?19, ?20, ?21, ?22)",
+                ?19, ?20, ?21, ?22, ?23, ?24)",
         )?
         .execute(params![
             entry.seq,
@@ -227,6 +258,8 @@ fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> 
             entry.recording,
             entry.uptime_s,
             entry.boot_id,
+            entry.unkept,
+            placement,
         ])?;
     let result = transaction.last_insert_rowid();
     for (place, gauge) in entry.gauges.iter().enumerate() {

@@ -62,6 +62,17 @@ pub mod flag {
     pub const WARM_UP: u16 = 1 << 6;
     /// At least one decision is doubtful; the station sets it from the gauges.
     pub const DOUBTFUL: u16 = 1 << 7;
+    /// The words for bits 0–7, in order.
+    pub const WORDS: [&str; 8] = [
+        "a pattern was taken again",
+        "a single level was used",
+        "two levels were used",
+        "the full sequence was used",
+        "measured again with a longer sequence",
+        "the head is simulated",
+        "measured while warming up",
+        "a decision is close to a limit",
+    ];
 }
 
 /// What was not computed in a cycle because nobody needs it, in pixels; and what took longer than usual.

@@ -53,6 +53,8 @@ assets! {
     "/colour.js" "text/javascript; charset=utf-8" "colour.js";
     "/recipes.js" "text/javascript; charset=utf-8" "recipes.js";
     "/editor.js" "text/javascript; charset=utf-8" "editor.js";
+    "/kept.js" "text/javascript; charset=utf-8" "kept.js";
+    "/scale.js" "text/javascript; charset=utf-8" "scale.js";
     "/history.js" "text/javascript; charset=utf-8" "history.js";
     "/registers.js" "text/javascript; charset=utf-8" "registers.js";
     "/journal.js" "text/javascript; charset=utf-8" "journal.js";

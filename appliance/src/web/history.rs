@@ -74,7 +74,8 @@ pub(super) async fn list(
             before_seq: None,
             ..filter
         };
-        Ok(json!({ "results": results, "counts": site.history.counts(&whole)? }))
+        let (counts, undated) = (site.history.counts(&whole)?, site.history.undated(&whole)?);
+        Ok(json!({ "results": results, "counts": counts, "undated": undated }))
     });
     found.await.map(Json)
 }

@@ -9,6 +9,7 @@ use super::map::{Map, map};
 use super::problem::Problem;
 use super::site::Site;
 use super::view;
+use crate::plan::Layers;
 use crate::station::snapshot::status;
 
 /// The description of this API.
@@ -50,34 +51,58 @@ pub(super) async fn picture(
         let found = site.maps.layers(site.last_seq());
         let words = "nothing was measured yet, or the station is busy; trigger a measurement";
         let (seq, layers) = found.ok_or_else(|| Problem::missing(words))?;
-        let (values, unit, symmetric) = match layer.as_str() {
-            "height" => (&layers.height_mm, "mm", false),
-            "deviation" => (&layers.deviation_mm, "mm", true),
-            "modulation" => (&layers.modulation, "counts", false),
-            _ => {
-                return Err(Problem::missing(
-                    "there are height, deviation and modulation",
-                ));
-            }
-        };
-        Ok(map(values, layers.width, unit, symmetric, Some(seq)))
+        map_of(&layers, &layer, seq)
     })
     .await
+}
+
+/// One of the maps of a part, by its name.
+pub(super) fn map_of(layers: &Layers, name: &str, seq: u32) -> Result<Map, Problem> {
+    let (values, unit, symmetric) = match name {
+        "height" => (&layers.height_mm, "mm", false),
+        "deviation" => (&layers.deviation_mm, "mm", true),
+        "modulation" => (&layers.modulation, "counts", false),
+        _ => {
+            return Err(Problem::missing(
+                "there are height, deviation and modulation",
+            ));
+        }
+    };
+    Ok(map(values, layers.width, unit, symmetric, Some(seq)))
 }
 
 pub(super) async fn registers(State(site): State<Site>) -> Json<Value> {
     Json((site.registers)(&site.station.snapshot()))
 }
 
-pub(super) async fn log(State(site): State<Site>) -> Json<Value> {
-    Json(json!({ "lines": site.log.latest() }))
+pub(super) async fn log(State(site): State<Site>) -> Result<Json<Value>, Problem> {
+    let lines = site
+        .aside(|site| Ok(dated(site, site.log.latest())))
+        .await?;
+    Ok(Json(json!({ "lines": lines })))
+}
+
+/// Lines of this start or of that of their `boot_id`, those without a time with what a browser's clock says of it.
+fn dated(site: &Site, mut lines: Vec<Value>) -> Vec<Value> {
+    // Without a history nothing is known of it.
+    let starts = site.history.starts().unwrap_or_default();
+    let this = format!("{:08x}", site.station.snapshot().boot_id);
+    for line in lines.iter_mut().filter(|line| line["utc_us"].is_null()) {
+        let start = starts.get(line["boot_id"].as_str().unwrap_or(&this));
+        if let (Some(start), Some(s)) = (start, line["uptime_s"].as_u64()) {
+            line["browser_utc_us"] = start.saturating_add(s.saturating_mul(1_000_000)).into();
+        }
+    }
+    lines
 }
 
 pub(super) async fn changes(State(site): State<Site>) -> Result<Json<Value>, Problem> {
     let lines = site
         .aside(|site| {
             let read = site.access.changes().latest();
-            read.map_err(|error| Problem::broken(format!("read the record of changes: {error}")))
+            let read = read
+                .map_err(|error| Problem::broken(format!("read the record of changes: {error}")))?;
+            Ok(dated(site, read))
         })
         .await?;
     Ok(Json(json!({ "changes": lines })))

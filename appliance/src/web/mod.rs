@@ -20,6 +20,7 @@ pub mod view;
 mod downloads;
 mod gate;
 mod history;
+mod kept;
 mod metrics;
 mod orders;
 mod recipes;

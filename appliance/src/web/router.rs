@@ -11,7 +11,9 @@ use axum::{Extension, handler::Handler};
 use super::gate::{Action, own_page_only, signed_in_only};
 use super::problem::Problem;
 use super::site::Site;
-use super::{assets, downloads, events, history, host, look, metrics, orders, recipes, sessions};
+use super::{
+    assets, downloads, events, history, host, kept, look, metrics, orders, recipes, sessions,
+};
 
 /// Only files of this device, nothing inline, in nobody's frame.
 const CONTENT_SECURITY_POLICY: &str =
@@ -81,6 +83,8 @@ pub fn routes() -> Vec<Route> {
         look("/api/last/gauges.csv", downloads::gauges),
         look("/api/history", history::list),
         look("/api/history.csv", history::csv),
+        look("/api/history/{seq}", kept::one),
+        look("/api/history/{seq}/picture/{layer}", kept::picture),
         look("/api/history/{seq}/recording.zip", history::recording),
         look("/api/diagnostics.zip", downloads::diagnostics),
         look("/api/recipes", recipes::list),

@@ -21,6 +21,7 @@ use super::gate::Peer;
 use super::router::router;
 use super::site::Site;
 use super::slots::{Slot, Slots};
+use crate::clock;
 
 /// The most connections at a time.
 const MOST_CONNECTIONS: usize = 64;
@@ -61,6 +62,11 @@ pub async fn serve(listener: TcpListener, site: Site, shutdown: impl Future<Outp
 
 /// Answers the requests of one connection.
 async fn answer(stream: TcpStream, peer: SocketAddr, slot: Arc<Slot>, router: Router) {
+    if clock::is_past_calendars() {
+        // The library works out a date for its answers, and panics.
+        refuse(&stream).await;
+        return;
+    }
     let mut stream = TimeoutStream::new(stream);
     stream.set_write_timeout(Some(WRITE_TIME));
     let asked = slot.clone();
@@ -87,4 +93,23 @@ async fn answer(stream: TcpStream, peer: SocketAddr, slot: Arc<Slot>, router: Ro
         _ = connection => {}
         () = slot.left() => {}
     }
+}
+
+/// Answers a connection where the system clock shows a time for which HTTP has no date.
+pub(super) async fn refuse(stream: &TcpStream) {
+    let words =
+        r#"{"error":"the clock of this device is before 1970 or past the year 9999: set it"}"#;
+    let answer = format!(
+        "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\
+         Connection: close\r\n\r\n{words}",
+        words.len()
+    );
+    let answered = async {
+        stream.readable().await?;
+        stream.try_read(&mut [0; 4096])?;
+        stream.writable().await?;
+        stream.try_write(answer.as_bytes())
+    };
+    // A client that breaks off or says nothing is no failure of ours.
+    let _ = tokio::time::timeout(HEADER_TIME, answered).await;
 }

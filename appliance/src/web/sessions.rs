@@ -16,11 +16,16 @@ use super::gate::{self, Peer};
 use super::problem::Problem;
 use super::site::Site;
 use crate::access::Refused;
+use crate::clock;
+use crate::station::Micros;
+use crate::station::snapshot::warning;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SignIn {
     secret: String,
+    /// The time by the browser's clock, ms since 1970 UTC.
+    time_ms: Option<u64>,
 }
 
 pub(super) async fn state(State(site): State<Site>, headers: HeaderMap) -> Json<Value> {
@@ -44,7 +49,8 @@ async fn enter(
     peer: Option<Peer>,
     request: extract::Request<Body>,
 ) -> Result<Response, Problem> {
-    let SignIn { secret } = body::json(request.into_body()).await?;
+    let SignIn { secret, time_ms } = body::json(request.into_body()).await?;
+    let received = site.station.now();
     let from = peer.map_or(IpAddr::from([0, 0, 0, 0]), |Peer(address)| address);
     let guess = site.change(move |site| Ok(site.access.sign_in(from, &secret, Instant::now())));
     let (token, outcome) = match guess.await? {
@@ -59,7 +65,17 @@ async fn enter(
         gate::record(site, peer, "sign in", "session".into(), outcome).await;
     }
     match token {
-        Ok(token) => Ok(with_cookie(gate::cookie(Some(&token)), true)),
+        Ok(token) => {
+            let time = match time_ms {
+                Some(ms) => {
+                    let dated = site.change(move |site| Ok(date(site, ms, received)));
+                    Some(dated.await?)
+                }
+                None => None,
+            };
+            let answer = json!({ "signed_in": true, "time": time });
+            Ok(with_cookie(gate::cookie(Some(&token)), answer))
+        }
         Err(refused) => {
             let status = match &refused {
                 Refused::Wrong => StatusCode::FORBIDDEN,
@@ -80,11 +96,26 @@ pub(super) async fn end(State(site): State<Site>, headers: HeaderMap) -> Respons
     if let Some(token) = gate::token(&headers) {
         site.access.sign_out(token);
     }
-    with_cookie(gate::cookie(None), false)
+    with_cookie(gate::cookie(None), json!({ "signed_in": false }))
 }
 
-fn with_cookie(cookie: Option<HeaderValue>, signed_in: bool) -> Response {
-    let mut response = Json(json!({ "signed_in": signed_in })).into_response();
+/// Dates this start by the clock of a browser whose user has signed in, where the device's own is not synchronised; answers with
+/// what came of it. The last sign-in counts: whoever finds a wrong time corrects it from a browser with the right one.
+fn date(site: &Site, ms: u64, received: Micros) -> &'static str {
+    if site.station.snapshot().warnings & warning::CLOCK_UNSYNCED == 0 {
+        return "not needed";
+    }
+    let Some(us) = clock::of_browser(ms) else {
+        return "refused";
+    };
+    match (site.date)(us.saturating_sub(received.0)) {
+        true => "taken",
+        false => "not stored",
+    }
+}
+
+fn with_cookie(cookie: Option<HeaderValue>, answer: Value) -> Response {
+    let mut response = Json(answer).into_response();
     if let Some(cookie) = cookie {
         response.headers_mut().insert(header::SET_COOKIE, cookie);
     }

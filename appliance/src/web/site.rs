@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use ipnet::IpNet;
 use serde_json::Value;
-use tokio::sync::Semaphore;
+use tokio::sync::{Mutex, Semaphore};
 
+use super::kept::LastKept;
 use super::problem::Problem;
 use super::slots::Slots;
 use crate::access::Access;
@@ -41,6 +42,9 @@ pub struct Parts {
     pub maps: LastMaps,
     /// The stored results.
     pub history: Reader,
+    /// Stores when this start of the daemon was, µs since 1970 UTC, by the clock of a signed-in user's browser; answers whether
+    /// it is stored.
+    pub date: Box<dyn Fn(u64) -> bool + Send + Sync>,
     /// Results since the start.
     pub tally: Tally,
     /// The log.
@@ -63,6 +67,8 @@ pub struct Site {
     pub(super) followers: Slots,
     /// Places for files that are being taken along.
     pub(super) files: Arc<Semaphore>,
+    /// The pictures of a kept part that were worked out last; held while others are.
+    pub(super) kept: Arc<Mutex<LastKept>>,
     looking: Arc<Semaphore>,
     changing: Arc<Semaphore>,
 }
@@ -82,6 +88,7 @@ impl Site {
             parts: Arc::new(parts),
             followers: Slots::new(MAX_FOLLOWERS, MAX_FOLLOWERS_EACH),
             files: Arc::new(Semaphore::new(MAX_FILES)),
+            kept: Arc::default(),
             looking: Arc::new(Semaphore::new(MAX_ASIDE)),
             changing: Arc::new(Semaphore::new(MAX_CHANGES)),
         }

@@ -144,11 +144,9 @@ impl Worker {
         });
         // Not where the station no longer waited for it.
         let published = |record: &Arc<ResultRecord>| Arc::ptr_eq(&record.inspection, &inspection);
-        if let Some(record) = after.result.clone().filter(published)
-            && self.history.wants(&record)
-        {
-            self.history.keep(FailedPart {
-                record,
+        if let Some(record) = after.result.clone().filter(published) {
+            self.history.keep(&record, || FailedPart {
+                record: record.clone(),
                 step: judged_by.step,
                 frames: judged_by.frames.clone(),
                 plan: plan.clone(),

@@ -57,6 +57,7 @@ impl Page {
             recipes: Store::open(&recipes).expect("a store"),
             maps: Default::default(),
             history: Reader::of(folder.path()),
+            date: Box::new(|_| false),
             tally: Default::default(),
             log: Default::default(),
             registers: |_| serde_json::json!({ "registers": [] }),

@@ -1,18 +1,28 @@
 // Stored results with a filter, a page at a time.
-import { $, fill, make, show, text } from "./element.js";
+import { $, button, fill, make, show, text } from "./element.js";
 import { ask } from "./api.js";
-import { count, milliseconds, moment, quantity } from "./number.js";
+import { openKept } from "./kept.js";
+import { about, count, milliseconds, moment, quantity } from "./number.js";
 
 const PAGE = 50;
 const PASS = 1, VALID = 2, LOW = 4;
 let oldest = null;
 let boot = "";
+let seen = false;
+
+// When a day that somebody chose begins where the browser is, `more` days later; µs since 1970 UTC.
+function day(id, more) {
+  const [year, month, date] = $(id).value.split("-").map(Number);
+  return 1000 * Math.max(0, new Date(year, month - 1, date + more).getTime());
+}
 
 function filter() {
   const wanted = new URLSearchParams();
   for (const [id, key] of [["filter-recipe", "recipe"], ["filter-verdict", "verdict"], ["filter-part", "part_id"]]) {
     if ($(id).value !== "") wanted.set(key, $(id).value);
   }
+  if ($("filter-from").value) wanted.set("since_us", day("filter-from", 0));
+  if ($("filter-to").value) wanted.set("until_us", day("filter-to", 1));
   return wanted;
 }
 
@@ -32,7 +42,11 @@ function row(entry) {
     frames.append(link);
   }
   const verdict = make("span", `tag ${entry.verdict.toLowerCase()}`, entry.verdict);
-  return make("tr", "", make("td", "", String(entry.seq)), make("td", "nowrap", moment(entry, boot)), make("td", "", `${entry.recipe}`), make("td", "", String(entry.part_id)),
+  const open = button(String(entry.seq), "open", () => openKept(entry.seq, boot));
+  open.setAttribute("aria-label", `show no. ${entry.seq}`);
+  const when = make("td", "nowrap", moment(entry, boot));
+  when.title = about(entry);
+  return make("tr", "", make("td", "", open), when, make("td", "", `${entry.recipe}`), make("td", "", String(entry.part_id)),
     make("td", "", verdict), make("td", "nowrap", milliseconds(entry.total_us)), make("td", "", outside(entry)), frames);
 }
 
@@ -42,14 +56,17 @@ async function load(more) {
   wanted.set("limit", PAGE);
   if (more && oldest !== null) wanted.set("before_seq", oldest);
   try {
-    const { results, counts } = await ask("GET", `/api/history?${wanted}`);
+    const { results, counts, undated } = await ask("GET", `/api/history?${wanted}`);
     const rows = results.map(row);
     if (more) $("history-rows").append(...rows); else fill($("history-rows"), ...rows);
     if (results.length) oldest = results[results.length - 1].seq;
     show("history-more", results.length === PAGE);
     const all = counts.pass + counts.fail + counts.invalid;
     const share = all ? ` (${(100 * counts.pass / all).toFixed(1)} %)` : "";
-    text("history-counts", all ? `${count(all)} results: ${count(counts.pass)} PASS${share}, ${count(counts.fail)} FAIL, ${count(counts.invalid)} INVALID` : "no result passes this filter");
+    const notes = [all ? `${count(all)} results: ${count(counts.pass)} PASS${share}, ${count(counts.fail)} FAIL, ${count(counts.invalid)} INVALID` : "no result passes this filter"];
+    if (undated) notes.push(`${count(undated)} left out, of which the time is not known`);
+    if (results.some(about)) notes.push("≈ time from the browser of a signed-in user");
+    text("history-counts", notes.join(" · "));
   } catch (error) {
     if (!more) fill($("history-rows"));
     show("history-more", false);
@@ -59,10 +76,12 @@ async function load(more) {
 
 export function openHistory(visible, now) {
   boot = now.boot_id;
+  seen = visible;
   if (visible) load(false);
 }
 
 export function start() {
   $("filter").addEventListener("submit", (event) => { event.preventDefault(); load(false); });
   $("history-more").addEventListener("click", () => load(true));
+  window.addEventListener("dated", () => { if (seen) load(false); });
 }

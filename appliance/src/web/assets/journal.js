@@ -1,14 +1,16 @@
 // Health, event log and the record of changes.
 import { $, fill, make } from "./element.js";
 import { ask } from "./api.js";
-import { count, duration, milliseconds, moment } from "./number.js";
+import { about, count, duration, milliseconds, moment } from "./number.js";
 import { notice } from "./session.js";
 
 let timer = 0;
 let boot = "";
 
-function line(when, words, kind) {
-  return make("li", kind || "", make("span", "when", when), make("span", "", words));
+function line(when, words, kind, title) {
+  const moment = make("span", "when", when);
+  if (title) moment.title = title;
+  return make("li", kind || "", moment, make("span", "", words));
 }
 
 function known(value, unit, places = 0) {
@@ -49,10 +51,10 @@ function condition(now) {
 async function refresh() {
   try {
     const [log, changes] = await Promise.all([ask("GET", "/api/log"), ask("GET", "/api/changes")]);
-    fill($("log-lines"), ...log.lines.map((entry) => line(moment(entry, boot), entry.words)));
+    fill($("log-lines"), ...log.lines.map((entry) => line(moment(entry, boot), entry.words, "", about(entry))));
     if (!log.lines.length) fill($("log-lines"), line("", "nothing happened yet"));
     fill($("change-lines"), ...changes.changes.map((entry) =>
-      line(moment(entry, boot), `${entry.action} (${entry.subject}) from ${entry.from}: ${entry.outcome}`, entry.outcome === "done" ? "" : "refused")));
+      line(moment(entry, boot), `${entry.action} (${entry.subject}) from ${entry.from}: ${entry.outcome}`, entry.outcome === "done" ? "" : "refused", about(entry))));
     if (!changes.changes.length) fill($("change-lines"), line("", "nothing was changed yet"));
   } catch (error) { notice(error.message, true); }
 }

@@ -47,9 +47,15 @@ export function duration(s) {
   return `${hours} h ${String(minutes).padStart(2, "0")} min`;
 }
 
-// When something happened; where the clock was not synchronised, how long after which start of the device.
+// Where the time of something is known only by the clock of a browser, the words for it.
+export function about(entry) {
+  return !entry.utc_us && !entry.time_utc_us && entry.browser_utc_us ? "time from the browser of a signed-in user: the clock was not synchronised" : "";
+}
+
+// When something happened; where the clock was not synchronised, by that of a browser, else how long after which start of
+// the device.
 export function moment(entry, boot) {
-  const utc_us = entry.utc_us || entry.time_utc_us;
+  const utc_us = entry.utc_us || entry.time_utc_us || entry.browser_utc_us;
   if (!utc_us) {
     if (entry.uptime_s === null || entry.uptime_s === undefined) return "time not known";
     const two = (number) => String(Math.floor(number)).padStart(2, "0");
@@ -58,5 +64,5 @@ export function moment(entry, boot) {
   }
   const date = new Date(utc_us / 1000);
   const two = (number) => String(number).padStart(2, "0");
-  return `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())} ${date.toLocaleTimeString("en-GB")}`;
+  return `${about(entry) ? "≈ " : ""}${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())} ${date.toLocaleTimeString("en-GB")}`;
 }

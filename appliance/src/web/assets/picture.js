@@ -1,41 +1,12 @@
 // The maps of the last part, with scale, cursor and the outlines of the recipe's regions.
 import { $, draw, fill, show, text } from "./element.js";
 import { ask, map } from "./api.js";
-import { colours, paint } from "./colour.js";
+import { paint } from "./colour.js";
+import { drawScale } from "./scale.js";
 import { signed } from "./number.js";
 
 const UNITS = { mm: 3, counts: 1 };
 const state = { layer: "height", map: null, deviation: null, result: null, key: "", recipe: null, recipeKey: "", asked: 0, at: [0, 0] };
-
-// The smallest of 1, 2, 5 × 10ⁿ that is at least `least`.
-function round(least) {
-  const decade = Math.pow(10, Math.floor(Math.log10(least)));
-  return [1, 2, 5, 10].map((factor) => factor * decade).find((step) => step >= least * 0.999999);
-}
-
-function drawScale() {
-  const { scale, unit } = state.map.about;
-  const [low, high] = scale;
-  const top = 24, bottom = 290, left = 2, wide = 14;
-  const parts = [draw("text", { x: left, y: 14 }, unit)];
-  const palette = colours(state.layer), count = 64;
-  for (let at = 0; at < count; at += 1) {
-    const y = bottom - (bottom - top) * (at + 1) / count;
-    const colour = palette[Math.round(at * 255 / (count - 1))];
-    parts.push(draw("rect", { x: left, y: y.toFixed(2), width: wide, height: ((bottom - top) / count + 0.5).toFixed(2), fill: `rgb(${colour.join(",")})` }));
-  }
-  const span = high - low;
-  if (span > 0) {
-    const step = round(span / 5);
-    const places = Math.max(0, -Math.floor(Math.log10(step)));
-    for (let tick = Math.ceil(low / step); tick * step <= high; tick += 1) {
-      const y = bottom - (bottom - top) * (tick * step - low) / span;
-      parts.push(draw("line", { x1: left + wide, x2: left + wide + 4, y1: y, y2: y }));
-      parts.push(draw("text", { x: left + wide + 7, y: y + 4 }, signed(tick * step + 0, places).replace(/^\u2212(0(\.0*)?)$/, "$1")));
-    }
-  }
-  fill($("scale"), ...parts);
-}
 
 // The gauges of the result that failed or could not be measured, as the recipe has them.
 function failing() {
@@ -161,7 +132,7 @@ async function load() {
   state.deviation = deviation;
   paint($("map"), loaded, layer);
   show("no-picture", false);
-  drawScale();
+  drawScale($("scale"), state.map.about, state.layer);
   drawOutlines();
 }
 

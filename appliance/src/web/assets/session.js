@@ -59,7 +59,10 @@ export function start() {
   $("sign-in").addEventListener("submit", async (event) => {
     event.preventDefault();
     try {
-      await ask("POST", "/api/session", { secret: $("secret").value });
+      // The time counts where the device's own clock is not synchronised.
+      const { time } = await ask("POST", "/api/session", { secret: $("secret").value, time_ms: Date.now() });
+      if (time === "refused") notice("the clock of this computer is wrong: set it, then sign in again to date results", true);
+      if (time === "taken") window.dispatchEvent(new Event("dated"));
       mark(true);
       show("sign-in", false);
       const next = after;

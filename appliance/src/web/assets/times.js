@@ -4,6 +4,7 @@ import { milliseconds } from "./number.js";
 
 // What the stages are called here.
 const NAMES = { strips: "phase, height, gauges" };
+export const nameOf = (stage) => NAMES[stage.name] || stage.name;
 
 export function showTimes(result) {
   if (!result) return;
@@ -19,5 +20,5 @@ export function showTimes(result) {
     return part;
   }));
   fill($("stages"), ...stages.map((stage, at) =>
-    make("li", "", make("span", `swatch s${at}`), make("span", "", NAMES[stage.name] || stage.name), make("b", "", milliseconds(stage.us)))));
+    make("li", "", make("span", `swatch s${at}`), make("span", "", nameOf(stage)), make("b", "", milliseconds(stage.us)))));
 }

@@ -163,3 +163,27 @@ async fn the_diagnostic_bundle_holds_no_secret() {
         assert!(!bundle.body.contains(secret));
     }
 }
+
+#[tokio::test]
+async fn where_the_clock_shows_no_date_of_http_an_answer_says_so() {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = listener.local_addr().unwrap();
+    let mut client = TcpStream::connect(address).await.unwrap();
+    client.write_all(b"GET / HTTP/1.1\r\n\r\n").await.unwrap();
+    let (stream, _) = listener.accept().await.unwrap();
+    server::refuse(&stream).await;
+    drop(stream);
+    let mut answer = String::new();
+    client.read_to_string(&mut answer).await.unwrap();
+    let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+    assert!(head.starts_with("HTTP/1.1 503 "), "{answer}");
+    assert!(
+        head.contains(&format!("Content-Length: {}\r\n", body.len())),
+        "{answer}"
+    );
+    let json: Value = serde_json::from_str(body).unwrap();
+    assert!(
+        json["error"].as_str().unwrap().ends_with(": set it"),
+        "{body}"
+    );
+}

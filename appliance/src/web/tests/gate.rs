@@ -209,3 +209,52 @@ async fn a_request_that_names_two_hosts_is_refused() {
     let answer = served.ask("POST", "/api/session", &two, "{}").await;
     assert_eq!(answer.status, 403, "{answer:?}");
 }
+
+#[tokio::test]
+async fn the_browsers_time_is_taken_at_sign_in_only_where_the_clock_is_not_synchronised_and_believable()
+ {
+    let served = served().await;
+    let sign_in = async |secret: &str, time: &str| {
+        let body = format!("{{\"secret\": \"{secret}\", \"time_ms\": {time}}}");
+        served.change("POST", "/api/session", "", &body).await
+    };
+    let said = async |time: &str| {
+        let answer = sign_in(&served.secret, time).await;
+        assert_eq!(answer.status, 200, "{answer:?}");
+        answer.json()["time"].clone()
+    };
+    const NOW_MS: u64 = 1_790_000_000_000;
+    assert_eq!(said(&NOW_MS.to_string()).await, "taken");
+    let start = served.dated.try_recv().unwrap();
+    let uptime = served.handle.now().0;
+    assert!(
+        start <= NOW_MS * 1000 && start + uptime >= NOW_MS * 1000,
+        "{start}"
+    );
+    for wrong in [
+        "0",
+        "1767225599999",
+        "4102444800000",
+        "18446744073709551615",
+    ] {
+        assert_eq!(said(wrong).await, "refused", "{wrong}");
+    }
+    assert_eq!(said("null").await, Value::Null);
+    for unclear in ["-1", "1.5", "\"now\"", "1e30"] {
+        assert_eq!(
+            sign_in(&served.secret, unclear).await.status,
+            400,
+            "{unclear}"
+        );
+    }
+    assert_eq!(
+        sign_in("AAAAA-AAAAA-AAAAA-AAAAA", "1790000000000")
+            .await
+            .status,
+        403
+    );
+    let utc_us = Some(NOW_MS * 1000);
+    served.handle.event(Event::Tick { utc_us });
+    assert_eq!(said(&NOW_MS.to_string()).await, "not needed");
+    assert!(served.dated.try_recv().is_err());
+}

@@ -6,7 +6,7 @@ mod gate;
 mod page;
 
 use std::net::SocketAddr;
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
 use std::time::Instant;
 
 use serde_json::Value;
@@ -25,6 +25,8 @@ struct Served {
     address: SocketAddr,
     handle: StationHandle,
     site: Site,
+    /// When browsers say that the start was.
+    dated: mpsc::Receiver<u64>,
     secret: String,
     _folder: TempDir,
 }
@@ -46,12 +48,14 @@ async fn served() -> Served {
     let folder = tempfile::tempdir().unwrap();
     let handle = StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| None);
     let (access, secret) = Access::open(&folder.path().join("access")).unwrap();
+    let (dates, dated) = mpsc::channel();
     let site = Site::new(Parts {
         station: handle.clone(),
         access,
         recipes: Store::open(&folder.path().join("recipes")).unwrap(),
         maps: Default::default(),
         history: Reader::of(folder.path()),
+        date: Box::new(move |utc_us| dates.send(utc_us).is_ok()),
         tally: Default::default(),
         log: Default::default(),
         registers: |_| serde_json::json!({ "registers": [] }),
@@ -66,6 +70,7 @@ async fn served() -> Served {
         address,
         handle,
         site,
+        dated,
         secret: secret.unwrap(),
         _folder: folder,
     }

@@ -1,0 +1,84 @@
+//! Why the frames of a part are not kept, as the database has it and in words.
+
+use super::entry::Entry;
+use crate::station::Verdict;
+use hal::replay::recorder::RecorderError;
+use std::fmt;
+use std::io::ErrorKind;
+
+/// Why the frames of a part that did not pass are not kept, or no longer. `docs/formats.md` has the texts in the database.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Unkept {
+    /// Recordings are switched off.
+    Off,
+    /// Those of another part were being written.
+    Busy,
+    /// Removed, because all together were over the quota.
+    Quota,
+    /// Removed, because the storage had no room for results.
+    Room,
+    /// Found missing at a start.
+    Gone,
+    /// The storage was full.
+    Full,
+    /// They could not be written, for a reason in words.
+    Failed(String),
+}
+
+impl fmt::Display for Unkept {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Off => "off",
+            Self::Busy => "busy",
+            Self::Quota => "quota",
+            Self::Room => "room",
+            Self::Gone => "gone",
+            Self::Full => "full",
+            Self::Failed(words) => return write!(f, "failed: {words}"),
+        })
+    }
+}
+
+impl From<&RecorderError> for Unkept {
+    fn from(error: &RecorderError) -> Self {
+        match error {
+            RecorderError::Create { source, .. }
+                if matches!(
+                    source.kind(),
+                    ErrorKind::StorageFull | ErrorKind::QuotaExceeded
+                ) =>
+            {
+                Self::Full
+            }
+            error => Self::Failed(error.to_string()),
+        }
+    }
+}
+
+/// Why there are no frames of a result, in words; none where they are kept.
+pub fn why_no_frames(entry: &Entry) -> Option<String> {
+    if entry.recording.is_some() {
+        return None;
+    }
+    let words = match entry.unkept.as_deref() {
+        Some("off") => "recordings are switched off: history.recordings_mib is 0",
+        Some("busy") => "the frames of another part were being written at that time",
+        Some("quota") => {
+            "they were removed: all recordings together took more than history.recordings_mib"
+        }
+        Some("room") => "they were removed: the storage had no room left for results",
+        Some("gone") => "their folder was removed or renamed, not by the station",
+        Some("full") => "the storage was full: free space",
+        Some(other) => {
+            let words = other.strip_prefix("failed: ").unwrap_or(other);
+            return Some(format!("they could not be written: {words}"));
+        }
+        None if entry.verdict == Verdict::Pass => "those of a part that passes are not kept",
+        None if entry.stages.is_empty() => "nothing was measured",
+        None => {
+            "it is not known why: they are still being written, the station ended before that, or an older program \
+             stored the result"
+        }
+    };
+    Some(words.into())
+}

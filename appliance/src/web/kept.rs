@@ -1,0 +1,102 @@
+//! One stored result in full, and the pictures of its part where the frames were kept.
+//!
+//! Pictures are worked out of the recording, by the code that makes those of the last part. That takes as much memory as a
+//! recipe does, so it is done for one part at a time, on a thread that gives way to the measuring task.
+
+use axum::extract::{Path, State};
+use axum::response::Json;
+use serde_json::{Value, json};
+
+use super::look::map_of;
+use super::map::Map;
+use super::problem::Problem;
+use super::site::Site;
+use crate::error::{Exit, Failure};
+use crate::history::why_no_frames;
+use crate::kept::Kept;
+use crate::priority;
+use crate::station::result::flag;
+
+/// The pictures that were worked out last, and of which result: height, deviation, modulation.
+pub(super) type LastKept = Option<(u32, [Map; 3])>;
+
+/// What can be asked for, in the order of [`LastKept`].
+const LAYERS: [&str; 3] = ["height", "deviation", "modulation"];
+
+pub(super) async fn one(
+    State(site): State<Site>,
+    Path(seq): Path<u32>,
+) -> Result<Json<Value>, Problem> {
+    let found = site.aside(move |site| {
+        let entry = site.history.result(seq)?;
+        let entry = entry.ok_or_else(|| unknown(seq))?;
+        let flags = flag::WORDS.iter().enumerate();
+        let set: Vec<_> = flags
+            .filter(|(bit, _)| entry.flags >> bit & 1 == 1)
+            .map(|(_, words)| words)
+            .collect();
+        Ok(json!({ "result": entry, "flags": set, "no_frames": why_no_frames(&entry) }))
+    });
+    found.await.map(Json)
+}
+
+fn unknown(seq: u32) -> Problem {
+    Problem::missing(format!("there is no result {seq} in the history"))
+}
+
+pub(super) async fn picture(
+    State(site): State<Site>,
+    Path((seq, layer)): Path<(u32, String)>,
+) -> Result<Map, Problem> {
+    let at = LAYERS.iter().position(|known| *known == layer);
+    let at = at.ok_or_else(|| Problem::missing("there are height, deviation and modulation"))?;
+    // Whoever waits here takes no place from those who look at something else.
+    let mut last = site.kept.clone().lock_owned().await;
+    if let Some((_, maps)) = last.as_ref().filter(|(of, _)| *of == seq) {
+        return Ok(maps[at].clone());
+    }
+    let worked = tokio::task::spawn_blocking(move || {
+        *last = None;
+        let maps = maps(&site, seq)?;
+        let wanted = maps[at].clone();
+        *last = Some((seq, maps));
+        Ok(wanted)
+    });
+    let failed = |_| Problem::broken("working it out failed; see the log");
+    worked.await.map_err(failed)?
+}
+
+/// The pictures of a kept part.
+fn maps(site: &Site, seq: u32) -> Result<[Map; 3], Problem> {
+    let entry = site.history.result(seq)?.ok_or_else(|| unknown(seq))?;
+    if let Some(words) = why_no_frames(&entry) {
+        let words = format!("the frames of result {seq} are not kept: {words}");
+        return Err(Problem::missing(words));
+    }
+    let folder = site.history.recording(seq)?.ok_or_else(|| unknown(seq))?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .thread_name(|_| "looking-back".into())
+        .start_handler(|_| priority::give_way())
+        .build()
+        .map_err(|error| Problem::broken(format!("start a thread: {error}: free memory")))?;
+    pool.install(|| {
+        let kept = Kept::open(&folder).map_err(broken)?;
+        let (recipe, _) = kept.recipe(&site.recipes).map_err(broken)?;
+        let plan = kept.plan(recipe, false);
+        let plan = plan.map_err(|error| Problem::broken(error.to_string()))?;
+        let step = plan.step_that_shows(&kept.shown());
+        let layers = step.and_then(|step| plan.layers(step, &kept.frames()));
+        let words = "the recording's frames are not those of its recipe";
+        let layers = layers.ok_or_else(|| Problem::broken(words))?;
+        let [height, deviation, modulation] = LAYERS.map(|name| map_of(&layers, name, seq));
+        Ok([height?, deviation?, modulation?])
+    })
+}
+
+fn broken(failure: Failure) -> Problem {
+    match failure.exit {
+        Exit::Missing => Problem::missing(failure.message),
+        _ => Problem::broken(failure.message),
+    }
+}
