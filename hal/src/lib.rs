@@ -4,6 +4,7 @@
 //! grey raster, a frame is an array of counts, and what the two have to do with each other is for the
 //! crate that decodes them.
 
+pub mod bounds;
 pub mod camera;
 pub mod clock;
 pub mod contract;

@@ -196,15 +196,19 @@ impl Sequence {
             let place = (shift - start) * steps as f64;
             let nearest = libm::rint(place);
             let slot = nearest - steps as f64 * libm::floor(nearest / steps as f64);
-            let slot = &mut places[slot as usize];
-            if libm::fabs(place - nearest) > SHIFT_TOLERANCE * steps as f64 || slot.is_some() {
-                return Err(SequenceError::Spacing {
-                    ratio,
-                    steps,
-                    shift,
-                });
+            // A shift of so many turns that its fraction is lost lies on no place.
+            let on_grid =
+                slot >= 0.0 && libm::fabs(place - nearest) <= SHIFT_TOLERANCE * steps as f64;
+            match places[..steps].get_mut(slot as usize) {
+                Some(free @ None) if on_grid => *free = Some(at),
+                _ => {
+                    return Err(SequenceError::Spacing {
+                        ratio,
+                        steps,
+                        shift,
+                    });
+                }
             }
-            *slot = Some(at);
         }
         Ok(Level {
             ratio,

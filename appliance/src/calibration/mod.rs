@@ -1,5 +1,6 @@
 //! What is known of a head: geometry, noise, grey response; how it is measured, imported and kept.
 
+mod bounds;
 pub mod file;
 pub mod make;
 pub mod opencv;

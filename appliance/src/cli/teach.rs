@@ -9,10 +9,12 @@ use crate::error::{Exit, Failure};
 use crate::measure::{measure, measure_after, primary_of};
 use crate::output::folder::write_whole;
 use crate::recipe::PatternFile;
+use crate::recipe::bounds::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_TOLERANCE_MM};
 use crate::recipe::golden::{GoldenPart, Naming, Taught};
 use crate::recipe::teach::{TeachError, teach};
 use crate::state::StateFolder;
 use algo::adaptive::ProjectorMap;
+use hal::bounds::text;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
 use std::path::{Path, PathBuf};
@@ -25,10 +27,10 @@ pub struct Teach {
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=9999))]
     number: u16,
     /// Part number: the key that a PLC may select by; without it PART-NNNN.
-    #[arg(long)]
+    #[arg(long, value_parser = part_number)]
     part_number: Option<String>,
     /// Name for people.
-    #[arg(long)]
+    #[arg(long, value_parser = name)]
     name: Option<String>,
     /// How far parts may lie from where this one lies, in any direction, mm.
     #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = tolerance)]
@@ -59,8 +61,20 @@ const TIMEOUT: Duration = Duration::from_secs(5);
 
 fn tolerance(text: &str) -> Result<f64, String> {
     let mm: Option<f64> = text.parse().ok();
-    mm.filter(|mm| (0.0..=20.0).contains(mm))
-        .ok_or_else(|| "give millimetres from 0 to 20".into())
+    mm.filter(|mm| (0.0..=MAX_TOLERANCE_MM).contains(mm))
+        .ok_or_else(|| format!("give millimetres from 0 to {MAX_TOLERANCE_MM}"))
+}
+
+fn part_number(given: &str) -> Result<String, String> {
+    text("it", given, LONGEST_PART_NUMBER)?;
+    match given.is_ascii() {
+        true => Ok(given.to_owned()),
+        false => Err("write ASCII characters: a PLC selects by it".into()),
+    }
+}
+
+fn name(given: &str) -> Result<String, String> {
+    text("it", given, LONGEST_NAME).map(|()| given.to_owned())
 }
 
 impl Teach {

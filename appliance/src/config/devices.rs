@@ -1,32 +1,19 @@
 //! What may be written for real devices: the ranges that the types do not hold.
 
 use super::{Config, HeadConfig};
+use hal::bounds::{MAX_SIDE, text, within};
 use hal::setup::{CameraSetup, ProjectorSetup, TriggerSetup};
 
-/// Checks that a value of a key lies within its range.
-pub(super) fn within(key: &str, value: u64, low: u64, high: u64) -> Result<(), String> {
-    if (low..=high).contains(&value) {
-        Ok(())
-    } else {
-        Err(format!("{key} = {value}: write {low} to {high}"))
-    }
-}
+/// Longest name of a device or a line, characters.
+const LONGEST_NAME: usize = 255;
 
-fn within_real(key: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
-    if (low..=high).contains(&value) {
-        Ok(())
-    } else {
-        Err(format!("{key} = {value}: write {low} to {high}"))
-    }
-}
-
-/// Both or neither, each of 16 bits.
+/// Both or neither.
 fn size(section: &str, width: Option<u32>, height: Option<u32>) -> Result<(), String> {
     match (width, height) {
         (None, None) => Ok(()),
         (Some(width), Some(height)) => {
-            within(&format!("{section}.width"), width.into(), 1, 65_535)?;
-            within(&format!("{section}.height"), height.into(), 1, 65_535)
+            within(&format!("{section}.width"), width, 1, MAX_SIDE)?;
+            within(&format!("{section}.height"), height, 1, MAX_SIDE)
         }
         _ => Err(format!(
             "{section}.width and {section}.height: write both or neither"
@@ -53,13 +40,15 @@ pub(super) fn check(config: &Config) -> Result<(), String> {
         ..
     } = camera;
     size("head.camera", camera.width, camera.height)?;
-    let exposure = u64::from(*exposure_us);
-    within("head.camera.exposure_us", exposure, 1, 1_000_000)?;
-    let period = u64::from(*period_us);
-    within("head.camera.period_us", period, exposure, 10_000_000)?;
-    within_real("head.camera.gain", *gain, 1.0, 64.0)?;
-    let delivery = u64::from(*delivery_us);
-    within("head.camera.delivery_us", delivery, 0, 1_000_000)?;
+    within("head.camera.exposure_us", *exposure_us, 1, 1_000_000)?;
+    within(
+        "head.camera.period_us",
+        *period_us,
+        *exposure_us,
+        10_000_000,
+    )?;
+    within("head.camera.gain", *gain, 1.0, 64.0)?;
+    within("head.camera.delivery_us", *delivery_us, 0, 1_000_000)?;
     let ProjectorSetup {
         width,
         height,
@@ -68,10 +57,10 @@ pub(super) fn check(config: &Config) -> Result<(), String> {
     } = projector;
     size("head.projector", *width, *height)?;
     if let Some(refresh) = refresh_hz {
-        within_real("head.projector.refresh_hz", *refresh, 1.0, 1000.0)?;
+        within("head.projector.refresh_hz", *refresh, 1.0, 1000.0)?;
     }
     let TriggerSetup { pulse_us, .. } = trigger;
-    within("head.trigger.pulse_us", (*pulse_us).into(), 1, 1_000_000)?;
+    within("head.trigger.pulse_us", *pulse_us, 1, 1_000_000)?;
     if trigger.line.is_some() && pulse_us > exposure_us {
         // Such a frame may show two patterns, and nothing in it would tell.
         return Err(format!(
@@ -80,7 +69,20 @@ pub(super) fn check(config: &Config) -> Result<(), String> {
         ));
     }
     let lines = &config.lines;
-    within("lines.debounce_ms", lines.debounce_ms.into(), 0, 1000)?;
+    for (key, name) in [
+        ("head.camera.id", camera.id.as_deref()),
+        ("head.projector.connector", projector.connector.as_deref()),
+        ("head.trigger.chip", Some(&*trigger.chip)),
+        ("head.trigger.line", trigger.line.as_deref()),
+        ("lines.chip", Some(&*lines.chip)),
+        ("lines.start", lines.start.as_deref()),
+        ("lines.busy", lines.busy.as_deref()),
+        ("lines.ok", lines.ok.as_deref()),
+        ("lines.fault", lines.fault.as_deref()),
+    ] {
+        text(key, name.unwrap_or(""), LONGEST_NAME)?;
+    }
+    within("lines.debounce_ms", lines.debounce_ms, 0, 1000)?;
     let mut named: Vec<(&str, &str, &str)> = Vec::new();
     for (key, chip, line) in [
         ("head.trigger.line", &trigger.chip, &trigger.line),

@@ -3,12 +3,12 @@
 mod devices;
 mod keys;
 
-use devices::within;
 pub use keys::{Key, keys, table};
 
 use crate::calibration::place::IN_STATE;
 use crate::error::{Exit, Failure};
 use crate::modbus::{CONNECTIONS, WordOrder};
+use hal::bounds::{length, text, within};
 use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
 use ipnet::IpNet;
 use serde::{Deserialize, Serialize};
@@ -132,6 +132,11 @@ pub enum Backend {
     Rpi,
 }
 
+/// Most networks, hosts or recordings.
+const MAX_LISTED: usize = 1024;
+/// Longest name of a host (RFC 1035, section 2.3.4).
+const LONGEST_HOST: usize = 255;
+
 impl Default for StationConfig {
     fn default() -> Self {
         Self {
@@ -246,14 +251,19 @@ impl Config {
     /// # Errors
     /// Naming the key and its range.
     pub fn check(&self) -> Result<(), String> {
-        within("threads", self.threads as u64, 0, 256)?;
-        within("station.recipe", u64::from(self.station.recipe), 1, 9999)?;
-        let timeout = u64::from(self.station.plc_timeout_s);
-        within("station.plc_timeout_s", timeout, 1, 3600)?;
-        let connections = u64::from(self.modbus.connections);
-        within("modbus.connections", connections, 2, 64)?;
-        let results = u64::from(self.history.results);
-        within("history.results", results, 1, 10_000_000)?;
+        within("threads", self.threads, 0, 256)?;
+        within("station.recipe", self.station.recipe, 1, 9999)?;
+        within("station.plc_timeout_s", self.station.plc_timeout_s, 1, 3600)?;
+        let modbus = &self.modbus;
+        within("modbus.connections", modbus.connections, 2, 64)?;
+        length("modbus.readers", modbus.readers.len(), 0, MAX_LISTED)?;
+        length("modbus.writers", modbus.writers.len(), 0, MAX_LISTED)?;
+        length("http.hosts", self.http.hosts.len(), 0, MAX_LISTED)?;
+        for host in &self.http.hosts {
+            text("http.hosts", host, LONGEST_HOST)?;
+        }
+        within("history.results", self.history.results, 1, 10_000_000)?;
+        length("head.recordings", self.head.recordings.len(), 0, MAX_LISTED)?;
         devices::check(self)?;
         if self.head.backend == Backend::Replay && self.head.recordings.is_empty() {
             return Err(

@@ -15,6 +15,8 @@ const MANIFEST: &str = "recipe.json";
 const MAX_MEMBERS: usize = 9;
 /// The largest manifest that is read, in bytes.
 const MAX_MANIFEST: u64 = 1 << 20;
+/// Characters of a message about a file.
+const LONGEST_MESSAGE: usize = 400;
 /// The fingerprint's value while it is computed.
 const NO_FINGERPRINT: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
@@ -63,7 +65,13 @@ pub enum ArchiveError {
 }
 
 fn broken(what: impl std::fmt::Display) -> ArchiveError {
-    ArchiveError::Broken(what.to_string())
+    let mut words = what.to_string();
+    // A message may repeat a text of the file, which has up to a megabyte.
+    if let Some((end, _)) = words.char_indices().nth(LONGEST_MESSAGE) {
+        words.truncate(end);
+        words.push('…');
+    }
+    ArchiveError::Broken(words)
 }
 
 /// Packs a recipe; its fingerprint is filled in and returned beside the bytes.
@@ -210,7 +218,12 @@ fn parse(text: &str) -> Result<RecipeFile, ArchiveError> {
             )));
         }
     }
-    serde_json::from_str(text).map_err(|error| broken(format!("recipe.json: {error}")))
+    let file: RecipeFile =
+        serde_json::from_str(text).map_err(|error| broken(format!("recipe.json: {error}")))?;
+    file.check_fingerprint()
+        .and_then(|()| file.check_bounds())
+        .map_err(|error| broken(format!("recipe.json: {error}")))?;
+    Ok(file)
 }
 
 fn read_array(arrays: &mut Arrays, name: &str, bytes: &[u8]) -> Result<(), ArchiveError> {

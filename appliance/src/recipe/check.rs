@@ -88,15 +88,7 @@ impl Recipe {
     }
 
     fn fit(file: RecipeFile, arrays: Arrays) -> Result<Self, String> {
-        if !(1..=9999).contains(&file.number) {
-            return Err(format!("recipe number {} is not 1 to 9999", file.number));
-        }
-        if file.part_number.len() > 32 || !file.part_number.is_ascii() {
-            let part_number = &file.part_number;
-            return Err(format!(
-                "part number {part_number:?} is not up to 32 ASCII characters"
-            ));
-        }
+        file.check_bounds()?;
         let (width, height) = (file.camera.width as usize, file.camera.height as usize);
         let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
         for (name, length) in [
@@ -142,23 +134,7 @@ impl Recipe {
             .map(|&[ratio, shift]| (ratio, shift))
             .collect();
         let sequence = Sequence::from_frames(&production).map_err(|error| error.to_string())?;
-        let gauges = Self::gauges(&file, (width, height))?;
-        let positive = [file.noise_counts, file.expansion_range_turns];
-        if !positive.iter().all(|x| x.is_finite() && *x > 0.0) {
-            return Err("noise and range of the expansion must be positive".into());
-        }
-        if !(file.placement_tolerance_mm.is_finite() && file.placement_tolerance_mm >= 0.0) {
-            return Err(format!(
-                "a tolerance of placement of {} mm is none",
-                file.placement_tolerance_mm
-            ));
-        }
-        if !(0.0..=1.0).contains(&file.min_coverage) {
-            return Err(format!(
-                "a least coverage of {} is no share",
-                file.min_coverage
-            ));
-        }
+        let gauges = gauges(&file.regions, &file.gauges, (width, height))?;
         Ok(Self {
             file,
             arrays,
@@ -168,21 +144,5 @@ impl Recipe {
             sequence,
             gauges,
         })
-    }
-
-    fn gauges(file: &RecipeFile, size: (usize, usize)) -> Result<Vec<Gauge>, String> {
-        if file.gauges.is_empty() || file.gauges.len() > MAX_GAUGES {
-            return Err(format!(
-                "{} gauges where 1 to {MAX_GAUGES} are needed",
-                file.gauges.len()
-            ));
-        }
-        if file.regions.len() > MAX_REGIONS {
-            return Err(format!(
-                "{} regions, over {MAX_REGIONS}",
-                file.regions.len()
-            ));
-        }
-        gauges(&file.regions, &file.gauges, size)
     }
 }

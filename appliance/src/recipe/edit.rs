@@ -1,13 +1,12 @@
 //! Changing what may be changed in a taught recipe: its names, regions and gauges.
 
 use super::archive;
+use super::bounds::LONGEST_NAME;
 use super::planner;
 use super::{GaugeFile, LoadError, Recipe, RegionFile, Store};
+use hal::bounds::clipped;
 use serde::Deserialize;
 use std::collections::HashSet;
-
-/// The longest name of a recipe, region or gauge, in characters.
-const LONGEST_NAME: usize = 48;
 
 /// What shall be different; what is left out stays.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -80,8 +79,10 @@ fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a String>) -> Resul
     for name in names {
         let length = name.chars().count();
         if name.trim().is_empty() || length > LONGEST_NAME {
-            let words =
-                format!("{what} name {name:?} has {length} characters: write 1 to {LONGEST_NAME}");
+            let words = format!(
+                "{what} name {:?} has {length} characters: write 1 to {LONGEST_NAME}",
+                clipped(name)
+            );
             return Err(EditError::Unfit(words));
         }
         if !seen.insert(name) {

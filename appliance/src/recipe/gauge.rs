@@ -66,21 +66,18 @@ impl GaugeKind {
     }
 
     /// What is wrong with it, in words.
-    fn check(&self) -> Result<(), String> {
-        if self.smoothing_px() == Some(0) {
-            return Err("averages over squares of 0 pixels: smoothing_px is 1 for none".into());
-        }
+    pub(super) fn check(&self) -> Result<(), String> {
         let [_, most] = Unit::Length.range();
         match self {
             Self::OutOfTolerance { tolerance_mm, .. }
                 if !(*tolerance_mm > 0.0 && *tolerance_mm <= most) =>
             {
                 Err(format!(
-                    "has a tolerance of {tolerance_mm} mm: write more than 0, up to {most} mm"
+                    "has a tolerance_mm of {tolerance_mm:?}: write more than 0, up to {most} mm"
                 ))
             }
             Self::Volume { above_mm } if !(-most..=most).contains(above_mm) => Err(format!(
-                "measures a volume above z = {above_mm} mm: write {} to {most} mm",
+                "measures a volume with above_mm = {above_mm:?}: write {} to {most} mm",
                 -most
             )),
             _ => Ok(()),
@@ -160,10 +157,6 @@ pub(super) fn gauges(
     }
     let gauge = |gauge: &GaugeFile| {
         let name = &gauge.name;
-        gauge
-            .measures
-            .check()
-            .map_err(|wrong| format!("gauge {name:?} {wrong}"))?;
         let find = |region: &str| {
             let found = named.get(region).cloned();
             found.ok_or_else(|| {

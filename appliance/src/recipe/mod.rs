@@ -1,9 +1,10 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
-//! `file` is the form on disk, `archive` the ZIP around it with its fingerprint, `check` turns the
+//! `file` is the form on disk, `bounds` what its values may be, `archive` the ZIP around it with its fingerprint, `check` turns the
 //! one into a [`Recipe`] that can be planned, `gauge` says what its gauges measure, `store` keeps the files of a station.
 
 pub mod archive;
+pub mod bounds;
 pub mod check;
 pub mod comparison;
 pub mod edit;

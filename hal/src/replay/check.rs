@@ -4,10 +4,16 @@ use std::path::{Component, Path};
 
 use super::failure::RecordingError;
 use super::manifest::{Manifest, PatternEntry};
+use crate::bounds::{
+    MAX_EXPOSURE_US, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_RANGE_MM, MAX_SHIFT_TURNS, MAX_SIDE,
+    MIN_NOISE_COUNTS, RATIOS, clipped, fingerprint, text, within,
+};
 use crate::model::DeviceModel;
 
-/// Largest width or height of a camera or projector.
-const MAX_SIZE: u32 = 16384;
+/// Longest description, characters.
+const MAX_TEXT: usize = 4096;
+/// Longest part id and name of a file, characters.
+const MAX_NAME: usize = 255;
 /// Most frames in a recording: two patterns of a hundred frames are plenty.
 const MAX_FRAMES: usize = 1024;
 /// Most bytes of decoded samples in a recording.
@@ -19,61 +25,60 @@ const MIN_SHIFTS: usize = 3;
 
 /// Checks everything that can be said without opening another file; `path` is the manifest's.
 pub(crate) fn manifest(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
-    let wrong = |problem: String, remedy: &str| Err(RecordingError::content(path, problem, remedy));
-
-    let (camera, projector) = (&manifest.camera, &manifest.projector);
-    for (device, width, height) in [
-        ("camera", camera.width, camera.height),
-        ("projector", projector.width, projector.height),
-    ] {
-        if !(1..=MAX_SIZE).contains(&width) || !(1..=MAX_SIZE).contains(&height) {
-            return wrong(
-                format!("{device} is {width}×{height}, expected 1…{MAX_SIZE} each way"),
-                "write the device's real size",
-            );
-        }
-    }
-    if !(8..=16).contains(&camera.bit_depth) {
-        return wrong(
-            format!("camera.bit_depth is {}, expected 8…16", camera.bit_depth),
-            "write the number of significant bits of a sample",
-        );
-    }
-    for (device, model) in [("camera", &camera.model), ("projector", &projector.model)] {
-        if let Some(name) = model.as_ref().and_then(DeviceModel::first_not_finite) {
-            return wrong(
-                format!("{device}.model.{name} is not finite"),
-                "write a number",
-            );
-        }
-    }
-    if let Some(noise) = camera.noise_counts
-        && !(noise.is_finite() && noise > 0.0)
-    {
-        return wrong(
-            format!("camera.noise_counts is {noise}, expected above 0"),
-            "write the standard deviation of one sample in counts, or leave the key out",
-        );
-    }
-    if let Some([lowest, highest]) = manifest.range_mm
-        && !(lowest.is_finite() && highest.is_finite() && lowest < highest)
-    {
-        return wrong(
-            format!("range_mm is [{lowest}, {highest}], expected two heights, the lower one first"),
-            "write [lowest, highest] in mm",
-        );
-    }
-    if let Some(exposure) = manifest.exposure_us
-        && !(exposure.is_finite() && exposure > 0.0)
-    {
-        return wrong(
-            format!("exposure_us is {exposure}, expected above 0"),
-            "write the exposure in µs, or leave the key out",
-        );
-    }
+    values(manifest).map_err(|problem| {
+        let remedy = "a value of no use in a recording is left out";
+        RecordingError::content(path, problem, remedy)
+    })?;
     patterns(manifest, path)?;
     frames(manifest, path)?;
     levels(manifest, path)
+}
+
+/// The values that stand for themselves.
+fn values(manifest: &Manifest) -> Result<(), String> {
+    let (camera, projector) = (&manifest.camera, &manifest.projector);
+    for (key, pixels) in [
+        ("camera.width", camera.width),
+        ("camera.height", camera.height),
+        ("projector.width", projector.width),
+        ("projector.height", projector.height),
+    ] {
+        within(key, pixels, 1, MAX_SIDE)?;
+    }
+    within("camera.bit_depth", camera.bit_depth, 8, 16)?;
+    for (device, model) in [("camera", &camera.model), ("projector", &projector.model)] {
+        if let Some(name) = model.as_ref().and_then(DeviceModel::first_not_finite) {
+            return Err(format!("{device}.model.{name} is not finite"));
+        }
+    }
+    if let Some(noise) = camera.noise_counts {
+        let key = "camera.noise_counts";
+        within(key, noise, MIN_NOISE_COUNTS, MAX_NOISE_COUNTS)?;
+    }
+    if let Some([lowest, highest]) = manifest.range_mm {
+        within("range_mm", lowest, -MAX_RANGE_MM, MAX_RANGE_MM)?;
+        within("range_mm", highest, -MAX_RANGE_MM, MAX_RANGE_MM)?;
+        if lowest >= highest {
+            return Err(format!(
+                "range_mm is [{lowest:?}, {highest:?}]: write two heights in mm, the lower one first"
+            ));
+        }
+    }
+    if let Some(exposure) = manifest.exposure_us {
+        within("exposure_us", exposure, 1e-3, MAX_EXPOSURE_US)?;
+    }
+    text("description", &manifest.description, MAX_TEXT)?;
+    text("source", &manifest.source, MAX_TEXT)?;
+    text(
+        "part_id",
+        manifest.part_id.as_deref().unwrap_or(""),
+        MAX_NAME,
+    )?;
+    if let Some(recipe) = &manifest.recipe {
+        within("recipe.number", recipe.number, 1, 9999)?;
+        fingerprint("recipe.fingerprint", &recipe.fingerprint)?;
+    }
+    Ok(())
 }
 
 fn patterns(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
@@ -91,10 +96,12 @@ fn patterns(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
     for (index, pattern) in patterns.iter().enumerate() {
         match pattern {
             PatternEntry::Vertical { fringes } | PatternEntry::Horizontal { fringes } => {
-                if !(fringes.is_finite() && *fringes > 0.0) {
+                if !(*fringes > 0.0 && *fringes <= MAX_FRINGES) {
                     return Err(RecordingError::content(
                         path,
-                        format!("pattern {index} has {fringes} fringes, expected above 0"),
+                        format!(
+                            "pattern {index} has {fringes} fringes, expected above 0 and at most {MAX_FRINGES}"
+                        ),
                         "write the number of fringes over the projector",
                     ));
                 }
@@ -126,19 +133,14 @@ fn frames(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
     }
     for frame in frames {
         inside(&frame.file, path)?;
-        if !(frame.ratio.is_finite() && frame.ratio > 0.0) {
+        let [low, high] = RATIOS;
+        let (most, shift) = (MAX_SHIFT_TURNS, frame.shift_turns);
+        let checked = within("ratio", frame.ratio, low, high)
+            .and_then(|()| within("shift_turns", shift, -most, most));
+        if let Err(problem) = checked {
             return wrong(
-                format!(
-                    "frame {:?} has ratio {}, expected above 0",
-                    frame.file, frame.ratio
-                ),
-                "write the level's share of the full phase function",
-            );
-        }
-        if !frame.shift_turns.is_finite() {
-            return wrong(
-                format!("frame {:?} has shift {}", frame.file, frame.shift_turns),
-                "write the shift in turns",
+                format!("frame {:?}: {problem}", frame.file),
+                "the level's share of the full phase function, and the shift in turns",
             );
         }
         if frame.pattern >= manifest.pattern.0.len() {
@@ -159,6 +161,7 @@ fn frames(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
 /// A file a manifest names must lie inside the recording's folder.
 fn inside(file: &str, path: &Path) -> Result<(), RecordingError> {
     let plain = !file.is_empty()
+        && file.len() <= MAX_NAME
         && !file.contains('\\')
         && Path::new(file)
             .components()
@@ -168,7 +171,10 @@ fn inside(file: &str, path: &Path) -> Result<(), RecordingError> {
     }
     Err(RecordingError::content(
         path,
-        format!("the file {file:?} does not lie inside the recording's folder"),
+        format!(
+            "the file {:?} does not lie inside the recording's folder",
+            clipped(file)
+        ),
         "name files relative to the folder, without . or ..",
     ))
 }

@@ -1,6 +1,7 @@
 //! The limits of a scenario's values: what is outside is refused by name before anything is computed with it.
 
 use super::scenario::{Device, Placement, Scenario};
+pub(crate) use crate::bounds::within;
 
 /// Most rays of a light transport. Each has at most four taps, which then fit the 32-bit offsets of the matrix.
 const MAX_RAYS: u64 = 1 << 28;
@@ -14,9 +15,7 @@ impl Scenario {
                 self.bit_depth
             ));
         }
-        if !(1..=16).contains(&self.sub_rays) {
-            return Err(format!("sub_rays is {}: write 1…16", self.sub_rays));
-        }
+        within("sub_rays", self.sub_rays, 1, 16)?;
         for (name, device) in [
             ("rig.camera", &self.rig.camera),
             ("rig.projector", &self.rig.projector),
@@ -74,9 +73,7 @@ impl Placement {
 impl Device {
     fn check(&self) -> Result<(), String> {
         for (name, pixels) in [("width", self.width), ("height", self.height)] {
-            if !(1..=4096).contains(&pixels) {
-                return Err(format!("{name} is {pixels}: write 1…4096"));
-            }
+            within(name, pixels, 1, 4096)?;
         }
         for fov in self.fov_deg {
             within("fov_deg", fov, 1.0, 120.0)?;
@@ -88,12 +85,4 @@ impl Device {
         }
         Ok(())
     }
-}
-
-/// An error that names `key` unless `value` lies in `low`…`high`; NaN does not.
-pub(crate) fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
-    if (low..=high).contains(&value) {
-        return Ok(());
-    }
-    Err(format!("{key} is {value}: write {low}…{high}"))
 }

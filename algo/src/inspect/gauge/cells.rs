@@ -98,7 +98,8 @@ impl Grid {
 
     /// The least number of pixels of a cell that stands for its square.
     pub fn least(&self) -> i64 {
-        libm::ceil(MIN_SUPPORT * (self.side * self.side) as f64) as i64
+        let side = self.side as f64;
+        libm::ceil(MIN_SUPPORT * side * side) as i64
     }
 
     /// The cell of a pixel of golden's frame; the nearest one for pixels beside the box.

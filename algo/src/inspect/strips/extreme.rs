@@ -27,7 +27,8 @@ impl Extreme {
 
 /// Whether sums over squares of `side` pixels of deviations up to `span_nm` fit beside their count.
 pub(super) fn fits(side: usize, span_nm: f64) -> bool {
-    let pixels = ((side | 1) * (side | 1)) as f64;
+    let side = (side | 1) as f64;
+    let pixels = side * side;
     // A signed sum of 44 bits; a count of 19 bits.
     pixels * span_nm < f64::from(1_u32 << 31) * 4096.0 && pixels < 524_288.0
 }

@@ -14,14 +14,14 @@ pub(super) const KEYS: [Key; 25] = [
     Key {
         name: "head.camera.width",
         unit: "px",
-        range: "1 to 65535, with head.camera.height",
+        range: "1 to 8192, with head.camera.height",
         default: "the sensor's",
         meaning: "columns of a frame",
     },
     Key {
         name: "head.camera.height",
         unit: "px",
-        range: "1 to 65535, with head.camera.width",
+        range: "1 to 8192, with head.camera.width",
         default: "the sensor's",
         meaning: "rows of a frame",
     },
@@ -77,14 +77,14 @@ pub(super) const KEYS: [Key; 25] = [
     Key {
         name: "head.projector.width",
         unit: "px",
-        range: "1 to 65535, with head.projector.height",
+        range: "1 to 8192, with head.projector.height",
         default: "the preferred mode's",
         meaning: "columns of the projector's mode",
     },
     Key {
         name: "head.projector.height",
         unit: "px",
-        range: "1 to 65535, with head.projector.width",
+        range: "1 to 8192, with head.projector.width",
         default: "the preferred mode's",
         meaning: "rows of the projector's mode",
     },

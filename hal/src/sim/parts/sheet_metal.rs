@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Surface;
+use crate::bounds::length;
 use crate::sim::limits::within;
 use crate::sim::optics::Vector;
 
@@ -39,6 +40,9 @@ const BEAD_HEIGHT: f64 = 2.2;
 /// The edges are drawn down by this much over this width.
 const EDGE_DROP: f64 = 0.4;
 const EDGE_WIDTH: f64 = 1.6;
+
+/// Most defects of a scenario.
+const MAX_DEFECTS: usize = 64;
 
 /// The bracket and what is wrong with it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -98,16 +102,12 @@ impl Defect {
 impl SheetMetal {
     pub(super) fn check(&self) -> Result<(), String> {
         let mut degrees_more = 0.0;
+        length("part.defects", self.defects.len(), 0, MAX_DEFECTS)?;
         for defect in &self.defects {
             match *defect {
                 Defect::Dent { .. } => defect.check_dent()?,
                 Defect::MissingHole { index } => {
-                    if index >= HOLES.len() {
-                        return Err(format!(
-                            "part.defects.index is {index}: write 0…{}",
-                            HOLES.len() - 1
-                        ));
-                    }
+                    within("part.defects.index", index, 0, HOLES.len() - 1)?;
                 }
                 Defect::BentFlange { degrees } => degrees_more += degrees,
             }

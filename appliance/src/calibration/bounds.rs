@@ -1,0 +1,124 @@
+//! Bounds of every value of `calibration.json`; whether the models are cameras at all is for the geometry.
+
+use super::file::{CalibrationFile, ContrastFile, MapFile, NoiseFile, ReferenceFile, TimingFile};
+use hal::bounds::{
+    MAX_FRINGES, MAX_NOISE_COUNTS, MAX_SIDE, MIN_NOISE_COUNTS, fingerprint, length, text, within,
+};
+
+/// Longest delay, readout and scatter of one, ns.
+const MAX_TIME_NS: u64 = 10_000_000_000;
+/// Longest name of a program or a file, characters.
+const MAX_NAME: usize = 255;
+/// Longest list of the files that models came from, characters.
+const MAX_SOURCES: usize = 8192;
+/// The last second of the year 9999.
+const LAST_SECOND: u64 = 253_402_300_799;
+/// Levels and pitches that are measured, at most.
+const MAX_LEVELS: usize = 256;
+
+impl CalibrationFile {
+    /// Checks each value by itself.
+    ///
+    /// # Errors
+    /// In words that name the key, the value and the bounds.
+    pub fn check_bounds(&self) -> Result<(), String> {
+        fingerprint("fingerprint", &self.fingerprint)?;
+        text("made_by", &self.made_by, MAX_NAME)?;
+        within("made_at_unix_s", self.made_at_unix_s, 0, LAST_SECOND)?;
+        if let Some(celsius) = self.temperature_c {
+            within("temperature_c", celsius, -100.0, 200.0)?;
+        }
+        text("models_from", &self.models_from, MAX_SOURCES)?;
+        let (camera, projector) = (&self.camera, &self.projector);
+        within("camera.width", camera.width, 1, MAX_SIDE)?;
+        within("camera.height", camera.height, 1, MAX_SIDE)?;
+        within("camera.bit_depth", camera.bit_depth, 8, 16)?;
+        within("projector.width", projector.width, 1, MAX_SIDE)?;
+        within("projector.height", projector.height, 1, MAX_SIDE)?;
+        self.timing.check_bounds()?;
+        self.noise.check_bounds()?;
+        length("response", self.response.len(), 256, 256)?;
+        self.contrast.check_bounds()?;
+        self.reference
+            .as_ref()
+            .map_or(Ok(()), ReferenceFile::check_bounds)
+    }
+}
+
+impl TimingFile {
+    fn check_bounds(&self) -> Result<(), String> {
+        within(
+            "timing.flip_to_light_ns",
+            self.flip_to_light_ns,
+            0,
+            MAX_TIME_NS,
+        )?;
+        within("timing.sigma_ns", self.sigma_ns, 0, MAX_TIME_NS)?;
+        within("timing.readout_ns", self.readout_ns, 0, MAX_TIME_NS)
+    }
+}
+
+impl NoiseFile {
+    fn check_bounds(&self) -> Result<(), String> {
+        let most = MAX_NOISE_COUNTS;
+        within("noise.counts", self.counts, MIN_NOISE_COUNTS, most)?;
+        within("noise.read_counts", self.read_counts, 0.0, most)?;
+        within("noise.shot", self.shot, 0.0, most)?;
+        length("noise.levels", self.levels.len(), 0, MAX_LEVELS)?;
+        for level in &self.levels {
+            within("noise.levels.level", level.level, 0.0, most)?;
+            within("noise.levels.counts", level.counts, 0.0, most)?;
+        }
+        Ok(())
+    }
+}
+
+impl ContrastFile {
+    fn check_bounds(&self) -> Result<(), String> {
+        let modulation = self.modulation_counts;
+        within(
+            "contrast.modulation_counts",
+            modulation,
+            0.0,
+            MAX_NOISE_COUNTS,
+        )?;
+        length("contrast.pitches", self.pitches.len(), 0, MAX_LEVELS)?;
+        for pitch in &self.pitches {
+            within("contrast.pitches.pitch_px", pitch.pitch_px, 1, MAX_SIDE)?;
+            within("contrast.pitches.contrast", pitch.contrast, 0.0, 100.0)?;
+        }
+        Ok(())
+    }
+}
+
+impl ReferenceFile {
+    fn check_bounds(&self) -> Result<(), String> {
+        let widest = f64::from(MAX_SIDE);
+        within("reference.pitch_px", self.pitch_px, 1.0, widest)?;
+        within("reference.models_off_px", self.models_off_px, 0.0, widest)?;
+        self.vertical.check_bounds("reference.vertical")?;
+        self.horizontal.check_bounds("reference.horizontal")
+    }
+}
+
+impl MapFile {
+    fn check_bounds(&self, key: &str) -> Result<(), String> {
+        let inner = |name: &str| format!("{key}.{name}");
+        text(&inner("file"), &self.file, MAX_NAME)?;
+        if self.file.is_empty() || self.file.contains(['/', '\\']) {
+            return Err(format!(
+                "{key}.file is {:?}: it must be the name of a file beside this one",
+                self.file
+            ));
+        }
+        fingerprint(&inner("sha256"), &self.sha256)?;
+        within(
+            &inner("residual_turns"),
+            self.residual_turns,
+            0.0,
+            MAX_FRINGES,
+        )?;
+        within(&inner("noise_turns"), self.noise_turns, 0.0, MAX_FRINGES)?;
+        within(&inner("filled"), self.filled, 0.0, 1.0)
+    }
+}

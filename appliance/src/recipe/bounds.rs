@@ -1,0 +1,166 @@
+//! Bounds of every value of `recipe.json`: what lies outside is refused by its key before anything is computed with it.
+//!
+//! They hold for a file that is read as for an edit that is to be stored; `docs/formats.md` lists them.
+
+use super::check::{MAX_GAUGES, MAX_REGIONS};
+use super::comparison::QualityFile;
+use super::file::{GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFile};
+use algo::pattern::{MAX_FRAMES, Sequence};
+use hal::bounds::{
+    FINGERPRINT_DIGITS, MAX_EXPOSURE_US, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_RANGE_MM,
+    MAX_SHIFT_TURNS, MAX_SIDE, MIN_NOISE_COUNTS, RATIOS, fingerprint, length, text, within,
+};
+
+/// The longest name of a recipe, region or gauge, in characters.
+pub const LONGEST_NAME: usize = 64;
+/// The longest part number: the registers of PART_NUMBER.
+pub const LONGEST_PART_NUMBER: usize = 32;
+/// Sequences that a part can be measured with; teaching makes four.
+const MAX_SEQUENCES: usize = 8;
+/// Corners of a region.
+const MAX_CORNERS: usize = 256;
+/// Farthest that a part may lie from where it was taught, mm.
+pub const MAX_TOLERANCE_MM: f64 = 20.0;
+/// The last second of the year 9999.
+const LAST_SECOND: u64 = 253_402_300_799;
+/// Largest σ_z, mm: no head is worse.
+const MAX_SIGMA_MM: f64 = 1000.0;
+
+impl RecipeFile {
+    /// Checks each value by itself; whether they fit each other and the arrays is for [`Recipe::check`](super::Recipe::check).
+    ///
+    /// # Errors
+    /// In words that name the key, the value and the bounds.
+    pub fn check_bounds(&self) -> Result<(), String> {
+        within("number", self.number, 1, 9999)?;
+        text("name", &self.name, LONGEST_NAME)?;
+        text("part_number", &self.part_number, LONGEST_PART_NUMBER)?;
+        if !self.part_number.is_ascii() {
+            let key = format!("part_number {:?}", self.part_number);
+            return Err(format!("{key} has characters that are not ASCII"));
+        }
+        text("taught_by", &self.taught_by, LONGEST_NAME)?;
+        within("taught_at_unix_s", self.taught_at_unix_s, 0, LAST_SECOND)?;
+        text("calibration", &self.calibration, FINGERPRINT_DIGITS)?;
+        let (camera, projector) = (&self.camera, &self.projector);
+        within("camera.width", camera.width, 1, MAX_SIDE)?;
+        within("camera.height", camera.height, 1, MAX_SIDE)?;
+        within("camera.bit_depth", camera.bit_depth, 8, 16)?;
+        within("projector.width", projector.width, 1, MAX_SIDE)?;
+        within("projector.height", projector.height, 1, MAX_SIDE)?;
+        if let PatternFile::Vertical { fringes } | PatternFile::Horizontal { fringes } =
+            self.pattern
+        {
+            within("pattern.fringes", fringes, 1e-3, MAX_FRINGES)?;
+        }
+        length("sequences", self.sequences.len(), 1, MAX_SEQUENCES)?;
+        for (at, sequence) in self.sequences.iter().enumerate() {
+            sequence
+                .check_bounds()
+                .map_err(|error| format!("sequences[{at}].{error}"))?;
+        }
+        within("production", self.production, 0, self.sequences.len() - 1)?;
+        let tolerance = self.placement_tolerance_mm;
+        within("placement_tolerance_mm", tolerance, 0.0, MAX_TOLERANCE_MM)?;
+        let [low, high] = self.range_mm;
+        within("range_mm", low, -MAX_RANGE_MM, MAX_RANGE_MM)?;
+        within("range_mm", high, low, MAX_RANGE_MM)?;
+        if let Some(exposure) = self.exposure_us {
+            within("exposure_us", exposure, 1.0, MAX_EXPOSURE_US)?;
+        }
+        let (least, most) = (MIN_NOISE_COUNTS, MAX_NOISE_COUNTS);
+        within("noise_counts", self.noise_counts, least, most)?;
+        let range = self.expansion_range_turns;
+        within("expansion_range_turns", range, 1e-3, MAX_FRINGES)?;
+        within("min_coverage", self.min_coverage, 0.0, 1.0)?;
+        length("regions", self.regions.len(), 0, MAX_REGIONS)?;
+        for (at, region) in self.regions.iter().enumerate() {
+            region
+                .check_bounds()
+                .map_err(|error| format!("regions[{at}].{error}"))?;
+        }
+        length("gauges", self.gauges.len(), 1, MAX_GAUGES)?;
+        let largest = camera.width.max(camera.height) as usize;
+        for (at, gauge) in self.gauges.iter().enumerate() {
+            gauge
+                .check_bounds(largest)
+                .map_err(|error| format!("gauges[{at}]: {error}"))?;
+        }
+        let comparison = self.comparison.iter();
+        for (which, quality) in
+            comparison.flat_map(|both| [("fixed", &both.fixed), ("adaptive", &both.adaptive)])
+        {
+            quality
+                .check_bounds()
+                .map_err(|error| format!("comparison.{which}.{error}"))?;
+        }
+        Ok(())
+    }
+
+    /// Checks the text that stands for the whole content; while a recipe is being made it has none.
+    ///
+    /// # Errors
+    /// If it cannot be a fingerprint.
+    pub fn check_fingerprint(&self) -> Result<(), String> {
+        fingerprint("fingerprint", &self.fingerprint)
+    }
+}
+
+impl SequenceFile {
+    fn check_bounds(&self) -> Result<(), String> {
+        length("frames", self.frames.len(), 3, MAX_FRAMES)?;
+        let [low, high] = RATIOS;
+        for (at, &[ratio, shift]) in self.frames.iter().enumerate() {
+            within("ratio", ratio, low, high)
+                .and_then(|()| within("shift", shift, -MAX_SHIFT_TURNS, MAX_SHIFT_TURNS))
+                .map_err(|error| format!("frames[{at}]: {error}"))?;
+        }
+        within("sigma_mm", self.sigma_mm, 0.0, MAX_SIGMA_MM)?;
+        within("safe_share", self.safe_share, 0.0, 1.0)?;
+        let frames: Vec<_> = self.frames.iter().map(|&[r, s]| (r, s)).collect();
+        Sequence::from_frames(&frames)
+            .map(drop)
+            .map_err(|error| format!("frames: {error}"))
+    }
+}
+
+impl RegionFile {
+    fn check_bounds(&self) -> Result<(), String> {
+        text("name", &self.name, LONGEST_NAME)?;
+        length("polygon", self.polygon.len(), 3, MAX_CORNERS)?;
+        // What lies outside of the frame is cut off: a frame's width on either side is enough for any polygon.
+        let far = f64::from(MAX_SIDE);
+        for corner in self.polygon.as_flattened() {
+            within("polygon", *corner, -far, 2.0 * far)?;
+        }
+        Ok(())
+    }
+}
+
+impl GaugeFile {
+    /// For frames of which the longer side has `largest` pixels.
+    fn check_bounds(&self, largest: usize) -> Result<(), String> {
+        text("name", &self.name, LONGEST_NAME)?;
+        text("region", &self.region, LONGEST_NAME)?;
+        if let GaugeKind::Step { from } = &self.measures {
+            text("measures.from", from, LONGEST_NAME)?;
+        }
+        if let Some(side) = self.measures.smoothing_px() {
+            within("measures.smoothing_px", side, 1, largest)?;
+            if matches!(self.measures, GaugeKind::Deviation { .. }) && side % 2 == 0 {
+                return Err(format!(
+                    "measures.smoothing_px is {side}: write an odd number, the square has a middle pixel"
+                ));
+            }
+        }
+        self.measures.check()
+    }
+}
+
+impl QualityFile {
+    fn check_bounds(&self) -> Result<(), String> {
+        within("frames", self.frames, 1, MAX_FRAMES)?;
+        within("sigma_mm", self.sigma_mm, 0.0, MAX_SIGMA_MM)?;
+        within("coverage", self.coverage, 0.0, 1.0)
+    }
+}

@@ -1,0 +1,121 @@
+//! Bounds of what files and requests say: a number within its range, a text of a length.
+//!
+//! What is outside is refused by its key before anything is allocated or computed with it.
+
+use std::fmt::Debug;
+
+/// Largest width or height of a camera's frame or a projector's raster, pixels. The largest devices on sale have 7680.
+pub const MAX_SIDE: u32 = 8192;
+/// Largest σ of a sample, counts: full scale of 16 bits.
+pub const MAX_NOISE_COUNTS: f64 = 65_535.0;
+/// Smallest σ of a sample, counts; rounding to whole counts alone gives 0.29.
+pub const MIN_NOISE_COUNTS: f64 = 1e-6;
+/// Farthest z of a working range, mm: a head measures up to 2 m from its reference plane, whatever a file says.
+pub const MAX_RANGE_MM: f64 = 10_000.0;
+/// Most fringes over a projector: what fixed point holds of a phase, turns.
+pub const MAX_FRINGES: f64 = 1000.0;
+/// Longest exposure, µs.
+pub const MAX_EXPOSURE_US: f64 = 10_000_000.0;
+/// Smallest and largest ratio of a level: eight levels, of which the coarsest spans at most a turn of a pattern of 1000.
+pub const RATIOS: [f64; 2] = [1e-6, 1000.0];
+/// Largest shift of a frame in either direction, turns: a shift counts by its fraction.
+pub const MAX_SHIFT_TURNS: f64 = 1000.0;
+/// Digits of a fingerprint.
+pub const FINGERPRINT_DIGITS: usize = 64;
+/// Characters of a text that a message repeats.
+const REPEATED: usize = 48;
+
+/// Checks that a value lies in `low` to `high`; a NaN does not.
+///
+/// # Errors
+/// In words that name the key, the value and the bounds.
+pub fn within<T: PartialOrd + Debug + Copy>(
+    key: &str,
+    value: T,
+    low: T,
+    high: T,
+) -> Result<(), String> {
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    // As it is written in files: 1e300 has few digits then.
+    Err(format!("{key} is {value:?}: write {low:?} to {high:?}"))
+}
+
+/// Checks that a text has at most `most` characters and none that controls a terminal.
+///
+/// # Errors
+/// In words that name the key.
+pub fn text(key: &str, value: &str, most: usize) -> Result<(), String> {
+    let length = value.chars().count();
+    if length > most {
+        return Err(format!(
+            "{key} {:?} has {length} characters: write at most {most}",
+            clipped(value)
+        ));
+    }
+    match value.chars().any(char::is_control) {
+        true => Err(format!(
+            "{key} {value:?} has control characters: write it in one line of plain text"
+        )),
+        false => Ok(()),
+    }
+}
+
+/// Checks that a list has `low` to `high` members.
+///
+/// # Errors
+/// In words that name the key.
+pub fn length(key: &str, count: usize, low: usize, high: usize) -> Result<(), String> {
+    match (low..=high).contains(&count) {
+        true => Ok(()),
+        false => Err(format!("{key} has {count} members: write {low} to {high}")),
+    }
+}
+
+/// Checks that a text is a SHA-256 in hexadecimal digits.
+///
+/// # Errors
+/// In words that name the key.
+pub fn fingerprint(key: &str, value: &str) -> Result<(), String> {
+    let digits = value.bytes().all(|byte| byte.is_ascii_hexdigit());
+    match digits && value.len() == FINGERPRINT_DIGITS {
+        true => Ok(()),
+        false => Err(format!(
+            "{key} is {:?}: it must be {FINGERPRINT_DIGITS} hexadecimal digits",
+            clipped(value)
+        )),
+    }
+}
+
+/// The beginning of a text, for messages.
+#[must_use]
+pub fn clipped(value: &str) -> String {
+    match value.char_indices().nth(REPEATED) {
+        None => value.to_owned(),
+        Some((end, _)) => format!("{}…", &value[..end]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_names_key_value_and_bounds_and_stays_short() {
+        let words = within("projector.width", u32::MAX, 1, MAX_SIDE).unwrap_err();
+        assert_eq!(words, "projector.width is 4294967295: write 1 to 8192");
+        let words = within("range_mm", 1e300, -1.0, 1.0).unwrap_err();
+        assert_eq!(words, "range_mm is 1e300: write -1.0 to 1.0");
+        within("x", f64::NAN, f64::MIN, f64::MAX).unwrap_err();
+        within("x", 1.0, 0.0, 1.0).unwrap();
+        for words in [
+            text("name", &"ä".repeat(1 << 20), 64).unwrap_err(),
+            fingerprint("fingerprint", &"0".repeat(1 << 20)).unwrap_err(),
+        ] {
+            assert!(words.len() < 200, "{words}");
+        }
+        text("name", "a\u{1b}[2J", 64).unwrap_err();
+        text("name", "Gehäuse 7", 9).unwrap();
+    }
+}
