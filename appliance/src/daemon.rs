@@ -11,6 +11,7 @@ pub use caller::Caller;
 use stopping::Stopping;
 
 use crate::access::Access;
+use crate::calibration::Current;
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
 use crate::history::{self, Bounds, History, Numbering, Reader};
@@ -116,6 +117,7 @@ impl Daemon {
             spawn("history", move || task.run(&station))?
         };
         let maps = LastMaps::default();
+        let calibration = Current::default();
         let (sockets, stopped) = watch::channel(false);
         let wiring = {
             let (station, progress, stopped) = (station.clone(), progress.clone(), stopped.clone());
@@ -134,6 +136,7 @@ impl Daemon {
                 station: station.clone(),
                 access,
                 recipes: state.recipes().clone(),
+                calibration: calibration.clone(),
                 maps: maps.clone(),
                 history: Reader::of(&path),
                 date: Box::new(move |utc_us| dating.date(boot_id, utc_us)),
@@ -186,6 +189,7 @@ impl Daemon {
                 };
                 let worker = Worker {
                     opened: head,
+                    calibration,
                     pool,
                     recipes,
                     station,

@@ -5,6 +5,8 @@ pub mod adapt;
 pub mod archive;
 pub mod backend;
 pub mod benchmark;
+#[cfg(test)]
+mod boundaries;
 pub mod calibration;
 pub mod cli;
 pub mod clock;

@@ -5,6 +5,7 @@ pub mod opening;
 mod recovery;
 
 use crate::backend::Opened;
+use crate::calibration::Current;
 use crate::config::HeadConfig;
 use crate::history::History;
 use crate::latest::{LastCycle, LastMaps};
@@ -21,6 +22,8 @@ use crate::station::{
 };
 use cycle::JudgedBy;
 use hal::error::{Device, Error};
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
@@ -82,6 +85,8 @@ const ABORTED: &str = "the PLC or a stop ended it";
 pub struct Worker {
     /// The head and its calibration.
     pub opened: Opened,
+    /// Who else is told what is known of it.
+    pub calibration: Current,
     /// Computing threads.
     pub pool: rayon::ThreadPool,
     /// The station's recipes.
@@ -163,8 +168,13 @@ impl Worker {
     /// Says whether the head's calibration can be trusted.
     fn tell_condition(&self) {
         let Opened {
-            problem, fallback, ..
+            problem,
+            fallback,
+            calibration,
+            ..
         } = &self.opened;
+        let trusted = problem.is_none().then_some(calibration);
+        self.calibration.set(trusted);
         for words in [problem, fallback].into_iter().flatten() {
             self.progress.warn(words);
         }
@@ -193,7 +203,10 @@ impl Worker {
 
     /// Loads a recipe; the one before stays active unless everything went well.
     fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Arc<Plan>>) {
-        let (result, message) = match self.prepare(key, plan.as_ref()) {
+        // Recipes come from elsewhere. One that breaks the computation must not end the process, which would load it again
+        // at its next start, for ever.
+        let prepared = catch_unwind(AssertUnwindSafe(|| self.prepare(key, plan.as_ref())));
+        let (result, message) = match prepared.unwrap_or_else(|panic| Err(broken(&*panic))) {
             Ok(_) if self.aborts.has(job) => (RecipeResult::Busy, format!("load: {ABORTED}")),
             Ok((ready, fallback)) => {
                 let recipe = active(&ready);
@@ -377,6 +390,18 @@ fn refuse_plan(error: PlanError) -> (RecipeResult, String) {
         PlanError::Unfit { .. } => RecipeResult::Corrupt,
     };
     (result, error.to_string())
+}
+
+/// What a panic says of a recipe.
+fn broken(panic: &(dyn Any + Send)) -> (RecipeResult, String) {
+    let said = panic.downcast_ref::<String>().map(String::as_str);
+    let said = said.or(panic.downcast_ref::<&str>().copied());
+    let message = format!(
+        "load: the recipe breaks the computation ({}): it stays stored and is not used; teach it again, and send its file \
+         with the diagnostic bundle",
+        said.unwrap_or("the log has more")
+    );
+    (RecipeResult::Corrupt, message)
 }
 
 fn active(plan: &Plan) -> ActiveRecipe {

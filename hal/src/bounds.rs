@@ -22,6 +22,8 @@ pub const RATIOS: [f64; 2] = [1e-6, 1000.0];
 pub const MAX_SHIFT_TURNS: f64 = 1000.0;
 /// Digits of a fingerprint.
 pub const FINGERPRINT_DIGITS: usize = 64;
+/// Characters of a message about a file.
+const LONGEST_MESSAGE: usize = 600;
 /// Characters of a text that a message repeats.
 const REPEATED: usize = 48;
 
@@ -88,6 +90,19 @@ pub fn fingerprint(key: &str, value: &str) -> Result<(), String> {
     }
 }
 
+/// A message without the middle of what is too long to be read: a library may repeat a whole megabyte of a file. The place in
+/// the file stands at its beginning or its end.
+#[must_use]
+pub fn shortened(words: &str) -> String {
+    let length = words.chars().count();
+    if length <= LONGEST_MESSAGE {
+        return words.to_owned();
+    }
+    let beginning: String = words.chars().take(LONGEST_MESSAGE / 2).collect();
+    let end: String = words.chars().skip(length - LONGEST_MESSAGE / 4).collect();
+    format!("{beginning}…{end}")
+}
+
 /// The beginning of a text, for messages.
 #[must_use]
 pub fn clipped(value: &str) -> String {
@@ -115,6 +130,10 @@ mod tests {
         ] {
             assert!(words.len() < 200, "{words}");
         }
+        let long = format!("unknown field `{}` at line 7", "ä".repeat(1 << 20));
+        let short = shortened(&long);
+        assert!(short.starts_with("unknown field") && short.ends_with("at line 7"));
+        assert!(short.chars().count() < LONGEST_MESSAGE, "{short}");
         text("name", "a\u{1b}[2J", 64).unwrap_err();
         text("name", "Gehäuse 7", 9).unwrap();
     }

@@ -5,6 +5,10 @@ use hal::bounds::{
     MAX_FRINGES, MAX_NOISE_COUNTS, MAX_SIDE, MIN_NOISE_COUNTS, fingerprint, length, text, within,
 };
 
+/// What a head may be warm, °C.
+pub const COLDEST_C: f64 = -100.0;
+/// The same.
+pub const HOTTEST_C: f64 = 200.0;
 /// Longest delay, readout and scatter of one, ns.
 const MAX_TIME_NS: u64 = 10_000_000_000;
 /// Longest name of a program or a file, characters.
@@ -26,7 +30,7 @@ impl CalibrationFile {
         text("made_by", &self.made_by, MAX_NAME)?;
         within("made_at_unix_s", self.made_at_unix_s, 0, LAST_SECOND)?;
         if let Some(celsius) = self.temperature_c {
-            within("temperature_c", celsius, -100.0, 200.0)?;
+            within("temperature_c", celsius, COLDEST_C, HOTTEST_C)?;
         }
         text("models_from", &self.models_from, MAX_SOURCES)?;
         let (camera, projector) = (&self.camera, &self.projector);

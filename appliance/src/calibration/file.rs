@@ -3,6 +3,7 @@
 use super::Calibration;
 use crate::recipe::archive::hex;
 use algo::pattern::GreyResponse;
+use hal::bounds::{clipped, shortened};
 use hal::head::{Stamp, Timing};
 use hal::model::DeviceModel;
 use serde::{Deserialize, Serialize};
@@ -179,12 +180,15 @@ impl CalibrationFile {
             format: String,
             version: u32,
         }
-        let damaged = |error: serde_json::Error| format!("it is damaged: {error}: calibrate anew");
+        let damaged = |error: serde_json::Error| {
+            let error = shortened(&error.to_string());
+            format!("it is damaged: {error}: calibrate anew")
+        };
         let header: Header = serde_json::from_slice(bytes).map_err(damaged)?;
         if header.format != FORMAT {
             return Err(format!(
                 "its format is {:?}, expected {FORMAT:?}",
-                header.format
+                clipped(&header.format)
             ));
         }
         if header.version != VERSION {

@@ -1,10 +1,13 @@
 //! What is known of a head: geometry, noise, grey response; how it is measured, imported and kept.
 
-mod bounds;
+pub mod bounds;
+mod current;
 pub mod file;
 pub mod make;
 pub mod opencv;
 pub mod place;
+
+pub use current::Current;
 
 use crate::recipe::archive::hex;
 use crate::seam;

@@ -5,6 +5,7 @@ mod report;
 use super::options::{Files, Json, Quiet, Threads, answer};
 use crate::backend::{self, Opened};
 use crate::calibration::Calibration;
+use crate::calibration::bounds::{COLDEST_C, HOTTEST_C};
 use crate::calibration::file::CalibrationFile;
 use crate::calibration::make::{Known, MakeError, make};
 use crate::calibration::opencv::{self, Declared, Models, Sizes, Unit};
@@ -14,6 +15,7 @@ use crate::error::{Exit, Failure};
 use crate::state::StateFolder;
 use algo::geometry::{Reference, RigError, Triangulator};
 use algo::pattern::PhaseFunction;
+use hal::bounds::within;
 use hal::sim::{Part, Stage};
 use std::path::{Path, PathBuf};
 
@@ -43,7 +45,7 @@ pub struct Calibrate {
     #[arg(long)]
     no_plate: bool,
     /// How warm the head is, °C: kept in the calibration.
-    #[arg(long, value_name = "CELSIUS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "CELSIUS", allow_negative_numbers = true, value_parser = celsius)]
     temperature: Option<f64>,
     #[command(flatten)]
     files: Files,
@@ -57,6 +59,11 @@ pub struct Calibrate {
 
 /// Where models came from, if not from a file.
 const OF_SCENARIO: &str = "scenario";
+
+fn celsius(given: &str) -> Result<f64, String> {
+    let celsius = given.parse().map_err(|_| "give a number")?;
+    within("it", celsius, COLDEST_C, HOTTEST_C).map(|()| celsius)
+}
 
 impl Calibrate {
     /// Opens the head, measures it, writes the calibration and prints what was found.

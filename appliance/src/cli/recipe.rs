@@ -5,6 +5,7 @@ use super::names;
 use super::options::{Files, Json, Quiet};
 use crate::backend;
 use crate::error::{Exit, Failure};
+use crate::plan::Plan;
 use crate::recipe::exchange::{ImportError, Listed};
 use crate::recipe::{LoadError, Store};
 use std::path::PathBuf;
@@ -77,8 +78,12 @@ impl RecipeCommand {
             Self::Import { file, files, quiet } => {
                 let store = store(files)?;
                 let head = files.head(&files.configuration()?);
-                let calibration = backend::calibration(&head)?.fingerprint();
-                let imported = store.import(file, Some(&calibration)).map_err(refused)?;
+                let calibration = backend::calibration(&head)?;
+                let fits = |recipe| {
+                    let tried = Plan::try_out(recipe, &calibration);
+                    tried.map_err(|error| error.to_string())
+                };
+                let imported = store.import(file, fits).map_err(refused)?;
                 let digits = imported.fingerprint.get(..8).unwrap_or_default();
                 quiet.say(|| {
                     format!(

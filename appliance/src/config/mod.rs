@@ -8,7 +8,7 @@ pub use keys::{Key, keys, table};
 use crate::calibration::place::IN_STATE;
 use crate::error::{Exit, Failure};
 use crate::modbus::{CONNECTIONS, WordOrder};
-use hal::bounds::{length, text, within};
+use hal::bounds::{length, shortened, text, within};
 use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
 use ipnet::IpNet;
 use serde::{Deserialize, Serialize};
@@ -134,6 +134,8 @@ pub enum Backend {
 
 /// Most networks, hosts or recordings.
 const MAX_LISTED: usize = 1024;
+/// Longest path that the system opens.
+const LONGEST_PATH: usize = 4096;
 /// Longest name of a host (RFC 1035, section 2.3.4).
 const LONGEST_HOST: usize = 255;
 
@@ -220,6 +222,7 @@ impl Config {
             Failure::because(exit, format!("read configuration {place}"), remedy)
         })?;
         let wrong = |error: String| {
+            let error = shortened(&error);
             let remedy = format!("{error}; `fringed config keys` lists every key");
             Failure::because(
                 Exit::Configuration,
@@ -264,6 +267,20 @@ impl Config {
         }
         within("history.results", self.history.results, 1, 10_000_000)?;
         length("head.recordings", self.head.recordings.len(), 0, MAX_LISTED)?;
+        let head = &self.head;
+        let paths = [
+            ("state", &self.state),
+            ("head.scenario", &head.scenario),
+            ("head.calibration", &head.calibration),
+            ("head.projector.card", &head.projector.card),
+        ];
+        let paths = paths
+            .into_iter()
+            .filter_map(|(key, path)| Some((key, path.as_ref()?)));
+        let recordings = head.recordings.iter().map(|path| ("head.recordings", path));
+        for (key, path) in paths.chain(recordings) {
+            text(key, &path.to_string_lossy(), LONGEST_PATH)?;
+        }
         devices::check(self)?;
         if self.head.backend == Backend::Replay && self.head.recordings.is_empty() {
             return Err(

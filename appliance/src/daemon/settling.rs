@@ -39,12 +39,13 @@ impl Daemon {
                 let message = format!("{}: {}", fault.cause, fault.remedy);
                 Err(Failure::new(Exit::Unavailable, message))
             }
+            (None, error) if refused(&snapshot) => {
+                let otherwise = "the recipe was not loaded: load another, or teach it again";
+                let message = error.as_deref().unwrap_or(otherwise);
+                Err(Failure::new(Exit::Content, message))
+            }
             (None, Some(error)) if !snapshot.is(status::READY) => {
                 Err(Failure::new(Exit::Unavailable, error.to_string()))
-            }
-            (None, None) if refused(&snapshot) => {
-                let message = "the recipe was not loaded: load another, or teach it again";
-                Err(Failure::new(Exit::Content, message))
             }
             _ => Ok(snapshot),
         }

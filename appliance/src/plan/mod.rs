@@ -5,6 +5,7 @@ mod golden;
 mod judge;
 mod layers;
 mod run;
+mod trial;
 mod window;
 
 pub use arriving::Arriving;
@@ -85,6 +86,8 @@ pub struct Maps {
 pub const STRIPS: usize = 4;
 /// Heights are planned at least so many pixels around the part as taught: what a part that is not aligned may be moved by.
 const AROUND: usize = 16;
+/// Most bytes of a recipe's patterns: 64 of a projector of 1920 × 1080 pixels take half of it.
+const MAX_PATTERN_BYTES: usize = 256 << 20;
 /// Error code of a cycle whose frames are not what the recipe was made for.
 const WRONG_FRAMES: u16 = 103;
 
@@ -141,8 +144,15 @@ impl Plan {
         let camera = (file.camera.width, file.camera.height, file.camera.bit_depth);
         if camera != calibration.camera {
             return Err(format!(
-                "it is for frames {camera:?}, the camera gives {:?}",
+                "it is for a camera of {camera:?}, the head's has {:?}: teach it again",
                 calibration.camera
+            ));
+        }
+        let raster = (file.projector.width, file.projector.height);
+        if raster != calibration.projector {
+            return Err(format!(
+                "it is for a projector of {raster:?}, the head's has {:?}: teach it again",
+                calibration.projector
             ));
         }
         let (camera, projector) = calibration.devices()?;
@@ -171,6 +181,15 @@ impl Plan {
         };
         let (sequences, surface) = rayon::join(sequences, || golden::surface(size.0, &arrays));
         let sequences = sequences?;
+        let patterns = frames.len() * raster.0 as usize * raster.1 as usize;
+        if patterns > MAX_PATTERN_BYTES {
+            return Err(format!(
+                "its sequences show {} patterns of {} MiB together, at most {} are held: teach it with fewer frames",
+                frames.len(),
+                patterns >> 20,
+                MAX_PATTERN_BYTES >> 20
+            ));
+        }
         // What is left of the recipe is no longer needed where the most memory is.
         drop(arrays);
         let range = file.expansion_range_turns;

@@ -2,6 +2,7 @@
 
 use super::file::{FORMAT, RecipeFile, VERSION};
 use crate::archive::Members;
+use hal::bounds::shortened;
 use hal::npy;
 use sha2::{Digest, Sha256};
 use std::io::{Cursor, Read, Seek, Write as _};
@@ -15,8 +16,6 @@ const MANIFEST: &str = "recipe.json";
 const MAX_MEMBERS: usize = 9;
 /// The largest manifest that is read, in bytes.
 const MAX_MANIFEST: u64 = 1 << 20;
-/// Characters of a message about a file.
-const LONGEST_MESSAGE: usize = 400;
 /// The fingerprint's value while it is computed.
 const NO_FINGERPRINT: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
@@ -65,13 +64,7 @@ pub enum ArchiveError {
 }
 
 fn broken(what: impl std::fmt::Display) -> ArchiveError {
-    let mut words = what.to_string();
-    // A message may repeat a text of the file, which has up to a megabyte.
-    if let Some((end, _)) = words.char_indices().nth(LONGEST_MESSAGE) {
-        words.truncate(end);
-        words.push('…');
-    }
-    ArchiveError::Broken(words)
+    ArchiveError::Broken(shortened(&what.to_string()))
 }
 
 /// Packs a recipe; its fingerprint is filled in and returned beside the bytes.
@@ -79,40 +72,51 @@ fn broken(what: impl std::fmt::Display) -> ArchiveError {
 /// # Errors
 /// If the archive cannot be made.
 pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), ArchiveError> {
-    let columns = file.camera.width as usize;
-    let mut members: Vec<(&str, Vec<u8>)> = Vec::new();
-    let mut add = |name, bytes| members.push((name, bytes));
-    if !arrays.phase_function.is_empty() {
-        let columns = file.projector.width as usize;
-        add(
-            "phase_function.npy",
-            npy::write(columns, &arrays.phase_function),
-        );
-    }
-    add(
-        "golden_phase.npy",
-        npy::write(columns, &arrays.golden_phase),
-    );
-    add(
-        "golden_height.npy",
-        npy::write(columns, &arrays.golden_height),
-    );
-    add(
-        "height_slope.npy",
-        npy::write(columns, &arrays.height_slope),
-    );
-    add(
-        "height_curvature.npy",
-        npy::write(columns, &arrays.height_curvature),
-    );
-    add("valid.npy", npy::write(columns, &arrays.valid));
-    add("modulation.npy", npy::write(columns, &arrays.modulation));
-    add("phase_reach.npy", npy::write(columns, &arrays.phase_reach));
     let zeroed = RecipeFile {
         fingerprint: NO_FINGERPRINT.into(),
         ..file.clone()
     };
     let manifest = serde_json::to_string_pretty(&zeroed).map_err(broken)?;
+    seal(&manifest, members(file, arrays))
+}
+
+/// The arrays by their members' names.
+pub(crate) fn members(file: &RecipeFile, arrays: &Arrays) -> Vec<(&'static str, Vec<u8>)> {
+    let columns = file.camera.width as usize;
+    let mut members = vec![
+        (
+            "golden_phase.npy",
+            npy::write(columns, &arrays.golden_phase),
+        ),
+        (
+            "golden_height.npy",
+            npy::write(columns, &arrays.golden_height),
+        ),
+        (
+            "height_slope.npy",
+            npy::write(columns, &arrays.height_slope),
+        ),
+        (
+            "height_curvature.npy",
+            npy::write(columns, &arrays.height_curvature),
+        ),
+        ("valid.npy", npy::write(columns, &arrays.valid)),
+        ("modulation.npy", npy::write(columns, &arrays.modulation)),
+        ("phase_reach.npy", npy::write(columns, &arrays.phase_reach)),
+    ];
+    if !arrays.phase_function.is_empty() {
+        let columns = file.projector.width as usize;
+        let function = npy::write(columns, &arrays.phase_function);
+        members.insert(0, ("phase_function.npy", function));
+    }
+    members
+}
+
+/// Packs the text of a manifest whose fingerprint is zeros with its arrays, as [`pack`] does.
+pub(crate) fn seal(
+    manifest: &str,
+    mut members: Vec<(&str, Vec<u8>)>,
+) -> Result<(Vec<u8>, String), ArchiveError> {
     let fingerprint = fingerprint(manifest.as_bytes(), &members);
     let manifest = manifest.replacen(NO_FINGERPRINT, &fingerprint, 1);
     members.insert(0, (MANIFEST, manifest.into_bytes()));
@@ -199,7 +203,11 @@ pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, ArchiveError> {
     Ok(read_manifest(&mut zip)?.0)
 }
 
-fn parse(text: &str) -> Result<RecipeFile, ArchiveError> {
+/// Reads the text of a manifest and checks the bounds of its values.
+///
+/// # Errors
+/// If it is no manifest, of a newer version, or a value is out of its bounds.
+pub fn parse(text: &str) -> Result<RecipeFile, ArchiveError> {
     let value: serde_json::Value =
         serde_json::from_str(text).map_err(|error| broken(format!("recipe.json: {error}")))?;
     if value["format"] != FORMAT {

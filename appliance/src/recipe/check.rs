@@ -119,7 +119,7 @@ impl Recipe {
                 PhaseFunction::sampled(columns, rows, arrays.phase_function.clone())
             }
         };
-        let function = function.map_err(|error| error.to_string())?;
+        let function = function.map_err(|error| format!("projector and pattern: {error}"))?;
         let production = file.sequences.get(file.production).ok_or_else(|| {
             format!(
                 "production names sequence {} of {}",

@@ -43,11 +43,17 @@ pub enum EditError {
     Store(String),
 }
 
-/// Changes a stored recipe; its previous generation stays beside it. Answers with its new fingerprint.
+/// Changes a stored recipe; its previous generation stays beside it. `fits` tries out what would be stored and says in words
+/// why it cannot be used. Answers with the new fingerprint.
 ///
 /// # Errors
 /// The recipe cannot be read, was changed since, would not be usable, or cannot be stored.
-pub fn edit(store: &Store, number: u16, edit: Edit) -> Result<String, EditError> {
+pub fn edit(
+    store: &Store,
+    number: u16,
+    edit: Edit,
+    fits: impl FnOnce(Recipe) -> Result<(), String>,
+) -> Result<String, EditError> {
     let Recipe {
         mut file, arrays, ..
     } = store.load_to_edit(number)?.recipe;
@@ -69,6 +75,7 @@ pub fn edit(store: &Store, number: u16, edit: Edit) -> Result<String, EditError>
     let checked = Recipe::check(file, arrays).map_err(EditError::Unfit)?;
     let (bytes, fingerprint) = archive::pack(&checked.file, &checked.arrays)
         .map_err(|error| EditError::Unfit(error.to_string()))?;
+    fits(checked).map_err(EditError::Unfit)?;
     let stored = store.save(number, &bytes);
     stored.map_err(|error| EditError::Store(error.to_string()))?;
     Ok(fingerprint)

@@ -148,16 +148,15 @@ impl Store {
     }
 
     /// Takes a recipe from a file, under the number that it has; what had this number before stays as the previous
-    /// generation. `calibration` is the fingerprint of the head's calibration, where it is known: a recipe for another
-    /// head is refused.
+    /// generation. `fits` tries it out on the head and says in words why it cannot be used there: then it is refused.
     ///
     /// # Errors
-    /// If the file is no whole recipe, of a newer version or for another calibration, or the store cannot be written. The
+    /// If the file is no whole recipe, of a newer version does not fit the head, or the store cannot be written. The
     /// store is then as it was.
     pub fn import(
         &self,
         source: &Path,
-        calibration: Option<&str>,
+        fits: impl FnOnce(Recipe) -> Result<(), String>,
     ) -> Result<RecipeFile, ImportError> {
         let refused = |reason: String| ImportError::Refused {
             path: source.to_path_buf(),
@@ -180,10 +179,8 @@ impl Store {
             .map_err(write(&arriving))
             .and_then(|()| {
                 let recipe = read(&arriving).map_err(&refused)?;
-                let file = recipe.file;
-                if let Some(present) = calibration.filter(|&present| present != file.calibration) {
-                    return Err(refused(foreign(&file.calibration, present)));
-                }
+                let file = recipe.file.clone();
+                fits(recipe).map_err(&refused)?;
                 let target = self.path(file.number);
                 self.keep_previous(file.number)
                     .and_then(|()| rename_whole(&arriving, &target))
@@ -229,15 +226,6 @@ fn read(path: &Path) -> Result<Recipe, String> {
     let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
     let (size, file) = opened.map_err(|error| error.to_string())?;
     Recipe::read(BufReader::new(file), size).map_err(|error| error.to_string())
-}
-
-fn foreign(made_for: &str, present: &str) -> String {
-    let digits = |fingerprint: &str| fingerprint.get(..8).unwrap_or(fingerprint).to_owned();
-    format!(
-        "it was made for calibration {}, this head has {}: teach it on this head",
-        digits(made_for),
-        digits(present)
-    )
 }
 
 fn copy_synced(source: &Path, target: &Path) -> io::Result<()> {

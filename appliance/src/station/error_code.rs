@@ -1,5 +1,7 @@
 //! The error codes that the station gives by itself; the worker brings its own (1xx camera … 7xx thermal).
 
+/// A stored recipe is damaged or cannot be used on this head; it stays stored.
+pub const RECIPE_UNUSABLE: u16 = 402;
 /// There is not enough room left to store results.
 pub const STORAGE_FULL: u16 = 602;
 /// The number of a result could not be stored.

@@ -1,5 +1,6 @@
 //! The step: `(station, event, now) → (station, effects)`, pure.
 
+use super::error_code;
 use super::event::{Effect, Effects, Event, JobId, RecipeResult, Request};
 use super::machine::{BEAT, Station, log, push};
 use super::state::{ActiveRecipe, ClearedBy, Fault, Micros, State};
@@ -36,6 +37,8 @@ pub fn step(mut station: Station, event: Event, now: Micros) -> (Station, Effect
                 station.requested_recipe = recipe.number;
                 station.recipe_result = RecipeResult::Ok;
                 station.recipe = Some(recipe);
+                let unusable = |(code, _): &(u16, _)| *code == error_code::RECIPE_UNUSABLE;
+                station.failure = station.failure.take().filter(|failure| !unusable(failure));
                 station.state = station.rest();
             } else {
                 station.late("a loaded recipe", job, &mut effects);
@@ -48,6 +51,9 @@ pub fn step(mut station: Station, event: Event, now: Micros) -> (Station, Effect
         } => {
             if matches!(&station.state, State::Loading { job: awaited, .. } if *awaited == job) {
                 station.recipe_result = result;
+                if result == RecipeResult::Corrupt {
+                    station.failure = Some((error_code::RECIPE_UNUSABLE, message.clone()));
+                }
                 station.state = station.rest();
                 log(&mut effects, message);
             } else {
@@ -144,7 +150,7 @@ pub fn step(mut station: Station, event: Event, now: Micros) -> (Station, Effect
 /// A failure always has a code.
 pub(super) fn named(error_code: u16) -> u16 {
     if error_code == 0 {
-        super::error_code::UNNAMED
+        error_code::UNNAMED
     } else {
         error_code
     }
@@ -273,7 +279,7 @@ impl Station {
         let silent = now.since(self.last_alive);
         if silent > self.settings.limits.silent {
             let fault = Fault {
-                code: super::error_code::DEADLINE,
+                code: error_code::DEADLINE,
                 cause: format!(
                     "the measuring task gave no sign of life for {} ms",
                     silent.0 / 1000

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use axum::body::{Body, Bytes, to_bytes};
 use axum::http::StatusCode;
+use hal::bounds::shortened;
 use serde::de::DeserializeOwned;
 
 use super::problem::Problem;
@@ -23,8 +24,10 @@ const FILE_TIME: Duration = Duration::from_secs(120);
 /// It is too long, too slow or not what is expected.
 pub async fn json<T: DeserializeOwned>(body: Body) -> Result<T, Problem> {
     let bytes = read(body, MAX_JSON, JSON_TIME).await?;
-    serde_json::from_slice(&bytes)
-        .map_err(|error| Problem::unclear(format!("the request's JSON: {error}")))
+    serde_json::from_slice(&bytes).map_err(|error| {
+        let error = shortened(&error.to_string());
+        Problem::unclear(format!("the request's JSON: {error}"))
+    })
 }
 
 /// A request's file.

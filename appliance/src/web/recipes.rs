@@ -11,6 +11,7 @@ use super::map::{Map, map};
 use super::problem::Problem;
 use super::site::Site;
 use super::{body, orders};
+use crate::plan::{Plan, PlanError};
 use crate::recipe::edit::{self, Edit, EditError};
 use crate::recipe::store::Loaded;
 use crate::recipe::{LoadError, Recipe};
@@ -102,13 +103,38 @@ pub(super) async fn edit(
     request: Request<Body>,
 ) -> Result<Json<Value>, Problem> {
     let wanted: Edit = body::json(request.into_body()).await?;
-    let edited = site.change(move |site| Ok(edit::edit(&site.recipes, number, wanted)?));
-    let fingerprint = edited.await?;
+    let edited = site.change(move |site| {
+        let mut note = None;
+        let fits = |recipe| {
+            note = tried(site, recipe)?;
+            Ok(())
+        };
+        let fingerprint = edit::edit(&site.recipes, number, wanted, fits)?;
+        Ok((fingerprint, note))
+    });
+    let (fingerprint, note) = edited.await?;
     let active = site.station.snapshot().active();
     let loading = active == Some(number) && orders::begin_load(&site, number).is_ok();
     Ok(Json(
-        json!({ "fingerprint": fingerprint, "loading": loading }),
+        json!({ "fingerprint": fingerprint, "loading": loading, "note": note }),
     ))
+}
+
+/// Tries out a recipe that is to be stored; where that cannot be done here, words that say why.
+///
+/// # Errors
+/// In words: it cannot be used on this head, though it was made for it.
+fn tried(site: &Site, recipe: Recipe) -> Result<Option<String>, String> {
+    let Some(calibration) = site.calibration.get() else {
+        let words =
+            "no calibrated head is open: whether the recipe can be used shows when it is loaded";
+        return Ok(Some(words.into()));
+    };
+    match Plan::try_out(recipe, &calibration) {
+        Ok(()) => Ok(None),
+        Err(error @ PlanError::OtherCalibration { .. }) => Ok(Some(error.to_string())),
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 pub(super) async fn import(
@@ -117,11 +143,16 @@ pub(super) async fn import(
 ) -> Result<(StatusCode, Json<Value>), Problem> {
     let bytes = body::file(request.into_body()).await?;
     let stored = site.change(move |site| {
-        let recipe = Recipe::from_bytes(&bytes).map_err(|error| Problem::unfit(error.to_string()))?;
-        let number = recipe.file.number;
+        let recipe =
+            Recipe::from_bytes(&bytes).map_err(|error| Problem::unfit(error.to_string()))?;
+        let (number, name) = (recipe.file.number, recipe.file.name.clone());
+        let fingerprint = recipe.file.fingerprint.clone();
+        let note = tried(site, recipe).map_err(Problem::unfit)?;
         let saved = site.recipes.save(number, &bytes);
-        saved.map_err(|error| Problem::broken(format!("store recipe {number}: {error}: free space")))?;
-        Ok(json!({ "number": number, "name": recipe.file.name, "fingerprint": recipe.file.fingerprint }))
+        saved.map_err(|error| {
+            Problem::broken(format!("store recipe {number}: {error}: free space"))
+        })?;
+        Ok(json!({ "number": number, "name": name, "fingerprint": fingerprint, "note": note }))
     });
     Ok((StatusCode::CREATED, Json(stored.await?)))
 }

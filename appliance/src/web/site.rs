@@ -11,6 +11,7 @@ use super::kept::LastKept;
 use super::problem::Problem;
 use super::slots::Slots;
 use crate::access::Access;
+use crate::calibration::Current;
 use crate::history::Reader;
 use crate::latest::LastMaps;
 use crate::logbook::Logbook;
@@ -38,6 +39,8 @@ pub struct Parts {
     pub access: Access,
     /// The station's recipes.
     pub recipes: Store,
+    /// What is known of the head that recipes are for.
+    pub calibration: Current,
     /// The way to the last cycle.
     pub maps: LastMaps,
     /// The stored results.

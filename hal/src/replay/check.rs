@@ -210,7 +210,7 @@ fn levels(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
             return Err(RecordingError::content(
                 path,
                 format!(
-                    "the shifts of ratio {} (pattern {}) are {shifts:?}, not equally spaced over one turn",
+                    "the shift_turns of ratio {} (pattern {}) are {shifts:?}, not equally spaced over one turn",
                     frame.ratio, frame.pattern
                 ),
                 format!(

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::bounds::shortened;
+
 /// A recording that cannot be opened. The message names the file and the remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RecordingError {
@@ -40,7 +42,7 @@ impl RecordingError {
     ) -> Self {
         Self::Content {
             path: path.to_path_buf(),
-            problem: problem.into(),
+            problem: shortened(&problem.into()),
             remedy: remedy.into(),
         }
     }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::parts::Part;
 use super::timing::Timing;
+use crate::bounds::shortened;
 use crate::model::DeviceModel;
 use crate::virtual_head::Faults;
 
@@ -254,7 +255,7 @@ impl Scenario {
     pub fn from_toml(text: &str, place: &str) -> Result<Self, ScenarioError> {
         let failed = |problem: String| ScenarioError {
             place: place.to_owned(),
-            problem,
+            problem: shortened(&problem),
         };
         let scenario: Self = toml::from_str(text).map_err(|error| failed(error.to_string()))?;
         scenario.check().map_err(failed)?;

@@ -55,6 +55,7 @@ impl Page {
             station,
             access: access.clone(),
             recipes: Store::open(&recipes).expect("a store"),
+            calibration: Default::default(),
             maps: Default::default(),
             history: Reader::of(folder.path()),
             date: Box::new(|_| false),

@@ -69,7 +69,11 @@ pub fn edit(data: &[u8]) {
     STORED.with(|stored| {
         // Written past the store: a sync for each input would be most of the time.
         fs::write(stored.folder.path().join("0001.recipe"), &part.bytes).expect("put back");
-        if edit::edit(&stored.store, 1, wanted).is_ok() {
+        let fits = |recipe| {
+            let tried = Plan::try_out(recipe, &part.calibration);
+            tried.map_err(|error| error.to_string())
+        };
+        if edit::edit(&stored.store, 1, wanted, fits).is_ok() {
             let loaded = stored.store.load(1).expect("what was taken can be loaded");
             assert_eq!(loaded.fallback, None);
             let plan = Plan::new(loaded.recipe, &part.calibration, true).expect("and planned");

@@ -8,6 +8,7 @@ mod matrix;
 mod pose;
 mod tree;
 
+use hal::bounds::shortened;
 use hal::model::DeviceModel;
 use matrix::Matrix;
 use pose::Pose;
@@ -159,7 +160,7 @@ pub fn from_one(path: &Path, sizes: Sizes, declared: Declared) -> Result<Models,
 
 fn read<T>(path: &Path, find: impl Fn(&Node) -> Result<T, String>) -> Result<T, String> {
     let place = path.display();
-    let failed = |error: String| format!("import {place}: {error}");
+    let failed = |error: String| format!("import {place}: {}", shortened(&error));
     let bytes = fs::metadata(path)
         .map_err(|error| failed(error.to_string()))?
         .len();

@@ -96,7 +96,7 @@ export function start() {
     const file = $("import-file").files[0];
     change(async () => {
       const stored = await ask("POST", "/api/recipes", file);
-      notice(`recipe ${stored.number} · ${stored.name} is stored`);
+      notice(`recipe ${stored.number} · ${stored.name} is stored${stored.note ? `: ${stored.note}` : ""}`);
       list();
     });
   });

@@ -1,6 +1,7 @@
 //! The page's server over real HTTP on a free port.
 
 mod answers;
+mod boundaries;
 mod connections;
 mod gate;
 mod page;
@@ -53,6 +54,7 @@ async fn served() -> Served {
         station: handle.clone(),
         access,
         recipes: Store::open(&folder.path().join("recipes")).unwrap(),
+        calibration: Default::default(),
         maps: Default::default(),
         history: Reader::of(folder.path()),
         date: Box::new(move |utc_us| dates.send(utc_us).is_ok()),

@@ -1,0 +1,379 @@
+//! Boundary values in calibrations, models of OpenCV, recordings, scenarios and configurations.
+
+use super::{Place, Tally, values};
+use crate::calibration::Calibration;
+use crate::calibration::file::{
+    CalibrationFile, CameraFile, ContrastFile, FORMAT, LevelFile, MapFile, NoiseFile, PitchFile,
+    ProjectorFile, ReferenceFile, TimingFile, VERSION,
+};
+use crate::calibration::opencv::{Declared, Sizes, from_two};
+use crate::config::Config;
+use crate::measure::measure;
+use hal::frame::{Frame, FrameFormat, Pixels};
+use hal::head::Stamp;
+use hal::replay::Recording;
+use hal::replay::recording::{PatternSpec, RecipeReference, RecordedFrame, RecordedProjector};
+use hal::sim::Scenario;
+use hal::units::Timestamp;
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::fs;
+use std::sync::Arc;
+
+fn small_head() -> Scenario {
+    let mut scenario = Scenario {
+        sub_rays: 1,
+        ..Scenario::default()
+    };
+    (scenario.rig.camera.width, scenario.rig.camera.height) = (16, 12);
+    (scenario.rig.projector.width, scenario.rig.projector.height) = (32, 24);
+    scenario
+}
+
+#[test]
+fn a_boundary_value_in_a_calibration_is_refused_by_its_key_or_the_head_is_known_by_it() {
+    let Calibration {
+        camera,
+        camera_model,
+        projector,
+        projector_model,
+        ..
+    } = Calibration::of_scenario(&small_head());
+    let map = |name: &str| MapFile {
+        file: format!("{name}.npy"),
+        sha256: "0".repeat(64),
+        residual_turns: 1e-4,
+        noise_turns: 1e-3,
+        filled: 0.99,
+    };
+    let file = CalibrationFile {
+        format: FORMAT.into(),
+        version: VERSION,
+        fingerprint: String::new(),
+        checksum: String::new(),
+        made_by: "fringed".into(),
+        made_at_unix_s: 0,
+        temperature_c: Some(30.0),
+        models_from: "scenario".into(),
+        camera: CameraFile {
+            width: camera.0,
+            height: camera.1,
+            bit_depth: camera.2,
+            model: camera_model,
+        },
+        projector: ProjectorFile {
+            width: projector.0,
+            height: projector.1,
+            model: projector_model,
+        },
+        timing: TimingFile {
+            flip_to_light_ns: 1000,
+            sigma_ns: 10,
+            stamp: Stamp::ExposureStart,
+            readout_ns: 0,
+        },
+        noise: NoiseFile {
+            counts: 3.0,
+            read_counts: 1.0,
+            shot: 0.01,
+            levels: vec![LevelFile {
+                level: 100.0,
+                counts: 3.0,
+            }],
+        },
+        response: (0..256).map(f64::from).collect(),
+        contrast: ContrastFile {
+            modulation_counts: 90.0,
+            pitches: vec![PitchFile {
+                pitch_px: 16,
+                contrast: 1.0,
+            }],
+        },
+        reference: Some(ReferenceFile {
+            pitch_px: 16.0,
+            models_off_px: 0.01,
+            vertical: map("reference_vertical"),
+            horizontal: map("reference_horizontal"),
+        }),
+    };
+    let (file, _) = file.sealed().unwrap();
+    let tree = serde_json::to_value(&file).unwrap();
+    let write = |tree: &Value| serde_json::to_string_pretty(tree).unwrap();
+    let mut tally = Tally::default();
+    tally.walk(&tree, |place, value| {
+        let text = place.replaced(&tree, value, write);
+        let read = CalibrationFile::read(text.as_bytes());
+        // What is well formed would be refused for its checksum alone: it gets the right one.
+        let Ok(file) = serde_json::from_str::<CalibrationFile>(&text) else {
+            return read.map(drop);
+        };
+        let (file, bytes) = file.sealed()?;
+        assert_eq!(CalibrationFile::read(&bytes)?, file);
+        file.calibration()?.devices().map(drop)
+    });
+    tally.end("calibration", 9000);
+}
+
+#[test]
+fn a_boundary_value_in_a_model_of_opencv_is_refused_by_its_node_or_a_device_is_known_by_it() {
+    const YAML: &str = "image_width: 512
+image_height: 512
+camera_matrix:
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 1451.85, 0., 255.5, 0., 1451.85, 255.5, 0., 0., 1. ]
+distortion_coefficients:
+   rows: 1
+   cols: 5
+   dt: d
+   data: [ -0.12, 0.15, 0.0002, -0.0003, 0. ]
+R:
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 0.9396926, 0., -0.3420201, 0., -1., 0., -0.3420201, 0., -0.9396926 ]
+T:
+   rows: 3
+   cols: 1
+   dt: d
+   data: [ 0., 0., 600. ]
+unit: mm
+";
+    let folder = tempfile::tempdir().unwrap();
+    let (camera, projector) = (
+        folder.path().join("camera"),
+        folder.path().join("projector"),
+    );
+    fs::write(&projector, YAML).unwrap();
+    let size = (512, 512);
+    let scenario = Scenario::default();
+    let read = |text: &str| {
+        fs::write(&camera, text).unwrap();
+        let sizes = Sizes {
+            camera: size,
+            projector: size,
+        };
+        let (camera_model, projector_model) =
+            from_two(&camera, &projector, sizes, Declared::default())?;
+        let calibration = Calibration {
+            camera: (size.0, size.1, 8),
+            camera_model,
+            projector: size,
+            projector_model,
+            ..Calibration::of_scenario(&scenario)
+        };
+        calibration.devices().map(drop)
+    };
+    read(YAML).unwrap();
+    let mut tally = Tally::default();
+    let words: Vec<&str> = YAML.split([' ', '\n', ',']).collect();
+    let mut from = 0;
+    for word in words.into_iter().filter(|word| !word.is_empty()) {
+        let at = from + YAML[from..].find(word).unwrap();
+        from = at + word.len();
+        // Words of the file stand for themselves in its messages: any node's name will do.
+        let place = Place(vec!["camera".into()]);
+        for value in values()
+            .iter()
+            .map(String::as_str)
+            .chain([".Nan", "-.Inf", "*a", "!!x y"])
+        {
+            let text = [&YAML[..at], value, &YAML[from..]].concat();
+            tally.run(&place, value, || read(&text));
+        }
+    }
+    tally.end("model of OpenCV", 2000);
+}
+
+/// A recording of a few pixels with every optional key.
+fn recording() -> Recording {
+    let scenario = small_head();
+    let calibration = Calibration::of_scenario(&scenario);
+    let format = FrameFormat::packed(16, 12, 8);
+    let levels = [0.03, 0.2, 1.0];
+    let shots = levels
+        .into_iter()
+        .flat_map(|ratio| (0..3).map(move |k| (ratio, f64::from(k) / 3.0)));
+    let frames = (0..).zip(shots).map(|(at, (ratio, shift_turns))| {
+        let sample = |u: usize| {
+            let turns = ratio * 30.0 * u as f64 / 16.0 + shift_turns;
+            (127.0 + 100.0 * (std::f64::consts::TAU * turns).sin()) as u8
+        };
+        let pixels = Pixels::Eight((0..16 * 12).map(|at| sample(at % 16)).collect());
+        RecordedFrame {
+            ratio,
+            shift_turns,
+            pattern: 0,
+            timestamp_ns: Some(at * 1000),
+            frame: Frame::new(format, Arc::new(pixels), Timestamp(at * 1000), at).unwrap(),
+        }
+    });
+    Recording {
+        width: 16,
+        height: 12,
+        bit_depth: 8,
+        description: "a test".into(),
+        source: "computed".into(),
+        camera_model: Some(calibration.camera_model),
+        noise_counts: Some(3.7),
+        projector: RecordedProjector {
+            width: 32,
+            height: 24,
+            model: Some(calibration.projector_model),
+        },
+        patterns: vec![PatternSpec::Vertical { fringes: 30.0 }],
+        frames: frames.collect(),
+        range_mm: Some([-50.0, 50.0]),
+        exposure_us: Some(33_333.0),
+        part_id: Some("7".into()),
+        recipe: Some(RecipeReference {
+            number: 1,
+            fingerprint: "0".repeat(64),
+        }),
+        truth_height: None,
+        truth_class: None,
+    }
+}
+
+#[test]
+fn a_boundary_value_in_a_recording_is_refused_by_its_key_or_it_is_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path().join("recording");
+    hal::replay::recorder::write(&recording(), &place).unwrap();
+    let manifest = place.join("recording.json");
+    let tree: Value = serde_json::from_slice(&fs::read(&manifest).unwrap()).unwrap();
+    let write = |tree: &Value| serde_json::to_string_pretty(tree).unwrap();
+    let mut tally = Tally::default();
+    tally.walk(&tree, |place_of_value, value| {
+        fs::write(&manifest, place_of_value.replaced(&tree, value, write)).unwrap();
+        let recording = Recording::open(&place).map_err(|error| error.to_string())?;
+        // Whether there is something to see in the frames is another question.
+        drop(measure(&recording, &place));
+        Ok(())
+    });
+    tally.end("recording", 3600);
+}
+
+/// A tree as TOML. Tables come after values, so that each value keeps its table.
+fn toml(tree: &Value) -> String {
+    fn inline(value: &Value) -> String {
+        match value {
+            Value::Object(map) => {
+                let pairs = map
+                    .iter()
+                    .filter(|(_, value)| !value.is_null())
+                    .map(|(key, value)| format!("{key} = {}", inline(value)));
+                format!("{{ {} }}", pairs.collect::<Vec<_>>().join(", "))
+            }
+            Value::Array(list) => {
+                let all: Vec<String> = list.iter().map(inline).collect();
+                format!("[{}]", all.join(", "))
+            }
+            other => other.to_string(),
+        }
+    }
+    let mut text = String::new();
+    let all = tree.as_object().unwrap().iter();
+    for (key, value) in all.filter(|(_, value)| !value.is_null()) {
+        let _ = writeln!(text, "{key} = {}", inline(value));
+    }
+    text
+}
+
+/// A boundary value of JSON as TOML writes it.
+fn in_toml(value: &str) -> &str {
+    match value {
+        "NaN" => "nan",
+        "1e999" => "inf",
+        "-1e999" => "-inf",
+        other => other,
+    }
+}
+
+#[test]
+fn a_boundary_value_in_a_scenario_is_refused_by_its_key_or_the_scene_can_be_lit() {
+    let mut scenario = small_head();
+    scenario.timing.calibrated_flip_to_light_us = Some(0);
+    let mut tree = serde_json::to_value(&scenario).unwrap();
+    tree["part"]["defects"] = json!([
+        { "kind": "dent", "x": 0.0, "y": -8.0, "depth_mm": 0.6, "diameter_mm": 14.0 },
+        { "kind": "missing_hole", "index": 0 },
+        { "kind": "bent_flange", "degrees": 2.0 },
+    ]);
+    let mut tally = Tally::default();
+    tally.walk(&tree, |place, value| {
+        let text = place.replaced(&tree, in_toml(value), toml);
+        let scenario = Scenario::from_toml(&text, "here").map_err(|error| error.to_string())?;
+        Calibration::of_scenario(&scenario).devices()?;
+        let camera = &scenario.rig.camera;
+        if camera.width * camera.height * scenario.sub_rays.pow(2) <= 16 * 12 * 4 {
+            drop(hal::sim::head(&scenario).map_err(|error| error.to_string())?);
+        }
+        Ok(())
+    });
+    for part in [
+        "cone",
+        "sawtooth",
+        "sphere",
+        "tube",
+        "flowerpot",
+        "spline",
+        "plane",
+    ] {
+        let text = format!("[part]\nkind = \"{part}\"\n");
+        let part = Scenario::from_toml(&text, "here").unwrap().part;
+        let mut tree = tree.clone();
+        tree["part"] = serde_json::to_value(part).unwrap();
+        let only = json!({ "part": tree["part"] });
+        let scene = |part: &Value| {
+            let mut tree = tree.clone();
+            tree["part"] = part["part"].clone();
+            toml(&tree)
+        };
+        tally.walk(&only, |place, value| {
+            let text = place.replaced(&only, in_toml(value), scene);
+            let scenario = Scenario::from_toml(&text, "here").map_err(|error| error.to_string())?;
+            drop(hal::sim::head(&scenario).map_err(|error| error.to_string())?);
+            Ok(())
+        });
+    }
+    tally.end("scenario", 5000);
+}
+
+#[test]
+fn a_boundary_value_in_a_configuration_is_refused_by_its_key_or_it_can_be_read_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fringed.toml");
+    let mut config = Config {
+        state: Some("state".into()),
+        ..Config::default()
+    };
+    config.modbus.strict_unit_id = Some(1);
+    config.http.hosts = vec!["sensor.local".into()];
+    let head = &mut config.head;
+    (head.scenario, head.calibration) = (Some("a.toml".into()), Some("c.json".into()));
+    head.recordings = vec!["recording".into()];
+    let (camera, projector) = (&mut head.camera, &mut head.projector);
+    (camera.width, camera.height) = (Some(1456), Some(1088));
+    camera.id = Some("camera".into());
+    (projector.width, projector.height) = (Some(912), Some(1140));
+    (projector.card, projector.connector) = (Some("/dev/dri/card1".into()), Some("DPI-1".into()));
+    projector.refresh_hz = Some(60.0);
+    head.trigger.line = Some("GPIO1".into());
+    config.lines.start = Some("GPIO2".into());
+    config.lines.busy = Some("GPIO3".into());
+    config.lines.ok = Some("GPIO4".into());
+    config.lines.fault = Some("GPIO5".into());
+    let tree = serde_json::to_value(&config).unwrap();
+    let mut tally = Tally::default();
+    tally.walk(&tree, |place, value| {
+        fs::write(&path, place.replaced(&tree, in_toml(value), toml)).unwrap();
+        let config = Config::read(&path).map_err(|failure| failure.message)?;
+        let text = toml::to_string(&config).map_err(|error| error.to_string())?;
+        fs::write(&path, text).unwrap();
+        assert_eq!(Config::read(&path).unwrap(), config);
+        Ok(())
+    });
+    tally.end("configuration", 1500);
+}

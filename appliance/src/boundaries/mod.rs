@@ -1,0 +1,202 @@
+//! Boundary values in every key of every file and request: each is refused by its key, or what it makes can be used.
+//!
+//! A valid example of a format is walked as a tree: each value in turn, each element of a list and each list as a whole is
+//! replaced by each of [`VALUES`]. What a test counts is printed with `--nocapture`.
+
+mod files;
+mod recipes;
+mod station;
+
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::{Duration, Instant};
+
+pub(crate) use recipes::Bed;
+
+/// What stands in for a value, as JSON: the ends of every type, what lies beyond, and what no JSON holds.
+const VALUES: [&str; 30] = [
+    "0",
+    "1",
+    "-1",
+    "2",
+    "3",
+    "0.5",
+    "64",
+    "65",
+    "65535",
+    "65536",
+    "2147483647",
+    "2147483648",
+    "4294967295",
+    "4294967296",
+    "9223372036854775807",
+    "9223372036854775808",
+    "18446744073709551615",
+    "18446744073709551616",
+    "1e300",
+    "-1e300",
+    "5e-324",
+    "1e999",
+    "-1e999",
+    "NaN",
+    "null",
+    "true",
+    "\"\"",
+    "\"\\u0000\\u001b[2J\"",
+    "[]",
+    "{}",
+];
+/// What marks the place of a value while a tree is written.
+const MARK: &str = "@here@";
+/// Most bytes of a message.
+const LONGEST_WORDS: usize = 3000;
+/// Longest time that a case may take.
+const LONGEST: Duration = Duration::from_secs(5);
+
+/// All values, and 900 kB of text; a manifest of a megabyte and more is not read at all.
+pub(crate) fn values() -> Vec<String> {
+    let long = format!("\"{}\"", "x".repeat(900_000));
+    let short = VALUES.iter().map(|value| (*value).to_owned());
+    short.chain([long]).collect()
+}
+
+/// The place of a value in a tree: keys, and for elements of lists their index.
+#[derive(Clone, Debug)]
+pub(crate) struct Place(Vec<String>);
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0.join("."))
+    }
+}
+
+impl Place {
+    /// Whether a message names one of its keys, or the line that it stands in.
+    pub fn is_named(&self, words: &str) -> bool {
+        let keys = self.0.iter().filter(|key| key.parse::<usize>().is_err());
+        // Of a list one member may be named.
+        words.contains("line ")
+            || keys
+                .clone()
+                .any(|key| words.contains(key.trim_end_matches('s')))
+    }
+
+    fn of<'a>(&self, tree: &'a mut Value) -> Option<&'a mut Value> {
+        self.0.iter().try_fold(tree, |node, key| match node {
+            Value::Object(all) => all.get_mut(key),
+            Value::Array(all) => all.get_mut(key.parse::<usize>().ok()?),
+            _ => None,
+        })
+    }
+
+    /// The tree's text with this value replaced; `write` makes the text of a tree.
+    pub fn replaced(&self, tree: &Value, value: &str, write: impl Fn(&Value) -> String) -> String {
+        let mut tree = tree.clone();
+        *self.of(&mut tree).unwrap() = Value::from(MARK);
+        write(&tree).replacen(&format!("\"{MARK}\""), value, 1)
+    }
+
+    /// The list at this place with its first element ten thousand times, if it is a list.
+    fn repeated(&self, tree: &Value) -> Option<String> {
+        let mut tree = tree.clone();
+        let first = self.of(&mut tree)?.as_array()?.first()?.to_string();
+        let mut list = String::from("[");
+        for _ in 1..10_000 {
+            let _ = write!(list, "{first},");
+        }
+        Some(list + &first + "]")
+    }
+}
+
+/// The places of everything below the root.
+pub(crate) fn places(tree: &Value) -> Vec<Place> {
+    fn collect(node: &Value, at: &[String], all: &mut Vec<Place>) {
+        if !at.is_empty() {
+            all.push(Place(at.to_vec()));
+        }
+        let inner: Vec<(String, &Value)> = match node {
+            Value::Object(map) => map.iter().map(|(key, node)| (key.clone(), node)).collect(),
+            Value::Array(list) => (0..).map(|at: usize| at.to_string()).zip(list).collect(),
+            _ => Vec::new(),
+        };
+        for (key, node) in inner {
+            let mut at = at.to_vec();
+            at.push(key);
+            collect(node, &at, all);
+        }
+    }
+    let mut all = Vec::new();
+    collect(tree, &[], &mut all);
+    all
+}
+
+/// How many cases there were, and of how many what they make could be used.
+#[derive(Debug, Default)]
+pub(crate) struct Tally {
+    cases: usize,
+    used: usize,
+    /// What went wrong.
+    wrong: Vec<String>,
+}
+
+impl Tally {
+    /// Takes the answer of a case: whether it could be used, or why it was refused.
+    pub fn take(&mut self, place: &Place, value: &str, answer: Result<(), String>) {
+        let value: String = value.chars().take(60).collect();
+        self.cases += 1;
+        match answer {
+            Ok(()) => self.used += 1,
+            Err(words) if words.len() > LONGEST_WORDS => {
+                let bytes = words.len();
+                self.wrong
+                    .push(format!("{place} = {value}: {bytes} bytes of words"));
+            }
+            Err(words) if !place.is_named(&words) => {
+                self.wrong
+                    .push(format!("{place} = {value} is not named: {words}"));
+            }
+            Err(_) => {}
+        }
+    }
+
+    /// Runs a case that must neither panic nor take long.
+    pub fn run(&mut self, place: &Place, value: &str, case: impl FnOnce() -> Result<(), String>) {
+        let began = Instant::now();
+        let answer = catch_unwind(AssertUnwindSafe(case));
+        let short: String = value.chars().take(60).collect();
+        let took = began.elapsed();
+        if took > LONGEST {
+            self.wrong.push(format!("{place} = {short} took {took:?}"));
+        }
+        match answer {
+            Ok(answer) => self.take(place, value, answer),
+            Err(_) => self.wrong.push(format!("{place} = {short} panicked")),
+        }
+    }
+
+    /// Walks a tree: each place with each value.
+    pub fn walk(&mut self, tree: &Value, case: impl Fn(&Place, &str) -> Result<(), String>) {
+        let values = values();
+        for place in places(tree) {
+            let repeated = place.repeated(tree);
+            for value in values.iter().chain(&repeated) {
+                self.run(&place, value, || case(&place, value));
+            }
+        }
+    }
+
+    /// Prints the count and checks that there were as many cases as there should be, and some of either answer.
+    pub fn end(&self, what: &str, least: usize) {
+        let Self { cases, used, wrong } = self;
+        println!("{what}: {cases} boundary values, {used} of them can be used");
+        assert!(
+            wrong.is_empty(),
+            "{what}, {}:\n{}",
+            wrong.len(),
+            wrong.join("\n")
+        );
+        assert!(*cases >= least, "{what}: only {cases} cases");
+        assert!(*used > 0 && used < cases, "{what}: {used} of {cases}");
+    }
+}

@@ -1,0 +1,232 @@
+//! Boundary values in a recipe: its manifest, its arrays, its ZIP.
+
+use super::Tally;
+use crate::calibration::Calibration;
+use crate::plan::Plan;
+use crate::recipe::archive::{members, parse, seal};
+use crate::recipe::golden::Naming;
+use crate::recipe::teach::teach;
+use crate::recipe::{Recipe, Store};
+use hal::frame::Frame;
+use hal::sim::Scenario;
+use serde_json::Value;
+use std::time::{Duration, Instant};
+
+const TIMEOUT: Duration = Duration::from_secs(5);
+/// A head of few pixels.
+pub(super) const HEAD: &str = "sub_rays = 1
+part = { kind = \"plane\" }
+[rig.camera]
+width = 64
+height = 48
+fov_deg = [20.0, 15.0]
+[rig.projector]
+width = 256
+height = 192
+";
+
+/// A small head with a recipe, and the frames of a part.
+pub(crate) struct Bed {
+    pub calibration: Calibration,
+    pub recipe: Recipe,
+    pub bytes: Vec<u8>,
+    frames: Vec<Frame>,
+}
+
+impl Bed {
+    pub fn new() -> Self {
+        let scenario = Scenario::from_toml(HEAD, "head").unwrap();
+        let (mut head, stage) = hal::sim::head(&scenario).unwrap();
+        let calibration = Calibration::of_stage(&stage);
+        let naming = Naming {
+            number: 1,
+            part_number: "P".into(),
+            name: "part".into(),
+            taught_at_unix_s: 0,
+            placement_tolerance_mm: 1.0,
+        };
+        let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &|_, _| ()).unwrap();
+        let plan = Plan::new(taught.recipe.clone(), &calibration, true).unwrap();
+        head.load(plan.rasters(&calibration).unwrap()).unwrap();
+        let mut frames = Vec::new();
+        head.acquire_while(plan.indices(0), TIMEOUT, &mut |_, frame| {
+            frames.push(frame);
+            true
+        })
+        .unwrap();
+        Self {
+            calibration,
+            recipe: taught.recipe,
+            bytes: taught.bytes,
+            frames,
+        }
+    }
+
+    /// Plans a recipe and judges a part with it, as the station would.
+    pub fn use_recipe(&self, recipe: Recipe) -> Result<(), String> {
+        let plan = Plan::new(recipe, &self.calibration, true).map_err(|error| error.to_string())?;
+        for step in 0..plan.steps() {
+            // As many frames as the sequence has, of whatever shift.
+            let count = plan.indices(step).len();
+            let frames: Vec<Frame> = self.frames.iter().cloned().cycle().take(count).collect();
+            drop(plan.inspect(step, &frames, Instant::now()));
+            drop(plan.heights(step, &frames));
+        }
+        Ok(())
+    }
+}
+
+#[test]
+fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_part() {
+    let bed = Bed::new();
+    let Recipe { file, arrays, .. } = &bed.recipe;
+    let mut full = file.clone();
+    full.fingerprint = "0".repeat(64);
+    full.exposure_us = Some(5000.0);
+    let kinds = [
+        r#"{ "kind": "out_of_tolerance", "smoothing_px": 3, "tolerance_mm": 0.1 }"#,
+        r#"{ "kind": "volume", "above_mm": 8.0 }"#,
+        r#"{ "kind": "flatness", "smoothing_px": 4 }"#,
+        r#"{ "kind": "step", "from": "frame" }"#,
+        r#"{ "kind": "tilt", "about": "x" }"#,
+        r#"{ "kind": "placement", "component": "about_z" }"#,
+    ];
+    for kind in kinds {
+        let mut gauge = full.gauges[0].clone();
+        gauge.measures = serde_json::from_str(kind).unwrap();
+        (gauge.low, gauge.high) = (Some(-0.5), Some(0.5));
+        if gauge.measures.unit() == crate::station::Unit::Share {
+            gauge.low = Some(0.0);
+        }
+        full.gauges.push(gauge);
+    }
+    let tree = serde_json::to_value(&full).unwrap();
+    let write = |tree: &Value| serde_json::to_string_pretty(tree).unwrap();
+    let members = members(file, arrays);
+    let read = |text: &str| {
+        // What parsing refuses is refused before a member is read.
+        parse(text).map_err(|error| error.to_string())?;
+        let (bytes, _) = seal(text, members.clone()).unwrap();
+        Recipe::from_bytes(&bytes).map_err(|error| error.to_string())
+    };
+    bed.use_recipe(read(&write(&tree)).unwrap()).unwrap();
+    let mut tally = Tally::default();
+    tally.walk(&tree, |place, value| {
+        let text = place.replaced(&tree, value, write);
+        bed.use_recipe(read(&text)?)
+    });
+    tally.end("recipe", 6500);
+}
+
+#[test]
+fn arrays_of_any_numbers_never_panic() {
+    let bed = Bed::new();
+    let mut cases = 0;
+    for number in [
+        f64::NAN,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::MAX,
+        f64::MIN,
+        f64::MIN_POSITIVE,
+        5e-324,
+        -1.0,
+        0.0,
+        1e9,
+    ] {
+        // One array at a time, one place of it, every third, or all.
+        for (array, every) in (0..8).flat_map(|array| [1, 3, 1500].map(|every| (array, every))) {
+            let mut recipe = bed.recipe.clone();
+            let arrays = &mut recipe.arrays;
+            let single = [
+                &mut arrays.golden_height,
+                &mut arrays.height_slope,
+                &mut arrays.height_curvature,
+                &mut arrays.modulation,
+                &mut arrays.phase_reach,
+            ];
+            if let Some(values) = single.into_iter().nth(array) {
+                let places = values.iter_mut().step_by(every);
+                places.for_each(|value| *value = number as f32);
+            } else if array < 7 {
+                let double = [&mut arrays.golden_phase, &mut arrays.phase_function];
+                let values = double.into_iter().nth(array - 5).unwrap();
+                let places = values.iter_mut().step_by(every);
+                places.for_each(|value| *value = number);
+            } else {
+                let places = arrays.valid.iter_mut().step_by(every);
+                places.for_each(|value| *value = number as u8);
+            }
+            // Whatever it answers, it answers.
+            drop(Recipe::check(recipe.file, recipe.arrays).map(|recipe| bed.use_recipe(recipe)));
+            cases += 1;
+        }
+    }
+    println!("{cases} arrays of extreme numbers");
+    assert_eq!(cases, 240);
+}
+
+#[test]
+fn a_recipe_for_a_projector_of_a_whole_turn_of_pixels_is_refused_and_does_not_replace_a_good_one() {
+    let bed = Bed::new();
+    let mut file = bed.recipe.file.clone();
+    file.fingerprint = "0".repeat(64);
+    (file.projector.width, file.projector.height) = (u32::MAX, u32::MAX);
+    file.pattern = serde_json::from_str(r#"{ "kind": "vertical", "fringes": 20.0 }"#).unwrap();
+    let text = serde_json::to_string(&file).unwrap();
+    let mut without = members(&file, &bed.recipe.arrays);
+    without.retain(|(name, _)| *name != "phase_function.npy");
+    let (bytes, _) = seal(&text, without).unwrap();
+    let words = Recipe::from_bytes(&bytes).unwrap_err().to_string();
+    assert!(
+        words.contains("projector.width is 4294967295: write 1 to 8192"),
+        "{words}"
+    );
+    // As an older program stored it: it is listed with its problem, the one before is used, and it pushes out nothing.
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).unwrap();
+    store.save(1, &bed.bytes).unwrap();
+    store.save(1, &bytes).unwrap();
+    assert!(
+        store.list()[0]
+            .problem
+            .as_deref()
+            .unwrap()
+            .contains("projector.width")
+    );
+    let loaded = store.load(1).unwrap();
+    assert!(loaded.fallback.unwrap().contains("projector.width"));
+    store.save(1, &bed.bytes).unwrap();
+    store.save(1, &bytes).unwrap();
+    bed.use_recipe(store.load(1).unwrap().recipe).unwrap();
+}
+
+#[test]
+fn a_recipe_is_tried_out_on_the_head_before_it_is_taken() {
+    let bed = Bed::new();
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(&folder.path().join("recipes")).unwrap();
+    let arriving = folder.path().join("arriving.recipe");
+    let try_out = |recipe| Plan::try_out(recipe, &bed.calibration).map_err(|e| e.to_string());
+    let import = |bytes: &[u8]| {
+        std::fs::write(&arriving, bytes).unwrap();
+        store
+            .import(&arriving, try_out)
+            .map_err(|error| error.to_string())
+    };
+    let changed = |change: fn(&mut crate::recipe::RecipeFile)| {
+        let Recipe {
+            mut file, arrays, ..
+        } = bed.recipe.clone();
+        change(&mut file);
+        crate::recipe::archive::pack(&file, &arrays).unwrap().0
+    };
+    // Each value is within its bounds; together they do not fit this head.
+    let beside = import(&changed(|file| file.range_mm = [-10.0, 9000.0])).unwrap_err();
+    assert!(beside.contains("range"), "{beside}");
+    let foreign = import(&changed(|file| file.calibration = "0".repeat(64))).unwrap_err();
+    assert!(foreign.contains("was made for calibration"), "{foreign}");
+    assert!(store.numbers().is_empty());
+    import(&bed.bytes).unwrap();
+    assert_eq!(store.numbers(), [1]);
+}

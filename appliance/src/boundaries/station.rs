@@ -1,0 +1,75 @@
+//! A station that starts with a recipe that cannot be used.
+
+use super::Bed;
+use super::recipes::HEAD;
+use crate::config::Config;
+use crate::daemon::Daemon;
+use crate::progress::Progress;
+use crate::recipe::archive::pack;
+use crate::recipe::{Recipe, Store};
+use crate::station::snapshot::status;
+use crate::station::{ControlWrite, Event, Masked, RecipeKey, Request, error_code};
+use std::fs;
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+
+#[test]
+fn a_station_whose_recipe_cannot_be_used_stays_reachable_and_loads_another() {
+    let bed = Bed::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fringed.toml");
+    fs::write(folder.path().join("head.toml"), HEAD).unwrap();
+    let text = "state = \"state\"\n[modbus]\nlisten = \"127.0.0.1:0\"\n[http]\nlisten = \"127.0.0.1:0\"\n\
+                [head]\nscenario = \"head.toml\"\n";
+    fs::write(&path, text).unwrap();
+    let store = Store::open(&folder.path().join("state/recipes")).unwrap();
+    // As an older program may have stored it: every value is within its bounds, and no head measures 9 m above itself.
+    let Recipe {
+        mut file, arrays, ..
+    } = bed.recipe.clone();
+    file.range_mm = [-10.0, 9000.0];
+    store.save(1, &pack(&file, &arrays).unwrap().0).unwrap();
+    (file.number, file.range_mm) = (2, bed.recipe.file.range_mm);
+    store.save(2, &pack(&file, &arrays).unwrap().0).unwrap();
+
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let config = Config::read(&path).unwrap();
+    let daemon = Daemon::start(&config, pool.unwrap(), Progress::new(true)).unwrap();
+    let refused = daemon.wait_until_ready().unwrap_err();
+    assert!(refused.message.contains("range"), "{}", refused.message);
+    let after = daemon.station.snapshot();
+    assert_eq!(after.error_code, error_code::RECIPE_UNUSABLE);
+    assert!(after.fault.is_none() && after.worker_alive && after.recipe.is_none());
+    TcpStream::connect(daemon.modbus).unwrap();
+    let mut page = TcpStream::connect(daemon.http).unwrap();
+    let request = format!(
+        "GET /healthz HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n",
+        daemon.http
+    );
+    page.write_all(request.as_bytes()).unwrap();
+    let mut answer = String::new();
+    page.read_to_string(&mut answer).unwrap();
+    assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+
+    let online = ControlWrite {
+        control: Masked::<u16>::all(crate::station::control::ONLINE),
+        ..ControlWrite::default()
+    };
+    let write = Event::Write {
+        write: online,
+        rising: 0,
+    };
+    daemon.station.event(write);
+    let load = Request::Load(RecipeKey::Number(2));
+    daemon.station.event(Event::Request(load));
+    let runtime = crate::daemon::runtime().unwrap();
+    let ready = runtime.block_on(async {
+        let mut snapshots = daemon.station.subscribe();
+        let ready = snapshots.wait_for(|now| now.is(status::READY)).await;
+        ready.unwrap().clone()
+    });
+    assert_eq!((ready.active(), ready.error_code), (Some(2), 0));
+    daemon.stop();
+    // Nothing is lost.
+    assert_eq!(store.numbers(), [1, 2]);
+}
