@@ -73,7 +73,7 @@ enum Command {
     History(history::History),
     /// Judge a kept part again and compare with the history.
     Replay(replay::Replay),
-    /// List, export, import or delete recipes.
+    /// List, export, import or delete recipes, or undo that.
     #[command(subcommand)]
     Recipe(recipe::RecipeCommand),
     /// Check a configuration, or list its keys.

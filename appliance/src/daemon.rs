@@ -362,7 +362,11 @@ fn effects(
         match effect {
             Effect::Measure(job) => order(Order::Measure(job)),
             Effect::Load { job, key } => order(Order::Load(job, key)),
-            Effect::Teach { job, number } => order(Order::Teach(job, number)),
+            Effect::Teach {
+                job,
+                number,
+                keep_gauges,
+            } => order(Order::Teach(job, number, keep_gauges)),
             Effect::PersistSeq(seq) => {
                 let unanswered = || "the storage does not answer".into();
                 let failed = (!history.take(seq)).then(unanswered);
@@ -391,7 +395,10 @@ fn first_request(
     if recipes.numbers().contains(&number) {
         Some(Request::Load(RecipeKey::Number(number)))
     } else {
-        simulated.then_some(Request::Teach { number })
+        simulated.then_some(Request::Teach {
+            number,
+            keep_gauges: false,
+        })
     }
 }
 

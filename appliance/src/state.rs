@@ -43,10 +43,26 @@ impl StateFolder {
     /// # Errors
     /// If it cannot be created or written, or another daemon holds it (exit code 73).
     pub fn open(path: &Path) -> Result<Self, Failure> {
-        let failed = |error: String| {
+        let remedy = "another fringed uses it: end that one or name another folder with --state";
+        Self::open_unless_held(path, (Exit::CannotCreate, remedy))
+    }
+
+    /// As [`StateFolder::open`], for a command that changes what a running station uses; `instead` says how it is done while
+    /// the station runs.
+    ///
+    /// # Errors
+    /// If it cannot be created or written (exit code 73), or a station uses it (exit code `used`).
+    pub fn open_unless_used(path: &Path, used: Exit, instead: &str) -> Result<Self, Failure> {
+        let remedy = format!("a station uses it: {instead}, or end the station first");
+        Self::open_unless_held(path, (used, &remedy))
+    }
+
+    fn open_unless_held(path: &Path, (held, remedy): (Exit, &str)) -> Result<Self, Failure> {
+        let refused = |exit, error: String| {
             let what = format!("open the state folder {}", path.display());
-            Failure::because(Exit::CannotCreate, what, error)
+            Failure::because(exit, what, error)
         };
+        let failed = |error| refused(Exit::CannotCreate, error);
         let cannot = |error: std::io::Error| {
             failed(format!(
                 "{error}: name one that can be written with --state"
@@ -56,12 +72,7 @@ impl StateFolder {
         let lock = File::create(path.join("lock")).map_err(cannot)?;
         match lock.try_lock() {
             Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                return Err(failed(
-                    "another fringed uses it: end that one or name another folder with --state"
-                        .into(),
-                ));
-            }
+            Err(TryLockError::WouldBlock) => return Err(refused(held, remedy.into())),
             Err(TryLockError::Error(error)) => return Err(cannot(error)),
         }
         let recipes = Store::open(&path.join("recipes")).map_err(cannot)?;

@@ -13,8 +13,8 @@ use crate::notify::Pulse;
 use crate::plan::{Plan, PlanError};
 use crate::progress::Progress;
 use crate::recipe::store::Stamp;
-use crate::recipe::teach::{Naming, TeachError, teach_while};
-use crate::recipe::{LoadError, Store};
+use crate::recipe::teach::{TeachError, teach_while};
+use crate::recipe::{LoadError, Store, replace};
 use crate::shelf::Shelf;
 use crate::station::{
     ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
@@ -36,16 +36,14 @@ pub enum Order {
     Measure(Job),
     /// Load a recipe.
     Load(JobId, RecipeKey),
-    /// Teach a recipe from the part in front of the head.
-    Teach(JobId, u16),
+    /// Teach a recipe from the part in front of the head; whether the gauges of the one that it replaces stay.
+    Teach(JobId, u16, bool),
     /// End.
     Stop,
 }
 
 /// Idle, the worker gives a sign of life this often.
 const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
-/// How far parts may lie from where they were taught, unless a recipe says otherwise.
-const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
 /// Longest wait for one flip, one pulse or one frame.
 const DEVICE_TIMEOUT: Duration = Duration::from_secs(2);
 
@@ -146,9 +144,9 @@ impl Worker {
                     last = JudgedBy::default();
                     self.load(job, &key, &mut plan);
                 }
-                Ok(Order::Teach(job, number)) => {
+                Ok(Order::Teach(job, number, keep_gauges)) => {
                     last = JudgedBy::default();
-                    self.teach(job, number, &mut plan);
+                    self.teach(job, number, keep_gauges, &mut plan);
                 }
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
                 Err(RecvTimeoutError::Timeout) => {
@@ -304,14 +302,10 @@ impl Worker {
         Ok((plan, fallback))
     }
 
-    fn teach(&mut self, job: JobId, number: u16, plan: &mut Option<Arc<Plan>>) {
-        let naming = Naming {
-            number,
-            part_number: format!("PART-{number:04}"),
-            name: format!("Part {number}"),
-            taught_at_unix_s: crate::clock::utc_us().unwrap_or(0) / 1_000_000,
-            placement_tolerance_mm: PLACEMENT_TOLERANCE_MM,
-        };
+    fn teach(&mut self, job: JobId, number: u16, keep_gauges: bool, plan: &mut Option<Arc<Plan>>) {
+        let replaced = self.recipes.present(number);
+        let naming = replace::naming(number, replaced.as_ref());
+        let kept = replaced.filter(|_| keep_gauges);
         let (station, bar) = (self.station.clone(), self.progress.clone());
         let (aborts, pulse) = (self.aborts.clone(), &self.pulse);
         let progress = |fraction: f64, words: &str| {
@@ -328,12 +322,21 @@ impl Worker {
         let Opened {
             head, calibration, ..
         } = &mut self.opened;
-        let taught = match problem {
-            Some(problem) => Err(TeachError::NotCalibrated(problem)),
-            None => self
+        let frames = (calibration.camera.0, calibration.camera.1);
+        let fit = kept
+            .as_ref()
+            .map_or(Ok(()), |file| replace::check_kept(file, frames));
+        let taught = match (problem, fit) {
+            (Some(problem), _) => Err(TeachError::NotCalibrated(problem)),
+            (None, Err(words)) => Err(TeachError::Rig(words)),
+            (None, Ok(())) => self
                 .pool
                 .install(|| teach_while(head, calibration, &naming, DEVICE_TIMEOUT, &progress)),
         };
+        let taught = taught.and_then(|taught| match &kept {
+            Some(file) => replace::keep_gauges(taught, file).map_err(TeachError::Rig),
+            None => Ok(taught),
+        });
         self.progress.clear();
         let stored = taught
             .map_err(|error| {

@@ -4,7 +4,9 @@
 import { strict as assert } from "node:assert";
 import { chromium } from "playwright-core";
 import { Daemon, Place } from "./daemon.js";
+import { forms } from "./forms.js";
 import { pictures } from "./pictures.js";
+import { recipes } from "./recipes.js";
 
 const [program, browserPath, folder] = process.argv.slice(2);
 // Longest wait for anything that must happen; nothing waits for so long when all is well.
@@ -33,9 +35,12 @@ await page.addInitScript(() => {
 const complaints = [];
 page.on("pageerror", (error) => complaints.push(error.message));
 page.on("console", (message) => {
-  // What the network says while the daemon is away, and refusals that are tested, are no faults of the page.
+  // What the network says while the daemon is away, and refusals that are tested, are no faults of the page; what is not
+  // there is reported below.
   if (message.type() === "error" && !/Failed to load resource|ERR_/.test(message.text())) complaints.push(message.text());
 });
+
+page.on("response", (response) => { if (response.status() === 404) complaints.push(`${response.request().method()} ${response.url()} is not there`); });
 
 async function step(name, run) {
   const began = Date.now();
@@ -156,6 +161,8 @@ try {
     await page.waitForFunction(() => document.querySelector("#gauge-rows").textContent.includes("deviation 1"));
   });
 
+  await recipes({ page, step, verdict, trigger });
+
   await step("teaching shows its progress and what it gained", async () => {
     await page.click("nav a[href='#recipes']");
     await page.fill("#teach-as", "7");
@@ -228,6 +235,19 @@ try {
     assert.ok(await page.locator("#refusal").isHidden());
   });
 
+  await step("without frames there is no picture, and no complaint either", async () => {
+    await page.click("nav a[href='#registers']");
+    const before = await number();
+    await page.evaluate(() => fetch("/api/trigger", { method: "POST" }));
+    await page.waitForFunction((seq) => Number(document.querySelector("#sequence").textContent.replace(/\D/g, "")) > seq, before);
+    await page.waitForSelector("#state[data-state=ready]");
+    await page.evaluate(() => fetch("/api/recipes/1/load", { method: "POST" }));
+    await page.waitForFunction(() => document.querySelector("#recipe-name").textContent.includes("recipe 1"));
+    await page.waitForSelector("#state[data-state=ready]");
+    await page.click("nav a[href='#live']");
+    await page.waitForFunction(() => document.querySelector("#no-picture").textContent.includes("gone"));
+  });
+
   await step("registers, history, log and changes are shown", async () => {
     await page.click("nav a[href='#registers']");
     await page.waitForFunction(() => document.querySelector("#register-rows").textContent.includes("RESULT_SEQ"));
@@ -298,6 +318,8 @@ try {
     await page.waitForFunction(() => document.querySelectorAll("#history-rows tr").length > 5);
     await page.click("nav a[href='#live']");
   });
+
+  await forms({ browser, page, url: daemon.url, step });
 
   await step("files can be taken along", async () => {
     for (const [selector, name] of [["a[href='/api/last/cloud.ply']", /\.ply$/], ["a[href='/api/last/gauges.csv']", /\.csv$/]]) {

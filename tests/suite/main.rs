@@ -28,6 +28,7 @@ mod production;
 mod promises_own;
 mod promises_shared;
 mod recovery;
+mod replacing;
 mod service;
 mod station;
 mod station_plc;

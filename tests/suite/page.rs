@@ -266,7 +266,8 @@ fn pictures_and_files_of_the_last_part_belong_to_its_result() {
     let place = Place::new();
     let daemon = Daemon::start(&place);
     let mut browser = Browser::new(&daemon);
-    assert_eq!(browser.ask("GET", "/api/picture/height", &[]).0, 404);
+    assert_eq!(browser.ask("GET", "/api/picture/height", &[]).0, 204);
+    assert_eq!(browser.ask("GET", "/api/picture/colour", &[]).0, 404);
     Plc::connect(&daemon).measure(1);
     for layer in ["height", "deviation", "modulation"] {
         let (status, words) = browser.ask("GET", &format!("/api/picture/{layer}"), &[]);

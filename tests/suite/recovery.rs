@@ -141,7 +141,10 @@ fn an_abort_ends_a_teach_and_the_recipe_before_it_goes_on() {
     let mut plc = Plc::at(daemon.modbus);
     plc.write(0, &[ONLINE]);
     let before = plc.status();
-    let request = Event::Request(Request::Teach { number: 2 });
+    let request = Event::Request(Request::Teach {
+        number: 2,
+        keep_gauges: false,
+    });
     assert_eq!(daemon.station.event(request).state_word, "teaching");
     plc.write(0, &[ONLINE | ABORT]);
     let ended = plc.wait("READY", |status| status.has(READY | RECIPE_OK));

@@ -1,5 +1,5 @@
-//! `fringed recipe`: list, export, import and delete the station's recipes. Works while the station runs: it takes up an
-//! imported recipe when it is selected.
+//! `fringed recipe`: list, export, import, delete the station's recipes, and undo that. While a station runs, it takes up an
+//! imported recipe when it is selected; what would take a recipe from under it is done on its page.
 
 use super::names;
 use super::options::{Files, Json, Quiet};
@@ -7,7 +7,9 @@ use crate::backend;
 use crate::error::{Exit, Failure};
 use crate::plan::Plan;
 use crate::recipe::exchange::{ImportError, Listed};
+use crate::recipe::generations::GenerationError;
 use crate::recipe::{LoadError, Store};
+use crate::state::StateFolder;
 use std::path::PathBuf;
 
 /// What to do with recipes.
@@ -42,8 +44,19 @@ pub enum RecipeCommand {
         #[command(flatten)]
         quiet: Quiet,
     },
-    /// Delete a recipe with its previous generation.
+    /// Delete a recipe; `undo` brings it back. Not while a station runs: its page deletes recipes as well.
     Delete {
+        /// Its number.
+        #[arg(value_parser = clap::value_parser!(u16).range(1..=9999))]
+        number: u16,
+        #[command(flatten)]
+        files: Files,
+        #[command(flatten)]
+        quiet: Quiet,
+    },
+    /// Bring back a deleted recipe, or the generation before the newest; the same again takes it back. Not while a station
+    /// runs: its page undoes as well.
+    Undo {
         /// Its number.
         #[arg(value_parser = clap::value_parser!(u16).range(1..=9999))]
         number: u16,
@@ -58,7 +71,8 @@ impl RecipeCommand {
     /// Does it.
     ///
     /// # Errors
-    /// If the recipe does not exist (66), is damaged or of another calibration (65), or the store cannot be written (73).
+    /// If the recipe does not exist (66), is damaged or of another calibration (65), a station has it in use (69), or the
+    /// store cannot be written (73).
     pub fn run(&self) -> Result<(), Failure> {
         match self {
             Self::List { files, json } => {
@@ -98,8 +112,26 @@ impl RecipeCommand {
                 files,
                 quiet,
             } => {
-                store(files)?.delete(*number).map_err(refused)?;
-                quiet.say(|| format!("recipe {number} is deleted"));
+                let state = at_rest(files, "Delete")?;
+                state.recipes().delete(*number).map_err(kept)?;
+                let undo = format!("`fringed recipe undo {number}` brings it back");
+                quiet.say(|| format!("recipe {number} is deleted; {undo}"));
+                Ok(())
+            }
+            Self::Undo {
+                number,
+                files,
+                quiet,
+            } => {
+                let state = at_rest(files, "Undo")?;
+                let file = state.recipes().undo(*number).map_err(kept)?;
+                let digits = file.fingerprint.get(..8).unwrap_or_default();
+                quiet.say(|| {
+                    format!(
+                        "recipe {number} ({}) is the one with fingerprint {digits} again",
+                        file.name
+                    )
+                });
                 Ok(())
             }
         }
@@ -113,6 +145,23 @@ fn store(files: &Files) -> Result<Store, Failure> {
         let what = format!("use the recipes in {}", folder.display());
         Failure::because(Exit::CannotCreate, what, error)
     })
+}
+
+/// The state folder, which no station uses meanwhile.
+fn at_rest(files: &Files, button: &str) -> Result<StateFolder, Failure> {
+    let instead = format!("use *Recipes*, *{button}* on its page");
+    StateFolder::open_unless_used(&files.state_folder()?, Exit::Unavailable, &instead)
+}
+
+fn kept(error: GenerationError) -> Failure {
+    let exit = match &error {
+        GenerationError::Load(LoadError::Unknown(_)) | GenerationError::Nothing(_) => Exit::Missing,
+        GenerationError::Load(LoadError::Corrupt { .. }) | GenerationError::Unfit { .. } => {
+            Exit::Content
+        }
+        GenerationError::Write { .. } => Exit::CannotCreate,
+    };
+    Failure::new(exit, error.to_string())
 }
 
 fn refused(error: ImportError) -> Failure {

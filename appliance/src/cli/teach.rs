@@ -8,10 +8,11 @@ use crate::config::Config;
 use crate::error::{Exit, Failure};
 use crate::measure::{measure, measure_after, primary_of};
 use crate::output::folder::write_whole;
-use crate::recipe::PatternFile;
 use crate::recipe::bounds::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_TOLERANCE_MM};
 use crate::recipe::golden::{GoldenPart, Naming, Taught};
+use crate::recipe::replace;
 use crate::recipe::teach::{TeachError, teach};
+use crate::recipe::{PatternFile, RecipeFile, Store};
 use crate::state::StateFolder;
 use algo::adaptive::ProjectorMap;
 use hal::bounds::text;
@@ -26,15 +27,22 @@ pub struct Teach {
     /// Recipe number.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=9999))]
     number: u16,
-    /// Part number: the key that a PLC may select by; without it PART-NNNN.
+    /// Replace the recipe that has this number; it stays as the generation before, `fringed recipe undo` brings it back.
+    #[arg(long, conflicts_with = "out")]
+    replace: bool,
+    /// Keep regions, gauges and limits of the recipe that is replaced.
+    #[arg(long, requires = "replace")]
+    keep_gauges: bool,
+    /// Part number: the key that a PLC may select by; without it that of the recipe that is replaced, or PART-NNNN.
     #[arg(long, value_parser = part_number)]
     part_number: Option<String>,
-    /// Name for people.
+    /// Name for people; without it that of the recipe that is replaced, or Part N.
     #[arg(long, value_parser = name)]
     name: Option<String>,
-    /// How far parts may lie from where this one lies, in any direction, mm.
-    #[arg(long, value_name = "MM", default_value_t = 1.0, value_parser = tolerance)]
-    tolerance: f64,
+    /// How far parts may lie from where this one lies, in any direction, mm; without it as in the recipe that is replaced,
+    /// or 1.
+    #[arg(long, value_name = "MM", value_parser = tolerance)]
+    tolerance: Option<f64>,
     /// Recording of the good part with the full sequence; its pattern becomes the recipe's. Without
     /// it, the part in front of the configured head is taught.
     #[arg(long, value_name = "DIR", requires = "out", conflicts_with = "state")]
@@ -54,6 +62,36 @@ pub struct Teach {
     quiet: Quiet,
     #[command(flatten)]
     json: Json,
+}
+
+/// Where the recipe goes.
+enum Target<'a> {
+    File(&'a Path),
+    /// Held until it is there.
+    State(StateFolder),
+}
+
+impl Target<'_> {
+    /// Writes the recipe; answers where it is, in words.
+    fn store(&self, taught: &Taught) -> Result<String, Failure> {
+        let (written, what, place) = match self {
+            Self::File(out) => (
+                write_whole(out, &taught.bytes),
+                format!("write {}", out.display()),
+                out.display().to_string(),
+            ),
+            Self::State(state) => {
+                let (number, path) = (taught.recipe.file.number, state.path().display());
+                (
+                    state.recipes().save(number, &taught.bytes),
+                    format!("store recipe {number} in {path}"),
+                    format!("stored in {path}"),
+                )
+            }
+        };
+        written.map_err(|error| Failure::because(Exit::CannotCreate, what, error))?;
+        Ok(place)
+    }
 }
 
 /// Longest wait for one frame.
@@ -81,24 +119,34 @@ impl Teach {
     /// Teaches, stores the recipe and says why which sequence was chosen.
     ///
     /// # Errors
-    /// If the part cannot be taught or the recipe not be stored; a recipe stored before is untouched.
+    /// If the part cannot be taught, the number is taken, or the recipe not be stored; a recipe stored before is untouched.
     pub fn run(&self) -> Result<(), Failure> {
         let config = self.files.configuration()?;
+        // Before anything is measured, and held until the recipe is stored.
+        let target = match &self.out {
+            Some(out) => Target::File(out),
+            None => Target::State(StateFolder::open_unless_used(
+                &self.files.state_folder()?,
+                Exit::CannotCreate,
+                "use *Recipes*, *Teach* on its page",
+            )?),
+        };
+        let replaced = match &target {
+            Target::File(_) => None,
+            Target::State(state) => self.replaced(state.recipes())?,
+        };
+        let naming = self.naming(replaced.as_ref());
         let pool = self.threads.pool(config.threads)?;
         let taught = match &self.golden {
-            Some(golden) => pool.install(|| self.teach_recordings(golden))?,
-            None => self.teach_head(&config, &pool)?,
+            Some(golden) => pool.install(|| self.teach_recordings(golden, &naming))?,
+            None => self.teach_head(&config, &pool, &naming)?,
         };
-        let place = match &self.out {
-            Some(out) => {
-                write_whole(out, &taught.bytes).map_err(|error| {
-                    let what = format!("write {}", out.display());
-                    Failure::because(Exit::CannotCreate, what, error)
-                })?;
-                out.display().to_string()
-            }
-            None => self.store(config.state, &taught)?,
+        let taught = match replaced.filter(|_| self.keep_gauges) {
+            Some(file) => replace::keep_gauges(taught, &file)
+                .map_err(|words| Failure::new(Exit::Content, format!("teach: {words}")))?,
+            None => taught,
         };
+        let place = target.store(&taught)?;
         let file = &taught.recipe.file;
         let summary = || {
             let summary = serde_json::json!({
@@ -124,23 +172,50 @@ impl Teach {
         Ok(())
     }
 
-    fn naming(&self) -> Naming {
+    /// The recipe that is replaced, if any.
+    ///
+    /// # Errors
+    /// The number is taken and nothing was said of replacing.
+    fn replaced(&self, recipes: &Store) -> Result<Option<RecipeFile>, Failure> {
+        let number = self.number;
+        let replaced = recipes.present(number);
+        if recipes.numbers().contains(&number) && !self.replace {
+            let what = match &replaced {
+                Some(file) => format!("has {:?} with {}", file.name, replace::gauges_of(file)),
+                None => "has a file that cannot be read".into(),
+            };
+            let free = recipes
+                .free()
+                .map(|free| format!(", or teach number {free}, which is free"));
+            let words = format!(
+                "teach: recipe {number} {what}: add --replace (and --keep-gauges){}",
+                free.unwrap_or_default()
+            );
+            return Err(Failure::new(Exit::CannotCreate, words));
+        }
+        if self.keep_gauges && replaced.is_none() {
+            let words = format!("teach: there is no recipe {number} whose gauges could be kept");
+            return Err(Failure::new(Exit::Missing, words));
+        }
+        Ok(replaced)
+    }
+
+    fn naming(&self, replaced: Option<&RecipeFile>) -> Naming {
+        let kept = replace::naming(self.number, replaced);
         Naming {
-            number: self.number,
-            part_number: self
-                .part_number
-                .clone()
-                .unwrap_or_else(|| format!("PART-{:04}", self.number)),
-            name: self
-                .name
-                .clone()
-                .unwrap_or_else(|| format!("Part {}", self.number)),
-            taught_at_unix_s: crate::clock::utc_us().unwrap_or(0) / 1_000_000,
-            placement_tolerance_mm: self.tolerance,
+            part_number: self.part_number.clone().unwrap_or(kept.part_number),
+            name: self.name.clone().unwrap_or(kept.name),
+            placement_tolerance_mm: self.tolerance.unwrap_or(kept.placement_tolerance_mm),
+            ..kept
         }
     }
 
-    fn teach_head(&self, config: &Config, pool: &rayon::ThreadPool) -> Result<Taught, Failure> {
+    fn teach_head(
+        &self,
+        config: &Config,
+        pool: &rayon::ThreadPool,
+        naming: &Naming,
+    ) -> Result<Taught, Failure> {
         let progress = self.quiet.progress();
         let told = |share: f64| progress.tell(share, "working out the light of the scene");
         let opened = pool.install(|| backend::open(&self.files.head(config), &told))?;
@@ -151,8 +226,7 @@ impl Teach {
             ..
         } = opened;
         let told = |share: f64, words: &str| progress.tell(share, words);
-        let naming = self.naming();
-        let taught = pool.install(|| teach(&mut head, &calibration, &naming, TIMEOUT, &told));
+        let taught = pool.install(|| teach(&mut head, &calibration, naming, TIMEOUT, &told));
         progress.clear();
         taught.map_err(|error| {
             let exit = match error {
@@ -165,23 +239,7 @@ impl Teach {
         })
     }
 
-    fn store(&self, state: Option<PathBuf>, taught: &Taught) -> Result<String, Failure> {
-        let path = match state {
-            Some(path) => path,
-            None => StateFolder::default_path()?,
-        };
-        let state = StateFolder::open(&path)?;
-        state
-            .recipes()
-            .save(self.number, &taught.bytes)
-            .map_err(|error| {
-                let what = format!("store recipe {} in {}", self.number, path.display());
-                Failure::because(Exit::CannotCreate, what, error)
-            })?;
-        Ok(format!("stored in {}", path.display()))
-    }
-
-    fn teach_recordings(&self, folder: &Path) -> Result<Taught, Failure> {
+    fn teach_recordings(&self, folder: &Path, naming: &Naming) -> Result<Taught, Failure> {
         let recording = Recording::open(folder)?;
         let manifest = folder.join("recording.json");
         let wrong = |error: &dyn std::fmt::Display| {
@@ -234,6 +292,6 @@ impl Teach {
             noise,
             comparison: None,
         };
-        part.recipe(&self.naming()).map_err(|error| wrong(&error))
+        part.recipe(naming).map_err(|error| wrong(&error))
     }
 }

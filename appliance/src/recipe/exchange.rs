@@ -1,9 +1,9 @@
-//! Recipes on their way in and out: list, export, import, delete. Nothing damaged or foreign comes in.
+//! Recipes on their way in and out: list, export, import. Nothing damaged or foreign comes in.
 
 use super::archive::{self, ArchiveError};
 use super::store::{LoadError, Store};
 use super::{Recipe, RecipeFile, SequenceKind};
-use crate::output::folder::{rename_whole, sync_folder_of};
+use crate::output::folder::rename_whole;
 use serde::Serialize;
 use std::fs::{self, File};
 use std::io::{self, BufReader};
@@ -40,7 +40,7 @@ pub struct Listed {
     pub problem: Option<String>,
 }
 
-/// A recipe that was not taken, given or deleted.
+/// A recipe that was not taken or given.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// It is not in the store, or damaged there.
@@ -192,33 +192,6 @@ impl Store {
             let _ = fs::remove_file(&arriving);
         }
         taken
-    }
-
-    /// Deletes a recipe with its previous generation. A station that has it active goes on with it until another is
-    /// selected.
-    ///
-    /// # Errors
-    /// If there is no such recipe or it cannot be deleted.
-    pub fn delete(&self, number: u16) -> Result<(), ImportError> {
-        let write = |path: &Path| {
-            let path = path.to_path_buf();
-            move |source| ImportError::Write { path, source }
-        };
-        let _alone = self.lock().map_err(write(&self.folder))?;
-        let (path, previous) = (self.path(number), self.previous(number));
-        let mut gone = false;
-        // The previous one first: a kill in between leaves the newest, not an old one that comes back.
-        for file in [&previous, &path] {
-            match fs::remove_file(file) {
-                Ok(()) => gone = true,
-                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-                Err(error) => return Err(write(file)(error)),
-            }
-        }
-        if !gone {
-            return Err(LoadError::Unknown(number.to_string()).into());
-        }
-        sync_folder_of(&path).map_err(write(&path))
     }
 }
 

@@ -1,7 +1,8 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
 //! `file` is the form on disk, `bounds` what its values may be, `archive` the ZIP around it with its fingerprint, `check` turns the
-//! one into a [`Recipe`] that can be planned, `gauge` says what its gauges measure, `store` keeps the files of a station.
+//! one into a [`Recipe`] that can be planned, `gauge` says what its gauges measure, `store` keeps the files of a station, `generations`
+//! those before the newest, `replace` what stays of a recipe that is taught again.
 
 pub mod archive;
 pub mod bounds;
@@ -11,8 +12,10 @@ pub mod edit;
 pub mod exchange;
 pub mod file;
 mod gauge;
+pub mod generations;
 pub mod golden;
 pub mod planner;
+pub mod replace;
 pub mod store;
 pub mod teach;
 

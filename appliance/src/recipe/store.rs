@@ -2,7 +2,7 @@
 
 use super::gauge::check_limits;
 use super::{Recipe, RecipeFile, archive};
-use crate::output::folder::{name_also, write_whole};
+use crate::output::folder::write_whole;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -77,13 +77,9 @@ impl Store {
         self.folder.join(format!("{number:04}.recipe"))
     }
 
-    pub(super) fn previous(&self, number: u16) -> PathBuf {
-        self.folder.join(format!("{number:04}.recipe.previous"))
-    }
-
     /// Where the generations of a recipe lie, the newest first; there may be none.
-    pub fn generations(&self, number: u16) -> [PathBuf; 2] {
-        [self.path(number), self.previous(number)]
+    pub fn generations(&self, number: u16) -> [PathBuf; 3] {
+        [self.path(number), self.previous(number), self.kept(number)]
     }
 
     /// Stores a packed recipe under its number; the one before stays as the previous generation.
@@ -94,18 +90,6 @@ impl Store {
         let _alone = self.lock()?;
         self.keep_previous(number)?;
         write_whole(&self.path(number), bytes)
-    }
-
-    /// Makes the current generation the previous one, unless it is damaged: a damaged file never pushes out the good
-    /// generation behind it.
-    pub(super) fn keep_previous(&self, number: u16) -> io::Result<()> {
-        let (path, previous) = (self.path(number), self.previous(number));
-        let sound = |file: fs::File| archive::is_sound(io::BufReader::new(file));
-        if !fs::File::open(&path).is_ok_and(sound) {
-            return Ok(());
-        }
-        // The current one stands until it is replaced.
-        name_also(&path, &previous)
     }
 
     /// Keeps other processes from changing the same recipes, as long as the answer lives.
@@ -189,7 +173,7 @@ impl Store {
     }
 
     /// The recipe in a file, if the file exists.
-    fn read(path: &Path, number: u16) -> Option<Result<Recipe, String>> {
+    pub(super) fn read(path: &Path, number: u16) -> Option<Result<Recipe, String>> {
         let opened = fs::File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (size, file) = match opened {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
@@ -244,13 +228,18 @@ impl Store {
 
     /// The numbers of all stored recipes, in order.
     pub fn numbers(&self) -> Vec<u16> {
+        self.numbers_with(&["", ".previous"])
+    }
+
+    /// The numbers of the files that end in `.recipe` and one of `endings`, in order.
+    pub(super) fn numbers_with(&self, endings: &[&str]) -> Vec<u16> {
         let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
         let mut numbers: Vec<u16> = entries
             .filter_map(|entry| {
                 let name = entry.file_name();
                 let (number, rest) = name.to_str()?.split_once(".recipe")?;
                 // A file that was being written when the plug was pulled is no recipe.
-                matches!(rest, "" | ".previous").then(|| number.parse().ok())?
+                endings.contains(&rest).then(|| number.parse().ok())?
             })
             .collect();
         numbers.sort_unstable();

@@ -69,6 +69,8 @@ pub enum Request {
     Teach {
         /// 1–9999.
         number: u16,
+        /// Whether regions, gauges and limits of the recipe that it replaces stay.
+        keep_gauges: bool,
     },
 }
 
@@ -253,6 +255,8 @@ pub enum Effect {
         job: JobId,
         /// 1–9999.
         number: u16,
+        /// Whether regions, gauges and limits of the recipe that it replaces stay.
+        keep_gauges: bool,
     },
     /// End the running job early; its answer is still awaited.
     Abort {

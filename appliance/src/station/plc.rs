@@ -127,7 +127,10 @@ impl Station {
             (0 | BY_PART_NUMBER, Some(_)) if self.is_other_recipe_asked_for() => {
                 Some(reject::OTHER_RECIPE)
             }
-            (0 | BY_PART_NUMBER, Some(number)) | (number, _) => self.teach(number, now, effects),
+            // The PLC chose the number; what had it stays as the generation before.
+            (0 | BY_PART_NUMBER, Some(number)) | (number, _) => {
+                self.teach(number, false, now, effects)
+            }
         };
         if let Some(reason) = reason {
             self.reject_reason = reason;
@@ -135,7 +138,13 @@ impl Station {
     }
 
     /// Orders a teach; answers with the reason if that cannot be.
-    pub(super) fn teach(&mut self, number: u16, now: Micros, effects: &mut Effects) -> Option<u16> {
+    pub(super) fn teach(
+        &mut self,
+        number: u16,
+        keep_gauges: bool,
+        now: Micros,
+        effects: &mut Effects,
+    ) -> Option<u16> {
         let refused = self.busy();
         if refused.is_some() {
             log(
@@ -147,7 +156,14 @@ impl Station {
             );
         } else {
             let job = self.next_job();
-            push(effects, Effect::Teach { job, number });
+            push(
+                effects,
+                Effect::Teach {
+                    job,
+                    number,
+                    keep_gauges,
+                },
+            );
             let deadline = now.after(self.settings.limits.teaching);
             self.state = State::Teaching {
                 job,

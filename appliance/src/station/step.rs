@@ -21,8 +21,11 @@ pub fn step(mut station: Station, event: Event, now: Micros) -> (Station, Effect
         Event::Request(Request::Load(key)) => {
             station.load(key, now, &mut effects);
         }
-        Event::Request(Request::Teach { number }) => {
-            station.teach(number, now, &mut effects);
+        Event::Request(Request::Teach {
+            number,
+            keep_gauges,
+        }) => {
+            station.teach(number, keep_gauges, now, &mut effects);
         }
         Event::Started => station.started(&mut effects),
         Event::ExposureDone { job } => station.exposed(job, now, &mut effects),

@@ -48,7 +48,10 @@ fn in_state(column: usize) -> Bench {
             bench.event(Event::Request(Request::Load(RecipeKey::Number(2))));
         }
         5 => {
-            bench.event(Event::Request(Request::Teach { number: 2 }));
+            bench.event(Event::Request(Request::Teach {
+                number: 2,
+                keep_gauges: false,
+            }));
         }
         6 => {
             bench.write(online_off);
@@ -142,7 +145,10 @@ fn events(job: JobId) -> Vec<(Event, [u16; 12])> {
             [0, 4, 2, 3, 4, 5, 4, 7, 7, 7, 7, 8],
         ),
         (
-            Event::Request(Request::Teach { number: 9 }),
+            Event::Request(Request::Teach {
+                number: 9,
+                keep_gauges: false,
+            }),
             [0, 5, 2, 3, 4, 5, 5, 7, 7, 7, 7, 8],
         ),
         (Event::Started, [1, 1, 2, 3, 4, 5, 6, 7, 1, 7, 1, 8]),

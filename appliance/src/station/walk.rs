@@ -119,7 +119,10 @@ fn any_event(random: &mut Random, edges: &mut ConnectionEdges, last: JobId) -> E
             ..Pace::default()
         }),
         31 if random.below(4) == 0 => Event::Request(Request::Load(RecipeKey::Number(number))),
-        32 if random.below(9) == 0 => Event::Request(Request::Teach { number }),
+        32 if random.below(9) == 0 => Event::Request(Request::Teach {
+            number,
+            keep_gauges: number.is_multiple_of(2),
+        }),
         33 => Event::Started,
         34 => Event::Condition(Condition::default()),
         35 => Event::Alive,

@@ -35,6 +35,13 @@ macro_rules! assets {
     };
 }
 
+/// The icon under the name by which browsers look for one where an answer is no page.
+pub const ICON: Asset = Asset {
+    path: "/favicon.ico",
+    kind: "image/svg+xml",
+    text: include_str!("assets/icon.svg"),
+};
+
 assets! {
     "/" "text/html; charset=utf-8" "index.html";
     "/page.css" "text/css; charset=utf-8" "page.css";
@@ -51,6 +58,7 @@ assets! {
     "/times.js" "text/javascript; charset=utf-8" "times.js";
     "/picture.js" "text/javascript; charset=utf-8" "picture.js";
     "/colour.js" "text/javascript; charset=utf-8" "colour.js";
+    "/question.js" "text/javascript; charset=utf-8" "question.js";
     "/recipes.js" "text/javascript; charset=utf-8" "recipes.js";
     "/editor.js" "text/javascript; charset=utf-8" "editor.js";
     "/kept.js" "text/javascript; charset=utf-8" "kept.js";

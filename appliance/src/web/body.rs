@@ -24,7 +24,23 @@ const FILE_TIME: Duration = Duration::from_secs(120);
 /// It is too long, too slow or not what is expected.
 pub async fn json<T: DeserializeOwned>(body: Body) -> Result<T, Problem> {
     let bytes = read(body, MAX_JSON, JSON_TIME).await?;
-    serde_json::from_slice(&bytes).map_err(|error| {
+    parsed(&bytes)
+}
+
+/// A request's JSON, or what `T` is without any where the request carries none.
+///
+/// # Errors
+/// As [`json`].
+pub async fn json_if_any<T: DeserializeOwned + Default>(body: Body) -> Result<T, Problem> {
+    let bytes = read(body, MAX_JSON, JSON_TIME).await?;
+    match bytes.is_empty() {
+        true => Ok(T::default()),
+        false => parsed(&bytes),
+    }
+}
+
+fn parsed<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+    serde_json::from_slice(bytes).map_err(|error| {
         let error = shortened(&error.to_string());
         Problem::unclear(format!("the request's JSON: {error}"))
     })

@@ -43,15 +43,24 @@ pub(super) async fn readiness(State(site): State<Site>) -> Response {
     (StatusCode::SERVICE_UNAVAILABLE, words).into_response()
 }
 
+/// The pictures of the last measured part.
+const LAYERS: [&str; 3] = ["height", "deviation", "modulation"];
+
 pub(super) async fn picture(
     State(site): State<Site>,
     Path(layer): Path<String>,
-) -> Result<Map, Problem> {
+) -> Result<Response, Problem> {
     site.aside(move |site| {
-        let found = site.maps.layers(site.last_seq());
-        let words = "nothing was measured yet, or the station is busy; trigger a measurement";
-        let (seq, layers) = found.ok_or_else(|| Problem::missing(words))?;
-        map_of(&layers, &layer, seq)
+        if !LAYERS.contains(&&*layer) {
+            let words = format!("there are {}", LAYERS.join(", "));
+            return Err(Problem::missing(words));
+        }
+        // No error: the page looks for a picture whenever there is a result.
+        let Some((seq, layers)) = site.maps.layers(site.last_seq()) else {
+            let words = "the frames are gone, or nothing was measured yet: trigger a measurement";
+            return Ok((StatusCode::NO_CONTENT, [("x-none", words)]).into_response());
+        };
+        Ok(map_of(&layers, &layer, seq)?.into_response())
     })
     .await
 }

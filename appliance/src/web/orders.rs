@@ -1,14 +1,20 @@
 //! Orders to the station: trigger, reset, load and teach.
 
-use axum::extract::{Path, State};
+use std::time::Duration;
+
+use axum::body::Body;
+use axum::extract::{Path, Request as Asked, State};
 use axum::http::StatusCode;
 use axum::response::Json;
+use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::body;
 use super::problem::Problem;
 use super::site::Site;
+use crate::recipe::{Store, replace};
 use crate::station::control::{ERROR_RESET, TRIGGER};
-use crate::station::{ControlWrite, Event, RecipeKey, Request, Snapshot};
+use crate::station::{ControlWrite, Event, RecipeKey, RecipeResult, Request, Snapshot};
 
 /// What an accepted order answers: it is under way, the events tell the rest.
 type Accepted = (StatusCode, Json<Value>);
@@ -58,6 +64,59 @@ pub(super) async fn load(
     Ok(accepted())
 }
 
+/// Longest wait for a cycle to end before a changed recipe is loaded.
+const REST: Duration = Duration::from_secs(5);
+
+/// A recipe of which another version was stored.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reload {
+    /// Whether it is the active one.
+    pub active: bool,
+    /// Whether the version that is stored now is being loaded; an active recipe that is not goes on as it was.
+    pub loading: bool,
+}
+
+/// Loads a recipe whose file was changed, if it is the active one, as soon as no cycle is in flight. After a load that failed
+/// nobody has said yet that the active recipe is the right one, and a change of its file does not say so either.
+pub(super) async fn reload(site: &Site, number: u16) -> Reload {
+    let is_active = |snapshot: &Snapshot| snapshot.active() == Some(number);
+    let mut snapshots = site.station.subscribe();
+    let begin = async {
+        loop {
+            let rest = snapshots.wait_for(|now| !is_active(now) || at_rest(now));
+            match rest.await.map(|now| is_active(&now)) {
+                Ok(true) if begin_load(site, number).is_ok() => return true,
+                // A trigger was faster.
+                Ok(true) => {}
+                Ok(false) | Err(_) => return false,
+            }
+        }
+    };
+    let failed = site.station.snapshot().recipe_result != RecipeResult::Ok;
+    let loading = !failed && tokio::time::timeout(REST, begin).await.unwrap_or(false);
+    Reload {
+        active: loading || is_active(&site.station.snapshot()),
+        loading,
+    }
+}
+
+/// Whether nothing is under way, so that a recipe can be loaded.
+fn at_rest(snapshot: &Snapshot) -> bool {
+    !snapshot.is_working() && snapshot.fault.is_none()
+}
+
+/// Refuses to change recipe files while the station reads or writes them.
+///
+/// # Errors
+/// It loads or teaches a recipe.
+pub(super) fn recipes_unused(site: &Site, what: &str) -> Result<(), Problem> {
+    let snapshot = site.station.snapshot();
+    match snapshot.state_word {
+        "loading" | "teaching" => Err(not_now(what, &snapshot)),
+        _ => Ok(()),
+    }
+}
+
 /// Orders a recipe to be loaded.
 ///
 /// # Errors
@@ -72,21 +131,68 @@ pub(super) fn begin_load(site: &Site, number: u16) -> Result<(), Problem> {
     }
 }
 
+/// How a recipe is taught whose number may be taken; without a body none is replaced.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Teaching {
+    /// The recipe that has the number may be replaced; it stays as the generation before.
+    replace: bool,
+    /// Regions, gauges and limits of the recipe that is replaced stay.
+    keep_gauges: bool,
+}
+
 pub(super) async fn teach(
     State(site): State<Site>,
     Path(number): Path<u16>,
+    request: Asked<Body>,
 ) -> Result<Accepted, Problem> {
     if !(1..=9999).contains(&number) {
         return Err(Problem::unfit(format!(
             "recipe {number}: numbers are 1 to 9999"
         )));
     }
-    let after = site
-        .station
-        .event(Event::Request(Request::Teach { number }));
+    let Teaching {
+        replace,
+        keep_gauges,
+    } = body::json_if_any(request.into_body()).await?;
+    site.change(move |site| match (replace, keep_gauges) {
+        (false, true) => Err(Problem::unfit(
+            "teach: keep_gauges needs replace: the gauges of the recipe that is replaced stay",
+        )),
+        (false, false) => refuse_taken(&site.recipes, number),
+        (true, _) if keep_gauges && site.recipes.present(number).is_none() => {
+            Err(Problem::missing(format!(
+                "teach: there is no recipe {number} whose gauges could be kept"
+            )))
+        }
+        (true, _) => Ok(()),
+    })
+    .await?;
+    let order = Request::Teach {
+        number,
+        keep_gauges,
+    };
+    let after = site.station.event(Event::Request(order));
     if after.state_word == "teaching" {
         Ok(accepted())
     } else {
         Err(not_now("teach", &after))
     }
+}
+
+/// Refuses a number that is taken, naming the recipe and a number that is free.
+fn refuse_taken(recipes: &Store, number: u16) -> Result<(), Problem> {
+    if !recipes.numbers().contains(&number) {
+        return Ok(());
+    }
+    let has = match recipes.present(number) {
+        Some(file) => format!("{:?} with {}", file.name, replace::gauges_of(&file)),
+        None => "a file that cannot be read".into(),
+    };
+    let free = recipes.free();
+    let free = free.map(|free| format!(", or teach number {free}, which is free"));
+    Err(Problem::busy(format!(
+        "teach: recipe {number} has {has}: send {{\"replace\": true}} to replace it{}",
+        free.unwrap_or_default()
+    )))
 }

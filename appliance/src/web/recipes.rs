@@ -1,4 +1,4 @@
-//! Recipes: list, look, export, import, edit.
+//! Recipes: list, look, export, import, edit, delete, and undo of that.
 
 use axum::body::Body;
 use axum::extract::{Path, Request, State};
@@ -6,15 +6,17 @@ use axum::http::StatusCode;
 use axum::response::{Json, Response};
 use serde_json::{Value, json};
 
+use super::body;
 use super::downloads::file;
 use super::map::{Map, map};
+use super::orders::{self, Reload};
 use super::problem::Problem;
 use super::site::Site;
-use super::{body, orders};
 use crate::plan::{Plan, PlanError};
 use crate::recipe::edit::{self, Edit, EditError};
+use crate::recipe::generations::GenerationError;
 use crate::recipe::store::Loaded;
-use crate::recipe::{LoadError, Recipe};
+use crate::recipe::{LoadError, Recipe, RecipeFile, Store};
 
 impl From<LoadError> for Problem {
     fn from(error: LoadError) -> Self {
@@ -37,25 +39,46 @@ impl From<EditError> for Problem {
     }
 }
 
+impl From<GenerationError> for Problem {
+    fn from(error: GenerationError) -> Self {
+        let words = error.to_string();
+        match error {
+            GenerationError::Load(error) => error.into(),
+            GenerationError::Nothing(_) => Self::missing(words),
+            GenerationError::Unfit { .. } => Self::unfit(words),
+            GenerationError::Write { .. } => Self::broken(words),
+        }
+    }
+}
+
 pub(super) async fn list(State(site): State<Site>) -> Result<Json<Value>, Problem> {
-    let rows = site
-        .aside(|site| {
-            let numbers = site.recipes.numbers();
-            Ok(numbers
-                .into_iter()
-                .map(|number| match site.recipes.manifest(number) {
-                    Ok(file) => json!({
-                        "number": number, "name": file.name, "part_number": file.part_number,
-                        "fingerprint": file.fingerprint, "taught_at_unix_s": file.taught_at_unix_s,
-                        "gauges": file.gauges.len(),
-                        "frames": file.sequences.get(file.production).map(|sequence| sequence.frames.len()),
-                    }),
-                    Err(words) => json!({ "number": number, "error": words }),
-                })
-                .collect::<Vec<_>>())
-        })
-        .await?;
-    Ok(Json(json!({ "recipes": rows })))
+    let listed = site.aside(|site| Ok(listed(&site.recipes))).await?;
+    Ok(Json(listed))
+}
+
+fn listed(recipes: &Store) -> Value {
+    let rows = recipes.numbers().into_iter().map(|number| {
+        let mut row = match recipes.manifest(number) {
+            Ok(file) => summary(&file),
+            Err(words) => json!({ "number": number, "error": words }),
+        };
+        row["before"] = recipes.manifest_before(number).as_ref().map(summary).into();
+        row
+    });
+    let deleted = recipes.deleted().into_iter();
+    let deleted = deleted.filter_map(|number| Some(summary(&recipes.manifest_before(number)?)));
+    json!({
+        "recipes": rows.collect::<Vec<_>>(), "deleted": deleted.collect::<Vec<_>>(), "free": recipes.free(),
+    })
+}
+
+fn summary(file: &RecipeFile) -> Value {
+    json!({
+        "number": file.number, "name": file.name, "part_number": file.part_number,
+        "fingerprint": file.fingerprint, "taught_at_unix_s": file.taught_at_unix_s,
+        "regions": file.regions.len(), "gauges": file.gauges.len(),
+        "frames": file.sequences.get(file.production).map(|sequence| sequence.frames.len()),
+    })
 }
 
 /// Everything of a recipe that is no array: `recipe.json`.
@@ -113,11 +136,41 @@ pub(super) async fn edit(
         Ok((fingerprint, note))
     });
     let (fingerprint, note) = edited.await?;
-    let active = site.station.snapshot().active();
-    let loading = active == Some(number) && orders::begin_load(&site, number).is_ok();
+    let Reload { active, loading } = orders::reload(&site, number).await;
     Ok(Json(
-        json!({ "fingerprint": fingerprint, "loading": loading, "note": note }),
+        json!({ "fingerprint": fingerprint, "active": active, "loading": loading, "note": note }),
     ))
+}
+
+/// Brings back the generation before the newest, or a deleted recipe.
+pub(super) async fn undo(
+    State(site): State<Site>,
+    Path(number): Path<u16>,
+) -> Result<Json<Value>, Problem> {
+    orders::recipes_unused(&site, "undo a recipe")?;
+    let file = site
+        .change(move |site| Ok(site.recipes.undo(number)?))
+        .await?;
+    let Reload { active, loading } = orders::reload(&site, number).await;
+    Ok(Json(json!({
+        "number": number, "name": file.name, "fingerprint": file.fingerprint, "active": active, "loading": loading,
+    })))
+}
+
+/// Deletes a recipe that is not the active one; undo brings it back.
+pub(super) async fn delete(
+    State(site): State<Site>,
+    Path(number): Path<u16>,
+) -> Result<Json<Value>, Problem> {
+    orders::recipes_unused(&site, "delete a recipe")?;
+    if site.station.snapshot().active() == Some(number) {
+        return Err(Problem::busy(format!(
+            "delete recipe {number}: it is the active one: load another recipe first"
+        )));
+    }
+    site.change(move |site| Ok(site.recipes.delete(number)?))
+        .await?;
+    Ok(Json(json!({ "number": number })))
 }
 
 /// Tries out a recipe that is to be stored; where that cannot be done here, words that say why.

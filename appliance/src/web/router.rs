@@ -65,6 +65,7 @@ where
 /// Every path that is answered, but for the page's own files.
 pub fn routes() -> Vec<Route> {
     let post = || (Method::POST, MethodFilter::POST);
+    let delete = || (Method::DELETE, MethodFilter::DELETE);
     let put = || (Method::PUT, MethodFilter::PUT);
     vec![
         look("/events", events::follow),
@@ -93,6 +94,18 @@ pub fn routes() -> Vec<Route> {
         look("/api/recipes/{number}/picture/{layer}", recipes::picture),
         change(post(), "/api/recipes", "import recipe", recipes::import),
         change(put(), "/api/recipes/{number}", "edit recipe", recipes::edit),
+        change(
+            delete(),
+            "/api/recipes/{number}",
+            "delete recipe",
+            recipes::delete,
+        ),
+        change(
+            post(),
+            "/api/recipes/{number}/undo",
+            "undo recipe",
+            recipes::undo,
+        ),
         change(
             post(),
             "/api/recipes/{number}/load",
@@ -141,6 +154,7 @@ pub fn router(site: Site) -> Router {
     for asset in assets::ALL {
         router = router.route(asset.path, get(move || async move { asset.answer() }));
     }
+    router = router.route(assets::ICON.path, get(async || assets::ICON.answer()));
     router
         .fallback(|| async { Problem::missing("there is no such page; start at /") })
         .layer(from_fn_with_state(site.clone(), guarded))

@@ -125,7 +125,7 @@ impl Plant {
                     };
                     self.handle.event(Event::RecipeLoaded { job, recipe });
                 }
-                Effect::Teach { job, number } => {
+                Effect::Teach { job, number, .. } => {
                     let recipe = recipe(number, "P-1".into());
                     self.handle.event(Event::Taught { job, recipe });
                 }

@@ -22,7 +22,10 @@ fn every_wait_has_a_deadline_and_a_missed_one_is_a_fault_that_says_how_to_clear_
             bench.event(Event::Request(Request::Load(RecipeKey::Number(2))));
         }),
         (5, |bench| {
-            bench.event(Event::Request(Request::Teach { number: 2 }));
+            bench.event(Event::Request(Request::Teach {
+                number: 2,
+                keep_gauges: false,
+            }));
         }),
     ];
     for (state, prepare) in waits {

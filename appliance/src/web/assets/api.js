@@ -15,13 +15,14 @@ export async function ask(method, path, body) {
   throw error;
 }
 
-// A map: its description and its values, NaN where there is none.
+// A map: its description and its values, NaN where there is none. Where there is no map, the error says why.
 export async function map(path) {
   const response = await fetch(path, { credentials: "same-origin" });
   if (!response.ok) {
     const content = await response.json().catch(() => null);
     throw new Error(content && content.error ? content.error : `the sensor answers ${response.status}`);
   }
+  if (response.status === 204) throw new Error(response.headers.get("x-none"));
   const about = JSON.parse(response.headers.get("x-map"));
   const view = new DataView(await response.arrayBuffer());
   const values = new Float32Array(view.byteLength / 2);

@@ -46,9 +46,27 @@ export async function edit(number) {
   $("editor").scrollIntoView();
 }
 
+// Side of what a finger hits of a corner, and radius of the grip that is drawn there, in pixels of the screen.
+const TARGET = 26;
+const GRIP = 8;
+
+// The middle of a corner's grip: outside the region, so far that the grips of a small one do not overlap and its inside
+// stays free.
+function outside(polygon, corner, scale) {
+  const middle = [0, 1].map((axis) => polygon.reduce((sum, point) => sum + point[axis], 0) / polygon.length);
+  const [u, v] = polygon[corner];
+  const by = [u - middle[0], v - middle[1]];
+  const far = Math.hypot(by[0], by[1]) || 1;
+  // Squares of this side around a circle, evenly spread, touch each other at this radius.
+  const least = TARGET * scale * Math.SQRT1_2 / Math.sin(Math.PI / polygon.length);
+  const reach = Math.max(far + (GRIP + 2) * scale, least);
+  return [middle[0] + 0.5 + by[0] / far * reach, middle[1] + 0.5 + by[1] / far * reach];
+}
+
 function drawRegions() {
   const { recipe, chosen } = state;
-  const radius = state.wide / 60;
+  // Camera pixels per pixel of the screen: a finger needs the same size on every screen.
+  const scale = state.wide / ($("editor-regions").getBoundingClientRect().width || state.wide);
   const parts = [];
   recipe.regions.forEach((region, at) => {
     const corners = region.polygon.map(([u, v]) => `${u + 0.5},${v + 0.5}`).join(" ");
@@ -61,7 +79,11 @@ function drawRegions() {
   if (region) {
     region.polygon.forEach(([u, v], corner) => {
       const kind = `handle${corner === chosen[1] ? " chosen" : ""}`;
-      const handle = draw("circle", { cx: u + 0.5, cy: v + 0.5, r: radius, class: kind, tabindex: 0, role: "button", "aria-label": `corner ${corner + 1} of region ${region.name}: column ${u.toFixed(0)}, row ${v.toFixed(0)}` });
+      const [x, y] = outside(region.polygon, corner, scale), side = TARGET * scale;
+      const handle = draw("g", { class: kind, tabindex: 0, role: "button", "aria-label": `corner ${corner + 1} of region ${region.name}: column ${u.toFixed(0)}, row ${v.toFixed(0)}` },
+        draw("rect", { x: x - side / 2, y: y - side / 2, width: side, height: side, class: "target" }),
+        draw("line", { x1: u + 0.5, y1: v + 0.5, x2: x, y2: y, "vector-effect": "non-scaling-stroke" }),
+        draw("circle", { cx: x, cy: y, r: GRIP * scale, class: "grip", "vector-effect": "non-scaling-stroke" }));
       handle.addEventListener("pointerdown", (event) => begin(event, chosen[0], corner));
       handle.addEventListener("keydown", (event) => nudge(event, corner));
       parts.push(handle);
@@ -191,7 +213,8 @@ function save(event) {
     const stored = await ask("PUT", `/api/recipes/${recipe.number}`, body);
     recipe.fingerprint = stored.fingerprint;
     show("editor", false);
-    notice(`recipe ${recipe.number} is stored${stored.loading ? " and is being loaded" : ""}`);
+    if (stored.active && !stored.loading) notice(`recipe ${recipe.number} is stored, but the station goes on with the version that it has: load it`, true);
+    else notice(`recipe ${recipe.number} is stored${stored.loading ? " and is being loaded" : ""}`);
     if (!stored.loading) window.dispatchEvent(new Event("recipes"));
   });
 }
@@ -200,6 +223,7 @@ export function start() {
   const svg = $("editor-regions");
   svg.addEventListener("pointermove", drag);
   for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { state.drag = null; });
+  window.addEventListener("resize", () => { if (state.recipe && !$("editor").hidden) drawRegions(); });
   $("region-add").addEventListener("click", addRegion);
   $("corner-add").addEventListener("click", addCorner);
   $("corner-remove").addEventListener("click", removeCorner);

@@ -38,7 +38,7 @@ function row(entry) {
     const link = make("a", "", "ZIP");
     link.href = `/api/history/${entry.seq}/recording.zip`;
     link.setAttribute("download", "");
-    link.setAttribute("aria-label", `frames of no. ${entry.seq}`);
+    link.setAttribute("aria-label", `ZIP: frames of no. ${entry.seq}`);
     frames.append(link);
   }
   const verdict = make("span", `tag ${entry.verdict.toLowerCase()}`, entry.verdict);

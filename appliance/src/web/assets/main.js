@@ -11,6 +11,7 @@ import { showRegisters, start as startRegisters } from "./registers.js";
 import { openDevice, showDevice } from "./journal.js";
 import { openHistory, start as startHistory } from "./history.js";
 import { start as startKept } from "./kept.js";
+import { start as startQuestion } from "./question.js";
 import { change, start as startSession } from "./session.js";
 import { ask } from "./api.js";
 import { count, duration } from "./number.js";
@@ -98,6 +99,7 @@ function openView() {
 }
 
 startSession();
+startQuestion();
 startPicture();
 startRecipes();
 startEditor();

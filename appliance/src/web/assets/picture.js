@@ -155,7 +155,12 @@ async function loadRecipe(result) {
   state.recipe = null;
   state.recipeKey = "";
   let recipe;
-  try { recipe = await ask("GET", `/api/recipes/${result.recipe}`); } catch (none) { return; }
+  try {
+    // It may be deleted or another version by now.
+    const { recipes } = await ask("GET", "/api/recipes");
+    if (!recipes.some((one) => one.number === result.recipe && !one.error && one.fingerprint.startsWith(result.fingerprint))) return;
+    recipe = await ask("GET", `/api/recipes/${result.recipe}`);
+  } catch (none) { return; }
   // Meanwhile there may be a result of another one.
   if (!state.result || keyOf(state.result) !== key) return;
   state.recipeKey = key;

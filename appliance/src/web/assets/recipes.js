@@ -1,12 +1,16 @@
-// The recipes: list, load, teach with what it gained, export, import.
+// The recipes: list, load, teach with what it gained, export, import, delete, and undo of that.
 import { $, button, fill, make, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { change, notice } from "./session.js";
 import { signed } from "./number.js";
+import { choose } from "./question.js";
 import { edit } from "./editor.js";
 
 let active = null;
 let taught = "";
+// What the list shows, and the number that the page proposed to teach.
+let stored = [];
+let proposed = "";
 
 function day(unix_s) {
   return unix_s ? new Date(unix_s * 1000).toISOString().slice(0, 10) : "not known";
@@ -15,32 +19,99 @@ function day(unix_s) {
 function row(recipe) {
   if (recipe.error) {
     const words = make("td", "", recipe.error);
-    words.colSpan = 7;
-    return make("tr", "", make("td", "", String(recipe.number)), words);
+    words.colSpan = 6;
+    return make("tr", "", make("td", "", String(recipe.number)), words, make("td", "actions", remover(recipe)));
   }
   const use = button("Load", "", () => change(() => ask("POST", `/api/recipes/${recipe.number}/load`), `recipe ${recipe.number} is being loaded`));
   use.setAttribute("aria-label", `Load recipe ${recipe.number}`);
   const alter = button("Edit", "", () => edit(recipe.number));
   alter.setAttribute("aria-label", `Edit recipe ${recipe.number}`);
   const gain = button("Before / after", "", () => compare(recipe.number));
-  gain.setAttribute("aria-label", `What teaching recipe ${recipe.number} gained`);
+  gain.setAttribute("aria-label", `Before / after: what teaching recipe ${recipe.number} gained`);
   const take = make("a", "", "Export");
   take.href = `/api/recipes/${recipe.number}/file`;
   take.setAttribute("download", "");
+  take.setAttribute("aria-label", `Export recipe ${recipe.number}`);
   const own = recipe.number === active;
   const line = make("tr", own ? "active" : "", make("td", "", String(recipe.number)), make("td", "", recipe.name + (own ? " (active)" : "")),
     make("td", "", recipe.part_number), make("td", "", make("code", "", recipe.fingerprint.slice(0, 8))), make("td", "", String(recipe.frames)),
-    make("td", "", String(recipe.gauges)), make("td", "", day(recipe.taught_at_unix_s)), make("td", "actions", use, alter, gain, take));
+    make("td", "", String(recipe.gauges)), make("td", "", day(recipe.taught_at_unix_s)), make("td", "actions", use, alter, gain, take, remover(recipe)));
   return line;
+}
+
+// "bracket with 2 regions and 4 gauges"
+function content(recipe) {
+  if (recipe.error) return "a file that cannot be read";
+  const number = (many, what) => `${many} ${what}${many === 1 ? "" : "s"}`;
+  return `${recipe.name} with ${number(recipe.regions, "region")} and ${number(recipe.gauges, "gauge")}`;
+}
+
+function remover(recipe) {
+  const remove = button("Delete", "", () => {
+    if (recipe.number === active) { notice(`recipe ${recipe.number} is active: load another recipe first`, true); return undefined; }
+    return change(async () => {
+      const words = `It is ${content(recipe)}. It can be brought back from this list.`;
+      if (!await choose(`Delete recipe ${recipe.number}?`, words, [["Delete", true]])) return;
+      await ask("DELETE", `/api/recipes/${recipe.number}`);
+      notice(`recipe ${recipe.number} is deleted`);
+      list();
+    });
+  });
+  remove.setAttribute("aria-label", `Delete recipe ${recipe.number}`);
+  return remove;
+}
+
+// A line below a recipe, or instead of a deleted one, that brings back what was there before.
+function undoer(number, before, words) {
+  const undo = button(words, "plain", () => change(async () => {
+    const now = await ask("POST", `/api/recipes/${number}/undo`);
+    const crc = `RECIPE_CRC32 is 0x${now.fingerprint.slice(0, 8).toUpperCase()}`;
+    if (now.active && !now.loading) notice(`recipe ${number} is undone, but the station goes on with the version that it has: load it`, true);
+    else notice(`recipe ${number} · ${now.name} is back${now.loading ? " and is being loaded" : ""}: its ${crc}`);
+    list();
+  }));
+  const place = make("td", "", undo);
+  place.colSpan = 7;
+  return make("tr", "before", make("td", "", before.deleted ? String(number) : ""), place);
+}
+
+// "the version of 2026-11-21 (a1b2c3d4, 4 gauges)"
+function version(recipe) {
+  const when = recipe.taught_at_unix_s ? ` of ${day(recipe.taught_at_unix_s)}` : "";
+  return `the version${when} (${recipe.fingerprint.slice(0, 8)}, ${recipe.gauges} gauges)`;
+}
+
+function rows(recipe) {
+  const { number, before } = recipe;
+  return before ? [row(recipe), undoer(number, before, `Undo: bring back ${version(before)}`)] : [row(recipe)];
+}
+
+function gone(recipe) {
+  return undoer(recipe.number, { deleted: true }, `Undo: bring back ${recipe.name}, which was deleted: ${version(recipe)}`);
 }
 
 export async function list() {
   try {
-    const { recipes } = await ask("GET", "/api/recipes");
+    const { recipes, deleted, free } = await ask("GET", "/api/recipes");
+    stored = recipes;
     const none = make("td", "quiet", "there is no recipe yet: teach or import one");
     none.colSpan = 8;
-    fill($("recipe-rows"), ...(recipes.length ? recipes.map(row) : [make("tr", "", none)]));
+    const lines = recipes.length ? recipes.map(rows) : [[make("tr", "", none)]];
+    fill($("recipe-rows"), ...[].concat(...lines), ...deleted.map(gone));
+    // A number that somebody typed stays.
+    const typed = $("teach-as").value;
+    if (typed === "" || typed === proposed) $("teach-as").value = proposed = free === null ? "" : String(free);
   } catch (error) { notice(error.message, true); }
+}
+
+// What the request to teach a number carries; none where a recipe has the number and shall stay.
+async function consent(number) {
+  await list();
+  const taken = stored.find((recipe) => recipe.number === number);
+  if (!taken) return {};
+  const words = `It is ${content(taken)}. New gauges take their place; regions that are kept stay where they are in the picture. Name and part number stay, and Undo in the list of recipes brings this version back.`;
+  const keep = taken.error ? [] : [["Replace, keep regions and gauges", { replace: true, keep_gauges: true }]];
+  return choose(`Replace recipe ${number}?`, words, keep.concat([["Replace, with new gauges", { replace: true }]]));
 }
 
 // Before and after: the same number of frames with straight fringes and with the part's own.
@@ -89,7 +160,12 @@ export function start() {
   $("teach").addEventListener("submit", (event) => {
     event.preventDefault();
     const number = Number($("teach-as").value);
-    change(() => ask("POST", `/api/recipes/${number}/teach`), `teaching recipe ${number} has begun: leave the part where it is`);
+    change(async () => {
+      const wanted = await consent(number);
+      if (!wanted) return;
+      await ask("POST", `/api/recipes/${number}/teach`, wanted);
+      notice(`teaching recipe ${number} has begun: leave the part where it is`);
+    });
   });
   $("import").addEventListener("submit", (event) => {
     event.preventDefault();

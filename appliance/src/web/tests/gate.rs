@@ -2,11 +2,13 @@
 
 use super::*;
 
-const CHANGES: [(&str, &str); 6] = [
+const CHANGES: [(&str, &str); 8] = [
     ("POST", "/api/trigger"),
     ("POST", "/api/reset"),
     ("POST", "/api/recipes"),
     ("PUT", "/api/recipes/1"),
+    ("DELETE", "/api/recipes/1"),
+    ("POST", "/api/recipes/1/undo"),
     ("POST", "/api/recipes/1/load"),
     ("POST", "/api/recipes/1/teach"),
 ];

@@ -1,0 +1,373 @@
+//! Generations of a recipe: the one before the newest, deletion, and how either is undone.
+//!
+//! Beside `NNNN.recipe` stands `NNNN.recipe.previous`, the generation before it. `NNNN.recipe.kept` holds what has neither
+//! name: a deleted recipe, or, while generations are exchanged, the newest one. A kill between two steps loses none of them.
+
+use super::gauge::check_limits;
+use super::store::{LoadError, Store};
+use super::{Recipe, RecipeFile, archive};
+use crate::output::folder::{name_also, rename_whole, sync_folder_of};
+use std::fs::{self, File};
+use std::io::{self, BufReader};
+use std::path::{Path, PathBuf};
+
+/// A generation that was not brought back, or a recipe that was not deleted; the recipes are as before.
+#[derive(Debug, thiserror::Error)]
+pub enum GenerationError {
+    /// There is no such recipe.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// There is nothing to bring back.
+    #[error(
+        "undo recipe {0}: no generation before it is stored, and it was not deleted: teach or import it"
+    )]
+    Nothing(u16),
+    /// The generation before cannot be used.
+    #[error("undo recipe {number}: the generation before it {reason}")]
+    Unfit {
+        /// The recipe.
+        number: u16,
+        /// Why, with the remedy.
+        reason: String,
+    },
+    /// A file cannot be renamed or removed.
+    #[error("write {path}: {source}: free space", path = path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+impl Store {
+    pub(super) fn previous(&self, number: u16) -> PathBuf {
+        self.folder.join(format!("{number:04}.recipe.previous"))
+    }
+
+    pub(super) fn kept(&self, number: u16) -> PathBuf {
+        self.folder.join(format!("{number:04}.recipe.kept"))
+    }
+
+    /// Makes the current generation the previous one, unless it is damaged: a damaged file never pushes out the good
+    /// generation behind it.
+    pub(super) fn keep_previous(&self, number: u16) -> io::Result<()> {
+        let (path, previous) = (self.path(number), self.previous(number));
+        let sound = |file: File| archive::is_sound(BufReader::new(file));
+        if !File::open(&path).is_ok_and(sound) {
+            return Ok(());
+        }
+        // The current one stands until it is replaced.
+        name_also(&path, &previous)?;
+        // A recipe that was deleted before the current one was stored is two generations back now.
+        remove(&self.kept(number)).map(drop)
+    }
+
+    /// The file that [`Store::undo`] brings back.
+    fn before(&self, number: u16) -> Option<PathBuf> {
+        let files = [self.previous(number), self.kept(number)];
+        files.into_iter().find(|file| file.exists())
+    }
+
+    /// The manifest of what [`Store::undo`] brings back: the generation before the newest, or the deleted recipe.
+    pub fn manifest_before(&self, number: u16) -> Option<RecipeFile> {
+        manifest(&self.before(number)?)
+    }
+
+    /// The manifest of the newest generation that can be read; none if the number is free.
+    pub fn present(&self, number: u16) -> Option<RecipeFile> {
+        let files = [self.path(number), self.previous(number)];
+        files.iter().find_map(|file| manifest(file))
+    }
+
+    /// The numbers under which there is only a deleted recipe, in order.
+    pub fn deleted(&self) -> Vec<u16> {
+        let stored = self.numbers();
+        let mut kept = self.numbers_with(&[".kept"]);
+        kept.retain(|number| stored.binary_search(number).is_err());
+        kept
+    }
+
+    /// The first number under which nothing is stored and nothing was deleted; none if all 9999 are taken.
+    pub fn free(&self) -> Option<u16> {
+        let taken = self.numbers_with(&["", ".previous", ".kept"]);
+        (1..=9999).find(|number| taken.binary_search(number).is_err())
+    }
+
+    /// Exchanges the newest generation and the one before it, or brings a deleted recipe back. The same again takes it back.
+    /// Answers with the manifest of what is the newest generation now.
+    ///
+    /// # Errors
+    /// If there is nothing to bring back, it is damaged or made for another calibration than the newest generation, or the
+    /// files cannot be renamed.
+    pub fn undo(&self, number: u16) -> Result<RecipeFile, GenerationError> {
+        let _alone = self.lock().map_err(write(&self.folder))?;
+        let before = self
+            .before(number)
+            .ok_or(GenerationError::Nothing(number))?;
+        let unfit = |reason| GenerationError::Unfit { number, reason };
+        let restored = read(&before, number).map_err(unfit)?;
+        let (path, previous, kept) = (self.path(number), self.previous(number), self.kept(number));
+        if let Some(newest) = manifest(&path)
+            && newest.calibration != restored.calibration
+        {
+            return Err(unfit(
+                "was made for another calibration: teach it again".into(),
+            ));
+        }
+        let rename = |from: &Path, to: &Path| rename_whole(from, to).map_err(write(to));
+        if !path.exists() {
+            rename(&before, &path)?;
+            return Ok(restored);
+        }
+        if before == kept {
+            rename(&kept, &previous)?;
+        }
+        name_also(&path, &kept).map_err(write(&kept))?;
+        rename(&previous, &path)?;
+        rename(&kept, &previous)?;
+        Ok(restored)
+    }
+
+    /// Deletes a recipe. Its newest generation that is whole is kept apart until another recipe with this number has been
+    /// replaced or deleted: [`Store::undo`] brings it back. No station may have it active.
+    ///
+    /// # Errors
+    /// If there is no such recipe or its files cannot be renamed or removed.
+    pub fn delete(&self, number: u16) -> Result<(), GenerationError> {
+        let _alone = self.lock().map_err(write(&self.folder))?;
+        let (path, previous, kept) = (self.path(number), self.previous(number), self.kept(number));
+        let whole = self.whole(number);
+        if let Err(error @ LoadError::Unknown(_)) = whole {
+            return Err(error.into());
+        }
+        let removed = |file: &Path| remove(file).map_err(write(file));
+        // A kill in between leaves the newest generation or none, not an old one that comes back.
+        match whole {
+            Ok(whole) if whole == path => {
+                removed(&previous)?;
+                rename_whole(&path, &kept).map_err(write(&kept))?;
+            }
+            Ok(_) => {
+                rename_whole(&previous, &kept).map_err(write(&kept))?;
+                removed(&path)?;
+            }
+            Err(_) => {
+                removed(&previous)?;
+                removed(&path)?;
+            }
+        }
+        sync_folder_of(&path).map_err(write(&path))
+    }
+}
+
+fn write(path: &Path) -> impl Fn(io::Error) -> GenerationError {
+    let path = path.to_path_buf();
+    move |source| GenerationError::Write {
+        path: path.clone(),
+        source,
+    }
+}
+
+/// Removes a file; answers whether it was there.
+fn remove(file: &Path) -> io::Result<bool> {
+    match fs::remove_file(file) {
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+fn manifest(file: &Path) -> Option<RecipeFile> {
+    archive::manifest(File::open(file).ok()?).ok()
+}
+
+/// The manifest of a whole recipe file of this number; else why it is none.
+fn read(path: &Path, number: u16) -> Result<RecipeFile, String> {
+    match Store::read(path, number) {
+        Some(Ok(Recipe { file, .. })) => match check_limits(&file.gauges) {
+            Ok(()) => Ok(file),
+            Err(reason) => Err(format!("cannot be used: {reason}")),
+        },
+        Some(Err(reason)) => Err(format!("cannot be used: {reason}")),
+        None => Err("is gone: teach the recipe again".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recipe::archive::Arrays;
+    use serde_json::json;
+
+    /// A small whole recipe.
+    fn packed(number: u16, name: &str, calibration: &str) -> Vec<u8> {
+        let file = json!({
+            "format": "fringed-recipe", "version": 1, "fingerprint": "", "number": number, "part_number": "", "name": name,
+            "taught_by": "a test", "taught_at_unix_s": 0, "calibration": calibration,
+            "camera": { "width": 4, "height": 4, "bit_depth": 8 }, "projector": { "width": 8, "height": 8 },
+            "pattern": { "kind": "vertical", "fringes": 2.0 },
+            "sequences": [{ "kind": "full", "frames": [[1.0, 0.0], [1.0, 0.25], [1.0, 0.5], [1.0, 0.75]], "sigma_mm": 0.01, "safe_share": 1.0 }],
+            "production": 0, "placement_tolerance_mm": 1.0, "range_mm": [0.0, 1.0], "noise_counts": 1.0,
+            "expansion_range_turns": 0.5, "min_coverage": 0.8,
+            "regions": [{ "name": "frame", "polygon": [[-0.5, -0.5], [3.5, -0.5], [3.5, 3.5], [-0.5, 3.5]] }],
+            "gauges": [{ "name": "coverage", "region": "frame", "measures": { "kind": "coverage" }, "low": 0.5 }],
+        });
+        let arrays = Arrays {
+            golden_phase: vec![0.0; 16],
+            golden_height: vec![0.0; 16],
+            height_slope: vec![1.0; 16],
+            height_curvature: vec![0.0; 16],
+            valid: vec![1; 16],
+            modulation: vec![50.0; 16],
+            phase_reach: vec![0.1; 16],
+            ..Arrays::default()
+        };
+        archive::pack(&serde_json::from_value(file).unwrap(), &arrays)
+            .unwrap()
+            .0
+    }
+
+    struct Place {
+        store: Store,
+        folder: tempfile::TempDir,
+    }
+
+    impl Place {
+        fn with(names: &[&str]) -> Self {
+            let folder = tempfile::tempdir().unwrap();
+            let store = Store::open(folder.path()).unwrap();
+            for name in names {
+                store.save(7, &packed(7, name, "c")).unwrap();
+            }
+            Self { store, folder }
+        }
+
+        fn newest(&self) -> String {
+            self.store.load(7).unwrap().recipe.file.name
+        }
+
+        fn before(&self) -> Option<String> {
+            Some(self.store.manifest_before(7)?.name)
+        }
+
+        fn file(&self, ending: &str) -> PathBuf {
+            self.folder.path().join(format!("0007.recipe{ending}"))
+        }
+    }
+
+    #[test]
+    fn undo_exchanges_the_two_generations_and_undo_again_takes_it_back() {
+        let place = Place::with(&["first", "second"]);
+        for (newest, before) in [("first", "second"), ("second", "first")] {
+            assert_eq!(place.store.undo(7).unwrap().name, newest);
+            assert_eq!(
+                (place.newest(), place.before()),
+                (newest.into(), Some(before.into()))
+            );
+        }
+        assert_eq!(fs::read_dir(place.folder.path()).unwrap().count(), 3);
+    }
+
+    #[test]
+    fn a_kill_between_any_two_steps_of_an_undo_loses_no_generation() {
+        type Step = fn(&Place);
+        let steps: [Step; 2] = [
+            |place| name_also(&place.file(""), &place.file(".kept")).unwrap(),
+            |place| fs::rename(place.file(".previous"), place.file("")).unwrap(),
+        ];
+        for done in 1..=steps.len() {
+            let place = Place::with(&["first", "second"]);
+            steps[..done].iter().for_each(|step| step(&place));
+            let undone = done == 2;
+            assert_eq!(place.newest() == "first", undone);
+            // The next undo finds the other one, and so does the one after it.
+            place.store.undo(7).unwrap();
+            assert_eq!(place.newest() == "first", !undone);
+            place.store.undo(7).unwrap();
+            assert_eq!(place.newest() == "first", undone);
+        }
+    }
+
+    #[test]
+    fn a_deleted_recipe_loads_no_more_and_comes_back_whole() {
+        let place = Place::with(&["first", "second"]);
+        place.store.delete(7).unwrap();
+        let gone = place.store.load(7).unwrap_err();
+        assert_eq!(gone, LoadError::Unknown("7".into()));
+        assert!(place.store.numbers().is_empty());
+        assert_eq!(place.store.deleted(), [7]);
+        assert_eq!(place.before().unwrap(), "second");
+        assert!(matches!(
+            place.store.delete(7),
+            Err(GenerationError::Load(LoadError::Unknown(_)))
+        ));
+        assert_eq!(place.store.undo(7).unwrap().name, "second");
+        assert_eq!(place.newest(), "second");
+        assert_eq!(place.store.deleted(), [0; 0]);
+    }
+
+    #[test]
+    fn a_deleted_recipe_is_the_generation_before_what_takes_its_number() {
+        let place = Place::with(&["first"]);
+        place.store.delete(7).unwrap();
+        place.store.save(7, &packed(7, "second", "c")).unwrap();
+        assert_eq!(place.before().unwrap(), "first");
+        place.store.undo(7).unwrap();
+        assert_eq!(
+            (place.newest(), place.before()),
+            ("first".into(), Some("second".into()))
+        );
+        place.store.save(7, &packed(7, "third", "c")).unwrap();
+        assert_eq!(place.before().unwrap(), "first");
+        assert!(!place.file(".kept").exists());
+    }
+
+    #[test]
+    fn a_damaged_newest_generation_is_undone_and_does_not_come_back() {
+        let place = Place::with(&["first", "second"]);
+        fs::write(place.file(""), "torn").unwrap();
+        assert_eq!(place.store.undo(7).unwrap().name, "first");
+        let refused = place.store.undo(7).unwrap_err();
+        assert!(refused.to_string().contains("cannot be used"), "{refused}");
+        assert_eq!(place.newest(), "first");
+        // A deletion keeps the generation that is whole.
+        fs::rename(place.file(""), place.file(".whole")).unwrap();
+        fs::rename(place.file(".previous"), place.file("")).unwrap();
+        fs::rename(place.file(".whole"), place.file(".previous")).unwrap();
+        place.store.delete(7).unwrap();
+        assert_eq!(place.store.undo(7).unwrap().name, "first");
+    }
+
+    #[test]
+    fn without_a_generation_before_or_for_another_calibration_nothing_is_undone() {
+        let place = Place::with(&["first"]);
+        let refused = place.store.undo(7).unwrap_err();
+        assert!(matches!(refused, GenerationError::Nothing(7)), "{refused}");
+        place
+            .store
+            .save(7, &packed(7, "second", "another"))
+            .unwrap();
+        let refused = place.store.undo(7).unwrap_err();
+        assert!(
+            refused.to_string().contains("another calibration"),
+            "{refused}"
+        );
+        assert_eq!(place.newest(), "second");
+    }
+
+    #[test]
+    fn the_first_number_without_a_recipe_of_any_kind_is_free() {
+        let place = Place::with(&["seven"]);
+        assert_eq!(place.store.free(), Some(1));
+        for number in [1, 2, 4] {
+            let bytes = packed(number, "x", "c");
+            place.store.save(number, &bytes).unwrap();
+        }
+        assert_eq!(place.store.free(), Some(3));
+        place.store.delete(2).unwrap();
+        assert_eq!(place.store.free(), Some(3));
+        fs::write(place.folder.path().join("0003.recipe"), "damaged").unwrap();
+        assert_eq!(place.store.free(), Some(5));
+    }
+}

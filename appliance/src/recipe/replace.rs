@@ -1,0 +1,85 @@
+//! Teaching onto a number that is taken: what stays of the recipe that is replaced.
+
+use super::archive;
+use super::gauge::check_limits;
+use super::golden::{Naming, Taught};
+use super::planner;
+use super::{Recipe, RecipeFile};
+
+/// How far parts may lie from where they were taught, unless the recipe before says otherwise, mm.
+pub const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
+
+/// What to call a recipe that is taught under a number, and its tolerance of placement: as the one that it replaces, if any.
+pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
+    let kept = replaced.cloned();
+    let (part_number, name, placement_tolerance_mm) = match kept {
+        Some(file) => (file.part_number, file.name, file.placement_tolerance_mm),
+        None => (
+            format!("PART-{number:04}"),
+            format!("Part {number}"),
+            PLACEMENT_TOLERANCE_MM,
+        ),
+    };
+    Naming {
+        number,
+        part_number,
+        name,
+        taught_at_unix_s: crate::clock::utc_us().unwrap_or(0) / 1_000_000,
+        placement_tolerance_mm,
+    }
+}
+
+/// What a recipe that is replaced has of regions and gauges, in words.
+pub fn gauges_of(file: &RecipeFile) -> String {
+    let count = |number: usize, what: &str| match number {
+        1 => format!("1 {what}"),
+        _ => format!("{number} {what}s"),
+    };
+    format!(
+        "{} and {}",
+        count(file.regions.len(), "region"),
+        count(file.gauges.len(), "gauge")
+    )
+}
+
+/// Whether the gauges of a recipe can stay for frames (width, height) of the head that teaches the next one.
+///
+/// # Errors
+/// In words: regions are polygons in camera pixels, so another size of frames has no place for them; or a limit cannot be kept.
+pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<(), String> {
+    let camera = &replaced.camera;
+    if (camera.width, camera.height) == (width, height) {
+        return check_limits(&replaced.gauges);
+    }
+    Err(format!(
+        "the regions of recipe {} are in pixels of frames of {}×{}, this camera has {width}×{height}: teach without its gauges",
+        replaced.number, camera.width, camera.height
+    ))
+}
+
+/// Gives a recipe that was just taught the regions, gauges, limits and least coverage of the one that it replaces; the
+/// production sequence is chosen anew for those limits.
+///
+/// # Errors
+/// In words, if they do not fit what was taught.
+pub fn keep_gauges(taught: Taught, replaced: &RecipeFile) -> Result<Taught, String> {
+    let Recipe {
+        mut file, arrays, ..
+    } = taught.recipe;
+    drop(taught.bytes);
+    check_kept(replaced, (file.camera.width, file.camera.height))?;
+    file.regions.clone_from(&replaced.regions);
+    file.gauges.clone_from(&replaced.gauges);
+    file.min_coverage = replaced.min_coverage;
+    let choice = planner::choose(&file.sequences, &file.gauges);
+    file.production = choice.production;
+    let mut recipe = Recipe::check(file, arrays)?;
+    let (bytes, fingerprint) =
+        archive::pack(&recipe.file, &recipe.arrays).map_err(|error| error.to_string())?;
+    recipe.file.fingerprint = fingerprint;
+    Ok(Taught {
+        bytes,
+        recipe,
+        choice,
+    })
+}

@@ -1,0 +1,80 @@
+// Recipes on the page: nobody loses a recipe by teaching, deleting or undoing.
+import { strict as assert } from "node:assert";
+
+export async function recipes({ page, step, verdict, trigger }) {
+  const rows = page.locator("#recipe-rows tr:not(.before)");
+  const notice = (words) => page.waitForFunction((wanted) => !document.querySelector("#notice").hidden && document.querySelector("#notice").textContent.includes(wanted), words);
+  const ready = () => page.waitForSelector("#state[data-state=ready]");
+  const recipe = (number) => page.evaluate(async (at) => (await fetch(`/api/recipes/${at}`)).json(), number);
+  const open = async () => { await page.click("nav a[href='#recipes']"); await rows.first().waitFor(); };
+  const taught = async () => { await page.waitForSelector("#teaching:not([hidden])"); await notice("is taught and active"); await ready(); };
+
+  await step("a number that is free is proposed to teach, and one that is taken asks before it is replaced", async () => {
+    await open();
+    await page.waitForFunction(() => document.querySelector("#teach-as").value === "2");
+    const before = await recipe(1);
+    await page.fill("#teach-as", "1");
+    await page.click("#teach button");
+    await page.waitForSelector("#question:not([hidden])");
+    assert.match(await page.textContent("#question-title"), /Replace recipe 1\?/);
+    const words = await page.textContent("#question-words");
+    for (const part of [before.name, `${before.regions.length} regions`, `${before.gauges.length} gauges`]) assert.ok(words.includes(part), words);
+    // The keyboard stays in the question, and Escape leaves everything as it is.
+    for (let times = 0; times < 7; times += 1) {
+      assert.ok(await page.evaluate(() => document.querySelector("#question").contains(document.activeElement)));
+      await page.keyboard.press("Tab");
+    }
+    await page.keyboard.press("Escape");
+    await page.waitForSelector("#question", { state: "hidden" });
+    assert.equal((await recipe(1)).fingerprint, before.fingerprint);
+    await page.waitForFunction(() => document.activeElement && document.activeElement.textContent === "Teach");
+  });
+
+  await step("what was edited stays when a recipe is taught again, if that is asked for", async () => {
+    const before = await recipe(1);
+    await page.click("#teach button");
+    await page.click("#question-choices button:has-text('keep regions and gauges')");
+    await taught();
+    const after = await recipe(1);
+    assert.notEqual(after.fingerprint, before.fingerprint);
+    for (const key of ["name", "part_number", "regions", "gauges"]) assert.deepEqual(after[key], before[key], key);
+  });
+
+  await step("undo brings back the version before, and undo again takes it back", async () => {
+    await open();
+    const versions = [await recipe(1)];
+    for (const turn of [0, 1]) {
+      const undo = page.locator("#recipe-rows tr.before button").first();
+      assert.match(await undo.textContent(), /^Undo: bring back the version .*\([0-9a-f]{8}, \d+ gauges\)$/);
+      const wanted = /\(([0-9a-f]{8}),/.exec(await undo.textContent())[1];
+      await undo.click();
+      await notice(`RECIPE_CRC32 is 0x${wanted.toUpperCase()}`);
+      await page.waitForFunction((digits) => document.querySelector("#fingerprint").textContent.startsWith(digits), wanted);
+      await ready();
+      versions.push(await recipe(1));
+      assert.ok(versions[turn + 1].fingerprint.startsWith(wanted));
+      await page.waitForFunction((digits) => document.querySelector("#recipe-rows tr.before").textContent.includes(digits), versions[turn].fingerprint.slice(0, 8));
+    }
+    assert.deepEqual(versions[2], versions[0]);
+  });
+
+  await step("a recipe is deleted after a question, not while it is active, and comes back", async () => {
+    await rows.first().locator("button:has-text('Delete')").click();
+    await notice("load another recipe first");
+    await page.fill("#teach-as", "2");
+    await page.click("#teach button");
+    await taught();
+    const before = await recipe(1);
+    await rows.first().locator("button:has-text('Delete')").click();
+    await page.click("#question-choices button:has-text('Delete')");
+    await page.waitForFunction(() => document.querySelectorAll("#recipe-rows tr:not(.before)").length === 1);
+    await page.click("#recipe-rows button:has-text('which was deleted')");
+    await page.waitForFunction(() => document.querySelectorAll("#recipe-rows tr:not(.before)").length === 2);
+    assert.deepEqual(await recipe(1), before);
+    await rows.first().locator("button:has-text('Load')").click();
+    await page.waitForFunction(() => document.querySelector("#recipe-name").textContent.includes("recipe 1"));
+    await page.click("nav a[href='#live']");
+    await trigger();
+    await verdict("FAIL");
+  });
+}
