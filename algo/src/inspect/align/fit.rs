@@ -9,7 +9,7 @@
 //! is told from a motion by how many points agree with either. Sums run over the points in their order.
 
 use super::Spot;
-use super::directions::{Directions, Six};
+use super::directions::{Directions, Six, form};
 use super::motion::Motion;
 use super::normal::{Normal, TUKEY, Weights};
 use super::surface::{Facet, GoldenSurface};
@@ -216,6 +216,12 @@ impl Fitting<'_> {
     pub fn row(&self, lift: Vector, point: Vector) -> [f64; 6] {
         let turning = (point - self.centre).cross(lift) * (1.0 / self.radius);
         [lift.x, lift.y, lift.z, turning.x, turning.y, turning.z]
+    }
+
+    /// Variance, mm², of how far the error of a motion lifts a facet at a point.
+    pub fn lift_variance(&self, placed: &Placed, lift: Vector, point: Vector) -> f64 {
+        let row = self.row(lift, point);
+        form(&row, &placed.covariance, &row).max(0.0)
     }
 
     /// The linear problem about a motion; `still` if that is none.

@@ -49,10 +49,33 @@ pub struct Alignment {
 /// takes about half a millisecond.
 const ROWS: usize = 48;
 const POINTS: usize = 1800;
+/// Where a wall is seen at a grazing angle, an error of the motion of a µm lifts it by tens: there are as many more points, up to
+/// this factor, until no place is lifted by more than so many mm (1 σ).
+const MORE_POINTS: usize = 8;
+const MOST_LIFT_MM: f64 = 0.01;
 
 impl Alignment {
     /// Plans it; none where the surface inside the window has too few points for it.
     pub fn new(golden: GoldenSurface<'_>, window: Window<'_>) -> Option<Self> {
+        let mut points = POINTS;
+        loop {
+            let (alignment, placed) = Self::of_points(points, golden, window)?;
+            let fitting = alignment.fitting(golden);
+            let lift = |spot: &Spot| fitting.lift_variance(&placed, spot.facet.lift, spot.point);
+            let most = alignment.spots.iter().map(lift).fold(0.0, f64::max);
+            points *= 2;
+            if most <= MOST_LIFT_MM * MOST_LIFT_MM || points > MORE_POINTS * POINTS {
+                return Some(alignment);
+            }
+        }
+    }
+
+    /// With about so many points, and how a part is then found to lie that lies as taught.
+    fn of_points(
+        points: usize,
+        golden: GoldenSurface<'_>,
+        window: Window<'_>,
+    ) -> Option<(Self, Placed)> {
         let width = golden.surface.width;
         let compared = |v: usize| {
             let row = window[v].clone();
@@ -62,7 +85,7 @@ impl Alignment {
         let filled = counts.iter().filter(|count| **count > 0).count();
         let rows = (filled / ROWS).max(1);
         let pixels = counts.iter().sum::<usize>() / rows;
-        let columns = pixels.div_ceil(POINTS).max(1);
+        let columns = pixels.div_ceil(points).max(1);
         let mut spots = Vec::new();
         for v in (0..window.len()).step_by(rows) {
             for u in compared(v).filter(|u| u % columns == 0) {
@@ -78,12 +101,6 @@ impl Alignment {
         let sum = |value: &dyn Fn(Vector) -> f64| spots.iter().map(|s| value(s.point)).sum::<f64>();
         let centre = Vector::new(sum(&|p| p.x), sum(&|p| p.y), sum(&|p| p.z)) * share;
         let radius = libm::sqrt(sum(&|p| (p - centre).dot(p - centre)) * share);
-        let still = |(at, spot): (usize, &Spot)| Sample {
-            point: spot.point,
-            sigma: spot.facet.sigma,
-            over: Some((at, 0.0)),
-        };
-        let samples: Vec<_> = spots.iter().enumerate().map(still).collect();
         let mut alignment = Self {
             centre,
             radius: radius.max(1e-3),
@@ -91,11 +108,20 @@ impl Alignment {
             corners: corners(spots.iter().map(|spot| spot.point)),
             spots,
         };
-        alignment.left_out = alignment
-            .fitting(golden)
-            .fit(&samples, &mut Room::default())?
-            .left_out;
-        Some(alignment)
+        let placed = alignment.still(golden)?;
+        alignment.left_out = placed.left_out;
+        Some((alignment, placed))
+    }
+
+    /// How a part is found to lie that lies as taught, with the noise of golden; none where the surface has too few points.
+    pub fn still(&self, golden: GoldenSurface<'_>) -> Option<Placed> {
+        let still = |(at, spot): (usize, &Spot)| Sample {
+            point: spot.point,
+            sigma: spot.facet.sigma,
+            over: Some((at, 0.0)),
+        };
+        let samples: Vec<_> = self.spots.iter().enumerate().map(still).collect();
+        self.fitting(golden).fit(&samples, &mut Room::default())
     }
 
     /// The spots of some rows, with the number of the first.

@@ -201,3 +201,30 @@ fn what_is_not_there_has_no_place() {
             .is_none()
     );
 }
+
+/// How far an error of the motion lifts the worst spot, mm (1 σ).
+fn worst_lift(alignment: &Alignment, golden: GoldenSurface<'_>) -> f64 {
+    let placed = alignment.still(golden).unwrap();
+    let fitting = alignment.fitting(golden);
+    let lift = |spot: &Spot| fitting.lift_variance(&placed, spot.facet.lift, spot.point);
+    libm::sqrt(alignment.spots.iter().map(lift).fold(0.0, f64::max))
+}
+
+#[test]
+fn a_wall_at_a_grazing_angle_is_not_lifted_by_the_noise_of_the_motion() {
+    let window = vec![0..SIDE; SIDE];
+    let even = made(hills);
+    let (few, _) = Alignment::of_points(POINTS, even.golden(), &window).unwrap();
+    assert_eq!(even.alignment(), few);
+    // The camera looks along a slope of 2.7.
+    let mut steep = made(|x, y| hills(x, y) + 2.4 * (x - 40.0).max(0.0));
+    steep.taught = Taught::new((0..SIDE * SIDE).map(|_| (true, 4.0 * SIGMA_MM)));
+    let golden = steep.golden();
+    let (few, _) = Alignment::of_points(POINTS, golden, &window).unwrap();
+    let (before, after) = (
+        worst_lift(&few, golden),
+        worst_lift(&steep.alignment(), golden),
+    );
+    assert!(before > MOST_LIFT_MM, "{before}");
+    assert!(after < before / 1.7, "{before} {after}");
+}
