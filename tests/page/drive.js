@@ -173,6 +173,7 @@ try {
     const rows = await page.locator("#comparison-rows tr").allTextContents();
     assert.equal(rows.length, 2);
     assert.match(rows.join(), /µm.*%/);
+    assert.match(await page.textContent("#comparison-limits"), /^Good parts deviate by up to 0\.0\d\d ± 0\.0\d\d mm; the limit was set to ±0\.15 mm\.$/);
     await page.waitForFunction(() => /recipe 7 · .* is active/.test(document.querySelector("#other-words").textContent));
     await page.click("nav a[href='#live']");
     await trigger();

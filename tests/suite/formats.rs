@@ -25,7 +25,7 @@ const MEMBERS: [&str; 9] = [
 ];
 
 /// Keys of its `recipe.json`, version 1, as a taught recipe has them. The same holds for these.
-const KEYS: [&str; 50] = [
+const KEYS: [&str; 57] = [
     "alignment",
     "calibration",
     "camera",
@@ -52,6 +52,13 @@ const KEYS: [&str; 50] = [
     "gauges.measures.smoothing_px",
     "gauges.name",
     "gauges.region",
+    "good_parts",
+    "good_parts.beyond",
+    "good_parts.largest_mm",
+    "good_parts.left_out",
+    "good_parts.limit_mm",
+    "good_parts.scatter_mm",
+    "good_parts.tolerance_mm",
     "min_coverage",
     "name",
     "noise_counts",

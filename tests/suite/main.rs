@@ -19,6 +19,7 @@ mod hostile;
 mod house;
 mod inputs;
 mod licences;
+mod limits;
 mod measured;
 mod outputs;
 mod page;

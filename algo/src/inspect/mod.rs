@@ -3,6 +3,7 @@
 pub mod align;
 mod deviation;
 pub mod gauge;
+pub mod good;
 mod openings;
 mod region;
 mod strips;

@@ -94,6 +94,11 @@ impl RecipeFile {
                 .check_bounds()
                 .map_err(|error| format!("comparison.{which}.{error}"))?;
         }
+        if let Some(good_parts) = &self.good_parts {
+            good_parts
+                .check_bounds()
+                .map_err(|error| format!("good_parts.{error}"))?;
+        }
         Ok(())
     }
 

@@ -1,6 +1,7 @@
 //! `recipe.json` inside a recipe, version 1, as it stands on disk. Frozen: see `docs/formats.md`.
 
 use super::comparison::ComparisonFile;
+use super::good_parts::GoodPartsFile;
 use algo::units::AbsolutePhase;
 use serde::{Deserialize, Serialize};
 
@@ -64,6 +65,9 @@ pub struct RecipeFile {
     /// What teaching gained; none where it was taught from a recording.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub comparison: Option<ComparisonFile>,
+    /// The deviation of good parts, as predicted when it was taught; none where it was taught before that was done.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub good_parts: Option<GoodPartsFile>,
 }
 
 /// A camera's frames.

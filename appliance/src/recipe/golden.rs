@@ -3,6 +3,7 @@
 use super::archive::{self, Arrays};
 use super::comparison::ComparisonFile;
 use super::file::{CameraFile, FORMAT, RasterFile, VERSION};
+use super::good_parts::{GoodPartsFile, Noise};
 use super::planner::{self, Choice};
 use super::{
     AlignmentKind, GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile, SequenceFile,
@@ -13,17 +14,18 @@ use algo::adaptive::{Surface, phase_reach};
 use algo::geometry::Triangulator;
 use algo::inspect::openings;
 use algo::phase::{Decoder, Trust};
-use algo::pipeline::{self, HeightMap, PhaseMap};
+use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
 
 /// Pixels at silhouettes mix two surfaces: the golden map is eroded by this much.
 const EROSION_PX: usize = 2;
 /// Pixels whose taught height is less certain than this are not compared, mm (1 σ).
 const MAX_SIGMA_MM: f64 = 0.25;
 /// Deviations are averaged over squares of this many camera pixels.
-const SMOOTHING_PX: usize = 9;
-/// Limit of the deviation, mm.
+pub(super) const SMOOTHING_PX: usize = 9;
+/// Limit of the deviation where the part can be measured that well, mm: see [`super::good_parts`].
 const DEVIATION_MM: f64 = 0.15;
-/// The part's coverage may fall by this share of the frame.
+/// The part's coverage may fall by this share of the frame: noise alone takes less from 200,000 pixels even if the modulation of
+/// all of them is the least that is trusted (6 σ of as many coins, twice).
 const COVERAGE_CHANGE: f64 = 0.01;
 /// Least share of the golden surface that must be resolved.
 const MIN_COVERAGE: f64 = 0.80;
@@ -98,10 +100,17 @@ impl GoldenPart<'_> {
             .iter()
             .map(|trust| *trust == Trust::Resolved)
             .collect();
-        let (regions, gauges) = gauges(&resolved, self.phases.width);
-        let arrays = self.arrays(naming.placement_tolerance_mm);
+        let (regions, mut gauges) = gauges(&resolved, self.phases.width);
+        let mut arrays = self.arrays(naming.placement_tolerance_mm);
         let sequences = self.sequences(&arrays);
-        let choice = planner::choose(&sequences, &gauges);
+        let mut choice = planner::choose(&sequences, &gauges);
+        let good_parts = self.hold(&mut arrays, &sequences, choice.production);
+        choice.reasons.extend(good_parts.words());
+        for gauge in &mut gauges {
+            if matches!(gauge.measures, GaugeKind::Deviation { .. }) {
+                (gauge.low, gauge.high) = (Some(-good_parts.limit_mm), Some(good_parts.limit_mm));
+            }
+        }
         let range = self.triangulator.range();
         let calibration = self.calibration;
         let file = RecipeFile {
@@ -136,6 +145,7 @@ impl GoldenPart<'_> {
             regions,
             gauges,
             comparison: self.comparison.clone(),
+            good_parts: Some(good_parts),
         };
         let (bytes, _) = archive::pack(&file, &arrays).map_err(|error| error.to_string())?;
         drop(arrays);
@@ -236,7 +246,13 @@ impl GoldenPart<'_> {
             .into()
     }
 
-    fn worth(&self, kind: SequenceKind, frames: Vec<[f64; 2]>, arrays: &Arrays) -> SequenceFile {
+    /// σ_z² in mm² of a pixel of golden, measured with these frames.
+    fn variance(
+        &self,
+        kind: SequenceKind,
+        frames: &[[f64; 2]],
+        arrays: &Arrays,
+    ) -> impl Fn(usize) -> f64 {
         // Of a geometric sequence only the finest level carries the accuracy.
         let absolute = !self.decoder.unwrapping().needs_map() && kind == SequenceKind::Full;
         let carries = |ratio: f64| !absolute || ratio >= 0.999;
@@ -245,22 +261,58 @@ impl GoldenPart<'_> {
             .filter(|[ratio, _]| carries(*ratio))
             .map(|[ratio, _]| ratio * ratio);
         let information: f64 = squares.sum();
+        move |at| {
+            let counts = f64::from(arrays.modulation[at]);
+            let turns =
+                self.noise / std::f64::consts::TAU * (2.0 / (information * counts * counts)).sqrt();
+            (turns * f64::from(arrays.height_slope[at])).powi(2)
+        }
+    }
+
+    /// The limit of the deviation, and the comparison without what cannot be held to it.
+    fn hold(
+        &self,
+        arrays: &mut Arrays,
+        sequences: &[SequenceFile],
+        production: usize,
+    ) -> GoodPartsFile {
+        let variances = |of: Option<&SequenceFile>| -> Vec<f32> {
+            let pixels = 0..arrays.valid.len();
+            match of {
+                Some(SequenceFile { kind, frames, .. }) => {
+                    let variance = self.variance(*kind, frames, arrays);
+                    pixels.map(|at| variance(at) as f32).collect()
+                }
+                None => vec![0.0; pixels.len()],
+            }
+        };
+        // Golden was measured with the full sequence, the last.
+        let noise = Noise {
+            triangulator: self.triangulator,
+            surface: KnownSurface {
+                width: self.phases.width,
+                phase: self.phases.phase.clone(),
+                height: self.heights.height.clone(),
+            },
+            golden: variances(sequences.last()),
+            production: variances(sequences.get(production)),
+        };
+        noise.hold(&mut arrays.valid, DEVIATION_MM)
+    }
+
+    fn worth(&self, kind: SequenceKind, frames: Vec<[f64; 2]>, arrays: &Arrays) -> SequenceFile {
         let safe = |at: &usize| {
             kind.reach()
                 .is_none_or(|reach| arrays.phase_reach[*at] < reach)
         };
         let valid = || (0..arrays.valid.len()).filter(|&at| arrays.valid[at] == 1);
-        let variance = |at: usize| {
-            let counts = f64::from(arrays.modulation[at]);
-            let turns =
-                self.noise / std::f64::consts::TAU * (2.0 / (information * counts * counts)).sqrt();
-            (turns * f64::from(arrays.height_slope[at])).powi(2)
-        };
+        let variance = self.variance(kind, &frames, arrays);
         let count = valid().count().max(1) as f64;
+        let sigma_mm = (valid().map(variance).sum::<f64>() / count).sqrt();
         SequenceFile {
             kind,
             frames,
-            sigma_mm: (valid().map(variance).sum::<f64>() / count).sqrt(),
+            sigma_mm,
             safe_share: valid().filter(safe).count() as f64 / count,
         }
     }

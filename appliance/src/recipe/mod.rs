@@ -14,6 +14,7 @@ pub mod file;
 mod gauge;
 pub mod generations;
 pub mod golden;
+pub mod good_parts;
 pub mod planner;
 pub mod replace;
 pub mod store;

@@ -5,7 +5,7 @@ use super::file::{GaugeKind, SequenceFile, SequenceKind};
 
 /// A sequence is good enough if its noise, after a gauge's smoothing, stays this many times inside
 /// the gauge's limit: a frame has some thousand independent places, whose extremes reach 4 σ.
-const SIGMAS: f64 = 6.0;
+pub(super) const SIGMAS: f64 = 6.0;
 /// Share of the golden surface that must be safe for a sequence that is not full.
 const SAFE_SHARE: f64 = 0.98;
 

@@ -71,6 +71,8 @@ pub fn keep_gauges(taught: Taught, replaced: &RecipeFile) -> Result<Taught, Stri
     file.regions.clone_from(&replaced.regions);
     file.gauges.clone_from(&replaced.gauges);
     file.min_coverage = replaced.min_coverage;
+    // It was predicted for the limits that teaching sets.
+    file.good_parts = None;
     let choice = planner::choose(&file.sequences, &file.gauges);
     file.production = choice.production;
     let mut recipe = Recipe::check(file, arrays)?;

@@ -114,12 +114,25 @@ async function consent(number) {
   return choose(`Replace recipe ${number}?`, words, keep.concat([["Replace, with new gauges", { replace: true }]]));
 }
 
+// What the limit of the deviation holds, as predicted when the part was taught.
+function held(good) {
+  if (!good) return "";
+  const limit = `±${good.limit_mm.toFixed(2)} mm`;
+  const expected = `Good parts deviate by up to ${good.largest_mm.toFixed(3)} ± ${good.scatter_mm.toFixed(3)} mm`;
+  const words = [good.limit_mm > good.tolerance_mm
+    ? `The deviation of ±${good.tolerance_mm.toFixed(2)} mm that is asked for cannot be held: the limit was set to ${limit}. ${expected}. More light, less noise or another pose narrows it.`
+    : `${expected}; the limit was set to ${limit}.`];
+  if (good.left_out > 0) words.push(`${(100 * good.left_out).toFixed(2)} % of the surface is seen too faintly or too flatly for that and is not compared: another pose brings it back.`);
+  return words.join(" ");
+}
+
 // Before and after: the same number of frames with straight fringes and with the part's own.
 export async function compare(number) {
   const recipe = await ask("GET", `/api/recipes/${number}`);
   const { comparison } = recipe;
   text("comparison-name", `recipe ${recipe.number} · ${recipe.name}`);
   show("comparison", true);
+  text("comparison-limits", held(recipe.good_parts));
   if (!comparison) {
     fill($("comparison-rows"));
     text("comparison-words", "this recipe was made from a recording: there is nothing to compare it with");

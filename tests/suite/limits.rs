@@ -1,0 +1,289 @@
+//! The limits that teaching sets by itself: good parts keep them, as predicted, and dents do not.
+
+use super::placement::{Bed, TIMEOUT, bed};
+use algo::geometry::Vector;
+use algo::units::Height;
+use appliance::plan::Plan;
+use appliance::recipe::good_parts::GoodPartsFile;
+use appliance::recipe::teach::{Naming, teach};
+use appliance::station::{Inspection, Verdict};
+use hal::sim::parts::{Defect, Flowerpot, SheetMetal};
+use hal::sim::{Part, Placement, Scenario};
+use std::time::Instant;
+use tests::random::Random;
+
+const STOCK: [&str; 8] = [
+    "cone",
+    "sawtooth",
+    "sphere",
+    "tube",
+    "flowerpot",
+    "spline",
+    "plane",
+    "sheet_metal",
+];
+const DEPTH_MM: f64 = 0.3;
+const DIAMETER_MM: f64 = 8.0;
+/// What the limits are asked to be.
+const TOLERANCE_MM: f64 = 0.15;
+/// Half the height of the flowerpot's wall, and the cosine of its slope against the axis.
+const POT_MM: (f64, f64) = (74.5, 0.967);
+
+/// The default head with a stock part in front of it, and its noise from a seed.
+fn scenario(kind: &str, seed: u64) -> Scenario {
+    let text = format!("[noise]\nseed = {seed}\n[part]\nkind = \"{kind}\"\n");
+    Scenario::from_toml(&text, kind).unwrap()
+}
+
+/// A quarter of the pixels, and of the rays of each.
+fn small(kind: &str, seed: u64) -> Scenario {
+    let mut scenario = scenario(kind, seed);
+    (scenario.rig.camera.width, scenario.rig.camera.height) = (256, 256);
+    scenario.sub_rays = 2;
+    scenario
+}
+
+/// A taught part: what it is judged by, the pixels that are compared, and the prediction.
+struct Line {
+    bed: Bed,
+    plan: Plan,
+    compared: Vec<bool>,
+    predicted: GoodPartsFile,
+}
+
+fn line(scenario: &Scenario) -> Line {
+    let mut bed = bed(scenario);
+    let naming = Naming {
+        number: 1,
+        part_number: "P".into(),
+        name: "part".into(),
+        taught_at_unix_s: 0,
+        placement_tolerance_mm: 3.0,
+    };
+    let (head, calibration) = (&mut bed.head, &bed.calibration);
+    let taught = teach(head, calibration, &naming, TIMEOUT, &|_, _| ()).unwrap();
+    let predicted = taught.recipe.file.good_parts.unwrap();
+    let words = predicted.words();
+    assert!(
+        words
+            .iter()
+            .all(|line| taught.choice.reasons.contains(line))
+    );
+    let compared = taught.recipe.arrays.valid.iter().map(|&on| on == 1);
+    let compared = compared.collect();
+    let plan = Plan::new(taught.recipe, calibration, true).unwrap();
+    let rasters = plan.rasters(calibration).unwrap();
+    head.load(rasters).unwrap();
+    Line {
+        bed,
+        plan,
+        compared,
+        predicted,
+    }
+}
+
+impl Line {
+    /// A cycle as production runs it: longer sequences while one asks for them.
+    fn judge(&mut self) -> Inspection {
+        let mut step = 0;
+        loop {
+            let mut frames = Vec::new();
+            let mut keep = |_, frame| frames.push(frame);
+            let indices = self.plan.indices(step);
+            self.bed.head.acquire(indices, TIMEOUT, &mut keep).unwrap();
+            let found = self.plan.inspect(step, &frames, Instant::now());
+            step += 1;
+            if found.step_up.is_none() || step == self.plan.steps() {
+                return found;
+            }
+        }
+    }
+
+    /// |deviation| of so many good parts, all of which must pass.
+    fn good(&mut self, name: &str, parts: usize) -> Vec<f64> {
+        let judged = (0..parts).map(|at| {
+            let found = self.judge();
+            let values = found.gauges.iter().map(|gauge| gauge.value);
+            let values: Vec<_> = values.collect();
+            let verdict = found.verdict();
+            assert_eq!(verdict, Verdict::Pass, "{name}, part {at}: {values:?}");
+            values[0].unwrap().abs()
+        });
+        judged.collect()
+    }
+
+    /// The point that a pixel sees, where it sees one.
+    fn point(&self, heights: &[f32], at: usize) -> Option<Vector> {
+        let width = self.plan.file().camera.width as usize;
+        let z = f64::from(*heights.get(at)?);
+        let triangulator = self.plan.production().triangulator();
+        let height = z.is_finite().then(|| Height::from_mm(z))?;
+        triangulator.point(at % width, at / width, height)
+    }
+
+    /// Places on the surface, uniform by its area, about which all that is seen of a dent is compared, and that keep the dent's
+    /// radius from the rim of the flowerpot.
+    fn places(&self, pot: bool, count: usize, seed: u64) -> Vec<Vector> {
+        let width = self.plan.file().camera.width as usize;
+        let heights = self.bed.stage.truth().height;
+        let point = |at: usize| self.point(&heights, at);
+        let area = |at: usize| match (point(at), point(at + 1), point(at + width)) {
+            (Some(here), Some(beside), Some(below)) if self.compared[at] => {
+                (beside - here).cross(below - here).length()
+            }
+            _ => 0.0,
+        };
+        let areas: Vec<f64> = (0..heights.len()).map(area).collect();
+        let total: f64 = areas.iter().sum();
+        let whole = |at: usize, middle: Vector| {
+            // Pixels that see the dent are less than this many away: the wall is nearer the camera by 15 % at most.
+            let (row, column, reach) = (at / width, at % width, 12);
+            let rim = POT_MM.0 - DIAMETER_MM / 2.0 * POT_MM.1;
+            (!pot || middle.z.abs() < rim)
+                && row >= reach
+                && column >= reach
+                && (row - reach..=row + reach).all(|v| {
+                    (column - reach..=column + reach).all(|u| {
+                        let near = v * width + u;
+                        // On the flat part an opening is seen as nothing.
+                        let (across, down) = (u.abs_diff(column), v.abs_diff(row));
+                        match point(near) {
+                            Some(p) if (p - middle).length() > DIAMETER_MM / 2.0 => true,
+                            Some(_) => self.compared[near],
+                            None => pot || across * across + down * down > reach * reach,
+                        }
+                    })
+                })
+        };
+        let mut random = Random::new(seed);
+        let mut places = Vec::new();
+        while places.len() < count {
+            let mut left = random.share() * total;
+            let beyond = |area: &f64| {
+                left -= area;
+                left < 0.0
+            };
+            let Some(at) = areas.iter().position(beyond) else {
+                continue;
+            };
+            places.extend(point(at).filter(|&middle| whole(at, middle)));
+        }
+        places
+    }
+}
+
+/// So many goldens, and good parts of each: all pass, and the largest deviations are as predicted within these shares.
+fn keep_their_limits(
+    goldens: u64,
+    parts: usize,
+    scenario: fn(&str, u64) -> Scenario,
+    [mean_within, scatter_within]: [f64; 2],
+) {
+    for kind in STOCK {
+        let (mut values, mut predicted) = (Vec::new(), Vec::new());
+        for seed in 1..=goldens {
+            let mut line = line(&scenario(kind, seed));
+            assert_eq!(line.predicted.limit_mm, TOLERANCE_MM, "{kind}");
+            assert!(line.predicted.beyond < 1e-5, "{kind}: {:?}", line.predicted);
+            assert!(
+                line.predicted.left_out < 0.05,
+                "{kind}: {:?}",
+                line.predicted
+            );
+            predicted.push(line.predicted);
+            values.extend(line.good(kind, parts));
+        }
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let scatter = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        let scatter = scatter.sqrt();
+        let of = |value: fn(&GoodPartsFile) -> f64| {
+            predicted.iter().map(value).sum::<f64>() / predicted.len() as f64
+        };
+        let (expected, spread) = (of(|p| p.largest_mm), of(|p| p.scatter_mm));
+        println!(
+            "{kind:12} {count} good parts: {mean:.4} ± {scatter:.4} mm, predicted {expected:.4} ± {spread:.4}, largest {:.4}; \
+             {:.1e} beyond, {:.2} % left out",
+            values.iter().copied().fold(0.0, f64::max),
+            of(|p| p.beyond),
+            of(|p| p.left_out) * 100.0
+        );
+        assert!((mean / expected - 1.0).abs() < mean_within, "{kind}");
+        assert!((scatter / spread - 1.0).abs() < scatter_within, "{kind}");
+    }
+}
+
+/// Dents at seeded places of both parts: all are found.
+fn are_found(dents: usize, sub_rays: u32) {
+    for kind in ["sheet_metal", "flowerpot"] {
+        let mut scenario = scenario(kind, 3);
+        scenario.sub_rays = sub_rays;
+        let mut line = line(&scenario);
+        let pot = kind == "flowerpot";
+        let mut smallest = f64::INFINITY;
+        for place in line.places(pot, dents, 11) {
+            let defects = vec![Defect::Dent {
+                x: place.x,
+                y: place.y,
+                depth_mm: DEPTH_MM,
+                diameter_mm: DIAMETER_MM,
+            }];
+            let part = match pot {
+                true => Part::Flowerpot(Flowerpot {
+                    defects,
+                    ..Flowerpot::default()
+                }),
+                false => Part::SheetMetal(SheetMetal { defects }),
+            };
+            let placement = Placement::default();
+            line.bed.stage.place(&part, &placement).unwrap();
+            let found = line.judge();
+            let deviation = found.gauges[0].value.unwrap_or(f64::NAN);
+            smallest = smallest.min(deviation.abs());
+            let verdict = found.verdict();
+            assert_eq!(verdict, Verdict::Fail, "{kind} at {place:?}: {deviation}");
+        }
+        println!("{kind}: {dents} dents found, smallest deviation {smallest:.3} mm");
+    }
+}
+
+#[test]
+fn good_parts_of_every_stock_kind_keep_the_limits_that_teaching_sets() {
+    // One golden decides where the mean lies within its scatter, and how much of that is left.
+    keep_their_limits(1, 25, small, [0.35, 0.8]);
+}
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn two_hundred_good_parts_of_every_stock_kind_keep_the_limits_that_teaching_sets() {
+    keep_their_limits(10, 20, scenario, [0.12, 0.35]);
+}
+
+#[test]
+fn a_dent_is_found_wherever_it_is_under_the_limits_that_teaching_sets() {
+    are_found(5, 2);
+}
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn fifty_dents_are_found_wherever_they_are_under_the_limits_that_teaching_sets() {
+    are_found(50, 4);
+}
+
+#[test]
+fn a_head_that_is_too_noisy_for_the_tolerance_says_so_with_the_numbers_and_good_parts_pass() {
+    let mut scenario = small("flowerpot", 1);
+    scenario.noise.noise_counts *= 2.0;
+    let mut line = line(&scenario);
+    let GoodPartsFile {
+        limit_mm,
+        largest_mm,
+        ..
+    } = line.predicted;
+    assert!(limit_mm > TOLERANCE_MM && largest_mm < limit_mm);
+    let words = &line.predicted.words()[0];
+    for number in ["±0.15 mm", "cannot be held", &format!("±{limit_mm:.2} mm")] {
+        assert!(words.contains(number), "{words}");
+    }
+    line.good("noisy", 25);
+}
