@@ -10,7 +10,7 @@ use appliance::daemon::Daemon;
 use appliance::history::seqs::AHEAD;
 use appliance::progress::Progress;
 use appliance::recipe::teach::{Naming, TeachError, teach_while};
-use appliance::station::{Event, Request};
+use appliance::station::{ConnectionEdges, ControlWrite, Event, Masked, Request};
 use hal::error::Device;
 use hal::sim::Scenario;
 use std::fs;
@@ -26,13 +26,17 @@ const REJECTED_BY_FAULT: u16 = 5;
 const ABORT: u16 = 1 << 5;
 
 fn start(place: &Place) -> Daemon {
+    let daemon = starting(place);
+    daemon.wait_until_ready().unwrap();
+    daemon
+}
+
+fn starting(place: &Place) -> Daemon {
     let mut config = Config::read(&place.path("fringed.toml")).unwrap();
     config.modbus.listen = "127.0.0.1:0".parse().unwrap();
     config.http.listen = config.modbus.listen;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    let daemon = Daemon::start(&config, pool.unwrap(), Progress::new(true)).unwrap();
-    daemon.wait_until_ready().unwrap();
-    daemon
+    Daemon::start(&config, pool.unwrap(), Progress::new(true)).unwrap()
 }
 
 fn state(status: &Status) -> u16 {
@@ -214,6 +218,37 @@ fn a_result_counter_that_cannot_be_stored_stops_the_station_until_it_can() {
         .unwrap();
     assert!(reserved >= u32::from(last), "{reserved}");
     assert_eq!(long(&plc.measure(last + 1), 0), u32::from(last) + 1);
+}
+
+#[test]
+fn a_start_ends_also_where_the_plc_asks_for_another_recipe_or_is_offline() {
+    let place = Place::new();
+    start(&place).stop();
+    let select = ControlWrite {
+        recipe_select: Some(77),
+        ..ControlWrite::default()
+    };
+    let offline = ControlWrite {
+        control: Masked::<u16>::all(0),
+        ..ControlWrite::default()
+    };
+    for (write, reason) in [(select, 6), (offline, 2)] {
+        let daemon = starting(&place);
+        let mut edges = ConnectionEdges::default();
+        daemon.station.write(&mut edges, write).unwrap();
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .unwrap();
+        let settled =
+            runtime.block_on(async { tokio::time::timeout(PATIENCE, daemon.settled()).await });
+        let snapshot = settled.expect("the start ends").unwrap();
+        assert_eq!(
+            (snapshot.active(), snapshot.refusal),
+            (Some(1), Some(reason))
+        );
+        daemon.stop();
+    }
 }
 
 #[test]

@@ -7,6 +7,7 @@ use crate::journal::Severity;
 use crate::notify::Notify;
 use crate::progress::Progress;
 use crate::station::Snapshot;
+use crate::station::refusal::reject;
 use crate::station::snapshot::status;
 use crate::told::Told;
 use std::time::Duration;
@@ -76,6 +77,9 @@ async fn serve(daemon: &Daemon, notify: &Notify, progress: &Progress) {
                 format!(", recipe {} ({})", recipe.number, recipe.name)
             });
             progress.report(Severity::Notice, &format!("ready{recipe}"));
+            if let Some(words) = snapshot.refusal_words() {
+                progress.warn(&format!("no trigger is accepted yet: {words}"));
+            }
         }
         // Without a recipe the station still serves: the PLC loads or teaches one.
         Err(failure) => progress.warn(&failure.message),
@@ -104,6 +108,9 @@ async fn serve(daemon: &Daemon, notify: &Notify, progress: &Progress) {
 fn standing(snapshot: &Snapshot) -> String {
     match (&snapshot.fault, &snapshot.recipe) {
         (Some(fault), _) => format!("fault {}: {}; {}", fault.code, fault.cause, fault.remedy),
+        (None, Some(_)) if snapshot.refusal == Some(reject::OTHER_RECIPE) => {
+            snapshot.refusal_words().unwrap_or_default()
+        }
         (None, Some(recipe)) => format!("recipe {} ({})", recipe.number, recipe.name),
         (None, None) if !snapshot.is(status::CALIBRATION_VALID) => {
             "the head is not calibrated: calibrate it with `fringed calibrate`".into()

@@ -1,4 +1,4 @@
-//! How a start ends: READY, or why not.
+//! How a start ends: with a recipe, or why not.
 
 use super::{Daemon, runtime};
 use crate::error::{Exit, Failure};
@@ -7,7 +7,8 @@ use crate::station::{RecipeResult, Snapshot};
 use std::sync::Arc;
 
 impl Daemon {
-    /// Waits until the station is READY, or says why it will not be.
+    /// Waits until the station has its recipe, or says why it will not have one. It is READY then, unless the PLC does not ask
+    /// for it or asks for another recipe.
     ///
     /// # Errors
     /// The station's fault, or that its recipe could be neither loaded nor taught.
@@ -29,7 +30,8 @@ impl Daemon {
         let refused = |snapshot: &Snapshot| snapshot.recipe_result != RecipeResult::Ok;
         let settled = |snapshot: &Arc<Snapshot>| {
             let broken = snapshot.fault.is_some() || snapshot.error.is_some();
-            snapshot.is(status::READY) || broken || refused(snapshot)
+            let loaded = snapshot.recipe.is_some() && !snapshot.is_working();
+            loaded || broken || refused(snapshot)
         };
         let snapshot = snapshots.wait_for(settled).await.map(|found| found.clone());
         let snapshot = snapshot

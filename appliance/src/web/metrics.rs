@@ -50,6 +50,11 @@ pub(super) fn text(site: &Site) -> String {
             "Register 102.",
         ),
         (
+            "fringed_reject_reason",
+            f64::from(now.reject_reason),
+            "Register 120: why the last rejected request was rejected.",
+        ),
+        (
             "fringed_buffered_results",
             f64::from(now.buffered),
             "Results that wait for RESULT_ACK.",
