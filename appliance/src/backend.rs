@@ -8,6 +8,9 @@ use crate::calibration::Calibration;
 use crate::calibration::place::{Loaded, Place};
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
+use crate::history::RECIPE;
+use crate::plan::{Plan, PlanError};
+use crate::recipe::{Recipe, archive};
 use hal::head::DynHead;
 use hal::replay::Recording;
 use hal::sim::{Scenario, Stage};
@@ -27,6 +30,44 @@ pub struct Opened {
     pub problem: Option<String>,
     /// Why the newest calibration could not be used and the one before is.
     pub fallback: Option<String>,
+    /// What a replay head plays.
+    pub played: Option<Played>,
+}
+
+/// The recordings that a replay head plays.
+#[derive(Clone, Debug)]
+pub struct Played {
+    /// Ratio and shift of each frame of a recording.
+    shown: Vec<(f64, f64)>,
+    /// Fingerprint of the calibration that they were taken with, where a station kept them with their recipe.
+    calibration: Option<String>,
+}
+
+impl Played {
+    fn of(folder: &Path, recording: &Recording) -> Self {
+        let recipe = fs::File::open(folder.join(RECIPE)).ok();
+        let manifest = recipe.and_then(|file| archive::manifest(file).ok());
+        let frames = recording.frames.iter();
+        Self {
+            shown: frames
+                .map(|taken| (taken.ratio, taken.shift_turns))
+                .collect(),
+            calibration: manifest.map(|manifest| manifest.calibration),
+        }
+    }
+
+    /// Makes a recipe ready to judge these recordings: of its sequences only the one that they show. A recording does not say
+    /// all of the calibration, so its own recipe's is believed.
+    ///
+    /// # Errors
+    /// If the recipe was made for another calibration or does not fit the frames.
+    pub fn plan(&self, recipe: Recipe, calibration: &Calibration) -> Result<Plan, PlanError> {
+        let plan = match self.calibration.as_ref() == Some(&recipe.file.calibration) {
+            true => Plan::again(recipe, calibration, false),
+            false => Plan::new(recipe, calibration, false),
+        };
+        Ok(plan?.only(&self.shown))
+    }
 }
 
 impl Opened {
@@ -217,6 +258,7 @@ fn simulated(path: Option<&Path>, progress: &(dyn Fn(f64) + Sync)) -> Result<Ope
         stage: Some(stage),
         problem: None,
         fallback: None,
+        played: None,
     })
 }
 
@@ -226,6 +268,8 @@ fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened, Failure> {
         .map(|folder| Recording::open(folder))
         .collect::<Result<Vec<_>, _>>()?;
     let calibration = calibration_of(folders, &recordings)?;
+    let first = folders.iter().zip(&recordings).next();
+    let played = first.map(|(folder, recording)| Played::of(folder, recording));
     let head = hal::replay::head(recordings)
         .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
     Ok(Opened {
@@ -234,6 +278,7 @@ fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened, Failure> {
         stage: None,
         problem: None,
         fallback: None,
+        played,
     })
 }
 

@@ -279,8 +279,11 @@ impl Worker {
                 // Before the arrays of the next take their place.
                 self.shelf.make_room(stamp.as_ref().map_or(0, Stamp::bytes));
                 let loaded = self.recipes.load(number).map_err(refuse)?;
-                let simulated = self.opened.stage.is_some();
-                let planned = pool.install(|| Plan::new(loaded.recipe, calibration, simulated));
+                let (played, simulated) = (&self.opened.played, self.opened.stage.is_some());
+                let planned = pool.install(|| match played {
+                    Some(played) => played.plan(loaded.recipe, calibration),
+                    None => Plan::new(loaded.recipe, calibration, simulated),
+                });
                 let plan = Arc::new(planned.map_err(refuse_plan)?);
                 // What stands in for a damaged file is not that file's plan.
                 if let Some(stamp) = stamp.filter(|_| loaded.fallback.is_none()) {

@@ -1,4 +1,4 @@
-//! Gauges, alignment and the choice of sequence on parts in front of the simulated head.
+//! Gauges and alignment on parts in front of the simulated head.
 
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
 use super::station_plc::{Daemon, Place, Plc, READY, SMALL_HEAD, long};
@@ -12,7 +12,7 @@ use appliance::recipe::{
 use appliance::seam;
 use appliance::station::{Inspection, Unit, Verdict};
 use hal::frame::Frame;
-use hal::sim::parts::{Cone, Plane, SheetMetal};
+use hal::sim::parts::{Plane, SheetMetal};
 use hal::sim::{Part, Placement, Scenario};
 use std::fs;
 use std::time::Instant;
@@ -103,7 +103,7 @@ pub(crate) fn frames(bed: &mut Bed, plan: &Plan, step: usize) -> Vec<Frame> {
     frames
 }
 
-fn inspect(bed: &mut Bed, plan: &Plan, step: usize) -> Inspection {
+pub(crate) fn inspect(bed: &mut Bed, plan: &Plan, step: usize) -> Inspection {
     bed.head
         .load(plan.rasters(&bed.calibration).unwrap())
         .unwrap();
@@ -341,82 +341,6 @@ fn a_component_that_the_shape_does_not_determine_is_invalid_and_is_named() {
     assert_eq!(found.verdict(), Verdict::Invalid);
     let reason = found.reason.unwrap();
     assert!(reason.contains("x, y, about z"), "{reason}");
-}
-
-#[test]
-fn the_shortest_sequence_will_do_for_a_part_in_place_and_not_for_one_out_of_it() {
-    let part = Part::Cone(Cone::default());
-    let mut bed = bed(&scenario(part.clone()));
-    let taught = taught(&mut bed).unwrap();
-    let file = RecipeFile {
-        production: 0,
-        ..taught.recipe.file.clone()
-    };
-    let plan = plan(&bed, &file, &taught.recipe.arrays);
-    assert_eq!(plan.steps(), 3);
-    let counts: Vec<usize> = (0..3).map(|step| plan.indices(step).len()).collect();
-    assert_eq!(counts, [3, 6, 12]);
-    let place = |bed: &Bed, z: f64| {
-        let placement = Placement {
-            shift_mm: [0.0, 0.0, z],
-            ..Placement::default()
-        };
-        bed.stage.place(&part, &placement).unwrap();
-    };
-    let flags = |found: &Inspection| found.flags & 0b1110;
-    place(&bed, 0.3);
-    let found: Vec<Inspection> = (0..3).map(|step| inspect(&mut bed, &plan, step)).collect();
-    assert_eq!(
-        [0, 1, 2].map(|step| flags(&found[step])),
-        [0b10, 0b100, 0b1000]
-    );
-    let z = |found: &Inspection| found.placement.unwrap().shift_mm[2];
-    for found in &found[1..] {
-        assert_eq!(found.step_up, None);
-        assert!((z(found) - 0.3).abs() < 0.02, "{}", z(found));
-    }
-    // Beyond the tolerance short sequences may lie: the full one measures how far, and it is the last.
-    place(&bed, 2.0);
-    let short = inspect(&mut bed, &plan, 1);
-    assert!(short.step_up.is_some());
-    let full = inspect(&mut bed, &plan, 2);
-    assert_eq!(full.step_up, None);
-    assert!((z(&full) - 2.0).abs() < 0.05, "{}", z(&full));
-    assert_eq!(full.verdict(), Verdict::Invalid);
-}
-
-#[test]
-fn sequences_of_the_same_length_and_of_different_kinds_are_all_run() {
-    let part = Part::Cone(Cone::default());
-    let mut bed = bed(&scenario(part.clone()));
-    let taught = taught(&mut bed).unwrap();
-    let mut file = RecipeFile {
-        production: 0,
-        ..taught.recipe.file.clone()
-    };
-    // As many shifts of its one level as the two levels behind it have together.
-    file.sequences[0].frames = (0..6).map(|k| [1.0, f64::from(k) / 6.0]).collect();
-    let plan = plan(&bed, &file, &taught.recipe.arrays);
-    let counts: Vec<usize> = (0..plan.steps())
-        .map(|step| plan.indices(step).len())
-        .collect();
-    assert_eq!(counts, [6, 6, 12]);
-    let flags: Vec<u16> = (0..3)
-        .map(|step| inspect(&mut bed, &plan, step).flags & 0b1110)
-        .collect();
-    assert_eq!(flags, [0b10, 0b100, 0b1000]);
-    for step in 0..3 {
-        let shown: Vec<_> = plan.shown(step).collect();
-        assert_eq!(plan.step_that_shows(&shown), Some(step));
-        let frames = frames(&mut bed, &plan, step);
-        let layers = plan.layers(step, &frames).unwrap();
-        let resolved = layers.height_mm.iter().filter(|z| !z.is_nan()).count();
-        assert!(resolved > 5000, "step {step}: {resolved}");
-    }
-    // What is recorded names its frames, so a part that was judged by the second is judged by the second again.
-    assert_eq!(plan.step_that_shows(&[(1.0, 0.0)]), None);
-    let none = plan.inspect(3, &[], Instant::now());
-    assert_eq!((none.verdict(), none.error_code), (Verdict::Invalid, 103));
 }
 
 #[test]

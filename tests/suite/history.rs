@@ -108,7 +108,7 @@ fn many_kills_lose_at_most_the_result_in_flight_and_no_seq_comes_back() {
 }
 
 /// A station that was taught a good part and then sees one with a dent.
-fn place_with_a_dent() -> Place {
+pub(crate) fn place_with_a_dent() -> Place {
     let place = Place::new();
     Daemon::start(&place).terminate();
     let scenario = fs::read_to_string(place.path("small.toml")).unwrap();
@@ -119,7 +119,7 @@ fn place_with_a_dent() -> Place {
 }
 
 /// The recording of a result, once it is linked.
-fn recording(place: &Place, seq: u32) -> PathBuf {
+pub(crate) fn recording(place: &Place, seq: u32) -> PathBuf {
     let started = Instant::now();
     loop {
         if let Some(folder) = reader(place).recording(seq).unwrap() {

@@ -73,6 +73,7 @@ pub(super) fn rpi(config: &HeadConfig) -> Result<Opened, Failure> {
         stage: None,
         problem: None,
         fallback: None,
+        played: None,
     })
 }
 

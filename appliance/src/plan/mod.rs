@@ -130,6 +130,18 @@ impl Plan {
             .map_err(|reason| PlanError::Unfit { number, reason })
     }
 
+    /// Leaves only the sequence that shows these frames, given by ratio and shift: a head that plays a recording has no others.
+    /// Where no sequence does, nothing changes.
+    pub fn only(mut self, frames: &[(f64, f64)]) -> Self {
+        if let Some(step) = self.step_that_shows(frames) {
+            let mut run = self.runs.swap_remove(step);
+            run.indices = (0..frames.len()).collect();
+            self.runs = vec![run];
+            self.frames = frames.to_vec();
+        }
+        self
+    }
+
     fn join(recipe: Recipe, calibration: &Calibration, simulated: bool) -> Result<Self, String> {
         let Recipe {
             file,

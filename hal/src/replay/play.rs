@@ -21,7 +21,8 @@ const EXPOSURE_REFRESHES: u32 = 2;
 /// recording has frames. After each frame of a recording was given at least once, the next recording's turn has come.
 ///
 /// # Errors
-/// `Unsupported` if there is no recording, or if they differ in camera format, projector size or number of frames.
+/// `Unsupported` if there is no recording, or if they differ in camera format, projector size, number of frames, or ratio and
+/// shift of a frame.
 pub fn head(recordings: Vec<Recording>) -> Result<DynHead, Error> {
     let Some(first) = recordings.first() else {
         return Err(Error::unsupported(
@@ -59,6 +60,22 @@ pub fn head(recordings: Vec<Recording>) -> Result<DynHead, Error> {
                 describe(first)
             ),
             "replay recordings of one head and one kind of sequence together",
+        ));
+    }
+    let differs = |r: &Recording| {
+        let mut pairs = r.frames.iter().zip(&first.frames);
+        pairs.position(|(a, b)| (a.ratio, a.shift_turns) != (b.ratio, b.shift_turns))
+    };
+    let other = recordings.iter().enumerate();
+    if let Some((index, frame)) = other
+        .filter_map(|(index, r)| Some((index, differs(r)?)))
+        .next()
+    {
+        return Err(Error::unsupported(
+            format!(
+                "replaying recording {index}, whose frame {frame} shows another ratio or shift than that of recording 0"
+            ),
+            "replay recordings of one sequence together",
         ));
     }
     let played = vec![false; wanted.3];

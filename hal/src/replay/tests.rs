@@ -398,4 +398,8 @@ fn a_replay_head_refuses_another_number_of_rasters_and_unlike_recordings() {
     assert!(error.to_string().contains("6 rasters") && error.to_string().contains("7 recorded"));
     assert!(head(vec![]).is_err());
     assert!(head(vec![small(8, 1), small(12, 1)]).is_err());
+    let mut other = small(8, 2);
+    other.frames[1].shift_turns += 0.125;
+    let refused = head(vec![small(8, 1), other]).map(|_| ()).unwrap_err();
+    assert!(refused.to_string().contains("frame 1"), "{refused}");
 }
