@@ -1,5 +1,6 @@
 //! What ends a command early: a message for people and an exit code after sysexits.
 
+pub use hal::bounds::shortened;
 use std::fmt;
 use std::process::ExitCode;
 

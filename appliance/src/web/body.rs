@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use axum::body::{Body, Bytes, to_bytes};
 use axum::http::StatusCode;
-use hal::bounds::shortened;
 use serde::de::DeserializeOwned;
 
 use super::problem::Problem;
+use crate::error::shortened;
 
 /// The most of a request in JSON, in bytes: 32 regions of 100 corners are a tenth of it.
 const MAX_JSON: usize = 64 << 10;
