@@ -44,7 +44,7 @@ function facts({ result, flags }, boot) {
     ["Resolved of the part", measured ? `${(result.coverage_permille / 10).toFixed(1)} %` : "–"],
     ["Height noise (1 σ)", measured && result.height_noise_mm !== null ? `${(1000 * result.height_noise_mm).toFixed(1)} µm` : "–"],
     ["Pattern fitness", measured ? `${(result.fitness_permille / 10).toFixed(1)} %` : "–"],
-    ["Stages", result.stages.map((stage) => `${nameOf(stage)} ${milliseconds(stage.us)}`).join(", ") || "–"],
+    ["Stages", result.stages.map((stage) => `${nameOf(stage)} ${milliseconds(stage.us)}`).join(" · ") || "–"],
     ["Placement", result.placement ? placement(result.placement) : "not known"],
     ["How it was measured", flags.length ? flags.join(", ") : "–"],
   ];
