@@ -357,12 +357,21 @@ impl Worker {
                 for reason in &taught.choice.reasons {
                     self.progress.log(reason);
                 }
-                self.recipes.save(number, &taught.bytes).map_err(|error| {
-                    (
-                        code::NOT_STORED,
-                        format!("store recipe {number}: {error}: free space"),
-                    )
-                })
+                let bytes = &taught.bytes;
+                let stored = match &kept {
+                    None => self.recipes.save(number, bytes).map(|()| true),
+                    // Whoever changed its gauges while it was taught was told that they are stored.
+                    Some(file) => self.recipes.replace(number, &file.fingerprint, bytes),
+                };
+                let problem = match stored {
+                    Ok(true) => return Ok(()),
+                    Ok(false) => "it was changed while it was taught: teach it again".into(),
+                    Err(error) => format!("{error}: free space"),
+                };
+                Err((
+                    code::NOT_STORED,
+                    format!("store recipe {number}: {problem}"),
+                ))
             });
         let ready = stored.and_then(|()| {
             let key = RecipeKey::Number(number);

@@ -39,4 +39,5 @@ mod stress;
 mod together;
 mod triangulation;
 mod twin;
+mod two_clients;
 mod written;

@@ -33,7 +33,9 @@ pub enum EditError {
     #[error(transparent)]
     Load(#[from] LoadError),
     /// Somebody else was faster.
-    #[error("recipe {0} was changed by somebody else: load it again and repeat the change")]
+    #[error(
+        "recipe {0} was changed or deleted by somebody else: load it again and repeat the change"
+    )]
     Outdated(u16),
     /// The recipe would not be one that can be used.
     #[error("{0}")]
@@ -76,9 +78,12 @@ pub fn edit(
     let (bytes, fingerprint) = archive::pack(&checked.file, &checked.arrays)
         .map_err(|error| EditError::Unfit(error.to_string()))?;
     fits(checked).map_err(EditError::Unfit)?;
-    let stored = store.save(number, &bytes);
-    stored.map_err(|error| EditError::Store(error.to_string()))?;
-    Ok(fingerprint)
+    // It was read without the lock: somebody else may have stored another one meanwhile.
+    match store.replace(number, &edit.fingerprint, &bytes) {
+        Ok(true) => Ok(fingerprint),
+        Ok(false) => Err(EditError::Outdated(number)),
+        Err(error) => Err(EditError::Store(error.to_string())),
+    }
 }
 
 fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a String>) -> Result<(), EditError> {

@@ -88,8 +88,37 @@ impl Store {
     /// Whatever the file system answers; then the stored recipe is the one before.
     pub fn save(&self, number: u16, bytes: &[u8]) -> io::Result<()> {
         let _alone = self.lock()?;
+        self.put(number, bytes)
+    }
+
+    /// Stores a packed recipe in place of the one with the fingerprint `base`. Answers whether it did: not if another one was
+    /// stored, or the recipe deleted, since `base` was read. Comparing and storing happen under one lock, so that of two
+    /// clients with the same base one is refused.
+    ///
+    /// # Errors
+    /// As [`Store::save`].
+    pub fn replace(&self, number: u16, base: &str, bytes: &[u8]) -> io::Result<bool> {
+        let _alone = self.lock()?;
+        let stored = self.is_newest(number, base);
+        if stored {
+            self.put(number, bytes)?;
+        }
+        Ok(stored)
+    }
+
+    fn put(&self, number: u16, bytes: &[u8]) -> io::Result<()> {
         self.keep_previous(number)?;
         write_whole(&self.path(number), bytes)
+    }
+
+    /// Whether the newest generation that is whole has this fingerprint.
+    fn is_newest(&self, number: u16, fingerprint: &str) -> bool {
+        let has = |path: &Path| {
+            let manifest = fs::File::open(path).map(archive::manifest);
+            matches!(manifest, Ok(Ok(file)) if file.fingerprint == fingerprint)
+        };
+        // Most often it is the newest; hashing all of a file is for one that is damaged.
+        has(&self.path(number)) || self.whole(number).is_ok_and(|whole| has(&whole))
     }
 
     /// Keeps other processes from changing the same recipes, as long as the answer lives.
