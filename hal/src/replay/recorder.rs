@@ -1,7 +1,7 @@
-//! Writes a recording in format 1: under a temporary name beside its place, synced, then renamed.
+//! Writes a recording in format 1: under a temporary name beside its place, files and folders synced, then renamed.
 
 use std::fs;
-use std::io::Write;
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -38,7 +38,7 @@ pub enum RecorderError {
         /// What was to be created.
         path: PathBuf,
         /// What the system says.
-        source: std::io::Error,
+        source: io::Error,
     },
 }
 
@@ -74,13 +74,7 @@ pub fn write_with(
     fs::create_dir(&partial).map_err(|source| create(&partial, source))?;
     let written = fill(recording, &manifest, &partial).and_then(|()| {
         add(&partial);
-        fs::rename(&partial, folder).map_err(|source| create(folder, source))?;
-        sync_folder(
-            folder
-                .parent()
-                .filter(|parent| !parent.as_os_str().is_empty()),
-        );
-        Ok(())
+        settle(&partial, folder).map_err(|source| create(folder, source))
     });
     if written.is_err() {
         // What matters is the first error; a temporary folder that cannot be removed either adds nothing to it.
@@ -110,18 +104,44 @@ fn wrong(folder: &Path, error: &RecordingError) -> RecorderError {
     }
 }
 
-fn create(path: &Path, source: std::io::Error) -> RecorderError {
+fn create(path: &Path, source: io::Error) -> RecorderError {
     RecorderError::Create {
         path: path.to_path_buf(),
         source,
     }
 }
 
-/// Recorded renames survive a power cut only if the folder is synced; not every file system can, and then
-/// nothing is lost that was promised.
-fn sync_folder(folder: Option<&Path>) {
-    if let Ok(folder) = fs::File::open(folder.unwrap_or(Path::new("."))) {
-        let _ = folder.sync_all();
+/// Gives a folder of synced files its name: whoever pulls the plug finds all of it under that name, or nothing. So the
+/// names of its files are synced before the rename, and the rename after it.
+fn settle(partial: &Path, folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(partial)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            sync_folder(&entry.path())?;
+        }
+    }
+    sync_folder(partial)?;
+    fs::rename(partial, folder)?;
+    let parent = folder.parent();
+    sync_folder(
+        parent
+            .filter(|parent| !parent.as_os_str().is_empty())
+            .unwrap_or(Path::new(".")),
+    )
+}
+
+/// Syncs the names in a folder. Where a file system cannot, nothing is lost that was promised.
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    match fs::File::open(folder)?.sync_all() {
+        Err(error)
+            if matches!(
+                error.kind(),
+                ErrorKind::InvalidInput | ErrorKind::Unsupported
+            ) =>
+        {
+            Ok(())
+        }
+        synced => synced,
     }
 }
 
@@ -268,7 +288,7 @@ fn fill(recording: &Recording, manifest: &Manifest, partial: &Path) -> Result<()
     for (index, frame) in recording.frames.iter().enumerate() {
         let path = partial.join(frame_file(index));
         let file = grey::encode(&frame.frame.format(), frame.frame.samples())
-            .map_err(|error| create(&path, std::io::Error::other(error)))?;
+            .map_err(|error| create(&path, io::Error::other(error)))?;
         put(&path, &file)?;
     }
     for (index, pattern) in recording.patterns.iter().enumerate() {
@@ -286,7 +306,7 @@ fn fill(recording: &Recording, manifest: &Manifest, partial: &Path) -> Result<()
     }
     let path = partial.join(MANIFEST);
     let mut text = serde_json::to_string_pretty(manifest)
-        .map_err(|error| create(&path, std::io::Error::other(error)))?;
+        .map_err(|error| create(&path, io::Error::other(error)))?;
     text.push('\n');
     put(&path, text.as_bytes())
 }
@@ -298,4 +318,58 @@ fn put(path: &Path, bytes: &[u8]) -> Result<(), RecorderError> {
             file.sync_all()
         })
         .map_err(|source| create(path, source))
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+    use rustix::fs::inotify;
+    use std::mem::MaybeUninit;
+
+    /// What was done in the watched folders, in order.
+    fn events(watch: &impl std::os::fd::AsFd) -> Vec<String> {
+        let mut buffer = [MaybeUninit::uninit(); 4096];
+        let mut reader = inotify::Reader::new(watch, &mut buffer);
+        let mut events = Vec::new();
+        while let Ok(event) = reader.next() {
+            let name = event
+                .file_name()
+                .map(|name| name.to_string_lossy().into_owned());
+            let name = name.unwrap_or_else(|| "itself".into());
+            let flags = event.events();
+            if flags.contains(inotify::ReadFlags::MOVED_TO) {
+                events.push(format!("rename to {name}"));
+            } else if flags.contains(inotify::ReadFlags::OPEN | inotify::ReadFlags::ISDIR) {
+                events.push(format!("open {name}"));
+            }
+        }
+        events
+    }
+
+    #[test]
+    fn folders_are_synced_before_a_recording_gets_its_name_and_the_name_after_it() {
+        let place = tempfile::tempdir().unwrap();
+        let partial = place.path().join(".7.partial");
+        for folder in ["frames", "truth"] {
+            fs::create_dir_all(partial.join(folder)).unwrap();
+        }
+        let watch = inotify::init(inotify::CreateFlags::NONBLOCK).unwrap();
+        for folder in [&*partial, place.path()] {
+            let wanted = inotify::WatchFlags::OPEN | inotify::WatchFlags::MOVED_TO;
+            inotify::add_watch(&watch, folder, wanted).unwrap();
+        }
+        settle(&partial, &place.path().join("7")).unwrap();
+        let events = events(&watch);
+        let last = |wanted: &str| {
+            let found = events.iter().rposition(|event| event == wanted);
+            found.unwrap_or_else(|| panic!("no {wanted:?} in {events:?}"))
+        };
+        // A folder is opened to be synced.
+        let renamed = last("rename to 7");
+        for folder in ["open frames", "open truth"] {
+            assert!(last(folder) < last("open .7.partial"), "{events:?}");
+        }
+        assert!(last("open .7.partial") < renamed, "{events:?}");
+        assert!(renamed < last("open itself"), "{events:?}");
+    }
 }
