@@ -368,8 +368,7 @@ fn effects(
                 keep_gauges,
             } => order(Order::Teach(job, number, keep_gauges)),
             Effect::PersistSeq(seq) => {
-                let unanswered = || "the storage does not answer".into();
-                let failed = (!history.take(seq)).then(unanswered);
+                let failed = history.take(seq).err();
                 return Some(Event::Stored { seq, failed });
             }
             Effect::Log(line) => progress.log(&line),

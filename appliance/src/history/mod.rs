@@ -8,7 +8,8 @@
 //! ```text
 //! station ───result──► spool     in memory that kill -9 does not touch
 //!                     queue ──► history's thread ──► history.db       ◄── Reader ◄── page, `fringed history`
-//!                       "         syncing        ──► result-seq       and the card: SEQs in use, reserved ahead
+//!                       "         syncing        ──► the card
+//! SEQ in use ──────────────────► reserving        ──► result-seq       SEQs that may be in use, reserved ahead
 //! measuring ──frames──► one slot ──► keeper's thread ─► recordings/NAME  ◄── Entry::recording, `fringed replay`
 //! ```
 //!

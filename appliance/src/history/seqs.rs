@@ -1,18 +1,24 @@
 //! Reserves RESULT_SEQs ahead of their use, so that none is used twice and none waits for the card.
 //!
-//! The counter's file says which SEQs may be in use: at the start, and whenever half of them are gone, [`AHEAD`] more are
-//! reserved by the history's thread. Besides, each SEQ is marked in memory that a kill does not touch (`mark`). So after
-//! kill -9 counting goes on behind the last number that was in use; after a loss of power behind the reservation, so that at
-//! most [`AHEAD`] numbers are skipped; after a stop the file holds the SEQ of the last result and none is.
+//! The counter's file says which SEQs may be in use: at the start, and whenever a quarter of them are gone, up to [`AHEAD`]
+//! are reserved by a thread of its own ([`Reserving`]), so that no other sync of the history comes before. Besides, each SEQ
+//! is marked in memory that a kill does not touch (`mark`). So after kill -9 counting goes on behind the last number that was
+//! in use; after a loss of power behind the reservation, so that at most [`AHEAD`] numbers are skipped; after a stop the file
+//! holds the SEQ of the last result and none is.
 
 use super::mark::Mark;
 use crate::state::{Counted, Counter};
+use crate::station::Unstored;
 use std::io;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
-/// Numbers that are reserved at a time: ten seconds of a fast line, in which the card must have answered once.
+/// The most numbers that are reserved: at 86 results a second the storage may take half a second for one sync.
 pub const AHEAD: u32 = 64;
+/// With so many left, more are reserved.
+const FEW: i32 = (AHEAD / 4 * 3) as i32;
 
 /// What numbers results.
 #[derive(Debug)]
@@ -40,34 +46,98 @@ pub struct Seqs {
     counter: Counter,
     mark: Option<Arc<Mark>>,
     run: u32,
+    wake: SyncSender<()>,
+    stopping: Arc<AtomicBool>,
+    numbers: Arc<Mutex<Numbers>>,
+}
+
+/// How far numbers are used and reserved.
+#[derive(Debug)]
+struct Numbers {
+    /// The last SEQ in use.
+    used: u32,
     /// The last SEQ that is reserved on the card.
-    reserved: Arc<AtomicU32>,
+    reserved: u32,
+    /// Since when the card has been asked for more, while it does not answer.
+    asked: Option<Instant>,
+    /// What the card answered last, if it refused.
+    refused: Option<Arc<str>>,
+    /// Whether the station was told that there is no number left.
+    exhausted: bool,
+}
+
+impl Numbers {
+    /// Numbers left. They start anew after 2³² − 1.
+    fn left(&self) -> i32 {
+        self.reserved.wrapping_sub(self.used) as i32
+    }
+}
+
+/// The thread that asks the card for more numbers.
+pub(super) struct Reserving {
+    seqs: Seqs,
+    woken: Receiver<()>,
+}
+
+impl Reserving {
+    /// Works until told to stop. `again` is told the last SEQ in use when the station waited for numbers and there are some.
+    pub(super) fn run(self, again: impl Fn(u32)) {
+        while self.woken.recv().is_ok() && !self.seqs.stopping.load(Ordering::Acquire) {
+            if let Some(seq) = self.seqs.refill() {
+                again(seq);
+            }
+        }
+    }
 }
 
 impl Seqs {
-    /// Reserves the first numbers from `next` on for this `run`, before anything is measured.
+    /// Reserves the first numbers from `next` on for this `run`, before anything is measured. Answers with the thread's side.
     ///
     /// # Errors
     /// Whatever the file system answers.
-    pub fn reserve(counter: Counter, mark: Option<Mark>, run: u32, next: u32) -> io::Result<Self> {
-        let last = next.wrapping_add(AHEAD - 1);
+    pub(super) fn reserve(
+        counter: Counter,
+        mark: Option<Mark>,
+        run: u32,
+        next: u32,
+    ) -> io::Result<(Self, Reserving)> {
+        let (used, reserved) = (next.wrapping_sub(1), next.wrapping_add(AHEAD - 1));
         // The mark first: from then on neither is believed without the other.
-        let mark = mark.filter(|mark| {
-            let before = next.wrapping_sub(1);
-            mark.write(Counted { last: before, run }).is_ok()
-        });
+        let mark = mark.filter(|mark| mark.write(Counted { last: used, run }).is_ok());
+        let last = reserved;
         counter.store(Counted { last, run })?;
-        Ok(Self {
+        let (wake, woken) = sync_channel(1);
+        let numbers = Numbers {
+            used,
+            reserved,
+            asked: None,
+            refused: None,
+            exhausted: false,
+        };
+        let seqs = Self {
             counter,
             mark: mark.map(Arc::new),
             run,
-            reserved: Arc::new(AtomicU32::new(last)),
-        })
+            wake,
+            stopping: Arc::default(),
+            numbers: Arc::new(Mutex::new(numbers)),
+        };
+        let reserving = Reserving {
+            seqs: seqs.clone(),
+            woken,
+        };
+        Ok((seqs, reserving))
     }
 
-    /// Takes a SEQ into use, and answers whether it is reserved on the card.
-    pub fn take(&self, seq: u32) -> bool {
-        // Also where it is not reserved: the station shows that result and takes no further trigger.
+    fn numbers(&self) -> MutexGuard<'_, Numbers> {
+        self.numbers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes a SEQ into use; it waits for nothing.
+    ///
+    /// # Errors
+    /// There is no reserved number after it: none must be used until the card has answered.
+    pub fn take(&self, seq: u32) -> Result<(), Unstored> {
         let counted = Counted {
             last: seq,
             run: self.run,
@@ -78,30 +148,60 @@ impl Seqs {
             // None is better than an old one.
             mark.remove();
         }
-        self.left_after(seq) >= 0
-    }
-
-    /// Numbers left behind a SEQ; negative where it is not reserved. Numbers start anew after 2³² − 1.
-    fn left_after(&self, seq: u32) -> i32 {
-        self.reserved.load(Ordering::Acquire).wrapping_sub(seq) as i32
-    }
-
-    /// Reserves more where half of the numbers behind `seq` are gone. For the history's thread: it waits for the card.
-    ///
-    /// # Errors
-    /// Whatever the file system answers.
-    pub(super) fn refill(&self, seq: u32) -> io::Result<()> {
-        if self.left_after(seq) > (AHEAD / 2) as i32 {
+        let mut numbers = self.numbers();
+        numbers.used = seq;
+        let left = numbers.left();
+        if left <= FEW {
+            // It is awake already.
+            let _ = self.wake.try_send(());
+        }
+        numbers.exhausted = left <= 0;
+        if left > 0 {
             return Ok(());
         }
-        let last = seq.wrapping_add(AHEAD);
-        let run = self.run;
-        self.counter.store(Counted { last, run })?;
-        self.reserved.store(last, Ordering::Release);
-        Ok(())
+        Err(match &numbers.refused {
+            Some(words) => Unstored::Refused(words.clone()),
+            None => Unstored::Busy(numbers.asked.map_or(0, |asked| asked.elapsed().as_millis())),
+        })
     }
 
-    /// Gives back what was not used: `seq` is the last of all.
+    /// Why the card did not reserve numbers, while it does not.
+    pub(super) fn refused(&self) -> Option<String> {
+        let words = self.numbers().refused.clone()?;
+        Some(format!("reserve result numbers: {words}: free space"))
+    }
+
+    /// Reserves more where few are left: it waits for the card. Answers with the last SEQ in use if the station was told
+    /// that there is none left, and now there is.
+    fn refill(&self) -> Option<u32> {
+        let used = {
+            let mut numbers = self.numbers();
+            if numbers.left() > FEW {
+                return None;
+            }
+            numbers.asked = Some(Instant::now());
+            numbers.used
+        };
+        let last = used.wrapping_add(AHEAD);
+        let run = self.run;
+        let stored = self.counter.store(Counted { last, run });
+        let mut numbers = self.numbers();
+        numbers.asked = None;
+        numbers.refused = stored.err().map(|error| error.to_string().into());
+        if numbers.refused.is_some() {
+            return None;
+        }
+        numbers.reserved = last;
+        std::mem::take(&mut numbers.exhausted).then_some(numbers.used)
+    }
+
+    /// Ends the thread.
+    pub(super) fn stop(&self) {
+        self.stopping.store(true, Ordering::Release);
+        let _ = self.wake.try_send(());
+    }
+
+    /// Gives back what was not used, once the thread has ended: `seq` is the last of all.
     ///
     /// # Errors
     /// Whatever the file system answers.
@@ -135,10 +235,10 @@ mod tests {
         let (mut next, mut skipped) = (1, 0);
         for run in 1..=6_u32 {
             let own = mark(folder.path(), &state);
-            let seqs = Seqs::reserve(state.counter(), own, run, next).unwrap();
+            let (seqs, _) = Seqs::reserve(state.counter(), own, run, next).unwrap();
             for _ in 0..50 * (run - 1) {
-                assert!(seqs.take(next));
-                seqs.refill(next).unwrap();
+                seqs.take(next).unwrap();
+                assert_eq!(seqs.refill(), None);
                 next += 1;
             }
             // What the next start finds.
@@ -155,12 +255,16 @@ mod tests {
         }
         assert!(skipped > 0);
         let own = mark(folder.path(), &state);
-        let seqs = Seqs::reserve(state.counter(), own, 9, next).unwrap();
-        assert!(seqs.take(next + AHEAD - 1) && !seqs.take(next + AHEAD));
-        // What was shown without being reserved does not come back either.
+        let (seqs, _) = Seqs::reserve(state.counter(), own, 9, next).unwrap();
+        seqs.take(next + AHEAD - 2).unwrap();
+        // The last one that is reserved: it does not come back, also after a loss of power, and no other may follow.
+        let last = next + AHEAD - 1;
+        assert_eq!(seqs.take(last), Err(Unstored::Busy(0)));
         let marked = mark(folder.path(), &state).and_then(|mark| mark.read());
-        let after = next_after(state.counted().unwrap(), marked);
-        assert_eq!(after, next + AHEAD + 1);
+        for marked in [marked, None] {
+            let after = next_after(state.counted().unwrap(), marked);
+            assert_eq!(after, last + 1);
+        }
         seqs.settle(next).unwrap();
         let marked = mark(folder.path(), &state).and_then(|mark| mark.read());
         assert_eq!(next_after(state.counted().unwrap(), marked), next + 1);
@@ -182,7 +286,67 @@ mod tests {
     fn numbers_that_start_anew_are_taken_too() {
         let folder = tempfile::tempdir().unwrap();
         let state = StateFolder::open(folder.path()).unwrap();
-        let seqs = Seqs::reserve(state.counter(), None, 1, u32::MAX - 1).unwrap();
-        assert!(seqs.take(u32::MAX) && seqs.take(3) && !seqs.take(100));
+        let (seqs, _) = Seqs::reserve(state.counter(), None, 1, u32::MAX - 1).unwrap();
+        assert!(seqs.take(u32::MAX).is_ok() && seqs.take(3).is_ok() && seqs.take(100).is_err());
+        assert_eq!(seqs.refill(), Some(100));
+        assert!(seqs.take(101).is_ok());
+    }
+
+    /// The counter's file of a storage that hangs until somebody reads from it.
+    fn hang(file: &Path) {
+        std::fs::remove_file(file).unwrap();
+        let kind = rustix::fs::FileType::Fifo;
+        let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
+        rustix::fs::mknodat(rustix::fs::CWD, file, kind, mode, 0).unwrap();
+    }
+
+    #[test]
+    fn a_storage_that_is_busy_is_told_from_one_that_refuses_and_the_station_hears_at_once_when_it_answers()
+     {
+        let folder = tempfile::tempdir().unwrap();
+        let state = StateFolder::open(folder.path()).unwrap();
+        let (seqs, reserving) = Seqs::reserve(state.counter(), None, 1, 1).unwrap();
+        let file = folder.path().join("result-seq");
+        hang(&file);
+        let (told, again) = std::sync::mpsc::channel();
+        let thread = std::thread::spawn(move || reserving.run(|seq| told.send(seq).unwrap()));
+        // Numbers go on as far as they are reserved.
+        for seq in 1..AHEAD {
+            assert_eq!(seqs.take(seq), Ok(()), "{seq}");
+        }
+        let began = Instant::now();
+        while seqs.numbers().asked.is_none() {
+            assert!(began.elapsed().as_secs() < 30);
+            std::thread::yield_now();
+        }
+        assert!(matches!(seqs.take(AHEAD), Err(Unstored::Busy(_))));
+        // It answers.
+        drop(std::fs::File::open(&file).unwrap());
+        let patience = std::time::Duration::from_secs(30);
+        assert_eq!(again.recv_timeout(patience), Ok(AHEAD));
+        assert_eq!(seqs.take(AHEAD + 1), Ok(()));
+        let began = Instant::now();
+        while seqs.numbers().left() <= FEW {
+            assert!(began.elapsed() < patience);
+        }
+        let reserved = state.counted().unwrap().last;
+        assert!(
+            reserved > AHEAD + 1 && reserved <= 2 * AHEAD + 1,
+            "{reserved}"
+        );
+        // It refuses.
+        std::fs::remove_file(&file).unwrap();
+        std::fs::create_dir_all(file.join("in the way")).unwrap();
+        let began = Instant::now();
+        while !matches!(seqs.take(3 * AHEAD), Err(Unstored::Refused(_))) {
+            assert!(began.elapsed() < patience);
+        }
+        assert!(seqs.refused().unwrap().contains("reserve result numbers"));
+        std::fs::remove_dir_all(&file).unwrap();
+        assert!(seqs.take(3 * AHEAD).is_err());
+        assert_eq!(again.recv_timeout(patience), Ok(3 * AHEAD));
+        assert_eq!(seqs.refused(), None);
+        seqs.stop();
+        thread.join().unwrap();
     }
 }

@@ -4,12 +4,11 @@
 //! is safe from kill -9 at once, and safe from a loss of power as soon as this thread has synced it.
 
 use super::schema;
-use super::seqs::Seqs;
 use super::task::Message;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
@@ -22,41 +21,29 @@ const MOST_SYNCS: u32 = 1000;
 #[derive(Clone)]
 pub(super) struct Syncer {
     wake: SyncSender<()>,
-    last_seq: Arc<AtomicU32>,
     stopping: Arc<AtomicBool>,
 }
 
 /// The thread's own side.
 pub(super) struct Syncing {
     woken: Receiver<()>,
-    last_seq: Arc<AtomicU32>,
     stopping: Arc<AtomicBool>,
-    seqs: Seqs,
     path: PathBuf,
     told: SyncSender<Message>,
 }
 
-/// For the database at `path`; `last_seq` is the last SEQ in use. Problems are `told` to the history's thread.
-pub(super) fn open(
-    path: &Path,
-    seqs: Seqs,
-    last_seq: u32,
-    told: SyncSender<Message>,
-) -> (Syncer, Syncing) {
+/// For the database at `path`. Problems are `told` to the history's thread.
+pub(super) fn open(path: &Path, told: SyncSender<Message>) -> (Syncer, Syncing) {
     // One more wake while it syncs is enough: the next sync covers everything written before it.
     let (wake, woken) = sync_channel(1);
-    let last_seq = Arc::new(AtomicU32::new(last_seq));
     let stopping = Arc::new(AtomicBool::new(false));
     let syncer = Syncer {
         wake,
-        last_seq: last_seq.clone(),
         stopping: stopping.clone(),
     };
     let syncing = Syncing {
         woken,
-        last_seq,
         stopping,
-        seqs,
         path: path.to_path_buf(),
         told,
     };
@@ -70,9 +57,8 @@ impl Syncer {
         let _ = self.wake.try_send(());
     }
 
-    /// Something was written; `last_seq` is the last SEQ in use.
-    pub(super) fn wake(&self, last_seq: u32) {
-        self.last_seq.store(last_seq, Ordering::Release);
+    /// Something was written.
+    pub(super) fn wake(&self) {
         // It is woken already.
         let _ = self.wake.try_send(());
     }
@@ -122,18 +108,12 @@ impl Syncing {
     }
 
     fn sync(&self) -> Result<(), String> {
-        let seq = self.last_seq.load(Ordering::Acquire);
-        let failed =
-            |what: &str, error: &dyn std::fmt::Display| format!("{what}: {error}: free space");
-        self.seqs
-            .refill(seq)
-            .map_err(|error| failed("reserve result numbers", &error))?;
         let log = schema::log_of(&self.path);
         let synced = match File::open(&log) {
             // On a file system without one each commit is synced by itself.
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
             opened => opened.and_then(|file| file.sync_data()),
         };
-        synced.map_err(|error| failed(&format!("sync {}", log.display()), &error))
+        synced.map_err(|error| format!("sync {}: {error}: free space", log.display()))
     }
 }

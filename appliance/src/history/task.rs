@@ -5,14 +5,14 @@ use super::keeper::{self, Keeper, Keeping};
 use super::mark::Mark;
 pub(super) use super::message::Message;
 use super::recordings::{FailedPart, seq_of};
-use super::seqs::{self, Numbering, Seqs};
+use super::seqs::{self, Numbering, Reserving, Seqs};
 use super::spool::Spool;
 use super::syncing::{self, Syncer, Syncing};
 use super::unkept::Unkept;
 use super::writer::{Opening, Writer};
 use super::{Bounds, DATABASE, HistoryError, RECORDINGS, Reader};
 use crate::recipe::Store;
-use crate::station::{Event, ResultRecord, StationHandle, Verdict};
+use crate::station::{Event, ResultRecord, StationHandle, Unstored, Verdict};
 use std::collections::VecDeque;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;
@@ -39,7 +39,6 @@ pub struct History {
     spool: Option<Arc<Spool>>,
     run: u32,
     seqs: Seqs,
-    syncer: Syncer,
     keeper: Keeper,
     reader: Reader,
 }
@@ -58,6 +57,7 @@ pub struct Task {
     shared: Arc<Shared>,
     spool: Option<Arc<Spool>>,
     seqs: Seqs,
+    reserving: Option<Reserving>,
     writer: Writer,
     keeper: Keeper,
     keeping: Option<Keeping>,
@@ -67,7 +67,6 @@ pub struct Task {
     unsynced: Option<String>,
     /// Results that the database has not taken yet, oldest first.
     waiting: VecDeque<Entry>,
-    last_seq: u32,
     lost_before: u32,
 }
 
@@ -112,7 +111,7 @@ pub fn open(
         (Some(spool), before) => recover(&mut writer, spool, (before, run))?,
     };
     let seqs = Seqs::reserve(counter, mark, run, next);
-    let seqs = seqs.map_err(|error| failed("result-seq", error))?;
+    let (seqs, reserving) = seqs.map_err(|error| failed("result-seq", error))?;
     let (queue, inbox) = sync_channel(MAX_WAITING);
     let (keeper, keeping) = keeper::open(
         &state.join(RECORDINGS),
@@ -122,12 +121,7 @@ pub fn open(
     )
     .map_err(|error| failed(RECORDINGS, error))?;
     let shared = Arc::new(Shared::default());
-    let (syncer, syncing) = syncing::open(
-        &state.join(DATABASE),
-        seqs.clone(),
-        next.wrapping_sub(1),
-        queue.clone(),
-    );
+    let (syncer, syncing) = syncing::open(&state.join(DATABASE), queue.clone());
     let history = History {
         queue,
         shared: shared.clone(),
@@ -135,7 +129,6 @@ pub fn open(
         run,
         seqs: seqs.clone(),
         reader: Reader::of(state),
-        syncer: syncer.clone(),
         keeper: keeper.clone(),
     };
     let task = Task {
@@ -143,6 +136,7 @@ pub fn open(
         shared,
         spool,
         seqs,
+        reserving: Some(reserving),
         writer,
         keeper,
         keeping: Some(keeping),
@@ -150,7 +144,6 @@ pub fn open(
         syncing: Some(syncing),
         unsynced: None,
         waiting,
-        last_seq: next.wrapping_sub(1),
         lost_before: 0,
     };
     Ok((history, task, next, complaint))
@@ -213,13 +206,12 @@ impl History {
         self.queue.try_send(dated).is_ok() && done.recv_timeout(DATING).is_ok()
     }
 
-    /// Takes a SEQ into use, and answers whether it is stored as used. If not, the card is asked once more.
-    pub fn take(&self, seq: u32) -> bool {
-        let taken = self.seqs.take(seq);
-        if !taken {
-            self.syncer.wake(seq);
-        }
-        taken
+    /// Takes a SEQ into use.
+    ///
+    /// # Errors
+    /// No number is reserved after it. The card is asked for more, and the station hears when it has answered.
+    pub fn take(&self, seq: u32) -> Result<(), Unstored> {
+        self.seqs.take(seq)
     }
 
     /// Results that the history has lost since the start because the card did not keep up.
@@ -250,6 +242,7 @@ impl Task {
     pub fn run(mut self, station: &StationHandle) {
         let keeping = self.keep_parts();
         let mut syncing = self.sync();
+        let mut reserving = self.reserve(station);
         // When it ends, whatever the keeper still writes: half a recording is removed at the next start.
         let mut stopping: Option<Instant> = None;
         loop {
@@ -298,7 +291,9 @@ impl Task {
                     },
                     Message::Stop { last_seq } => {
                         self.syncer.stop();
+                        self.seqs.stop();
                         drop(syncing.take().map(JoinHandle::join));
+                        drop(reserving.take().map(JoinHandle::join));
                         // Not settled, the reservation is skipped at the next start: nothing is used twice.
                         let _ = self.seqs.settle(last_seq);
                         if let Some(spool) = self.spool.as_ref().filter(|_| self.waiting.is_empty())
@@ -327,6 +322,17 @@ impl Task {
         Builder::new().name("syncing".into()).spawn(run).ok()
     }
 
+    /// Starts the thread that reserves numbers.
+    fn reserve(&mut self, station: &StationHandle) -> Option<JoinHandle<()>> {
+        let reserving = self.reserving.take()?;
+        let station = station.clone();
+        let again = move |seq| {
+            station.event(Event::Stored { seq, failed: None });
+        };
+        let run = move || reserving.run(again);
+        Builder::new().name("reserving".into()).spawn(run).ok()
+    }
+
     /// Starts the thread that keeps recordings.
     fn keep_parts(&mut self) -> Option<JoinHandle<()>> {
         let keeping = self.keeping.take()?;
@@ -339,7 +345,6 @@ impl Task {
     }
 
     fn queue(&mut self, entry: Entry) {
-        self.last_seq = entry.seq;
         if self.waiting.len() == MAX_WAITING {
             self.waiting.pop_front();
             self.shared.lost.fetch_add(1, Ordering::Relaxed);
@@ -347,13 +352,12 @@ impl Task {
         self.waiting.push_back(entry);
     }
 
-    /// Stores what waits, and reserves numbers; what did not go, in words.
+    /// Stores what waits; what did not go, in words.
     fn flush(&mut self) -> Option<String> {
-        let mut problem = self.unsynced.clone();
+        let mut problem = self.unsynced.clone().or_else(|| self.seqs.refused());
         if !self.waiting.is_empty() {
             let stored = self.store();
-            // Also where it failed: numbers must be reserved.
-            self.syncer.wake(self.last_seq);
+            self.syncer.wake();
             match stored {
                 Ok(begun) => {
                     self.waiting.clear();

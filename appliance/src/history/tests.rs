@@ -549,14 +549,14 @@ fn what_was_shown_and_not_stored_before_a_kill_is_stored_once_by_the_next_start(
     // Its thread never comes to write, as where the card is busy.
     let (killed, never, next, _) = opened(&state, 1);
     for seq in next..next + 3 {
-        assert!(killed.take(seq));
+        killed.take(seq).unwrap();
         killed.record(&record(seq));
     }
     drop((killed, never));
     assert_eq!(stored(), [0; 0]);
     let (killed, never, next, _) = opened(&state, 2);
     assert_eq!((stored(), next), (vec![3, 2, 1], 4));
-    killed.take(next);
+    killed.take(next).unwrap();
     killed.record(&record(next));
     drop((killed, never));
     let (history, task, next, _) = opened(&state, 3);

@@ -190,8 +190,8 @@ pub enum Event {
     Stored {
         /// Which.
         seq: u32,
-        /// Why it could not be stored.
-        failed: Option<Arc<str>>,
+        /// Why it is not.
+        failed: Option<Unstored>,
     },
     /// The worker's sign of life.
     Alive,
@@ -237,6 +237,15 @@ pub struct Job {
     pub accepted: Micros,
 }
 
+/// Why no RESULT_SEQ may be used after the last one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Unstored {
+    /// The storage has not answered for so many milliseconds.
+    Busy(u128),
+    /// What the storage answered.
+    Refused(Arc<str>),
+}
+
 /// Something to be done by those who have threads, files and sockets. Carried out in order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
@@ -263,8 +272,8 @@ pub enum Effect {
         /// The running job.
         job: JobId,
     },
-    /// Make sure that this RESULT_SEQ is stored as used, and answer with [`Event::Stored`]. Always directly before the
-    /// [`Effect::Publish`] of that result; again when it could not be stored.
+    /// Make sure that this RESULT_SEQ is stored as used and that another one may follow, and answer with [`Event::Stored`].
+    /// Always directly before the [`Effect::Publish`] of that result; again while none may follow.
     PersistSeq(u32),
     /// A result is complete: for the history.
     Publish(Arc<ResultRecord>),

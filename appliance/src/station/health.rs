@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::error_code;
-use super::event::{Effect, Effects};
+use super::event::{Effect, Effects, Unstored};
 use super::machine::{Station, log, push};
 use super::state::{ClearedBy, Fault, Micros, State};
 
@@ -151,11 +151,11 @@ impl Station {
     pub(super) fn stored(
         &mut self,
         seq: u32,
-        failed: Option<Arc<str>>,
+        failed: Option<Unstored>,
         now: Micros,
         effects: &mut Effects,
     ) {
-        let Some(cause) = failed else {
+        let Some(unstored) = failed else {
             // A number that is stored covers those before it.
             self.unstored &= seq != self.last_seq;
             if !self.health.room_is_below(FULL_STORAGE_MIB) {
@@ -166,10 +166,22 @@ impl Station {
         self.health.storage_errors = self.health.storage_errors.saturating_add(1);
         self.unstored = true;
         if matches!(self.state, State::Ready | State::Offline) {
+            let (cause, remedy) = match unstored {
+                Unstored::Busy(ms) => (
+                    format!(
+                        "no result number is reserved after {seq}: the storage is busy, {ms} ms so far"
+                    ),
+                    "trigger more slowly, or use faster storage; it clears by itself as soon as the storage has answered",
+                ),
+                Unstored::Refused(answer) => (
+                    format!("no result number can be stored after {seq}: {answer}"),
+                    "free space, or replace the storage if it is broken; it is tried every second and clears by itself",
+                ),
+            };
             let fault = Fault {
                 code: error_code::SEQ_NOT_STORED,
-                cause: format!("result number {seq} could not be stored: {cause}").into(),
-                remedy: "free space, or replace the storage if it is broken; it is tried every second and clears by itself".into(),
+                cause: cause.into(),
+                remedy: remedy.into(),
                 since: now,
                 cleared_by: ClearedBy::Storage,
             };

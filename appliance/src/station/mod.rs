@@ -58,7 +58,9 @@ mod tests;
 mod walk;
 
 pub use control::{ConnectionEdges, ControlRegisters, ControlWrite, Masked, RefusedWrite};
-pub use event::{Condition, Effect, Effects, Event, Job, JobId, RecipeKey, RecipeResult, Request};
+pub use event::{
+    Condition, Effect, Effects, Event, Job, JobId, RecipeKey, RecipeResult, Request, Unstored,
+};
 pub use gauge::{Decision, GaugeValue, Unit};
 pub use handle::{StationHandle, system_utc_us, tick};
 pub use health::{Health, Pace, System};

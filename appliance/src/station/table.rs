@@ -247,7 +247,7 @@ fn events(job: JobId) -> Vec<(Event, [u16; 12])> {
         (
             Event::Stored {
                 seq: 40,
-                failed: Some(words),
+                failed: Some(Unstored::Refused(words)),
             },
             [0, 7, 2, 3, 4, 5, 7, 7, 7, 7, 7, 8],
         ),

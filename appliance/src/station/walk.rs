@@ -193,7 +193,7 @@ fn a_hundred_thousand_random_events_break_no_promise() {
                     persisted = Some(*seq);
                     answers.push(Event::Stored {
                         seq: *seq,
-                        failed: broken.then(|| "no room".into()),
+                        failed: broken.then(|| Unstored::Refused("no room".into())),
                     });
                 }
                 Effect::Publish(record) => {

@@ -288,11 +288,9 @@ fn a_number_that_was_not_stored_stops_the_station_until_it_is() {
     let mut bench = Bench::ready();
     bench.token(1);
     assert_eq!(bench.finish().result_seq, 41);
-    let stored = |failed: Option<&str>| Event::Stored {
-        seq: 41,
-        failed: failed.map(Arc::from),
-    };
-    let snapshot = bench.event(stored(Some("input/output error")));
+    let stored = |failed: Option<Unstored>| Event::Stored { seq: 41, failed };
+    let refused = || Some(Unstored::Refused("input/output error".into()));
+    let snapshot = bench.event(stored(refused()));
     assert_eq!(
         (snapshot.state, snapshot.error_code),
         (7, error_code::SEQ_NOT_STORED)
@@ -305,13 +303,45 @@ fn a_number_that_was_not_stored_stops_the_station_until_it_is() {
         assert_eq!(bench.event(room(10_000)).state, 7);
         assert_eq!(bench.effects, [Effect::PersistSeq(41)], "try {tried}");
     }
-    bench.event(stored(Some("input/output error")));
+    bench.event(stored(refused()));
     let snapshot = bench.event(stored(None));
     assert!(snapshot.is(status::READY), "{snapshot:?}");
     assert_eq!(
         (snapshot.error_code, snapshot.health.storage_errors),
         (0, 2)
     );
+}
+
+#[test]
+fn a_storage_that_is_only_busy_is_not_to_be_replaced() {
+    for (unstored, cause, remedy) in [
+        (
+            Unstored::Busy(740),
+            "busy, 740 ms so far",
+            "trigger more slowly",
+        ),
+        (
+            Unstored::Refused("input/output error".into()),
+            "input/output error",
+            "replace the storage",
+        ),
+    ] {
+        let mut bench = Bench::ready();
+        bench.token(1);
+        let seq = bench.finish().result_seq;
+        let failed = Some(unstored);
+        let fault = bench
+            .event(Event::Stored { seq, failed })
+            .fault
+            .clone()
+            .unwrap();
+        assert!(
+            fault.cause.contains(cause) && fault.remedy.contains(remedy),
+            "{fault:?}"
+        );
+        assert_eq!(fault.remedy.contains("replace"), remedy.contains("replace"));
+        assert!(fault.remedy.contains("clears by itself"));
+    }
 }
 
 #[test]
