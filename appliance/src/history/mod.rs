@@ -33,6 +33,8 @@ mod unkept;
 pub mod writer;
 
 #[cfg(test)]
+mod log_tests;
+#[cfg(test)]
 mod tests;
 
 pub use entry::{Entry, Filter, GaugeEntry, PlacementEntry, StageEntry, difference};

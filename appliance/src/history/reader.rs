@@ -10,6 +10,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+/// Results that are read from the database at a time.
+const BATCH: usize = 256;
+
 /// A way to read one history. Cheap to clone; each call opens the database anew, so that it also sees a new one that was
 /// begun in place of a damaged one. Every call blocks.
 #[derive(Clone, Debug)]
@@ -146,7 +149,8 @@ impl Reader {
         Ok(found.map(|name| self.recordings.join(name)))
     }
 
-    /// Hands each result that passes the filter to `take`, newest first; stops at its first error.
+    /// Hands each result that passes the filter to `take`, newest first; stops at its first error. Some are read at a time,
+    /// and nothing of the database is held meanwhile: whoever takes slowly does not let its log grow.
     pub(super) fn each(
         &self,
         filter: &Filter,
@@ -154,13 +158,30 @@ impl Reader {
     ) -> Result<(), HistoryError> {
         let connection = self.open()?;
         let failed = self.failed();
-        let (condition, mut values) = condition(filter);
-        values.push(Value::from(i64::try_from(filter.limit).unwrap_or(i64::MAX)));
-        let query = format!("SELECT * FROM dated WHERE {condition} ORDER BY id DESC LIMIT ?");
+        let (condition, values) = condition(filter);
+        let query =
+            format!("SELECT * FROM dated WHERE {condition} AND id < ? ORDER BY id DESC LIMIT ?");
         let mut statement = connection.prepare(&query).map_err(&failed)?;
-        let mut rows = statement.query(params_from_iter(values)).map_err(&failed)?;
-        while let Some(row) = rows.next().map_err(&failed)? {
-            take(with_gauges(&connection, row).map_err(&failed)?)?;
+        let mut below = i64::MAX;
+        let mut left = filter.limit;
+        while left > 0 {
+            let most = left.min(BATCH);
+            let bounds = [Value::from(below), Value::from(most as i64)];
+            let values = values.iter().cloned().chain(bounds);
+            let batch = statement
+                .query_map(params_from_iter(values), |row| {
+                    Ok((row.get("id")?, with_gauges(&connection, row)?))
+                })
+                .and_then(|rows| rows.collect::<rusqlite::Result<Vec<(i64, Entry)>>>())
+                .map_err(&failed)?;
+            left -= batch.len();
+            if batch.len() < most {
+                left = 0;
+            }
+            for (id, entry) in batch {
+                below = id;
+                take(entry)?;
+            }
         }
         Ok(())
     }

@@ -13,6 +13,12 @@ pub const VERSION: i64 = 1;
 /// Longest wait for another process that holds the database, the command line's for instance.
 const BUSY: Duration = Duration::from_secs(2);
 
+/// Longest wait for readers while nothing can be stored: most queries take some milliseconds, and half of a fast line's queue
+/// is filled by then.
+const READING: Duration = Duration::from_secs(1);
+/// The log's file is not made shorter than this many bytes.
+const LOG_KEPT: u64 = 1 << 20;
+
 /// `docs/formats.md` has the columns in words.
 const TABLES: &str = "
 CREATE TABLE result (
@@ -149,7 +155,7 @@ fn settle(connection: &Connection) -> rusqlite::Result<()> {
     connection.pragma_update(None, "synchronous", "normal")?;
     connection.pragma_update(None, "wal_autocheckpoint", 0)?;
     connection.pragma_update(None, "foreign_keys", true)?;
-    connection.pragma_update(None, "journal_size_limit", 4 << 20)?;
+    connection.pragma_update(None, "journal_size_limit", LOG_KEPT)?;
     // Negative: KiB.
     connection.pragma_update(None, "cache_size", -1024)
 }
@@ -159,18 +165,39 @@ pub(super) fn log_of(path: &Path) -> PathBuf {
     with_suffix(path, "-wal")
 }
 
+/// The bytes of the log of a database; 0 without one.
+pub(super) fn log_bytes(path: &Path) -> u64 {
+    fs::metadata(log_of(path)).map_or(0, |found| found.len())
+}
+
 /// Brings the log into the database, as far as no reader needs it, and syncs both.
+///
+/// Results are stored meanwhile, so that on a fast line there are always some more in the log than in the database, and it
+/// would never begin anew. Where it is longer than `most` bytes after that, the rest is brought in while nothing is stored:
+/// results wait in the queue for as long as the card takes for two syncs.
 ///
 /// # Errors
 /// [`HistoryError`].
-pub(super) fn checkpoint(path: &Path) -> Result<(), HistoryError> {
-    let failed = |error: rusqlite::Error| HistoryError::of(path, &error);
-    let connection = Connection::open(path).map_err(failed)?;
-    settle(&connection).map_err(failed)?;
-    let passive = "PRAGMA wal_checkpoint(PASSIVE)";
-    let brought = connection.query_row(passive, (), |_| Ok(()));
-    let begun = brought.and_then(|()| begin_log(&connection));
-    begun.map_err(failed)
+pub(super) fn checkpoint(path: &Path, most: u64) -> Result<(), HistoryError> {
+    let brought = || {
+        let connection = Connection::open(path)?;
+        settle(&connection)?;
+        let bring = |how: &str| {
+            let pragma = format!("PRAGMA wal_checkpoint({how})");
+            connection.query_row(&pragma, (), |_| Ok(()))
+        };
+        bring("PASSIVE")?;
+        begin_log(&connection)?;
+        if log_bytes(path) <= most {
+            return Ok(());
+        }
+        // It holds up whoever stores results, so it does not wait long for whoever reads them.
+        connection.busy_timeout(READING)?;
+        bring("RESTART")?;
+        connection.busy_timeout(BUSY)?;
+        begin_log(&connection)
+    };
+    brought().map_err(|error| HistoryError::of(path, &error))
 }
 
 /// Begins the log anew where all of it is in the database. That is the one write that SQLite syncs by itself, so it is done

@@ -14,8 +14,12 @@ use std::time::Duration;
 
 /// The log is brought into the database when nothing came for this long ...
 const IDLE: Duration = Duration::from_secs(1);
-/// ... or at the latest after this many syncs; a result is a few pages of 4 KiB.
-const MOST_SYNCS: u32 = 1000;
+/// ... or when it is longer by so many bytes than after the last time.
+const STRETCH: u64 = 4 << 20;
+/// A log that is longer than this after it was brought into the database is begun anew while no result is stored.
+const LONG: u64 = 4 << 20;
+/// A log that is longer than this is a warning.
+const TOO_LONG: u64 = 32 << 20;
 
 /// The way to the thread; nothing here waits.
 #[derive(Clone)]
@@ -68,9 +72,11 @@ impl Syncing {
     /// Works until told to stop.
     pub(super) fn run(self) {
         let mut problem = None;
-        let mut syncs: u32 = 0;
+        // Whether there is nothing to do until the next result, and from which length of the log on it is brought into the
+        // database.
+        let (mut idle, mut due) = (true, STRETCH);
         loop {
-            let woken = if syncs == 0 {
+            let woken = if idle {
                 self.woken
                     .recv()
                     .map_err(|_| RecvTimeoutError::Disconnected)
@@ -81,19 +87,21 @@ impl Syncing {
                 return;
             }
             let now = match woken {
-                Ok(()) => {
-                    syncs += 1;
-                    self.sync().err()
-                }
-                Err(RecvTimeoutError::Timeout) => problem.clone(),
+                Ok(()) => self.sync().err(),
+                Err(RecvTimeoutError::Timeout) => None,
                 Err(RecvTimeoutError::Disconnected) => return,
             };
-            let now = if woken.is_err() || syncs >= MOST_SYNCS {
-                syncs = 0;
-                self.checkpoint().err().or(now)
+            let paused = woken.is_err();
+            let now = if paused || schema::log_bytes(&self.path) >= due {
+                let brought = self.checkpoint();
+                due = schema::log_bytes(&self.path) + STRETCH;
+                brought.err().or(now)
             } else {
                 now
             };
+            let too_long = self.too_long();
+            idle = paused && too_long.is_none();
+            let now = now.or(too_long);
             if now != problem {
                 problem = now.clone();
                 // Where the queue is full there is a problem already.
@@ -103,8 +111,20 @@ impl Syncing {
     }
 
     fn checkpoint(&self) -> Result<(), String> {
-        let done = schema::checkpoint(&self.path);
+        let done = schema::checkpoint(&self.path, LONG);
         done.map_err(|error| format!("sync the history: {error}: free space"))
+    }
+
+    /// What is wrong with a log that does not begin anew, in words.
+    fn too_long(&self) -> Option<String> {
+        (schema::log_bytes(&self.path) > TOO_LONG).then(|| {
+            format!(
+                "{} has more than {} MiB: another program reads the history without an end, or the storage is too slow: \
+                 end that program, or trigger more slowly",
+                schema::log_of(&self.path).display(),
+                TOO_LONG >> 20
+            )
+        })
     }
 
     fn sync(&self) -> Result<(), String> {

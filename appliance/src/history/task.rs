@@ -303,7 +303,10 @@ impl Task {
                         self.keeper.stop();
                         stopping = Some(Instant::now() + LAST_PART);
                     }
-                    Message::Synced { problem } => self.unsynced = problem,
+                    Message::Synced { problem: found } => {
+                        problem = problem.or(found.clone());
+                        self.unsynced = found;
+                    }
                     Message::KeeperEnded => ended = true,
                     Message::Result(_) => {}
                 }

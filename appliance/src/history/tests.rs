@@ -376,11 +376,11 @@ fn a_replay_compares_what_the_frames_show_to_the_last_bit_and_not_how_the_cycle_
 }
 
 /// Longest wait for the history's threads.
-const PATIENCE: Duration = Duration::from_secs(20);
+pub(super) const PATIENCE: Duration = Duration::from_secs(20);
 /// Room for the tables and some results, in pages of 4 KiB.
 const FEW_PAGES: u32 = 24;
 
-fn station() -> StationHandle {
+pub(super) fn station() -> StationHandle {
     let settings = Settings {
         next_seq: 1,
         boot_id: 1,
@@ -396,7 +396,7 @@ fn station() -> StationHandle {
     StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| None)
 }
 
-fn record(seq: u32) -> Arc<ResultRecord> {
+pub(super) fn record(seq: u32) -> Arc<ResultRecord> {
     Arc::new(ResultRecord {
         seq,
         verdict: Verdict::Invalid,
@@ -408,7 +408,7 @@ fn record(seq: u32) -> Arc<ResultRecord> {
     })
 }
 
-fn wait(what: &str, done: impl Fn() -> bool) {
+pub(super) fn wait(what: &str, done: impl Fn() -> bool) {
     let began = Instant::now();
     while !done() {
         assert!(began.elapsed() < PATIENCE, "no {what}");
@@ -417,7 +417,7 @@ fn wait(what: &str, done: impl Fn() -> bool) {
 }
 
 /// Opens the history of a state folder that keeps no recordings, for a run.
-fn opened(state: &StateFolder, run: u32) -> (History, Task, u32, Option<String>) {
+pub(super) fn opened(state: &StateFolder, run: u32) -> (History, Task, u32, Option<String>) {
     let bounds = Bounds {
         results: ENOUGH,
         recordings: 0,
