@@ -76,6 +76,7 @@ impl StateFolder {
             Err(TryLockError::Error(error)) => return Err(cannot(error)),
         }
         let recipes = Store::open(&path.join("recipes")).map_err(cannot)?;
+        recipes.remove_left_behind().map_err(cannot)?;
         Ok(Self {
             path: path.to_path_buf(),
             recipes,

@@ -17,6 +17,7 @@ mod guide;
 mod history;
 mod hostile;
 mod house;
+mod imports;
 mod inputs;
 mod kept;
 mod licences;

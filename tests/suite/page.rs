@@ -25,18 +25,22 @@ impl Browser {
         }
     }
 
-    /// Status and body.
-    pub fn ask(&mut self, method: &str, path: &str, body: &[u8]) -> (u16, Vec<u8>) {
+    /// A request of which the body is still to be sent.
+    pub fn begin(&self, method: &str, path: &str, length: usize) -> TcpStream {
         let mut stream = TcpStream::connect(self.address).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let head = format!(
-            "{method} {path} HTTP/1.1\r\nHost: {0}\r\nOrigin: http://{0}\r\nCookie: {1}\r\nContent-Length: {2}\r\n\
+            "{method} {path} HTTP/1.1\r\nHost: {0}\r\nOrigin: http://{0}\r\nCookie: {1}\r\nContent-Length: {length}\r\n\
              Connection: close\r\n\r\n",
-            self.address,
-            self.cookie,
-            body.len()
+            self.address, self.cookie,
         );
         stream.write_all(head.as_bytes()).unwrap();
+        stream
+    }
+
+    /// Status and body.
+    pub fn ask(&mut self, method: &str, path: &str, body: &[u8]) -> (u16, Vec<u8>) {
+        let mut stream = self.begin(method, path, body.len());
         // A request that is refused may be answered before its body is read.
         let _ = stream.write_all(body);
         let mut answer = Vec::new();

@@ -171,34 +171,19 @@ impl Store {
             let path = path.to_path_buf();
             move |source| ImportError::Write { path, source }
         };
-        let folder = self.folder.clone();
-        let _alone = self.lock().map_err(write(&folder))?;
-        let arriving = folder.join("arriving.new");
-        File::open(source).map_err(missing)?;
-        let taken = copy_synced(source, &arriving)
-            .map_err(write(&arriving))
-            .and_then(|()| {
-                let recipe = read(&arriving).map_err(&refused)?;
-                let file = recipe.file.clone();
-                fits(recipe).map_err(&refused)?;
-                let target = self.path(file.number);
-                self.keep_previous(file.number)
-                    .and_then(|()| rename_whole(&arriving, &target))
-                    .map_err(write(&target))?;
-                Ok(file)
-            });
-        if taken.is_err() {
-            // There may be nothing to remove.
-            let _ = fs::remove_file(&arriving);
-        }
-        taken
+        let _alone = self.lock().map_err(write(&self.folder))?;
+        let opened = File::open(source).and_then(|file| Ok((file.metadata()?.len(), file)));
+        let (size, mut opened) = opened.map_err(missing)?;
+        let mut arriving = self.arriving(size).map_err(write(&self.folder))?;
+        io::copy(&mut opened, &mut arriving).map_err(write(arriving.path()))?;
+        let recipe = arriving.recipe().map_err(&refused)?;
+        let file = recipe.file.clone();
+        fits(recipe).map_err(&refused)?;
+        let target = self.path(file.number);
+        let taken = self.take_locked(arriving, file.number);
+        taken.map_err(write(&target))?;
+        Ok(file)
     }
-}
-
-fn read(path: &Path) -> Result<Recipe, String> {
-    let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
-    let (size, file) = opened.map_err(|error| error.to_string())?;
-    Recipe::read(BufReader::new(file), size).map_err(|error| error.to_string())
 }
 
 fn copy_synced(source: &Path, target: &Path) -> io::Result<()> {

@@ -1,10 +1,12 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
 //! `file` is the form on disk, `bounds` what its values may be, `archive` the ZIP around it with its fingerprint, `check` turns the
-//! one into a [`Recipe`] that can be planned, `gauge` says what its gauges measure, `store` keeps the files of a station, `generations`
-//! those before the newest, `replace` what stays of a recipe that is taught again.
+//! one into a [`Recipe`] that can be planned, `gauge` says what its gauges measure, `store` keeps the files of a station,
+//! `arriving` those on their way into it, `generations` those before the newest, `replace` what stays of a recipe that is
+//! taught again.
 
 pub mod archive;
+pub mod arriving;
 pub mod bounds;
 pub mod check;
 pub mod comparison;

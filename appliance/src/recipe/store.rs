@@ -233,8 +233,8 @@ impl Store {
     ///
     /// # Errors
     /// Whatever the file system answers.
-    pub fn bytes(&self, number: u16) -> io::Result<Vec<u8>> {
-        fs::read(self.path(number))
+    pub fn file(&self, number: u16) -> io::Result<fs::File> {
+        fs::File::open(self.path(number))
     }
 
     /// The number of the recipe taught for a part number.

@@ -63,7 +63,7 @@ pub use event::{
 };
 pub use gauge::{Decision, GaugeValue, Unit};
 pub use handle::{StationHandle, system_utc_us, tick};
-pub use health::{Health, Pace, System};
+pub use health::{FULL_STORAGE_MIB, Health, Pace, System};
 pub use machine::{Limits, Settings, Station};
 pub use result::{Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, Verdict};
 pub use snapshot::{Identity, Snapshot, TeachProgress};

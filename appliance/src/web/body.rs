@@ -1,20 +1,25 @@
-//! Reading what a request carries: bounded in size and in time.
+//! Reading what a request carries: bounded in size, in time and in memory.
 
+use std::io::{ErrorKind, Write as _};
 use std::time::Duration;
 
-use axum::body::{Body, Bytes, to_bytes};
+use axum::body::{Body, Bytes, HttpBody as _, to_bytes};
 use axum::http::StatusCode;
 use serde::de::DeserializeOwned;
+use tokio::sync::{OwnedSemaphorePermit, mpsc};
+use tokio_stream::StreamExt as _;
 
 use super::problem::Problem;
+use super::site::Site;
 use crate::error::shortened;
+use crate::recipe::arriving::Arriving;
 
 /// The most of a request in JSON, in bytes: 32 regions of 100 corners are a tenth of it.
 const MAX_JSON: usize = 64 << 10;
 /// Longest wait for it.
 const JSON_TIME: Duration = Duration::from_secs(10);
 /// The most of a file, in bytes: a recipe for 2048 × 2048 pixels has 160 MB.
-const MAX_FILE: usize = 256 << 20;
+const MAX_FILE: u64 = 256 << 20;
 /// Longest wait for it.
 const FILE_TIME: Duration = Duration::from_secs(120);
 
@@ -46,27 +51,90 @@ fn parsed<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     })
 }
 
-/// A request's file.
+/// A file that has come, and its place among those that arrive at a time.
+pub struct Upload {
+    /// The file.
+    pub file: Arriving,
+    _place: OwnedSemaphorePermit,
+}
+
+/// A request's file, which goes to the recipes' storage as it comes: it is never in memory as a whole.
 ///
 /// # Errors
-/// It is too long or too slow.
-pub async fn file(body: Body) -> Result<Bytes, Problem> {
-    read(body, MAX_FILE, FILE_TIME).await
+/// Too many arrive already; it is too long or too slow; or there is no room for it.
+pub async fn file(site: &Site, body: Body) -> Result<Upload, Problem> {
+    let place = site.arriving.clone().try_acquire_owned().map_err(|_| {
+        Problem::crowded("other files are being imported: wait until they are done")
+    })?;
+    let expected = body.size_hint().lower();
+    if expected > MAX_FILE {
+        return Err(too_long(MAX_FILE));
+    }
+    let (chunks, mut come) = mpsc::channel::<Bytes>(1);
+    let store = site.recipes.clone();
+    let storing = tokio::task::spawn_blocking(move || {
+        let mut file = store.arriving(expected)?;
+        while let Some(chunk) = come.blocking_recv() {
+            file.write_all(&chunk)?;
+        }
+        Ok(file)
+    });
+    let came = in_time(FILE_TIME, hand_over(body, chunks)).await;
+    let stored = storing.await;
+    came?;
+    let stored = stored.unwrap_or_else(|_| Err(ErrorKind::Other.into()));
+    let file = stored.map_err(|error: std::io::Error| {
+        let status = match error.kind() {
+            ErrorKind::StorageFull => StatusCode::INSUFFICIENT_STORAGE,
+            _ => StatusCode::INTERNAL_SERVER_ERROR,
+        };
+        Problem::new(status, format!("store the file: {error}: free space"))
+    })?;
+    let _place = place;
+    Ok(Upload { file, _place })
+}
+
+/// Hands a body over piece by piece, as far as somebody takes it.
+async fn hand_over(body: Body, chunks: mpsc::Sender<Bytes>) -> Result<(), Problem> {
+    let mut body = body.into_data_stream();
+    let mut left = MAX_FILE;
+    while let Some(chunk) = body.next().await {
+        let chunk =
+            chunk.map_err(|error| Problem::unclear(format!("the request's body: {error}")))?;
+        left = left
+            .checked_sub(chunk.len() as u64)
+            .ok_or_else(|| too_long(MAX_FILE))?;
+        if chunks.send(chunk).await.is_err() {
+            // It could not be stored: the storing thread says why.
+            break;
+        }
+    }
+    Ok(())
 }
 
 async fn read(body: Body, most: usize, time: Duration) -> Result<Bytes, Problem> {
-    match tokio::time::timeout(time, to_bytes(body, most)).await {
-        Ok(Ok(bytes)) => Ok(bytes),
-        Ok(Err(error)) => {
-            let words = format!("the request's body: {error}; at most {most} bytes are read");
-            Err(Problem::new(StatusCode::PAYLOAD_TOO_LARGE, words))
-        }
-        Err(_) => {
-            let words = format!(
-                "the request's body did not come within {} s",
-                time.as_secs()
-            );
-            Err(Problem::new(StatusCode::REQUEST_TIMEOUT, words))
-        }
-    }
+    let read = async {
+        to_bytes(body, most)
+            .await
+            .map_err(|_| too_long(most as u64))
+    };
+    in_time(time, read).await
+}
+
+async fn in_time<T>(
+    time: Duration,
+    work: impl Future<Output = Result<T, Problem>>,
+) -> Result<T, Problem> {
+    tokio::time::timeout(time, work).await.unwrap_or_else(|_| {
+        let words = format!(
+            "the request's body did not come within {} s",
+            time.as_secs()
+        );
+        Err(Problem::new(StatusCode::REQUEST_TIMEOUT, words))
+    })
+}
+
+fn too_long(most: u64) -> Problem {
+    let words = format!("the request's body is too long: at most {most} bytes are read");
+    Problem::new(StatusCode::PAYLOAD_TOO_LARGE, words)
 }

@@ -144,19 +144,48 @@ pub(super) async fn folder(
 ) -> Result<Response, Problem> {
     let permit = place(site)?;
     let (name, packed) = site.aside(work).await?;
+    let body = as_it_is_taken(permit, |to| packed.write(to).map_err(io::Error::other));
+    Ok((attached("application/zip", &name), body).into_response())
+}
+
+/// A stored file, as `work` finds it; a few at a time.
+///
+/// # Errors
+/// Too many are on their way, or what `work` answers.
+pub(super) async fn stored(
+    site: &Site,
+    kind: &'static str,
+    work: impl FnOnce(&Site) -> Result<(String, File), Problem> + Send + 'static,
+) -> Result<Response, Problem> {
+    let permit = place(site)?;
+    let (name, mut file) = site.aside(work).await?;
+    let failed = |error: io::Error| Problem::broken(format!("read {name}: {error}"));
+    let length = file.metadata().map_err(failed)?.len().to_string();
+    let body = as_it_is_taken(permit, move |mut to| {
+        io::copy(&mut file, &mut to)?;
+        to.flush()
+    });
+    let length = [(header::CONTENT_LENGTH, length)];
+    Ok((attached(kind, &name), length, body).into_response())
+}
+
+/// A body that `write` hands over piece by piece, no faster than its client takes it.
+fn as_it_is_taken(
+    permit: OwnedSemaphorePermit,
+    write: impl FnOnce(ToClient) -> io::Result<()> + Send + 'static,
+) -> Body {
     let (sender, receiver) = mpsc::channel(1);
     tokio::task::spawn_blocking(move || {
         // Held until the client has taken the file or is gone.
         let _permit = permit;
         let (sender, broken) = (sender.clone(), sender);
         let chunk = Vec::with_capacity(CHUNK);
-        if let Err(error) = packed.write(ToClient { sender, chunk }) {
+        if let Err(error) = write(ToClient { sender, chunk }) {
             // The answer breaks off, and the client knows that it is not whole.
-            let _ = broken.blocking_send(Err(io::Error::other(error)));
+            let _ = broken.blocking_send(Err(error));
         }
     });
-    let body = Body::from_stream(ReceiverStream::new(receiver));
-    Ok((attached("application/zip", &name), body).into_response())
+    Body::from_stream(ReceiverStream::new(receiver))
 }
 
 pub(super) async fn cloud(State(site): State<Site>) -> Result<Response, Problem> {

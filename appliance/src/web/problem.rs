@@ -1,8 +1,11 @@
 //! An answer that says what went wrong: a status and words with the remedy, as JSON.
 
-use axum::http::StatusCode;
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde_json::json;
+
+/// Whoever is told to come again waits for so many seconds.
+const RETRY_AFTER_S: &str = "5";
 
 /// What went wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,6 +33,11 @@ impl Problem {
         Self::new(StatusCode::NOT_FOUND, words)
     }
 
+    /// 503: too many do the same at the moment.
+    pub fn crowded(words: impl Into<String>) -> Self {
+        Self::new(StatusCode::SERVICE_UNAVAILABLE, words)
+    }
+
     /// 409: not now.
     pub fn busy(words: impl Into<String>) -> Self {
         Self::new(StatusCode::CONFLICT, words)
@@ -49,6 +57,10 @@ impl Problem {
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let mut response = (self.status, Json(json!({ "error": self.words }))).into_response();
+        if self.status == StatusCode::SERVICE_UNAVAILABLE {
+            let soon = HeaderValue::from_static(RETRY_AFTER_S);
+            response.headers_mut().insert(header::RETRY_AFTER, soon);
+        }
         response.extensions_mut().insert(Outcome(self.words));
         response
     }

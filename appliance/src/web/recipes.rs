@@ -7,7 +7,7 @@ use axum::response::{Json, Response};
 use serde_json::{Value, json};
 
 use super::body;
-use super::downloads::file;
+use super::downloads::stored;
 use super::map::{Map, map};
 use super::orders::{self, Reload};
 use super::problem::Problem;
@@ -96,10 +96,10 @@ pub(super) async fn export(
     State(site): State<Site>,
     Path(number): Path<u16>,
 ) -> Result<Response, Problem> {
-    file(&site, "application/zip", move |site| {
-        let read = site.recipes.bytes(number);
+    stored(&site, "application/zip", move |site| {
+        let opened = site.recipes.file(number);
         let failed = |error| Problem::missing(format!("read recipe {number}: {error}"));
-        Ok((format!("{number:04}.recipe"), read.map_err(failed)?))
+        Ok((format!("{number:04}.recipe"), opened.map_err(failed)?))
     })
     .await
 }
@@ -194,14 +194,13 @@ pub(super) async fn import(
     State(site): State<Site>,
     request: Request<Body>,
 ) -> Result<(StatusCode, Json<Value>), Problem> {
-    let bytes = body::file(request.into_body()).await?;
+    let upload = body::file(&site, request.into_body()).await?;
     let stored = site.change(move |site| {
-        let recipe =
-            Recipe::from_bytes(&bytes).map_err(|error| Problem::unfit(error.to_string()))?;
+        let recipe = upload.file.recipe().map_err(Problem::unfit)?;
         let (number, name) = (recipe.file.number, recipe.file.name.clone());
         let fingerprint = recipe.file.fingerprint.clone();
         let note = tried(site, recipe).map_err(Problem::unfit)?;
-        let saved = site.recipes.save(number, &bytes);
+        let saved = site.recipes.take(upload.file, number);
         saved.map_err(|error| {
             Problem::broken(format!("store recipe {number}: {error}: free space"))
         })?;

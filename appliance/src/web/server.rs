@@ -33,6 +33,8 @@ const HEADER_TIME: Duration = Duration::from_secs(10);
 const WRITE_TIME: Duration = Duration::from_secs(15);
 /// The most header lines of a request.
 const MOST_HEADERS: usize = 64;
+/// The most bytes of a request that are read ahead of what is being done with it.
+const READ_AHEAD: usize = 64 << 10;
 /// Pause after a connection that could not be accepted.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
@@ -87,6 +89,7 @@ async fn answer(stream: TcpStream, peer: SocketAddr, slot: Arc<Slot>, router: Ro
         .timer(TokioTimer::new())
         .header_read_timeout(HEADER_TIME)
         .max_headers(MOST_HEADERS)
+        .max_buf_size(READ_AHEAD)
         .serve_connection(TokioIo::new(Box::pin(stream)), service);
     // A client that breaks off is no failure of ours.
     tokio::select! {

@@ -28,6 +28,8 @@ pub const MAX_FOLLOWERS_EACH: usize = 8;
 const MAX_ASIDE: usize = 2;
 /// The most sign-ins, changes and records of them at a time: whoever only looks must not keep them waiting.
 const MAX_CHANGES: usize = 2;
+/// The most files that arrive at a time: each takes storage, and memory while it is checked.
+const MAX_ARRIVING: usize = 2;
 /// The most files that are on their way at a time: each is in memory until its client has taken it.
 const MAX_FILES: usize = 4;
 
@@ -68,6 +70,8 @@ pub struct Site {
     parts: Arc<Parts>,
     /// Places for pages that follow the events.
     pub(super) followers: Slots,
+    /// Places for files that arrive.
+    pub(super) arriving: Arc<Semaphore>,
     /// Places for files that are being taken along.
     pub(super) files: Arc<Semaphore>,
     /// The pictures of a kept part that were worked out last; held while others are.
@@ -90,6 +94,7 @@ impl Site {
         Self {
             parts: Arc::new(parts),
             followers: Slots::new(MAX_FOLLOWERS, MAX_FOLLOWERS_EACH),
+            arriving: Arc::new(Semaphore::new(MAX_ARRIVING)),
             files: Arc::new(Semaphore::new(MAX_FILES)),
             kept: Arc::default(),
             looking: Arc::new(Semaphore::new(MAX_ASIDE)),

@@ -260,7 +260,7 @@ fn full_storage_is_a_warning_then_a_fault_between_two_jobs_and_clears_by_itself(
     let low = bench.event(room(health::LOW_STORAGE_MIB - 1));
     assert!(low.warnings & warning::STORAGE != 0 && low.is(status::READY));
     bench.token(1);
-    let full = room(health::FULL_STORAGE_MIB - 1);
+    let full = room(FULL_STORAGE_MIB - 1);
     assert_eq!(bench.event(full.clone()).state, 2, "the cycle goes on");
     assert_eq!(bench.finish().result_seq, 41, "and has its result");
     let snapshot = bench.event(full);

@@ -57,7 +57,7 @@ async fn a_boundary_value_in_an_edit_is_refused_by_its_key_or_the_recipe_judges_
         for value in &values {
             let body = place.replaced(&edit, value, Value::to_string);
             let answer = served.change("PUT", "/api/recipes/1", &cookie, &body).await;
-            let stored = store.bytes(1).unwrap();
+            let stored = std::fs::read(&store.generations(1)[0]).unwrap();
             let used = match answer.status {
                 200 => {
                     let used = bed.use_recipe(store.load(1).unwrap().recipe);

@@ -1,0 +1,173 @@
+//! A recipe file on its way into the store: beside the recipes, on their storage, under a name that is no recipe's. Dropped,
+//! it is gone; what a kill leaves behind, the next start removes.
+
+use super::{Recipe, Store};
+use crate::output::folder::rename_whole;
+use crate::station::FULL_STORAGE_MIB;
+use rustix::fs::fstatvfs;
+use std::fs::{self, File};
+use std::io::{self, BufReader, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// How the name of a file on its way begins.
+const PREFIX: &str = "arriving-";
+/// The free storage is looked at each time so many bytes more have come.
+const STRETCH: u64 = 1 << 20;
+
+/// A file that is being written, and then read and taken.
+#[derive(Debug)]
+pub struct Arriving {
+    path: PathBuf,
+    file: File,
+    bytes: u64,
+}
+
+impl Store {
+    /// Begins a file of `expected` bytes, or 0 where that is not known.
+    ///
+    /// # Errors
+    /// Whatever the file system answers, or that the file would leave less free storage than the station needs.
+    pub fn arriving(&self, expected: u64) -> io::Result<Arriving> {
+        static COUNT: AtomicU64 = AtomicU64::new(0);
+        loop {
+            let count = COUNT.fetch_add(1, Ordering::Relaxed);
+            let name = format!("{PREFIX}{}-{count}.new", std::process::id());
+            let path = self.folder.join(name);
+            let opened = File::options().write(true).create_new(true).open(&path);
+            match opened {
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                opened => {
+                    let file = opened?;
+                    let bytes = 0;
+                    let arriving = Arriving { path, file, bytes };
+                    arriving.check_room(expected)?;
+                    return Ok(arriving);
+                }
+            }
+        }
+    }
+
+    /// Stores a file that has come under a number; the recipe before stays as the previous generation.
+    ///
+    /// # Errors
+    /// Whatever the file system answers; then the stored recipe is the one before.
+    pub fn take(&self, arriving: Arriving, number: u16) -> io::Result<()> {
+        let _alone = self.lock()?;
+        self.take_locked(arriving, number)
+    }
+
+    pub(super) fn take_locked(&self, arriving: Arriving, number: u16) -> io::Result<()> {
+        arriving.file.sync_all()?;
+        self.keep_previous(number)?;
+        rename_whole(&arriving.path, &self.path(number))
+    }
+
+    /// Removes the files on their way that a kill left behind.
+    ///
+    /// # Errors
+    /// Whatever the file system answers.
+    pub fn remove_left_behind(&self) -> io::Result<()> {
+        // Another process may be importing just now.
+        let _alone = self.lock()?;
+        for entry in fs::read_dir(&self.folder)? {
+            let entry = entry?;
+            if entry.file_name().to_string_lossy().starts_with(PREFIX) {
+                fs::remove_file(entry.path())?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Arriving {
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Reads and checks what has come.
+    ///
+    /// # Errors
+    /// In words: it is no recipe.
+    pub fn recipe(&self) -> Result<Recipe, String> {
+        let file = File::open(&self.path).map_err(|error| error.to_string())?;
+        let read = Recipe::read(BufReader::new(file), self.bytes);
+        read.map_err(|error| error.to_string())
+    }
+
+    /// Checks that `more` bytes leave what the station needs.
+    fn check_room(&self, more: u64) -> io::Result<()> {
+        let storage = fstatvfs(&self.file)?;
+        let free = storage.f_bavail.saturating_mul(storage.f_frsize);
+        let needed = (FULL_STORAGE_MIB << 20).saturating_add(more);
+        if free >= needed {
+            return Ok(());
+        }
+        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+        let words = format!("{} MiB are free, {} are needed", mib(free), mib(needed));
+        Err(io::Error::new(ErrorKind::StorageFull, words))
+    }
+}
+
+impl Write for Arriving {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.file.write(bytes)?;
+        let before = self.bytes;
+        self.bytes += written as u64;
+        if before / STRETCH < self.bytes / STRETCH {
+            self.check_room(0)?;
+        }
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Drop for Arriving {
+    fn drop(&mut self) {
+        // Nothing is there if it was taken; what cannot be removed now, the next start removes.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_arrives_is_no_recipe_until_it_is_taken_and_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path()).unwrap();
+        let files = || fs::read_dir(folder.path()).unwrap().count();
+        let mut arriving = store.arriving(4).unwrap();
+        arriving.write_all(b"none").unwrap();
+        assert!(arriving.recipe().is_err());
+        assert_eq!((store.numbers(), files()), (Vec::new(), 1));
+        drop(arriving);
+        assert_eq!(files(), 0);
+        // A kill leaves it behind.
+        std::mem::forget(store.arriving(0).unwrap());
+        assert_eq!(files(), 1);
+        store.remove_left_behind().unwrap();
+        let mut arriving = store.arriving(4).unwrap();
+        arriving.write_all(b"some").unwrap();
+        store.take(arriving, 7).unwrap();
+        assert_eq!(store.numbers(), [7]);
+        // The lock's file beside it.
+        assert_eq!(fs::read(store.path(7)).unwrap(), b"some");
+        assert_eq!(files(), 2);
+    }
+
+    #[test]
+    fn a_file_that_would_fill_the_storage_is_refused_before_it_comes() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path()).unwrap();
+        let refused = store.arriving(u64::MAX / 2).unwrap_err();
+        assert_eq!(refused.kind(), ErrorKind::StorageFull);
+        assert!(refused.to_string().contains("MiB are free"), "{refused}");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}
