@@ -243,7 +243,7 @@ try {
     await page.waitForFunction((seq) => Number(document.querySelector("#sequence").textContent.replace(/\D/g, "")) > seq, before);
     await page.waitForSelector("#state[data-state=ready]");
     await page.evaluate(() => fetch("/api/recipes/1/load", { method: "POST" }));
-    await page.waitForFunction(() => document.querySelector("#recipe-name").textContent.includes("recipe 1"));
+    await page.waitForFunction(() => /recipe 1 .* is active/.test(document.querySelector("#other-words").textContent));
     await page.waitForSelector("#state[data-state=ready]");
     await page.click("nav a[href='#live']");
     await page.waitForFunction(() => document.querySelector("#no-picture").textContent.includes("gone"));
