@@ -1,13 +1,13 @@
-//! The history across kill -9, and the way from a failed part to its replay.
+//! The history across kill -9, and what it shows.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, READY, long, trigger};
 use appliance::history::{Entry, Filter, Reader, Writer};
 use appliance::station::Verdict;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use tests::program::{Program, Run};
+use tests::program::Program;
 use tests::random::Random;
 
 /// Words of VERDICT.
@@ -15,11 +15,11 @@ const FAIL: u16 = 2;
 /// Longest wait for the history's own threads.
 const WRITTEN: Duration = Duration::from_secs(30);
 
-fn program() -> Program {
+pub(crate) fn program() -> Program {
     Program::at(env!("CARGO_BIN_EXE_fringed-under-test"))
 }
 
-fn reader(place: &Place) -> Reader {
+pub(crate) fn reader(place: &Place) -> Reader {
     Reader::of(&place.path("state"))
 }
 
@@ -128,136 +128,6 @@ pub(crate) fn recording(place: &Place, seq: u32) -> PathBuf {
         assert!(started.elapsed() < WRITTEN, "no recording of result {seq}");
         std::thread::yield_now();
     }
-}
-
-fn replay(folder: &Path, more: &[&str]) -> Run {
-    let mut arguments = vec!["replay", folder.to_str().unwrap()];
-    arguments.extend(more);
-    program().run(&arguments)
-}
-
-#[test]
-fn a_failed_part_is_kept_and_replays_bit_by_bit_and_a_difference_is_said() {
-    let place = place_with_a_dent();
-    let daemon = Daemon::start(&place);
-    let mut plc = Plc::connect(&daemon);
-    let words = plc.measure(9);
-    assert_eq!(words[8], FAIL);
-    let folder = recording(&place, long(&words, 0));
-    daemon.kill();
-    let entry = reader(&place).result(long(&words, 0)).unwrap().unwrap();
-    assert_eq!((entry.verdict, entry.part_id), (Verdict::Fail, 0x10009));
-    assert_eq!(entry.gauges.len(), usize::from(words[27]));
-    let first = entry.gauges[0].value.unwrap();
-    assert_eq!(
-        (first as f32).to_bits(),
-        long(&words, 64),
-        "the same value as in the registers"
-    );
-
-    let run = replay(&folder, &[]).succeeded();
-    assert!(
-        run.stdout.contains("FAIL") && run.stdout.contains("bit by bit"),
-        "{}",
-        run.stdout
-    );
-    // With one thread as with many.
-    replay(&folder, &["--threads", "1"]).succeeded();
-
-    // One frame of the finest level that is another's.
-    fs::copy(folder.join("frames/008.png"), folder.join("frames/011.png")).unwrap();
-    let run = replay(&folder, &[]);
-    assert_eq!(run.code, 70, "{}", run.stderr);
-    assert!(
-        run.stderr.contains("differs from result 1"),
-        "{}",
-        run.stderr
-    );
-
-    // Elsewhere nothing is known of it, but it can be judged.
-    let elsewhere = place.path("elsewhere");
-    fs::rename(&folder, &elsewhere).unwrap();
-    let state = place.path("state");
-    let run = replay(&elsewhere, &["--state", state.to_str().unwrap()]);
-    assert_eq!(run.code, 66, "{}", run.stderr);
-    assert!(
-        run.stdout.contains("FAIL") && run.stderr.contains("compared with nothing"),
-        "{}",
-        run.stderr
-    );
-}
-
-#[test]
-fn a_kept_part_is_judged_again_by_its_own_recipe_after_that_was_edited_or_deleted_also_from_the_pages_zip()
- {
-    let place = place_with_a_dent();
-    // A new one is shown at the next start.
-    fs::remove_file(place.path("state/access/secret")).unwrap();
-    let daemon = Daemon::start(&place);
-    let words = Plc::connect(&daemon).measure(9);
-    assert_eq!(words[8], FAIL);
-    let seq = long(&words, 0);
-    let folder = recording(&place, seq);
-    let mut browser = Browser::new(&daemon);
-    let (status, zip) = browser.ask("GET", &format!("/api/history/{seq}/recording.zip"), &[]);
-    assert_eq!(status, 200);
-    let file = place.path("part.zip");
-    fs::write(&file, zip).unwrap();
-    // No limits, so that the dent passes, and another name: no generation is left that judged the part.
-    let taught = fs::read(place.recipe()).unwrap();
-    assert_eq!(taught, fs::read(folder.join("recipe.recipe")).unwrap());
-    browser.sign_in(&daemon);
-    for name in ["lenient", "renamed"] {
-        let recipe = browser.get("/api/recipes/1");
-        let mut gauges = recipe["gauges"].clone();
-        for gauge in gauges.as_array_mut().unwrap() {
-            let gauge = gauge.as_object_mut().unwrap();
-            gauge.retain(|key, _| key != "low" && key != "high");
-        }
-        let fingerprint = &recipe["fingerprint"];
-        let edit =
-            serde_json::json!({ "fingerprint": fingerprint, "gauges": gauges, "name": name });
-        let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
-        assert_eq!(status, 200, "{answer}");
-        browser.wait_for_another(fingerprint.as_str().unwrap());
-    }
-    daemon.kill();
-    let own = |run: Run| {
-        let said = run.succeeded().stdout;
-        assert!(said.contains("the recording's own recipe"), "{said}");
-        assert!(
-            said.contains("FAIL") && said.contains("bit by bit"),
-            "{said}"
-        );
-    };
-    let state = place.path("state");
-    let of_zip = ["--state", state.to_str().unwrap()];
-    own(replay(&folder, &[]));
-    own(replay(&file, &of_zip));
-    let run = replay(&folder, &["--recipe", "stored"]).succeeded();
-    assert!(
-        run.stdout.starts_with("PASS") && run.stdout.contains("is FAIL, judged by another recipe"),
-        "{}",
-        run.stdout
-    );
-    for recipe in [
-        place.recipe(),
-        place.path("state/recipes/0001.recipe.previous"),
-    ] {
-        fs::remove_file(recipe).unwrap();
-    }
-    own(replay(&folder, &[]));
-    own(replay(&file, &of_zip));
-    let out = place.path("out");
-    program().measure(&file, &out, &[]).succeeded();
-    assert!(out.join("height.npy").exists());
-    assert_eq!(replay(&folder, &["--recipe", "stored"]).code, 66);
-    // What an older program kept has no recipe of its own: the file that taught it is named.
-    let named = place.path("named.recipe");
-    fs::rename(folder.join("recipe.recipe"), &named).unwrap();
-    assert_eq!(replay(&folder, &[]).code, 66);
-    let run = replay(&folder, &["--recipe", named.to_str().unwrap()]).succeeded();
-    assert!(run.stdout.contains("bit by bit"), "{}", run.stdout);
 }
 
 #[test]
