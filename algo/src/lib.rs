@@ -1,13 +1,11 @@
 //! From frames to a verdict: the pure computation of `fringed`.
 //!
-//! Data flows one way through the modules, and imports only point backwards along it:
-//! [`units`], [`trust`], [`math`] ← [`simd`] ← [`frame`] ← [`pattern`], [`phase`] ← [`geometry`] ←
-//! [`pipeline`] ← [`inspect`] ← [`adaptive`].
-//!
 //! Everything here is a function of its arguments: no input or output, no clock, no randomness, no
 //! global state. The per-pixel path from samples to absolute phase is integer arithmetic (the mean of
 //! dense levels `f32` with `+ − ×`); geometry is `f64` with `+ − × ÷` and `libm`. So the same frames give the same bits on every machine, with
 //! any number of threads.
+//!
+#![doc = include_str!("../README.md")]
 #![no_std]
 
 extern crate alloc;
