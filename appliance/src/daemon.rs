@@ -12,6 +12,7 @@ use stopping::Stopping;
 
 use crate::access::Access;
 use crate::calibration::Current;
+use crate::computing::Computing;
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
 use crate::history::{self, Bounds, History, Numbering, Reader};
@@ -118,6 +119,7 @@ impl Daemon {
         };
         let maps = LastMaps::default();
         let calibration = Current::default();
+        let computing = Computing::default();
         let (sockets, stopped) = watch::channel(false);
         let wiring = {
             let (station, progress, stopped) = (station.clone(), progress.clone(), stopped.clone());
@@ -174,6 +176,7 @@ impl Daemon {
             let (station, recipes) = (station.clone(), state.recipes().clone());
             let (config, progress, history) =
                 (config.head_in(&path), progress.clone(), history.clone());
+            let computing = computing.clone();
             let (patient, pulse) = (caller.notify.is_listened_to(), caller.notify.pulse());
             spawn("measuring", move || {
                 let opening = Opening {
@@ -183,6 +186,7 @@ impl Daemon {
                     station: &station,
                     pulse: &pulse,
                     patient,
+                    computing: &computing,
                 };
                 let Some((head, begin)) = opening.run(&inbox, &opened) else {
                     return;
@@ -201,6 +205,7 @@ impl Daemon {
                     lost: None,
                     shelf: Shelf::default(),
                     pulse,
+                    computing,
                 };
                 worker.run(&inbox, begin, first);
             })?
@@ -214,6 +219,7 @@ impl Daemon {
             station: station.clone(),
             history,
             writing,
+            computing,
         };
         let gone = || {
             Failure::new(

@@ -10,6 +10,7 @@ mod boundaries;
 pub mod calibration;
 pub mod cli;
 pub mod clock;
+pub mod computing;
 pub mod config;
 pub mod daemon;
 pub mod doctor;

@@ -6,6 +6,7 @@ mod recovery;
 
 use crate::backend::Opened;
 use crate::calibration::Current;
+use crate::computing::Computing;
 use crate::config::HeadConfig;
 use crate::history::History;
 use crate::latest::{LastCycle, LastMaps};
@@ -107,6 +108,8 @@ pub struct Worker {
     pub shelf: Shelf,
     /// What the service manager's watchdog is fed by.
     pub pulse: Pulse,
+    /// Told while it only computes.
+    pub computing: Computing,
 }
 
 impl Worker {
@@ -115,8 +118,8 @@ impl Worker {
     pub fn run(mut self, orders: &Receiver<Order>, begin: Event, first: Option<Request>) {
         self.progress.clear();
         self.tell_condition();
-        self.station.event(begin);
-        if let Some(first) = first {
+        let begun = self.station.event(begin);
+        if let Some(first) = first.filter(|_| begun.state_word != "stopping") {
             self.station.event(Event::Request(first));
         }
         let mut plan: Option<Arc<Plan>> = None;
@@ -311,6 +314,7 @@ impl Worker {
         let kept = replaced.filter(|_| keep_gauges);
         let (station, bar) = (self.station.clone(), self.progress.clone());
         let (aborts, pulse) = (self.aborts.clone(), &self.pulse);
+        let computing = &self.computing;
         let progress = |fraction: f64, words: &str| {
             pulse.beat();
             bar.tell(fraction, words);
@@ -332,9 +336,16 @@ impl Worker {
         let taught = match (problem, fit) {
             (Some(problem), _) => Err(TeachError::NotCalibrated(problem)),
             (None, Err(words)) => Err(TeachError::Rig(words)),
-            (None, Ok(())) => self
-                .pool
-                .install(|| teach_while(head, calibration, &naming, DEVICE_TIMEOUT, &progress)),
+            (None, Ok(())) => self.pool.install(|| {
+                teach_while(
+                    head,
+                    calibration,
+                    &naming,
+                    DEVICE_TIMEOUT,
+                    computing,
+                    &progress,
+                )
+            }),
         };
         let taught = taught.and_then(|taught| match &kept {
             Some(file) => replace::keep_gauges(taught, file).map_err(TeachError::Rig),

@@ -6,6 +6,7 @@ use crate::station_plc::{
     trigger,
 };
 use appliance::calibration::Calibration;
+use appliance::computing::Computing;
 use appliance::config::Config;
 use appliance::daemon::Daemon;
 use appliance::history::seqs::AHEAD;
@@ -171,12 +172,20 @@ fn a_teach_that_is_ended_does_no_further_step() {
         taught_at_unix_s: 0,
         placement_tolerance_mm: 1.0,
     };
+    let computing = Computing::default();
     let told = Mutex::new(Vec::new());
     let progress = |share: f64, _: &str| {
         told.lock().unwrap().push(share);
         share < 0.35
     };
-    let ended = teach_while(&mut head, &calibration, &naming, PATIENCE, &progress);
+    let ended = teach_while(
+        &mut head,
+        &calibration,
+        &naming,
+        PATIENCE,
+        &computing,
+        &progress,
+    );
     assert!(matches!(ended, Err(TeachError::Ended)), "{ended:?}");
     let told = told.into_inner().unwrap();
     assert_eq!(told.last(), Some(&0.35), "{told:?}");

@@ -4,6 +4,8 @@ use crate::station_plc::{
     Daemon, ONLINE, PATIENCE, Place, Plc, READY, SMALL_HEAD, STOPPING, command,
 };
 use std::fs::{self, File};
+use std::io::{Read as _, Write as _};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::os::unix::fs::MetadataExt as _;
 use std::os::unix::net::UnixDatagram;
 use std::process::{Child, Command, ExitStatus};
@@ -72,17 +74,21 @@ fn start(mut command: Command) -> Silent {
     Silent(command.spawn().unwrap())
 }
 
-fn end(mut silent: Silent) -> ExitStatus {
+fn end(silent: Silent) -> ExitStatus {
+    end_by("-TERM", silent)
+}
+
+fn end_by(signal: &str, mut silent: Silent) -> ExitStatus {
     let child = &mut silent.0;
     let pid = child.id().to_string();
-    let told = Command::new("kill").args(["-TERM", &pid]).status();
+    let told = Command::new("kill").args([signal, &pid]).status();
     assert!(told.unwrap().success());
     let began = Instant::now();
     loop {
         if let Some(status) = child.try_wait().unwrap() {
             return status;
         }
-        assert!(began.elapsed() < STOPPING, "SIGTERM did not end it");
+        assert!(began.elapsed() < STOPPING, "{signal} did not end it");
         std::thread::yield_now();
     }
 }
@@ -160,6 +166,61 @@ fn a_start_that_is_told_to_end_ends_cleanly() {
     // Stopped and not killed, as the next start counts.
     let boots = fs::read_to_string(place.path("state/boots")).unwrap();
     assert!(boots.contains("stopped"), "{boots}");
+}
+
+/// What the daemon of a place says when Ctrl-C ends it as soon as something is `reached`, by what it said so far and where its page is.
+fn interrupted(place: &Place, reached: &dyn Fn(&str, SocketAddr) -> bool) -> String {
+    let free = TcpListener::bind("127.0.0.1:0").unwrap();
+    let page = free.local_addr().unwrap();
+    drop(free);
+    let said = place.path("stderr");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fringed-under-test"));
+    command
+        .args(["serve", "--modbus", "127.0.0.1:0", "--http"])
+        .arg(page.to_string())
+        .arg("--config")
+        .arg(place.path("fringed.toml"))
+        .stderr(File::create(&said).unwrap());
+    let child = start(command);
+    let began = Instant::now();
+    while !reached(&fs::read_to_string(&said).unwrap(), page) {
+        assert!(began.elapsed() < PATIENCE, "it is not reached");
+        std::thread::yield_now();
+    }
+    assert_eq!(end_by("-INT", child).code(), Some(0));
+    fs::read_to_string(&said).unwrap()
+}
+
+#[test]
+fn ctrl_c_during_the_opening_or_the_first_teaching_ends_it_in_time_and_without_a_complaint() {
+    let place = Place::new();
+    fs::write(
+        place.path("fringed.toml"),
+        "state = \"state\"\n[head]\nscenario = \"many.toml\"\n",
+    )
+    .unwrap();
+    // Working out the light of so many rays takes longer than any stop waits.
+    fs::write(place.path("many.toml"), "sub_rays = 16\n").unwrap();
+    let opening = interrupted(&place, &|said, _| said.contains("shown this once"));
+    fs::write(place.path("many.toml"), "sub_rays = 1\n").unwrap();
+    let teaching = interrupted(&place, &|_, page| {
+        let Ok(mut stream) = TcpStream::connect(page) else {
+            return false;
+        };
+        let ask =
+            format!("GET /api/snapshot HTTP/1.1\r\nHost: {page}\r\nConnection: close\r\n\r\n");
+        let mut answer = String::new();
+        let asked = stream.write_all(ask.as_bytes());
+        asked
+            .and_then(|()| stream.read_to_string(&mut answer))
+            .is_ok()
+            && answer.contains("\"state\":\"teaching\"")
+    });
+    for said in [opening, teaching] {
+        let (_, after) = said.split_once("fringed: stopping\n").expect(&said);
+        assert_eq!(after, "", "{said}");
+    }
+    assert!(!place.recipe().exists());
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The end of the daemon: every thread is told, and none is waited for for ever.
 
+use crate::computing::Computing;
 use crate::history::History;
 use crate::progress::Progress;
 use crate::station::StationHandle;
@@ -19,6 +20,7 @@ pub(super) struct Stopping {
     pub(super) station: StationHandle,
     pub(super) history: History,
     pub(super) writing: JoinHandle<()>,
+    pub(super) computing: Computing,
 }
 
 /// Time between two looks at a thread that ends.
@@ -36,7 +38,14 @@ impl Stopping {
         // An order that nobody takes, or a runtime that is gone, is what is wanted here.
         drop(self.orders.send(Order::Stop));
         let [measuring, serving, surveying, wiring] = self.threads;
-        join("measuring", measuring, began + MEASURING, &self.progress);
+        let needed = || !self.computing.is_under_way();
+        join_while(
+            &needed,
+            "measuring",
+            measuring,
+            began + MEASURING,
+            &self.progress,
+        );
         let _ = self.sockets.send(true);
         join("sockets", serving, until, &self.progress);
         join("lines", wiring, until, &self.progress);
@@ -50,7 +59,21 @@ impl Stopping {
 
 /// Waits for a thread to end. One that hangs in a device or in a storage must not keep the program from ending.
 fn join(name: &str, thread: JoinHandle<()>, until: Instant, progress: &Progress) {
+    join_while(&|| true, name, thread, until, progress);
+}
+
+/// The same as long as the thread is `needed`: one that only computes ends with the program.
+fn join_while(
+    needed: &dyn Fn() -> bool,
+    name: &str,
+    thread: JoinHandle<()>,
+    until: Instant,
+    progress: &Progress,
+) {
     while !thread.is_finished() {
+        if !needed() {
+            return;
+        }
         if Instant::now() > until {
             progress.warn(&format!(
                 "the thread {name} does not end and is left behind"

@@ -6,6 +6,7 @@ use super::PatternFile;
 use super::comparison::ComparisonFile;
 use super::golden::GoldenPart;
 use crate::calibration::Calibration;
+use crate::computing::Computing;
 use crate::rig::{About, Measured, Rig, RigError};
 use crate::seam;
 use algo::adaptive::{AdaptError, ProjectorMap, noise};
@@ -76,10 +77,11 @@ pub fn teach(
         progress(share, words);
         true
     };
-    teach_while(head, calibration, naming, timeout, &all)
+    let computing = Computing::default();
+    teach_while(head, calibration, naming, timeout, &computing, &all)
 }
 
-/// As [`teach`], but `progress` ends it before the next step by answering `false`.
+/// As [`teach`], but `progress` ends it before the next step by answering `false`; `computing` is told of steps that use no device.
 ///
 /// # Errors
 /// As [`teach`]; [`TeachError::Ended`] where it was ended.
@@ -88,6 +90,7 @@ pub fn teach_while(
     calibration: &Calibration,
     naming: &Naming,
     timeout: Duration,
+    computing: &Computing,
     progress: &dyn Fn(f64, &str) -> bool,
 ) -> Result<Taught, TeachError> {
     let step = |share: f64, words: &str| match progress(share, words) {
@@ -115,13 +118,15 @@ pub fn teach_while(
     refuse_empty(&first.phases)?;
     step(0.35, "making the part's own pattern")?;
     let map = ProjectorMap::from_heights(&first.triangulator, &first.heights);
-    let optics = noise::Optics {
-        projector_blur: blur(&first, &frames, &map, columns as f64)?,
-        camera_blur: 0.0,
-        projector_pitch: noise::PROJECTOR_PITCH,
-        image_pitch: noise::IMAGE_PITCH,
-    };
-    let function = noise::adapt(&map, columns, rows, &optics)?;
+    let function = computing.on(|| {
+        let optics = noise::Optics {
+            projector_blur: blur(&first, &frames, &map, columns as f64)?,
+            camera_blur: 0.0,
+            projector_pitch: noise::PROJECTOR_PITCH,
+            image_pitch: noise::IMAGE_PITCH,
+        };
+        noise::adapt(&map, columns, rows, &optics).map_err(TeachError::from)
+    })?;
     step(0.4, "measuring the part with its own pattern")?;
     let expected = map.expected_phase(&function);
     let full = dense(DENSE_N);
@@ -151,7 +156,8 @@ pub fn teach_while(
         noise: calibration.noise_counts,
         comparison: Some(comparison),
     };
-    let taught = part.recipe(naming).map_err(TeachError::Rig)?;
+    let taught = computing.on(|| part.recipe(naming));
+    let taught = taught.map_err(TeachError::Rig)?;
     step(1.0, "taught")?;
     Ok(taught)
 }

@@ -168,6 +168,8 @@ impl Station {
                 self.recipe = None;
                 self.state = self.rest();
             }
+            // The stop came while the head was being opened.
+            State::Stopping { .. } => {}
             _ => log(effects, "the measuring task started twice; ignored"),
         }
     }
@@ -199,6 +201,10 @@ impl Station {
 
     /// An answer that nobody waits for: of an order that ran into its deadline, or from before.
     pub(super) fn late(&self, what: &str, job: JobId, effects: &mut Effects) {
+        // A stop ends what is under way, and that it ended needs no remark.
+        if matches!(self.state, State::Stopping { .. }) {
+            return;
+        }
         log(
             effects,
             format!(

@@ -3,7 +3,8 @@
 use super::Order;
 use super::recovery::{FIRST_WAIT, LONGEST_WAIT, REMEDY, wait};
 use crate::backend::{self, Opened};
-use crate::config::HeadConfig;
+use crate::computing::Computing;
+use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::notify::Pulse;
 use crate::progress::Progress;
@@ -25,6 +26,8 @@ pub struct Opening<'a> {
     pub pulse: &'a Pulse,
     /// Whether a head that is not there is waited for.
     pub patient: bool,
+    /// Told while the light of a simulated head is worked out.
+    pub computing: &'a Computing,
 }
 
 impl Opening<'_> {
@@ -46,7 +49,12 @@ impl Opening<'_> {
         loop {
             self.pulse.beat();
             // Nobody hears any more only if the start was given up.
-            match self.pool.install(|| backend::open(self.config, &told)) {
+            let open = || self.pool.install(|| backend::open(self.config, &told));
+            let opened = match self.config.backend {
+                Backend::Sim => self.computing.on(open),
+                Backend::Replay | Backend::Rpi => open(),
+            };
+            match opened {
                 Ok(head) => {
                     drop(heard.send(Ok(head.stage.clone())));
                     let event = match said.is_empty() {
