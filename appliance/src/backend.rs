@@ -153,7 +153,7 @@ pub fn open_as_it_is(
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<Opened, Failure> {
     let mut opened = match config.backend {
-        Backend::Sim => simulated(config.scenario.as_deref(), progress)?,
+        Backend::Sim => simulated(config, progress)?,
         Backend::Replay => replayed(&config.recordings)?,
         Backend::Rpi => devices::rpi(config)?,
     };
@@ -247,8 +247,11 @@ pub fn scenario(path: Option<&Path>) -> Result<Scenario, Failure> {
         .map_err(|error| Failure::new(Exit::Configuration, error.to_string()))
 }
 
-fn simulated(path: Option<&Path>, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
-    let scenario = scenario(path)?;
+fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
+    let mut scenario = scenario(config.scenario.as_deref())?;
+    if let Some(placed) = &config.part {
+        (scenario.part, scenario.placement) = (placed.part.clone(), placed.placement);
+    }
     let (head, stage) = hal::sim::head_with_progress(&scenario, progress)
         .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
     let calibration = Calibration::of_stage(&stage);

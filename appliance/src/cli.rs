@@ -20,6 +20,7 @@ mod history;
 mod measure;
 mod names;
 mod options;
+mod part;
 mod recipe;
 mod record;
 mod replay;

@@ -20,6 +20,7 @@ use crate::journal::{self, Severity};
 use crate::latest::LastMaps;
 use crate::progress::Progress;
 use crate::shelf::Shelf;
+use crate::simulation::{Placed, Simulation};
 use crate::state::{StateFolder, random};
 use crate::station::{
     Effect, Event, Identity, Limits, Micros, RecipeKey, Request, Settings, Station, StationHandle,
@@ -119,6 +120,7 @@ impl Daemon {
         };
         let maps = LastMaps::default();
         let calibration = Current::default();
+        let simulation = Simulation::new(orders.clone());
         let computing = Computing::default();
         let (sockets, stopped) = watch::channel(false);
         let wiring = {
@@ -140,6 +142,7 @@ impl Daemon {
                 recipes: state.recipes().clone(),
                 calibration: calibration.clone(),
                 maps: maps.clone(),
+                simulation: simulation.clone(),
                 history: Reader::of(&path),
                 date: Box::new(move |utc_us| dating.date(boot_id, utc_us)),
                 tally,
@@ -174,8 +177,12 @@ impl Daemon {
         let awaited = first.is_some();
         let measuring = {
             let (station, recipes) = (station.clone(), state.recipes().clone());
-            let (config, progress, history) =
+            let (mut config, progress, history) =
                 (config.head_in(&path), progress.clone(), history.clone());
+            let waiting = match first {
+                Some(Request::Teach { .. }) => Placed::after_teaching(&mut config.part),
+                _ => None,
+            };
             let computing = computing.clone();
             let (patient, pulse) = (caller.notify.is_listened_to(), caller.notify.pulse());
             spawn("measuring", move || {
@@ -191,6 +198,7 @@ impl Daemon {
                 let Some((head, begin)) = opening.run(&inbox, &opened) else {
                     return;
                 };
+                simulation.opened(head.stage.as_ref());
                 let worker = Worker {
                     opened: head,
                     calibration,
@@ -206,6 +214,7 @@ impl Daemon {
                     shelf: Shelf::default(),
                     pulse,
                     computing,
+                    waiting,
                 };
                 worker.run(&inbox, begin, first);
             })?

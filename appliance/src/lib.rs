@@ -35,6 +35,7 @@ pub mod recipe;
 pub mod rig;
 pub mod seam;
 pub mod shelf;
+pub mod simulation;
 pub mod socket;
 pub mod state;
 pub mod station;

@@ -2,6 +2,7 @@
 
 mod cycle;
 pub mod opening;
+mod placing;
 mod recovery;
 
 use crate::backend::Opened;
@@ -17,6 +18,7 @@ use crate::recipe::store::Stamp;
 use crate::recipe::teach::{TeachError, teach_while};
 use crate::recipe::{LoadError, Store, replace};
 use crate::shelf::Shelf;
+use crate::simulation::{Placed, Placing};
 use crate::station::{
     ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
     error_code,
@@ -39,6 +41,8 @@ pub enum Order {
     Load(JobId, RecipeKey),
     /// Teach a recipe from the part in front of the head; whether the gauges of the one that it replaces stay.
     Teach(JobId, u16, bool),
+    /// Put another part in front of a simulated head.
+    Place(Placing),
     /// End.
     Stop,
 }
@@ -110,6 +114,8 @@ pub struct Worker {
     pub pulse: Pulse,
     /// Told while it only computes.
     pub computing: Computing,
+    /// The part that comes in front of a simulated head once a good one is taught.
+    pub waiting: Option<Placed>,
 }
 
 impl Worker {
@@ -151,6 +157,7 @@ impl Worker {
                     last = JudgedBy::default();
                     self.teach(job, number, keep_gauges, &mut plan);
                 }
+                Ok(Order::Place(placing)) => placing.carry_out(),
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
                 Err(RecvTimeoutError::Timeout) => {
                     self.station.event(Event::Alive);
@@ -394,6 +401,7 @@ impl Worker {
             Ok((ready, _)) => {
                 let recipe = active(&ready);
                 *plan = Some(ready);
+                self.place_waiting(job);
                 self.station.event(Event::Taught { job, recipe });
             }
             Err((error_code, message)) => {

@@ -102,6 +102,27 @@ try {
     for (const id of ["#processing", "#processor-time"]) assert.match(await page.textContent(id), /\d+ m?s/);
   });
 
+  await step("a dent in the simulated part fails, without it the moved part passes", async () => {
+    const put = async () => {
+      await page.click("#part-put");
+      await page.waitForFunction(() => document.querySelector("#notice").textContent.includes("part is in place") && !document.querySelector("#part-put").disabled);
+      await page.evaluate(() => { document.querySelector("#notice").textContent = ""; });
+    };
+    await page.selectOption("#defect-kind", "dent");
+    await page.click("#defect-add");
+    assert.equal(await page.locator("#part-defects input").count(), 4);
+    await put();
+    await trigger();
+    await verdict("FAIL");
+    await page.click("#part-defects button");
+    await page.fill("#place-0", "0.3");
+    await put();
+    await trigger();
+    await verdict("PASS");
+    await page.fill("#place-0", "0");
+    await put();
+  });
+
   await step("nothing jumps when results come", async () => {
     await page.evaluate(() => { window.jumped = 0; });
     for (let cycle = 0; cycle < 3; cycle += 1) {

@@ -34,6 +34,7 @@ mod recovery;
 mod replacing;
 mod sequences;
 mod service;
+mod simulated_part;
 mod station;
 mod station_plc;
 mod stress;

@@ -1,6 +1,7 @@
 //! `fringed serve`: the station, until it is told to end.
 
 use super::options::{Files, Listen, Quiet, Threads};
+use super::part::SimulatedPart;
 use crate::daemon::{Caller, Daemon, runtime};
 use crate::error::Failure;
 use crate::journal::Severity;
@@ -26,6 +27,8 @@ pub struct Serve {
     threads: Threads,
     #[command(flatten)]
     quiet: Quiet,
+    #[command(flatten)]
+    part: SimulatedPart,
 }
 
 impl Serve {
@@ -36,6 +39,7 @@ impl Serve {
     pub fn run(&self) -> Result<(), Failure> {
         let mut config = self.files.configuration()?;
         self.listen.over(&mut config);
+        config.head.part = self.part.placed(&config.head)?;
         let progress = self.quiet.progress();
         let caller = Caller {
             notify: Notify::from_environment(),

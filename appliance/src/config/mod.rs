@@ -8,6 +8,7 @@ pub use keys::{Key, keys, table};
 use crate::calibration::place::IN_STATE;
 use crate::error::{Exit, Failure};
 use crate::modbus::{CONNECTIONS, WordOrder};
+use crate::simulation::Placed;
 use hal::bounds::{length, shortened, text, within};
 use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
 use ipnet::IpNet;
@@ -118,6 +119,9 @@ pub struct HeadConfig {
     pub trigger: TriggerSetup,
     /// The head's `calibration.json`; none = in the state folder.
     pub calibration: Option<PathBuf>,
+    /// The part in front of the simulated head instead of the scenario's, from the command line.
+    #[serde(skip)]
+    pub part: Option<Placed>,
 }
 
 /// The kinds of head.
@@ -192,6 +196,7 @@ impl Default for HeadConfig {
             projector: ProjectorSetup::default(),
             trigger: TriggerSetup::default(),
             calibration: None,
+            part: None,
         }
     }
 }

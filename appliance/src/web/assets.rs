@@ -64,6 +64,7 @@ assets! {
     "/kept.js" "text/javascript; charset=utf-8" "kept.js";
     "/scale.js" "text/javascript; charset=utf-8" "scale.js";
     "/history.js" "text/javascript; charset=utf-8" "history.js";
+    "/simulation.js" "text/javascript; charset=utf-8" "simulation.js";
     "/registers.js" "text/javascript; charset=utf-8" "registers.js";
     "/journal.js" "text/javascript; charset=utf-8" "journal.js";
 }

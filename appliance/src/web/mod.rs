@@ -13,7 +13,8 @@ pub mod map;
 pub mod problem;
 pub mod router;
 pub mod server;
-pub mod site;
+pub mod simulation;
+mod site;
 pub mod slots;
 pub mod view;
 

@@ -13,6 +13,7 @@ use super::problem::Problem;
 use super::site::Site;
 use super::{
     assets, downloads, events, history, host, kept, look, metrics, orders, recipes, sessions,
+    simulation,
 };
 
 /// Only files of this device, nothing inline, in nobody's frame.
@@ -120,6 +121,13 @@ pub fn routes() -> Vec<Route> {
         ),
         change(post(), "/api/trigger", "trigger", orders::trigger),
         change(post(), "/api/reset", "reset errors", orders::reset),
+        look("/api/simulation/part", simulation::part),
+        change(
+            put(),
+            "/api/simulation/part",
+            "place simulated part",
+            simulation::put,
+        ),
         look("/api/session", sessions::state),
         Route {
             method: Method::POST,

@@ -16,6 +16,7 @@ use crate::history::Reader;
 use crate::latest::LastMaps;
 use crate::logbook::Logbook;
 use crate::recipe::Store;
+use crate::simulation::Simulation;
 use crate::socket;
 use crate::station::{Snapshot, StationHandle};
 use crate::tally::Tally;
@@ -45,6 +46,8 @@ pub struct Parts {
     pub calibration: Current,
     /// The way to the last cycle.
     pub maps: LastMaps,
+    /// The part in front of a simulated head.
+    pub simulation: Simulation,
     /// The stored results.
     pub history: Reader,
     /// Stores when this start of the daemon was, µs since 1970 UTC, by the clock of a signed-in user's browser; answers whether

@@ -8,7 +8,11 @@ const MAX_RAYS: u64 = 1 << 28;
 
 impl Scenario {
     /// What is wrong with the values, if anything.
-    pub(crate) fn check(&self) -> Result<(), String> {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// Naming the first key that is out of its range, and the range.
+    pub fn check(&self) -> Result<(), String> {
         if ![8, 10, 12].contains(&self.bit_depth) {
             return Err(format!(
                 "bit_depth is {}: write 8, 10 or 12",

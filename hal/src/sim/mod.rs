@@ -17,7 +17,7 @@ pub mod transport;
 pub use crate::virtual_head::Faults;
 pub use parts::Part;
 pub use scenario::{Placement, Scenario};
-pub use stage::{Stage, head, head_with_progress};
+pub use stage::{Stage, Staged, head, head_with_progress};
 pub use timing::Timing;
 pub use transport::Truth;
 

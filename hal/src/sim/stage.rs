@@ -20,11 +20,14 @@ const MAX_REMEMBERED: usize = 8;
 pub struct Stage {
     bench: Shared<SimScene>,
     scenario: Arc<Scenario>,
-    remembered: Arc<Mutex<Vec<Remembered>>>,
+    placed: Arc<Mutex<(Part, Placement)>>,
+    /// The one used last stands at the end.
+    remembered: Arc<Mutex<Vec<Staged>>>,
 }
 
-/// A placed part whose transport is known; the one used last stands at the end.
-struct Remembered {
+/// A part whose light is worked out where it is to lie, ready to be put in place.
+#[derive(Clone, Debug)]
+pub struct Staged {
     part: Part,
     placement: Placement,
     transport: Arc<Transport>,
@@ -56,7 +59,7 @@ pub fn head_with_progress(
         &scenario.placement,
         progress,
     ));
-    let remembered = Remembered {
+    let remembered = Staged {
         part: scenario.part.clone(),
         placement: scenario.placement,
         transport: Arc::clone(&transport),
@@ -65,6 +68,7 @@ pub fn head_with_progress(
     let (head, bench) = virtual_head::head(scene, scenario.mechanics());
     let stage = Stage {
         bench,
+        placed: Arc::new(Mutex::new((scenario.part.clone(), scenario.placement))),
         scenario,
         remembered: Arc::new(Mutex::new(vec![remembered])),
     };
@@ -91,20 +95,52 @@ impl Stage {
         placement: &Placement,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<(), Error> {
-        part.check()
-            .and_then(|()| placement.check())
-            .map_err(|problem| Error::unsupported("placing this part", problem))?;
-        let known = self.recall(part, placement);
-        let transport = known.unwrap_or_else(|| {
-            let built = Arc::new(Transport::build(&self.scenario, part, placement, progress));
-            self.remember(part, placement, &built);
-            built
-        });
-        lock(&self.bench).scene.place(transport);
+        let staged = match self.recall(part, placement) {
+            Some(known) => known,
+            None => self.work_out(part, placement, progress)?,
+        };
+        self.remember(&staged);
+        self.show(staged);
         Ok(())
     }
 
-    fn recall(&self, part: &Part, placement: &Placement) -> Option<Arc<Transport>> {
+    /// Works out the light of `part` without putting it in place, which takes the longest: frames may be taken of the part before
+    /// meanwhile. `progress` is told the share done, 0…1, from any thread.
+    ///
+    /// # Errors
+    /// `Unsupported` if a measure of the part or the placement is out of its range.
+    pub fn work_out(
+        &self,
+        part: &Part,
+        placement: &Placement,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Staged, Error> {
+        part.check()
+            .and_then(|()| placement.check())
+            .map_err(|problem| Error::unsupported("placing this part", problem))?;
+        let transport = Transport::build(&self.scenario, part, placement, progress);
+        Ok(Staged {
+            part: part.clone(),
+            placement: *placement,
+            transport: Arc::new(transport),
+        })
+    }
+
+    /// Puts a part in place whose light is worked out; the next exposure sees it.
+    pub fn show(&self, staged: Staged) {
+        let mut placed = self.placed.lock().unwrap_or_else(PoisonError::into_inner);
+        lock(&self.bench).scene.place(staged.transport);
+        *placed = (staged.part, staged.placement);
+    }
+
+    /// The part that is in place, and where it lies.
+    #[must_use]
+    pub fn placed(&self) -> (Part, Placement) {
+        let placed = self.placed.lock().unwrap_or_else(PoisonError::into_inner);
+        placed.clone()
+    }
+
+    fn recall(&self, part: &Part, placement: &Placement) -> Option<Staged> {
         let mut remembered = self
             .remembered
             .lock()
@@ -112,13 +148,10 @@ impl Stage {
         let at = remembered
             .iter()
             .position(|r| r.part == *part && r.placement == *placement)?;
-        let found = remembered.remove(at);
-        let transport = Arc::clone(&found.transport);
-        remembered.push(found);
-        Some(transport)
+        Some(remembered.remove(at))
     }
 
-    fn remember(&self, part: &Part, placement: &Placement, transport: &Arc<Transport>) {
+    fn remember(&self, staged: &Staged) {
         let mut remembered = self
             .remembered
             .lock()
@@ -126,12 +159,7 @@ impl Stage {
         if remembered.len() == MAX_REMEMBERED {
             remembered.remove(0);
         }
-        let (part, transport) = (part.clone(), Arc::clone(transport));
-        remembered.push(Remembered {
-            part,
-            placement: *placement,
-            transport,
-        });
+        remembered.push(staged.clone());
     }
 
     /// Pulls a device's cable out: every call of it fails from now on, until it is plugged in and the head opened again.

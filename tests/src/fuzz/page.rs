@@ -5,6 +5,7 @@ use super::plant::{runtime, settings};
 use appliance::access::Access;
 use appliance::history::Reader;
 use appliance::recipe::Store;
+use appliance::simulation::Simulation;
 use appliance::station::{Micros, Station, StationHandle};
 use appliance::web::{Parts, Site, serve};
 use std::cell::RefCell;
@@ -12,6 +13,7 @@ use std::fs;
 use std::future;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
+use std::sync::mpsc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -57,6 +59,7 @@ impl Page {
             recipes: Store::open(&recipes).expect("a store"),
             calibration: Default::default(),
             maps: Default::default(),
+            simulation: Simulation::new(mpsc::channel().0),
             history: Reader::of(folder.path()),
             date: Box::new(|_| false),
             tally: Default::default(),

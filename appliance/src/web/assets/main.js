@@ -12,6 +12,7 @@ import { openDevice, showDevice } from "./journal.js";
 import { openHistory, start as startHistory } from "./history.js";
 import { start as startKept } from "./kept.js";
 import { start as startQuestion } from "./question.js";
+import { showSimulation, start as startSimulation } from "./simulation.js";
 import { change, start as startSession } from "./session.js";
 import { ask } from "./api.js";
 import { count, duration } from "./number.js";
@@ -64,6 +65,7 @@ function showSnapshot(now) {
   showCounters(now);
   showRecipes(now, view === "recipes");
   showDevice(now, view === "device");
+  showSimulation(now);
   // Times without a clock are told from the start, so lists are read again when that is known.
   if (restarted) { openHistory(view === "history", now); openDevice(view === "device", now); }
   const key = `${now.boot_id}/${now.result ? now.result.seq : "none"}`;
@@ -104,6 +106,7 @@ startPicture();
 startRecipes();
 startEditor();
 startRegisters();
+startSimulation();
 startHistory();
 startKept();
 $("trigger").addEventListener("click", () => change(() => ask("POST", "/api/trigger")));

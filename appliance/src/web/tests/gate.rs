@@ -2,7 +2,7 @@
 
 use super::*;
 
-const CHANGES: [(&str, &str); 8] = [
+const CHANGES: [(&str, &str); 9] = [
     ("POST", "/api/trigger"),
     ("POST", "/api/reset"),
     ("POST", "/api/recipes"),
@@ -11,6 +11,7 @@ const CHANGES: [(&str, &str); 8] = [
     ("POST", "/api/recipes/1/undo"),
     ("POST", "/api/recipes/1/load"),
     ("POST", "/api/recipes/1/teach"),
+    ("PUT", "/api/simulation/part"),
 ];
 
 #[tokio::test]

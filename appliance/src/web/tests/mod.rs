@@ -19,6 +19,7 @@ use super::*;
 use crate::access::Access;
 use crate::history::Reader;
 use crate::recipe::Store;
+use crate::simulation::Simulation;
 use crate::station::*;
 
 /// A station whose measuring task is silent, and its page.
@@ -56,6 +57,7 @@ async fn served() -> Served {
         recipes: Store::open(&folder.path().join("recipes")).unwrap(),
         calibration: Default::default(),
         maps: Default::default(),
+        simulation: Simulation::new(std::sync::mpsc::channel().0),
         history: Reader::of(folder.path()),
         date: Box::new(move |utc_us| dates.send(utc_us).is_ok()),
         tally: Default::default(),

@@ -65,6 +65,22 @@ pub(crate) trait Surface: Send + Sync {
 }
 
 impl Part {
+    /// One of each kind with its usual measures, good.
+    #[must_use]
+    pub fn stock() -> [Self; 9] {
+        [
+            Self::SheetMetal(SheetMetal::default()),
+            Self::Flowerpot(Flowerpot::default()),
+            Self::Cone(Cone::default()),
+            Self::Sawtooth(Sawtooth::default()),
+            Self::Sphere(Sphere::default()),
+            Self::Tube(Tube::default()),
+            Self::Spline(Box::default()),
+            Self::Plane(Plane::default()),
+            Self::Empty {},
+        ]
+    }
+
     /// What is wrong with the measures, if anything.
     pub(crate) fn check(&self) -> Result<(), String> {
         let positive = |key: &str, value: f64| within(&format!("part.{key}"), value, 1e-3, 1000.0);

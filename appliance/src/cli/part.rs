@@ -1,0 +1,80 @@
+//! The part in front of a simulated head, from the command line.
+
+use crate::backend;
+use crate::config::{Backend, HeadConfig};
+use crate::error::{Exit, Failure};
+use crate::simulation::Placed;
+
+/// Which part lies in front of a simulated head, instead of the scenario's.
+#[derive(Clone, Debug, clap::Args)]
+pub struct SimulatedPart {
+    /// Put this stock part in front of the simulated head: sheet_metal, flowerpot, cone, sawtooth, sphere, tube, spline, plane or empty.
+    #[arg(long, value_name = "KIND")]
+    part: Option<String>,
+    /// Give the simulated part a defect: dent:X,Y,DEPTH,DIAMETER in mm, missing_hole:INDEX or bent_flange:DEGREES; more than once for more.
+    #[arg(long, value_name = "KIND:NUMBERS")]
+    defect: Vec<String>,
+    /// Move the simulated part by this, mm.
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true)]
+    shift: Option<[f64; 3]>,
+    /// Tilt the simulated part about x and y, degrees.
+    #[arg(long, value_name = "X,Y", value_parser = numbers::<2>, allow_hyphen_values = true)]
+    tilt: Option<[f64; 2]>,
+    /// Turn the simulated part about z, degrees.
+    #[arg(long, value_name = "DEGREES", value_parser = numbers::<1>, allow_hyphen_values = true)]
+    rotate: Option<[f64; 1]>,
+}
+
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let numbers: Result<Vec<f64>, _> = text
+        .split(',')
+        .map(|number| number.trim().parse())
+        .collect();
+    let wanted = || format!("give {N} numbers with commas between them");
+    let numbers: [f64; N] = numbers
+        .map_err(|_| wanted())?
+        .try_into()
+        .map_err(|_| wanted())?;
+    numbers
+        .iter()
+        .all(|number| number.is_finite())
+        .then_some(numbers)
+        .ok_or_else(wanted)
+}
+
+impl SimulatedPart {
+    /// The part that is asked for, if one is.
+    ///
+    /// # Errors
+    /// If the configured head is not simulated, or there is no such part, defect or place (64).
+    pub fn placed(&self, head: &HeadConfig) -> Result<Option<Placed>, Failure> {
+        let asked = self.part.is_some() || !self.defect.is_empty();
+        if !asked && self.shift.is_none() && self.tilt.is_none() && self.rotate.is_none() {
+            return Ok(None);
+        }
+        let usage =
+            |words: String| Failure::because(Exit::Usage, "put a part in front of the head", words);
+        if head.backend != Backend::Sim {
+            return Err(usage(
+                "the configured head is not simulated: leave out --part, --defect, --shift, --tilt and --rotate".into(),
+            ));
+        }
+        let scenario = backend::scenario(head.scenario.as_deref())?;
+        let mut placed = match &self.part {
+            Some(kind) => Placed::stock(kind).map_err(usage)?,
+            None => Placed {
+                part: scenario.part,
+                placement: scenario.placement,
+            },
+        };
+        for defect in &self.defect {
+            placed.add_defect(defect).map_err(usage)?;
+        }
+        let place = &mut placed.placement;
+        place.shift_mm = self.shift.unwrap_or(place.shift_mm);
+        place.tilt_deg = self.tilt.unwrap_or(place.tilt_deg);
+        place.rotation_deg = self.rotate.map_or(place.rotation_deg, |[degrees]| degrees);
+        placed.check().map_err(usage)?;
+        Ok(Some(placed))
+    }
+}

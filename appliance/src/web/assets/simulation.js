@@ -1,0 +1,82 @@
+// The part in front of a simulated head: which one lies there, and putting another in its place.
+import { $, button, fill, make, show, text } from "./element.js";
+import { ask } from "./api.js";
+import { change } from "./session.js";
+
+const PLACE = "/api/simulation/part";
+const UNITS = { x: "mm", y: "mm", depth_mm: "mm", diameter_mm: "mm", degrees: "°" };
+let kinds = [];
+let part = null;
+let asked = "";
+
+const copy = (value) => JSON.parse(JSON.stringify(value));
+const words = (name) => name.replace(/_(mm|deg)$/, "").replace(/_/g, " ");
+
+// A number with its name and unit, as wide as it needs to be.
+function field(name, value, take) {
+  const input = make("input");
+  input.type = "number";
+  input.step = name === "index" ? "1" : "any";
+  input.required = true;
+  input.value = String(value);
+  input.addEventListener("input", () => take(Number(input.value)));
+  return make("label", "", words(name) + (UNITS[name] ? ` (${UNITS[name]})` : ""), input);
+}
+
+function showDefects() {
+  const rows = (part.defects || []).map((defect, at) => {
+    const numbers = Object.keys(defect).filter((name) => name !== "kind");
+    const remove = button("Remove", "", () => { part.defects.splice(at, 1); showDefects(); });
+    remove.setAttribute("aria-label", `Remove the defect ${words(defect.kind)}`);
+    return make("p", "line", make("b", "", words(defect.kind)), ...numbers.map((name) => field(name, defect[name], (number) => { defect[name] = number; })), remove);
+  });
+  fill($("part-defects"), ...rows);
+  const offered = kinds.find((one) => one.part.kind === part.kind).defects;
+  show("part-defect", offered.length > 0);
+  fill($("defect-kind"), ...offered.map((defect) => new Option(words(defect.kind), defect.kind)));
+}
+
+function showPart(answer) {
+  show("simulation", answer.simulated);
+  if (!answer.simulated) return;
+  ({ kinds, part } = answer);
+  fill($("part-kind"), ...kinds.map((one) => new Option(words(one.part.kind), one.part.kind)));
+  $("part-kind").value = part.kind;
+  const { shift_mm, tilt_deg, rotation_deg } = answer.placement;
+  [...shift_mm, ...tilt_deg, rotation_deg].forEach((number, at) => { $(`place-${at}`).value = String(number); });
+  showDefects();
+}
+
+async function put() {
+  const number = (at) => Number($(`place-${at}`).value);
+  const placement = { shift_mm: [0, 1, 2].map(number), tilt_deg: [3, 4].map(number), rotation_deg: number(5) };
+  text("simulation-words", "the light of the part is being worked out…");
+  const answer = await change(() => ask("PUT", PLACE, { part, placement }), "the part is in place: the next cycle sees it");
+  text("simulation-words", "");
+  if (answer) showPart(answer);
+}
+
+// Follows the snapshot: after a start, and when teaching has put the part in place that was asked for.
+export async function showSimulation(now) {
+  const key = `${now.boot_id}/${now.state === "boot"}/${Boolean(now.teach)}`;
+  if (key === asked) return;
+  asked = key;
+  try { showPart(await ask("GET", PLACE)); } catch (gone) { asked = ""; }
+}
+
+export function start() {
+  $("part-kind").addEventListener("change", () => {
+    part = copy(kinds.find((one) => one.part.kind === $("part-kind").value).part);
+    showDefects();
+  });
+  $("defect-add").addEventListener("click", () => {
+    const offered = kinds.find((one) => one.part.kind === part.kind).defects;
+    part.defects.push(copy(offered.find((defect) => defect.kind === $("defect-kind").value)));
+    showDefects();
+  });
+  $("simulation").addEventListener("submit", async (event) => {
+    event.preventDefault();
+    $("part-put").disabled = true;
+    try { await put(); } finally { $("part-put").disabled = false; }
+  });
+}
