@@ -4,10 +4,12 @@
 //! the station is plain values behind a handle that both use.
 
 mod caller;
+mod serving;
 mod settling;
 mod stopping;
 
 pub use caller::Caller;
+use serving::{PlcSide, serve};
 use stopping::Stopping;
 
 use crate::access::Access;
@@ -24,13 +26,12 @@ use crate::simulation::{Placed, Simulation};
 use crate::state::{StateFolder, random};
 use crate::station::{
     Effect, Event, Identity, Limits, Micros, RecipeKey, Request, Settings, Station, StationHandle,
-    tick,
 };
 use crate::survey::Survey;
 use crate::tally::Tally;
 use crate::worker::opening::Opening;
 use crate::worker::{Aborts, Order, Worker};
-use crate::{backend, clock, lines, modbus, socket, web};
+use crate::{backend, lines, modbus, socket, web};
 use hal::sim::Stage;
 use std::net::SocketAddr;
 use std::path::Path;
@@ -414,47 +415,4 @@ fn first_request(
             keep_gauges: false,
         })
     }
-}
-
-/// The PLC's side of the sockets.
-struct PlcSide {
-    listener: TcpListener,
-    clients: modbus::Clients,
-    refusals: modbus::Refusals,
-}
-
-async fn serve(
-    plc: PlcSide,
-    page: TcpListener,
-    station: StationHandle,
-    site: web::Site,
-    config: &Config,
-    stopped: watch::Receiver<bool>,
-) {
-    let stop = || {
-        let mut stopped = stopped.clone();
-        async move {
-            // An error means that the daemon itself is gone: stop as well.
-            let _ = stopped.wait_for(|stop| *stop).await;
-        }
-    };
-    let options = modbus::Options {
-        word_order: config.modbus.word_order.into(),
-        strict_unit_id: config.modbus.strict_unit_id,
-        readers: config.modbus.readers.clone(),
-        writers: config.modbus.writers.clone(),
-        ..modbus::Options::default()
-    };
-    tokio::join!(
-        tick(station.clone(), clock::utc_us, stop()),
-        modbus::serve(
-            plc.listener,
-            station,
-            options,
-            plc.clients,
-            plc.refusals,
-            stop()
-        ),
-        web::serve(page, site, stop()),
-    );
 }

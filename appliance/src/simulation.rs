@@ -181,8 +181,16 @@ fn kinds() -> Vec<Value> {
         let all = DEFECTS
             .iter()
             .map(|(kind, numbers)| defect(kind, numbers.iter().copied()));
-        all.filter(|defect| with_defect(part, defect.clone()).is_ok())
-            .collect()
+        let is_one = |defect: &Value| {
+            with_defect(part, defect.clone()).is_ok_and(|part| {
+                let placed = Placed {
+                    part,
+                    ..Placed::default()
+                };
+                placed.check().is_ok()
+            })
+        };
+        all.filter(is_one).collect()
     };
     let parts = Part::stock().into_iter();
     parts

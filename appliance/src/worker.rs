@@ -1,9 +1,12 @@
 //! The measuring task: one thread that owns the head, the plan and the computing threads.
 
+mod aborts;
 mod cycle;
 pub mod opening;
 mod placing;
 mod recovery;
+
+pub use aborts::Aborts;
 
 use crate::backend::Opened;
 use crate::calibration::Current;
@@ -28,7 +31,6 @@ use hal::error::{Device, Error};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::time::Duration;
 
@@ -64,21 +66,6 @@ mod code {
     pub const RIG: u16 = 501;
     pub const NOT_CALIBRATED: u16 = 502;
     pub const NOT_STORED: u16 = 601;
-}
-
-/// Which job was aborted last; told by the station, asked by the worker between two frames. Cheap to clone.
-#[derive(Clone, Debug, Default)]
-pub struct Aborts(Arc<AtomicU64>);
-
-impl Aborts {
-    /// Ends this job early. Jobs are numbered upwards.
-    pub fn abort(&self, job: JobId) {
-        self.0.fetch_max(job.0, Ordering::Relaxed);
-    }
-
-    fn has(&self, job: JobId) -> bool {
-        self.0.load(Ordering::Relaxed) == job.0
-    }
 }
 
 /// Words of what an abort ended.

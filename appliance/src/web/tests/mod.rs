@@ -57,7 +57,7 @@ async fn served() -> Served {
         recipes: Store::open(&folder.path().join("recipes")).unwrap(),
         calibration: Default::default(),
         maps: Default::default(),
-        simulation: Simulation::new(std::sync::mpsc::channel().0),
+        simulation: Simulation::new(mpsc::channel().0),
         history: Reader::of(folder.path()),
         date: Box::new(move |utc_us| dates.send(utc_us).is_ok()),
         tally: Default::default(),
