@@ -1,12 +1,14 @@
 //! The measuring task: one thread that owns the head, the plan and the computing threads.
 
 mod aborts;
+mod code;
 mod cycle;
 pub mod opening;
 mod placing;
 mod recovery;
 
 pub use aborts::Aborts;
+pub(crate) use code::code_of;
 
 use crate::backend::Opened;
 use crate::calibration::Current;
@@ -24,10 +26,10 @@ use crate::shelf::Shelf;
 use crate::simulation::{Placed, Placing};
 use crate::station::{
     ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
-    error_code,
 };
+use code::code_of_teaching;
 use cycle::JudgedBy;
-use hal::error::{Device, Error};
+use hal::error::Error;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -53,20 +55,6 @@ pub enum Order {
 const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
 /// Longest wait for one flip, one pulse or one frame.
 const DEVICE_TIMEOUT: Duration = Duration::from_secs(2);
-
-/// Error codes of the worker; `docs/operations.md` has the table.
-mod code {
-    pub const CAMERA_LOST: u16 = 101;
-    pub const UNSUPPORTED: u16 = 102;
-    pub const PROJECTOR_LOST: u16 = 201;
-    pub const TIMEOUT: u16 = 301;
-    pub const PROTOCOL: u16 = 302;
-    pub const LINES_LOST: u16 = 303;
-    pub const NOTHING_TO_TEACH: u16 = 401;
-    pub const RIG: u16 = 501;
-    pub const NOT_CALIBRATED: u16 = 502;
-    pub const NOT_STORED: u16 = 601;
-}
 
 /// Words of what an abort ended.
 const ABORTED: &str = "the PLC or a stop ended it";
@@ -431,29 +419,5 @@ fn active(plan: &Plan) -> ActiveRecipe {
         crc: plan.crc(),
         part_number: plan.file().part_number.as_str().into(),
         name: plan.file().name.as_str().into(),
-    }
-}
-
-/// ERROR_CODE of a device's error.
-pub(crate) fn code_of(error: &Error) -> u16 {
-    match error {
-        Error::Timeout { .. } => code::TIMEOUT,
-        Error::Disconnected { device, .. } => match device {
-            Device::Camera => code::CAMERA_LOST,
-            Device::Projector => code::PROJECTOR_LOST,
-            Device::Lines => code::LINES_LOST,
-        },
-        Error::Unsupported { .. } => code::UNSUPPORTED,
-        Error::Protocol { .. } => code::PROTOCOL,
-    }
-}
-
-fn code_of_teaching(error: &TeachError) -> u16 {
-    match error {
-        TeachError::Device(error) => code_of(error),
-        TeachError::Scene(_) => code::NOTHING_TO_TEACH,
-        TeachError::Rig(_) => code::RIG,
-        TeachError::NotCalibrated(_) => code::NOT_CALIBRATED,
-        TeachError::Ended => error_code::ABORTED,
     }
 }

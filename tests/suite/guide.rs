@@ -49,7 +49,7 @@ fn source(folder: &Path) -> String {
 /// The error codes that the program can show.
 fn error_codes() -> BTreeSet<String> {
     let mut defined = BTreeSet::new();
-    for file in ["station/error_code.rs", "worker.rs", "plan/mod.rs"] {
+    for file in ["station/error_code.rs", "worker/code.rs", "plan/mod.rs"] {
         let text = fs::read_to_string(root().join("appliance/src").join(file)).unwrap();
         let numbers = text
             .lines()

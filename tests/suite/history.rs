@@ -11,7 +11,6 @@ use tests::program::Program;
 use tests::random::Random;
 
 /// Words of VERDICT.
-const FAIL: u16 = 2;
 /// Longest wait for the history's own threads.
 const WRITTEN: Duration = Duration::from_secs(30);
 

@@ -14,9 +14,9 @@ async fn pipelined_requests_are_answered_one_by_one_each_with_its_own_flaw() {
         .unwrap();
     let mut answers = [0; 11 + 9 + 11];
     stream.read_exact(&mut answers).await.unwrap();
-    assert_eq!(answers[7..11], [3, 2, 1, 0]);
+    assert_eq!(answers[7..11], [3, 2, 1, 1]);
     assert_eq!(answers[11 + 7..11 + 9], [0x83, 3]);
-    assert_eq!(answers[20 + 7..], [3, 2, 1, 0]);
+    assert_eq!(answers[20 + 7..], [3, 2, 1, 1]);
 }
 
 #[tokio::test]
