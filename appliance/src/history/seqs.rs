@@ -1,7 +1,7 @@
 //! Reserves RESULT_SEQs ahead of their use, so that none is used twice and none waits for the card.
 //!
 //! The counter's file says which SEQs may be in use: at the start, and whenever a quarter of them are gone, up to [`AHEAD`]
-//! are reserved by a thread of its own ([`Reserving`]), so that no other sync of the history comes before. Besides, each SEQ
+//! are reserved by a thread of its own (`reserving`), so that no other sync of the history comes before. Besides, each SEQ
 //! is marked in memory that a kill does not touch (`mark`). So after kill -9 counting goes on behind the last number that was
 //! in use; after a loss of power behind the reservation, so that at most [`AHEAD`] numbers are skipped; after a stop the file
 //! holds the SEQ of the last result and none is.

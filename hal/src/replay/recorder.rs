@@ -54,7 +54,7 @@ pub fn write(recording: &Recording, folder: &Path) -> Result<(), RecorderError> 
 /// the recording gets its name.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_with(
     recording: &Recording,
     folder: &Path,
