@@ -8,11 +8,13 @@
 //! - [`files`]: reads what it writes, [`score`]: compares it with the truth, [`plane`]: fits planes.
 //! - [`random`]: a seeded generator.
 //! - [`fuzz`]: functions of bytes that must not panic.
+//! - [`power`]: what a loss of power leaves of a folder.
 
 pub mod files;
 pub mod fuzz;
 pub mod oracle;
 pub mod plane;
+pub mod power;
 pub mod program;
 pub mod random;
 pub mod render;

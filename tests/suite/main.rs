@@ -26,6 +26,7 @@ mod measured;
 mod outputs;
 mod page;
 mod placement;
+mod power;
 mod precision;
 mod production;
 mod promises_own;

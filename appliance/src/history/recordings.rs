@@ -5,7 +5,7 @@
 //! or another recording has it, counts once however many have it, and goes with the last one.
 
 use crate::calibration::Calibration;
-use crate::output::folder::name_also;
+use crate::output::folder::{name_also, rename_whole};
 use crate::plan::Plan;
 use crate::recipe::{PatternFile, Store, archive};
 use crate::station::{ResultRecord, Verdict};
@@ -163,11 +163,14 @@ impl Recordings {
         }
     }
 
-    /// Removes the oldest recording; answers with its name.
+    /// Removes the oldest recording; answers with its name. It loses its name first, so that a loss of power meanwhile leaves a
+    /// whole recording or none.
     pub(super) fn remove_oldest(&mut self) -> Option<String> {
         let Kept { name, .. } = self.kept.pop_front()?;
-        // Whatever stays of it is counted again at the next start.
-        let _ = fs::remove_dir_all(self.folder.join(&name));
+        let nameless = self.folder.join(format!(".{name}.partial-removed"));
+        // What stays of it is removed at the next start, or counted again where it has kept its name.
+        let _ = rename_whole(&self.folder.join(&name), &nameless)
+            .and_then(|()| fs::remove_dir_all(nameless));
         Some(name)
     }
 }

@@ -1,0 +1,414 @@
+//! Losses of power: every prefix of what a run does to its files is opened, with what was not synced there, gone, or partly there.
+
+use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, STOPPING, command, long};
+use appliance::access::Access;
+use appliance::history::{self, Bounds, Filter, Numbering, Reader};
+use appliance::recipe::{Recipe, archive};
+use appliance::state::StateFolder;
+use hal::replay::Recording;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use tests::files;
+use tests::power::Operation;
+use tests::power::disk::{Disk, Left};
+use tests::power::trace::{OPTIONS, operations};
+use tests::random::Random;
+
+const SEED: u64 = 0x0FF_0FF;
+/// Numbers that a loss of power may skip.
+const SKIPPED: u32 = 64;
+
+/// Few pixels: what counts here are files.
+const HEAD: &str = "sub_rays = 1
+part = { kind = \"plane\" }
+[rig.camera]
+width = 48
+height = 36
+fov_deg = [5.0, 3.75]
+[rig.projector]
+width = 96
+height = 72
+fov_deg = [8.0, 6.0]
+";
+/// The part lies outside its tolerance: nothing passes, and every part's frames are kept.
+const MOVED: &str = "[placement]\nshift_mm = [0.0, 0.0, 4.0]\n";
+/// Recordings that are made of them; those of the first go when those of the last come.
+const KEPT: usize = 20;
+
+/// What somebody was told, and when.
+enum Told {
+    /// A result.
+    Shown(u32),
+    /// A recipe is stored: its number and fingerprint.
+    Stored(u16, String),
+    /// It is deleted.
+    Deleted(u16),
+}
+
+/// A run, as its files and its clients saw it.
+struct Run {
+    place: Place,
+    operations: Vec<Operation>,
+    told: Vec<(u64, Told)>,
+}
+
+fn now() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
+    u64::try_from(since.as_micros()).unwrap()
+}
+
+/// Whether programs can be traced here; says so where they cannot.
+fn can_trace() -> bool {
+    let tried = Command::new("strace")
+        .args(["-o", "/dev/null", "true"])
+        .output();
+    let can = tried.is_ok_and(|output| output.status.success());
+    if !can {
+        println!("SKIPPED: strace is not there or may not trace (Debian package strace)");
+    }
+    can
+}
+
+impl Run {
+    fn log(&self, number: usize) -> PathBuf {
+        self.place.path(&format!("trace-{number}"))
+    }
+
+    /// A command under strace.
+    fn traced(&self, number: usize, plain: &Command) -> Command {
+        let mut traced = Command::new("strace");
+        traced.args(OPTIONS).arg("-o").arg(self.log(number));
+        traced.arg(plain.get_program()).args(plain.get_args());
+        traced.stdin(std::process::Stdio::null());
+        traced.stdout(std::process::Stdio::null());
+        traced
+    }
+
+    /// Runs a command that changes recipes.
+    fn recipe(&mut self, number: usize, arguments: &[&str], told: Told) {
+        let mut plain = Command::new(env!("CARGO_BIN_EXE_fringed-under-test"));
+        plain
+            .arg("recipe")
+            .args(arguments)
+            .arg("--config")
+            .arg(self.place.path("fringed.toml"));
+        assert!(self.traced(number, &plain).status().unwrap().success());
+        self.told.push((now(), told));
+    }
+
+    /// Starts the station and measures parts one after the other until it is `enough`.
+    fn measure(&mut self, number: usize, mut enough: impl FnMut(&Self) -> bool) -> Daemon {
+        let daemon = Daemon::of(self.traced(number, &command(&self.place)));
+        let mut plc = Plc::connect(&daemon);
+        plc.wait("READY", |status| status.has(READY));
+        let started = Instant::now();
+        for token in 1.. {
+            let seq = long(&plc.measure(token), 0);
+            self.told.push((now(), Told::Shown(seq)));
+            if enough(self) {
+                break;
+            }
+            assert!(started.elapsed() < PATIENCE, "{seq} results are not enough");
+        }
+        daemon
+    }
+
+    /// Teaches, measures good parts, imports and deletes recipes, measures parts that are kept, and is killed.
+    fn recorded() -> Self {
+        let place = Place::new();
+        fs::write(place.path("small.toml"), HEAD).unwrap();
+        let config =
+            "state = \"state\"\n[head]\nscenario = \"small.toml\"\n[history]\nrecordings_mib = 1\n";
+        fs::write(place.path("fringed.toml"), config).unwrap();
+        let mut run = Self {
+            place,
+            operations: Vec::new(),
+            told: Vec::new(),
+        };
+        let daemon = run.measure(0, |run| run.told.len() == 3);
+        let taught = fs::read(run.place.recipe()).unwrap();
+        let taught = Recipe::from_bytes(&taught).unwrap();
+        run.told
+            .push((now(), Told::Stored(1, taught.file.fingerprint.clone())));
+        assert!(daemon.terminate().success());
+        for (log, number, name) in [(1, 2, "second"), (2, 1, "first"), (3, 1, "first again")] {
+            let mut file = taught.file.clone();
+            (file.number, file.name) = (number, name.into());
+            file.part_number = format!("P-{number}");
+            let (bytes, fingerprint) = archive::pack(&file, &taught.arrays).unwrap();
+            let path = run.place.path(&format!("{log}.recipe"));
+            fs::write(&path, bytes).unwrap();
+            run.recipe(
+                log,
+                &["import", path.to_str().unwrap()],
+                Told::Stored(number, fingerprint),
+            );
+        }
+        run.recipe(4, &["delete", "2"], Told::Deleted(2));
+        fs::write(run.place.path("small.toml"), format!("{HEAD}{MOVED}")).unwrap();
+        let mut kept = BTreeSet::new();
+        let daemon = run.measure(5, |run| {
+            let names = files::names(&run.place.path("state/recordings"));
+            kept.extend(names.into_iter().filter(|name| !name.starts_with('.')));
+            kept.len() >= KEPT
+        });
+        let left = files::names(&run.place.path("state/recordings")).len();
+        assert!(left < KEPT, "none of {left} recordings was removed");
+        daemon.kill();
+        let root = run.place.path("");
+        for log in 0..=5 {
+            let log = whole(&run.log(log));
+            run.operations.extend(operations(&log, &root));
+        }
+        run
+    }
+}
+
+/// A log to its end, which the tracer writes after the program's.
+fn whole(path: &Path) -> String {
+    let started = Instant::now();
+    loop {
+        let log = fs::read_to_string(path).unwrap_or_default();
+        let mut lines = log.lines();
+        // The program's own thread, which is traced first, ends last.
+        let own = lines.next().and_then(|line| line.split_whitespace().next());
+        let ended =
+            lines.any(|line| line.contains(" +++ ") && line.split_whitespace().next() == own);
+        if ended {
+            return log;
+        }
+        assert!(started.elapsed() < STOPPING, "the trace has no end");
+        std::thread::yield_now();
+    }
+}
+
+/// What must hold after a loss of power at `time`.
+struct Promise {
+    /// The last result that was shown.
+    shown: u32,
+    /// The first that was shown afterwards, or would have been.
+    next: u32,
+    /// Fingerprints of the recipes that were there, and of what came next where it was on its way.
+    recipes: BTreeMap<u16, Vec<Option<String>>>,
+    /// Whether the device had been in use.
+    begun: bool,
+}
+
+impl Promise {
+    fn at(run: &Run, time: u64) -> Self {
+        let mut promise = Self {
+            shown: 0,
+            next: u32::MAX,
+            recipes: BTreeMap::new(),
+            begun: false,
+        };
+        for (when, told) in &run.told {
+            let before = *when <= time;
+            promise.begun |= before;
+            let (number, fingerprint) = match told {
+                Told::Shown(seq) => {
+                    if before {
+                        promise.shown = promise.shown.max(*seq);
+                    } else {
+                        promise.next = promise.next.min(*seq);
+                    }
+                    continue;
+                }
+                Told::Stored(number, fingerprint) => (*number, Some(fingerprint.clone())),
+                Told::Deleted(number) => (*number, None),
+            };
+            let possible = promise.recipes.entry(number).or_insert_with(|| vec![None]);
+            if before {
+                possible.clear();
+            }
+            possible.push(fingerprint);
+        }
+        promise.next = promise.next.min(promise.shown + 1);
+        promise
+    }
+
+    /// Opens what is left as the daemon does and compares.
+    fn check(&self, state: &Path) -> Result<usize, String> {
+        if !state.exists() {
+            return if self.begun {
+                Err("everything is gone".into())
+            } else {
+                Ok(0)
+            };
+        }
+        let words = |error: &dyn std::fmt::Display| error.to_string();
+        let folder = StateFolder::open(state).map_err(|error| words(&error))?;
+        let (_, new_secret) = Access::open(&state.join("access")).map_err(|error| words(&error))?;
+        if self.begun && new_secret.is_some() {
+            return Err("the secret is gone".into());
+        }
+        self.check_recipes(&folder)?;
+        for name in files::names(&state.join("recordings")) {
+            if !name.starts_with('.') {
+                let opened = Recording::open(&state.join("recordings").join(&name));
+                opened.map_err(|error| format!("recording {name}: {error}"))?;
+            }
+        }
+        let numbering = Numbering {
+            counted: folder.counted().map_err(|error| words(&error))?,
+            counter: folder.counter(),
+            serial: folder.serial().map_err(|error| words(&error))?,
+            run: 7,
+        };
+        forget(&numbering.serial);
+        let serial = numbering.serial.clone();
+        let bounds = Bounds {
+            results: 1000,
+            recordings: 1 << 30,
+        };
+        let opened = history::open(state, numbering, bounds);
+        let (history, task, next, complaint) = opened.map_err(|error| words(&error))?;
+        if let Some(complaint) = complaint {
+            return Err(complaint);
+        }
+        let stored = results(state)?;
+        drop((history, task));
+        forget(&serial);
+        if next <= self.shown {
+            return Err(format!("{next} comes next, {} was shown", self.shown));
+        }
+        // The number of the result in flight was in use; those behind it are skipped.
+        if next > self.next + 1 + SKIPPED {
+            return Err(format!("{next} comes next, {} was the last", self.shown));
+        }
+        let in_order = stored.iter().zip(1..).all(|(seq, place)| *seq == place);
+        if !in_order || stored.len() > self.next as usize {
+            return Err(format!(
+                "results {stored:?} are stored, {} was shown",
+                self.shown
+            ));
+        }
+        Ok(stored.len())
+    }
+
+    fn check_recipes(&self, folder: &StateFolder) -> Result<(), String> {
+        for (&number, possible) in &self.recipes {
+            let found = match folder.recipes().load(number) {
+                Ok(loaded) => {
+                    if let Some(fallback) = loaded
+                        .fallback
+                        .filter(|_| possible.iter().all(Option::is_some))
+                    {
+                        return Err(fallback);
+                    }
+                    Some(loaded.recipe.file.fingerprint)
+                }
+                Err(_) => None,
+            };
+            if !possible.contains(&found) {
+                return Err(format!(
+                    "recipe {number} is {found:?}, expected one of {possible:?}"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Shared memory of a station, which a loss of power takes away.
+fn forget(serial: &str) {
+    for name in files::names(Path::new("/dev/shm")) {
+        if name.starts_with("fringed-") && name.contains(serial) {
+            let _ = fs::remove_file(Path::new("/dev/shm").join(name));
+        }
+    }
+}
+
+/// The stored results, oldest first.
+fn results(state: &Path) -> Result<Vec<u32>, String> {
+    let all = Filter {
+        limit: usize::MAX,
+        ..Filter::default()
+    };
+    let found = Reader::of(state)
+        .results(&all)
+        .map_err(|error| error.to_string())?;
+    Ok(found.iter().rev().map(|entry| entry.seq).collect())
+}
+
+/// Replays a run; every `step`-th operation is followed by three losses of power. Answers how many there were.
+fn losses(run: &Run, step: usize) -> usize {
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = Random::new(SEED);
+    let mut disk = Disk::default();
+    let mut broken = Vec::new();
+    let (mut losses, mut certain) = (0, 0);
+    for (at, operation) in run.operations.iter().enumerate() {
+        disk.apply(operation);
+        let next = run
+            .operations
+            .get(at + 1)
+            .map_or(u64::MAX, |next| next.done);
+        let promise = Promise::at(run, next - 1);
+        if at % step != 0 {
+            continue;
+        }
+        for kind in 0..3 {
+            let mut left = match kind {
+                0 => Left::Nothing,
+                1 => Left::All,
+                _ => Left::Some(&mut random),
+            };
+            let target = folder.path().join(format!("{at}-{kind}"));
+            disk.leave(&mut left, &target).unwrap();
+            losses += 1;
+            match promise.check(&target.join("state")) {
+                Ok(stored) if stored < certain => {
+                    broken.push(format!(
+                        "{at}, {left:?}: {stored} results, {certain} were certain before"
+                    ));
+                }
+                Ok(stored) if kind == 0 => certain = stored,
+                Ok(_) => {}
+                Err(words) => broken.push(format!(
+                    "after {at} {:?}, kind {kind}: {words}",
+                    operation.what
+                )),
+            }
+            fs::remove_dir_all(&target).unwrap();
+        }
+    }
+    let first: Vec<_> = broken
+        .iter()
+        .take(20)
+        .map(|words| words.chars().take(400).collect::<String>())
+        .collect();
+    assert!(
+        broken.is_empty(),
+        "{} of {losses}: {first:#?}",
+        broken.len()
+    );
+    losses
+}
+
+#[test]
+fn a_loss_of_power_at_some_operations_leaves_what_was_promised() {
+    if can_trace() {
+        let run = Run::recorded();
+        let losses = losses(&run, run.operations.len() / 30);
+        println!(
+            "{losses} losses of power in {} operations",
+            run.operations.len()
+        );
+    }
+}
+
+#[test]
+#[ignore = "minutes: `.ci/run full` does it"]
+fn a_loss_of_power_at_any_operation_leaves_what_was_promised() {
+    assert!(can_trace(), "strace must be there");
+    let run = Run::recorded();
+    let losses = losses(&run, 1);
+    println!(
+        "{losses} losses of power in {} operations",
+        run.operations.len()
+    );
+}
