@@ -106,7 +106,7 @@ impl<R: Read + Seek> Members<R> {
 }
 
 /// How many members the record at the end says that there are; none if the file does not end in such a record with the
-/// directory right before it. A ZIP with a comment or with 64-bit sizes is none here: no file of ours is one.
+/// directory right before it. A ZIP with a comment or with 64-bit sizes is refused: this program writes neither.
 fn listed(source: &mut (impl Read + Seek)) -> io::Result<Option<usize>> {
     let size = source.seek(SeekFrom::End(0))?;
     let Some(start) = size.checked_sub(END_BYTES as u64) else {

@@ -64,7 +64,7 @@ impl LastMaps {
     ) -> Option<T> {
         let (sender, receiver): (SyncSender<Option<T>>, _) = sync_channel(1);
         let question: Question = Box::new(move |cycle| {
-            // Whoever asked may have given up.
+            // The requester may have given up.
             let _ = sender.send(cycle.map(answer));
         });
         let mut inside = self.inside();

@@ -25,7 +25,7 @@ impl Browser {
         }
     }
 
-    /// A request of which the body is still to be sent.
+    /// The head of a request; its body is still to be sent.
     pub fn begin(&self, method: &str, path: &str, length: usize) -> TcpStream {
         let mut stream = TcpStream::connect(self.address).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();

@@ -186,7 +186,7 @@ pub fn behind_the_command(
     words
 }
 
-/// The option of this name, of whichever command.
+/// The option of this name; the command does not matter.
 fn option<'a>(tree: &'a Command, long: &str) -> Option<&'a Arg> {
     let own = tree
         .get_arguments()

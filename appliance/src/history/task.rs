@@ -285,7 +285,7 @@ impl Task {
                         utc_us,
                         stored,
                     } => match self.writer.date(&boot_id, utc_us) {
-                        // Whoever asked may have given up.
+                        // The requester may have given up.
                         Ok(()) => drop(stored.send(())),
                         Err(error) => problem = problem.or(Some(error.to_string())),
                     },

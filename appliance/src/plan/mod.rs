@@ -114,9 +114,9 @@ impl Plan {
         Self::again(recipe, calibration, simulated)
     }
 
-    /// The same, to judge a part once more: `calibration` is what its recording says of the head. Of a calibration's
-    /// fingerprint the recording lacks the projector's response, which frames are not judged by; so fingerprints are not
-    /// compared, but were when the part was measured.
+    /// The same, to judge a recorded part again: `calibration` is read from the recording. A recording does not hold the
+    /// projector's grey response, so the calibration's fingerprint cannot be computed from it and is not compared here;
+    /// it was compared when the part was measured. Judging frames does not use the response.
     ///
     /// # Errors
     /// If the recipe does not fit the frames.

@@ -4,7 +4,7 @@ use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde_json::json;
 
-/// Whoever is told to come again waits for so many seconds.
+/// Seconds in Retry-After, where a request is refused because others are in hand.
 const RETRY_AFTER_S: &str = "5";
 
 /// What went wrong.

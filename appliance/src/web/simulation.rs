@@ -34,7 +34,7 @@ pub(super) async fn put(State(site): State<Site>, body: Body) -> Result<Json<Val
     std::thread::Builder::new()
         .name("staging".into())
         .spawn(move || {
-            // Whoever asked may be gone.
+            // The client may have closed its connection.
             let _ = done.send(simulation.put(&placed));
         })
         .map_err(|_| broken())?;

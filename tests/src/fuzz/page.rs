@@ -89,7 +89,7 @@ impl Page {
     /// Exactly the taught recipe is stored.
     fn put_back(&self) {
         for entry in fs::read_dir(&self.recipes).into_iter().flatten().flatten() {
-            // Whoever still reads it keeps it.
+            // A reader that has it open keeps its content.
             let _ = fs::remove_file(entry.path());
         }
         fs::write(self.recipes.join("0001.recipe"), &PART.bytes).expect("put back");
