@@ -52,17 +52,19 @@ mod tests {
 
     #[test]
     fn work_on_a_pool_is_timed_on_the_threads_that_do_it() {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
-        let (sum, spent) = timed_on(&pool.unwrap(), || {
-            let busy = || (0..10_000_000_u64).map(std::hint::black_box).sum::<u64>();
-            rayon::join(busy, busy)
-        });
-        assert_eq!(sum.0, sum.1);
-        let alone = timed(|| {
-            std::hint::black_box((0..10_000_000_u64).map(std::hint::black_box).sum::<u64>());
-        });
-        // Twice the work; half of it would be one thread's.
-        assert!(spent > alone * 3 / 2, "{spent:?} for twice {alone:?}");
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(2)
+            .build()
+            .unwrap();
+        let busy = || {
+            timed(|| {
+                std::hint::black_box((0..10_000_000_u64).map(std::hint::black_box).sum::<u64>());
+            })
+        };
+        let ((one, other), spent) = timed_on(&pool, || rayon::join(busy, busy));
+        // Each half by the clock of the thread that did it: a busy machine makes both sides longer.
+        assert!(spent >= one + other, "{spent:?} for {one:?} and {other:?}");
+        assert!(!one.is_zero() && !other.is_zero());
     }
 
     #[test]
