@@ -78,7 +78,7 @@ fn every_crate_has_a_licence_that_is_taken_and_comes_from_the_registry() {
     for one in &crates {
         assert!(
             is_taken(one.licence.as_deref()),
-            "{one} has the licence {:?}, which is not on the list in tests/suite/licences.rs: do without it, or ask who \
+            "{one} has the licence {:?}, which is not on the list in tests/suite/licences/mod.rs: do without it, or ask who \
              answers for the product and add it",
             one.licence
         );

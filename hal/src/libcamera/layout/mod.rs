@@ -288,5 +288,4 @@ fn unpack<const BYTES: usize>(row: &[u8], into: &mut [u16], bits: usize) {
 }
 
 #[cfg(test)]
-#[path = "layout_tests.rs"]
 mod tests;

@@ -2,10 +2,9 @@
 
 #![allow(clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
 
-#[path = "kms/crc.rs"]
 mod crc;
+#[path = "../machine/mod.rs"]
 mod machine;
-#[path = "kms/readback.rs"]
 mod readback;
 
 use crc::Checksums;

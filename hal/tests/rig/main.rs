@@ -2,12 +2,11 @@
 
 #![allow(clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
 
-#[path = "rig/chip.rs"]
 mod chip;
-#[path = "kms/crc.rs"]
+#[path = "../kms/crc.rs"]
 mod crc;
-#[path = "rig/eye.rs"]
 mod eye;
+#[path = "../machine/mod.rs"]
 mod machine;
 
 use std::collections::HashMap;
