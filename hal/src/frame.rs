@@ -332,6 +332,5 @@ mod tests {
         fn moved<T: Send>() {}
         shared::<Frame>();
         moved::<crate::head::DynHead>();
-        shared::<crate::sim::Stage>();
     }
 }

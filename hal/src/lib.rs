@@ -26,5 +26,4 @@ pub mod setup;
 pub mod sim;
 pub mod trigger;
 pub mod units;
-
-mod virtual_head;
+pub mod virtual_head;

@@ -109,12 +109,12 @@ impl Projector for Closed {
 #[cfg(test)]
 mod tests {
     use crate::error::ErrorKind;
-    use crate::sim::{Scenario, head_with_progress};
+    use crate::head::tests::{labelled, plain};
     use std::time::Duration;
 
     #[test]
     fn a_closed_head_is_what_it_was_like_and_measures_nothing() {
-        let (head, _stage) = head_with_progress(&Scenario::default(), &|_| ()).unwrap();
+        let head = labelled(plain(), 1);
         let mut closed = head.closed();
         assert_eq!(
             (closed.camera_format(), closed.projector_size()),

@@ -13,6 +13,6 @@ pub use play::head;
 pub use recording::Recording;
 
 #[cfg(test)]
-pub(crate) mod shared_tests;
+mod shared_tests;
 #[cfg(test)]
 mod tests;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::recording::{PatternSpec, Recording};
 
 /// The folder of shared recordings beside the workspace, if it is there.
-pub(crate) fn shared_recordings() -> Option<PathBuf> {
+fn shared_recordings() -> Option<PathBuf> {
     let workspace = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     let folder = workspace
         .parent()?

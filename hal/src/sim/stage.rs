@@ -10,7 +10,7 @@ use super::transport::{Transport, Truth};
 use crate::error::{Device, Error};
 use crate::head::DynHead;
 use crate::model::DeviceModel;
-use crate::virtual_head::{self, Scene as _, Shared, lock};
+use crate::virtual_head::{self, Control, Scene as _};
 
 /// Placed parts whose transport is remembered; one of 512 × 512 takes about 20 MB.
 const MAX_REMEMBERED: usize = 8;
@@ -18,7 +18,7 @@ const MAX_REMEMBERED: usize = 8;
 /// The part in front of a simulated head. Clones place parts in front of the same head.
 #[derive(Clone)]
 pub struct Stage {
-    bench: Shared<SimScene>,
+    control: Control<SimScene>,
     scenario: Arc<Scenario>,
     placed: Arc<Mutex<(Part, Placement)>>,
     /// The one used last stands at the end.
@@ -65,9 +65,9 @@ pub fn head_with_progress(
         transport: Arc::clone(&transport),
     };
     let scene = SimScene::new(Arc::clone(&scenario), transport);
-    let (head, bench) = virtual_head::head(scene, scenario.mechanics());
+    let (head, control) = virtual_head::head(scene, scenario.mechanics());
     let stage = Stage {
-        bench,
+        control,
         placed: Arc::new(Mutex::new((scenario.part.clone(), scenario.placement))),
         scenario,
         remembered: Arc::new(Mutex::new(vec![remembered])),
@@ -129,7 +129,7 @@ impl Stage {
     /// Puts a part in place whose light is worked out; the next exposure sees it.
     pub fn show(&self, staged: Staged) {
         let mut placed = self.placed.lock().unwrap_or_else(PoisonError::into_inner);
-        lock(&self.bench).scene.place(staged.transport);
+        self.control.scene(|scene| scene.place(staged.transport));
         *placed = (staged.part, staged.placement);
     }
 
@@ -164,17 +164,16 @@ impl Stage {
 
     /// Pulls a device's cable out: every call of it fails from now on, until it is plugged in and the head opened again.
     pub fn unplug(&self, device: Device) {
-        let mut bench = lock(&self.bench);
-        bench.plug(device, false);
+        self.control.plug(device, false);
         if device == Device::Projector {
             // Patterns live in the projector's memory. A simulated one refuses no load.
-            let _ = bench.scene.load(Vec::new());
+            let _ = self.control.scene(|scene| scene.load(Vec::new()));
         }
     }
 
     /// Plugs a device in again.
     pub fn plug(&self, device: Device) {
-        lock(&self.bench).plug(device, true);
+        self.control.plug(device, true);
     }
 
     /// Opens the head again, in front of the same part.
@@ -182,19 +181,19 @@ impl Stage {
     /// # Errors
     /// `Disconnected` if camera or projector is pulled out.
     pub fn reopen(&self) -> Result<DynHead, Error> {
-        virtual_head::reopen(&self.bench)
+        self.control.reopen()
     }
 
     /// What is true of the part that is in place.
     #[must_use]
     pub fn truth(&self) -> Truth {
-        let transport = lock(&self.bench).scene.transport();
+        let transport = self.control.scene(|scene| scene.transport());
         transport.truth.clone()
     }
 
     /// Starts the noise anew from `seed`: the next frame is frame 0 of it.
     pub fn reseed(&self, seed: u64) {
-        lock(&self.bench).scene.reseed(seed);
+        self.control.scene(|scene| scene.reseed(seed));
     }
 
     /// The scenario of this head, with the part it started with.

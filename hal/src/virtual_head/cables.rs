@@ -2,7 +2,7 @@
 
 use std::sync::MutexGuard;
 
-use super::{Bench, Device, Scene, lock};
+use super::{Bench, Control, Device, Scene, lock};
 use crate::error::{self, Error};
 
 /// The cable of one device.
@@ -49,12 +49,13 @@ impl<S> Device<S> {
     }
 }
 
-impl<S> Bench<S> {
-    /// Pulls a device's cable out, or puts it back. What was opened before stays dead.
-    pub fn plug(&mut self, device: error::Device, into: bool) {
+impl<S> Control<S> {
+    /// Pulls a device's cable out, or plugs it `into` the device again. What was opened before stays dead.
+    pub fn plug(&self, device: error::Device, into: bool) {
+        let mut bench = lock(&self.bench);
         let line = match device {
-            error::Device::Camera => &mut self.camera,
-            error::Device::Projector => &mut self.projector,
+            error::Device::Camera => &mut bench.camera,
+            error::Device::Projector => &mut bench.projector,
             // Its trigger needs no chip.
             error::Device::Lines => return,
         };

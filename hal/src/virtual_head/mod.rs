@@ -1,4 +1,6 @@
-//! Camera, projector, trigger and clock around one scene: what simulation and replay have in common.
+//! Camera, projector, trigger and clock around one scene, without hardware: what simulation and replay have in common.
+//!
+//! A back-end implements [`Scene`], which says what the camera sees of what the projector shows, and gets a head from [`head`].
 //!
 //! Nothing here waits in real time. The clock stands still between waits and jumps to the next thing that happens, at most to
 //! the end of the wait. So a sequence has the times of a real head, at the speed of the computer, and the same every
@@ -29,10 +31,10 @@ pub use faults::Faults;
 use light::Light;
 use projector::Screen;
 use pulse::Pulses;
-pub(crate) use timing::Mechanics;
+pub use timing::Mechanics;
 
 /// What the virtual devices look at.
-pub(crate) trait Scene: Send {
+pub trait Scene: Send {
     /// The format of every frame.
     fn format(&self) -> FrameFormat;
 
@@ -40,6 +42,9 @@ pub(crate) trait Scene: Send {
     fn projector_size(&self) -> (u32, u32);
 
     /// Replaces the patterns, whose size has been checked.
+    ///
+    /// # Errors
+    /// Where the scene cannot show them.
     fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error>;
 
     /// Patterns loaded.
@@ -48,6 +53,9 @@ pub(crate) trait Scene: Send {
     /// The frame of an exposure. `seen` says which patterns (or none) were in view, in turn, for which share of the planned
     /// exposure; it is not empty, and its shares sum to 1, or to more if the exposure lasted longer. `timestamp` and
     /// `sequence` are the frame's.
+    ///
+    /// # Errors
+    /// Where the scene has no frame of that.
     fn expose(
         &mut self,
         seen: &[(Option<usize>, f32)],
@@ -57,8 +65,8 @@ pub(crate) trait Scene: Send {
 }
 
 /// The scene and the state of the devices in front of it.
-pub(crate) struct Bench<S> {
-    pub scene: S,
+struct Bench<S> {
+    scene: S,
     mechanics: Mechanics,
     dice: Dice,
     now: Timestamp,
@@ -71,11 +79,40 @@ pub(crate) struct Bench<S> {
     projector: Line,
 }
 
-/// One bench, shared by the devices (and whoever changes the scene).
-pub(crate) type Shared<S> = Arc<Mutex<Bench<S>>>;
+/// One bench, shared by the devices and the [`Control`].
+type Shared<S> = Arc<Mutex<Bench<S>>>;
 
-/// The devices of a bench whose time goes like this.
-pub(crate) fn head<S: Scene + 'static>(scene: S, mechanics: Mechanics) -> (DynHead, Shared<S>) {
+/// Changes the scene of a virtual head and plugs its cables. Clones act on the same head.
+pub struct Control<S> {
+    bench: Shared<S>,
+}
+
+impl<S> Clone for Control<S> {
+    fn clone(&self) -> Self {
+        Self {
+            bench: Arc::clone(&self.bench),
+        }
+    }
+}
+
+impl<S: Scene + 'static> Control<S> {
+    /// Calls `act` with the scene; no device is used meanwhile.
+    pub fn scene<R>(&self, act: impl FnOnce(&mut S) -> R) -> R {
+        act(&mut lock(&self.bench).scene)
+    }
+
+    /// Opens the devices anew: a stopped camera and a blank projector.
+    ///
+    /// # Errors
+    /// `Disconnected` if one of them is pulled out.
+    pub fn reopen(&self) -> Result<DynHead, Error> {
+        lock(&self.bench).reset()?;
+        Ok(devices(&self.bench))
+    }
+}
+
+/// A head in front of `scene` with these times and faults, and the control of it.
+pub fn head<S: Scene + 'static>(scene: S, mechanics: Mechanics) -> (DynHead, Control<S>) {
     let bench = Arc::new(Mutex::new(Bench {
         scene,
         dice: Dice::new(mechanics.faults.seed),
@@ -90,7 +127,7 @@ pub(crate) fn head<S: Scene + 'static>(scene: S, mechanics: Mechanics) -> (DynHe
         mechanics,
     }));
     let head = devices(&bench);
-    (head, bench)
+    (head, Control { bench })
 }
 
 /// The devices, opened as the cables are now.
@@ -113,17 +150,8 @@ fn devices<S: Scene + 'static>(bench: &Shared<S>) -> DynHead {
     Head::new(device(), device(), device(), device(), timing)
 }
 
-/// Opens the devices of a bench anew: a stopped camera and a blank projector.
-///
-/// # Errors
-/// `Disconnected` if one of them is pulled out.
-pub(crate) fn reopen<S: Scene + 'static>(bench: &Shared<S>) -> Result<DynHead, Error> {
-    lock(bench).reset()?;
-    Ok(devices(bench))
-}
-
 /// Locks a bench. A panic of another thread leaves no half-done state behind that would matter here.
-pub(crate) fn lock<S>(bench: &Shared<S>) -> MutexGuard<'_, Bench<S>> {
+fn lock<S>(bench: &Shared<S>) -> MutexGuard<'_, Bench<S>> {
     bench.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

@@ -8,22 +8,28 @@ use crate::head::{Stamp, TOLERANCE, Timing};
 
 /// The true times of a virtual head, and its faults.
 #[derive(Clone, Debug)]
-pub(crate) struct Mechanics {
+pub struct Mechanics {
+    /// Time from one refresh of the projector to the next.
     pub refresh: Duration,
+    /// From a flip to its pattern's light.
     pub flip_to_light: Duration,
-    /// What the head is told of it.
+    /// What the head's calibration believes of that.
     pub calibrated_flip_to_light: Duration,
+    /// Planned exposure.
     pub exposure: Duration,
+    /// From the end of an exposure to its frame.
     pub readout: Duration,
     /// Period and first exposure after the start of a camera that runs by itself.
     pub free_running: Option<(Duration, Duration)>,
+    /// What the camera's stamps mark.
     pub stamp: Stamp,
+    /// What goes wrong.
     pub faults: Faults,
 }
 
 impl Mechanics {
     /// A triggered camera that exposes `refreshes` whole refreshes, as a digital micromirror device needs it, and is read out in no time.
-    pub fn plain(refresh: Duration, refreshes: u32) -> Self {
+    pub(crate) fn plain(refresh: Duration, refreshes: u32) -> Self {
         Self {
             refresh,
             flip_to_light: Duration::ZERO,

@@ -93,7 +93,7 @@ fn label(frame: &Frame) -> Label {
 }
 
 /// A head in front of labels, with so many patterns loaded.
-fn labelled(mechanics: Mechanics, patterns: usize) -> DynHead {
+pub(super) fn labelled(mechanics: Mechanics, patterns: usize) -> DynHead {
     in_front_of(Labels::default(), mechanics, patterns)
 }
 
@@ -104,7 +104,7 @@ fn in_front_of(labels: Labels, mechanics: Mechanics, patterns: usize) -> DynHead
     head
 }
 
-fn plain() -> Mechanics {
+pub(super) fn plain() -> Mechanics {
     Mechanics::plain(REFRESH, 1)
 }
 

@@ -151,3 +151,9 @@ fn going_back_to_a_placed_part_costs_nothing() {
         "each of four parts is traced once, row by row"
     );
 }
+
+#[test]
+fn a_stage_can_be_shared_between_threads() {
+    fn shared<T: Send + Sync + Clone>() {}
+    shared::<Stage>();
+}
