@@ -13,7 +13,7 @@ use crate::plan::{Plan, PlanError};
 use crate::recipe::{Recipe, archive};
 use hal::head::DynHead;
 use hal::replay::Recording;
-use hal::sim::{Scenario, Stage};
+use sim::{Scenario, Stage};
 use std::fs;
 use std::path::Path;
 
@@ -252,7 +252,7 @@ fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Ope
     if let Some(placed) = &config.part {
         (scenario.part, scenario.placement) = (placed.part.clone(), placed.placement);
     }
-    let (head, stage) = hal::sim::head_with_progress(&scenario, progress)
+    let (head, stage) = sim::head_with_progress(&scenario, progress)
         .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
     let calibration = Calibration::of_stage(&stage);
     Ok(Opened {

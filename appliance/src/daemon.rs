@@ -32,7 +32,7 @@ use crate::tally::Tally;
 use crate::worker::opening::Opening;
 use crate::worker::{Aborts, Order, Worker};
 use crate::{backend, lines, modbus, socket, web};
-use hal::sim::Stage;
+use sim::Stage;
 use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::{Arc, mpsc};

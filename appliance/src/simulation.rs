@@ -4,9 +4,9 @@
 //! task puts it in place between two cycles: frames of one cycle never show two parts.
 
 use crate::worker::Order;
-use hal::sim::{Part, Placement, Scenario, Stage, Staged};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
+use sim::{Part, Placement, Scenario, Stage, Staged};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender, SyncSender};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;

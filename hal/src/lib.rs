@@ -23,7 +23,6 @@ pub mod npy;
 pub mod projector;
 pub mod replay;
 pub mod setup;
-pub mod sim;
 pub mod trigger;
 pub mod units;
 pub mod virtual_head;

@@ -39,5 +39,6 @@ fi
 
 if [[ -n $tests ]]; then
     "$dir/bin/cargo" test -p hal --features "$features"
+    "$dir/bin/cargo" test -p sim
     "$dir/bin/cargo" test -p appliance --features "$features"
 fi

@@ -14,7 +14,7 @@ use appliance::station::{
 };
 use appliance::station::{ConnectionEdges, ControlWrite, Effect};
 use hal::frame::Frame;
-use hal::sim::Scenario;
+use sim::Scenario;
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
@@ -45,7 +45,7 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
         "small",
     )
     .unwrap();
-    let (mut head, stage) = hal::sim::head(&scenario).unwrap();
+    let (mut head, stage) = sim::head(&scenario).unwrap();
     let calibration = Calibration::of_stage(&stage);
     let taught = teach(&mut head, &calibration, &naming(), TIMEOUT, &|_, _| ()).unwrap();
     let mut file = taught.recipe.file.clone();

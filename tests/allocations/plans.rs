@@ -6,7 +6,7 @@ use appliance::calibration::Calibration;
 use appliance::plan::Plan;
 use appliance::recipe::teach::teach;
 use appliance::recipe::{Recipe, archive};
-use hal::sim::Scenario;
+use sim::Scenario;
 
 const PIXELS: usize = 320 * 240;
 /// Samples of the phase function, in f64.
@@ -30,7 +30,7 @@ fn a_plan_keeps_nothing_twice_and_making_it_takes_little_more_than_its_file() {
         "small",
     )
     .unwrap();
-    let (mut head, stage) = hal::sim::head(&scenario).unwrap();
+    let (mut head, stage) = sim::head(&scenario).unwrap();
     let calibration = Calibration::of_stage(&stage);
     let taught = teach(&mut head, &calibration, &naming(), TIMEOUT, &|_, _| ()).unwrap();
     let pool = rayon::ThreadPoolBuilder::new()

@@ -9,8 +9,8 @@ use appliance::rig::{self, About};
 use hal::head::DynHead;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedFrame, RecordedProjector};
-use hal::sim::parts::Sphere;
-use hal::sim::{Part, Scenario, Stage};
+use sim::parts::Sphere;
+use sim::{Part, Scenario, Stage};
 use std::ffi::OsStr;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -267,7 +267,7 @@ impl Taught {
         };
         (scenario.rig.camera.width, scenario.rig.camera.height) = (128, 128);
         (scenario.rig.projector.width, scenario.rig.projector.height) = (512, 384);
-        let (mut head, stage) = hal::sim::head(&scenario).expect("a head");
+        let (mut head, stage) = sim::head(&scenario).expect("a head");
         let calibration = Calibration {
             camera: (128, 128, 8),
             camera_model: stage.camera_model(),

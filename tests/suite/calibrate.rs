@@ -1,8 +1,8 @@
 //! `fringed calibrate` on simulated heads: what is measured is what the scenario says, and what is written survives.
 
 use appliance::calibration::place::Place;
-use hal::sim::Scenario;
 use serde_json::Value;
+use sim::Scenario;
 use std::fs;
 use std::path::Path;
 use tests::program::{Program, Run};

@@ -4,7 +4,7 @@ use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, TRIGGER, long, tr
 use appliance::calibration::Calibration;
 use appliance::plan::Plan;
 use appliance::recipe::{Recipe, Store, archive};
-use hal::sim::Scenario;
+use sim::Scenario;
 use std::fs;
 use std::time::{Duration, Instant};
 use tests::random::Random;
@@ -281,7 +281,7 @@ fn recipes_at_full_resolution_are_switched_within_a_second() {
 /// second, so that a machine with nothing else to do switches within it.
 fn stages(store: &Store, bytes: usize) {
     let scenario = Scenario::from_toml(FULL_HEAD, "full").unwrap();
-    let (mut head, stage) = hal::sim::head(&scenario).unwrap();
+    let (mut head, stage) = sim::head(&scenario).unwrap();
     let calibration = Calibration::of_stage(&stage);
     let mut works = Vec::new();
     for number in 1..=3 {

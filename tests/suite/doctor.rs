@@ -3,8 +3,8 @@
 use appliance::calibration::Calibration;
 use appliance::doctor::{Verdict, examine};
 use hal::head::Timing;
-use hal::sim::Scenario;
 use serde_json::Value;
+use sim::Scenario;
 use std::path::Path;
 use tests::program::{Program, Run};
 use tests::small_head::SMALL_HEAD as HEAD;
@@ -109,7 +109,7 @@ fn a_head_that_nobody_has_calibrated_fails_in_nothing_but_what_calibration_measu
     let timing = "[timing]\nflip_to_light_us = 33333\nstamp = \"exposure_end\"\nreadout_us = 16000\nexposure_refreshes = 1.0\n";
     let scenario = Scenario::from_toml(&format!("{HEAD}{timing}"), "here").unwrap();
     for calibrated in [false, true] {
-        let (mut head, stage) = hal::sim::head_with_progress(&scenario, &|_| ()).unwrap();
+        let (mut head, stage) = sim::head_with_progress(&scenario, &|_| ()).unwrap();
         head.set_timing(Timing::default());
         let known = Calibration::of_stage(&stage);
         let steps = examine(&mut head, &known, calibrated, &|_, _| ());

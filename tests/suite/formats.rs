@@ -213,8 +213,8 @@ fn the_documented_scenario_is_the_default_one() {
     let documented = document("formats.md");
     let (_, from) = documented.split_once("```toml\n").unwrap();
     let (scenario, _) = from.split_once("```").unwrap();
-    let read = hal::sim::Scenario::from_toml(scenario, "docs/formats.md").unwrap();
-    assert_eq!(read, hal::sim::Scenario::default());
+    let read = sim::Scenario::from_toml(scenario, "docs/formats.md").unwrap();
+    assert_eq!(read, sim::Scenario::default());
 }
 
 /// Keys of `calibration.json`, version 1. If this fails, do not change the test: old files must stay readable.

@@ -12,8 +12,8 @@ use appliance::recipe::{
 use appliance::seam;
 use appliance::station::{Inspection, Unit, Verdict};
 use hal::frame::Frame;
-use hal::sim::parts::{Plane, SheetMetal};
-use hal::sim::{Part, Placement, Scenario};
+use sim::parts::{Plane, SheetMetal};
+use sim::{Part, Placement, Scenario};
 use std::fs;
 use std::time::Instant;
 

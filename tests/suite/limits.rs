@@ -7,8 +7,8 @@ use appliance::plan::Plan;
 use appliance::recipe::good_parts::GoodPartsFile;
 use appliance::recipe::teach::{Naming, teach};
 use appliance::station::{Inspection, Verdict};
-use hal::sim::parts::{Defect, Flowerpot, SheetMetal};
-use hal::sim::{Part, Placement, Scenario};
+use sim::parts::{Defect, Flowerpot, SheetMetal};
+use sim::{Part, Placement, Scenario};
 use std::time::Instant;
 use tests::random::Random;
 

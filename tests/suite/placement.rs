@@ -9,8 +9,8 @@ use appliance::recipe::teach::{Naming, Taught, teach};
 use appliance::recipe::{AlignmentKind, GaugeFile, Recipe, RecipeFile, RegionFile, safe};
 use appliance::rig::{About, Rig};
 use hal::head::DynHead;
-use hal::sim::parts::{Cone, Plane, Sawtooth, SheetMetal, Sphere, Spline};
-use hal::sim::{Part, Placement, Scenario, Stage};
+use sim::parts::{Cone, Plane, Sawtooth, SheetMetal, Sphere, Spline};
+use sim::{Part, Placement, Scenario, Stage};
 use std::time::{Duration, Instant};
 
 pub(crate) const TIMEOUT: Duration = Duration::from_secs(5);
@@ -23,7 +23,7 @@ pub(crate) struct Bed {
 }
 
 pub(crate) fn bed(scenario: &Scenario) -> Bed {
-    let (head, stage) = hal::sim::head(scenario).unwrap();
+    let (head, stage) = sim::head(scenario).unwrap();
     Bed {
         head,
         calibration: Calibration::of_stage(&stage),

@@ -6,8 +6,8 @@ use appliance::plan::Plan;
 use appliance::recipe::teach::{Naming, Taught, teach};
 use appliance::recipe::{GaugeKind, RecipeFile, SequenceKind};
 use appliance::station::{Inspection, Verdict};
-use hal::sim::parts::{Defect, SheetMetal};
-use hal::sim::{Part, Placement, Scenario};
+use sim::parts::{Defect, SheetMetal};
+use sim::{Part, Placement, Scenario};
 use std::time::Instant;
 use tests::random::Random;
 

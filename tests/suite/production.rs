@@ -13,8 +13,8 @@ use appliance::recipe::{AlignmentKind, Recipe};
 use appliance::seam;
 use appliance::station::{Inspection, Stages};
 use hal::frame::Frame;
-use hal::sim::parts::{Cone, Sawtooth, SheetMetal};
-use hal::sim::{Part, Placement};
+use sim::parts::{Cone, Sawtooth, SheetMetal};
+use sim::{Part, Placement};
 use std::time::Instant;
 
 /// Heights by the production path are off the exact ones by at most this, mm: the noise of one level of four frames is

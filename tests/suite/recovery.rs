@@ -14,7 +14,7 @@ use appliance::progress::Progress;
 use appliance::recipe::teach::{Naming, TeachError, teach_while};
 use appliance::station::{ConnectionEdges, ControlWrite, Event, Masked, Request};
 use hal::error::Device;
-use hal::sim::Scenario;
+use sim::Scenario;
 use std::fs;
 use std::sync::Mutex;
 use std::time::Instant;
@@ -163,7 +163,7 @@ fn an_abort_ends_a_teach_and_the_recipe_before_it_goes_on() {
 #[test]
 fn a_teach_that_is_ended_does_no_further_step() {
     let scenario = Scenario::from_toml(SMALL_HEAD, "small head").unwrap();
-    let (mut head, stage) = hal::sim::head(&scenario).unwrap();
+    let (mut head, stage) = sim::head(&scenario).unwrap();
     let calibration = Calibration::of_stage(&stage);
     let naming = Naming {
         number: 1,

@@ -4,8 +4,8 @@ use crate::gauges::{frames, inspect, plan};
 use crate::placement::{Bed, bed, scenario, taught};
 use appliance::recipe::RecipeFile;
 use appliance::station::{Inspection, Verdict};
-use hal::sim::parts::Cone;
-use hal::sim::{Part, Placement};
+use sim::parts::Cone;
+use sim::{Part, Placement};
 use std::time::Instant;
 
 #[test]

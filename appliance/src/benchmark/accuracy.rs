@@ -222,7 +222,7 @@ fn variant(name: &str, kernel: Box<dyn Kernel>) -> Variant {
 /// Truth class of a pixel that is wholly lit.
 const WHOLE_PIXEL: u8 = 2;
 
-fn lit(truth: &hal::sim::Truth) -> usize {
+fn lit(truth: &sim::Truth) -> usize {
     truth
         .class
         .iter()
@@ -231,7 +231,7 @@ fn lit(truth: &hal::sim::Truth) -> usize {
 }
 
 /// The rows in which some of the part is seen, as a recipe's gauges would ask for them.
-fn rows_seen(truth: &hal::sim::Truth, width: usize) -> Vec<Range<usize>> {
+fn rows_seen(truth: &sim::Truth, width: usize) -> Vec<Range<usize>> {
     let rows = truth.class.chunks(width.max(1));
     let seen = rows.map(|row| row.iter().any(|&class| class > 0));
     seen.map(|seen| if seen { 0..width } else { 0..0 })
@@ -239,7 +239,7 @@ fn rows_seen(truth: &hal::sim::Truth, width: usize) -> Vec<Range<usize>> {
 }
 
 /// The heights of an implementation's phases, by exact triangulation, against the truth.
-fn score(measured: &Measured, truth: &hal::sim::Truth, turns: &[f64]) -> Option<Score> {
+fn score(measured: &Measured, truth: &sim::Truth, turns: &[f64]) -> Option<Score> {
     let mut phases = PhaseMap {
         width: measured.phases.width,
         phase: turns

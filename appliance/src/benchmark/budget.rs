@@ -10,8 +10,8 @@ use crate::recipe::teach::{Naming, teach};
 use crate::recipe::{AlignmentKind, Recipe, archive};
 use hal::frame::Frame;
 use hal::head::DynHead;
-use hal::sim::Scenario;
 use serde::Serialize;
+use sim::Scenario;
 use std::time::{Duration, Instant};
 
 /// Angles of view of the physical head of the study (section 5.2), degrees.
@@ -63,7 +63,7 @@ pub fn budgets(
     (camera.width, camera.height, camera.fov_deg) = (width, height, FOV_DEG);
     let about = format!("{width}x{height}");
     progress(0.0, &format!("{about}: light of the scene"));
-    let (mut head, stage) = hal::sim::head(&scenario).map_err(words)?;
+    let (mut head, stage) = sim::head(&scenario).map_err(words)?;
     let calibration = Calibration::of_stage(&stage);
     let naming = Naming {
         number: 1,

@@ -13,9 +13,9 @@ use hal::frame::{Frame, FrameFormat, Pixels};
 use hal::head::Stamp;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecipeReference, RecordedFrame, RecordedProjector};
-use hal::sim::Scenario;
 use hal::units::Timestamp;
 use serde_json::{Value, json};
+use sim::Scenario;
 use std::fmt::Write as _;
 use std::fs;
 use std::sync::Arc;
@@ -308,7 +308,7 @@ fn a_boundary_value_in_a_scenario_is_refused_by_its_key_or_the_scene_can_be_lit(
         Calibration::of_scenario(&scenario).devices()?;
         let camera = &scenario.rig.camera;
         if camera.width * camera.height * scenario.sub_rays.pow(2) <= 16 * 12 * 4 {
-            drop(hal::sim::head(&scenario).map_err(|error| error.to_string())?);
+            drop(sim::head(&scenario).map_err(|error| error.to_string())?);
         }
         Ok(())
     });
@@ -334,7 +334,7 @@ fn a_boundary_value_in_a_scenario_is_refused_by_its_key_or_the_scene_can_be_lit(
         tally.walk(&only, |place, value| {
             let text = place.replaced(&only, in_toml(value), scene);
             let scenario = Scenario::from_toml(&text, "here").map_err(|error| error.to_string())?;
-            drop(hal::sim::head(&scenario).map_err(|error| error.to_string())?);
+            drop(sim::head(&scenario).map_err(|error| error.to_string())?);
             Ok(())
         });
     }

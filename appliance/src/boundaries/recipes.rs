@@ -8,8 +8,8 @@ use crate::recipe::golden::Naming;
 use crate::recipe::teach::teach;
 use crate::recipe::{Recipe, Store};
 use hal::frame::Frame;
-use hal::sim::Scenario;
 use serde_json::Value;
+use sim::Scenario;
 use std::time::{Duration, Instant};
 
 const TIMEOUT: Duration = Duration::from_secs(5);
@@ -36,7 +36,7 @@ pub(crate) struct Bed {
 impl Bed {
     pub fn new() -> Self {
         let scenario = Scenario::from_toml(HEAD, "head").unwrap();
-        let (mut head, stage) = hal::sim::head(&scenario).unwrap();
+        let (mut head, stage) = sim::head(&scenario).unwrap();
         let calibration = Calibration::of_stage(&stage);
         let naming = Naming {
             number: 1,

@@ -15,8 +15,8 @@ use algo::geometry::{ModelError, Pinhole};
 use algo::pattern::GreyResponse;
 use hal::model::DeviceModel;
 use hal::replay::Recording;
-use hal::sim::{Scenario, Stage};
 use sha2::{Digest, Sha256};
+use sim::{Scenario, Stage};
 
 /// The calibration of a head.
 #[derive(Clone, Debug)]

@@ -16,7 +16,7 @@ use crate::state::StateFolder;
 use algo::geometry::{Reference, RigError, Triangulator};
 use algo::pattern::PhaseFunction;
 use hal::bounds::within;
-use hal::sim::{Part, Stage};
+use sim::{Part, Stage};
 use std::path::{Path, PathBuf};
 
 /// Calibrate the head: import its models, measure delay, stamps, grey response, noise, contrast and the reference plane.
@@ -233,9 +233,9 @@ fn lay_plate(stage: Option<&Stage>, notes: &mut Vec<String>) -> Result<(), Failu
         return Ok(());
     }
     notes.push("a flat plate was laid in front of the simulated head".into());
-    let plate = Part::Plane(hal::sim::parts::Plane::default());
+    let plate = Part::Plane(sim::parts::Plane::default());
     stage
-        .place(&plate, &hal::sim::Placement::default())
+        .place(&plate, &sim::Placement::default())
         .map_err(|error| Failure::new(Exit::Software, error.to_string()))
 }
 

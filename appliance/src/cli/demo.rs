@@ -118,7 +118,7 @@ async fn play(
     for (at, placed) in PARTS.iter().enumerate() {
         progress.tell(at as f64 / PARTS.len() as f64, "measuring parts");
         stage
-            .place(&placed.part(), &hal::sim::Placement::default())
+            .place(&placed.part(), &sim::Placement::default())
             .map_err(|error| Failure::new(Exit::Software, error.to_string()))?;
         let result = plc.measure(at as u16 + 1).await?;
         // The registers number the gauges; their names are the recipe's.

@@ -93,7 +93,7 @@ impl Record {
             told(frames.len() as f64 / sequence.len() as f64);
         })
         .map_err(device)?;
-        let truth = stage.as_ref().map(hal::sim::Stage::truth);
+        let truth = stage.as_ref().map(sim::Stage::truth);
         let (width, height, bit_depth) = calibration.camera;
         Ok(Recording {
             width,

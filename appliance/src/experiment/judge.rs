@@ -32,7 +32,7 @@ impl Outcome {
 }
 
 /// Judges a measurement of a part of which all is known.
-pub fn judge(truth: &hal::sim::Truth, measured: &Measured, judged: Judged) -> Outcome {
+pub fn judge(truth: &sim::Truth, measured: &Measured, judged: Judged) -> Outcome {
     let known = Truth {
         height: Some(&truth.height),
         class: Some(&truth.class),

@@ -13,7 +13,7 @@ use algo::pattern::{PhaseFunction, PhaseRange, Sequence};
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use hal::head::DynHead;
-use hal::sim::{Stage, Truth};
+use sim::{Stage, Truth};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -103,7 +103,7 @@ impl Runner {
     /// If the scene cannot be simulated.
     pub fn new(scene: &Scene, optics: OpticsKind) -> Result<Self, RigError> {
         let scenario = scene.scenario(optics, 1);
-        let (head, stage) = hal::sim::head(&scenario)?;
+        let (head, stage) = sim::head(&scenario)?;
         let calibration = Calibration::of_stage(&stage);
         Ok(Self {
             head,

@@ -1,9 +1,9 @@
 //! Parts and optics of the experiments, and what each part is judged by.
 
 use super::methods::Method;
-use hal::sim::parts::{Cone, Flowerpot, Sawtooth, Sphere, Spline, Tube};
-use hal::sim::scenario::Optics;
-use hal::sim::{Part, Placement, Scenario};
+use sim::parts::{Cone, Flowerpot, Sawtooth, Sphere, Spline, Tube};
+use sim::scenario::Optics;
+use sim::{Part, Placement, Scenario};
 
 /// A part of the paper's experiments, placed.
 #[derive(Clone, Debug)]

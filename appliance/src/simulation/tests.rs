@@ -8,7 +8,7 @@ fn small() -> (Simulation, mpsc::Receiver<Order>, Stage) {
         ..Scenario::default()
     };
     (scenario.rig.camera.width, scenario.rig.camera.height) = (32, 32);
-    let (_, stage) = hal::sim::head(&scenario).unwrap();
+    let (_, stage) = sim::head(&scenario).unwrap();
     let (orders, inbox) = mpsc::channel();
     let simulation = Simulation::new(orders);
     simulation.opened(Some(&stage));

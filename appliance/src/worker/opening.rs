@@ -9,7 +9,7 @@ use crate::error::{Exit, Failure};
 use crate::notify::Pulse;
 use crate::progress::Progress;
 use crate::station::{Event, StationHandle, error_code};
-use hal::sim::Stage;
+use sim::Stage;
 use std::sync::mpsc::{Receiver, Sender};
 
 /// What opens the head.

@@ -6,7 +6,7 @@ use appliance::calibration::file::CalibrationFile;
 use appliance::calibration::opencv::{self, Declared, Sizes, Unit};
 use appliance::config::Config;
 use hal::model::DeviceModel;
-use hal::sim::Scenario;
+use sim::Scenario;
 use std::fs;
 use tempfile::TempDir;
 

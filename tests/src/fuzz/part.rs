@@ -5,7 +5,7 @@ use appliance::plan::Plan;
 use appliance::recipe::teach::{Naming, teach};
 use appliance::recipe::{Recipe, archive};
 use hal::frame::Frame;
-use hal::sim::{self, Scenario};
+use sim::Scenario;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 

@@ -2,7 +2,7 @@
 
 use super::{Declared, Sizes, Unit, from_one, from_two};
 use hal::model::DeviceModel;
-use hal::sim::Scenario;
+use sim::Scenario;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! The ten parts of the demonstration.
 
-use hal::sim::Part;
-use hal::sim::parts::{Defect, SheetMetal};
+use sim::Part;
+use sim::parts::{Defect, SheetMetal};
 
 /// A part that is put in front of the head.
 pub struct Placed {

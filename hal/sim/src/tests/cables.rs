@@ -1,9 +1,9 @@
 //! A head whose cables are pulled out.
 
 use super::{PATIENT, frames, small};
-use crate::error::{Device, ErrorKind};
-use crate::sim::parts::Plane;
-use crate::sim::{Part, head};
+use crate::parts::Plane;
+use crate::{Part, head};
+use hal::error::{Device, ErrorKind};
 
 #[test]
 fn a_device_that_is_pulled_out_is_gone_until_the_head_is_opened_again() {

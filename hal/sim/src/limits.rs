@@ -1,7 +1,7 @@
 //! The limits of a scenario's values: what is outside is refused by name before anything is computed with it.
 
 use super::scenario::{Device, Placement, Scenario};
-pub(crate) use crate::bounds::within;
+pub(crate) use hal::bounds::within;
 
 /// Most rays of a light transport. Each has at most four taps, which then fit the 32-bit offsets of the matrix.
 const MAX_RAYS: u64 = 1 << 28;

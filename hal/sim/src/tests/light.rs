@@ -1,11 +1,11 @@
 //! Light and noise: brightness, darkness, gain, response, blur, and the statistics of the noise.
 
 use super::{PATIENT, counts, frames, small};
-use crate::head::Showing;
-use crate::projector::Raster;
-use crate::sim::optics::normalised;
-use crate::sim::parts::Plane;
-use crate::sim::{Part, Scenario, head};
+use crate::optics::normalised;
+use crate::parts::Plane;
+use crate::{Part, Scenario, head};
+use hal::head::Showing;
+use hal::projector::Raster;
 
 #[test]
 fn a_lit_plane_is_as_bright_as_its_angle_to_the_projector_says() {

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::limits::within;
 use super::scenario::Scenario;
-use crate::head::Stamp;
-use crate::virtual_head::Mechanics;
+use hal::head::Stamp;
+use hal::virtual_head::Mechanics;
 
 /// Times of a simulated head. By default the camera is triggered, exposes two refreshes and is read out in no time, and a
 /// pattern's light is there with its flip.

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Surface;
 use super::shapes::{in_square, square};
-use crate::sim::limits::within;
-use crate::sim::optics::Vector;
+use crate::limits::within;
+use crate::optics::Vector;
 
 /// Control values along each side: 8 patches of cubics.
 const CONTROL: usize = 11;

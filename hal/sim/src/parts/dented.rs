@@ -5,7 +5,7 @@
 
 use super::Surface;
 use super::sheet_metal::{BUMP_SLOPE, Defect, bump};
-use crate::sim::optics::Vector;
+use crate::optics::Vector;
 
 /// Half the step of the derivative that a normal is worked out from, mm.
 const STEP_MM: f64 = 1e-3;

@@ -1,10 +1,10 @@
 //! Surfaces and rays: slopes stay in their bounds, and rays meet what small steps meet.
 
 use super::{all_parts, wall_dent};
-use crate::sim::optics::{Lens, Vector, along};
-use crate::sim::parts::Flowerpot;
-use crate::sim::trace::Traced;
-use crate::sim::{Part, Scenario};
+use crate::optics::{Lens, Vector, along};
+use crate::parts::Flowerpot;
+use crate::trace::Traced;
+use crate::{Part, Scenario};
 
 #[test]
 fn no_height_has_a_slope_above_its_bound() {

@@ -6,9 +6,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::parts::Part;
 use super::timing::Timing;
-use crate::bounds::shortened;
-use crate::model::DeviceModel;
-use crate::virtual_head::Faults;
+use hal::bounds::shortened;
+use hal::model::DeviceModel;
+use hal::virtual_head::Faults;
 
 /// A whole simulated head. Keys that are left out of the TOML have the defaults of the study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -6,9 +6,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::Surface;
-use crate::bounds::length;
-use crate::sim::limits::within;
-use crate::sim::optics::Vector;
+use crate::limits::within;
+use crate::optics::Vector;
+use hal::bounds::length;
 
 /// z of the plate's upper side.
 const PLATE_Z: f64 = 8.0;

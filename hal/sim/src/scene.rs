@@ -11,11 +11,11 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::blur;
 use super::scenario::Scenario;
 use super::transport::Transport;
-use crate::error::Error;
-use crate::frame::{Frame, FrameFormat, Pixels, Pool};
-use crate::projector::Raster;
-use crate::units::Timestamp;
-use crate::virtual_head::Scene;
+use hal::error::Error;
+use hal::frame::{Frame, FrameFormat, Pixels, Pool};
+use hal::projector::Raster;
+use hal::units::Timestamp;
+use hal::virtual_head::Scene;
 
 /// Frames that a user may keep before each new one costs an allocation.
 const MAX_KEPT_FRAMES: usize = 64;

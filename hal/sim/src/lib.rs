@@ -14,7 +14,7 @@ pub mod timing;
 mod trace;
 pub mod transport;
 
-pub use crate::virtual_head::Faults;
+pub use hal::virtual_head::Faults;
 pub use parts::Part;
 pub use scenario::{Placement, Scenario};
 pub use stage::{Stage, Staged, head, head_with_progress};

@@ -3,7 +3,7 @@
 //! Brown's model as OpenCV writes it (D. C. Brown, "Close-range camera calibration", 1971): with r² = x² + y²,
 //! x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²), and the like for y with p1 and p2 exchanged.
 
-use crate::model::DeviceModel;
+use hal::model::DeviceModel;
 
 /// A point or direction in mm.
 pub type Vector = [f64; 3];
@@ -149,7 +149,7 @@ pub(crate) fn normalised(v: Vector) -> Vector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::scenario::Rig;
+    use crate::scenario::Rig;
 
     #[test]
     fn a_point_on_the_ray_of_a_pixel_projects_back_onto_it() {

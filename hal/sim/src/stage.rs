@@ -7,10 +7,10 @@ use super::parts::Part;
 use super::scenario::{Placement, Scenario};
 use super::scene::SimScene;
 use super::transport::{Transport, Truth};
-use crate::error::{Device, Error};
-use crate::head::DynHead;
-use crate::model::DeviceModel;
-use crate::virtual_head::{self, Control, Scene as _};
+use hal::error::{Device, Error};
+use hal::head::DynHead;
+use hal::model::DeviceModel;
+use hal::virtual_head::{self, Control, Scene as _};
 
 /// Placed parts whose transport is remembered; one of 512 × 512 takes about 20 MB.
 const MAX_REMEMBERED: usize = 8;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Defect, Surface};
-use crate::sim::optics::Vector;
+use crate::optics::Vector;
 
 /// A lying cylinder is vertical at its sides; what is steeper than this is left away.
 const TUBE_SLOPE: f64 = 6.0;

@@ -6,10 +6,10 @@ use std::time::Duration;
 use super::parts::{Cone, Sphere};
 use super::scenario::Scenario;
 use super::{Part, head};
-use crate::frame::Samples;
-use crate::projector::Raster;
-use crate::replay::Recording;
-use crate::replay::recording::{PatternSpec, RecordedFrame};
+use hal::frame::Samples;
+use hal::projector::Raster;
+use hal::replay::Recording;
+use hal::replay::recording::{PatternSpec, RecordedFrame};
 
 /// Truth heights agree this well, RMS mm: a hundredth of a millimetre is far below the noise of any measurement.
 const HEIGHT_RMS_MM: f64 = 0.01;

@@ -1,8 +1,8 @@
 //! Parts on the stage: defects, placements, and what is remembered.
 
 use super::{all_parts, small};
-use crate::sim::parts::{Defect, Plane, SheetMetal};
-use crate::sim::{Part, Placement, Scenario, Stage, head};
+use crate::parts::{Defect, Plane, SheetMetal};
+use crate::{Part, Placement, Scenario, Stage, head};
 
 /// Pixels whose truth is not NaN, and the largest difference of truth from the good part.
 fn against_good(stage: &Stage, defects: Vec<Defect>) -> (usize, f32) {

@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 
 use super::parts::{Cone, Defect, Flowerpot, Plane, Sawtooth, SheetMetal, Sphere, Tube};
 use super::{Part, Scenario, head};
-use crate::contract::check_head;
-use crate::frame::{Frame, Samples};
-use crate::head::DynHead;
-use crate::projector::Raster;
+use hal::contract::check_head;
+use hal::frame::{Frame, Samples};
+use hal::head::DynHead;
+use hal::projector::Raster;
 
 const PATIENT: Duration = Duration::from_secs(1);
 
