@@ -1,6 +1,6 @@
-//! Devices: traits, their one generic user, and the simulated and replay back-ends.
+//! Devices: traits, their one generic user, real back-ends behind features, and one that replays recordings.
 //!
-//! This crate knows cameras, projectors, triggers and light. It knows nothing of phase: a pattern is a
+//! This crate knows cameras, projectors and triggers. It knows nothing of phase: a pattern is a
 //! grey raster, a frame is an array of counts, and what the two have to do with each other is for the
 //! crate that decodes them.
 

@@ -107,9 +107,10 @@ fn forbid_dependency(rule: &str, package: &str, packages: &[&str]) {
 #[test]
 fn algo_knows_neither_devices_nor_the_daemon_nor_the_outside_world() {
     let rule = "algo is a function of its input: no I/O, clock, threads of its own, environment, \
-                randomness or global state, and it does not know hal or appliance.";
+                randomness or global state, and it does not know hal, sim or appliance.";
     let outside = [
         "hal::",
+        "sim::",
         "appliance::",
         "std::fs",
         "std::io",
@@ -130,7 +131,7 @@ fn algo_knows_neither_devices_nor_the_daemon_nor_the_outside_world() {
     forbid_dependency(
         rule,
         "algo",
-        &["hal", "appliance", "tests", "rand_core", "getrandom"],
+        &["hal", "sim", "appliance", "tests", "rand_core", "getrandom"],
     );
     let text = fs::read_to_string(root().join("algo/src/lib.rs")).unwrap();
     assert!(text.contains("#![no_std]"), "{rule}\nalgo must be no_std");
@@ -139,16 +140,17 @@ fn algo_knows_neither_devices_nor_the_daemon_nor_the_outside_world() {
 #[test]
 fn hal_knows_neither_the_computation_nor_the_daemon() {
     let rule = "Two leaf crates that do not know each other: algo (pure computation) and hal \
-                (devices). appliance joins them.";
-    forbid(rule, "hal/src", &["algo::", "appliance::"]);
-    forbid_dependency(rule, "hal", &["algo", "appliance", "tests"]);
+                (devices). appliance joins them. The simulator knows hal, and hal does not know it.";
+    forbid(rule, "hal/src", &["algo::", "appliance::", "sim::"]);
+    forbid_dependency(rule, "hal", &["algo", "appliance", "sim", "tests"]);
 }
 
 #[test]
 fn the_simulator_does_not_know_how_fringes_are_decoded() {
     let rule = "The simulator models light, not phase: it knows surfaces, optics and noise, never how \
-                fringes are decoded, and imports nothing from algo.";
-    forbid(rule, "hal/sim/src", &["algo"]);
+                fringes are decoded, and imports nothing from algo or appliance.";
+    forbid(rule, "hal/sim/src", &["algo", "appliance"]);
+    forbid_dependency(rule, "hal/sim", &["algo", "appliance", "tests"]);
 }
 
 #[test]
@@ -162,8 +164,8 @@ fn the_oracle_shares_no_code_with_what_it_judges() {
 
 #[test]
 fn modbus_and_web_see_only_the_snapshot() {
-    let rule = "modbus and web see only Snapshot, never each other, never algo or hal.";
-    let ours = ["algo::", "hal::"];
+    let rule = "modbus and web see only Snapshot, never each other, never algo, hal or sim.";
+    let ours = ["algo::", "hal::", "sim::"];
     for (folder, other) in [
         ("appliance/src/modbus", ["crate::web", "super::web"]),
         ("appliance/src/web", ["crate::modbus", "super::modbus"]),
@@ -185,6 +187,7 @@ fn the_stations_decisions_are_pure() {
         "SystemTime::now",
         "tokio::",
         "hal::",
+        "sim::",
     ];
     // The handle is where the decisions meet the clock and the sockets.
     for part in ["state", "step", "control", "snapshot", "result"] {
@@ -234,6 +237,17 @@ fn untested_lines(source: &Source) -> usize {
     lines
         .take_while(|line| !line.starts_with("#[cfg(test)]"))
         .count()
+}
+
+#[test]
+fn a_module_with_parts_is_a_folder_with_a_mod_rs() {
+    let rule = "One module style: x/mod.rs, never x.rs beside x/.";
+    for folder in ["algo", "hal", "tests"] {
+        for source in sources(folder) {
+            let parts = root().join(source.name.trim_end_matches(".rs"));
+            assert!(!parts.is_dir(), "{rule}\n{}", source.name);
+        }
+    }
 }
 
 #[test]

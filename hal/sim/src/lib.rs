@@ -1,7 +1,7 @@
-//! The simulated back-end: surfaces, optics and noise under the light of a projector.
+//! A simulated head: surfaces, optics and noise under the light of a projector.
 //!
-//! It models light and knows nothing of how fringes are decoded, so that it can judge the code that decodes
-//! them. What the camera sees follows from what the projector shows.
+//! The crate models light and knows nothing of how fringes are decoded, so that it can judge the code that decodes
+//! them. It implements a scene of hal's virtual head: what the camera sees follows from what the projector shows.
 
 mod blur;
 mod limits;

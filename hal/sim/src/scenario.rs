@@ -1,6 +1,6 @@
 //! A scenario: rig, light, optics, noise and part of a simulated head, from TOML or built in code.
 //!
-//! The defaults are the study's rig and light (measurement.md, section 5) around the sheet-metal part.
+//! The defaults are the study's rig and light around the sheet-metal part.
 
 use serde::{Deserialize, Deserializer, Serialize};
 

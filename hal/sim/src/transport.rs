@@ -3,7 +3,7 @@
 //! A frame is linear in the raster, so everything geometric is worked out once per placed part: n × n sub-rays per
 //! camera pixel find their point of the surface, its normal, whether it sees the projector, and the projector
 //! point (ξ, η) that lights it. The bilinear taps of all sub-rays of a pixel are merged into one row of a sparse
-//! matrix; a frame is then matrix × raster. The model of light is the study's (measurement.md, section 5):
+//! matrix; a frame is then matrix × raster. The model of light:
 //! I = ambient + diffuse · max(0, n·l) · pattern, averaged over the sub-rays, no fall-off with distance; the
 //! ambient part reaches shadowed points too, and a sub-ray that meets nothing sees 0.
 //!
