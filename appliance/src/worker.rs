@@ -6,6 +6,7 @@ mod cycle;
 pub mod opening;
 mod placing;
 mod recovery;
+pub mod stopwatch;
 
 pub use aborts::Aborts;
 pub(crate) use code::code_of;

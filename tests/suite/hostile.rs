@@ -1,10 +1,10 @@
 //! Clients that mean no good, and many that do: neither takes the processor from the measurement, nor a place from the PLC.
 
 use crate::station_plc::{PATIENCE, READY, SMALL_HEAD, long, trigger};
-use appliance::benchmark::stopwatch::median;
 use appliance::config::Config;
 use appliance::daemon::Daemon;
 use appliance::progress::Progress;
+use appliance::worker::stopwatch::median;
 use std::fs;
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};

@@ -2,8 +2,8 @@
 
 use super::frames::{FrameSet, Output};
 use super::kernel::Kernel;
-use super::stopwatch::timed;
 use crate::plan::STRIPS;
+use crate::worker::stopwatch::timed;
 use algo::inspect::{Production, Strips};
 use algo::phase::{Arrived, Decoder, PhaseRow};
 use algo::pipeline::arrive;

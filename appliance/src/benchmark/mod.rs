@@ -13,7 +13,6 @@ mod point;
 mod real;
 mod reference;
 mod report;
-pub mod stopwatch;
 mod variants;
 mod workload;
 

@@ -7,7 +7,7 @@
 use super::frames::{Buffer, FrameSet};
 use super::kernel::Kernel;
 use super::real::Real;
-use super::stopwatch::timed;
+use crate::worker::stopwatch::timed;
 use algo::pattern::{Level, PhaseRange, Sequence, Unwrapping};
 use algo::phase::{DecodeError, FULL_TRUST_STEPS, MIN_MODULATION_8_BIT};
 use algo::units::AbsolutePhase;

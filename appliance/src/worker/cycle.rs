@@ -1,7 +1,7 @@
 //! A cycle of the measuring task: sequence after sequence until one is good enough, then the result.
 
+use super::stopwatch::timed_on;
 use super::{ABORTED, DEVICE_TIMEOUT, Worker, code, code_of};
-use crate::benchmark::stopwatch::timed_on;
 use crate::history::FailedPart;
 use crate::plan::{Arriving, Plan};
 use crate::station::result::flag::{RETRIED, STEPPED_UP};
