@@ -18,7 +18,7 @@ mod doctor;
 mod experiment;
 mod history;
 mod measure;
-mod names;
+pub mod names;
 mod options;
 mod part;
 mod recipe;
@@ -27,6 +27,10 @@ mod replay;
 mod serve;
 mod teach;
 
+pub use completions::Completions;
+pub use options::{Json, Quiet, Threads, answer};
+
+use crate::VERSION;
 use crate::error::{Exit, Failure};
 use crate::journal::{self, Severity};
 use crate::modbus::{registers_csv, registers_json};
@@ -35,7 +39,7 @@ use std::process::ExitCode;
 
 /// The open 3-D smart sensor.
 #[derive(Debug, Parser)]
-#[command(name = "fringed", version = env!("FRINGED_VERSION"), after_help = MORE)]
+#[command(name = "fringed", version = VERSION, after_help = MORE)]
 struct Arguments {
     /// What to do; without a command: serve.
     #[command(subcommand)]
@@ -81,15 +85,21 @@ enum Command {
     #[command(subcommand)]
     Config(config::ConfigCommand),
     /// Print the register map as CSV (or JSON with --json).
-    Registers(options::Json),
+    Registers(Json),
     /// Print what makes a shell complete the command line.
-    Completions(completions::Completions),
+    Completions(Completions),
 }
 
-/// Parses the arguments, runs the command and answers with its exit code.
+/// Runs the program `fringed`.
 pub fn main() -> ExitCode {
-    let words = options::behind_the_command(&Arguments::command(), std::env::args_os());
-    let arguments = match Arguments::try_parse_from(words) {
+    start(run)
+}
+
+/// Parses the arguments of this process, runs the command that they name and answers with its exit code. Options may stand before the
+/// command as well as behind it.
+pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<(), Failure>) -> ExitCode {
+    let words = options::behind_the_command(&A::command(), std::env::args_os());
+    let arguments = match A::try_parse_from(words) {
         Ok(arguments) => arguments,
         Err(error) => {
             // `--help` and `--version` come this way as well; they are no errors.
@@ -132,13 +142,13 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
             Ok(())
         }
         Some(Command::Completions(command)) => {
-            command.run(&mut Arguments::command());
+            command.run(Arguments::command());
             Ok(())
         }
     }
 }
 
-fn registers(format: options::Json) {
+fn registers(format: Json) {
     if format.json {
         say!("{:#}", registers_json());
     } else {

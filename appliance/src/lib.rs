@@ -45,3 +45,6 @@ pub mod told;
 pub mod unpack;
 pub mod web;
 pub mod worker;
+
+/// The version of this build with its commit, where that is known.
+pub const VERSION: &str = env!("FRINGED_VERSION");

@@ -12,9 +12,10 @@ pub struct Completions {
 
 impl Completions {
     /// Prints the script for all commands and options of `program`.
-    pub fn run(&self, program: &mut clap::Command) {
+    pub fn run(&self, mut program: clap::Command) {
+        let name = program.get_name().to_owned();
         let mut script = Vec::new();
-        generate(self.shell, program, "fringed", &mut script);
+        generate(self.shell, &mut program, name, &mut script);
         say!("{}", String::from_utf8_lossy(&script).trim_end());
     }
 }
