@@ -9,13 +9,11 @@ macro_rules! say {
 }
 
 mod adapt;
-mod bench;
 mod calibrate;
 mod completions;
 mod config;
 mod demo;
 mod doctor;
-mod experiment;
 mod history;
 mod measure;
 pub mod names;
@@ -68,10 +66,6 @@ enum Command {
     Calibrate(calibrate::Calibrate),
     /// Record a sequence from the configured head.
     Record(record::Record),
-    /// Repeat the paper's experiments on the simulated head.
-    Experiment(experiment::Experiment),
-    /// Time the kernels, time against error, and trigger to verdict.
-    Bench(bench::Bench),
     /// Make a recipe from a good part in front of the head, or from recordings.
     Teach(teach::Teach),
     /// Show or export stored results.
@@ -130,8 +124,6 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Doctor(command)) => command.run(),
         Some(Command::Calibrate(command)) => command.run(),
         Some(Command::Record(command)) => command.run(),
-        Some(Command::Experiment(command)) => command.run(),
-        Some(Command::Bench(command)) => command.run(),
         Some(Command::Teach(command)) => command.run(),
         Some(Command::History(command)) => command.run(),
         Some(Command::Replay(command)) => command.run(),

@@ -4,7 +4,6 @@ pub mod access;
 pub mod adapt;
 pub mod archive;
 pub mod backend;
-pub mod benchmark;
 #[cfg(test)]
 mod boundaries;
 pub mod calibration;
@@ -16,7 +15,6 @@ pub mod daemon;
 pub mod doctor;
 pub mod error;
 pub mod examine;
-pub mod experiment;
 pub mod history;
 pub mod journal;
 pub mod kept;

@@ -89,7 +89,7 @@ fn time_stands_against_error_and_the_cycle_has_its_stages() {
     assert!(points.iter().any(|point| point["skipping"] == true));
     let csv = fs::read_to_string(out.join("accuracy.csv")).unwrap();
     let header = csv.lines().next().unwrap();
-    assert_eq!(header, appliance::benchmark::HEADER);
+    assert_eq!(header, fringed_lab::benchmark::HEADER);
     // One part: every line is a mean.
     assert_eq!(csv.lines().count(), points.len() + 1);
     for (name, start) in [("accuracy.svg", "<svg"), ("benchmarks.md", "Machine")] {

@@ -1,7 +1,7 @@
 //! `fringed experiment`: what it promises of the better pattern, and its files.
 
 use crate::written::program;
-use appliance::experiment::{HEADER, Method, OpticsKind, Runner, Scene, Shot};
+use fringed_lab::experiment::{HEADER, Method, OpticsKind, Runner, Scene, Shot};
 
 /// Columns and rows of the camera: the study's picture, or its middle quarter with pixels of the same size.
 const WHOLE: u32 = 512;

@@ -5,4 +5,3 @@ pub mod cloud;
 pub mod colour;
 pub mod folder;
 pub mod picture;
-pub mod plot;

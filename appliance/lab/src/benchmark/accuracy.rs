@@ -6,14 +6,14 @@ use super::kernel::{Effort, FloorSets, Kernel, interleaved};
 use super::point::Point;
 use super::variants::{Variant, decoders, references};
 use crate::experiment::{OpticsKind, Pattern, Runner, Scene};
-use crate::measure::{Score, Truth};
-use crate::recipe::teach::dense;
-use crate::rig::Measured;
-use crate::worker::stopwatch::median;
 use algo::pattern::{PhaseRange, Sequence};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::{AbsolutePhase, Modulation};
+use appliance::measure::{Score, Truth};
+use appliance::recipe::teach::dense;
+use appliance::rig::Measured;
+use appliance::worker::stopwatch::median;
 use std::ops::Range;
 use std::time::Duration;
 

@@ -1,10 +1,9 @@
 //! `fringed experiment --out DIR`: the paper's experiments as tables, plots and pictures.
 
-use super::names;
-use super::options::{Json, Quiet, Threads, answer};
-use crate::error::{Exit, Failure};
 use crate::experiment::{Campaign, OpticsKind, PARTS, Results, Row, Scene, csv, figures, means};
-use crate::output::folder::OutputFolder;
+use appliance::cli::{Json, Quiet, Threads, answer, names};
+use appliance::error::{Exit, Failure};
+use appliance::output::folder::OutputFolder;
 use std::path::PathBuf;
 
 /// Repeat the paper's experiments on the simulated head.

@@ -2,7 +2,7 @@
 
 use super::point::{Point, means};
 use super::report::Report;
-use crate::output::plot::{Kind, Plot, Series};
+use crate::plot::{Kind, Plot, Series};
 
 /// A colour for each implementation, in the order in which they first appear.
 const COLOURS: [&str; 5] = ["#9ca3af", "#c2410c", "#7c3aed", "#1f5fa8", "#0e7490"];

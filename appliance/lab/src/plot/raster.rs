@@ -1,7 +1,7 @@
 //! A plot as a picture of pixels: lines and dots with soft edges, words in the font of all pictures.
 
 use super::marks::{Anchor, DASH, Mark};
-use crate::output::canvas::{Canvas, LETTER, LINE};
+use appliance::output::canvas::{Canvas, LETTER, LINE};
 
 /// Marks on white.
 pub fn render((width, height): (f64, f64), marks: &[Mark]) -> Canvas<3> {

@@ -63,7 +63,7 @@ pub struct Values {
 impl Values {
     fn of(outcome: &Outcome) -> Self {
         let score = outcome.score.as_ref();
-        let scored = |value: fn(&crate::measure::Score) -> f64| score.map_or(f64::NAN, value);
+        let scored = |value: fn(&appliance::measure::Score) -> f64| score.map_or(f64::NAN, value);
         let fitted = outcome.cylinder;
         Self {
             scored_px: score.map_or(0.0, |score| score.scored as f64),

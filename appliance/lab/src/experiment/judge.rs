@@ -2,9 +2,9 @@
 
 use super::cylinder::{self, Cylinder};
 use super::scenes::Judged;
-use crate::measure::{Score, Truth};
-use crate::rig::Measured;
 use algo::phase::Trust;
+use appliance::measure::{Score, Truth};
+use appliance::rig::Measured;
 
 /// What a method reached on a part.
 #[derive(Clone, Debug)]

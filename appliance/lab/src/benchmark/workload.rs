@@ -1,9 +1,9 @@
 //! What the kernels are timed on: synthetic frames of every kind of sequence, and the phase that is in them.
 
 use super::frames::{Buffer, FrameSet};
-use crate::recipe::teach::dense;
 use algo::pattern::{PhaseRange, Sequence};
 use algo::units::AbsolutePhase;
+use appliance::recipe::teach::dense;
 use std::f64::consts::TAU;
 
 /// A kind of sequence, and how much of its frames is lit.

@@ -6,12 +6,12 @@
 use super::judge::{Outcome, judge};
 use super::methods::{self, Method, Shot};
 use super::scenes::{Judged, OpticsKind, Scene};
-use crate::calibration::Calibration;
-use crate::rig::{About, Measured, Rig, RigError};
 use algo::adaptive::{ProjectorMap, noise, paper};
 use algo::pattern::{PhaseFunction, PhaseRange, Sequence};
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
+use appliance::calibration::Calibration;
+use appliance::rig::{About, Measured, Rig, RigError};
 use hal::head::DynHead;
 use sim::{Stage, Truth};
 use std::sync::Arc;

@@ -3,8 +3,8 @@
 use super::methods::Method;
 use super::runner::Run;
 use super::shade;
-use crate::output::canvas::{Canvas, LINE};
 use algo::pattern::Encoder;
+use appliance::output::canvas::{Canvas, LINE};
 use hal::frame::Samples;
 
 /// What a method showed, saw and measured.

@@ -2,11 +2,11 @@
 
 use super::frames::{FrameSet, Output};
 use super::kernel::Kernel;
-use crate::plan::STRIPS;
-use crate::worker::stopwatch::timed;
 use algo::inspect::{Production, Strips};
 use algo::phase::{Arrived, Decoder, PhaseRow};
 use algo::pipeline::arrive;
+use appliance::plan::STRIPS;
+use appliance::worker::stopwatch::timed;
 use std::hint::black_box;
 use std::ops::Range;
 use std::time::Duration;

@@ -2,7 +2,7 @@
 
 use super::scenes::{Judged, Scene};
 use super::table::Row;
-use crate::output::plot::{Kind, Plot, Series};
+use crate::plot::{Kind, Plot, Series};
 
 const FIXED: &str = "#1f5fa8";
 const PAPER: &str = "#c2410c";

@@ -4,7 +4,7 @@ use super::floor::{self, floor};
 use super::frames::{FrameSet, Rotation};
 use super::variants::{self, Variant};
 use super::workload::Workload;
-use crate::worker::stopwatch::{median, timed};
+use appliance::worker::stopwatch::{median, timed};
 use std::hint::black_box;
 use std::time::Duration;
 

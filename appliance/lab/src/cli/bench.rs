@@ -1,10 +1,9 @@
 //! `fringed bench`: the kernel table, run time against error, and the budget from trigger to verdict.
 
-use super::names;
-use super::options::{Json, Quiet, Threads, answer};
 use crate::benchmark::{self, Effort, Machine, Report, Study};
-use crate::error::{Exit, Failure};
-use crate::output::folder::OutputFolder;
+use appliance::cli::{Json, Quiet, Threads, answer, names};
+use appliance::error::{Exit, Failure};
+use appliance::output::folder::OutputFolder;
 use std::path::PathBuf;
 
 /// Time the kernels, time against error, and trigger to verdict.

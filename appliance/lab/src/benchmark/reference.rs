@@ -7,10 +7,10 @@
 use super::frames::{Buffer, FrameSet};
 use super::kernel::Kernel;
 use super::real::Real;
-use crate::worker::stopwatch::timed;
 use algo::pattern::{Level, PhaseRange, Sequence, Unwrapping};
 use algo::phase::{DecodeError, FULL_TRUST_STEPS, MIN_MODULATION_8_BIT};
 use algo::units::AbsolutePhase;
+use appliance::worker::stopwatch::timed;
 use std::time::Duration;
 
 /// Largest residual of an unwrapping step, turns.
