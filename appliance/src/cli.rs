@@ -32,6 +32,7 @@ use crate::VERSION;
 use crate::error::{Exit, Failure};
 use crate::journal::{self, Severity};
 use crate::modbus::{registers_csv, registers_json};
+use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory as _, Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -84,6 +85,9 @@ enum Command {
     Completions(Completions),
 }
 
+/// Commands of `fringed-lab` that `fringed` once had.
+const LABORATORY: [&str; 2] = ["bench", "experiment"];
+
 /// Runs the program `fringed`.
 pub fn main() -> ExitCode {
     start(run)
@@ -95,15 +99,7 @@ pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<(), Failure>) -> ExitCode 
     let words = options::behind_the_command(&A::command(), std::env::args_os());
     let arguments = match A::try_parse_from(words) {
         Ok(arguments) => arguments,
-        Err(error) => {
-            // `--help` and `--version` come this way as well; they are no errors.
-            let _ = error.print();
-            return if error.use_stderr() {
-                Exit::Usage.into()
-            } else {
-                ExitCode::SUCCESS
-            };
-        }
+        Err(error) => return refused(&error),
     };
     match run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
@@ -111,6 +107,24 @@ pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<(), Failure>) -> ExitCode 
             journal::write(Severity::Error, &failure.to_string());
             failure.exit.into()
         }
+    }
+}
+
+/// Says what is wrong with the arguments, or prints the help or the version that they ask for.
+fn refused(error: &clap::Error) -> ExitCode {
+    if let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidSubcommand)
+        && LABORATORY.contains(&name.as_str())
+    {
+        let remedy = format!("{name} is a command of another program: run fringed-lab {name}");
+        journal::write(Severity::Error, &remedy);
+        return Exit::Usage.into();
+    }
+    // Nothing can be done where stdout and stderr are closed.
+    let _ = error.print();
+    if error.use_stderr() {
+        Exit::Usage.into()
+    } else {
+        ExitCode::SUCCESS
     }
 }
 

@@ -2,7 +2,7 @@
 
     peers.py FRAMES BENCHMARKS [--docs FILE]
 
-FRAMES is the folder that `fringed bench --frames` writes, BENCHMARKS the folder that `fringed bench --out` writes: its
+FRAMES is the folder that `fringed-lab bench --frames` writes, BENCHMARKS the folder that `fringed-lab bench --out` writes: its
 floor of this machine is the unit, and its kernels stand in the same table. The table is printed and written there as
 peers.json and peers.md. With --docs, everything behind the marker line of FILE is replaced by both tables.
 

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Times other people's decoders beside ours, in an own virtual environment.
 #
-#     tests/peers/run.sh target/release/fringed               kernels and peers, printed
-#     tests/peers/run.sh target/release/fringed docs          the whole benchmark; docs/benchmarks* are written anew
+#     tests/peers/run.sh target/release/fringed-lab               kernels and peers, printed
+#     tests/peers/run.sh target/release/fringed-lab docs          the whole benchmark; docs/benchmarks* are written anew
 #
 # Needs python3 with venv, and the network for the first run.
 set -euo pipefail
-fringed=$1
+lab=$1
 docs=${2:-}
 here=$(dirname "${BASH_SOURCE[0]}")
 environment=${CARGO_TARGET_DIR:-target}/peers
@@ -15,11 +15,11 @@ trap 'rm -rf "$frames"' EXIT
 
 if [[ ! -x $environment/bin/python ]]; then python3 -m venv "$environment"; fi
 "$environment/bin/python" -m pip install --quiet --disable-pip-version-check -r "$here/requirements.txt"
-"$fringed" bench --quiet --frames "$frames"
+"$lab" bench --quiet --frames "$frames"
 if [[ -n $docs ]]; then
-    "$fringed" bench --quiet --out "$docs/benchmarks"
+    "$lab" bench --quiet --out "$docs/benchmarks"
     "$environment/bin/python" "$here/peers.py" "$frames" "$docs/benchmarks" --docs "$docs/benchmarks.md"
 else
-    "$fringed" bench kernel --quiet --out "$frames"
+    "$lab" bench kernel --quiet --out "$frames"
     "$environment/bin/python" "$here/peers.py" "$frames" "$frames"
 fi

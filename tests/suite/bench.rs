@@ -1,6 +1,6 @@
-//! `fringed bench`: its keys and files, on frames too small to say anything about speed.
+//! `fringed-lab bench`: its keys and files, on frames too small to say anything about speed.
 
-use crate::written::program;
+use crate::written::laboratory;
 use serde_json::Value;
 use std::fs;
 
@@ -8,7 +8,7 @@ use std::fs;
 const RIGHT: f64 = 0.99;
 
 fn json(arguments: &[&str]) -> Value {
-    let run = program().run(arguments).succeeded();
+    let run = laboratory().run(arguments).succeeded();
     serde_json::from_str(&run.stdout).unwrap()
 }
 
@@ -126,7 +126,7 @@ fn time_stands_against_error_and_the_cycle_has_its_stages() {
 fn the_frames_that_are_timed_can_be_had_as_files() {
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().to_str().unwrap();
-    program()
+    laboratory()
         .run(&["bench", "--quick", "--frames", name])
         .succeeded();
     let sequence = fs::read_to_string(folder.path().join("sequence.json")).unwrap();
@@ -152,7 +152,7 @@ fn wrong_arguments_measure_nothing() {
         &["bench", "--size", "3"],
         &["bench", "kernel", "--frames", "x"],
     ] {
-        let run = program().run(arguments);
+        let run = laboratory().run(arguments);
         assert_eq!(run.code, 64, "{arguments:?}: {}", run.stderr);
         assert_eq!(run.stdout, "");
     }
@@ -160,6 +160,6 @@ fn wrong_arguments_measure_nothing() {
     let file = folder.path().join("file");
     fs::write(&file, "").unwrap();
     let name = file.to_str().unwrap();
-    let run = program().run(&["bench", "--quick", "--out", name]);
+    let run = laboratory().run(&["bench", "--quick", "--out", name]);
     assert_eq!(run.code, 73, "{}", run.stderr);
 }

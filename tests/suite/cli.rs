@@ -1,18 +1,19 @@
 //! The command line: what each command answers, and its exit code where it cannot.
 
 use crate::station_plc::{Daemon, Place};
+use crate::written::{laboratory, program};
 use serde_json::Value;
 use std::fs;
 use std::net::TcpListener;
 use std::path::Path;
-use tests::program::{Program, Run};
+use tests::program::Run;
 
 /// A measured error may exceed the predicted one by this factor: the prediction knows the noise, not
 /// how a pixel averages over a slope.
 const OVER_PREDICTION: f64 = 1.2;
 
 fn run(arguments: &[&str]) -> Run {
-    Program::at(env!("CARGO_BIN_EXE_fringed-under-test")).run(arguments)
+    program().run(arguments)
 }
 
 fn text(path: &Path) -> &str {
@@ -335,19 +336,36 @@ fn json_is_one_document_also_where_something_is_wrong() {
 
 #[test]
 fn the_completions_of_each_shell_know_every_command() {
-    let help = run(&["--help"]).succeeded().stdout;
-    let (_, commands) = help.split_once("\nCommands:\n").unwrap();
-    let (commands, _) = commands.split_once("\n\n").unwrap();
-    for shell in ["bash", "zsh", "fish"] {
-        let script = run(&["completions", shell]).succeeded().stdout;
-        for command in commands
-            .lines()
-            .filter_map(|line| line.split_whitespace().next())
-        {
-            assert!(script.contains(command), "{shell} does not know {command}");
+    for program in [program(), laboratory()] {
+        let help = program.run(&["--help"]).succeeded().stdout;
+        let (_, commands) = help.split_once("\nCommands:\n").unwrap();
+        let (commands, _) = commands.split_once("\n\n").unwrap();
+        for shell in ["bash", "zsh", "fish"] {
+            let script = program.run(&["completions", shell]).succeeded().stdout;
+            for command in commands
+                .lines()
+                .filter_map(|line| line.split_whitespace().next())
+            {
+                assert!(script.contains(command), "{shell} does not know {command}");
+            }
         }
     }
     check_refused(&run(&["completions", "dos"]), 64, &["zsh"]);
+}
+
+#[test]
+fn benchmarks_and_experiments_are_commands_of_another_program() {
+    for (arguments, remedy) in [
+        (&["bench", "kernel", "--json"][..], "fringed-lab bench"),
+        (&["--quiet", "bench"], "fringed-lab bench"),
+        (
+            &["experiment", "--part", "cone", "--out", "x"],
+            "fringed-lab experiment",
+        ),
+        (&["help", "experiment"], "fringed-lab experiment"),
+    ] {
+        check_refused(&run(arguments), 64, &[remedy]);
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
-//! `fringed experiment`: what it promises of the better pattern, and its files.
+//! `fringed-lab experiment`: what it promises of the better pattern, and its files.
 
-use crate::written::program;
+use crate::written::laboratory;
 use fringed_lab::experiment::{HEADER, Method, OpticsKind, Runner, Scene, Shot};
 
 /// Columns and rows of the camera: the study's picture, or its middle quarter with pixels of the same size.
@@ -78,13 +78,17 @@ fn an_unknown_part_is_a_usage_error_and_leaves_nothing() {
     let out = folder.path().join("out");
     let out_name = out.to_str().unwrap();
     let arguments = ["experiment", "--part", "cone", "teapot", "--out", out_name];
-    let run = program().run(&arguments);
+    let run = laboratory().run(&arguments);
     assert_eq!(run.code, 64, "{}", run.stderr);
     for word in ["teapot", "sawtooth", "all"] {
         assert!(run.stderr.contains(word), "{}", run.stderr);
     }
     assert!(!out.exists());
-    assert_eq!(program().run(&["experiment"]).code, 64, "--out is missing");
+    assert_eq!(
+        laboratory().run(&["experiment"]).code,
+        64,
+        "--out is missing"
+    );
 }
 
 #[test]

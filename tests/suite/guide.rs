@@ -1,10 +1,10 @@
 //! The operations guide knows every error code and speaks of no line that the program does not write; the manual page knows what there is.
 
+use crate::written::{laboratory, program};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tests::files;
-use tests::program::Program;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -92,47 +92,83 @@ fn every_line_of_the_log_in_the_guide_is_one_that_the_program_writes() {
     }
 }
 
-#[test]
-fn the_manual_page_has_exactly_the_commands_options_and_exit_codes_that_there_are() {
-    let page = fs::read_to_string(root().join("debian/fringed.1")).unwrap();
-    let items = |kind: &str| -> BTreeSet<_> {
-        let of_kind = page.lines().filter_map(|line| line.strip_prefix(kind));
+/// A manual page.
+struct Page(String);
+
+impl Page {
+    fn of(program: &str) -> Self {
+        let file = root().join("debian").join(program).with_extension("1");
+        Self(fs::read_to_string(file).unwrap())
+    }
+
+    /// The first words of the items of a kind.
+    fn items(&self, kind: &str) -> BTreeSet<String> {
+        let of_kind = self.0.lines().filter_map(|line| line.strip_prefix(kind));
         of_kind
             .map(|item| item.split(' ').next().unwrap().to_owned())
             .collect()
-    };
-    let help = Program::at(env!("CARGO_BIN_EXE_fringed-under-test"))
-        .run(&["--help"])
-        .stdout;
-    let (commands, options) = help.split_once("\nOptions:\n").unwrap();
-    let (_, commands) = commands.split_once("\nCommands:\n").unwrap();
-    let first_words = commands
-        .lines()
-        .filter_map(|line| line.split_whitespace().next());
-    let commands: BTreeSet<_> = first_words.map(str::to_owned).collect();
-    let mut told = items(".It Cm ");
-    assert!(told.insert("help".to_owned()) && told.len() > 10);
-    assert_eq!(told, commands);
+    }
+
+    fn exit_codes(&self) -> BTreeSet<u8> {
+        let items = self.items(".It ");
+        items.iter().filter_map(|item| item.parse().ok()).collect()
+    }
+}
+
+/// The commands that a program's help lists.
+fn commands(help: &str) -> BTreeSet<String> {
+    let (_, commands) = help.split_once("\nCommands:\n").unwrap();
+    let lines = commands.split("\n\n").next().unwrap().lines();
+    let first_words = lines.filter_map(|line| line.split_whitespace().next());
+    first_words.map(str::to_owned).collect()
+}
+
+/// The long options that a help lists.
+fn options(help: &str) -> BTreeSet<String> {
+    let (_, options) = help.split_once("\nOptions:\n").unwrap();
     let long = options.lines().filter_map(|line| line.split_once(" --"));
-    let mut options: BTreeSet<_> = long
-        .map(|(_, option)| format!("-{}", option.split(' ').next().unwrap()))
-        .collect();
-    let mut told = items(".It Fl ");
-    assert!(told.insert("-version".to_owned()));
-    // What runs without a command, serve, prints no table.
-    assert!(options.insert("-json".to_owned()));
-    assert_eq!(told, options);
+    long.map(|(_, option)| format!("-{}", option.split(' ').next().unwrap()))
+        .collect()
+}
+
+/// The exit codes in the README.
+fn exit_codes() -> BTreeSet<u8> {
     let readme = fs::read_to_string(root().join("README.md")).unwrap();
     let (_, codes) = readme.split_once("\n## Exit codes\n").unwrap();
     let codes = codes.split("\n## ").next().unwrap();
     let rows = codes.lines().filter_map(|line| line.strip_prefix("| "));
-    let codes: BTreeSet<_> = rows
-        .filter_map(|row| row.split(' ').next()?.parse::<u8>().ok())
-        .collect();
-    assert!(codes.contains(&78));
-    let told: BTreeSet<u8> = items(".It ")
-        .iter()
-        .filter_map(|item| item.parse().ok())
-        .collect();
-    assert_eq!(told, codes);
+    rows.filter_map(|row| row.split(' ').next()?.parse().ok())
+        .collect()
+}
+
+#[test]
+fn the_manual_page_has_exactly_the_commands_options_and_exit_codes_that_there_are() {
+    let page = Page::of("fringed");
+    let help = program().run(&["--help"]).stdout;
+    let mut told = page.items(".It Cm ");
+    assert!(told.insert("help".to_owned()) && told.len() > 10);
+    assert_eq!(told, commands(&help));
+    let mut options = options(&help);
+    let mut told = page.items(".It Fl ");
+    assert!(told.insert("-version".to_owned()));
+    // What runs without a command, serve, prints no table.
+    assert!(options.insert("-json".to_owned()));
+    assert_eq!(told, options);
+    assert!(exit_codes().contains(&78));
+    assert_eq!(page.exit_codes(), exit_codes());
+}
+
+#[test]
+fn the_laboratorys_manual_page_has_exactly_the_commands_and_options_that_there_are() {
+    let page = Page::of("fringed-lab");
+    let help = laboratory().run(&["--help"]).stdout;
+    let mut told = page.items(".It Cm ");
+    assert!(told.insert("help".to_owned()));
+    assert_eq!(told, commands(&help));
+    let help = ["bench", "experiment"].map(|name| laboratory().run(&[name, "--help"]).stdout);
+    assert_eq!(
+        page.items(".It Fl "),
+        help.iter().flat_map(|help| options(help)).collect()
+    );
+    assert!(page.exit_codes().is_subset(&exit_codes()));
 }

@@ -4,7 +4,7 @@ use crate::station_plc::{PATIENCE, READY, SMALL_HEAD, long, trigger};
 use appliance::config::Config;
 use appliance::daemon::Daemon;
 use appliance::progress::Progress;
-use appliance::worker::stopwatch::median;
+use fringed_lab::benchmark::median;
 use std::fs;
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};

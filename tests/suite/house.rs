@@ -260,6 +260,7 @@ fn files_hold_one_concept_each_and_say_which() {
         "hal/src",
         "hal/sim/src",
         "appliance/src",
+        "appliance/lab/src",
         "tests/src",
         "tests/suite",
     ] {

@@ -13,6 +13,11 @@ pub fn program() -> Program {
     Program::at(env!("CARGO_BIN_EXE_fringed-under-test"))
 }
 
+/// The program of benchmarks and experiments, built together with this suite.
+pub fn laboratory() -> Program {
+    Program::at(env!("CARGO_BIN_EXE_fringed-lab-under-test"))
+}
+
 /// A geometric recording of three levels of four shifts.
 pub fn geometric() -> Scene {
     Scene::new(49.0, levels(&[0.0192, 0.138, 1.0], 4))

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const ENDINGS: [&str; 8] = ["csv", "json", "npy", "ply", "png", "recipe", "svg", "zip"];
 
 /// A file whose name ends like its content, `npy` or `recipe`.
-pub fn file(ending: &'static str) -> impl TypedValueParser<Value = PathBuf> {
+pub(super) fn file(ending: &'static str) -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(move |path| match ends_in(&path, ending) {
         true => Ok(path),
         false => Err(format!("name a file that ends in .{ending}")),

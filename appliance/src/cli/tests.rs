@@ -51,12 +51,6 @@ const SHARED: &[(&str, &str, &str)] = &[
     ("record", "state", "where the head's calibration is"),
     ("record", "threads", "of the simulated light"),
     ("record", "quiet", "no progress, no closing line"),
-    ("experiment", "threads", "of everything"),
-    ("experiment", "quiet", "no progress, no tables"),
-    ("experiment", "json", "the means"),
-    ("bench", "threads", "of accuracy and budget"),
-    ("bench", "quiet", "no progress, no tables"),
-    ("bench", "json", "the tables"),
     ("teach", "config", "which head"),
     ("teach", "state", "where calibration and recipes are"),
     ("teach", "threads", "of the measurements"),
@@ -267,9 +261,6 @@ fn an_output_is_refused_whose_name_says_another_content() {
         ("fringed recipe export 2 x.zip", ".recipe"),
         ("fringed measure r --out height.png", "folder"),
         ("fringed measure r --out cloud.ply", "folder"),
-        ("fringed experiment --out experiments.csv", "folder"),
-        ("fringed bench --out benchmarks.json", "folder"),
-        ("fringed bench --frames frames.NPY", "folder"),
         ("fringed record part.zip", "folder"),
     ] {
         let error = parse(line).expect_err(line);
@@ -296,8 +287,6 @@ fn options_that_contradict_each_other_are_refused() {
         "fringed doctor --scenario s.toml --state s",
         "fringed calibrate --unit mm",
         "fringed calibrate --z-away",
-        "fringed bench --frames f --json",
-        "fringed bench --frames f --threads 1",
         "fringed history --csv --json",
     ] {
         let error = parse(line).expect_err(line);

@@ -1,4 +1,4 @@
-//! What a measurement leaves behind for people: pictures, plots, clouds.
+//! What a measurement leaves behind for people: pictures and clouds, each file whole.
 
 pub mod canvas;
 pub mod cloud;

@@ -27,12 +27,6 @@ fn now() -> Duration {
     Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
 }
 
-/// The middle value; of an even number the upper of the two, of none NaN.
-pub fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -65,11 +59,5 @@ mod tests {
         // Each half by the clock of the thread that did it: a busy machine makes both sides longer.
         assert!(spent >= one + other, "{spent:?} for {one:?} and {other:?}");
         assert!(!one.is_zero() && !other.is_zero());
-    }
-
-    #[test]
-    fn the_median_is_the_middle() {
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
-        assert!(median(Vec::new()).is_nan());
     }
 }

@@ -73,7 +73,7 @@ pub fn all() -> Result<Vec<Crate>, String> {
     Ok(crates)
 }
 
-/// Everything that `appliance` reaches without build scripts, derives and tests.
+/// Everything that the programs reach without build scripts, derives and tests.
 fn shipped(metadata: &Value) -> HashSet<String> {
     let of_compiler = |package: &Value| {
         let kinds = list(&package["targets"]).flat_map(|target| list(&target["kind"]));
@@ -86,7 +86,11 @@ fn shipped(metadata: &Value) -> HashSet<String> {
     let nodes: HashMap<String, &Value> = list(&metadata["resolve"]["nodes"])
         .map(|node| (text(&node["id"]), node))
         .collect();
-    let program = |package: &&Value| package["name"] == "appliance";
+    let program = |package: &&Value| {
+        ["appliance", "fringed-lab"]
+            .map(Value::from)
+            .contains(&package["name"])
+    };
     let mut open: Vec<String> = list(&metadata["packages"])
         .filter(program)
         .map(|package| text(&package["id"]))

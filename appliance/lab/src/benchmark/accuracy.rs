@@ -3,6 +3,7 @@
 use super::decoding::Decoding;
 use super::frames::{FrameSet, Rotation};
 use super::kernel::{Effort, FloorSets, Kernel, interleaved};
+use super::median::median;
 use super::point::Point;
 use super::variants::{Variant, decoders, references};
 use crate::experiment::{OpticsKind, Pattern, Runner, Scene};
@@ -13,7 +14,6 @@ use algo::units::{AbsolutePhase, Modulation};
 use appliance::measure::{Score, Truth};
 use appliance::recipe::teach::dense;
 use appliance::rig::Measured;
-use appliance::worker::stopwatch::median;
 use std::ops::Range;
 use std::time::Duration;
 

@@ -3,11 +3,11 @@
 use super::decoding::{Decoding, Inspecting};
 use super::frames::{FrameSet, Rotation};
 use super::kernel::{Effort, Kernel, rotate};
+use super::median::median;
 use appliance::calibration::Calibration;
 use appliance::plan::Plan;
 use appliance::recipe::teach::{Naming, teach};
 use appliance::recipe::{AlignmentKind, Recipe, archive};
-use appliance::worker::stopwatch::median;
 use hal::frame::Frame;
 use hal::head::DynHead;
 use serde::Serialize;

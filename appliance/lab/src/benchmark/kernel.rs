@@ -2,9 +2,10 @@
 
 use super::floor::{self, floor};
 use super::frames::{FrameSet, Rotation};
+use super::median::median;
 use super::variants::{self, Variant};
 use super::workload::Workload;
-use appliance::worker::stopwatch::{median, timed};
+use appliance::worker::stopwatch::timed;
 use std::hint::black_box;
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! `fringed bench`: how fast the kernels are, what accuracy costs, and the time from trigger to verdict.
+//! `fringed-lab bench`: how fast the kernels are, what accuracy costs, and the time from trigger to verdict.
 
 mod accuracy;
 mod budget;
@@ -9,6 +9,7 @@ mod floor;
 mod frames;
 mod kernel;
 mod machine;
+mod median;
 mod point;
 mod real;
 mod reference;
@@ -21,5 +22,6 @@ pub use budget::{Budget, budgets};
 pub use export::frame_files;
 pub use kernel::{Effort, KernelTable, Timing, kernel_table};
 pub use machine::Machine;
+pub use median::median;
 pub use point::{Point, means};
 pub use report::{HEADER, Report};

@@ -1,4 +1,4 @@
-//! `fringed bench`: the kernel table, run time against error, and the budget from trigger to verdict.
+//! `fringed-lab bench`: the kernel table, run time against error, and the budget from trigger to verdict.
 
 use crate::benchmark::{self, Effort, Machine, Report, Study};
 use appliance::cli::{Json, Quiet, Threads, answer, names};

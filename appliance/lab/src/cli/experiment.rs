@@ -1,4 +1,4 @@
-//! `fringed experiment --out DIR`: the paper's experiments as tables, plots and pictures.
+//! `fringed-lab experiment --out DIR`: the paper's experiments as tables, plots and pictures.
 
 use crate::experiment::{Campaign, OpticsKind, PARTS, Results, Row, Scene, csv, figures, means};
 use appliance::cli::{Json, Quiet, Threads, answer, names};

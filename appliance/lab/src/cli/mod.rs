@@ -43,3 +43,6 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,5 @@
 //! The paper's experiments on the simulated head, with fixed, the paper's adaptive and the better
-//! patterns (`fringed experiment`).
+//! patterns (`fringed-lab experiment`).
 
 mod campaign;
 mod cylinder;

@@ -1,0 +1,75 @@
+//! The command line as clap takes it: each command offers what it uses.
+
+use super::Arguments;
+use clap::error::ErrorKind;
+use clap::{CommandFactory as _, Parser as _};
+use std::collections::BTreeSet;
+
+/// What each option that the programs share does in each command that offers it; the options that one command has for itself say so in
+/// its help. A pair that is not here is refused.
+const SHARED: [(&str, &str, &str); 6] = [
+    ("experiment", "threads", "of everything"),
+    ("experiment", "quiet", "no progress, no tables"),
+    ("experiment", "json", "the means"),
+    ("bench", "threads", "of accuracy and budget"),
+    ("bench", "quiet", "no progress, no tables"),
+    ("bench", "json", "the tables"),
+];
+
+fn refused(line: &str) -> clap::Error {
+    Arguments::try_parse_from(line.split_whitespace()).expect_err(line)
+}
+
+#[test]
+fn every_command_offers_exactly_the_shared_options_that_do_something_there() {
+    let shared: BTreeSet<_> = SHARED
+        .map(|(command, option, _)| (command.to_owned(), option.to_owned()))
+        .into();
+    let names: BTreeSet<_> = SHARED.map(|(_, option, _)| option).into();
+    let mut offered = BTreeSet::new();
+    for command in Arguments::command().get_subcommands() {
+        let options = command
+            .get_arguments()
+            .filter_map(|option| option.get_long());
+        for option in options.filter(|option| names.contains(option)) {
+            offered.insert((command.get_name().to_owned(), option.to_owned()));
+        }
+    }
+    assert_eq!(offered, shared);
+}
+
+#[test]
+fn every_command_option_and_argument_says_in_the_help_what_it_does() {
+    for command in Arguments::command().get_subcommands() {
+        assert!(command.get_about().is_some(), "{}", command.get_name());
+        for argument in command.get_arguments() {
+            let help = argument.get_help().map(ToString::to_string);
+            let help = help.unwrap_or_default();
+            assert!(help.len() > 5, "{argument}: {help:?}");
+        }
+    }
+}
+
+#[test]
+fn an_output_is_refused_whose_name_says_another_content() {
+    for line in [
+        "fringed-lab experiment --out experiments.csv",
+        "fringed-lab bench --out benchmarks.json",
+        "fringed-lab bench --frames frames.NPY",
+    ] {
+        let error = refused(line);
+        assert_eq!(error.kind(), ErrorKind::ValueValidation, "{line}");
+        assert!(error.to_string().contains("folder"), "{line}: {error}");
+    }
+}
+
+#[test]
+fn options_that_contradict_each_other_are_refused() {
+    for line in [
+        "fringed-lab bench --frames f --json",
+        "fringed-lab bench --frames f --threads 1",
+    ] {
+        let error = refused(line);
+        assert_eq!(error.kind(), ErrorKind::ArgumentConflict, "{line}: {error}");
+    }
+}
