@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Checks what is in a package: the size of the binary, where the files lie, what belongs to the user, what it needs.
+# Checks what is in the package fringed and in fringed-lab beside it: the size of the binary, where the files lie, what belongs to the
+# user, what they need.
 #
 #     tests/package/check.sh PACKAGE.deb
 set -euo pipefail
@@ -9,14 +10,16 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 largest=$((12 << 20)) # bytes of the stripped binary, without libcamera's own
 
 work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
+trap 'rm -rf "$work" "$work-lab"' EXIT
 failed=0
 broken() {
     echo "FAILED: $*" >&2
     failed=1
 }
 
+lab=${package/fringed_/fringed-lab_}
 dpkg-deb --raw-extract "$package" "$work"
+dpkg-deb --raw-extract "$lab" "$work-lab"
 for file in usr/bin/fringed usr/lib/systemd/system/fringed.service usr/lib/sysusers.d/fringed.conf usr/lib/tmpfiles.d/fringed.conf \
     usr/lib/udev/rules.d/60-fringed.rules usr/share/{bash-completion/completions/fringed,zsh/vendor-completions/_fringed,fish/vendor_completions.d/fringed.fish} \
     usr/share/man/man1/fringed.1.gz usr/share/doc/fringed/{README.md,licences.txt,copyright,examples/fringed.toml}; do
@@ -53,13 +56,27 @@ for step in 'postinst deb-systemd-helper enable' 'postinst systemd-sysusers' 'po
     grep -q -- "${step#* }" "$work/DEBIAN/${step%% *}" || broken "${step%% *} has no ${step#* }"
 done
 
+# Benchmarks and experiments: a program, its documentation, and nothing that a station would start or find.
+stray=$(cd "$work-lab" && find . -type f -not -path './usr/share/doc/fringed-lab/*' | sort | tr '\n' ' ')
+[[ $stray == './DEBIAN/control ./DEBIAN/md5sums ./usr/bin/fringed-lab ./usr/share/bash-completion/completions/fringed-lab '\
+'./usr/share/fish/vendor_completions.d/fringed-lab.fish ./usr/share/man/man1/fringed-lab.1.gz ./usr/share/zsh/vendor-completions/_fringed-lab ' ]] ||
+    broken "fringed-lab has $stray"
+for file in licences.txt copyright; do
+    [[ -s $work-lab/usr/share/doc/fringed-lab/$file ]] || broken "fringed-lab has no $file"
+done
+grep -q -- --frames "$work-lab/usr/share/bash-completion/completions/fringed-lab" || broken "the completion of fringed-lab does not know --frames"
+
 binary=$work/usr/bin/fringed
 size=$(stat --format %s "$binary")
 ((size <= largest)) || broken "the binary has $size bytes, more than $largest"
-sections=$(readelf --section-headers --wide "$binary")
-[[ $sections != *.symtab* && $sections != *.debug_info* ]] || broken "the binary is not stripped"
-depends=$(dpkg-deb --field "$package" Depends)
-[[ $depends == *'libc6 (>= 2.'* ]] || broken "it depends on $depends, on no C library"
+for one in "$binary" "$work-lab/usr/bin/fringed-lab"; do
+    sections=$(readelf --section-headers --wide "$one")
+    [[ $sections != *.symtab* && $sections != *.debug_info* ]] || broken "$one is not stripped"
+done
+for one in "$lab" "$package"; do
+    depends=$(dpkg-deb --field "$one" Depends)
+    [[ $depends == *'libc6 (>= 2.'* ]] || broken "$one depends on $depends, on no C library"
+done
 loads=$(readelf --dynamic --wide "$binary" | sed -n 's/.*(NEEDED).*\[libcamera\.so\.\(.*\)\]/libcamera\1/p')
 [[ ", $depends, " == *", $loads, "* || -z $loads ]] || broken "it loads $loads and depends on $depends"
 
