@@ -187,10 +187,7 @@ impl Worker {
 
     /// Loads a recipe; the one before stays active unless everything went well.
     fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Arc<Plan>>) {
-        // Recipes come from elsewhere. One that breaks the computation must not end the process, which would load it again
-        // at its next start, for ever.
-        let prepared = catch_unwind(AssertUnwindSafe(|| self.prepare(key, plan.as_ref())));
-        let (result, message) = match prepared.unwrap_or_else(|panic| Err(broken(&*panic))) {
+        let (result, message) = match caught(|| self.prepare(key, plan.as_ref())) {
             Ok(_) if self.aborts.has(job) => (RecipeResult::Busy, format!("load: {ABORTED}")),
             Ok((ready, fallback)) => {
                 let recipe = active(&ready);
@@ -400,6 +397,16 @@ fn refuse_plan(error: PlanError) -> (RecipeResult, String) {
         PlanError::Unfit { .. } => RecipeResult::Corrupt,
     };
     (result, error.to_string())
+}
+
+/// Runs what makes a recipe ready; a panic is an answer that refuses the recipe.
+///
+/// Recipes come from elsewhere. One that breaks the computation must not end the process, which would load it again at its next
+/// start, for ever.
+pub(crate) fn caught<T>(
+    prepare: impl FnOnce() -> Result<T, (RecipeResult, String)>,
+) -> Result<T, (RecipeResult, String)> {
+    catch_unwind(AssertUnwindSafe(prepare)).unwrap_or_else(|panic| Err(broken(&*panic)))
 }
 
 /// What a panic says of a recipe.

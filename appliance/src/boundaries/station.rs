@@ -1,4 +1,4 @@
-//! A station that starts with a recipe that cannot be used.
+//! A station with a recipe that cannot be used.
 
 use super::Bed;
 use super::recipes::HEAD;
@@ -8,10 +8,16 @@ use crate::progress::Progress;
 use crate::recipe::archive::pack;
 use crate::recipe::{Recipe, Store};
 use crate::station::snapshot::status;
-use crate::station::{ControlWrite, Event, Masked, RecipeKey, Request, error_code};
+use crate::station::{
+    ActiveRecipe, ControlWrite, Effect, Event, Identity, Limits, Masked, Micros, RecipeKey,
+    Request, Settings, Station, StationHandle, error_code,
+};
+use crate::worker::caught;
 use std::fs;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
+use std::sync::Arc;
+use std::time::Instant;
 
 #[test]
 fn a_station_whose_recipe_cannot_be_used_stays_reachable_and_loads_another() {
@@ -72,4 +78,65 @@ fn a_station_whose_recipe_cannot_be_used_stays_reachable_and_loads_another() {
     daemon.stop();
     // Nothing is lost.
     assert_eq!(store.numbers(), [1, 2]);
+}
+
+#[test]
+fn a_panic_while_a_recipe_is_loaded_becomes_error_402_of_a_station_that_loads_another() {
+    let identity = Identity {
+        vendor: "v".into(),
+        product: "sensor".into(),
+        serial: "S".into(),
+        version: "1".into(),
+    };
+    let settings = Settings {
+        next_seq: 1,
+        boot_id: 1,
+        teach_allowed: false,
+        identity: Arc::new(identity),
+        limits: Limits::default(),
+    };
+    // The answers of a measuring task whose planning of recipe 1 panics, with words that were formatted or not.
+    let answer = |effect| {
+        let Effect::Load {
+            job,
+            key: RecipeKey::Number(number),
+        } = effect
+        else {
+            return None;
+        };
+        let prepared = caught(|| match number {
+            1 => panic!("index {number} of an empty list"),
+            2 => panic!("explicit"),
+            _ => Ok(ActiveRecipe {
+                number,
+                crc: 1,
+                part_number: "P".into(),
+                name: "part".into(),
+            }),
+        });
+        Some(match prepared {
+            Ok(recipe) => Event::RecipeLoaded { job, recipe },
+            Err((result, message)) => Event::LoadFailed {
+                job,
+                result,
+                message: message.into(),
+            },
+        })
+    };
+    let station = Station::new(settings, Micros(0));
+    let handle = StationHandle::new(station, Instant::now(), answer);
+    handle.event(Event::Started);
+    let load = |number| handle.event(Event::Request(Request::Load(RecipeKey::Number(number))));
+    for (number, said) in [(1, "(index 1 of an empty list)"), (2, "(explicit)")] {
+        let after = load(number);
+        assert_eq!(after.error_code, error_code::RECIPE_UNUSABLE);
+        let words = after.error.as_deref().unwrap();
+        assert!(
+            words.contains(said) && words.contains("teach it again"),
+            "{words}"
+        );
+        assert!(after.fault.is_none() && after.recipe.is_none());
+    }
+    let after = load(3);
+    assert_eq!((after.active(), after.error_code), (Some(3), 0));
 }
