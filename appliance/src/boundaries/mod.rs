@@ -7,6 +7,7 @@ mod files;
 mod recipes;
 mod station;
 
+use serde::de::IgnoredAny;
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -72,8 +73,15 @@ impl std::fmt::Display for Place {
 }
 
 impl Place {
-    /// Whether a message names one of its keys, or the line that it stands in.
-    pub fn is_named(&self, words: &str) -> bool {
+    /// Whether a message about a value names one of its keys, or the line that it stands in; of a limit, gauge and key.
+    pub fn is_named(&self, value: &str, words: &str) -> bool {
+        if let [gauges, _, limit] = &self.0[..]
+            && gauges == "gauges"
+            && ["low", "high"].contains(&limit.as_str())
+            && serde_json::from_str::<IgnoredAny>(value).is_ok()
+        {
+            return words.contains("gauge \"") && words.contains(limit);
+        }
         let keys = self.0.iter().filter(|key| key.parse::<usize>().is_err());
         // Of a list one member may be named.
         words.contains("line ")
@@ -143,18 +151,19 @@ pub(crate) struct Tally {
 impl Tally {
     /// Takes the answer of a case: whether it could be used, or why it was refused.
     pub fn take(&mut self, place: &Place, value: &str, answer: Result<(), String>) {
-        let value: String = value.chars().take(60).collect();
+        let named = |words: &str| place.is_named(value, words);
+        let short: String = value.chars().take(60).collect();
         self.cases += 1;
         match answer {
             Ok(()) => self.used += 1,
             Err(words) if words.len() > LONGEST_WORDS => {
                 let bytes = words.len();
                 self.wrong
-                    .push(format!("{place} = {value}: {bytes} bytes of words"));
+                    .push(format!("{place} = {short}: {bytes} bytes of words"));
             }
-            Err(words) if !place.is_named(&words) => {
+            Err(words) if !named(&words) => {
                 self.wrong
-                    .push(format!("{place} = {value} is not named: {words}"));
+                    .push(format!("{place} = {short} is not named: {words}"));
             }
             Err(_) => {}
         }

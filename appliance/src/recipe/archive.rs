@@ -208,23 +208,25 @@ pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, ArchiveError> {
 /// # Errors
 /// If it is no manifest, of a newer version, or a value is out of its bounds.
 pub fn parse(text: &str) -> Result<RecipeFile, ArchiveError> {
-    let value: serde_json::Value =
+    /// What every version has. Other values are not looked at: one that cannot be read is refused by its key below.
+    #[derive(serde::Deserialize)]
+    struct Header {
+        #[serde(default)]
+        format: serde_json::Value,
+        #[serde(default)]
+        version: serde_json::Value,
+    }
+    let Header { format, version } =
         serde_json::from_str(text).map_err(|error| broken(format!("recipe.json: {error}")))?;
-    if value["format"] != FORMAT {
+    if format != FORMAT {
         return Err(broken(format!(
-            "recipe.json: format is {}, not {FORMAT:?}",
-            value["format"]
+            "recipe.json: format is {format}, not {FORMAT:?}"
         )));
     }
-    match value["version"].as_u64() {
+    match version.as_u64() {
         Some(version) if version > u64::from(VERSION) => return Err(ArchiveError::Newer(version)),
         Some(1) => {}
-        _ => {
-            return Err(broken(format!(
-                "recipe.json: version is {}",
-                value["version"]
-            )));
-        }
+        _ => return Err(broken(format!("recipe.json: version is {version}"))),
     }
     let file: RecipeFile =
         serde_json::from_str(text).map_err(|error| broken(format!("recipe.json: {error}")))?;

@@ -176,20 +176,20 @@ pub struct RegionFile {
 
 /// A gauge and its limits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "super::gauge::GaugeText")]
 pub struct GaugeFile {
     /// Its name.
     pub name: String,
     /// The name of its region; only a placement needs none.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
+    #[serde(skip_serializing_if = "String::is_empty")]
     pub region: String,
     /// What it measures.
     pub measures: GaugeKind,
     /// Lower limit, inclusive, in mm, degrees, mm³ or as a share.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub low: Option<f64>,
     /// Upper limit, inclusive.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub high: Option<f64>,
 }
 

@@ -3,7 +3,75 @@
 use super::file::{AxisFile, ComponentFile, GaugeFile, GaugeKind, RegionFile};
 use crate::station::Unit;
 use algo::inspect::{Axis, Gauge, Measure, Region};
+use hal::bounds::clipped;
+use serde::Deserialize;
+use serde_json::value::RawValue;
 use std::collections::HashMap;
+use std::fmt::Display;
+
+/// A gauge as it is written. Its limits are read when its name and unit are known, so that a refusal says which gauge it is
+/// about: the message of a parser has only a place in the text.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GaugeText {
+    name: String,
+    #[serde(default)]
+    region: String,
+    measures: GaugeKind,
+    #[serde(default)]
+    low: Option<Box<RawValue>>,
+    #[serde(default)]
+    high: Option<Box<RawValue>>,
+}
+
+impl TryFrom<GaugeText> for GaugeFile {
+    type Error = String;
+
+    fn try_from(text: GaugeText) -> Result<Self, String> {
+        let GaugeText {
+            name,
+            region,
+            measures,
+            low,
+            high,
+        } = text;
+        let read = |which, limit: Option<Box<RawValue>>| {
+            let Some(limit) = limit else { return Ok(None) };
+            serde_json::from_str(limit.get()).map(Some).map_err(|_| {
+                let words = no_limit(
+                    &clipped(&name),
+                    measures.unit(),
+                    which,
+                    clipped(limit.get()),
+                );
+                words + " as a number"
+            })
+        };
+        Ok(Self {
+            low: read("low", low)?,
+            high: read("high", high)?,
+            name,
+            region,
+            measures,
+        })
+    }
+}
+
+/// Refuses a limit that the unit of its gauge cannot have.
+fn no_limit(gauge: &str, unit: Unit, which: &str, limit: impl Display) -> String {
+    let ([least, most], symbol) = (unit.range(), spaced(unit));
+    format!(
+        "gauge {gauge:?} cannot have the limit {which} = {limit}{symbol}: write {least} to {most}{symbol}"
+    )
+}
+
+/// The symbol of a unit behind a number.
+fn spaced(unit: Unit) -> String {
+    match unit.symbol() {
+        "" => String::new(),
+        symbol => format!(" {symbol}"),
+    }
+}
 
 impl GaugeKind {
     /// The unit of its value and limits.
@@ -108,15 +176,10 @@ impl GaugeFile {
         } = self;
         let unit = measures.unit();
         let [least, most] = unit.range();
-        let symbol = match unit.symbol() {
-            "" => String::new(),
-            symbol => format!(" {symbol}"),
-        };
+        let symbol = spaced(unit);
         for (which, limit) in [("low", low), ("high", high)] {
             if let Some(limit) = limit.filter(|limit| !(least..=most).contains(limit)) {
-                return Err(format!(
-                    "gauge {name:?} cannot have the limit {which} = {limit}{symbol}: write {least} to {most}{symbol}"
-                ));
+                return Err(no_limit(name, unit, which, limit));
             }
         }
         match (low, high) {
@@ -242,6 +305,30 @@ mod tests {
         ] {
             assert!(check_limits(&[gauge(&kind, None, Some(-0.1))]).is_err());
             assert_eq!(check_limits(&[gauge(&kind, Some(-0.1), Some(0.1))]), Ok(()));
+        }
+    }
+
+    #[test]
+    fn a_limit_that_is_no_number_is_refused_by_its_gauge_and_key_with_the_bounds() {
+        let read = |measures: &str, limit: &str| {
+            let text = format!(
+                r#"{{"high": {limit}, "name": "dome", "region": "all", "measures": {measures}}}"#
+            );
+            let read = serde_json::from_str::<GaugeFile>(&text);
+            read.map(|gauge| gauge.high)
+                .map_err(|error| error.to_string())
+        };
+        for limit in ["1e999", "\"0.3\"", "true", "[]", "{}"] {
+            let words = read(r#"{"kind": "mean_height"}"#, limit).unwrap_err();
+            let wanted = format!(
+                "gauge \"dome\" cannot have the limit high = {limit} mm: write -214748.3647 to 214748.3647 mm as a number"
+            );
+            assert!(words.starts_with(&wanted), "{words}");
+            let words = read(r#"{"kind": "coverage"}"#, limit).unwrap_err();
+            assert!(words.contains("write 0 to 1 as a number"), "{words}");
+        }
+        for (limit, number) in [("0.3", Some(0.3)), ("-1", Some(-1.0)), ("null", None)] {
+            assert_eq!(read(r#"{"kind": "mean_height"}"#, limit), Ok(number));
         }
     }
 
