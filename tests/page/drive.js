@@ -140,6 +140,12 @@ try {
     await page.click("#recipe-rows tr button:has-text('Edit')");
     await page.waitForSelector("#editor-regions .handle");
     const limits = page.locator("#editor-gauges input[aria-label^='lowest deviation']");
+    // What the browser does not take for a number is refused at its field, by the name of the gauge.
+    await limits.first().fill("");
+    await limits.first().pressSequentially("1e999");
+    await page.click("#editor-form button[type=submit]");
+    assert.match(await limits.first().evaluate((field) => field.validationMessage), /^lowest deviation.* in mm: write a number from -214748\.3647 to 214748\.3647$/);
+    assert.ok(await page.isVisible("#editor"));
     await limits.first().fill("0.2");
     // Above the other limit: no part would pass. The field says so, and nothing is sent.
     await page.click("#editor-form button[type=submit]");

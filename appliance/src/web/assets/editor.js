@@ -157,7 +157,14 @@ function drawGauges() {
     const limit = (key) => (value) => { if (value === null) delete gauge[key]; else gauge[key] = value; check(); };
     const low = field(gauge.low, `lowest ${gauge.name}`, units, limit("low"));
     const high = field(gauge.high, `highest ${gauge.name}`, units, limit("high"));
-    const check = () => low.setCustomValidity(gauge.low > gauge.high ? `the lowest ${gauge.name} is above the highest: no part would pass` : "");
+    // What is refused names the gauge: the browser's own words do not.
+    const refused = ({ validity }) => validity.badInput || validity.rangeUnderflow || validity.rangeOverflow;
+    const check = () => {
+      const crossed = gauge.low > gauge.high ? `the lowest ${gauge.name} is above the highest: no part would pass` : "";
+      for (const [input, more] of [[low, crossed], [high, ""]]) {
+        input.setCustomValidity(refused(input) ? `${input.getAttribute("aria-label")}: write a number from ${units[2]} to ${units[3]}` : more);
+      }
+    };
     check();
     const line = make("tr", "", make("td", "", gauge.name), make("td", "", words(gauge.measures)), make("td", "", gauge.region || "whole part"),
       make("td", "", low), make("td", "", high), make("td", "", units[1]));
