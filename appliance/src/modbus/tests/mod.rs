@@ -1,6 +1,7 @@
 //! The server as a PLC sees it: `tokio-modbus`' own client, and raw bytes where that client is too well-behaved.
 
 mod blocks;
+mod boundaries;
 mod connections;
 mod exceptions;
 mod handshakes;
