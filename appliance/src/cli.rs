@@ -17,6 +17,7 @@ mod doctor;
 mod history;
 mod measure;
 pub mod names;
+mod numbers;
 mod options;
 mod part;
 mod recipe;

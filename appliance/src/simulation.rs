@@ -4,6 +4,7 @@
 //! task puts it in place between two cycles: frames of one cycle never show two parts.
 
 use crate::worker::Order;
+use hal::bounds::clipped;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use sim::{Part, Placement, Scenario, Stage, Staged};
@@ -104,7 +105,8 @@ impl Placed {
         let Some(known) = known else {
             let forms: Vec<String> = DEFECTS.iter().map(form).collect();
             return Err(format!(
-                "there is no defect {kind:?}: write one of {}",
+                "there is no defect {:?}: write one of {}",
+                clipped(kind),
                 forms.join(" ")
             ));
         };
@@ -113,8 +115,14 @@ impl Placed {
             .map_while(|number| number.trim().parse().ok())
             .filter(|number: &f64| number.is_finite())
             .collect();
-        if numbers.len() != known.1.len() || numbers.len() != text.split(',').count() {
-            return Err(format!("{text:?} is no defect: write {}", form(known)));
+        let is_place = |n: f64| n >= 0.0 && n.fract() == 0.0;
+        let mut named = known.1.iter().zip(&numbers);
+        if numbers.len() != known.1.len()
+            || numbers.len() != text.split(',').count()
+            || !named.all(|((name, _), &n)| *name != "index" || is_place(n))
+        {
+            let (text, form) = (clipped(text), form(known));
+            return Err(format!("{text:?} is no defect: write {form}"));
         }
         let named = known.1.iter().zip(numbers).map(|((name, _), n)| (*name, n));
         self.part = with_defect(&self.part, defect(kind, named))

@@ -20,6 +20,12 @@ pub const MAX_EXPOSURE_US: f64 = 10_000_000.0;
 pub const RATIOS: [f64; 2] = [1e-6, 1000.0];
 /// Largest shift of a frame in either direction, turns: a shift counts by its fraction.
 pub const MAX_SHIFT_TURNS: f64 = 1000.0;
+/// Farthest that a simulated part is moved along an axis, mm.
+pub const MAX_PLACEMENT_MM: f64 = 1000.0;
+/// Farthest that a simulated part is tilted about x or y, degrees.
+pub const MAX_TILT_DEG: f64 = 80.0;
+/// Farthest that a simulated part is turned about z, degrees.
+pub const MAX_ROTATION_DEG: f64 = 360.0;
 /// Digits of a fingerprint.
 pub const FINGERPRINT_DIGITS: usize = 64;
 /// Characters of a message about a file.

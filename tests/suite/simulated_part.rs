@@ -131,8 +131,8 @@ fn a_part_that_cannot_be_simulated_is_a_usage_error_with_the_remedy() {
     );
     refused(&["--defect", "missing_hole:7"], "index");
     refused(&["--shift", "1,2"], "3 numbers");
-    refused(&["--tilt", "90,0"], "tilt_deg");
-    refused(&["--rotate", "nan"], "1 numbers");
+    refused(&["--tilt", "90,0"], "from -80 to 80");
+    refused(&["--rotate", "nan"], "from -360 to 360");
     let replay = "[head]\nbackend = \"replay\"\nrecordings = [\"none\"]\n";
     std::fs::write(&config, replay).unwrap();
     refused(&["--part", "plane"], "not simulated");

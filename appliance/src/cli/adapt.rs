@@ -1,6 +1,7 @@
 //! `fringed adapt RECORDING --method paper|fringed --out phase.npy`.
 
 use super::names;
+use super::numbers::number;
 use super::options::{Json, Quiet, Threads, answer};
 use crate::adapt::{Choice, Method, adapt};
 use crate::error::{Exit, Failure};
@@ -24,16 +25,16 @@ pub struct Adapt {
     #[arg(long, value_name = "FILE.npy", value_parser = names::file("npy"))]
     out: PathBuf,
     /// σ of the projector's blur, projector pixels.
-    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = blur)]
+    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = number(0.0, 20.0))]
     projector_blur: f64,
     /// σ of the camera's blur, camera pixels.
-    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = blur)]
+    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = number(0.0, 20.0))]
     camera_blur: f64,
     /// Smallest pitch in projector pixels; 6 if not given, and 8 always for the paper's method.
-    #[arg(long, value_name = "PX", value_parser = pitch)]
+    #[arg(long, value_name = "PX", value_parser = number(2.0, 128.0))]
     projector_pitch: Option<f64>,
     /// Smallest pitch in camera pixels; if not given 2.2, and 5 for the paper's method.
-    #[arg(long, value_name = "PX", value_parser = pitch)]
+    #[arg(long, value_name = "PX", value_parser = number(2.0, 128.0))]
     image_pitch: Option<f64>,
     #[command(flatten)]
     threads: Threads,
@@ -41,22 +42,6 @@ pub struct Adapt {
     quiet: Quiet,
     #[command(flatten)]
     json: Json,
-}
-
-fn blur(text: &str) -> Result<f64, String> {
-    within(text, 0.0, 20.0)
-}
-
-fn pitch(text: &str) -> Result<f64, String> {
-    within(text, 2.0, 128.0)
-}
-
-/// A number of pixels from `low` to `high`.
-fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
-    let number: Option<f64> = text.parse().ok();
-    number
-        .filter(|number| (low..=high).contains(number))
-        .ok_or_else(|| format!("give a number of pixels from {low} to {high}"))
 }
 
 impl Adapt {

@@ -2,6 +2,7 @@
 
 mod report;
 
+use super::numbers::number;
 use super::options::{Files, Json, Quiet, Threads, answer};
 use crate::backend::{self, Opened};
 use crate::calibration::Calibration;
@@ -15,7 +16,6 @@ use crate::error::{Exit, Failure};
 use crate::state::StateFolder;
 use algo::geometry::{Reference, RigError, Triangulator};
 use algo::pattern::PhaseFunction;
-use hal::bounds::within;
 use sim::{Part, Stage};
 use std::path::{Path, PathBuf};
 
@@ -45,7 +45,7 @@ pub struct Calibrate {
     #[arg(long)]
     no_plate: bool,
     /// How warm the head is, °C: kept in the calibration.
-    #[arg(long, value_name = "CELSIUS", allow_negative_numbers = true, value_parser = celsius)]
+    #[arg(long, value_name = "CELSIUS", allow_negative_numbers = true, value_parser = number(COLDEST_C, HOTTEST_C))]
     temperature: Option<f64>,
     #[command(flatten)]
     files: Files,
@@ -59,11 +59,6 @@ pub struct Calibrate {
 
 /// Where models came from, if not from a file.
 const OF_SCENARIO: &str = "scenario";
-
-fn celsius(given: &str) -> Result<f64, String> {
-    let celsius = given.parse().map_err(|_| "give a number")?;
-    within("it", celsius, COLDEST_C, HOTTEST_C).map(|()| celsius)
-}
 
 impl Calibrate {
     /// Opens the head, measures it, writes the calibration and prints what was found.

@@ -1,10 +1,13 @@
 //! `fringed history`: stored results as a table, JSON or CSV. Works while the station runs.
 
+use super::numbers::number;
 use super::options::{Files, Json};
+use crate::config::MAX_RESULTS;
 use crate::error::{Exit, Failure};
 use crate::history::{Entry, Filter, HistoryError, Reader, time};
 use crate::journal::{self, Severity};
 use crate::station::Verdict;
+use crate::station::control::MAX_RECIPE;
 
 /// Show or export stored results, newest first.
 #[derive(Debug, clap::Args)]
@@ -13,13 +16,13 @@ pub struct History {
     #[arg(long, conflicts_with = "json")]
     csv: bool,
     /// Only of this recipe.
-    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u16).range(1..=9999))]
+    #[arg(long, value_name = "NUMBER", value_parser = number(1, MAX_RECIPE))]
     recipe: Option<u16>,
     /// Only with this verdict.
     #[arg(long, value_parser = verdict, value_name = "pass|fail|invalid")]
     verdict: Option<Verdict>,
     /// Only of this PART_ID.
-    #[arg(long, value_name = "PART_ID")]
+    #[arg(long, value_name = "PART_ID", value_parser = number(0, u32::MAX))]
     part: Option<u32>,
     /// Only triggered at or after this time (UTC).
     #[arg(long, value_parser = time::utc_us, value_name = "TIME")]
@@ -28,8 +31,8 @@ pub struct History {
     #[arg(long, value_parser = time::utc_us, value_name = "TIME")]
     until: Option<u64>,
     /// At most this many, the newest; as CSV all, unless given.
-    #[arg(long, value_name = "N")]
-    limit: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = number(1, MAX_RESULTS))]
+    limit: Option<u32>,
     #[command(flatten)]
     files: Files,
     #[command(flatten)]
@@ -37,7 +40,7 @@ pub struct History {
 }
 
 /// Rows of a table for a screen.
-const SCREEN: usize = 20;
+const SCREEN: u32 = 20;
 
 fn verdict(word: &str) -> Result<Verdict, String> {
     match word.to_ascii_lowercase().as_str() {
@@ -56,7 +59,7 @@ impl History {
     pub fn run(&self) -> Result<(), Failure> {
         let state = self.files.state_folder()?;
         let reader = Reader::of(&state);
-        let usual = if self.csv { usize::MAX } else { SCREEN };
+        let usual = if self.csv { MAX_RESULTS } else { SCREEN };
         let filter = Filter {
             recipe: self.recipe,
             verdict: self.verdict,
@@ -64,7 +67,7 @@ impl History {
             since_us: self.since,
             until_us: self.until,
             before_seq: None,
-            limit: self.limit.unwrap_or(usual),
+            limit: self.limit.unwrap_or(usual) as usize,
         };
         let undated = reader.undated(&filter).map_err(failure)?;
         if undated > 0 {

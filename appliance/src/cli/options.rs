@@ -1,5 +1,6 @@
 //! Options that several commands share, in the groups in which commands take them.
 
+use super::numbers::{address, number};
 use crate::config::{Config, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::progress::Progress;
@@ -24,10 +25,10 @@ pub struct Files {
 #[derive(Clone, Debug, Args)]
 pub struct Listen {
     /// Where to serve Modbus TCP.
-    #[arg(long, value_name = "ADDR:PORT")]
+    #[arg(long, value_name = "ADDR:PORT", value_parser = address)]
     modbus: Option<SocketAddr>,
     /// Where to serve the page.
-    #[arg(long, value_name = "ADDR:PORT")]
+    #[arg(long, value_name = "ADDR:PORT", value_parser = address)]
     http: Option<SocketAddr>,
 }
 
@@ -35,7 +36,7 @@ pub struct Listen {
 #[derive(Clone, Debug, Args)]
 pub struct Threads {
     /// Computing threads; 0 = one per core.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=256))]
+    #[arg(long, value_name = "N", value_parser = number(0u16, 256))]
     threads: Option<u16>,
 }
 

@@ -1,9 +1,11 @@
 //! The part in front of a simulated head, from the command line.
 
+use super::numbers::{number, numbers};
 use crate::backend;
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::simulation::Placed;
+use hal::bounds::{MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG, clipped};
 
 /// Which part lies in front of a simulated head, instead of the scenario's.
 #[derive(Clone, Debug, clap::Args)]
@@ -15,31 +17,14 @@ pub struct SimulatedPart {
     #[arg(long, value_name = "KIND:NUMBERS")]
     defect: Vec<String>,
     /// Move the simulated part by this, mm.
-    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>(MAX_PLACEMENT_MM), allow_hyphen_values = true)]
     shift: Option<[f64; 3]>,
     /// Tilt the simulated part about x and y, degrees.
-    #[arg(long, value_name = "X,Y", value_parser = numbers::<2>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y", value_parser = numbers::<2>(MAX_TILT_DEG), allow_hyphen_values = true)]
     tilt: Option<[f64; 2]>,
     /// Turn the simulated part about z, degrees.
-    #[arg(long, value_name = "DEGREES", value_parser = numbers::<1>, allow_hyphen_values = true)]
-    rotate: Option<[f64; 1]>,
-}
-
-fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let numbers: Result<Vec<f64>, _> = text
-        .split(',')
-        .map(|number| number.trim().parse())
-        .collect();
-    let wanted = || format!("give {N} numbers with commas between them");
-    let numbers: [f64; N] = numbers
-        .map_err(|_| wanted())?
-        .try_into()
-        .map_err(|_| wanted())?;
-    numbers
-        .iter()
-        .all(|number| number.is_finite())
-        .then_some(numbers)
-        .ok_or_else(wanted)
+    #[arg(long, value_name = "DEGREES", value_parser = number(-MAX_ROTATION_DEG, MAX_ROTATION_DEG), allow_hyphen_values = true)]
+    rotate: Option<f64>,
 }
 
 impl SimulatedPart {
@@ -68,12 +53,13 @@ impl SimulatedPart {
             },
         };
         for defect in &self.defect {
-            placed.add_defect(defect).map_err(usage)?;
+            let added = placed.add_defect(defect).and_then(|()| placed.check());
+            added.map_err(|words| usage(format!("--defect {}: {words}", clipped(defect))))?;
         }
         let place = &mut placed.placement;
         place.shift_mm = self.shift.unwrap_or(place.shift_mm);
         place.tilt_deg = self.tilt.unwrap_or(place.tilt_deg);
-        place.rotation_deg = self.rotate.map_or(place.rotation_deg, |[degrees]| degrees);
+        place.rotation_deg = self.rotate.unwrap_or(place.rotation_deg);
         placed.check().map_err(usage)?;
         Ok(Some(placed))
     }

@@ -2,6 +2,7 @@
 //! imported recipe when it is selected; what would take a recipe from under it is done on its page.
 
 use super::names;
+use super::numbers::number;
 use super::options::{Files, Json, Quiet};
 use crate::backend;
 use crate::error::{Exit, Failure};
@@ -10,6 +11,7 @@ use crate::recipe::exchange::{ImportError, Listed};
 use crate::recipe::generations::GenerationError;
 use crate::recipe::{LoadError, Store};
 use crate::state::StateFolder;
+use crate::station::control::MAX_RECIPE;
 use std::path::PathBuf;
 
 /// What to do with recipes.
@@ -25,7 +27,7 @@ pub enum RecipeCommand {
     /// Write a recipe to a file.
     Export {
         /// Its number.
-        #[arg(value_parser = clap::value_parser!(u16).range(1..=9999))]
+        #[arg(value_parser = number(1, MAX_RECIPE))]
         number: u16,
         /// The file, NAME.recipe; one that is there is replaced.
         #[arg(value_parser = names::file("recipe"))]
@@ -47,7 +49,7 @@ pub enum RecipeCommand {
     /// Delete a recipe; `undo` brings it back. Not while a station runs: its page deletes recipes as well.
     Delete {
         /// Its number.
-        #[arg(value_parser = clap::value_parser!(u16).range(1..=9999))]
+        #[arg(value_parser = number(1, MAX_RECIPE))]
         number: u16,
         #[command(flatten)]
         files: Files,
@@ -58,7 +60,7 @@ pub enum RecipeCommand {
     /// runs: its page undoes as well.
     Undo {
         /// Its number.
-        #[arg(value_parser = clap::value_parser!(u16).range(1..=9999))]
+        #[arg(value_parser = number(1, MAX_RECIPE))]
         number: u16,
         #[command(flatten)]
         files: Files,

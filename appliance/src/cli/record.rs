@@ -1,11 +1,13 @@
 //! `fringed record DIR`: a sequence from the configured head as a recording.
 
 use super::names;
+use super::numbers::number;
 use super::options::{Files, Quiet, Threads};
 use crate::backend::{self, Opened};
 use crate::error::{Exit, Failure};
 use crate::plan::rasters;
 use algo::pattern::{PhaseFunction, Sequence};
+use hal::bounds::MAX_FRINGES;
 use hal::replay::Recording;
 use hal::replay::recorder;
 use hal::replay::recording::{PatternSpec, RecordedFrame, RecordedProjector};
@@ -19,13 +21,13 @@ pub struct Record {
     #[arg(value_parser = names::folder())]
     folder: PathBuf,
     /// Fringes over the projector's width; without it, one per 12 pixels.
-    #[arg(long)]
+    #[arg(long, value_name = "N", value_parser = number(1e-3, MAX_FRINGES))]
     fringes: Option<f64>,
     /// Levels, from coarse to fine.
-    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=8))]
+    #[arg(long, default_value_t = 3, value_parser = number(1u8, 8))]
     levels: u8,
     /// Shifts per level.
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u8).range(3..=64))]
+    #[arg(long, default_value_t = 4, value_parser = number(3u8, 64))]
     steps: u8,
     #[command(flatten)]
     files: Files,

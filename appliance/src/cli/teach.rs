@@ -1,6 +1,7 @@
 //! `fringed teach`: a recipe from the part in front of the head, or from recordings.
 
 use super::names;
+use super::numbers::number;
 use super::options::{Files, Json, Quiet, Threads, answer};
 use crate::backend::{self, Opened};
 use crate::calibration::Calibration;
@@ -14,6 +15,7 @@ use crate::recipe::replace;
 use crate::recipe::teach::{TeachError, teach};
 use crate::recipe::{PatternFile, RecipeFile, Store};
 use crate::state::StateFolder;
+use crate::station::control::MAX_RECIPE;
 use algo::adaptive::ProjectorMap;
 use hal::bounds::text;
 use hal::replay::Recording;
@@ -25,7 +27,7 @@ use std::time::Duration;
 #[derive(Debug, clap::Args)]
 pub struct Teach {
     /// Recipe number.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=9999))]
+    #[arg(long, value_parser = number(1, MAX_RECIPE))]
     number: u16,
     /// Replace the recipe that has this number; it stays as the generation before, `fringed recipe undo` brings it back.
     #[arg(long, conflicts_with = "out")]
@@ -41,7 +43,7 @@ pub struct Teach {
     name: Option<String>,
     /// How far parts may lie from where this one lies, in any direction, mm; without it as in the recipe that is replaced,
     /// or 1.
-    #[arg(long, value_name = "MM", value_parser = tolerance)]
+    #[arg(long, value_name = "MM", value_parser = number(0.0, MAX_TOLERANCE_MM))]
     tolerance: Option<f64>,
     /// Recording of the good part with the full sequence; its pattern becomes the recipe's. Without
     /// it, the part in front of the configured head is taught.
@@ -96,12 +98,6 @@ impl Target<'_> {
 
 /// Longest wait for one frame.
 const TIMEOUT: Duration = Duration::from_secs(5);
-
-fn tolerance(text: &str) -> Result<f64, String> {
-    let mm: Option<f64> = text.parse().ok();
-    mm.filter(|mm| (0.0..=MAX_TOLERANCE_MM).contains(mm))
-        .ok_or_else(|| format!("give millimetres from 0 to {MAX_TOLERANCE_MM}"))
-}
 
 fn part_number(given: &str) -> Result<String, String> {
     text("it", given, LONGEST_PART_NUMBER)?;

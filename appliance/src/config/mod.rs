@@ -39,6 +39,9 @@ pub struct Config {
     pub history: HistoryConfig,
 }
 
+/// The most results that a history can be told to keep.
+pub const MAX_RESULTS: u32 = 10_000_000;
+
 /// What is kept of results; the oldest go first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -270,7 +273,7 @@ impl Config {
         for host in &self.http.hosts {
             text("http.hosts", host, LONGEST_HOST)?;
         }
-        within("history.results", self.history.results, 1, 10_000_000)?;
+        within("history.results", self.history.results, 1, MAX_RESULTS)?;
         length("head.recordings", self.head.recordings.len(), 0, MAX_LISTED)?;
         let head = &self.head;
         let paths = [

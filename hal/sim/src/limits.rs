@@ -2,6 +2,7 @@
 
 use super::scenario::{Device, Placement, Scenario};
 pub(crate) use hal::bounds::within;
+use hal::bounds::{MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG};
 
 /// Most rays of a light transport. Each has at most four taps, which then fit the 32-bit offsets of the matrix.
 const MAX_RAYS: u64 = 1 << 28;
@@ -65,12 +66,23 @@ impl Placement {
     /// What is wrong with the values, if anything.
     pub(crate) fn check(&self) -> Result<(), String> {
         for shift in self.shift_mm {
-            within("placement.shift_mm", shift, -1000.0, 1000.0)?;
+            within(
+                "placement.shift_mm",
+                shift,
+                -MAX_PLACEMENT_MM,
+                MAX_PLACEMENT_MM,
+            )?;
         }
         for tilt in self.tilt_deg {
-            within("placement.tilt_deg", tilt, -80.0, 80.0)?;
+            within("placement.tilt_deg", tilt, -MAX_TILT_DEG, MAX_TILT_DEG)?;
         }
-        within("placement.rotation_deg", self.rotation_deg, -360.0, 360.0)
+        let turned = self.rotation_deg;
+        within(
+            "placement.rotation_deg",
+            turned,
+            -MAX_ROTATION_DEG,
+            MAX_ROTATION_DEG,
+        )
     }
 }
 

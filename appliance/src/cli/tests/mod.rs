@@ -1,5 +1,7 @@
 //! The command line as clap takes it: each command offers what it uses.
 
+mod numbers;
+
 use super::Arguments;
 use super::options::behind_the_command;
 use clap::error::ErrorKind;

@@ -1,0 +1,231 @@
+//! Boundary values in every number of the command line: each is refused with its option and bounds, or lies within them.
+
+use super::super::part::SimulatedPart;
+use super::{Arg, leaves};
+use crate::calibration::bounds::{COLDEST_C, HOTTEST_C};
+use crate::config::HeadConfig;
+use crate::error::Exit;
+use clap::{ArgMatches, FromArgMatches as _};
+use std::any::TypeId;
+use std::collections::BTreeSet;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+/// What an option takes.
+#[derive(Clone, Copy, PartialEq)]
+enum Takes {
+    /// A number within bounds.
+    Number(f64, f64),
+    /// So many numbers, each so far from 0 at most.
+    List(usize, f64),
+    /// An address with a port.
+    Address,
+    /// A date; none of the values is one.
+    Date,
+    /// A defect of a simulated part.
+    Defect,
+    /// Words: nothing counts with them.
+    Words,
+}
+use Takes::{Address, Date, Defect, List, Number, Words};
+
+/// Every option and positional argument that takes neither a path nor one word of a list; `*` is every command.
+const TABLE: &[(&str, &str, Takes)] = &[
+    ("*", "threads", Number(0.0, 256.0)),
+    ("*", "number", Number(1.0, 9999.0)),
+    ("*", "modbus", Address),
+    ("*", "http", Address),
+    ("serve", "part", Words),
+    ("serve", "defect", Defect),
+    ("serve", "shift", List(3, 1000.0)),
+    ("serve", "tilt", List(2, 80.0)),
+    ("serve", "rotate", Number(-360.0, 360.0)),
+    ("adapt", "projector_blur", Number(0.0, 20.0)),
+    ("adapt", "camera_blur", Number(0.0, 20.0)),
+    ("adapt", "projector_pitch", Number(2.0, 128.0)),
+    ("adapt", "image_pitch", Number(2.0, 128.0)),
+    ("calibrate", "temperature", Number(COLDEST_C, HOTTEST_C)),
+    ("record", "fringes", Number(1e-3, 1000.0)),
+    ("record", "levels", Number(1.0, 8.0)),
+    ("record", "steps", Number(3.0, 64.0)),
+    ("teach", "part_number", Words),
+    ("teach", "name", Words),
+    ("teach", "tolerance", Number(0.0, 20.0)),
+    ("history", "recipe", Number(1.0, 9999.0)),
+    ("history", "verdict", Words),
+    ("history", "part", Number(0.0, 4_294_967_295.0)),
+    ("history", "since", Date),
+    ("history", "until", Date),
+    ("history", "limit", Number(1.0, 1e7)),
+];
+
+const VALUES: [&str; 16] = [
+    "",
+    "0",
+    "-1",
+    "1",
+    "2",
+    "65535",
+    "2147483648",
+    "4294967295",
+    "4294967296",
+    "9223372036854775808",
+    "18446744073709551616",
+    "NaN",
+    "inf",
+    "-inf",
+    "1e999",
+    "5e-324",
+];
+
+impl Takes {
+    /// What is written for a boundary value.
+    fn texts(self, value: &str) -> Vec<String> {
+        let beside = |others: &[&str]| {
+            (0..others.len())
+                .map(|at| {
+                    let mut all = others.to_vec();
+                    all[at] = value;
+                    all.join(",")
+                })
+                .collect()
+        };
+        match self {
+            Number(..) | Date => vec![value.to_owned()],
+            List(count, _) => beside(&["0"; 3][..count]),
+            Address => vec![format!("127.0.0.1:{value}")],
+            Defect => {
+                let dents: Vec<String> = beside(&["0", "0", "0.3", "8"]);
+                let dents = dents.into_iter().map(|numbers| format!("dent:{numbers}"));
+                let others = ["missing_hole", "bent_flange"].map(|kind| format!("{kind}:{value}"));
+                dents.chain(others).collect()
+            }
+            Words => Vec::new(),
+        }
+    }
+
+    /// What a refusal says beside the option.
+    fn bounds(self) -> Vec<String> {
+        match self {
+            Number(low, high) => vec![format!("from {low} to {high}")],
+            List(_, most) => vec![format!("from -{most} to {most}")],
+            Address => vec!["0 to 65535".into()],
+            Date => vec!["write a date".into()],
+            Defect => vec!["write ".into()],
+            Words => Vec::new(),
+        }
+    }
+}
+
+/// The numbers that were read.
+fn read(matches: &ArgMatches, id: &str) -> Vec<f64> {
+    fn one<T: Copy + Send + Sync + 'static>(matches: &ArgMatches, id: &str) -> Option<T> {
+        matches.try_get_one::<T>(id).ok().flatten().copied()
+    }
+    let single = one::<f64>(matches, id)
+        .or_else(|| one::<u8>(matches, id).map(f64::from))
+        .or_else(|| one::<u16>(matches, id).map(f64::from))
+        .or_else(|| one::<u32>(matches, id).map(f64::from))
+        .or_else(|| one::<u64>(matches, id).map(|whole| whole as f64));
+    let list = one::<[f64; 2]>(matches, id).map(Vec::from);
+    let list = list.or_else(|| one::<[f64; 3]>(matches, id).map(Vec::from));
+    single
+        .map(|number| vec![number])
+        .or(list)
+        .unwrap_or_default()
+}
+
+#[test]
+fn a_boundary_value_of_an_option_is_refused_with_its_bounds_or_lies_within_them() {
+    let long = "x".repeat(100_000);
+    let (mut cases, mut taken, mut known) = (0, 0, BTreeSet::new());
+    for (words, command) in leaves() {
+        let command = command.mut_args(|argument| argument.required(false));
+        for argument in command.get_arguments() {
+            let (id, parser) = (argument.get_id().as_str(), argument.get_value_parser());
+            let named = parser.possible_values().is_some();
+            if !argument.get_action().takes_values()
+                || named
+                || parser.type_id() == TypeId::of::<PathBuf>()
+            {
+                continue;
+            }
+            let row = TABLE.iter().position(|(command, option, _)| {
+                *option == id && (*command == "*" || *command == words)
+            });
+            let row = row.unwrap_or_else(|| panic!("{words} {id}: what are its bounds?"));
+            known.insert(row);
+            let takes = TABLE[row].2;
+            for value in VALUES.into_iter().chain([&*long]) {
+                for text in takes.texts(value) {
+                    let case = format!("{words} {id} {text:.60}");
+                    let written = match argument.get_long() {
+                        Some(long) => vec![format!("--{long}={text}")],
+                        None => vec!["--".into(), text],
+                    };
+                    let matches = command
+                        .clone()
+                        .no_binary_name(true)
+                        .try_get_matches_from(written);
+                    cases += 1;
+                    taken += usize::from(check(argument, takes, matches, &case));
+                }
+            }
+        }
+    }
+    println!("{cases} boundary values of options, {taken} of them can be used");
+    assert_eq!(known.len(), TABLE.len(), "an option is gone");
+    assert_eq!(cases, 731);
+}
+
+/// Checks what came of a case; whether its value was taken.
+fn check(
+    argument: &Arg,
+    takes: Takes,
+    matches: Result<ArgMatches, clap::Error>,
+    case: &str,
+) -> bool {
+    let id = argument.get_id().as_str();
+    let name = argument
+        .get_long()
+        .map_or(id.to_uppercase(), |long| format!("--{long}"));
+    let matches = match matches {
+        Ok(matches) => matches,
+        Err(error) => {
+            // The program ends with 64.
+            assert!(error.use_stderr(), "{case}");
+            let words = error.to_string();
+            assert!(words.contains(&name), "{case}: {words}");
+            for bounds in takes.bounds() {
+                assert!(words.contains(&bounds), "{case}: {words}");
+            }
+            return false;
+        }
+    };
+    match takes {
+        Number(low, high) => {
+            let [number] = read(&matches, id)[..] else {
+                panic!("{case}: of another type");
+            };
+            assert!((low..=high).contains(&number), "{case}: {number}");
+        }
+        List(count, most) => {
+            let numbers = read(&matches, id);
+            assert_eq!(numbers.len(), count, "{case}");
+            assert!(numbers.iter().all(|number| number.abs() <= most), "{case}");
+        }
+        Address => assert!(matches.get_one::<SocketAddr>(id).is_some(), "{case}"),
+        Defect => {
+            let part = SimulatedPart::from_arg_matches(&matches).unwrap();
+            if let Err(refused) = part.placed(&HeadConfig::default()) {
+                assert_eq!(refused.exit, Exit::Usage, "{case}");
+                let words = refused.message;
+                assert!(words.contains(&name), "{case}: {words}");
+                assert!(words.contains(&takes.bounds()[0]), "{case}: {words}");
+                return false;
+            }
+        }
+        Date | Words => panic!("{case} was taken"),
+    }
+    true
+}
