@@ -105,7 +105,11 @@ pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<(), Failure>) -> ExitCode 
     match run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            journal::write(Severity::Error, &failure.to_string());
+            journal::write_of(
+                A::command().get_name(),
+                Severity::Error,
+                &failure.to_string(),
+            );
             failure.exit.into()
         }
     }

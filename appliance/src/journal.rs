@@ -15,18 +15,23 @@ pub enum Severity {
     Info = 6,
 }
 
-/// Writes words of one or more lines.
+/// Writes words of one or more lines of the daemon.
 pub fn write(severity: Severity, words: &str) {
+    write_of("fringed", severity, words);
+}
+
+/// Writes words of one or more lines of this program.
+pub fn write_of(program: &str, severity: Severity, words: &str) {
     static JOURNAL: OnceLock<bool> = OnceLock::new();
     let journal = *JOURNAL.get_or_init(stderr_is_a_journal);
-    eprint!("{}", form(journal, severity, words));
+    eprint!("{}", form(program, journal, severity, words));
 }
 
 /// Each line of the words as it is written.
-fn form(journal: bool, severity: Severity, words: &str) -> String {
+fn form(program: &str, journal: bool, severity: Severity, words: &str) -> String {
     let lines = words.lines().map(|line| match journal {
         true => format!("<{}>{line}\n", severity as u8),
-        false => format!("fringed: {line}\n"),
+        false => format!("{program}: {line}\n"),
     });
     lines.collect()
 }
@@ -54,9 +59,9 @@ mod tests {
     #[test]
     fn a_journal_gets_the_priority_of_every_line_and_people_get_none() {
         let words = "fault 101: gone\nplug it in";
-        let journal = form(true, Severity::Error, words);
+        let journal = form("fringed", true, Severity::Error, words);
         assert_eq!(journal, "<3>fault 101: gone\n<3>plug it in\n");
-        let people = form(false, Severity::Error, words);
+        let people = form("fringed", false, Severity::Error, words);
         assert_eq!(people, "fringed: fault 101: gone\nfringed: plug it in\n");
     }
 

@@ -80,6 +80,7 @@ fn an_unknown_part_is_a_usage_error_and_leaves_nothing() {
     let arguments = ["experiment", "--part", "cone", "teapot", "--out", out_name];
     let run = laboratory().run(&arguments);
     assert_eq!(run.code, 64, "{}", run.stderr);
+    assert!(run.stderr.starts_with("fringed-lab: "), "{}", run.stderr);
     for word in ["teapot", "sawtooth", "all"] {
         assert!(run.stderr.contains(word), "{}", run.stderr);
     }
