@@ -1,4 +1,4 @@
-//! Run time against error: what each implementation, sequence and depth costs on the simulated parts, and what it is worth.
+//! Run time against error: processor time and height error of each implementation, sequence and bit depth on the simulated parts.
 
 use super::decoding::Decoding;
 use super::frames::{FrameSet, Rotation};
@@ -85,13 +85,13 @@ impl Compared {
 }
 
 impl Study {
-    /// What figures are quoted from.
+    /// For figures that are quoted.
     pub fn full() -> Self {
         Self {
             parts: vec!["cone", "sawtooth", "sphere", "spline"],
             camera: 512,
             bit_depths: vec![8, 10, 12],
-            // Ten sequences of three depths on four parts: a shorter look at each.
+            // Shorter for each: ten sequences of three depths on four parts.
             effort: Effort {
                 patience: Duration::from_millis(15),
                 ..Effort::FULL
@@ -99,7 +99,7 @@ impl Study {
         }
     }
 
-    /// Whether everything works.
+    /// For checking that everything works; the times mean nothing.
     pub fn quick() -> Self {
         Self {
             parts: vec!["cone"],
@@ -230,7 +230,7 @@ fn lit(truth: &sim::Truth) -> usize {
         .count()
 }
 
-/// The rows in which some of the part is seen, as a recipe's gauges would ask for them.
+/// The columns of each row to decode: all where the part is seen, none elsewhere.
 fn rows_seen(truth: &sim::Truth, width: usize) -> Vec<Range<usize>> {
     let rows = truth.class.chunks(width.max(1));
     let seen = rows.map(|row| row.iter().any(|&class| class > 0));

@@ -44,7 +44,7 @@ pub struct Budget {
     pub one_thread_ms: f64,
     /// Processor time of the phase kernel alone, same frames and window, ms.
     pub kernel_ms: f64,
-    /// Their ratio.
+    /// The ratio of the last two.
     pub x_kernel: f64,
 }
 
@@ -162,8 +162,8 @@ fn budget(
     })
 }
 
-/// Processor time of frames → verdict and of the phase kernel alone, ms, and their ratio; interleaved, each over frame sets
-/// in turn so that no cache holds them.
+/// Processor time of frames → verdict and of the phase kernel alone, ms, and their ratio. The two are timed in turn, each on
+/// so many frame sets that no cache holds them.
 fn on_one_thread(plan: &Plan, frames: &[Frame], effort: &Effort) -> Result<[f64; 3], String> {
     let map = plan.golden_phase().to_vec();
     let mut sets = Rotation::of(FrameSet::of(frames, Some(map)), effort.bytes);

@@ -11,10 +11,10 @@ use std::hint::black_box;
 use std::ops::Range;
 use std::time::Duration;
 
-/// A decoder on one thread, into memory that is there already.
+/// A decoder on one thread that writes into memory allocated before.
 pub struct Decoding {
     decoder: Decoder,
-    /// The columns of each row that somebody looks at; none = all.
+    /// The columns of each row that are decoded; `None` for all.
     window: Option<Vec<Range<usize>>>,
     /// Whether the coarser levels are demodulated before the clock starts, as they are when each is decoded while the next
     /// is being exposed.
@@ -31,7 +31,7 @@ impl Decoding {
         }
     }
 
-    /// With a decoder that has had all levels but the last.
+    /// With a decoder that times the last level only: the others are demodulated before.
     pub fn after_the_last(decoder: Decoder) -> Self {
         Self {
             decoder,
@@ -40,7 +40,7 @@ impl Decoding {
         }
     }
 
-    /// All levels but the last.
+    /// Demodulates all levels but the last.
     fn before(&self, set: &mut FrameSet) -> Arrived {
         let (width, height) = (set.width(), set.out.phase.len() / set.width().max(1));
         let (frames, _, _) = set.parts();
@@ -55,14 +55,14 @@ impl Decoding {
     }
 }
 
-/// Production from frames to the readings of gauges, on as many threads as the pool has that it is run in.
+/// Production from frames to the readings of gauges, on all threads of the current pool.
 pub struct Inspecting<'a> {
     production: &'a Production,
     strips: Strips,
 }
 
 impl<'a> Inspecting<'a> {
-    /// As a plan has it.
+    /// With strips as high as those of a plan.
     pub fn new(production: &'a Production) -> Self {
         let rows = production.window().len();
         Self {
@@ -80,7 +80,7 @@ impl Kernel for Inspecting<'_> {
         timed(|| drop(black_box(production.inspect(&frames, strips, None))))
     }
 
-    /// No map is left behind.
+    /// None: production keeps no phase map.
     fn turns(&self, _: &FrameSet) -> Vec<f64> {
         Vec::new()
     }

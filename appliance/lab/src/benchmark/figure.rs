@@ -1,4 +1,4 @@
-//! The plot of run time against error: every point, and the front of those that none beats in both.
+//! The plot of run time against error: every point, and the Pareto front.
 
 use super::point::{Point, means};
 use super::report::Report;
@@ -79,7 +79,7 @@ fn label(point: &Point) -> String {
     format!("{sequence} {levels}×{steps}, {bits} bit, {implementation}{skipping}")
 }
 
-/// The points that none beats in both, from fast to slow.
+/// The Pareto front, from fast to slow: no other point is both faster and more accurate.
 fn front(points: &[Point]) -> Vec<&Point> {
     let mut sorted: Vec<&Point> = points.iter().filter(|point| point.rms_mm > 0.0).collect();
     sorted.sort_by(|a, b| a.ns_per_px.total_cmp(&b.ns_per_px));

@@ -1,7 +1,7 @@
 //! The floor: a loop that only reads twelve frames of 8 bits and writes one map of 32 bits.
 //!
-//! No decoder can be faster, as it must do that as well; so times are told in floors, which makes machines
-//! comparable. Memory bounds it: a block of pixels is an exclusive or over twelve streams, and four copies of that,
+//! Every decoder has to do this as well, so none can be faster. Times are given as multiples of it, which makes machines
+//! comparable. It is bound by memory: a block of pixels is an exclusive or over twelve streams, and four copies of that,
 //! each with another constant, are the block's 32-bit values.
 
 /// Frames that the floor reads.

@@ -1,11 +1,11 @@
-//! Sets of frames that kernels are timed on, and the rotation through so many that no cache holds them.
+//! Sets of frames that kernels are timed on, and a rotation through so many copies that no cache holds them.
 
 use algo::frame::{FrameView, Samples};
 use algo::phase::Trust;
 use algo::units::{AbsolutePhase, Modulation};
 use hal::frame::Frame;
 
-/// The frames of one measurement, the map that they are unwrapped about, and room for what comes out.
+/// The frames of one measurement, the map that they are unwrapped about, and memory for the result.
 #[derive(Clone)]
 pub struct FrameSet {
     width: usize,
@@ -44,7 +44,7 @@ impl FrameSet {
         map: Option<Vec<AbsolutePhase>>,
     ) -> Self {
         let pixels = width * height;
-        // No value is zero, so that the memory is really there before the first run.
+        // No value is zero, so that the system provides the memory before the first run.
         let out = Output {
             phase: vec![AbsolutePhase::UNKNOWN; pixels],
             modulation: vec![Modulation::from_bits(1); pixels],
@@ -59,7 +59,7 @@ impl FrameSet {
         }
     }
 
-    /// From what a head took (frames of equal format), without the padding of its rows.
+    /// From a head's frames, which have equal format, without the padding of their rows.
     pub fn of(frames: &[Frame], map: Option<Vec<AbsolutePhase>>) -> Self {
         let (mut eight, mut sixteen) = (Vec::new(), Vec::new());
         let mut size = (0, 0);
@@ -101,7 +101,7 @@ impl FrameSet {
         &self.samples
     }
 
-    /// Frames, map and room, borrowed apart.
+    /// Frames, map and result, borrowed separately.
     pub fn parts(&mut self) -> (Vec<FrameView<'_>>, Option<&[AbsolutePhase]>, &mut Output) {
         let pixels = (self.width * self.height).max(1);
         let frames: Vec<Samples<'_>> = match &self.samples {
@@ -147,7 +147,7 @@ impl Rotation {
         self.sets.len()
     }
 
-    /// The set that was not used for longest.
+    /// The set that was used least recently.
     pub fn next(&mut self) -> &mut FrameSet {
         self.next = (self.next + 1) % self.sets.len();
         &mut self.sets[self.next]

@@ -9,37 +9,37 @@ use appliance::worker::stopwatch::timed;
 use std::hint::black_box;
 use std::time::Duration;
 
-/// Something that finds the phases of a set of frames.
+/// An implementation that computes the phases of a set of frames.
 pub trait Kernel {
-    /// Decodes a set; answers the processor time of what is to be timed: all of it, or what is left to do when the last
-    /// frame is there and the coarser levels were decoded outside of the stopwatch.
+    /// Decodes a set and returns the processor time of the part that is timed: all of it, or only what remains once the
+    /// last frame has arrived, where the coarser levels are decoded before.
     fn run(&mut self, set: &mut FrameSet) -> Duration;
     /// Φ in turns that the last run found in `set`, NaN where rejected.
     fn turns(&self, set: &FrameSet) -> Vec<f64>;
 }
 
-/// How large and how often.
+/// The size of the frames, and how often each kernel is timed.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
     /// Columns and rows of the frames.
     pub size: (usize, usize),
     /// Bytes that are read before the first frame set comes again: more than caches hold.
     pub bytes: usize,
-    /// Rounds; of each time the median counts.
+    /// Rounds; figures are medians over them.
     pub rounds: usize,
     /// A time is measured over a whole rotation, or over fewer sets once it has taken this long.
     pub patience: Duration,
 }
 
 impl Effort {
-    /// What figures are quoted from.
+    /// For figures that are quoted.
     pub const FULL: Self = Self {
         size: (1456, 1088),
         bytes: 210_000_000,
         rounds: 5,
         patience: Duration::from_millis(60),
     };
-    /// Whether everything works.
+    /// For checking that everything works; the times mean nothing.
     pub const QUICK: Self = Self {
         size: (64, 48),
         bytes: 1,
@@ -135,8 +135,8 @@ pub(super) struct Round {
     pub floor: f64,
 }
 
-/// For each variant its rounds; in every round the floor and then each variant in turn, so that what disturbs the
-/// machine disturbs all of them.
+/// The rounds of each variant. In every round the floor is timed first and then each variant in turn, so that other work
+/// on the machine affects all of them alike.
 pub(super) fn interleaved(
     variants: &mut [Variant],
     sets: &mut Rotation,

@@ -17,7 +17,7 @@ pub struct Point {
     pub steps: usize,
     /// Bits of a sample.
     pub bits: u8,
-    /// Whether rows that nobody looks at are left out.
+    /// Whether rows in which the part is not seen are skipped.
     pub skipping: bool,
     /// Processor time of the decoding per pixel of a frame.
     pub ns_per_px: f64,

@@ -1,8 +1,9 @@
-//! What a newcomer writes: the textbook's formulas in floating point, one pass over whole frames per step.
+//! The reference that kernels are compared with: the textbook's formulas in floating point, one pass over whole frames
+//! per step, as a first implementation has them.
 //!
-//! S, C, atan2, modulation and one unwrapping step per level each walk over the frame and leave an intermediate of its
-//! size behind. In `f64` it is the textbook, in `f32` the straightforward fast version of it. The intermediates are
-//! kept from run to run, which is more than most newcomers do.
+//! The sums S and C, atan2, modulation and one unwrapping step per level each walk over the frame and store an
+//! intermediate of its size. The intermediates are allocated once and reused, which favours the reference. It runs in
+//! `f64` and in `f32`.
 
 use super::frames::{Buffer, FrameSet};
 use super::kernel::Kernel;
@@ -64,7 +65,7 @@ impl<T: Real> Textbook<T> {
     /// For a sequence of a phase function with this range, and frames of `pixels` samples.
     ///
     /// # Errors
-    /// If the levels are of no known form.
+    /// If the ratios of the levels have none of the forms that can be unwrapped.
     pub fn new(
         sequence: &Sequence,
         range: PhaseRange,
@@ -76,7 +77,7 @@ impl<T: Real> Textbook<T> {
         let margin = (1.0 - coarsest * range.span()).max(0.0) / 2.0;
         let full_scale = f64::from((1_u32 << bit_depth) - 1);
         let count = sequence.levels().len();
-        // Not zero, so that the memory is really there before the first run.
+        // Not zero, so that the system provides the memory before the first run.
         let buffer = || vec![T::of(1.0); pixels];
         Ok(Self {
             levels: sequence.levels().iter().map(Step::new).collect(),
@@ -227,14 +228,14 @@ impl<T: Real> Kernel for Textbook<T> {
     }
 }
 
-/// The nearest whole number, and whether little enough is left over.
+/// The nearest whole number, and whether the residual is small enough.
 fn order<T: Real>(turns: T) -> (T, bool) {
     let order = turns.round();
     let left = turns - order;
     (order, left * left <= T::of(MAX_RESIDUAL * MAX_RESIDUAL))
 }
 
-/// The short way round, −½ ≤ x < ½.
+/// The same angle in turns, −½ ≤ x < ½.
 fn wrap<T: Real>(turns: T) -> T {
     turns - (turns + T::of(0.5)).floor()
 }

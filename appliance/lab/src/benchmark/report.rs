@@ -7,10 +7,10 @@ use super::point::{Point, means};
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 
-/// What was measured; nothing where it was not asked for.
+/// What was measured; `None` where it was not asked for.
 #[derive(Debug)]
 pub struct Report {
-    /// Where.
+    /// The machine.
     pub machine: Machine,
     /// The kernel table.
     pub kernel: Option<KernelTable>,

@@ -34,7 +34,7 @@ pub fn decoders(
         .collect())
 }
 
-/// The two references: what a newcomer writes, in both precisions.
+/// The textbook's decoder in both precisions.
 ///
 /// # Errors
 /// If the sequence cannot be decoded.

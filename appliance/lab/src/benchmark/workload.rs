@@ -30,7 +30,7 @@ pub const RANGE: PhaseRange = PhaseRange {
 };
 /// n of the dense levels.
 const DENSE_N: f64 = 6.0;
-/// Offset and modulation of lit pixels and the light of dark ones, shares of full scale.
+/// Offset and modulation of lit pixels, and the value of dark ones, as shares of full scale.
 const OFFSET: f64 = 0.48;
 const MODULATION: f64 = 0.40;
 const DARK: f64 = 0.04;

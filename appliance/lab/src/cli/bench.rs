@@ -54,7 +54,7 @@ impl Bench {
         if let Some(folder) = &self.frames {
             return self.write_frames(folder);
         }
-        // Made before the minutes of measuring, not found wanting after them.
+        // Made first: a folder that cannot be written is found before minutes of measuring.
         let folder = self.out.as_deref().map(OutputFolder::create);
         let folder = folder.transpose()?;
         let progress = self.quiet.progress();

@@ -18,7 +18,7 @@ pub struct Campaign {
     pub seeds: u64,
 }
 
-/// What came out.
+/// The results of all runs.
 #[derive(Debug, Default)]
 pub struct Results {
     /// One row per run.
@@ -28,7 +28,7 @@ pub struct Results {
 }
 
 impl Campaign {
-    /// Runs everything. `progress` is told the share done and what is being done.
+    /// Runs everything. `progress` is called with the share done, 0…1, and with the run that begins.
     ///
     /// # Errors
     /// If the simulated head or a pattern fails.

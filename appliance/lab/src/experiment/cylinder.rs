@@ -22,7 +22,7 @@ const STEPS: usize = 12;
 /// x₀, a, z₀, c, radius.
 const UNKNOWNS: usize = 5;
 
-/// Fits a cylinder along y to points (x, y, z) in mm, seen from +z; none where they determine none.
+/// Fits a cylinder along y to points (x, y, z) in mm that lie on the side towards +z; `None` where they do not determine one.
 pub fn fit(points: &[[f64; 3]]) -> Option<Cylinder> {
     let count = points.len() as f64;
     let extent = |axis: usize| {

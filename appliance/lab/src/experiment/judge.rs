@@ -9,15 +9,15 @@ use appliance::rig::Measured;
 /// What a method reached on a part.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// Errors against truth; none where nothing was resolved.
+    /// Errors against truth; `None` where nothing was resolved.
     pub score: Option<Score>,
-    /// Pixels that truth calls wholly lit: those that everything here is counted over, as the study does.
+    /// Pixels that truth calls wholly lit. Everything here is counted over them, as in the study.
     pub lit: usize,
     /// Those of them that are not resolved.
     pub unresolved: usize,
     /// RMS of error / predicted σ_z over scored pixels without gross errors.
     pub error_over_sigma: f64,
-    /// The cylinder through the resolved points, of a part that is judged by it.
+    /// The cylinder fitted to the resolved points, of a part that is judged by it.
     pub cylinder: Option<Cylinder>,
 }
 
@@ -31,7 +31,7 @@ impl Outcome {
     }
 }
 
-/// Judges a measurement of a part of which all is known.
+/// Compares a measurement of a simulated part with the truth.
 pub fn judge(truth: &sim::Truth, measured: &Measured, judged: Judged) -> Outcome {
     let known = Truth {
         height: Some(&truth.height),

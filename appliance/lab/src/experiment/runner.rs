@@ -136,8 +136,8 @@ impl Runner {
         }
     }
 
-    /// Measures with a sequence of the caller's choice and the noise of `seed`: the levels for a phase function with
-    /// this range are asked for. Answers the map that it is unwrapped about as well.
+    /// Measures with a sequence of the caller's choice and the noise of `seed`. `frames` returns ratio and shift of each
+    /// frame for the range of the phase function. The second result is the map that the phase was unwrapped about.
     ///
     /// # Errors
     /// If the head or the pattern fails.
@@ -165,7 +165,7 @@ impl Runner {
         Ok((measured, map))
     }
 
-    /// What is true of the part.
+    /// The true heights and classes of the pixels.
     pub fn truth(&self) -> &Truth {
         &self.truth
     }

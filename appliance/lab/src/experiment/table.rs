@@ -29,7 +29,7 @@ pub struct Row {
     pub values: Values,
 }
 
-/// The measured quantities of a row; NaN (an empty cell, null) where there is none.
+/// The measured quantities of a row; NaN where there is no value (an empty cell in CSV, null in JSON).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Values {
     /// Resolved pixels that truth calls wholly lit.

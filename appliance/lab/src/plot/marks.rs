@@ -1,4 +1,4 @@
-//! What a plot is drawn with: lines, dots and words, and how they are told in SVG.
+//! The marks that a plot consists of (lines, dots, words), and how they are written as SVG.
 
 use std::fmt::Write as _;
 

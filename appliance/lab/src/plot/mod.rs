@@ -1,7 +1,7 @@
 //! Plots with labelled points, as SVG and PNG.
 //!
-//! Own and small: a plot is a frame, ticks, and points whose labels keep clear of each other, which is
-//! the one thing that plotting libraries do not do.
+//! Written here and not by a plotting library, because the labels of the points have to keep clear of each other and of
+//! the lines, which those libraries do not do; the rest is a frame and ticks.
 
 mod axis;
 mod labels;
