@@ -4,6 +4,8 @@ use super::Outcome;
 use super::cases::{Case, FRINGES};
 use algo::frame::{FrameView, Samples};
 use algo::units::AbsolutePhase;
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 /// Samples between the end of a row and the next.
 const PADDING: usize = 3;
@@ -41,7 +43,8 @@ impl Image {
             width,
             height,
         };
-        let mut random = Random(u64::from(case.bits) << 8 | case.steps as u64);
+        // The hashes of the probe are frozen, and with them this generator.
+        let mut random = SplitMix64::seed_from_u64(u64::from(case.bits) << 8 | case.steps as u64);
         let frames = case.frames().map(|(ratio, k)| {
             let mut samples = vec![0; (width + PADDING) * height];
             for (v, row) in samples.chunks_mut(width + PADDING).enumerate() {
@@ -117,8 +120,8 @@ impl Scene {
         (phase * (ratio * f64::from(1 << 30)) as i64) >> 30
     }
 
-    fn sample(&self, u: usize, v: usize, turn: u16, finest: bool, random: &mut Random) -> u16 {
-        let draw = random.next();
+    fn sample(&self, u: usize, v: usize, turn: u16, finest: bool, random: &mut SplitMix64) -> u16 {
+        let draw = random.next_u64();
         let band = if self.light == Light::Everything {
             6 * v / self.height
         } else {
@@ -162,17 +165,4 @@ fn sine(turn: u16) -> i64 {
     let x = i64::from(turn as i16);
     let y = (4 * x * (32_768 - x.abs())) >> 15;
     y + ((29 * (((y * y.abs()) >> 15) - y)) >> 7)
-}
-
-/// SplitMix64 (Steele, Lea & Flood 2014).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
 }

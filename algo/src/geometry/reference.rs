@@ -156,18 +156,19 @@ pub fn fit_map(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand_xoshiro::SplitMix64;
+    use rand_xoshiro::rand_core::{Rng, SeedableRng};
     use std::vec::Vec;
 
     #[test]
     fn the_fit_follows_the_map_and_drops_its_noise() {
         let truth =
             |u: f64, v: f64| 500.0 + 1.4 * u - 2e-4 * u * u + 1e-4 * u * v + 1e-7 * v * v * v;
-        let mut seed = 7_u64;
+        let mut random = SplitMix64::seed_from_u64(7);
         let samples: Vec<_> = (0..128 * 96)
             .map(|i| {
                 let (u, v) = (f64::from(i % 128), f64::from(i / 128));
-                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                let noise = (seed >> 40) as f64 / 16_777_216.0 - 0.5;
+                let noise = (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
                 (u, v, truth(u, v) + noise)
             })
             .collect();

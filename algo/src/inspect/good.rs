@@ -338,19 +338,17 @@ fn density(t: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand_xoshiro::SplitMix64;
+    use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
     const SIDE: usize = 9;
 
-    /// Normal numbers from a fixed seed, by SplitMix64.
-    struct Normal(u64);
+    /// Normal numbers from a fixed seed.
+    struct Normal(SplitMix64);
 
     impl Normal {
         fn uniform(&mut self) -> f64 {
-            self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-            let mut z = self.0;
-            z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-            ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+            (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
         }
 
         fn next(&mut self) -> f64 {
@@ -413,7 +411,7 @@ mod tests {
                 }
             }
             let predicted = LargestDeviation::new(&sigmas, WIDTH, SIDE);
-            let mut random = Normal(5);
+            let mut random = Normal(SplitMix64::seed_from_u64(5));
             let drawn: Vec<f64> = (0..DRAWS)
                 .map(|_| largest(WIDTH, &sigma, &mut random))
                 .collect();

@@ -10,6 +10,8 @@ use super::pictures::{Lit, counts};
 use hal::error::Error;
 use hal::head::{DynHead, Showing};
 use hal::projector::Raster;
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::time::Duration;
 
 /// Changes between black and white in a round.
@@ -83,11 +85,11 @@ impl Round {
         let (exposure, refresh) = (head.camera_timing().exposure, head.refresh());
         let whole = exposure.as_nanos().div_ceil(refresh.as_nanos().max(1));
         let whole = u32::try_from(whole).unwrap_or(1).clamp(1, 100);
-        let mut state = u64::from(round).wrapping_add(1);
+        let mut random = SplitMix64::seed_from_u64(u64::from(round).wrapping_add(1));
         let mut showings: Vec<Showing> = (0..CHANGES)
             .map(|change| Showing {
                 index: change as usize % 2,
-                refreshes: whole + random(&mut state) % 3,
+                refreshes: whole + (random.next_u64() >> 33) as u32 % 3,
                 settle: 0,
             })
             .collect();
@@ -220,14 +222,6 @@ fn corner_of_inverse(m: &[[f64; 3]; 3]) -> Option<f64> {
         + m[1][2] * (m[0][2] * m[0][1] - m[0][0] * m[1][2]);
     let corner = minor / determinant;
     (corner.is_finite() && corner > 0.0).then_some(corner)
-}
-
-/// Numbers without an order (SplitMix64: Steele, Lea, Flood 2014).
-fn random(state: &mut u64) -> u32 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (*state ^ *state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ z >> 31) >> 33) as u32
 }
 
 #[cfg(test)]

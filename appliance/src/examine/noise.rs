@@ -158,25 +158,24 @@ fn fit(points: &[NoisePoint]) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand_xoshiro::SplitMix64;
+    use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-    /// Uniform numbers of mean 0 and variance 1 (SplitMix64).
-    fn random(state: &mut u64) -> f64 {
-        *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (*state ^ *state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (((z ^ z >> 31) >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 12_f64.sqrt()
+    /// A uniform number of mean 0 and variance 1.
+    fn uniform(random: &mut SplitMix64) -> f64 {
+        ((random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 12_f64.sqrt()
     }
 
     #[test]
     fn read_and_shot_noise_are_told_apart() {
-        let mut seed = 5;
+        let mut random = SplitMix64::seed_from_u64(5);
         for (read, shot) in [(2.0_f64, 0.05), (3.0, 0.0), (1.0, 0.2)] {
             let mut sums = Sums::new(1023.0);
             for level in (40..980).step_by(20) {
                 let sigma = (read * read + shot * f64::from(level)).sqrt();
                 let mut picture = || -> Vec<f32> {
                     (0..4000)
-                        .map(|_| (f64::from(level) + sigma * random(&mut seed)).round() as f32)
+                        .map(|_| (f64::from(level) + sigma * uniform(&mut random)).round() as f32)
                         .collect()
                 };
                 let (first, second) = (picture(), picture());

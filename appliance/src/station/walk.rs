@@ -2,6 +2,9 @@
 
 use std::sync::Arc;
 
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+
 use super::control;
 use super::event::MAX_EFFECTS;
 use super::machine::MAX_BUFFERED;
@@ -11,20 +14,12 @@ use super::*;
 
 const EVENTS: u32 = 100_000;
 
-/// SplitMix64 (Steele, Lea, Flood 2014): a small generator is enough to shuffle events.
-struct Random(u64);
+/// The choices of the walk.
+struct Random(SplitMix64);
 
 impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
     fn below(&mut self, n: u64) -> u64 {
-        self.next() % n
+        self.0.next_u64() % n
     }
 
     fn word(&mut self, n: u64) -> u16 {
@@ -140,7 +135,7 @@ fn asked_for(after: &Snapshot) -> bool {
 
 #[test]
 fn a_hundred_thousand_random_events_break_no_promise() {
-    let mut random = Random(2024);
+    let mut random = Random(SplitMix64::seed_from_u64(2024));
     let mut edges = ConnectionEdges::default();
     let settings = Settings {
         teach_allowed: true,

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
 /// Faults of a simulated head. Chances are 0…1 per event, times are the longest that may happen; all are 0 by default.
@@ -90,18 +92,13 @@ impl Dice {
 
     /// Two independent numbers, 0 ≤ x < 1.
     fn throw(self, kind: Kind, n: u64) -> (f64, f64) {
-        // SplitMix64 (Steele, Lea, Flood 2014) of all three.
-        let mut state = self
+        let seed = self
             .seed
             .wrapping_add((kind as u64) << 56)
             .wrapping_add(n.wrapping_mul(0x2545_f491_4f6c_dd1d));
-        let mut next = || {
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let z = (state ^ state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((z ^ z >> 31) >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (next(), next())
+        let mut random = SplitMix64::seed_from_u64(seed);
+        let mut share = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+        (share(), share())
     }
 
     /// Whether the n-th event of a kind happens.

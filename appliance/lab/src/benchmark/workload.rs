@@ -4,6 +4,8 @@ use super::frames::{Buffer, FrameSet};
 use algo::pattern::{PhaseRange, Sequence};
 use algo::units::AbsolutePhase;
 use appliance::recipe::teach::dense;
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
 
 /// A kind of sequence, and how much of its frames is lit.
@@ -102,18 +104,18 @@ impl Workload {
             .collect();
         let size = (width, height);
         let phases: Vec<f64> = (0..width * height).map(|at| self.phase(at, size)).collect();
-        let mut seed = 0;
+        let mut random = SplitMix64::seed_from_u64(0);
         let mut samples = Vec::with_capacity(self.frames.len() * phases.len());
         for &(ratio, shift) in &self.frames {
             samples.extend(phases.iter().map(|phase| {
-                seed += 1;
                 let light = if phase.is_nan() {
                     DARK * full
                 } else {
                     let turns = ratio * phase + shift;
                     sine[((turns - turns.floor()) * 65_536.0) as usize & 0xFFFF]
                 };
-                let noise = (2.0 * random(seed) - 1.0) * NOISE * full;
+                let share = (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+                let noise = (2.0 * share - 1.0) * NOISE * full;
                 (light + noise).round().clamp(0.0, full) as u16
             }));
         }
@@ -149,12 +151,4 @@ impl Workload {
 /// The shifts of one level of `steps`.
 fn level(ratio: f64, steps: u32) -> impl Iterator<Item = (f64, f64)> {
     (0..steps).map(move |k| (ratio, f64::from(k) / f64::from(steps)))
-}
-
-/// A number in 0…1 for each seed: SplitMix64 (Steele, Lea & Flood 2014).
-fn random(seed: u64) -> f64 {
-    let mut z = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
 }

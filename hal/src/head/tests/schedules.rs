@@ -1,5 +1,8 @@
 //! Thousands of seeded fault schedules: no frame under another pattern's name or of a spoiled pulse, and an end within the deadline.
 
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+
 use super::*;
 use crate::clock::Clock as _;
 
@@ -8,17 +11,12 @@ const QUICK: u64 = 400;
 const ALL: u64 = 10_000;
 
 /// Numbers of a schedule, from its seed.
-struct Draw(u64);
+struct Draw(SplitMix64);
 
 impl Draw {
     /// 0 … below `n`.
     fn below(&mut self, n: u64) -> u64 {
-        // Numerical Recipes' LCG (Press et al. 2007, section 7.1); its high bits are good enough to choose with.
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % n
+        self.0.next_u64() % n
     }
 
     fn us(&mut self, below: u64) -> Duration {
@@ -36,10 +34,7 @@ impl Draw {
 
 /// A head of any kind with faults of any kind.
 fn schedule(seed: u64) -> (Mechanics, usize) {
-    let mut draw = Draw(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) + 1);
-    for _ in 0..4 {
-        draw.below(2);
-    }
+    let mut draw = Draw(SplitMix64::seed_from_u64(seed));
     let refresh = [
         REFRESH,
         Duration::from_micros(8_333),
@@ -85,9 +80,12 @@ fn schedule(seed: u64) -> (Mechanics, usize) {
         stamp_jitter_us: draw.below(2) * draw.below(60),
         lost_trigger: draw.chance(0.2),
         trigger_jitter_us: draw.below(2) * draw.below(100),
-        // Drawn below, so that the schedules of a seed stay what they were.
-        long_pulse: 0.0,
-        long_pulse_us: 0,
+        long_pulse: draw.chance(0.3),
+        // About as much as makes a difference, as the tolerance of stamps, as an exposure, and as several.
+        long_pulse_us: {
+            let longest = [150, 400, 20_000, 80_000][draw.below(4) as usize];
+            draw.below(longest)
+        },
         drift_ppm: draw.below(401) as i32 - 200,
         stall: draw.chance(0.2),
         stall_us: draw.below(40_000),
@@ -105,7 +103,7 @@ fn schedule(seed: u64) -> (Mechanics, usize) {
         compressed: false,
     };
     let stamps = [Stamp::ExposureStart, Stamp::ExposureEnd, Stamp::ReadoutEnd];
-    let mut mechanics = Mechanics {
+    let mechanics = Mechanics {
         refresh,
         flip_to_light,
         calibrated_flip_to_light: flip_to_light,
@@ -116,10 +114,6 @@ fn schedule(seed: u64) -> (Mechanics, usize) {
         faults,
     };
     let patterns = 1 + draw.below(16) as usize;
-    // About as much as makes a difference, as the tolerance of stamps, as an exposure, and as several.
-    let longest = [150, 400, 20_000, 80_000][draw.below(4) as usize];
-    mechanics.faults.long_pulse = draw.chance(0.3);
-    mechanics.faults.long_pulse_us = draw.below(longest);
     (mechanics, patterns)
 }
 

@@ -8,9 +8,9 @@ use std::vec::Vec;
 const WIDTH: usize = 150;
 const ROWS: usize = 24;
 
-/// Numbers without a pattern.
-fn scatter(seed: usize) -> i32 {
-    (seed as u32).wrapping_mul(2_654_435_761).rotate_left(13) as i32
+/// A hash of a place, which has the same number wherever it is asked for.
+fn scatter(place: usize) -> i32 {
+    (place as u32).wrapping_mul(2_654_435_761).rotate_left(13) as i32
 }
 
 #[test]
