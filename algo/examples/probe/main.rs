@@ -2,8 +2,9 @@
 //!
 //! ```text
 //! cargo run -p algo --example probe                 one line per back-end and case: hashes of the maps
-//! cargo run -p algo --example probe decode CASE R   decodes the first R rows of one case, once, and
-//!                                                   says how many pixels that are
+//! cargo run -p algo --example probe decode CASE R W decodes the first R rows of one case, W pixels wide
+//!                                                   (1456 if not said), once, and says how many pixels
+//!                                                   that are
 //! ```
 //!
 //! CASE is a case's name, with `/background` behind it if three quarters of the frames shall be dark, or `/arrival` if the
@@ -92,7 +93,7 @@ fn main() -> Outcome<()> {
             }
             Ok(())
         }
-        ["decode", counted, rows] => {
+        ["decode", counted, rows, ref rest @ ..] if rest.len() <= 1 => {
             let (name, way) = counted.split_once('/').unwrap_or((counted, ""));
             let light = match way {
                 "background" => Light::Background,
@@ -100,7 +101,11 @@ fn main() -> Outcome<()> {
             };
             let case = CASES.iter().find(|case| case.name == name);
             let case = case.ok_or("no such case")?;
-            let (width, height) = COUNTED;
+            let (widest, height) = COUNTED;
+            let width = match rest.first() {
+                Some(width) => width.parse::<usize>()?.min(widest),
+                None => widest,
+            };
             let image = Image::new(case, light, width, height);
             let frames = image.frames(rows.parse::<usize>()?.min(height))?;
             let decoder = case.decoder()?;
@@ -110,7 +115,7 @@ fn main() -> Outcome<()> {
             };
             Ok(writeln!(stdout(), "{}", black_box(map).phase.len())?)
         }
-        _ => Err("usage: probe [decode CASE ROWS]".into()),
+        _ => Err("usage: probe [decode CASE ROWS [WIDTH]]".into()),
     }
 }
 

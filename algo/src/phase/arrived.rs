@@ -154,6 +154,7 @@ impl Arrived {
     }
 
     /// Every row, for the next level to be written to.
+    #[cfg(test)]
     pub(crate) fn rows(&mut self) -> impl Iterator<Item = ArrivingRow<'_>> {
         let width = self.width.max(1);
         let (level, (first, second, third)) = self.arriving();

@@ -1,7 +1,7 @@
 //! Fewer columns than a block: a block around them, of rows that are narrower a copy that is wide enough.
 
 use super::PhaseRow;
-use super::arrived::{ClimbedRow, ClimbedRowMut, WrappedRow, WrappedRowMut};
+use super::arrived::{ClimbedRow, ClimbedRowMut, NO_DOUBT, WrappedRow, WrappedRowMut};
 use super::fold::BlockSample;
 use crate::frame::{FrameView, Samples};
 use crate::trust::Trust;
@@ -76,19 +76,19 @@ impl FewResults {
     }
 }
 
-/// A padded row of what geometric levels have come to.
-pub(super) struct FewClimbed {
-    pub fraction: [u16; MAX_PIXELS],
-    pub turns: [u16; MAX_PIXELS],
-    pub doubt: [u8; MAX_PIXELS],
+/// `N` columns of what geometric levels have come to.
+pub(super) struct FewClimbed<const N: usize> {
+    pub fraction: [u16; N],
+    pub turns: [u16; N],
+    pub doubt: [u8; N],
 }
 
-impl FewClimbed {
-    pub fn new(row: ClimbedRow<'_>, columns: &Range<usize>) -> Self {
+impl<const N: usize> FewClimbed<N> {
+    pub fn new() -> Self {
         Self {
-            fraction: padded(row.fraction, columns),
-            turns: padded(row.turns, columns),
-            doubt: padded(row.doubt, columns),
+            fraction: [0; N],
+            turns: [0; N],
+            doubt: [NO_DOUBT; N],
         }
     }
 
@@ -109,26 +109,29 @@ impl FewClimbed {
     }
 }
 
-/// A padded row of a level about a known map.
-pub(super) struct FewWrapped {
-    pub phase: [u16; MAX_PIXELS],
-    pub doubts: [u8; MAX_PIXELS],
-}
-
-impl Default for FewWrapped {
-    fn default() -> Self {
+impl FewClimbed<MAX_PIXELS> {
+    /// Padded columns of a row.
+    pub fn padded(row: ClimbedRow<'_>, columns: &Range<usize>) -> Self {
         Self {
-            phase: [0; MAX_PIXELS],
-            doubts: [0; MAX_PIXELS],
+            fraction: padded(row.fraction, columns),
+            turns: padded(row.turns, columns),
+            doubt: padded(row.doubt, columns),
         }
     }
 }
 
-impl FewWrapped {
-    pub fn new(row: WrappedRow<'_>, columns: &Range<usize>) -> Self {
+/// `N` columns of a level about a known map.
+#[derive(Clone, Copy)]
+pub(super) struct FewWrapped<const N: usize> {
+    pub phase: [u16; N],
+    pub doubts: [u8; N],
+}
+
+impl<const N: usize> FewWrapped<N> {
+    pub fn new() -> Self {
         Self {
-            phase: padded(row.phase, columns),
-            doubts: padded(row.doubts, columns),
+            phase: [0; N],
+            doubts: [0; N],
         }
     }
 
@@ -143,6 +146,16 @@ impl FewWrapped {
         WrappedRowMut {
             phase: &mut self.phase,
             doubts: &mut self.doubts,
+        }
+    }
+}
+
+impl FewWrapped<MAX_PIXELS> {
+    /// Padded columns of a row.
+    pub fn padded(row: WrappedRow<'_>, columns: &Range<usize>) -> Self {
+        Self {
+            phase: padded(row.phase, columns),
+            doubts: padded(row.doubts, columns),
         }
     }
 }

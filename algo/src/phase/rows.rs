@@ -81,18 +81,19 @@ impl Decoder {
         out: PhaseRow<'_>,
     ) {
         let places = self.levels.iter().flat_map(|level| &level.frames);
-        // A sequence has no more frames than fit.
-        let rows: heapless::Vec<&[T], MAX_FRAMES> =
-            places.map(|&at| T::row(frames[at], v)).collect();
+        // A sequence has no more frames than fit. Filled in place: `collect` moves all 8 KiB of it, for every row.
+        let mut rows: heapless::Vec<&[T], MAX_FRAMES> = heapless::Vec::new();
+        rows.extend(places.map(|&at| T::row(frames[at], v)));
         if columns.len() >= MAX_PIXELS {
             return self.columns(&rows, map, columns, out);
         }
         let near = near(&columns, width(&rows));
         let padded = padded_rows(&rows, &near);
-        let rows: heapless::Vec<&[T], MAX_FRAMES> = near_rows(&rows, &padded, &near);
+        let mut around: heapless::Vec<&[T], MAX_FRAMES> = heapless::Vec::new();
+        around.extend(near_rows(&rows, &padded, &near));
         let mut few = FewResults::new();
         let map = few_known(map, &near);
-        self.columns(&rows, &map, 0..MAX_PIXELS, few.row());
+        self.columns(&around, &map, 0..MAX_PIXELS, few.row());
         few.copy_to(out, columns, near.start);
     }
 
@@ -128,17 +129,20 @@ impl Decoder {
         v: usize,
         row: ArrivingRow<'_>,
     ) {
-        let rows = level_rows::<T>(frames, v);
+        let mut rows = LevelRows::new();
+        rows.extend(frames.iter().map(|&frame| T::row(frame, v)));
         let width = width(&rows);
         if width >= MAX_PIXELS {
             return self.arrive(level, &rows, width, row);
         }
         let columns = 0..width;
         let padded = padded_rows(&rows, &columns);
-        let rows: heapless::Vec<&[T], MAX_SHIFTS> = near_rows(&rows, &padded, &columns);
+        let mut around = LevelRows::new();
+        around.extend(near_rows(&rows, &padded, &columns));
+        let rows = around;
         match row {
             ArrivingRow::Climbing(out) => {
-                let mut few = FewClimbed::new(out.as_row(), &columns);
+                let mut few = FewClimbed::padded(out.as_row(), &columns);
                 self.arrive(
                     level,
                     &rows,
@@ -150,7 +154,7 @@ impl Decoder {
                 out.doubt.copy_from_slice(&few.doubt[..width]);
             }
             ArrivingRow::Wrapping { row: out, .. } => {
-                let mut few = FewWrapped::default();
+                let mut few = FewWrapped::<MAX_PIXELS>::new();
                 let row = ArrivingRow::Wrapping {
                     coarsest: None,
                     row: few.row_mut(),
@@ -185,16 +189,19 @@ impl Decoder {
         columns: Range<usize>,
         out: PhaseRow<'_>,
     ) {
-        let rows = level_rows::<T>(last, v);
+        let mut rows = LevelRows::new();
+        rows.extend(last.iter().map(|&frame| T::row(frame, v)));
         let (climbed, wrapped) = (arrived.climbed_row(v), arrived.wrapped_rows(v));
         if columns.len() >= MAX_PIXELS {
             return self.last(&rows, climbed, &wrapped, map, columns, out);
         }
         let near = near(&columns, width(&rows));
         let padded = padded_rows(&rows, &near);
-        let rows: heapless::Vec<&[T], MAX_SHIFTS> = near_rows(&rows, &padded, &near);
-        let climbed = climbed.map(|row| FewClimbed::new(row, &near));
-        let wrapped = wrapped.iter().map(|row| FewWrapped::new(*row, &near));
+        let mut around = LevelRows::new();
+        around.extend(near_rows(&rows, &padded, &near));
+        let rows = around;
+        let climbed = climbed.map(|row| FewClimbed::padded(row, &near));
+        let wrapped = wrapped.iter().map(|row| FewWrapped::padded(*row, &near));
         let wrapped: heapless::Vec<_, MAX_LEVELS> = wrapped.collect();
         let wrapped: heapless::Vec<_, MAX_LEVELS> = wrapped.iter().map(FewWrapped::row).collect();
         let climbed = climbed.as_ref().map(FewClimbed::row);
@@ -236,13 +243,8 @@ fn results<'a>(out: PhaseRow<'a>, columns: &Range<usize>) -> Results<'a> {
     Results::new(out.phase, out.modulation, out.trust, columns.end)
 }
 
-/// The rows of a level's frames.
-fn level_rows<'a, T: RowSample>(
-    frames: &[FrameView<'a>],
-    v: usize,
-) -> heapless::Vec<&'a [T], MAX_SHIFTS> {
-    frames.iter().map(|&frame| T::row(frame, v)).collect()
-}
+/// The rows of a level's frames, filled in place as those of all frames are.
+type LevelRows<'a, T> = heapless::Vec<&'a [T], MAX_SHIFTS>;
 
 /// Pixels of a row.
 fn width<T>(rows: &[&[T]]) -> usize {
@@ -262,15 +264,17 @@ fn padded_rows<T: RowSample>(rows: &[&[T]], near: &Range<usize>) -> Vec<[T; MAX_
 }
 
 /// The rows' columns, or the copies that are wide enough.
-fn near_rows<'a, T, const N: usize>(
+fn near_rows<'a, T>(
     rows: &[&'a [T]],
     padded: &'a [[T; MAX_PIXELS]],
     near: &Range<usize>,
-) -> heapless::Vec<&'a [T], N> {
-    match padded {
-        [] => rows.iter().map(|row| &row[near.clone()]).collect(),
-        padded => padded.iter().map(|row| &row[..]).collect(),
-    }
+) -> impl Iterator<Item = &'a [T]> {
+    rows.iter()
+        .enumerate()
+        .map(|(at, row)| match padded.get(at) {
+            Some(padded) => &padded[..],
+            None => &row[near.clone()],
+        })
 }
 
 fn few_known(map: &[AbsolutePhase], columns: &Range<usize>) -> [AbsolutePhase; MAX_PIXELS] {

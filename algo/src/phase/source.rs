@@ -55,8 +55,11 @@ impl<T: BlockSample> Frames for &[&[T]] {
         v: V,
         level: &LevelLanes<'_, V>,
         at: usize,
-        _after: usize,
+        after: usize,
     ) -> Folded<V> {
+        for row in *self {
+            v.fetch(row, at, after);
+        }
         fold(v, level, self, at)
     }
 }

@@ -4,6 +4,7 @@ use super::Lanes;
 use super::plain;
 use crate::trust::Trust;
 use crate::units::{AbsolutePhase, Modulation};
+use core::ops::Range;
 
 /// Phase, modulation and trust of a row as plain numbers, of equal length.
 pub(crate) struct Results<'a> {
@@ -38,6 +39,15 @@ impl<'a> Results<'a> {
             phase: &mut self.phase[..length],
             modulation: &mut self.modulation[..length],
             trust: &mut self.trust[..length],
+        }
+    }
+
+    /// Columns of the row.
+    pub fn part(&mut self, columns: &Range<usize>) -> Results<'_> {
+        Results {
+            phase: &mut self.phase[columns.clone()],
+            modulation: &mut self.modulation[columns.clone()],
+            trust: &mut self.trust[columns.clone()],
         }
     }
 

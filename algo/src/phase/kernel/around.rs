@@ -2,12 +2,13 @@
 
 use super::climb::{doubled_where, four};
 use super::doubt::{Doubts, none, trust};
-use super::next_block;
+use super::{STRETCH, next_block, of_stretch, stretches};
 use crate::phase::about::{About, AboutLanes, Around};
 use crate::phase::angle::AngleLanes;
-use crate::phase::arrived::{Arrived, ArrivingRow, WrappedRow, WrappedRowMut};
+use crate::phase::arrived::{WrappedRow, WrappedRowMut};
 use crate::phase::fold::BlockSample;
 use crate::phase::level::{Demodulated, Level, LevelLanes};
+use crate::phase::narrow::FewWrapped;
 use crate::phase::source::{Frames, Source};
 use crate::phase::step::Turns;
 use crate::simd::{Backend, Four, Lanes, Results, back_end_entry, plain};
@@ -38,7 +39,7 @@ pub(crate) fn around_row<T: BlockSample>(
     }
 }
 
-/// One level after the other, as if they arrived one after the other.
+/// One level after the other, stretch by stretch.
 fn in_turn<T: BlockSample>(
     backend: Backend,
     plan: &About,
@@ -46,22 +47,36 @@ fn in_turn<T: BlockSample>(
     rows: &[&[&[T]]],
     map: &[AbsolutePhase],
     columns: Range<usize>,
-    out: Results<'_>,
+    mut out: Results<'_>,
 ) {
-    let Some((last, coarser)) = rows.split_last() else {
+    let Some((last, others)) = rows.split_last() else {
         return;
     };
-    let mut arrived = Arrived::wrapping(columns.end, 1, coarser.len());
-    for (level, rows) in levels.iter().zip(coarser) {
-        for row in arrived.rows() {
-            if let ArrivingRow::Wrapping { coarsest, row } = row {
-                wrap_row(backend, level, rows, coarsest, columns.clone(), row);
-            }
+    // Dense levels are three at most.
+    let mut room = [FewWrapped::<STRETCH>::new(); 2];
+    for stretch in stretches(columns) {
+        let columns = 0..stretch.len();
+        let mut before: heapless::Vec<WrappedRow<'_>, 2> = heapless::Vec::new();
+        for ((level, rows), room) in levels.iter().zip(others).zip(&mut room) {
+            let rows = of_stretch(rows, &stretch);
+            let coarsest = before.first().copied();
+            wrap_row(
+                backend,
+                level,
+                &rows,
+                coarsest,
+                columns.clone(),
+                room.row_mut(),
+            );
+            before.extend([room.row()]);
         }
-        arrived.add_level();
+        let (rows, map, out) = (
+            of_stretch(last, &stretch),
+            &map[stretch.clone()],
+            out.part(&stretch),
+        );
+        last_row(backend, plan, levels, &before, &rows, map, columns, out);
     }
-    let before = arrived.wrapped_rows(0);
-    last_row(backend, plan, levels, &before, last, map, columns, out);
 }
 
 /// As [`around_row`], from the levels that have arrived and the frames of the finest.

@@ -3,11 +3,11 @@
 use super::arrive::{arrive_row, top_row};
 use super::climb::{Ground, Rung, four};
 use super::doubt::unless_dark;
-use super::next_block;
-use crate::phase::arrived::{Arrived, ArrivingRow};
+use super::{STRETCH, next_block, of_stretch, stretches};
 use crate::phase::fold::BlockSample;
 use crate::phase::geometric::Geometric;
 use crate::phase::level::{Level, LevelLanes};
+use crate::phase::narrow::FewClimbed;
 use crate::phase::source::Frames;
 use crate::simd::{Backend, Four, Lanes, Results, back_end_entry};
 use crate::trust::Trust;
@@ -44,7 +44,7 @@ pub(crate) fn climb_row<T: BlockSample>(
     plan.finish(&mut out.phase[part]);
 }
 
-/// One level after the other, as if they arrived one after the other.
+/// One level after the other, stretch by stretch.
 fn in_turn<T: BlockSample>(
     backend: Backend,
     plan: &Geometric,
@@ -53,20 +53,19 @@ fn in_turn<T: BlockSample>(
     columns: Range<usize>,
     out: &mut Results<'_>,
 ) {
-    let mut arrived = Arrived::climbing(columns.end, 1);
     let (Some((finest, coarser)), Some((last, rows))) = (levels.split_last(), rows.split_last())
     else {
         return;
     };
-    for (at, (level, rows)) in coarser.iter().zip(rows).enumerate() {
-        for row in arrived.rows() {
-            if let ArrivingRow::Climbing(row) = row {
-                arrive_row(backend, plan, at, level, rows, columns.clone(), row);
-            }
+    let mut climbed = FewClimbed::<STRETCH>::new();
+    for stretch in stretches(columns) {
+        let (columns, mut out) = (0..stretch.len(), out.part(&stretch));
+        for (at, (level, rows)) in coarser.iter().zip(rows).enumerate() {
+            let (rows, row) = (of_stretch(rows, &stretch), climbed.row_mut());
+            arrive_row(backend, plan, at, level, &rows, columns.clone(), row);
         }
-    }
-    if let Some(before) = arrived.climbed_row(0) {
-        top_row(backend, plan, finest, last, before, columns, out);
+        let (rows, before) = (of_stretch(last, &stretch), climbed.row());
+        top_row(backend, plan, finest, &rows, before, columns, &mut out);
     }
 }
 

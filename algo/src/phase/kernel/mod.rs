@@ -6,6 +6,8 @@ mod climb;
 mod doubt;
 pub(super) mod fused;
 
+use super::narrow::MAX_PIXELS;
+use crate::pattern::MAX_SHIFTS;
 use crate::simd::Lanes;
 use core::ops::Range;
 
@@ -17,4 +19,27 @@ fn next_block<V: Lanes>(at: usize, columns: &Range<usize>) -> Option<usize> {
         return None;
     }
     Some(at.min(columns.end - V::PIXELS))
+}
+
+/// Columns of a row that levels are decoded of one after the other, with what each says of the next on the stack.
+const STRETCH: usize = 512;
+
+/// The columns in stretches of at most [`STRETCH`] and at least [`MAX_PIXELS`]: the last may begin before the end of the one
+/// before it.
+fn stretches(columns: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let Range { start, end } = columns;
+    (start..end).step_by(STRETCH).map(move |at| {
+        let start = at.min(end - MAX_PIXELS);
+        start..(at + STRETCH).min(end)
+    })
+}
+
+/// The rows of a level, of these columns only.
+fn of_stretch<'a, T>(
+    rows: &[&'a [T]],
+    columns: &Range<usize>,
+) -> heapless::Vec<&'a [T], MAX_SHIFTS> {
+    let mut part = heapless::Vec::new();
+    part.extend(rows.iter().map(|row| &row[columns.clone()]));
+    part
 }
