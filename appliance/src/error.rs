@@ -48,7 +48,7 @@ impl Failure {
     /// A device that cannot be opened.
     pub fn of_device(error: &hal::error::Error) -> Self {
         Self {
-            code: Some(crate::worker::code_of(error)),
+            code: Some(crate::production::code_of(error)),
             ..Self::new(Exit::Unavailable, error.to_string())
         }
     }

@@ -4,9 +4,9 @@
 mod plans;
 
 use allocation_counter::measure;
-use appliance::calibration::Calibration;
-use appliance::plan::Plan;
+use appliance::head::calibration::Calibration;
 use appliance::recipe::golden::Naming;
+use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::teach;
 use appliance::recipe::{AxisFile, ComponentFile, GaugeFile, GaugeKind, Recipe, archive};
 use appliance::station::{

@@ -2,8 +2,8 @@
 
 use super::{TIMEOUT, naming};
 use allocation_counter::measure;
-use appliance::calibration::Calibration;
-use appliance::plan::Plan;
+use appliance::head::calibration::Calibration;
+use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::teach;
 use appliance::recipe::{Recipe, archive};
 use sim::Scenario;

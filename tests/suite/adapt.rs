@@ -2,10 +2,10 @@
 
 use crate::measured::SPHERE;
 use crate::written::{Written, geometric, program};
-use appliance::calibration::Calibration;
+use appliance::head::calibration::Calibration;
+use appliance::head::rig::{self, About};
 use appliance::recipe::Recipe;
 use appliance::recipe::teach::{Naming, teach};
-use appliance::rig::{self, About};
 use hal::head::DynHead;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedFrame, RecordedProjector};

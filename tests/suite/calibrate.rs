@@ -1,6 +1,6 @@
 //! `fringed calibrate` on simulated heads: what is measured is what the scenario says, and what is written survives.
 
-use appliance::calibration::place::Place;
+use appliance::head::calibration::place::Place;
 use serde_json::Value;
 use sim::Scenario;
 use std::fs;

@@ -1,8 +1,8 @@
 //! A line that changes its part between triggers: the verdict is always that of the recipe that was asked for.
 
 use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, TRIGGER, long, trigger};
-use appliance::calibration::Calibration;
-use appliance::plan::Plan;
+use appliance::head::calibration::Calibration;
+use appliance::recipe::plan::Plan;
 use appliance::recipe::{Recipe, Store, archive};
 use sim::Scenario;
 use std::fs;

@@ -1,7 +1,7 @@
 //! `fringed doctor` on the simulated head: a well head passes, each single fault is named and nothing else.
 
-use appliance::calibration::Calibration;
-use appliance::doctor::{Verdict, examine};
+use appliance::head::calibration::Calibration;
+use appliance::head::doctor::{Verdict, examine};
 use hal::head::Timing;
 use serde_json::Value;
 use sim::Scenario;

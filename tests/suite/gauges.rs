@@ -4,12 +4,12 @@ use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
 use super::station_plc::{Daemon, Place, Plc, READY, SMALL_HEAD, long};
 use algo::inspect::{Findings, Production};
 use algo::simd::Backend;
-use appliance::plan::Plan;
+use appliance::head::seam;
 use appliance::recipe::archive::{Arrays, pack};
+use appliance::recipe::plan::Plan;
 use appliance::recipe::{
     AlignmentKind, AxisFile, ComponentFile, GaugeFile, GaugeKind, Recipe, RecipeFile, RegionFile,
 };
-use appliance::seam;
 use appliance::station::{Inspection, Unit, Verdict};
 use hal::frame::Frame;
 use sim::parts::{Plane, SheetMetal};

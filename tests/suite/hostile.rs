@@ -2,8 +2,8 @@
 
 use crate::station_plc::{PATIENCE, READY, SMALL_HEAD, long, trigger};
 use appliance::config::Config;
-use appliance::daemon::Daemon;
-use appliance::progress::Progress;
+use appliance::service::Daemon;
+use appliance::system::progress::Progress;
 use fringed_lab::benchmark::median;
 use std::fs;
 use std::io::{Read as _, Write as _};

@@ -3,8 +3,8 @@
 use super::placement::{Bed, TIMEOUT, bed};
 use algo::geometry::Vector;
 use algo::units::Height;
-use appliance::plan::Plan;
 use appliance::recipe::good_parts::GoodPartsFile;
+use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, teach};
 use appliance::station::{Inspection, Verdict};
 use sim::parts::{Defect, Flowerpot, SheetMetal};

@@ -2,12 +2,12 @@
 
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
-use appliance::calibration::Calibration;
-use appliance::plan::Plan;
+use appliance::head::calibration::Calibration;
+use appliance::head::rig::{About, Rig};
 use appliance::recipe::archive::{Arrays, pack};
+use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, Taught, teach};
 use appliance::recipe::{AlignmentKind, GaugeFile, Recipe, RecipeFile, RegionFile, safe};
-use appliance::rig::{About, Rig};
 use hal::head::DynHead;
 use sim::parts::{Cone, Plane, Sawtooth, SheetMetal, Sphere, Spline};
 use sim::{Part, Placement, Scenario, Stage};

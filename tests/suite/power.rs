@@ -1,10 +1,10 @@
 //! Losses of power: every prefix of what a run does to its files is opened, with what was not synced there, gone, or partly there.
 
 use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, STOPPING, command, long};
-use appliance::access::Access;
 use appliance::history::{self, Bounds, Filter, Numbering, Reader};
 use appliance::recipe::{Recipe, archive};
-use appliance::state::StateFolder;
+use appliance::storage::state::StateFolder;
+use appliance::web::access::Access;
 use hal::replay::Recording;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

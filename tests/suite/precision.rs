@@ -2,7 +2,7 @@
 
 use super::gauges::{all_kinds, frames, gauge, plan, regions};
 use super::placement::{Bed, TIMEOUT, bed};
-use appliance::plan::Plan;
+use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, Taught, teach};
 use appliance::recipe::{GaugeKind, RecipeFile, SequenceKind};
 use appliance::station::{Inspection, Verdict};

@@ -5,14 +5,14 @@ use crate::station_plc::{
     Daemon as Program, ONLINE, PATIENCE, Place, Plc, READY, RECIPE_OK, SMALL_HEAD, Status, long,
     trigger,
 };
-use appliance::calibration::Calibration;
-use appliance::computing::Computing;
 use appliance::config::Config;
-use appliance::daemon::Daemon;
+use appliance::head::calibration::Calibration;
 use appliance::history::seqs::AHEAD;
-use appliance::progress::Progress;
 use appliance::recipe::teach::{Naming, TeachError, teach_while};
+use appliance::service::Daemon;
 use appliance::station::{ConnectionEdges, ControlWrite, Event, Masked, Request};
+use appliance::system::computing::Computing;
+use appliance::system::progress::Progress;
 use hal::error::Device;
 use sim::Scenario;
 use std::fs;

@@ -2,7 +2,7 @@
 //! the ends of the working range, and with patterns that give several heights.
 
 use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
-use appliance::seam;
+use appliance::head::seam;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
 use std::f64::consts::TAU;

@@ -1,13 +1,13 @@
 //! Boundary values in calibrations, models of OpenCV, recordings, scenarios and configurations.
 
 use super::{Place, Tally, values};
-use crate::calibration::Calibration;
-use crate::calibration::file::{
+use crate::config::Config;
+use crate::head::calibration::Calibration;
+use crate::head::calibration::file::{
     CalibrationFile, CameraFile, ContrastFile, FORMAT, LevelFile, MapFile, NoiseFile, PitchFile,
     ProjectorFile, ReferenceFile, TimingFile, VERSION,
 };
-use crate::calibration::opencv::{Declared, Sizes, from_two};
-use crate::config::Config;
+use crate::head::calibration::opencv::{Declared, Sizes, from_two};
 use crate::measure::measure;
 use hal::frame::{Frame, FrameFormat, Pixels};
 use hal::head::Stamp;

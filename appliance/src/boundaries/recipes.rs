@@ -1,10 +1,10 @@
 //! Boundary values in a recipe: its manifest, its arrays, its ZIP.
 
 use super::Tally;
-use crate::calibration::Calibration;
-use crate::plan::Plan;
+use crate::head::calibration::Calibration;
 use crate::recipe::archive::{members, parse, seal};
 use crate::recipe::golden::Naming;
+use crate::recipe::plan::Plan;
 use crate::recipe::teach::teach;
 use crate::recipe::{Recipe, Store};
 use hal::frame::Frame;

@@ -3,16 +3,16 @@
 use super::Bed;
 use super::recipes::HEAD;
 use crate::config::Config;
-use crate::daemon::Daemon;
-use crate::progress::Progress;
+use crate::production::caught;
 use crate::recipe::archive::pack;
 use crate::recipe::{Recipe, Store};
+use crate::service::Daemon;
 use crate::station::snapshot::status;
 use crate::station::{
     ActiveRecipe, ControlWrite, Effect, Event, Identity, Limits, Masked, Micros, RecipeKey,
     Request, Settings, Station, StationHandle, error_code,
 };
-use crate::worker::caught;
+use crate::system::progress::Progress;
 use std::fs;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -68,7 +68,7 @@ fn a_station_whose_recipe_cannot_be_used_stays_reachable_and_loads_another() {
     daemon.station.event(write);
     let load = Request::Load(RecipeKey::Number(2));
     daemon.station.event(Event::Request(load));
-    let runtime = crate::daemon::runtime().unwrap();
+    let runtime = crate::service::runtime().unwrap();
     let ready = runtime.block_on(async {
         let mut snapshots = daemon.station.subscribe();
         let ready = snapshots.wait_for(|now| now.is(status::READY)).await;

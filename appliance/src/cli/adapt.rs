@@ -3,9 +3,9 @@
 use super::names;
 use super::numbers::number;
 use super::options::{Json, Quiet, Threads, answer};
-use crate::adapt::{Choice, Method, adapt};
 use crate::error::{Exit, Failure};
-use crate::output::folder::OutputFolder;
+use crate::measure::adapt::{Choice, Method, adapt};
+use crate::storage::folder::OutputFolder;
 use algo::adaptive::{noise, paper};
 use algo::pattern::PhaseFunction;
 use hal::npy;

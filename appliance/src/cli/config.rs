@@ -1,10 +1,10 @@
 //! `fringed config check [FILE]` and `fringed config keys`.
 
 use super::options::{Json, Quiet};
-use crate::backend;
-use crate::calibration::place::Place;
 use crate::config::{Backend, Config, keys, table};
 use crate::error::{Exit, Failure};
+use crate::head::calibration::place::Place;
+use crate::production::backend;
 use hal::replay::Recording;
 use std::path::{Path, PathBuf};
 

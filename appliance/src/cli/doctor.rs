@@ -1,10 +1,10 @@
 //! `fringed doctor`: examines the head step by step, with a verdict and a remedy for each.
 
 use super::options::{Files, Json, Quiet, Threads, answer};
-use crate::backend;
 use crate::config::Backend;
-use crate::doctor::{Step, Verdict, examine};
 use crate::error::{Exit, Failure};
+use crate::head::doctor::{Step, Verdict, examine};
+use crate::production::backend;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 

@@ -5,9 +5,9 @@ use super::options::{Files, Json};
 use crate::config::MAX_RESULTS;
 use crate::error::{Exit, Failure};
 use crate::history::{Entry, Filter, HistoryError, Reader, time};
-use crate::journal::{self, Severity};
 use crate::station::Verdict;
 use crate::station::control::MAX_RECIPE;
+use crate::system::journal::{self, Severity};
 
 /// Show or export stored results, newest first.
 #[derive(Debug, clap::Args)]

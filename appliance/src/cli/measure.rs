@@ -3,11 +3,11 @@
 use super::names;
 use super::options::{Json, Quiet, Threads, answer};
 use crate::error::{Exit, Failure};
-use crate::kept;
+use crate::history::kept;
 use crate::measure::{Measurement, measure_with};
-use crate::output::folder::OutputFolder;
 use crate::output::{cloud, picture};
-use crate::unpack::Unpacked;
+use crate::storage::folder::OutputFolder;
+use crate::storage::unpack::Unpacked;
 use algo::pipeline::PhaseMap;
 use hal::npy;
 use hal::replay::Recording;

@@ -3,8 +3,8 @@
 use super::numbers::{address, number};
 use crate::config::{Config, HeadConfig};
 use crate::error::{Exit, Failure};
-use crate::progress::Progress;
-use crate::state::StateFolder;
+use crate::storage::state::StateFolder;
+use crate::system::progress::Progress;
 use clap::{Arg, Args, Command};
 use std::ffi::OsString;
 use std::net::SocketAddr;

@@ -4,14 +4,14 @@
 use super::names;
 use super::numbers::number;
 use super::options::{Files, Json, Quiet};
-use crate::backend;
 use crate::error::{Exit, Failure};
-use crate::plan::Plan;
+use crate::production::backend;
 use crate::recipe::exchange::{ImportError, Listed};
 use crate::recipe::generations::GenerationError;
+use crate::recipe::plan::Plan;
 use crate::recipe::{LoadError, Store};
-use crate::state::StateFolder;
 use crate::station::control::MAX_RECIPE;
+use crate::storage::state::StateFolder;
 use std::path::PathBuf;
 
 /// What to do with recipes.

@@ -3,9 +3,9 @@
 use super::names;
 use super::numbers::number;
 use super::options::{Files, Quiet, Threads};
-use crate::backend::{self, Opened};
 use crate::error::{Exit, Failure};
-use crate::plan::rasters;
+use crate::production::backend::{self, Opened};
+use crate::recipe::plan::rasters;
 use algo::pattern::{PhaseFunction, Sequence};
 use hal::bounds::MAX_FRINGES;
 use hal::replay::Recording;

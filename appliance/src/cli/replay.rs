@@ -3,13 +3,13 @@
 use super::history::failure;
 use super::options::{Files, Json, Quiet, Threads, answer};
 use crate::error::{Exit, Failure};
+use crate::history::kept::{self, Kept, missing};
 use crate::history::{Entry, Reader, difference, seq_of};
-use crate::kept::{self, Kept, missing};
-use crate::plan::PlanError;
+use crate::recipe::plan::PlanError;
 use crate::recipe::{Recipe, Store};
 use crate::station::result::flag::SIMULATED;
 use crate::station::{Inspection, ResultRecord};
-use crate::unpack::Unpacked;
+use crate::storage::unpack::Unpacked;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;

@@ -2,15 +2,15 @@
 
 use super::options::{Files, Listen, Quiet, Threads};
 use super::part::SimulatedPart;
-use crate::daemon::{Caller, Daemon, runtime};
 use crate::error::Failure;
-use crate::journal::Severity;
-use crate::notify::Notify;
-use crate::progress::Progress;
+use crate::service::{Caller, Daemon, runtime};
 use crate::station::Snapshot;
 use crate::station::refusal::reject;
 use crate::station::snapshot::status;
-use crate::told::Told;
+use crate::system::journal::Severity;
+use crate::system::notify::Notify;
+use crate::system::progress::Progress;
+use crate::system::told::Told;
 use std::time::Duration;
 
 /// READY waits so long for devices that are switched on together with the computer.

@@ -5,10 +5,10 @@ mod keys;
 
 pub use keys::{Key, keys, table};
 
-use crate::calibration::place::IN_STATE;
 use crate::error::{Exit, Failure};
+use crate::head::calibration::place::IN_STATE;
 use crate::modbus::{CONNECTIONS, WordOrder};
-use crate::simulation::Placed;
+use crate::production::simulation::Placed;
 use hal::bounds::{length, shortened, text, within};
 use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
 use ipnet::IpNet;

@@ -3,8 +3,8 @@
 use super::schema::log_bytes;
 use super::tests::{opened, record, station, wait};
 use super::*;
-use crate::state::StateFolder;
 use crate::station::snapshot::warning;
+use crate::storage::state::StateFolder;
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;

@@ -4,7 +4,7 @@
 //! ([`super::seqs`]). POSIX shared memory is a file that no card is behind: writing to it takes no longer than copying
 //! 20 bytes, whatever the card does. Where a system has none, or somebody else owns it, nothing is lost but numbers.
 
-use crate::state::Counted;
+use crate::storage::state::Counted;
 use rustix::fs::Mode;
 use rustix::shm::{self, OFlags};
 use std::fs::File;

@@ -19,6 +19,7 @@
 pub mod csv;
 pub mod entry;
 mod keeper;
+pub mod kept;
 mod mark;
 mod message;
 pub mod reader;

@@ -4,11 +4,11 @@
 //! second name (hard link) of the store's, which replaces its files and never changes them: it takes no room while the store
 //! or another recording has it, counts once however many have it, and goes with the last one.
 
-use crate::calibration::Calibration;
-use crate::output::folder::{name_also, rename_whole};
-use crate::plan::Plan;
+use crate::head::calibration::Calibration;
+use crate::recipe::plan::Plan;
 use crate::recipe::{PatternFile, Store, archive};
 use crate::station::{ResultRecord, Verdict};
+use crate::storage::folder::{name_also, rename_whole};
 use hal::frame::Frame;
 use hal::replay::Recording;
 use hal::replay::recorder::{self, RecorderError};

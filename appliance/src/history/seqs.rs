@@ -7,8 +7,8 @@
 //! holds the SEQ of the last result and none is.
 
 use super::mark::Mark;
-use crate::state::{Counted, Counter};
 use crate::station::Unstored;
+use crate::storage::state::{Counted, Counter};
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -218,7 +218,7 @@ impl Seqs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::StateFolder;
+    use crate::storage::state::StateFolder;
     use std::os::unix::fs::MetadataExt as _;
     use std::path::Path;
 

@@ -1,11 +1,11 @@
 //! What is stored is read again, bit by bit; filters, bounds, damage.
 
 use super::*;
-use crate::state::StateFolder;
 use crate::station::snapshot::warning;
 use crate::station::{
     Identity, Inspection, Limits, Micros, ResultRecord, Settings, Station, StationHandle, Verdict,
 };
+use crate::storage::state::StateFolder;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};

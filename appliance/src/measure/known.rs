@@ -2,8 +2,8 @@
 //! measurement expects it.
 
 use super::AnyError;
+use crate::head::seam;
 use crate::recipe::{Recipe, SequenceKind, safe};
-use crate::seam;
 use algo::adaptive::ProjectorMap;
 use algo::pattern::{PhaseFunction, Unwrapping};
 use algo::units::AbsolutePhase;

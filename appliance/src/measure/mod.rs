@@ -1,5 +1,6 @@
 //! From a recording to phase, height and report: what `fringed measure` does.
 
+pub mod adapt;
 mod known;
 mod report;
 mod score;
@@ -8,8 +9,8 @@ pub use report::{RecipeName, Report, StageTimes};
 pub use score::{Score, Truth};
 
 use crate::error::{Exit, Failure};
+use crate::head::seam;
 use crate::recipe::Recipe;
-use crate::seam;
 use algo::adaptive::ProjectorMap;
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};

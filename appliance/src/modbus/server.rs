@@ -14,8 +14,8 @@ use super::guard::Guard;
 use super::places::Clients;
 use super::refusals::{Refusals, Refused};
 use super::service::{FrameFlaw, PlcService};
-use crate::socket::holds;
 use crate::station::{ConnectionEdges, StationHandle};
+use crate::system::socket::holds;
 
 /// Most connections at a time, unless configured.
 pub const CONNECTIONS: usize = 8;

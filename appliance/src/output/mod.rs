@@ -3,5 +3,4 @@
 pub mod canvas;
 pub mod cloud;
 pub mod colour;
-pub mod folder;
 pub mod picture;

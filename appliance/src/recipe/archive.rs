@@ -1,7 +1,7 @@
 //! A recipe as one file: a ZIP (stored) of `recipe.json` and NumPy arrays, with a fingerprint.
 
 use super::file::{FORMAT, RecipeFile, VERSION};
-use crate::archive::Members;
+use crate::storage::archive::Members;
 use hal::bounds::shortened;
 use hal::npy;
 use sha2::{Digest, Sha256};

@@ -2,8 +2,8 @@
 //! it is gone; what a kill leaves behind, the next start removes.
 
 use super::{Recipe, Store};
-use crate::output::folder::rename_whole;
 use crate::station::FULL_STORAGE_MIB;
+use crate::storage::folder::rename_whole;
 use rustix::fs::fstatvfs;
 use std::fs::{self, File};
 use std::io::{self, BufReader, ErrorKind, Write};

@@ -1,6 +1,6 @@
 //! What teaching gained: the part with straight fringes and with its own, measured with equally many frames.
 
-use crate::rig::Measured;
+use crate::head::rig::Measured;
 use algo::phase::Trust;
 use serde::{Deserialize, Serialize};
 

@@ -3,7 +3,7 @@
 use super::archive::{self, ArchiveError};
 use super::store::{LoadError, Store};
 use super::{Recipe, RecipeFile, SequenceKind};
-use crate::output::folder::rename_whole;
+use crate::storage::folder::rename_whole;
 use serde::Serialize;
 use std::fs::{self, File};
 use std::io::{self, BufReader};

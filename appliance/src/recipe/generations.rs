@@ -6,7 +6,7 @@
 use super::gauge::check_limits;
 use super::store::{LoadError, Store};
 use super::{Recipe, RecipeFile, archive};
-use crate::output::folder::{name_also, rename_whole, sync_folder_of};
+use crate::storage::folder::{name_also, rename_whole, sync_folder_of};
 use std::fs::{self, File};
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};

@@ -9,7 +9,7 @@ use super::{
     AlignmentKind, GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile, SequenceFile,
     SequenceKind,
 };
-use crate::calibration::Calibration;
+use crate::head::calibration::Calibration;
 use algo::adaptive::{Surface, phase_reach};
 use algo::geometry::Triangulator;
 use algo::inspect::openings;

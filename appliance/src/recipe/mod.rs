@@ -17,6 +17,7 @@ mod gauge;
 pub mod generations;
 pub mod golden;
 pub mod good_parts;
+pub mod plan;
 pub mod planner;
 pub mod replace;
 pub mod store;

@@ -24,7 +24,7 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
         number,
         part_number,
         name,
-        taught_at_unix_s: crate::clock::utc_us().unwrap_or(0) / 1_000_000,
+        taught_at_unix_s: crate::system::clock::utc_us().unwrap_or(0) / 1_000_000,
         placement_tolerance_mm,
     }
 }

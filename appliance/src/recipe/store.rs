@@ -2,7 +2,7 @@
 
 use super::gauge::check_limits;
 use super::{Recipe, RecipeFile, archive};
-use crate::output::folder::write_whole;
+use crate::storage::folder::write_whole;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};

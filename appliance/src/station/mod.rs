@@ -46,6 +46,7 @@ pub mod snapshot;
 pub mod stages;
 pub mod state;
 pub mod step;
+pub mod tally;
 
 mod cycle;
 mod plc;

@@ -11,9 +11,9 @@ use axum::response::{IntoResponse, Response};
 use super::host::only;
 use super::problem::{Outcome, Problem};
 use super::site::Site;
-use crate::access::{Change, MAX_AGE_S, Token};
-use crate::clock;
-use crate::journal::{self, Severity};
+use crate::system::clock;
+use crate::system::journal::{self, Severity};
+use crate::web::access::{Change, MAX_AGE_S, Token};
 
 /// The session's cookie.
 const COOKIE: &str = "fringed-session";

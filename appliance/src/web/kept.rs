@@ -12,10 +12,10 @@ use super::map::Map;
 use super::problem::Problem;
 use super::site::Site;
 use crate::error::{Exit, Failure};
+use crate::history::kept::Kept;
 use crate::history::why_no_frames;
-use crate::kept::Kept;
-use crate::priority;
 use crate::station::result::flag;
+use crate::system::priority;
 
 /// The pictures that were worked out last, and of which result: height, deviation, modulation.
 pub(super) type LastKept = Option<(u32, [Map; 3])>;

@@ -9,7 +9,7 @@ use super::map::{Map, map};
 use super::problem::Problem;
 use super::site::Site;
 use super::view;
-use crate::plan::Layers;
+use crate::recipe::plan::Layers;
 use crate::station::snapshot::status;
 
 /// The description of this API.

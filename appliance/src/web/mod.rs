@@ -4,6 +4,7 @@
 //! something passes the gate: Origin, session, record. [`events`] are the server-sent events, [`view`] the JSON of a
 //! snapshot, [`host`] keeps requests away that were meant for another name, [`server`] listens and [`slots`] bounds its
 //! connections. The page itself is a handful of files in `assets/`, compiled in.
+pub mod access;
 pub mod assets;
 pub mod body;
 pub mod events;

@@ -12,9 +12,9 @@ use super::map::{Map, map};
 use super::orders::{self, Reload};
 use super::problem::Problem;
 use super::site::Site;
-use crate::plan::{Plan, PlanError};
 use crate::recipe::edit::{self, Edit, EditError};
 use crate::recipe::generations::GenerationError;
+use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::store::Loaded;
 use crate::recipe::{LoadError, Recipe, RecipeFile, Store};
 

@@ -21,7 +21,7 @@ use super::gate::Peer;
 use super::router::router;
 use super::site::Site;
 use super::slots::{Slot, Slots};
-use crate::clock;
+use crate::system::clock;
 
 /// The most connections at a time.
 const MOST_CONNECTIONS: usize = 64;

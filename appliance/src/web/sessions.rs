@@ -15,10 +15,10 @@ use super::body;
 use super::gate::{self, Peer};
 use super::problem::Problem;
 use super::site::Site;
-use crate::access::Refused;
-use crate::clock;
 use crate::station::Micros;
 use crate::station::snapshot::warning;
+use crate::system::clock;
+use crate::web::access::Refused;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

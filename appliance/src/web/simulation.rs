@@ -9,7 +9,7 @@ use tokio::sync::oneshot;
 use super::body::json;
 use super::problem::Problem;
 use super::site::Site;
-use crate::simulation::{Placed, PutError};
+use crate::production::simulation::{Placed, PutError};
 
 impl From<PutError> for Problem {
     fn from(error: PutError) -> Self {

@@ -10,16 +10,16 @@ use tokio::sync::{Mutex, Semaphore};
 use super::kept::LastKept;
 use super::problem::Problem;
 use super::slots::Slots;
-use crate::access::Access;
-use crate::calibration::Current;
+use crate::head::calibration::Current;
 use crate::history::Reader;
-use crate::latest::LastMaps;
-use crate::logbook::Logbook;
+use crate::production::latest::LastMaps;
+use crate::production::simulation::Simulation;
 use crate::recipe::Store;
-use crate::simulation::Simulation;
-use crate::socket;
+use crate::station::tally::Tally;
 use crate::station::{Snapshot, StationHandle};
-use crate::tally::Tally;
+use crate::system::logbook::Logbook;
+use crate::system::socket;
+use crate::web::access::Access;
 
 /// The most pages that follow the events at a time.
 pub const MAX_FOLLOWERS: usize = 16;

@@ -1,10 +1,10 @@
 //! Targets of what describes a station: calibration, models of OpenCV, scenario, configuration.
 
 use super::bounded;
-use appliance::calibration::Calibration;
-use appliance::calibration::file::CalibrationFile;
-use appliance::calibration::opencv::{self, Declared, Sizes, Unit};
 use appliance::config::Config;
+use appliance::head::calibration::Calibration;
+use appliance::head::calibration::file::CalibrationFile;
+use appliance::head::calibration::opencv::{self, Declared, Sizes, Unit};
 use hal::model::DeviceModel;
 use sim::Scenario;
 use std::fs;

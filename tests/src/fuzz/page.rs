@@ -2,11 +2,11 @@
 
 use super::part::PART;
 use super::plant::{runtime, settings};
-use appliance::access::Access;
 use appliance::history::Reader;
+use appliance::production::simulation::Simulation;
 use appliance::recipe::Store;
-use appliance::simulation::Simulation;
 use appliance::station::{Micros, Station, StationHandle};
+use appliance::web::access::Access;
 use appliance::web::{Parts, Site, serve};
 use std::cell::RefCell;
 use std::fs;

@@ -1,7 +1,7 @@
 //! A head of few pixels with a part that was taught on it: what the targets of recipes start from.
 
-use appliance::calibration::Calibration;
-use appliance::plan::Plan;
+use appliance::head::calibration::Calibration;
+use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, teach};
 use appliance::recipe::{Recipe, archive};
 use hal::frame::Frame;

@@ -2,8 +2,8 @@
 
 use super::bounded;
 use super::part::PART;
-use appliance::plan::Plan;
 use appliance::recipe::edit::{self, Edit};
+use appliance::recipe::plan::Plan;
 use appliance::recipe::{Recipe, RecipeFile, Store, archive};
 use std::fs;
 use std::io::Cursor;

@@ -4,8 +4,8 @@
 use super::random::between;
 use super::rig;
 use algo::geometry::{ModelError, Pinhole, PinholeModel, fit_map};
+use appliance::head::seam;
 use appliance::measure::measure;
-use appliance::seam;
 use hal::model::DeviceModel;
 use std::path::Path;
 use tests::random::Random;

@@ -2,7 +2,7 @@
 
 use algo::geometry::{HeightRange, Pinhole, PinholeModel, Reference, RigError, Triangulator};
 use algo::pattern::PhaseFunction;
-use appliance::seam;
+use appliance::head::seam;
 use hal::model::DeviceModel;
 
 /// Projector columns and rows.

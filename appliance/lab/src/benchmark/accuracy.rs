@@ -11,9 +11,9 @@ use algo::pattern::{PhaseRange, Sequence};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::{AbsolutePhase, Modulation};
+use appliance::head::rig::Measured;
 use appliance::measure::{Score, Truth};
 use appliance::recipe::teach::dense;
-use appliance::rig::Measured;
 use std::ops::Range;
 use std::time::Duration;
 

@@ -5,7 +5,7 @@ use super::frames::{FrameSet, Rotation};
 use super::median::median;
 use super::variants::{self, Variant};
 use super::workload::Workload;
-use appliance::worker::stopwatch::timed;
+use appliance::production::stopwatch::timed;
 use std::hint::black_box;
 use std::time::Duration;
 

@@ -11,7 +11,7 @@ use super::real::Real;
 use algo::pattern::{Level, PhaseRange, Sequence, Unwrapping};
 use algo::phase::{DecodeError, FULL_TRUST_STEPS, MIN_MODULATION_8_BIT};
 use algo::units::AbsolutePhase;
-use appliance::worker::stopwatch::timed;
+use appliance::production::stopwatch::timed;
 use std::time::Duration;
 
 /// Largest residual of an unwrapping step, turns.

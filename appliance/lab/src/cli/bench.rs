@@ -3,7 +3,7 @@
 use crate::benchmark::{self, Effort, Machine, Report, Study};
 use appliance::cli::{Json, Quiet, Threads, answer, names};
 use appliance::error::{Exit, Failure};
-use appliance::output::folder::OutputFolder;
+use appliance::storage::folder::OutputFolder;
 use std::path::PathBuf;
 
 /// Time the kernels, time against error, and trigger to verdict.

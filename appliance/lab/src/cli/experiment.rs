@@ -3,7 +3,7 @@
 use crate::experiment::{Campaign, OpticsKind, PARTS, Results, Row, Scene, csv, figures, means};
 use appliance::cli::{Json, Quiet, Threads, answer, names};
 use appliance::error::{Exit, Failure};
-use appliance::output::folder::OutputFolder;
+use appliance::storage::folder::OutputFolder;
 use std::path::PathBuf;
 
 /// Repeat the paper's experiments on the simulated head.

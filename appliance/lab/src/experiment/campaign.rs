@@ -5,7 +5,7 @@ use super::methods::{SHOWN_ADAPTIVE, SHOWN_FIXED};
 use super::runner::Runner;
 use super::scenes::{OpticsKind, Scene};
 use super::table::{self, Row};
-use appliance::rig::RigError;
+use appliance::head::rig::RigError;
 
 /// What is to be run.
 #[derive(Clone, Debug)]

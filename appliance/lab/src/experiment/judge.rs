@@ -3,8 +3,8 @@
 use super::cylinder::{self, Cylinder};
 use super::scenes::Judged;
 use algo::phase::Trust;
+use appliance::head::rig::Measured;
 use appliance::measure::{Score, Truth};
-use appliance::rig::Measured;
 
 /// What a method reached on a part.
 #[derive(Clone, Debug)]

@@ -1,8 +1,8 @@
 //! A shaded view of a measured surface: neighbouring points as small facets, seen obliquely.
 
 use algo::phase::Trust;
+use appliance::head::rig::Measured;
 use appliance::output::canvas::Canvas;
-use appliance::rig::Measured;
 
 /// The view comes from this far above the plane z = 0, after a turn about z, radians.
 const ELEVATION: f64 = 0.96;

@@ -1,6 +1,6 @@
 //! What `fringed calibrate` says: a table for people, JSON for programs.
 
-use crate::calibration::file::{CalibrationFile, MapFile};
+use crate::head::calibration::file::{CalibrationFile, MapFile};
 use hal::head::Stamp;
 use serde_json::{Value, json};
 use std::fmt::Write as _;

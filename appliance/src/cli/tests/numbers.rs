@@ -2,9 +2,9 @@
 
 use super::super::part::SimulatedPart;
 use super::{Arg, leaves};
-use crate::calibration::bounds::{COLDEST_C, HOTTEST_C};
 use crate::config::HeadConfig;
 use crate::error::Exit;
+use crate::head::calibration::bounds::{COLDEST_C, HOTTEST_C};
 use clap::{ArgMatches, FromArgMatches as _};
 use std::any::TypeId;
 use std::collections::BTreeSet;

@@ -3,7 +3,7 @@
 use super::*;
 use crate::boundaries::{Bed, Tally, places, values};
 use crate::history::{Bounds, Numbering};
-use crate::state::StateFolder;
+use crate::storage::state::StateFolder;
 
 /// What stands in for a number or a word of an address.
 const WORDS: [&str; 14] = [

@@ -16,11 +16,11 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 
 use super::*;
-use crate::access::Access;
 use crate::history::Reader;
+use crate::production::simulation::Simulation;
 use crate::recipe::Store;
-use crate::simulation::Simulation;
 use crate::station::*;
+use crate::web::access::Access;
 
 /// A station whose measuring task is silent, and its page.
 struct Served {

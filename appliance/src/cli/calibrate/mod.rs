@@ -1,0 +1,243 @@
+//! `fringed calibrate`: imports models, measures on the head what they do not say, and writes `calibration.json`.
+
+mod report;
+
+use super::numbers::number;
+use super::options::{Files, Json, Quiet, Threads, answer};
+use crate::config::{Backend, HeadConfig};
+use crate::error::{Exit, Failure};
+use crate::head::calibration::Calibration;
+use crate::head::calibration::bounds::{COLDEST_C, HOTTEST_C};
+use crate::head::calibration::file::CalibrationFile;
+use crate::head::calibration::make::{Known, MakeError, make};
+use crate::head::calibration::opencv::{self, Declared, Models, Sizes, Unit};
+use crate::head::calibration::place::Place;
+use crate::production::backend::{self, Opened};
+use crate::storage::state::StateFolder;
+use algo::geometry::{Reference, RigError, Triangulator};
+use algo::pattern::PhaseFunction;
+use sim::{Part, Stage};
+use std::path::{Path, PathBuf};
+
+/// Calibrate the head: import its models, measure delay, stamps, grey response, noise, contrast and the reference plane.
+#[derive(Debug, clap::Args)]
+#[command(group = clap::ArgGroup::new("imported").args(["camera", "projector", "models"]).multiple(true))]
+pub struct Calibrate {
+    /// Calibrate a simulated head of this scenario instead of the configured head.
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// The camera's model, written by OpenCV (YAML, XML, JSON). Without models those of before stay.
+    #[arg(long, value_name = "FILE", requires = "projector")]
+    camera: Option<PathBuf>,
+    /// The projector's model.
+    #[arg(long, value_name = "FILE", requires = "camera")]
+    projector: Option<PathBuf>,
+    /// Both models in one file, with R and T from the camera to the projector and the pose of the plate.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["camera", "projector"])]
+    models: Option<PathBuf>,
+    /// Unit of lengths in the models' files, where they do not say it.
+    #[arg(long, requires = "imported")]
+    unit: Option<Unit>,
+    /// The world's z in the models' files points away from the head, as on OpenCV's boards.
+    #[arg(long, requires = "imported")]
+    z_away: bool,
+    /// No flat plate lies in the plane z = 0: leave the reference plane to the models.
+    #[arg(long)]
+    no_plate: bool,
+    /// How warm the head is, °C: kept in the calibration.
+    #[arg(long, value_name = "CELSIUS", allow_negative_numbers = true, value_parser = number(COLDEST_C, HOTTEST_C))]
+    temperature: Option<f64>,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
+    #[command(flatten)]
+    json: Json,
+}
+
+/// Where models came from, if not from a file.
+const OF_SCENARIO: &str = "scenario";
+
+impl Calibrate {
+    /// Opens the head, measures it, writes the calibration and prints what was found.
+    ///
+    /// # Errors
+    /// If a model cannot be imported (65, 66), the head not be measured (69), or the calibration not be written (73). The
+    /// calibration before is then untouched.
+    pub fn run(&self) -> Result<(), Failure> {
+        let mut config = self.files.configuration()?;
+        if let Some(scenario) = &self.scenario {
+            (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
+        }
+        if config.head.backend == Backend::Replay {
+            return Err(Failure::new(
+                Exit::Usage,
+                "calibrate: a recording carries its own calibration: configure another head or name a scenario with --scenario",
+            ));
+        }
+        // Held until all is written: no station measures meanwhile by what is being replaced.
+        let state = StateFolder::open(&self.files.state_folder()?)?;
+        let head = config.head_in(state.path());
+        let place = Place::at(head.calibration.as_deref().unwrap_or(Path::new("")));
+        let mut notes = Vec::new();
+        let before = place.load().unwrap_or_else(|problem| {
+            notes.push(format!("{problem}; it is left behind"));
+            None
+        });
+        let before = before.map(|loaded| loaded.file);
+        let progress = self.quiet.progress();
+        let told = |share: f64| progress.tell(0.3 * share, "working out the light of the scene");
+        let pool = self.threads.pool(config.threads)?;
+        // As if nothing were known of it.
+        let bare = HeadConfig {
+            calibration: None,
+            ..head
+        };
+        let mut opened = pool.install(|| backend::open(&bare, &told))?;
+        let known = self.known(&opened, before.as_ref())?;
+        if known.plate {
+            let stage = opened.stage.clone();
+            pool.install(|| lay_plate(stage.as_ref(), &mut notes))?;
+        }
+        let told = |share: f64, words: &str| progress.tell(0.3 + 0.7 * share, words);
+        let made = pool.install(|| make(&mut opened.head, known, &told));
+        progress.clear();
+        let mut made = made.map_err(refused)?;
+        place.save(&made.bytes, &made.maps).map_err(|error| {
+            let what = format!("write {}", place.path().display());
+            Failure::because(
+                Exit::CannotCreate,
+                what,
+                format!("{error}: free space, or name another file with head.calibration"),
+            )
+        })?;
+        notes.append(&mut made.notes);
+        let report = report::Report {
+            file: &made.file,
+            before: before.as_ref().map(|file| file.fingerprint.as_str()),
+            place: place.path(),
+            notes: &notes,
+        };
+        let document = || format!("{:#}", report.json());
+        answer(self.json, self.quiet, document, || report.table());
+        Ok(())
+    }
+
+    /// What is known before anything is measured.
+    fn known(&self, opened: &Opened, before: Option<&CalibrationFile>) -> Result<Known, Failure> {
+        let mut calibration = opened.calibration.clone();
+        let content = |error: String| Failure::new(Exit::Content, error);
+        let stored = before
+            .map(|file| Ok((file, file.calibration()?)))
+            .transpose()
+            .map_err(content)?
+            .filter(|(_, stored)| {
+                let sizes = |of: &Calibration| (of.camera, of.projector);
+                sizes(stored) == sizes(&calibration)
+            });
+        let mut models_from = OF_SCENARIO.to_owned();
+        if let Some((from, (camera, projector))) = self.imported(&calibration)? {
+            models_from = from;
+            (calibration.camera_model, calibration.projector_model) = (camera, projector);
+            fits(&calibration)
+                .map_err(|error| content(format!("import {models_from}: {error}")))?;
+        } else if let Some((file, stored)) = &stored
+            && file.models_from != OF_SCENARIO
+        {
+            models_from = file.models_from.clone();
+            calibration.camera_model = stored.camera_model.clone();
+            calibration.projector_model = stored.projector_model.clone();
+        } else if opened.problem.is_some() {
+            let words = "calibrate: the models of camera and projector are not known yet: import them with --camera and --projector, \
+                         or with --models";
+            return Err(Failure::new(Exit::Usage, words));
+        }
+        if models_from == OF_SCENARIO && opened.stage.is_none() {
+            let message = "calibrate: the models of this head are not known: make them with OpenCV and name them with --camera and --projector";
+            return Err(Failure::new(Exit::Usage, message));
+        }
+        calibration.response = None;
+        Ok(Known {
+            calibration,
+            models_from,
+            response: stored.map(|(file, _)| file.response.clone()),
+            temperature_c: self.temperature.filter(|celsius| celsius.is_finite()),
+            plate: !self.no_plate,
+        })
+    }
+
+    /// The models that the options name, and their files' names.
+    fn imported(&self, head: &Calibration) -> Result<Option<(String, Models)>, Failure> {
+        let sizes = Sizes {
+            camera: (head.camera.0, head.camera.1),
+            projector: head.projector,
+        };
+        let declared = Declared {
+            unit: self.unit,
+            z_away: self.z_away,
+        };
+        let name = |path: &Path| path.display().to_string();
+        let missing = [&self.camera, &self.projector, &self.models];
+        let missing = missing.into_iter().flatten().find(|path| !path.exists());
+        if let Some(path) = missing {
+            let words = format!(
+                "import {}: there is no such file: name one that cv2.FileStorage wrote",
+                name(path)
+            );
+            return Err(Failure::new(Exit::Missing, words));
+        }
+        let content = |error| Failure::new(Exit::Content, error);
+        Ok(match (&self.camera, &self.projector, &self.models) {
+            (Some(camera), Some(projector), _) => {
+                let models = opencv::from_two(camera, projector, sizes, declared);
+                let names = format!("{}, {}", name(camera), name(projector));
+                Some((names, models.map_err(content)?))
+            }
+            (_, _, Some(models)) => {
+                let both = opencv::from_one(models, sizes, declared);
+                Some((name(models), both.map_err(content)?))
+            }
+            _ => None,
+        })
+    }
+}
+
+/// Whether camera and projector make a head that looks down at the plane z = 0 from two places.
+fn fits(calibration: &Calibration) -> Result<(), String> {
+    let (camera, projector) = calibration.devices()?;
+    let (columns, rows) = (projector.width(), projector.height());
+    let function =
+        PhaseFunction::vertical(columns, rows, 1.0).map_err(|error| error.to_string())?;
+    match Triangulator::new(camera, projector, Reference::Models, function, None) {
+        Ok(_) => Ok(()),
+        Err(error @ RigError::NotAbove(_)) => Err(format!(
+            "{error}; OpenCV's boards have their z pointing away from the camera: then add --z-away"
+        )),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// In front of a simulated head a plate needs nobody to lay it.
+fn lay_plate(stage: Option<&Stage>, notes: &mut Vec<String>) -> Result<(), Failure> {
+    let Some(stage) = stage else {
+        return Ok(());
+    };
+    if matches!(stage.scenario().part, Part::Plane(_)) {
+        return Ok(());
+    }
+    notes.push("a flat plate was laid in front of the simulated head".into());
+    let plate = Part::Plane(sim::parts::Plane::default());
+    stage
+        .place(&plate, &sim::Placement::default())
+        .map_err(|error| Failure::new(Exit::Software, error.to_string()))
+}
+
+fn refused(error: MakeError) -> Failure {
+    let exit = match error {
+        MakeError::Device(_) | MakeError::Scene(_) => Exit::Unavailable,
+        MakeError::Models(_) => Exit::Content,
+    };
+    Failure::new(exit, error.to_string())
+}

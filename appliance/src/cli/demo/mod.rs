@@ -1,0 +1,142 @@
+//! `fringed demo`: the station, and the PLC in front of it, over real Modbus TCP.
+
+mod parts;
+mod plc;
+mod table;
+
+use super::options::{Files, Json, Listen, Quiet, Threads, answer};
+use crate::config::Backend;
+use crate::error::{Exit, Failure};
+use crate::service::{Daemon, runtime};
+use crate::storage::state::StateFolder;
+use crate::system::told::Told;
+use parts::{PARTS, Placed};
+use plc::{Plc, PlcResult};
+use std::io::IsTerminal;
+
+/// Run the station and play the PLC.
+#[derive(Debug, clap::Args)]
+pub struct Demo {
+    /// End after the table; the default where stdout is no terminal.
+    #[arg(long)]
+    exit: bool,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    listen: Listen,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
+    #[command(flatten)]
+    json: Json,
+}
+
+/// Seed of the noise of the demonstration's frames.
+const NOISE_SEED: u64 = 2008;
+
+/// One part of the demonstration and what came of it.
+struct Row {
+    placed: &'static Placed,
+    result: PlcResult,
+    /// Names of the gauges outside their limits.
+    outside: Vec<String>,
+}
+
+impl Demo {
+    /// Starts the station, measures ten parts, prints the table, and leaves the page running unless
+    /// told to end.
+    ///
+    /// # Errors
+    /// If the station cannot start or answer, or judges a part wrongly.
+    pub fn run(&self) -> Result<(), Failure> {
+        let mut config = self.files.configuration()?;
+        self.listen.over(&mut config);
+        if config.head.backend != Backend::Sim || config.head.scenario.is_some() {
+            return Err(Failure::new(
+                Exit::Usage,
+                "demo: it brings its own parts: leave out head.backend and head.scenario",
+            ));
+        }
+        if config.state.is_none() {
+            // Recipes that somebody taught stay untouched.
+            config.state = Some(StateFolder::default_path()?.join("demo"));
+        }
+        let progress = self.quiet.progress();
+        let pool = self.threads.pool(config.threads)?;
+        let daemon = Daemon::start(&config, pool, progress.clone())?;
+        daemon.wait_until_ready()?;
+        progress.log(&format!(
+            "page on http://{}, Modbus TCP on {}",
+            daemon.http, daemon.modbus
+        ));
+        let recipe = config.station.recipe;
+        let rows = runtime()?.block_on(play(&daemon, recipe, &progress));
+        progress.clear();
+        let rows = rows?;
+        let document = || format!("{:#}", table::json(&rows));
+        answer(self.json, self.quiet, document, || table::text(&rows));
+        if !self.exit && std::io::stdout().is_terminal() {
+            if !self.json.json {
+                say!("\nThe page stays on http://{} until Ctrl-C.", daemon.http);
+            }
+            runtime()?.block_on(Told::listen()?.wait());
+        }
+        daemon.stop();
+        let wrong = rows.iter().filter(|row| row.is_wrong()).count();
+        if wrong > 0 {
+            let message = format!("demo: {wrong} of {} parts were judged wrongly", rows.len());
+            return Err(Failure::new(Exit::Software, message));
+        }
+        Ok(())
+    }
+}
+
+impl Row {
+    /// A good part that did not pass, or a defective one that did.
+    fn is_wrong(&self) -> bool {
+        self.placed.defect.is_some() == self.result.passed()
+    }
+}
+
+/// Lets ten parts come by and triggers a measurement of each.
+async fn play(
+    daemon: &Daemon,
+    recipe: u16,
+    progress: &crate::system::progress::Progress,
+) -> Result<Vec<Row>, Failure> {
+    let Some(stage) = &daemon.stage else {
+        return Err(Failure::new(
+            Exit::Software,
+            "demo: there is no simulated head",
+        ));
+    };
+    // Other noise than the golden map was taught with.
+    stage.reseed(NOISE_SEED);
+    let mut plc = Plc::connect(daemon.modbus, recipe).await?;
+    let mut rows = Vec::with_capacity(PARTS.len());
+    for (at, placed) in PARTS.iter().enumerate() {
+        progress.tell(at as f64 / PARTS.len() as f64, "measuring parts");
+        stage
+            .place(&placed.part(), &sim::Placement::default())
+            .map_err(|error| Failure::new(Exit::Software, error.to_string()))?;
+        let result = plc.measure(at as u16 + 1).await?;
+        // The registers number the gauges; their names are the recipe's.
+        let snapshot = daemon.station.snapshot();
+        let names = snapshot
+            .result
+            .iter()
+            .flat_map(|record| &record.inspection.gauges);
+        let outside = names
+            .zip(&result.passes)
+            .filter(|(_, pass)| !**pass)
+            .map(|(gauge, _)| gauge.name.to_string())
+            .collect();
+        rows.push(Row {
+            placed,
+            result,
+            outside,
+        });
+    }
+    Ok(rows)
+}

@@ -1,0 +1,171 @@
+//! The command line.
+
+/// Prints a line of the answer. Whoever closes the pipe early has read enough: that is no error.
+macro_rules! say {
+    ($($argument:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout(), $($argument)*);
+    }};
+}
+
+mod adapt;
+mod calibrate;
+mod completions;
+mod config;
+mod demo;
+mod doctor;
+mod history;
+mod measure;
+pub mod names;
+mod numbers;
+mod options;
+mod part;
+mod recipe;
+mod record;
+mod replay;
+mod serve;
+mod teach;
+
+pub use completions::Completions;
+pub use options::{Json, Quiet, Threads, answer};
+
+use crate::VERSION;
+use crate::error::{Exit, Failure};
+use crate::modbus::{registers_csv, registers_json};
+use crate::system::journal::{self, Severity};
+use clap::error::{ContextKind, ContextValue};
+use clap::{CommandFactory as _, Parser, Subcommand};
+use std::process::ExitCode;
+
+/// The open 3-D smart sensor.
+#[derive(Debug, Parser)]
+#[command(name = "fringed", version = VERSION, after_help = MORE)]
+struct Arguments {
+    /// What to do; without a command: serve.
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    serve: serve::Serve,
+}
+
+/// Below the options of `fringed --help`, which are those of `serve`.
+const MORE: &str = "These are the options of serve; `fringed help COMMAND` lists those of a command. They may stand before the command \
+                    as well as behind it.";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run the station: Modbus TCP for the PLC, a page for the technician.
+    Serve(serve::Serve),
+    /// Run the station and play the PLC: ten parts, three of them defective.
+    Demo(demo::Demo),
+    /// Measure a recording: phase, height, picture, point cloud and report.
+    Measure(measure::Measure),
+    /// Make a pattern for the part of a preliminary recording.
+    Adapt(adapt::Adapt),
+    /// Examine the head step by step.
+    Doctor(doctor::Doctor),
+    /// Calibrate the head: import its models, measure the rest.
+    Calibrate(calibrate::Calibrate),
+    /// Record a sequence from the configured head.
+    Record(record::Record),
+    /// Make a recipe from a good part in front of the head, or from recordings.
+    Teach(teach::Teach),
+    /// Show or export stored results.
+    History(history::History),
+    /// Judge a kept part again and compare with the history.
+    Replay(replay::Replay),
+    /// List, export, import or delete recipes, or undo that.
+    #[command(subcommand)]
+    Recipe(recipe::RecipeCommand),
+    /// Check a configuration, or list its keys.
+    #[command(subcommand)]
+    Config(config::ConfigCommand),
+    /// Print the register map as CSV (or JSON with --json).
+    Registers(Json),
+    /// Print what makes a shell complete the command line.
+    Completions(Completions),
+}
+
+/// Commands of `fringed-lab` that `fringed` once had.
+const LABORATORY: [&str; 2] = ["bench", "experiment"];
+
+/// Runs the program `fringed`.
+pub fn main() -> ExitCode {
+    start(run)
+}
+
+/// Parses the arguments of this process, runs the command that they name and answers with its exit code. Options may stand before the
+/// command as well as behind it.
+pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<(), Failure>) -> ExitCode {
+    let words = options::behind_the_command(&A::command(), std::env::args_os());
+    let arguments = match A::try_parse_from(words) {
+        Ok(arguments) => arguments,
+        Err(error) => return refused(&error),
+    };
+    match run(arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            journal::write_of(
+                A::command().get_name(),
+                Severity::Error,
+                &failure.to_string(),
+            );
+            failure.exit.into()
+        }
+    }
+}
+
+/// Says what is wrong with the arguments, or prints the help or the version that they ask for.
+fn refused(error: &clap::Error) -> ExitCode {
+    if let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidSubcommand)
+        && LABORATORY.contains(&name.as_str())
+    {
+        let remedy = format!("{name} is a command of another program: run fringed-lab {name}");
+        journal::write(Severity::Error, &remedy);
+        return Exit::Usage.into();
+    }
+    // Nothing can be done where stdout and stderr are closed.
+    let _ = error.print();
+    if error.use_stderr() {
+        Exit::Usage.into()
+    } else {
+        ExitCode::SUCCESS
+    }
+}
+
+fn run(arguments: Arguments) -> Result<(), Failure> {
+    match arguments.command {
+        None => arguments.serve.run(),
+        Some(Command::Serve(command)) => command.run(),
+        Some(Command::Demo(command)) => command.run(),
+        Some(Command::Measure(command)) => command.run(),
+        Some(Command::Adapt(command)) => command.run(),
+        Some(Command::Doctor(command)) => command.run(),
+        Some(Command::Calibrate(command)) => command.run(),
+        Some(Command::Record(command)) => command.run(),
+        Some(Command::Teach(command)) => command.run(),
+        Some(Command::History(command)) => command.run(),
+        Some(Command::Replay(command)) => command.run(),
+        Some(Command::Recipe(command)) => command.run(),
+        Some(Command::Config(command)) => command.run(),
+        Some(Command::Registers(format)) => {
+            registers(format);
+            Ok(())
+        }
+        Some(Command::Completions(command)) => {
+            command.run(Arguments::command());
+            Ok(())
+        }
+    }
+}
+
+fn registers(format: Json) {
+    if format.json {
+        say!("{:#}", registers_json());
+    } else {
+        say!("{}", registers_csv().trim_end());
+    }
+}
+
+#[cfg(test)]
+mod tests;

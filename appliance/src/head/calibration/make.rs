@@ -1,0 +1,308 @@
+//! A calibration measured on a head, from what its stamps mark to the reference plane. Each step uses what those before it found.
+
+use super::Calibration;
+use super::file::{
+    CalibrationFile, CameraFile, ContrastFile, FORMAT, LevelFile, MapFile, NoiseFile, PitchFile,
+    ProjectorFile, ReferenceFile, TimingFile, VERSION, inverted,
+};
+use super::place::Place;
+use crate::head::doctor::{LEAST_BRIGHT, LEAST_LIT, MOST_SATURATED};
+use crate::head::examine::{
+    Delay, Lit, Noise, Plate, PlateError, SETTLE, Stamps, contrast, response,
+};
+use algo::geometry::Vector;
+use hal::error::Error;
+use hal::head::{DynHead, Timing};
+use std::time::Duration;
+
+/// Rounds of the delay, at most: 100 s where stamps jitter or the camera has few pixels.
+const ROUNDS: u32 = 24;
+/// A delay below zero by more than this is none: light does not come before its flip.
+const LEAST_DELAY_S: f64 = -200e-6;
+/// Refreshes that light is given beyond its delay.
+const BEYOND: u32 = 2;
+/// Longest wait for a flip or a frame beyond the plan.
+const TIMEOUT: Duration = Duration::from_secs(5);
+/// Models may be off the measured plane by this, RMS, projector pixels: a millimetre of height, with devices 27° apart 600 mm away.
+const MOST_OFF_PX: f64 = 2.0;
+/// A response that is off the one before by less than this many levels is the same: recipes stay valid.
+const SAME_RESPONSE: f64 = 1.0;
+
+/// What is known before.
+#[derive(Debug)]
+pub struct Known {
+    /// The models, and what else is known; noise and response are measured.
+    pub calibration: Calibration,
+    /// Where the models come from.
+    pub models_from: String,
+    /// The response of the calibration before.
+    pub response: Option<Vec<f64>>,
+    /// How warm the head is.
+    pub temperature_c: Option<f64>,
+    /// A flat plate lies in the plane z = 0.
+    pub plate: bool,
+}
+
+/// A calibration, ready to be written.
+#[derive(Debug)]
+pub struct Made {
+    /// The file.
+    pub file: CalibrationFile,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+    /// Names and bytes of the reference phase maps.
+    pub maps: Vec<(String, Vec<u8>)>,
+    /// What else there is to say.
+    pub notes: Vec<String>,
+}
+
+/// A head that cannot be calibrated.
+#[derive(Debug, thiserror::Error)]
+pub enum MakeError {
+    /// A device failed.
+    #[error("{0}")]
+    Device(#[from] Error),
+    /// What stands in front of the head, or how it is set.
+    #[error("{0}")]
+    Scene(String),
+    /// The models are not this head's.
+    #[error("{0}")]
+    Models(String),
+}
+
+impl From<PlateError> for MakeError {
+    fn from(error: PlateError) -> Self {
+        match error {
+            PlateError::Device(error) => Self::Device(error),
+            PlateError::Unfit(words) => Self::Scene(words),
+        }
+    }
+}
+
+/// Measures everything. `told` is told the share done and what is measured. The head's time goes by the calibration afterwards.
+///
+/// # Errors
+/// Of a device; if too little light comes back, or too much; if the plate is none or the models do not fit it.
+pub fn make(head: &mut DynHead, known: Known, told: &dyn Fn(f64, &str)) -> Result<Made, MakeError> {
+    let mut calibration = known.calibration;
+    let mut notes = Vec::new();
+    told(0.0, "camera stamps");
+    let stamps = Stamps::measure(head)?;
+    head.set_timing(Timing {
+        flip_to_light: Duration::ZERO,
+        stamp: stamps.stamp,
+        readout: stamps.readout,
+        ..head.timing()
+    });
+    told(0.05, "light");
+    let lit = Lit::take(head, SETTLE)?;
+    bright_enough(&lit)?;
+    told(0.1, "flip-to-light delay");
+    let delay = Delay::measure(head, &lit, ROUNDS)?
+        .filter(|delay| delay.seconds >= LEAST_DELAY_S)
+        .ok_or_else(|| {
+            let words = "measure the flip-to-light delay: light does not follow the flips: `fringed doctor` says more";
+            MakeError::Scene(words.into())
+        })?;
+    head.set_timing(Timing {
+        flip_to_light: delay.duration(),
+        ..head.timing()
+    });
+    let refreshes = delay
+        .duration()
+        .as_nanos()
+        .div_ceil(head.refresh().as_nanos().max(1));
+    let settle = u32::try_from(refreshes).unwrap_or(SETTLE) + BEYOND;
+    let share = |share: f64| told(0.2 + 0.4 * share, "grey response");
+    let mut greys = response(head, settle, &lit, &share)?.to_vec();
+    if let Some(before) = known.response.filter(|before| same(before, &greys)) {
+        notes.push(
+            "the grey response is that of before, within noise: it stays, and recipes stay valid"
+                .into(),
+        );
+        greys = before;
+    }
+    calibration.response = inverted(&greys).map_err(MakeError::Scene)?;
+    told(0.6, "noise");
+    let noise = Noise::measure(head, settle, &lit)?;
+    calibration.noise_counts = noise.counts;
+    told(0.65, "contrast");
+    let contrast = contrast(head, &calibration, settle, &lit)?;
+    let mut maps = Vec::new();
+    let reference = if known.plate {
+        told(0.75, "reference plane, vertical fringes");
+        let vertical = Plate::measure(head, &calibration, true, TIMEOUT)?;
+        told(0.88, "reference plane, horizontal fringes");
+        let horizontal = Plate::measure(head, &calibration, false, TIMEOUT)?;
+        Some(reference(&calibration, &vertical, &horizontal, &mut maps)?)
+    } else {
+        notes.push("no plate was measured: the reference plane is that of the models".into());
+        None
+    };
+    told(1.0, "calibrated");
+    let coarsest = contrast.first().map_or(0.0, |first| first.1);
+    let (width, height, bit_depth) = calibration.camera;
+    let file = CalibrationFile {
+        format: FORMAT.into(),
+        version: VERSION,
+        fingerprint: String::new(),
+        checksum: String::new(),
+        made_by: concat!("fringed ", env!("CARGO_PKG_VERSION")).into(),
+        made_at_unix_s: crate::system::clock::utc_us().unwrap_or(0) / 1_000_000,
+        temperature_c: known.temperature_c,
+        models_from: known.models_from,
+        camera: CameraFile {
+            width,
+            height,
+            bit_depth,
+            model: calibration.camera_model.clone(),
+        },
+        projector: ProjectorFile {
+            width: calibration.projector.0,
+            height: calibration.projector.1,
+            model: calibration.projector_model.clone(),
+        },
+        timing: TimingFile {
+            flip_to_light_ns: nanoseconds(delay.duration()),
+            // At most seconds.
+            sigma_ns: (delay.error * 1e9).ceil() as u64,
+            stamp: stamps.stamp,
+            readout_ns: nanoseconds(stamps.readout),
+        },
+        noise: NoiseFile {
+            counts: noise.counts,
+            read_counts: noise.read_counts,
+            shot: noise.shot,
+            levels: noise
+                .points
+                .iter()
+                .map(|point| LevelFile {
+                    level: point.level,
+                    counts: point.counts,
+                })
+                .collect(),
+        },
+        response: greys,
+        contrast: ContrastFile {
+            modulation_counts: coarsest,
+            pitches: contrast
+                .iter()
+                .map(|(pitch_px, modulation)| PitchFile {
+                    pitch_px: *pitch_px,
+                    contrast: modulation / coarsest.max(1e-9),
+                })
+                .collect(),
+        },
+        reference,
+    };
+    let (file, bytes) = file.sealed().map_err(MakeError::Scene)?;
+    Ok(Made {
+        file,
+        bytes,
+        maps,
+        notes,
+    })
+}
+
+fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
+}
+
+fn same(before: &[f64], now: &[f64]) -> bool {
+    let near = |(a, b): (&f64, &f64)| (a - b).abs() < SAME_RESPONSE;
+    before.len() == now.len() && before.iter().zip(now).all(near)
+}
+
+fn bright_enough(lit: &Lit) -> Result<(), MakeError> {
+    let (share, bright) = (lit.share(), lit.bright() / lit.full_scale());
+    let words = if share < LEAST_LIT {
+        format!(
+            "{:.1} % of the picture is lit: switch the lamp on, open the apertures",
+            share * 100.0
+        )
+    } else if lit.saturated() > MOST_SATURATED {
+        format!(
+            "{:.0} % of the lit pixels are saturated: expose less",
+            lit.saturated() * 100.0
+        )
+    } else if bright < LEAST_BRIGHT {
+        format!(
+            "white is {:.0} % of full scale: expose more",
+            bright * 100.0
+        )
+    } else {
+        return Ok(());
+    };
+    Err(MakeError::Scene(format!(
+        "calibrate: {words}; `fringed doctor` says more"
+    )))
+}
+
+/// The maps' part of the file; their bytes go to `maps`.
+fn reference(
+    calibration: &Calibration,
+    vertical: &Plate,
+    horizontal: &Plate,
+    maps: &mut Vec<(String, Vec<u8>)>,
+) -> Result<ReferenceFile, MakeError> {
+    let models_off_px = models_off(calibration, vertical, horizontal).map_err(MakeError::Models)?;
+    if !(models_off_px <= MOST_OFF_PX) {
+        return Err(MakeError::Models(format!(
+            "the models are off the measured plate by {models_off_px:.1} projector pixels, at most {MOST_OFF_PX} are right: put the \
+             plate into the plane z = 0 of the models, or import the models of this head"
+        )));
+    }
+    let (width, height) = (calibration.camera.0 as usize, calibration.camera.1 as usize);
+    let mut map = |name: &str, plate: &Plate| {
+        let bytes = hal::npy::write(width, &plate.map(width, height));
+        let (file, sha256) = Place::name_of_map(name, &bytes);
+        maps.push((file.clone(), bytes));
+        MapFile {
+            file,
+            sha256,
+            residual_turns: plate.residual_turns,
+            noise_turns: plate.noise_turns,
+            filled: plate.filled,
+        }
+    };
+    Ok(ReferenceFile {
+        pitch_px: Plate::PITCH,
+        models_off_px,
+        vertical: map("reference_vertical", vertical),
+        horizontal: map("reference_horizontal", horizontal),
+    })
+}
+
+/// How far the projector point that the models say is off the measured one, RMS over a grid of camera pixels, projector pixels.
+fn models_off(
+    calibration: &Calibration,
+    vertical: &Plate,
+    horizontal: &Plate,
+) -> Result<f64, String> {
+    const GRID: u32 = 16;
+    let (camera, projector) = calibration.devices()?;
+    let eye = camera.centre();
+    let (mut squares, mut points) = (0.0, 0.0);
+    for at in 0..GRID * GRID {
+        let place =
+            |at: u32, pixels: u32| (f64::from(at) + 0.5) / f64::from(GRID) * f64::from(pixels);
+        let u = place(at % GRID, calibration.camera.0);
+        let v = place(at / GRID, calibration.camera.1);
+        let on_plane = camera.ray(u, v).map(|ray| eye + ray * (-eye.z / ray.z));
+        let lights = on_plane.and_then(|point: Vector| projector.project(point));
+        let Some((xi, eta)) = lights else { continue };
+        let off = (
+            xi - Plate::PITCH * vertical.turns(u, v),
+            eta - Plate::PITCH * horizontal.turns(u, v),
+        );
+        squares += off.0 * off.0 + off.1 * off.1;
+        points += 1.0;
+    }
+    if points < f64::from(GRID * GRID) / 2.0 {
+        return Err(
+            "the models do not see the plane z = 0: import models of this head, with +z towards it"
+                .into(),
+        );
+    }
+    Ok((squares / points).sqrt())
+}

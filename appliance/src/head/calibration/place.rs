@@ -1,0 +1,149 @@
+//! Where a head's calibration lies: `calibration.json`, the generation before it, and the phase maps beside them.
+
+use super::file::CalibrationFile;
+use crate::recipe::archive::hex;
+use crate::storage::folder::{name_also, sync_folder_of, write_whole};
+use sha2::{Digest, Sha256};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Where it lies in a state folder.
+pub const IN_STATE: &str = "calibration/calibration.json";
+/// Digits of a map's checksum in its name: maps of two generations never have the same.
+const DIGITS: usize = 16;
+
+/// The place of a `calibration.json`.
+#[derive(Clone, Debug)]
+pub struct Place {
+    path: PathBuf,
+}
+
+/// A calibration that was read.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// It.
+    pub file: CalibrationFile,
+    /// Why the newest generation could not be used and this is the one before.
+    pub fallback: Option<String>,
+}
+
+impl Place {
+    /// A `calibration.json`, which need not be there.
+    pub fn at(path: &Path) -> Self {
+        Self {
+            path: path.to_path_buf(),
+        }
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn previous(&self) -> PathBuf {
+        self.path.with_extension("json.previous")
+    }
+
+    /// Reads the newest generation that is whole; none if there never was one.
+    ///
+    /// # Errors
+    /// In words, with the file: no generation can be used.
+    pub fn load(&self) -> Result<Option<Loaded>, String> {
+        let newest = read(&self.path);
+        if let Some(Ok(file)) = newest {
+            return Ok(Some(Loaded {
+                file,
+                fallback: None,
+            }));
+        }
+        let reason = newest.and_then(Result::err);
+        let place = self.path.display();
+        match (read(&self.previous()), reason) {
+            (Some(Ok(file)), reason) => Ok(Some(Loaded {
+                file,
+                fallback: Some(format!(
+                    "calibration {place}: {}; the one before it is used",
+                    reason.as_deref().unwrap_or("it is missing")
+                )),
+            })),
+            (_, Some(reason)) => Err(format!("calibration {place}: {reason}")),
+            (_, None) => Ok(None),
+        }
+    }
+
+    /// The generation before, if there is a whole one.
+    pub fn load_previous(&self) -> Option<CalibrationFile> {
+        read(&self.previous())?.ok()
+    }
+
+    /// The name of a map in the file, by its bytes.
+    pub fn name_of_map(name: &str, bytes: &[u8]) -> (String, String) {
+        let sum = hex(&Sha256::digest(bytes));
+        (format!("{name}-{}.npy", &sum[..DIGITS]), sum)
+    }
+
+    /// Writes a calibration with its maps (name, bytes); the one before stays as the previous generation. Whenever the plug is
+    /// pulled, the old one is whole or the new one is: maps have names of their own, and count once `calibration.json` names them.
+    ///
+    /// # Errors
+    /// Whatever the file system answers; then the calibration is the one before.
+    pub fn save(&self, bytes: &[u8], maps: &[(String, Vec<u8>)]) -> io::Result<()> {
+        let folder = self.folder();
+        fs::create_dir_all(folder)?;
+        sync_folder_of(folder)?;
+        for (name, bytes) in maps {
+            write_whole(&folder.join(name), bytes)?;
+        }
+        self.keep_previous()?;
+        write_whole(&self.path, bytes)?;
+        self.forget_maps();
+        Ok(())
+    }
+
+    fn folder(&self) -> &Path {
+        let folder = self.path.parent();
+        folder
+            .filter(|folder| !folder.as_os_str().is_empty())
+            .unwrap_or(Path::new("."))
+    }
+
+    /// Makes the current generation the previous one, unless it is damaged: a damaged file never pushes out a good one.
+    fn keep_previous(&self) -> io::Result<()> {
+        if !matches!(read(&self.path), Some(Ok(_))) {
+            return Ok(());
+        }
+        // The current one stands until it is replaced.
+        name_also(&self.path, &self.previous())
+    }
+
+    /// Removes maps that no generation names, and what a kill has left. What cannot be removed only takes room.
+    fn forget_maps(&self) {
+        let generations = [read(&self.path), read(&self.previous())];
+        let named: Vec<&str> = generations
+            .iter()
+            .flatten()
+            .flatten()
+            .filter_map(|file| file.reference.as_ref())
+            .flat_map(|maps| [maps.vertical.file.as_str(), maps.horizontal.file.as_str()])
+            .collect();
+        for entry in fs::read_dir(self.folder()).into_iter().flatten().flatten() {
+            let name = entry.file_name();
+            let Some(name) = name.to_str() else { continue };
+            let ours = name.starts_with("reference_")
+                && (name.ends_with(".npy") || name.ends_with(".npy.new"));
+            if ours && !named.contains(&name) {
+                let _ = fs::remove_file(entry.path());
+            }
+        }
+    }
+}
+
+/// The calibration in a file, if there is one.
+fn read(path: &Path) -> Option<Result<CalibrationFile, String>> {
+    match fs::read(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+        Err(error) => Some(Err(format!("{error}: make it readable, or calibrate anew"))),
+        Ok(bytes) => Some(CalibrationFile::read(&bytes)),
+    }
+}

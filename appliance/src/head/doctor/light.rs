@@ -1,0 +1,147 @@
+//! The doctor's steps about light: there at all, exposed well, sharp at several pitches, and in proportion to grey.
+
+use super::Finding;
+use crate::head::calibration::Calibration;
+use crate::head::examine::{self, Lit, SETTLE};
+use hal::error::Error;
+use hal::head::DynHead;
+use serde_json::{Value, json};
+
+/// Grey levels whose response is measured, besides black and white.
+const GREYS: [u8; 7] = [32, 64, 96, 128, 160, 192, 224];
+/// The pitch that must be sharp: teaching starts with it.
+const SHARP_PITCH: u32 = 12;
+/// Least contrast at that pitch, relative to the coarsest. A blur of σ pixels leaves exp(−2 (π σ / pitch)²): 0.5 is σ = 2.2 px.
+const LEAST_CONTRAST: f64 = 0.5;
+/// Share of the picture that must be lit.
+pub const LEAST_LIT: f64 = 0.01;
+/// Share of the lit pixels that may be saturated: glints.
+pub const MOST_SATURATED: f64 = 0.01;
+/// Median of white over the lit pixels, share of full scale: below, noise is a large part of the signal.
+pub const LEAST_BRIGHT: f64 = 0.2;
+/// Grey may answer off proportion by this share of white. Of gamma 1.1 it is 0.035.
+const MOST_NONLINEAR: f64 = 0.03;
+
+pub(super) fn light(lit: &Lit) -> Finding {
+    let share = lit.share();
+    let measured = json!({ "lit_percent": share * 100.0 });
+    let found = format!(
+        "{:.1} % of the picture is lit by the projector",
+        share * 100.0
+    );
+    if share < LEAST_LIT {
+        return Finding::fail(
+            found,
+            "switch the projector's lamp on, take off the lens caps, open the apertures, and put a part into view",
+            measured,
+        );
+    }
+    Finding::pass(found, measured)
+}
+
+pub(super) fn exposure(lit: &Lit) -> Finding {
+    let saturated = lit.saturated();
+    let bright = lit.bright() / lit.full_scale();
+    let measured =
+        json!({ "saturated_percent": saturated * 100.0, "white_percent": bright * 100.0 });
+    let found = format!(
+        "white is {:.0} % of full scale, {:.1} % of the lit pixels are saturated",
+        bright * 100.0,
+        saturated * 100.0
+    );
+    if saturated > MOST_SATURATED {
+        return Finding::fail(
+            found,
+            "lower the gain, the lamp or the aperture, or expose fewer whole refreshes",
+            measured,
+        );
+    }
+    if bright < LEAST_BRIGHT {
+        return Finding::fail(
+            found,
+            "raise the lamp, open the aperture, or expose more whole refreshes",
+            measured,
+        );
+    }
+    Finding::pass(found, measured)
+}
+
+pub(super) fn contrast(
+    head: &mut DynHead,
+    calibration: &Calibration,
+    lit: &Lit,
+) -> Result<Finding, Error> {
+    let modulations = examine::contrast(head, calibration, SETTLE, lit)?;
+    let coarsest = modulations.first().map_or(0.0, |first| first.1);
+    let relative: Vec<(u32, f64)> = modulations
+        .iter()
+        .map(|(pitch, modulation)| (*pitch, modulation / coarsest.max(1e-9)))
+        .collect();
+    let by_pitch: serde_json::Map<String, Value> = relative
+        .iter()
+        .map(|(pitch, contrast)| (pitch.to_string(), json!(contrast)))
+        .collect();
+    let measured = json!({ "modulation_counts": coarsest, "contrast_by_pitch": by_pitch });
+    let listed: Vec<String> = relative
+        .iter()
+        .map(|(pitch, contrast)| format!("{:.0} % at {pitch} px", contrast * 100.0))
+        .collect();
+    let found = format!(
+        "contrast of the coarsest pitch is kept to {}",
+        listed.join(", ")
+    );
+    let sharp = relative.iter().find(|(pitch, _)| *pitch == SHARP_PITCH);
+    if sharp.is_none_or(|(_, contrast)| *contrast < LEAST_CONTRAST) {
+        return Ok(Finding::fail(
+            found,
+            format!(
+                "focus projector and camera on the part until {SHARP_PITCH} px keep {:.0} %",
+                LEAST_CONTRAST * 100.0
+            ),
+            measured,
+        ));
+    }
+    Ok(Finding::pass(found, measured))
+}
+
+pub(super) fn response(
+    head: &mut DynHead,
+    calibration: &Calibration,
+    lit: &Lit,
+) -> Result<Finding, Error> {
+    // As patterns are projected: through the inverse of the response that is known.
+    let asked = GREYS.map(|grey| {
+        let response = calibration.response.as_ref();
+        response.map_or(grey, |response| response.level_for(grey))
+    });
+    let lights = examine::lights(head, SETTLE, lit, &asked, &|_| ())?;
+    let answers: Vec<(f64, f64)> = GREYS
+        .iter()
+        .zip(lights)
+        .map(|(grey, light)| (f64::from(*grey) / 255.0, light))
+        .collect();
+    let off = answers
+        .iter()
+        .map(|(grey, light)| (light - grey).abs())
+        .fold(0.0, f64::max);
+    // Least squares of ln light = gamma ln grey.
+    let (mut products, mut squares) = (0.0, 0.0);
+    for (grey, light) in &answers {
+        let (x, y) = (grey.ln(), light.max(1e-3).ln());
+        (products, squares) = (products + x * y, squares + x * x);
+    }
+    let gamma = products / squares;
+    let measured = json!({ "gamma": gamma, "nonlinear_percent": off * 100.0 });
+    let found = format!(
+        "light follows grey with exponent {gamma:.2}, off proportion by {:.1} % of white at most",
+        off * 100.0
+    );
+    if off > MOST_NONLINEAR {
+        return Ok(Finding::fail(
+            found,
+            "set the projector's gamma to 1 (a mode without picture improvement), or calibrate its response",
+            measured,
+        ));
+    }
+    Ok(Finding::pass(found, measured))
+}

@@ -1,0 +1,284 @@
+//! The doctor's steps about devices and time: there, right format and mode, flips, triggers, flip-to-light delay.
+
+use super::Finding;
+use crate::head::examine::{Delay, Lit, PATIENCE, Stamps};
+use hal::camera::Starts;
+use hal::error::Error;
+use hal::head::{DynHead, Showing, TOLERANCE, Timing, Watched};
+use hal::projector::{Flip, Raster};
+use hal::trigger::Spoiled;
+use serde_json::json;
+use std::time::Duration;
+
+/// Flips whose cadence is judged.
+const FLIPS: u32 = 60;
+/// The period of flips may be off the mode's by this share: a mode says 60 Hz where it is 59.94.
+const PERIOD_TOLERANCE: f64 = 2e-3;
+/// Refreshes over which the trigger is judged.
+const TRIGGERED: u32 = 24;
+/// The patterns that are loaded for it.
+const WHITE: usize = 1;
+/// How far the delay may be off even where it was measured well, ms: what one round of a small camera leaves.
+const LEAST_OFF_MS: f64 = 0.05;
+
+fn ms(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
+}
+
+pub(super) fn devices(head: &DynHead) -> Result<Finding, Error> {
+    head.present()?;
+    let ((columns, rows), camera) = (head.projector_size(), head.camera_format());
+    Ok(Finding::pass(
+        format!(
+            "a camera of {} and a projector of {columns}×{rows}",
+            camera.describe()
+        ),
+        json!({
+            "camera": [camera.width, camera.height], "bit_depth": camera.bit_depth,
+            "projector": [columns, rows],
+        }),
+    ))
+}
+
+pub(super) fn format(head: &DynHead) -> Finding {
+    let encoding = head.encoding();
+    let measured = json!({ "encoding": encoding.name, "exact": encoding.exact });
+    if encoding.exact {
+        return Finding::pass(
+            format!("{}: samples are what the sensor counted", encoding.name),
+            measured,
+        );
+    }
+    Finding::fail(
+        format!(
+            "the camera grants {} only: its samples are not what the sensor counted, but compressed or processed",
+            encoding.name
+        ),
+        "ask for an uncompressed raw format (R16 on a Raspberry Pi 5, R10_CSI2P on a Pi 4)",
+        measured,
+    )
+}
+
+pub(super) fn mode(head: &DynHead) -> Finding {
+    let (camera, refresh) = (head.camera_timing(), head.refresh());
+    let refreshes = camera.exposure.as_secs_f64() / refresh.as_secs_f64();
+    let whole = refresh.mul_f64(refreshes.round().max(1.0));
+    let off = camera.exposure.abs_diff(whole);
+    let measured = json!({
+        "refresh_hz": 1.0 / refresh.as_secs_f64(),
+        "exposure_ms": ms(camera.exposure), "exposure_refreshes": refreshes,
+        "camera_period_ms": ms(camera.period),
+    });
+    let found = format!(
+        "{:.2} Hz; exposures of {:.3} ms, {refreshes:.2} refreshes, at most every {:.3} ms",
+        1.0 / refresh.as_secs_f64(),
+        ms(camera.exposure),
+        ms(camera.period)
+    );
+    if off > TOLERANCE {
+        let remedy = format!(
+            "set the exposure to {:.3} ms: a micromirror device makes grey levels over whole refreshes",
+            ms(whole)
+        );
+        return Finding::fail(found, remedy, measured);
+    }
+    Finding::pass(found, measured)
+}
+
+/// Black and white.
+fn load(head: &mut DynHead) -> Result<(), Error> {
+    let (columns, rows) = head.projector_size();
+    head.load(vec![
+        Raster::uniform(columns, rows, 0)?,
+        Raster::uniform(columns, rows, u8::MAX)?,
+    ])
+}
+
+pub(super) fn cadence(head: &mut DynHead) -> Result<Finding, Error> {
+    load(head)?;
+    let showing = |index: u32| Showing {
+        index: index as usize % 2,
+        refreshes: 1,
+        settle: FLIPS,
+    };
+    let showings: Vec<Showing> = (0..FLIPS).map(showing).collect();
+    let flips = head.watch(&showings, PATIENCE, &mut |_| ())?.flips;
+    let nominal = head.refresh();
+    let (Some(first), Some(last)) = (flips.first(), flips.last()) else {
+        return Ok(Finding::fail(
+            "no flip came",
+            "check the projector's connection and that no other program holds the display",
+            json!({ "flips": 0 }),
+        ));
+    };
+    let counted = last.sequence - first.sequence;
+    let missed = counted.saturating_sub(u64::from(FLIPS) - 1);
+    let period = last.timestamp.since(first.timestamp).as_secs_f64() / counted.max(1) as f64;
+    let off_grid = |flip: &Flip| {
+        let expected = period * (flip.sequence - first.sequence) as f64;
+        (flip.timestamp.since(first.timestamp).as_secs_f64() - expected).abs()
+    };
+    let jitter = flips.iter().map(off_grid).fold(0.0, f64::max);
+    let measured = json!({
+        "flips": flips.len(), "missed": missed, "period_ms": period * 1e3, "jitter_us": jitter * 1e6,
+    });
+    let found = format!(
+        "{} of {FLIPS} flips, {missed} refreshes missed, one per {:.3} ms, off by {:.0} µs at most",
+        flips.len(),
+        period * 1e3,
+        jitter * 1e6
+    );
+    let remedy = if flips.len() < FLIPS as usize {
+        "the projector stopped flipping: check its cable and the display driver's log"
+    } else if missed > 0 {
+        "flips come late: stop what else loads the computer, and give fringed a real-time priority"
+    } else if (period / nominal.as_secs_f64() - 1.0).abs() > PERIOD_TOLERANCE {
+        "the projector does not run in the mode that it says: set the mode anew"
+    } else if jitter > TOLERANCE.as_secs_f64() {
+        "the display driver does not stamp flips at the refresh: use a driver with precise vblank times"
+    } else {
+        return Ok(Finding::pass(found, measured));
+    };
+    Ok(Finding::fail(found, remedy, measured))
+}
+
+pub(super) fn trigger(head: &mut DynHead, calibrated: bool) -> Result<Finding, Error> {
+    load(head)?;
+    let showing = Showing {
+        index: WHITE,
+        refreshes: TRIGGERED,
+        settle: 0,
+    };
+    let mut seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
+    if !calibrated && !seen.frames.is_empty() {
+        // Calibrating comes after the doctor: what it will find is what frames are judged by here.
+        let Stamps { stamp, readout } = Stamps::measure(head)?;
+        head.set_timing(Timing {
+            stamp,
+            readout,
+            ..head.timing()
+        });
+        load(head)?;
+        seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
+    }
+    Ok(match head.camera_timing().starts {
+        Starts::OnTrigger => triggered(&seen),
+        Starts::ByItself => by_itself(&seen, head.camera_timing().period),
+    })
+}
+
+fn triggered(seen: &Watched<()>) -> Finding {
+    let (pulses, frames) = (seen.triggers.len(), seen.frames.len());
+    let latest = |frame: &hal::head::Seen<()>| {
+        let off = seen.triggers.iter().map(|at| at.0.abs_diff(frame.start.0));
+        off.min().unwrap_or(u64::MAX)
+    };
+    let off_us = seen.frames.iter().map(latest).max().unwrap_or(0) / 1000;
+    let spoiled = seen.spoiled.len();
+    let pulse_off = seen.spoiled.iter().map(Spoiled::off).max();
+    let measured = json!({
+        "triggers": pulses, "frames": frames, "off_us": off_us, "spoiled": spoiled,
+    });
+    let found =
+        format!("{frames} frames for {pulses} triggers, exposed {off_us} µs from them at most");
+    if frames == 0 {
+        return Finding::fail(
+            format!("no frame for {pulses} triggers"),
+            "check the wire from the trigger output to the camera's trigger input, and that the camera is in trigger mode",
+            measured,
+        );
+    }
+    if let Some(off) = pulse_off {
+        return Finding::fail(
+            format!(
+                "{spoiled} of {pulses} pulses were not as long as they should be, by up to {:.2} ms: so far off is the exposure",
+                ms(off)
+            ),
+            "stop what else loads the computer, and give fringed a real-time priority",
+            measured,
+        );
+    }
+    if frames < pulses {
+        return Finding::fail(
+            found,
+            "triggers are lost: check the wire's contact and level, and that the camera's period fits its exposure and readout",
+            measured,
+        );
+    }
+    if u128::from(off_us) > TOLERANCE.as_micros() {
+        return Finding::fail(
+            found,
+            "the camera's stamps mark another moment of the exposure than the calibration says: calibrate anew",
+            measured,
+        );
+    }
+    Finding::pass(found, measured)
+}
+
+fn by_itself(seen: &Watched<()>, nominal: Duration) -> Finding {
+    let frames = seen.frames.len();
+    let (first, last) = (seen.frames.first(), seen.frames.last());
+    let (Some(first), Some(last)) = (first, last.filter(|_| frames > 1)) else {
+        return Finding::fail(
+            format!("{frames} frames of a camera that runs by itself"),
+            "check the camera's cable and that no other program holds it",
+            json!({ "frames": frames }),
+        );
+    };
+    let counted = last.count.saturating_sub(first.count).max(1);
+    let lost = (counted + 1).saturating_sub(frames as u64);
+    let period = last.start.since(first.start).as_secs_f64() / counted as f64;
+    let measured = json!({ "frames": frames, "lost": lost, "period_ms": period * 1e3 });
+    let found = format!(
+        "{frames} frames by itself, {lost} lost, one per {:.3} ms",
+        period * 1e3
+    );
+    if lost > 0 {
+        return Finding::fail(
+            found,
+            "frames are lost: check the camera's cable and the load of the computer",
+            measured,
+        );
+    }
+    if (period / nominal.as_secs_f64() - 1.0).abs() > PERIOD_TOLERANCE {
+        return Finding::fail(
+            found,
+            "the camera does not keep its frame length: set it before the start and not again",
+            measured,
+        );
+    }
+    Finding::pass(found, measured)
+}
+
+/// The time from a flip to its light, by how bright the frames around many flips are.
+pub(super) fn delay(head: &mut DynHead, lit: &Lit) -> Result<Finding, Error> {
+    let believed = head.timing().flip_to_light.as_secs_f64();
+    let refresh = head.refresh().as_secs_f64();
+    let Some(measured) = Delay::measure(head, lit, 1)? else {
+        return Ok(Finding::fail(
+            "no light follows the flips from black to white",
+            "check the projector's input: it may show another source",
+            json!({ "calibrated_ms": believed * 1e3 }),
+        ));
+    };
+    let delay = measured.seconds;
+    let off_ms = (3.0 * measured.error * 1e3).max(LEAST_OFF_MS);
+    let numbers = json!({
+        "delay_ms": delay * 1e3, "off_ms": off_ms, "calibrated_ms": believed * 1e3,
+        "off_refreshes": (delay - believed) / refresh,
+    });
+    let found = format!(
+        "light comes {:.2} ± {off_ms:.2} ms after its flip, the calibration says {:.2} ms",
+        delay * 1e3,
+        believed * 1e3
+    );
+    // Finer than this the calibration measures it, with more flips.
+    if (delay - believed).abs() > (off_ms * 1e-3).max(refresh / 8.0) {
+        let remedy = format!(
+            "the calibration is off by {:.1} refreshes: switch off the projector's picture processing, or calibrate anew",
+            (delay - believed) / refresh
+        );
+        return Ok(Finding::fail(found, remedy, numbers));
+    }
+    Ok(Finding::pass(found, numbers))
+}

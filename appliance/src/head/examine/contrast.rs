@@ -1,0 +1,59 @@
+//! Contrast against pitch: what fringes keep of the projector's light on their way to the camera.
+//!
+//! Contrast is the modulation B of four shifts by a quarter of a turn, B = ½ √((I₀ − I₂)² + (I₁ − I₃)²) (Creath 1988), relative to
+//! that of the coarsest pitch, so neither brightness nor the projector's response changes it.
+
+use super::pictures::{Lit, median, pictures};
+use crate::head::calibration::Calibration;
+use crate::recipe::plan::rasters;
+use algo::pattern::PhaseFunction;
+use hal::error::Error;
+use hal::head::DynHead;
+use hal::projector::Raster;
+
+/// Pitches whose contrast is measured, projector pixels, the coarsest first: the others are relative to it.
+pub const PITCHES: [u32; 6] = [64, 32, 24, 16, 12, 8];
+/// Quarter turns of a pitch.
+const SHIFTS: usize = 4;
+
+/// The median modulation over the lit pixels for each of [`PITCHES`], counts.
+///
+/// # Errors
+/// Of a device, or if the projector is too small for a pitch.
+pub fn contrast(
+    head: &mut DynHead,
+    calibration: &Calibration,
+    settle: u32,
+    lit: &Lit,
+) -> Result<Vec<(u32, f64)>, Error> {
+    let mut measured = Vec::with_capacity(PITCHES.len());
+    for pitch in PITCHES {
+        let patterns = shifts(head.projector_size(), pitch, calibration)?;
+        let mut shots = Vec::with_capacity(SHIFTS);
+        pictures(head, settle, patterns.into_iter().map(Ok), &mut |counts| {
+            shots.push(counts);
+        })?;
+        let shot = |shift: usize, at: usize| f64::from(shots[shift][at]);
+        let one =
+            |at: &usize| (shot(0, *at) - shot(2, *at)).hypot(shot(1, *at) - shot(3, *at)) / 2.0;
+        measured.push((pitch, median(lit.places().iter().map(one).collect())));
+    }
+    Ok(measured)
+}
+
+fn shifts(
+    (columns, rows): (u32, u32),
+    pitch: u32,
+    calibration: &Calibration,
+) -> Result<Vec<Raster>, Error> {
+    let fringes = f64::from(columns) / f64::from(pitch);
+    let function =
+        PhaseFunction::vertical(columns as usize, rows as usize, fringes).map_err(|error| {
+            Error::unsupported(
+                format!("a pitch of {pitch} px: {error}, which"),
+                "use a projector of more pixels",
+            )
+        })?;
+    let shifts = (0..SHIFTS).map(|shift| (1.0, shift as f64 / SHIFTS as f64));
+    rasters(&function, shifts, calibration)
+}

@@ -1,0 +1,7 @@
+//! The head as a measuring instrument: its calibration, what can be measured on it, and the doctor who judges that.
+
+pub mod calibration;
+pub mod doctor;
+pub mod examine;
+pub mod rig;
+pub mod seam;

@@ -1,0 +1,151 @@
+//! A part that a station kept, opened again to be judged: its frames, what its recording says of the head, its recipe.
+
+use crate::error::{Exit, Failure};
+use crate::head::calibration::Calibration;
+use crate::history::RECIPE;
+use crate::recipe::plan::{Plan, PlanError};
+use crate::recipe::{LoadError, Recipe, Store, archive};
+use hal::frame::Frame;
+use hal::replay::Recording;
+use hal::replay::recording::RecipeReference;
+use std::fs::File;
+use std::io::{self, BufReader};
+use std::path::{Path, PathBuf};
+
+/// A recording that a station made of a part that it had judged.
+#[derive(Debug)]
+pub struct Kept {
+    recording: Recording,
+    reference: RecipeReference,
+    calibration: Calibration,
+    /// The recording's own recipe; recordings of older programs have none.
+    own: Option<PathBuf>,
+}
+
+impl Kept {
+    /// Opens the recording in a folder.
+    ///
+    /// # Errors
+    /// If it is not there (66), damaged, or not one that a station kept (65).
+    pub fn open(folder: &Path) -> Result<Self, Failure> {
+        let mut recording = Recording::open(folder)?;
+        let wrong = |lacks: &str| {
+            let place = folder.join("recording.json");
+            let words = format!(
+                "replay {}: it has no {lacks}: replay one that the station kept",
+                place.display()
+            );
+            Failure::new(Exit::Content, words)
+        };
+        let reference = recording.recipe.take().ok_or_else(|| wrong("recipe"))?;
+        let noise = recording.noise_counts;
+        let noise = noise.ok_or_else(|| wrong("camera.noise_counts"))?;
+        let calibration = Calibration::of(&recording, noise).map_err(wrong)?;
+        let own = folder.join(RECIPE);
+        Ok(Self {
+            recording,
+            reference,
+            calibration,
+            own: own.exists().then_some(own),
+        })
+    }
+
+    /// The recipe that judged the part.
+    pub fn reference(&self) -> &RecipeReference {
+        &self.reference
+    }
+
+    /// PART_ID, as far as the recording says.
+    pub fn part_id(&self) -> Option<&str> {
+        self.recording.part_id.as_deref()
+    }
+
+    /// The frames, in the order of their sequence.
+    pub fn frames(&self) -> Vec<Frame> {
+        let taken = self.recording.frames.iter();
+        taken.map(|taken| taken.frame.clone()).collect()
+    }
+
+    /// Ratio and shift of each frame, in turns: which sequence of a recipe they are of.
+    pub fn shown(&self) -> Vec<(f64, f64)> {
+        let taken = self.recording.frames.iter();
+        taken
+            .map(|taken| (taken.ratio, taken.shift_turns))
+            .collect()
+    }
+
+    /// The recipe that judged the part: the recording's own, else the generation of the station's that has its fingerprint.
+    /// The answer says whether it is the recording's.
+    ///
+    /// # Errors
+    /// If there is none any more (66), or the recording's is damaged or another one (65).
+    pub fn recipe(&self, stored: &Store) -> Result<(Recipe, bool), Failure> {
+        let RecipeReference {
+            number,
+            fingerprint,
+        } = &self.reference;
+        let Some(own) = &self.own else {
+            let number = u16::try_from(*number).unwrap_or(0);
+            return match stored.load_fingerprint(number, fingerprint) {
+                Ok(recipe) => Ok((recipe, false)),
+                Err(error) => Err(missing(&error)),
+            };
+        };
+        let recipe = read(own)?;
+        if recipe.file.fingerprint == *fingerprint {
+            return Ok((recipe, true));
+        }
+        let words = format!(
+            "read recipe {}: its fingerprint is {:.8}, the part was judged by {fingerprint:.8}: copy the whole recording \
+             again, or name a recipe",
+            own.display(),
+            recipe.file.fingerprint
+        );
+        Err(Failure::new(Exit::Content, words))
+    }
+
+    /// Joins a recipe with what the recording says of the head.
+    ///
+    /// # Errors
+    /// If it was made for another head or does not fit the frames.
+    pub fn plan(&self, recipe: Recipe, simulated: bool) -> Result<Plan, PlanError> {
+        let judged = recipe.file.fingerprint == self.reference.fingerprint;
+        if judged || self.calibration_then().as_ref() == Some(&recipe.file.calibration) {
+            return Plan::again(recipe, &self.calibration, simulated);
+        }
+        Plan::new(recipe, &self.calibration, simulated)
+    }
+
+    /// Fingerprint of the calibration that the part was measured with, as far as the recording's own recipe says.
+    fn calibration_then(&self) -> Option<String> {
+        let file = File::open(self.own.as_ref()?).ok()?;
+        Some(archive::manifest(file).ok()?.calibration)
+    }
+}
+
+/// A recipe that the station has not, as an exit code.
+pub fn missing(error: &LoadError) -> Failure {
+    let exit = match error {
+        LoadError::Unknown(_) => Exit::Missing,
+        LoadError::Corrupt { .. } => Exit::Content,
+    };
+    Failure::new(exit, format!("{error}; or name its file with --recipe"))
+}
+
+/// Reads a recipe by itself: a file may lie anywhere and have any name.
+///
+/// # Errors
+/// If it is not there (66), or is no recipe (65).
+pub fn read(path: &Path) -> Result<Recipe, Failure> {
+    let what = format!("read recipe {}", path.display());
+    let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
+    let (size, file) = opened.map_err(|error| match error.kind() {
+        io::ErrorKind::NotFound => Failure::new(
+            Exit::Missing,
+            format!("{what}: {error}: name the .recipe file of the part"),
+        ),
+        _ => Failure::because(Exit::Content, &what, error),
+    })?;
+    Recipe::read(BufReader::new(file), size)
+        .map_err(|error| Failure::because(Exit::Content, what, error))
+}

@@ -1,0 +1,195 @@
+//! Wires beside the network: a start line in, and busy, ok and fault out, for presses without Modbus and for lamps.
+//!
+//! One thread serves them. It follows the station's snapshots, as Modbus and the page do, and its start is a trigger by edge, as
+//! the page's is. When the chip of the lines goes it is opened again until it is there; meanwhile resistors say fault.
+
+mod signals;
+
+pub use signals::{Follower, Signals};
+
+use crate::error::Failure;
+use crate::service::runtime;
+use crate::station::control::TRIGGER;
+use crate::station::{ControlWrite, Event, StationHandle};
+use crate::system::progress::Progress;
+use hal::clock::monotonic;
+use hal::error::Error;
+use hal::lines::{OutputLine, StartLine};
+use hal::units::Timestamp;
+use std::future::pending;
+use std::os::fd::OwnedFd;
+use std::time::Duration;
+use tokio::io::unix::AsyncFd;
+use tokio::sync::watch;
+
+/// Waits before the lines are opened again: doubled after each attempt, from the first to the last.
+const FIRST_WAIT: Duration = Duration::from_millis(100);
+const LONGEST_WAIT: Duration = Duration::from_secs(2);
+
+/// The lines that are wired.
+#[derive(Default)]
+pub struct Wires {
+    /// In: starts a cycle.
+    pub start: Option<Box<dyn StartLine>>,
+    /// Out: the station works.
+    pub busy: Option<Box<dyn OutputLine>>,
+    /// Out: the last part passed.
+    pub ok: Option<Box<dyn OutputLine>>,
+    /// Out: a start would not be taken, and not for being busy.
+    pub fault: Option<Box<dyn OutputLine>>,
+}
+
+/// How the lines are opened again.
+pub type Open = Box<dyn Fn() -> Result<Wires, Failure> + Send + Sync>;
+
+/// Serves the lines until `stopped` says so; then they go back to what they are without a station.
+///
+/// # Errors
+/// If the system gives no runtime.
+pub fn serve(
+    wires: Wires,
+    open: &Open,
+    station: &StationHandle,
+    progress: &Progress,
+    mut stopped: watch::Receiver<bool>,
+) -> Result<(), Failure> {
+    runtime()?.block_on(async {
+        let stop = stopped.wait_for(|stop| *stop);
+        tokio::select! {
+            // An error means that the daemon itself is gone: stop as well.
+            _ = stop => {}
+            () = follow(wires, open, station, progress) => {}
+        }
+    });
+    Ok(())
+}
+
+/// Follows the station for ever.
+async fn follow(mut wires: Wires, open: &Open, station: &StationHandle, progress: &Progress) {
+    loop {
+        if let Err(error) = wires.follow(station).await {
+            progress.log(&format!("{error}; opened again when it is there"));
+        }
+        drop(wires);
+        wires = reopened(open, progress).await;
+        progress.log("the lines are there again");
+    }
+}
+
+async fn reopened(open: &Open, progress: &Progress) -> Wires {
+    let (mut wait, mut said) = (FIRST_WAIT, String::new());
+    loop {
+        tokio::time::sleep(wait).await;
+        wait = (2 * wait).min(LONGEST_WAIT);
+        match open() {
+            Ok(wires) => return wires,
+            Err(failure) if failure.message != said => {
+                progress.log(&failure.message);
+                said = failure.message;
+            }
+            Err(_) => {}
+        }
+    }
+}
+
+impl Wires {
+    /// Follows the station until a line fails.
+    async fn follow(&mut self, station: &StationHandle) -> Result<(), Error> {
+        if self.none() {
+            pending::<()>().await;
+        }
+        let mut snapshots = station.subscribe();
+        let first = snapshots.borrow_and_update().clone();
+        let (mut follower, signals) = Follower::new(&first);
+        self.say(signals)?;
+        let descriptor = self.start.as_deref().map(descriptor).transpose()?;
+        loop {
+            tokio::select! {
+                changed = snapshots.changed() => {
+                    let snapshot = snapshots.borrow_and_update().clone();
+                    for signals in follower.follow(&snapshot) {
+                        self.say(signals)?;
+                    }
+                    if changed.is_err() {
+                        // Nobody tells anything any more.
+                        pending::<()>().await;
+                    }
+                }
+                () = moved(descriptor.as_ref(), self.start.as_deref().and_then(StartLine::settles)) => {
+                    self.started(station)?;
+                }
+            }
+        }
+    }
+
+    fn none(&self) -> bool {
+        let outputs = [&self.busy, &self.ok, &self.fault];
+        self.start.is_none() && outputs.into_iter().all(Option::is_none)
+    }
+
+    /// Takes the starts that have come.
+    fn started(&mut self, station: &StationHandle) -> Result<(), Error> {
+        let Some(start) = &mut self.start else {
+            return Ok(());
+        };
+        while start.poll_start()?.is_some() {
+            // An edge without a write: the registers of the PLC stay as it wrote them.
+            let (write, rising) = (ControlWrite::default(), TRIGGER);
+            station.event(Event::Write { write, rising });
+        }
+        Ok(())
+    }
+
+    /// Puts the signals on the lines. Busy is last: whoever sees it fall finds the others right.
+    fn say(&mut self, signals: Signals) -> Result<(), Error> {
+        let Signals { busy, ok, fault } = signals;
+        for (line, on) in [
+            (&mut self.ok, ok),
+            (&mut self.fault, fault),
+            (&mut self.busy, busy),
+        ] {
+            if let Some(line) = line {
+                line.set(on)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The start line's descriptor, to wait for.
+#[expect(
+    deprecated,
+    reason = "unsound for a value that does not own its descriptor; this one does"
+)]
+fn descriptor(start: &dyn StartLine) -> Result<AsyncFd<OwnedFd>, Error> {
+    let own = start.as_fd().try_clone_to_owned();
+    own.and_then(AsyncFd::new).map_err(|error| {
+        let remedy = "raise the limit of open files of the service";
+        Error::unsupported(format!("waiting for the start line: {error}"), remedy)
+    })
+}
+
+/// Ends when the start line has edges, or may have settled.
+async fn moved(descriptor: Option<&AsyncFd<OwnedFd>>, settles: Option<Timestamp>) {
+    let edges = async {
+        match descriptor {
+            // All edges are taken after this, so it is not readable until others come.
+            Some(descriptor) => {
+                if let Ok(mut ready) = descriptor.readable().await {
+                    ready.clear_ready();
+                }
+            }
+            None => pending().await,
+        }
+    };
+    let still = async {
+        match settles {
+            Some(at) => tokio::time::sleep(at.since(monotonic())).await,
+            None => pending().await,
+        }
+    };
+    tokio::select! { () = edges => {} () = still => {} }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,243 @@
+//! From a preliminary recording to a phase function made for its part: what `fringed adapt` does.
+
+use crate::error::{Exit, Failure};
+use crate::head::seam;
+use crate::measure::{Measurement, Surface, measure};
+use algo::adaptive::{ProjectorMap, noise, paper};
+use algo::pattern::PhaseFunction;
+use hal::replay::Recording;
+use hal::replay::recording::PatternSpec;
+use serde::Serialize;
+use std::path::Path;
+
+/// How a phase function is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Choice {
+    /// By which method.
+    pub method: Method,
+    /// Blur and smallest pitches. The paper's method knows only the image pitch; its own projector
+    /// pitch is [`paper::PROJECTOR_PITCH`], and the blur is only that of the prediction.
+    pub optics: noise::Optics,
+}
+
+/// A method of making a pattern for a part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Peng & Gupta (2008), from vertical and horizontal fringes.
+    Paper,
+    /// Least noise for the contrast that there is, from vertical fringes alone.
+    Fringed,
+}
+
+/// A phase function that was made for a part.
+#[derive(Clone, Debug)]
+pub struct Adapted {
+    /// Φ_P over the projector's raster.
+    pub function: PhaseFunction,
+    /// The summary.
+    pub report: Report,
+}
+
+/// The summary of an adaptation.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// How it was made.
+    pub method: Method,
+    /// Rows and columns of the phase function: the projector's.
+    pub shape: [usize; 2],
+    /// Camera pixels whose projector point is known and on the raster.
+    pub pixels_used: usize,
+    /// Smallest and largest local pitch along ξ over the whole raster, projector pixels.
+    pub pitch_px: [f64; 2],
+    /// Largest Φ_P in turns; the smallest is 0.
+    pub max_turns: f64,
+    /// RMS of the preliminary measurement's σ_z, mm; none where the noise is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub preliminary_sigma_mm: Option<f64>,
+    /// The same with the preliminary sequence's levels and shifts of the new phase function.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub predicted_sigma_mm: Option<f64>,
+}
+
+/// Measures a preliminary recording and makes a phase function for its part.
+///
+/// # Errors
+/// If it cannot be measured, lacks a pattern or a model that the method needs, or shows nothing.
+pub fn adapt(recording: &Recording, folder: &Path, choice: &Choice) -> Result<Adapted, Failure> {
+    let wrong = |error: &dyn std::fmt::Display| {
+        let manifest = folder.join("recording.json");
+        Failure::because(Exit::Content, manifest.display(), error)
+    };
+    let channels = Channels::of(recording, choice.method).map_err(|error| wrong(&error))?;
+    let measurement = measure(recording, folder)?;
+    let surface = measurement.heights.as_ref().map_err(|missing| {
+        wrong(&format!(
+            "{missing}: calibrate the head and add both models, or record with fringed record"
+        ))
+    })?;
+    let projector = &recording.projector;
+    let (columns, rows) = (projector.width as usize, projector.height as usize);
+    let map = match channels.across {
+        None => ProjectorMap::from_heights(&surface.triangulator, &surface.map),
+        Some(across) => measured_map(&measurement, across),
+    };
+    let made = match choice.method {
+        Method::Fringed => noise::adapt(&map, columns, rows, &choice.optics),
+        Method::Paper => paper::adapt(&map, columns, rows, choice.optics.image_pitch),
+    };
+    let function = made.map_err(|error| wrong(&error))?;
+    let spec = &recording.patterns[measurement.primary];
+    let before = seam::phase_function(spec, columns, rows).map_err(|error| wrong(&error))?;
+    let sigmas = predict(surface, &map, &before, &function, &choice.optics);
+    let on_raster = |point: &&[f64; 2]| {
+        let inside = |x: f64, count: usize| x > -0.5 && x < count as f64 - 0.5;
+        inside(point[0], columns) && inside(point[1], rows)
+    };
+    let report = Report {
+        method: choice.method,
+        shape: [rows, columns],
+        pixels_used: map.points.iter().filter(on_raster).count(),
+        pitch_px: pitches(&function),
+        max_turns: function.range().max,
+        preliminary_sigma_mm: sigmas.map(|[before, _]| before),
+        predicted_sigma_mm: sigmas.map(|[_, after]| after),
+    };
+    Ok(Adapted { function, report })
+}
+
+/// The patterns of a recording that a method works from; the vertical one is the measurement's
+/// primary one.
+struct Channels {
+    /// For the paper's method.
+    across: Option<Across>,
+}
+
+/// Vertical and horizontal fringes of a recording.
+#[derive(Clone, Copy)]
+struct Across {
+    /// Places of the vertical and the horizontal pattern.
+    at: [usize; 2],
+    /// Pitch of each, projector pixels.
+    pitch: [f64; 2],
+}
+
+impl Channels {
+    fn of(recording: &Recording, method: Method) -> Result<Self, String> {
+        let projector = &recording.projector;
+        let found = |wanted: &dyn Fn(&PatternSpec) -> Option<f64>| {
+            let mut patterns = recording.patterns.iter().enumerate();
+            patterns.find_map(|(at, spec)| wanted(spec).map(|pitch| (at, pitch)))
+        };
+        let vertical = found(&|spec| match spec {
+            PatternSpec::Vertical { fringes } => Some(f64::from(projector.width) / fringes),
+            _ => None,
+        });
+        let horizontal = found(&|spec| match spec {
+            PatternSpec::Horizontal { fringes } => Some(f64::from(projector.height) / fringes),
+            _ => None,
+        });
+        match (method, vertical, horizontal) {
+            (Method::Fringed, Some(_), _) => Ok(Self { across: None }),
+            (Method::Paper, Some(v), Some(h)) => Ok(Self {
+                across: Some(Across {
+                    at: [v.0, h.0],
+                    pitch: [v.1, h.1],
+                }),
+            }),
+            (Method::Paper, Some(_), None) => Err(
+                "the paper's method needs vertical and horizontal fringes, and the recording has no \
+                 horizontal pattern: record both, or use --method fringed"
+                    .into(),
+            ),
+            (Method::Paper, None, _) => Err(
+                "the paper's method needs vertical and horizontal fringes, and the recording has no \
+                 vertical pattern: record both"
+                    .into(),
+            ),
+            (Method::Fringed, None, _) => Err(
+                "the recording has no vertical pattern, which the heights come from: record one with \
+                 fringed record"
+                    .into(),
+            ),
+        }
+    }
+}
+
+/// ξ and η as measured, each from its own phase map (eqs. 3 and 4).
+fn measured_map(measurement: &Measurement, across: Across) -> ProjectorMap {
+    let [vertical, horizontal] = across.at.map(|at| &measurement.phases[at]);
+    let phases = vertical.phase.iter().zip(&horizontal.phase);
+    let points = phases.map(|(v, h)| {
+        if v.is_known() && h.is_known() {
+            [across.pitch[0] * v.turns(), across.pitch[1] * h.turns()]
+        } else {
+            [f64::NAN; 2]
+        }
+    });
+    ProjectorMap {
+        width: vertical.width,
+        points: points.collect(),
+    }
+}
+
+/// Smallest and largest pitch along the rows of a phase function.
+fn pitches(function: &PhaseFunction) -> [f64; 2] {
+    let places = (0..function.rows())
+        .flat_map(|row| (1..function.columns()).map(move |column| (column, row)));
+    let pitches = places.map(|(column, row)| {
+        1.0 / (function.at_pixel(column, row) - function.at_pixel(column - 1, row))
+    });
+    pitches.fold([f64::INFINITY, 0.0], |[low, high], pitch| {
+        [low.min(pitch), high.max(pitch)]
+    })
+}
+
+/// RMS of σ_z before and, for the same levels and shifts, after: it falls with frequency times
+/// contrast, g·M(g) (see [`noise`]), on every pixel.
+fn predict(
+    surface: &Surface,
+    map: &ProjectorMap,
+    before: &PhaseFunction,
+    after: &PhaseFunction,
+    optics: &noise::Optics,
+) -> Option<[f64; 2]> {
+    let slopes = map.slopes(noise::MAX_STEP);
+    let (mut squares, mut count) = ([0.0; 2], 0.0);
+    for ((sigma, [xi, eta]), [ju, jv]) in surface.map.sigma.iter().zip(&map.points).zip(slopes) {
+        let worth = |function: &PhaseFunction| {
+            let g = function.at(xi + 0.5, *eta) - function.at(xi - 0.5, *eta);
+            g * noise::contrast(optics, g, [g * ju, g * jv])
+        };
+        let now = f64::from(*sigma);
+        let then = now * worth(before) / worth(after);
+        if now.is_finite() && then.is_finite() {
+            squares = [squares[0] + now * now, squares[1] + then * then];
+            count += 1.0;
+        }
+    }
+    (count > 0.0).then(|| squares.map(|sum: f64| (sum / count).sqrt()))
+}
+
+impl Report {
+    /// The report as lines of a name and a value.
+    pub fn table(&self) -> String {
+        let [rows, columns] = self.shape;
+        let [low, high] = self.pitch_px;
+        let mut lines = vec![
+            ("phase function", format!("{rows} rows x {columns} columns")),
+            ("pixels used", format!("{} px", self.pixels_used)),
+            ("local pitch", format!("{low:.2} to {high:.2} px")),
+            ("largest phase", format!("{:.3} turns", self.max_turns)),
+        ];
+        let sigmas = self.preliminary_sigma_mm.zip(self.predicted_sigma_mm);
+        if let Some((before, after)) = sigmas {
+            let text = format!("{after:.4} mm RMS, was {before:.4} mm with the same levels");
+            lines.push(("predicted error (1 σ)", text));
+        }
+        let lines = lines
+            .iter()
+            .map(|(name, value)| format!("{name:<26}{value}\n"));
+        lines.collect()
+    }
+}

@@ -1,0 +1,205 @@
+//! Real devices: what this build has of their libraries, and how they are opened.
+
+#[cfg(all(feature = "kms", feature = "libcamera"))]
+mod rpi;
+
+use super::Opened;
+use crate::config::{Backend, Config, HeadConfig};
+use crate::error::{Exit, Failure};
+use crate::head::calibration::Calibration;
+use crate::lines::Wires;
+use hal::frame::FrameFormat;
+use hal::head::DynHead;
+use hal::model::DeviceModel;
+use hal::setup::{LinesSetup, TriggerSetup};
+use hal::trigger::{NoTrigger, Trigger};
+
+/// The libraries of devices, and whether this build has them.
+const LIBRARIES: [(&str, bool); 3] = [
+    ("libcamera", cfg!(feature = "libcamera")),
+    ("kms", cfg!(feature = "kms")),
+    ("gpio", cfg!(feature = "gpio")),
+];
+
+/// Whether this build has what a configuration needs.
+///
+/// # Errors
+/// What it lacks, and how it is built with it (78).
+pub fn built_for(config: &Config) -> Result<(), Failure> {
+    built_for_head(&config.head)?;
+    built_for_lines(&config.lines)
+}
+
+fn built_for_head(config: &HeadConfig) -> Result<(), Failure> {
+    let needed: &[&str] = match (config.backend, &config.trigger.line) {
+        (Backend::Sim | Backend::Replay, _) => &[],
+        (Backend::Rpi, None) => &["libcamera", "kms"],
+        (Backend::Rpi, Some(_)) => &["libcamera", "kms", "gpio"],
+    };
+    built_with("head.backend = \"rpi\"", needed, "rpi")
+}
+
+fn built_for_lines(setup: &LinesSetup) -> Result<(), Failure> {
+    let needed: &[&str] = if setup.any() { &["gpio"] } else { &[] };
+    built_with("lines", needed, "gpio")
+}
+
+fn built_with(key: &str, needed: &[&str], feature: &str) -> Result<(), Failure> {
+    let lacked = LIBRARIES
+        .iter()
+        .filter(|(library, has)| !has && needed.contains(library));
+    let lacked: Vec<&str> = lacked.map(|(library, _)| *library).collect();
+    if lacked.is_empty() {
+        return Ok(());
+    }
+    let message = format!(
+        "{key}: this fringed was built without {}: build it with `cargo build --release --features {feature}`",
+        lacked.join(" and ")
+    );
+    Err(Failure::new(Exit::Configuration, message))
+}
+
+/// Opens camera, projector and trigger. What is known of them is nominal, so nothing may be measured with it.
+///
+/// # Errors
+/// If this build has no such devices (78), or one of them is not there (69).
+pub(super) fn rpi(config: &HeadConfig) -> Result<Opened, Failure> {
+    built_for_head(config)?;
+    let head = head(config, trigger(&config.trigger)?)?;
+    let calibration = nominal(head.camera_format(), head.projector_size());
+    Ok(Opened {
+        head,
+        calibration,
+        stage: None,
+        problem: None,
+        fallback: None,
+        played: None,
+    })
+}
+
+#[cfg(all(feature = "kms", feature = "libcamera"))]
+fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<DynHead, Failure> {
+    rpi::head(config, trigger).map_err(|error| Failure::of_device(&error))
+}
+
+/// [`built_for_head`] has refused it before.
+#[cfg(not(all(feature = "kms", feature = "libcamera")))]
+fn head(_: &HeadConfig, _: Box<dyn Trigger>) -> Result<DynHead, Failure> {
+    Err(uncalibrated())
+}
+
+#[cfg(feature = "gpio")]
+fn trigger(setup: &TriggerSetup) -> Result<Box<dyn Trigger>, Failure> {
+    let Some(line) = &setup.line else {
+        return Ok(Box::new(NoTrigger));
+    };
+    match hal::gpio::Pulse::open(setup, line) {
+        Ok(pulse) => Ok(Box::new(pulse)),
+        Err(error) => Err(Failure::new(Exit::Unavailable, error.to_string())),
+    }
+}
+
+/// None is named: [`built_for_head`] has refused one.
+#[cfg(not(feature = "gpio"))]
+fn trigger(_: &TriggerSetup) -> Result<Box<dyn Trigger>, Failure> {
+    Ok(Box::new(NoTrigger))
+}
+
+/// Something that can be worked with until the head is calibrated: lenses and places like those of the reference head. No height may be made of it.
+fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Calibration {
+    let model = |width: u32, height: u32, aside_mm: f64| DeviceModel {
+        fx: 1.6 * f64::from(width),
+        fy: 1.6 * f64::from(width),
+        cx: 0.5 * (f64::from(width) - 1.0),
+        cy: 0.5 * (f64::from(height) - 1.0),
+        distortion: [0.0; 5],
+        // Looking down at the plane z = 0.
+        rotation: [1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0],
+        translation_mm: [aside_mm, 0.0, 600.0],
+    };
+    Calibration {
+        camera: (camera.width, camera.height, camera.bit_depth),
+        camera_model: model(camera.width, camera.height, 0.0),
+        projector,
+        projector_model: model(projector.0, projector.1, 250.0),
+        noise_counts: 1.0,
+        response: None,
+    }
+}
+
+/// The failure of a head of which nothing is known yet.
+pub(super) fn uncalibrated() -> Failure {
+    let message = "the head is not calibrated: calibrate it with `fringed calibrate`";
+    Failure::new(Exit::Missing, message)
+}
+
+/// Opens the lines that are named.
+///
+/// # Errors
+/// If this build has no lines (78), or one of them cannot be used (69).
+pub fn lines(setup: &LinesSetup) -> Result<Wires, Failure> {
+    built_for_lines(setup)?;
+    wired(setup)
+}
+
+#[cfg(feature = "gpio")]
+fn wired(setup: &LinesSetup) -> Result<Wires, Failure> {
+    use hal::gpio::{LineError, Output, Start};
+    use hal::lines::{OutputLine, StartLine};
+    let output = |name: &Option<String>, idle| -> Result<_, LineError> {
+        let open = |name: &String| Output::open(&setup.chip, name, setup.outputs_active_low, idle);
+        let opened = name.as_ref().map(open).transpose()?;
+        Ok(opened.map(|line| -> Box<dyn OutputLine> { Box::new(line) }))
+    };
+    let open = || {
+        let start = setup.start.as_ref();
+        let start = start.map(|name| Start::open(setup, name)).transpose()?;
+        Ok(Wires {
+            start: start.map(|line| -> Box<dyn StartLine> { Box::new(line) }),
+            busy: output(&setup.busy, false)?,
+            ok: output(&setup.ok, false)?,
+            // Without a station nothing is measured.
+            fault: output(&setup.fault, true)?,
+        })
+    };
+    open().map_err(|error: LineError| Failure::new(Exit::Unavailable, error.to_string()))
+}
+
+/// None is named: [`lines`] has refused those that are.
+#[cfg(not(feature = "gpio"))]
+fn wired(_: &LinesSetup) -> Result<Wires, Failure> {
+    Ok(Wires::default())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_build_says_what_it_lacks_and_how_to_get_it() {
+        let failure = built_with("lines", &["gpio", "nothing"], "gpio");
+        if cfg!(feature = "gpio") {
+            assert_eq!(failure, Ok(()));
+        } else {
+            let Failure { exit, message, .. } = failure.unwrap_err();
+            assert_eq!(exit, Exit::Configuration);
+            assert!(message.starts_with("lines: this fringed was built without gpio: "));
+            assert!(message.ends_with("--features gpio`"), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_head_that_runs_by_itself_needs_no_gpio() {
+        let mut config = HeadConfig {
+            backend: Backend::Rpi,
+            ..HeadConfig::default()
+        };
+        let lacks = |config: &HeadConfig| built_for_head(config).map_err(|failure| failure.message);
+        let free = lacks(&config);
+        config.trigger.line = Some("GPIO24".into());
+        let triggered = lacks(&config);
+        let says_gpio = |said: Result<(), String>| said.is_err_and(|said| said.contains("gpio"));
+        assert!(!says_gpio(free));
+        assert_eq!(says_gpio(triggered), !cfg!(feature = "gpio"));
+    }
+}

@@ -1,0 +1,311 @@
+//! The head that the configuration names: the one place that knows which back-ends there are.
+
+mod devices;
+
+pub use devices::{built_for, lines};
+
+use crate::config::{Backend, HeadConfig};
+use crate::error::{Exit, Failure};
+use crate::head::calibration::Calibration;
+use crate::head::calibration::place::{Loaded, Place};
+use crate::history::RECIPE;
+use crate::recipe::plan::{Plan, PlanError};
+use crate::recipe::{Recipe, archive};
+use hal::head::DynHead;
+use hal::replay::Recording;
+use sim::{Scenario, Stage};
+use std::fs;
+use std::path::Path;
+
+/// An opened head.
+pub struct Opened {
+    /// The devices.
+    pub head: DynHead,
+    /// What is known of them.
+    pub calibration: Calibration,
+    /// Where parts are placed in front of a simulated head.
+    pub stage: Option<Stage>,
+    /// Why what is known of it cannot be trusted: it is nominal only, or the stored calibration cannot be used. Then nothing must be
+    /// measured.
+    pub problem: Option<String>,
+    /// Why the newest calibration could not be used and the one before is.
+    pub fallback: Option<String>,
+    /// What a replay head plays.
+    pub played: Option<Played>,
+}
+
+/// The recordings that a replay head plays.
+#[derive(Clone, Debug)]
+pub struct Played {
+    /// Ratio and shift of each frame of a recording.
+    shown: Vec<(f64, f64)>,
+    /// Fingerprint of the calibration that they were taken with, where a station kept them with their recipe.
+    calibration: Option<String>,
+}
+
+impl Played {
+    fn of(folder: &Path, recording: &Recording) -> Self {
+        let recipe = fs::File::open(folder.join(RECIPE)).ok();
+        let manifest = recipe.and_then(|file| archive::manifest(file).ok());
+        let frames = recording.frames.iter();
+        Self {
+            shown: frames
+                .map(|taken| (taken.ratio, taken.shift_turns))
+                .collect(),
+            calibration: manifest.map(|manifest| manifest.calibration),
+        }
+    }
+
+    /// Makes a recipe ready to judge these recordings: of its sequences only the one that they show. A recording does not say
+    /// all of the calibration, so its own recipe's is believed.
+    ///
+    /// # Errors
+    /// If the recipe was made for another calibration or does not fit the frames.
+    pub fn plan(&self, recipe: Recipe, calibration: &Calibration) -> Result<Plan, PlanError> {
+        let plan = match self.calibration.as_ref() == Some(&recipe.file.calibration) {
+            true => Plan::again(recipe, calibration, false),
+            false => Plan::new(recipe, calibration, false),
+        };
+        Ok(plan?.only(&self.shown))
+    }
+}
+
+impl Opened {
+    /// Opens the head again after it was lost. It may be another one then: what is known of it is read anew.
+    ///
+    /// # Errors
+    /// As long as a device of it is not there.
+    pub fn reopen(&mut self, config: &HeadConfig) -> Result<(), Failure> {
+        match &self.stage {
+            Some(stage) => {
+                self.head = stage
+                    .reopen()
+                    .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+                self.problem = None;
+                self.adopt(config);
+            }
+            None => {
+                // Who holds a device cannot open it again.
+                self.head = self.head.closed();
+                *self = open(config, &|_| ())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether what is known of the head can be trusted.
+    ///
+    /// # Errors
+    /// Why not (exit code 65).
+    pub fn calibrated(&self) -> Result<(), Failure> {
+        match &self.problem {
+            None => Ok(()),
+            Some(problem) => Err(Failure::new(Exit::Content, problem.clone())),
+        }
+    }
+
+    /// Goes by the stored calibration, where there is one; else by what the back-end knows.
+    fn adopt(&mut self, config: &HeadConfig) {
+        self.fallback = None;
+        self.problem = match stored(config) {
+            // Of real devices nothing is known but this.
+            Ok(None) => (config.backend == Backend::Rpi).then(|| devices::uncalibrated().message),
+            Ok(Some((loaded, calibration))) => {
+                let misfit = misfit(config, &self.calibration, &calibration);
+                if misfit.is_none() {
+                    self.head.set_timing(loaded.file.timing(self.head.timing()));
+                    self.calibration = calibration;
+                    self.fallback = loaded.fallback;
+                }
+                misfit
+            }
+            Err(problem) => Some(problem),
+        };
+    }
+}
+
+/// Opens the configured head. `progress` is told the share done, from any thread.
+///
+/// # Errors
+/// If a file of the head is missing or wrong, or a device is not there.
+pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
+    let opened = open_as_it_is(config, progress)?;
+    let encoding = opened.head.encoding();
+    // Luma is what an image processor made of the light; who asks for it gets it.
+    let luma = config.backend == Backend::Rpi && config.camera.luma;
+    if !(encoding.exact || luma) {
+        let message = format!(
+            "open the camera: it grants {} only, which is compressed, and no phase can be trusted that is made of it: \
+             ask for a raw format; `fringed doctor` says more",
+            encoding.name
+        );
+        return Err(Failure::new(Exit::Unavailable, message));
+    }
+    Ok(opened)
+}
+
+/// Opens the configured head even if nothing can be measured with it. `progress` is told the share done, from any thread.
+///
+/// # Errors
+/// If a file of the head is missing or wrong, or a device is not there.
+pub fn open_as_it_is(
+    config: &HeadConfig,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<Opened, Failure> {
+    let mut opened = match config.backend {
+        Backend::Sim => simulated(config, progress)?,
+        Backend::Replay => replayed(&config.recordings)?,
+        Backend::Rpi => devices::rpi(config)?,
+    };
+    opened.adopt(config);
+    Ok(opened)
+}
+
+/// The stored calibration of the configured head, if there is one. Recordings carry their own.
+fn stored(config: &HeadConfig) -> Result<Option<(Loaded, Calibration)>, String> {
+    let place = config
+        .calibration
+        .as_deref()
+        .filter(|_| config.backend != Backend::Replay);
+    let Some(loaded) = place.map_or(Ok(None), |place| Place::at(place).load())? else {
+        return Ok(None);
+    };
+    let calibration = loaded.file.calibration()?;
+    Ok(Some((loaded, calibration)))
+}
+
+/// Why a stored calibration is not this head's, if it is not.
+fn misfit(config: &HeadConfig, head: &Calibration, stored: &Calibration) -> Option<String> {
+    let sizes = |calibration: &Calibration| (calibration.camera, calibration.projector);
+    if sizes(head) == sizes(stored) {
+        return None;
+    }
+    let place = config.calibration.as_deref().unwrap_or(Path::new(""));
+    let describe = |calibration: &Calibration| {
+        let ((width, height, bits), projector) = sizes(calibration);
+        format!(
+            "a camera of {width}×{height} pixels of {bits} bit and a projector of {}×{}",
+            projector.0, projector.1
+        )
+    };
+    Some(format!(
+        "calibration {} is of another head: it is for {}, this is {}: calibrate anew, or name this head's with head.calibration",
+        place.display(),
+        describe(stored),
+        describe(head)
+    ))
+}
+
+/// What is known of the configured head, without opening it.
+///
+/// # Errors
+/// If a file of the head is missing or wrong.
+pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
+    let wrong = |problem| Failure::new(Exit::Content, problem);
+    match config.backend {
+        Backend::Sim => {
+            let exact = Calibration::of_scenario(&scenario(config.scenario.as_deref())?);
+            match stored(config).map_err(wrong)? {
+                None => Ok(exact),
+                Some((_, calibration)) => misfit(config, &exact, &calibration)
+                    .map_or(Ok(calibration), |why| Err(wrong(why))),
+            }
+        }
+        Backend::Replay => {
+            let first = config
+                .recordings
+                .iter()
+                .take(1)
+                .map(|folder| Recording::open(folder));
+            calibration_of(&config.recordings, &first.collect::<Result<Vec<_>, _>>()?)
+        }
+        Backend::Rpi => match stored(config).map_err(wrong)? {
+            Some((_, calibration)) => Ok(calibration),
+            None => Err(devices::uncalibrated()),
+        },
+    }
+}
+
+/// The scenario of a file, or the default one.
+///
+/// # Errors
+/// If the file does not exist or is no scenario.
+pub fn scenario(path: Option<&Path>) -> Result<Scenario, Failure> {
+    let Some(path) = path else {
+        return Ok(Scenario::default());
+    };
+    let place = path.display().to_string();
+    let text = fs::read_to_string(path).map_err(|error| {
+        let what = format!("read scenario {place}");
+        Failure::because(
+            Exit::Missing,
+            what,
+            format!("{error}: head.scenario names a TOML file"),
+        )
+    })?;
+    Scenario::from_toml(&text, &place)
+        .map_err(|error| Failure::new(Exit::Configuration, error.to_string()))
+}
+
+fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
+    let mut scenario = scenario(config.scenario.as_deref())?;
+    if let Some(placed) = &config.part {
+        (scenario.part, scenario.placement) = (placed.part.clone(), placed.placement);
+    }
+    let (head, stage) = sim::head_with_progress(&scenario, progress)
+        .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+    let calibration = Calibration::of_stage(&stage);
+    Ok(Opened {
+        head,
+        calibration,
+        stage: Some(stage),
+        problem: None,
+        fallback: None,
+        played: None,
+    })
+}
+
+fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened, Failure> {
+    let recordings = folders
+        .iter()
+        .map(|folder| Recording::open(folder))
+        .collect::<Result<Vec<_>, _>>()?;
+    let calibration = calibration_of(folders, &recordings)?;
+    let first = folders.iter().zip(&recordings).next();
+    let played = first.map(|(folder, recording)| Played::of(folder, recording));
+    let head = hal::replay::head(recordings)
+        .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+    Ok(Opened {
+        head,
+        calibration,
+        stage: None,
+        problem: None,
+        fallback: None,
+        played,
+    })
+}
+
+/// The calibration that the first recording carries; the others were taken with the same head.
+fn calibration_of(
+    folders: &[std::path::PathBuf],
+    recordings: &[Recording],
+) -> Result<Calibration, Failure> {
+    let (Some(folder), Some(first)) = (folders.first(), recordings.first()) else {
+        return Err(Failure::new(
+            Exit::Configuration,
+            "head.backend is \"replay\" and head.recordings names no folder",
+        ));
+    };
+    let missing = |what: &str| {
+        let manifest = folder.join("recording.json");
+        let message = format!(
+            "{} has no {what}: the replay head needs it",
+            manifest.display()
+        );
+        Failure::new(Exit::Content, message)
+    };
+    let noise = first
+        .noise_counts
+        .ok_or_else(|| missing("camera.noise_counts"))?;
+    Calibration::of(first, noise).map_err(missing)
+}

@@ -1,0 +1,186 @@
+//! A cycle of the measuring task: sequence after sequence until one is good enough, then the result.
+
+use super::stopwatch::timed_on;
+use super::{ABORTED, DEVICE_TIMEOUT, Worker, code, code_of};
+use crate::history::FailedPart;
+use crate::recipe::plan::{Arriving, Plan};
+use crate::station::result::flag::{RETRIED, STEPPED_UP};
+use crate::station::{
+    Event, Inspection, Job, JobId, Pace, ResultRecord, Stage, Stages, error_code,
+};
+use hal::frame::Frame;
+use hal::head::Exposure;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// What a part was judged by.
+#[derive(Default)]
+pub(super) struct JudgedBy {
+    /// Which of the recipe's sequences: the step of the plan.
+    pub step: usize,
+    /// Its frames; none if there was no judgement.
+    pub frames: Vec<Frame>,
+}
+
+/// The frames of a sequence.
+struct Taken {
+    frames: Vec<Frame>,
+    exposure: Exposure,
+    /// Processor time of what was decoded meanwhile.
+    spent: Duration,
+}
+
+impl Worker {
+    /// Runs a cycle; the frames that its part was judged by.
+    pub(super) fn measure(&mut self, plan: Option<&Arc<Plan>>, job: &Job) -> JudgedBy {
+        let id = job.job;
+        let Some(plan) = plan else {
+            // The station triggers only with an active recipe, and that is this plan's.
+            let message = "measure: no recipe is loaded".into();
+            self.station.event(failed(id, code::RIG, message));
+            return JudgedBy::default();
+        };
+        let (mut step, mut flags, mut cpu) = (0, 0, Duration::ZERO);
+        let mut stages = Stages::default();
+        let waited = self.station.now().since(job.accepted);
+        stages.add(Stage::Waiting, waited.to_u32());
+        loop {
+            let began = Instant::now();
+            let mut arriving = plan.arriving(step);
+            let Some(taken) = self.take(plan, step, &mut arriving, id) else {
+                return JudgedBy::default();
+            };
+            let Taken {
+                frames,
+                exposure,
+                spent,
+            } = taken;
+            cpu += spent;
+            stages.add(Stage::Exposure, us(began.elapsed()));
+            if exposure.retaken > 0 {
+                flags |= RETRIED;
+            }
+            let last = step + 1 >= plan.steps();
+            // The part must stay while another sequence may follow.
+            if last {
+                self.station.event(Event::ExposureDone { job: id });
+            }
+            let inspect = || plan.inspect_arrived(&frames, arriving, Instant::now());
+            let (mut inspection, spent) = timed_on(&self.pool, inspect);
+            cpu += spent;
+            stages.extend(&inspection.stages);
+            if let Some(reason) = inspection.step_up.filter(|_| !last) {
+                self.progress
+                    .log(&format!("measuring again with more frames: {reason}"));
+                flags |= STEPPED_UP;
+                step += 1;
+                continue;
+            }
+            if !last {
+                self.station.event(Event::ExposureDone { job: id });
+            }
+            inspection.flags |= flags;
+            inspection.stages = stages;
+            inspection.cpu_us = us(cpu);
+            let judged_by = JudgedBy { step, frames };
+            self.publish(id, inspection, plan, &judged_by);
+            return judged_by;
+        }
+    }
+
+    /// The frames of a sequence, each level decoded as soon as it is there; none if there are not all of them, and then the
+    /// station knows why.
+    fn take(
+        &mut self,
+        plan: &Plan,
+        step: usize,
+        arriving: &mut Arriving,
+        job: JobId,
+    ) -> Option<Taken> {
+        let indices = plan.indices(step);
+        let mut frames: Vec<Frame> = Vec::with_capacity(indices.len());
+        let mut spent = Duration::ZERO;
+        let (station, aborts, pool) = (&self.station, &self.aborts, &self.pool);
+        let pulse = &self.pulse;
+        let mut keep = |_, frame| {
+            frames.push(frame);
+            station.event(Event::Alive);
+            pulse.beat();
+            while plan.can_arrive(arriving, frames.len()) {
+                spent += timed_on(pool, || plan.arrive(arriving, &frames)).1;
+            }
+            !aborts.has(job)
+        };
+        let head = &mut self.opened.head;
+        match head.acquire_while(indices, DEVICE_TIMEOUT, &mut keep) {
+            Ok(_) if frames.len() < indices.len() => {
+                let message = format!("measure: {ABORTED}");
+                self.station
+                    .event(failed(job, error_code::ABORTED, message));
+                None
+            }
+            Ok(exposure) => {
+                self.paced(indices.len(), &exposure);
+                Some(Taken {
+                    frames,
+                    exposure,
+                    spent,
+                })
+            }
+            Err(error) => {
+                let failed = failed(job, code_of(&error), error.to_string());
+                self.fail(error, failed);
+                None
+            }
+        }
+    }
+
+    /// Hands the result to the station, and the frames of a part that did not pass to the history.
+    fn publish(&self, job: JobId, inspection: Inspection, plan: &Arc<Plan>, judged_by: &JudgedBy) {
+        let inspection = Arc::new(inspection);
+        let after = self.station.event(Event::Finished {
+            job,
+            inspection: inspection.clone(),
+        });
+        // Not where the station no longer waited for it.
+        let published = |record: &Arc<ResultRecord>| Arc::ptr_eq(&record.inspection, &inspection);
+        if let Some(record) = after.result.clone().filter(published) {
+            self.history.keep(&record, || FailedPart {
+                record: record.clone(),
+                step: judged_by.step,
+                frames: judged_by.frames.clone(),
+                plan: plan.clone(),
+                calibration: self.opened.calibration.clone(),
+            });
+        }
+    }
+
+    /// Says how well the head kept time.
+    fn paced(&self, frames: usize, exposure: &Exposure) {
+        let span = exposure.done.since(exposure.started).as_secs_f64();
+        let refresh = self.opened.head.refresh().as_secs_f64();
+        // Saturating casts; a span of 0 gives the largest number.
+        self.station.event(Event::Paced(Pace {
+            camera_centihertz: (frames.saturating_sub(1) as f64 / span * 100.0) as u32,
+            refresh_millihertz: (1000.0 / refresh).round() as u32,
+            lag_us: us(exposure.lag),
+            dropped: exposure.dropped,
+            missed_flips: exposure.missed_flips,
+            retaken: exposure.retaken,
+            sync_error_us: us(exposure.sync_error),
+        }));
+    }
+}
+
+/// µs, saturating at about 71 minutes.
+fn us(time: Duration) -> u32 {
+    u32::try_from(time.as_micros()).unwrap_or(u32::MAX)
+}
+
+fn failed(job: JobId, error_code: u16, message: String) -> Event {
+    Event::MeasureFailed {
+        job,
+        error_code,
+        message: message.into(),
+    }
+}

@@ -1,0 +1,435 @@
+//! The measuring task: one thread that owns the head, the plan and the computing threads.
+
+mod aborts;
+pub mod backend;
+mod code;
+mod cycle;
+pub mod latest;
+pub mod opening;
+mod placing;
+mod recovery;
+pub mod shelf;
+pub mod simulation;
+pub mod stopwatch;
+
+pub use aborts::Aborts;
+pub(crate) use code::code_of;
+
+use crate::config::HeadConfig;
+use crate::head::calibration::Current;
+use crate::history::History;
+use crate::production::backend::Opened;
+use crate::production::latest::{LastCycle, LastMaps};
+use crate::production::shelf::Shelf;
+use crate::production::simulation::{Placed, Placing};
+use crate::recipe::plan::{Plan, PlanError};
+use crate::recipe::store::Stamp;
+use crate::recipe::teach::{TeachError, teach_while};
+use crate::recipe::{LoadError, Store, replace};
+use crate::station::{
+    ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
+};
+use crate::system::computing::Computing;
+use crate::system::notify::Pulse;
+use crate::system::progress::Progress;
+use code::code_of_teaching;
+use cycle::JudgedBy;
+use hal::error::Error;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
+use std::time::Duration;
+
+/// What the worker is told to do.
+#[derive(Debug)]
+pub enum Order {
+    /// Measure a part.
+    Measure(Job),
+    /// Load a recipe.
+    Load(JobId, RecipeKey),
+    /// Teach a recipe from the part in front of the head; whether the gauges of the one that it replaces stay.
+    Teach(JobId, u16, bool),
+    /// Put another part in front of a simulated head.
+    Place(Placing),
+    /// End.
+    Stop,
+}
+
+/// Idle, the worker gives a sign of life this often.
+const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
+/// Longest wait for one flip, one pulse or one frame.
+const DEVICE_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Words of what an abort ended.
+const ABORTED: &str = "the PLC or a stop ended it";
+
+/// Everything that the measuring task owns.
+pub struct Worker {
+    /// The head and its calibration.
+    pub opened: Opened,
+    /// Who else is told what is known of it.
+    pub calibration: Current,
+    /// Computing threads.
+    pub pool: rayon::ThreadPool,
+    /// The station's recipes.
+    pub recipes: Store,
+    /// The way to the station.
+    pub station: StationHandle,
+    /// Where the last maps go.
+    pub maps: LastMaps,
+    /// Where the frames of failed parts go.
+    pub history: History,
+    /// Shows how far teaching is, and the log.
+    pub progress: Progress,
+    /// How the head is opened again.
+    pub config: HeadConfig,
+    /// What the station wants to be ended early.
+    pub aborts: Aborts,
+    /// The head is gone since this error.
+    pub lost: Option<Error>,
+    /// Recipes made ready.
+    pub shelf: Shelf,
+    /// What the service manager's watchdog is fed by.
+    pub pulse: Pulse,
+    /// Told while it only computes.
+    pub computing: Computing,
+    /// The part that comes in front of a simulated head once a good one is taught.
+    pub waiting: Option<Placed>,
+}
+
+impl Worker {
+    /// Works until told to stop, or until nobody can tell it anything any more. `begin` tells the station that it can, and
+    /// `first` is asked of the station then.
+    pub fn run(mut self, orders: &Receiver<Order>, begin: Event, first: Option<Request>) {
+        self.progress.clear();
+        self.tell_condition();
+        let begun = self.station.event(begin);
+        if let Some(first) = first.filter(|_| begun.state_word != "stopping") {
+            self.station.event(Event::Request(first));
+        }
+        let mut plan: Option<Arc<Plan>> = None;
+        let mut last = JudgedBy::default();
+        loop {
+            self.pulse.beat();
+            // A trigger that is there already waits for no picture.
+            let order = match orders.try_recv() {
+                Err(TryRecvError::Empty) => {
+                    if self.maps.wanted() {
+                        self.tell(plan.as_ref(), &last);
+                    }
+                    orders.recv_timeout(SIGN_OF_LIFE)
+                }
+                Err(TryRecvError::Disconnected) => Err(RecvTimeoutError::Disconnected),
+                Ok(order) => Ok(order),
+            };
+            match order {
+                Ok(Order::Measure(job)) => {
+                    // The memory of the frames before is what these are written to.
+                    drop(last);
+                    last = self.measure(plan.as_ref(), &job);
+                }
+                Ok(Order::Load(job, key)) => {
+                    last = JudgedBy::default();
+                    self.load(job, &key, &mut plan);
+                }
+                Ok(Order::Teach(job, number, keep_gauges)) => {
+                    last = JudgedBy::default();
+                    self.teach(job, number, keep_gauges, &mut plan);
+                }
+                Ok(Order::Place(placing)) => placing.carry_out(),
+                Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
+                Err(RecvTimeoutError::Timeout) => {
+                    self.station.event(Event::Alive);
+                    self.lost = self.opened.head.present().err();
+                }
+            }
+            if let Some(error) = self.lost.take() {
+                last = JudgedBy::default();
+                if self.recover(&error, &mut plan, orders).is_break() {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Says whether the head's calibration can be trusted.
+    fn tell_condition(&self) {
+        let Opened {
+            problem,
+            fallback,
+            calibration,
+            ..
+        } = &self.opened;
+        let trusted = problem.is_none().then_some(calibration);
+        self.calibration.set(trusted);
+        for words in [problem, fallback].into_iter().flatten() {
+            self.progress.warn(words);
+        }
+        self.station.event(Event::Condition(Condition {
+            calibration_valid: self.opened.problem.is_none(),
+            ..Condition::default()
+        }));
+    }
+
+    /// Answers those who want to know more of the last cycle.
+    fn tell(&self, plan: Option<&Arc<Plan>>, last: &JudgedBy) {
+        let (maps, calibration) = (&self.maps, &self.opened.calibration);
+        let result = self.station.snapshot().result.clone();
+        let measured = plan
+            .filter(|_| !last.frames.is_empty())
+            .zip(result.as_ref());
+        let cycle = measured.map(|(plan, record)| LastCycle {
+            record,
+            plan,
+            step: last.step,
+            frames: &last.frames,
+            calibration,
+        });
+        self.pool.install(|| maps.answer(cycle));
+    }
+
+    /// Loads a recipe; the one before stays active unless everything went well.
+    fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Arc<Plan>>) {
+        let (result, message) = match caught(|| self.prepare(key, plan.as_ref())) {
+            Ok(_) if self.aborts.has(job) => (RecipeResult::Busy, format!("load: {ABORTED}")),
+            Ok((ready, fallback)) => {
+                let recipe = active(&ready);
+                *plan = Some(ready);
+                if let Some(fallback) = fallback {
+                    self.progress.warn(&fallback);
+                }
+                self.station.event(Event::RecipeLoaded { job, recipe });
+                return;
+            }
+            Err(refused) => refused,
+        };
+        self.restore(plan);
+        // A lost head ends the job by itself.
+        if self.lost.is_none() {
+            let message = Arc::from(message);
+            self.station.event(Event::LoadFailed {
+                job,
+                result,
+                message,
+            });
+        }
+    }
+
+    /// Puts the patterns of the active recipe back into the projector, after another one's may have
+    /// replaced them. Without them the recipe cannot measure: then each trigger ends INVALID.
+    fn restore(&mut self, plan: &mut Option<Arc<Plan>>) {
+        let Some(before) = plan else { return };
+        let shown = self
+            .pool
+            .install(|| before.rasters(&self.opened.calibration));
+        match shown.and_then(|rasters| self.opened.head.load(rasters)) {
+            Ok(()) => {}
+            Err(error) if recovery::is_lost(&error) => self.lost = Some(error),
+            Err(error) => {
+                self.progress.warn(&error.to_string());
+                *plan = None;
+            }
+        }
+    }
+
+    /// Makes a recipe ready to measure. `shown` is the plan whose patterns the head holds: if its recipe is asked for and has not
+    /// changed, there is nothing left to do.
+    fn prepare(
+        &mut self,
+        key: &RecipeKey,
+        shown: Option<&Arc<Plan>>,
+    ) -> Result<(Arc<Plan>, Option<String>), (RecipeResult, String)> {
+        if let Some(problem) = &self.opened.problem {
+            return Err((RecipeResult::OtherCalibration, problem.clone()));
+        }
+        let refuse = |error: LoadError| {
+            let result = match error {
+                LoadError::Unknown(_) => RecipeResult::Unknown,
+                LoadError::Corrupt { .. } => RecipeResult::Corrupt,
+            };
+            (result, error.to_string())
+        };
+        let number = match key {
+            RecipeKey::Number(number) => *number,
+            RecipeKey::PartNumber(part_number) => self.recipes.find(part_number).map_err(refuse)?,
+        };
+        let stamp = self.recipes.stamp(number);
+        let (pool, calibration) = (&self.pool, &self.opened.calibration);
+        let fingerprint = calibration.fingerprint();
+        let kept = stamp
+            .as_ref()
+            .and_then(|stamp| self.shelf.take(stamp, &fingerprint));
+        let (plan, fallback) = match kept {
+            Some(plan) => (plan, None),
+            None => {
+                // Before the arrays of the next take their place.
+                self.shelf.make_room(stamp.as_ref().map_or(0, Stamp::bytes));
+                let loaded = self.recipes.load(number).map_err(refuse)?;
+                let (played, simulated) = (&self.opened.played, self.opened.stage.is_some());
+                let planned = pool.install(|| match played {
+                    Some(played) => played.plan(loaded.recipe, calibration),
+                    None => Plan::new(loaded.recipe, calibration, simulated),
+                });
+                let plan = Arc::new(planned.map_err(refuse_plan)?);
+                // What stands in for a damaged file is not that file's plan.
+                if let Some(stamp) = stamp.filter(|_| loaded.fallback.is_none()) {
+                    self.shelf.put(stamp, fingerprint, plan.clone());
+                }
+                (plan, loaded.fallback)
+            }
+        };
+        if shown.is_some_and(|shown| Arc::ptr_eq(shown, &plan)) {
+            return Ok((plan, fallback));
+        }
+        pool.install(|| plan.rasters(calibration))
+            .and_then(|rasters| self.opened.head.load(rasters))
+            .map_err(|error| {
+                let message = error.to_string();
+                self.lost = Some(error).filter(recovery::is_lost);
+                (RecipeResult::Corrupt, message)
+            })?;
+        Ok((plan, fallback))
+    }
+
+    fn teach(&mut self, job: JobId, number: u16, keep_gauges: bool, plan: &mut Option<Arc<Plan>>) {
+        let replaced = self.recipes.present(number);
+        let naming = replace::naming(number, replaced.as_ref());
+        let kept = replaced.filter(|_| keep_gauges);
+        let (station, bar) = (self.station.clone(), self.progress.clone());
+        let (aborts, pulse) = (self.aborts.clone(), &self.pulse);
+        let computing = &self.computing;
+        let progress = |fraction: f64, words: &str| {
+            pulse.beat();
+            bar.tell(fraction, words);
+            station.event(Event::Progress {
+                job,
+                fraction: fraction as f32,
+                words: words.into(),
+            });
+            !aborts.has(job)
+        };
+        let problem = self.opened.problem.clone();
+        let Opened {
+            head, calibration, ..
+        } = &mut self.opened;
+        let frames = (calibration.camera.0, calibration.camera.1);
+        let fit = kept
+            .as_ref()
+            .map_or(Ok(()), |file| replace::check_kept(file, frames));
+        let taught = match (problem, fit) {
+            (Some(problem), _) => Err(TeachError::NotCalibrated(problem)),
+            (None, Err(words)) => Err(TeachError::Rig(words)),
+            (None, Ok(())) => self.pool.install(|| {
+                teach_while(
+                    head,
+                    calibration,
+                    &naming,
+                    DEVICE_TIMEOUT,
+                    computing,
+                    &progress,
+                )
+            }),
+        };
+        let taught = taught.and_then(|taught| match &kept {
+            Some(file) => replace::keep_gauges(taught, file).map_err(TeachError::Rig),
+            None => Ok(taught),
+        });
+        self.progress.clear();
+        let stored = taught
+            .map_err(|error| {
+                let words = match error {
+                    TeachError::Ended => format!("teach: {ABORTED}"),
+                    _ => error.to_string(),
+                };
+                let failed = (code_of_teaching(&error), words);
+                if let TeachError::Device(error) = error {
+                    self.lost = Some(error).filter(recovery::is_lost);
+                }
+                failed
+            })
+            .and_then(|taught| {
+                for reason in &taught.choice.reasons {
+                    self.progress.log(reason);
+                }
+                let bytes = &taught.bytes;
+                let stored = match &kept {
+                    None => self.recipes.save(number, bytes).map(|()| true),
+                    // Whoever changed its gauges while it was taught was told that they are stored.
+                    Some(file) => self.recipes.replace(number, &file.fingerprint, bytes),
+                };
+                let problem = match stored {
+                    Ok(true) => return Ok(()),
+                    Ok(false) => "it was changed while it was taught: teach it again".into(),
+                    Err(error) => format!("{error}: free space"),
+                };
+                Err((
+                    code::NOT_STORED,
+                    format!("store recipe {number}: {problem}"),
+                ))
+            });
+        let ready = stored.and_then(|()| {
+            let key = RecipeKey::Number(number);
+            // Teaching has shown patterns of its own.
+            self.prepare(&key, None)
+                .map_err(|(_, message)| (code::RIG, message))
+        });
+        match ready {
+            Ok((ready, _)) => {
+                let recipe = active(&ready);
+                *plan = Some(ready);
+                self.place_waiting(job);
+                self.station.event(Event::Taught { job, recipe });
+            }
+            Err((error_code, message)) => {
+                self.restore(plan);
+                if self.lost.is_none() {
+                    self.station.event(Event::TeachFailed {
+                        job,
+                        error_code,
+                        message: message.into(),
+                    });
+                }
+            }
+        }
+    }
+}
+
+fn refuse_plan(error: PlanError) -> (RecipeResult, String) {
+    let result = match error {
+        PlanError::OtherCalibration { .. } => RecipeResult::OtherCalibration,
+        PlanError::Unfit { .. } => RecipeResult::Corrupt,
+    };
+    (result, error.to_string())
+}
+
+/// Runs what makes a recipe ready; a panic is an answer that refuses the recipe.
+///
+/// Recipes come from elsewhere. One that breaks the computation must not end the process, which would load it again at its next
+/// start, for ever.
+pub(crate) fn caught<T>(
+    prepare: impl FnOnce() -> Result<T, (RecipeResult, String)>,
+) -> Result<T, (RecipeResult, String)> {
+    catch_unwind(AssertUnwindSafe(prepare)).unwrap_or_else(|panic| Err(broken(&*panic)))
+}
+
+/// What a panic says of a recipe.
+fn broken(panic: &(dyn Any + Send)) -> (RecipeResult, String) {
+    let said = panic.downcast_ref::<String>().map(String::as_str);
+    let said = said.or(panic.downcast_ref::<&str>().copied());
+    let message = format!(
+        "load: the recipe breaks the computation ({}): it stays stored and is not used; teach it again, and send its file \
+         with the diagnostic bundle",
+        said.unwrap_or("the log has more")
+    );
+    (RecipeResult::Corrupt, message)
+}
+
+fn active(plan: &Plan) -> ActiveRecipe {
+    ActiveRecipe {
+        number: plan.file().number,
+        crc: plan.crc(),
+        part_number: plan.file().part_number.as_str().into(),
+        name: plan.file().name.as_str().into(),
+    }
+}

@@ -1,0 +1,128 @@
+//! Recovery of a lost head: a fault that says what to do, and opening it again until it is there.
+
+use super::{Order, SIGN_OF_LIFE, Worker, active, code_of};
+use crate::recipe::plan::Plan;
+use crate::station::{Event, StationHandle};
+use crate::system::notify::Pulse;
+use hal::error::Error;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+
+/// Waits before the head is opened again, in signs of life: doubled after each attempt, from the first to the last.
+pub(super) const FIRST_WAIT: u32 = 1;
+pub(super) const LONGEST_WAIT: u32 = 16;
+/// What to do about a head that is not there.
+pub(super) const REMEDY: &str = "the head is opened again by itself as soon as it is there; the cable and the power of camera and projector are what to check";
+
+/// Whether the head has to be opened again: a device is gone, or one did not answer in time and nobody knows in what state
+/// it is.
+pub fn is_lost(error: &Error) -> bool {
+    matches!(error, Error::Disconnected { .. } | Error::Timeout { .. })
+}
+
+impl Worker {
+    /// Reports an error of a job: a lost head as such, anything else as `failed`.
+    pub(super) fn fail(&mut self, error: Error, failed: Event) {
+        if is_lost(&error) {
+            // The fault that follows ends the job.
+            self.lost = Some(error);
+        } else {
+            self.station.event(failed);
+        }
+    }
+
+    /// Opens the head until it is there again; ends early with `Break` when the daemon does.
+    pub(super) fn recover(
+        &mut self,
+        error: &Error,
+        plan: &mut Option<Arc<Plan>>,
+        orders: &Receiver<Order>,
+    ) -> ControlFlow<()> {
+        self.station.event(Event::Faulted {
+            error_code: code_of(error),
+            cause: error.to_string().into(),
+            remedy: REMEDY.into(),
+        });
+        let before = self.opened.calibration.fingerprint();
+        let mut pause = FIRST_WAIT;
+        let mut said = String::new();
+        loop {
+            wait(pause, orders, &self.station, &self.pulse)?;
+            pause = (2 * pause).min(LONGEST_WAIT);
+            let problem = match self.opened.reopen(&self.config) {
+                Err(failure) => failure.message,
+                Ok(()) => {
+                    self.tell_condition();
+                    if self.opened.calibration.fingerprint() != before && plan.take().is_some() {
+                        self.progress.warn("the head that came back has another calibration: load or teach a recipe for it");
+                    }
+                    self.restore(plan);
+                    match self.lost.take() {
+                        Some(error) => error.to_string(),
+                        None => break,
+                    }
+                }
+            };
+            if problem != said {
+                self.progress
+                    .warn(&format!("the head cannot be opened yet: {problem}"));
+                said = problem;
+            }
+        }
+        let recipe = plan.as_deref().map(active);
+        self.station.event(Event::Recovered { recipe });
+        ControlFlow::Continue(())
+    }
+}
+
+/// Waits for a head, giving signs of life, until it is time to try again; `Break` when the daemon ends. Orders that come are
+/// dropped: the fault has ended their jobs.
+pub(super) fn wait(
+    signs: u32,
+    orders: &Receiver<Order>,
+    station: &StationHandle,
+    pulse: &Pulse,
+) -> ControlFlow<()> {
+    for _ in 0..signs {
+        match orders.recv_timeout(SIGN_OF_LIFE) {
+            Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => {
+                return ControlFlow::Break(());
+            }
+            Ok(_) | Err(RecvTimeoutError::Timeout) => {
+                station.event(Event::Alive);
+                pulse.beat();
+            }
+        }
+    }
+    ControlFlow::Continue(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hal::error::Device;
+    use std::time::Duration;
+
+    #[test]
+    fn a_device_that_is_gone_or_silent_is_opened_again_and_one_that_cannot_is_not() {
+        assert!(is_lost(&Error::disconnected(
+            Device::Projector,
+            "showing pattern 3"
+        )));
+        let silent = Error::timeout(
+            "showing pattern 3",
+            Duration::from_secs(2),
+            "check the cable",
+        );
+        assert!(is_lost(&silent));
+        assert!(!is_lost(&Error::unsupported(
+            "a raster of 3×3",
+            "make it 8×8"
+        )));
+        assert!(!is_lost(&Error::protocol(
+            "showing pattern 3",
+            "load it first"
+        )));
+    }
+}

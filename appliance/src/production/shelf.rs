@@ -1,0 +1,59 @@
+//! Recipes made ready: those used last stay, so that a line that changes back and forth does not wait.
+
+use crate::recipe::plan::Plan;
+use crate::recipe::store::Stamp;
+use std::sync::Arc;
+
+/// Bytes of the plans that are kept, the active one's included, and of the file that is being read beside them: two recipes
+/// of a camera of 1.6 megapixels, or dozens of a small one.
+const ROOM: u64 = 112 << 20;
+
+/// The plans, the one used last at the end.
+#[derive(Debug, Default)]
+pub struct Shelf {
+    ready: Vec<Ready>,
+}
+
+#[derive(Debug)]
+struct Ready {
+    stamp: Stamp,
+    /// Fingerprint of the calibration that it was joined with.
+    calibration: String,
+    plan: Arc<Plan>,
+}
+
+impl Ready {
+    fn bytes(&self) -> u64 {
+        self.plan.bytes() as u64
+    }
+}
+
+impl Shelf {
+    /// The plan of a recipe file as it is now, joined with this calibration, if it is there.
+    pub fn take(&mut self, stamp: &Stamp, calibration: &str) -> Option<Arc<Plan>> {
+        let same = |ready: &Ready| ready.stamp == *stamp && ready.calibration == calibration;
+        let found = self.ready.iter().position(same)?;
+        let ready = self.ready.remove(found);
+        let plan = ready.plan.clone();
+        self.ready.push(ready);
+        Some(plan)
+    }
+
+    /// Drops the plans used longest ago until another `bytes` have room.
+    pub fn make_room(&mut self, bytes: u64) {
+        let taken = |ready: &[Ready]| ready.iter().map(Ready::bytes).sum::<u64>();
+        while !self.ready.is_empty() && taken(&self.ready).saturating_add(bytes) > ROOM {
+            self.ready.remove(0);
+        }
+    }
+
+    /// Keeps a plan that was just made.
+    pub fn put(&mut self, stamp: Stamp, calibration: String, plan: Arc<Plan>) {
+        self.make_room(plan.bytes() as u64);
+        self.ready.push(Ready {
+            stamp,
+            calibration,
+            plan,
+        });
+    }
+}

@@ -1,0 +1,131 @@
+//! Decoding on arrival: each level while the next is being exposed.
+
+use super::Plan;
+use super::run::Run;
+use crate::head::seam;
+use algo::frame::FrameView;
+use algo::pattern::MAX_SHIFTS;
+use algo::phase::Arrived;
+use algo::pipeline::arrive;
+use hal::frame::Frame;
+use std::sync::PoisonError;
+
+/// What the levels of a sequence said that have arrived so far.
+#[derive(Debug)]
+pub struct Arriving {
+    step: usize,
+    /// None where there is nothing to decode before the last frame.
+    arrived: Option<Arrived>,
+}
+
+impl Arriving {
+    /// A measurement with a sequence of which nothing is decoded on arrival.
+    pub(super) fn none(step: usize) -> Self {
+        let arrived = None;
+        Self { step, arrived }
+    }
+
+    /// Which sequence.
+    pub(super) fn step(&self) -> usize {
+        self.step
+    }
+}
+
+impl Plan {
+    /// Begins a measurement with a sequence.
+    pub fn arriving(&self, step: usize) -> Arriving {
+        let room = self.runs.get(step).and_then(Run::room);
+        Arriving {
+            step,
+            arrived: room,
+        }
+    }
+
+    /// Whether the frames so far complete a level that can be decoded now.
+    pub fn can_arrive(&self, arriving: &Arriving, frames: usize) -> bool {
+        let (Some(run), Some(arrived)) = (self.runs.get(arriving.step), &arriving.arrived) else {
+            return false;
+        };
+        let places = run.coarser().nth(arrived.levels());
+        places.is_some_and(|places| places.iter().all(|&at| at < frames))
+    }
+
+    /// Decodes the level that the frames so far complete.
+    pub fn arrive(&self, arriving: &mut Arriving, frames: &[Frame]) {
+        let (Some(run), Some(arrived)) = (self.runs.get(arriving.step), &mut arriving.arrived)
+        else {
+            return;
+        };
+        let decoder = run.production.decoder();
+        let places = run.coarser().nth(arrived.levels()).unwrap_or(&[]);
+        let views = views(places, frames);
+        // What does not fit says so when all frames are there.
+        if views.is_none_or(|views| arrive(decoder, &views, arrived).is_err()) {
+            arriving.arrived = None;
+        }
+    }
+
+    /// Inspects with what the levels said that have arrived, if these are all but the finest; their room goes back to its run.
+    pub(super) fn with_arrived<R>(
+        &self,
+        arriving: Arriving,
+        frames: &[Frame],
+        inspect: impl FnOnce(Option<(&Arrived, &[FrameView<'_>])>) -> R,
+    ) -> R {
+        let Arriving {
+            step,
+            arrived: Some(arrived),
+        } = arriving
+        else {
+            return inspect(None);
+        };
+        let Some(run) = self
+            .runs
+            .get(step)
+            .filter(|run| run.indices.len() == frames.len())
+        else {
+            return inspect(None);
+        };
+        let complete = arrived.levels() == run.coarser().len();
+        let last = run.production.decoder().levels().last().unwrap_or(&[]);
+        let views = views(last, frames).filter(|_| complete);
+        let done = inspect(views.as_deref().map(|views| (&arrived, views)));
+        *run.arrived.lock().unwrap_or_else(PoisonError::into_inner) = Some(arrived);
+        done
+    }
+}
+
+impl Run {
+    /// The frames of all levels but the finest.
+    fn coarser(&self) -> impl ExactSizeIterator<Item = &[usize]> {
+        let levels = self.production.decoder().levels();
+        let coarser = levels.len().saturating_sub(1);
+        levels.take(coarser)
+    }
+
+    /// Room for them; none if there are none.
+    fn room(&self) -> Option<Arrived> {
+        if self.coarser().len() == 0 {
+            return None;
+        }
+        let mut kept = self.arrived.lock().unwrap_or_else(PoisonError::into_inner);
+        let production = &self.production;
+        let (width, height) = (
+            production.rises().surface().width,
+            production.window().len(),
+        );
+        let room = kept.take();
+        let mut room = room.unwrap_or_else(|| production.decoder().arrived(width, height));
+        room.restart();
+        Some(room)
+    }
+}
+
+/// Some of the frames as computation takes them; none if one is not there or not what it says.
+fn views<'a>(
+    places: &[usize],
+    frames: &'a [Frame],
+) -> Option<heapless::Vec<FrameView<'a>, MAX_SHIFTS>> {
+    let view = |&at: &usize| seam::view(frames.get(at)?).ok();
+    places.iter().map(view).collect()
+}

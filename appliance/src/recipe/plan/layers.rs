@@ -1,0 +1,74 @@
+//! Pictures of a measured part: height, deviation from golden and modulation of every pixel, and its point cloud.
+
+use super::Plan;
+use crate::head::seam;
+use crate::output::cloud::{Vertex, binary_ply};
+use algo::pipeline;
+use algo::units::Height;
+use hal::frame::Frame;
+
+/// Maps of one part, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layers {
+    /// Pixels per row.
+    pub width: usize,
+    /// z in mm, NaN where not resolved.
+    pub height_mm: Vec<f32>,
+    /// z above golden in mm, NaN where either is not known.
+    pub deviation_mm: Vec<f32>,
+    /// Modulation of the finest level in counts.
+    pub modulation: Vec<f32>,
+}
+
+impl Plan {
+    /// The maps of a part from the frames of sequence `step`; `None` if the frames are not those.
+    pub fn layers(&self, step: usize, frames: &[Frame]) -> Option<Layers> {
+        let maps = self.heights(step, frames)?;
+        let production = &self.runs.get(step)?.production;
+        let golden = &production.rises().surface().height;
+        let deviation = maps.height_mm.iter().zip(golden).map(|(&here, golden)| {
+            if golden.is_known() {
+                here - golden.mm() as f32
+            } else {
+                f32::NAN
+            }
+        });
+        let deviation_mm = deviation.collect();
+        let decoder = production.decoder();
+        let views: Result<Vec<_>, _> = frames.iter().map(seam::view).collect();
+        let phases = pipeline::decode(decoder, &views.ok()?, Some(production.map()), None).ok()?;
+        let full_scale = decoder.full_scale();
+        let counts = phases.modulation.iter();
+        Some(Layers {
+            width: maps.width,
+            height_mm: maps.height_mm,
+            deviation_mm,
+            modulation: counts.map(|b| b.counts(full_scale) as f32).collect(),
+        })
+    }
+
+    /// The point cloud of a part as binary PLY, with its modulation as intensity; `None` as for [`Self::layers`].
+    pub fn cloud(&self, step: usize, frames: &[Frame]) -> Option<Vec<u8>> {
+        let layers = self.layers(step, frames)?;
+        let production = &self.runs.get(step)?.production;
+        let full_scale = f32::from(production.decoder().full_scale());
+        let triangulator = production.triangulator();
+        let known = layers
+            .height_mm
+            .iter()
+            .enumerate()
+            .filter(|(_, z)| !z.is_nan());
+        let vertices: Vec<Vertex> = known
+            .filter_map(|(at, &z)| {
+                let (u, v) = (at % layers.width, at / layers.width);
+                let point = triangulator.point(u, v, Height::from_mm(f64::from(z)))?;
+                Some(Vertex {
+                    point: [point.x as f32, point.y as f32, point.z as f32],
+                    intensity: (layers.modulation[at] * 2.0 / full_scale * 255.0) as u8,
+                    sigma: f32::NAN,
+                })
+            })
+            .collect();
+        Some(binary_ply(&vertices))
+    }
+}

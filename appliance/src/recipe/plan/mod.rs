@@ -1,0 +1,450 @@
+//! A recipe made ready to run: from frames to an inspection without anything that can fail.
+
+mod arriving;
+mod golden;
+mod judge;
+mod layers;
+mod run;
+mod trial;
+mod window;
+
+pub use arriving::Arriving;
+pub use layers::Layers;
+
+use crate::head::calibration::Calibration;
+use crate::head::seam;
+use crate::recipe::{AlignmentKind, Recipe, RecipeFile, SequenceKind, short};
+use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
+use crate::station::{Inspection, Stage, Stages, Verdict};
+use algo::frame::FrameView;
+use algo::geometry::{HeightRange, Reference, Triangulator};
+use algo::inspect::{Findings, Light, Production, Strips};
+use algo::pattern::{Encoder, MAX_FRAMES, Sequence};
+use algo::phase::Arrived;
+use algo::pipeline::Rises;
+use algo::units::{AbsolutePhase, Height};
+use hal::frame::Frame;
+use hal::projector::Raster;
+use rayon::prelude::*;
+use run::{Run, Shared, Unjoined};
+use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+/// A recipe joined with the head's calibration. Of the recipe's arrays only what production needs is kept.
+#[derive(Debug)]
+pub struct Plan {
+    file: RecipeFile,
+    /// The names of its gauges, shared with every result.
+    names: Vec<Arc<str>>,
+    /// Ratio and shift of what is projected, each once; first those of the first run.
+    frames: Vec<(f64, f64)>,
+    /// The sequences in the order in which they are tried; each unwraps further than the one before. Their indices are the
+    /// steps of a cycle.
+    runs: Vec<Run>,
+    /// The buffers of a cycle, made once.
+    strips: Mutex<Strips>,
+    simulated: bool,
+}
+
+/// A recipe that cannot be run on this head.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlanError {
+    /// It was made for another calibration.
+    #[error(
+        "recipe {number} was made for calibration {made_for}, this head has {present}: teach it again on \
+         this head"
+    )]
+    OtherCalibration {
+        /// The recipe's number.
+        number: u16,
+        /// First digits of the fingerprint in the recipe.
+        made_for: String,
+        /// First digits of the head's.
+        present: String,
+    },
+    /// Something in it does not fit.
+    #[error("recipe {number}: {reason}")]
+    Unfit {
+        /// The recipe's number.
+        number: u16,
+        /// In words, with the remedy.
+        reason: String,
+    },
+}
+
+/// The heights of a part, for the page.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Maps {
+    /// Pixels per row.
+    pub width: usize,
+    /// z in mm, NaN where not resolved.
+    pub height_mm: Vec<f32>,
+}
+
+/// A frame is inspected in this many strips: work for four threads, and few rows that two of them need.
+pub const STRIPS: usize = 4;
+/// Heights are planned at least so many pixels around the part as taught: what a part that is not aligned may be moved by.
+const AROUND: usize = 16;
+/// Most bytes of a recipe's patterns: 64 of a projector of 1920 × 1080 pixels take half of it.
+const MAX_PATTERN_BYTES: usize = 256 << 20;
+/// Error code of a cycle whose frames are not what the recipe was made for.
+const WRONG_FRAMES: u16 = 103;
+
+impl Plan {
+    /// Joins a recipe and a calibration.
+    ///
+    /// # Errors
+    /// If the recipe was made for another calibration or does not fit the head.
+    pub fn new(
+        recipe: Recipe,
+        calibration: &Calibration,
+        simulated: bool,
+    ) -> Result<Self, PlanError> {
+        let number = recipe.file.number;
+        let present = calibration.fingerprint();
+        if recipe.file.calibration != present {
+            let digits = |fingerprint: &str| fingerprint.chars().take(8).collect();
+            return Err(PlanError::OtherCalibration {
+                number,
+                made_for: digits(&recipe.file.calibration),
+                present: digits(&present),
+            });
+        }
+        Self::again(recipe, calibration, simulated)
+    }
+
+    /// The same, to judge a recorded part again: `calibration` is read from the recording. A recording does not hold the
+    /// projector's grey response, so the calibration's fingerprint cannot be computed from it and is not compared here;
+    /// it was compared when the part was measured. Judging frames does not use the response.
+    ///
+    /// # Errors
+    /// If the recipe does not fit the frames.
+    pub fn again(
+        recipe: Recipe,
+        calibration: &Calibration,
+        simulated: bool,
+    ) -> Result<Self, PlanError> {
+        let number = recipe.file.number;
+        Self::join(recipe, calibration, simulated)
+            .map_err(|reason| PlanError::Unfit { number, reason })
+    }
+
+    /// Leaves only the sequence that shows these frames, given by ratio and shift: a head that plays a recording has no others.
+    /// Where no sequence does, nothing changes.
+    pub fn only(mut self, frames: &[(f64, f64)]) -> Self {
+        if let Some(step) = self.step_that_shows(frames) {
+            let mut run = self.runs.swap_remove(step);
+            run.indices = (0..frames.len()).collect();
+            self.runs = vec![run];
+            self.frames = frames.to_vec();
+        }
+        self
+    }
+
+    fn join(recipe: Recipe, calibration: &Calibration, simulated: bool) -> Result<Self, String> {
+        let Recipe {
+            file,
+            mut arrays,
+            function,
+            gauges,
+            ..
+        } = recipe;
+        // They are large, and nobody asks for them in production.
+        arrays.phase_function = Vec::new();
+        arrays.height_curvature = Vec::new();
+        let camera = (file.camera.width, file.camera.height, file.camera.bit_depth);
+        if camera != calibration.camera {
+            return Err(format!(
+                "it is for a camera of {camera:?}, the head's has {:?}: teach it again",
+                calibration.camera
+            ));
+        }
+        let raster = (file.projector.width, file.projector.height);
+        if raster != calibration.projector {
+            return Err(format!(
+                "it is for a projector of {raster:?}, the head's has {:?}: teach it again",
+                calibration.projector
+            ));
+        }
+        let (camera, projector) = calibration.devices()?;
+        let [low, high] = file.range_mm;
+        let range = Some(HeightRange { low, high });
+        let triangulator = Triangulator::new(camera, projector, Reference::Models, function, range)
+            .map_err(|error| error.to_string())?;
+        let size = (file.camera.width as usize, file.camera.height as usize);
+        let aligned = file.alignment == AlignmentKind::Rigid;
+        let away = match aligned {
+            true => pixels(&triangulator, file.placement_tolerance_mm),
+            false => 0,
+        };
+        let mut window = window::of(&gauges, size, away);
+        if aligned {
+            golden::widen(&mut window, &arrays, size.0);
+        }
+        let range = triangulator.function().range();
+        let chain = run::chain(&file);
+        let mut frames = Vec::new();
+        let sequences = || {
+            let sequences = chain.into_iter();
+            let sequences =
+                sequences.map(|at| Unjoined::new(&file, &arrays, range, at, &mut frames));
+            sequences.collect::<Result<Vec<_>, _>>()
+        };
+        let (sequences, surface) = rayon::join(sequences, || golden::surface(size.0, &arrays));
+        let sequences = sequences?;
+        let patterns = frames.len() * raster.0 as usize * raster.1 as usize;
+        if patterns > MAX_PATTERN_BYTES {
+            return Err(format!(
+                "its sequences show {} patterns of {} MiB together, at most {} are held: teach it with fewer frames",
+                frames.len(),
+                patterns >> 20,
+                MAX_PATTERN_BYTES >> 20
+            ));
+        }
+        // What is left of the recipe is no longer needed where the most memory is.
+        drop(arrays);
+        let range = file.expansion_range_turns;
+        let rises = Rises::new(&triangulator, surface, range, &window, away.max(AROUND));
+        let shared = Shared {
+            file: &file,
+            triangulator: Arc::new(triangulator),
+            rises: Arc::new(rises),
+            gauges,
+            window,
+        };
+        let runs = sequences.into_iter().map(|sequence| sequence.join(&shared));
+        let runs = runs.collect::<Result<Vec<_>, _>>()?;
+        let first = runs.first().ok_or("it has no sequence")?;
+        let strips = first.production.strips(size.1.div_ceil(STRIPS));
+        let names = file.gauges.iter().map(|gauge| Arc::from(&*gauge.name));
+        Ok(Self {
+            strips: Mutex::new(strips),
+            names: names.collect(),
+            file,
+            frames,
+            runs,
+            simulated,
+        })
+    }
+
+    /// The recipe's manifest.
+    pub fn file(&self) -> &RecipeFile {
+        &self.file
+    }
+
+    /// First 32 bits of the recipe's fingerprint.
+    pub fn crc(&self) -> u32 {
+        short(&self.file.fingerprint)
+    }
+
+    /// Bytes of its maps and of its phase function: nearly all that it takes.
+    pub fn bytes(&self) -> usize {
+        let production = self.production();
+        let function = production.triangulator().function();
+        let samples = match function.is_sampled() {
+            true => function.columns() * function.rows(),
+            false => 0,
+        };
+        let runs: usize = self.runs.iter().map(|run| run.bytes).sum();
+        production.rises().bytes() + samples * size_of::<f64>() + runs
+    }
+
+    /// Levels and shifts of the sequence that is tried first.
+    pub fn sequence(&self) -> &Sequence {
+        &self.runs[0].sequence
+    }
+
+    /// How many sequences there are to try, one after the other until one is good enough.
+    pub fn steps(&self) -> usize {
+        self.runs.len()
+    }
+
+    /// Which of the plan's rasters the frames of a sequence show; none if there is no such sequence.
+    pub fn indices(&self, step: usize) -> &[usize] {
+        self.runs.get(step).map_or(&[], |run| &run.indices)
+    }
+
+    /// Ratio and shift of each frame of a sequence, in their order; none if there is no such sequence.
+    pub fn shown(&self, step: usize) -> impl ExactSizeIterator<Item = (f64, f64)> {
+        let indices = self.indices(step).iter();
+        indices.map(|&index| self.frames[index])
+    }
+
+    /// Which sequence shows these frames, given by ratio and shift; `None` if none does.
+    pub fn step_that_shows(&self, frames: &[(f64, f64)]) -> Option<usize> {
+        (0..self.steps()).find(|&step| self.shown(step).eq(frames.iter().copied()))
+    }
+
+    /// The columns of each row that some gauge looks at.
+    pub fn window(&self) -> &[Range<usize>] {
+        self.production().window()
+    }
+
+    /// The phase that the first sequence is unwrapped about, row-major: golden's, where it is safe.
+    pub fn golden_phase(&self) -> &[AbsolutePhase] {
+        self.production().map()
+    }
+
+    /// From frames of the first sequence to findings.
+    pub fn production(&self) -> &Production {
+        &self.runs[0].production
+    }
+
+    /// The same, for its own sake.
+    pub fn into_production(mut self) -> Production {
+        self.runs.swap_remove(0).production
+    }
+
+    /// The patterns of all sequences; those of the first stand first, in the order of its frames.
+    pub fn rasters(&self, calibration: &Calibration) -> Result<Vec<Raster>, hal::error::Error> {
+        let frames = self.frames.iter().copied();
+        let function = self.production().triangulator().function();
+        rasters(function, frames, calibration)
+    }
+
+    /// Judges a part from the frames of sequence `step`; its stages begin at `exposed`. Always ends in an inspection; what
+    /// cannot be measured is INVALID with a reason.
+    pub fn inspect(&self, step: usize, frames: &[Frame], exposed: Instant) -> Inspection {
+        self.inspect_arrived(frames, Arriving::none(step), exposed)
+    }
+
+    /// The same, with the levels that were decoded on arrival.
+    pub fn inspect_arrived(
+        &self,
+        frames: &[Frame],
+        arriving: Arriving,
+        exposed: Instant,
+    ) -> Inspection {
+        let step = arriving.step();
+        let simulated = if self.simulated { SIMULATED } else { 0 };
+        let kind = self.runs.get(step).map(|run| run.kind);
+        let mut inspection = Inspection {
+            flags: kind.map_or(0, sequence_flag) | simulated,
+            ..Inspection::default()
+        };
+        let mut laps = Laps::since(exposed);
+        let found = self.with_arrived(arriving, frames, |finest| {
+            self.run(step, frames, finest, None, &mut laps)
+        });
+        match found {
+            Ok(findings) => {
+                judge::judge(&self.file, &self.names, &findings, &mut inspection);
+                if step + 1 < self.runs.len() {
+                    inspection.step_up = judge::step_up(&self.file, &findings);
+                }
+            }
+            Err(reason) => {
+                inspection.judged = Verdict::Invalid;
+                inspection.reason = Some(reason.into());
+                inspection.error_code = WRONG_FRAMES;
+            }
+        }
+        laps.end(Stage::Judgement);
+        inspection.stages = laps.stages;
+        inspection
+    }
+
+    /// The heights of the part from the frames of sequence `step`, for the page; `None` if the frames are not those.
+    pub fn heights(&self, step: usize, frames: &[Frame]) -> Option<Maps> {
+        let width = self.file.camera.width as usize;
+        let mut height_mm = vec![f32::NAN; width * self.file.camera.height as usize];
+        let mut laps = Laps::since(Instant::now());
+        let heights = Some(&mut height_mm[..]);
+        self.run(step, frames, None, heights, &mut laps).ok()?;
+        Some(Maps { width, height_mm })
+    }
+
+    fn run(
+        &self,
+        step: usize,
+        frames: &[Frame],
+        finest: Option<(&Arrived, &[FrameView<'_>])>,
+        heights: Option<&mut [f32]>,
+        laps: &mut Laps,
+    ) -> Result<Findings, String> {
+        let run = self.runs.get(step);
+        let run = run.ok_or_else(|| format!("the recipe has no sequence {step}"))?;
+        // Made for every trigger, so not on the heap.
+        let mut views: heapless::Vec<FrameView<'_>, MAX_FRAMES> = heapless::Vec::new();
+        for frame in frames {
+            let view = seam::view(frame).map_err(|error| error.to_string())?;
+            let full = |_| format!("{} frames are more than any sequence has", frames.len());
+            views.push(view).map_err(full)?;
+        }
+        let light = match finest {
+            Some((arrived, last)) => Light::Finest(arrived, last),
+            None => Light::Frames(&views),
+        };
+        // A strip is cleared before it is used, whatever was left in it.
+        let mut strips = self.strips.lock().unwrap_or_else(PoisonError::into_inner);
+        let production = &run.production;
+        let placed = production.place(light, &mut strips);
+        laps.end(Stage::Alignment);
+        let findings = placed
+            .and_then(|placed| production.inspect_placed(light, &mut strips, placed, heights))
+            .map_err(|error| error.to_string());
+        laps.end(Stage::Strips);
+        findings
+    }
+}
+
+/// Stamps the stages of an inspection, each from the end of the one before.
+struct Laps {
+    stages: Stages,
+    since: Instant,
+}
+
+impl Laps {
+    fn since(since: Instant) -> Self {
+        let stages = Stages::default();
+        Self { stages, since }
+    }
+
+    fn end(&mut self, stage: Stage) {
+        let now = Instant::now();
+        let us = (now - self.since).as_micros();
+        self.stages
+            .add(stage, u32::try_from(us).unwrap_or(u32::MAX));
+        self.since = now;
+    }
+}
+
+/// How many pixels a part that is moved by `mm` moves at most, about.
+fn pixels(triangulator: &Triangulator, mm: f64) -> usize {
+    let camera = triangulator.camera();
+    let (u, v) = (camera.width() as f64 / 2.0, camera.height() as f64 / 2.0);
+    let at = |u: f64, v: f64| triangulator.point(u as usize, v as usize, Height::from_nm(0));
+    let pitch = at(u, v).zip(at(u + 1.0, v)).map(|(a, b)| (b - a).length());
+    // A pixel more for the rounding of corners.
+    pitch.map_or(0, |pitch| (mm / pitch).ceil().min(u) as usize + 1)
+}
+
+/// Grey rasters of frames (ratio, shift) of a phase function.
+///
+/// # Errors
+/// Never for a phase function that could be made.
+pub fn rasters(
+    function: &algo::pattern::PhaseFunction,
+    frames: impl Iterator<Item = (f64, f64)>,
+    calibration: &Calibration,
+) -> Result<Vec<Raster>, hal::error::Error> {
+    let frames: Vec<_> = frames.collect();
+    let encoder = Encoder::new(calibration.response.as_ref());
+    frames
+        .into_par_iter()
+        .map(|(ratio, shift)| {
+            let grey = encoder.raster(function, ratio, shift);
+            Raster::new(grey.width as u32, grey.height as u32, grey.pixels)
+        })
+        .collect()
+}
+
+/// The bit of RESULT's flags that says which sequence was used.
+fn sequence_flag(kind: SequenceKind) -> u16 {
+    match kind {
+        SequenceKind::SingleLevel => SINGLE_LEVEL,
+        SequenceKind::TwoLevels => TWO_LEVELS,
+        SequenceKind::Full => FULL_SEQUENCE,
+    }
+}

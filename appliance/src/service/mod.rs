@@ -1,0 +1,421 @@
+//! The daemon: station, measuring task, Modbus and page, each where it belongs.
+//!
+//! One OS thread measures ([`crate::production`]), one serves sockets on a current-thread runtime, and
+//! the station is plain values behind a handle that both use.
+
+mod caller;
+mod serving;
+mod settling;
+mod stopping;
+pub mod survey;
+
+pub use caller::Caller;
+use serving::{PlcSide, serve};
+use stopping::Stopping;
+
+use crate::config::{Backend, Config};
+use crate::error::{Exit, Failure};
+use crate::head::calibration::Current;
+use crate::history::{self, Bounds, History, Numbering, Reader};
+use crate::production::backend;
+use crate::production::latest::LastMaps;
+use crate::production::opening::Opening;
+use crate::production::shelf::Shelf;
+use crate::production::simulation::{Placed, Simulation};
+use crate::production::{Aborts, Order, Worker};
+use crate::service::survey::Survey;
+use crate::station::tally::Tally;
+use crate::station::{
+    Effect, Event, Identity, Limits, Micros, RecipeKey, Request, Settings, Station, StationHandle,
+};
+use crate::storage::state::{StateFolder, random};
+use crate::system::computing::Computing;
+use crate::system::journal::{self, Severity};
+use crate::system::progress::Progress;
+use crate::system::socket;
+use crate::web::access::Access;
+use crate::{lines, modbus, web};
+use sim::Stage;
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::{Arc, mpsc};
+use std::thread::JoinHandle;
+use std::time::Instant;
+use tokio::net::TcpListener;
+use tokio::runtime::Runtime;
+use tokio::sync::watch;
+
+/// Time between two looks at whether a start is to be given up.
+const LOOKING: std::time::Duration = std::time::Duration::from_millis(20);
+
+/// A running daemon.
+pub struct Daemon {
+    /// The way to the station.
+    pub station: StationHandle,
+    /// Where Modbus TCP is served.
+    pub modbus: SocketAddr,
+    /// Where the page is served.
+    pub http: SocketAddr,
+    /// Where parts are placed in front of a simulated head.
+    pub stage: Option<Stage>,
+    /// Whether a recipe is loaded or taught at the start.
+    awaited: bool,
+    stopping: Stopping,
+    /// Held as long as the daemon runs.
+    _state: StateFolder,
+}
+
+impl Daemon {
+    /// Starts everything and returns when the head is open. The station is then on its way to READY:
+    /// it loads its recipe, or teaches it where a simulated head has none.
+    ///
+    /// # Errors
+    /// If the state folder cannot be used (73), a port is in use or the head missing (69), or the
+    /// configuration is wrong (78). Nothing keeps running then.
+    pub fn start(
+        config: &Config,
+        pool: rayon::ThreadPool,
+        progress: Progress,
+    ) -> Result<Self, Failure> {
+        Self::start_for(config, pool, progress, &Caller::default())
+    }
+
+    /// The same for a caller. For a service manager it also returns when the head is not there, and waits for it as for one that was
+    /// lost. It returns at once when it is told to end: then only [`Daemon::stop`] makes sense.
+    ///
+    /// # Errors
+    /// As [`Daemon::start`].
+    pub fn start_for(
+        config: &Config,
+        pool: rayon::ThreadPool,
+        progress: Progress,
+        caller: &Caller,
+    ) -> Result<Self, Failure> {
+        let path = match &config.state {
+            Some(path) => path.clone(),
+            None => StateFolder::default_path()?,
+        };
+        crate::system::memory::give_back();
+        let state = StateFolder::open(&path)?;
+        let access = open_access(&state)?;
+        let wires = backend::lines(&config.lines)?;
+        let runtime = runtime()?;
+        let (plc, page) = runtime.block_on(listen(config))?;
+        let (modbus, http) = (address_of(&plc)?, address_of(&page)?);
+        let (orders, inbox) = mpsc::channel();
+        let (history, task, next_seq, complaint) = open_history(config, &state)?;
+        if let Some(complaint) = complaint {
+            progress.warn(&complaint);
+        }
+        let tally = Tally::default();
+        let aborts = Aborts::default();
+        let sink = effects(
+            orders.clone(),
+            aborts.clone(),
+            history.clone(),
+            progress.clone(),
+            tally.clone(),
+        );
+        let settings = station(config, &state, next_seq)?;
+        let station = StationHandle::new(settings, Instant::now(), sink);
+        let writing = {
+            let station = station.clone();
+            spawn("history", move || task.run(&station))?
+        };
+        let maps = LastMaps::default();
+        let calibration = Current::default();
+        let simulation = Simulation::new(orders.clone());
+        let computing = Computing::default();
+        let (sockets, stopped) = watch::channel(false);
+        let wiring = {
+            let (station, progress, stopped) = (station.clone(), progress.clone(), stopped.clone());
+            let setup = config.lines.clone();
+            let open: lines::Open = Box::new(move || backend::lines(&setup));
+            spawn("lines", move || {
+                if let Err(failure) = lines::serve(wires, &open, &station, &progress, stopped) {
+                    progress.warn(&failure.message);
+                }
+            })?
+        };
+        let clients = modbus::Clients::new(usize::from(config.modbus.connections));
+        let serving = {
+            let (dating, boot_id) = (history.clone(), station.snapshot().boot_id);
+            let site = web::Site::new(web::Parts {
+                station: station.clone(),
+                access,
+                recipes: state.recipes().clone(),
+                calibration: calibration.clone(),
+                maps: maps.clone(),
+                simulation: simulation.clone(),
+                history: Reader::of(&path),
+                date: Box::new(move |utc_us| dating.date(boot_id, utc_us)),
+                tally,
+                log: progress.logbook().clone(),
+                registers: modbus::live,
+                configuration: toml::to_string(config).unwrap_or_default(),
+                hosts: config.http.hosts.clone(),
+                proxies: config.http.proxies.clone(),
+            });
+            let (station, config) = (station.clone(), config.clone());
+            let log = progress.clone();
+            let plc = PlcSide {
+                listener: plc,
+                clients: clients.clone(),
+                refusals: modbus::Refusals::new(move |line| log.warn(line)),
+            };
+            let serve = move || {
+                runtime.block_on(serve(plc, page, station, site, &config, stopped));
+            };
+            spawn("sockets", serve)?
+        };
+        let (survey, surveyed) = mpsc::channel();
+        let surveying = {
+            let station = station.clone();
+            let recipes = state.recipes().clone();
+            let survey = Survey::new(&path, recipes, clients, progress.clone());
+            spawn("survey", move || survey.run(&station, &surveyed))?
+        };
+        let (opened, opening) = mpsc::channel();
+        let simulated = config.head.backend == Backend::Sim;
+        let first = first_request(config, simulated, state.recipes());
+        let awaited = first.is_some();
+        let measuring = {
+            let (station, recipes) = (station.clone(), state.recipes().clone());
+            let (mut config, progress, history) =
+                (config.head_in(&path), progress.clone(), history.clone());
+            let waiting = match first {
+                Some(Request::Teach { .. }) => Placed::after_teaching(&mut config.part),
+                _ => None,
+            };
+            let computing = computing.clone();
+            let (patient, pulse) = (caller.notify.is_listened_to(), caller.notify.pulse());
+            spawn("measuring", move || {
+                let opening = Opening {
+                    config: &config,
+                    pool: &pool,
+                    progress: &progress,
+                    station: &station,
+                    pulse: &pulse,
+                    patient,
+                    computing: &computing,
+                };
+                let Some((head, begin)) = opening.run(&inbox, &opened) else {
+                    return;
+                };
+                simulation.opened(head.stage.as_ref());
+                let worker = Worker {
+                    opened: head,
+                    calibration,
+                    pool,
+                    recipes,
+                    station,
+                    maps,
+                    history,
+                    progress,
+                    config,
+                    aborts,
+                    lost: None,
+                    shelf: Shelf::default(),
+                    pulse,
+                    computing,
+                    waiting,
+                };
+                worker.run(&inbox, begin, first);
+            })?
+        };
+        let stopping = Stopping {
+            orders,
+            sockets,
+            survey,
+            threads: [measuring, serving, surveying, wiring],
+            progress,
+            station: station.clone(),
+            history,
+            writing,
+            computing,
+        };
+        let gone = || {
+            Failure::new(
+                Exit::Software,
+                "the measuring task ended before its head was open",
+            )
+        };
+        let outcome = loop {
+            match opening.recv_timeout(LOOKING) {
+                Ok(outcome) => break outcome,
+                Err(mpsc::RecvTimeoutError::Timeout) if caller.told.already() => break Ok(None),
+                Err(mpsc::RecvTimeoutError::Timeout) => {}
+                Err(mpsc::RecvTimeoutError::Disconnected) => break Err(gone()),
+            }
+        };
+        match outcome {
+            Ok(stage) => Ok(Self {
+                station,
+                modbus,
+                http,
+                stage,
+                awaited,
+                stopping,
+                _state: state,
+            }),
+            Err(failure) => {
+                stopping.stop();
+                Err(failure)
+            }
+        }
+    }
+
+    /// Ends everything: the cycle in flight ends with its result, INVALID if it was still exposing, then the sockets close.
+    pub fn stop(self) {
+        self.station.event(Event::Stop);
+        self.stopping.stop();
+    }
+}
+
+/// The credential that gives the secret of this device.
+const SECRET: &str = "fringed.secret";
+
+/// Opens the way in; the secret of a new device is shown here and never again.
+fn open_access(state: &StateFolder) -> Result<Access, Failure> {
+    let folder = state.place("access");
+    let given =
+        std::env::var_os("CREDENTIALS_DIRECTORY").map(|given| Path::new(&given).join(SECRET));
+    let (access, secret) = Access::open_given(&folder, given.as_deref())?;
+    if let Some(secret) = secret {
+        // Whatever is quiet: without it nobody could ever sign in.
+        let words = format!(
+            "the secret of this device, shown this once: {secret} (sign in on the page with it; for another one \
+             delete {} and start again)",
+            folder.join("secret").display()
+        );
+        journal::write(Severity::Notice, &words);
+    }
+    Ok(access)
+}
+
+/// A current-thread runtime.
+///
+/// # Errors
+/// If the system gives none.
+pub fn runtime() -> Result<Runtime, Failure> {
+    tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|error| Failure::because(Exit::Software, "start a socket runtime", error))
+}
+
+fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, Failure> {
+    std::thread::Builder::new()
+        .name(name.into())
+        .spawn(run)
+        .map_err(|error| {
+            Failure::because(Exit::Software, format!("start the thread {name}"), error)
+        })
+}
+
+async fn listen(config: &Config) -> Result<(TcpListener, TcpListener), Failure> {
+    let bind = async |what, address| {
+        let bound = socket::bind(what, address).await;
+        bound.map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))
+    };
+    let plc = bind("Modbus TCP", config.modbus.listen).await?;
+    let page = bind("the page", config.http.listen).await?;
+    Ok((plc, page))
+}
+
+fn address_of(listener: &TcpListener) -> Result<SocketAddr, Failure> {
+    listener
+        .local_addr()
+        .map_err(|error| Failure::because(Exit::Unavailable, "ask for a socket's port", error))
+}
+
+fn open_history(
+    config: &Config,
+    state: &StateFolder,
+) -> Result<(History, history::Task, u32, Option<String>), Failure> {
+    let bounds = Bounds {
+        results: u64::from(config.history.results),
+        recordings: u64::from(config.history.recordings_mib) << 20,
+    };
+    let numbering = Numbering {
+        counted: state.counted()?,
+        counter: state.counter(),
+        serial: state.serial()?,
+        // 0 is nobody's.
+        run: random()?.max(1),
+    };
+    history::open(state.path(), numbering, bounds)
+        .map_err(|error| Failure::new(Exit::CannotCreate, error.to_string()))
+}
+
+fn station(config: &Config, state: &StateFolder, next_seq: u32) -> Result<Station, Failure> {
+    let settings = Settings {
+        next_seq,
+        boot_id: random()?,
+        teach_allowed: config.station.teach_allowed,
+        identity: Arc::new(Identity {
+            vendor: "fringed".into(),
+            product: "fringed 3-D smart sensor".into(),
+            serial: state.serial()?,
+            version: env!("CARGO_PKG_VERSION").into(),
+        }),
+        limits: Limits {
+            plc: Micros::from_millis(u64::from(config.station.plc_timeout_s) * 1000),
+            ..Limits::default()
+        },
+    };
+    Ok(Station::new(settings, Micros(0)))
+}
+
+/// Carries out what the station wants done. Called with the station locked: it only hands on and waits for nothing.
+fn effects(
+    orders: mpsc::Sender<Order>,
+    aborts: Aborts,
+    history: History,
+    progress: Progress,
+    tally: Tally,
+) -> impl FnMut(Effect) -> Option<Event> {
+    // An order that nobody takes is noticed by the station itself: its wait has a deadline.
+    let order = move |order| drop(orders.send(order));
+    move |effect| {
+        match effect {
+            Effect::Measure(job) => order(Order::Measure(job)),
+            Effect::Load { job, key } => order(Order::Load(job, key)),
+            Effect::Teach {
+                job,
+                number,
+                keep_gauges,
+            } => order(Order::Teach(job, number, keep_gauges)),
+            Effect::PersistSeq(seq) => {
+                let failed = history.take(seq).err();
+                return Some(Event::Stored { seq, failed });
+            }
+            Effect::Log(line) => progress.log(&line),
+            Effect::Alarm(line) => progress.report(Severity::Error, &line),
+            Effect::Abort { job } => aborts.abort(job),
+            Effect::Publish(result) => {
+                tally.add(result.verdict);
+                history.record(&result);
+            }
+        }
+        None
+    }
+}
+
+/// What the station does first: load its recipe; a simulated head without it teaches the part that
+/// lies in front of it.
+fn first_request(
+    config: &Config,
+    simulated: bool,
+    recipes: &crate::recipe::Store,
+) -> Option<Request> {
+    let number = config.station.recipe;
+    if recipes.numbers().contains(&number) {
+        Some(Request::Load(RecipeKey::Number(number)))
+    } else {
+        simulated.then_some(Request::Teach {
+            number,
+            keep_gauges: false,
+        })
+    }
+}

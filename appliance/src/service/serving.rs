@@ -1,0 +1,51 @@
+//! What runs on the sockets' thread: Modbus, the page, and the station's tick.
+
+use crate::config::Config;
+use crate::station::{StationHandle, tick};
+use crate::system::clock;
+use crate::{modbus, web};
+use tokio::net::TcpListener;
+use tokio::sync::watch;
+
+/// The PLC's side of the sockets.
+pub(super) struct PlcSide {
+    pub(super) listener: TcpListener,
+    pub(super) clients: modbus::Clients,
+    pub(super) refusals: modbus::Refusals,
+}
+
+pub(super) async fn serve(
+    plc: PlcSide,
+    page: TcpListener,
+    station: StationHandle,
+    site: web::Site,
+    config: &Config,
+    stopped: watch::Receiver<bool>,
+) {
+    let stop = || {
+        let mut stopped = stopped.clone();
+        async move {
+            // An error means that the daemon itself is gone: stop as well.
+            let _ = stopped.wait_for(|stop| *stop).await;
+        }
+    };
+    let options = modbus::Options {
+        word_order: config.modbus.word_order.into(),
+        strict_unit_id: config.modbus.strict_unit_id,
+        readers: config.modbus.readers.clone(),
+        writers: config.modbus.writers.clone(),
+        ..modbus::Options::default()
+    };
+    tokio::join!(
+        tick(station.clone(), clock::utc_us, stop()),
+        modbus::serve(
+            plc.listener,
+            station,
+            options,
+            plc.clients,
+            plc.refusals,
+            stop()
+        ),
+        web::serve(page, site, stop()),
+    );
+}

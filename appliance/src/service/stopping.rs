@@ -1,0 +1,87 @@
+//! The end of the daemon: every thread is told, and none is waited for for ever.
+
+use crate::history::History;
+use crate::production::Order;
+use crate::station::StationHandle;
+use crate::system::computing::Computing;
+use crate::system::progress::Progress;
+use std::sync::mpsc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use tokio::sync::watch;
+
+/// What ends the daemon's threads.
+pub(super) struct Stopping {
+    pub(super) orders: mpsc::Sender<Order>,
+    pub(super) sockets: watch::Sender<bool>,
+    pub(super) survey: mpsc::Sender<()>,
+    pub(super) threads: [JoinHandle<()>; 4],
+    pub(super) progress: Progress,
+    pub(super) station: StationHandle,
+    pub(super) history: History,
+    pub(super) writing: JoinHandle<()>,
+    pub(super) computing: Computing,
+}
+
+/// Time between two looks at a thread that ends.
+const LOOKING: Duration = Duration::from_millis(2);
+/// A measuring task that has not ended after this time is left behind: each wait for a device ends after 2 s.
+const MEASURING: Duration = Duration::from_secs(3);
+/// What has not ended after this time is left behind, whatever hangs: who stops a station waits at most 5 s.
+const STOPPING: Duration = Duration::from_millis(4500);
+
+impl Stopping {
+    /// Ends measuring, then the sockets, the survey and the history.
+    pub(super) fn stop(self) {
+        let began = Instant::now();
+        let until = began + STOPPING;
+        // An order that nobody takes, or a runtime that is gone, is what is wanted here.
+        drop(self.orders.send(Order::Stop));
+        let [measuring, serving, surveying, wiring] = self.threads;
+        let needed = || !self.computing.is_under_way();
+        join_while(
+            &needed,
+            "measuring",
+            measuring,
+            began + MEASURING,
+            &self.progress,
+        );
+        let _ = self.sockets.send(true);
+        join("sockets", serving, until, &self.progress);
+        join("lines", wiring, until, &self.progress);
+        drop(self.survey);
+        join("survey", surveying, until, &self.progress);
+        // Last: what the others brought to an end is stored.
+        self.history.stop(self.station.snapshot().result_seq);
+        join("history", self.writing, until, &self.progress);
+    }
+}
+
+/// Waits for a thread to end. One that hangs in a device or in a storage must not keep the program from ending.
+fn join(name: &str, thread: JoinHandle<()>, until: Instant, progress: &Progress) {
+    join_while(&|| true, name, thread, until, progress);
+}
+
+/// The same as long as the thread is `needed`: one that only computes ends with the program.
+fn join_while(
+    needed: &dyn Fn() -> bool,
+    name: &str,
+    thread: JoinHandle<()>,
+    until: Instant,
+    progress: &Progress,
+) {
+    while !thread.is_finished() {
+        if !needed() {
+            return;
+        }
+        if Instant::now() > until {
+            progress.warn(&format!(
+                "the thread {name} does not end and is left behind"
+            ));
+            return;
+        }
+        std::thread::sleep(LOOKING);
+    }
+    // One that panicked has said so.
+    drop(thread.join());
+}

@@ -1,0 +1,131 @@
+//! How often the daemon was started with a state folder, and how often it had not been stopped before.
+
+use crate::storage::folder::write_whole;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// The file: starts, unclean starts, how the daemon is, and starts after it hung, e.g. `12 1 running 0`.
+const FILE: &str = "boots";
+
+/// How the daemon is; what an end without a stop leaves in the file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Condition {
+    /// It was stopped.
+    #[default]
+    Stopped,
+    /// It runs.
+    Running,
+    /// It runs, and its measuring task has not met its deadlines for a while: what a watchdog ends.
+    Hanging,
+}
+
+impl Condition {
+    const ALL: [Self; 3] = [Self::Stopped, Self::Running, Self::Hanging];
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Stopped => "stopped",
+            Self::Running => "running",
+            Self::Hanging => "hanging",
+        }
+    }
+}
+
+/// The counts, this start included.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Boots {
+    /// Starts.
+    pub starts: u32,
+    /// Starts after an end without a stop.
+    pub unclean: u32,
+    /// Those of them after an end of a daemon that hung: whoever watches had to end it.
+    pub after_hanging: u32,
+    /// Now.
+    pub condition: Condition,
+}
+
+impl Boots {
+    /// The counts with this start. A damaged file starts anew: they are for people, nothing is decided by them.
+    pub fn begin(folder: &Path) -> Self {
+        let text = fs::read_to_string(folder.join(FILE)).unwrap_or_default();
+        let mut words = text.split_whitespace();
+        let number = |word: Option<&str>| word.and_then(|word| word.parse().ok()).unwrap_or(0_u32);
+        let (starts, unclean) = (number(words.next()), number(words.next()));
+        let left = words.next().unwrap_or_default();
+        let condition = Condition::ALL
+            .into_iter()
+            .find(|known| known.word() == left);
+        let condition = condition.unwrap_or_default();
+        let more = |happened: bool| u32::from(happened);
+        Self {
+            starts: starts.saturating_add(1),
+            unclean: unclean.saturating_add(more(condition != Condition::Stopped)),
+            after_hanging: number(words.next())
+                .saturating_add(more(condition == Condition::Hanging)),
+            condition: Condition::Running,
+        }
+    }
+
+    /// Stores the counts.
+    ///
+    /// # Errors
+    /// Whatever the file system answers.
+    pub fn store(&self, folder: &Path) -> io::Result<()> {
+        let Self {
+            starts,
+            unclean,
+            after_hanging,
+            condition,
+        } = self;
+        let text = format!("{starts} {unclean} {} {after_hanging}\n", condition.word());
+        write_whole(&folder.join(FILE), text.as_bytes())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn start(folder: &Path) -> Boots {
+        let boots = Boots::begin(folder);
+        boots.store(folder).unwrap();
+        boots
+    }
+
+    fn end(boots: Boots, condition: Condition, folder: &Path) {
+        Boots { condition, ..boots }.store(folder).unwrap();
+    }
+
+    #[test]
+    fn a_start_after_a_kill_is_counted_as_unclean_and_one_after_a_stop_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let start = || start(folder.path());
+        assert_eq!((start().starts, start().unclean), (1, 1));
+        let third = start();
+        assert_eq!((third.starts, third.unclean), (3, 2));
+        end(third, Condition::Stopped, folder.path());
+        assert_eq!(
+            (start().starts, Boots::begin(folder.path()).unclean),
+            (4, 3)
+        );
+        fs::write(folder.path().join(FILE), "x y z").unwrap();
+        assert_eq!((start().starts, start().starts), (1, 2));
+    }
+
+    #[test]
+    fn a_start_after_the_end_of_a_daemon_that_hung_is_one_of_a_watchdog() {
+        let folder = tempfile::tempdir().unwrap();
+        let start = || start(folder.path());
+        end(start(), Condition::Hanging, folder.path());
+        let second = start();
+        assert_eq!((second.unclean, second.after_hanging), (1, 1));
+        // Killed while all was well.
+        let third = start();
+        assert_eq!((third.unclean, third.after_hanging), (2, 1));
+        // As the program before this one wrote it.
+        fs::write(folder.path().join(FILE), "12 3 running\n").unwrap();
+        let next = start();
+        assert_eq!((next.starts, next.unclean, next.after_hanging), (13, 4, 0));
+    }
+}

@@ -1,0 +1,93 @@
+//! The survey: once a second, what the system, the stored recipes and the Modbus clients look like.
+//!
+//! It has a thread of its own, because a storage that hangs must hold up neither sockets nor measuring.
+
+mod boots;
+mod system;
+
+use crate::modbus::Clients;
+use crate::recipe::Store;
+use crate::station::{Event, StationHandle, System};
+use crate::system::progress::Progress;
+use boots::{Boots, Condition};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::Duration;
+
+/// Time between two surveys.
+const PERIOD: Duration = Duration::from_secs(1);
+/// A measuring task that missed its deadlines for so many surveys hangs. A lost head that is opened again takes less, and
+/// each change is a write to the card.
+const HANGING: u32 = 10;
+
+/// Everything that is surveyed.
+pub struct Survey {
+    folder: PathBuf,
+    boots: Boots,
+    recipes: Store,
+    clients: Clients,
+    progress: Progress,
+}
+
+impl Survey {
+    /// A survey of the state folder, the recipes in it and the clients; counts this start.
+    pub fn new(folder: &Path, recipes: Store, clients: Clients, progress: Progress) -> Self {
+        let boots = Boots::begin(folder);
+        let survey = Self {
+            folder: folder.to_path_buf(),
+            boots,
+            recipes,
+            clients,
+            progress,
+        };
+        survey.store_boots();
+        survey
+    }
+
+    /// Tells the station once a second, until `stopped` says or loses something; then this run has ended cleanly.
+    pub fn run(mut self, station: &StationHandle, stopped: &Receiver<()>) {
+        let mut processors = system::Processors::default();
+        let mut late = 0_u32;
+        loop {
+            let (clients, writer_connected) = self.clients.open();
+            let after = station.event(Event::Surveyed(System {
+                cpu_percent: processors.load_percent(),
+                free_memory_mib: system::free_memory_mib(),
+                free_storage_mib: system::free_storage_mib(&self.folder),
+                cpu_temperature_c: system::temperature_c(),
+                boots: self.boots.starts,
+                unclean_boots: self.boots.unclean,
+                watchdog_restarts: self.boots.after_hanging,
+                clients,
+                writer_connected,
+                recipes: Arc::from(self.recipes.numbers()),
+            }));
+            late = match after.worker_alive {
+                true => 0,
+                false => late.saturating_add(1),
+            };
+            let condition = match late {
+                HANGING.. => Condition::Hanging,
+                _ => Condition::Running,
+            };
+            if condition != self.boots.condition {
+                self.boots.condition = condition;
+                self.store_boots();
+            }
+            match stopped.recv_timeout(PERIOD) {
+                Err(RecvTimeoutError::Timeout) => {}
+                Ok(()) | Err(RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        self.boots.condition = Condition::Stopped;
+        self.store_boots();
+    }
+
+    fn store_boots(&self) {
+        if let Err(error) = self.boots.store(&self.folder) {
+            self.progress
+                .log(&format!("store the number of starts: {error}: free space"));
+        }
+    }
+}

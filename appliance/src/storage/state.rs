@@ -1,0 +1,258 @@
+//! The state folder: recipes, the result counter, the device's serial.
+
+use crate::error::{Exit, Failure};
+use crate::recipe::Store;
+use crate::storage::folder::write_whole;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// The folder that outlives a restart. One daemon at a time holds it.
+#[derive(Debug)]
+pub struct StateFolder {
+    path: PathBuf,
+    recipes: Store,
+    /// Held until the daemon ends; the system drops it with the process, however that ends.
+    _lock: File,
+}
+
+/// The counter's file: the last SEQ that may be in use, in decimal, and behind it the run that says so, in hexadecimal.
+const COUNTER: &str = "result-seq";
+/// The serial's file.
+const SERIAL: &str = "serial";
+
+impl StateFolder {
+    /// The platform's state folder for this program.
+    ///
+    /// # Errors
+    /// If the platform has none, e.g. without a home directory.
+    pub fn default_path() -> Result<PathBuf, Failure> {
+        dirs::state_dir()
+            .or_else(dirs::data_local_dir)
+            .map(|folder| folder.join("fringed"))
+            .ok_or_else(|| {
+                Failure::new(
+                    Exit::CannotCreate,
+                    "find the state folder: this user has no home directory; name one with --state",
+                )
+            })
+    }
+
+    /// Opens the folder, creating it where it does not exist, and takes it for this process.
+    ///
+    /// # Errors
+    /// If it cannot be created or written, or another daemon holds it (exit code 73).
+    pub fn open(path: &Path) -> Result<Self, Failure> {
+        let remedy = "another fringed uses it: end that one or name another folder with --state";
+        Self::open_unless_held(path, (Exit::CannotCreate, remedy))
+    }
+
+    /// As [`StateFolder::open`], for a command that changes what a running station uses; `instead` says how it is done while
+    /// the station runs.
+    ///
+    /// # Errors
+    /// If it cannot be created or written (exit code 73), or a station uses it (exit code `used`).
+    pub fn open_unless_used(path: &Path, used: Exit, instead: &str) -> Result<Self, Failure> {
+        let remedy = format!("a station uses it: {instead}, or end the station first");
+        Self::open_unless_held(path, (used, &remedy))
+    }
+
+    fn open_unless_held(path: &Path, (held, remedy): (Exit, &str)) -> Result<Self, Failure> {
+        let refused = |exit, error: String| {
+            let what = format!("open the state folder {}", path.display());
+            Failure::because(exit, what, error)
+        };
+        let failed = |error| refused(Exit::CannotCreate, error);
+        let cannot = |error: std::io::Error| {
+            failed(format!(
+                "{error}: name one that can be written with --state"
+            ))
+        };
+        fs::create_dir_all(path).map_err(cannot)?;
+        let lock = File::create(path.join("lock")).map_err(cannot)?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(refused(held, remedy.into())),
+            Err(TryLockError::Error(error)) => return Err(cannot(error)),
+        }
+        let recipes = Store::open(&path.join("recipes")).map_err(cannot)?;
+        recipes.remove_left_behind().map_err(cannot)?;
+        Ok(Self {
+            path: path.to_path_buf(),
+            recipes,
+            _lock: lock,
+        })
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The recipes.
+    pub fn recipes(&self) -> &Store {
+        &self.recipes
+    }
+
+    /// Where a part of the state lies that somebody else opens.
+    pub fn place(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// What the counter's file says: the last SEQ that may be in use, and which run says so; 0 without a file.
+    ///
+    /// # Errors
+    /// If it is damaged: guessing would let a SEQ be used twice.
+    pub fn counted(&self) -> Result<Counted, Failure> {
+        let file = self.path.join(COUNTER);
+        let text = match fs::read_to_string(&file) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return Ok(Counted::default());
+            }
+            Err(error) => {
+                let what = format!("read {}", file.display());
+                return Err(Failure::because(Exit::CannotCreate, what, error));
+            }
+        };
+        Counted::read(&text).ok_or_else(|| {
+            Failure::new(
+                Exit::CannotCreate,
+                format!(
+                    "read {}: {:?} is no number: write the SEQ of the last result there",
+                    file.display(),
+                    text.trim()
+                ),
+            )
+        })
+    }
+
+    /// A writer of the counter.
+    pub fn counter(&self) -> Counter {
+        Counter {
+            file: self.path.join(COUNTER),
+        }
+    }
+
+    /// The device's serial, made at the first start.
+    ///
+    /// # Errors
+    /// If it can neither be read nor written.
+    pub fn serial(&self) -> Result<String, Failure> {
+        let file = self.path.join(SERIAL);
+        if let Ok(serial) = fs::read_to_string(&file)
+            && !serial.trim().is_empty()
+        {
+            return Ok(serial.trim().to_owned());
+        }
+        let serial = format!("{:08X}", random()?);
+        write_whole(&file, format!("{serial}\n").as_bytes()).map_err(|error| {
+            Failure::because(
+                Exit::CannotCreate,
+                format!("write {}", file.display()),
+                error,
+            )
+        })?;
+        Ok(serial)
+    }
+}
+
+/// The last SEQ that may be in use, and which run of the daemon says so.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counted {
+    /// The SEQ.
+    pub last: u32,
+    /// Random per start; 0 where a person or an older program wrote the number.
+    pub run: u32,
+}
+
+impl Counted {
+    /// From text; none if it is not that.
+    pub fn read(text: &str) -> Option<Self> {
+        let mut words = text.split_whitespace();
+        let last = words.next()?.parse().ok()?;
+        let run = words.next().map(|word| u32::from_str_radix(word, 16).ok());
+        let run = run.unwrap_or(Some(0))?;
+        words.next().is_none().then_some(Self { last, run })
+    }
+
+    /// As text, always as long: whoever writes it over another needs no more room.
+    pub fn text(self) -> String {
+        format!("{:010} {:08x}\n", self.last, self.run)
+    }
+}
+
+/// Stores which SEQs may be in use, before anybody sees their results, so that none is used twice.
+#[derive(Clone, Debug)]
+pub struct Counter {
+    file: PathBuf,
+}
+
+impl Counter {
+    /// Stores that SEQs up to this one may be in use. Written in place, a few digits in one sector: it needs no room on a
+    /// full card, and whoever pulls the plug finds the old numbers or the new ones.
+    ///
+    /// # Errors
+    /// Whatever the file system answers.
+    pub fn store(&self, counted: Counted) -> std::io::Result<()> {
+        let text = counted.text();
+        match OpenOptions::new().write(true).open(&self.file) {
+            Ok(mut file) if file.metadata()?.len() == text.len() as u64 => {
+                file.write_all(text.as_bytes())?;
+                file.sync_data()
+            }
+            // The first time, or another program's or a person's file.
+            _ => write_whole(&self.file, text.as_bytes()),
+        }
+    }
+}
+
+/// 32 random bits from the system.
+///
+/// # Errors
+/// If the system gives none.
+pub fn random() -> Result<u32, Failure> {
+    getrandom::u32()
+        .map_err(|error| Failure::because(Exit::Software, "ask the system for random bits", error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_counter_and_the_serial_outlive_a_restart() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = StateFolder::open(folder.path()).unwrap();
+        assert_eq!(first.counted().unwrap(), Counted::default());
+        let counted = Counted { last: 41, run: 7 };
+        first.counter().store(counted).unwrap();
+        let serial = first.serial().unwrap();
+        drop(first);
+        let second = StateFolder::open(folder.path()).unwrap();
+        assert_eq!(second.counted().unwrap(), counted);
+        assert_eq!(second.serial().unwrap(), serial);
+    }
+
+    #[test]
+    fn one_daemon_at_a_time_holds_the_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let _first = StateFolder::open(folder.path()).unwrap();
+        let refused = StateFolder::open(folder.path()).unwrap_err();
+        assert_eq!(refused.exit, Exit::CannotCreate);
+        assert!(refused.message.contains("another fringed"), "{refused}");
+    }
+
+    #[test]
+    fn a_damaged_counter_is_not_guessed() {
+        let folder = tempfile::tempdir().unwrap();
+        let state = StateFolder::open(folder.path()).unwrap();
+        for damaged in ["4x", "", "4 y", "4 5 6", "-4", "4294967296"] {
+            fs::write(folder.path().join(COUNTER), damaged).unwrap();
+            let refused = state.counted().unwrap_err();
+            assert!(refused.message.contains("result-seq"), "{damaged}");
+        }
+        fs::write(folder.path().join(COUNTER), "4\n").unwrap();
+        assert_eq!(state.counted().unwrap(), Counted { last: 4, run: 0 });
+    }
+}

@@ -1,0 +1,76 @@
+//! The last lines of the log, for the page.
+
+use serde_json::{Value, json};
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+/// Lines that are kept.
+const LINES: usize = 200;
+
+/// One line.
+#[derive(Clone, Debug, PartialEq)]
+struct Line {
+    /// Time in µs since 1970 UTC, if the clock is synchronised.
+    utc_us: Option<u64>,
+    /// Since the start.
+    uptime_s: u64,
+    words: String,
+}
+
+/// The lines. Cheap to clone; clones share them.
+#[derive(Clone, Debug)]
+pub struct Logbook {
+    begun: Instant,
+    lines: Arc<Mutex<VecDeque<Line>>>,
+}
+
+impl Default for Logbook {
+    fn default() -> Self {
+        Self {
+            begun: Instant::now(),
+            lines: Arc::default(),
+        }
+    }
+}
+
+impl Logbook {
+    /// Adds a line; the oldest gives way.
+    pub fn add(&self, words: &str) {
+        let line = Line {
+            utc_us: crate::system::clock::utc_us(),
+            uptime_s: self.begun.elapsed().as_secs(),
+            words: words.to_owned(),
+        };
+        let mut lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
+        if lines.len() >= LINES {
+            lines.pop_front();
+        }
+        lines.push_back(line);
+    }
+
+    /// All lines, newest first: `utc_us` (none if the clock was not synchronised), `uptime_s`, `words`.
+    pub fn latest(&self) -> Vec<Value> {
+        let lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
+        let newest = lines.iter().rev();
+        newest
+            .map(|line| json!({ "utc_us": line.utc_us, "uptime_s": line.uptime_s, "words": line.words }))
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_newest_line_comes_first_and_the_book_stays_bounded() {
+        let book = Logbook::default();
+        for at in 0..LINES + 5 {
+            book.clone().add(&format!("line {at}"));
+        }
+        let lines = book.latest();
+        assert_eq!(lines.len(), LINES);
+        assert_eq!(lines[0]["words"], format!("line {}", LINES + 4));
+    }
+}

@@ -1,0 +1,174 @@
+//! The device's secret: given to it, or made at the first start and kept as an argon2id hash.
+
+use crate::storage::folder::write_whole;
+use argon2::Argon2;
+use argon2::password_hash::phc::PasswordHash;
+use argon2::password_hash::{PasswordHasher, PasswordVerifier};
+use std::io::ErrorKind;
+use std::path::Path;
+
+/// Digits of the secret: Crockford's base 32, without I, L, O and U, so that nothing is misread.
+const DIGITS: &[u8; 32] = b"0123456789ABCDEFGHJKMNPQRSTVWXYZ";
+/// 4 groups of 5 digits of 5 bits each: 100 bits, far beyond guessing.
+const LENGTH: usize = 20;
+const GROUP: usize = 5;
+/// Nobody types more; longer text is not hashed.
+const LONGEST: usize = 64;
+/// Letters and digits of the shortest secret that may be given: 60 bits where they are random.
+const SHORTEST: usize = 12;
+
+/// The hash of the secret that this file gives, as such or as its argon2id hash; none if there is no such file.
+///
+/// # Errors
+/// In words, with the remedy.
+pub(super) fn given(file: &Path) -> Result<Option<String>, String> {
+    let text = match std::fs::read_to_string(file) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        read => read.map_err(|error| format!("read the secret that was given: {error}"))?,
+    };
+    let text = text.trim();
+    if text.starts_with('$') {
+        return match PasswordHash::new(text) {
+            Ok(_) => Ok(Some(text.to_owned())),
+            Err(error) => Err(format!(
+                "the secret that was given is no hash ({error}): give a new one"
+            )),
+        };
+    }
+    if plain(text).len() < SHORTEST || text.len() > LONGEST {
+        return Err(format!(
+            "the secret that was given must have {SHORTEST} letters and digits at least and {LONGEST} characters at most: give a new one"
+        ));
+    }
+    hash(text).map(Some)
+}
+
+/// The stored hash, and the secret itself if it was made just now.
+///
+/// # Errors
+/// In words, with the remedy.
+pub(super) fn open(file: &Path) -> Result<(String, Option<String>), String> {
+    match std::fs::read_to_string(file) {
+        Ok(text) => {
+            let hash = text.trim();
+            PasswordHash::new(hash).map_err(|error| {
+                format!("secret is damaged ({error}): delete it, the next start makes a new one")
+            })?;
+            Ok((hash.to_owned(), None))
+        }
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            let secret = make()?;
+            let hash = hash(&secret)?;
+            write_whole(file, format!("{hash}\n").as_bytes())
+                .and_then(|()| close_to_others(file))
+                .map_err(|error| format!("write secret: {error}: free space"))?;
+            Ok((hash, Some(secret)))
+        }
+        Err(error) => Err(format!("read secret: {error}")),
+    }
+}
+
+/// Whether somebody typed the secret; dashes, spaces and small letters do not matter.
+///
+/// # Errors
+/// If the stored hash cannot be read.
+pub(super) fn is_right(typed: &str, stored: &str) -> Result<bool, String> {
+    if typed.len() > LONGEST {
+        return Ok(false);
+    }
+    let stored = PasswordHash::new(stored).map_err(|error| error.to_string())?;
+    let verified = Argon2::default().verify_password(plain(typed).as_bytes(), &stored);
+    Ok(verified.is_ok())
+}
+
+fn make() -> Result<String, String> {
+    let mut random = [0_u8; LENGTH];
+    getrandom::fill(&mut random).map_err(|error| error.to_string())?;
+    // 256 is a multiple of 32: every digit is equally likely.
+    let digits: Vec<char> = random
+        .iter()
+        .map(|byte| char::from(DIGITS[usize::from(byte % 32)]))
+        .collect();
+    let groups: Vec<String> = digits.chunks(GROUP).map(String::from_iter).collect();
+    Ok(groups.join("-"))
+}
+
+fn hash(secret: &str) -> Result<String, String> {
+    // The crate's default: argon2id, 19 MiB, 2 passes, as OWASP recommends.
+    Argon2::default()
+        .hash_password(plain(secret).as_bytes())
+        .map(|hash| hash.to_string())
+        .map_err(|error| error.to_string())
+}
+
+/// As it is hashed: only letters and digits, capital, with the letters that Crockford's digits leave out read as what
+/// they look like.
+fn plain(typed: &str) -> String {
+    let kept = typed.chars().filter(char::is_ascii_alphanumeric);
+    kept.map(|digit| match digit.to_ascii_uppercase() {
+        'O' => '0',
+        'I' | 'L' => '1',
+        digit => digit,
+    })
+    .collect()
+}
+
+#[cfg(unix)]
+fn close_to_others(file: &Path) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt as _;
+    std::fs::set_permissions(file, std::fs::Permissions::from_mode(0o600))
+}
+
+#[cfg(not(unix))]
+fn close_to_others(_: &Path) -> std::io::Result<()> {
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_secret_survives_how_people_type_and_nothing_else_opens() {
+        let stored = hash("0123A-BCDEF-GHJKM-NPQR1").unwrap();
+        for typed in ["0123A-BCDEF-GHJKM-NPQR1", " o123abcdef ghjkmnpqrI"] {
+            assert!(is_right(typed, &stored).unwrap(), "{typed}");
+        }
+        for typed in ["", "0123A-BCDEF-GHJKM-NPQR2", "0123A", &"0".repeat(1000)] {
+            assert!(!is_right(typed, &stored).unwrap(), "{typed}");
+        }
+    }
+
+    #[test]
+    fn a_secret_is_given_as_such_or_as_its_hash_and_a_weak_or_broken_one_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("given");
+        assert_eq!(given(&file), Ok(None));
+        let hashed = hash("0123A-BCDEF-GHJKM").unwrap();
+        for text in ["0123a-bcdef-ghjkm\n", hashed.as_str()] {
+            std::fs::write(&file, text).unwrap();
+            let stored = given(&file).unwrap().unwrap();
+            assert!(is_right("0123A BCDEF GHJKM", &stored).unwrap(), "{text}");
+            assert!(!is_right(&hashed, &stored).unwrap(), "{text}");
+        }
+        for text in [
+            "",
+            "0123A-BCDEF",
+            "-------------",
+            "$argon2id$broken",
+            &"0".repeat(65),
+        ] {
+            std::fs::write(&file, text).unwrap();
+            let refused = given(&file).unwrap_err();
+            assert!(refused.contains("give a new one"), "{text}: {refused}");
+        }
+    }
+
+    #[test]
+    fn secrets_have_a_hundred_bits_in_groups_that_can_be_read_out() {
+        let secret = make().unwrap();
+        assert_eq!(secret.len(), LENGTH + 3);
+        assert!(secret.split('-').all(|group| group.len() == GROUP));
+        assert_ne!(secret, make().unwrap());
+    }
+}
