@@ -1,6 +1,8 @@
 //! What ends a command early: a message for people and an exit code after sysexits.
 
+use crate::station::error_code;
 pub use hal::bounds::shortened;
+use hal::error::{Device, Error};
 use std::fmt;
 use std::process::ExitCode;
 
@@ -46,9 +48,9 @@ impl Failure {
     }
 
     /// A device that cannot be opened.
-    pub fn of_device(error: &hal::error::Error) -> Self {
+    pub fn of_device(error: &Error) -> Self {
         Self {
-            code: Some(crate::production::code_of(error)),
+            code: Some(code_of(error)),
             ..Self::new(Exit::Unavailable, error.to_string())
         }
     }
@@ -56,6 +58,20 @@ impl Failure {
     /// `error` while doing `what`, which names the file.
     pub fn because(exit: Exit, what: impl fmt::Display, error: impl fmt::Display) -> Self {
         Self::new(exit, format!("{what}: {error}"))
+    }
+}
+
+/// ERROR_CODE of a device's error.
+pub fn code_of(error: &Error) -> u16 {
+    match error {
+        Error::Timeout { .. } => error_code::TIMEOUT,
+        Error::Disconnected { device, .. } => match device {
+            Device::Camera => error_code::CAMERA_LOST,
+            Device::Projector => error_code::PROJECTOR_LOST,
+            Device::Lines => error_code::LINES_LOST,
+        },
+        Error::Unsupported { .. } => error_code::UNSUPPORTED,
+        Error::Protocol { .. } => error_code::PROTOCOL,
     }
 }
 

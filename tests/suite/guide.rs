@@ -48,18 +48,15 @@ fn source(folder: &Path) -> String {
 
 /// The error codes that the program can show.
 fn error_codes() -> BTreeSet<String> {
-    let mut defined = BTreeSet::new();
-    for file in ["station/error_code.rs", "worker/code.rs", "plan/mod.rs"] {
-        let text = fs::read_to_string(root().join("appliance/src").join(file)).unwrap();
-        let numbers = text
-            .lines()
-            .filter_map(|line| line.split_once(": u16 = ")?.1.strip_suffix(';'));
-        defined.extend(
-            numbers
-                .filter(|number| number.len() == 3)
-                .map(str::to_owned),
-        );
-    }
+    let file = root().join("appliance/src/station/error_code.rs");
+    let text = fs::read_to_string(file).unwrap();
+    let numbers = text
+        .lines()
+        .filter_map(|line| line.split_once(": u16 = ")?.1.strip_suffix(';'));
+    let defined: BTreeSet<_> = numbers
+        .filter(|number| number.len() == 3)
+        .map(str::to_owned)
+        .collect();
     assert!(defined.len() > 10, "{defined:?}");
     defined
 }

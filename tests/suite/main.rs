@@ -33,6 +33,7 @@ mod promises_own;
 mod promises_shared;
 mod recovery;
 mod replacing;
+mod rooms;
 mod sequences;
 mod service;
 mod simulated_part;

@@ -2,6 +2,7 @@
 
 use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, STOPPING, command, long};
 use appliance::history::{self, Bounds, Filter, Numbering, Reader};
+use appliance::recipe::Store;
 use appliance::recipe::{Recipe, archive};
 use appliance::storage::state::StateFolder;
 use appliance::web::access::Access;
@@ -290,8 +291,9 @@ impl Promise {
     }
 
     fn check_recipes(&self, folder: &StateFolder) -> Result<(), String> {
+        let recipes = Store::of_state(folder).map_err(|failure| failure.to_string())?;
         for (&number, possible) in &self.recipes {
-            let found = match folder.recipes().load(number) {
+            let found = match recipes.load(number) {
                 Ok(loaded) => {
                     if let Some(fallback) = loaded
                         .fallback

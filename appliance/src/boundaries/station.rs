@@ -68,7 +68,7 @@ fn a_station_whose_recipe_cannot_be_used_stays_reachable_and_loads_another() {
     daemon.station.event(write);
     let load = Request::Load(RecipeKey::Number(2));
     daemon.station.event(Event::Request(load));
-    let runtime = crate::service::runtime().unwrap();
+    let runtime = crate::system::runtime().unwrap();
     let ready = runtime.block_on(async {
         let mut snapshots = daemon.station.subscribe();
         let ready = snapshots.wait_for(|now| now.is(status::READY)).await;

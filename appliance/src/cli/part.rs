@@ -3,8 +3,8 @@
 use super::numbers::{number, numbers};
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
+use crate::head::placed::Placed;
 use crate::production::backend;
-use crate::production::simulation::Placed;
 use hal::bounds::{MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG, clipped};
 
 /// Which part lies in front of a simulated head, instead of the scenario's.

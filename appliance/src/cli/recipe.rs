@@ -115,7 +115,7 @@ impl RecipeCommand {
                 quiet,
             } => {
                 let state = at_rest(files, "Delete")?;
-                state.recipes().delete(*number).map_err(kept)?;
+                Store::of_state(&state)?.delete(*number).map_err(kept)?;
                 let undo = format!("`fringed recipe undo {number}` brings it back");
                 quiet.say(|| format!("recipe {number} is deleted; {undo}"));
                 Ok(())
@@ -126,7 +126,7 @@ impl RecipeCommand {
                 quiet,
             } => {
                 let state = at_rest(files, "Undo")?;
-                let file = state.recipes().undo(*number).map_err(kept)?;
+                let file = Store::of_state(&state)?.undo(*number).map_err(kept)?;
                 let digits = file.fingerprint.get(..8).unwrap_or_default();
                 quiet.say(|| {
                     format!(

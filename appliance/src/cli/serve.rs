@@ -3,13 +3,14 @@
 use super::options::{Files, Listen, Quiet, Threads};
 use super::part::SimulatedPart;
 use crate::error::Failure;
-use crate::service::{Caller, Daemon, runtime};
+use crate::service::{Caller, Daemon};
 use crate::station::Snapshot;
 use crate::station::refusal::reject;
 use crate::station::snapshot::status;
 use crate::system::journal::Severity;
 use crate::system::notify::Notify;
 use crate::system::progress::Progress;
+use crate::system::runtime;
 use crate::system::told::Told;
 use std::time::Duration;
 

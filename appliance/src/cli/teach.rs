@@ -85,7 +85,7 @@ impl Target<'_> {
             Self::State(state) => {
                 let (number, path) = (taught.recipe.file.number, state.path().display());
                 (
-                    state.recipes().save(number, &taught.bytes),
+                    Store::of_state(state)?.save(number, &taught.bytes),
                     format!("store recipe {number} in {path}"),
                     format!("stored in {path}"),
                 )
@@ -129,7 +129,7 @@ impl Teach {
         };
         let replaced = match &target {
             Target::File(_) => None,
-            Target::State(state) => self.replaced(state.recipes())?,
+            Target::State(state) => self.replaced(&Store::of_state(state)?)?,
         };
         let naming = self.naming(replaced.as_ref());
         let pool = self.threads.pool(config.threads)?;

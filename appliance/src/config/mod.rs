@@ -7,8 +7,7 @@ pub use keys::{Key, keys, table};
 
 use crate::error::{Exit, Failure};
 use crate::head::calibration::place::IN_STATE;
-use crate::modbus::{CONNECTIONS, WordOrder};
-use crate::production::simulation::Placed;
+use crate::head::placed::Placed;
 use hal::bounds::{length, shortened, text, within};
 use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
 use ipnet::IpNet;
@@ -16,6 +15,20 @@ use serde::{Deserialize, Serialize};
 use std::fs;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
+
+/// Most Modbus connections at a time, unless configured.
+const CONNECTIONS: u16 = 8;
+/// This machine.
+const LOOPBACK: [&str; 2] = ["127.0.0.0/8", "::1/128"];
+/// Networks that are nobody else's: RFC 1918, 3927, 4193 and 4291.
+const PRIVATE: [&str; 6] = [
+    "10.0.0.0/8",
+    "172.16.0.0/12",
+    "192.168.0.0/16",
+    "169.254.0.0/16",
+    "fc00::/7",
+    "fe80::/10",
+];
 
 /// The whole configuration. The defaults need no file: a simulated head on this machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -71,7 +84,7 @@ pub struct ModbusConfig {
     /// Address and port.
     pub listen: SocketAddr,
     /// Order of the words of 32- and 64-bit values.
-    pub word_order: WordOrderConfig,
+    pub word_order: WordOrder,
     /// Answer only to this unit id.
     pub strict_unit_id: Option<u8>,
     /// The most connections at a time.
@@ -82,11 +95,12 @@ pub struct ModbusConfig {
     pub writers: Vec<IpNet>,
 }
 
-/// Order of the words of 32- and 64-bit values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Order of the words of 32- and 64-bit values; the bytes of a word are always big-endian.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum WordOrderConfig {
+pub enum WordOrder {
     /// High word first (ABCD).
+    #[default]
     Normal,
     /// Low word first (CDAB).
     Swapped,
@@ -158,14 +172,14 @@ impl Default for StationConfig {
 
 impl Default for ModbusConfig {
     fn default() -> Self {
-        let defaults = crate::modbus::Options::default();
+        let networks = |all: &[&str]| all.iter().filter_map(|net| net.parse().ok()).collect();
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 1502)),
-            word_order: WordOrderConfig::Normal,
+            word_order: WordOrder::Normal,
             strict_unit_id: None,
-            connections: CONNECTIONS as u16,
-            readers: defaults.readers,
-            writers: defaults.writers,
+            connections: CONNECTIONS,
+            readers: networks(&[&LOOPBACK[..], &PRIVATE].concat()),
+            writers: networks(&LOOPBACK),
         }
     }
 }
@@ -200,15 +214,6 @@ impl Default for HeadConfig {
             trigger: TriggerSetup::default(),
             calibration: None,
             part: None,
-        }
-    }
-}
-
-impl From<WordOrderConfig> for WordOrder {
-    fn from(order: WordOrderConfig) -> Self {
-        match order {
-            WordOrderConfig::Normal => Self::Normal,
-            WordOrderConfig::Swapped => Self::Swapped,
         }
     }
 }

@@ -1,7 +1,10 @@
 //! The head as a measuring instrument: its calibration, what can be measured on it, and the doctor who judges that.
 
+pub mod calibrate;
 pub mod calibration;
 pub mod doctor;
 pub mod examine;
+pub mod placed;
+pub mod rasters;
 pub mod rig;
 pub mod seam;

@@ -1,8 +1,8 @@
 //! A head, a part and the measurements that teaching and experiments are made of.
 
 use crate::head::calibration::Calibration;
+use crate::head::rasters::rasters;
 use crate::head::seam;
-use crate::recipe::plan::rasters;
 use algo::geometry::{HeightRange, Reference, Triangulator};
 use algo::pattern::{PhaseFunction, Sequence};
 use algo::phase::Decoder;

@@ -8,13 +8,14 @@ mod signals;
 pub use signals::{Follower, Signals};
 
 use crate::error::Failure;
-use crate::service::runtime;
+use crate::production::backend::Wires;
 use crate::station::control::TRIGGER;
 use crate::station::{ControlWrite, Event, StationHandle};
 use crate::system::progress::Progress;
+use crate::system::runtime;
 use hal::clock::monotonic;
 use hal::error::Error;
-use hal::lines::{OutputLine, StartLine};
+use hal::lines::StartLine;
 use hal::units::Timestamp;
 use std::future::pending;
 use std::os::fd::OwnedFd;
@@ -25,19 +26,6 @@ use tokio::sync::watch;
 /// Waits before the lines are opened again: doubled after each attempt, from the first to the last.
 const FIRST_WAIT: Duration = Duration::from_millis(100);
 const LONGEST_WAIT: Duration = Duration::from_secs(2);
-
-/// The lines that are wired.
-#[derive(Default)]
-pub struct Wires {
-    /// In: starts a cycle.
-    pub start: Option<Box<dyn StartLine>>,
-    /// Out: the station works.
-    pub busy: Option<Box<dyn OutputLine>>,
-    /// Out: the last part passed.
-    pub ok: Option<Box<dyn OutputLine>>,
-    /// Out: a start would not be taken, and not for being busy.
-    pub fault: Option<Box<dyn OutputLine>>,
-}
 
 /// How the lines are opened again.
 pub type Open = Box<dyn Fn() -> Result<Wires, Failure> + Send + Sync>;

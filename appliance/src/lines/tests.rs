@@ -6,6 +6,7 @@ use crate::station::{
     ActiveRecipe, ConnectionEdges, Effect, GaugeValue, Identity, Inspection, JobId, Limits, Micros,
     RecipeKey, Request, Settings, Station, Unit, Verdict,
 };
+use hal::lines::OutputLine;
 use rustix::io::{read, write};
 use rustix::pipe::{PipeFlags, pipe_with};
 use std::os::fd::{AsFd, BorrowedFd};

@@ -2,7 +2,8 @@
 
 use crate::error::{Exit, Failure};
 use crate::head::seam;
-use crate::measure::{Measurement, Surface, measure};
+use crate::measure::{Measurement, measure};
+use crate::output::cloud::Surface;
 use algo::adaptive::{ProjectorMap, noise, paper};
 use algo::pattern::PhaseFunction;
 use hal::replay::Recording;

@@ -10,13 +10,14 @@ pub use score::{Score, Truth};
 
 use crate::error::{Exit, Failure};
 use crate::head::seam;
+use crate::output::cloud::Surface;
 use crate::recipe::Recipe;
 use algo::adaptive::ProjectorMap;
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
 use algo::pattern::{PhaseFunction, Sequence};
 use algo::phase::Decoder;
-use algo::pipeline::{self, HeightMap, PhaseMap};
+use algo::pipeline::{self, PhaseMap};
 use algo::units::AbsolutePhase;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
@@ -40,15 +41,6 @@ pub struct Measurement {
     pub report: Report,
     /// Mean of the finest level's frames of the primary pattern, scaled to 8 bits.
     pub intensity: Vec<u8>,
-}
-
-/// Heights with the geometry that they come from.
-#[derive(Debug)]
-pub struct Surface {
-    /// z and σ_z per pixel.
-    pub map: HeightMap,
-    /// The rig, for the points behind the heights.
-    pub triangulator: Triangulator,
 }
 
 /// Measures every pattern of a recording; the first vertical one gives the height.

@@ -1,6 +1,7 @@
 //! The summary of a measurement, as JSON and as a table.
 
-use super::{Score, Surface, Truth};
+use super::{Score, Truth};
+use crate::output::cloud::Surface;
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use serde::Serialize;

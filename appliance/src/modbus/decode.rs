@@ -1,7 +1,7 @@
 //! From the words of a request to one write of the PLC.
 
-use super::encode::WordOrder;
 use super::map::at::control as a;
+use crate::config::WordOrder;
 use crate::station::{ControlWrite, Masked};
 
 /// First register of the reserved rest of CONTROL.

@@ -1,17 +1,8 @@
 //! From a snapshot to the 16-bit words of each block.
 
 use super::map::{self, Block, at};
+use crate::config::WordOrder;
 use crate::station::{GaugeValue, Health, ResultRecord, Snapshot};
-
-/// The order of the words of 32- and 64-bit values; the bytes of a word are always big-endian.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum WordOrder {
-    /// High word first (ABCD).
-    #[default]
-    Normal,
-    /// Low word first (CDAB).
-    Swapped,
-}
 
 /// `i32` of a value that is not there.
 pub const INVALID_I32: u32 = 0x8000_0000;

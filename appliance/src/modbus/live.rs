@@ -1,7 +1,8 @@
 //! The registers with their present values, as a PLC reads them: for the page.
 
-use super::encode::{WordOrder, block_words};
+use super::encode::block_words;
 use super::map::{Kind, Register, registers};
+use crate::config::WordOrder;
 use crate::station::Snapshot;
 use serde_json::{Value, json};
 

@@ -30,9 +30,8 @@ mod frozen;
 #[cfg(test)]
 mod tests;
 
-pub use encode::WordOrder;
 pub use live::live;
 pub use places::Clients;
 pub use refusals::Refusals;
 pub use render::{registers_csv, registers_json};
-pub use server::{CONNECTIONS, Options, serve};
+pub use server::{Options, serve};

@@ -9,27 +9,13 @@ use ipnet::IpNet;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_modbus::server::tcp::Server;
 
-use super::encode::WordOrder;
 use super::guard::Guard;
 use super::places::Clients;
 use super::refusals::{Refusals, Refused};
 use super::service::{FrameFlaw, PlcService};
+use crate::config::{ModbusConfig, WordOrder};
 use crate::station::{ConnectionEdges, StationHandle};
 use crate::system::socket::holds;
-
-/// Most connections at a time, unless configured.
-pub const CONNECTIONS: usize = 8;
-/// This machine.
-pub const LOOPBACK: [&str; 2] = ["127.0.0.0/8", "::1/128"];
-/// Networks that are nobody else's: RFC 1918, 3927, 4193 and 4291.
-pub const PRIVATE: [&str; 6] = [
-    "10.0.0.0/8",
-    "172.16.0.0/12",
-    "192.168.0.0/16",
-    "169.254.0.0/16",
-    "fc00::/7",
-    "fe80::/10",
-];
 
 /// How the server behaves.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -50,15 +36,18 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
+        let ModbusConfig {
+            word_order,
+            strict_unit_id,
+            readers,
+            writers,
+            ..
+        } = ModbusConfig::default();
         Self {
-            word_order: WordOrder::Normal,
-            strict_unit_id: None,
-            readers: LOOPBACK
-                .iter()
-                .chain(&PRIVATE)
-                .filter_map(|net| net.parse().ok())
-                .collect(),
-            writers: LOOPBACK.iter().filter_map(|net| net.parse().ok()).collect(),
+            word_order,
+            strict_unit_id,
+            readers,
+            writers,
             idle: Duration::from_secs(300),
             frame: Duration::from_secs(10),
         }

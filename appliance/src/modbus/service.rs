@@ -9,9 +9,10 @@ use tokio_modbus::server::Service;
 use tokio_modbus::{ExceptionCode, Request, Response, SlaveRequest};
 
 use super::decode::{coil_write, control_write};
-use super::encode::{WordOrder, block_words};
+use super::encode::block_words;
 use super::map;
 use super::refusals::{Refusals, Refused};
+use crate::config::WordOrder;
 use crate::station::{ConnectionEdges, ControlWrite, Identity, Snapshot, StationHandle};
 
 /// Most registers of one read.

@@ -1,7 +1,17 @@
 //! Point clouds as binary PLY, as CloudCompare, MeshLab and Open3D open them.
 
-use crate::measure::Surface;
+use algo::geometry::Triangulator;
+use algo::pipeline::HeightMap;
 use algo::units::Height;
+
+/// Heights with the geometry that they come from.
+#[derive(Debug)]
+pub struct Surface {
+    /// z and σ_z per pixel.
+    pub map: HeightMap,
+    /// The rig, for the points behind the heights.
+    pub triangulator: Triangulator,
+}
 
 /// One point of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,8 @@
 //! A cycle of the measuring task: sequence after sequence until one is good enough, then the result.
 
 use super::stopwatch::timed_on;
-use super::{ABORTED, DEVICE_TIMEOUT, Worker, code, code_of};
+use super::{ABORTED, DEVICE_TIMEOUT, Worker};
+use crate::error::code_of;
 use crate::history::FailedPart;
 use crate::recipe::plan::{Arriving, Plan};
 use crate::station::result::flag::{RETRIED, STEPPED_UP};
@@ -37,7 +38,7 @@ impl Worker {
         let Some(plan) = plan else {
             // The station triggers only with an active recipe, and that is this plan's.
             let message = "measure: no recipe is loaded".into();
-            self.station.event(failed(id, code::RIG, message));
+            self.station.event(failed(id, error_code::RIG, message));
             return JudgedBy::default();
         };
         let (mut step, mut flags, mut cpu) = (0, 0, Duration::ZERO);

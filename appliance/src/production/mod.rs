@@ -2,7 +2,6 @@
 
 mod aborts;
 pub mod backend;
-mod code;
 mod cycle;
 pub mod latest;
 pub mod opening;
@@ -13,26 +12,26 @@ pub mod simulation;
 pub mod stopwatch;
 
 pub use aborts::Aborts;
-pub(crate) use code::code_of;
 
 use crate::config::HeadConfig;
 use crate::head::calibration::Current;
+use crate::head::placed::Placed;
 use crate::history::History;
 use crate::production::backend::Opened;
 use crate::production::latest::{LastCycle, LastMaps};
 use crate::production::shelf::Shelf;
-use crate::production::simulation::{Placed, Placing};
+use crate::production::simulation::Placing;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::store::Stamp;
 use crate::recipe::teach::{TeachError, teach_while};
 use crate::recipe::{LoadError, Store, replace};
+use crate::station::error_code;
 use crate::station::{
     ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
 };
 use crate::system::computing::Computing;
 use crate::system::notify::Pulse;
 use crate::system::progress::Progress;
-use code::code_of_teaching;
 use cycle::JudgedBy;
 use hal::error::Error;
 use std::any::Any;
@@ -342,7 +341,7 @@ impl Worker {
                     TeachError::Ended => format!("teach: {ABORTED}"),
                     _ => error.to_string(),
                 };
-                let failed = (code_of_teaching(&error), words);
+                let failed = (error.code(), words);
                 if let TeachError::Device(error) = error {
                     self.lost = Some(error).filter(recovery::is_lost);
                 }
@@ -364,7 +363,7 @@ impl Worker {
                     Err(error) => format!("{error}: free space"),
                 };
                 Err((
-                    code::NOT_STORED,
+                    error_code::NOT_STORED,
                     format!("store recipe {number}: {problem}"),
                 ))
             });
@@ -372,7 +371,7 @@ impl Worker {
             let key = RecipeKey::Number(number);
             // Teaching has shown patterns of its own.
             self.prepare(&key, None)
-                .map_err(|(_, message)| (code::RIG, message))
+                .map_err(|(_, message)| (error_code::RIG, message))
         });
         match ready {
             Ok((ready, _)) => {

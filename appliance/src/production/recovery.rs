@@ -1,6 +1,7 @@
 //! Recovery of a lost head: a fault that says what to do, and opening it again until it is there.
 
-use super::{Order, SIGN_OF_LIFE, Worker, active, code_of};
+use super::{Order, SIGN_OF_LIFE, Worker, active};
+use crate::error::code_of;
 use crate::recipe::plan::Plan;
 use crate::station::{Event, StationHandle};
 use crate::system::notify::Pulse;

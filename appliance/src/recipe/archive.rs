@@ -2,6 +2,7 @@
 
 use super::file::{FORMAT, RecipeFile, VERSION};
 use crate::storage::archive::Members;
+use crate::storage::hex;
 use hal::bounds::shortened;
 use hal::npy;
 use sha2::{Digest, Sha256};
@@ -302,11 +303,6 @@ fn fingerprint(manifest: &[u8], members: &[(&str, Vec<u8>)]) -> String {
         hash.add(name, content);
     }
     hash.finish()
-}
-
-/// Lower-case hexadecimal digits.
-pub fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// The first 32 bits of a fingerprint: RECIPE_CRC32 on Modbus.

@@ -2,7 +2,9 @@
 
 use super::gauge::check_limits;
 use super::{Recipe, RecipeFile, archive};
+use crate::error::{Exit, Failure};
 use crate::storage::folder::write_whole;
+use crate::storage::state::StateFolder;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -70,6 +72,21 @@ impl Store {
         fs::create_dir_all(folder)?;
         Ok(Self {
             folder: folder.to_path_buf(),
+        })
+    }
+
+    /// Opens the recipes of a state folder, without what an import that was killed left behind.
+    ///
+    /// # Errors
+    /// If the folder cannot be created or written (exit code 73).
+    pub fn of_state(state: &StateFolder) -> Result<Self, Failure> {
+        let folder = state.place("recipes");
+        let opened =
+            Self::open(&folder).and_then(|store| store.remove_left_behind().map(|()| store));
+        opened.map_err(|error| {
+            let what = format!("open the state folder {}", state.path().display());
+            let remedy = format!("{error}: name one that can be written with --state");
+            Failure::because(Exit::CannotCreate, what, remedy)
         })
     }
 

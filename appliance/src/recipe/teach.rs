@@ -5,9 +5,11 @@ pub use super::golden::{Naming, Taught};
 use super::PatternFile;
 use super::comparison::ComparisonFile;
 use super::golden::GoldenPart;
+use crate::error::code_of;
 use crate::head::calibration::Calibration;
 use crate::head::rig::{About, Measured, Rig, RigError};
 use crate::head::seam;
+use crate::station::error_code;
 use crate::system::computing::Computing;
 use algo::adaptive::{AdaptError, ProjectorMap, noise};
 use algo::pattern::{PhaseFunction, Sequence};
@@ -44,6 +46,19 @@ pub enum TeachError {
     /// Whoever was told of the progress wanted no more.
     #[error("teach: it was ended early")]
     Ended,
+}
+
+impl TeachError {
+    /// ERROR_CODE of it.
+    pub fn code(&self) -> u16 {
+        match self {
+            Self::Device(error) => code_of(error),
+            Self::Scene(_) => error_code::NOTHING_TO_TEACH,
+            Self::Rig(_) => error_code::RIG,
+            Self::NotCalibrated(_) => error_code::NOT_CALIBRATED,
+            Self::Ended => error_code::ABORTED,
+        }
+    }
 }
 
 impl From<RigError> for TeachError {

@@ -9,6 +9,7 @@ mod settling;
 mod stopping;
 pub mod survey;
 
+use crate::recipe::Store;
 pub use caller::Caller;
 use serving::{PlcSide, serve};
 use stopping::Stopping;
@@ -16,12 +17,13 @@ use stopping::Stopping;
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Current;
+use crate::head::placed::Placed;
 use crate::history::{self, Bounds, History, Numbering, Reader};
 use crate::production::backend;
 use crate::production::latest::LastMaps;
 use crate::production::opening::Opening;
 use crate::production::shelf::Shelf;
-use crate::production::simulation::{Placed, Simulation};
+use crate::production::simulation::Simulation;
 use crate::production::{Aborts, Order, Worker};
 use crate::service::survey::Survey;
 use crate::station::tally::Tally;
@@ -32,7 +34,7 @@ use crate::storage::state::{StateFolder, random};
 use crate::system::computing::Computing;
 use crate::system::journal::{self, Severity};
 use crate::system::progress::Progress;
-use crate::system::socket;
+use crate::system::{runtime, socket};
 use crate::web::access::Access;
 use crate::{lines, modbus, web};
 use sim::Stage;
@@ -42,7 +44,6 @@ use std::sync::{Arc, mpsc};
 use std::thread::JoinHandle;
 use std::time::Instant;
 use tokio::net::TcpListener;
-use tokio::runtime::Runtime;
 use tokio::sync::watch;
 
 /// Time between two looks at whether a start is to be given up.
@@ -97,6 +98,7 @@ impl Daemon {
         };
         crate::system::memory::give_back();
         let state = StateFolder::open(&path)?;
+        let recipes = Store::of_state(&state)?;
         let access = open_access(&state)?;
         let wires = backend::lines(&config.lines)?;
         let runtime = runtime()?;
@@ -143,7 +145,7 @@ impl Daemon {
             let site = web::Site::new(web::Parts {
                 station: station.clone(),
                 access,
-                recipes: state.recipes().clone(),
+                recipes: recipes.clone(),
                 calibration: calibration.clone(),
                 maps: maps.clone(),
                 simulation: simulation.clone(),
@@ -171,16 +173,15 @@ impl Daemon {
         let (survey, surveyed) = mpsc::channel();
         let surveying = {
             let station = station.clone();
-            let recipes = state.recipes().clone();
-            let survey = Survey::new(&path, recipes, clients, progress.clone());
+            let survey = Survey::new(&path, recipes.clone(), clients, progress.clone());
             spawn("survey", move || survey.run(&station, &surveyed))?
         };
         let (opened, opening) = mpsc::channel();
         let simulated = config.head.backend == Backend::Sim;
-        let first = first_request(config, simulated, state.recipes());
+        let first = first_request(config, simulated, &recipes);
         let awaited = first.is_some();
         let measuring = {
-            let (station, recipes) = (station.clone(), state.recipes().clone());
+            let (station, recipes) = (station.clone(), recipes.clone());
             let (mut config, progress, history) =
                 (config.head_in(&path), progress.clone(), history.clone());
             let waiting = match first {
@@ -293,17 +294,6 @@ fn open_access(state: &StateFolder) -> Result<Access, Failure> {
     Ok(access)
 }
 
-/// A current-thread runtime.
-///
-/// # Errors
-/// If the system gives none.
-pub fn runtime() -> Result<Runtime, Failure> {
-    tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .map_err(|error| Failure::because(Exit::Software, "start a socket runtime", error))
-}
-
 fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, Failure> {
     std::thread::Builder::new()
         .name(name.into())
@@ -404,11 +394,7 @@ fn effects(
 
 /// What the station does first: load its recipe; a simulated head without it teaches the part that
 /// lies in front of it.
-fn first_request(
-    config: &Config,
-    simulated: bool,
-    recipes: &crate::recipe::Store,
-) -> Option<Request> {
+fn first_request(config: &Config, simulated: bool, recipes: &Store) -> Option<Request> {
     let number = config.station.recipe;
     if recipes.numbers().contains(&number) {
         Some(Request::Load(RecipeKey::Number(number)))

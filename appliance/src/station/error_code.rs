@@ -1,7 +1,29 @@
-//! The error codes that the station gives by itself; the worker brings its own (1xx camera … 7xx thermal).
+//! ERROR_CODE: every code that a result or a fault can have; `docs/operations.md` has the table with the remedies.
 
+/// The camera is lost.
+pub const CAMERA_LOST: u16 = 101;
+/// A device cannot do what it is asked for.
+pub const UNSUPPORTED: u16 = 102;
+/// The frames of a cycle are not those that the recipe was made for.
+pub const WRONG_FRAMES: u16 = 103;
+/// The projector is lost.
+pub const PROJECTOR_LOST: u16 = 201;
+/// A device did not answer in time.
+pub const TIMEOUT: u16 = 301;
+/// A device broke the rules of its interface.
+pub const PROTOCOL: u16 = 302;
+/// The chip of the lines (trigger, start, results) is lost.
+pub const LINES_LOST: u16 = 303;
+/// The scene does not make a recipe.
+pub const NOTHING_TO_TEACH: u16 = 401;
 /// A stored recipe is damaged or cannot be used on this head; it stays stored.
 pub const RECIPE_UNUSABLE: u16 = 402;
+/// The geometry or the pattern is impossible.
+pub const RIG: u16 = 501;
+/// The head has no calibration that can be used.
+pub const NOT_CALIBRATED: u16 = 502;
+/// A recipe could not be stored.
+pub const NOT_STORED: u16 = 601;
 /// There is not enough room left to store results.
 pub const STORAGE_FULL: u16 = 602;
 /// The number of a result could not be stored.

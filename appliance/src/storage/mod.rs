@@ -4,3 +4,8 @@ pub mod archive;
 pub mod folder;
 pub mod state;
 pub mod unpack;
+
+/// Lower-case hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}

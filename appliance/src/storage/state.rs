@@ -1,7 +1,6 @@
-//! The state folder: recipes, the result counter, the device's serial.
+//! The state folder: its lock, the result counter, the device's serial, and where the rest of the state lies.
 
 use crate::error::{Exit, Failure};
-use crate::recipe::Store;
 use crate::storage::folder::write_whole;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::Write as _;
@@ -11,7 +10,6 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct StateFolder {
     path: PathBuf,
-    recipes: Store,
     /// Held until the daemon ends; the system drops it with the process, however that ends.
     _lock: File,
 }
@@ -75,11 +73,8 @@ impl StateFolder {
             Err(TryLockError::WouldBlock) => return Err(refused(held, remedy.into())),
             Err(TryLockError::Error(error)) => return Err(cannot(error)),
         }
-        let recipes = Store::open(&path.join("recipes")).map_err(cannot)?;
-        recipes.remove_left_behind().map_err(cannot)?;
         Ok(Self {
             path: path.to_path_buf(),
-            recipes,
             _lock: lock,
         })
     }
@@ -87,11 +82,6 @@ impl StateFolder {
     /// The folder.
     pub fn path(&self) -> &Path {
         &self.path
-    }
-
-    /// The recipes.
-    pub fn recipes(&self) -> &Store {
-        &self.recipes
     }
 
     /// Where a part of the state lies that somebody else opens.

@@ -1,5 +1,7 @@
 //! What the operating system gives: clock, signals, sockets, priorities, memory, a service manager, and the log on stderr.
 
+use crate::error::{Exit, Failure};
+
 pub mod clock;
 pub mod computing;
 pub mod journal;
@@ -10,3 +12,14 @@ pub mod priority;
 pub mod progress;
 pub mod socket;
 pub mod told;
+
+/// A current-thread runtime.
+///
+/// # Errors
+/// If the system gives none.
+pub fn runtime() -> Result<tokio::runtime::Runtime, Failure> {
+    tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|error| Failure::because(Exit::Software, "start a socket runtime", error))
+}

@@ -1,7 +1,7 @@
 //! Whether somebody told the program to end: Ctrl-C or SIGTERM, heard from the moment that anybody listens.
 
+use super::runtime;
 use crate::error::{Exit, Failure};
-use crate::service::runtime;
 use std::future::pending;
 use tokio::sync::watch;
 

@@ -9,7 +9,8 @@ use tokio::sync::oneshot;
 use super::body::json;
 use super::problem::Problem;
 use super::site::Site;
-use crate::production::simulation::{Placed, PutError};
+use crate::head::placed::Placed;
+use crate::production::simulation::PutError;
 
 impl From<PutError> for Problem {
     fn from(error: PutError) -> Self {

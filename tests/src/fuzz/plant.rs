@@ -1,6 +1,7 @@
 //! The target of what a PLC sends: bytes of one connection to the Modbus server, with a worker that carries out every order.
 
-use appliance::modbus::{Clients, Options, Refusals, WordOrder, serve};
+use appliance::config::WordOrder;
+use appliance::modbus::{Clients, Options, Refusals, serve};
 use appliance::station::{
     ActiveRecipe, Effect, Event, Identity, Inspection, Job, Limits, Micros, RecipeKey, Request,
     Settings, Station, StationHandle, Verdict,

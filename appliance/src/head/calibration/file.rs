@@ -1,7 +1,7 @@
 //! `calibration.json`, version 1: its keys, its checks, its fingerprint and its checksum.
 
 use super::Calibration;
-use crate::recipe::archive::hex;
+use crate::storage::hex;
 use algo::pattern::GreyResponse;
 use hal::bounds::{clipped, shortened};
 use hal::head::{Stamp, Timing};

@@ -3,14 +3,13 @@
 pub mod bounds;
 mod current;
 pub mod file;
-pub mod make;
 pub mod opencv;
 pub mod place;
 
 pub use current::Current;
 
 use crate::head::seam;
-use crate::recipe::archive::hex;
+use crate::storage::hex;
 use algo::geometry::{ModelError, Pinhole};
 use algo::pattern::GreyResponse;
 use hal::model::DeviceModel;

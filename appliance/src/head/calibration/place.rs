@@ -1,8 +1,8 @@
 //! Where a head's calibration lies: `calibration.json`, the generation before it, and the phase maps beside them.
 
 use super::file::CalibrationFile;
-use crate::recipe::archive::hex;
 use crate::storage::folder::{name_also, sync_folder_of, write_whole};
+use crate::storage::hex;
 use sha2::{Digest, Sha256};
 use std::fs;
 use std::io;

@@ -3,6 +3,7 @@
 use super::Finding;
 use crate::head::calibration::Calibration;
 use crate::head::examine::{self, Lit, SETTLE};
+use crate::head::examine::{LEAST_BRIGHT, LEAST_LIT, MOST_SATURATED};
 use hal::error::Error;
 use hal::head::DynHead;
 use serde_json::{Value, json};
@@ -13,12 +14,6 @@ const GREYS: [u8; 7] = [32, 64, 96, 128, 160, 192, 224];
 const SHARP_PITCH: u32 = 12;
 /// Least contrast at that pitch, relative to the coarsest. A blur of σ pixels leaves exp(−2 (π σ / pitch)²): 0.5 is σ = 2.2 px.
 const LEAST_CONTRAST: f64 = 0.5;
-/// Share of the picture that must be lit.
-pub const LEAST_LIT: f64 = 0.01;
-/// Share of the lit pixels that may be saturated: glints.
-pub const MOST_SATURATED: f64 = 0.01;
-/// Median of white over the lit pixels, share of full scale: below, noise is a large part of the signal.
-pub const LEAST_BRIGHT: f64 = 0.2;
 /// Grey may answer off proportion by this share of white. Of gamma 1.1 it is 0.035.
 const MOST_NONLINEAR: f64 = 0.03;
 

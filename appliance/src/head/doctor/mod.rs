@@ -6,8 +6,6 @@
 mod light;
 mod time;
 
-pub use light::{LEAST_BRIGHT, LEAST_LIT, MOST_SATURATED};
-
 use crate::head::calibration::Calibration;
 use crate::head::examine::{Lit, SETTLE};
 use hal::error::Error;

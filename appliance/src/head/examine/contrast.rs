@@ -5,7 +5,7 @@
 
 use super::pictures::{Lit, median, pictures};
 use crate::head::calibration::Calibration;
-use crate::recipe::plan::rasters;
+use crate::head::rasters::rasters;
 use algo::pattern::PhaseFunction;
 use hal::error::Error;
 use hal::head::DynHead;

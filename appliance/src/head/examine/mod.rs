@@ -14,7 +14,7 @@ mod stamps;
 pub use contrast::{PITCHES, contrast};
 pub use delay::Delay;
 pub use noise::{Noise, NoisePoint};
-pub use pictures::{Lit, SETTLE, counts, pictures};
+pub use pictures::{LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, SETTLE, counts, pictures};
 pub use plate::{Plate, PlateError};
 pub use response::{lights, response};
 pub use stamps::Stamps;

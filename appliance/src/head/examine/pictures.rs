@@ -6,6 +6,13 @@ use hal::frame::{Frame, Samples};
 use hal::head::{DynHead, Showing};
 use hal::projector::Raster;
 
+/// Share of the picture that must be lit.
+pub const LEAST_LIT: f64 = 0.01;
+/// Share of the lit pixels that may be saturated: glints.
+pub const MOST_SATURATED: f64 = 0.01;
+/// Median of white over the lit pixels, share of full scale: below, noise is a large part of the signal.
+pub const LEAST_BRIGHT: f64 = 0.2;
+
 /// After so many refreshes the light of a flip has come and stays, on any head that can be used.
 pub const SETTLE: u32 = 12;
 /// Patterns that are loaded at a time: a projector's memory holds a sequence, not 256 greys.

@@ -4,8 +4,8 @@
 //! pitch · Φ_R^V, η = pitch · Φ_R^H. Raw they have the noise of a measurement; a polynomial of degree 6 has a hundredth of it.
 
 use crate::head::calibration::Calibration;
+use crate::head::rasters::rasters;
 use crate::head::seam;
-use crate::recipe::plan::rasters;
 use algo::geometry::{FittedMap, fit_map};
 use algo::pattern::{PhaseFunction, Sequence};
 use algo::phase::{Decoder, Trust};

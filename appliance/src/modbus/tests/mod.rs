@@ -19,6 +19,7 @@ use tokio_modbus::slave::Slave;
 
 use super::map::at;
 use super::*;
+use crate::config::WordOrder;
 use crate::station::snapshot::status;
 use crate::station::*;
 
@@ -36,7 +37,7 @@ impl Plant {
     }
 
     async fn with(options: Options, buffered: bool) -> Self {
-        Self::with_places(options, CONNECTIONS, buffered).await
+        Self::with_places(options, 8, buffered).await
     }
 
     async fn with_places(options: Options, places: usize, buffered: bool) -> Self {

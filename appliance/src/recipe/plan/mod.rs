@@ -12,20 +12,21 @@ pub use arriving::Arriving;
 pub use layers::Layers;
 
 use crate::head::calibration::Calibration;
+use crate::head::rasters::rasters;
 use crate::head::seam;
 use crate::recipe::{AlignmentKind, Recipe, RecipeFile, SequenceKind, short};
+use crate::station::error_code::WRONG_FRAMES;
 use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
 use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
 use algo::inspect::{Findings, Light, Production, Strips};
-use algo::pattern::{Encoder, MAX_FRAMES, Sequence};
+use algo::pattern::{MAX_FRAMES, Sequence};
 use algo::phase::Arrived;
 use algo::pipeline::Rises;
 use algo::units::{AbsolutePhase, Height};
 use hal::frame::Frame;
 use hal::projector::Raster;
-use rayon::prelude::*;
 use run::{Run, Shared, Unjoined};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -88,8 +89,6 @@ pub const STRIPS: usize = 4;
 const AROUND: usize = 16;
 /// Most bytes of a recipe's patterns: 64 of a projector of 1920 × 1080 pixels take half of it.
 const MAX_PATTERN_BYTES: usize = 256 << 20;
-/// Error code of a cycle whose frames are not what the recipe was made for.
-const WRONG_FRAMES: u16 = 103;
 
 impl Plan {
     /// Joins a recipe and a calibration.
@@ -418,26 +417,6 @@ fn pixels(triangulator: &Triangulator, mm: f64) -> usize {
     let pitch = at(u, v).zip(at(u + 1.0, v)).map(|(a, b)| (b - a).length());
     // A pixel more for the rounding of corners.
     pitch.map_or(0, |pitch| (mm / pitch).ceil().min(u) as usize + 1)
-}
-
-/// Grey rasters of frames (ratio, shift) of a phase function.
-///
-/// # Errors
-/// Never for a phase function that could be made.
-pub fn rasters(
-    function: &algo::pattern::PhaseFunction,
-    frames: impl Iterator<Item = (f64, f64)>,
-    calibration: &Calibration,
-) -> Result<Vec<Raster>, hal::error::Error> {
-    let frames: Vec<_> = frames.collect();
-    let encoder = Encoder::new(calibration.response.as_ref());
-    frames
-        .into_par_iter()
-        .map(|(ratio, shift)| {
-            let grey = encoder.raster(function, ratio, shift);
-            Raster::new(grey.width as u32, grey.height as u32, grey.pixels)
-        })
-        .collect()
 }
 
 /// The bit of RESULT's flags that says which sequence was used.

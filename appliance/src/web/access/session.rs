@@ -54,7 +54,7 @@ impl Sessions {
     pub(super) fn begin(&mut self, now: Instant) -> Result<Token, String> {
         let mut random = [0_u8; 32];
         getrandom::fill(&mut random).map_err(|error| error.to_string())?;
-        let token = Token(crate::recipe::archive::hex(&random));
+        let token = Token(crate::storage::hex(&random));
         self.0.retain(|session| session.is_open(now));
         if self.0.len() >= MOST {
             self.0.sort_by_key(|session| session.used);

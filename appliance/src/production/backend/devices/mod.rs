@@ -7,12 +7,25 @@ use super::Opened;
 use crate::config::{Backend, Config, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
-use crate::lines::Wires;
 use hal::frame::FrameFormat;
 use hal::head::DynHead;
+use hal::lines::{OutputLine, StartLine};
 use hal::model::DeviceModel;
 use hal::setup::{LinesSetup, TriggerSetup};
 use hal::trigger::{NoTrigger, Trigger};
+
+/// The lines that are wired.
+#[derive(Default)]
+pub struct Wires {
+    /// In: starts a cycle.
+    pub start: Option<Box<dyn StartLine>>,
+    /// Out: the station works.
+    pub busy: Option<Box<dyn OutputLine>>,
+    /// Out: the last part passed.
+    pub ok: Option<Box<dyn OutputLine>>,
+    /// Out: a start would not be taken, and not for being busy.
+    pub fault: Option<Box<dyn OutputLine>>,
+}
 
 /// The libraries of devices, and whether this build has them.
 const LIBRARIES: [(&str, bool); 3] = [

@@ -1,14 +1,14 @@
 //! A calibration measured on a head, from what its stamps mark to the reference plane. Each step uses what those before it found.
 
-use super::Calibration;
-use super::file::{
+use super::calibration::Calibration;
+use super::calibration::file::{
     CalibrationFile, CameraFile, ContrastFile, FORMAT, LevelFile, MapFile, NoiseFile, PitchFile,
     ProjectorFile, ReferenceFile, TimingFile, VERSION, inverted,
 };
-use super::place::Place;
-use crate::head::doctor::{LEAST_BRIGHT, LEAST_LIT, MOST_SATURATED};
-use crate::head::examine::{
-    Delay, Lit, Noise, Plate, PlateError, SETTLE, Stamps, contrast, response,
+use super::calibration::place::Place;
+use super::examine::{
+    Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, Noise, Plate, PlateError, SETTLE, Stamps,
+    contrast, response,
 };
 use algo::geometry::Vector;
 use hal::error::Error;

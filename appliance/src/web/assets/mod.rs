@@ -30,7 +30,7 @@ macro_rules! assets {
         pub const ALL: &[Asset] = &[$(Asset {
             path: $path,
             kind: $kind,
-            text: include_str!(concat!("assets/", $file)),
+            text: include_str!($file),
         }),*];
     };
 }
@@ -39,7 +39,7 @@ macro_rules! assets {
 pub const ICON: Asset = Asset {
     path: "/favicon.ico",
     kind: "image/svg+xml",
-    text: include_str!("assets/icon.svg"),
+    text: include_str!("icon.svg"),
 };
 
 assets! {

@@ -1,0 +1,190 @@
+//! The part in front of a simulated head: its kind, its defects and where it lies, checked.
+
+use hal::bounds::clipped;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+use sim::{Part, Placement, Scenario};
+
+/// The most defects of a part: each ray is traced against all of them.
+const MAX_DEFECTS: usize = 16;
+/// The defects that there are, each with the names of its numbers in their order, and an example of it.
+const DEFECTS: [(&str, &[(&str, f64)]); 3] = [
+    (
+        "dent",
+        &[
+            ("x", 0.0),
+            ("y", -8.0),
+            ("depth_mm", 0.6),
+            ("diameter_mm", 14.0),
+        ],
+    ),
+    ("missing_hole", &[("index", 1.0)]),
+    ("bent_flange", &[("degrees", 3.0)]),
+];
+
+/// A part and where it lies, as a scenario has them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Placed {
+    /// The part with its defects.
+    pub part: Part,
+    /// Where it lies; as it was designed, if left out.
+    #[serde(default)]
+    pub placement: Placement,
+}
+
+impl Placed {
+    /// The stock part of a kind, good, where it was designed to lie.
+    ///
+    /// # Errors
+    /// If there is no such kind: those that there are.
+    pub fn stock(kind: &str) -> Result<Self, String> {
+        let mut stock = Part::stock().into_iter();
+        let found = stock.find(|part| self::kind(part) == kind);
+        let part = found.ok_or_else(|| {
+            let kinds: Vec<String> = Part::stock().iter().map(self::kind).collect();
+            format!("there is no part {kind}: name one of {}", kinds.join(", "))
+        })?;
+        Ok(Self {
+            part,
+            ..Self::default()
+        })
+    }
+
+    /// The same part without its defects, where it was designed to lie.
+    pub fn good(&self) -> Self {
+        let mut value = value(&self.part);
+        if let Some(defects) = value.get_mut("defects") {
+            *defects = json!([]);
+        }
+        Self {
+            // What was one stays one.
+            part: serde_json::from_value(value).unwrap_or_default(),
+            ..Self::default()
+        }
+    }
+
+    /// Puts a good part of the kind in the place of the one that was `asked` for, to be taught; that one comes afterwards.
+    pub fn after_teaching(asked: &mut Option<Self>) -> Option<Self> {
+        let placed = asked.take()?;
+        *asked = Some(placed.good());
+        Some(placed)
+    }
+
+    /// Adds a defect, `KIND:NUMBER,NUMBER,…`, as in `dent:10,5,0.3,8`.
+    ///
+    /// # Errors
+    /// If it is none, or the part has none of this kind.
+    pub fn add_defect(&mut self, text: &str) -> Result<(), String> {
+        let form = |(kind, keys): &(&str, &[(&str, f64)])| {
+            let names: Vec<&str> = keys.iter().map(|(name, _)| *name).collect();
+            format!("{kind}:{}", names.join(","))
+        };
+        let (kind, numbers) = text.split_once(':').unwrap_or((text, ""));
+        let known = DEFECTS.iter().find(|(name, _)| *name == kind);
+        let Some(known) = known else {
+            let forms: Vec<String> = DEFECTS.iter().map(form).collect();
+            return Err(format!(
+                "there is no defect {:?}: write one of {}",
+                clipped(kind),
+                forms.join(" ")
+            ));
+        };
+        let numbers: Vec<f64> = numbers
+            .split(',')
+            .map_while(|number| number.trim().parse().ok())
+            .filter(|number: &f64| number.is_finite())
+            .collect();
+        let is_place = |n: f64| n >= 0.0 && n.fract() == 0.0;
+        let mut named = known.1.iter().zip(&numbers);
+        if numbers.len() != known.1.len()
+            || numbers.len() != text.split(',').count()
+            || !named.all(|((name, _), &n)| *name != "index" || is_place(n))
+        {
+            let (text, form) = (clipped(text), form(known));
+            return Err(format!("{text:?} is no defect: write {form}"));
+        }
+        let named = known.1.iter().zip(numbers).map(|((name, _), n)| (*name, n));
+        self.part = with_defect(&self.part, defect(kind, named))
+            .map_err(|error| format!("a {} has no {kind}: {error}", self::kind(&self.part)))?;
+        Ok(())
+    }
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// Naming the one that is out of its range.
+    pub fn check(&self) -> Result<(), String> {
+        let defects = value(&self.part)["defects"].as_array().map_or(0, Vec::len);
+        if defects > MAX_DEFECTS {
+            return Err(format!(
+                "{defects} defects: at most {MAX_DEFECTS} are simulated on a part"
+            ));
+        }
+        let scenario = Scenario {
+            part: self.part.clone(),
+            placement: self.placement,
+            ..Scenario::default()
+        };
+        scenario.check()
+    }
+}
+
+fn value(part: &Part) -> Value {
+    serde_json::to_value(part).unwrap_or_default()
+}
+
+fn kind(part: &Part) -> String {
+    value(part)["kind"].as_str().unwrap_or_default().to_owned()
+}
+
+fn defect<'a>(kind: &str, numbers: impl Iterator<Item = (&'a str, f64)>) -> Value {
+    let mut defect = Map::from_iter([("kind".to_owned(), json!(kind))]);
+    for (name, number) in numbers {
+        // Places are counted in whole numbers.
+        let whole = name == "index" && number.fract() == 0.0 && number >= 0.0;
+        let number = if whole {
+            json!(number as u64)
+        } else {
+            json!(number)
+        };
+        defect.insert(name.to_owned(), number);
+    }
+    defect.into()
+}
+
+/// The part with one more defect, if it has any of this kind.
+fn with_defect(part: &Part, defect: Value) -> Result<Part, String> {
+    let mut value = value(part);
+    let defects = value.get_mut("defects").and_then(Value::as_array_mut);
+    defects
+        .ok_or("it has no defects to choose from")?
+        .push(defect);
+    serde_json::from_value(value).map_err(|error| error.to_string())
+}
+
+/// Every stock part with an example of each defect that it can have.
+pub fn kinds() -> Vec<Value> {
+    let offers = |part: &Part| -> Vec<Value> {
+        let all = DEFECTS
+            .iter()
+            .map(|(kind, numbers)| defect(kind, numbers.iter().copied()));
+        let is_one = |defect: &Value| {
+            with_defect(part, defect.clone()).is_ok_and(|part| {
+                let placed = Placed {
+                    part,
+                    ..Placed::default()
+                };
+                placed.check().is_ok()
+            })
+        };
+        all.filter(is_one).collect()
+    };
+    let parts = Part::stock().into_iter();
+    parts
+        .map(|part| json!({ "part": part, "defects": offers(&part) }))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;

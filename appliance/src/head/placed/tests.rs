@@ -1,0 +1,91 @@
+//! Parts by their names and numbers.
+
+use super::*;
+
+#[test]
+fn a_part_is_named_by_its_kind_and_its_defects_by_their_numbers() {
+    let mut placed = Placed::stock("sheet_metal").unwrap();
+    placed.add_defect("dent:10,5,0.3,8").unwrap();
+    placed.add_defect("missing_hole:2").unwrap();
+    placed.add_defect("bent_flange:-3").unwrap();
+    placed.check().unwrap();
+    let defects = value(&placed.part)["defects"].clone();
+    assert_eq!(
+        defects,
+        json!([
+            { "kind": "dent", "x": 10.0, "y": 5.0, "depth_mm": 0.3, "diameter_mm": 8.0 },
+            { "kind": "missing_hole", "index": 2 },
+            { "kind": "bent_flange", "degrees": -3.0 },
+        ])
+    );
+    assert_eq!(placed.good(), Placed::stock("sheet_metal").unwrap());
+    for (defect, words) in [
+        ("scratch:1,2", "dent:x,y,depth_mm,diameter_mm"),
+        ("dent:1,2,3", "dent:x,y,depth_mm,diameter_mm"),
+        ("dent:1,2,3,4,5", "dent:x,y"),
+        ("dent:1,2,3,nan", "dent:x,y"),
+        ("missing_hole:0.5", "index"),
+        ("missing_hole:-1", "index"),
+        ("missing_hole", "missing_hole:index"),
+    ] {
+        let error = placed.add_defect(defect).unwrap_err();
+        assert!(
+            error.contains(words) || error.contains("missing_hole"),
+            "{defect}: {error}"
+        );
+    }
+    let error = Placed::stock("plane")
+        .unwrap()
+        .add_defect("bent_flange:3")
+        .unwrap_err();
+    assert!(error.contains("plane has no bent_flange"), "{error}");
+    assert!(Placed::stock("teapot").unwrap_err().contains("flowerpot"));
+}
+
+#[test]
+fn every_number_is_bounded() {
+    let with = |key: &str, number: f64| -> Placed {
+        let mut placed = Placed::stock("sheet_metal").unwrap();
+        let mut numbers = DEFECTS[0].1.to_vec();
+        numbers
+            .iter_mut()
+            .filter(|(name, _)| *name == key)
+            .for_each(|(_, n)| *n = number);
+        placed.part = with_defect(&placed.part, defect("dent", numbers.into_iter())).unwrap();
+        placed
+    };
+    with("x", 99.0).check().unwrap();
+    for (key, number) in [
+        ("x", 1e9),
+        ("y", -1e9),
+        ("depth_mm", 1e300),
+        ("diameter_mm", 0.0),
+    ] {
+        assert!(with(key, number).check().is_err(), "{key}");
+    }
+    let mut far = Placed::stock("plane").unwrap();
+    far.placement.shift_mm = [0.0, 0.0, 1e9];
+    assert!(far.check().is_err());
+    let mut many = Placed::stock("sheet_metal").unwrap();
+    for _ in 0..=MAX_DEFECTS {
+        many.add_defect("dent:0,0,0.1,5").unwrap();
+    }
+    assert!(many.check().unwrap_err().contains("17 defects"));
+}
+
+#[test]
+fn the_page_is_offered_every_stock_part_with_the_defects_that_it_can_have() {
+    let kinds = kinds();
+    assert_eq!(kinds.len(), 9);
+    for one in &kinds {
+        let part: Part = serde_json::from_value(one["part"].clone()).unwrap();
+        for defect in one["defects"].as_array().unwrap() {
+            let defective = Placed {
+                part: with_defect(&part, defect.clone()).unwrap(),
+                ..Placed::default()
+            };
+            defective.check().unwrap();
+        }
+    }
+    assert_eq!(kinds[0]["defects"].as_array().unwrap().len(), 3);
+}
