@@ -17,7 +17,7 @@ mod doctor;
 mod history;
 mod measure;
 pub mod names;
-mod numbers;
+pub mod numbers;
 mod options;
 mod part;
 mod recipe;

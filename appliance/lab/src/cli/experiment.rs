@@ -1,7 +1,7 @@
 //! `fringed-lab experiment --out DIR`: the paper's experiments as tables, plots and pictures.
 
 use crate::experiment::{Campaign, OpticsKind, PARTS, Results, Row, Scene, csv, figures, means};
-use appliance::cli::{Json, Quiet, Threads, answer, names};
+use appliance::cli::{Json, Quiet, Threads, answer, names, numbers};
 use appliance::error::{Exit, Failure};
 use appliance::storage::folder::OutputFolder;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ pub struct Experiment {
     #[arg(long, value_enum, default_value = "ideal")]
     optics: OpticsKind,
     /// Noise seeds.
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=100))]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = numbers::number(1, 100))]
     seeds: u64,
     /// Folder for tables, plots and pictures; made if it does not exist.
     #[arg(long, value_name = "DIR", value_parser = names::folder())]

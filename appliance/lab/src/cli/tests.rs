@@ -64,6 +64,18 @@ fn an_output_is_refused_whose_name_says_another_content() {
 }
 
 #[test]
+fn a_number_out_of_its_bounds_is_refused_with_its_option_and_them() {
+    for value in ["", "0", "-1", "101", "1.5", "18446744073709551616", "NaN"] {
+        let line = format!("fringed-lab experiment --out x --seeds={value}");
+        let error = refused(&line);
+        assert_eq!(error.kind(), ErrorKind::ValueValidation, "{line}: {error}");
+        for words in ["--seeds", "from 1 to 100"] {
+            assert!(error.to_string().contains(words), "{line}: {error}");
+        }
+    }
+}
+
+#[test]
 fn options_that_contradict_each_other_are_refused() {
     for line in [
         "fringed-lab bench --frames f --json",
