@@ -1,4 +1,4 @@
-//! The rig of the study (measurement.md, section 5) at any size.
+//! The rig of the study (docs/measurement.md, *The study's head and parts*) at any size.
 
 use hal::model::DeviceModel;
 

@@ -1,4 +1,4 @@
-//! Measured heights against the truth, after measurement.md section 2.
+//! Measured heights against the truth, after docs/measurement.md, *Which pixels count*.
 
 /// |e| above this is a gross error, mm.
 const GROSS_MM: f64 = 1.0;

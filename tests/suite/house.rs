@@ -319,3 +319,33 @@ fn a_rule_that_is_broken_is_found() {
     assert!(dependencies("appliance").contains(&"algo".to_owned()));
     assert!(sources("algo/src").len() > 15);
 }
+
+#[test]
+fn every_file_that_the_architecture_names_is_there() {
+    let text = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    let bases = ["", "appliance/src", "algo/src", "hal/src"].map(|base| root().join(base));
+    let quoted = text.split('`').skip(1).step_by(2);
+    let file = |quoted: &&str| {
+        let named = [".rs", ".js", ".md", ".toml"]
+            .iter()
+            .any(|end| quoted.ends_with(end));
+        named || (quoted.contains('/') && !quoted.contains(['{', ' ', ':', '\n']))
+    };
+    let named: Vec<_> = quoted.filter(file).collect();
+    assert!(named.len() > 40, "{named:?}");
+    for file in named {
+        // A file beside the one that was named before it needs only its name.
+        let by_name = || {
+            sources("algo/src")
+                .into_iter()
+                .chain(sources("hal/src"))
+                .any(|source| {
+                    Path::new(&source.name)
+                        .file_name()
+                        .is_some_and(|name| name == file)
+                })
+        };
+        let found = bases.iter().any(|base| base.join(file).exists()) || by_name();
+        assert!(found, "ARCHITECTURE.md names {file}, which is not there");
+    }
+}

@@ -8,7 +8,7 @@ use tests::oracle::height::sigma_z;
 use tests::oracle::{self, Pattern, PhaseTwin, Reason, Rig, levels_of};
 use tests::score::rms;
 
-/// 1 % of the noise of one 4-frame level in the study, 7.4e-3 turn (measurement.md, section 4).
+/// 1 % of the noise of one 4-frame level in the study, 7.4e-3 turn (docs/measurement.md, *Noise*).
 const PHASE_RMS_TURNS: f64 = 7.4e-5;
 /// Pixels whose mask may differ: a modulation or residual so near its threshold that the last bit of
 /// the fixed point decides. 0.01 % of the pixels, but one pixel of a small recording may be that near.

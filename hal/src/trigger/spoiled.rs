@@ -7,7 +7,7 @@
 //!
 //! # How much a pulse may be off
 //!
-//! N-step phase shifting (measurement.md, section 1) has frames I_k = A + B sin(2πφ + θ_k), θ_k = 2πk/N, and φ = atan2(S, C) / 2π
+//! N-step phase shifting (docs/measurement.md, *Pattern and wrapped phase*) has frames I_k = A + B sin(2πφ + θ_k), θ_k = 2πk/N, and φ = atan2(S, C) / 2π
 //! of S = Σ I_k cos θ_k and C = Σ I_k sin θ_k, which are NB/2 · (sin 2πφ, cos 2πφ). Is one frame k brighter by the share e, S and C
 //! change by e I_k (cos θ_k, sin θ_k), and to first order
 //!
@@ -15,7 +15,7 @@
 //!
 //! which is at most e / (πN) · (A/B + 1/2). All pixels of one phase have the same error, so no mean over an area betters it.
 //! With e = 0.5 %, N = 4 and A = B (a pattern down to black, no other light) that is 0.0006 turn, a twelfth of the noise of one
-//! pixel in such a level (0.0074 turn, 0.056 mm in measurement.md, section 4), or 0.0045 mm; with three steps and as much other
+//! pixel in such a level (0.0074 turn, 0.056 mm in docs/measurement.md, *Noise*), or 0.0045 mm; with three steps and as much other
 //! light as the pattern's mean (A = 2 B) it is 0.0013 turn or 0.01 mm. A pulse that ends 200 µs of 16.7 ms late, which no stamp
 //! tells from a good one, is 2.4 times as bad.
 

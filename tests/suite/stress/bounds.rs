@@ -10,7 +10,7 @@ use tests::oracle::demodulate::Demodulated;
 use tests::oracle::unwrap::Form;
 use tests::oracle::{Level, PixelTwin, Reason};
 
-/// The arctangent: a polynomial of degree 5 about a reciprocal of one Newton step (kernel.md).
+/// The arctangent: a polynomial of degree 5 about a reciprocal of one Newton step (`algo/src/phase/angle.rs`).
 pub const ARCTANGENT: f64 = 2.5e-5;
 /// The arctangent of geometric levels below the finest, which give orders only: a cubic about a cubic reciprocal. Every pair
 /// of 8-bit differences is within it (`every_rough_angle_is_within_the_bound` of `algo`).

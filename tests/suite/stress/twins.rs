@@ -12,7 +12,7 @@ use tests::random::Random;
 pub const FRINGES: f64 = 60.0;
 pub const FRAME: (usize, usize) = (65, 65);
 /// Less than this over the default working range, ± 0.2 × the camera's height, is noise: one level of
-/// 4 frames has 7.4e-3 turn (measurement.md, section 4).
+/// 4 frames has 7.4e-3 turn (docs/measurement.md, *Noise*).
 const LEAST_TURNS: f64 = 0.01;
 /// Half a unit of Q16.16.
 pub const UNIT: f64 = 0.5 / 65_536.0;
