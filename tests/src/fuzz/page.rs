@@ -3,6 +3,7 @@
 use super::part::PART;
 use super::plant::{runtime, settings};
 use appliance::history::Reader;
+use appliance::production::latest::LastMaps;
 use appliance::production::simulation::Simulation;
 use appliance::recipe::Store;
 use appliance::station::{Micros, Station, StationHandle};
@@ -29,7 +30,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// How long events are followed.
 const FOLLOWED: Duration = Duration::from_millis(20);
 
-/// A station whose measuring task is silent, and its page.
+/// A station that has measured nothing yet, and its page.
 struct Page {
     runtime: Runtime,
     address: SocketAddr,
@@ -58,7 +59,7 @@ impl Page {
             access: access.clone(),
             recipes: Store::open(&recipes).expect("a store"),
             calibration: Default::default(),
-            maps: Default::default(),
+            maps: maps_of_no_cycle(),
             simulation: Simulation::new(mpsc::channel().0),
             history: Reader::of(folder.path()),
             date: Box::new(|_| false),
@@ -135,6 +136,22 @@ impl Page {
         );
         answer
     }
+}
+
+/// The way to the last cycle, where a thread answers for the measuring task that there was none: without it each picture that is
+/// asked for would wait for seconds.
+fn maps_of_no_cycle() -> LastMaps {
+    let maps = LastMaps::default();
+    let asked = maps.clone();
+    std::thread::spawn(move || {
+        loop {
+            if asked.wanted() {
+                asked.answer(None);
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    });
+    maps
 }
 
 /// Bytes of one browser; `@T@` stands for the token of a session. The page answers or closes, and none of its workers panics.
