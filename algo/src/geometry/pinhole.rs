@@ -102,8 +102,8 @@ impl fmt::Display for ModelError {
                 determinant,
             } => write!(
                 f,
-                "the rotation is none: R·Rᵀ is off the unit matrix by {deviation:.2e}, det R = \
-                 {determinant:.6}; it is 9 numbers, row by row"
+                "the rotation is not a rotation matrix: R·Rᵀ is off the unit matrix by {deviation:.2e}, det R = \
+                 {determinant:.6}; write its 9 numbers row by row"
             ),
             Self::Translation { distance } => write!(
                 f,

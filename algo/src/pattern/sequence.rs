@@ -291,7 +291,7 @@ impl Unwrapping {
             }
             return Ok(Self::Geometric);
         }
-        // Not a number of levels that is dense, or ratios of 1 and more, have an n that is none.
+        // For ratios that are not dense, or of 1 and more, n is ≤ 0 or infinite.
         let n = 1.0 / (1.0 - ratios[0]);
         let reachable = n > 0.0 && n <= MAX_DENSE_N * (1.0 + RATIO_TOLERANCE);
         match ratios[..] {

@@ -106,7 +106,7 @@ pub fn open(
     } = numbering;
     let spool = Spool::open(&serial, owner.uid()).ok().map(Arc::new);
     let waiting = match (&spool, counted.run) {
-        // Nobody's run is no run.
+        // Run 0 means that none was recorded.
         (None, _) | (_, 0) => VecDeque::new(),
         (Some(spool), before) => recover(&mut writer, spool, (before, run))?,
     };

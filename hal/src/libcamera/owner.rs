@@ -341,7 +341,7 @@ impl Owner<'_> {
     }
 
     fn tell(&self, event: Event) {
-        // First the bell: whoever fetches an event takes one stroke off, so that must be there.
+        // Signal the eventfd before sending: the receiver decrements it for each event that it fetches.
         ring(&self.wires.ready);
         let _ = self.wires.events.send(event);
     }

@@ -224,7 +224,7 @@ impl Fitting<'_> {
         form(&row, &placed.covariance, &row).max(0.0)
     }
 
-    /// The linear problem about a motion; `still` if that is none.
+    /// The linear problem about a motion; `still` where that is the part as taught.
     fn linearise(&self, samples: &[Sample], motion: &Motion, still: bool, rows: &mut Vec<Row>) {
         rows.clear();
         rows.extend(samples.iter().filter_map(|sample| {

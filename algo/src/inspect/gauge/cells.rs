@@ -111,7 +111,7 @@ impl Grid {
     }
 }
 
-/// Sums over the pixels of a cell. Whole numbers: their order is nothing.
+/// Sums over the pixels of a cell. Whole numbers, so that the order of summation does not matter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sum {
     /// Pixels.

@@ -17,7 +17,7 @@ pub(super) struct Threshold {
 
 /// Farther above the minimum than this many σ a pixel is no coin: e⁻¹⁶.
 const SURE: f64 = 8.0;
-/// What one pixel of variance 1 counts: sums are whole numbers, so that their order is nothing.
+/// What one pixel of variance 1 counts: sums are whole numbers, so that the order of summation does not matter.
 const ONE: f64 = 1_048_576.0;
 
 impl Threshold {

@@ -1,4 +1,4 @@
-//! What a cycle has of light.
+//! Input of an inspection: the frames, or the levels that were decoded on arrival.
 
 use super::Production;
 use crate::frame::FrameView;

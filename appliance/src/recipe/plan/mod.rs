@@ -149,7 +149,7 @@ impl Plan {
             gauges,
             ..
         } = recipe;
-        // They are large, and nobody asks for them in production.
+        // They are large, and production does not read them.
         arrays.phase_function = Vec::new();
         arrays.height_curvature = Vec::new();
         let camera = (file.camera.width, file.camera.height, file.camera.bit_depth);
