@@ -98,10 +98,7 @@ impl Page {
 
     /// The bytes with the token of an open session in them.
     fn signed(&self, data: &[u8]) -> Vec<u8> {
-        let places: Vec<usize> = (0..data.len())
-            .filter(|&at| data[at..].starts_with(TOKEN))
-            .collect();
-        if places.is_empty() {
+        if !data.windows(TOKEN.len()).any(|window| window == TOKEN) {
             return data.to_vec();
         }
         let now = Instant::now();
@@ -111,13 +108,20 @@ impl Page {
             *token = session.expect("the secret is right").text().to_owned();
         }
         let mut bytes = Vec::new();
-        let mut at = 0;
-        for place in places {
-            bytes.extend_from_slice(&data[at..place]);
-            bytes.extend_from_slice(token.as_bytes());
-            at = place + TOKEN.len();
+        let mut rest = data;
+        // From the front: of two marks that overlap the first one counts.
+        while let Some((&first, behind)) = rest.split_first() {
+            match rest.strip_prefix(TOKEN) {
+                Some(behind) => {
+                    bytes.extend_from_slice(token.as_bytes());
+                    rest = behind;
+                }
+                None => {
+                    bytes.push(first);
+                    rest = behind;
+                }
+            }
         }
-        bytes.extend_from_slice(&data[at..]);
         bytes
     }
 
