@@ -16,7 +16,7 @@ pub struct Experiment {
     #[arg(long, value_enum, default_value = "ideal")]
     optics: OpticsKind,
     /// Noise seeds.
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = numbers::number(1, 100))]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = numbers::number(1_u64, 100))]
     seeds: u64,
     /// Folder for tables, plots and pictures; made if it does not exist.
     #[arg(long, value_name = "DIR", value_parser = names::folder())]

@@ -73,6 +73,11 @@ fn a_number_out_of_its_bounds_is_refused_with_its_option_and_them() {
             assert!(error.to_string().contains(words), "{line}: {error}");
         }
     }
+    for value in [1, 100] {
+        let line = format!("fringed-lab experiment --out x --seeds={value}");
+        let parsed = Arguments::try_parse_from(line.split_whitespace());
+        assert!(parsed.is_ok(), "{line}");
+    }
 }
 
 #[test]
