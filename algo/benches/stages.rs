@@ -7,7 +7,7 @@
 use algo::frame::{FrameView, Samples};
 use algo::geometry::{Pinhole, PinholeModel, Reference, Triangulator};
 use algo::inspect::{Comparison, Golden, Region};
-use algo::pattern::{Encoder, PhaseFunction, Sequence};
+use algo::pattern::{Encoder, PhaseFunction, Sequence, Shot};
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{HeightMap, PhaseMap, decode, triangulate};
 use algo::units::AbsolutePhase;
@@ -57,10 +57,10 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(frames: &[(f64, f64)]) -> Self {
+    fn new(frames: &[Shot]) -> Self {
         let map = triangulator().reference_map();
         let sequence = Sequence::from_frames(frames).unwrap();
-        let light = |&(ratio, shift): &(f64, f64)| {
+        let light = |&Shot { ratio, shift }: &Shot| {
             let sample = |phase: &AbsolutePhase| {
                 let sine = (TAU * (ratio * phase.turns() + shift)).sin();
                 (122.0 + 100.0 * sine).round() as u8
@@ -101,12 +101,6 @@ impl Scene {
     }
 }
 
-/// Shifts of levels with these ratios.
-fn levels(ratios: &[f64], steps: usize) -> Vec<(f64, f64)> {
-    let level = |&ratio| (0..steps).map(move |k| (ratio, k as f64 / steps as f64));
-    ratios.iter().flat_map(level).collect()
-}
-
 fn bench_decode(bencher: Bencher<'_, '_>, scene: &Scene) {
     bencher
         .counter(ItemsCount::new(PIXELS))
@@ -120,15 +114,13 @@ fn decode_geometric_12(bencher: Bencher<'_, '_>) {
 
 #[divan::bench]
 fn decode_dense_12(bencher: Bencher<'_, '_>) {
-    bench_decode(
-        bencher,
-        &Scene::new(&levels(&[1.0, 1.0 - 1.0 / 36.0, 1.0 - 1.0 / 6.0], 4)),
-    );
+    bench_decode(bencher, &Scene::new(&Sequence::dense(6.0, 4)));
 }
 
 #[divan::bench]
 fn decode_golden_4(bencher: Bencher<'_, '_>) {
-    bench_decode(bencher, &Scene::new(&levels(&[1.0], 4)));
+    let level: Vec<Shot> = Shot::level(1.0, 4).collect();
+    bench_decode(bencher, &Scene::new(&level));
 }
 
 #[divan::bench]
@@ -192,8 +184,12 @@ fn gauge_over_the_frame(bencher: Bencher<'_, '_>) {
 #[divan::bench]
 fn pattern_raster(bencher: Bencher<'_, '_>) {
     let function = function();
+    let shot = Shot {
+        ratio: 1.0,
+        shift: 0.25,
+    };
     let counter = ItemsCount::new(1024_usize * 768);
     bencher
         .counter(counter)
-        .bench(|| Encoder::new(None).raster(&function, 1.0, 0.25));
+        .bench(|| Encoder::new(None).raster(&function, shot));
 }

@@ -2,8 +2,10 @@
 
 use crate::measured::SPHERE;
 use crate::written::{Written, geometric, program};
+use algo::pattern::Shot;
 use appliance::head::calibration::Calibration;
 use appliance::head::rig::{self, About};
+use appliance::head::seam;
 use appliance::recipe::Recipe;
 use appliance::recipe::teach::{Naming, teach};
 use hal::head::DynHead;
@@ -278,8 +280,9 @@ impl Taught {
         };
         let (bytes, recipe) = taught_recipe(&mut head, &calibration);
         let mut record = |ratios: &[f64], steps| {
-            let frames = levels(ratios, steps);
-            record(&mut head, &stage, &calibration, &recipe, &frames)
+            let levels = ratios.iter().flat_map(|&ratio| Shot::level(ratio, steps));
+            let shots: Vec<_> = levels.collect();
+            record(&mut head, &stage, &calibration, &recipe, &shots)
         };
         let max = recipe.function.range().max;
         Self {
@@ -306,7 +309,7 @@ fn record(
     stage: &Stage,
     calibration: &Calibration,
     recipe: &Recipe,
-    frames: &[(f64, f64)],
+    shots: &[Shot],
 ) -> Recording {
     let mut rig = rig::Rig {
         head,
@@ -316,7 +319,7 @@ fn record(
     };
     let function = &recipe.function;
     let measured = rig
-        .measure(function, frames, About::Reference, &|_| ())
+        .measure(function, shots, About::Reference, &|_| ())
         .expect("a measurement");
     let (columns, rows) = (function.columns(), function.rows());
     let turns = (0..columns * rows).map(|at| function.at_pixel(at % columns, at / columns));
@@ -339,15 +342,12 @@ fn record(
             columns,
             turns: turns.collect(),
         }],
-        frames: frames
+        frames: shots
             .iter()
             .zip(measured.frames)
-            .map(|(&(ratio, shift_turns), frame)| RecordedFrame {
-                ratio,
-                shift_turns,
-                pattern: 0,
+            .map(|(&shot, frame)| RecordedFrame {
                 timestamp_ns: None,
-                frame,
+                ..seam::recorded(shot, frame)
             })
             .collect(),
         range_mm: None,

@@ -1,5 +1,6 @@
 //! Parts that lie elsewhere than where they were taught, and scenes that cannot be taught.
 
+use algo::pattern::Shot;
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use appliance::head::calibration::Calibration;
@@ -63,12 +64,7 @@ pub(crate) fn taught(bed: &mut Bed) -> Result<Taught, String> {
 
 /// Pixels whose phase is more than half a turn off the true one, and all that were compared, for a
 /// sequence about the golden map inside its safe mask.
-fn wrong_orders(
-    bed: &mut Bed,
-    taught: &Taught,
-    frames: &[(f64, f64)],
-    reach: f32,
-) -> (usize, usize) {
+fn wrong_orders(bed: &mut Bed, taught: &Taught, shots: &[Shot], reach: f32) -> (usize, usize) {
     let arrays = &taught.recipe.arrays;
     let golden = arrays.golden_phase.iter();
     let golden: Vec<_> = golden
@@ -83,7 +79,7 @@ fn wrong_orders(
     };
     let function = &taught.recipe.function;
     let measured = rig
-        .measure(function, frames, About::Map(&map), &|_| ())
+        .measure(function, shots, About::Map(&map), &|_| ())
         .unwrap();
     let truth = bed.stage.truth();
     let width = measured.phases.width;
@@ -122,7 +118,6 @@ fn moved_parts_have_no_wrong_fringe_order_inside_the_safe_masks() {
             let Some(reach) = sequence.kind.reach() else {
                 continue;
             };
-            let frames: Vec<_> = sequence.frames.iter().map(|&[r, s]| (r, s)).collect();
             let mut all = 0;
             for (seed, shift_mm) in (7..).zip(moves) {
                 let placement = Placement {
@@ -131,18 +126,18 @@ fn moved_parts_have_no_wrong_fringe_order_inside_the_safe_masks() {
                 };
                 bed.stage.place(&part, &placement).unwrap();
                 bed.stage.reseed(seed);
-                let (wrong, compared) = wrong_orders(&mut bed, &taught, &frames, reach);
+                let (wrong, compared) = wrong_orders(&mut bed, &taught, &sequence.frames, reach);
                 assert_eq!(
                     wrong,
                     0,
                     "{name}, {} frames, moved {shift_mm:?}",
-                    frames.len()
+                    sequence.frames.len()
                 );
                 all += compared;
             }
             println!(
                 "{name}: {} frames safe on {:.1} % of the part, {all} pixels compared",
-                frames.len(),
+                sequence.frames.len(),
                 sequence.safe_share * 100.0
             );
             // A mask that is empty keeps every promise.

@@ -2,6 +2,7 @@
 
 use crate::gauges::{frames, inspect, plan};
 use crate::placement::{Bed, bed, scenario, taught};
+use algo::pattern::Shot;
 use appliance::recipe::RecipeFile;
 use appliance::station::{Inspection, Verdict};
 use sim::parts::Cone;
@@ -60,7 +61,7 @@ fn sequences_of_the_same_length_and_of_different_kinds_are_all_run() {
         ..taught.recipe.file.clone()
     };
     // As many shifts of its one level as the two levels behind it have together.
-    file.sequences[0].frames = (0..6).map(|k| [1.0, f64::from(k) / 6.0]).collect();
+    file.sequences[0].frames = Shot::level(1.0, 6).collect();
     let plan = plan(&bed, &file, &taught.recipe.arrays);
     let counts: Vec<usize> = (0..plan.steps())
         .map(|step| plan.indices(step).len())
@@ -71,15 +72,16 @@ fn sequences_of_the_same_length_and_of_different_kinds_are_all_run() {
         .collect();
     assert_eq!(flags, [0b10, 0b100, 0b1000]);
     for step in 0..3 {
-        let shown: Vec<_> = plan.shown(step).collect();
-        assert_eq!(plan.step_that_shows(&shown), Some(step));
+        let shots: Vec<_> = plan.shots(step).collect();
+        assert_eq!(plan.step_that_shows(&shots), Some(step));
         let frames = frames(&mut bed, &plan, step);
         let layers = plan.layers(step, &frames).unwrap();
         let resolved = layers.height_mm.iter().filter(|z| !z.is_nan()).count();
         assert!(resolved > 5000, "step {step}: {resolved}");
     }
     // What is recorded names its frames, so a part that was judged by the second is judged by the second again.
-    assert_eq!(plan.step_that_shows(&[(1.0, 0.0)]), None);
+    let other: Vec<_> = Shot::level(1.0, 1).collect();
+    assert_eq!(plan.step_that_shows(&other), None);
     let none = plan.inspect(3, &[], Instant::now());
     assert_eq!((none.verdict(), none.error_code), (Verdict::Invalid, 103));
 }

@@ -1,7 +1,7 @@
 //! The sequences that are probed.
 
 use super::Outcome;
-use algo::pattern::{PhaseRange, Sequence};
+use algo::pattern::{PhaseRange, Sequence, Shot};
 use algo::phase::Decoder;
 
 /// A sequence and the depth of its samples.
@@ -70,8 +70,10 @@ impl Case {
 
     /// With the machine's best back-end.
     pub fn decoder(&self) -> Outcome<Decoder> {
-        let shift = |(ratio, k): (f64, usize)| (ratio, k as f64 / self.steps as f64);
-        let frames: Vec<(f64, f64)> = self.frames().map(shift).collect();
+        let levels = self.ratios.iter();
+        let frames: Vec<Shot> = levels
+            .flat_map(|&ratio| Shot::level(ratio, self.steps))
+            .collect();
         let range = PhaseRange {
             min: 0.0,
             max: FRINGES as f64,

@@ -1,6 +1,6 @@
 //! Grey rasters of a phase function (eq. 1 of Peng & Gupta 2008, with a phase step).
 
-use super::PhaseFunction;
+use super::{PhaseFunction, Shot};
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 use core::fmt;
@@ -106,8 +106,9 @@ impl Encoder {
         }
     }
 
-    /// The raster of the phase function at ratio r with a shift of s turns.
-    pub fn raster(&self, function: &PhaseFunction, ratio: f64, shift: f64) -> GreyRaster {
+    /// The raster that a shot of the phase function shows.
+    pub fn raster(&self, function: &PhaseFunction, shot: Shot) -> GreyRaster {
+        let Shot { ratio, shift } = shot;
         let (width, height) = (function.columns(), function.rows());
         let grey = |phase: f64| {
             let step = ((ratio * phase + shift) * STEPS + ROUNDER).to_bits();
@@ -139,7 +140,11 @@ mod tests {
     #[test]
     fn a_raster_is_the_sine_of_equation_one() {
         let function = PhaseFunction::vertical(64, 3, 4.0).unwrap();
-        let raster = Encoder::new(None).raster(&function, 0.5, 0.25);
+        let shot = Shot {
+            ratio: 0.5,
+            shift: 0.25,
+        };
+        let raster = Encoder::new(None).raster(&function, shot);
         assert_eq!(raster.pixels.len(), 64 * 3);
         for row in 0..3 {
             for column in 0..64 {
@@ -152,7 +157,7 @@ mod tests {
         // The same function by its samples, turns below 0 included.
         let samples = (0..64 * 3).map(|at| f64::from(at % 64) / 16.0 - 2.0);
         let sampled = PhaseFunction::sampled(64, 3, samples.collect()).unwrap();
-        assert_eq!(Encoder::new(None).raster(&sampled, 0.5, 0.25), raster);
+        assert_eq!(Encoder::new(None).raster(&sampled, shot), raster);
     }
 
     #[test]

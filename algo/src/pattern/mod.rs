@@ -4,6 +4,7 @@ mod encode;
 mod function;
 mod interpolate;
 mod sequence;
+mod shot;
 
 pub use encode::{Encoder, GreyRaster, GreyResponse, ResponseError};
 pub use function::{MAX_TURNS, PhaseFunction, PhaseFunctionError, PhaseRange};
@@ -11,3 +12,4 @@ pub use sequence::{
     Level, MAX_DENSE_N, MAX_FRAMES, MAX_LEVELS, MAX_SHIFTS, MAX_STEP, Sequence, SequenceError,
     Unwrapping,
 };
+pub use shot::Shot;

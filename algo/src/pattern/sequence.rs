@@ -1,7 +1,7 @@
 //! Levels and shifts of a sequence, and how its levels are unwrapped.
 
-use super::PhaseRange;
 use super::function::MAX_TURNS;
+use super::{PhaseRange, Shot};
 use alloc::vec::Vec;
 use core::fmt;
 
@@ -55,12 +55,7 @@ pub enum SequenceError {
     /// There are no frames.
     Empty,
     /// A ratio is not a positive finite number, or a shift not finite.
-    NotFinite {
-        /// The frame's ratio.
-        ratio: f64,
-        /// The frame's shift in turns.
-        shift: f64,
-    },
+    NotFinite(Shot),
     /// More levels than [`MAX_LEVELS`].
     TooManyLevels(usize),
     /// A level has fewer than 3 shifts or more than [`MAX_SHIFTS`].
@@ -101,7 +96,7 @@ impl fmt::Display for SequenceError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Empty => write!(f, "there are no frames: a level needs at least 3"),
-            Self::NotFinite { ratio, shift } => write!(
+            Self::NotFinite(Shot { ratio, shift }) => write!(
                 f,
                 "a frame with ratio {ratio} and shift {shift}: both must be finite and the ratio positive"
             ),
@@ -147,7 +142,7 @@ impl fmt::Display for SequenceError {
 impl core::error::Error for SequenceError {}
 
 impl Sequence {
-    /// From the ratio and the shift (turns) of each frame, in the order of the frames.
+    /// From what each frame shows, in the order of the frames.
     ///
     /// Frames of equal ratio form a level; within it the shifts may come in any order and start
     /// anywhere.
@@ -155,17 +150,16 @@ impl Sequence {
     /// # Errors
     /// If a level has a number of shifts out of range or they are not equally spaced, or there are
     /// too many levels.
-    pub fn from_frames(frames: &[(f64, f64)]) -> Result<Self, SequenceError> {
+    pub fn from_frames(frames: &[Shot]) -> Result<Self, SequenceError> {
         if frames.is_empty() {
             return Err(SequenceError::Empty);
         }
-        if let Some(&(ratio, shift)) = frames
-            .iter()
-            .find(|(ratio, shift)| !(ratio.is_finite() && *ratio > 0.0 && shift.is_finite()))
-        {
-            return Err(SequenceError::NotFinite { ratio, shift });
+        let finite =
+            |shot: &Shot| shot.ratio.is_finite() && shot.ratio > 0.0 && shot.shift.is_finite();
+        if let Some(&shot) = frames.iter().find(|shot| !finite(shot)) {
+            return Err(SequenceError::NotFinite(shot));
         }
-        let mut ratios: Vec<f64> = frames.iter().map(|&(ratio, _)| ratio).collect();
+        let mut ratios: Vec<f64> = frames.iter().map(|shot| shot.ratio).collect();
         ratios.sort_by(f64::total_cmp);
         ratios.dedup();
         let mut levels = heapless::Vec::new();
@@ -180,11 +174,11 @@ impl Sequence {
         })
     }
 
-    fn level(ratio: f64, frames: &[(f64, f64)]) -> Result<Level, SequenceError> {
+    fn level(ratio: f64, frames: &[Shot]) -> Result<Level, SequenceError> {
         let shifts: Vec<(u16, f64)> = (0..)
             .zip(frames)
-            .filter(|(_, frame)| frame.0 == ratio)
-            .map(|(at, frame)| (at, frame.1))
+            .filter(|(_, shot)| shot.ratio == ratio)
+            .map(|(at, shot)| (at, shot.shift))
             .collect();
         let steps = shifts.len();
         if !(3..=MAX_SHIFTS).contains(&steps) {
@@ -222,7 +216,7 @@ impl Sequence {
     ///
     /// The coarsest level spans 0.94 turn (one turn less a margin for noise on both sides), the
     /// finest has ratio 1, the steps between are equal.
-    pub fn geometric(range: PhaseRange, levels: usize, steps: usize) -> Vec<(f64, f64)> {
+    pub fn geometric(range: PhaseRange, levels: usize, steps: usize) -> Vec<Shot> {
         let step = libm::pow(
             (range.span() / 0.94).max(1.0),
             1.0 / (levels.max(2) - 1) as f64,
@@ -230,8 +224,16 @@ impl Sequence {
         (0..levels)
             .flat_map(|level| {
                 let ratio = libm::pow(step, -((levels - 1 - level) as f64));
-                (0..steps).map(move |k| (ratio, k as f64 / steps as f64))
+                Shot::level(ratio, steps)
             })
+            .collect()
+    }
+
+    /// Three dense levels of `steps` shifts: ratios 1, 1 − 1/n², 1 − 1/n, in this order.
+    pub fn dense(n: f64, steps: usize) -> Vec<Shot> {
+        [1.0, 1.0 - 1.0 / (n * n), 1.0 - 1.0 / n]
+            .into_iter()
+            .flat_map(|ratio| Shot::level(ratio, steps))
             .collect()
     }
 
@@ -340,19 +342,21 @@ mod tests {
     fn levels(ratios: &[f64]) -> Sequence {
         let frames: Vec<_> = ratios
             .iter()
-            .flat_map(|&ratio| (0..3).map(move |k| (ratio, f64::from(k) / 3.0)))
+            .flat_map(|&ratio| Shot::level(ratio, 3))
             .collect();
         Sequence::from_frames(&frames).unwrap()
     }
 
+    fn shifted(shifts: &[f64]) -> Vec<Shot> {
+        let shot = |&shift| Shot { ratio: 1.0, shift };
+        shifts.iter().map(shot).collect()
+    }
+
     #[test]
     fn shifts_may_come_in_any_order_and_from_any_start() {
-        let frames = [
-            (1.0, 0.25),
-            (1.0, -0.083_333_333_33),
-            (1.0, -0.416_666_666_7),
-        ];
-        let sequence = Sequence::from_frames(&frames).unwrap();
+        let sequence =
+            Sequence::from_frames(&shifted(&[0.25, -0.083_333_333_33, -0.416_666_666_7]));
+        let sequence = sequence.unwrap();
         let level = &sequence.levels()[0];
         assert_eq!(level.start, 0.25);
         assert_eq!(level.frames, [0, 2, 1]);
@@ -368,12 +372,12 @@ mod tests {
 
     #[test]
     fn unequal_few_and_repeated_shifts_are_refused() {
-        let unequal = [(1.0, 0.0), (1.0, 0.3), (1.0, 0.6)];
+        let unequal = shifted(&[0.0, 0.3, 0.6]);
         assert!(matches!(
             Sequence::from_frames(&unequal),
             Err(SequenceError::Spacing { steps: 3, .. })
         ));
-        let repeated = [(1.0, 0.0), (1.0, 0.25), (1.0, 0.5), (1.0, 0.5)];
+        let repeated = shifted(&[0.0, 0.25, 0.5, 0.5]);
         assert!(matches!(
             Sequence::from_frames(&repeated),
             Err(SequenceError::Spacing { steps: 4, .. })
@@ -383,7 +387,11 @@ mod tests {
             Err(SequenceError::Steps { steps: 2, .. })
         ));
         assert_eq!(Sequence::from_frames(&[]), Err(SequenceError::Empty));
-        assert!(Sequence::from_frames(&[(f64::NAN, 0.0); 3]).is_err());
+        let unknown = Shot {
+            ratio: f64::NAN,
+            shift: 0.0,
+        };
+        assert!(Sequence::from_frames(&[unknown; 3]).is_err());
     }
 
     #[test]

@@ -8,11 +8,13 @@ use crate::head::calibration::file::{
     ProjectorFile, ReferenceFile, TimingFile, VERSION,
 };
 use crate::head::calibration::opencv::{Declared, Sizes, from_two};
+use crate::head::seam;
 use crate::measure::measure;
+use algo::pattern::Shot;
 use hal::frame::{Frame, FrameFormat, Pixels};
 use hal::head::Stamp;
 use hal::replay::Recording;
-use hal::replay::recording::{PatternSpec, RecipeReference, RecordedFrame, RecordedProjector};
+use hal::replay::recording::{PatternSpec, RecipeReference, RecordedProjector};
 use hal::units::Timestamp;
 use serde_json::{Value, json};
 use sim::Scenario;
@@ -192,22 +194,15 @@ fn recording() -> Recording {
     let calibration = Calibration::of_scenario(&scenario);
     let format = FrameFormat::packed(16, 12, 8);
     let levels = [0.03, 0.2, 1.0];
-    let shots = levels
-        .into_iter()
-        .flat_map(|ratio| (0..3).map(move |k| (ratio, f64::from(k) / 3.0)));
-    let frames = (0..).zip(shots).map(|(at, (ratio, shift_turns))| {
+    let shots = levels.into_iter().flat_map(|ratio| Shot::level(ratio, 3));
+    let frames = (0..).zip(shots).map(|(at, shot)| {
         let sample = |u: usize| {
-            let turns = ratio * 30.0 * u as f64 / 16.0 + shift_turns;
+            let turns = shot.ratio * 30.0 * u as f64 / 16.0 + shot.shift;
             (127.0 + 100.0 * (std::f64::consts::TAU * turns).sin()) as u8
         };
         let pixels = Pixels::Eight((0..16 * 12).map(|at| sample(at % 16)).collect());
-        RecordedFrame {
-            ratio,
-            shift_turns,
-            pattern: 0,
-            timestamp_ns: Some(at * 1000),
-            frame: Frame::new(format, Arc::new(pixels), Timestamp(at * 1000), at).unwrap(),
-        }
+        let frame = Frame::new(format, Arc::new(pixels), Timestamp(at * 1000), at);
+        seam::recorded(shot, frame.unwrap())
     });
     Recording {
         width: 16,

@@ -5,12 +5,13 @@ use super::numbers::number;
 use super::options::{Files, Quiet, Threads};
 use crate::error::{Exit, Failure};
 use crate::head::rasters::rasters;
+use crate::head::seam;
 use crate::production::backend::{self, Opened};
 use algo::pattern::{PhaseFunction, Sequence};
 use hal::bounds::MAX_FRINGES;
 use hal::replay::Recording;
 use hal::replay::recorder;
-use hal::replay::recording::{PatternSpec, RecordedFrame, RecordedProjector};
+use hal::replay::recording::{PatternSpec, RecordedProjector};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -77,22 +78,15 @@ impl Record {
         let function = PhaseFunction::vertical(columns as usize, rows as usize, fringes)
             .map_err(|error| Failure::because(Exit::Usage, "--fringes", error))?;
         let (levels, steps) = (usize::from(self.levels), usize::from(self.steps));
-        let sequence = Sequence::geometric(function.range(), levels, steps);
+        let shots = Sequence::geometric(function.range(), levels, steps);
         let device = |error: hal::error::Error| Failure::new(Exit::Unavailable, error.to_string());
-        let patterns = rasters(&function, sequence.iter().copied(), calibration).map_err(device)?;
+        let patterns = rasters(&function, &shots, calibration).map_err(device)?;
         head.load(patterns).map_err(device)?;
-        let mut frames = Vec::with_capacity(sequence.len());
-        let indices: Vec<usize> = (0..sequence.len()).collect();
+        let mut frames = Vec::with_capacity(shots.len());
+        let indices: Vec<usize> = (0..shots.len()).collect();
         head.acquire(&indices, TIMEOUT, &mut |at, frame| {
-            let (ratio, shift_turns) = sequence[at];
-            frames.push(RecordedFrame {
-                ratio,
-                shift_turns,
-                pattern: 0,
-                timestamp_ns: Some(frame.timestamp().0),
-                frame,
-            });
-            told(frames.len() as f64 / sequence.len() as f64);
+            frames.push(seam::recorded(shots[at], frame));
+            told(frames.len() as f64 / shots.len() as f64);
         })
         .map_err(device)?;
         let truth = stage.as_ref().map(sim::Stage::truth);

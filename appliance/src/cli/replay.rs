@@ -55,12 +55,12 @@ impl Replay {
         let (number, fingerprint) = (recipe.file.number, recipe.file.fingerprint.clone());
         let stored = stored(&state, unpacked.name(), &kept)?;
         let flags = stored.as_ref().map_or(0, |entry| entry.flags);
-        let (frames, shown) = (kept.frames(), kept.shown());
+        let (frames, shots) = (kept.frames(), kept.shots());
         let threads = self.files.configuration()?.threads;
         let judged = self.threads.pool(threads)?.install(|| {
             let plan = kept.plan(recipe, flags & SIMULATED != 0)?;
             let inspect = |step| plan.inspect(step, &frames, Instant::now());
-            Ok::<_, PlanError>(plan.step_that_shows(&shown).map(inspect))
+            Ok::<_, PlanError>(plan.step_that_shows(&shots).map(inspect))
         });
         let judged = judged.map_err(|error| Failure::new(Exit::Content, error.to_string()))?;
         let inspection = judged.ok_or_else(|| {

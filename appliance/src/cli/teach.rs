@@ -6,6 +6,7 @@ use super::options::{Files, Json, Quiet, Threads, answer};
 use crate::config::Config;
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
+use crate::head::seam;
 use crate::measure::{measure, measure_after, primary_of};
 use crate::production::backend::{self, Opened};
 use crate::recipe::bounds::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_TOLERANCE_MM};
@@ -270,9 +271,7 @@ impl Teach {
         crate::recipe::teach::refuse_empty(phases).map_err(|error| wrong(&error))?;
         let at = primary_of(&recording);
         let frames = recording.frames.iter().filter(|frame| frame.pattern == at);
-        let full: Vec<_> = frames
-            .map(|frame| (frame.ratio, frame.shift_turns))
-            .collect();
+        let full: Vec<_> = frames.map(seam::shot).collect();
         let part = GoldenPart {
             calibration: &calibration,
             pattern: match recording.patterns[at] {

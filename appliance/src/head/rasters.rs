@@ -1,25 +1,24 @@
 //! What the projector shows of a phase function: grey rasters through the inverse of the head's response.
 
 use crate::head::calibration::Calibration;
-use algo::pattern::{Encoder, PhaseFunction};
+use algo::pattern::{Encoder, PhaseFunction, Shot};
 use hal::projector::Raster;
 use rayon::prelude::*;
 
-/// Grey rasters of frames (ratio, shift) of a phase function.
+/// The grey raster of each shot of a phase function.
 ///
 /// # Errors
 /// Never for a phase function that could be made.
 pub fn rasters(
     function: &PhaseFunction,
-    frames: impl Iterator<Item = (f64, f64)>,
+    shots: &[Shot],
     calibration: &Calibration,
 ) -> Result<Vec<Raster>, hal::error::Error> {
-    let frames: Vec<_> = frames.collect();
     let encoder = Encoder::new(calibration.response.as_ref());
-    frames
-        .into_par_iter()
-        .map(|(ratio, shift)| {
-            let grey = encoder.raster(function, ratio, shift);
+    shots
+        .par_iter()
+        .map(|&shot| {
+            let grey = encoder.raster(function, shot);
             Raster::new(grey.width as u32, grey.height as u32, grey.pixels)
         })
         .collect()

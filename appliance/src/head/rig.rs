@@ -4,7 +4,7 @@ use crate::head::calibration::Calibration;
 use crate::head::rasters::rasters;
 use crate::head::seam;
 use algo::geometry::{HeightRange, Reference, Triangulator};
-use algo::pattern::{PhaseFunction, Sequence};
+use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::Decoder;
 use algo::pipeline::{self, HeightMap, PhaseMap};
 use algo::units::AbsolutePhase;
@@ -80,7 +80,7 @@ impl Rig<'_> {
         .map_err(rig)
     }
 
-    /// Projects `frames` (ratio, shift in turns) of a phase function and measures the part.
+    /// Projects the shots of a phase function and measures the part.
     /// `progress` is told the share of the frames taken.
     ///
     /// # Errors
@@ -88,21 +88,21 @@ impl Rig<'_> {
     pub fn measure(
         &mut self,
         function: &PhaseFunction,
-        frames: &[(f64, f64)],
+        shots: &[Shot],
         about: About<'_>,
         progress: &dyn Fn(f64),
     ) -> Result<Measured, RigError> {
-        let sequence = Sequence::from_frames(frames).map_err(rig)?;
+        let sequence = Sequence::from_frames(shots).map_err(rig)?;
         let bit_depth = self.calibration.camera.2;
         let decoder = Decoder::new(&sequence, function.range(), bit_depth).map_err(rig)?;
         let triangulator = self.triangulator(function)?;
         self.head
-            .load(rasters(function, frames.iter().copied(), self.calibration)?)?;
-        let mut taken = Vec::with_capacity(frames.len());
-        let indices: Vec<usize> = (0..frames.len()).collect();
+            .load(rasters(function, shots, self.calibration)?)?;
+        let mut taken = Vec::with_capacity(shots.len());
+        let indices: Vec<usize> = (0..shots.len()).collect();
         self.head.acquire(&indices, self.timeout, &mut |_, frame| {
             taken.push(frame);
-            progress(taken.len() as f64 / frames.len() as f64);
+            progress(taken.len() as f64 / shots.len() as f64);
         })?;
         let views = taken
             .iter()

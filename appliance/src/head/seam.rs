@@ -2,15 +2,16 @@
 
 use algo::frame::{FrameError, FrameView, Samples};
 use algo::geometry::PinholeModel;
-use algo::pattern::{PhaseFunction, PhaseFunctionError};
+use algo::pattern::{PhaseFunction, PhaseFunctionError, Shot};
+use hal::frame::Frame;
 use hal::model::DeviceModel;
-use hal::replay::recording::PatternSpec;
+use hal::replay::recording::{PatternSpec, RecordedFrame};
 
 /// Borrows a device's frame without a copy.
 ///
 /// # Errors
 /// If the frame's samples do not make up its size.
-pub fn view(frame: &hal::frame::Frame) -> Result<FrameView<'_>, FrameError> {
+pub fn view(frame: &Frame) -> Result<FrameView<'_>, FrameError> {
     let format = frame.format();
     let samples = match frame.samples() {
         hal::frame::Samples::Eight(samples) => Samples::Eight(samples),
@@ -50,5 +51,24 @@ pub fn phase_function(
         PatternSpec::Vertical { fringes } => PhaseFunction::vertical(columns, rows, *fringes),
         PatternSpec::Horizontal { fringes } => PhaseFunction::horizontal(columns, rows, *fringes),
         PatternSpec::File { turns, .. } => PhaseFunction::sampled(columns, rows, turns.clone()),
+    }
+}
+
+/// What a recorded frame shows of its pattern.
+pub fn shot(recorded: &RecordedFrame) -> Shot {
+    Shot {
+        ratio: recorded.ratio,
+        shift: recorded.shift_turns,
+    }
+}
+
+/// A frame as a recording of one pattern holds it.
+pub fn recorded(shot: Shot, frame: Frame) -> RecordedFrame {
+    RecordedFrame {
+        ratio: shot.ratio,
+        shift_turns: shot.shift,
+        pattern: 0,
+        timestamp_ns: Some(frame.timestamp().0),
+        frame,
     }
 }

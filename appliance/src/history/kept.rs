@@ -2,9 +2,11 @@
 
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
+use crate::head::seam;
 use crate::history::RECIPE;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::{LoadError, Recipe, Store, archive};
+use algo::pattern::Shot;
 use hal::frame::Frame;
 use hal::replay::Recording;
 use hal::replay::recording::RecipeReference;
@@ -66,12 +68,9 @@ impl Kept {
         taken.map(|taken| taken.frame.clone()).collect()
     }
 
-    /// Ratio and shift of each frame, in turns: which sequence of a recipe they are of.
-    pub fn shown(&self) -> Vec<(f64, f64)> {
-        let taken = self.recording.frames.iter();
-        taken
-            .map(|taken| (taken.ratio, taken.shift_turns))
-            .collect()
+    /// What each frame shows: which sequence of a recipe they are of.
+    pub fn shots(&self) -> Vec<Shot> {
+        self.recording.frames.iter().map(seam::shot).collect()
     }
 
     /// The recipe that judged the part: the recording's own, else the generation of the station's that has its fingerprint.

@@ -5,6 +5,7 @@
 //! or another recording has it, counts once however many have it, and goes with the last one.
 
 use crate::head::calibration::Calibration;
+use crate::head::seam;
 use crate::recipe::plan::Plan;
 use crate::recipe::{PatternFile, Store, archive};
 use crate::station::{ResultRecord, Verdict};
@@ -12,7 +13,7 @@ use crate::storage::folder::{name_also, rename_whole};
 use hal::frame::Frame;
 use hal::replay::Recording;
 use hal::replay::recorder::{self, RecorderError};
-use hal::replay::recording::{PatternSpec, RecipeReference, RecordedFrame, RecordedProjector};
+use hal::replay::recording::{PatternSpec, RecipeReference, RecordedProjector};
 use std::collections::{BTreeMap, VecDeque};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
@@ -217,7 +218,7 @@ fn recording(part: &FailedPart) -> Recording {
     } = part;
     let file = plan.file();
     let (width, height, bit_depth) = calibration.camera;
-    let shown = plan.shown(*step).zip(frames);
+    let shown = plan.shots(*step).zip(frames);
     Recording {
         width,
         height,
@@ -238,13 +239,7 @@ fn recording(part: &FailedPart) -> Recording {
         },
         patterns: vec![pattern(plan)],
         frames: shown
-            .map(|((ratio, shift_turns), frame)| RecordedFrame {
-                ratio,
-                shift_turns,
-                pattern: 0,
-                timestamp_ns: Some(frame.timestamp().0),
-                frame: frame.clone(),
-            })
+            .map(|(shot, frame)| seam::recorded(shot, frame.clone()))
             .collect(),
         range_mm: Some(file.range_mm),
         exposure_us: file.exposure_us,

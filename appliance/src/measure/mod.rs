@@ -216,8 +216,8 @@ impl<'a> Channel<'a> {
                 .iter()
                 .filter(move |frame| frame.pattern == pattern)
         };
-        let shifts: Vec<_> = recorded().map(|f| (f.ratio, f.shift_turns)).collect();
-        let sequence = Sequence::from_frames(&shifts)?;
+        let shots: Vec<_> = recorded().map(seam::shot).collect();
+        let sequence = Sequence::from_frames(&shots)?;
         let decoder = Decoder::new(&sequence, function.range(), recording.bit_depth)?;
         let frames = recorded()
             .map(|f| seam::view(&f.frame))

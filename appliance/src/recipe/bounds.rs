@@ -5,7 +5,7 @@
 use super::check::{MAX_GAUGES, MAX_REGIONS};
 use super::comparison::QualityFile;
 use super::file::{GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFile};
-use algo::pattern::{MAX_FRAMES, Sequence};
+use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use hal::bounds::{
     FINGERPRINT_DIGITS, MAX_EXPOSURE_US, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_RANGE_MM,
     MAX_SHIFT_TURNS, MAX_SIDE, MIN_NOISE_COUNTS, RATIOS, fingerprint, length, text, within,
@@ -115,15 +115,14 @@ impl SequenceFile {
     fn check_bounds(&self) -> Result<(), String> {
         length("frames", self.frames.len(), 3, MAX_FRAMES)?;
         let [low, high] = RATIOS;
-        for (at, &[ratio, shift]) in self.frames.iter().enumerate() {
+        for (at, &Shot { ratio, shift }) in self.frames.iter().enumerate() {
             within("ratio", ratio, low, high)
                 .and_then(|()| within("shift", shift, -MAX_SHIFT_TURNS, MAX_SHIFT_TURNS))
                 .map_err(|error| format!("frames[{at}]: {error}"))?;
         }
         within("sigma_mm", self.sigma_mm, 0.0, MAX_SIGMA_MM)?;
         within("safe_share", self.safe_share, 0.0, 1.0)?;
-        let frames: Vec<_> = self.frames.iter().map(|&[r, s]| (r, s)).collect();
-        Sequence::from_frames(&frames)
+        Sequence::from_frames(&self.frames)
             .map(drop)
             .map_err(|error| format!("frames: {error}"))
     }

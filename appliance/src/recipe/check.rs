@@ -4,7 +4,7 @@ use super::archive::{ArchiveError, Arrays, short, unpack};
 use super::file::{PatternFile, RecipeFile, SequenceKind};
 use super::gauge::{check_limits, gauges};
 use algo::inspect::Gauge;
-use algo::pattern::{PhaseFunction, Sequence};
+use algo::pattern::{PhaseFunction, Sequence, Shot};
 use std::io::{Cursor, Read, Seek};
 
 /// A recipe whose parts fit each other.
@@ -18,8 +18,8 @@ pub struct Recipe {
     pub function: PhaseFunction,
     /// What the production sequence can unwrap.
     pub kind: SequenceKind,
-    /// Ratio and shift of each frame that is projected in production.
-    pub production: Vec<(f64, f64)>,
+    /// What each frame shows that is projected in production.
+    pub production: Vec<Shot>,
     /// Its levels and shifts.
     pub sequence: Sequence,
     /// What its gauges measure.
@@ -128,11 +128,7 @@ impl Recipe {
             )
         })?;
         let kind = production.kind;
-        let production: Vec<_> = production
-            .frames
-            .iter()
-            .map(|&[ratio, shift]| (ratio, shift))
-            .collect();
+        let production = production.frames.clone();
         let sequence = Sequence::from_frames(&production).map_err(|error| error.to_string())?;
         let gauges = gauges(&file.regions, &file.gauges, (width, height))?;
         Ok(Self {

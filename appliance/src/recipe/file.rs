@@ -2,6 +2,7 @@
 
 use super::comparison::ComparisonFile;
 use super::good_parts::GoodPartsFile;
+use algo::pattern::Shot;
 use algo::units::AbsolutePhase;
 use serde::{Deserialize, Serialize};
 
@@ -116,13 +117,30 @@ pub enum PatternFile {
 pub struct SequenceFile {
     /// What it can unwrap.
     pub kind: SequenceKind,
-    /// [ratio, shift in turns] of each frame.
-    pub frames: Vec<[f64; 2]>,
+    /// What each frame shows: [ratio, shift in turns].
+    #[serde(with = "shots")]
+    pub frames: Vec<Shot>,
     /// Predicted σ_z, RMS over the golden surface, mm.
     pub sigma_mm: f64,
     /// Share of the golden surface whose phase stays within the sequence's reach for every
     /// placement inside the tolerance.
     pub safe_share: f64,
+}
+
+/// Shots as pairs of numbers.
+mod shots {
+    use algo::pattern::Shot;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(shots: &[Shot], to: S) -> Result<S::Ok, S::Error> {
+        to.collect_seq(shots.iter().map(|shot| [shot.ratio, shot.shift]))
+    }
+
+    pub(super) fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<Vec<Shot>, D::Error> {
+        let pairs: Vec<[f64; 2]> = Vec::deserialize(from)?;
+        let shots = pairs.into_iter();
+        Ok(shots.map(|[ratio, shift]| Shot { ratio, shift }).collect())
+    }
 }
 
 /// The kinds of sequence, ordered by how far from the golden map they can unwrap.

@@ -13,6 +13,7 @@ use crate::head::calibration::Calibration;
 use algo::adaptive::{Surface, phase_reach};
 use algo::geometry::Triangulator;
 use algo::inspect::openings;
+use algo::pattern::Shot;
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
 
@@ -59,8 +60,8 @@ pub struct GoldenPart<'a> {
     pub calibration: &'a Calibration,
     /// The pattern's file form; the function itself is the triangulator's.
     pub pattern: PatternFile,
-    /// Ratio and shift of each frame of the full sequence.
-    pub full: &'a [(f64, f64)],
+    /// What each frame of the full sequence shows.
+    pub full: &'a [Shot],
     /// How it was decoded.
     pub decoder: &'a Decoder,
     /// The geometry with its phase function.
@@ -222,22 +223,15 @@ impl GoldenPart<'_> {
 
     /// The sequences that the part can be measured with, and what each is worth.
     fn sequences(&self, arrays: &Arrays) -> Vec<SequenceFile> {
-        let level = |ratio: f64, steps: u32| {
-            (0..steps).map(move |k| [ratio, f64::from(k) / f64::from(steps)])
-        };
-        let mut full: Vec<[f64; 2]> = self
-            .full
-            .iter()
-            .map(|&(ratio, shift)| [ratio, shift])
-            .collect();
+        let mut full = self.full.to_vec();
         // The finest last: the others are decoded while it is being exposed.
-        full.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        full.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
         let candidates = [
-            (SequenceKind::SingleLevel, level(1.0, 3).collect()),
-            (SequenceKind::SingleLevel, level(1.0, 4).collect()),
+            (SequenceKind::SingleLevel, Shot::level(1.0, 3).collect()),
+            (SequenceKind::SingleLevel, Shot::level(1.0, 4).collect()),
             (
                 SequenceKind::TwoLevels,
-                level(0.8, 3).chain(level(1.0, 3)).collect(),
+                Shot::level(0.8, 3).chain(Shot::level(1.0, 3)).collect(),
             ),
             (SequenceKind::Full, full),
         ];
@@ -250,7 +244,7 @@ impl GoldenPart<'_> {
     fn variance(
         &self,
         kind: SequenceKind,
-        frames: &[[f64; 2]],
+        frames: &[Shot],
         arrays: &Arrays,
     ) -> impl Fn(usize) -> f64 {
         // Of a geometric sequence only the finest level carries the accuracy.
@@ -258,8 +252,8 @@ impl GoldenPart<'_> {
         let carries = |ratio: f64| !absolute || ratio >= 0.999;
         let squares = frames
             .iter()
-            .filter(|[ratio, _]| carries(*ratio))
-            .map(|[ratio, _]| ratio * ratio);
+            .filter(|shot| carries(shot.ratio))
+            .map(|shot| shot.ratio * shot.ratio);
         let information: f64 = squares.sum();
         move |at| {
             let counts = f64::from(arrays.modulation[at]);
@@ -300,7 +294,7 @@ impl GoldenPart<'_> {
         noise.hold(&mut arrays.valid, DEVIATION_MM)
     }
 
-    fn worth(&self, kind: SequenceKind, frames: Vec<[f64; 2]>, arrays: &Arrays) -> SequenceFile {
+    fn worth(&self, kind: SequenceKind, frames: Vec<Shot>, arrays: &Arrays) -> SequenceFile {
         let safe = |at: &usize| {
             kind.reach()
                 .is_none_or(|reach| arrays.phase_reach[*at] < reach)

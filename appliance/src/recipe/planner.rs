@@ -80,6 +80,7 @@ pub fn choose(sequences: &[SequenceFile], gauges: &[GaugeFile]) -> Choice {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use algo::pattern::Shot;
 
     fn sequences(sigmas: [f64; 3], safe: [f64; 3]) -> Vec<SequenceFile> {
         let kinds = [
@@ -90,7 +91,7 @@ mod tests {
         (0..3)
             .map(|i| SequenceFile {
                 kind: kinds[i],
-                frames: vec![[1.0, 0.0]; [4, 6, 12][i]],
+                frames: Shot::level(1.0, [4, 6, 12][i]).collect(),
                 sigma_mm: sigmas[i],
                 safe_share: safe[i],
             })

@@ -12,7 +12,7 @@ use crate::head::seam;
 use crate::station::error_code;
 use crate::system::computing::Computing;
 use algo::adaptive::{AdaptError, ProjectorMap, noise};
-use algo::pattern::{PhaseFunction, Sequence};
+use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, PhaseMap};
 use hal::head::DynHead;
@@ -125,8 +125,8 @@ pub fn teach_while(
     );
     let preliminary = PhaseFunction::vertical(columns, rows, columns as f64 / PRELIMINARY_PITCH_PX)
         .map_err(|error| TeachError::Rig(error.to_string()))?;
-    let frames = Sequence::geometric(preliminary.range(), LEVELS, STEPS);
-    let first = rig.measure(&preliminary, &frames, About::Reference, &|share| {
+    let shots = Sequence::geometric(preliminary.range(), LEVELS, STEPS);
+    let first = rig.measure(&preliminary, &shots, About::Reference, &|share| {
         // The sequence goes on; the next step does not.
         progress(0.3 * share, "measuring the part");
     })?;
@@ -135,7 +135,7 @@ pub fn teach_while(
     let map = ProjectorMap::from_heights(&first.triangulator, &first.heights);
     let function = computing.on(|| {
         let optics = noise::Optics {
-            projector_blur: blur(&first, &frames, &map, columns as f64)?,
+            projector_blur: blur(&first, &shots, &map, columns as f64)?,
             camera_blur: 0.0,
             projector_pitch: noise::PROJECTOR_PITCH,
             image_pitch: noise::IMAGE_PITCH,
@@ -144,7 +144,7 @@ pub fn teach_while(
     })?;
     step(0.4, "measuring the part with its own pattern")?;
     let expected = map.expected_phase(&function);
-    let full = dense(DENSE_N);
+    let full = Sequence::dense(DENSE_N, STEPS);
     let golden = rig.measure(&function, &full, About::Map(&expected), &|share| {
         progress(0.4 + 0.3 * share, "measuring the part with its own pattern");
     })?;
@@ -181,7 +181,7 @@ pub fn teach_while(
 /// measurement's coarsest and finest level.
 fn blur(
     first: &Measured,
-    frames: &[(f64, f64)],
+    shots: &[Shot],
     map: &ProjectorMap,
     columns: f64,
 ) -> Result<f64, TeachError> {
@@ -190,7 +190,7 @@ fn blur(
     let views = views
         .collect::<Result<Vec<_>, _>>()
         .map_err(|error| rig(&error))?;
-    let sequence = Sequence::from_frames(&frames[..STEPS]).map_err(|error| rig(&error))?;
+    let sequence = Sequence::from_frames(&shots[..STEPS]).map_err(|error| rig(&error))?;
     let function = first.triangulator.function();
     let bit_depth = first.frames[0].format().bit_depth;
     let decoder =
@@ -207,15 +207,7 @@ fn blur(
         )
     });
     let frequency = function.range().span() / (columns - 1.0);
-    Ok(noise::measured_blur(samples, frequency, frequency * frames[0].0).unwrap_or(0.0))
-}
-
-/// Ratio and shift of three dense levels of four steps, ratios 1, 1 − 1/n², 1 − 1/n.
-pub fn dense(n: f64) -> Vec<(f64, f64)> {
-    [1.0, 1.0 - 1.0 / (n * n), 1.0 - 1.0 / n]
-        .into_iter()
-        .flat_map(|ratio| (0..4).map(move |k| (ratio, f64::from(k) / 4.0)))
-        .collect()
+    Ok(noise::measured_blur(samples, frequency, frequency * shots[0].ratio).unwrap_or(0.0))
 }
 
 /// Says what keeps an unusable scene from being taught.

@@ -1,11 +1,11 @@
 //! All differences of 8-bit samples with four shifts, through the whole decoder.
 
 use super::bounds::ARCTANGENT;
-use super::stack::Stack;
+use super::stack::{Stack, shots};
+use algo::pattern::Shot;
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use std::f64::consts::TAU;
-use tests::render::levels;
 
 /// Of the error, turns: the prototype of such a kernel left 6.7e-6.
 const RMS: f64 = 1e-5;
@@ -54,7 +54,7 @@ fn exhaust(name: &str, mut stack: Stack, middle: i32) -> Error {
         let turns = f64::from(s).atan2(f64::from(c)) / TAU;
         let phase = 40.0 + turns;
         for frame in 0..finest {
-            let (ratio, shift) = stack.frames[frame];
+            let Shot { ratio, shift } = stack.frames[frame];
             let light = 127.0 + 100.0 * (TAU * (ratio * phase + shift)).sin();
             stack.set(frame, pixel, light.round() as u16);
         }
@@ -110,7 +110,7 @@ fn check(name: &str, stack: Stack, middle: i32) {
 }
 
 fn dark(ratios: &[f64], range: (f64, f64)) -> Stack {
-    Stack::dark((DIFFERENCES, DIFFERENCES), 8, levels(ratios, 4), range)
+    Stack::dark((DIFFERENCES, DIFFERENCES), 8, shots(ratios, 4), range)
 }
 
 #[test]

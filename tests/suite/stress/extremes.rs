@@ -3,13 +3,12 @@
 use super::bounds::Tally;
 use super::random::{Draw, KINDS};
 use super::rig;
-use super::stack::{Stack, pool};
+use super::stack::{Stack, pool, shots};
 use algo::phase::{FULL_TRUST_STEPS, Trust};
 use algo::pipeline::triangulate;
 use algo::units::AbsolutePhase;
 use std::f64::consts::TAU;
 use tests::random::Random;
-use tests::render::levels;
 
 const SEED: u64 = 20_260_606;
 /// Of 8 bit; scales with full scale.
@@ -21,12 +20,12 @@ const SATURATED_RMS: f64 = 7e-4;
 /// Three geometric levels of `shifts`.
 fn geometric(size: (usize, usize), bit_depth: u8, shifts: usize) -> Stack {
     let ratios = [0.94 / 60.0, (0.94_f64 / 60.0).sqrt(), 1.0];
-    Stack::dark(size, bit_depth, levels(&ratios, shifts), (0.0, 60.0))
+    Stack::dark(size, bit_depth, shots(&ratios, shifts), (0.0, 60.0))
 }
 
 /// One level about a map of zeros.
 fn single(size: (usize, usize), bit_depth: u8, shifts: usize) -> Stack {
-    let mut stack = Stack::dark(size, bit_depth, levels(&[1.0], shifts), (0.0, 60.0));
+    let mut stack = Stack::dark(size, bit_depth, shots(&[1.0], shifts), (0.0, 60.0));
     stack.map = Some(vec![AbsolutePhase::from_turns(0.0); stack.pixels()]);
     stack
 }
@@ -135,7 +134,7 @@ fn from_sixteen_counts_on_the_phase_is_known_and_below_it_never() {
             for pixel in 0..stack.pixels() {
                 let (turns, counts) = truth(pixel);
                 for frame in 0..shifts {
-                    let sine = (TAU * (turns + stack.frames[frame].1)).sin();
+                    let sine = (TAU * (turns + stack.frames[frame].shift)).sin();
                     let light = scale * (100.3 + counts as f64 * sine);
                     stack.set(frame, pixel, light.round() as u16);
                 }
@@ -170,7 +169,7 @@ fn a_tenth_over_full_scale_is_rejected_below_eight_shifts_and_a_small_periodic_e
         let truth = |pixel: usize| 0.99 * (pixel as f64 / 1024.0 - 0.5);
         for pixel in 0..stack.pixels() {
             for frame in 0..shifts {
-                let sine = (TAU * (truth(pixel) + stack.frames[frame].1)).sin();
+                let sine = (TAU * (truth(pixel) + stack.frames[frame].shift)).sin();
                 let light = full * 1.1 * (0.5 + 0.5 * sine);
                 stack.set(frame, pixel, light.round().min(full) as u16);
             }

@@ -2,22 +2,21 @@
 
 use super::bounds::Tally;
 use super::random::between;
-use super::stack::Stack;
+use super::stack::{Stack, shots};
 use algo::pattern::{
     MAX_DENSE_N, MAX_LEVELS, MAX_SHIFTS, MAX_STEP, MAX_TURNS, PhaseFunction, PhaseFunctionError,
-    PhaseRange, Sequence,
+    PhaseRange, Sequence, Shot,
 };
 use algo::phase::{DecodeError, Decoder, Trust};
 use algo::units::AbsolutePhase;
 use std::f64::consts::TAU;
 use tests::random::Random;
-use tests::render::levels;
 
 const SEED: u64 = 20_260_608;
 
 /// Why a sequence of ratios, of `shifts` each, is refused for a phase function of this range.
 fn refusal(ratios: &[f64], shifts: usize, (min, max): (f64, f64)) -> Option<String> {
-    let frames = levels(ratios, shifts);
+    let frames = shots(ratios, shifts);
     let sequence = match Sequence::from_frames(&frames) {
         Ok(sequence) => sequence,
         Err(error) => return Some(error.to_string()),
@@ -45,7 +44,7 @@ fn climb(span: f64, finest: f64, step: f64) -> Vec<f64> {
 }
 
 /// A stack of noise-free 12-bit pixels with phases all over the range.
-fn lit(frames: Vec<(f64, f64)>, (min, max): (f64, f64), reach: f64) -> (Stack, Vec<f64>) {
+fn lit(frames: Vec<Shot>, (min, max): (f64, f64), reach: f64) -> (Stack, Vec<f64>) {
     let mut random = Random::new(SEED);
     let mut stack = Stack::dark((4096, 1), 12, frames, (min, max));
     let phases: Vec<f64> = (0..stack.pixels())
@@ -56,7 +55,7 @@ fn lit(frames: Vec<(f64, f64)>, (min, max): (f64, f64), reach: f64) -> (Stack, V
         })
         .collect();
     for frame in 0..stack.frames.len() {
-        let (ratio, shift) = stack.frames[frame];
+        let Shot { ratio, shift } = stack.frames[frame];
         for (pixel, phase) in phases.iter().enumerate() {
             let light = 2047.5 + 1800.0 * (TAU * (ratio * phase + shift)).sin();
             stack.set(frame, pixel, light.round() as u16);
@@ -86,12 +85,12 @@ fn decodes(name: &str, (stack, phases): (Stack, Vec<f64>)) {
 fn as_many_turns_as_documented_decode_in_every_fringe_and_more_are_refused() {
     for range in [(0.0, MAX_TURNS), (-MAX_TURNS, 0.0)] {
         let ratios = climb(MAX_TURNS, 1.0, 16.0);
-        decodes("geometric", lit(levels(&ratios, 4), range, 0.0));
+        decodes("geometric", lit(shots(&ratios, 4), range, 0.0));
         decodes(
             "dense",
-            lit(levels(&[35.0 / 36.0, 5.0 / 6.0, 1.0], 4), range, 11.0),
+            lit(shots(&[35.0 / 36.0, 5.0 / 6.0, 1.0], 4), range, 11.0),
         );
-        decodes("single", lit(levels(&[1.0], 4), range, 0.45));
+        decodes("single", lit(shots(&[1.0], 4), range, 0.45));
     }
     let over = MAX_TURNS + 1.0;
     for ratios in [climb(over, 1.0, 16.0), vec![0.8, 1.0], vec![1.0]] {
@@ -136,10 +135,10 @@ fn the_largest_step_between_levels_decodes_and_a_larger_one_is_refused() {
     // Half a count of 12 bit in a level of 16 shifts leaves at most 9e-5 turn: the step must not take more
     // than the limit of the residual from it.
     const { assert!(MAX_STEP * 9e-5 < 0.4, "a step that rounding alone slips") };
-    decodes("two levels", lit(levels(&ratios, 16), (0.0, span), 0.0));
+    decodes("two levels", lit(shots(&ratios, 16), (0.0, span), 0.0));
     // The finest ratio may be as small as the step is large.
     let small = [1.0 / MAX_STEP];
-    decodes("a small ratio", lit(levels(&small, 16), (0.0, span), 0.0));
+    decodes("a small ratio", lit(shots(&small, 16), (0.0, span), 0.0));
     let over = 1.0 / (MAX_STEP + 1.0);
     names(
         refusal(&[over, 1.0], 4, (0.0, span)),
@@ -168,7 +167,7 @@ fn dense_levels_have_an_n_of_at_most_the_documented_one() {
     let n = 20.0_f64;
     let three = [1.0 - 1.0 / n, 1.0 - 1.0 / (n * n), 1.0];
     let reach = n * n / 2.0 - n;
-    decodes("n = 20", lit(levels(&three, 4), (0.0, 1000.0), reach));
+    decodes("n = 20", lit(shots(&three, 4), (0.0, 1000.0), reach));
 }
 
 #[test]
@@ -182,7 +181,7 @@ fn as_many_levels_and_shifts_as_documented_decode_and_more_are_refused() {
     };
     let most = ratios(MAX_LEVELS);
     assert_eq!(most.len(), MAX_LEVELS);
-    decodes("levels", lit(levels(&most, 3), (0.0, 100.0), 0.0));
+    decodes("levels", lit(shots(&most, 3), (0.0, 100.0), 0.0));
     let over: Vec<f64> = (0..=MAX_LEVELS)
         .map(|i| 0.01 * 1.5_f64.powi(i as i32))
         .collect();
@@ -190,7 +189,7 @@ fn as_many_levels_and_shifts_as_documented_decode_and_more_are_refused() {
         refusal(&over, 3, (0.0, 90.0)),
         &[(MAX_LEVELS + 1).to_string(), MAX_LEVELS.to_string()],
     );
-    decodes("shifts", lit(levels(&[1.0], MAX_SHIFTS), (0.0, 0.9), 0.0));
+    decodes("shifts", lit(shots(&[1.0], MAX_SHIFTS), (0.0, 0.9), 0.0));
     for shifts in [1, 2, MAX_SHIFTS + 1] {
         names(
             refusal(&[1.0], shifts, (0.0, 0.9)),
@@ -202,7 +201,7 @@ fn as_many_levels_and_shifts_as_documented_decode_and_more_are_refused() {
 #[test]
 fn the_brightest_frames_of_the_most_shifts_do_not_overflow() {
     for bit_depth in 8..=16 {
-        let frames = levels(&[0.01, 0.1, 1.0], MAX_SHIFTS);
+        let frames = shots(&[0.01, 0.1, 1.0], MAX_SHIFTS);
         let mut stack = Stack::dark((9, 1), bit_depth, frames, (0.0, 90.0));
         let full = stack.full_scale();
         // Full scale in a growing half of the shifts: the largest sums there are.
@@ -218,7 +217,7 @@ fn the_brightest_frames_of_the_most_shifts_do_not_overflow() {
 
 #[test]
 fn bit_depths_that_no_sample_has_are_refused() {
-    let sequence = Sequence::from_frames(&levels(&[1.0], 3)).unwrap();
+    let sequence = Sequence::from_frames(&shots(&[1.0], 3)).unwrap();
     let range = PhaseRange { min: 0.0, max: 0.9 };
     for bits in [0, 1, 7, 17, 255] {
         let error = Decoder::new(&sequence, range, bits).unwrap_err();

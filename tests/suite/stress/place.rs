@@ -2,7 +2,7 @@
 //! is looked at beside it.
 
 use super::random::{Draw, KINDS, stack};
-use super::stack::Stack;
+use super::stack::{Stack, shots};
 use algo::pipeline::PhaseMap;
 use algo::units::{AbsolutePhase, Modulation};
 use std::ops::Range;
@@ -137,7 +137,7 @@ fn what_is_looked_at_does_not_change_what_is_seen() {
 #[test]
 fn frames_without_pixels_decode_to_nothing() {
     for size in [(0, 0), (0, 3), (3, 0)] {
-        let frames = tests::render::levels(&[0.01, 0.1, 1.0], 4);
+        let frames = shots(&[0.01, 0.1, 1.0], 4);
         let stack = Stack::dark(size, 8, frames, (0.0, 90.0));
         assert!(stack.decode().phase.is_empty());
     }

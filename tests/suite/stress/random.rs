@@ -1,7 +1,7 @@
 //! Seeded stacks of every form: any number of shifts, depth, ratios, size and stride.
 
 use super::stack::Stack;
-use algo::pattern::MAX_STEP;
+use algo::pattern::{MAX_STEP, Shot};
 use algo::units::AbsolutePhase;
 use std::f64::consts::TAU;
 use tests::random::Random;
@@ -61,7 +61,7 @@ pub fn stack(random: &mut Random, draw: Draw) -> Stack {
         let (offset, modulation, noise) = light(random);
         let wild = random.below(6) == 0;
         for frame in 0..stack.frames.len() {
-            let (ratio, shift) = stack.frames[frame];
+            let Shot { ratio, shift } = stack.frames[frame];
             let sine = (TAU * (ratio * phase + shift)).sin();
             let share = offset + modulation * sine + between(random, -noise, noise);
             let share = if wild { random.share() } else { share };
@@ -138,13 +138,14 @@ fn order(random: &mut Random, least: usize) -> f64 {
 }
 
 /// Frames of levels whose shifts start anywhere and run up or down, in any order.
-fn frames(random: &mut Random, ratios: &[f64], shifts: Option<usize>) -> Vec<(f64, f64)> {
+fn frames(random: &mut Random, ratios: &[f64], shifts: Option<usize>) -> Vec<Shot> {
     let mut frames = Vec::new();
     for &ratio in ratios {
         let count = shifts.unwrap_or_else(|| 3 + random.below(14));
         let start = [0.0, 0.0, 0.25, random.share() - 0.5][random.below(4)];
         let sign = [1.0, -1.0][random.below(2)];
-        frames.extend((0..count).map(|k| (ratio, start + sign * k as f64 / count as f64)));
+        let shift = |k| start + sign * k as f64 / count as f64;
+        frames.extend((0..count).map(shift).map(|shift| Shot { ratio, shift }));
     }
     if random.below(2) == 0 {
         for place in (1..frames.len()).rev() {

@@ -1,7 +1,7 @@
 //! Frames of any samples, decoded in every way that must give the same bits.
 
 use algo::frame::{FrameView, Samples};
-use algo::pattern::{PhaseRange, Sequence};
+use algo::pattern::{PhaseRange, Sequence, Shot};
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, PhaseMap, Window};
 use algo::simd::Backend;
@@ -19,8 +19,8 @@ pub struct Stack {
     /// Samples from row to row; what lies between a row's end and the next row is no light.
     pub stride: usize,
     pub bit_depth: u8,
-    /// Ratio and shift of each frame.
-    pub frames: Vec<(f64, f64)>,
+    /// What each frame shows.
+    pub frames: Vec<Shot>,
     /// Of the phase function.
     pub range: PhaseRange,
     /// The known map, row-major, for the forms that need one.
@@ -39,7 +39,7 @@ impl Stack {
     pub fn dark(
         (width, height): (usize, usize),
         bit_depth: u8,
-        frames: Vec<(f64, f64)>,
+        frames: Vec<Shot>,
         (min, max): (f64, f64),
     ) -> Self {
         let samples = vec![vec![0; width * height]; frames.len()];
@@ -102,7 +102,7 @@ impl Stack {
     /// The levels as the textbook sees them, from coarse to fine.
     pub fn levels(&self) -> Vec<Level> {
         let frames = self.frames.iter().enumerate();
-        levels_from(frames.map(|(place, &(ratio, shift))| (place, ratio, shift)))
+        levels_from(frames.map(|(place, shot)| (place, shot.ratio, shot.shift)))
     }
 
     /// How the textbook unwraps the levels.
@@ -193,6 +193,12 @@ impl Delivered {
             |samples| FrameView::new(samples, stack.width, stack.height, stack.stride).unwrap();
         frames.into_iter().map(view).collect()
     }
+}
+
+/// The frames of levels with these ratios.
+pub fn shots(ratios: &[f64], shifts: usize) -> Vec<Shot> {
+    let levels = ratios.iter().map(|&ratio| Shot::level(ratio, shifts));
+    levels.flatten().collect()
 }
 
 /// A rejected pixel has no phase, and only a rejected pixel has none.

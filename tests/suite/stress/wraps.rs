@@ -2,13 +2,12 @@
 
 use super::bounds::ROUNDING;
 use super::random::between;
-use super::stack::Stack;
-use algo::pattern::{PhaseRange, Sequence};
+use super::stack::{Stack, shots};
+use algo::pattern::{PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use std::f64::consts::TAU;
 use tests::random::Random;
-use tests::render::levels;
 
 const SEED: u64 = 20_260_607;
 const FRINGES: f64 = 100.0;
@@ -39,14 +38,14 @@ fn phases(min: f64) -> Vec<f64> {
 }
 
 /// One pixel per phase, without noise; the map is off by up to `reach` turns.
-fn stack(phases: &[f64], min: f64, bit_depth: u8, frames: Vec<(f64, f64)>, reach: f64) -> Stack {
+fn stack(phases: &[f64], min: f64, bit_depth: u8, frames: Vec<Shot>, reach: f64) -> Stack {
     let mut random = Random::new(SEED);
     let range = (min, min + FRINGES);
     let mut stack = Stack::dark((phases.len(), 1), bit_depth, frames, range);
     let full = f64::from(stack.full_scale());
     for (pixel, phase) in phases.iter().enumerate() {
         for frame in 0..stack.frames.len() {
-            let (ratio, shift) = stack.frames[frame];
+            let Shot { ratio, shift } = stack.frames[frame];
             let sine = (TAU * (ratio * phase + shift)).sin();
             let light = full * (LIGHT.0 + LIGHT.1 * sine);
             stack.set(frame, pixel, light.round() as u16);
@@ -102,7 +101,10 @@ fn no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes() {
                 let frames = Sequence::geometric(range, count, shifts);
                 // Shifts from 0 are even about the ends; from anywhere else rounding tips them over.
                 for start in [0.0, 0.137] {
-                    let moved = frames.iter().map(|(ratio, shift)| (*ratio, start + shift));
+                    let moved = frames.iter().map(|&Shot { ratio, shift }| Shot {
+                        ratio,
+                        shift: start + shift,
+                    });
                     let stack = stack(&phases, min, bit_depth, moved.collect(), 0.0);
                     let name =
                         format!("{count} levels of {shifts}, {bit_depth} bit, from {min}, {start}");
@@ -128,7 +130,7 @@ fn no_fringe_order_slips_at_any_wrap_about_a_map() {
             (vec![1.0], 0.49),
         ] {
             for shifts in [3, 4] {
-                let frames = levels(&ratios, shifts);
+                let frames = shots(&ratios, shifts);
                 let stack = stack(&phases, 0.0, bit_depth, frames, reach);
                 let name = format!("{ratios:.3?} of {shifts}, {bit_depth} bit");
                 check(&name, &phases, &stack);

@@ -2,7 +2,7 @@
 
 use super::super::{Decoder, PhaseRow, Trust};
 use crate::frame::{FrameView, Samples};
-use crate::pattern::{PhaseRange, Sequence};
+use crate::pattern::{PhaseRange, Sequence, Shot};
 use crate::simd::Backend;
 use crate::units::{AbsolutePhase, Modulation};
 use rand_xoshiro::SplitMix64;
@@ -119,9 +119,7 @@ fn every_back_end_and_levels_on_arrival_give_the_same_bits() {
             for depth in [8, 10, 12, 16] {
                 let sequence: Vec<_> = ratios
                     .iter()
-                    .flat_map(|&ratio| {
-                        (0..steps).map(move |k| (ratio, f64::from(k) / f64::from(steps)))
-                    })
+                    .flat_map(|&ratio| Shot::level(ratio, steps))
                     .collect();
                 let sequence = Sequence::from_frames(&sequence).unwrap();
                 let decoder = Decoder::new(&sequence, range, depth).unwrap();

@@ -8,7 +8,7 @@ mod weights;
 use super::arrived::{Arrived, ArrivingRow, WrappedRow};
 use super::{Decoder, PhaseRow};
 use crate::frame::{FrameView, Samples};
-use crate::pattern::{PhaseRange, Sequence};
+use crate::pattern::{PhaseRange, Sequence, Shot};
 use crate::trust::Trust;
 use crate::units::{AbsolutePhase, Modulation};
 use core::f64::consts::TAU;
@@ -18,7 +18,8 @@ const ONE_TURN: PhaseRange = PhaseRange { min: 0.0, max: 1.0 };
 
 /// A decoder of one level with these shifts.
 fn level(shifts: &[f64], depth: u8) -> Decoder {
-    let frames: Vec<_> = shifts.iter().map(|&shift| (1.0, shift)).collect();
+    let shot = |&shift| Shot { ratio: 1.0, shift };
+    let frames: Vec<_> = shifts.iter().map(shot).collect();
     Decoder::new(&Sequence::from_frames(&frames).unwrap(), ONE_TURN, depth).unwrap()
 }
 

@@ -7,13 +7,12 @@ use super::median::median;
 use super::point::Point;
 use super::variants::{Variant, decoders, references};
 use crate::experiment::{OpticsKind, Pattern, Runner, Scene};
-use algo::pattern::{PhaseRange, Sequence};
+use algo::pattern::{PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::{AbsolutePhase, Modulation};
 use appliance::head::rig::Measured;
 use appliance::measure::{Score, Truth};
-use appliance::recipe::teach::dense;
 use std::ops::Range;
 use std::time::Duration;
 
@@ -68,19 +67,14 @@ const SEQUENCES: [Compared; 10] = [
 ];
 
 impl Compared {
-    fn frames(&self, range: PhaseRange) -> Vec<(f64, f64)> {
-        if matches!(self.pattern, Pattern::Fixed { .. }) {
-            return Sequence::geometric(range, self.levels, self.steps);
+    fn frames(&self, range: PhaseRange) -> Vec<Shot> {
+        let level = |ratio| Shot::level(ratio, self.steps);
+        match (self.pattern, self.levels) {
+            (Pattern::Fixed { .. }, levels) => Sequence::geometric(range, levels, self.steps),
+            (_, 3) => Sequence::dense(DENSE_N, self.steps),
+            (_, 2) => level(1.0).chain(level(0.8)).collect(),
+            _ => level(1.0).collect(),
         }
-        let mut ratios: Vec<f64> = match self.levels {
-            3 => dense(DENSE_N).iter().map(|frame| frame.0).collect(),
-            2 => vec![1.0, 0.8],
-            _ => vec![1.0],
-        };
-        ratios.dedup();
-        let steps = self.steps;
-        let level = |ratio| (0..steps).map(move |k| (ratio, k as f64 / steps as f64));
-        ratios.into_iter().flat_map(level).collect()
     }
 }
 

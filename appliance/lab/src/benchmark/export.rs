@@ -21,7 +21,7 @@ pub fn frame_files((width, height): (usize, usize)) -> Vec<(String, Vec<u8>)> {
     files.push(("phase.npy".into(), npy::write(width, &phases)));
     let sequence = serde_json::json!({
         "fringes": RANGE.span(),
-        "frames": workload.frames.iter().map(|(ratio, shift)| serde_json::json!({"ratio": ratio, "shift": shift})).collect::<Vec<_>>(),
+        "frames": workload.frames.iter().map(|shot| serde_json::json!({"ratio": shot.ratio, "shift": shot.shift})).collect::<Vec<_>>(),
     });
     files.push(("sequence.json".into(), format!("{sequence:#}\n").into()));
     files

@@ -1,9 +1,8 @@
 //! What the kernels are timed on: synthetic frames of every kind of sequence, and the phase that is in them.
 
 use super::frames::{Buffer, FrameSet};
-use algo::pattern::{PhaseRange, Sequence};
+use algo::pattern::{PhaseRange, Sequence, Shot};
 use algo::units::AbsolutePhase;
-use appliance::recipe::teach::dense;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
@@ -13,8 +12,8 @@ use std::f64::consts::TAU;
 pub struct Workload {
     /// For tables and keys.
     pub name: &'static str,
-    /// Ratio and shift of each frame.
-    pub frames: Vec<(f64, f64)>,
+    /// What each frame shows.
+    pub frames: Vec<Shot>,
     /// Share of the pixels on which the part is; the rest is dark.
     pub lit: f64,
     /// Bits of a sample.
@@ -89,10 +88,13 @@ impl Workload {
             geometric("geometric_24", 8),
             bits("bits_10", 10),
             bits("bits_12", 12),
-            compared(about("dense_12", dense(DENSE_N))),
-            compared(about("golden_4", level(1.0, 4).collect())),
-            about("golden_3", level(1.0, 3).collect()),
-            about("golden_6", level(1.0, 3).chain(level(0.8, 3)).collect()),
+            compared(about("dense_12", Sequence::dense(DENSE_N, 4))),
+            compared(about("golden_4", Shot::level(1.0, 4).collect())),
+            about("golden_3", Shot::level(1.0, 3).collect()),
+            about(
+                "golden_6",
+                Shot::level(1.0, 3).chain(Shot::level(0.8, 3)).collect(),
+            ),
         ]
     }
 
@@ -106,7 +108,7 @@ impl Workload {
         let phases: Vec<f64> = (0..width * height).map(|at| self.phase(at, size)).collect();
         let mut random = SplitMix64::seed_from_u64(0);
         let mut samples = Vec::with_capacity(self.frames.len() * phases.len());
-        for &(ratio, shift) in &self.frames {
+        for &Shot { ratio, shift } in &self.frames {
             samples.extend(phases.iter().map(|phase| {
                 let light = if phase.is_nan() {
                     DARK * full
@@ -146,9 +148,4 @@ impl Workload {
         }
         0.5 + (RANGE.span() - 1.0) * x + 0.4 * (3.0 * TAU * y).sin()
     }
-}
-
-/// The shifts of one level of `steps`.
-fn level(ratio: f64, steps: u32) -> impl Iterator<Item = (f64, f64)> {
-    (0..steps).map(move |k| (ratio, f64::from(k) / f64::from(steps)))
 }

@@ -3,7 +3,7 @@
 use super::methods::Method;
 use super::runner::Run;
 use super::shade;
-use algo::pattern::Encoder;
+use algo::pattern::{Encoder, Shot};
 use appliance::output::canvas::{Canvas, LINE};
 use hal::frame::Samples;
 
@@ -24,7 +24,11 @@ const LEVELS: u8 = 16;
 impl View {
     /// Of a run.
     pub fn of(method: Method, run: &Run) -> Self {
-        let raster = Encoder::new(None).raster(&run.function, 1.0, 0.0);
+        let shot = Shot {
+            ratio: 1.0,
+            shift: 0.0,
+        };
+        let raster = Encoder::new(None).raster(&run.function, shot);
         let frame = &run.measured.frames[run.finest];
         let format = frame.format();
         let bytes: Vec<u8> = match frame.samples() {

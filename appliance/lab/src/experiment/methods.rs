@@ -1,6 +1,6 @@
 //! The methods that are compared, and the frames of each.
 
-use algo::pattern::PhaseFunction;
+use algo::pattern::{PhaseFunction, Sequence, Shot};
 
 /// A way to measure a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,12 +16,12 @@ pub enum Method {
         image_pitch: u32,
     },
     /// The better pattern.
-    Better(Shot),
+    Better(Frames),
 }
 
 /// The sequences of the better method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shot {
+pub enum Frames {
     /// Three dense levels of four steps about the map of the preliminary measurement.
     Twelve,
     /// Three dense levels of three steps.
@@ -37,7 +37,7 @@ pub enum Shot {
 /// The fixed pattern that pictures show.
 pub const SHOWN_FIXED: Method = Method::Fixed { fringes: 100 };
 /// The adaptive pattern that pictures show.
-pub const SHOWN_ADAPTIVE: Method = Method::Better(Shot::Twelve);
+pub const SHOWN_ADAPTIVE: Method = Method::Better(Frames::Twelve);
 /// What all ratios refer to: the paper's own adaptive run.
 pub const PAPER: Method = Method::Paper { image_pitch: 5 };
 
@@ -46,7 +46,7 @@ impl Method {
     pub fn table(fringes: &[u32]) -> Vec<Self> {
         let fixed = fringes.iter().map(|&fringes| Self::Fixed { fringes });
         let papers = [PAPER, Self::Paper { image_pitch: 4 }];
-        let better = Shot::ALL.map(Self::Better);
+        let better = Frames::ALL.map(Self::Better);
         fixed.chain(papers).chain(better).collect()
     }
 
@@ -55,7 +55,7 @@ impl Method {
         match self {
             Self::Fixed { fringes } => format!("fixed-{fringes}"),
             Self::Paper { image_pitch } => format!("paper-{image_pitch}"),
-            Self::Better(shot) => format!("better-{}", shot.count()),
+            Self::Better(frames) => format!("better-{}", frames.count()),
         }
     }
 
@@ -63,12 +63,12 @@ impl Method {
     pub fn frame_count(self) -> u32 {
         match self {
             Self::Fixed { .. } | Self::Paper { .. } => 12,
-            Self::Better(shot) => shot.count(),
+            Self::Better(frames) => frames.count(),
         }
     }
 }
 
-impl Shot {
+impl Frames {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Twelve, Self::Nine, Self::Six, Self::Four, Self::Three];
 
@@ -88,37 +88,28 @@ impl Shot {
         !matches!(self, Self::Twelve | Self::Nine)
     }
 
-    /// Ratio and shift of each frame.
-    pub fn frames(self) -> Vec<(f64, f64)> {
-        let n = 4.0;
-        let dense = [1.0, 1.0 - 1.0 / (n * n), 1.0 - 1.0 / n];
-        let (ratios, steps): (&[f64], u32) = match self {
-            Self::Twelve => (&dense, 4),
-            Self::Nine => (&dense, 3),
-            Self::Six => (&[1.0, 0.8], 3),
-            Self::Four => (&[1.0], 4),
-            Self::Three => (&[1.0], 3),
-        };
-        shifted(ratios, steps)
+    /// What each frame shows.
+    pub fn shots(self) -> Vec<Shot> {
+        match self {
+            Self::Twelve => Sequence::dense(4.0, 4),
+            Self::Nine => Sequence::dense(4.0, 3),
+            Self::Six => Shot::level(1.0, 3).chain(Shot::level(0.8, 3)).collect(),
+            Self::Four => Shot::level(1.0, 4).collect(),
+            Self::Three => Shot::level(1.0, 3).collect(),
+        }
     }
 }
 
 /// A geometric sequence as the paper has it: levels 1, n, n² with n = √(max Φ_P), N = 4.
-pub fn geometric(function: &PhaseFunction) -> Vec<(f64, f64)> {
+pub fn geometric(function: &PhaseFunction) -> Vec<Shot> {
     let max = function.range().max;
-    shifted(&[1.0 / max, 1.0 / max.sqrt(), 1.0], 4)
-}
-
-fn shifted(ratios: &[f64], steps: u32) -> Vec<(f64, f64)> {
-    let level = |&ratio| (0..steps).map(move |k| (ratio, f64::from(k) / f64::from(steps)));
-    ratios.iter().flat_map(level).collect()
+    let ratios = [1.0 / max, 1.0 / max.sqrt(), 1.0].into_iter();
+    ratios.flat_map(|ratio| Shot::level(ratio, 4)).collect()
 }
 
 /// The first frame of the finest level.
-pub fn finest(frames: &[(f64, f64)]) -> usize {
-    let ratio = frames
-        .iter()
-        .fold(0.0, |most, frame| f64::max(most, frame.0));
-    let found = frames.iter().position(|frame| frame.0 == ratio);
+pub fn finest(shots: &[Shot]) -> usize {
+    let ratio = shots.iter().map(|shot| shot.ratio).fold(0.0, f64::max);
+    let found = shots.iter().position(|shot| shot.ratio == ratio);
     found.unwrap_or(0)
 }

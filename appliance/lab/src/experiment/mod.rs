@@ -16,7 +16,7 @@ pub use campaign::{Campaign, Results};
 pub use cylinder::Cylinder;
 pub use figures::figures;
 pub use judge::Outcome;
-pub use methods::{Method, Shot};
+pub use methods::{Frames, Method};
 pub use runner::{Pattern, Run, Runner};
 pub use scenes::{Judged, OpticsKind, PARTS, Scene};
 pub use table::{HEADER, Row, Values, csv, means, table};

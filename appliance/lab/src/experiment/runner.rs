@@ -4,10 +4,10 @@
 //! is measured once per noise seed and shared by the runs that need it.
 
 use super::judge::{Outcome, judge};
-use super::methods::{self, Method, Shot};
+use super::methods::{self, Frames, Method};
 use super::scenes::{Judged, OpticsKind, Scene};
 use algo::adaptive::{ProjectorMap, noise, paper};
-use algo::pattern::{PhaseFunction, PhaseRange, Sequence};
+use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use appliance::head::calibration::Calibration;
@@ -132,19 +132,19 @@ impl Runner {
                 let function = paper::adapt(&map, columns, rows, f64::from(image_pitch));
                 self.paper_chain(method, function.map_err(rig)?)
             }
-            Method::Better(shot) => self.better_shot(method, shot),
+            Method::Better(frames) => self.better_frames(method, frames),
         }
     }
 
-    /// Measures with a sequence of the caller's choice and the noise of `seed`. `frames` returns ratio and shift of each
-    /// frame for the range of the phase function. The second result is the map that the phase was unwrapped about.
+    /// Measures with a sequence of the caller's choice and the noise of `seed`. `shots` returns what each frame
+    /// shows, for the range of the phase function. The second result is the map that the phase was unwrapped about.
     ///
     /// # Errors
     /// If the head or the pattern fails.
     pub fn measure_with(
         &mut self,
         pattern: Pattern,
-        frames: impl Fn(PhaseRange) -> Vec<(f64, f64)>,
+        shots: impl Fn(PhaseRange) -> Vec<Shot>,
         seed: u64,
     ) -> Result<(Measured, Option<Vec<AbsolutePhase>>), RigError> {
         self.learn_with(seed);
@@ -160,8 +160,8 @@ impl Runner {
             }
         };
         let about = map.as_deref().map_or(About::Reference, About::Map);
-        let frames = frames(function.range());
-        let measured = self.measure(CHOSEN_STREAM, &function, &frames, about)?;
+        let shots = shots(function.range());
+        let measured = self.measure(CHOSEN_STREAM, &function, &shots, about)?;
         Ok((measured, map))
     }
 
@@ -188,7 +188,7 @@ impl Runner {
         &mut self,
         noise_stream: u64,
         function: &PhaseFunction,
-        frames: &[(f64, f64)],
+        shots: &[Shot],
         about: About<'_>,
     ) -> Result<Measured, RigError> {
         self.stage.reseed(self.learnt.seed * STREAMS + noise_stream);
@@ -198,7 +198,7 @@ impl Runner {
             range: None,
             timeout: TIMEOUT,
         };
-        rig.measure(function, frames, about, &|_| ())
+        rig.measure(function, shots, about, &|_| ())
     }
 
     fn vertical(&self, fringes: f64) -> Result<PhaseFunction, RigError> {
@@ -212,8 +212,8 @@ impl Runner {
             return Ok(Arc::clone(known));
         }
         let function = self.vertical(self.size().0 as f64 / PRELIMINARY_PITCH)?;
-        let frames = Sequence::geometric(function.range(), 3, 4);
-        let measured = self.measure(PRELIMINARY_STREAM, &function, &frames, About::Reference)?;
+        let shots = Sequence::geometric(function.range(), 3, 4);
+        let measured = self.measure(PRELIMINARY_STREAM, &function, &shots, About::Reference)?;
         let map = ProjectorMap::from_heights(&measured.triangulator, &measured.heights);
         let phase = measured.phases.phase;
         let found = Arc::new(Preliminary { phase, map });
@@ -229,8 +229,8 @@ impl Runner {
         let (columns, rows) = self.size();
         let fringes = rows as f64 / PRELIMINARY_PITCH;
         let function = PhaseFunction::horizontal(columns, rows, fringes).map_err(rig)?;
-        let frames = Sequence::geometric(function.range(), 3, 4);
-        let horizontal = self.measure(HORIZONTAL_STREAM, &function, &frames, About::Reference)?;
+        let shots = Sequence::geometric(function.range(), 3, 4);
+        let horizontal = self.measure(HORIZONTAL_STREAM, &function, &shots, About::Reference)?;
         let pairs = vertical.phase.iter().zip(&horizontal.phases.phase);
         let map = ProjectorMap {
             width: horizontal.phases.width,
@@ -278,44 +278,44 @@ impl Runner {
         }
         let better = self.better()?;
         let about = About::Map(&better.expected);
-        let frames = Shot::Twelve.frames();
-        let measured = self.measure(GOLDEN_STREAM, &better.function, &frames, about)?;
+        let shots = Frames::Twelve.shots();
+        let measured = self.measure(GOLDEN_STREAM, &better.function, &shots, about)?;
         let found = Arc::new(measured.phases.phase);
         Ok(Arc::clone(self.learnt.golden.insert(found)))
     }
 
-    fn better_shot(&mut self, method: Method, shot: Shot) -> Result<Run, RigError> {
+    fn better_frames(&mut self, method: Method, frames: Frames) -> Result<Run, RigError> {
         let better = self.better()?;
-        let golden = if shot.needs_golden() {
+        let golden = if frames.needs_golden() {
             Some(self.golden()?)
         } else {
             None
         };
         let map = golden.as_deref().unwrap_or(&better.expected);
-        let frames = shot.frames();
-        let measured = self.measure(stream(method), &better.function, &frames, About::Map(map))?;
-        Ok(self.judged(better.function.clone(), &frames, measured))
+        let shots = frames.shots();
+        let measured = self.measure(stream(method), &better.function, &shots, About::Map(map))?;
+        Ok(self.judged(better.function.clone(), &shots, measured))
     }
 
     /// The paper's chain with its own criterion of image pitch.
     fn paper_chain(&mut self, method: Method, function: PhaseFunction) -> Result<Run, RigError> {
-        let frames = methods::geometric(&function);
-        let mut measured = self.measure(stream(method), &function, &frames, About::Reference)?;
+        let shots = methods::geometric(&function);
+        let mut measured = self.measure(stream(method), &function, &shots, About::Reference)?;
         let fine = too_fine(&measured.phases.phase, measured.phases.width);
         for (trust, fine) in measured.phases.trust.iter_mut().zip(fine) {
             if fine && *trust == Trust::Resolved {
                 *trust = Trust::LowModulation;
             }
         }
-        Ok(self.judged(function, &frames, measured))
+        Ok(self.judged(function, &shots, measured))
     }
 
-    fn judged(&self, function: PhaseFunction, frames: &[(f64, f64)], measured: Measured) -> Run {
+    fn judged(&self, function: PhaseFunction, shots: &[Shot], measured: Measured) -> Run {
         Run {
             outcome: judge(&self.truth, &measured, self.judged),
             measured,
             function,
-            finest: methods::finest(frames),
+            finest: methods::finest(shots),
         }
     }
 }

@@ -6,7 +6,7 @@
 use super::pictures::{Lit, median, pictures};
 use crate::head::calibration::Calibration;
 use crate::head::rasters::rasters;
-use algo::pattern::PhaseFunction;
+use algo::pattern::{PhaseFunction, Shot};
 use hal::error::Error;
 use hal::head::DynHead;
 use hal::projector::Raster;
@@ -54,6 +54,6 @@ fn shifts(
                 "use a projector of more pixels",
             )
         })?;
-    let shifts = (0..SHIFTS).map(|shift| (1.0, shift as f64 / SHIFTS as f64));
-    rasters(&function, shifts, calibration)
+    let shots: Vec<_> = Shot::level(1.0, SHIFTS).collect();
+    rasters(&function, &shots, calibration)
 }

@@ -8,9 +8,11 @@ use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::place::{Loaded, Place};
+use crate::head::seam;
 use crate::history::RECIPE;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::{Recipe, archive};
+use algo::pattern::Shot;
 use hal::head::DynHead;
 use hal::replay::Recording;
 use sim::{Scenario, Stage};
@@ -37,8 +39,8 @@ pub struct Opened {
 /// The recordings that a replay head plays.
 #[derive(Clone, Debug)]
 pub struct Played {
-    /// Ratio and shift of each frame of a recording.
-    shown: Vec<(f64, f64)>,
+    /// What each frame of a recording shows.
+    shots: Vec<Shot>,
     /// Fingerprint of the calibration that they were taken with, where a station kept them with their recipe.
     calibration: Option<String>,
 }
@@ -47,11 +49,8 @@ impl Played {
     fn of(folder: &Path, recording: &Recording) -> Self {
         let recipe = fs::File::open(folder.join(RECIPE)).ok();
         let manifest = recipe.and_then(|file| archive::manifest(file).ok());
-        let frames = recording.frames.iter();
         Self {
-            shown: frames
-                .map(|taken| (taken.ratio, taken.shift_turns))
-                .collect(),
+            shots: recording.frames.iter().map(seam::shot).collect(),
             calibration: manifest.map(|manifest| manifest.calibration),
         }
     }
@@ -66,7 +65,7 @@ impl Played {
             true => Plan::again(recipe, calibration, false),
             false => Plan::new(recipe, calibration, false),
         };
-        Ok(plan?.only(&self.shown))
+        Ok(plan?.only(&self.shots))
     }
 }
 

@@ -21,7 +21,7 @@ use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
 use algo::inspect::{Findings, Light, Production, Strips};
-use algo::pattern::{MAX_FRAMES, Sequence};
+use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use algo::phase::Arrived;
 use algo::pipeline::Rises;
 use algo::units::{AbsolutePhase, Height};
@@ -38,8 +38,8 @@ pub struct Plan {
     file: RecipeFile,
     /// The names of its gauges, shared with every result.
     names: Vec<Arc<str>>,
-    /// Ratio and shift of what is projected, each once; first those of the first run.
-    frames: Vec<(f64, f64)>,
+    /// What is projected, each once; first the shots of the first run.
+    shots: Vec<Shot>,
     /// The sequences in the order in which they are tried; each unwraps further than the one before. Their indices are the
     /// steps of a cycle.
     runs: Vec<Run>,
@@ -129,14 +129,14 @@ impl Plan {
             .map_err(|reason| PlanError::Unfit { number, reason })
     }
 
-    /// Leaves only the sequence that shows these frames, given by ratio and shift: a head that plays a recording has no others.
-    /// Where no sequence does, nothing changes.
-    pub fn only(mut self, frames: &[(f64, f64)]) -> Self {
-        if let Some(step) = self.step_that_shows(frames) {
+    /// Leaves only the sequence of these shots: a head that plays a recording has no others. Where no sequence does, nothing
+    /// changes.
+    pub fn only(mut self, shots: &[Shot]) -> Self {
+        if let Some(step) = self.step_that_shows(shots) {
             let mut run = self.runs.swap_remove(step);
-            run.indices = (0..frames.len()).collect();
+            run.indices = (0..shots.len()).collect();
             self.runs = vec![run];
-            self.frames = frames.to_vec();
+            self.shots = shots.to_vec();
         }
         self
     }
@@ -183,20 +183,20 @@ impl Plan {
         }
         let range = triangulator.function().range();
         let chain = run::chain(&file);
-        let mut frames = Vec::new();
+        let mut shots = Vec::new();
         let sequences = || {
             let sequences = chain.into_iter();
             let sequences =
-                sequences.map(|at| Unjoined::new(&file, &arrays, range, at, &mut frames));
+                sequences.map(|at| Unjoined::new(&file, &arrays, range, at, &mut shots));
             sequences.collect::<Result<Vec<_>, _>>()
         };
         let (sequences, surface) = rayon::join(sequences, || golden::surface(size.0, &arrays));
         let sequences = sequences?;
-        let patterns = frames.len() * raster.0 as usize * raster.1 as usize;
+        let patterns = shots.len() * raster.0 as usize * raster.1 as usize;
         if patterns > MAX_PATTERN_BYTES {
             return Err(format!(
                 "its sequences show {} patterns of {} MiB together, at most {} are held: teach it with fewer frames",
-                frames.len(),
+                shots.len(),
                 patterns >> 20,
                 MAX_PATTERN_BYTES >> 20
             ));
@@ -221,7 +221,7 @@ impl Plan {
             strips: Mutex::new(strips),
             names: names.collect(),
             file,
-            frames,
+            shots,
             runs,
             simulated,
         })
@@ -264,15 +264,15 @@ impl Plan {
         self.runs.get(step).map_or(&[], |run| &run.indices)
     }
 
-    /// Ratio and shift of each frame of a sequence, in their order; none if there is no such sequence.
-    pub fn shown(&self, step: usize) -> impl ExactSizeIterator<Item = (f64, f64)> {
+    /// What each frame of a sequence shows, in their order; nothing if there is no such sequence.
+    pub fn shots(&self, step: usize) -> impl ExactSizeIterator<Item = Shot> {
         let indices = self.indices(step).iter();
-        indices.map(|&index| self.frames[index])
+        indices.map(|&index| self.shots[index])
     }
 
-    /// Which sequence shows these frames, given by ratio and shift; `None` if none does.
-    pub fn step_that_shows(&self, frames: &[(f64, f64)]) -> Option<usize> {
-        (0..self.steps()).find(|&step| self.shown(step).eq(frames.iter().copied()))
+    /// Which sequence consists of these shots; `None` if none does.
+    pub fn step_that_shows(&self, shots: &[Shot]) -> Option<usize> {
+        (0..self.steps()).find(|&step| self.shots(step).eq(shots.iter().copied()))
     }
 
     /// The columns of each row that some gauge looks at.
@@ -297,9 +297,8 @@ impl Plan {
 
     /// The patterns of all sequences; those of the first stand first, in the order of its frames.
     pub fn rasters(&self, calibration: &Calibration) -> Result<Vec<Raster>, hal::error::Error> {
-        let frames = self.frames.iter().copied();
         let function = self.production().triangulator().function();
-        rasters(function, frames, calibration)
+        rasters(function, &self.shots, calibration)
     }
 
     /// Judges a part from the frames of sequence `step`; its stages begin at `exposed`. Always ends in an inspection; what

@@ -5,7 +5,7 @@ use crate::recipe::archive::Arrays;
 use crate::recipe::{AlignmentKind, RecipeFile, SequenceFile, SequenceKind};
 use algo::geometry::Triangulator;
 use algo::inspect::{Gauge, Parts, Production, Taught};
-use algo::pattern::{PhaseRange, Sequence};
+use algo::pattern::{PhaseRange, Sequence, Shot};
 use algo::phase::{Arrived, Decoder};
 use algo::pipeline::Rises;
 use algo::units::AbsolutePhase;
@@ -62,27 +62,24 @@ pub(super) fn chain(file: &RecipeFile) -> Vec<usize> {
 }
 
 impl Unjoined {
-    /// The sequence at a place in the recipe's list, for phases of `range`. `frames` are those of all runs; those of this
+    /// The sequence at a place in the recipe's list, for phases of `range`. `shots` are those of all runs; those of this
     /// one are added.
     pub fn new(
         file: &RecipeFile,
         arrays: &Arrays,
         range: PhaseRange,
         at: usize,
-        frames: &mut Vec<(f64, f64)>,
+        shots: &mut Vec<Shot>,
     ) -> Result<Self, String> {
-        let SequenceFile {
-            kind, frames: own, ..
-        } = &file.sequences[at];
-        let own: Vec<_> = own.iter().map(|&[r, s]| (r, s)).collect();
-        let sequence = Sequence::from_frames(&own).map_err(|error| error.to_string())?;
+        let SequenceFile { kind, frames, .. } = &file.sequences[at];
+        let sequence = Sequence::from_frames(frames).map_err(|error| error.to_string())?;
         let decoder = Decoder::new(&sequence, range, file.camera.bit_depth)
             .map_err(|error| error.to_string())?;
-        let indices = own.into_iter().map(|frame| {
-            let shown = frames.iter().position(|known| *known == frame);
+        let indices = frames.iter().map(|shot| {
+            let shown = shots.iter().position(|known| known == shot);
             shown.unwrap_or_else(|| {
-                frames.push(frame);
-                frames.len() - 1
+                shots.push(*shot);
+                shots.len() - 1
             })
         });
         Ok(Self {
