@@ -3,62 +3,48 @@
 use std::sync::Arc;
 
 use super::control;
+use super::error_code;
 use super::event::{Effect, Effects, Job, JobId};
+use super::fault::Failure;
 use super::machine::{Station, log, push};
 use super::result::{Inspection, ResultRecord, Verdict};
 use super::stages::Stages;
-use super::state::{Cycle, Micros, State};
-use super::step::named;
+use super::state::{Cycle, State};
 
 impl Station {
     /// Accepts a trigger: latches what belongs to it and orders the measurement. Only while READY.
-    pub(super) fn begin(&mut self, token: u16, now: Micros, effects: &mut Effects) {
-        let Some(recipe) = self.recipe.clone() else {
+    pub(super) fn begin(&mut self, token: u16, effects: &mut Effects) {
+        let Some(recipe) = self.recipes.active.clone() else {
             return;
         };
-        let job = self.next_job();
-        let (part_id, press_stroke) = (self.control.part_id, self.control.press_stroke);
-        self.triggers = self.triggers.wrapping_add(1);
-        if token != 0 {
-            self.last_token = token;
-        }
-        self.exposure_done = false;
-        self.result_valid = false;
-        push(
-            effects,
-            Effect::Measure(Job {
-                job,
-                token,
-                part_id,
-                press_stroke,
-                recipe: recipe.clone(),
-                accepted: now,
-            }),
-        );
-        let cycle = Cycle {
-            job,
+        self.requests.accept(token);
+        self.results.begin();
+        let order = Job {
+            job: self.worker.next_job(),
             token,
-            part_id,
-            press_stroke,
+            part_id: self.plc.registers.part_id,
+            press_stroke: self.plc.registers.press_stroke,
             recipe,
-            accepted: now,
-            exposed: None,
+            accepted: self.clock.now(),
         };
+        push(effects, Effect::Measure(order.clone()));
         self.state = State::Acquiring {
-            cycle,
-            deadline: now.after(self.settings.limits.acquiring),
+            cycle: Cycle {
+                order,
+                exposed: None,
+            },
+            deadline: self.within(self.settings.limits.acquiring),
         };
     }
 
-    pub(super) fn exposed(&mut self, job: JobId, now: Micros, effects: &mut Effects) {
+    /// The last frame is exposed.
+    pub(super) fn exposed(&mut self, job: JobId, effects: &mut Effects) {
         match std::mem::replace(&mut self.state, State::Offline) {
-            State::Acquiring { mut cycle, .. } if cycle.job == job => {
-                cycle.exposed = Some(now);
-                self.exposure_done = true;
-                self.state = State::Processing {
-                    cycle,
-                    deadline: now.after(self.settings.limits.processing),
-                };
+            State::Acquiring { mut cycle, .. } if cycle.order.job == job => {
+                cycle.exposed = Some(self.clock.now());
+                self.results.exposed();
+                let deadline = self.within(self.settings.limits.processing);
+                self.state = State::Processing { cycle, deadline };
             }
             other => {
                 self.state = other;
@@ -67,32 +53,32 @@ impl Station {
         }
     }
 
+    /// The measurement ended with an inspection.
     pub(super) fn finished(
         &mut self,
         job: JobId,
         inspection: Arc<Inspection>,
-        now: Micros,
         effects: &mut Effects,
     ) {
         if let Some(cycle) = self.take_cycle(job, "a result", effects) {
             if inspection.error_code == 0 {
                 self.failure = None;
             }
-            self.publish(cycle, inspection, now, effects);
+            self.publish(cycle, inspection, effects);
         }
     }
 
+    /// The measurement ended without an inspection.
     pub(super) fn measure_failed(
         &mut self,
         job: JobId,
-        error_code: u16,
-        message: Arc<str>,
-        now: Micros,
+        code: u16,
+        words: Arc<str>,
         effects: &mut Effects,
     ) {
         if let Some(cycle) = self.take_cycle(job, "a failed measurement", effects) {
-            log(effects, message.clone());
-            self.fail_cycle(cycle, named(error_code), message, now, effects);
+            log(effects, words.clone());
+            self.fail_cycle(cycle, error_code::named(code), words, effects);
         }
     }
 
@@ -100,31 +86,30 @@ impl Station {
     pub(super) fn fail_cycle(
         &mut self,
         cycle: Cycle,
-        error_code: u16,
-        reason: Arc<str>,
-        now: Micros,
+        code: u16,
+        words: Arc<str>,
         effects: &mut Effects,
     ) {
-        self.failure = Some((error_code, reason.clone()));
         let inspection = Inspection {
             judged: Verdict::Invalid,
-            error_code,
-            reason: Some(reason),
+            error_code: code,
+            reason: Some(words.clone()),
             ..Default::default()
         };
-        self.publish(cycle, Arc::new(inspection), now, effects);
+        self.failure = Some(Failure { code, words });
+        self.publish(cycle, Arc::new(inspection), effects);
     }
 
     /// The cycle that `job` answers for, taken out of the state; the state becomes the one after it.
     fn take_cycle(&mut self, job: JobId, what: &str, effects: &mut Effects) -> Option<Cycle> {
         match std::mem::replace(&mut self.state, State::Offline) {
             State::Acquiring { cycle, .. } | State::Processing { cycle, .. }
-                if cycle.job == job =>
+                if cycle.order.job == job =>
             {
                 self.state = self.rest();
                 Some(cycle)
             }
-            State::Stopping { cycle: Some(cycle) } if cycle.job == job => {
+            State::Stopping { cycle: Some(cycle) } if cycle.order.job == job => {
                 self.state = State::Stopping { cycle: None };
                 Some(cycle)
             }
@@ -136,36 +121,26 @@ impl Station {
         }
     }
 
-    /// The result as one unit: block, RESULT_VALID, RESULT_TOGGLE, SEQ, queue.
-    fn publish(
-        &mut self,
-        cycle: Cycle,
-        inspection: Arc<Inspection>,
-        now: Micros,
-        effects: &mut Effects,
-    ) {
-        let verdict = inspection.verdict();
-        let total = now.since(cycle.accepted);
-        self.last_seq = self.last_seq.wrapping_add(1);
+    /// Makes the cycle's result and shows it as one unit.
+    fn publish(&mut self, cycle: Cycle, inspection: Arc<Inspection>, effects: &mut Effects) {
+        let Cycle { order, exposed } = cycle;
+        let accepted = order.accepted;
+        let total = self.clock.now().since(accepted);
+        let exposure = exposed.map_or(total, |exposed| exposed.since(accepted));
         let record = Arc::new(ResultRecord {
-            seq: self.last_seq,
-            token: cycle.token,
-            recipe: cycle.recipe.number,
-            recipe_name: cycle.recipe.name,
-            recipe_crc: cycle.recipe.crc,
-            part_id: cycle.part_id,
-            press_stroke: cycle.press_stroke,
-            verdict,
+            seq: self.results.next_seq(),
+            token: order.token,
+            recipe: order.recipe.number,
+            recipe_name: order.recipe.name,
+            recipe_crc: order.recipe.crc,
+            part_id: order.part_id,
+            press_stroke: order.press_stroke,
+            verdict: inspection.verdict(),
             error_code: inspection.error_code,
-            time_utc_us: self
-                .utc_at_zero
-                .map_or(0, |zero| zero.saturating_add(cycle.accepted.0)),
-            uptime_s: cycle.accepted.seconds(),
+            time_utc_us: self.clock.utc_us(accepted).unwrap_or(0),
+            uptime_s: accepted.seconds(),
             boot_id: self.settings.boot_id,
-            exposure_us: cycle
-                .exposed
-                .map_or(total, |exposed| exposed.since(cycle.accepted))
-                .to_u32(),
+            exposure_us: exposure.to_u32(),
             total_us: total.to_u32(),
             inspection,
         });
@@ -175,22 +150,16 @@ impl Station {
         }
         push(effects, Effect::PersistSeq(record.seq));
         push(effects, Effect::Publish(record.clone()));
-        if self.control.control & control::BUFFERED != 0
-            && self.queue.push_back(record.clone()).is_err()
+        let seq = record.seq;
+        if !self
+            .results
+            .publish(record, self.plc.holds(control::BUFFERED))
         {
-            self.overflow_latch = true;
+            let waiting = self.results.queue.len();
             log(
                 effects,
-                format!(
-                    "result {} was not queued: {} results wait for RESULT_ACK",
-                    record.seq,
-                    self.queue.len()
-                ),
+                format!("result {seq} was not queued: {waiting} results wait for RESULT_ACK"),
             );
         }
-        self.result = Some(record);
-        self.result_valid = true;
-        self.result_toggle = !self.result_toggle;
-        self.exposure_done = true;
     }
 }

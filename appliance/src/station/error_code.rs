@@ -35,6 +35,11 @@ pub const ABORTED: u16 = 802;
 /// The measuring task failed without naming a code of its own.
 pub const UNNAMED: u16 = 899;
 
+/// The code of a failure, which always has one.
+pub(super) fn named(code: u16) -> u16 {
+    if code == 0 { UNNAMED } else { code }
+}
+
 /// The family of an error code in words, for the page and the log.
 pub fn family(code: u16) -> &'static str {
     match code / 100 {

@@ -2,63 +2,15 @@
 
 use std::sync::Arc;
 
+use super::clock::Micros;
 use super::control::ControlWrite;
 use super::health::{Pace, System};
+use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 use super::result::{Inspection, ResultRecord};
-use super::state::{ActiveRecipe, Micros};
 
 /// Names one order to the worker; the worker quotes it in every answer, so that a late answer is recognised as one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct JobId(pub u64);
-
-/// How a recipe is chosen.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum RecipeKey {
-    /// 1–9999.
-    Number(u16),
-    /// The recipe taught for this part number.
-    PartNumber(Arc<str>),
-}
-
-/// How the last recipe request ended: register 109.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum RecipeResult {
-    /// 0.
-    #[default]
-    Ok,
-    /// 1: no such recipe.
-    Unknown,
-    /// 2: it failed its checksum.
-    Corrupt,
-    /// 3: it was made for another calibration.
-    OtherCalibration,
-    /// 4: the station could not load now.
-    Busy,
-}
-
-impl RecipeResult {
-    /// The number of register 109.
-    pub fn number(self) -> u16 {
-        match self {
-            Self::Ok => 0,
-            Self::Unknown => 1,
-            Self::Corrupt => 2,
-            Self::OtherCalibration => 3,
-            Self::Busy => 4,
-        }
-    }
-
-    /// In words.
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::Ok => "it was loaded",
-            Self::Unknown => "there is no such recipe",
-            Self::Corrupt => "it is damaged or does not fit this head",
-            Self::OtherCalibration => "it was made for another calibration",
-            Self::Busy => "a load or teach was refused or interrupted",
-        }
-    }
-}
 
 /// A request from this side of the wall: the daemon's own start, the command line, later the page.
 #[derive(Debug, Clone, PartialEq, Eq)]

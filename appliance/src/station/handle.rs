@@ -7,11 +7,11 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use tokio::sync::watch;
 use tokio::time::MissedTickBehavior;
 
+use super::clock::Micros;
 use super::control::{ConnectionEdges, ControlWrite, RefusedWrite};
 use super::event::{Effect, Event};
 use super::machine::Station;
 use super::snapshot::Snapshot;
-use super::state::Micros;
 use super::step::step;
 
 /// Carries out effects, in order. Called with the station locked: it hands on and returns, at most writing one small file. An
@@ -136,7 +136,8 @@ pub fn system_utc_us() -> Option<u64> {
 mod tests {
     use std::sync::mpsc::channel;
 
-    use super::super::event::{RecipeKey, Request};
+    use super::super::event::Request;
+    use super::super::recipes::RecipeKey;
     use super::super::tests::settings;
     use super::*;
 

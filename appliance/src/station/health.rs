@@ -1,11 +1,6 @@
-//! Health: what system, head and clients say of themselves, and when storage is too full to go on measuring.
+//! Health: measured values of system, head and clients for the HEALTH registers, and the limits of storage and temperature.
 
 use std::sync::Arc;
-
-use super::error_code;
-use super::event::{Effect, Effects, Unstored};
-use super::machine::{Station, log, push};
-use super::state::{ClearedBy, Fault, Micros, State};
 
 /// Less free storage than this is a warning, MiB: a day of results and some recordings.
 pub const LOW_STORAGE_MIB: u64 = 256;
@@ -106,8 +101,16 @@ impl Health {
         self.processing_max_us = self.processing_max_us.max(us);
     }
 
+    pub(super) fn storage_failed(&mut self) {
+        self.storage_errors = self.storage_errors.saturating_add(1);
+    }
+
     pub(super) fn storage_is_low(&self) -> bool {
         self.room_is_below(LOW_STORAGE_MIB)
+    }
+
+    pub(super) fn storage_is_full(&self) -> bool {
+        self.room_is_below(FULL_STORAGE_MIB)
     }
 
     fn room_is_below(&self, mib: u64) -> bool {
@@ -118,87 +121,5 @@ impl Health {
         self.system
             .cpu_temperature_c
             .is_some_and(|celsius| celsius >= HOT_PROCESSOR_C)
-    }
-}
-
-impl Station {
-    /// Takes a survey: full storage is a fault between two jobs, and clears by itself when there is room again.
-    pub(super) fn surveyed(&mut self, system: System, now: Micros, effects: &mut Effects) {
-        self.health.system = system;
-        if self.unstored {
-            // Tried until it goes; the answer comes as `Stored`.
-            push(effects, Effect::PersistSeq(self.last_seq));
-        }
-        let full = self.health.room_is_below(FULL_STORAGE_MIB);
-        match &self.state {
-            State::Ready | State::Offline if full => {
-                let room = self.health.system.free_storage_mib.unwrap_or(0);
-                let fault = Fault {
-                    code: error_code::STORAGE_FULL,
-                    cause: format!("{room} MiB of storage are free, {FULL_STORAGE_MIB} are needed").into(),
-                    remedy: "remove recordings or other files from the storage; it clears by itself when there is room".into(),
-                    since: now,
-                    cleared_by: ClearedBy::Storage,
-                };
-                self.fault(fault, now, effects);
-            }
-            State::Fault(_) if !full => self.storage_settled(effects),
-            _ => {}
-        }
-    }
-
-    /// Takes the answer to [`Effect::PersistSeq`].
-    pub(super) fn stored(
-        &mut self,
-        seq: u32,
-        failed: Option<Unstored>,
-        now: Micros,
-        effects: &mut Effects,
-    ) {
-        let Some(unstored) = failed else {
-            // A number that is stored covers those before it.
-            self.unstored &= seq != self.last_seq;
-            if !self.health.room_is_below(FULL_STORAGE_MIB) {
-                self.storage_settled(effects);
-            }
-            return;
-        };
-        self.health.storage_errors = self.health.storage_errors.saturating_add(1);
-        self.unstored = true;
-        if matches!(self.state, State::Ready | State::Offline) {
-            let (cause, remedy) = match unstored {
-                Unstored::Busy(ms) => (
-                    format!(
-                        "no result number is reserved after {seq}: the storage is busy, {ms} ms so far"
-                    ),
-                    "trigger more slowly, or use faster storage; it clears by itself as soon as the storage has answered",
-                ),
-                Unstored::Refused(answer) => (
-                    format!("no result number can be stored after {seq}: {answer}"),
-                    "free space, or replace the storage if it is broken; it is tried every second and clears by itself",
-                ),
-            };
-            let fault = Fault {
-                code: error_code::SEQ_NOT_STORED,
-                cause: cause.into(),
-                remedy: remedy.into(),
-                since: now,
-                cleared_by: ClearedBy::Storage,
-            };
-            self.fault(fault, now, effects);
-        }
-    }
-
-    fn storage_settled(&mut self, effects: &mut Effects) {
-        if let State::Fault(fault) = &self.state
-            && fault.cleared_by == ClearedBy::Storage
-            && !self.unstored
-        {
-            log(
-                effects,
-                format!("storage works again after error {}", fault.code),
-            );
-            self.state = self.rest();
-        }
     }
 }

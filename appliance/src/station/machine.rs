@@ -2,17 +2,18 @@
 
 use std::sync::Arc;
 
-use super::control::{self, ControlRegisters};
-use super::event::{Condition, Effect, Effects, JobId, RecipeResult};
+use super::clock::{Clock, Micros};
+use super::control;
+use super::event::{Condition, Effect, Effects, JobId, MAX_EFFECTS};
+use super::fault::Failure;
 use super::health::Health;
-use super::result::ResultRecord;
+use super::plc::Plc;
+use super::recipes::Recipes;
+use super::requests::Requests;
+use super::results::Results;
 use super::snapshot::Identity;
-use super::state::{ActiveRecipe, ClearedBy, Fault, Micros, State};
-
-/// The most unacknowledged results in BUFFERED mode.
-pub const MAX_BUFFERED: usize = 32;
-/// The HEARTBEAT register advances once in this time.
-pub const BEAT: Micros = Micros::from_millis(100);
+use super::state::State;
+use super::worker::Worker;
 
 /// The deadline of every wait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,7 +51,7 @@ impl Default for Limits {
     }
 }
 
-/// What the station is told once, when it is made.
+/// What does not change after the start.
 #[derive(Debug, Clone)]
 pub struct Settings {
     /// The SEQ of the next result: one more than the last that was stored.
@@ -65,82 +66,43 @@ pub struct Settings {
     pub limits: Limits,
 }
 
-/// The station: plain values. [`super::step()`] is its only door.
+/// The station: plain values, each part with the transitions that only it decides. [`super::step()`] is its only entry.
 #[derive(Debug, Clone)]
 pub struct Station {
     pub(super) settings: Settings,
+    pub(super) clock: Clock,
     pub(super) state: State,
-    pub(super) control: ControlRegisters,
-    pub(super) recipe: Option<ActiveRecipe>,
-    pub(super) requested_recipe: u16,
-    pub(super) recipe_result: RecipeResult,
-    pub(super) triggers: u32,
-    pub(super) missed: u32,
-    pub(super) last_seq: u32,
-    pub(super) last_token: u16,
-    pub(super) last_job: JobId,
-    pub(super) reject_reason: u16,
-    pub(super) missed_latch: bool,
-    pub(super) overflow_latch: bool,
-    pub(super) exposure_done: bool,
-    pub(super) result_valid: bool,
-    pub(super) result_toggle: bool,
-    pub(super) result: Option<Arc<ResultRecord>>,
-    pub(super) queue: heapless::Deque<Arc<ResultRecord>, MAX_BUFFERED>,
-    /// The last cycle's failure: its code and words.
-    pub(super) failure: Option<(u16, Arc<str>)>,
+    pub(super) plc: Plc,
+    pub(super) requests: Requests,
+    pub(super) recipes: Recipes,
+    pub(super) worker: Worker,
+    pub(super) results: Results,
+    pub(super) failure: Option<Failure>,
     pub(super) condition: Condition,
+    pub(super) health: Health,
     /// Whether the history cannot be written.
     pub(super) history_fails: bool,
-    pub(super) health: Health,
-    /// Whether the SEQ of the last result still has to be stored.
-    pub(super) unstored: bool,
-    pub(super) heartbeat: u16,
-    pub(super) next_beat: Micros,
-    pub(super) last_alive: Micros,
-    /// The last change of PLC_HEARTBEAT; `None` until the PLC uses it.
-    pub(super) plc_seen: Option<Micros>,
-    /// µs since 1970 at the time zero of [`Micros`], while the clock is synchronised.
-    pub(super) utc_at_zero: Option<u64>,
-    /// The time of the last event.
-    pub(super) now: Micros,
 }
 
 impl Station {
     /// A station that boots at `now`.
     pub fn new(settings: Settings, now: Micros) -> Self {
+        let mut clock = Clock::default();
+        clock.advance(now);
         Self {
+            clock,
             state: State::Boot {
                 deadline: now.after(settings.limits.boot),
             },
-            control: ControlRegisters::default(),
-            recipe: None,
-            requested_recipe: 0,
-            recipe_result: RecipeResult::Ok,
-            triggers: 0,
-            missed: 0,
-            last_seq: settings.next_seq.wrapping_sub(1),
-            last_token: 0,
-            last_job: JobId(0),
-            reject_reason: 0,
-            missed_latch: false,
-            overflow_latch: false,
-            exposure_done: false,
-            result_valid: false,
-            result_toggle: false,
-            result: None,
-            queue: heapless::Deque::new(),
+            plc: Plc::default(),
+            requests: Requests::default(),
+            recipes: Recipes::default(),
+            worker: Worker::new(now),
+            results: Results::new(settings.next_seq),
             failure: None,
             condition: Condition::default(),
-            history_fails: false,
             health: Health::default(),
-            unstored: false,
-            heartbeat: 0,
-            next_beat: now.after(BEAT),
-            last_alive: now,
-            plc_seen: None,
-            utc_at_zero: None,
-            now,
+            history_fails: false,
             settings,
         }
     }
@@ -150,47 +112,43 @@ impl Station {
         &self.state
     }
 
-    /// Whether the PLC asks for ONLINE.
-    pub(super) fn wants_online(&self) -> bool {
-        self.control.control & control::ONLINE != 0
-    }
-
     /// The state between two jobs.
     pub(super) fn rest(&self) -> State {
-        if self.wants_online() {
+        if self.plc.holds(control::ONLINE) {
             State::Ready
         } else {
             State::Offline
         }
     }
 
+    /// Whether the station is between two jobs.
+    pub(super) fn is_at_rest(&self) -> bool {
+        matches!(self.state, State::Ready | State::Offline)
+    }
+
+    /// The deadline of a wait that begins now.
+    pub(super) fn within(&self, limit: Micros) -> Micros {
+        self.clock.now().after(limit)
+    }
+
     /// Whether the worker meets its deadlines: that of the wait it is in, else a sign of life now and then.
-    pub(super) fn worker_meets_deadlines(&self, now: Micros) -> bool {
+    pub(super) fn worker_is_in_time(&self) -> bool {
+        let now = self.clock.now();
         match self.state.deadline() {
             Some(deadline) => now <= deadline,
-            None => now.since(self.last_alive) <= self.settings.limits.idle,
+            None => now.since(self.worker.last_alive) <= self.settings.limits.idle,
         }
     }
 
-    /// Whether the PLC's heartbeat stands still.
-    pub(super) fn plc_is_lost(&self, now: Micros) -> bool {
-        self.plc_seen
-            .is_some_and(|seen| now.since(seen) > self.settings.limits.plc)
-    }
-
-    pub(super) fn next_job(&mut self) -> JobId {
-        self.last_job = JobId(self.last_job.0.wrapping_add(1));
-        self.last_job
-    }
-
-    /// The fault of a worker that did not answer in time.
-    pub(super) fn deadline_fault(&self, waiting_for: &str, limit: Micros, now: Micros) -> Fault {
-        Fault {
-            code: super::error_code::DEADLINE,
-            cause: format!("the measuring task was given {} ms to {waiting_for} and did not answer", limit.0 / 1000).into(),
-            remedy: "wait until the heartbeat runs again, then set ERROR_RESET; if it stays still, restart fringed".into(),
-            since: now,
-            cleared_by: ClearedBy::SignOfLife,
+    /// Logs an answer that nothing waits for: of an order that missed its deadline, or from before.
+    pub(super) fn late(&self, what: &str, job: JobId, effects: &mut Effects) {
+        // A stop ends what is under way; that it ended needs no line.
+        if !matches!(self.state, State::Stopping { .. }) {
+            let (job, state) = (job.0, self.state.word());
+            log(
+                effects,
+                format!("{what} of job {job} came while {state}; ignored"),
+            );
         }
     }
 }
@@ -201,8 +159,7 @@ pub(super) fn push(effects: &mut Effects, effect: Effect) {
     let pushed = effects.push(effect);
     debug_assert!(
         pushed.is_ok(),
-        "more than {} effects of one event",
-        super::event::MAX_EFFECTS
+        "more than {MAX_EFFECTS} effects of one event"
     );
 }
 

@@ -33,23 +33,31 @@
 //! - Full storage is a fault only between two jobs: the cycle in flight still gets its result. A result whose SEQ could not be
 //!   stored is shown, but no further trigger is accepted until that SEQ is stored.
 //! - REJECT_REASON stays until the next rejected request.
+pub mod clock;
 pub mod control;
 pub mod error_code;
 pub mod event;
+pub mod fault;
 pub mod gauge;
 pub mod handle;
 pub mod health;
 pub mod machine;
+pub mod recipes;
 pub mod refusal;
 pub mod result;
+pub mod results;
 pub mod snapshot;
 pub mod stages;
 pub mod state;
 pub mod step;
 pub mod tally;
 
+mod change;
 mod cycle;
 mod plc;
+mod requests;
+mod watch;
+mod worker;
 
 #[cfg(test)]
 mod table;
@@ -58,16 +66,17 @@ mod tests;
 #[cfg(test)]
 mod walk;
 
+pub use clock::Micros;
 pub use control::{ConnectionEdges, ControlRegisters, ControlWrite, Masked, RefusedWrite};
-pub use event::{
-    Condition, Effect, Effects, Event, Job, JobId, RecipeKey, RecipeResult, Request, Unstored,
-};
+pub use event::{Condition, Effect, Effects, Event, Job, JobId, Request, Unstored};
+pub use fault::Fault;
 pub use gauge::{Decision, GaugeValue, Unit};
 pub use handle::{StationHandle, system_utc_us, tick};
 pub use health::{FULL_STORAGE_MIB, Health, Pace, System};
 pub use machine::{Limits, Settings, Station};
+pub use recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 pub use result::{Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, Verdict};
 pub use snapshot::{Identity, Snapshot, TeachProgress};
 pub use stages::{Stage, StageTime, Stages};
-pub use state::{ActiveRecipe, Cycle, Fault, Micros, State};
+pub use state::{Cycle, State};
 pub use step::step;

@@ -1,10 +1,10 @@
 //! Why a trigger is rejected: the number for the PLC, and the words for people.
 
-use super::control::BY_PART_NUMBER;
-use super::event::RecipeResult;
+use super::control::{self, BY_PART_NUMBER};
 use super::machine::Station;
+use super::recipes::{ActiveRecipe, RecipeResult};
 use super::snapshot::Snapshot;
-use super::state::{ActiveRecipe, State};
+use super::state::State;
 
 /// REJECT_REASON, register 120: why the last rejected request was rejected.
 pub mod reject {
@@ -26,28 +26,16 @@ impl Station {
     /// Why a trigger would be rejected now, as REJECT_REASON; `None` exactly while READY.
     pub(super) fn refusal(&self) -> Option<u16> {
         Some(match self.state {
-            _ if !self.wants_online() => reject::OFFLINE,
+            _ if !self.plc.holds(control::ONLINE) => reject::OFFLINE,
             State::Fault(_) => reject::FAULT,
-            State::Ready if self.recipe.is_none() => reject::NO_RECIPE,
-            State::Ready if self.unstored => reject::FAULT,
-            State::Ready if self.is_other_recipe_asked_for() => reject::OTHER_RECIPE,
+            State::Ready if self.recipes.active.is_none() => reject::NO_RECIPE,
+            State::Ready if self.results.unstored => reject::FAULT,
+            State::Ready if self.recipes.is_other_asked_for(&self.plc.registers) => {
+                reject::OTHER_RECIPE
+            }
             State::Ready => return None,
             _ => reject::NOT_READY,
         })
-    }
-
-    /// Whether a part must not be measured with the active recipe, because another one was asked for: by the RECIPE_SELECT
-    /// that is held in CONTROL, or by a load that failed.
-    pub(super) fn is_other_recipe_asked_for(&self) -> bool {
-        let selected = |recipe: &ActiveRecipe| match self.control.recipe_select {
-            0 => true,
-            BY_PART_NUMBER => {
-                let part_number = self.control.part_number_text();
-                !part_number.is_empty() && part_number == *recipe.part_number
-            }
-            number => number == recipe.number,
-        };
-        self.recipe_result != RecipeResult::Ok || !self.recipe.as_ref().is_some_and(selected)
     }
 }
 

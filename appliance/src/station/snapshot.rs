@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
-use super::control::ControlRegisters;
-use super::event::RecipeResult;
+use super::clock::Micros;
+use super::control::{self, ControlRegisters};
+use super::fault::Fault;
 use super::health::Health;
 use super::machine::Station;
+use super::recipes::{ActiveRecipe, RecipeResult};
 use super::result::ResultRecord;
-use super::state::{ActiveRecipe, Fault, Micros, State};
+use super::state::State;
 
 /// STATUS bits, register 100.
 pub mod status {
@@ -179,16 +181,16 @@ impl Snapshot {
 }
 
 impl Station {
-    /// The picture as of the last event.
+    /// The snapshot as of the last event.
     pub fn snapshot(&self) -> Snapshot {
-        let now = self.now;
+        let now = self.clock.now();
         let fault = match &self.state {
             State::Fault(fault) => Some(fault.clone()),
             _ => None,
         };
         let (error_code, error) = match (&fault, &self.failure) {
             (Some(fault), _) => (fault.code, Some(fault.cause.clone())),
-            (None, Some((code, words))) => (*code, Some(words.clone())),
+            (None, Some(failure)) => (failure.code, Some(failure.words.clone())),
             (None, None) => (0, None),
         };
         let teach = match &self.state {
@@ -204,103 +206,89 @@ impl Station {
             }),
             _ => None,
         };
-        let warnings = self.warnings(now);
+        let warnings = self.warnings();
         Snapshot {
             at: now,
             state: self.state.number(),
             state_word: self.state.word(),
             status: self.status(warnings, error_code),
             warnings,
-            heartbeat: self.heartbeat,
-            worker_alive: self.worker_meets_deadlines(now),
+            heartbeat: self.worker.heartbeat,
+            worker_alive: self.worker_is_in_time(),
             error_code,
             error,
             fault,
-            control: self.control,
-            recipe: self.recipe.clone(),
-            requested_recipe: self.requested_recipe,
-            recipe_result: self.recipe_result,
-            triggers: self.triggers,
-            result_seq: self.last_seq,
-            missed: self.missed,
-            last_token: self.last_token,
-            buffered: u16::try_from(self.queue.len()).unwrap_or(u16::MAX),
-            reject_reason: self.reject_reason,
+            control: self.plc.registers,
+            recipe: self.recipes.active.clone(),
+            requested_recipe: self.recipes.requested,
+            recipe_result: self.recipes.result,
+            triggers: self.requests.triggers,
+            result_seq: self.results.last_seq,
+            missed: self.requests.missed,
+            last_token: self.requests.last_token,
+            buffered: u16::try_from(self.results.queue.len()).unwrap_or(u16::MAX),
+            reject_reason: self.requests.reject_reason,
             refusal: self.refusal(),
             uptime_s: now.seconds(),
             boot_id: self.settings.boot_id,
             identity: self.settings.identity.clone(),
-            result: self.result.clone(),
-            oldest: self.queue.front().cloned(),
+            result: self.results.latest.clone(),
+            oldest: self.results.queue.front().cloned(),
             teach,
             health: self.health.clone(),
         }
     }
 
-    fn warnings(&self, now: Micros) -> u16 {
+    /// WARNING: the worker's bits, but for those that are the station's own.
+    fn warnings(&self) -> u16 {
         let own = warning::PLC_LOST | warning::CLOCK_UNSYNCED;
-        let lost = if self.plc_is_lost(now) {
-            warning::PLC_LOST
-        } else {
-            0
-        };
-        let unwritten = if self.history_fails {
-            warning::STORAGE
-        } else {
-            0
-        };
-        let unsynced = if self.utc_at_zero.is_none() {
-            warning::CLOCK_UNSYNCED
-        } else {
-            0
-        };
-        let storage = if self.unstored || self.health.storage_is_low() {
-            warning::STORAGE
-        } else {
-            0
-        };
-        let hot = if self.health.processor_is_hot() {
-            warning::TEMPERATURE
-        } else {
-            0
-        };
-        (self.condition.warnings & !own & 0x00FF) | lost | unsynced | storage | unwritten | hot
+        let of_worker = self.condition.warnings & !own & 0x00FF;
+        let now = self.clock.now();
+        let storage = self.results.unstored || self.history_fails || self.health.storage_is_low();
+        of_worker
+            | word([
+                (
+                    warning::PLC_LOST,
+                    self.plc.is_lost(self.settings.limits.plc, now),
+                ),
+                (warning::CLOCK_UNSYNCED, self.clock.utc_us(now).is_none()),
+                (warning::STORAGE, storage),
+                (warning::TEMPERATURE, self.health.processor_is_hot()),
+            ])
     }
 
     fn status(&self, warnings: u16, error_code: u16) -> u16 {
-        let state = &self.state;
+        let (state, results) = (&self.state, &self.results);
         let up = !matches!(state, State::Boot { .. } | State::Stopping { .. });
-        let bits = [
-            (status::ONLINE, up && self.wants_online()),
+        word([
+            (status::ONLINE, up && self.plc.holds(control::ONLINE)),
             (status::READY, self.refusal().is_none()),
             (status::BUSY, matches!(state, State::Acquiring { .. })),
             (
                 status::PROCESSING,
                 matches!(state, State::Processing { .. }),
             ),
-            (status::EXPOSURE_DONE, self.exposure_done),
-            (status::RESULT_VALID, self.result_valid),
-            (status::RESULT_TOGGLE, self.result_toggle),
-            (
-                status::TRIGGER_ACK,
-                self.control.control & super::control::TRIGGER != 0,
-            ),
+            (status::EXPOSURE_DONE, results.exposure_done),
+            (status::RESULT_VALID, results.valid),
+            (status::RESULT_TOGGLE, results.toggle),
+            (status::TRIGGER_ACK, self.plc.holds(control::TRIGGER)),
             (
                 status::RECIPE_LOADING,
                 matches!(state, State::Loading { .. }),
             ),
-            (
-                status::RECIPE_OK,
-                self.recipe.is_some() && self.recipe_result == RecipeResult::Ok,
-            ),
+            (status::RECIPE_OK, self.recipes.is_ok()),
             (status::WARNING, warnings != 0),
             (status::ERROR, error_code != 0),
-            (status::MISSED_TRIGGER, self.missed_latch),
-            (status::BUFFER_OVERFLOW, self.overflow_latch),
+            (status::MISSED_TRIGGER, self.requests.missed_latch),
+            (status::BUFFER_OVERFLOW, results.overflow_latch),
             (status::WARMING_UP, self.condition.warming_up),
             (status::CALIBRATION_VALID, self.condition.calibration_valid),
-        ];
-        bits.iter()
-            .fold(0, |word, &(bit, set)| if set { word | bit } else { word })
+        ])
     }
+}
+
+/// The word with the bits that are set.
+fn word<const N: usize>(bits: [(u16, bool); N]) -> u16 {
+    let set = bits.into_iter().filter(|(_, set)| *set);
+    set.fold(0, |word, (bit, _)| word | bit)
 }

@@ -7,7 +7,7 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 use super::control;
 use super::event::MAX_EFFECTS;
-use super::machine::MAX_BUFFERED;
+use super::results::MAX_BUFFERED;
 use super::snapshot::status;
 use super::tests::{good, recipe, settings};
 use super::*;
@@ -161,7 +161,7 @@ fn a_hundred_thousand_random_events_break_no_promise() {
         }
         let event = answers
             .pop()
-            .unwrap_or_else(|| any_event(&mut random, &mut edges, station.last_job));
+            .unwrap_or_else(|| any_event(&mut random, &mut edges, station.worker.last_job));
         let (next, effects) = step(station, event.clone(), now);
         station = next;
         let after = station.snapshot();
@@ -218,7 +218,7 @@ fn a_hundred_thousand_random_events_break_no_promise() {
         );
         let may = after.state == 1
             && after.recipe.is_some()
-            && !station.unstored
+            && !station.results.unstored
             && asked_for(&after)
             && after.control.control & control::ONLINE != 0;
         assert_eq!(after.is(status::READY), may, "{count}: READY");
@@ -233,16 +233,16 @@ fn a_hundred_thousand_random_events_break_no_promise() {
         assert_eq!(after.is(status::ERROR), after.error_code != 0);
         assert_eq!(after.fault.is_some(), after.state == 7);
         assert!(
-            !station.unstored || !after.is(status::READY),
+            !station.results.unstored || !after.is(status::READY),
             "{count}: READY while a result's number is not stored"
         );
         assert!(after.missed >= before.missed && after.triggers >= before.triggers);
     }
     assert!(measures > 2_000, "the walk measured only {measures} times");
     assert!(
-        station.missed > 1_000,
+        station.requests.missed > 1_000,
         "the walk missed only {} triggers",
-        station.missed
+        station.requests.missed
     );
     assert!(most < MAX_EFFECTS, "{most} effects of one event");
 }

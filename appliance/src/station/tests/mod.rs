@@ -114,7 +114,7 @@ impl Bench {
 
     /// Raises one bit and lowers it again; answers with the snapshot while it is up.
     fn pulse(&mut self, bit: u16) -> Snapshot {
-        let level = self.station.control.control & !bit;
+        let level = self.station.plc.registers.control & !bit;
         let up = self.control(level | bit);
         self.control(level);
         up
@@ -153,7 +153,7 @@ impl Bench {
     }
 
     pub(super) fn job(&self) -> JobId {
-        self.station.last_job
+        self.station.worker.last_job
     }
 
     fn finish(&mut self) -> Snapshot {

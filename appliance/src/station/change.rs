@@ -1,0 +1,211 @@
+//! A change of recipe: a load or a teach, from its order to the worker's answer.
+
+use super::control::BY_PART_NUMBER;
+use super::error_code;
+use super::event::{Effect, Effects, JobId};
+use super::fault::Failure;
+use super::machine::{Station, log, push};
+use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
+use super::refusal::reject;
+use super::state::State;
+use std::sync::Arc;
+
+impl Station {
+    /// RECIPE_LOAD: a load that is refused is one that failed, because the PLC may trigger without looking at the answer.
+    pub(super) fn plc_load(&mut self, effects: &mut Effects) {
+        let select = self.plc.registers.recipe_select;
+        let key = match select {
+            0 => return,
+            BY_PART_NUMBER => RecipeKey::PartNumber(self.plc.registers.part_number_text().into()),
+            number => RecipeKey::Number(number),
+        };
+        if let Some(reason) = self.load(key, effects) {
+            self.recipes.refuse(select);
+            self.requests.reject(reason);
+        }
+    }
+
+    /// TEACH.
+    pub(super) fn plc_teach(&mut self, effects: &mut Effects) {
+        let active = self.recipes.active.as_ref().map(|recipe| recipe.number);
+        let reason = match (self.plc.registers.recipe_select, active) {
+            _ if !self.settings.teach_allowed => Some(reject::TEACH_NOT_ALLOWED),
+            (0 | BY_PART_NUMBER, None) => Some(reject::NO_RECIPE),
+            // It would replace the recipe of another part.
+            (0 | BY_PART_NUMBER, Some(_))
+                if self.recipes.is_other_asked_for(&self.plc.registers) =>
+            {
+                Some(reject::OTHER_RECIPE)
+            }
+            // The PLC chose the number; the recipe that had it is kept as the generation before.
+            (0 | BY_PART_NUMBER, Some(number)) | (number, _) => self.teach(number, false, effects),
+        };
+        if let Some(reason) = reason {
+            self.requests.reject(reason);
+        }
+    }
+
+    /// Orders a load. Answers with the reason if it is refused; then nothing has changed.
+    pub(super) fn load(&mut self, key: RecipeKey, effects: &mut Effects) -> Option<u16> {
+        let refused = self.busy();
+        if refused.is_some() {
+            let state = self.state.word();
+            log(effects, format!("a recipe cannot be loaded while {state}"));
+            return refused;
+        }
+        self.recipes.request(&key);
+        let job = self.worker.next_job();
+        let ordered = key.clone();
+        push(effects, Effect::Load { job, key: ordered });
+        let deadline = self.within(self.settings.limits.loading);
+        self.state = State::Loading { job, key, deadline };
+        None
+    }
+
+    /// Orders a teach. Answers with the reason if it is refused; then nothing has changed.
+    pub(super) fn teach(
+        &mut self,
+        number: u16,
+        keep_gauges: bool,
+        effects: &mut Effects,
+    ) -> Option<u16> {
+        let refused = self.busy();
+        if refused.is_some() {
+            let state = self.state.word();
+            log(
+                effects,
+                format!("recipe {number} cannot be taught while {state}"),
+            );
+            return refused;
+        }
+        let job = self.worker.next_job();
+        push(
+            effects,
+            Effect::Teach {
+                job,
+                number,
+                keep_gauges,
+            },
+        );
+        self.state = State::Teaching {
+            job,
+            number,
+            fraction: 0.0,
+            words: "starting".into(),
+            deadline: self.within(self.settings.limits.teaching),
+        };
+        None
+    }
+
+    /// Why no recipe can be loaded or taught now; it can be while offline.
+    fn busy(&self) -> Option<u16> {
+        match self.state {
+            State::Ready | State::Offline => None,
+            State::Fault(_) => Some(reject::FAULT),
+            _ => Some(reject::NOT_READY),
+        }
+    }
+
+    /// Whether the station waits for this job in a state of the kind; then the wait is over. Otherwise the answer is logged as late.
+    fn ends(&mut self, waits: bool, job: JobId, what: &str, effects: &mut Effects) -> bool {
+        let ends = waits && self.state.job() == Some(job);
+        if ends {
+            self.state = self.rest();
+        } else {
+            self.late(what, job, effects);
+        }
+        ends
+    }
+
+    fn is_loading(&self) -> bool {
+        matches!(self.state, State::Loading { .. })
+    }
+
+    fn is_teaching(&self) -> bool {
+        matches!(self.state, State::Teaching { .. })
+    }
+
+    /// The recipe is loaded.
+    pub(super) fn loaded(&mut self, job: JobId, recipe: ActiveRecipe, effects: &mut Effects) {
+        if self.ends(self.is_loading(), job, "a loaded recipe", effects) {
+            self.recipes.activate(recipe);
+            let failure = self.failure.take();
+            self.failure = failure.filter(|failure| failure.code != error_code::RECIPE_UNUSABLE);
+        }
+    }
+
+    /// The load failed.
+    pub(super) fn load_failed(
+        &mut self,
+        job: JobId,
+        result: RecipeResult,
+        words: Arc<str>,
+        effects: &mut Effects,
+    ) {
+        if self.ends(self.is_loading(), job, "a failed load", effects) {
+            self.recipes.fail(result);
+            log(effects, words.clone());
+            if result == RecipeResult::Corrupt {
+                let code = error_code::RECIPE_UNUSABLE;
+                self.failure = Some(Failure { code, words });
+            }
+        }
+    }
+
+    /// Teaching goes on: its deadline moves.
+    pub(super) fn progress(
+        &mut self,
+        job: JobId,
+        reached: f32,
+        doing: Arc<str>,
+        effects: &mut Effects,
+    ) {
+        let until = self.within(self.settings.limits.teaching);
+        match &mut self.state {
+            State::Teaching {
+                job: awaited,
+                fraction,
+                words,
+                deadline,
+                ..
+            } if *awaited == job => {
+                if reached.is_finite() {
+                    *fraction = reached.clamp(0.0, 1.0);
+                }
+                *words = doing;
+                *deadline = until;
+            }
+            _ => self.late("progress", job, effects),
+        }
+    }
+
+    /// The recipe is taught.
+    pub(super) fn taught(&mut self, job: JobId, recipe: ActiveRecipe, effects: &mut Effects) {
+        if self.ends(self.is_teaching(), job, "a taught recipe", effects) {
+            let ActiveRecipe {
+                number, name, crc, ..
+            } = &recipe;
+            log(
+                effects,
+                format!("taught recipe {number} \"{name}\", fingerprint {crc:08x}"),
+            );
+            self.recipes.activate(recipe);
+            self.failure = None;
+        }
+    }
+
+    /// Teaching failed; the recipe before it stays active.
+    pub(super) fn teach_failed(
+        &mut self,
+        job: JobId,
+        code: u16,
+        words: Arc<str>,
+        effects: &mut Effects,
+    ) {
+        if self.ends(self.is_teaching(), job, "a failed teach", effects) {
+            log(effects, words.clone());
+            let code = error_code::named(code);
+            self.failure = Some(Failure { code, words });
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! The results of this run as the PLC sees them: their numbers, the latest one with its handshake, the queue of BUFFERED mode.
+
+use std::sync::Arc;
+
+use super::result::ResultRecord;
+
+/// The most unacknowledged results in BUFFERED mode.
+pub const MAX_BUFFERED: usize = 32;
+
+/// The results since the start.
+#[derive(Debug, Clone)]
+pub(super) struct Results {
+    /// RESULT_SEQ of the last result, also of the run before.
+    pub(super) last_seq: u32,
+    /// Whether `last_seq` still has to be stored. Until then no trigger is accepted.
+    pub(super) unstored: bool,
+    /// The last result.
+    pub(super) latest: Option<Arc<ResultRecord>>,
+    /// RESULT_VALID.
+    pub(super) valid: bool,
+    /// RESULT_TOGGLE.
+    pub(super) toggle: bool,
+    /// EXPOSURE_DONE.
+    pub(super) exposure_done: bool,
+    /// Unacknowledged results, oldest first.
+    pub(super) queue: heapless::Deque<Arc<ResultRecord>, MAX_BUFFERED>,
+    /// BUFFER_OVERFLOW.
+    pub(super) overflow_latch: bool,
+}
+
+impl Results {
+    /// No result yet; the first one is `next_seq`.
+    pub(super) fn new(next_seq: u32) -> Self {
+        Self {
+            last_seq: next_seq.wrapping_sub(1),
+            unstored: false,
+            latest: None,
+            valid: false,
+            toggle: false,
+            exposure_done: false,
+            queue: heapless::Deque::new(),
+            overflow_latch: false,
+        }
+    }
+
+    /// A trigger was accepted.
+    pub(super) fn begin(&mut self) {
+        self.exposure_done = false;
+        self.valid = false;
+    }
+
+    /// The part may move.
+    pub(super) fn exposed(&mut self) {
+        self.exposure_done = true;
+    }
+
+    /// The number of the result that is complete now.
+    pub(super) fn next_seq(&mut self) -> u32 {
+        self.last_seq = self.last_seq.wrapping_add(1);
+        self.last_seq
+    }
+
+    /// Shows a result as one unit. Answers whether it was queued where it had to be.
+    pub(super) fn publish(&mut self, record: Arc<ResultRecord>, buffered: bool) -> bool {
+        let queued = !buffered || self.queue.push_back(record.clone()).is_ok();
+        self.overflow_latch |= !queued;
+        self.latest = Some(record);
+        self.valid = true;
+        self.toggle = !self.toggle;
+        self.exposure_done = true;
+        queued
+    }
+
+    /// RESULT_ACK.
+    pub(super) fn acknowledge(&mut self) {
+        self.valid = false;
+        self.queue.pop_front();
+    }
+
+    /// The storage has this number. Only the last one counts: its storing covers those before it.
+    pub(super) fn stored(&mut self, seq: u32) {
+        self.unstored &= seq != self.last_seq;
+    }
+
+    /// The storage does not have the last number.
+    pub(super) fn not_stored(&mut self) {
+        self.unstored = true;
+    }
+
+    /// ERROR_RESET.
+    pub(super) fn reset(&mut self) {
+        self.overflow_latch = false;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_queue_still_shows_the_result_and_latches_the_overflow() {
+        let mut results = Results::new(1);
+        for seq in 1..=MAX_BUFFERED + 1 {
+            let record = ResultRecord {
+                seq: results.next_seq(),
+                ..ResultRecord::default()
+            };
+            let queued = results.publish(Arc::new(record), true);
+            assert_eq!(queued, seq <= MAX_BUFFERED);
+        }
+        assert!(results.overflow_latch && results.valid);
+        assert_eq!(results.latest.as_ref().unwrap().seq, results.last_seq);
+        results.acknowledge();
+        assert_eq!(results.queue.front().unwrap().seq, 2);
+    }
+
+    #[test]
+    fn only_the_last_number_settles_the_storage() {
+        let mut results = Results::new(u32::MAX);
+        assert_eq!((results.next_seq(), results.next_seq()), (u32::MAX, 0));
+        results.not_stored();
+        results.stored(u32::MAX);
+        assert!(results.unstored);
+        results.stored(0);
+        assert!(!results.unstored);
+    }
+}
