@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # Compares the bits of every back-end of this machine and of aarch64 (under qemu) with each other and with the frozen ones.
 #
-#     tests/aarch64/bits.sh DIR      DIR as toolchain.sh made it
+#     tests/aarch64/bits.sh DIR [PROFILE]      DIR as toolchain.sh made it; of the build that is shipped (dist) or of another
 set -euo pipefail
 shopt -s inherit_errexit
-dir=${1:?usage: bits.sh DIR}
+dir=${1:?usage: bits.sh DIR [PROFILE]}
+profile=${2:-dist}
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-probe=(run --quiet --release -p algo --no-default-features --features std --example probe)
+probe=(run --quiet --profile "$profile" -p algo --no-default-features --features std --example probe)
 frozen=algo/examples/probe/frozen.txt
 
 here=$(cargo "${probe[@]}")
@@ -17,6 +18,6 @@ for machine in here there; do
             echo "$back_end $machine (>) does not give the frozen bits (<)" >&2
             exit 1
         fi
-        echo "$back_end $machine: $(wc -l <"$frozen") cases as frozen"
+        echo "$back_end $machine: $(wc -l <"$frozen") cases as frozen, profile $profile"
     done
 done

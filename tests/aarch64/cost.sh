@@ -20,12 +20,12 @@ headroom=0.02
 # A ceiling further above than this holds nothing.
 slack=0.03
 
-build=(build --quiet --release -p algo --no-default-features --features std --example probe)
+build=(build --quiet --profile dist -p algo --no-default-features --features std --example probe)
 cargo "${build[@]}"
 "$dir/bin/cargo" "${build[@]}"
 declare -A probe=(
-    [aarch64]=$dir/build/aarch64-unknown-linux-gnu/release/examples/probe
-    [x86_64]=${CARGO_TARGET_DIR:-target}/release/examples/probe
+    [aarch64]=$dir/build/aarch64-unknown-linux-gnu/dist/examples/probe
+    [x86_64]=${CARGO_TARGET_DIR:-target}/dist/examples/probe
 )
 cc -shared -fPIC -O2 -o "$dir/count.so" tests/aarch64/count.c
 

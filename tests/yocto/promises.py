@@ -92,6 +92,8 @@ def the_build_has_the_devices(layer):
         yield f"cargo is called with {given}"
     if given.get("features") not in manifest["features"]:
         yield f"appliance has no feature {given.get('features')}"
+    if [layer.text("fringed", name) for name in ("BUILD_MODE", "BUILD_DIR")] != ["--profile dist", "dist"]:
+        yield "cargo does not build the profile that is shipped"
     yield from missing(["libcamera", "clang-native"], layer.words("fringed", "DEPENDS"))
     yield from missing(["libpisp"], layer.words("libcamera", "DEPENDS"))
 

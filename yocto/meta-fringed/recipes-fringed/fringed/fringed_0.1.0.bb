@@ -24,6 +24,9 @@ PACKAGECONFIG ?= "rpi"
 PACKAGECONFIG[rpi] = "--features rpi,,clang-native libcamera,libcamera"
 
 CARGO_BUILD_FLAGS += "--package appliance --bin fringed"
+# The profile that is shipped, and its folder, in place of the class's `--release`.
+BUILD_MODE = "--profile dist"
+BUILD_DIR = "dist"
 
 # What --version says.
 export FRINGED_COMMIT = "${@d.getVar('SRCREV')[:12]}"
