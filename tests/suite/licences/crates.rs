@@ -10,15 +10,12 @@ use std::process::Command;
 const PLATFORMS: [&str; 2] = ["x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu"];
 
 /// A crate of somebody else.
-#[derive(Clone, Debug, Default)]
 pub struct Crate {
     pub name: String,
     pub version: String,
     /// As its manifest has it.
     pub licence: Option<String>,
     pub authors: Vec<String>,
-    /// Where cargo has it from.
-    pub source: String,
     /// Where it lies on this machine.
     pub folder: PathBuf,
     /// Whether its code is in the program: the others serve building and testing only.
@@ -61,7 +58,6 @@ pub fn all() -> Result<Vec<Crate>, String> {
             version: text(&package["version"]),
             licence: package["license"].as_str().map(str::to_owned),
             authors: list(&package["authors"]).map(text).collect(),
-            source: text(&package["source"]),
             folder: Path::new(&text(&package["manifest_path"]))
                 .parent()
                 .unwrap()
