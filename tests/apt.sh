@@ -32,9 +32,13 @@ sources_of_its_own() {
     printf '%s\n' "Dir::Etc::SourceList \"$dir/sources.list\";" 'Dir::Etc::SourceParts "/dev/null";' >>"$APT_CONFIG"
 }
 
-# installed PACKAGE…: installs what is not there yet. Fails where that is not possible, as without root.
+# installed PACKAGE…: with CI=true, installs what is not there yet. Fails where that is not possible, as without root, and without CI=true.
 installed() {
     ! dpkg-query --show "$@" >/dev/null 2>&1 || return 0
+    if [[ ${CI:-} != true ]]; then
+        echo "not installed, and installed only with CI=true: $*" >&2
+        return 1
+    fi
     [[ $(id -u) -eq 0 ]] && command -v apt-get >/dev/null || return 1
     { apt-get install -y -qq --no-install-recommends "$@" ||
         { apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@"; }; } >&2

@@ -4,7 +4,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/apt.sh"
 source "$(dirname "${BASH_SOURCE[0]}")/vm/pins"
 libcamera_version=${libcamera%-*}
 
-# libcamera_source DIR: unpacks the source into DIR/source. What its build needs is installed where this runs as root.
+# libcamera_source DIR: unpacks the source into DIR/source. What its build needs is installed as tests/apt.sh says (CI=true).
 libcamera_source() {
     local dir=$1 archive
     local tools=(meson ninja-build g++ pkg-config libclang-dev openssl python3-jinja2 python3-ply python3-yaml)

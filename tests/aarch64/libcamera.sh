@@ -5,7 +5,7 @@
 #     DIR/bin/cargo-rpi build -p appliance --features rpi
 #
 # DIR/libcamera/root is what libcamera needs of a Debian 13 for arm64, the system below Raspberry Pi OS, and libcamera itself, laid out as
-# installed: DIR/bin/qemu-rpi runs programs in it. What its build needs is installed where this runs as root. DIR keeps it: a second call
+# installed: DIR/bin/qemu-rpi runs programs in it. What its build needs is installed as tests/apt.sh says (CI=true). DIR keeps it: a second call
 # only looks whether it is there. Ends with 69 (EX_UNAVAILABLE) and the reason where it cannot be had.
 set -euo pipefail
 shopt -s inherit_errexit

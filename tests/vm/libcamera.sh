@@ -5,7 +5,7 @@
 #     export PKG_CONFIG_PATH=DIR/root/usr/lib/x86_64-linux-gnu/pkgconfig     to build against it
 #     export LD_LIBRARY_PATH=DIR/root/usr/lib/x86_64-linux-gnu               to run with it
 #
-# DIR/root is laid out as it lies in the virtual machine's root. What its build needs is installed where this runs as root. DIR keeps it:
+# DIR/root is laid out as it lies in the virtual machine's root. What its build needs is installed as tests/apt.sh says (CI=true). DIR keeps it:
 # a second call only looks whether it is there. Ends with 69 (EX_UNAVAILABLE) and the reason where it cannot be had.
 set -euo pipefail
 
