@@ -10,7 +10,7 @@ use appliance::recipe::Recipe;
 use appliance::recipe::teach::{Naming, teach};
 use hal::head::DynHead;
 use hal::replay::Recording;
-use hal::replay::recording::{PatternSpec, RecordedFrame, RecordedProjector};
+use hal::replay::recording::{PatternSpec, RecordedFrame};
 use sim::parts::Sphere;
 use sim::{Part, Scenario, Stage};
 use std::ffi::OsStr;
@@ -270,14 +270,7 @@ impl Taught {
         (scenario.rig.camera.width, scenario.rig.camera.height) = (128, 128);
         (scenario.rig.projector.width, scenario.rig.projector.height) = (512, 384);
         let (mut head, stage) = sim::head(&scenario).expect("a head");
-        let calibration = Calibration {
-            camera: (128, 128, 8),
-            camera_model: stage.camera_model(),
-            projector: (512, 384),
-            projector_model: stage.projector_model(),
-            noise_counts: scenario.noise_sigma_counts(),
-            response: None,
-        };
+        let calibration = Calibration::of_stage(&stage).unwrap();
         let (bytes, recipe) = taught_recipe(&mut head, &calibration);
         let mut record = |ratios: &[f64], steps| {
             let levels = ratios.iter().flat_map(|&ratio| Shot::level(ratio, steps));
@@ -325,18 +318,9 @@ fn record(
     let turns = (0..columns * rows).map(|at| function.at_pixel(at % columns, at / columns));
     let truth = stage.truth();
     Recording {
-        width: calibration.camera.0,
-        height: calibration.camera.1,
-        bit_depth: calibration.camera.2,
         description: "a sphere".into(),
         source: "the simulated head".into(),
-        camera_model: Some(calibration.camera_model.clone()),
         noise_counts: None,
-        projector: RecordedProjector {
-            width: columns as u32,
-            height: rows as u32,
-            model: Some(calibration.projector_model.clone()),
-        },
         patterns: vec![PatternSpec::File {
             rows,
             columns,
@@ -350,12 +334,9 @@ fn record(
                 ..seam::recorded(shot, frame)
             })
             .collect(),
-        range_mm: None,
-        exposure_us: None,
-        part_id: None,
-        recipe: None,
         truth_height: Some(truth.height.clone()),
         truth_class: Some(truth.class.clone()),
+        ..calibration.recording()
     }
 }
 

@@ -164,7 +164,7 @@ fn an_abort_ends_a_teach_and_the_recipe_before_it_goes_on() {
 fn a_teach_that_is_ended_does_no_further_step() {
     let scenario = Scenario::from_toml(SMALL_HEAD, "small head").unwrap();
     let (mut head, stage) = sim::head(&scenario).unwrap();
-    let calibration = Calibration::of_stage(&stage);
+    let calibration = Calibration::of_stage(&stage).unwrap();
     let naming = Naming {
         number: 1,
         part_number: "PART".into(),

@@ -208,6 +208,11 @@ impl Pinhole {
         Ok(self)
     }
 
+    /// The model as it was given.
+    pub fn model(&self) -> &PinholeModel {
+        &self.model
+    }
+
     /// Width of the frame in pixels.
     pub fn width(&self) -> usize {
         self.width

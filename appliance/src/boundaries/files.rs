@@ -14,7 +14,7 @@ use algo::pattern::Shot;
 use hal::frame::{Frame, FrameFormat, Pixels};
 use hal::head::Stamp;
 use hal::replay::Recording;
-use hal::replay::recording::{PatternSpec, RecipeReference, RecordedProjector};
+use hal::replay::recording::{PatternSpec, RecipeReference};
 use hal::units::Timestamp;
 use serde_json::{Value, json};
 use sim::Scenario;
@@ -34,13 +34,7 @@ fn small_head() -> Scenario {
 
 #[test]
 fn a_boundary_value_in_a_calibration_is_refused_by_its_key_or_the_head_is_known_by_it() {
-    let Calibration {
-        camera,
-        camera_model,
-        projector,
-        projector_model,
-        ..
-    } = Calibration::of_scenario(&small_head());
+    let Scenario { rig, bit_depth, .. } = small_head();
     let map = |name: &str| MapFile {
         file: format!("{name}.npy"),
         sha256: "0".repeat(64),
@@ -58,15 +52,15 @@ fn a_boundary_value_in_a_calibration_is_refused_by_its_key_or_the_head_is_known_
         temperature_c: Some(30.0),
         models_from: "scenario".into(),
         camera: CameraFile {
-            width: camera.0,
-            height: camera.1,
-            bit_depth: camera.2,
-            model: camera_model,
+            width: rig.camera.width,
+            height: rig.camera.height,
+            bit_depth,
+            model: rig.camera.model(),
         },
         projector: ProjectorFile {
-            width: projector.0,
-            height: projector.1,
-            model: projector_model,
+            width: rig.projector.width,
+            height: rig.projector.height,
+            model: rig.projector.model(),
         },
         timing: TimingFile {
             flip_to_light_ns: 1000,
@@ -111,7 +105,7 @@ fn a_boundary_value_in_a_calibration_is_refused_by_its_key_or_the_head_is_known_
         };
         let (file, bytes) = file.sealed()?;
         assert_eq!(CalibrationFile::read(&bytes)?, file);
-        file.calibration()?.devices().map(drop)
+        file.calibration().map(drop)
     });
     tally.end("calibration", 9000);
 }
@@ -149,23 +143,14 @@ unit: mm
     );
     fs::write(&projector, YAML).unwrap();
     let size = (512, 512);
-    let scenario = Scenario::default();
     let read = |text: &str| {
         fs::write(&camera, text).unwrap();
         let sizes = Sizes {
             camera: size,
             projector: size,
         };
-        let (camera_model, projector_model) =
-            from_two(&camera, &projector, sizes, Declared::default())?;
-        let calibration = Calibration {
-            camera: (size.0, size.1, 8),
-            camera_model,
-            projector: size,
-            projector_model,
-            ..Calibration::of_scenario(&scenario)
-        };
-        calibration.devices().map(drop)
+        let (camera, projector) = from_two(&camera, &projector, sizes, Declared::default())?;
+        Calibration::new((size.0, size.1, 8), size, (&camera, &projector), 1.0).map(drop)
     };
     read(YAML).unwrap();
     let mut tally = Tally::default();
@@ -191,7 +176,7 @@ unit: mm
 /// A recording of a few pixels with every optional key.
 fn recording() -> Recording {
     let scenario = small_head();
-    let calibration = Calibration::of_scenario(&scenario);
+    let calibration = Calibration::of_scenario(&scenario).unwrap();
     let format = FrameFormat::packed(16, 12, 8);
     let levels = [0.03, 0.2, 1.0];
     let shots = levels.into_iter().flat_map(|ratio| Shot::level(ratio, 3));
@@ -205,18 +190,9 @@ fn recording() -> Recording {
         seam::recorded(shot, frame.unwrap())
     });
     Recording {
-        width: 16,
-        height: 12,
-        bit_depth: 8,
         description: "a test".into(),
         source: "computed".into(),
-        camera_model: Some(calibration.camera_model),
         noise_counts: Some(3.7),
-        projector: RecordedProjector {
-            width: 32,
-            height: 24,
-            model: Some(calibration.projector_model),
-        },
         patterns: vec![PatternSpec::Vertical { fringes: 30.0 }],
         frames: frames.collect(),
         range_mm: Some([-50.0, 50.0]),
@@ -226,8 +202,7 @@ fn recording() -> Recording {
             number: 1,
             fingerprint: "0".repeat(64),
         }),
-        truth_height: None,
-        truth_class: None,
+        ..calibration.recording()
     }
 }
 
@@ -300,7 +275,7 @@ fn a_boundary_value_in_a_scenario_is_refused_by_its_key_or_the_scene_can_be_lit(
     tally.walk(&tree, |place, value| {
         let text = place.replaced(&tree, in_toml(value), toml);
         let scenario = Scenario::from_toml(&text, "here").map_err(|error| error.to_string())?;
-        Calibration::of_scenario(&scenario).devices()?;
+        Calibration::of_scenario(&scenario)?;
         let camera = &scenario.rig.camera;
         if camera.width * camera.height * scenario.sub_rays.pow(2) <= 16 * 12 * 4 {
             drop(sim::head(&scenario).map_err(|error| error.to_string())?);

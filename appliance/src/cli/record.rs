@@ -4,14 +4,14 @@ use super::names;
 use super::numbers::number;
 use super::options::{Files, Quiet, Threads};
 use crate::error::{Exit, Failure};
-use crate::head::rasters::rasters;
+use crate::head::scan::take;
 use crate::head::seam;
 use crate::production::backend::{self, Opened};
 use algo::pattern::{PhaseFunction, Sequence};
 use hal::bounds::MAX_FRINGES;
 use hal::replay::Recording;
 use hal::replay::recorder;
-use hal::replay::recording::{PatternSpec, RecordedProjector};
+use hal::replay::recording::PatternSpec;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -73,48 +73,29 @@ impl Record {
             stage,
             ..
         } = opened;
-        let (columns, rows) = calibration.projector;
+        let (columns, rows) = calibration.raster();
         let fringes = self.fringes.unwrap_or(f64::from(columns) / 12.0);
         let function = PhaseFunction::vertical(columns as usize, rows as usize, fringes)
             .map_err(|error| Failure::because(Exit::Usage, "--fringes", error))?;
         let (levels, steps) = (usize::from(self.levels), usize::from(self.steps));
         let shots = Sequence::geometric(function.range(), levels, steps);
         let device = |error: hal::error::Error| Failure::new(Exit::Unavailable, error.to_string());
-        let patterns = rasters(&function, &shots, calibration).map_err(device)?;
-        head.load(patterns).map_err(device)?;
-        let mut frames = Vec::with_capacity(shots.len());
-        let indices: Vec<usize> = (0..shots.len()).collect();
-        head.acquire(&indices, TIMEOUT, &mut |at, frame| {
-            frames.push(seam::recorded(shots[at], frame));
-            told(frames.len() as f64 / shots.len() as f64);
-        })
-        .map_err(device)?;
+        let taken = take(head, calibration, &function, &shots, TIMEOUT, told).map_err(device)?;
+        let recorded = shots.into_iter().zip(taken);
         let truth = stage.as_ref().map(sim::Stage::truth);
-        let (width, height, bit_depth) = calibration.camera;
         Ok(Recording {
-            width,
-            height,
-            bit_depth,
             description: format!("{levels} levels of {steps} shifts, {fringes} vertical fringes"),
             source: match stage {
                 Some(_) => "fringed's simulated head".into(),
                 None => "a head of fringed".into(),
             },
-            camera_model: Some(calibration.camera_model.clone()),
-            noise_counts: Some(calibration.noise_counts),
-            projector: RecordedProjector {
-                width: columns,
-                height: rows,
-                model: Some(calibration.projector_model.clone()),
-            },
             patterns: vec![PatternSpec::Vertical { fringes }],
-            frames,
-            range_mm: None,
-            exposure_us: None,
-            part_id: None,
-            recipe: None,
+            frames: recorded
+                .map(|(shot, frame)| seam::recorded(shot, frame))
+                .collect(),
             truth_height: truth.as_ref().map(|truth| truth.height.clone()),
             truth_class: truth.map(|truth| truth.class),
+            ..calibration.recording()
         })
     }
 }

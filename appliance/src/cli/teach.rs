@@ -266,7 +266,7 @@ impl Teach {
             wrong(&"the noise of a sample is not known: add camera.noise_counts or levels of 4 shifts")
         })?;
         let calibration = Calibration::of(&recording, noise)
-            .map_err(|lacks| wrong(&format!("it has no {lacks}: add both models")))?;
+            .map_err(|lacks| wrong(&format!("it {lacks}: add both models")))?;
         let phases = &measured.phases[measured.primary];
         crate::recipe::teach::refuse_empty(phases).map_err(|error| wrong(&error))?;
         let at = primary_of(&recording);

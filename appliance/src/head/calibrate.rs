@@ -10,6 +10,7 @@ use super::examine::{
     Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, Noise, Plate, PlateError, SETTLE, Stamps,
     contrast, response,
 };
+use super::seam;
 use algo::geometry::Vector;
 use hal::error::Error;
 use hal::head::{DynHead, Timing};
@@ -141,7 +142,8 @@ pub fn make(head: &mut DynHead, known: Known, told: &dyn Fn(f64, &str)) -> Resul
     };
     told(1.0, "calibrated");
     let coarsest = contrast.first().map_or(0.0, |first| first.1);
-    let (width, height, bit_depth) = calibration.camera;
+    let (width, height, bit_depth) = calibration.frames();
+    let (columns, rows) = calibration.raster();
     let file = CalibrationFile {
         format: FORMAT.into(),
         version: VERSION,
@@ -155,12 +157,12 @@ pub fn make(head: &mut DynHead, known: Known, told: &dyn Fn(f64, &str)) -> Resul
             width,
             height,
             bit_depth,
-            model: calibration.camera_model.clone(),
+            model: seam::device_model(&calibration.camera),
         },
         projector: ProjectorFile {
-            width: calibration.projector.0,
-            height: calibration.projector.1,
-            model: calibration.projector_model.clone(),
+            width: columns,
+            height: rows,
+            model: seam::device_model(&calibration.projector),
         },
         timing: TimingFile {
             flip_to_light_ns: nanoseconds(delay.duration()),
@@ -252,7 +254,7 @@ fn reference(
              plate into the plane z = 0 of the models, or import the models of this head"
         )));
     }
-    let (width, height) = (calibration.camera.0 as usize, calibration.camera.1 as usize);
+    let (width, height) = (calibration.camera.width(), calibration.camera.height());
     let mut map = |name: &str, plate: &Plate| {
         let bytes = hal::npy::write(width, &plate.map(width, height));
         let (file, sha256) = Place::name_of_map(name, &bytes);
@@ -280,14 +282,15 @@ fn models_off(
     horizontal: &Plate,
 ) -> Result<f64, String> {
     const GRID: u32 = 16;
-    let (camera, projector) = calibration.devices()?;
+    let (camera, projector) = (&calibration.camera, &calibration.projector);
+    let (width, height, _) = calibration.frames();
     let eye = camera.centre();
     let (mut squares, mut points) = (0.0, 0.0);
     for at in 0..GRID * GRID {
         let place =
             |at: u32, pixels: u32| (f64::from(at) + 0.5) / f64::from(GRID) * f64::from(pixels);
-        let u = place(at % GRID, calibration.camera.0);
-        let v = place(at / GRID, calibration.camera.1);
+        let u = place(at % GRID, width);
+        let v = place(at / GRID, height);
         let on_plane = camera.ray(u, v).map(|ray| eye + ray * (-eye.z / ray.z));
         let lights = on_plane.and_then(|point: Vector| projector.project(point));
         let Some((xi, eta)) = lights else { continue };

@@ -7,4 +7,5 @@ pub mod examine;
 pub mod placed;
 pub mod rasters;
 pub mod rig;
+pub mod scan;
 pub mod seam;

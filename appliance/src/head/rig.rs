@@ -1,12 +1,11 @@
 //! A head, a part and the measurements that teaching and experiments are made of.
 
 use crate::head::calibration::Calibration;
-use crate::head::rasters::rasters;
-use crate::head::seam;
+use crate::head::scan::{self, Scan};
 use algo::geometry::{HeightRange, Reference, Triangulator};
-use algo::pattern::{PhaseFunction, Sequence, Shot};
+use algo::pattern::{PhaseFunction, Shot};
 use algo::phase::Decoder;
-use algo::pipeline::{self, HeightMap, PhaseMap};
+use algo::pipeline::{HeightMap, PhaseMap};
 use algo::units::AbsolutePhase;
 use hal::frame::Frame;
 use hal::head::DynHead;
@@ -67,12 +66,11 @@ impl Rig<'_> {
     /// The geometry for a phase function.
     ///
     /// # Errors
-    /// If the calibration is absurd.
+    /// If the devices do not look down at the plane from two places, or the range is unusable.
     pub fn triangulator(&self, function: &PhaseFunction) -> Result<Triangulator, RigError> {
-        let (camera, projector) = self.calibration.devices().map_err(rig)?;
         Triangulator::new(
-            camera,
-            projector,
+            self.calibration.camera.clone(),
+            self.calibration.projector.clone(),
             Reference::Models,
             function.clone(),
             self.range,
@@ -92,42 +90,28 @@ impl Rig<'_> {
         about: About<'_>,
         progress: &dyn Fn(f64),
     ) -> Result<Measured, RigError> {
-        let sequence = Sequence::from_frames(shots).map_err(rig)?;
-        let bit_depth = self.calibration.camera.2;
-        let decoder = Decoder::new(&sequence, function.range(), bit_depth).map_err(rig)?;
         let triangulator = self.triangulator(function)?;
-        self.head
-            .load(rasters(function, shots, self.calibration)?)?;
-        let mut taken = Vec::with_capacity(shots.len());
-        let indices: Vec<usize> = (0..shots.len()).collect();
-        self.head.acquire(&indices, self.timeout, &mut |_, frame| {
-            taken.push(frame);
-            progress(taken.len() as f64 / shots.len() as f64);
-        })?;
-        let views = taken
-            .iter()
-            .map(seam::view)
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(rig)?;
+        let (calibration, timeout) = (self.calibration, self.timeout);
+        let frames = scan::take(self.head, calibration, function, shots, timeout, progress)?;
+        let scan = Scan::new(function.range(), shots, &frames).map_err(rig)?;
         let reference;
         let map = match about {
-            _ if !decoder.unwrapping().needs_map() => None,
+            _ if !scan.needs_map() => None,
             About::Map(map) => Some(map),
             About::Reference => {
                 reference = triangulator.reference_map();
                 Some(&reference[..])
             }
         };
-        let mut phases = pipeline::decode(&decoder, &views, map, None).map_err(rig)?;
-        let noise = Some(self.calibration.noise_counts);
-        let heights =
-            pipeline::triangulate(&triangulator, &decoder, noise, None, None, &mut phases);
+        let mut phases = scan.phases(map).map_err(rig)?;
+        let noise = Some(calibration.noise_counts);
+        let heights = scan.heights(&triangulator, noise, &mut phases);
         Ok(Measured {
             phases,
             heights,
-            decoder,
+            decoder: scan.decoder,
             triangulator,
-            frames: taken,
+            frames,
         })
     }
 }

@@ -1,7 +1,7 @@
 //! The seam between devices and computation: `hal`'s frames and models as `algo` takes them.
 
 use algo::frame::{FrameError, FrameView, Samples};
-use algo::geometry::PinholeModel;
+use algo::geometry::{Pinhole, PinholeModel};
 use algo::pattern::{PhaseFunction, PhaseFunctionError, Shot};
 use hal::frame::Frame;
 use hal::model::DeviceModel;
@@ -35,6 +35,20 @@ pub fn pinhole_model(model: &DeviceModel) -> PinholeModel {
         distortion: model.distortion,
         rotation: model.rotation,
         translation: model.translation_mm,
+    }
+}
+
+/// A checked device as files store its model.
+pub fn device_model(device: &Pinhole) -> DeviceModel {
+    let model = device.model();
+    DeviceModel {
+        fx: model.fx,
+        fy: model.fy,
+        cx: model.cx,
+        cy: model.cy,
+        distortion: model.distortion,
+        rotation: model.rotation,
+        translation_mm: model.translation,
     }
 }
 

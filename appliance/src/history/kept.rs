@@ -34,15 +34,18 @@ impl Kept {
         let wrong = |lacks: &str| {
             let place = folder.join("recording.json");
             let words = format!(
-                "replay {}: it has no {lacks}: replay one that the station kept",
+                "replay {}: it {lacks}: replay one that the station kept",
                 place.display()
             );
             Failure::new(Exit::Content, words)
         };
-        let reference = recording.recipe.take().ok_or_else(|| wrong("recipe"))?;
+        let reference = recording
+            .recipe
+            .take()
+            .ok_or_else(|| wrong("has no recipe"))?;
         let noise = recording.noise_counts;
-        let noise = noise.ok_or_else(|| wrong("camera.noise_counts"))?;
-        let calibration = Calibration::of(&recording, noise).map_err(wrong)?;
+        let noise = noise.ok_or_else(|| wrong("has no camera.noise_counts"))?;
+        let calibration = Calibration::of(&recording, noise).map_err(|lacks| wrong(&lacks))?;
         let own = folder.join(RECIPE);
         Ok(Self {
             recording,

@@ -13,7 +13,7 @@ use crate::storage::folder::{name_also, rename_whole};
 use hal::frame::Frame;
 use hal::replay::Recording;
 use hal::replay::recorder::{self, RecorderError};
-use hal::replay::recording::{PatternSpec, RecipeReference, RecordedProjector};
+use hal::replay::recording::{PatternSpec, RecipeReference};
 use std::collections::{BTreeMap, VecDeque};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
@@ -217,12 +217,8 @@ fn recording(part: &FailedPart) -> Recording {
         calibration,
     } = part;
     let file = plan.file();
-    let (width, height, bit_depth) = calibration.camera;
     let shown = plan.shots(*step).zip(frames);
     Recording {
-        width,
-        height,
-        bit_depth,
         description: format!(
             "result {}, recipe {}, {}",
             record.seq,
@@ -230,13 +226,6 @@ fn recording(part: &FailedPart) -> Recording {
             record.verdict.word()
         ),
         source: "kept by fringed".into(),
-        camera_model: Some(calibration.camera_model.clone()),
-        noise_counts: Some(calibration.noise_counts),
-        projector: RecordedProjector {
-            width: calibration.projector.0,
-            height: calibration.projector.1,
-            model: Some(calibration.projector_model.clone()),
-        },
         patterns: vec![pattern(plan)],
         frames: shown
             .map(|(shot, frame)| seam::recorded(shot, frame.clone()))
@@ -248,8 +237,7 @@ fn recording(part: &FailedPart) -> Recording {
             number: u32::from(file.number),
             fingerprint: file.fingerprint.clone(),
         }),
-        truth_height: None,
-        truth_class: None,
+        ..calibration.recording()
     }
 }
 

@@ -1,13 +1,14 @@
 //! What is known of a recording's phase beforehand: a recipe's golden map, or where a preliminary
 //! measurement expects it.
 
-use super::AnyError;
 use crate::head::seam;
 use crate::recipe::{Recipe, SequenceKind, safe};
 use algo::adaptive::ProjectorMap;
 use algo::pattern::{PhaseFunction, Unwrapping};
 use algo::units::AbsolutePhase;
 use hal::replay::Recording;
+
+type AnyError = Box<dyn std::error::Error>;
 
 /// Phase functions that differ by no more than this are the same one, in turns: files hold `f64`.
 const SAME: f64 = 1e-9;

@@ -9,13 +9,13 @@ pub use report::{RecipeName, Report, StageTimes};
 pub use score::{Score, Truth};
 
 use crate::error::{Exit, Failure};
+use crate::head::scan::Scan;
 use crate::head::seam;
 use crate::output::cloud::Surface;
 use crate::recipe::Recipe;
 use algo::adaptive::ProjectorMap;
-use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
-use algo::pattern::{PhaseFunction, Sequence};
+use algo::pattern::PhaseFunction;
 use algo::phase::Decoder;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::AbsolutePhase;
@@ -103,23 +103,23 @@ fn measure_about(
     let mut phases = Vec::new();
     let mut chosen = None;
     for at in 0..recording.patterns.len() {
-        let channel = Channel::new(recording, at).map_err(|error| wrong(&*error))?;
+        let channel = Channel::new(recording, at).map_err(|error| wrong(&error))?;
         let started = Instant::now();
         let geometry = rig.triangulator(&channel.function);
         let geometry = geometry.map_err(|error| wrong(&error))?;
         let golden = known.as_ref().filter(|known| known.pattern == at);
         let made;
-        let map: Option<(&str, &[AbsolutePhase])> = if !channel.decoder.unwrapping().needs_map() {
+        let map: Option<(&str, &[AbsolutePhase])> = if !channel.scan.needs_map() {
             None
         } else if let Some(known) = golden {
-            made = known.map(channel.decoder.unwrapping());
+            made = known.map(channel.scan.decoder.unwrapping());
             Some((known.name, &made))
         } else {
             let about = geometry.as_ref().map_err(|missing| {
                 wrong(&format!(
                     "{} levels {:?} are unwrapped about a known map, and {missing}: add both models, or \
                      give a recipe with a golden map",
-                    channel.decoder.unwrapping().kind(),
+                    channel.kind(),
                     channel.ratios(),
                 ))
             })?;
@@ -128,9 +128,8 @@ fn measure_about(
         };
         stages.map += started.elapsed();
         let started = Instant::now();
-        let decoded = channel
-            .decode(map.map(|(_, map)| map))
-            .map_err(|error| wrong(&*error))?;
+        let decoded = channel.scan.phases(map.map(|(_, map)| map));
+        let decoded = decoded.map_err(|error| wrong(&error))?;
         stages.phase += started.elapsed();
         phases.push(decoded);
         if at == primary {
@@ -144,19 +143,17 @@ fn measure_about(
     let stated = recording.noise_counts;
     let stated = stated.or_else(|| recipe.map(|recipe| recipe.file.noise_counts));
     let noise = stated.or_else(|| {
-        pipeline::sample_noise(&channel.sequence, &channel.frames, &phases[primary].trust)
+        let Scan {
+            sequence, frames, ..
+        } = &channel.scan;
+        pipeline::sample_noise(sequence, frames, &phases[primary].trust)
     });
     stages.noise = started.elapsed();
     let started = Instant::now();
     let heights = geometry.map(|triangulator| Surface {
-        map: pipeline::triangulate(
-            &triangulator,
-            &channel.decoder,
-            noise,
-            None,
-            None,
-            &mut phases[primary],
-        ),
+        map: channel
+            .scan
+            .heights(&triangulator, noise, &mut phases[primary]),
         triangulator,
     });
     stages.height = started.elapsed();
@@ -164,7 +161,7 @@ fn measure_about(
         &phases[primary],
         &heights,
         Manner {
-            kind: channel.decoder.unwrapping().kind(),
+            kind: channel.kind(),
             ratios: channel.ratios(),
             map,
             recipe: recipe.map(|recipe| RecipeName {
@@ -181,7 +178,7 @@ fn measure_about(
         phases,
         primary,
         heights,
-        decoder: channel.decoder,
+        decoder: channel.scan.decoder,
         report,
     })
 }
@@ -192,65 +189,46 @@ pub fn primary_of(recording: &Recording) -> usize {
     recording.patterns.iter().position(vertical).unwrap_or(0)
 }
 
-/// The frames of one pattern of a recording, ready to decode.
+/// The frames of one pattern of a recording, with its phase function.
 struct Channel<'a> {
     function: PhaseFunction,
-    sequence: Sequence,
-    decoder: Decoder,
-    frames: Vec<FrameView<'a>>,
+    scan: Scan<'a>,
 }
 
-type AnyError = Box<dyn std::error::Error>;
-
 impl<'a> Channel<'a> {
-    fn new(recording: &'a Recording, pattern: usize) -> Result<Self, AnyError> {
+    fn new(recording: &'a Recording, pattern: usize) -> Result<Self, String> {
         let projector = &recording.projector;
         let function = seam::phase_function(
             &recording.patterns[pattern],
             projector.width as usize,
             projector.height as usize,
-        )?;
-        let recorded = || {
-            recording
-                .frames
-                .iter()
-                .filter(move |frame| frame.pattern == pattern)
-        };
-        let shots: Vec<_> = recorded().map(seam::shot).collect();
-        let sequence = Sequence::from_frames(&shots)?;
-        let decoder = Decoder::new(&sequence, function.range(), recording.bit_depth)?;
-        let frames = recorded()
-            .map(|f| seam::view(&f.frame))
-            .collect::<Result<_, _>>()?;
-        Ok(Self {
-            function,
-            sequence,
-            decoder,
-            frames,
-        })
-    }
-
-    fn decode(&self, map: Option<&[AbsolutePhase]>) -> Result<PhaseMap, AnyError> {
-        Ok(pipeline::decode(&self.decoder, &self.frames, map, None)?)
+        )
+        .map_err(|error| error.to_string())?;
+        let taken = recording.frames.iter();
+        let recorded: Vec<_> = taken.filter(|frame| frame.pattern == pattern).collect();
+        let shots: Vec<_> = recorded.iter().map(|frame| seam::shot(frame)).collect();
+        let frames = recorded.iter().map(|recorded| &recorded.frame);
+        let scan = Scan::new(function.range(), &shots, frames)?;
+        Ok(Self { function, scan })
     }
 
     /// The ratios from coarse to fine.
     fn ratios(&self) -> Vec<f64> {
-        self.sequence
-            .levels()
-            .iter()
-            .map(|level| level.ratio)
-            .collect()
+        let levels = self.scan.sequence.levels().iter();
+        levels.map(|level| level.ratio).collect()
+    }
+
+    fn kind(&self) -> &'static str {
+        self.scan.decoder.unwrapping().kind()
     }
 
     fn intensity(&self) -> Vec<u8> {
-        let finest = &self.sequence.levels()[self.sequence.levels().len() - 1];
+        let levels = self.scan.sequence.levels();
+        let finest = levels[levels.len() - 1].frames.iter();
         let frames: Vec<_> = finest
-            .frames
-            .iter()
-            .map(|&at| self.frames[usize::from(at)])
+            .map(|&at| self.scan.frames[usize::from(at)])
             .collect();
-        algo::frame::mean(&frames, self.decoder.full_scale())
+        algo::frame::mean(&frames, self.scan.decoder.full_scale())
     }
 }
 

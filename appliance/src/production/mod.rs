@@ -312,10 +312,10 @@ impl Worker {
         let Opened {
             head, calibration, ..
         } = &mut self.opened;
-        let frames = (calibration.camera.0, calibration.camera.1);
+        let (width, height, _) = calibration.frames();
         let fit = kept
             .as_ref()
-            .map_or(Ok(()), |file| replace::check_kept(file, frames));
+            .map_or(Ok(()), |file| replace::check_kept(file, (width, height)));
         let taught = match (problem, fit) {
             (Some(problem), _) => Err(TeachError::NotCalibrated(problem)),
             (None, Err(words)) => Err(TeachError::Rig(words)),

@@ -114,6 +114,8 @@ impl GoldenPart<'_> {
         }
         let range = self.triangulator.range();
         let calibration = self.calibration;
+        let (width, height, bit_depth) = calibration.frames();
+        let (columns, rows) = calibration.raster();
         let file = RecipeFile {
             format: FORMAT.into(),
             version: VERSION,
@@ -125,13 +127,13 @@ impl GoldenPart<'_> {
             taught_at_unix_s: naming.taught_at_unix_s,
             calibration: calibration.fingerprint(),
             camera: CameraFile {
-                width: calibration.camera.0,
-                height: calibration.camera.1,
-                bit_depth: calibration.camera.2,
+                width,
+                height,
+                bit_depth,
             },
             projector: RasterFile {
-                width: calibration.projector.0,
-                height: calibration.projector.1,
+                width: columns,
+                height: rows,
             },
             pattern: self.pattern.clone(),
             sequences,

@@ -8,13 +8,13 @@ use super::golden::GoldenPart;
 use crate::error::code_of;
 use crate::head::calibration::Calibration;
 use crate::head::rig::{About, Measured, Rig, RigError};
-use crate::head::seam;
+use crate::head::scan::Scan;
 use crate::station::error_code;
 use crate::system::computing::Computing;
 use algo::adaptive::{AdaptError, ProjectorMap, noise};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
-use algo::phase::{Decoder, Trust};
-use algo::pipeline::{self, PhaseMap};
+use algo::phase::Trust;
+use algo::pipeline::PhaseMap;
 use hal::head::DynHead;
 use std::time::Duration;
 
@@ -120,8 +120,8 @@ pub fn teach_while(
         timeout,
     };
     let (columns, rows) = (
-        calibration.projector.0 as usize,
-        calibration.projector.1 as usize,
+        calibration.projector.width(),
+        calibration.projector.height(),
     );
     let preliminary = PhaseFunction::vertical(columns, rows, columns as f64 / PRELIMINARY_PITCH_PX)
         .map_err(|error| TeachError::Rig(error.to_string()))?;
@@ -185,17 +185,10 @@ fn blur(
     map: &ProjectorMap,
     columns: f64,
 ) -> Result<f64, TeachError> {
-    let rig = |error: &dyn std::fmt::Display| TeachError::Rig(error.to_string());
-    let views = first.frames[..STEPS].iter().map(seam::view);
-    let views = views
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(|error| rig(&error))?;
-    let sequence = Sequence::from_frames(&shots[..STEPS]).map_err(|error| rig(&error))?;
     let function = first.triangulator.function();
-    let bit_depth = first.frames[0].format().bit_depth;
-    let decoder =
-        Decoder::new(&sequence, function.range(), bit_depth).map_err(|error| rig(&error))?;
-    let coarse = pipeline::decode(&decoder, &views, None, None).map_err(|error| rig(&error))?;
+    let coarse = Scan::new(function.range(), &shots[..STEPS], &first.frames[..STEPS])
+        .and_then(|coarse| coarse.phases(None))
+        .map_err(TeachError::Rig)?;
     let slopes = map.slopes(noise::MAX_STEP);
     let resolved = (0..slopes.len())
         .filter(|&at| first.phases.trust[at] == Trust::Resolved && !slopes[at][0].is_nan());

@@ -19,8 +19,8 @@ fn of_text(data: &[u8]) -> usize {
 pub fn calibration(data: &[u8]) {
     bounded(of_text(data), || {
         if let Ok(file) = CalibrationFile::read(data) {
-            let calibration = file.calibration().expect("a response that can be inverted");
-            calibration.devices().expect("models that can be used");
+            file.calibration()
+                .expect("models and a response that can be used");
         }
         let parsed = serde_json::from_slice::<CalibrationFile>(data);
         if let Ok(Ok((file, bytes))) = parsed.map(CalibrationFile::sealed) {
@@ -74,7 +74,7 @@ pub fn scenario(data: &[u8]) {
     bounded(of_text(data), || {
         if let Ok(scenario) = Scenario::from_toml(text, "scenario.toml") {
             let calibration = Calibration::of_scenario(&scenario);
-            std::hint::black_box((calibration.devices().is_ok(), calibration.fingerprint()));
+            std::hint::black_box(calibration.map(|known| known.fingerprint()).is_ok());
         }
     });
 }

@@ -43,7 +43,7 @@ impl Part {
     fn taught() -> Self {
         let scenario = Scenario::from_toml(HEAD, "the fuzz targets' head").expect("a scenario");
         let (mut head, stage) = sim::head(&scenario).expect("a head");
-        let calibration = Calibration::of_stage(&stage);
+        let calibration = Calibration::of_stage(&stage).expect("models that can be used");
         let naming = Naming {
             number: 1,
             part_number: "P-1".into(),

@@ -64,7 +64,7 @@ pub fn budgets(
     let about = format!("{width}x{height}");
     progress(0.0, &format!("{about}: light of the scene"));
     let (mut head, stage) = sim::head(&scenario).map_err(words)?;
-    let calibration = Calibration::of_stage(&stage);
+    let calibration = Calibration::of_stage(&stage)?;
     let naming = Naming {
         number: 1,
         part_number: "BENCH".into(),
@@ -146,7 +146,7 @@ fn budget(
     let whole = |run: &Vec<(String, f64)>| run.iter().map(|stage| stage.1).sum();
     let verdict_ms = median(runs.iter().map(whole).collect());
     let [one_thread_ms, kernel_ms, x_kernel] = on_one_thread(plan, &frames, effort)?;
-    let (width, height, _) = calibration.camera;
+    let (width, height, _) = calibration.frames();
     Ok(Budget {
         width,
         height,

@@ -104,7 +104,7 @@ impl Runner {
     pub fn new(scene: &Scene, optics: OpticsKind) -> Result<Self, RigError> {
         let scenario = scene.scenario(optics, 1);
         let (head, stage) = sim::head(&scenario)?;
-        let calibration = Calibration::of_stage(&stage);
+        let calibration = Calibration::of_stage(&stage).map_err(rig)?;
         Ok(Self {
             head,
             truth: stage.truth(),
@@ -180,8 +180,8 @@ impl Runner {
     }
 
     fn size(&self) -> (usize, usize) {
-        let (columns, rows) = self.calibration.projector;
-        (columns as usize, rows as usize)
+        let projector = &self.calibration.projector;
+        (projector.width(), projector.height())
     }
 
     fn measure(

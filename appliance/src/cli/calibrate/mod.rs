@@ -134,21 +134,23 @@ impl Calibrate {
             .transpose()
             .map_err(content)?
             .filter(|(_, stored)| {
-                let sizes = |of: &Calibration| (of.camera, of.projector);
+                let sizes = |of: &Calibration| (of.frames(), of.raster());
                 sizes(stored) == sizes(&calibration)
             });
         let mut models_from = OF_SCENARIO.to_owned();
         if let Some((from, (camera, projector))) = self.imported(&calibration)? {
             models_from = from;
-            (calibration.camera_model, calibration.projector_model) = (camera, projector);
-            fits(&calibration)
+            let (frames, raster) = (calibration.frames(), calibration.raster());
+            let noise = calibration.noise_counts;
+            calibration = Calibration::new(frames, raster, (&camera, &projector), noise)
+                .and_then(|imported| fits(&imported).map(|()| imported))
                 .map_err(|error| content(format!("import {models_from}: {error}")))?;
         } else if let Some((file, stored)) = &stored
             && file.models_from != OF_SCENARIO
         {
             models_from = file.models_from.clone();
-            calibration.camera_model = stored.camera_model.clone();
-            calibration.projector_model = stored.projector_model.clone();
+            calibration.camera = stored.camera.clone();
+            calibration.projector = stored.projector.clone();
         } else if opened.problem.is_some() {
             let words = "calibrate: the models of camera and projector are not known yet: import them with --camera and --projector, \
                          or with --models";
@@ -170,9 +172,10 @@ impl Calibrate {
 
     /// The models that the options name, and their files' names.
     fn imported(&self, head: &Calibration) -> Result<Option<(String, Models)>, Failure> {
+        let (width, height, _) = head.frames();
         let sizes = Sizes {
-            camera: (head.camera.0, head.camera.1),
-            projector: head.projector,
+            camera: (width, height),
+            projector: head.raster(),
         };
         let declared = Declared {
             unit: self.unit,
@@ -206,7 +209,7 @@ impl Calibrate {
 
 /// Whether camera and projector make a head that looks down at the plane z = 0 from two places.
 fn fits(calibration: &Calibration) -> Result<(), String> {
-    let (camera, projector) = calibration.devices()?;
+    let (camera, projector) = (calibration.camera.clone(), calibration.projector.clone());
     let (columns, rows) = (projector.width(), projector.height());
     let function =
         PhaseFunction::vertical(columns, rows, 1.0).map_err(|error| error.to_string())?;

@@ -209,11 +209,7 @@ impl CalibrationFile {
     }
 
     fn check(&self) -> Result<(), String> {
-        self.check_bounds()
-            .map_err(|error| format!("{error}: calibrate anew"))?;
-        let calibration = self.calibration()?;
-        calibration.devices()?;
-        if calibration.fingerprint() != self.fingerprint {
+        if self.calibration()?.fingerprint() != self.fingerprint {
             return Err("its fingerprint is not that of its content: calibrate anew".into());
         }
         Ok(())
@@ -222,16 +218,19 @@ impl CalibrationFile {
     /// What is known of the head.
     ///
     /// # Errors
-    /// If the response cannot be inverted.
+    /// If a value is out of its bounds, a model is absurd, or the response cannot be inverted.
     pub fn calibration(&self) -> Result<Calibration, String> {
+        self.check_bounds()
+            .map_err(|error| format!("{error}: calibrate anew"))?;
         let (camera, projector) = (&self.camera, &self.projector);
         Ok(Calibration {
-            camera: (camera.width, camera.height, camera.bit_depth),
-            camera_model: camera.model.clone(),
-            projector: (projector.width, projector.height),
-            projector_model: projector.model.clone(),
-            noise_counts: self.noise.counts,
             response: inverted(&self.response)?,
+            ..Calibration::new(
+                (camera.width, camera.height, camera.bit_depth),
+                (projector.width, projector.height),
+                (&camera.model, &projector.model),
+                self.noise.counts,
+            )?
         })
     }
 
@@ -250,6 +249,8 @@ impl CalibrationFile {
     /// # Errors
     /// If a number in it is not finite or the response cannot be inverted.
     pub fn sealed(mut self) -> Result<(Self, Vec<u8>), String> {
+        // Of the right form until there is one.
+        self.fingerprint = NO_CHECKSUM.into();
         self.fingerprint = self.calibration()?.fingerprint();
         self.checksum = self.checksummed();
         let mut bytes = serde_json::to_vec_pretty(&self).map_err(|error| error.to_string())?;

@@ -10,24 +10,23 @@ pub use current::Current;
 
 use crate::head::seam;
 use crate::storage::hex;
-use algo::geometry::{ModelError, Pinhole};
+use algo::geometry::Pinhole;
 use algo::pattern::GreyResponse;
 use hal::model::DeviceModel;
 use hal::replay::Recording;
+use hal::replay::recording::RecordedProjector;
 use sha2::{Digest, Sha256};
 use sim::{Scenario, Stage};
 
-/// The calibration of a head.
+/// The calibration of a head. Its models are checked: each pixel has one ray.
 #[derive(Clone, Debug)]
 pub struct Calibration {
-    /// Columns, rows and bits of the camera's frames.
-    pub camera: (u32, u32, u8),
-    /// The camera's geometry.
-    pub camera_model: DeviceModel,
-    /// Columns and rows of the projector's raster.
-    pub projector: (u32, u32),
-    /// The projector's geometry.
-    pub projector_model: DeviceModel,
+    /// The camera's geometry and the size of its frames.
+    pub camera: Pinhole,
+    /// Bits of a sample.
+    pub bit_depth: u8,
+    /// The projector's geometry and the size of its raster.
+    pub projector: Pinhole,
     /// σ of one sample in counts.
     pub noise_counts: f64,
     /// The projector's measured grey response, where it is not linear.
@@ -35,60 +34,129 @@ pub struct Calibration {
 }
 
 impl Calibration {
+    /// A head whose camera has frames of `(columns, rows, bits)` and whose projector a raster of `(columns, rows)`; its response
+    /// is linear.
+    ///
+    /// # Errors
+    /// If the model of the camera or of the projector is absurd: which one, and why.
+    pub fn new(
+        (width, height, bit_depth): (u32, u32, u8),
+        raster: (u32, u32),
+        (camera, projector): (&DeviceModel, &DeviceModel),
+        noise_counts: f64,
+    ) -> Result<Self, String> {
+        let checked = |device: &str, model, (columns, rows): (u32, u32)| {
+            let model = seam::pinhole_model(model);
+            Pinhole::new(model, columns as usize, rows as usize)
+                .map_err(|error| format!("the {device}'s calibration: {error}"))
+        };
+        Ok(Self {
+            camera: checked("camera", camera, (width, height))?,
+            bit_depth,
+            projector: checked("projector", projector, raster)?,
+            noise_counts,
+            response: None,
+        })
+    }
+
     /// The exact calibration of a simulated head.
-    pub fn of_stage(stage: &Stage) -> Self {
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_stage(stage: &Stage) -> Result<Self, String> {
         Self::of_scenario(stage.scenario())
     }
 
     /// The same, of a head that need not be there.
-    pub fn of_scenario(scenario: &Scenario) -> Self {
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_scenario(scenario: &Scenario) -> Result<Self, String> {
         let (camera, projector) = (&scenario.rig.camera, &scenario.rig.projector);
-        Self {
-            camera: (camera.width, camera.height, scenario.bit_depth),
-            camera_model: camera.model(),
-            projector: (projector.width, projector.height),
-            projector_model: projector.model(),
-            noise_counts: scenario.noise_sigma_counts(),
-            response: None,
-        }
+        Self::new(
+            (camera.width, camera.height, scenario.bit_depth),
+            (projector.width, projector.height),
+            (&camera.model(), &projector.model()),
+            scenario.noise_sigma_counts(),
+        )
     }
 
     /// What a recording says of the head that took it, with the noise of a sample in counts.
     ///
     /// # Errors
-    /// The word for what it lacks.
-    pub fn of(recording: &Recording, noise_counts: f64) -> Result<Self, &'static str> {
+    /// What is the matter with the recording, as a predicate: "has no camera model".
+    pub fn of(recording: &Recording, noise_counts: f64) -> Result<Self, String> {
         let projector = &recording.projector;
-        Ok(Self {
-            camera: (recording.width, recording.height, recording.bit_depth),
-            camera_model: recording.camera_model.clone().ok_or("camera model")?,
-            projector: (projector.width, projector.height),
-            projector_model: projector.model.clone().ok_or("projector model")?,
+        let lens = projector.model.as_ref();
+        Self::new(
+            (recording.width, recording.height, recording.bit_depth),
+            (projector.width, projector.height),
+            (
+                recording
+                    .camera_model
+                    .as_ref()
+                    .ok_or("has no camera model")?,
+                lens.ok_or("has no projector model")?,
+            ),
             noise_counts,
-            response: None,
-        })
+        )
+        .map_err(|error| format!("has an absurd model: {error}"))
+    }
+
+    /// A recording of this head, without patterns and frames.
+    pub fn recording(&self) -> Recording {
+        let (width, height, bit_depth) = self.frames();
+        let (columns, rows) = self.raster();
+        Recording {
+            width,
+            height,
+            bit_depth,
+            description: String::new(),
+            source: String::new(),
+            camera_model: Some(seam::device_model(&self.camera)),
+            noise_counts: Some(self.noise_counts),
+            projector: RecordedProjector {
+                width: columns,
+                height: rows,
+                model: Some(seam::device_model(&self.projector)),
+            },
+            patterns: Vec::new(),
+            frames: Vec::new(),
+            range_mm: None,
+            exposure_us: None,
+            part_id: None,
+            recipe: None,
+            truth_height: None,
+            truth_class: None,
+        }
+    }
+
+    /// Columns, rows and bits of the camera's frames.
+    pub fn frames(&self) -> (u32, u32, u8) {
+        let (width, height) = size(&self.camera);
+        (width, height, self.bit_depth)
+    }
+
+    /// Columns and rows of the projector's raster.
+    pub fn raster(&self) -> (u32, u32) {
+        size(&self.projector)
     }
 
     /// A strong hash over everything that heights depend on: a recipe made for another calibration
     /// is refused by it.
     pub fn fingerprint(&self) -> String {
         let mut hash = Sha256::new();
-        let (width, height, bits) = self.camera;
-        for number in [
-            width,
-            height,
-            u32::from(bits),
-            self.projector.0,
-            self.projector.1,
-        ] {
+        let (width, height, bits) = self.frames();
+        let (columns, rows) = self.raster();
+        for number in [width, height, u32::from(bits), columns, rows] {
             hash.update(number.to_le_bytes());
         }
-        for model in [&self.camera_model, &self.projector_model] {
+        for model in [self.camera.model(), self.projector.model()] {
             let numbers = [model.fx, model.fy, model.cx, model.cy].into_iter();
             let numbers = numbers
                 .chain(model.distortion)
                 .chain(model.rotation)
-                .chain(model.translation_mm);
+                .chain(model.translation);
             for number in numbers {
                 hash.update(number.to_le_bytes());
             }
@@ -102,24 +170,9 @@ impl Calibration {
         }
         hex(&hash.finalize())
     }
+}
 
-    /// Camera and projector, checked.
-    ///
-    /// # Errors
-    /// If a model is absurd; the message names the device.
-    pub fn devices(&self) -> Result<(Pinhole, Pinhole), String> {
-        let checked = |name: &str, model: &DeviceModel, width: u32, height: u32| {
-            Pinhole::new(seam::pinhole_model(model), width as usize, height as usize)
-                .map_err(|error: ModelError| format!("the {name}'s calibration: {error}"))
-        };
-        Ok((
-            checked("camera", &self.camera_model, self.camera.0, self.camera.1)?,
-            checked(
-                "projector",
-                &self.projector_model,
-                self.projector.0,
-                self.projector.1,
-            )?,
-        ))
-    }
+/// Columns and rows of a device's pictures, which were given as `u32`.
+fn size(device: &Pinhole) -> (u32, u32) {
+    (device.width() as u32, device.height() as u32)
 }

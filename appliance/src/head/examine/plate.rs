@@ -4,12 +4,11 @@
 //! pitch · Φ_R^V, η = pitch · Φ_R^H. Raw they have the noise of a measurement; a polynomial of degree 6 has a hundredth of it.
 
 use crate::head::calibration::Calibration;
-use crate::head::rasters::rasters;
-use crate::head::seam;
+use crate::head::scan::{self, Scan};
 use algo::geometry::{FittedMap, fit_map};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
-use algo::phase::{Decoder, Trust};
-use algo::pipeline::{self, PhaseMap};
+use algo::phase::Trust;
+use algo::pipeline::PhaseMap;
 use hal::head::DynHead;
 use std::time::Duration;
 
@@ -77,17 +76,9 @@ impl Plate {
         let mut shots = Sequence::geometric(function.range(), LEVELS, SHIFTS);
         shots.truncate((LEVELS - 1) * SHIFTS);
         shots.extend(Shot::level(1.0, FINEST_SHIFTS));
-        let sequence = Sequence::from_frames(&shots).map_err(unfit)?;
-        let format = head.camera_format();
-        let decoder = Decoder::new(&sequence, function.range(), format.bit_depth).map_err(unfit)?;
-        head.load(rasters(&function, &shots, calibration)?)?;
-        let mut taken = Vec::with_capacity(shots.len());
-        let indices: Vec<usize> = (0..shots.len()).collect();
-        head.acquire(&indices, timeout, &mut |_, frame| taken.push(frame))?;
-        let views = taken.iter().map(seam::view);
-        let views = views.collect::<Result<Vec<_>, _>>().map_err(unfit)?;
-        let phases = pipeline::decode(&decoder, &views, None, None).map_err(unfit)?;
-        Self::fit(&phases)
+        let taken = scan::take(head, calibration, &function, &shots, timeout, &|_| ())?;
+        let scan = Scan::new(function.range(), &shots, &taken).map_err(unfit)?;
+        Self::fit(&scan.phases(None).map_err(unfit)?)
     }
 
     fn fit(phases: &PhaseMap) -> Result<Self, PlateError> {

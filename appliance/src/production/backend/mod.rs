@@ -175,7 +175,7 @@ fn stored(config: &HeadConfig) -> Result<Option<(Loaded, Calibration)>, String> 
 
 /// Why a stored calibration is not this head's, if it is not.
 fn misfit(config: &HeadConfig, head: &Calibration, stored: &Calibration) -> Option<String> {
-    let sizes = |calibration: &Calibration| (calibration.camera, calibration.projector);
+    let sizes = |calibration: &Calibration| (calibration.frames(), calibration.raster());
     if sizes(head) == sizes(stored) {
         return None;
     }
@@ -203,7 +203,7 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
     let wrong = |problem| Failure::new(Exit::Content, problem);
     match config.backend {
         Backend::Sim => {
-            let exact = Calibration::of_scenario(&scenario(config.scenario.as_deref())?);
+            let exact = exact(&scenario(config.scenario.as_deref())?)?;
             match stored(config).map_err(wrong)? {
                 None => Ok(exact),
                 Some((_, calibration)) => misfit(config, &exact, &calibration)
@@ -246,6 +246,12 @@ pub fn scenario(path: Option<&Path>) -> Result<Scenario, Failure> {
         .map_err(|error| Failure::new(Exit::Configuration, error.to_string()))
 }
 
+/// What is known of a simulated head: everything.
+fn exact(scenario: &Scenario) -> Result<Calibration, Failure> {
+    Calibration::of_scenario(scenario)
+        .map_err(|error| Failure::because(Exit::Configuration, "simulate the head", error))
+}
+
 fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
     let mut scenario = scenario(config.scenario.as_deref())?;
     if let Some(placed) = &config.part {
@@ -253,7 +259,7 @@ fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Ope
     }
     let (head, stage) = sim::head_with_progress(&scenario, progress)
         .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
-    let calibration = Calibration::of_stage(&stage);
+    let calibration = exact(&scenario)?;
     Ok(Opened {
         head,
         calibration,
@@ -297,14 +303,11 @@ fn calibration_of(
     };
     let missing = |what: &str| {
         let manifest = folder.join("recording.json");
-        let message = format!(
-            "{} has no {what}: the replay head needs it",
-            manifest.display()
-        );
+        let message = format!("{} {what}: the replay head needs it", manifest.display());
         Failure::new(Exit::Content, message)
     };
     let noise = first
         .noise_counts
-        .ok_or_else(|| missing("camera.noise_counts"))?;
-    Calibration::of(first, noise).map_err(missing)
+        .ok_or_else(|| missing("has no camera.noise_counts"))?;
+    Calibration::of(first, noise).map_err(|what| missing(&what))
 }

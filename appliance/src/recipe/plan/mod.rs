@@ -153,20 +153,20 @@ impl Plan {
         arrays.phase_function = Vec::new();
         arrays.height_curvature = Vec::new();
         let camera = (file.camera.width, file.camera.height, file.camera.bit_depth);
-        if camera != calibration.camera {
+        if camera != calibration.frames() {
             return Err(format!(
                 "it is for a camera of {camera:?}, the head's has {:?}: teach it again",
-                calibration.camera
+                calibration.frames()
             ));
         }
         let raster = (file.projector.width, file.projector.height);
-        if raster != calibration.projector {
+        if raster != calibration.raster() {
             return Err(format!(
                 "it is for a projector of {raster:?}, the head's has {:?}: teach it again",
-                calibration.projector
+                calibration.raster()
             ));
         }
-        let (camera, projector) = calibration.devices()?;
+        let (camera, projector) = (calibration.camera.clone(), calibration.projector.clone());
         let [low, high] = file.range_mm;
         let range = Some(HeightRange { low, high });
         let triangulator = Triangulator::new(camera, projector, Reference::Models, function, range)

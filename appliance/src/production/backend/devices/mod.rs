@@ -79,7 +79,7 @@ fn built_with(key: &str, needed: &[&str], feature: &str) -> Result<(), Failure> 
 pub(super) fn rpi(config: &HeadConfig) -> Result<Opened, Failure> {
     built_for_head(config)?;
     let head = head(config, trigger(&config.trigger)?)?;
-    let calibration = nominal(head.camera_format(), head.projector_size());
+    let calibration = nominal(head.camera_format(), head.projector_size())?;
     Ok(Opened {
         head,
         calibration,
@@ -119,7 +119,7 @@ fn trigger(_: &TriggerSetup) -> Result<Box<dyn Trigger>, Failure> {
 }
 
 /// Something that can be worked with until the head is calibrated: lenses and places like those of the reference head. No height may be made of it.
-fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Calibration {
+fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Result<Calibration, Failure> {
     let model = |width: u32, height: u32, aside_mm: f64| DeviceModel {
         fx: 1.6 * f64::from(width),
         fy: 1.6 * f64::from(width),
@@ -130,14 +130,16 @@ fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Calibration {
         rotation: [1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0],
         translation_mm: [aside_mm, 0.0, 600.0],
     };
-    Calibration {
-        camera: (camera.width, camera.height, camera.bit_depth),
-        camera_model: model(camera.width, camera.height, 0.0),
+    Calibration::new(
+        (camera.width, camera.height, camera.bit_depth),
         projector,
-        projector_model: model(projector.0, projector.1, 250.0),
-        noise_counts: 1.0,
-        response: None,
-    }
+        (
+            &model(camera.width, camera.height, 0.0),
+            &model(projector.0, projector.1, 250.0),
+        ),
+        1.0,
+    )
+    .map_err(|error| Failure::because(Exit::Unavailable, "open the head", error))
 }
 
 /// The failure of a head of which nothing is known yet.

@@ -1,0 +1,105 @@
+//! One sequence of a pattern: frames from the head, and phases and heights from frames. Everything but production measures so.
+
+use super::calibration::Calibration;
+use super::rasters::rasters;
+use super::seam;
+use algo::frame::FrameView;
+use algo::geometry::Triangulator;
+use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
+use algo::phase::Decoder;
+use algo::pipeline::{self, HeightMap, PhaseMap};
+use algo::units::AbsolutePhase;
+use hal::frame::Frame;
+use hal::head::DynHead;
+use std::time::Duration;
+
+/// Projects the shots of a phase function and takes a frame of each, in their order. `told` is told the share of the frames taken.
+///
+/// # Errors
+/// Of the device that failed.
+pub fn take(
+    head: &mut DynHead,
+    calibration: &Calibration,
+    function: &PhaseFunction,
+    shots: &[Shot],
+    timeout: Duration,
+    told: &dyn Fn(f64),
+) -> Result<Vec<Frame>, hal::error::Error> {
+    head.load(rasters(function, shots, calibration)?)?;
+    let mut taken = Vec::with_capacity(shots.len());
+    let indices: Vec<usize> = (0..shots.len()).collect();
+    head.acquire(&indices, timeout, &mut |_, frame| {
+        taken.push(frame);
+        told(taken.len() as f64 / shots.len() as f64);
+    })?;
+    Ok(taken)
+}
+
+/// The frames of one sequence, ready to be decoded.
+#[derive(Debug)]
+pub struct Scan<'a> {
+    /// Its levels and shifts.
+    pub sequence: Sequence,
+    /// How it is decoded.
+    pub decoder: Decoder,
+    /// The frames, in the order of the shots.
+    pub frames: Vec<FrameView<'a>>,
+}
+
+impl<'a> Scan<'a> {
+    /// The frames of `shots`, in their order, of a phase function of `range`.
+    ///
+    /// # Errors
+    /// In words: the shots are no sequence that can be decoded, or there are no such frames.
+    pub fn new(
+        range: PhaseRange,
+        shots: &[Shot],
+        frames: impl IntoIterator<Item = &'a Frame>,
+    ) -> Result<Self, String> {
+        let sequence = Sequence::from_frames(shots).map_err(words)?;
+        let frames: Vec<&Frame> = frames.into_iter().collect();
+        let bit_depth = frames.first().map_or(0, |first| first.format().bit_depth);
+        let decoder = Decoder::new(&sequence, range, bit_depth).map_err(words)?;
+        let frames: Result<_, _> = frames.into_iter().map(seam::view).collect();
+        Ok(Self {
+            sequence,
+            decoder,
+            frames: frames.map_err(words)?,
+        })
+    }
+
+    /// Whether it is unwrapped about a map that must be known beforehand.
+    pub fn needs_map(&self) -> bool {
+        self.decoder.unwrapping().needs_map()
+    }
+
+    /// The phases, unwrapped about `map` (row-major) where one is needed.
+    ///
+    /// # Errors
+    /// In words: frames or map do not fit each other.
+    pub fn phases(&self, map: Option<&[AbsolutePhase]>) -> Result<PhaseMap, String> {
+        pipeline::decode(&self.decoder, &self.frames, map, None).map_err(words)
+    }
+
+    /// The heights of its phases, and their σ where the noise of a sample is known; phases outside of the working range lose
+    /// their trust.
+    pub fn heights(
+        &self,
+        triangulator: &Triangulator,
+        noise_counts: Option<f64>,
+        phases: &mut PhaseMap,
+    ) -> HeightMap {
+        pipeline::triangulate(
+            triangulator,
+            &self.decoder,
+            noise_counts,
+            None,
+            None,
+            phases,
+        )
+    }
+}
+
+fn words(error: impl std::fmt::Display) -> String {
+    error.to_string()
+}
