@@ -1,10 +1,10 @@
 //! From the file form of a recipe to a checked one.
 
 use super::archive::{ArchiveError, Arrays, short, unpack};
-use super::file::{PatternFile, RecipeFile, SequenceKind};
+use super::file::{PatternFile, RecipeFile};
 use super::gauge::{check_limits, gauges};
 use algo::inspect::Gauge;
-use algo::pattern::{PhaseFunction, Sequence, Shot};
+use algo::pattern::{PhaseFunction, Sequence};
 use std::io::{Cursor, Read, Seek};
 
 /// A recipe whose parts fit each other.
@@ -16,12 +16,8 @@ pub struct Recipe {
     pub arrays: Arrays,
     /// Φ_P.
     pub function: PhaseFunction,
-    /// What the production sequence can unwrap.
-    pub kind: SequenceKind,
-    /// What each frame shows that is projected in production.
-    pub production: Vec<Shot>,
-    /// Its levels and shifts.
-    pub sequence: Sequence,
+    /// Levels and shifts of each of its sequences, in the order of the manifest.
+    pub sequences: Vec<Sequence>,
     /// What its gauges measure.
     pub gauges: Vec<Gauge>,
 }
@@ -120,24 +116,16 @@ impl Recipe {
             }
         };
         let function = function.map_err(|error| format!("projector and pattern: {error}"))?;
-        let production = file.sequences.get(file.production).ok_or_else(|| {
-            format!(
-                "production names sequence {} of {}",
-                file.production,
-                file.sequences.len()
-            )
-        })?;
-        let kind = production.kind;
-        let production = production.frames.clone();
-        let sequence = Sequence::from_frames(&production).map_err(|error| error.to_string())?;
+        let sequences = file.sequences.iter();
+        let sequences = sequences.map(|sequence| Sequence::from_frames(&sequence.frames));
+        let sequences = sequences.collect::<Result<_, _>>();
+        let sequences = sequences.map_err(|error| error.to_string())?;
         let gauges = gauges(&file.regions, &file.gauges, (width, height))?;
         Ok(Self {
             file,
             arrays,
             function,
-            kind,
-            production,
-            sequence,
+            sequences,
             gauges,
         })
     }

@@ -27,6 +27,7 @@ use algo::pipeline::Rises;
 use algo::units::{AbsolutePhase, Height};
 use hal::frame::Frame;
 use hal::projector::Raster;
+use judge::Demands;
 use run::{Run, Shared, Unjoined};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -36,8 +37,8 @@ use std::time::Instant;
 #[derive(Debug)]
 pub struct Plan {
     file: RecipeFile,
-    /// The names of its gauges, shared with every result.
-    names: Vec<Arc<str>>,
+    /// What it demands of a part.
+    demands: Demands,
     /// What is projected, each once; first the shots of the first run.
     shots: Vec<Shot>,
     /// The sequences in the order in which they are tried; each unwraps further than the one before. Their indices are the
@@ -146,8 +147,8 @@ impl Plan {
             file,
             mut arrays,
             function,
+            sequences,
             gauges,
-            ..
         } = recipe;
         // They are large, and production does not read them.
         arrays.phase_function = Vec::new();
@@ -185,10 +186,10 @@ impl Plan {
         let chain = run::chain(&file);
         let mut shots = Vec::new();
         let sequences = || {
-            let sequences = chain.into_iter();
-            let sequences =
-                sequences.map(|at| Unjoined::new(&file, &arrays, range, at, &mut shots));
-            sequences.collect::<Result<Vec<_>, _>>()
+            let chained = chain.into_iter();
+            let chained = chained.map(|at| (&file.sequences[at], sequences[at].clone()));
+            let runs = chained.map(|of| Unjoined::new(&file, &arrays, range, of, &mut shots));
+            runs.collect::<Result<Vec<_>, _>>()
         };
         let (sequences, surface) = rayon::join(sequences, || golden::surface(size.0, &arrays));
         let sequences = sequences?;
@@ -216,10 +217,9 @@ impl Plan {
         let runs = runs.collect::<Result<Vec<_>, _>>()?;
         let first = runs.first().ok_or("it has no sequence")?;
         let strips = first.production.strips(size.1.div_ceil(STRIPS));
-        let names = file.gauges.iter().map(|gauge| Arc::from(&*gauge.name));
         Ok(Self {
             strips: Mutex::new(strips),
-            names: names.collect(),
+            demands: Demands::of(&file),
             file,
             shots,
             runs,
@@ -327,9 +327,9 @@ impl Plan {
         });
         match found {
             Ok(findings) => {
-                judge::judge(&self.file, &self.names, &findings, &mut inspection);
+                self.demands.judge(&findings, &mut inspection);
                 if step + 1 < self.runs.len() {
-                    inspection.step_up = judge::step_up(&self.file, &findings);
+                    inspection.step_up = self.demands.step_up(&findings);
                 }
             }
             Err(reason) => {

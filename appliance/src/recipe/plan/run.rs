@@ -62,17 +62,14 @@ pub(super) fn chain(file: &RecipeFile) -> Vec<usize> {
 }
 
 impl Unjoined {
-    /// The sequence at a place in the recipe's list, for phases of `range`. `shots` are those of all runs; those of this
-    /// one are added.
+    /// A sequence of the recipe, for phases of `range`. `shots` are those of all runs; those of this one are added.
     pub fn new(
         file: &RecipeFile,
         arrays: &Arrays,
         range: PhaseRange,
-        at: usize,
+        (SequenceFile { kind, frames, .. }, sequence): (&SequenceFile, Sequence),
         shots: &mut Vec<Shot>,
     ) -> Result<Self, String> {
-        let SequenceFile { kind, frames, .. } = &file.sequences[at];
-        let sequence = Sequence::from_frames(frames).map_err(|error| error.to_string())?;
         let decoder = Decoder::new(&sequence, range, file.camera.bit_depth)
             .map_err(|error| error.to_string())?;
         let indices = frames.iter().map(|shot| {
