@@ -39,6 +39,26 @@ impl ProjectorMap {
         Self { width, points }
     }
 
+    /// From a preliminary measurement with straight fringes of these pitches, vertical and horizontal ones: ξ and η are pitch ×
+    /// phase (Peng & Gupta 2008, eqs. 3 and 4).
+    pub fn from_phases(
+        [vertical, horizontal]: [&[AbsolutePhase]; 2],
+        [across, down]: [f64; 2],
+        width: usize,
+    ) -> Self {
+        let points = vertical.iter().zip(horizontal).map(|(v, h)| {
+            if v.is_known() && h.is_known() {
+                [across * v.turns(), down * h.turns()]
+            } else {
+                UNKNOWN
+            }
+        });
+        Self {
+            width,
+            points: points.collect(),
+        }
+    }
+
     /// The phase that each pixel has under a phase function if the surface is where it was measured,
     /// unknown where it was not.
     pub fn expected_phase(&self, function: &PhaseFunction) -> Vec<AbsolutePhase> {
@@ -137,5 +157,20 @@ impl ProjectorMap {
             (xz * yy - yz * xy) / determinant,
             (yz * xx - xz * xy) / determinant,
         ])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_projector_point_is_the_pitch_times_its_two_phases() {
+        let phases = |turns: [f64; 3]| turns.map(AbsolutePhase::from_turns);
+        let (vertical, horizontal) = (phases([0.5, 3.0, 1.0]), phases([2.0, f64::NAN, 0.25]));
+        let map = ProjectorMap::from_phases([&vertical, &horizontal], [20.0, 16.0], 3);
+        assert_eq!(map.at(0, 0), Some([10.0, 32.0]));
+        assert_eq!(map.at(1, 0), None);
+        assert_eq!(map.at(2, 0), Some([20.0, 4.0]));
     }
 }

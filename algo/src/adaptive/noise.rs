@@ -135,6 +135,32 @@ fn first(last: usize, holds: impl Fn(usize) -> bool) -> usize {
     low
 }
 
+/// RMS of σ_z in mm under one phase function, and predicted for the same levels and shifts of another one: σ_z falls with
+/// g·M(g) on every pixel. `sigma` is that of each camera pixel of `map` under the first; none if no pixel has one.
+pub fn predict(
+    sigma: &[f32],
+    map: &ProjectorMap,
+    before: &PhaseFunction,
+    after: &PhaseFunction,
+    optics: &Optics,
+) -> Option<[f64; 2]> {
+    let slopes = map.slopes(MAX_STEP);
+    let (mut squares, mut count) = ([0.0; 2], 0.0);
+    for ((sigma, [xi, eta]), [ju, jv]) in sigma.iter().zip(&map.points).zip(slopes) {
+        let worth = |function: &PhaseFunction| {
+            let g = function.at(xi + 0.5, *eta) - function.at(xi - 0.5, *eta);
+            g * contrast(optics, g, [g * ju, g * jv])
+        };
+        let now = f64::from(*sigma);
+        let then = now * worth(before) / worth(after);
+        if now.is_finite() && then.is_finite() {
+            squares = [squares[0] + now * now, squares[1] + then * then];
+            count += 1.0;
+        }
+    }
+    (count > 0.0).then(|| squares.map(|sum: f64| libm::sqrt(sum / count)))
+}
+
 /// Makes the phase function for a part, over a projector of `columns` × `rows` pixels.
 ///
 /// # Errors
@@ -272,5 +298,25 @@ mod tests {
             let g = best_frequency(&optics, slope);
             assert!(g <= limit && g > 0.9 * limit, "{g}");
         }
+    }
+
+    #[test]
+    fn twice_the_frequency_halves_the_predicted_noise_where_nothing_blurs() {
+        let (before, after) = [4.0, 8.0]
+            .map(|n| PhaseFunction::vertical(256, 8, n).unwrap())
+            .into();
+        let points = (0..64).map(|at| [f64::from(at % 8) + 100.0, f64::from(at / 8)]);
+        let map = ProjectorMap {
+            width: 8,
+            points: points.collect(),
+        };
+        let mut sigma = [0.1; 64];
+        sigma[0] = f32::NAN;
+        let [now, then] = predict(&sigma, &map, &before, &after, &SHARP).unwrap();
+        assert!((now - 0.1).abs() < 1e-8);
+        // The pixel's own box takes a little of the finer contrast.
+        assert!((0.5..0.51).contains(&(then / now)), "{then}");
+        let unknown = [f32::NAN; 64];
+        assert_eq!(predict(&unknown, &map, &before, &after, &SHARP), None);
     }
 }

@@ -218,6 +218,18 @@ impl PhaseFunction {
         }
     }
 
+    /// Smallest and largest pitch along the rows of the raster, pixels.
+    pub fn pitches(&self) -> [f64; 2] {
+        let places =
+            (0..self.rows).flat_map(|row| (1..self.columns).map(move |column| (column, row)));
+        let pitches = places.map(|(column, row)| {
+            1.0 / (self.at_pixel(column, row) - self.at_pixel(column - 1, row))
+        });
+        pitches.fold([f64::INFINITY, 0.0], |[low, high], pitch| {
+            [low.min(pitch), high.max(pitch)]
+        })
+    }
+
     /// The values over the pixel centres of the raster.
     pub fn range(&self) -> PhaseRange {
         match &self.shape {
@@ -331,5 +343,13 @@ mod tests {
                 given: 16
             })
         ));
+    }
+    #[test]
+    fn the_pitches_of_a_pattern_are_those_of_its_rows() {
+        let straight = PhaseFunction::vertical(64, 3, 8.0).unwrap();
+        assert_eq!(straight.pitches(), [8.0, 8.0]);
+        let turns = (0..3 * 5).map(|at| [0.0, 0.25, 0.5, 0.625, 0.75][at % 5]);
+        let curved = PhaseFunction::sampled(5, 3, turns.collect()).unwrap();
+        assert_eq!(curved.pitches(), [4.0, 8.0]);
     }
 }

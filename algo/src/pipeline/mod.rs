@@ -2,11 +2,13 @@
 
 mod measure;
 mod noise;
+mod plate;
 mod rise;
 mod rows;
 
 pub use measure::{Guess, HeightMap, PhaseMap, Window, arrive, decode, decode_last, triangulate};
 pub use noise::sample_noise;
+pub use plate::{Plate, PlateError};
 pub(crate) use rise::{
     COMPARED, Risen, RowTally, SIGMA, SQUARE, Seen, UNKNOWN as NO_RISE, VARIANCE_UNIT_NM, rise_row,
     weigh_row,

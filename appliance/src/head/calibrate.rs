@@ -7,11 +7,12 @@ use super::calibration::file::{
 };
 use super::calibration::place::Place;
 use super::examine::{
-    Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, Noise, Plate, PlateError, SETTLE, Stamps,
-    contrast, response,
+    Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, PLATE_PITCH, PlateError, SETTLE, Stamps,
+    contrast, noise, plate, response,
 };
 use super::seam;
 use algo::geometry::Vector;
+use algo::pipeline::Plate;
 use hal::error::Error;
 use hal::head::{DynHead, Timing};
 use std::time::Duration;
@@ -125,16 +126,16 @@ pub fn make(head: &mut DynHead, known: Known, told: &dyn Fn(f64, &str)) -> Resul
     }
     calibration.response = inverted(&greys).map_err(MakeError::Scene)?;
     told(0.6, "noise");
-    let noise = Noise::measure(head, settle, &lit)?;
+    let noise = noise(head, settle, &lit)?;
     calibration.noise_counts = noise.counts;
     told(0.65, "contrast");
     let contrast = contrast(head, &calibration, settle, &lit)?;
     let mut maps = Vec::new();
     let reference = if known.plate {
         told(0.75, "reference plane, vertical fringes");
-        let vertical = Plate::measure(head, &calibration, true, TIMEOUT)?;
+        let vertical = plate(head, &calibration, true, TIMEOUT)?;
         told(0.88, "reference plane, horizontal fringes");
-        let horizontal = Plate::measure(head, &calibration, false, TIMEOUT)?;
+        let horizontal = plate(head, &calibration, false, TIMEOUT)?;
         Some(reference(&calibration, &vertical, &horizontal, &mut maps)?)
     } else {
         notes.push("no plate was measured: the reference plane is that of the models".into());
@@ -268,7 +269,7 @@ fn reference(
         }
     };
     Ok(ReferenceFile {
-        pitch_px: Plate::PITCH,
+        pitch_px: PLATE_PITCH,
         models_off_px,
         vertical: map("reference_vertical", vertical),
         horizontal: map("reference_horizontal", horizontal),
@@ -295,8 +296,8 @@ fn models_off(
         let lights = on_plane.and_then(|point: Vector| projector.project(point));
         let Some((xi, eta)) = lights else { continue };
         let off = (
-            xi - Plate::PITCH * vertical.turns(u, v),
-            eta - Plate::PITCH * horizontal.turns(u, v),
+            xi - PLATE_PITCH * vertical.turns(u, v),
+            eta - PLATE_PITCH * horizontal.turns(u, v),
         );
         squares += off.0 * off.0 + off.1 * off.1;
         points += 1.0;

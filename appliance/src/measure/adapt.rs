@@ -2,8 +2,7 @@
 
 use crate::error::{Exit, Failure};
 use crate::head::seam;
-use crate::measure::{Measurement, measure};
-use crate::output::cloud::Surface;
+use crate::measure::measure;
 use algo::adaptive::{ProjectorMap, noise, paper};
 use algo::pattern::PhaseFunction;
 use hal::replay::Recording;
@@ -81,7 +80,10 @@ pub fn adapt(recording: &Recording, folder: &Path, choice: &Choice) -> Result<Ad
     let (columns, rows) = (projector.width as usize, projector.height as usize);
     let map = match channels.across {
         None => ProjectorMap::from_heights(&surface.triangulator, &surface.map),
-        Some(across) => measured_map(&measurement, across),
+        Some(Across { at, pitch }) => {
+            let phases = at.map(|at| &measurement.phases[at].phase[..]);
+            ProjectorMap::from_phases(phases, pitch, surface.map.width)
+        }
     };
     let made = match choice.method {
         Method::Fringed => noise::adapt(&map, columns, rows, &choice.optics),
@@ -90,7 +92,7 @@ pub fn adapt(recording: &Recording, folder: &Path, choice: &Choice) -> Result<Ad
     let function = made.map_err(|error| wrong(&error))?;
     let spec = &recording.patterns[measurement.primary];
     let before = seam::phase_function(spec, columns, rows).map_err(|error| wrong(&error))?;
-    let sigmas = predict(surface, &map, &before, &function, &choice.optics);
+    let sigmas = noise::predict(&surface.map.sigma, &map, &before, &function, &choice.optics);
     let on_raster = |point: &&[f64; 2]| {
         let inside = |x: f64, count: usize| x > -0.5 && x < count as f64 - 0.5;
         inside(point[0], columns) && inside(point[1], rows)
@@ -99,7 +101,7 @@ pub fn adapt(recording: &Recording, folder: &Path, choice: &Choice) -> Result<Ad
         method: choice.method,
         shape: [rows, columns],
         pixels_used: map.points.iter().filter(on_raster).count(),
-        pitch_px: pitches(&function),
+        pitch_px: function.pitches(),
         max_turns: function.range().max,
         preliminary_sigma_mm: sigmas.map(|[before, _]| before),
         predicted_sigma_mm: sigmas.map(|[_, after]| after),
@@ -163,61 +165,6 @@ impl Channels {
             ),
         }
     }
-}
-
-/// ξ and η as measured, each from its own phase map (eqs. 3 and 4).
-fn measured_map(measurement: &Measurement, across: Across) -> ProjectorMap {
-    let [vertical, horizontal] = across.at.map(|at| &measurement.phases[at]);
-    let phases = vertical.phase.iter().zip(&horizontal.phase);
-    let points = phases.map(|(v, h)| {
-        if v.is_known() && h.is_known() {
-            [across.pitch[0] * v.turns(), across.pitch[1] * h.turns()]
-        } else {
-            [f64::NAN; 2]
-        }
-    });
-    ProjectorMap {
-        width: vertical.width,
-        points: points.collect(),
-    }
-}
-
-/// Smallest and largest pitch along the rows of a phase function.
-fn pitches(function: &PhaseFunction) -> [f64; 2] {
-    let places = (0..function.rows())
-        .flat_map(|row| (1..function.columns()).map(move |column| (column, row)));
-    let pitches = places.map(|(column, row)| {
-        1.0 / (function.at_pixel(column, row) - function.at_pixel(column - 1, row))
-    });
-    pitches.fold([f64::INFINITY, 0.0], |[low, high], pitch| {
-        [low.min(pitch), high.max(pitch)]
-    })
-}
-
-/// RMS of σ_z before and, for the same levels and shifts, after: it falls with frequency times
-/// contrast, g·M(g) (see [`noise`]), on every pixel.
-fn predict(
-    surface: &Surface,
-    map: &ProjectorMap,
-    before: &PhaseFunction,
-    after: &PhaseFunction,
-    optics: &noise::Optics,
-) -> Option<[f64; 2]> {
-    let slopes = map.slopes(noise::MAX_STEP);
-    let (mut squares, mut count) = ([0.0; 2], 0.0);
-    for ((sigma, [xi, eta]), [ju, jv]) in surface.map.sigma.iter().zip(&map.points).zip(slopes) {
-        let worth = |function: &PhaseFunction| {
-            let g = function.at(xi + 0.5, *eta) - function.at(xi - 0.5, *eta);
-            g * noise::contrast(optics, g, [g * ju, g * jv])
-        };
-        let now = f64::from(*sigma);
-        let then = now * worth(before) / worth(after);
-        if now.is_finite() && then.is_finite() {
-            squares = [squares[0] + now * now, squares[1] + then * then];
-            count += 1.0;
-        }
-    }
-    (count > 0.0).then(|| squares.map(|sum: f64| (sum / count).sqrt()))
 }
 
 impl Report {

@@ -231,19 +231,9 @@ impl Runner {
         let function = PhaseFunction::horizontal(columns, rows, fringes).map_err(rig)?;
         let shots = Sequence::geometric(function.range(), 3, 4);
         let horizontal = self.measure(HORIZONTAL_STREAM, &function, &shots, About::Reference)?;
-        let pairs = vertical.phase.iter().zip(&horizontal.phases.phase);
-        let map = ProjectorMap {
-            width: horizontal.phases.width,
-            points: pairs
-                .map(|(v, h)| {
-                    if v.is_known() && h.is_known() {
-                        [PRELIMINARY_PITCH * v.turns(), PRELIMINARY_PITCH * h.turns()]
-                    } else {
-                        [f64::NAN; 2]
-                    }
-                })
-                .collect(),
-        };
+        let phases = [&vertical.phase[..], &horizontal.phases.phase];
+        let width = horizontal.phases.width;
+        let map = ProjectorMap::from_phases(phases, [PRELIMINARY_PITCH; 2], width);
         Ok(Arc::clone(self.learnt.paper.insert(Arc::new(map))))
     }
 
@@ -263,10 +253,7 @@ impl Runner {
         let (columns, rows) = self.size();
         let map = &preliminary.map;
         let function = noise::adapt(map, columns, rows, &optics).map_err(rig)?;
-        let points = map.points.iter();
-        let expected = points
-            .map(|[xi, eta]| AbsolutePhase::from_turns(function.at(*xi, *eta)))
-            .collect();
+        let expected = map.expected_phase(&function);
         let found = Arc::new(Better { function, expected });
         Ok(Arc::clone(self.learnt.better.insert(found)))
     }

@@ -1,214 +1,38 @@
-//! The camera's noise against its level: read noise and shot noise, from two pictures of each of several greys.
-//!
-//! Two pictures of the same light differ by noise alone: half the mean square of their difference is the variance of a sample.
-//! Over the level it is read² + gain · level (photon transfer: Janesick 1987): what is the same in the dark, and what light adds.
+//! The camera's noise, measured on the head: two pictures of each of several greys.
 
 use super::pictures::{Lit, greys, pictures};
+use algo::frame::{Noise, PhotonTransfer};
 use hal::error::Error;
 use hal::head::DynHead;
 
 /// Greys that are pictured twice.
 const GREYS: [u8; 8] = [16, 48, 80, 112, 144, 176, 208, 240];
-/// Levels between black and full scale that are told apart.
-const BINS: usize = 16;
-/// A level counts if so many pixels have it: its σ is then known to three percent.
-const LEAST_PIXELS: u64 = 500;
-/// Levels so many σ from black and full scale are not clipped.
-const CLEAR: f64 = 4.0;
-/// Variance of the rounding to counts. Without other noise it is all there is, and no two pictures tell it.
-const ROUNDING: f64 = 1.0 / 12.0;
-/// Shot noise counts if it is this many σ from none.
-const SIGNIFICANT: f64 = 3.0;
 
-/// Noise at one level.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NoisePoint {
-    /// Mean sample, counts.
-    pub level: f64,
-    /// σ of one sample, counts.
-    pub counts: f64,
-    /// Pixels that told it.
-    pub pixels: u64,
-}
-
-/// The camera's noise.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Noise {
-    /// σ of one sample at half the light of white, counts.
-    pub counts: f64,
-    /// σ in the dark, counts.
-    pub read_counts: f64,
-    /// What light adds to the variance, counts² per count.
-    pub shot: f64,
-    /// As measured.
-    pub points: Vec<NoisePoint>,
-}
-
-impl Noise {
-    /// Takes two pictures of each of eight greys.
-    ///
-    /// # Errors
-    /// Of a device, or `Unsupported` if no level is clear of black and full scale.
-    pub fn measure(head: &mut DynHead, settle: u32, lit: &Lit) -> Result<Self, Error> {
-        let levels = GREYS.iter().flat_map(|grey| [*grey, *grey]);
-        let full_scale = lit.full_scale();
-        let mut sums = Sums::new(full_scale);
-        // Which pixels have which level is told by other pictures: those whose own noise goes together would seem quiet.
-        let mut before: Option<Vec<f32>> = None;
-        pictures(
-            head,
-            settle,
-            greys(head.projector_size(), levels),
-            &mut |counts| match before.take() {
-                None => before = Some(counts),
-                Some(first) => {
-                    let share = lit.share_of_white((lit.mean(&first) + lit.mean(&counts)) / 2.0);
-                    sums.add(&first, &counts, lit.levels(share));
-                }
-            },
-        )?;
-        sums.noise(lit.bright() / 2.0).ok_or_else(|| {
-            Error::unsupported(
-                "measuring noise where every level is dark or saturated",
-                "expose so that white is at half to nine tenths of full scale",
-            )
-        })
-    }
-}
-
-/// Sums over the pixels of each level.
-struct Sums {
-    full_scale: f64,
-    bins: [(f64, f64, u64); BINS],
-}
-
-impl Sums {
-    fn new(full_scale: f64) -> Self {
-        Self {
-            full_scale,
-            bins: [(0.0, 0.0, 0); BINS],
-        }
-    }
-
-    /// Adds two pictures of the same light, which has these levels.
-    fn add(&mut self, first: &[f32], second: &[f32], levels: impl Iterator<Item = f64>) {
-        let per_count = BINS as f64 / (self.full_scale + 1.0);
-        for ((a, b), level) in first.iter().zip(second).zip(levels) {
-            let (a, b) = (f64::from(*a), f64::from(*b));
-            // A whole number below BINS; the cast saturates at 0.
-            let bin = &mut self.bins[((level * per_count) as usize).min(BINS - 1)];
-            let level = (a + b) / 2.0;
-            *bin = (bin.0 + level, bin.1 + (a - b) * (a - b) / 2.0, bin.2 + 1);
-        }
-    }
-
-    /// The noise, with its σ at `level`; none if too little is clear of black and full scale.
-    fn noise(&self, level: f64) -> Option<Noise> {
-        let told = |(levels, squares, pixels): &(f64, f64, u64)| NoisePoint {
-            level: levels / *pixels as f64,
-            counts: (squares / *pixels as f64).max(ROUNDING).sqrt(),
-            pixels: *pixels,
-        };
-        let enough = self.bins.iter().filter(|bin| bin.2 >= LEAST_PIXELS);
-        let points: Vec<NoisePoint> = enough.map(told).collect();
-        let half_bin = (self.full_scale + 1.0) / BINS as f64 / 2.0;
-        let clear = |point: &&NoisePoint| {
-            let margin = CLEAR * point.counts + half_bin;
-            (margin..=self.full_scale - margin).contains(&point.level)
-        };
-        let points: Vec<NoisePoint> = points.iter().filter(clear).copied().collect();
-        let (read, shot) = fit(&points)?;
-        let at = |level: f64| (read + shot * level).max(ROUNDING).sqrt();
-        Some(Noise {
-            counts: at(level),
-            read_counts: at(0.0),
-            shot,
-            points,
-        })
-    }
-}
-
-/// Variance in the dark and what light adds to it, by least squares weighted with what is known of each variance: of n pairs it
-/// has itself the variance 2σ⁴/n. Without significant shot noise, or where it would make the read noise imaginary, the mean.
-fn fit(points: &[NoisePoint]) -> Option<(f64, f64)> {
-    let (mut w, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for point in points {
-        let variance = point.counts * point.counts;
-        let weight = point.pixels as f64 / (2.0 * variance * variance);
-        w += weight;
-        x += weight * point.level;
-        y += weight * variance;
-        xx += weight * point.level * point.level;
-        xy += weight * point.level * variance;
-    }
-    if !(w > 0.0) {
-        return None;
-    }
-    let (spread, mean) = (xx - x * x / w, y / w);
-    let shot = (xy - x * y / w) / spread;
-    let read = mean - shot * x / w;
-    let significant = shot * spread.sqrt() > SIGNIFICANT;
-    Some(if significant && read > 0.0 {
-        (read, shot)
-    } else {
-        (mean, 0.0)
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use rand_xoshiro::SplitMix64;
-    use rand_xoshiro::rand_core::{Rng, SeedableRng};
-
-    /// A uniform number of mean 0 and variance 1.
-    fn uniform(random: &mut SplitMix64) -> f64 {
-        ((random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 12_f64.sqrt()
-    }
-
-    #[test]
-    fn read_and_shot_noise_are_told_apart() {
-        let mut random = SplitMix64::seed_from_u64(5);
-        for (read, shot) in [(2.0_f64, 0.05), (3.0, 0.0), (1.0, 0.2)] {
-            let mut sums = Sums::new(1023.0);
-            for level in (40..980).step_by(20) {
-                let sigma = (read * read + shot * f64::from(level)).sqrt();
-                let mut picture = || -> Vec<f32> {
-                    (0..4000)
-                        .map(|_| (f64::from(level) + sigma * uniform(&mut random)).round() as f32)
-                        .collect()
-                };
-                let (first, second) = (picture(), picture());
-                sums.add(&first, &second, std::iter::repeat(f64::from(level)));
+/// The camera's noise from two pictures of each of eight greys, with its σ at half the light of white.
+///
+/// # Errors
+/// Of a device, or `Unsupported` if no level is clear of black and full scale.
+pub fn noise(head: &mut DynHead, settle: u32, lit: &Lit) -> Result<Noise, Error> {
+    let levels = GREYS.iter().flat_map(|grey| [*grey, *grey]);
+    let full_scale = lit.full_scale();
+    let mut sums = PhotonTransfer::new(full_scale);
+    let mut before: Option<Vec<f32>> = None;
+    pictures(
+        head,
+        settle,
+        greys(head.projector_size(), levels),
+        &mut |counts| match before.take() {
+            None => before = Some(counts),
+            Some(first) => {
+                let share = lit.share_of_white((lit.mean(&first) + lit.mean(&counts)) / 2.0);
+                sums.add(&first, &counts, lit.levels(share));
             }
-            let noise = sums.noise(400.0).unwrap();
-            let true_at = |level: f64| (read * read + shot * level + ROUNDING).sqrt();
-            // 188,000 pixels over 12 levels: 1 % and less of σ.
-            assert!(
-                (noise.counts / true_at(400.0) - 1.0).abs() < 0.01,
-                "{noise:?}"
-            );
-            assert!(
-                (noise.read_counts / true_at(0.0) - 1.0).abs() < 0.1,
-                "{noise:?}"
-            );
-            assert!((noise.shot - shot).abs() < 0.05 * shot + 1e-9, "{noise:?}");
-        }
-    }
-
-    #[test]
-    fn a_camera_without_noise_still_rounds() {
-        let mut sums = Sums::new(255.0);
-        sums.add(&[100.0; 4000], &[100.0; 4000], std::iter::repeat(100.0));
-        let noise = sums.noise(100.0).unwrap();
-        assert!((noise.counts - ROUNDING.sqrt()).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_camera_that_sees_black_or_white_only_tells_no_noise() {
-        let mut sums = Sums::new(255.0);
-        sums.add(&[0.0; 4000], &[0.0; 4000], std::iter::repeat(0.0));
-        sums.add(&[255.0; 4000], &[255.0; 4000], std::iter::repeat(255.0));
-        assert_eq!(sums.noise(100.0), None);
-    }
+        },
+    )?;
+    sums.noise(lit.bright() / 2.0).ok_or_else(|| {
+        Error::unsupported(
+            "measuring noise where every level is dark or saturated",
+            "expose so that white is at half to nine tenths of full scale",
+        )
+    })
 }

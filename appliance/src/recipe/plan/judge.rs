@@ -85,7 +85,7 @@ impl Demands {
         };
     }
 
-    /// Why a part cannot be judged of which all but that is known; none if it can.
+    /// Why the part cannot be judged, from an inspection that lacks only its verdict; none if it can.
     fn not_judged(&self, inspection: &Inspection, coverage: f64) -> Option<String> {
         if coverage < self.min_coverage {
             return Some(format!(

@@ -1,0 +1,193 @@
+//! A reference phase map from the phases of a flat plate in the plane z = 0, fitted smoothly.
+//!
+//! Φ_R^V and Φ_R^H (Peng & Gupta 2008, eqs. 10–11) tell which projector point lights each camera pixel's point of the plane: ξ =
+//! pitch · Φ_R^V, η = pitch · Φ_R^H. Raw they have the noise of a measurement; a polynomial of degree 6 has a hundredth of it.
+
+use super::PhaseMap;
+use crate::geometry::{FittedMap, ReferenceError, fit_map};
+use crate::trust::Trust;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::fmt;
+
+/// What lies so many times the scatter off the fit is dust or a scratch, and left out of a second one.
+const OUTLIER: f64 = 4.0;
+/// The plate must fill this share of the frame: beyond it the fit would guess.
+const LEAST_FILLED: f64 = 0.6;
+/// Side of the squares over which noise is averaged, so that what is left tells how well the polynomial follows the plate.
+const SQUARE: usize = 16;
+
+/// One reference phase map.
+#[derive(Clone, Debug)]
+pub struct Plate {
+    fit: FittedMap,
+    /// Scatter of the pixels about the fit, turns: noise.
+    pub noise_turns: f64,
+    /// How far the fit is from the plate, RMS, turns: what squares of pixels are off on the mean beyond their noise, and what noise
+    /// leaves in the coefficients.
+    pub residual_turns: f64,
+    /// Share of the frame that it was fitted to.
+    pub filled: f64,
+}
+
+/// Phases that are not those of a plate.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum PlateError {
+    /// Too little of the frame is resolved.
+    Small {
+        /// The share that is.
+        filled: f64,
+    },
+    /// What is resolved does not determine the fit.
+    Fit(ReferenceError),
+}
+
+impl fmt::Display for PlateError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Small { filled } => write!(
+                f,
+                "{:.0} % of the frame shows fringes: put a flat, bright, matt plate into the plane z = 0 that fills it",
+                filled * 100.0
+            ),
+            Self::Fit(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for PlateError {}
+
+impl Plate {
+    /// Fits the phases of a plate.
+    ///
+    /// # Errors
+    /// If too little of the frame is resolved, or what is does not determine the fit.
+    pub fn fit(phases: &PhaseMap) -> Result<Self, PlateError> {
+        let width = phases.width.max(1);
+        let height = phases.phase.len() / width;
+        let resolved: Vec<(f64, f64, f64)> = phases
+            .phase
+            .iter()
+            .zip(&phases.trust)
+            .enumerate()
+            .filter(|(_, (_, trust))| **trust == Trust::Resolved)
+            .map(|(at, (phase, _))| ((at % width) as f64, (at / width) as f64, phase.turns()))
+            .collect();
+        let filled = resolved.len() as f64 / phases.phase.len().max(1) as f64;
+        if filled < LEAST_FILLED {
+            return Err(PlateError::Small { filled });
+        }
+        let first = fit_map(width, height, resolved.iter().copied()).map_err(PlateError::Fit)?;
+        let limit = OUTLIER * first.residual();
+        let near = |&&(u, v, turns): &&(f64, f64, f64)| libm::fabs(first.at(u, v) - turns) <= limit;
+        let kept: Vec<_> = resolved.iter().filter(near).copied().collect();
+        let fit = fit_map(width, height, kept.iter().copied()).map_err(PlateError::Fit)?;
+        let noise_turns = fit.residual();
+        let lack = lack_of_fit(&fit, &kept, width, height);
+        // Of 28 coefficients, each takes one part in N of the noise.
+        let left = noise_turns * libm::sqrt(28.0 / kept.len() as f64);
+        Ok(Self {
+            fit,
+            noise_turns,
+            residual_turns: libm::hypot(lack, left),
+            filled,
+        })
+    }
+
+    /// Φ_R at a camera pixel, turns.
+    pub fn turns(&self, u: f64, v: f64) -> f64 {
+        self.fit.at(u, v)
+    }
+
+    /// Φ_R of the whole frame, row-major, turns.
+    pub fn map(&self, width: usize, height: usize) -> Vec<f64> {
+        let places = (0..height).flat_map(|v| (0..width).map(move |u| (u as f64, v as f64)));
+        places.map(|(u, v)| self.turns(u, v)).collect()
+    }
+}
+
+/// What the fit is off the plate beyond noise, RMS: the variance of squares' means less what noise makes of it.
+fn lack_of_fit(fit: &FittedMap, samples: &[(f64, f64, f64)], width: usize, height: usize) -> f64 {
+    let across = width.div_ceil(SQUARE);
+    let mut squares = vec![(0.0, 0.0, 0.0); across * height.div_ceil(SQUARE)];
+    for &(u, v, turns) in samples {
+        let off = turns - fit.at(u, v);
+        // Pixels of the frame: whole numbers inside it.
+        let square = &mut squares[v as usize / SQUARE * across + u as usize / SQUARE];
+        *square = (square.0 + 1.0, square.1 + off, square.2 + off * off);
+    }
+    let (mut pixels, mut beyond) = (0.0, 0.0);
+    for (n, sum, sum_of_squares) in squares {
+        if n >= 16.0 {
+            let mean = sum / n;
+            let variance = (sum_of_squares / n - mean * mean) * n / (n - 1.0);
+            pixels += n;
+            beyond += n * (mean * mean - variance / n);
+        }
+    }
+    if pixels > 0.0 {
+        libm::sqrt((beyond / pixels).max(0.0))
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::AbsolutePhase;
+    use rand_xoshiro::SplitMix64;
+    use rand_xoshiro::rand_core::{Rng, SeedableRng};
+    use std::string::ToString;
+
+    const SIDE: usize = 96;
+    /// Half width of the uniform noise, turns.
+    const NOISE: f64 = 0.01;
+
+    fn turns(u: f64, v: f64) -> f64 {
+        3.0 + 0.1 * u + 0.02 * v + 1e-4 * u * v
+    }
+
+    /// A plate whose first rows are not resolved and whose pixels are off by noise.
+    fn plate(unresolved_rows: usize) -> PhaseMap {
+        let mut random = SplitMix64::seed_from_u64(3);
+        let mut phases = PhaseMap::new(SIDE, SIDE);
+        for at in unresolved_rows * SIDE..SIDE * SIDE {
+            let share = (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+            let noise = NOISE * (2.0 * share - 1.0);
+            let true_turns = turns((at % SIDE) as f64, (at / SIDE) as f64);
+            phases.phase[at] = AbsolutePhase::from_turns(true_turns + noise);
+            phases.trust[at] = Trust::Resolved;
+        }
+        phases
+    }
+
+    #[test]
+    fn the_fit_follows_the_plate_and_tells_noise_from_lack_of_fit() {
+        let mut phases = plate(4);
+        // A scratch is left out.
+        for at in 50 * SIDE + 20..50 * SIDE + 60 {
+            phases.phase[at] = AbsolutePhase::from_turns(0.0);
+        }
+        let plate = Plate::fit(&phases).unwrap();
+        assert!((plate.filled - 92.0 / 96.0).abs() < 1e-12);
+        let sigma = NOISE / libm::sqrt(3.0);
+        assert!((plate.noise_turns / sigma - 1.0).abs() < 0.05, "{plate:?}");
+        assert!(plate.residual_turns < 0.2 * sigma, "{plate:?}");
+        let map = plate.map(SIDE, SIDE);
+        let off = |(u, v)| libm::fabs(map[v * SIDE + u] - turns(u as f64, v as f64));
+        let worst = [(0, 0), (48, 50), (95, 95)]
+            .map(off)
+            .into_iter()
+            .fold(0.0, f64::max);
+        assert!(worst < sigma, "{worst}");
+    }
+
+    #[test]
+    fn a_plate_that_fills_little_of_the_frame_is_refused_with_its_share() {
+        let error = Plate::fit(&plate(48)).unwrap_err();
+        assert_eq!(error, PlateError::Small { filled: 0.5 });
+        assert!(error.to_string().starts_with("50 % of the frame"));
+    }
+}
