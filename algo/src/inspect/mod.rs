@@ -4,12 +4,14 @@ pub mod align;
 mod deviation;
 pub mod gauge;
 pub mod good;
+mod mask;
 mod openings;
 mod region;
 mod strips;
 
 pub use deviation::{Comparison, Golden, Reading};
 pub use gauge::{Axis, Measure};
+pub use mask::eroded;
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
 pub use strips::{

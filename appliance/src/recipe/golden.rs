@@ -12,7 +12,7 @@ use super::{
 use crate::head::calibration::Calibration;
 use algo::adaptive::{Surface, phase_reach};
 use algo::geometry::Triangulator;
-use algo::inspect::openings;
+use algo::inspect::{eroded, openings};
 use algo::pattern::Shot;
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
@@ -312,22 +312,6 @@ impl GoldenPart<'_> {
             safe_share: valid().filter(safe).count() as f64 / count,
         }
     }
-}
-
-/// Takes `by` pixels off every edge of a mask (square neighbourhood); the frame's border is an edge.
-fn eroded(mask: &[bool], width: usize, by: usize) -> Vec<bool> {
-    let rows = mask.len() / width.max(1);
-    let inside = |column: usize, row: usize| {
-        let fits = column >= by && row >= by && column + by < width && row + by < rows;
-        fits && (row - by..=row + by).all(|v| {
-            mask[v * width + column - by..=v * width + column + by]
-                .iter()
-                .all(|on| *on)
-        })
-    };
-    (0..mask.len())
-        .map(|at| inside(at % width, at / width))
-        .collect()
 }
 
 /// The regions and gauges that a taught part gets by itself.

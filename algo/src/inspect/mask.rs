@@ -1,0 +1,40 @@
+//! Masks of pixels.
+
+use alloc::vec::Vec;
+
+/// Takes `by` pixels off every edge of a mask (square neighbourhood); the frame's border is an edge.
+pub fn eroded(mask: &[bool], width: usize, by: usize) -> Vec<bool> {
+    let rows = mask.len() / width.max(1);
+    let inside = |column: usize, row: usize| {
+        let fits = column >= by && row >= by && column + by < width && row + by < rows;
+        fits && (row - by..=row + by).all(|v| {
+            mask[v * width + column - by..=v * width + column + by]
+                .iter()
+                .all(|on| *on)
+        })
+    };
+    (0..mask.len())
+        .map(|at| inside(at % width, at / width))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn erosion_takes_pixels_off_the_border_of_the_frame_and_around_every_hole() {
+        let (width, height) = (9, 7);
+        let hole = 3 * width + 6;
+        let mut mask = [true; 63];
+        mask[hole] = false;
+        let left = eroded(&mask, width, 1);
+        for (at, left) in left.into_iter().enumerate() {
+            let (u, v) = (at % width, at / width);
+            let inside = u >= 1 && v >= 1 && u + 1 < width && v + 1 < height;
+            let near_hole = u.abs_diff(6) <= 1 && v.abs_diff(3) <= 1;
+            assert_eq!(left, inside && !near_hole, "({u}, {v})");
+        }
+        assert_eq!(eroded(&mask, width, 0), mask);
+    }
+}
