@@ -6,15 +6,15 @@
 use alloc::vec::Vec;
 use libm::sqrt;
 
-/// Levels between black and full scale that are told apart.
+/// Bins of levels between black and full scale.
 const BINS: usize = 16;
-/// A level counts if so many pixels have it: its σ is then known to three percent.
+/// Least number of pixels of a bin that is used: its σ is then known to 3 %.
 const LEAST_PIXELS: u64 = 500;
-/// Levels so many σ from black and full scale are not clipped.
+/// Bins at least this many σ from black and full scale are not clipped.
 const CLEAR: f64 = 4.0;
-/// Variance of the rounding to counts. Without other noise it is all there is, and no two pictures tell it.
+/// Variance of the rounding to counts. A camera without other noise has this, though its two pictures are equal.
 const ROUNDING: f64 = 1.0 / 12.0;
-/// Shot noise counts if it is this many σ from none.
+/// Shot noise that differs from 0 by fewer σ than this is taken as 0.
 const SIGNIFICANT: f64 = 3.0;
 
 /// Noise at one level.

@@ -10,9 +10,9 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
 
-/// What lies so many times the scatter off the fit is dust or a scratch, and left out of a second one.
+/// Pixels that are off the first fit by more than this many times its scatter (dust, scratches) are left out of the second.
 const OUTLIER: f64 = 4.0;
-/// The plate must fill this share of the frame: beyond it the fit would guess.
+/// Least share of the frame that the plate must fill: where it does not, the fit extrapolates.
 const LEAST_FILLED: f64 = 0.6;
 /// Side of the squares over which noise is averaged, so that what is left tells how well the polynomial follows the plate.
 const SQUARE: usize = 16;
@@ -23,8 +23,8 @@ pub struct Plate {
     fit: FittedMap,
     /// Scatter of the pixels about the fit, turns: noise.
     pub noise_turns: f64,
-    /// How far the fit is from the plate, RMS, turns: what squares of pixels are off on the mean beyond their noise, and what noise
-    /// leaves in the coefficients.
+    /// Estimated RMS error of the fit, turns: its lack of fit, from the means of squares of pixels, and the noise that is left in
+    /// its coefficients.
     pub residual_turns: f64,
     /// Share of the frame that it was fitted to.
     pub filled: f64,
@@ -107,7 +107,7 @@ impl Plate {
     }
 }
 
-/// What the fit is off the plate beyond noise, RMS: the variance of squares' means less what noise makes of it.
+/// Lack of fit, RMS: the mean square deviation of the means of squares of pixels, less what noise contributes to it.
 fn lack_of_fit(fit: &FittedMap, samples: &[(f64, f64, f64)], width: usize, height: usize) -> f64 {
     let across = width.div_ceil(SQUARE);
     let mut squares = vec![(0.0, 0.0, 0.0); across * height.div_ceil(SQUARE)];
