@@ -11,7 +11,7 @@ use crate::system::journal::Severity;
 use crate::system::notify::Notify;
 use crate::system::progress::Progress;
 use crate::system::runtime;
-use crate::system::told::Told;
+use crate::system::stop_signal::Told;
 use std::time::Duration;
 
 /// READY waits so long for devices that are switched on together with the computer.

@@ -1,7 +1,7 @@
 //! Who started the daemon: whom it tells how it goes, and who tells it to end.
 
 use crate::system::notify::Notify;
-use crate::system::told::Told;
+use crate::system::stop_signal::Told;
 
 /// Who started the daemon; by default nobody who listens or ends it.
 #[derive(Clone, Debug, Default)]

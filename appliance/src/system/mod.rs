@@ -11,7 +11,7 @@ pub mod notify;
 pub mod priority;
 pub mod progress;
 pub mod socket;
-pub mod told;
+pub mod stop_signal;
 
 /// A current-thread runtime.
 ///

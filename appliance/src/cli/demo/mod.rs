@@ -10,7 +10,7 @@ use crate::error::{Exit, Failure};
 use crate::service::Daemon;
 use crate::storage::state::StateFolder;
 use crate::system::runtime;
-use crate::system::told::Told;
+use crate::system::stop_signal::Told;
 use parts::{PARTS, Placed};
 use plc::{Plc, PlcResult};
 use std::io::IsTerminal;
