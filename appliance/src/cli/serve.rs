@@ -1,4 +1,4 @@
-//! `fringed serve`: the station, until it is told to end.
+//! `fringed serve`: the station, until the stop signal.
 
 use super::options::{Files, Listen, Quiet, Threads};
 use super::part::SimulatedPart;
@@ -11,7 +11,7 @@ use crate::system::journal::Severity;
 use crate::system::notify::Notify;
 use crate::system::progress::Progress;
 use crate::system::runtime;
-use crate::system::stop_signal::Told;
+use crate::system::stop_signal::StopSignal;
 use std::time::Duration;
 
 /// READY waits so long for devices that are switched on together with the computer.
@@ -45,14 +45,14 @@ impl Serve {
         let caller = Caller {
             notify: Notify::from_environment(),
             // Before anything is done: whatever it does then, the end that is asked for is clean.
-            told: Told::listen()?,
+            stop: StopSignal::listen()?,
         };
         caller.notify.status("starting");
         let pool = self.threads.pool(config.threads)?;
         let daemon = Daemon::start_for(&config, pool, progress.clone(), &caller)?;
         runtime()?.block_on(async {
             tokio::select! {
-                () = caller.told.wait() => {}
+                () = caller.stop.wait() => {}
                 () = serve(&daemon, &caller.notify, &progress) => {}
             }
         });
@@ -67,7 +67,7 @@ impl Serve {
 async fn serve(daemon: &Daemon, notify: &Notify, progress: &Progress) {
     let mut settled = daemon.settled().await;
     let faulted = || daemon.station.snapshot().fault.is_some();
-    if notify.is_listened_to() && settled.is_err() && faulted() {
+    if notify.is_connected() && settled.is_err() && faulted() {
         notify.status(&standing(&daemon.station.snapshot()));
         let there = async {
             let mut snapshots = daemon.station.subscribe();

@@ -4,13 +4,13 @@ use super::map::{self, Block, at};
 use crate::config::WordOrder;
 use crate::station::{GaugeValue, Health, ResultRecord, Snapshot};
 
-/// `i32` of a value that is not there.
+/// `i32` of a missing value.
 pub const INVALID_I32: u32 = 0x8000_0000;
-/// `f32` of a value that is not there.
+/// `f32` of a missing value.
 pub const INVALID_F32: u32 = 0x7FC0_0000;
-/// Temperature that is not known.
+/// Unknown temperature.
 pub const UNKNOWN_I16: u16 = 0x8000;
-/// Load, memory or storage that is not known.
+/// Unknown load, memory or storage.
 pub const UNKNOWN_U16: u16 = 0xFFFF;
 /// "FRNG".
 pub const MAGIC: u32 = 0x4652_4E47;
@@ -77,7 +77,7 @@ impl Words {
         }
     }
 
-    /// At most 32 characters, NUL padded; what is not ASCII becomes `?`.
+    /// At most 32 characters, NUL padded; characters that are not ASCII become `?`.
     fn ascii32(&mut self, address: u16, text: &str) {
         let ascii: Vec<u8> = text
             .chars()
@@ -210,7 +210,7 @@ fn result(words: &mut Words, record: &ResultRecord) {
     words.u16(a::FLAGS, record.flags());
     for k in 0..map::GAUGES {
         let gauge = found.gauges.get(usize::from(k));
-        // Shown only if it was decided upon: a number beside VALID = 0 would be taken for a measurement.
+        // Shown only if it is valid: a number beside VALID = 0 would be taken for a measurement.
         let value = gauge
             .filter(|gauge| gauge.decision.valid)
             .and_then(|gauge| gauge.value);
@@ -276,7 +276,7 @@ fn recipe_directory(words: &mut Words, stored: &[u16]) {
     }
 }
 
-/// A number that saturates below the one that means "not known".
+/// A number, saturated below the value that means "not known".
 fn known(value: Option<u64>) -> u16 {
     let most = UNKNOWN_U16 - 1;
     value.map_or(UNKNOWN_U16, |value| {
@@ -312,7 +312,7 @@ fn tenths(celsius: Option<f64>) -> u16 {
 }
 
 fn saturated_u16(value: f64) -> u16 {
-    // NaN casts to 0, the rest saturates.
+    // The cast turns NaN into 0 and saturates everything else.
     value.round() as u16
 }
 

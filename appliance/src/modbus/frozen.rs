@@ -121,7 +121,7 @@ const BLOCKS_1: [(&str, u16, u16, bool); 8] = [
     ("IDENTITY", 900, 939, false),
 ];
 
-/// What version 1.0 said of the rows that later versions say more of.
+/// The meanings in version 1.0 of the rows whose meaning a later version extends.
 const MEANINGS_1: [(u16, &str); 2] = [
     (2, "1-9999; 0 leave the recipe; 65535 select by PART_NUMBER"),
     (

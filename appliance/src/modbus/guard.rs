@@ -1,4 +1,4 @@
-//! The guard of one connection: hands on whole, well-formed frames one at a time and enforces both time-outs.
+//! The guard of one connection: passes on complete, well-formed frames one at a time and enforces both time-outs.
 //!
 //! It stands between the socket and `tokio-modbus`, whose server has no time-outs, closes the connection on a request that
 //! contradicts itself, and panics on an FC15 whose quantity exceeds its bytes. A flawed request is replaced by an empty one
@@ -18,7 +18,7 @@ use tokio::time::{Instant, Sleep};
 use super::places::Place;
 use super::service::{FrameFlaw, MAX_READ_WRITE, MAX_WRITE, MAX_WRITE_BITS};
 
-/// Transaction, protocol and length: what must be there to know the rest.
+/// Transaction, protocol and length: the bytes needed to know the frame's length.
 const HEADER: usize = 6;
 /// Longest frame: header, unit id and a PDU of 253 bytes.
 const MAX_FRAME: usize = HEADER + 1 + 253;
@@ -36,10 +36,10 @@ enum Waiting {
     Answer,
 }
 
-/// A transport that reads whole frames and gives up on time.
+/// A transport that passes on complete frames and closes the connection after a time-out.
 pub struct Guard<T> {
     stream: T,
-    /// Held as long as the connection is open; may be taken away.
+    /// Held while the connection is open; another client may displace it.
     place: Place,
     flaw: FrameFlaw,
     idle: Duration,
@@ -48,9 +48,9 @@ pub struct Guard<T> {
     deadline: Pin<Box<Sleep>>,
     input: [u8; MAX_FRAME],
     filled: usize,
-    /// A complete frame on its way to the library, and how much of it has gone.
+    /// A complete frame for the library, and how many bytes of it the library has read.
     output: Vec<u8>,
-    gone: usize,
+    read: usize,
 }
 
 impl<T> Guard<T> {
@@ -67,11 +67,11 @@ impl<T> Guard<T> {
             input: [0; MAX_FRAME],
             filled: 0,
             output: Vec::with_capacity(MAX_FRAME),
-            gone: 0,
+            read: 0,
         }
     }
 
-    /// Starts the time of a wait, unless it already runs.
+    /// Starts the time-out of a wait, unless it already runs.
     fn wait_for(&mut self, waiting: Waiting) {
         if self.waiting != waiting {
             self.waiting = waiting;
@@ -84,16 +84,16 @@ impl<T> Guard<T> {
         }
     }
 
-    /// Pending, or an error if the time of this wait is over or the place is somebody else's.
+    /// Pending, or an error if this wait has timed out or another client has displaced this one.
     fn poll_deadline<R>(&mut self, context: &mut Context<'_>) -> Poll<io::Result<R>> {
-        if self.place.poll_gone(context).is_ready() {
+        if self.place.poll_displaced(context).is_ready() {
             return Poll::Ready(Err(io::Error::from(io::ErrorKind::ConnectionAborted)));
         }
         ready!(self.deadline.as_mut().poll(context));
         Poll::Ready(Err(io::Error::from(io::ErrorKind::TimedOut)))
     }
 
-    /// The length of the frame whose header has come.
+    /// The length of the frame whose header was received.
     fn frame_length(&self) -> io::Result<usize> {
         let [_, _, p1, p0, l1, l0, ..] = self.input;
         let length = usize::from(u16::from_be_bytes([l1, l0]));
@@ -106,8 +106,8 @@ impl<T> Guard<T> {
         Ok(HEADER + length)
     }
 
-    /// Puts the complete frame, or its empty stand-in, where the library fetches it.
-    fn hand_on(&mut self) {
+    /// Puts the complete frame, or its empty replacement, into `output`.
+    fn pass_on(&mut self) {
         self.place.spoke();
         let frame = self.input.get(..self.filled).unwrap_or_default();
         let (head, pdu) = frame.split_at_checked(HEADER + 1).unwrap_or_default();
@@ -127,7 +127,7 @@ impl<T> Guard<T> {
         self.flaw
             .store(stand_in.map_or(0, |flaw| flaw.exception), Ordering::Relaxed);
         self.filled = 0;
-        self.gone = 0;
+        self.read = 0;
     }
 }
 
@@ -207,11 +207,11 @@ impl<T: AsyncRead + Unpin> AsyncRead for Guard<T> {
     ) -> Poll<io::Result<()>> {
         let this = self.get_mut();
         loop {
-            let left = this.output.get(this.gone..).unwrap_or_default();
+            let left = this.output.get(this.read..).unwrap_or_default();
             if !left.is_empty() {
                 let count = left.len().min(buffer.remaining());
                 buffer.put_slice(left.get(..count).unwrap_or_default());
-                this.gone += count;
+                this.read += count;
                 return Poll::Ready(Ok(()));
             }
             this.wait_for(if this.filled == 0 {
@@ -239,7 +239,7 @@ impl<T: AsyncRead + Unpin> AsyncRead for Guard<T> {
             }
             this.filled += count;
             if this.filled > HEADER && this.filled == this.frame_length()? {
-                this.hand_on();
+                this.pass_on();
             }
         }
     }

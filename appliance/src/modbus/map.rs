@@ -75,7 +75,7 @@ pub struct Register {
     pub name: &'static str,
     /// How it is read.
     pub kind: Kind,
-    /// How many items stand one behind the other (for ASCII: registers).
+    /// The number of consecutive items (for ASCII: of registers).
     pub items: u16,
     /// What it means, with its unit.
     pub meaning: &'static str,
@@ -88,7 +88,7 @@ impl Register {
     }
 }
 
-/// Writes every row once: the constant with its address and the line of the table.
+/// Declares each row once, as the constant with its address and as the line of the table.
 macro_rules! registers {
     ($($module:ident $table:ident { $($address:literal $name:ident $kind:ident x $items:literal, $meaning:literal;)* })*) => {
         /// The addresses by block and name.
@@ -226,7 +226,7 @@ pub const CONTROL: Block = Block {
 pub const STATUS: Block = read_only("STATUS", 100, 131, true);
 /// RESULT: the last result.
 pub const RESULT: Block = read_only("RESULT", 200, 319, true);
-/// OLDEST: RESULT's twin with the oldest unacknowledged result.
+/// OLDEST: the layout of RESULT, with the oldest unacknowledged result.
 pub const OLDEST: Block = read_only("OLDEST", 400, 519, true);
 /// Gauge detail.
 pub const GAUGE_DETAIL: Block = read_only("GAUGE_DETAIL", 520, 583, true);
@@ -249,7 +249,7 @@ pub const BLOCKS: [(Block, &[Register]); 8] = [
     (IDENTITY, IDENTITY_ROWS),
 ];
 
-/// Every row of the map at its address, with its block.
+/// Every row of the map with its address and block.
 pub fn registers() -> impl Iterator<Item = (Block, Register)> {
     BLOCKS.into_iter().flat_map(|(block, rows)| {
         let moved = if block == OLDEST {

@@ -1,7 +1,7 @@
-//! Places: how many connections there are, who may have one, and who makes room for whom.
+//! Places: the limit on connections, and which one is closed for a new one.
 //!
-//! One place is kept for a client that may write. Who comes to a full house takes the place of the connection that has been
-//! idle for longest; where nobody is idle, the newcomer is refused. Readers never displace writers.
+//! One place is kept for a client that may write. When all places are taken, the connection that has been idle for longest is closed;
+//! if none is idle, the new one is refused. Readers never displace writers.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll};
@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::oneshot;
 
-/// A connection makes room if its last request is older than this: three missed polls of a slow PLC.
+/// A connection is idle if its last request is older than this: three missed polls of a slow PLC.
 const IDLE: Duration = Duration::from_secs(5);
-/// A connection that never sent a whole request makes room after this: far more than a round trip.
+/// A connection that never sent a complete request is idle after this: far more than a round trip.
 const MUTE: Duration = Duration::from_millis(250);
 
 /// The places of one server. Cheap to clone.
@@ -22,16 +22,16 @@ pub struct Clients(Arc<Mutex<Table>>);
 struct Table {
     limit: usize,
     next: u64,
-    taken: Vec<Taken>,
+    taken: Vec<Connection>,
 }
 
 #[derive(Debug)]
-struct Taken {
+struct Connection {
     number: u64,
     may_write: bool,
-    /// Whether a whole request has come.
+    /// Whether it has sent a complete request.
     spoke: bool,
-    /// When the last one came, or the connection.
+    /// The time of its last request; before that, of the connection.
     since: Instant,
     /// Dropped to close it.
     _open: oneshot::Sender<()>,
@@ -48,7 +48,7 @@ impl Table {
         let (open, closed) = oneshot::channel();
         let number = self.next;
         self.next += 1;
-        self.taken.push(Taken {
+        self.taken.push(Connection {
             number,
             may_write,
             spoke: false,
@@ -58,9 +58,9 @@ impl Table {
         Some((number, closed))
     }
 
-    /// Who makes room for a newcomer: a reader before a writer, and of those the one that has been idle for longest.
+    /// The connection to close for a new one: readers before writers, and among them the one that has been idle for longest.
     fn idle_longest(&self, may_write: bool, now: Instant) -> Option<u64> {
-        let idle = |other: &&Taken| {
+        let idle = |other: &&Connection| {
             let patience = if other.spoke { IDLE } else { MUTE };
             (may_write || !other.may_write) && now.saturating_duration_since(other.since) > patience
         };
@@ -88,7 +88,7 @@ impl Clients {
         (count, table.taken.iter().any(|taken| taken.may_write))
     }
 
-    /// A place for a newcomer, or `None` if nobody makes room.
+    /// A place for a new connection, or `None` if all are taken and none is idle.
     pub(super) fn admit(&self, may_write: bool) -> Option<Place> {
         let (number, closed) = self.table().admit(may_write, Instant::now())?;
         Some(Place {
@@ -112,7 +112,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// A whole request came.
+    /// A complete request was received.
     pub(super) fn spoke(&self) {
         let mut table = self.clients.table();
         let mut taken = table.taken.iter_mut();
@@ -122,8 +122,8 @@ impl Place {
         }
     }
 
-    /// Ready when somebody else has got the place.
-    pub(super) fn poll_gone(&mut self, context: &mut Context<'_>) -> Poll<()> {
+    /// Ready when a new connection has displaced this one.
+    pub(super) fn poll_displaced(&mut self, context: &mut Context<'_>) -> Poll<()> {
         Future::poll(std::pin::Pin::new(&mut self.closed), context).map(|_| ())
     }
 }

@@ -1,4 +1,4 @@
-//! Refusals: what was refused to whom, for the log, but never so often that the log itself is the attack.
+//! Refusals for the log: what was refused to which address, with a rate limit, so that an attack cannot flood the log.
 
 use std::fmt;
 use std::net::IpAddr;
@@ -13,7 +13,7 @@ const PAUSE: Duration = Duration::from_secs(10);
 pub enum Refused {
     /// A connection from outside the subnets that may read.
     Connection,
-    /// A connection to a full house.
+    /// A connection while all places are taken and none is idle.
     Full,
     /// A write of a client that may not write.
     Write,
@@ -31,12 +31,12 @@ impl Refused {
     }
 }
 
-/// Writes refusals down. Cheap to clone.
+/// Logs refusals. Cheap to clone; clones share the rate limit.
 #[derive(Clone)]
 pub struct Refusals {
     say: Arc<dyn Fn(&str) + Send + Sync>,
     /// By kind, so that a flood of one does not hide another.
-    paces: Arc<Mutex<[Pace; 3]>>,
+    limits: Arc<Mutex<[RateLimit; 3]>>,
 }
 
 impl fmt::Debug for Refusals {
@@ -46,14 +46,14 @@ impl fmt::Debug for Refusals {
 }
 
 #[derive(Debug, Default)]
-struct Pace {
+struct RateLimit {
     last: Option<Instant>,
     /// Refusals since the last line.
     silent: u64,
 }
 
-impl Pace {
-    /// Whether a line may be written now, and how many were not since the last one.
+impl RateLimit {
+    /// Whether a line may be written now: then the number of refusals since the last line.
     fn pass(&mut self, now: Instant) -> Option<u64> {
         if self
             .last
@@ -68,24 +68,24 @@ impl Pace {
 }
 
 impl Refusals {
-    /// Refusals are told to `say`, a line at a time.
+    /// `say` gets one line at a time.
     pub fn new(say: impl Fn(&str) + Send + Sync + 'static) -> Self {
         Self {
             say: Arc::new(say),
-            paces: Arc::default(),
+            limits: Arc::default(),
         }
     }
 
-    /// Notes one.
+    /// Logs a refusal, or counts it for the next line.
     pub(super) fn note(&self, refused: Refused, peer: IpAddr) {
-        let mut paces = self.paces.lock().unwrap_or_else(PoisonError::into_inner);
-        let [connection, full, write] = &mut *paces;
-        let pace = match refused {
+        let mut limits = self.limits.lock().unwrap_or_else(PoisonError::into_inner);
+        let [connection, full, write] = &mut *limits;
+        let limit = match refused {
             Refused::Connection => connection,
             Refused::Full => full,
             Refused::Write => write,
         };
-        match pace.pass(Instant::now()) {
+        match limit.pass(Instant::now()) {
             None => {}
             Some(0) => (self.say)(&format!("Modbus, {peer}: {}", refused.words())),
             Some(silent) => (self.say)(&format!(
@@ -102,12 +102,12 @@ mod tests {
 
     #[test]
     fn a_flood_of_refusals_is_one_line_in_ten_seconds_that_counts_the_others() {
-        let (mut pace, start) = (Pace::default(), Instant::now());
-        assert_eq!(pace.pass(start), Some(0));
+        let (mut limit, start) = (RateLimit::default(), Instant::now());
+        assert_eq!(limit.pass(start), Some(0));
         for ms in 1..=500 {
-            assert_eq!(pace.pass(start + Duration::from_millis(ms)), None);
+            assert_eq!(limit.pass(start + Duration::from_millis(ms)), None);
         }
-        assert_eq!(pace.pass(start + PAUSE), Some(500));
-        assert_eq!(pace.pass(start + 2 * PAUSE), Some(0));
+        assert_eq!(limit.pass(start + PAUSE), Some(500));
+        assert_eq!(limit.pass(start + 2 * PAUSE), Some(0));
     }
 }

@@ -1,4 +1,4 @@
-//! The server: connections, their number and their time, on top of `tokio-modbus`.
+//! The server: accepts connections on top of `tokio-modbus`, within their limits of number and time.
 
 use std::future::Future;
 use std::net::{IpAddr, SocketAddr};
@@ -17,20 +17,20 @@ use crate::config::{ModbusConfig, WordOrder};
 use crate::station::{ConnectionEdges, StationHandle};
 use crate::system::socket::holds;
 
-/// How the server behaves.
+/// The server's settings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Options {
     /// Word order of 32- and 64-bit values.
     pub word_order: WordOrder,
     /// Answer only to this unit id, exception 0x0B to others.
     pub strict_unit_id: Option<u8>,
-    /// From where connections are taken.
+    /// Networks from which connections are accepted.
     pub readers: Vec<IpNet>,
-    /// From where writes are taken.
+    /// Networks from which writes are accepted.
     pub writers: Vec<IpNet>,
     /// A connection without a request for this long is closed.
     pub idle: Duration,
-    /// A started frame must be finished, and an answer be taken, in this time.
+    /// Time to finish a started frame, and for the client to read an answer.
     pub frame: Duration,
 }
 
@@ -78,7 +78,7 @@ pub async fn serve(
     };
     let on_connected = |stream: TcpStream, peer: SocketAddr| {
         let connection = admit(peer.ip()).map(|(place, may_write)| {
-            // Answers are small and awaited: Nagle's algorithm would only delay them. Without it the connection still works.
+            // Nagle's algorithm would delay the small answers. If it cannot be switched off the connection still works.
             let _ = stream.set_nodelay(true);
             let flaw = FrameFlaw::default();
             let service = PlcService {
@@ -100,7 +100,7 @@ pub async fn serve(
     };
     let accept = async {
         loop {
-            // Ends only when accept fails, for example without file descriptors: wait for some, then go on.
+            // Returns only when accept fails, for example without free file descriptors: wait, then go on.
             let _ = server.serve(&on_connected, |_broken_connection| ()).await;
             tokio::time::sleep(Duration::from_millis(100)).await;
         }

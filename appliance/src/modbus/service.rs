@@ -1,4 +1,4 @@
-//! One request of one connection: checks it, reads one snapshot or applies one write, answers.
+//! One request of one connection: checks it, then reads one snapshot or applies one write.
 
 use std::future::{Ready, ready};
 use std::net::IpAddr;
@@ -28,7 +28,7 @@ pub const MAX_WRITE_BITS: usize = 1968;
 /// Coils and discrete inputs: one word each.
 const BITS: u16 = 16;
 
-/// What the guard found wrong with the frame that the library decodes next: 0, or the exception to answer with.
+/// The guard's verdict on the frame that the library decodes next: 0, or the exception to answer with.
 pub type FrameFlaw = Arc<AtomicU8>;
 
 /// The service of one connection.
@@ -201,7 +201,7 @@ fn bits(word: u16, first: u16, count: u16) -> Result<Vec<bool>, ExceptionCode> {
         .collect())
 }
 
-/// The answer to FC43/14 behind its function code. `tokio-modbus` 0.17 does not export its type, so the bytes are laid here:
+/// The answer to FC43/14 after its function code. `tokio-modbus` 0.17 does not export its type, so the bytes are built here:
 /// MEI type, read code, conformity (0x83: extended, stream and individual), more follows, next object, number of objects, objects.
 ///
 /// Stream access (read code 1–3) starts at `object` if that exists, else at the first one; read code 4 gives one object.

@@ -1,13 +1,13 @@
-//! Who started the daemon: whom it tells how it goes, and who tells it to end.
+//! Who started the daemon: where its status goes, and where its stop signal comes from.
 
 use crate::system::notify::Notify;
-use crate::system::stop_signal::Told;
+use crate::system::stop_signal::StopSignal;
 
-/// Who started the daemon; by default nobody who listens or ends it.
+/// Who started the daemon; by default no service manager and no stop signal.
 #[derive(Clone, Debug, Default)]
 pub struct Caller {
     /// The service manager.
     pub notify: Notify,
-    /// Whether the end was asked for.
-    pub told: Told,
+    /// Ends the start early.
+    pub stop: StopSignal,
 }

@@ -1,7 +1,7 @@
-//! The daemon: station, measuring task, Modbus and page, each where it belongs.
+//! The running daemon: starts and stops its threads, and connects them.
 //!
-//! One OS thread measures ([`crate::production`]), one serves sockets on a current-thread runtime, and
-//! the station is plain values behind a handle that both use.
+//! One OS thread measures ([`crate::production`]), one serves sockets on a current-thread runtime, and the station is plain values
+//! behind a handle that both use.
 
 mod caller;
 mod serving;
@@ -46,12 +46,12 @@ use std::time::Instant;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 
-/// Time between two looks at whether a start is to be given up.
-const LOOKING: std::time::Duration = std::time::Duration::from_millis(20);
+/// Time between two checks for the stop signal during the start.
+const POLLING: std::time::Duration = std::time::Duration::from_millis(20);
 
 /// A running daemon.
 pub struct Daemon {
-    /// The way to the station.
+    /// Access to the station.
     pub station: StationHandle,
     /// Where Modbus TCP is served.
     pub modbus: SocketAddr,
@@ -81,8 +81,8 @@ impl Daemon {
         Self::start_for(config, pool, progress, &Caller::default())
     }
 
-    /// The same for a caller. For a service manager it also returns when the head is not there, and waits for it as for one that was
-    /// lost. It returns at once when it is told to end: then only [`Daemon::stop`] makes sense.
+    /// The same for a caller. For a service manager it also returns when the head is missing; the measuring task then waits for it
+    /// as for a lost one. It returns at once on the stop signal: the daemon can then only be stopped.
     ///
     /// # Errors
     /// As [`Daemon::start`].
@@ -189,7 +189,7 @@ impl Daemon {
                 _ => None,
             };
             let computing = computing.clone();
-            let (patient, pulse) = (caller.notify.is_listened_to(), caller.notify.pulse());
+            let (patient, pulse) = (caller.notify.is_connected(), caller.notify.pulse());
             spawn("measuring", move || {
                 let opening = Opening {
                     config: &config,
@@ -242,9 +242,11 @@ impl Daemon {
             )
         };
         let outcome = loop {
-            match opening.recv_timeout(LOOKING) {
+            match opening.recv_timeout(POLLING) {
                 Ok(outcome) => break outcome,
-                Err(mpsc::RecvTimeoutError::Timeout) if caller.told.already() => break Ok(None),
+                Err(mpsc::RecvTimeoutError::Timeout) if caller.stop.has_arrived() => {
+                    break Ok(None);
+                }
                 Err(mpsc::RecvTimeoutError::Timeout) => {}
                 Err(mpsc::RecvTimeoutError::Disconnected) => break Err(gone()),
             }
@@ -266,24 +268,24 @@ impl Daemon {
         }
     }
 
-    /// Ends everything: the cycle in flight ends with its result, INVALID if it was still exposing, then the sockets close.
+    /// Stops everything: the cycle in flight ends with its result, INVALID if it was still exposing; then the sockets close.
     pub fn stop(self) {
         self.station.event(Event::Stop);
         self.stopping.stop();
     }
 }
 
-/// The credential that gives the secret of this device.
+/// The service manager's credential with the secret of this device.
 const SECRET: &str = "fringed.secret";
 
-/// Opens the way in; the secret of a new device is shown here and never again.
+/// Opens the access control; the secret of a new device is written to stderr here and never again.
 fn open_access(state: &StateFolder) -> Result<Access, Failure> {
     let folder = state.place("access");
     let given =
         std::env::var_os("CREDENTIALS_DIRECTORY").map(|given| Path::new(&given).join(SECRET));
     let (access, secret) = Access::open_given(&folder, given.as_deref())?;
     if let Some(secret) = secret {
-        // Whatever is quiet: without it nobody could ever sign in.
+        // Also with `--quiet`: without the secret nobody could sign in.
         let words = format!(
             "the secret of this device, shown this once: {secret} (sign in on the page with it; for another one \
              delete {} and start again)",
@@ -331,7 +333,7 @@ fn open_history(
         counted: state.counted()?,
         counter: state.counter(),
         serial: state.serial()?,
-        // 0 is nobody's.
+        // Run 0 means that none was recorded.
         run: random()?.max(1),
     };
     history::open(state.path(), numbering, bounds)
@@ -357,7 +359,7 @@ fn station(config: &Config, state: &StateFolder, next_seq: u32) -> Result<Statio
     Ok(Station::new(settings, Micros(0)))
 }
 
-/// Carries out what the station wants done. Called with the station locked: it only hands on and waits for nothing.
+/// Carries out the station's effects. Called with the station locked, so it only passes them on and never waits.
 fn effects(
     orders: mpsc::Sender<Order>,
     aborts: Aborts,
@@ -365,7 +367,7 @@ fn effects(
     progress: Progress,
     tally: Tally,
 ) -> impl FnMut(Effect) -> Option<Event> {
-    // An order that nobody takes is noticed by the station itself: its wait has a deadline.
+    // If the measuring task is gone the order is lost; the station notices by the deadline of its wait.
     let order = move |order| drop(orders.send(order));
     move |effect| {
         match effect {
@@ -392,8 +394,7 @@ fn effects(
     }
 }
 
-/// What the station does first: load its recipe; a simulated head without it teaches the part that
-/// lies in front of it.
+/// The station's first request: to load its recipe. Without one, a simulated head teaches the part in front of it.
 fn first_request(config: &Config, simulated: bool, recipes: &Store) -> Option<Request> {
     let number = config.station.recipe;
     if recipes.numbers().contains(&number) {

@@ -1,4 +1,4 @@
-//! What runs on the sockets' thread: Modbus, the page, and the station's tick.
+//! The sockets' thread: Modbus, the page, and the station's tick.
 
 use crate::config::Config;
 use crate::station::{StationHandle, tick};
@@ -7,7 +7,7 @@ use crate::{modbus, web};
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 
-/// The PLC's side of the sockets.
+/// What the Modbus server needs.
 pub(super) struct PlcSide {
     pub(super) listener: TcpListener,
     pub(super) clients: modbus::Clients,
@@ -25,7 +25,7 @@ pub(super) async fn serve(
     let stop = || {
         let mut stopped = stopped.clone();
         async move {
-            // An error means that the daemon itself is gone: stop as well.
+            // An error means that the daemon is gone: stop as well.
             let _ = stopped.wait_for(|stop| *stop).await;
         }
     };

@@ -1,4 +1,4 @@
-//! How a start ends: with a recipe, or why not.
+//! The end of a start: the station has its recipe, or the reason why not.
 
 use super::{Daemon, runtime};
 use crate::error::{Exit, Failure};
@@ -7,16 +7,16 @@ use crate::station::{RecipeResult, Snapshot};
 use std::sync::Arc;
 
 impl Daemon {
-    /// Waits until the station has its recipe, or says why it will not have one. It is READY then, unless the PLC does not ask
-    /// for it or asks for another recipe.
+    /// Waits until the station has its recipe or cannot get it. It is READY then, unless the PLC does not ask for ONLINE or asks
+    /// for another recipe.
     ///
     /// # Errors
-    /// The station's fault, or that its recipe could be neither loaded nor taught.
+    /// The station has a fault, or its recipe could be neither loaded nor taught.
     pub fn wait_until_ready(&self) -> Result<Arc<Snapshot>, Failure> {
         runtime()?.block_on(self.settled())
     }
 
-    /// The same, for those who wait for something else as well.
+    /// The same as a future, to wait for something else as well.
     ///
     /// # Errors
     /// As [`Daemon::wait_until_ready`].

@@ -1,4 +1,4 @@
-//! The end of the daemon: every thread is told, and none is waited for for ever.
+//! The stop of the daemon: every thread is asked to end, and each wait for one has a limit.
 
 use crate::history::History;
 use crate::production::Order;
@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
-/// What ends the daemon's threads.
+/// The daemon's threads and what makes each of them end.
 pub(super) struct Stopping {
     pub(super) orders: mpsc::Sender<Order>,
     pub(super) sockets: watch::Sender<bool>,
@@ -23,11 +23,11 @@ pub(super) struct Stopping {
     pub(super) computing: Computing,
 }
 
-/// Time between two looks at a thread that ends.
-const LOOKING: Duration = Duration::from_millis(2);
-/// A measuring task that has not ended after this time is left behind: each wait for a device ends after 2 s.
+/// Time between two checks whether a thread has ended.
+const POLLING: Duration = Duration::from_millis(2);
+/// A measuring task that has not ended after this time is abandoned: each wait for a device ends after 2 s.
 const MEASURING: Duration = Duration::from_secs(3);
-/// What has not ended after this time is left behind, whatever hangs: who stops a station waits at most 5 s.
+/// A thread that has not ended after this time is abandoned: a stop takes at most 5 s, whatever hangs.
 const STOPPING: Duration = Duration::from_millis(4500);
 
 impl Stopping {
@@ -35,7 +35,7 @@ impl Stopping {
     pub(super) fn stop(self) {
         let began = Instant::now();
         let until = began + STOPPING;
-        // An order that nobody takes, or a runtime that is gone, is what is wanted here.
+        // A receiver that is gone has ended already.
         drop(self.orders.send(Order::Stop));
         let [measuring, serving, surveying, wiring] = self.threads;
         let needed = || !self.computing.is_under_way();
@@ -51,18 +51,18 @@ impl Stopping {
         join("lines", wiring, until, &self.progress);
         drop(self.survey);
         join("survey", surveying, until, &self.progress);
-        // Last: what the others brought to an end is stored.
+        // Last, so that the results of the others are stored.
         self.history.stop(self.station.snapshot().result_seq);
         join("history", self.writing, until, &self.progress);
     }
 }
 
-/// Waits for a thread to end. One that hangs in a device or in a storage must not keep the program from ending.
+/// Waits for a thread to end, at most until `until`: one that hangs in a device or a storage must not keep the program alive.
 fn join(name: &str, thread: JoinHandle<()>, until: Instant, progress: &Progress) {
     join_while(&|| true, name, thread, until, progress);
 }
 
-/// The same as long as the thread is `needed`: one that only computes ends with the program.
+/// The same while the thread is `needed`: one that only computes may end with the program.
 fn join_while(
     needed: &dyn Fn() -> bool,
     name: &str,
@@ -80,8 +80,8 @@ fn join_while(
             ));
             return;
         }
-        std::thread::sleep(LOOKING);
+        std::thread::sleep(POLLING);
     }
-    // One that panicked has said so.
+    // A panic has already written its message.
     drop(thread.join());
 }

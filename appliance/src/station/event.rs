@@ -8,16 +8,16 @@ use super::health::{Pace, System};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 use super::result::{Inspection, ResultRecord};
 
-/// Names one order to the worker; the worker quotes it in every answer, so that a late answer is recognised as one.
+/// The number of one order to the worker. Each answer carries it, so that a late answer is recognised.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct JobId(pub u64);
 
-/// A request from this side of the wall: the daemon's own start, the command line, later the page.
+/// A request that does not come from the PLC: from the daemon's start, the command line or the page.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Request {
     /// Load a recipe.
     Load(RecipeKey),
-    /// Teach a recipe; allowed whatever the PLC is allowed.
+    /// Teach a recipe; allowed also where the PLC must not teach.
     Teach {
         /// 1–9999.
         number: u16,
@@ -47,7 +47,7 @@ pub enum Event {
         /// The edges, see [`super::ConnectionEdges`].
         rising: u16,
     },
-    /// A request from this side.
+    /// A request that does not come from the PLC.
     Request(Request),
     /// The worker has opened its head: the boot is over.
     Started,
@@ -60,7 +60,7 @@ pub enum Event {
     Finished {
         /// Quoted.
         job: JobId,
-        /// What was found.
+        /// Its gauges, verdict and times.
         inspection: Arc<Inspection>,
     },
     /// A measurement ended without one.
@@ -115,7 +115,7 @@ pub enum Event {
     },
     /// The head's condition changed.
     Condition(Condition),
-    /// A device is broken and stays so.
+    /// A device is lost; [`Event::Recovered`] follows when it works again.
     Faulted {
         /// 1xx camera … 8xx internal.
         error_code: u16,
@@ -126,15 +126,15 @@ pub enum Event {
     },
     /// The broken device works again.
     Recovered {
-        /// What the worker has ready in its hands now.
+        /// The recipe that the worker is ready to measure with now.
         recipe: Option<ActiveRecipe>,
     },
     /// The history cannot be written, or can again.
     History {
-        /// Why not, and the remedy; none if it can.
+        /// Why not, and the remedy; `None` if it can.
         problem: Option<Arc<str>>,
     },
-    /// A sequence was exposed: how well the head kept time.
+    /// A sequence was exposed: its timing.
     Paced(Pace),
     /// A survey of the system.
     Surveyed(System),
@@ -192,13 +192,13 @@ pub struct Job {
 /// Why no RESULT_SEQ may be used after the last one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Unstored {
-    /// The storage has not answered for so many milliseconds.
+    /// The storage has not answered for this many milliseconds.
     Busy(u128),
     /// What the storage answered.
     Refused(Arc<str>),
 }
 
-/// Something to be done by those who have threads, files and sockets. Carried out in order.
+/// Something for the daemon's threads, files and sockets to do. Carried out in order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
     /// Measure now.
@@ -219,7 +219,7 @@ pub enum Effect {
         /// Whether regions, gauges and limits of the recipe that it replaces stay.
         keep_gauges: bool,
     },
-    /// End the running job early; its answer is still awaited.
+    /// End the running job early; the station still waits for its answer.
     Abort {
         /// The running job.
         job: JobId,

@@ -1,4 +1,4 @@
-//! One gauge of a result: its value, unit and limits, and what they lead to.
+//! One gauge of a result: its value, unit and limits, and the decision.
 
 use std::sync::Arc;
 
@@ -49,7 +49,7 @@ impl Unit {
         [-most, most]
     }
 
-    /// The symbol behind a value.
+    /// The unit's symbol.
     pub fn symbol(self) -> &'static str {
         match self {
             Self::None | Self::Share => "",
@@ -84,8 +84,8 @@ impl Decision {
             .fold(0, |bits, (k, &set)| bits | (u16::from(set) << k))
     }
 
-    /// The decision that a value, its σ and its limits (inclusive) lead to. No value, or one that is not finite: nothing but
-    /// invalid.
+    /// The decision for a value with its σ and its limits (inclusive). Without a finite value it is not valid, and no other bit
+    /// is set.
     pub fn of(value: Option<f64>, sigma: Option<f64>, low: Option<f64>, high: Option<f64>) -> Self {
         let Some(value) = value.filter(|value| value.is_finite()) else {
             return Self::default();
@@ -116,7 +116,7 @@ pub struct GaugeValue {
     pub unit: Unit,
     /// `None` if it could not be measured.
     pub value: Option<f64>,
-    /// One standard deviation of the value, as far as predicted.
+    /// One standard deviation of the value; `None` where it is not predicted.
     pub sigma: Option<f64>,
     /// The lower limit.
     pub low: Option<f64>,
@@ -127,7 +127,7 @@ pub struct GaugeValue {
 }
 
 impl GaugeValue {
-    /// A gauge with the decision that its numbers lead to.
+    /// A gauge with the decision that follows from its value and limits.
     pub fn judged(
         name: impl Into<Arc<str>>,
         unit: Unit,

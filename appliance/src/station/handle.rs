@@ -14,8 +14,8 @@ use super::machine::Station;
 use super::snapshot::Snapshot;
 use super::step::step;
 
-/// Carries out effects, in order. Called with the station locked: it hands on and returns, at most writing one small file. An
-/// answer that it has at once is taken before anybody sees the effect's snapshot.
+/// Carries out effects, in order. Called with the station locked, so it only passes effects on and never waits. An event that it
+/// returns is taken before the snapshot is published.
 pub type EffectSink = Box<dyn FnMut(Effect) -> Option<Event> + Send>;
 
 struct Guarded {
@@ -23,7 +23,7 @@ struct Guarded {
     sink: EffectSink,
 }
 
-/// A way to the station for the worker, Modbus and the page. Cheap to clone.
+/// Access to the station for the worker, Modbus and the page. Cheap to clone; clones share the station.
 #[derive(Clone)]
 pub struct StationHandle {
     guarded: Arc<Mutex<Guarded>>,
@@ -102,7 +102,7 @@ impl StationHandle {
     }
 
     fn lock(&self) -> MutexGuard<'_, Guarded> {
-        // A sink that panicked leaves a whole station behind: the step is stored before its effects are carried out.
+        // After a panic in the sink the station is still consistent: it is stored before its effects are carried out.
         self.guarded.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,4 +1,4 @@
-//! Health: measured values of system, head and clients for the HEALTH registers, and the limits of storage and temperature.
+//! Health: measured values of system, head and clients for the HEALTH registers, with the limits of storage and temperature.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ pub const FULL_STORAGE_MIB: u64 = 24;
 /// From here on the processor is a warning, °C: small computers slow themselves down at 80 to 85.
 pub const HOT_PROCESSOR_C: f64 = 80.0;
 
-/// What a survey of the system found; about once a second.
+/// One survey of the system; about one a second.
 #[derive(Debug, Clone, PartialEq)]
 pub struct System {
     /// Load of all processors since the last survey, %.
@@ -24,7 +24,7 @@ pub struct System {
     pub boots: u32,
     /// Starts that followed an end without a stop: a crash, a kill, a loss of power.
     pub unclean_boots: u32,
-    /// Those of them after an end of a daemon whose measuring task hung.
+    /// Of the unclean starts, those that followed a daemon whose measuring task hung.
     pub watchdog_restarts: u32,
     /// Open Modbus connections.
     pub clients: u16,
@@ -51,7 +51,7 @@ impl Default for System {
     }
 }
 
-/// How well camera and projector kept time in one sequence.
+/// Timing of camera and projector in one sequence.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Pace {
     /// Frames per second × 100.
@@ -60,13 +60,13 @@ pub struct Pace {
     pub refresh_millihertz: u32,
     /// Longest time from a pattern in view to its exposure, µs.
     pub lag_us: u32,
-    /// Frames that never came.
+    /// Frames that the camera did not deliver.
     pub dropped: u32,
     /// Refreshes that the projector missed.
     pub missed_flips: u32,
-    /// Patterns that were shown again because no frame was wholly theirs, or a spoiled one.
+    /// Patterns that were shown again because no frame was exposed to them alone, or their frame was spoiled.
     pub retaken: u32,
-    /// Largest departure of a flip from its count and of an exposure from its trigger, µs.
+    /// Largest deviation of a flip from its expected time and of an exposure from its trigger, µs.
     pub sync_error_us: u32,
 }
 

@@ -56,11 +56,11 @@ impl Default for Limits {
 pub struct Settings {
     /// The SEQ of the next result: one more than the last that was stored.
     pub next_seq: u32,
-    /// Random per start.
+    /// BOOT_ID: random, new with each start.
     pub boot_id: u32,
     /// Whether the PLC may teach.
     pub teach_allowed: bool,
-    /// Who this device is.
+    /// Names of this device.
     pub identity: Arc<Identity>,
     /// Deadlines.
     pub limits: Limits,

@@ -1,4 +1,4 @@
-//! A result: what one cycle found, as the worker reports it and as the registers and the page show it.
+//! A result: the outcome of one cycle, as the worker reports it and as registers and page show it.
 
 use std::sync::Arc;
 
@@ -75,31 +75,31 @@ pub mod flag {
     ];
 }
 
-/// What was not computed in a cycle because nobody needs it, in pixels; and what took longer than usual.
+/// Pixels of a cycle that were skipped because no gauge needs them, and pixels that needed the slower exact solution.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Skipped {
     /// Outside of every gauge's region.
     pub outside: u32,
-    /// Golden knows nothing there to unwrap about.
+    /// Golden has no expected phase there.
     pub unexpected: u32,
-    /// The pattern's light does not reach them.
+    /// Not lit by the pattern.
     pub dark: u32,
     /// Too far from golden for its expansion: their heights were solved exactly.
     pub exact: u32,
 }
 
-/// How a part lies against how it was taught.
+/// The pose of a part relative to its pose at teaching.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Placement {
     /// How far the middle of its surface was shifted, x, y, z.
     pub shift_mm: [f64; 3],
     /// The rotation vector about it: about x, y, z.
     pub turn_deg: [f64; 3],
-    /// Which of the six the part's shape does not determine: they are taken as 0.
+    /// Which of the six components the part's shape does not determine: they are taken as 0.
     pub left_out: [bool; 6],
-    /// How far its farthest corner went.
+    /// Displacement of the corner that moved farthest.
     pub reach_mm: f64,
-    /// Share of the points looked at that do not fit: they lie on defects, or their fringe order is wrong.
+    /// Share of the sampled points that do not fit: they lie on defects, or their fringe order is wrong.
     pub outliers: f64,
 }
 
@@ -117,7 +117,7 @@ impl Placement {
     }
 }
 
-/// What the worker found in one cycle.
+/// The worker's report of one cycle.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Inspection {
     /// The worker's judgement; [`Inspection::verdict`] is what counts.
@@ -144,18 +144,18 @@ pub struct Inspection {
     pub skipped: Skipped,
     /// What the measuring task knows of its stages' times; [`ResultRecord::stages`] adds the rest.
     pub stages: Stages,
-    /// Processor time of the processing on all computing threads, µs: unlike the times above it does not grow when somebody
-    /// else has the processor.
+    /// Processor time of the processing, summed over all computing threads, µs. Unlike the times above it does not grow when
+    /// other programs use the processor.
     pub cpu_us: u32,
-    /// How the part lies, if it was aligned.
+    /// The part's pose, if it was aligned.
     pub placement: Option<Placement>,
     /// Why the part should be measured again with the next longer sequence, where there is one.
     pub step_up: Option<&'static str>,
 }
 
 impl Inspection {
-    /// The verdict that may be shown. The worker can judge more sharply than the gauges say, never more kindly: without a
-    /// judgement, without gauges or with a gauge that was not measured it is INVALID, with a gauge outside its limits it is no PASS.
+    /// The verdict that is shown. The worker's judgement can make it worse than the gauges say, never better: it is INVALID
+    /// without a judgement, without gauges, or with a gauge that was not measured; it is not PASS with a gauge outside its limits.
     pub fn verdict(&self) -> Verdict {
         let unmeasured =
             self.gauges.is_empty() || self.gauges.iter().any(|gauge| !gauge.decision.valid);
@@ -191,20 +191,20 @@ pub struct ResultRecord {
     pub error_code: u16,
     /// Trigger time in µs since 1970 UTC, 0 if the clock is not synchronised.
     pub time_utc_us: u64,
-    /// Trigger time since the start of the daemon, s: known whatever the clock says.
+    /// Trigger time since the start of the daemon, s; also known while the clock is not synchronised.
     pub uptime_s: u32,
-    /// Which start that was.
+    /// BOOT_ID of that start.
     pub boot_id: u32,
     /// Trigger → exposure done, µs.
     pub exposure_us: u32,
     /// Trigger → result, µs.
     pub total_us: u32,
-    /// What the worker found; empty after a failure, with `reason` saying why.
+    /// The worker's report. After a failure it is empty but for `reason`.
     pub inspection: Arc<Inspection>,
 }
 
 impl ResultRecord {
-    /// The stages that trigger → result went into; none where nothing was measured.
+    /// The stages from trigger to result; empty where nothing was measured.
     pub fn stages(&self) -> Stages {
         self.inspection.stages.of_cycle(self.total_us)
     }

@@ -1,4 +1,4 @@
-//! The snapshot: one immutable picture of the station, of which the registers and the page are two views.
+//! The snapshot: one immutable copy of what the station shows. Registers and page are two views of it.
 
 use std::sync::Arc;
 
@@ -78,7 +78,7 @@ pub mod warning {
     ];
 }
 
-/// Who this device is.
+/// Names of this device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Identity {
     /// For FC43/14.
@@ -98,7 +98,7 @@ pub struct TeachProgress {
     pub number: u16,
     /// 0…1.
     pub fraction: f32,
-    /// What it is doing.
+    /// The present stage of teaching, for people.
     pub words: Arc<str>,
 }
 
@@ -149,9 +149,9 @@ pub struct Snapshot {
     pub refusal: Option<u16>,
     /// Seconds since the start.
     pub uptime_s: u32,
-    /// Random per start.
+    /// BOOT_ID: random, new with each start.
     pub boot_id: u32,
-    /// Who this device is.
+    /// Names of this device.
     pub identity: Arc<Identity>,
     /// The last result of this run.
     pub result: Option<Arc<ResultRecord>>,
@@ -159,7 +159,7 @@ pub struct Snapshot {
     pub oldest: Option<Arc<ResultRecord>>,
     /// While teaching.
     pub teach: Option<TeachProgress>,
-    /// What system, head and clients say of themselves.
+    /// Measured values of system, head and clients.
     pub health: Health,
 }
 
@@ -169,7 +169,7 @@ impl Snapshot {
         self.recipe.as_ref().map(|recipe| recipe.number)
     }
 
-    /// Whether it is at work, so that it would be ready for a trigger by itself after a while: every state but ready, offline and fault.
+    /// Whether the station is busy with something that ends by itself: every state but ready, offline and fault.
     pub fn is_working(&self) -> bool {
         !matches!(self.state, 1 | 6 | 7)
     }
@@ -239,7 +239,7 @@ impl Station {
         }
     }
 
-    /// WARNING: the worker's bits, but for those that are the station's own.
+    /// WARNING: the worker's bits, except those that the station decides.
     fn warnings(&self) -> u16 {
         let own = warning::PLC_LOST | warning::CLOCK_UNSYNCED;
         let of_worker = self.condition.warnings & !own & 0x00FF;

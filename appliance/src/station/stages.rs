@@ -7,7 +7,7 @@ pub enum Stage {
     Waiting,
     /// From the first flip to the last frame.
     Exposure,
-    /// How the part lies: some rows decoded, and the motion fitted to them.
+    /// The part's pose: some rows are decoded and a rigid motion is fitted to them.
     Alignment,
     /// Phase, height and gauges in one pass over the frames.
     Strips,
@@ -33,7 +33,7 @@ impl Stage {
         }
     }
 
-    /// Whether the frames are there already.
+    /// Whether the stage works on frames that are complete.
     pub fn is_processing(self) -> bool {
         !matches!(self, Self::Waiting | Self::Exposure)
     }
@@ -58,7 +58,7 @@ impl Stages {
     pub fn add(&mut self, stage: Stage, us: u32) {
         match self.0.iter_mut().find(|known| known.stage == stage) {
             Some(known) => known.us = known.us.saturating_add(us),
-            // Each stage once: there is room for all.
+            // Each stage is stored once, so the vector never overflows.
             None => drop(self.0.push(StageTime { stage, us })),
         }
     }
@@ -75,18 +75,18 @@ impl Stages {
         self.0.iter().copied()
     }
 
-    /// All of them together, µs.
+    /// Their sum, µs.
     pub fn sum_us(&self) -> u32 {
         self.iter().fold(0, |sum, time| sum.saturating_add(time.us))
     }
 
-    /// Those of the processing, µs.
+    /// The sum of the processing stages, µs.
     pub fn processing_us(&self) -> u32 {
         let processing = self.iter().filter(|time| time.stage.is_processing());
         processing.fold(0, |sum, time| sum.saturating_add(time.us))
     }
 
-    /// The stages of a cycle that took `total_us`: what is left over went into the hand-over. None if no stage is known.
+    /// The stages of a cycle that took `total_us`: the time of no other stage is hand-over. Empty if no stage is known.
     pub fn of_cycle(&self, total_us: u32) -> Self {
         let mut all = self.clone();
         if !all.0.is_empty() {

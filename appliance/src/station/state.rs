@@ -57,12 +57,12 @@ pub enum State {
         number: u16,
         /// 0…1.
         fraction: f32,
-        /// What it is doing.
+        /// The present stage of teaching, for people.
         words: Arc<str>,
         /// The next sign of progress must come by then.
         deadline: Micros,
     },
-    /// Ready but for the PLC, which does not ask for ONLINE.
+    /// As ready, but the PLC does not ask for ONLINE.
     Offline,
     /// A lasting condition; triggers are rejected with reason 5.
     Fault(Fault),
@@ -104,7 +104,7 @@ impl State {
         }
     }
 
-    /// The deadline of the wait that this state is, if it is one.
+    /// The deadline, where the state waits for the worker.
     pub fn deadline(&self) -> Option<Micros> {
         match self {
             Self::Boot { deadline }

@@ -2,16 +2,16 @@
 
 use crate::station::system_utc_us;
 
-/// The beginning of the year 10000, µs since 1970 UTC: dates in HTTP (RFC 9110), in SQLite and in most of what reads a CSV
-/// have four digits for the year. Linux itself sets no clock past 2232.
+/// The beginning of the year 10000, µs since 1970 UTC: dates in HTTP (RFC 9110), SQLite and most programs that read CSV have
+/// four digits for the year. Linux itself sets no clock past 2232.
 const YEAR_10000_US: u64 = 253_402_300_800_000_000;
 /// The beginning of 2026, ms since 1970 UTC: this program is not older.
 const YEAR_2026_MS: u64 = 1_767_225_600_000;
 /// The beginning of 2100.
 const YEAR_2100_MS: u64 = 4_102_444_800_000;
 
-/// The time in µs since 1970 UTC, or `None` while no time service has synchronised the clock, or where it is beyond every
-/// calendar: a time that may be wrong is worse than none.
+/// The time in µs since 1970 UTC. `None` while no time service has synchronised the clock, or from the year 10000 on: a wrong
+/// time is worse than none.
 pub fn utc_us() -> Option<u64> {
     in_calendars(system_utc_us()).filter(|_| synchronised())
 }
@@ -37,7 +37,7 @@ pub fn of_browser(ms: u64) -> Option<u64> {
 #[cfg(target_os = "linux")]
 #[expect(
     unsafe_code,
-    reason = "the kernel's word on the clock has no safe wrapper that is kept"
+    reason = "adjtimex has no safe wrapper that is maintained"
 )]
 fn synchronised() -> bool {
     let mut state = std::mem::MaybeUninit::<libc::timex>::zeroed();
@@ -47,7 +47,7 @@ fn synchronised() -> bool {
     answer >= 0 && answer != libc::TIME_ERROR
 }
 
-/// Elsewhere nothing is known of it.
+/// Elsewhere this is not known.
 #[cfg(not(target_os = "linux"))]
 fn synchronised() -> bool {
     false

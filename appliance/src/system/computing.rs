@@ -1,19 +1,19 @@
-//! Whether the measuring task only computes: it holds no device then and stores nothing, so the program may end without it.
+//! Whether the measuring task only computes. It then uses no device and stores nothing, so the program may end without waiting for it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Told by the measuring task, asked by who ends the program. Cheap to clone.
+/// Set by the measuring task, read when the program stops. Cheap to clone; clones share the flag.
 #[derive(Clone, Debug, Default)]
 pub struct Computing(Arc<AtomicBool>);
 
 impl Computing {
-    /// Works on something for seconds that is worth nothing once the program ends.
+    /// Runs work of seconds whose result is of no use once the program ends.
     pub fn on<T>(&self, work: impl FnOnce() -> T) -> T {
         self.0.store(true, Ordering::Relaxed);
-        let made = work();
+        let result = work();
         self.0.store(false, Ordering::Relaxed);
-        made
+        result
     }
 
     /// Whether it is under way.

@@ -1,33 +1,33 @@
-//! Lines on stderr: for people with the program's name in front, for a journal with their priority, which notes name and time itself.
+//! Lines on stderr: for people with the program's name in front; for a journal, which adds name and time itself, with their priority.
 
 use std::sync::OnceLock;
 
 /// How much a line matters, as syslog numbers it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
-    /// Nothing is measured until somebody does something.
+    /// Nothing is measured until its cause is removed.
     Error = 3,
-    /// Somebody should look.
+    /// Measuring goes on, but something needs attention.
     Warning = 4,
-    /// Rare, and to be found again: the device's secret, a start, an end.
+    /// Rare and worth finding again: the device's secret, a start, a stop.
     Notice = 5,
-    /// Everyday.
+    /// Normal operation.
     Info = 6,
 }
 
-/// Writes words of one or more lines of the daemon.
+/// Writes one or more lines in the daemon's name.
 pub fn write(severity: Severity, words: &str) {
     write_of("fringed", severity, words);
 }
 
-/// Writes words of one or more lines of this program.
+/// Writes one or more lines in the name of `program`.
 pub fn write_of(program: &str, severity: Severity, words: &str) {
     static JOURNAL: OnceLock<bool> = OnceLock::new();
     let journal = *JOURNAL.get_or_init(stderr_is_a_journal);
     eprint!("{}", form(program, journal, severity, words));
 }
 
-/// Each line of the words as it is written.
+/// The lines with their prefix.
 fn form(program: &str, journal: bool, severity: Severity, words: &str) -> String {
     let lines = words.lines().map(|line| match journal {
         true => format!("<{}>{line}\n", severity as u8),

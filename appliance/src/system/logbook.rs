@@ -35,7 +35,7 @@ impl Default for Logbook {
 }
 
 impl Logbook {
-    /// Adds a line; the oldest gives way.
+    /// Adds a line; beyond 200 lines the oldest is dropped.
     pub fn add(&self, words: &str) {
         let line = Line {
             utc_us: crate::system::clock::utc_us(),
@@ -49,7 +49,7 @@ impl Logbook {
         lines.push_back(line);
     }
 
-    /// All lines, newest first: `utc_us` (none if the clock was not synchronised), `uptime_s`, `words`.
+    /// All lines, newest first: `utc_us` (null if the clock was not synchronised), `uptime_s`, `words`.
     pub fn latest(&self) -> Vec<Value> {
         let lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
         let newest = lines.iter().rev();

@@ -1,11 +1,11 @@
-//! What the program does with memory that it no longer needs.
+//! How freed memory goes back to the system.
 
-/// Arrays of this many bytes are given back to the system as soon as they are dropped.
+/// Arrays from this many bytes on go back to the system as soon as they are dropped.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const LARGE: libc::c_int = 1 << 20;
 
-/// Gives large arrays back to the system when they are dropped. By itself the C library keeps them once a few were dropped,
-/// and a change of recipe would leave its 50 MB of arrays behind; a trigger makes no large array.
+/// Makes large arrays go back to the system when they are dropped. By default the C library starts to keep them after a few were
+/// dropped; a change of recipe would leave 50 MB behind. A trigger allocates no large array, so it costs no time there.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[expect(
     unsafe_code,
@@ -16,6 +16,6 @@ pub fn give_back() {
     unsafe { libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE) };
 }
 
-/// Elsewhere the C library does as it likes.
+/// Elsewhere the allocator's default holds.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub fn give_back() {}

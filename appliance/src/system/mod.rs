@@ -1,4 +1,4 @@
-//! What the operating system gives: clock, signals, sockets, priorities, memory, a service manager, and the log on stderr.
+//! What comes from the operating system: clock, signals, sockets, thread priorities, memory, the service manager; and the log on stderr.
 
 use crate::error::{Exit, Failure};
 
@@ -16,7 +16,7 @@ pub mod stop_signal;
 /// A current-thread runtime.
 ///
 /// # Errors
-/// If the system gives none.
+/// If the system refuses its resources (exit code 70).
 pub fn runtime() -> Result<tokio::runtime::Runtime, Failure> {
     tokio::runtime::Builder::new_current_thread()
         .enable_all()

@@ -1,21 +1,21 @@
-//! What a service manager is told (`sd_notify`): READY, signs of life of the measuring task, how things stand, the end.
+//! Notifications to the service manager (`sd_notify`): READY, signs of life of the measuring task, the status line, the stop.
 //!
-//! Where no service manager started the program nobody is told anything. A manager that cannot be told is no reason to stop
-//! measuring: it finds out by itself.
+//! Without a service manager nothing is sent. A notification that fails is dropped and measuring goes on: the manager's own
+//! time-outs notice what is missing.
 
 use sd_notify::NotifyState;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Signs of life in the time after which the manager takes silence for a hang.
+/// Signs of life sent per watchdog period.
 const BEATS: u32 = 4;
 
-/// The way to the service manager. Cheap to clone.
+/// The connection to the service manager. Cheap to clone; clones share the phase.
 #[derive(Clone, Debug, Default)]
 pub struct Notify {
-    listened_to: bool,
-    /// Silence that the manager takes for a hang; none if it does not watch.
+    connected: bool,
+    /// The watchdog period: a longer silence counts as a hang. `None` without a watchdog.
     watchdog: Option<Duration>,
     phase: Arc<AtomicU8>,
 }
@@ -26,38 +26,38 @@ const RUNNING: u8 = 1;
 const STOPPING: u8 = 2;
 
 impl Notify {
-    /// To the manager that the environment names; to nobody where it names none.
+    /// To the manager that NOTIFY_SOCKET names, if it is set.
     pub fn from_environment() -> Self {
         Self {
-            listened_to: std::env::var_os("NOTIFY_SOCKET").is_some(),
+            connected: std::env::var_os("NOTIFY_SOCKET").is_some(),
             watchdog: sd_notify::watchdog_enabled(),
             phase: Arc::default(),
         }
     }
 
     /// Whether a service manager started the program.
-    pub fn is_listened_to(&self) -> bool {
-        self.listened_to
+    pub fn is_connected(&self) -> bool {
+        self.connected
     }
 
-    /// The start is over. From now on silence of the measuring task is a hang.
+    /// The start is complete. From now on the watchdog takes silence of the measuring task for a hang.
     pub fn ready(&self) {
         self.phase.fetch_max(RUNNING, Ordering::Relaxed);
-        self.tell(&[NotifyState::Ready]);
+        self.send(&[NotifyState::Ready]);
     }
 
-    /// How things stand, in one line for people.
+    /// The status line for people.
     pub fn status(&self, words: &str) {
-        self.tell(&[NotifyState::Status(&words.replace('\n', " "))]);
+        self.send(&[NotifyState::Status(&words.replace('\n', " "))]);
     }
 
-    /// The end has begun.
+    /// The stop has begun.
     pub fn stopping(&self) {
         self.phase.store(STOPPING, Ordering::Relaxed);
-        self.tell(&[NotifyState::Stopping, NotifyState::Status("stopping")]);
+        self.send(&[NotifyState::Stopping, NotifyState::Status("stopping")]);
     }
 
-    /// The measuring task's signs of life. There must be one owner only.
+    /// The source of the measuring task's signs of life; only that task may own it.
     pub fn pulse(&self) -> Pulse {
         Pulse {
             notify: self.clone(),
@@ -66,25 +66,25 @@ impl Notify {
         }
     }
 
-    fn tell(&self, states: &[NotifyState<'_>]) {
-        if self.listened_to {
+    fn send(&self, states: &[NotifyState<'_>]) {
+        if self.connected {
             drop(sd_notify::notify(states));
         }
     }
 }
 
-/// The measuring task's signs of life: what feeds the watchdog, and nothing else does. No clones: whoever owns it is the
-/// measuring task.
+/// The measuring task's signs of life, the only source that feeds the watchdog. It cannot be cloned, so that no other thread can
+/// answer for a measuring task that hangs.
 #[derive(Debug)]
 pub struct Pulse {
     notify: Notify,
     begun: Instant,
-    /// When the manager is told next, in ms since `begun`.
+    /// When the next notification is due, in ms since `begun`.
     next_ms: AtomicU64,
 }
 
 impl Pulse {
-    /// A sign of life. The manager is told of a few of them only, so that it may come at any rate.
+    /// A sign of life. May be called at any rate: only a few per watchdog period are sent.
     pub fn beat(&self) {
         let Some(watchdog) = self.notify.watchdog else {
             return;
@@ -96,12 +96,12 @@ impl Pulse {
         let next = now.saturating_add(millis(watchdog / BEATS));
         self.next_ms.store(next, Ordering::Relaxed);
         match self.notify.phase.load(Ordering::Relaxed) {
-            // As long as there is something to do a start may take; one that hangs may not.
+            // A start may take long as long as it makes progress: each sign of life extends its time-out by one period.
             STARTING => {
                 let more = u32::try_from(watchdog.as_micros()).unwrap_or(u32::MAX);
-                self.notify.tell(&[NotifyState::ExtendTimeoutUsec(more)]);
+                self.notify.send(&[NotifyState::ExtendTimeoutUsec(more)]);
             }
-            RUNNING => self.notify.tell(&[NotifyState::Watchdog]),
+            RUNNING => self.notify.send(&[NotifyState::Watchdog]),
             _ => {}
         }
     }

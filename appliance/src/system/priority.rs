@@ -1,11 +1,11 @@
-//! Work that the measuring task must not feel.
+//! Priority of threads that must not slow the measuring task down.
 
-/// How far such a thread stands behind the others: a tenth of their share of a busy core.
+/// Nice value of such a thread: on a busy core it gets a tenth of the share of another thread.
 #[cfg(target_os = "linux")]
 const NICE: libc::c_int = 10;
 
-/// Lets the calling thread stand behind all others of the program, also where a service manager has given the program a
-/// real-time priority, which a new thread inherits.
+/// Lowers the calling thread's priority below that of the program's other threads, also where a service manager has given the
+/// program a real-time priority, which a new thread inherits.
 #[cfg(target_os = "linux")]
 #[expect(
     unsafe_code,
@@ -20,6 +20,6 @@ pub fn give_way() {
     }
 }
 
-/// Elsewhere all threads are alike.
+/// Elsewhere all threads have the same priority.
 #[cfg(not(target_os = "linux"))]
 pub fn give_way() {}

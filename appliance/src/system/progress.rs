@@ -1,10 +1,10 @@
-//! Progress of anything longer than a second: on stderr, only on a terminal, not with `--quiet`.
+//! Progress of anything longer than a second, and the daemon's log above it: on stderr, the bar only on a terminal, neither with `--quiet`.
 
 use crate::system::journal::{self, Severity};
 use crate::system::logbook::Logbook;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// A progress bar that stays away where nobody looks. Cheap to clone; clones share the bar.
+/// A progress bar and the log. Cheap to clone; clones share both.
 #[derive(Clone, Debug)]
 pub struct Progress {
     bar: ProgressBar,
@@ -12,8 +12,8 @@ pub struct Progress {
     logbook: Logbook,
 }
 
-/// Steps of the bar.
-const STEPS: u64 = 1000;
+/// Resolution of the bar.
+const TICKS: u64 = 1000;
 
 impl Progress {
     /// A bar, or none with `quiet`.
@@ -24,7 +24,7 @@ impl Progress {
             // Draws nothing where stderr is no terminal.
             ProgressDrawTarget::stderr()
         };
-        let bar = ProgressBar::with_draw_target(Some(STEPS), target);
+        let bar = ProgressBar::with_draw_target(Some(TICKS), target);
         if let Ok(style) = ProgressStyle::with_template("{bar:32} {percent:>3} % {msg}") {
             bar.set_style(style);
         }
@@ -41,10 +41,10 @@ impl Progress {
             self.bar.set_message(words.to_owned());
         }
         self.bar
-            .set_position((share.clamp(0.0, 1.0) * STEPS as f64) as u64);
+            .set_position((share.clamp(0.0, 1.0) * TICKS as f64) as u64);
     }
 
-    /// Takes the bar away until something is told again.
+    /// Removes the bar until the next call of [`Progress::tell`].
     pub fn clear(&self) {
         self.bar.set_position(0);
         self.bar.set_message("");
@@ -54,12 +54,12 @@ impl Progress {
         }
     }
 
-    /// An everyday line for the log, above the bar.
+    /// A line about normal operation for the log, above the bar.
     pub fn log(&self, line: &str) {
         self.report(Severity::Info, line);
     }
 
-    /// A line for the log that somebody should look at.
+    /// A warning for the log, above the bar.
     pub fn warn(&self, line: &str) {
         self.report(Severity::Warning, line);
     }

@@ -1,4 +1,4 @@
-//! Listening on a TCP port, why that is not possible, and which addresses belong together.
+//! Listening on a TCP port, and comparing addresses with networks.
 
 use ipnet::IpNet;
 use std::io;
@@ -6,10 +6,10 @@ use std::net::{IpAddr, Ipv6Addr, SocketAddr};
 use thiserror::Error;
 use tokio::net::TcpListener;
 
-/// Why nobody listens there.
+/// Why a port cannot be listened on.
 #[derive(Debug, Error)]
 pub enum BindError {
-    /// Something else does.
+    /// Another program listens there.
     #[error(
         "serve {what} on {address}: the port is in use; end the other program or choose another port"
     )]
@@ -19,7 +19,7 @@ pub enum BindError {
         /// What was attempted.
         address: SocketAddr,
     },
-    /// Ports below 1024 belong to the system.
+    /// Ports below 1024 need a permission.
     #[error(
         "serve {what} on {address}: not permitted; choose a port from 1024 on or grant CAP_NET_BIND_SERVICE"
     )]
@@ -41,7 +41,7 @@ pub enum BindError {
     },
 }
 
-/// Opens the socket on which `what` is served; the listener's own address tells the port if 0 was asked for.
+/// Opens the socket on which `what` is served. With port 0 the system chooses one: the listener's own address has it.
 ///
 /// # Errors
 /// The address is in use, not permitted, or not of this machine.
@@ -59,13 +59,13 @@ pub async fn bind(what: &'static str, address: SocketAddr) -> Result<TcpListener
         })
 }
 
-/// Whether one of the networks holds an address. An IPv4 address that comes through an IPv6 socket is an IPv4 address.
+/// Whether one of the networks contains an address. An IPv4-mapped IPv6 address counts as its IPv4 address.
 pub fn holds(networks: &[IpNet], address: IpAddr) -> bool {
     let address = address.to_canonical();
     networks.iter().any(|network| network.contains(&address))
 }
 
-/// What one host has: an IPv4 address, or the /64 of an IPv6 address.
+/// The network of one host: an IPv4 address, or the /64 of an IPv6 address.
 pub fn network(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(six) => {

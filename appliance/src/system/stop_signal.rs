@@ -1,16 +1,16 @@
-//! Whether somebody told the program to end: Ctrl-C or SIGTERM, heard from the moment that anybody listens.
+//! The stop signal: Ctrl-C or SIGTERM.
 
 use super::runtime;
 use crate::error::{Exit, Failure};
 use std::future::pending;
 use tokio::sync::watch;
 
-/// Whether it was told to end; by default nobody ever tells. Cheap to clone.
+/// Whether the signal has arrived; the default value never gets one. Cheap to clone.
 #[derive(Clone, Debug, Default)]
-pub struct Told(Option<watch::Receiver<bool>>);
+pub struct StopSignal(Option<watch::Receiver<bool>>);
 
-impl Told {
-    /// Listens from now on.
+impl StopSignal {
+    /// Catches the signals from now on.
     ///
     /// # Errors
     /// If the system does not deliver signals (exit code 70).
@@ -27,7 +27,7 @@ impl Told {
                 listen(SignalKind::terminate())?,
             )
         };
-        let (tell, told) = watch::channel(false);
+        let (arrive, arrived) = watch::channel(false);
         let wait = move || {
             runtime.block_on(async {
                 #[cfg(unix)]
@@ -38,25 +38,25 @@ impl Told {
                 #[cfg(not(unix))]
                 drop(tokio::signal::ctrl_c().await);
             });
-            // Nobody waits any more only where the program ends anyway.
-            let _ = tell.send(true);
+            // All receivers are gone only where the program ends anyway.
+            let _ = arrive.send(true);
         };
         std::thread::Builder::new()
             .name("signals".into())
             .spawn(wait)
             .map_err(failed)?;
-        Ok(Self(Some(told)))
+        Ok(Self(Some(arrived)))
     }
 
-    /// Whether it was told by now.
-    pub fn already(&self) -> bool {
-        self.0.as_ref().is_some_and(|told| *told.borrow())
+    /// Whether it has arrived.
+    pub fn has_arrived(&self) -> bool {
+        self.0.as_ref().is_some_and(|arrived| *arrived.borrow())
     }
 
-    /// Waits until it is told.
+    /// Waits until it arrives.
     pub async fn wait(&self) {
-        if let Some(mut told) = self.0.clone()
-            && told.wait_for(|told| *told).await.is_ok()
+        if let Some(mut arrived) = self.0.clone()
+            && arrived.wait_for(|arrived| *arrived).await.is_ok()
         {
             return;
         }

@@ -10,7 +10,7 @@ use crate::error::{Exit, Failure};
 use crate::service::Daemon;
 use crate::storage::state::StateFolder;
 use crate::system::runtime;
-use crate::system::stop_signal::Told;
+use crate::system::stop_signal::StopSignal;
 use parts::{PARTS, Placed};
 use plc::{Plc, PlcResult};
 use std::io::IsTerminal;
@@ -81,7 +81,7 @@ impl Demo {
             if !self.json.json {
                 say!("\nThe page stays on http://{} until Ctrl-C.", daemon.http);
             }
-            runtime()?.block_on(Told::listen()?.wait());
+            runtime()?.block_on(StopSignal::listen()?.wait());
         }
         daemon.stop();
         let wrong = rows.iter().filter(|row| row.is_wrong()).count();

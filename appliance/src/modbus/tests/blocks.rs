@@ -234,7 +234,7 @@ async fn processing_time_is_that_of_the_stages_after_the_exposure_and_the_longes
     plant.work();
     let result = plc.read_input_registers(200, 120).await.unwrap().unwrap();
     let words = plc.read_input_registers(610, 4).await.unwrap().unwrap();
-    // What is left of the cycle is the hand-over; this plant is faster than its stages.
+    // The rest of the cycle is hand-over; here the cycle is shorter than its stages' times.
     let processing = u32_at(&result, 20).max(1_740);
     assert_eq!(
         (u32_at(&words, 0), u32_at(&words, 2)),

@@ -51,7 +51,7 @@ async fn garbage_closes_its_own_connection_and_disturbs_nobody() {
         let mut stream = TcpStream::connect(plant.address).await.unwrap();
         stream.write_all(garbage).await.unwrap();
         let mut answer = Vec::new();
-        // Closed, with or without a reset for what was left unread.
+        // Closed, with or without a reset for unread bytes.
         let _ = stream.read_to_end(&mut answer).await;
         assert!(
             answer.is_empty(),
@@ -154,7 +154,7 @@ async fn a_mute_crowd_makes_room_for_a_client_that_speaks() {
     for _ in 0..3 {
         crowd.push(TcpStream::connect(plant.address).await.unwrap());
     }
-    // As soon as the crowd has been mute for long enough.
+    // As soon as the silent connections have been idle for long enough.
     let mut plc = loop {
         let mut plc = plant.client().await;
         if plc.read_input_registers(100, 1).await.is_ok() {

@@ -1,4 +1,4 @@
-//! What cannot be, and what merely contradicts itself.
+//! Requests that are impossible, and requests that contradict themselves.
 
 use super::*;
 

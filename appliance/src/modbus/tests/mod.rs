@@ -23,7 +23,7 @@ use crate::config::WordOrder;
 use crate::station::snapshot::status;
 use crate::station::*;
 
-/// A station behind a real server on a free port, with a worker that works when told to.
+/// A station behind a real server on a free port, with a worker that carries out orders when asked.
 struct Plant {
     address: SocketAddr,
     handle: StationHandle,
@@ -59,7 +59,7 @@ impl Plant {
             Station::new(settings, Micros(0)),
             Instant::now(),
             move |effect| {
-                // The plant outlives its station's last effect only in tests that have looked at what they wanted.
+                // The receiver is gone only in tests that have checked all they wanted.
                 let _ = sink.send(effect);
                 None
             },

@@ -1,14 +1,14 @@
-//! How often the daemon was started with a state folder, and how often it had not been stopped before.
+//! Counts of the daemon's starts with a state folder, and of those that followed an end without a stop.
 
 use crate::storage::folder::write_whole;
 use std::fs;
 use std::io;
 use std::path::Path;
 
-/// The file: starts, unclean starts, how the daemon is, and starts after it hung, e.g. `12 1 running 0`.
+/// The file: starts, unclean starts, the daemon's condition, and starts after it hung, e.g. `12 1 running 0`.
 const FILE: &str = "boots";
 
-/// How the daemon is; what an end without a stop leaves in the file.
+/// The daemon's condition. An end without a stop leaves the last one in the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Condition {
     /// It was stopped.
@@ -16,7 +16,7 @@ pub enum Condition {
     Stopped,
     /// It runs.
     Running,
-    /// It runs, and its measuring task has not met its deadlines for a while: what a watchdog ends.
+    /// It runs, but its measuring task has missed its deadlines for a while, for which a watchdog ends it.
     Hanging,
 }
 
@@ -39,14 +39,14 @@ pub struct Boots {
     pub starts: u32,
     /// Starts after an end without a stop.
     pub unclean: u32,
-    /// Those of them after an end of a daemon that hung: whoever watches had to end it.
+    /// Of the unclean starts, those after a daemon that hung, as a rule ended by a watchdog.
     pub after_hanging: u32,
     /// Now.
     pub condition: Condition,
 }
 
 impl Boots {
-    /// The counts with this start. A damaged file starts anew: they are for people, nothing is decided by them.
+    /// The counts with this start. With a damaged file they begin anew: they are for people, and no decision depends on them.
     pub fn begin(folder: &Path) -> Self {
         let text = fs::read_to_string(folder.join(FILE)).unwrap_or_default();
         let mut words = text.split_whitespace();
@@ -70,7 +70,7 @@ impl Boots {
     /// Stores the counts.
     ///
     /// # Errors
-    /// Whatever the file system answers.
+    /// Errors of the file system.
     pub fn store(&self, folder: &Path) -> io::Result<()> {
         let Self {
             starts,

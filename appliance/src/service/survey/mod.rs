@@ -1,6 +1,6 @@
-//! The survey: once a second, what the system, the stored recipes and the Modbus clients look like.
+//! The survey: load, memory, storage, temperature, stored recipes and Modbus clients, once a second.
 //!
-//! It has a thread of its own, because a storage that hangs must hold up neither sockets nor measuring.
+//! It has a thread of its own, because a storage that hangs must delay neither sockets nor measuring.
 
 mod boots;
 mod system;
@@ -17,11 +17,11 @@ use std::time::Duration;
 
 /// Time between two surveys.
 const PERIOD: Duration = Duration::from_secs(1);
-/// A measuring task that missed its deadlines for so many surveys hangs. A lost head that is opened again takes less, and
-/// each change is a write to the card.
+/// A measuring task that missed its deadlines for this many surveys hangs. Opening a lost head again takes less, so it causes no
+/// write to the card.
 const HANGING: u32 = 10;
 
-/// Everything that is surveyed.
+/// What is surveyed.
 pub struct Survey {
     folder: PathBuf,
     boots: Boots,
@@ -45,7 +45,7 @@ impl Survey {
         survey
     }
 
-    /// Tells the station once a second, until `stopped` says or loses something; then this run has ended cleanly.
+    /// Sends a survey to the station once a second until `stopped` receives a message or is closed; then counts a clean end.
     pub fn run(mut self, station: &StationHandle, stopped: &Receiver<()>) {
         let mut processors = system::Processors::default();
         let mut late = 0_u32;

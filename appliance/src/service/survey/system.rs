@@ -1,19 +1,19 @@
-//! Load, memory, storage and temperature, as the kernel tells them; `None` where it does not.
+//! Load, memory, storage and temperature as the kernel reports them; `None` where it does not.
 
 use std::fs;
 use std::path::Path;
 
 const MIB: u64 = 1 << 20;
 
-/// The processors' load between two questions.
+/// The load of all processors between two readings.
 #[derive(Debug, Default)]
 pub struct Processors {
-    /// Busy and whole time at the last question, in ticks.
+    /// Busy and total time at the last reading, in ticks.
     before: Option<(u64, u64)>,
 }
 
 impl Processors {
-    /// Load since the last question, %; `None` at the first one.
+    /// Load since the last reading, %; `None` at the first one.
     pub fn load_percent(&mut self) -> Option<u8> {
         let now = busy_and_whole(&fs::read_to_string("/proc/stat").ok()?)?;
         let (busy, whole) = self.before.replace(now)?;
@@ -23,10 +23,10 @@ impl Processors {
     }
 }
 
-/// Ticks of all processors that were work, and all of them: proc_stat(5), first line.
+/// Busy and total ticks of all processors: proc_stat(5), first line.
 fn busy_and_whole(stat: &str) -> Option<(u64, u64)> {
     let line = stat.lines().next()?.strip_prefix("cpu ")?;
-    // user nice system idle iowait irq softirq steal; what follows is contained in the first two.
+    // user nice system idle iowait irq softirq steal; the fields after them are contained in the first two.
     let ticks: Vec<u64> = line
         .split_whitespace()
         .take(8)
@@ -37,7 +37,7 @@ fn busy_and_whole(stat: &str) -> Option<(u64, u64)> {
     Some((whole.checked_sub(idle)?, whole))
 }
 
-/// Memory that a program could get without anything being swapped out, MiB.
+/// Memory that a program could get without swapping, MiB.
 pub fn free_memory_mib() -> Option<u64> {
     available(&fs::read_to_string("/proc/meminfo").ok()?)
 }
@@ -51,7 +51,7 @@ fn available(meminfo: &str) -> Option<u64> {
     Some(kilobytes / 1024)
 }
 
-/// Room for this user on the storage of a folder, MiB.
+/// Free storage for this user in the file system of a folder, MiB.
 pub fn free_storage_mib(folder: &Path) -> Option<u64> {
     let storage = rustix::fs::statvfs(folder).ok()?;
     Some(storage.f_bavail.checked_mul(storage.f_frsize)? / MIB)
