@@ -94,7 +94,7 @@ impl ControlRegisters {
     }
 }
 
-/// A value of which a write names only the bits of `mask`: half a 32-bit item, or one coil.
+/// A value whose bits in `mask` are written: half a 32-bit item, or one coil.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Masked<T> {
     /// The bits that the write names.

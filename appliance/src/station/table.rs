@@ -1,4 +1,4 @@
-//! Every state × every event: defined, without a panic, and with nothing that a stray event could disturb.
+//! Every state × every event: the next state is defined, nothing panics, and an event out of place changes nothing.
 
 use std::sync::Arc;
 
@@ -297,7 +297,7 @@ fn an_answer_of_another_job_changes_no_state() {
                 let only_logged = effects
                     .iter()
                     .all(|effect| matches!(effect, Effect::Log(_) | Effect::Alarm(_)));
-                // A sign of life is all that it is, and that ends an idle worker's silence.
+                // It counts only as a sign of life, which ends the fault of an idle worker's silence.
                 let as_before = station.state == bench.station.state || state == SILENT;
                 assert!(as_before && only_logged, "state {state}, {event:?}");
             }

@@ -30,7 +30,7 @@ impl Random {
 fn plc_write(random: &mut Random, edges: &mut ConnectionEdges) -> Event {
     let mut write = ControlWrite::default();
     if random.below(2) == 0 {
-        // Mostly online, so that the walk gets anywhere.
+        // Mostly online, so that the walk reaches all states.
         let online = u16::from(random.below(8) != 0);
         write.control = Masked::<u16>::all((random.word(256) & !1) | online);
     }

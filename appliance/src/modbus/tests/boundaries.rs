@@ -155,7 +155,7 @@ async fn a_boundary_value_in_a_write_of_a_register_is_refused_as_the_map_says_or
                 writer.words(first, &vec![word; count]).await;
             }
         }
-        // Counts of which a frame cannot hold the registers.
+        // Counts with more registers than a frame can hold.
         for count in [0, 124, 0x7FFF, 0x8000, 0xFFFFu16] {
             let ([high, low], [most, least]) = (first.to_be_bytes(), count.to_be_bytes());
             let bytes = (2 * u32::from(count)) as u8;

@@ -129,13 +129,13 @@ fn after_a_failed_load_no_trigger_is_accepted_until_a_load_succeeds() {
         RecipeResult::Unknown,
         RecipeResult::Corrupt,
         RecipeResult::OtherCalibration,
-        // An abort ends a load so.
+        // An abort of a load ends like this.
         RecipeResult::Busy,
     ] {
         let mut bench = Bench::ready();
         bench.load(77, Err(failed));
         no_trigger_is_accepted(&mut bench);
-        // Neither to leave the recipe, nor to select the active one, nor to reset errors is a load.
+        // RECIPE_SELECT 0, selecting the active recipe and ERROR_RESET are no loads.
         for select in [0, 1] {
             bench.select(select);
             no_trigger_is_accepted(&mut bench);

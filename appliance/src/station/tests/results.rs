@@ -1,4 +1,4 @@
-//! From a trigger to its one result, and what becomes of it.
+//! From a trigger to its one result, the handshake and the queue.
 
 use super::*;
 
