@@ -22,6 +22,4 @@ pub use timing::Timing;
 pub use transport::Truth;
 
 #[cfg(test)]
-mod study_tests;
-#[cfg(test)]
 mod tests;

@@ -13,6 +13,4 @@ pub use play::head;
 pub use recording::Recording;
 
 #[cfg(test)]
-mod shared_tests;
-#[cfg(test)]
 mod tests;

@@ -3,13 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::parts::{Cone, Sphere};
-use super::scenario::Scenario;
-use super::{Part, head};
 use hal::frame::Samples;
 use hal::projector::Raster;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedFrame};
+use sim::parts::{Cone, Sphere};
+use sim::{Part, Scenario, head};
 
 /// Truth heights agree this well, RMS mm: a hundredth of a millimetre is far below the noise of any measurement.
 const HEIGHT_RMS_MM: f64 = 0.01;

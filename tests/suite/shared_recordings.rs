@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::recording::{PatternSpec, Recording};
+use hal::replay::Recording;
+use hal::replay::recording::PatternSpec;
 
 /// The folder of shared recordings beside the workspace, if it is there.
 fn shared_recordings() -> Option<PathBuf> {
