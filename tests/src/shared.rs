@@ -1,25 +1,36 @@
-//! The recordings that lie beside the project.
+//! The recordings that lie beside the project, and which tests were skipped because they do not.
 
 use hal::replay::Recording;
 use std::path::PathBuf;
+use std::{env, fs, thread};
 
-/// The folder of a shared recording; none, with a message, where it is absent.
+/// Where the recordings lie.
+pub fn recordings() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/recordings")
+}
+
+/// The folder of a shared recording; none where it is absent: the test that asks counts as skipped.
 pub fn folder(name: &str) -> Option<PathBuf> {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-    let folder = root.join("../../shared/recordings").join(name);
+    let folder = recordings().join(name);
     if folder.join("recording.json").is_file() {
         return Some(folder);
     }
-    println!(
-        "SKIPPED: the recording {name} is not at {}",
-        folder.display()
-    );
+    let marks = marks();
+    let test = thread::current().name().unwrap_or("unnamed").to_owned();
+    fs::create_dir_all(&marks).expect("the target folder can be written");
+    fs::write(marks.join(test.replace("::", ".")), "").expect("the target folder can be written");
     None
 }
 
-/// A shared recording, opened; none, with a message, where it is absent.
+/// A shared recording, opened; none where it is absent, as with [`folder`].
 pub fn recording(name: &str) -> Option<(PathBuf, Recording)> {
     let folder = folder(name)?;
     let recording = Recording::open(&folder).expect("a shared recording is valid");
     Some((folder, recording))
+}
+
+/// The folder with one empty file per skipped test: beside the programs that hold the tests, in the target folder.
+pub fn marks() -> PathBuf {
+    let program = env::current_exe().expect("a program knows its file");
+    program.with_file_name("skipped")
 }

@@ -324,6 +324,25 @@ fn a_rule_that_is_broken_is_found() {
 }
 
 #[test]
+fn documentation_has_examples_only_where_cargo_test_runs_them() {
+    for source in ["appliance", "hal", "tests"].into_iter().flat_map(sources) {
+        let comments = source
+            .text
+            .lines()
+            .filter_map(|line| line.trim().strip_prefix("//"));
+        let fences = comments
+            .filter_map(|text| text.trim_start_matches(['/', '!', ' ']).strip_prefix("```"));
+        for language in fences.step_by(2) {
+            let name = &source.name;
+            assert_eq!(
+                language, "text",
+                "{name}: its crate has `doctest = false` in Cargo.toml"
+            );
+        }
+    }
+}
+
+#[test]
 fn every_file_that_the_architecture_names_is_there() {
     let text = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
     let bases = ["", "appliance/src", "algo/src", "hal/src"].map(|base| root().join(base));

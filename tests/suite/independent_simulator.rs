@@ -1,14 +1,13 @@
 //! The simulator against an independent one: the study's recordings, rendered again.
 
-use std::path::{Path, PathBuf};
-use std::time::Duration;
-
 use hal::frame::Samples;
 use hal::projector::Raster;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedFrame};
 use sim::parts::{Cone, Sphere};
 use sim::{Part, Scenario, head};
+use std::time::Duration;
+use tests::shared;
 
 /// Truth heights agree this well, RMS mm: a hundredth of a millimetre is far below the noise of any measurement.
 const HEIGHT_RMS_MM: f64 = 0.01;
@@ -38,24 +37,10 @@ fn raster(recording: &Recording, frame: &RecordedFrame) -> Raster {
     Raster::new(width, height, pixels).unwrap()
 }
 
-/// The study's recordings, where they lie beside the workspace.
-fn shared_recording(name: &str) -> Option<PathBuf> {
-    let mut above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
-    let folder = above.find_map(|folder| {
-        let recordings = folder.join("shared/recordings");
-        recordings.is_dir().then_some(recordings)
-    });
-    if folder.is_none() {
-        println!("skipped: the shared recordings are not beside the workspace");
-    }
-    folder.map(|folder| folder.join(name))
-}
-
 fn compare(name: &str, part: Part) {
-    let Some(folder) = shared_recording(name) else {
+    let Some((_, recording)) = shared::recording(name) else {
         return;
     };
-    let recording = Recording::open(&folder).unwrap();
     let mut scenario = Scenario {
         part,
         ..Scenario::default()

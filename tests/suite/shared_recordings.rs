@@ -1,30 +1,10 @@
 //! The recordings beside the project, where they are: they open, and hold what their README says.
 
-use std::path::PathBuf;
-
-use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
-
-/// The folder of shared recordings beside the workspace, if it is there.
-fn shared_recordings() -> Option<PathBuf> {
-    let workspace = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-    let folder = workspace
-        .parent()?
-        .parent()?
-        .join("shared")
-        .join("recordings");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: the shared recordings are not beside the workspace");
-    None
-}
+use tests::shared;
 
 #[test]
 fn every_shared_recording_opens() {
-    let Some(folder) = shared_recordings() else {
-        return;
-    };
     for (name, size, frames, patterns) in [
         ("slstudio-board2", (1688, 1352), 12, 2),
         ("slstudio-skull", (1688, 1352), 6, 1),
@@ -32,7 +12,9 @@ fn every_shared_recording_opens() {
         ("study-sphere-fixed81", (256, 256), 12, 1),
         ("study-spline-dense121", (256, 256), 12, 1),
     ] {
-        let recording = Recording::open(&folder.join(name)).unwrap();
+        let Some((_, recording)) = shared::recording(name) else {
+            return;
+        };
         assert_eq!((recording.width, recording.height), size, "{name}");
         assert_eq!(recording.frames.len(), frames, "{name}");
         assert_eq!(recording.patterns.len(), patterns, "{name}");
@@ -44,7 +26,7 @@ fn every_shared_recording_opens() {
         assert_eq!(recording.truth_height.is_some(), rendered, "{name}");
         assert_eq!(recording.truth_class.is_some(), rendered, "{name}");
     }
-    let cone = Recording::open(&folder.join("study-cone-adaptive")).unwrap();
+    let (_, cone) = shared::recording("study-cone-adaptive").unwrap();
     assert!(matches!(
         cone.patterns[0],
         PatternSpec::File {
