@@ -6,7 +6,7 @@
 
 use algo::frame::{FrameView, Samples};
 use algo::geometry::{Pinhole, PinholeModel, Reference, Triangulator};
-use algo::inspect::{Comparison, Golden, Region};
+use algo::inspect::{Comparison, Golden, Region, Weight};
 use algo::pattern::{Encoder, PhaseFunction, Sequence, Shot};
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{HeightMap, PhaseMap, decode, triangulate};
@@ -171,6 +171,7 @@ fn gauge_over_the_frame(bencher: Bencher<'_, '_>) {
     let golden = Golden {
         width: SIDE,
         height: heights.height.clone(),
+        weight: vec![Weight::FULL; heights.height.len()],
     };
     let end = SIDE as f64;
     let corners = [(0.0, 0.0), (end, 0.0), (end, end), (0.0, end)];

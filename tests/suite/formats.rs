@@ -25,7 +25,7 @@ const MEMBERS: [&str; 9] = [
 ];
 
 /// Keys of its `recipe.json`, version 1, as a taught recipe has them. The same holds for these.
-const KEYS: [&str; 57] = [
+const KEYS: [&str; 59] = [
     "alignment",
     "calibration",
     "camera",
@@ -55,10 +55,12 @@ const KEYS: [&str; 57] = [
     "good_parts",
     "good_parts.beyond",
     "good_parts.largest_mm",
+    "good_parts.least_weight",
     "good_parts.left_out",
     "good_parts.limit_mm",
     "good_parts.scatter_mm",
     "good_parts.tolerance_mm",
+    "good_parts.weighed",
     "min_coverage",
     "name",
     "noise_counts",

@@ -46,4 +46,5 @@ mod together;
 mod triangulation;
 mod twin;
 mod two_clients;
+mod weights;
 mod written;

@@ -1,7 +1,7 @@
 //! Production by strips against exact triangulation and against the comparison of whole maps.
 
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
-use algo::inspect::{Comparison, Findings, Golden, Measure, Production, Region};
+use algo::inspect::{Comparison, Findings, Golden, Measure, Production, Region, Weight};
 use algo::phase::Trust;
 use algo::pipeline::{HeightMap, decode};
 use algo::simd::Backend;
@@ -29,7 +29,7 @@ const REACHED: f64 = 0.8;
 /// σ as taught is stored in steps of 32 nm; σ here is above 10 µm, and that of a mean is theirs.
 const SIGMA_SHARE: f64 = 2e-3;
 
-fn parts() -> [(&'static str, Part); 3] {
+pub(crate) fn parts() -> [(&'static str, Part); 3] {
     [
         ("cone", Part::Cone(Cone::default())),
         ("sawtooth", Part::Sawtooth(Sawtooth::default())),
@@ -38,11 +38,11 @@ fn parts() -> [(&'static str, Part); 3] {
 }
 
 /// The recipe's plan with one of its sequences and without alignment, and its whole recipe.
-fn plan(bed: &Bed, taught: &Taught, sequence: usize) -> (Plan, Recipe) {
+pub(crate) fn plan(bed: &Bed, taught: &Taught, sequence: usize) -> (Plan, Recipe) {
     plan_with(bed, taught, sequence, AlignmentKind::None)
 }
 
-fn plan_with(
+pub(crate) fn plan_with(
     bed: &Bed,
     taught: &Taught,
     sequence: usize,
@@ -57,7 +57,7 @@ fn plan_with(
     (plan, recipe)
 }
 
-fn frames(bed: &mut Bed, plan: &Plan) -> Vec<Frame> {
+pub(crate) fn frames(bed: &mut Bed, plan: &Plan) -> Vec<Frame> {
     let rasters = plan.rasters(&bed.calibration).unwrap();
     let indices: Vec<usize> = (0..plan.sequence().frame_count()).collect();
     bed.head.load(rasters).unwrap();
@@ -88,7 +88,7 @@ fn heights_about_golden_are_exact_to_micrometres_within_the_declared_range() {
                 let moved: Vec<_> = row.iter().map(|&phase| phase + delta).collect();
                 rises.heights(Backend::best(), v, &moved, &mut heights);
                 for (u, height) in heights.iter().enumerate() {
-                    if taught.recipe.arrays.valid[v * width + u] != 1 {
+                    if taught.recipe.arrays.valid[v * width + u] == 0 {
                         continue;
                     }
                     all += 1;
@@ -147,7 +147,7 @@ fn strips_find_what_the_comparison_of_whole_maps_finds() {
     }
 }
 
-fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]) {
+pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]) {
     let production = plan.production();
     let views: Vec<_> = frames
         .iter()
@@ -263,7 +263,7 @@ fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]) {
     );
 }
 
-fn expected(
+pub(crate) fn expected(
     comparison: &Comparison<'_>,
     measure: &Measure,
     region: &Region,
@@ -298,9 +298,15 @@ fn golden(recipe: &Recipe) -> Golden {
         width: recipe.file.camera.width as usize,
         height: heights
             .map(|(&mm, &valid)| match valid {
-                1 => Height::from_mm(f64::from(mm)),
-                _ => Height::UNKNOWN,
+                0 => Height::UNKNOWN,
+                _ => Height::from_mm(f64::from(mm)),
             })
+            .collect(),
+        weight: arrays
+            .valid
+            .iter()
+            .copied()
+            .map(Weight::from_bits)
             .collect(),
     }
 }

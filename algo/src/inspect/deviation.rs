@@ -1,6 +1,6 @@
 //! A measured height map against the golden one: deviation and coverage of regions.
 
-use super::Region;
+use super::{Region, Weight};
 use crate::pipeline::{HeightMap, Window};
 use crate::units::Height;
 use alloc::vec;
@@ -13,6 +13,8 @@ pub struct Golden {
     pub width: usize,
     /// Height as taught, [`Height::UNKNOWN`] where the part is not to be compared.
     pub height: Vec<Height>,
+    /// How much the deviation there counts in the means over squares.
+    pub weight: Vec<Weight>,
 }
 
 /// What a gauge found.
@@ -72,22 +74,24 @@ impl<'a> Comparison<'a> {
         comparison
     }
 
-    /// Deviation in nm and its variance in nm² (0 where the noise is not known).
+    /// Weighted deviation in nm and its variance in nm² (0 where the noise is not known).
     fn at(&self, place: usize) -> Option<(i64, f64)> {
         let (golden, measured) = (self.golden.height[place], self.measured.height[place]);
         if !(golden.is_known() && measured.is_known()) {
             return None;
         }
-        let sigma = f64::from(self.measured.sigma[place]) * 1e6;
+        let weight = self.golden.weight[place];
+        let sigma = f64::from(self.measured.sigma[place]) * 1e6 * weight.share();
         let variance = if sigma.is_finite() {
             sigma * sigma
         } else {
             0.0
         };
-        Some((i64::from(measured.nm()) - i64::from(golden.nm()), variance))
+        let deviation = i64::from(measured.nm()) - i64::from(golden.nm());
+        Some((weight.apply(deviation), variance))
     }
 
-    /// The mean deviation over a square of `side` pixels around a place, in mm, and its σ.
+    /// The mean weighted deviation over a square of `side` pixels around a place, in mm, and its σ.
     fn smoothed(&self, row: usize, column: usize, side: usize) -> Option<Reading> {
         let stride = self.golden.width + 1;
         let rows = self.count.len() / stride - 1;
@@ -119,8 +123,8 @@ impl<'a> Comparison<'a> {
         })
     }
 
-    /// The deviation from golden of largest magnitude in a region, with its sign, after averaging
-    /// over squares of `side` pixels (odd; 1 = none): single noisy pixels do not decide. `None`
+    /// The deviation from golden of largest magnitude in a region, with its sign, each pixel's times its weight, after
+    /// averaging over squares of `side` pixels (odd; 1 = none): single noisy pixels do not decide. `None`
     /// where no square has enough pixels that both maps know.
     pub fn deviation(&self, region: &Region, side: usize) -> Option<Reading> {
         let places = region
@@ -173,6 +177,7 @@ mod tests {
         let golden = Golden {
             width: WIDTH,
             height: vec![Height::from_nm(0); WIDTH * WIDTH],
+            weight: vec![Weight::FULL; WIDTH * WIDTH],
         };
         let measured = HeightMap {
             width: WIDTH,
@@ -204,6 +209,22 @@ mod tests {
         assert!((dent.sigma.unwrap() - 0.04 / 7.0).abs() < 1e-7);
         let raw = comparison.deviation(&region, 1).unwrap();
         assert!((raw.value - 3.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_dent_in_weighted_pixels_counts_times_their_weight_and_so_does_their_noise() {
+        let (mut golden, mut measured, region) = flat();
+        for row in 20..27 {
+            for column in 20..27 {
+                measured.height[row * WIDTH + column] = Height::from_mm(-0.5);
+                golden.weight[row * WIDTH + column] = Weight::from_bits(64);
+            }
+        }
+        let dent = Comparison::new(&golden, &measured)
+            .deviation(&region, 7)
+            .unwrap();
+        assert!((dent.value + 0.125).abs() < 1e-9, "{dent:?}");
+        assert!((dent.sigma.unwrap() - 0.01 / 7.0).abs() < 1e-7);
     }
 
     #[test]

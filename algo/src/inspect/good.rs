@@ -7,14 +7,18 @@
 //! at a grazing angle or by little light, single squares are many times as noisy as the rest and decide the extreme alone.
 //!
 //! # Equations
-//! The mean over a square with n compared pixels has
+//! The mean over a square with n compared pixels of weights w has
 //!
 //! ```text
-//! σ² = Σ σ_p² / n² + σ_m²
+//! σ² = (Σ w² σ_p² + (Σ w)² σ_m²) / n²
 //! ```
 //!
 //! σ_p of a pixel's deviation (√(golden² + measurement²)), σ_m of what an error of the motion does to it: that moves all
-//! pixels of a square together. There is a square about each pixel, so neighbours share pixels; along each axis the means
+//! pixels of a square together. Where a limit asks for a lower σ than the square about a pixel has, the pixel's weight is next to
+//! their ratio, else 1: noise there reaches as far as elsewhere, and what stands out of it is still found.
+//!
+//!
+//! There is a square about each pixel, so neighbours share pixels; along each axis the means
 //! correlate by 1 − k/L at k pixels, L the side. Excursions of such a field above t σ come in clumps, and the clumps are
 //! a Poisson process (D. Siegmund, *Approximate tail probabilities for the maxima of some random fields*, Ann. Probab. 16,
 //! 1988; ν by D. Siegmund, B. Yakir, *The Statistics of Gene Mapping*, 2007, 5.2):
@@ -37,11 +41,14 @@
 //! Mean and scatter of the largest of simulated squares within 5 % and 20 %, its upper tail within a half
 //! (`the_largest_of_simulated_squares_is_as_predicted`); on parts in front of the simulated head in `tests/suite/limits.rs`.
 
-use super::align::{Alignment, GoldenSurface};
+use super::Weight;
+use super::align::{Alignment, Facet, GoldenSurface};
 use super::deviation::MIN_SUPPORT;
+use crate::geometry::Vector;
 use crate::pipeline::for_each_row;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::array::from_fn;
 use core::f64::consts::{PI, SQRT_2};
 
 /// What a pixel's deviation varies by on a good part.
@@ -56,94 +63,103 @@ pub struct DeviationNoise<'a> {
 }
 
 impl DeviationNoise<'_> {
+    /// The weights with which no mean over a square of `side` has a σ above `most`: the pixel in the middle of each square that
+    /// has one gets the ratio of the two. Where that is not enough, because pixels beside it are noisier, all
+    /// pixels of the square get what is missing. What would get less than 1/16 is not compared.
+    pub fn weights(&self, compared: &[bool], side: usize, most: f64) -> Vec<Weight> {
+        let width = self.width.max(1);
+        let rows = compared.len() / width;
+        let mut weights: Vec<Weight> = compared.iter().copied().map(Weight::from).collect();
+        let mut reach = 0;
+        loop {
+            let sigmas = self.of_squares(&weights, side);
+            let mut shares = vec![1.0_f64; weights.len()];
+            let ratios = sigmas.iter().map(|sigma| most / f64::from(*sigma));
+            for (place, ratio) in ratios.enumerate().filter(|(_, ratio)| *ratio < 1.0) {
+                let (row, column) = (place / width, place % width);
+                let columns = column.saturating_sub(reach)..(column + reach + 1).min(width);
+                for row in row.saturating_sub(reach)..(row + reach + 1).min(rows) {
+                    let shares = &mut shares[row * width..][columns.clone()];
+                    shares
+                        .iter_mut()
+                        .for_each(|share| *share = share.min(ratio));
+                }
+            }
+            let mut quiet = true;
+            for (weight, share) in weights.iter_mut().zip(shares) {
+                if share < 1.0 {
+                    // Rounded down, so that there is an end.
+                    *weight = Weight::of_share(weight.share() * share);
+                    quiet = false;
+                }
+            }
+            if quiet {
+                return weights;
+            }
+            reach = side / 2;
+        }
+    }
+
     /// σ of the mean over the square of `side` pixels about each pixel; NaN where the pixel is not compared, or too few around it
     /// are.
-    pub fn of_squares(&self, compared: &[bool], side: usize) -> Vec<f32> {
+    pub fn of_squares(&self, weights: &[Weight], side: usize) -> Vec<f32> {
         let width = self.width.max(1);
-        let squares = Squares::new(self, compared, side);
-        let mut sigma = vec![f32::NAN; compared.len()];
+        let least = MIN_SUPPORT * (side * side) as f64;
+        let squares = Squares::new(self, weights, side);
+        let mut sigma = vec![f32::NAN; weights.len()];
         for_each_row(&mut sigma, width, |row, sigma| {
             for (column, sigma) in sigma.iter_mut().enumerate() {
                 let place = row * width + column;
-                if let (true, Some((pixels, own))) = (compared[place], squares.at(row, column)) {
-                    let mean = own / (pixels * pixels);
-                    *sigma = libm::sqrt(mean + f64::from(self.motion[place])) as f32;
+                let [pixels, weight, own] = squares.at(row, column);
+                if weights[place].compared() && pixels >= least {
+                    let motion = weight * weight * f64::from(self.motion[place]);
+                    *sigma = (libm::sqrt(own + motion) / pixels) as f32;
                 }
             }
         });
         sigma
     }
-
-    /// Stops comparing pixels until no mean over a square of `side` has a σ above `most`: about each square that has, its middle
-    /// if that is noisier than the square, so that the quiet side of an edge stays; where none is, all of them. A pixel that
-    /// is left out counts in no other square either. Answers with the σ of the squares that are left.
-    pub fn leave_out(&self, compared: &mut [bool], side: usize, most: f64) -> Vec<f32> {
-        let width = self.width.max(1);
-        loop {
-            let sigma = self.of_squares(compared, side);
-            let too_noisy = |place: &usize| f64::from(sigma[*place]) > most;
-            let failing: Vec<usize> = (0..sigma.len()).filter(too_noisy).collect();
-            if failing.is_empty() {
-                return sigma;
-            }
-            let squares = Squares::new(self, compared, side);
-            let noisier = |place: &usize| {
-                let square = squares.at(place / width, place % width);
-                square.is_some_and(|(pixels, own)| f64::from(self.pixel[*place]) * pixels >= own)
-            };
-            let noisiest: Vec<usize> = failing.iter().copied().filter(noisier).collect();
-            let out = if noisiest.is_empty() {
-                failing
-            } else {
-                noisiest
-            };
-            for place in out {
-                compared[place] = false;
-            }
-        }
-    }
 }
 
-/// How many pixels of a square are compared, and the sum of their variances, from integral tables of (width + 1) × (rows + 1).
+/// Sums over squares from integral tables of (width + 1) × (rows + 1): how many of a square's pixels are compared, Σ w and Σ w² σ_p².
 struct Squares {
     width: usize,
     rows: usize,
     side: usize,
-    count: Vec<u32>,
-    variance: Vec<f64>,
+    table: Vec<[f64; 3]>,
 }
 
 impl Squares {
-    fn new(noise: &DeviationNoise<'_>, compared: &[bool], side: usize) -> Self {
+    fn new(noise: &DeviationNoise<'_>, weights: &[Weight], side: usize) -> Self {
         let width = noise.width.max(1);
-        let rows = compared.len() / width;
+        let rows = weights.len() / width;
         let stride = width + 1;
-        let mut count = vec![0_u32; stride * (rows + 1)];
-        let mut variance = vec![0.0_f64; stride * (rows + 1)];
+        let mut table = vec![[0.0; 3]; stride * (rows + 1)];
         for row in 0..rows {
-            let (mut pixels, mut sum) = (0, 0.0);
+            let mut sums = [0.0; 3];
             for column in 0..width {
                 let place = row * width + column;
-                if compared[place] {
-                    pixels += 1;
-                    sum += f64::from(noise.pixel[place]);
+                if weights[place].compared() {
+                    let weight = weights[place].share();
+                    let variance = weight * weight * f64::from(noise.pixel[place]);
+                    for (sum, value) in sums.iter_mut().zip([1.0, weight, variance]) {
+                        *sum += value;
+                    }
                 }
-                let (here, above) = ((row + 1) * stride + column + 1, row * stride + column + 1);
-                count[here] = count[above] + pixels;
-                variance[here] = variance[above] + sum;
+                let above = table[row * stride + column + 1];
+                table[(row + 1) * stride + column + 1] = from_fn(|i| above[i] + sums[i]);
             }
         }
         Self {
             width,
             rows,
             side,
-            count,
-            variance,
+            table,
         }
     }
 
-    /// Of the square about a pixel; none if too few are compared.
-    fn at(&self, row: usize, column: usize) -> Option<(f64, f64)> {
+    /// Of the square about a pixel.
+    fn at(&self, row: usize, column: usize) -> [f64; 3] {
         let (stride, half) = (self.width + 1, self.side / 2);
         let (top, bottom) = (row.saturating_sub(half), (row + half + 1).min(self.rows));
         let (left, right) = (
@@ -156,30 +172,47 @@ impl Squares {
             bottom * stride + left,
             top * stride + right,
         ];
-        let [a, b, c, d] = corners.map(|at| self.count[at]);
-        let pixels = f64::from(a + b - c - d);
-        let [a, b, c, d] = corners.map(|at| self.variance[at]);
-        let least = MIN_SUPPORT * (self.side * self.side) as f64;
-        (pixels >= least).then(|| (pixels, (a + b - c - d).max(0.0)))
+        let [a, b, c, d] = corners.map(|at| self.table[at]);
+        from_fn(|i| (a[i] + b[i] - c[i] - d[i]).max(0.0))
     }
 }
 
 /// Variance of each pixel's deviation by the errors of the motion of golden and of a part, as far as both are found from
-/// heights with the noise of golden; 0 where no motion is found. `window` is where the part is looked at.
+/// heights with the noise of golden; 0 where no motion is found. `window` is where the part is looked at; the motion is found from
+/// what counts in full in `golden`, and lifts what is compared in `whole`.
 ///
 /// An error δ of the motion lifts a pixel by j·δ ([`Fitting::row`](super::align::Fitting::row)), so it is 2 jᵀ C j with the covariance C of
 /// the motion of a part that lies as taught.
-pub fn motion_variance(golden: GoldenSurface<'_>, window: crate::pipeline::Window<'_>) -> Vec<f32> {
-    let width = golden.surface.width;
-    let mut variance = vec![0.0; golden.surface.height.len()];
+pub fn motion_variance(
+    golden: GoldenSurface<'_>,
+    whole: GoldenSurface<'_>,
+    window: crate::pipeline::Window<'_>,
+) -> Vec<f32> {
+    let still = || vec![0.0; golden.surface.height.len()];
     let Some(alignment) = Alignment::new(golden, window) else {
-        return variance;
+        return still();
     };
     let Some(placed) = alignment.still(golden) else {
-        return variance;
+        return still();
     };
     let fitting = alignment.fitting(golden);
-    for_each_row(&mut variance, width, |v, row| {
+    of_facets(whole, |facet, point| {
+        2.0 * fitting.lift_variance(&placed, facet.lift, point)
+    })
+}
+
+/// What each compared pixel sees of the surface, mm².
+pub fn areas(golden: GoldenSurface<'_>) -> Vec<f32> {
+    of_facets(golden, |facet, _| {
+        facet.area * facet.lift.length() / libm::fabs(facet.lift.z)
+    })
+}
+
+/// A value of the facet that each compared pixel sees, and of its point; 0 where there is none in its row.
+fn of_facets(golden: GoldenSurface<'_>, value: impl Fn(&Facet, Vector) -> f64 + Sync) -> Vec<f32> {
+    let width = golden.surface.width;
+    let mut values = vec![0.0; golden.surface.height.len()];
+    for_each_row(&mut values, width, |v, row| {
         let of_pixel = |u: usize| {
             let height = golden.surface.height[v * width + u];
             if !golden.taught.compared(v * width + u) {
@@ -187,19 +220,19 @@ pub fn motion_variance(golden: GoldenSurface<'_>, window: crate::pipeline::Windo
             }
             let point = golden.triangulator.point(u, v, height)?;
             let facet = golden.facet(point, (u as f64, v as f64))?;
-            Some(2.0 * fitting.lift_variance(&placed, facet.lift, point))
+            Some(value(&facet, point) as f32)
         };
-        for (u, variance) in row.iter_mut().enumerate() {
-            *variance = of_pixel(u).map_or(f32::NAN, |variance| variance as f32);
+        for (u, value) in row.iter_mut().enumerate() {
+            *value = of_pixel(u).unwrap_or(f32::NAN);
         }
         // Next to an edge no normal is known: as beside it.
         carry(row.iter_mut());
         carry(row.iter_mut().rev());
-        for variance in row.iter_mut().filter(|variance| variance.is_nan()) {
-            *variance = 0.0;
+        for value in row.iter_mut().filter(|value| value.is_nan()) {
+            *value = 0.0;
         }
     });
-    variance
+    values
 }
 
 /// Gives what is not a number the value before it.
@@ -401,7 +434,7 @@ mod tests {
                 pixel: &pixel,
                 motion: &vec![0.0; WIDTH * WIDTH],
             };
-            let mut sigmas = noise.of_squares(&[true; WIDTH * WIDTH], SIDE);
+            let mut sigmas = noise.of_squares(&[Weight::FULL; WIDTH * WIDTH], SIDE);
             // Whole squares, as drawn.
             let half = SIDE / 2;
             let whole = half..WIDTH - half;
@@ -430,10 +463,16 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_noisy_is_left_out_and_what_is_left_is_quiet_enough() {
+    fn what_is_too_noisy_counts_with_a_weight_that_makes_it_quiet_enough() {
         const WIDTH: usize = 40;
+        const MOST: f64 = 0.02;
+        // Columns that get nine times as noisy towards the edge, and one that no weight makes quiet.
         let pixel: Vec<f32> = (0..WIDTH * WIDTH)
-            .map(|place| if place % WIDTH < 6 { 1.0 } else { 0.01 })
+            .map(|place| match place % WIDTH {
+                0 => 900.0,
+                column @ 1..8 => 0.01 * (9 - column) as f32 * (9 - column) as f32,
+                _ => 0.01,
+            })
             .collect();
         let motion = vec![1e-5; WIDTH * WIDTH];
         let noise = DeviationNoise {
@@ -441,16 +480,25 @@ mod tests {
             pixel: &pixel,
             motion: &motion,
         };
-        let mut compared = vec![true; WIDTH * WIDTH];
+        let compared = |place: usize| !place.is_multiple_of(WIDTH) || place / WIDTH < WIDTH / 2;
+        let compared: Vec<bool> = (0..WIDTH * WIDTH).map(compared).collect();
+        let weights = noise.weights(&compared, SIDE, MOST);
+        let row = |row: usize| &weights[row * WIDTH..(row + 1) * WIDTH];
+        let [upper, lower] = [row(10), row(30)];
+        // Beside what is far too noisy squares are as well.
+        assert!(upper[..5].iter().all(|weight| !weight.compared()));
+        assert!(!lower[0].compared());
+        assert!(lower[1..7].iter().all(|weight| weight.partial()));
+        assert!(lower[1].bits() < lower[6].bits());
+        assert!(lower[20..].iter().all(|weight| *weight == Weight::FULL));
+        let sigmas = noise.of_squares(&weights, SIDE);
         // A whole quiet square has √(0.01 / 81 + 1e-5) = 0.0116 mm.
-        let quiet = noise.of_squares(&compared, SIDE)[20 * WIDTH + 20];
-        assert!((f64::from(quiet) - 0.011_55).abs() < 1e-5, "{quiet}");
-        let sigma = noise.leave_out(&mut compared, SIDE, 0.02);
-        assert!(sigma.iter().all(|sigma| sigma.is_nan() || *sigma <= 0.02));
-        assert!(compared[20 * WIDTH + 20] && !compared[20 * WIDTH + 2]);
-        let kept = compared.iter().filter(|on| **on).count();
-        // The noisy columns, and next to nothing beside them: in corners squares have too few pixels to be judged.
-        assert!((33 * WIDTH..=34 * WIDTH + 32).contains(&kept), "{kept}");
+        let quiet = f64::from(sigmas[20 * WIDTH + 20]);
+        assert!((quiet - 0.011_55).abs() < 1e-5, "{quiet}");
+        let known = sigmas.iter().filter(|sigma| !sigma.is_nan());
+        let largest = known.copied().fold(0.0, f32::max);
+        let expected = 0.85 * MOST..1.000_001 * MOST;
+        assert!(expected.contains(&f64::from(largest)), "{largest}");
         assert!(LargestDeviation::new(&[], WIDTH, SIDE).limit(1e-6) == 0.0);
     }
 }

@@ -8,6 +8,7 @@ mod mask;
 mod openings;
 mod region;
 mod strips;
+mod weight;
 
 pub use deviation::{Comparison, Golden, Reading};
 pub use gauge::{Axis, Measure};
@@ -17,3 +18,4 @@ pub use region::{Region, RegionError, polygon_spans};
 pub use strips::{
     Findings, Gauge, Light, MAX_GAUGES, Parts, Production, Skipped, Strips, Taught, Unmeasurable,
 };
+pub use weight::Weight;

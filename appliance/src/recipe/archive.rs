@@ -33,7 +33,7 @@ pub struct Arrays {
     pub height_slope: Vec<f32>,
     /// ∂²z/∂Φ² in mm per turn².
     pub height_curvature: Vec<f32>,
-    /// 1 where the part is compared with golden.
+    /// How much the part's deviation from golden counts ([`algo::inspect::Weight::bits`]); 0 where it is not compared.
     pub valid: Vec<u8>,
     /// Modulation as taught, in counts.
     pub modulation: Vec<f32>,

@@ -265,7 +265,7 @@ impl GoldenPart<'_> {
         }
     }
 
-    /// The limit of the deviation, and the comparison without what cannot be held to it.
+    /// The limit of the deviation; pixels that are too noisy for it get weights.
     fn hold(
         &self,
         arrays: &mut Arrays,

@@ -1,22 +1,24 @@
 //! What the deviation gauge reads on good parts by prediction, and the limit that follows.
 //!
-//! The limit is the tolerance that is asked for, as far as the part can be measured that well. Places whose squares are too noisy
-//! for it are left out of the comparison, and teaching says how many; where they would be more than a small share of the surface,
-//! the limit is wider instead, and teaching says that the tolerance cannot be held.
+//! The limit is the tolerance that is asked for, as far as the part can be measured that well. Where squares are too noisy for it,
+//! deviations count with less weight, and teaching says on how much of the surface and how much larger they must be to be found;
+//! where that would be more than a small share of the pixels, the limit is wider instead, and teaching says that the tolerance
+//! cannot be held.
 
 use super::golden::SMOOTHING_PX;
-use super::planner::SIGMAS;
 use crate::station::Unit;
 use algo::geometry::Triangulator;
-use algo::inspect::Taught;
 use algo::inspect::align::GoldenSurface;
-use algo::inspect::good::{DeviationNoise, LargestDeviation, motion_variance};
+use algo::inspect::good::{DeviationNoise, LargestDeviation, areas, motion_variance};
+use algo::inspect::{Taught, Weight};
 use algo::pipeline::KnownSurface;
 use hal::bounds::within;
 use serde::{Deserialize, Serialize};
 
-/// At most this share of the compared surface is left out; else the limit is wider.
-const LEFT_OUT: f64 = 0.05;
+/// At most this share of the compared pixels counts with less weight or not at all; else the limit is wider.
+const WEIGHED: f64 = 0.05;
+/// Squares have at most a σ of the limit by this: of a part with 10⁴ squares of just this σ, one in 10⁶ exceeds the limit.
+const SIGMAS: f64 = 6.5;
 /// At most this share of good parts exceeds the limit, by prediction.
 const BEYOND: f64 = 1e-6;
 /// Limits that are not asked for are rounded up to this, mm, tried in steps by this factor, and at most so many times the tolerance.
@@ -38,8 +40,18 @@ pub struct GoodPartsFile {
     pub scatter_mm: f64,
     /// Share of such parts that exceed the limit.
     pub beyond: f64,
-    /// Share of the surface that is too noisy for the limit, and so not compared.
+    /// Share of the pixels that are too noisy for the limit to be compared at all.
     pub left_out: f64,
+    /// Share of the surface, by its area, that is too noisy for the limit, and so counts with less weight.
+    #[serde(default)]
+    pub weighed: f64,
+    /// The least of these weights; 1 where there are none.
+    #[serde(default = "full")]
+    pub least_weight: f64,
+}
+
+const fn full() -> f64 {
+    1.0
 }
 
 /// What is known of the noise of a taught part.
@@ -55,11 +67,11 @@ pub(super) struct Noise<'a> {
 }
 
 impl Noise<'_> {
-    /// The limit of the deviation for a tolerance. What cannot be held to it is taken out of the pixels that are compared, where
-    /// `mask` is 1.
+    /// The limit of the deviation for a tolerance. `mask` is where the part can be compared, not 0, and gets the weights of
+    /// the pixels ([`Weight::bits`]) that hold it.
     pub fn hold(&self, mask: &mut [u8], tolerance_mm: f64) -> GoodPartsFile {
         let width = self.surface.width;
-        let valid: Vec<bool> = mask.iter().map(|&valid| valid == 1).collect();
+        let valid: Vec<bool> = mask.iter().map(|&valid| valid != 0).collect();
         let both = self.golden.iter().zip(&self.production);
         let pixel: Vec<f32> = both.map(|(a, b)| a + b).collect();
         let still = vec![0.0; valid.len()];
@@ -68,20 +80,36 @@ impl Noise<'_> {
             pixel: &pixel,
             motion: &still,
         };
-        // The motion is found from what is compared, and what is compared depends on the motion: once each.
-        let (_, compared, _) = limited(&noise, &valid, tolerance_mm);
-        let motion = self.motion(&compared);
+        let full: Vec<Weight> = valid.iter().copied().map(Weight::from).collect();
+        let whole = self.taught(&full);
+        let whole = self.golden_surface(&whole);
+        // The motion is found from what counts in full, and what does depends on the motion: once each.
+        let (_, weights) = limited(&noise, &valid, tolerance_mm);
+        let taught = self.taught(&weights);
+        let window = vec![0..width; valid.len() / width.max(1)];
+        let motion = motion_variance(self.golden_surface(&taught), whole, &window);
         noise.motion = &motion;
-        let (limit_mm, compared, sigmas) = limited(&noise, &valid, tolerance_mm);
-        let largest = LargestDeviation::new(&sigmas, width, SMOOTHING_PX);
+        let (limit_mm, weights) = limited(&noise, &valid, tolerance_mm);
+        let squares = noise.of_squares(&weights, SMOOTHING_PX);
+        let largest = LargestDeviation::new(&squares, width, SMOOTHING_PX);
         let limit_mm = match largest.beyond(limit_mm) > BEYOND {
             true => rounded_up(largest.limit(BEYOND)),
             false => limit_mm,
         };
         let (largest_mm, scatter_mm) = largest.mean_and_scatter();
-        let left_out = 1.0 - count(&compared) / count(&valid).max(1.0);
-        for (valid, compared) in mask.iter_mut().zip(compared) {
-            *valid = u8::from(compared);
+        let (mut all, mut weighed) = (0.0, 0.0);
+        for (area, weight) in areas(whole).into_iter().zip(&weights) {
+            let area = f64::from(area);
+            all += area;
+            weighed += if weight.partial() { area } else { 0.0 };
+        }
+        let compared = weights.iter().filter(|weight| weight.compared());
+        let least_weight = compared
+            .clone()
+            .map(|weight| weight.share())
+            .fold(1.0, f64::min);
+        for (mask, weight) in mask.iter_mut().zip(&weights) {
+            *mask = weight.bits();
         }
         GoodPartsFile {
             tolerance_mm,
@@ -89,39 +117,39 @@ impl Noise<'_> {
             largest_mm,
             scatter_mm,
             beyond: largest.beyond(limit_mm),
-            left_out,
+            left_out: 1.0 - compared.count() as f64 / count(&valid).max(1.0),
+            weighed: weighed / f64::max(all, f64::MIN_POSITIVE),
+            least_weight,
         }
     }
 
-    fn motion(&self, compared: &[bool]) -> Vec<f32> {
+    /// Golden with these weights.
+    fn taught(&self, weights: &[Weight]) -> Taught {
         let sigmas = self
             .golden
             .iter()
             .map(|variance| f64::from(*variance).sqrt());
-        let taught = Taught::new(compared.iter().copied().zip(sigmas));
-        let golden = GoldenSurface {
+        Taught::new(weights.iter().copied().zip(sigmas))
+    }
+
+    fn golden_surface<'a>(&'a self, taught: &'a Taught) -> GoldenSurface<'a> {
+        GoldenSurface {
             triangulator: self.triangulator,
             surface: &self.surface,
-            taught: &taught,
-        };
-        let width = self.surface.width;
-        motion_variance(golden, &vec![0..width; compared.len() / width.max(1)])
+            taught,
+        }
     }
 }
 
-/// The limit, at least the tolerance, that all but [`LEFT_OUT`] of the surface can hold; what holds it; and σ of its squares.
-fn limited(
-    noise: &DeviationNoise<'_>,
-    valid: &[bool],
-    tolerance_mm: f64,
-) -> (f64, Vec<bool>, Vec<f32>) {
-    let least = (1.0 - LEFT_OUT) * count(valid);
+/// The limit, at least the tolerance, that all but [`WEIGHED`] of the pixels can hold, and the weights with which the others can.
+fn limited(noise: &DeviationNoise<'_>, valid: &[bool], tolerance_mm: f64) -> (f64, Vec<Weight>) {
+    let least = (1.0 - WEIGHED) * count(valid);
     let mut limit = tolerance_mm;
     loop {
-        let mut compared = valid.to_vec();
-        let sigmas = noise.leave_out(&mut compared, SMOOTHING_PX, limit / SIGMAS);
-        if count(&compared) >= least || limit > WIDEST * tolerance_mm {
-            return (limit, compared, sigmas);
+        let weights = noise.weights(valid, SMOOTHING_PX, limit / SIGMAS);
+        let full = weights.iter().filter(|weight| **weight == Weight::FULL);
+        if full.count() as f64 >= least || limit > WIDEST * tolerance_mm {
+            return (limit, weights);
         }
         limit = rounded_up(limit * WIDER);
     }
@@ -148,10 +176,12 @@ impl GoodPartsFile {
         within("largest_mm", self.largest_mm, 0.0, longest)?;
         within("scatter_mm", self.scatter_mm, 0.0, longest)?;
         within("beyond", self.beyond, 0.0, 1.0)?;
-        within("left_out", self.left_out, 0.0, 1.0)
+        within("left_out", self.left_out, 0.0, 1.0)?;
+        within("weighed", self.weighed, 0.0, 1.0)?;
+        within("least_weight", self.least_weight, 1.0 / 256.0, 1.0)
     }
 
-    /// What is held, in words: a line, and a second one where something is not.
+    /// What is held, in words: a line, and further ones where something is not.
     pub fn words(&self) -> Vec<String> {
         let Self {
             tolerance_mm,
@@ -160,6 +190,8 @@ impl GoodPartsFile {
             scatter_mm,
             beyond,
             left_out,
+            weighed,
+            least_weight,
         } = *self;
         if largest_mm == 0.0 {
             return vec![
@@ -177,10 +209,18 @@ impl GoodPartsFile {
             ),
             false => format!("deviation: {expected}"),
         }];
+        if weighed > 0.0 {
+            lines.push(format!(
+                "{:.2} % of the surface is seen so faintly or flatly that a deviation there must be larger to be found, by a \
+                 factor of {:.1} at its worst place: another pose or more light lowers it",
+                weighed * 100.0,
+                1.0 / least_weight
+            ));
+        }
         if left_out > 0.0 {
             lines.push(format!(
-                "{:.2} % of the surface is seen too faintly or too flatly for a limit of ±{limit_mm:.2} mm and is not \
-                 compared: another pose brings it back",
+                "{:.2} % of the surface's pixels are seen too faintly or too flatly for a limit of ±{limit_mm:.2} mm and are not \
+                 compared: another pose brings them back",
                 left_out * 100.0
             ));
         }

@@ -235,7 +235,7 @@ impl Fitting<'_> {
             let point = motion.undo(sample.point);
             let seen = self.golden.triangulator.camera().project(point)?;
             let above = point.z - self.golden.height_at(seen.0, seen.1)?;
-            let facet = self.golden.facet(point, seen)?;
+            let facet = self.golden.quiet_facet(point, seen)?;
             Some(self.of_facet(sample, &facet, point, above))
         }));
     }

@@ -77,21 +77,21 @@ impl Alignment {
         window: Window<'_>,
     ) -> Option<(Self, Placed)> {
         let width = golden.surface.width;
-        let compared = |v: usize| {
+        let full = |v: usize| {
             let row = window[v].clone();
-            row.filter(move |u| golden.taught.compared(v * width + u))
+            row.filter(move |u| golden.taught.full(v * width + u))
         };
-        let counts: Vec<usize> = (0..window.len()).map(|v| compared(v).count()).collect();
+        let counts: Vec<usize> = (0..window.len()).map(|v| full(v).count()).collect();
         let filled = counts.iter().filter(|count| **count > 0).count();
         let rows = (filled / ROWS).max(1);
         let pixels = counts.iter().sum::<usize>() / rows;
         let columns = pixels.div_ceil(points).max(1);
         let mut spots = Vec::new();
         for v in (0..window.len()).step_by(rows) {
-            for u in compared(v).filter(|u| u % columns == 0) {
+            for u in full(v).filter(|u| u % columns == 0) {
                 let height = golden.surface.height[v * width + u];
                 let seen = golden.triangulator.point(u, v, height).and_then(|point| {
-                    let facet = golden.facet(point, (u as f64, v as f64))?;
+                    let facet = golden.quiet_facet(point, (u as f64, v as f64))?;
                     Some(Spot { u, v, point, facet })
                 });
                 spots.extend(seen);

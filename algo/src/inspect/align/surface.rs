@@ -41,7 +41,7 @@ impl GoldenSurface<'_> {
         self.surface.height.len() / self.surface.width.max(1)
     }
 
-    /// The height between four pixels that are all compared, mm, by bilinear interpolation.
+    /// The height between four pixels that all count in full, mm, by bilinear interpolation.
     pub fn height_at(&self, u: f64, v: f64) -> Option<f64> {
         let width = self.surface.width;
         let inside = u >= 0.0 && v >= 0.0 && u < (width - 1) as f64 && v < (self.rows() - 1) as f64;
@@ -50,7 +50,7 @@ impl GoldenSurface<'_> {
         }
         let place = v as usize * width + u as usize;
         let corners = [place, place + 1, place + width, place + width + 1];
-        if !corners.iter().all(|&at| self.taught.compared(at)) {
+        if !corners.iter().all(|&at| self.taught.full(at)) {
             return None;
         }
         let (fu, fv) = (u - libm::floor(u), v - libm::floor(v));
@@ -60,7 +60,21 @@ impl GoldenSurface<'_> {
     }
 
     /// How the surface faces about the pixel next to where `point` is seen, (u, v); its whole neighbourhood must be compared.
-    pub fn facet(&self, point: Vector, (u, v): (f64, f64)) -> Option<Facet> {
+    pub fn facet(&self, point: Vector, seen: (f64, f64)) -> Option<Facet> {
+        self.facet_of(point, seen, Taught::compared)
+    }
+
+    /// As [`Self::facet`], but its whole neighbourhood must count in full.
+    pub(super) fn quiet_facet(&self, point: Vector, seen: (f64, f64)) -> Option<Facet> {
+        self.facet_of(point, seen, Taught::full)
+    }
+
+    fn facet_of(
+        &self,
+        point: Vector,
+        (u, v): (f64, f64),
+        counts: impl Fn(&Taught, usize) -> bool,
+    ) -> Option<Facet> {
         let width = self.surface.width;
         let inside = |x: f64, end: usize| x >= REACH as f64 && x + REACH as f64 + 1.0 < end as f64;
         let (u, v) = (libm::rint(u), libm::rint(v));
@@ -72,7 +86,7 @@ impl GoldenSurface<'_> {
         for i in 0..=2 * REACH {
             let start = place + i * width - REACH * width - REACH;
             for j in 0..=2 * REACH {
-                if !self.taught.compared(start + j) {
+                if !counts(self.taught, start + j) {
                     return None;
                 }
                 let z = i64::from(self.surface.height[start + j].nm());

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::geometry::{Pinhole, PinholeModel, Reference, Triangulator};
-use crate::inspect::Taught;
+use crate::inspect::{Taught, Weight};
 use crate::pattern::PhaseFunction;
 use crate::pipeline::KnownSurface;
 use crate::units::AbsolutePhase;
@@ -56,7 +56,7 @@ fn made(f: impl Fn(f64, f64) -> f64) -> Made {
         phase: vec![AbsolutePhase::from_bits(0); SIDE * SIDE],
         height: height.collect(),
     };
-    let taught = Taught::new((0..SIDE * SIDE).map(|_| (true, SIGMA_MM)));
+    let taught = Taught::new((0..SIDE * SIDE).map(|_| (Weight::FULL, SIGMA_MM)));
     Made {
         triangulator,
         surface,
@@ -218,7 +218,7 @@ fn a_wall_at_a_grazing_angle_is_not_lifted_by_the_noise_of_the_motion() {
     assert_eq!(even.alignment(), few);
     // The camera looks along a slope of 2.7.
     let mut steep = made(|x, y| hills(x, y) + 2.4 * (x - 40.0).max(0.0));
-    steep.taught = Taught::new((0..SIDE * SIDE).map(|_| (true, 4.0 * SIGMA_MM)));
+    steep.taught = Taught::new((0..SIDE * SIDE).map(|_| (Weight::FULL, 4.0 * SIGMA_MM)));
     let golden = steep.golden();
     let (few, _) = Alignment::of_points(POINTS, golden, &window).unwrap();
     let (before, after) = (

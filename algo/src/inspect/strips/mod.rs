@@ -21,6 +21,7 @@ mod squares;
 mod stance;
 mod strip;
 mod taught;
+mod weighted;
 
 pub use findings::{Findings, Skipped};
 pub use light::Light;
@@ -42,6 +43,7 @@ use coins::Threshold;
 use core::ops::Range;
 use stance::Stance;
 use strip::Strip;
+use weighted::WeightedTiles;
 
 /// A gauge: where it measures what.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,6 +74,8 @@ pub struct Production {
     /// Φ₀ that phases are unwrapped about, where it is not that of the rises.
     map: Option<Vec<AbsolutePhase>>,
     taught: Taught,
+    /// None where all that is compared counts in full.
+    weighted: Option<WeightedTiles>,
     gauges: Vec<Gauge>,
     /// One per gauge, then those that steps start from.
     regions: Vec<Region>,
@@ -199,6 +203,7 @@ impl Production {
             return Err(Unmeasurable::TooMany { gauges });
         }
         taught.mark_squares(rises.surface().width.max(1));
+        let weighted = WeightedTiles::new(rises.surface().width, &taught);
         let range = triangulator.range();
         let span_nm = (range.high - range.low) * 1e6;
         let mut sides = Vec::new();
@@ -261,6 +266,7 @@ impl Production {
             rises,
             map,
             taught,
+            weighted,
             gauges,
             regions,
             patches,

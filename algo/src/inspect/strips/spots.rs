@@ -3,6 +3,7 @@
 use super::Production;
 use super::displaced::{Found, Golden, Row, find_row};
 use super::stance::{Node, Stance};
+use crate::inspect::Weight;
 use crate::inspect::gauge::{Grid, Sum};
 use crate::pipeline::NO_RISE;
 use alloc::vec;
@@ -48,7 +49,7 @@ impl Spots {
         seen.stance.row(seen.v, height, &mut self.nodes);
         let golden = Golden {
             height: &plan.rises.surface().height,
-            taught: &plan.taught.0,
+            taught: &plan.taught.pixels,
             width,
         };
         let row = Row {
@@ -79,6 +80,25 @@ impl Spots {
         self.row[columns.clone()].fill(v as i32);
         for u in columns {
             self.column[u] = u as i32;
+        }
+    }
+
+    /// Multiplies the deviations of a span by the weights of golden where the part had them.
+    pub fn weigh(&self, plan: &Production, deviation: &mut [i32], span: Range<usize>) {
+        if let Some(weighted) = &plan.weighted {
+            let (columns, rows) = (&self.column[span.clone()], &self.row[span.clone()]);
+            weighted.apply(&plan.taught, columns, rows, &mut deviation[span]);
+        }
+    }
+
+    /// The weight of golden where the part had what pixel `u` sees.
+    pub fn weight(&self, plan: &Production, u: usize) -> Weight {
+        match plan.weighted {
+            Some(_) => {
+                let place = self.row[u] as usize * plan.size().0 + self.column[u] as usize;
+                plan.taught.weight(place)
+            }
+            None => Weight::FULL,
         }
     }
 

@@ -135,6 +135,7 @@ impl Strip {
                         self.store(plan, v, &mut heights[row..row + self.width]);
                     }
                 }
+                self.weigh(plan, v);
             }
             self.smooth(plan, stance, v, first);
         }
@@ -143,7 +144,7 @@ impl Strip {
     /// Works out where the pixels of row `v`, which has just been worked on, lie on the part as taught.
     fn settle(&mut self, plan: &Production, stance: &Stance, v: usize, columns: Range<usize>) {
         if stance.placed.is_none() {
-            if !plan.patches.is_empty() {
+            if !plan.patches.is_empty() || plan.weighted.is_some() {
                 self.spots.stay(v, columns);
             }
             return;
@@ -160,6 +161,14 @@ impl Strip {
         if self.spots.find(&seen, deviation) {
             self.wild = Some(v);
         }
+    }
+
+    /// Weighs the deviations of row `v`, which has been counted.
+    fn weigh(&mut self, plan: &Production, v: usize) {
+        let row = v % self.kept;
+        let deviation = &mut self.recent[row * self.width..(row + 1) * self.width];
+        let span = self.extents[row].clone();
+        self.spots.weigh(plan, deviation, span);
     }
 
     fn clear(&mut self) {
@@ -210,7 +219,7 @@ impl Strip {
             phase: &self.phase,
             modulation: &self.modulation,
             trust: &self.trust,
-            taught: &plan.taught.0[row],
+            taught: &plan.taught.pixels[row],
             noise: plan.noise,
         };
         let risen = Risen {
@@ -391,7 +400,7 @@ impl Strip {
         }
     }
 
-    /// Σ of the variances of the deviations of row `v` inside `columns`, nm².
+    /// Σ of the variances of the weighted deviations of row `v` inside `columns`, nm².
     pub(super) fn variance(
         &mut self,
         plan: &Production,
@@ -407,7 +416,8 @@ impl Strip {
         for u in columns {
             if self.recent[v % self.kept * self.width + u] != NO_RISE {
                 let slope = plan.slope((u, v), self.phase[u]);
-                let measured = plan.sigma_nm(self.modulation[u], slope);
+                let share = self.spots.weight(plan, u).share();
+                let measured = plan.sigma_nm(self.modulation[u], slope) * share;
                 sum += measured * measured;
             }
         }

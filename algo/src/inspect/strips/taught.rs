@@ -1,48 +1,80 @@
-//! The part as taught: where parts are compared with it, and how noisy its heights were.
+//! The part as taught: where parts are compared with it, how noisy its heights were, and how much deviations count.
 
+use crate::inspect::Weight;
 use crate::pipeline::{COMPARED, SIGMA, SQUARE};
 use alloc::vec::Vec;
 
 /// The part as taught, as far as parts are compared with it; row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Taught(pub(super) Vec<u16>);
+pub struct Taught {
+    /// [`COMPARED`], [`SQUARE`] and σ.
+    pub(super) pixels: Vec<u16>,
+    /// Empty where all that is compared counts in full.
+    weights: Vec<Weight>,
+}
 
 impl Taught {
     /// Unit of σ in nm.
     const SIGMA_UNIT_NM: f64 = 32.0;
 
-    /// From where the part is compared and σ of its heights in mm, NaN where not known. σ is stored in units of 32 nm, at
-    /// most half a mm.
-    pub fn new(pixels: impl Iterator<Item = (bool, f64)>) -> Self {
-        let stored = |(compared, mm): (bool, f64)| {
+    /// From the weights of pixels and σ of their heights in mm, NaN where not known. σ is stored in units of 32 nm, at most
+    /// half a mm.
+    pub fn new(pixels: impl Iterator<Item = (Weight, f64)>) -> Self {
+        let mut weights = Vec::with_capacity(pixels.size_hint().0);
+        let stored = |(weight, mm): (Weight, f64)| {
+            weights.push(weight);
             let units = libm::rint(mm * 1e6 / Self::SIGMA_UNIT_NM);
             let sigma = match units.is_finite() {
                 true => units.clamp(1.0, f64::from(SIGMA)) as u16,
                 false => 0,
             };
-            sigma | if compared { COMPARED } else { 0 }
+            sigma | if weight.compared() { COMPARED } else { 0 }
         };
-        Self(pixels.map(stored).collect())
+        let pixels = pixels.map(stored).collect();
+        if !weights.iter().any(|weight| weight.partial()) {
+            weights = Vec::new();
+        }
+        Self { pixels, weights }
+    }
+
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.pixels) + size_of_val(&*self.weights)
     }
 
     /// Marks the places where the four pixels to the right and below are all compared.
     pub(super) fn mark_squares(&mut self, width: usize) {
-        for place in 0..self.0.len().saturating_sub(width + 1) {
+        for place in 0..self.pixels.len().saturating_sub(width + 1) {
             let corners = [place, place + 1, place + width, place + width + 1];
             if place % width + 1 < width && corners.iter().all(|&at| self.compared(at)) {
-                self.0[place] |= SQUARE;
+                self.pixels[place] |= SQUARE;
             }
         }
     }
 
+    /// How much the deviation at a compared place counts.
+    pub(super) fn weight(&self, place: usize) -> Weight {
+        self.weights.get(place).copied().unwrap_or(Weight::FULL)
+    }
+
+    /// All weights, row-major; none where all that is compared counts in full.
+    pub(super) fn weights(&self) -> &[Weight] {
+        &self.weights
+    }
+
+    /// Whether the part is compared at a place, and its deviation counts in full.
+    pub(in crate::inspect) fn full(&self, place: usize) -> bool {
+        self.compared(place) && self.weight(place) == Weight::FULL
+    }
+
     /// Whether the part is compared at a place.
     pub(in crate::inspect) fn compared(&self, place: usize) -> bool {
-        self.0[place] & COMPARED != 0
+        self.pixels[place] & COMPARED != 0
     }
 
     /// σ in its units.
     pub(super) fn sigma(&self, place: usize) -> u16 {
-        self.0[place] & SIGMA
+        self.pixels[place] & SIGMA
     }
 
     /// σ in mm, 0 where not known.

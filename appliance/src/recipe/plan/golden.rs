@@ -3,14 +3,14 @@
 use crate::recipe::archive::Arrays;
 use crate::recipe::{RecipeFile, SequenceKind, safe};
 use algo::adaptive::Field;
-use algo::inspect::Taught;
+use algo::inspect::{Taught, Weight};
 use algo::phase::Decoder;
 use algo::pipeline::{self, KnownSurface};
 use algo::units::{AbsolutePhase, Height, Modulation};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Where the part is compared, and how certain its taught heights are.
+/// Where the part is compared, how much deviations count there, and how certain its taught heights are.
 pub(super) fn taught(file: &RecipeFile, arrays: &Arrays, decoder: &Decoder) -> Taught {
     let full_scale = f64::from(decoder.full_scale());
     let noises = arrays.modulation.iter().zip(&arrays.height_slope);
@@ -19,12 +19,12 @@ pub(super) fn taught(file: &RecipeFile, arrays: &Arrays, decoder: &Decoder) -> T
         let turns = decoder.phase_noise(Modulation::from_bits(share), file.noise_counts);
         turns * f64::from(slope).abs()
     });
-    let compared = arrays
-        .valid
-        .iter()
-        .zip(&arrays.golden_height)
-        .map(|(&valid, height)| valid == 1 && height.is_finite());
-    Taught::new(compared.zip(sigmas))
+    let valid = arrays.valid.iter().zip(&arrays.golden_height);
+    let weights = valid.map(|(&valid, height)| match height.is_finite() {
+        true => Weight::from_bits(valid),
+        false => Weight::NONE,
+    });
+    Taught::new(weights.zip(sigmas))
 }
 
 /// The phase that a sequence of limited reach is unwrapped about: golden, but where the placement could move it further.
@@ -65,8 +65,8 @@ pub(super) fn surface(width: usize, arrays: &Arrays) -> KnownSurface {
 /// Widens a window by what parts are compared with: their motion is found from all of it.
 pub(super) fn widen(window: &mut [Range<usize>], arrays: &Arrays, width: usize) {
     for (seen, valid) in window.iter_mut().zip(arrays.valid.chunks(width.max(1))) {
-        let first = valid.iter().position(|&valid| valid == 1);
-        let last = valid.iter().rposition(|&valid| valid == 1);
+        let first = valid.iter().position(|&valid| valid != 0);
+        let last = valid.iter().rposition(|&valid| valid != 0);
         if let Some((first, last)) = first.zip(last) {
             *seen = match seen.start == seen.end {
                 true => first..last + 1,

@@ -26,9 +26,6 @@ pub(super) struct Run {
     pub bytes: usize,
 }
 
-/// Of what is kept of a taught pixel.
-const TAUGHT_BYTES: usize = 2;
-
 /// A sequence of a recipe before it is known how phases become heights.
 pub(super) struct Unjoined {
     kind: SequenceKind,
@@ -92,7 +89,8 @@ impl Unjoined {
     /// Joins it with what all have in common.
     pub fn join(self, shared: &Shared<'_>) -> Result<Run, String> {
         let file = shared.file;
-        let bytes = size_of_val(self.map.as_deref().unwrap_or(&[]));
+        let map = size_of_val(self.map.as_deref().unwrap_or(&[]));
+        let bytes = map + self.taught.bytes();
         let production = Production::new(Parts {
             decoder: self.decoder,
             triangulator: Arc::clone(&shared.triangulator),
@@ -108,7 +106,7 @@ impl Unjoined {
             kind: self.kind,
             sequence: self.sequence,
             indices: self.indices,
-            bytes: bytes + shared.rises.surface().phase.len() * TAUGHT_BYTES,
+            bytes,
             production: production.map_err(|error| error.to_string())?,
             arrived: Mutex::new(None),
         })

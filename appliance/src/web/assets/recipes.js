@@ -122,7 +122,8 @@ function held(good) {
   const words = [good.limit_mm > good.tolerance_mm
     ? `The deviation of ±${good.tolerance_mm.toFixed(2)} mm that is asked for cannot be held: the limit was set to ${limit}. ${expected}. More light, less noise or another pose narrows it.`
     : `${expected}; the limit was set to ${limit}.`];
-  if (good.left_out > 0) words.push(`${(100 * good.left_out).toFixed(2)} % of the surface is seen too faintly or too flatly for that and is not compared: another pose brings it back.`);
+  if (good.weighed > 0) words.push(`${(100 * good.weighed).toFixed(2)} % of the surface is seen so faintly or flatly that a deviation there must be larger to be found, by a factor of ${(1 / good.least_weight).toFixed(1)} at its worst place: another pose or more light lowers it.`);
+  if (good.left_out > 0) words.push(`${(100 * good.left_out).toFixed(2)} % of the surface's pixels are seen too faintly or too flatly for that and are not compared: another pose brings them back.`);
   return words.join(" ");
 }
 

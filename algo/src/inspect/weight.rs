@@ -1,0 +1,101 @@
+//! How much a pixel's deviation counts in the mean over a square.
+
+/// The weight of a pixel, n/256 or 1, as a byte: 0 where it is not compared, 1 where its deviation counts in full, and from 2 on
+/// n, where it counts times n/256.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Weight(u8);
+
+/// Weights are multiples of 1/256; one below 1/16 is 0.
+const UNITS: f64 = 256.0;
+const LEAST: f64 = 16.0;
+/// Binary digits of a weight.
+const BITS: u32 = 8;
+
+impl Weight {
+    /// Not compared.
+    pub const NONE: Self = Self(0);
+    /// Counts in full.
+    pub const FULL: Self = Self(1);
+
+    /// From a byte.
+    pub const fn from_bits(bits: u8) -> Self {
+        Self(bits)
+    }
+
+    /// As a byte.
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+
+    /// The next weight that is not above a share; none below 1/16.
+    pub fn of_share(share: f64) -> Self {
+        match libm::floor(share * UNITS) {
+            units if units >= UNITS => Self::FULL,
+            units if units >= LEAST => Self(units as u8),
+            _ => Self::NONE,
+        }
+    }
+
+    /// Whether the pixel is compared.
+    pub fn compared(self) -> bool {
+        self != Self::NONE
+    }
+
+    /// Whether it counts, but not in full.
+    pub fn partial(self) -> bool {
+        self.0 > 1
+    }
+
+    /// As a number.
+    pub fn share(self) -> f64 {
+        match self.partial() {
+            true => f64::from(self.0) / UNITS,
+            false => f64::from(self.0),
+        }
+    }
+
+    /// A deviation of a compared pixel times the weight, rounded to nearest.
+    pub fn apply(self, nm: i64) -> i64 {
+        match self.partial() {
+            true => (nm * i64::from(self.0) + (1 << (BITS - 1))) >> BITS,
+            false => nm,
+        }
+    }
+}
+
+impl From<bool> for Weight {
+    /// Whether it is compared, and then in full.
+    fn from(compared: bool) -> Self {
+        match compared {
+            true => Self::FULL,
+            false => Self::NONE,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_weight_is_a_share_rounded_down_and_scales_to_nearest() {
+        for (share, bits) in [(0.0, 0), (0.0624, 0), (0.0625, 16), (0.5, 128)] {
+            assert_eq!(Weight::of_share(share).bits(), bits, "{share}");
+        }
+        for (share, bits) in [(0.999, 255), (1.0, 1), (7.0, 1), (f64::NAN, 0)] {
+            assert_eq!(Weight::of_share(share).bits(), bits, "{share}");
+        }
+        for bits in 0..=255 {
+            let weight = Weight::from_bits(bits);
+            assert_eq!(weight.compared(), bits > 0);
+            assert_eq!(weight.partial(), bits > 1);
+            for nm in [-2_000_001, -513, -1, 0, 1, 300, 2_000_001]
+                .into_iter()
+                .filter(|_| bits > 0)
+            {
+                let exact = nm as f64 * weight.share();
+                assert!((weight.apply(nm) as f64 - exact).abs() <= 0.5);
+            }
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! Deviations that count with a weight: production by strips against the comparison of whole maps, still and displaced.
+
+use super::placement::{bed, scenario, taught};
+use super::production::{compare, expected, frames, parts, plan, plan_with};
+use algo::inspect::{Comparison, Golden, Weight};
+use algo::pipeline::HeightMap;
+use algo::units::Height;
+use appliance::head::seam;
+use appliance::recipe::plan::Plan;
+use appliance::recipe::teach::Taught;
+use appliance::recipe::{AlignmentKind, Recipe};
+use hal::frame::Frame;
+use sim::Placement;
+
+/// Where a pixel sees the taught part is interpolated between nodes.
+const BROUGHT_MM: f64 = 5e-5;
+
+/// Gives what is compared weights, in a pattern in which squares of a gauge hold several.
+fn weigh(taught: &mut Taught) {
+    let width = taught.recipe.file.camera.width as usize;
+    let valid = taught.recipe.arrays.valid.iter_mut().enumerate();
+    for (place, valid) in valid.filter(|(_, valid)| **valid != 0) {
+        *valid = [1, 60, 190][(place % width / 23 + place / width / 17) % 3];
+    }
+}
+
+#[test]
+fn strips_weigh_deviations_as_the_comparison_of_whole_maps_does() {
+    for (name, part) in parts() {
+        let mut bed = bed(&scenario(part.clone()));
+        let mut taught = taught(&mut bed).unwrap();
+        weigh(&mut taught);
+        let placement = Placement {
+            shift_mm: [0.2, -0.1, 0.15],
+            ..Placement::default()
+        };
+        bed.stage.place(&part, &placement).unwrap();
+        let full = taught.recipe.file.sequences.len() - 1;
+        let (still, recipe) = plan(&bed, &taught, full);
+        let taken = frames(&mut bed, &still);
+        compare(&format!("{name}, weighed"), &still, &recipe, &taken);
+        let (plan, recipe) = plan_with(&bed, &taught, full, AlignmentKind::Rigid);
+        // On the cone's steep wall a pixel more or less of a weight is micrometres.
+        if name != "cone" {
+            compare_displaced(name, &plan, &recipe, &taken);
+        }
+    }
+}
+
+/// The deviation of a part that was brought back, against maps in which golden is brought to where each pixel sees the part.
+fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]) {
+    let production = plan.production();
+    let views: Vec<_> = frames
+        .iter()
+        .map(|frame| seam::view(frame).unwrap())
+        .collect();
+    let mut strips = production.strips(37);
+    let found = production.inspect(&views, &mut strips, None).unwrap();
+    let motion = found.placed.unwrap().motion;
+    let heights = plan.heights(0, frames).unwrap();
+    let (width, triangulator) = (heights.width, production.triangulator());
+    let arrays = &recipe.arrays;
+    // z less the deviation, and the weight.
+    let brought = |at: usize, z: f64| {
+        let point = triangulator.point(at % width, at / width, Height::from_mm(z))?;
+        let back = motion.undo(point);
+        let (u, v) = triangulator.camera().project(back)?;
+        let place = v.floor() as usize * width + u.floor() as usize;
+        let corners = [place, place + 1, place + width, place + width + 1];
+        if !corners
+            .iter()
+            .all(|&at| arrays.valid.get(at).is_some_and(|&valid| valid != 0))
+        {
+            return None;
+        }
+        let [a, b, c, d] = corners.map(|at| f64::from(arrays.golden_height[at]));
+        let (along, down) = (u.fract(), v.fract());
+        let (upper, lower) = (a + (b - a) * along, c + (d - c) * along);
+        let deviation = back.z - (upper + (lower - upper) * down);
+        let nearest = v.round() as usize * width + u.round() as usize;
+        let weight = Weight::from_bits(arrays.valid[nearest]);
+        Some((Height::from_mm(z - deviation), weight))
+    };
+    let measured = HeightMap {
+        width,
+        height: heights
+            .height_mm
+            .iter()
+            .map(|&mm| Height::from_mm(f64::from(mm)))
+            .collect(),
+        sigma: vec![f32::NAN; heights.height_mm.len()],
+    };
+    let heights = heights.height_mm.iter().map(|&mm| f64::from(mm));
+    let golden = heights.enumerate().map(|(at, z)| {
+        let golden = z.is_finite().then(|| brought(at, z)).flatten();
+        golden.unwrap_or((Height::UNKNOWN, Weight::NONE))
+    });
+    let (height, weight) = golden.unzip();
+    let golden = Golden {
+        width,
+        height,
+        weight,
+    };
+    let unweighed = Golden {
+        weight: vec![Weight::FULL; golden.weight.len()],
+        ..golden.clone()
+    };
+    let gauge = &recipe.gauges[0];
+    let reading = found.readings[0].unwrap().value;
+    let [expected, full] = [golden, unweighed].map(|golden| {
+        let comparison = Comparison::new(&golden, &measured);
+        expected(&comparison, &gauge.measure, &gauge.region).value
+    });
+    println!("{name}: {reading} {expected}, without weights {full}");
+    assert!((reading - expected).abs() < BROUGHT_MM, "{name}");
+    assert!((reading - full).abs() > 10.0 * BROUGHT_MM, "{name}");
+}
