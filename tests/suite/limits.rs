@@ -296,8 +296,9 @@ fn a_dent_where_deviations_count_with_less_weight_is_found_by_them() {
     let heights = weighed.bed.stage.truth().height;
     let places = weighed.places(true, 1000, 11).into_iter();
     let places = places.filter(|&place| weighed.is_weighed(&heights, place));
-    let places: Vec<Vector> = places.take(5).collect();
-    assert_eq!(places.len(), 5);
+    // So few lie wholly where nothing counts in full.
+    let places: Vec<Vector> = places.take(3).collect();
+    assert_eq!(places.len(), 3);
     for place in places {
         let judged = [&mut weighed, &mut without].map(|line| {
             line.dent(true, place);
