@@ -358,14 +358,12 @@ fn every_file_that_the_architecture_names_is_there() {
     for file in named {
         // A file beside the one that was named before it needs only its name.
         let by_name = || {
-            sources("algo/src")
-                .into_iter()
-                .chain(sources("hal/src"))
-                .any(|source| {
-                    Path::new(&source.name)
-                        .file_name()
-                        .is_some_and(|name| name == file)
-                })
+            let all = ["algo/src", "hal/src", "appliance/src"];
+            all.iter().flat_map(|folder| sources(folder)).any(|source| {
+                Path::new(&source.name)
+                    .file_name()
+                    .is_some_and(|name| name == file)
+            })
         };
         let found = bases.iter().any(|base| base.join(file).exists()) || by_name();
         assert!(found, "ARCHITECTURE.md names {file}, which is not there");

@@ -45,20 +45,14 @@ fn small(kind: &str, seed: u64) -> Scenario {
     scenario
 }
 
-/// A taught part: what it is judged by, how much the deviations of its pixels count, and the prediction.
+/// A taught part: what it is judged by, and the prediction.
 struct Line {
     bed: Bed,
     plan: Plan,
-    weights: Vec<u8>,
     predicted: GoodPartsFile,
 }
 
 fn line(scenario: &Scenario) -> Line {
-    line_with(scenario, |weight| weight)
-}
-
-/// A part taught with other weights.
-fn line_with(scenario: &Scenario, change: fn(u8) -> u8) -> Line {
     let mut bed = bed(scenario);
     let naming = Naming {
         number: 1,
@@ -68,7 +62,7 @@ fn line_with(scenario: &Scenario, change: fn(u8) -> u8) -> Line {
         placement_tolerance_mm: 3.0,
     };
     let (head, calibration) = (&mut bed.head, &bed.calibration);
-    let mut taught = teach(head, calibration, &naming, TIMEOUT, &|_, _| ()).unwrap();
+    let taught = teach(head, calibration, &naming, TIMEOUT, &|_, _| ()).unwrap();
     let predicted = taught.recipe.file.good_parts.unwrap();
     let words = predicted.words();
     assert!(
@@ -76,18 +70,12 @@ fn line_with(scenario: &Scenario, change: fn(u8) -> u8) -> Line {
             .iter()
             .all(|line| taught.choice.reasons.contains(line))
     );
-    let weights = &mut taught.recipe.arrays.valid;
-    weights
-        .iter_mut()
-        .for_each(|weight| *weight = change(*weight));
-    let weights = weights.clone();
     let plan = Plan::new(taught.recipe, calibration, true).unwrap();
     let rasters = plan.rasters(calibration).unwrap();
     head.load(rasters).unwrap();
     Line {
         bed,
         plan,
-        weights,
         predicted,
     }
 }
@@ -138,16 +126,6 @@ impl Line {
             false => Part::SheetMetal(SheetMetal { defects }),
         };
         self.bed.stage.place(&part, &Placement::default()).unwrap();
-    }
-
-    /// Whether no pixel that sees a dent counts in full.
-    fn is_weighed(&self, heights: &[f32], middle: Vector) -> bool {
-        let inside = |at: usize| {
-            let point = self.point(heights, at);
-            point.is_some_and(|point| (point - middle).length() < DIAMETER_MM / 2.0)
-        };
-        let seen = (0..heights.len()).filter(|&at| self.weights[at] == 1 && inside(at));
-        seen.count() == 0
     }
 
     /// The point that a pixel sees, where it sees one.
@@ -285,30 +263,6 @@ fn two_hundred_good_parts_of_every_stock_kind_keep_the_limits_that_teaching_sets
 #[test]
 fn a_dent_is_found_wherever_it_is_under_the_limits_that_teaching_sets() {
     are_found(5, 2);
-}
-
-#[test]
-fn a_dent_where_deviations_count_with_less_weight_is_found_by_them() {
-    let mut scenario = scenario("flowerpot", 3);
-    scenario.sub_rays = 2;
-    let mut weighed = line(&scenario);
-    let mut without = line_with(&scenario, |weight| u8::from(weight == 1));
-    let heights = weighed.bed.stage.truth().height;
-    let places = weighed.places(true, 1000, 11).into_iter();
-    let places = places.filter(|&place| weighed.is_weighed(&heights, place));
-    // So few lie wholly where nothing counts in full.
-    let places: Vec<Vector> = places.take(3).collect();
-    assert_eq!(places.len(), 3);
-    for place in places {
-        let judged = [&mut weighed, &mut without].map(|line| {
-            line.dent(true, place);
-            let found = line.judge();
-            (found.verdict(), found.gauges[0].value)
-        });
-        println!("{place:?}: {judged:?}");
-        assert_eq!(judged[0].0, Verdict::Fail, "{place:?}: {judged:?}");
-        assert_eq!(judged[1].0, Verdict::Pass, "{place:?}: {judged:?}");
-    }
 }
 
 #[test]
