@@ -15,8 +15,7 @@
 //!
 //! σ_p of a pixel's deviation (√(golden² + measurement²)), σ_m of what an error of the motion does to it: that moves all
 //! pixels of a square together. Where a limit asks for a lower σ than the square about a pixel has, the pixel's weight is next to
-//! their ratio, else 1: noise there reaches as far as elsewhere, and what stands out of it is still found.
-//!
+//! their ratio, else 1: noise there reaches as far as elsewhere.
 //!
 //! There is a square about each pixel, so neighbours share pixels; along each axis the means
 //! correlate by 1 − k/L at k pixels, L the side. Excursions of such a field above t σ come in clumps, and the clumps are
