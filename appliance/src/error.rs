@@ -2,7 +2,7 @@
 
 use crate::station::error_code;
 pub use hal::bounds::shortened;
-use hal::error::{Device, Error};
+use hal::error::{DeviceKind, Error};
 use std::fmt;
 use std::process::ExitCode;
 
@@ -66,9 +66,9 @@ pub fn code_of(error: &Error) -> u16 {
     match error {
         Error::Timeout { .. } => error_code::TIMEOUT,
         Error::Disconnected { device, .. } => match device {
-            Device::Camera => error_code::CAMERA_LOST,
-            Device::Projector => error_code::PROJECTOR_LOST,
-            Device::Lines => error_code::LINES_LOST,
+            DeviceKind::Camera => error_code::CAMERA_LOST,
+            DeviceKind::Projector => error_code::PROJECTOR_LOST,
+            DeviceKind::Lines => error_code::LINES_LOST,
         },
         Error::Unsupported { .. } => error_code::UNSUPPORTED,
         Error::Protocol { .. } => error_code::PROTOCOL,

@@ -1,6 +1,6 @@
-//! Bounds of what files and requests say: a number within its range, a text of a length.
+//! Bounds of the values in files and requests: ranges of numbers, lengths of texts and lists.
 //!
-//! What is outside is refused by its key before anything is allocated or computed with it.
+//! A value outside its bounds is refused, naming its key, before anything is allocated or computed from it.
 
 use std::fmt::Debug;
 
@@ -10,15 +10,15 @@ pub const MAX_SIDE: u32 = 8192;
 pub const MAX_NOISE_COUNTS: f64 = 65_535.0;
 /// Smallest σ of a sample, counts; rounding to whole counts alone gives 0.29.
 pub const MIN_NOISE_COUNTS: f64 = 1e-6;
-/// Farthest z of a working range, mm: a head measures up to 2 m from its reference plane, whatever a file says.
+/// Farthest z of a working range, mm. More than enough: a head measures up to 2 m from its reference plane.
 pub const MAX_RANGE_MM: f64 = 10_000.0;
-/// Most fringes over a projector: what fixed point holds of a phase, turns.
+/// Most fringes over a projector, turns: the largest phase that the fixed-point format holds.
 pub const MAX_FRINGES: f64 = 1000.0;
 /// Longest exposure, µs.
 pub const MAX_EXPOSURE_US: f64 = 10_000_000.0;
-/// Smallest and largest ratio of a level: eight levels, of which the coarsest spans at most a turn of a pattern of 1000.
+/// Smallest and largest ratio of a level. With up to eight levels, the coarsest spans at most one turn of a pattern of 1000 turns.
 pub const RATIOS: [f64; 2] = [1e-6, 1000.0];
-/// Largest shift of a frame in either direction, turns: a shift counts by its fraction.
+/// Largest shift of a frame in either direction, turns; only its fraction matters.
 pub const MAX_SHIFT_TURNS: f64 = 1000.0;
 /// Farthest that a simulated part is moved along an axis, mm.
 pub const MAX_PLACEMENT_MM: f64 = 1000.0;
@@ -26,17 +26,17 @@ pub const MAX_PLACEMENT_MM: f64 = 1000.0;
 pub const MAX_TILT_DEG: f64 = 80.0;
 /// Farthest that a simulated part is turned about z, degrees.
 pub const MAX_ROTATION_DEG: f64 = 360.0;
-/// Digits of a fingerprint.
+/// Hexadecimal digits of a fingerprint (SHA-256).
 pub const FINGERPRINT_DIGITS: usize = 64;
-/// Characters of a message about a file.
+/// Most characters of a message about a file.
 const LONGEST_MESSAGE: usize = 600;
-/// Characters of a text that a message repeats.
+/// Most characters of a value that a message quotes.
 const REPEATED: usize = 48;
 
 /// Checks that a value lies in `low` to `high`; a NaN does not.
 ///
 /// # Errors
-/// In words that name the key, the value and the bounds.
+/// A message that names the key, the value and the bounds.
 pub fn within<T: PartialOrd + Debug + Copy>(
     key: &str,
     value: T,
@@ -46,14 +46,14 @@ pub fn within<T: PartialOrd + Debug + Copy>(
     if (low..=high).contains(&value) {
         return Ok(());
     }
-    // As it is written in files: 1e300 has few digits then.
+    // Debug format: 1e300 is written as it would be in a file, not with 301 digits.
     Err(format!("{key} is {value:?}: write {low:?} to {high:?}"))
 }
 
-/// Checks that a text has at most `most` characters and none that controls a terminal.
+/// Checks that a text has at most `most` characters and no control characters.
 ///
 /// # Errors
-/// In words that name the key.
+/// A message that names the key.
 pub fn text(key: &str, value: &str, most: usize) -> Result<(), String> {
     let length = value.chars().count();
     if length > most {
@@ -73,7 +73,7 @@ pub fn text(key: &str, value: &str, most: usize) -> Result<(), String> {
 /// Checks that a list has `low` to `high` members.
 ///
 /// # Errors
-/// In words that name the key.
+/// A message that names the key.
 pub fn length(key: &str, count: usize, low: usize, high: usize) -> Result<(), String> {
     match (low..=high).contains(&count) {
         true => Ok(()),
@@ -84,7 +84,7 @@ pub fn length(key: &str, count: usize, low: usize, high: usize) -> Result<(), St
 /// Checks that a text is a SHA-256 in hexadecimal digits.
 ///
 /// # Errors
-/// In words that name the key.
+/// A message that names the key.
 pub fn fingerprint(key: &str, value: &str) -> Result<(), String> {
     let digits = value.bytes().all(|byte| byte.is_ascii_hexdigit());
     match digits && value.len() == FINGERPRINT_DIGITS {
@@ -96,8 +96,8 @@ pub fn fingerprint(key: &str, value: &str) -> Result<(), String> {
     }
 }
 
-/// A message without the middle of what is too long to be read: a library may repeat a whole megabyte of a file. The place in
-/// the file stands at its beginning or its end.
+/// Shortens a message that is too long to be read by leaving out its middle: a parser may quote a whole megabyte of a file. The
+/// position in the file is at the beginning or the end of such messages.
 #[must_use]
 pub fn shortened(words: &str) -> String {
     let length = words.chars().count();
@@ -109,7 +109,7 @@ pub fn shortened(words: &str) -> String {
     format!("{beginning}…{end}")
 }
 
-/// The beginning of a text, for messages.
+/// The beginning of a value, for messages.
 #[must_use]
 pub fn clipped(value: &str) -> String {
     match value.char_indices().nth(REPEATED) {

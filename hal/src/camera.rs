@@ -1,4 +1,4 @@
-//! The camera of a head: what every back-end offers.
+//! The camera of a head: the trait that every back-end implements.
 
 use std::time::Duration;
 
@@ -14,44 +14,44 @@ pub enum Starts {
     ByItself,
 }
 
-/// How a running camera takes its frames. Nothing of it changes between start and stop.
+/// How a running camera takes its frames. Nothing changes between start and stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraTiming {
     /// Who starts an exposure.
     pub starts: Starts,
-    /// How long one lasts; the same for all rows.
+    /// How long an exposure lasts; all rows are exposed at the same time.
     pub exposure: Duration,
-    /// From the start of one exposure to the start of the next: the shortest time if it is triggered, the time if it runs by itself.
+    /// From the start of one exposure to the start of the next: the shortest possible time of a triggered camera, the fixed time of one that runs by itself.
     pub period: Duration,
-    /// From the end of an exposure until its frame can be fetched when nothing is late.
+    /// From the end of an exposure until its frame can be fetched, without any delay.
     pub delivery: Duration,
 }
 
-/// How samples come over the wire.
+/// How samples are encoded on their way from the sensor.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Encoding {
-    /// The driver's word, as "R16" or "MONO_PISP_COMP1".
+    /// The driver's name of the encoding, such as "R16" or "MONO_PISP_COMP1".
     pub name: String,
-    /// Whether samples are what the sensor counted. Compressed ones are not, and no phase can be trusted that is made of them.
+    /// Whether samples are the sensor's counts. Compressed samples are not, and a phase computed from them cannot be trusted.
     pub exact: bool,
 }
 
 /// A camera that stamps and counts its frames.
 ///
-/// A frame carries the camera's own count (a gap means a frame that was lost) and the sensor's time on the head's
-/// clock. What moment of the exposure that time marks is known by calibration ([`crate::head::Stamp`]). Frames
-/// may come late, twice or in another order: nobody relies on the order of arrival.
+/// A frame carries the camera's own count (a gap means that a frame was lost) and the sensor's time stamp on the head's
+/// clock. Which moment of the exposure the stamp marks is measured by calibration ([`crate::head::Stamp`]). Frames
+/// may arrive late, twice or in another order; users must not rely on the order of arrival.
 pub trait Camera: Send {
     /// The format that every frame will have.
     fn format(&self) -> FrameFormat;
 
-    /// How samples come over the wire.
+    /// How samples are encoded on their way from the sensor.
     fn encoding(&self) -> Encoding;
 
-    /// How it takes its frames.
+    /// How the camera takes its frames.
     fn timing(&self) -> CameraTiming;
 
-    /// Asks whether the camera is still there, without disturbing it. A back-end whose driver cannot say answers that it is.
+    /// Checks that the camera is still connected, without disturbing it. A back-end whose driver cannot tell returns `Ok`.
     ///
     /// # Errors
     /// `Disconnected` if it is gone.
@@ -59,22 +59,22 @@ pub trait Camera: Send {
         Ok(())
     }
 
-    /// Arms the camera; triggers before this expose nothing.
+    /// Starts the camera; triggers before this expose nothing.
     ///
     /// # Errors
-    /// `Protocol` if it is armed already.
+    /// `Protocol` if it is running already.
     fn start(&mut self) -> Result<(), Error>;
 
-    /// The next frame that is there. Does not wait: [`crate::clock::Clock::wait`] does.
+    /// The next frame that has arrived, if any. Does not wait; [`crate::clock::Clock::wait`] does.
     ///
     /// # Errors
-    /// `Protocol` if the camera is not armed; `Disconnected` if it is gone.
+    /// `Protocol` if the camera is not running; `Disconnected` if it is gone.
     fn poll_frame(&mut self) -> Result<Option<Frame>, Error>;
 
-    /// Disarms the camera and forgets frames that were not fetched. Stopping a stopped camera is fine.
+    /// Stops the camera and discards frames that were not fetched. Stopping a stopped camera does nothing.
     ///
     /// # Errors
-    /// What the device says.
+    /// The device's error.
     fn stop(&mut self) -> Result<(), Error>;
 }
 

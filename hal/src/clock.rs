@@ -1,4 +1,4 @@
-//! The clock of a head: what time it is for all its devices, and how to wait for them.
+//! The clock of a head: the time that all its devices share, and waiting for them.
 
 use std::os::fd::OwnedFd;
 use std::time::Duration;
@@ -13,10 +13,10 @@ pub trait Clock: Send {
     /// Now.
     fn now(&self) -> Timestamp;
 
-    /// Waits until `until`, or less if a flip or a frame has come meanwhile; it may also return early for nothing.
+    /// Waits until `until`, or until a flip or a frame arrives; it may also return early without a reason.
     fn wait(&mut self, until: Timestamp);
 
-    /// Whether time passes only in [`Clock::wait`], as in a simulation. Then nobody is late by working between two waits.
+    /// Whether time passes only in [`Clock::wait`], as in a simulation. Work between two waits then takes no time on this clock.
     fn stands_still(&self) -> bool {
         false
     }
@@ -38,8 +38,8 @@ impl<K: Clock + ?Sized> Clock for Box<K> {
 
 /// The clock of real devices: `CLOCK_MONOTONIC`, waiting for any of their descriptors.
 ///
-/// A descriptor is readable as long as its device has a flip or a frame that was not fetched, or an error to tell. It may be a
-/// duplicate (`BorrowedFd::try_clone_to_owned`): the device keeps its own.
+/// A descriptor must be readable as long as its device has a flip, a frame or an error that was not fetched. It may be a
+/// duplicate (`BorrowedFd::try_clone_to_owned`); the device keeps its own.
 #[derive(Debug, Default)]
 pub struct Monotonic {
     devices: Vec<OwnedFd>,
@@ -68,7 +68,7 @@ impl Clock for Monotonic {
             .iter()
             .map(|device| PollFd::new(device, PollFlags::IN))
             .collect();
-        // A signal ends it early, as the promise allows; nothing else can fail with descriptors that are ours.
+        // A signal ends the wait early, which the trait allows; nothing else can fail with descriptors that we own.
         let _ = poll(&mut waiting, Some(&timespec(left)));
         let hung_up: Vec<bool> = waiting
             .iter()
@@ -77,7 +77,7 @@ impl Clock for Monotonic {
                 !came.is_empty() && !came.contains(PollFlags::IN)
             })
             .collect();
-        // A device that is gone ends one wait: then it says so itself, and no later wait spins on it.
+        // A device that is gone ends one wait, so that its error is noticed. It is removed here, or every later wait would return at once.
         let mut hung_up = hung_up.into_iter();
         self.devices.retain(|_| hung_up.next() != Some(true));
     }
@@ -87,7 +87,7 @@ impl Clock for Monotonic {
 #[must_use]
 pub fn monotonic() -> Timestamp {
     let now = clock_gettime(ClockId::Monotonic);
-    // It starts at 0 with the system and never goes back.
+    // The clock starts at 0 when the system boots and never goes back, so neither conversion fails.
     let seconds = u64::try_from(now.tv_sec).unwrap_or(0);
     let nanoseconds = u64::try_from(now.tv_nsec).unwrap_or(0);
     Timestamp(
@@ -97,7 +97,7 @@ pub fn monotonic() -> Timestamp {
     )
 }
 
-/// A span as the kernel takes it.
+/// A duration in the kernel's form.
 pub(crate) fn timespec(span: Duration) -> Timespec {
     Timespec {
         tv_sec: i64::try_from(span.as_secs()).unwrap_or(i64::MAX),
@@ -113,9 +113,9 @@ mod tests {
     use rustix::pipe::pipe;
     use std::time::Instant;
 
-    /// A wait that nothing ends.
+    /// Longer than any wait in these tests lasts.
     const LONG: Duration = Duration::from_secs(60);
-    /// Far less than that, on a computer that does much else.
+    /// Far less than `LONG`, but enough on a busy computer.
     const SOON: Duration = Duration::from_secs(10);
 
     #[test]

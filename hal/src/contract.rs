@@ -1,6 +1,6 @@
-//! The promises that every head keeps, as checks that each back-end's tests run.
+//! The promises that every head keeps, as checks that the tests of each back-end run.
 //!
-//! The checks use nothing but the traits, so a new back-end is tested by one call.
+//! The checks use only the traits, so a new back-end is tested by one call.
 
 use std::fmt::Display;
 use std::time::{Duration, Instant};
@@ -16,9 +16,9 @@ use crate::units::Timestamp;
 
 /// Long enough for any device that works.
 const PATIENT: Duration = Duration::from_secs(5);
-/// What a call may take that waits for nothing, on a computer that does much else.
+/// Longest time of a call that does not wait, on a busy computer.
 const SLACK: Duration = Duration::from_secs(2);
-/// A head is used all day.
+/// Repetitions of starts and of sequences: a head is used all day.
 const RESTARTS: usize = 20;
 
 /// A promise that was not kept.
@@ -42,7 +42,7 @@ fn must<T>(promise: &'static str, result: Result<T, Error>) -> Result<T, Violati
     result.map_err(|error| violated(promise, error))
 }
 
-/// What `call` answers, which waits for nothing.
+/// The result of `call`, which must return without waiting.
 fn prompt<T>(call: impl FnOnce() -> T) -> Result<T, Violation> {
     let begun = Instant::now();
     let answer = call();
@@ -55,7 +55,7 @@ fn prompt<T>(call: impl FnOnce() -> T) -> Result<T, Violation> {
     Ok(answer)
 }
 
-/// `call` fails with an error of `kind`, and at once.
+/// Checks that `call` fails with an error of `kind`, without waiting.
 fn must_fail<T>(
     promise: &'static str,
     kind: ErrorKind,
@@ -188,18 +188,18 @@ pub fn check_projector(
             ));
         }
         if let Some(last) = last {
-            if flip.timestamp <= last.timestamp || flip.sequence <= last.sequence {
+            if flip.timestamp <= last.timestamp || flip.count <= last.count {
                 return Err(violated(
                     "flips have increasing times and counts",
                     format!("{last:?}, then {flip:?}"),
                 ));
             }
-            let steps = u32::try_from(flip.sequence - last.sequence).unwrap_or(u32::MAX);
-            let (by_time, by_count) = (flip.timestamp.since(last.timestamp), refresh * steps);
+            let counts = u32::try_from(flip.count - last.count).unwrap_or(u32::MAX);
+            let (by_time, by_count) = (flip.timestamp.since(last.timestamp), refresh * counts);
             if by_time.abs_diff(by_count) > refresh / 4 {
                 return Err(violated(
                     "a flip's count is the count of refreshes",
-                    format!("{steps} counts in {by_time:?} at a period of {refresh:?}"),
+                    format!("{counts} counts in {by_time:?} at a period of {refresh:?}"),
                 ));
             }
         }
@@ -253,15 +253,15 @@ pub fn check_trigger(trigger: &mut impl Trigger, clock: &mut impl Clock) -> Resu
         last = fired;
         clock.wait(clock.now() + Duration::from_millis(1));
     }
-    let mut told = begun;
+    let mut earliest = begun;
     while let Some(spoiled) = prompt(|| trigger.poll_spoiled())? {
-        if spoiled.fired < told || spoiled.fired > last {
+        if spoiled.fired < earliest || spoiled.fired > last {
             return Err(violated(
-                "a trigger tells of pulses that it fired, in order and once",
-                format!("{spoiled:?} after {told}, the last one fired at {last}"),
+                "a trigger reports spoiled pulses that it fired, in order and once",
+                format!("{spoiled:?} after {earliest}, the last one fired at {last}"),
             ));
         }
-        told = spoiled.fired + Duration::from_nanos(1);
+        earliest = spoiled.fired + Duration::from_nanos(1);
     }
     Ok(())
 }
@@ -273,7 +273,7 @@ pub fn check_trigger(trigger: &mut impl Trigger, clock: &mut impl Clock) -> Resu
 pub fn check_clock(clock: &mut impl Clock) -> Result<(), Violation> {
     for ms in [0, 1, 20] {
         let (begun, until) = (clock.now(), clock.now() + Duration::from_millis(ms));
-        // It may return early for nothing, but not for ever.
+        // A wait may return early without a reason, but not for ever.
         for _ in 0..1000 {
             clock.wait(until);
         }
@@ -334,15 +334,15 @@ pub fn check_head<C: Camera, P: Projector, T: Trigger, K: Clock>(
                 ));
             }
             if let Some(last) = &last
-                && (frame.timestamp() <= last.timestamp() || frame.sequence() <= last.sequence())
+                && (frame.timestamp() <= last.timestamp() || frame.count() <= last.count())
             {
                 return Err(violated(
-                    "timestamps and sequence numbers of frames increase",
+                    "timestamps and counts of frames increase",
                     format!(
                         "frame {} at {}, then {} at {}",
-                        last.sequence(),
+                        last.count(),
                         last.timestamp(),
-                        frame.sequence(),
+                        frame.count(),
                         frame.timestamp()
                     ),
                 ));
@@ -373,10 +373,10 @@ pub fn check_head<C: Camera, P: Projector, T: Trigger, K: Clock>(
 
 /// A checksum of a frame's samples (FNV-1a).
 fn digest(frame: &Frame) -> u64 {
-    let step = |hash: u64, sample: u64| (hash ^ sample).wrapping_mul(0x0100_0000_01b3);
+    let mix = |hash: u64, sample: u64| (hash ^ sample).wrapping_mul(0x0100_0000_01b3);
     let start = 0xcbf2_9ce4_8422_2325;
     match frame.samples() {
-        Samples::Eight(samples) => samples.iter().fold(start, |h, s| step(h, u64::from(*s))),
-        Samples::Sixteen(samples) => samples.iter().fold(start, |h, s| step(h, u64::from(*s))),
+        Samples::Eight(samples) => samples.iter().fold(start, |h, s| mix(h, u64::from(*s))),
+        Samples::Sixteen(samples) => samples.iter().fold(start, |h, s| mix(h, u64::from(*s))),
     }
 }

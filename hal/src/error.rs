@@ -1,4 +1,4 @@
-//! What can go wrong with a device, and of which kind it is.
+//! Errors of devices and their kinds.
 
 use std::time::Duration;
 
@@ -11,23 +11,23 @@ pub enum ErrorKind {
     Disconnected,
     /// The device cannot do what was asked, now or later; the request has to change.
     Unsupported,
-    /// The call does not fit what was called before or what the device answered.
+    /// The call is out of order, or the device gave an answer that does not fit.
     Protocol,
 }
 
-/// A device that can be pulled out.
+/// A kind of device that can be disconnected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Device {
+pub enum DeviceKind {
     /// The camera.
     Camera,
     /// The projector.
     Projector,
-    /// The chip of the trigger line and of the lines to whoever starts a cycle.
+    /// The GPIO chip of the trigger line, and of the lines to a press or another machine.
     Lines,
 }
 
-impl Device {
-    /// The word for it.
+impl DeviceKind {
+    /// Its name in messages.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -41,7 +41,7 @@ impl Device {
 /// A failed call of a device. The message says what was attempted, with what numbers, and the remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
-    /// Nothing came within the time given.
+    /// There was no answer within the time given.
     #[error("{attempt} did not finish within {} ms: {remedy}", timeout.as_secs_f64() * 1e3)]
     Timeout {
         /// What was attempted, with its numbers.
@@ -54,8 +54,8 @@ pub enum Error {
     /// The device is gone.
     #[error("{attempt} failed because the {} is gone: {remedy}", device.word())]
     Disconnected {
-        /// Which.
-        device: Device,
+        /// Which device.
+        device: DeviceKind,
         /// What was attempted, with its numbers.
         attempt: String,
         /// What to do about it.
@@ -69,7 +69,7 @@ pub enum Error {
         /// What to do about it.
         remedy: String,
     },
-    /// The call is out of order, or the answer was.
+    /// The call is out of order, or the device's answer is.
     #[error("{attempt} is out of order: {remedy}")]
     Protocol {
         /// What was attempted, with its numbers.
@@ -104,8 +104,8 @@ impl Error {
         }
     }
 
-    /// `device` is gone, which `attempt` needs.
-    pub fn disconnected(device: Device, attempt: impl Into<String>) -> Self {
+    /// `attempt` failed because `device` is gone.
+    pub fn disconnected(device: DeviceKind, attempt: impl Into<String>) -> Self {
         Self::Disconnected {
             device,
             attempt: attempt.into(),
@@ -121,7 +121,7 @@ impl Error {
         }
     }
 
-    /// `attempt` does not fit what was called before.
+    /// `attempt` is out of order.
     pub fn protocol(attempt: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::Protocol {
             attempt: attempt.into(),

@@ -1,4 +1,4 @@
-//! One camera image: its format, its samples, when it was exposed, and the buffers it lives in.
+//! One camera image: its format, its samples, its time stamp, and the memory of the samples.
 
 use std::sync::Arc;
 
@@ -89,7 +89,7 @@ impl Pixels {
     }
 }
 
-/// Samples in memory that belongs to a camera, lent until the last frame in them is dropped.
+/// Samples in memory that belongs to a camera; it is lent until the last clone of the frame is dropped.
 pub trait Lent: std::fmt::Debug + Send + Sync {
     /// The samples; the same at every call.
     fn samples(&self) -> Samples<'_>;
@@ -101,17 +101,17 @@ enum Memory {
     Lent(Arc<dyn Lent>),
 }
 
-/// One camera image. Cloning shares the samples; a frame may be kept while others arrive.
+/// One camera image. Clones share the samples; a frame may be kept while others arrive.
 #[derive(Clone, Debug)]
 pub struct Frame {
     format: FrameFormat,
     memory: Memory,
     timestamp: Timestamp,
-    sequence: u64,
+    count: u64,
 }
 
 impl Frame {
-    /// A frame of `format` whose exposure started at `timestamp`, the `sequence`-th of its camera.
+    /// A frame of `format` whose exposure started at `timestamp`, the `count`-th of its camera.
     ///
     /// # Errors
     /// `Unsupported` if the format has no pixels, a stride below its width or a depth outside 8…16, or if
@@ -120,13 +120,13 @@ impl Frame {
         format: FrameFormat,
         pixels: Arc<Pixels>,
         timestamp: Timestamp,
-        sequence: u64,
+        count: u64,
     ) -> Result<Self, Error> {
         let fits = pixels.fits(&format);
-        Self::of(format, fits, Memory::Own(pixels), timestamp, sequence)
+        Self::of(format, fits, Memory::Own(pixels), timestamp, count)
     }
 
-    /// As [`Frame::new`], in memory that a camera lends and gets back with the last clone of this frame.
+    /// As [`Frame::new`], in memory that a camera lends and gets back when the last clone of this frame is dropped.
     ///
     /// # Errors
     /// As [`Frame::new`].
@@ -134,13 +134,13 @@ impl Frame {
         format: FrameFormat,
         lent: Arc<dyn Lent>,
         timestamp: Timestamp,
-        sequence: u64,
+        count: u64,
     ) -> Result<Self, Error> {
         let fits = match lent.samples() {
             Samples::Eight(samples) => format.bit_depth == 8 && samples.len() == format.samples(),
             Samples::Sixteen(samples) => format.bit_depth != 8 && samples.len() == format.samples(),
         };
-        Self::of(format, fits, Memory::Lent(lent), timestamp, sequence)
+        Self::of(format, fits, Memory::Lent(lent), timestamp, count)
     }
 
     fn of(
@@ -148,7 +148,7 @@ impl Frame {
         fits: bool,
         memory: Memory,
         timestamp: Timestamp,
-        sequence: u64,
+        count: u64,
     ) -> Result<Self, Error> {
         let sane = format.width > 0
             && format.height > 0
@@ -168,7 +168,7 @@ impl Frame {
             format,
             memory,
             timestamp,
-            sequence,
+            count,
         })
     }
 
@@ -198,25 +198,25 @@ impl Frame {
 
     /// The camera's own count of frames; a gap means a lost frame.
     #[must_use]
-    pub fn sequence(&self) -> u64 {
-        self.sequence
+    pub fn count(&self) -> u64 {
+        self.count
     }
 
-    /// The same samples under another time and count; how a recorded frame is played again.
+    /// The same samples with another time and count, as needed to replay a recorded frame.
     #[must_use]
-    pub fn restamped(&self, timestamp: Timestamp, sequence: u64) -> Self {
+    pub fn restamped(&self, timestamp: Timestamp, count: u64) -> Self {
         Self {
             format: self.format,
             memory: self.memory.clone(),
             timestamp,
-            sequence,
+            count,
         }
     }
 }
 
-/// Buffers that are used again once nobody keeps a frame in them.
+/// Buffers that are used again when no frame refers to them any more.
 ///
-/// In a steady state (as many frames kept at a time as ever before) taking a buffer allocates nothing.
+/// As long as no more frames are kept at a time than before, taking a buffer allocates nothing.
 #[derive(Debug)]
 pub struct Pool {
     format: FrameFormat,
@@ -235,14 +235,14 @@ impl Pool {
         }
     }
 
-    /// Fills a free buffer with `write` and makes a frame of it. What the buffer holds before is not defined.
+    /// Fills a free buffer with `write` and makes a frame of it. The buffer's content before that is undefined.
     ///
     /// # Errors
-    /// As [`Frame::new`], if the pool's format is not sane.
+    /// As [`Frame::new`], if the pool's format is invalid.
     pub fn frame(
         &mut self,
         timestamp: Timestamp,
-        sequence: u64,
+        count: u64,
         write: impl FnOnce(&mut Pixels),
     ) -> Result<Frame, Error> {
         let free = self
@@ -253,7 +253,7 @@ impl Pool {
             && let Some(pixels) = Arc::get_mut(buffer)
         {
             write(pixels);
-            return Frame::new(self.format, Arc::clone(buffer), timestamp, sequence);
+            return Frame::new(self.format, Arc::clone(buffer), timestamp, count);
         }
         let mut pixels = Pixels::zeroed(&self.format);
         write(&mut pixels);
@@ -261,7 +261,7 @@ impl Pool {
         if self.buffers.len() < self.limit {
             self.buffers.push(Arc::clone(&buffer));
         }
-        Frame::new(self.format, buffer, timestamp, sequence)
+        Frame::new(self.format, buffer, timestamp, count)
     }
 
     /// Buffers the pool remembers, free or in use.

@@ -1,8 +1,7 @@
-//! Devices: traits, their one generic user, real back-ends behind features, and one that replays recordings.
+//! Devices of a measuring head: traits, the acquisition that uses them, real back-ends behind features, and a replay back-end.
 //!
 //! This crate knows cameras, projectors and triggers. It knows nothing of phase: a pattern is a
-//! grey raster, a frame is an array of counts, and what the two have to do with each other is for the
-//! crate that decodes them.
+//! grey raster and a frame is an array of counts. How the two are related is known to the crate that decodes them.
 
 pub mod bounds;
 pub mod camera;
@@ -15,6 +14,7 @@ pub mod gpio;
 pub mod head;
 #[cfg(feature = "kms")]
 pub mod kms;
+mod latest;
 #[cfg(any(test, feature = "libcamera"))]
 pub mod libcamera;
 pub mod lines;

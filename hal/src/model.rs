@@ -1,12 +1,12 @@
 //! The geometry of a device as files state it: pinhole and Brown distortion in OpenCV's convention.
 //!
 //! X_device = R · X_world + t in mm, pixel centres at integer coordinates, x right, y down, z forward.
-//! A projector is a camera run backwards. Whether the numbers make a usable camera is for the crate that
-//! measures with them; here they are only carried, and refused when they are no numbers.
+//! A projector has the model of a camera; light only goes the other way. Here the numbers are only stored, and refused if
+//! they are not finite; the crate that measures with them checks whether they describe a usable camera.
 
 use serde::{Deserialize, Serialize};
 
-/// `MODEL` of recording format 1 (see the project's formats).
+/// `MODEL` of recording format 1 (docs/formats.md).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DeviceModel {

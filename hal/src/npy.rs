@@ -1,8 +1,8 @@
-//! NumPy arrays of two dimensions in `.npy` files, read and written.
+//! Reading and writing two-dimensional NumPy arrays in `.npy` files.
 //!
-//! Format: NumPy enhancement proposal 1 (versions 1.0, 2.0 and 3.0 of the header). Read here by hand, because
-//! what arrives in a recording or a recipe may be broken on purpose: the header is bounded and matched against
-//! the one grammar NumPy writes, and nothing is allocated before the file's length is known to fit the shape.
+//! Format: NumPy enhancement proposal 1 (versions 1.0, 2.0 and 3.0 of the header). The parser is written here because
+//! files in a recording or a recipe may be malformed on purpose: the header's length is bounded, it must have
+//! the form that NumPy writes, and nothing is allocated before the file's length is known to fit the shape.
 
 /// Rows and columns, then the elements row by row.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,7 +15,7 @@ pub struct Array<T> {
     pub elements: Vec<T>,
 }
 
-/// Bytes that are no array of the wanted kind.
+/// An array that cannot be read, or is not of the expected kind.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{problem}: {remedy}")]
 pub struct NpyError {
@@ -25,11 +25,11 @@ pub struct NpyError {
     pub remedy: &'static str,
 }
 
-/// A type of element that files hold, little-endian.
+/// A type of array element, stored little-endian.
 pub trait Element: Copy {
     /// NumPy's name of the type that is written.
     const KIND: &'static str;
-    /// Reads all elements of a file of type `kind`; `None` if that type is not this one.
+    /// Reads all elements of a file of type `kind`; `None` if this type cannot hold them.
     fn read(kind: &str, bytes: &[u8]) -> Option<Vec<Self>>;
     /// Appends the element's bytes.
     fn write(self, bytes: &mut Vec<u8>);
@@ -78,7 +78,7 @@ impl Element for f64 {
 const MAGIC: &[u8] = b"\x93NUMPY";
 /// NumPy aligns the start of the elements to this many bytes.
 const ALIGNMENT: usize = 64;
-/// NumPy's headers of plain arrays are below 128 bytes; anything far longer is not one.
+/// Longest header that is read. NumPy's headers of plain arrays are shorter than 128 bytes.
 const MAX_HEADER: usize = 4096;
 
 struct Header<'a> {
@@ -91,7 +91,7 @@ struct Header<'a> {
 /// Reads an array.
 ///
 /// # Errors
-/// If the bytes are no two-dimensional row-major array of this type of element, or end early.
+/// If the bytes are not a two-dimensional row-major array of this type of element, or are cut off.
 pub fn read<T: Element>(bytes: &[u8]) -> Result<Array<T>, NpyError> {
     let Header {
         kind,
@@ -127,15 +127,14 @@ pub fn read<T: Element>(bytes: &[u8]) -> Result<Array<T>, NpyError> {
     })
 }
 
-/// The bytes of a version 1.0 file with rows of `columns` elements; elements beyond the last whole row are left
-/// out.
+/// The bytes of a version 1.0 file with rows of `columns` elements; an incomplete last row is left out.
 pub fn write<T: Element>(columns: usize, elements: &[T]) -> Vec<u8> {
     let rows = elements.len() / columns.max(1);
     let kind = T::KIND;
     let mut text =
         format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
     let preamble = MAGIC.len() + 4;
-    // The header ends in a newline and is padded in front of it.
+    // The header ends with a newline, and is padded with spaces before it.
     let padded = (preamble + text.len() + 1).next_multiple_of(ALIGNMENT) - preamble;
     while text.len() + 1 < padded {
         text.push(' ');

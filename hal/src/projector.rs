@@ -1,11 +1,11 @@
-//! The projector of a head: load patterns, then show number n.
+//! The projector of a head: patterns are loaded, then shown by their index.
 
 use std::time::Duration;
 
 use crate::error::Error;
 use crate::units::Timestamp;
 
-/// A grey picture for the projector, row by row, 0 black … 255 white.
+/// A grey picture for the projector, row by row, 0 (black) to 255 (white).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Raster {
     width: u32,
@@ -63,19 +63,19 @@ impl Raster {
     }
 }
 
-/// The refresh at which a pattern was taken up.
+/// The refresh with which the projector changed to a queued pattern.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Flip {
-    /// When that refresh began. The pattern's light is there a while later, by the head's [`crate::head::Timing::flip_to_light`].
+    /// When that refresh began. The pattern's light follows after the head's [`crate::head::Timing::flip_to_light`].
     pub timestamp: Timestamp,
-    /// The projector's own count of refreshes; a step above the planned one means a missed refresh.
-    pub sequence: u64,
+    /// The projector's own count of refreshes; a larger increase than planned means missed refreshes.
+    pub count: u64,
 }
 
 /// A projector that holds patterns and shows one of them at a time.
 ///
-/// A flip is queued without waiting and comes with the next refresh; its time and count follow when it has come. At most
-/// one flip waits at a time.
+/// A flip is queued without waiting and happens with the next refresh; its time and count are reported afterwards. At most
+/// one flip can be queued at a time.
 pub trait Projector: Send {
     /// Columns and rows.
     fn size(&self) -> (u32, u32);
@@ -83,7 +83,7 @@ pub trait Projector: Send {
     /// Time from one refresh to the next.
     fn refresh(&self) -> Duration;
 
-    /// Asks whether the projector is still there, without disturbing it. A back-end whose driver cannot say answers that it is.
+    /// Checks that the projector is still connected, without disturbing it. A back-end whose driver cannot tell returns `Ok`.
     ///
     /// # Errors
     /// `Disconnected` if it is gone.
@@ -100,19 +100,19 @@ pub trait Projector: Send {
     /// Queues pattern `index` for the next refresh and returns at once.
     ///
     /// # Errors
-    /// `Protocol` if no such pattern is loaded or another one still waits for its refresh.
+    /// `Protocol` if no such pattern is loaded or another one is still queued.
     fn queue(&mut self, index: usize) -> Result<(), Error>;
 
-    /// The flip that has come since the last call: one for each queued pattern. Does not wait.
+    /// The flip that has happened since the last call, if any; there is one for each queued pattern. Does not wait.
     ///
     /// # Errors
     /// `Disconnected` if the projector is gone.
     fn poll_flip(&mut self) -> Result<Option<Flip>, Error>;
 
-    /// Shows nothing; a flip that still waits is forgotten and never reported.
+    /// Shows black; a flip that is still queued is discarded and never reported.
     ///
     /// # Errors
-    /// What the device says.
+    /// The device's error.
     fn blank(&mut self) -> Result<(), Error>;
 }
 
@@ -146,10 +146,10 @@ impl<P: Projector + ?Sized> Projector for Box<P> {
     }
 }
 
-/// Checks that a projector of this size (width, height) can show all of these.
+/// Checks that all rasters have the projector's size (width, height).
 ///
 /// # Errors
-/// Naming the first that it cannot.
+/// `Unsupported`, naming the first raster of another size.
 pub(crate) fn all_of_size(rasters: &[Raster], (width, height): (u32, u32)) -> Result<(), Error> {
     let wrong = |raster: &&Raster| (raster.width(), raster.height()) != (width, height);
     let Some((index, raster)) = rasters.iter().enumerate().find(|(_, raster)| wrong(raster)) else {

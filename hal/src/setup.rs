@@ -1,7 +1,7 @@
-//! What a head of real devices is made of, by name: which camera, which projector, which lines.
+//! Settings of a head of real devices: which camera, which projector, which lines.
 //!
 //! Each back-end opens its device from one of these: `libcamera` from [`CameraSetup`], `kms` from [`ProjectorSetup`], `gpio` from
-//! [`TriggerSetup`] and [`LinesSetup`]. They are plain values, known in every build, so that a configuration can be read and
+//! [`TriggerSetup`] and [`LinesSetup`]. They exist in every build, whatever its features, so that a configuration can be read and
 //! checked on a computer that has none of the devices.
 
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// Which camera, and how it exposes. Nothing of it changes while it runs.
+/// Which camera, and how it exposes. Nothing changes while it runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CameraSetup {
@@ -21,11 +21,11 @@ pub struct CameraSetup {
     pub height: Option<u32>,
     /// Exposure, µs: whole refreshes of the projector.
     pub exposure_us: u32,
-    /// From the start of one exposure to the start of the next, µs: the shortest time if it is triggered, the time if it runs by itself.
+    /// From the start of one exposure to the start of the next, µs: the shortest possible time of a triggered camera, the fixed time of one that runs by itself.
     pub period_us: u32,
     /// Gain, 1 = none.
     pub gain: f64,
-    /// From the end of an exposure until its frame can be fetched when nothing is late, µs.
+    /// From the end of an exposure until its frame can be fetched, without any delay, µs.
     pub delivery_us: u32,
     /// Whether the luminance of a YUV format will do where the camera offers no raw one.
     pub luma: bool,
@@ -51,9 +51,9 @@ impl Default for CameraSetup {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ProjectorSetup {
-    /// The card's device file, as "/dev/dri/card1"; none = the only one with a connector that fits.
+    /// The card's device file, such as "/dev/dri/card1"; none = the only one with a connector that fits.
     pub card: Option<PathBuf>,
-    /// The kernel's name of the connector, as "HDMI-A-1" or "DPI-1"; none = the only one that is connected.
+    /// The kernel's name of the connector, such as "HDMI-A-1" or "DPI-1"; none = the only one that is connected.
     pub connector: Option<String>,
     /// Columns of the mode; none = the preferred mode's.
     pub width: Option<u32>,
@@ -71,14 +71,15 @@ pub struct TriggerSetup {
     pub chip: String,
     /// Name of the line; none = the camera runs by itself.
     pub line: Option<String>,
-    /// How long a pulse lasts, µs. For many cameras this is the exposure; one of less than half of it is taken for its start only.
+    /// How long a pulse lasts, µs. Many cameras expose for as long as the pulse lasts; a pulse shorter than half the exposure is
+    /// assumed to start the exposure only.
     pub pulse_us: u32,
-    /// Whether a pulse is low and idle is high.
+    /// Whether the line is low during a pulse and high when idle.
     pub active_low: bool,
 }
 
 impl Default for TriggerSetup {
-    /// The reference head: a pulse of 16 653 µs exposes for 16 667 µs. A transistor turns it over for the camera.
+    /// The reference head: a pulse of 16 653 µs exposes for 16 667 µs. A transistor inverts it for the camera.
     fn default() -> Self {
         Self {
             chip: "pinctrl-rp1".into(),
@@ -97,7 +98,7 @@ impl TriggerSetup {
     }
 }
 
-/// The lines between the station and whoever starts it by wire. Each is used only if it is named.
+/// The lines between the station and a press or another machine that starts it by wire. Each is used only if it is named.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LinesSetup {
@@ -105,11 +106,11 @@ pub struct LinesSetup {
     pub chip: String,
     /// In: starts a cycle.
     pub start: Option<String>,
-    /// Whether the start line is low when it starts.
+    /// Whether the start line is active when low.
     pub start_active_low: bool,
-    /// The start line counts once it has been still for so long, ms.
+    /// How long the start line must keep its level before a start counts, ms.
     pub debounce_ms: u32,
-    /// Out: the station works.
+    /// Out: the station is measuring.
     pub busy: Option<String>,
     /// Out: the last part passed.
     pub ok: Option<String>,
@@ -143,7 +144,7 @@ impl LinesSetup {
             .any(Option::is_some)
     }
 
-    /// The start line counts once it has been still for so long.
+    /// How long the start line must keep its level before a start counts.
     #[must_use]
     pub fn debounce(&self) -> Duration {
         Duration::from_millis(u64::from(self.debounce_ms))

@@ -8,12 +8,12 @@ use std::time::Duration;
 ///
 /// The clock is `CLOCK_MONOTONIC` for real devices (back-ends convert theirs to it) and a virtual clock
 /// that starts at zero for the simulated and the replay head. Timestamps of one head may be compared
-/// and subtracted; those of two heads mean nothing to each other.
+/// and subtracted; those of different heads may not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Timestamp(pub u64);
 
 impl Timestamp {
-    /// Time from `earlier` to `self`; zero if `earlier` is in fact later.
+    /// Time from `earlier` to `self`; zero if `earlier` is later than `self`.
     #[must_use]
     pub fn since(self, earlier: Self) -> Duration {
         Duration::from_nanos(self.0.saturating_sub(earlier.0))

@@ -1,4 +1,4 @@
-//! The lines of GPIO chips that the kernel simulates: run in the virtual machine of `tests/vm`, skipped elsewhere.
+//! Lines of GPIO chips that the kernel simulates; these tests run in the virtual machine of `tests/vm` and are skipped elsewhere.
 
 #![allow(clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
 
@@ -19,14 +19,14 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 
-/// By how much a pulse may be off by the kernel's record: the way into the kernel and out of it, some 10 000 instructions of 2 ns, and a µs of
-/// the record's resolution.
+/// How far a pulse may be off by the kernel's record: a system call of some 10 000 instructions of 2 ns, and the record's resolution of
+/// 1 µs.
 const PULSE_TOLERANCE: Duration = Duration::from_micros(21);
-/// A pulse that is long enough to measure by: half a percent of it is far more than what its edges take.
+/// From this width on, half a percent of a pulse is much longer than its edges take.
 const MEASURED: Duration = Duration::from_millis(10);
-/// How long the line needs to be still in these tests: longer than a change of a simulated line takes.
+/// Debounce time in these tests: longer than a change of a simulated line takes.
 const QUIET_MS: u32 = 5;
-/// Long enough for a start that comes, and for one that must not.
+/// Longer than a start takes that comes; how long to wait for one that must not come.
 const PATIENCE: Duration = Duration::from_millis(200);
 
 /// A chip that the kernel simulates.
@@ -112,7 +112,7 @@ impl Drop for Chip {
     }
 }
 
-/// Waits as a station does, for the descriptor and for the line to settle; the start that comes before `patience` is over.
+/// Waits as a station does, for the descriptor and for the line to settle; returns the start that comes within `patience`.
 fn next_start(start: &mut Start, patience: Duration) -> Option<Timestamp> {
     let descriptor = start.as_fd().try_clone_to_owned().unwrap();
     let mut clock = Monotonic::new(vec![descriptor]);
@@ -196,7 +196,7 @@ impl Trace {
         settings.collect()
     }
 
-    /// What a line was set to last, before its owner let it go: no resistor has a part in that.
+    /// The level that a line was last set to by its owner, which does not depend on a resistor.
     fn left_at(&self) -> bool {
         self.settings().last().unwrap().1
     }
@@ -241,7 +241,7 @@ fn a_pulse_has_its_width_and_begins_when_it_says() {
         println!("{count} pulses of {width:?}: begun within {begun:?}, width within {off:?}");
         assert!(begun < PULSE_TOLERANCE && off < PULSE_TOLERANCE);
         println!("{} of them spoiled: {spoiled:?}", spoiled.len());
-        // Shorter ones may not be off by much more than what edges take here.
+        // Shorter pulses may be reported: their edges take a larger share of them here.
         assert!(spoiled.is_empty() || width < MEASURED, "{spoiled:?}");
     }
 }
@@ -344,7 +344,7 @@ fn bounces_and_spikes_start_nothing_more() {
     }
     let chip = Chip::new("bounces", &["start"]);
     let mut start = chip.start();
-    // Whoever waits is told of each edge as it comes; none but the last one may count.
+    // The line is polled after each edge; only the last edge may count.
     let bounce = |start: &mut Start, levels: &[bool]| {
         for level in levels {
             chip.pull(0, *level);
@@ -366,7 +366,7 @@ fn edges_that_the_kernel_dropped_are_made_up_for_by_the_level() {
     }
     let chip = Chip::new("burst", &["start"]);
     let mut start = chip.start();
-    // Edges that nobody fetches: the kernel keeps 16, the last of which is a fall.
+    // Edges that are not fetched: the kernel keeps 16, and the last of these is a falling edge.
     for edge in 0..41 {
         chip.pull(0, edge % 2 == 0);
     }
@@ -374,7 +374,7 @@ fn edges_that_the_kernel_dropped_are_made_up_for_by_the_level() {
         next_start(&mut start, PATIENCE).is_some(),
         "the line stayed active"
     );
-    // The last of these that is kept is a rise.
+    // Here the last edge that is kept is a rising edge.
     for edge in 0..41 {
         chip.pull(0, edge % 2 == 1);
     }

@@ -1,7 +1,7 @@
-//! The camera back-end against libcamera's virtual cameras and the kernel's; runs in the machine of `tests/vm` only.
+//! The camera back-end with virtual cameras of libcamera and of the kernel; runs in the machine of `tests/vm` only.
 //!
-//! "Replay" shows four fringe images that are drawn here, each four times, as fast as it is asked. "vimc" goes through a real driver
-//! and takes seconds for a frame. Neither has a raw format or an exposure to set: these decisions are tested without a camera.
+//! "Replay" delivers four fringe images that are drawn here, each four times, as fast as frames are requested. "vimc" uses a real
+//! driver and takes seconds for a frame. Neither has a raw format or a settable exposure; these are tested without a camera.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic)]
 
@@ -22,16 +22,16 @@ use hal::setup::CameraSetup;
 use machine::in_the_machine;
 
 const SIZE: (u32, u32) = (640, 400);
-/// Images that the virtual camera replays, and how often each comes before the next.
+/// Images that the virtual camera replays, and how often each is repeated.
 const IMAGES: usize = 4;
 const REPEATS: usize = 4;
 const AMPLITUDE: f64 = 100.0;
-/// Mean difference of an image from what was drawn, counts. JPEG and its decoder take 1.7 of it (measured). Half of what one
-/// column too far makes, 2 sin(π / 40) · 2/π amplitudes; the next image is 90 counts off.
+/// Largest mean difference of an image from the one drawn, counts. JPEG and its decoder cause 1.7 (measured). The limit is half of what
+/// a shift by one column causes, 2 sin(π / 40) · 2/π amplitudes; another image differs by 90 counts.
 const LIKENESS: f64 = 5.0;
-/// Longer than anything takes here that works: vimc needs 6 s to its first frame.
+/// Longer than any wait here lasts normally: vimc needs 6 s for its first frame.
 const PATIENT: Duration = Duration::from_secs(30);
-/// What the virtual driver of vimc needs to notice that it is to stop: a frame.
+/// Longest time in which vimc stops: its driver stops at the end of a frame.
 const A_FRAME: Duration = Duration::from_secs(8);
 
 const CAMERAS: &str = "/usr/share/libcamera/pipeline/virtual/virtual.yaml";
@@ -48,7 +48,7 @@ fn with_cameras() -> bool {
 
 /// Describes the virtual cameras and draws what they replay.
 fn set_up() {
-    // The folder that is the root of an emulated program (tests/aarch64/rpi.sh); the machine has its own.
+    // The root folder of an emulated program (tests/aarch64/rpi.sh); empty in the virtual machine.
     let root = std::env::var("VM_ROOT").unwrap_or_default();
     fs::create_dir_all(format!("{root}{IMAGE_FOLDER}")).unwrap();
     for image in 0..IMAGES {
@@ -66,7 +66,7 @@ fn set_up() {
     fs::write(format!("{root}{CAMERAS}"), include_str!("virtual.yaml")).unwrap();
 }
 
-/// Fringes of 40 pixels, the `image`-th shifted by as many quarters of a turn.
+/// Fringes with a pitch of 40 pixels; image n is shifted by n quarters of a turn.
 fn fringes(image: usize) -> Vec<u8> {
     let turns = |x: u32| f64::from(x) / 40.0 + image as f64 / IMAGES as f64;
     let row = (0..SIZE.0).map(|x| (128.0 + AMPLITUDE * (TAU * turns(x)).cos()).round() as u8);
@@ -123,7 +123,7 @@ fn clock_of(camera: &LibCamera) -> Monotonic {
     Monotonic::new(vec![camera.ready().unwrap()])
 }
 
-/// The image that a frame shows, and by how many counts it differs from it on average.
+/// The image that a frame shows, and the mean difference from it in counts.
 fn shown(frame: &Frame) -> (usize, f64) {
     let off = |image: usize| {
         let drawn = fringes(image);
@@ -179,7 +179,7 @@ fn without_any_camera_opening_says_so() {
     if !with_cameras() {
         return;
     }
-    // What the library finds at its first start it keeps in mind, so this wants a process of its own.
+    // The library remembers the cameras of its first start, so this needs a process of its own.
     let own = std::process::Command::new(std::env::current_exe().unwrap())
         .args([
             "--ignored",
@@ -254,7 +254,7 @@ fn replayed_fringes_come_in_order_without_a_gap_in_memory_that_is_not_copied() {
         images.push(image);
         places.insert(samples(&frame).as_ptr());
         if let Some(last) = &last {
-            assert_eq!(frame.sequence(), last.sequence() + 1);
+            assert_eq!(frame.count(), last.count() + 1);
             assert!(frame.timestamp() >= last.timestamp());
         }
         assert!(frame.timestamp() >= begun && frame.timestamp() <= clock.now());
@@ -321,12 +321,12 @@ fn stopping_takes_back_the_requests_in_flight_and_starting_again_works() {
         assert_eq!(camera.poll_frame().unwrap_err().kind(), ErrorKind::Protocol);
         camera.start().unwrap();
         let frame = next(&mut camera, &mut clock);
-        assert!(frame.sequence() >= last, "the count goes on over a stop");
-        last = frame.sequence() + 1;
+        assert!(frame.count() >= last, "the count goes on over a stop");
+        last = frame.count() + 1;
         camera.stop().unwrap();
     }
     drop((camera, clock));
-    // This one is stopped amid its first frame, with all its requests in flight.
+    // This camera is stopped during its first frame, with all its requests in flight.
     let mut camera = vimc();
     let mut clock = clock_of(&camera);
     camera.start().unwrap();
@@ -345,7 +345,7 @@ fn twenty_starts_and_stops_and_five_openings_leak_no_descriptor() {
     if !with_cameras() {
         return;
     }
-    // What the library keeps for good is there from now on.
+    // After this, everything exists that the library keeps for the life of the process.
     let mut camera = open("Replay", Reading::Luma);
     camera.start().unwrap();
     drop(camera);
@@ -399,7 +399,7 @@ fn a_wait_ends_with_a_frame_or_in_time_and_polling_never_waits() {
 
     let mut camera = open("Replay", Reading::Luma);
     let mut clock = clock_of(&camera);
-    // Stopped with frames that nobody fetched: they are forgotten, and wake nobody.
+    // Stopped with frames that were not fetched: they are discarded and end no wait.
     camera.start().unwrap();
     clock.wait(clock.now() + PATIENT);
     camera.stop().unwrap();
@@ -424,7 +424,7 @@ fn a_real_driver_gives_frames_with_times_and_counts_that_increase() {
     for frame in &two {
         println!(
             "frame {} after {:?}",
-            frame.sequence(),
+            frame.count(),
             frame.timestamp().since(begun)
         );
         assert_eq!(frame.format(), FrameFormat::packed(160, 120, 8));
@@ -434,7 +434,7 @@ fn a_real_driver_gives_frames_with_times_and_counts_that_increase() {
         assert!(different.len() > 1);
     }
     assert!(two[1].timestamp() > two[0].timestamp());
-    assert!(two[1].sequence() > two[0].sequence());
+    assert!(two[1].count() > two[0].count());
 }
 
 #[test]

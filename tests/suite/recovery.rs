@@ -13,7 +13,7 @@ use appliance::service::Daemon;
 use appliance::station::{ConnectionEdges, ControlWrite, Event, Masked, Request};
 use appliance::system::computing::Computing;
 use appliance::system::progress::Progress;
-use hal::error::Device;
+use hal::error::DeviceKind;
 use sim::Scenario;
 use std::fs;
 use std::sync::Mutex;
@@ -57,7 +57,10 @@ fn a_device_that_is_unplugged_is_a_fault_that_names_it_and_ends_when_it_is_plugg
     let mut plc = Plc::at(daemon.modbus);
     assert_eq!(plc.measure(1)[8], PASS);
     let before = plc.status();
-    for (triggers, device, code) in [(1, Device::Camera, 101), (2, Device::Projector, 201)] {
+    for (triggers, device, code) in [
+        (1, DeviceKind::Camera, 101),
+        (2, DeviceKind::Projector, 201),
+    ] {
         stage.unplug(device);
         let lost = plc.wait("the fault", |status| state(status) == FAULT);
         assert_eq!((error_code(&lost), lost.has(READY)), (code, false));
@@ -90,7 +93,7 @@ fn a_trigger_that_meets_a_dead_camera_ends_in_one_invalid_result_or_is_rejected(
     for token in 1..=10 {
         plc.wait("READY", |status| status.has(READY));
         let before = plc.status();
-        stage.unplug(Device::Camera);
+        stage.unplug(DeviceKind::Camera);
         plc.write(1, &trigger(token));
         let lost = plc.wait("the fault", |status| state(status) == FAULT);
         assert_eq!(
@@ -102,7 +105,7 @@ fn a_trigger_that_meets_a_dead_camera_ends_in_one_invalid_result_or_is_rejected(
             assert_eq!((words[2], words[8], words[9]), (token, INVALID, 101));
             met += 1;
         }
-        stage.plug(Device::Camera);
+        stage.plug(DeviceKind::Camera);
     }
     assert!(met > 0, "no trigger came before the loss was noticed");
     assert_eq!(plc.measure(99)[8], PASS);

@@ -66,7 +66,7 @@ struct Lamp(&'static str, Panel);
 impl OutputLine for Lamp {
     fn set(&mut self, on: bool) -> Result<(), Error> {
         if self.1.broken.load(Ordering::Relaxed) {
-            return Err(Error::disconnected(hal::error::Device::Lines, "a lamp"));
+            return Err(Error::disconnected(hal::error::DeviceKind::Lines, "a lamp"));
         }
         self.1.told.lock().unwrap().push((self.0, on));
         Ok(())

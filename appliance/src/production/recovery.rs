@@ -102,13 +102,13 @@ pub(super) fn wait(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hal::error::Device;
+    use hal::error::DeviceKind;
     use std::time::Duration;
 
     #[test]
     fn a_device_that_is_gone_or_silent_is_opened_again_and_one_that_cannot_is_not() {
         assert!(is_lost(&Error::disconnected(
-            Device::Projector,
+            DeviceKind::Projector,
             "showing pattern 3"
         )));
         let silent = Error::timeout(

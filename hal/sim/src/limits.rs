@@ -1,18 +1,17 @@
-//! The limits of a scenario's values: what is outside is refused by name before anything is computed with it.
+//! The limits of a scenario's values: a value outside is refused, naming its key, before anything is computed from it.
 
-use super::scenario::{Device, Placement, Scenario};
+use super::scenario::{Placement, RigDevice, Scenario};
 pub(crate) use hal::bounds::within;
 use hal::bounds::{MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG};
 
-/// Most rays of a light transport. Each has at most four taps, which then fit the 32-bit offsets of the matrix.
+/// Most rays of a light transport. Each has at most four taps, so all taps fit the 32-bit offsets of the matrix.
 const MAX_RAYS: u64 = 1 << 28;
 
 impl Scenario {
-    /// What is wrong with the values, if anything.
     /// Checks every value.
     ///
     /// # Errors
-    /// Naming the first key that is out of its range, and the range.
+    /// A message that names the first key that is out of its range, and the range.
     pub fn check(&self) -> Result<(), String> {
         if ![8, 10, 12].contains(&self.bit_depth) {
             return Err(format!(
@@ -63,7 +62,7 @@ impl Scenario {
 }
 
 impl Placement {
-    /// What is wrong with the values, if anything.
+    /// Checks every value; the error names the key and its range.
     pub(crate) fn check(&self) -> Result<(), String> {
         for shift in self.shift_mm {
             within(
@@ -86,7 +85,7 @@ impl Placement {
     }
 }
 
-impl Device {
+impl RigDevice {
     fn check(&self) -> Result<(), String> {
         for (name, pixels) in [("width", self.width), ("height", self.height)] {
             within(name, pixels, 1, 4096)?;

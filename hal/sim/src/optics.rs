@@ -1,4 +1,4 @@
-//! Pinhole and Brown distortion, forward and backward, for the devices of the simulated rig.
+//! Pinhole camera with Brown distortion, in both directions, for the devices of the simulated rig.
 //!
 //! Brown's model as OpenCV writes it (D. C. Brown, "Close-range camera calibration", 1971): with r² = x² + y²,
 //! x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²), and the like for y with p1 and p2 exchanged.
@@ -8,12 +8,12 @@ use hal::model::DeviceModel;
 /// A point or direction in mm.
 pub type Vector = [f64; 3];
 
-/// Steps of the inversion; it converges quadratically and needs three for the study's lenses.
-const MAX_NEWTON_STEPS: usize = 20;
-/// The inversion is done when the distorted point is met this well, in units of the focal length.
+/// Most iterations of the inversion; it converges quadratically and needs three for the default lenses.
+const MAX_ITERATIONS: usize = 20;
+/// The inversion ends when the distorted point is met this closely, in units of the focal length.
 const CONVERGED: f64 = 1e-13;
 
-/// A device with its centre worked out.
+/// A device's model with its centre of projection.
 #[derive(Clone, Debug)]
 pub struct Lens {
     model: DeviceModel,
@@ -38,7 +38,7 @@ impl Lens {
         self.centre
     }
 
-    /// The pixel that the world point `point` (mm) falls on, or none behind the device.
+    /// The pixel onto which the world point `point` (mm) is projected; none if it is behind the device.
     #[must_use]
     pub fn project(&self, point: Vector) -> Option<[f64; 2]> {
         let turned = turned(&self.model.rotation, point);
@@ -58,7 +58,7 @@ impl Lens {
         ])
     }
 
-    /// Direction in the world (length 1) of the ray through pixel (u, v), pixel centres being whole numbers.
+    /// Unit vector in world coordinates along the ray through pixel (u, v); pixel centres are integers.
     #[must_use]
     pub fn ray(&self, u: f64, v: f64) -> Vector {
         let seen = [
@@ -83,7 +83,7 @@ fn distort(&[k1, k2, p1, p2, k3]: &[f64; 5], [x, y]: [f64; 2]) -> [f64; 2] {
 fn undistort(coefficients: &[f64; 5], seen: [f64; 2]) -> [f64; 2] {
     let &[k1, k2, p1, p2, k3] = coefficients;
     let [mut x, mut y] = seen;
-    for _ in 0..MAX_NEWTON_STEPS {
+    for _ in 0..MAX_ITERATIONS {
         let at = distort(coefficients, [x, y]);
         let (dx, dy) = (at[0] - seen[0], at[1] - seen[1]);
         if dx.abs() + dy.abs() < CONVERGED {
@@ -98,7 +98,7 @@ fn undistort(coefficients: &[f64; 5], seen: [f64; 2]) -> [f64; 2] {
         let xy = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
         let determinant = xx * yy - xy * xy;
         if determinant.abs() < 1e-9 {
-            // The distortion folds here; no lens does that, and the point is as good as any.
+            // The distortion folds back here, which no real lens does; any point will do.
             break;
         }
         x -= (yy * dx - xy * dy) / determinant;

@@ -1,6 +1,6 @@
-//! A scenario: rig, light, optics, noise and part of a simulated head, from TOML or built in code.
+//! A scenario: rig, lighting, optics, noise and part of a simulated head, from TOML or built in code.
 //!
-//! The defaults are the study's rig and light around the sheet-metal part.
+//! The defaults are the study's rig and lighting (docs/measurement.md, *The study's head and parts*) with the sheet-metal part.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -10,7 +10,7 @@ use hal::bounds::shortened;
 use hal::model::DeviceModel;
 use hal::virtual_head::Faults;
 
-/// A whole simulated head. Keys that are left out of the TOML have the defaults of the study.
+/// A whole simulated head. Keys that are missing in the TOML have their default values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Scenario {
@@ -22,15 +22,15 @@ pub struct Scenario {
     pub refresh_hz: f64,
     /// Camera and projector.
     pub rig: Rig,
-    /// How the part answers light.
-    pub light: Light,
+    /// Ambient light, and how much light the part reflects.
+    pub light: Lighting,
     /// Noise of the camera.
     pub noise: Noise,
     /// Blur, response and exposure.
     pub optics: Optics,
     /// What is measured.
     pub part: Part,
-    /// Where it lies.
+    /// How the part lies.
     pub placement: Placement,
     /// Exposure, readout and delays.
     pub timing: Timing,
@@ -38,21 +38,21 @@ pub struct Scenario {
     pub faults: Faults,
 }
 
-/// The two devices. Each looks at the world's origin from the xz plane, image x along +x, image y along −y.
+/// The two devices. Each looks at the world's origin from the xz plane; its image x runs along +x, its image y along −y.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Rig {
     /// The camera.
     #[serde(deserialize_with = "camera_from")]
-    pub camera: Device,
+    pub camera: RigDevice,
     /// The projector.
     #[serde(deserialize_with = "projector_from")]
-    pub projector: Device,
+    pub projector: RigDevice,
 }
 
 /// One device of the rig.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Device {
+pub struct RigDevice {
     /// Columns.
     pub width: u32,
     /// Rows.
@@ -67,13 +67,13 @@ pub struct Device {
     pub distortion: [f64; 5],
 }
 
-/// Phong without specular part: I = ambient + diffuse · max(0, n·l) · pattern/255, 1 = full scale.
+/// Phong's model without its specular part: I = ambient + diffuse · max(0, n·l) · pattern/255, 1 = full scale.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Light {
-    /// Light that needs no projector.
+pub struct Lighting {
+    /// Light that does not come from the projector.
     pub ambient: f64,
-    /// Share of the projector's light that a facing surface returns.
+    /// Share of the projector's light that a surface reflects which faces the projector.
     pub diffuse: f64,
 }
 
@@ -81,13 +81,13 @@ pub struct Light {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Noise {
-    /// Half-width of the uniform noise, in counts of 8 bits; deeper cameras have the same share of full scale.
+    /// Half-width of the uniform noise, in counts of 8 bits; cameras with more bits have the same share of full scale.
     pub noise_counts: f64,
     /// Seed; frame n of a head has the same noise whenever the seed is the same.
     pub seed: u64,
 }
 
-/// What happens to light on its way.
+/// Blur, response and gain between raster and samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Optics {
@@ -97,11 +97,11 @@ pub struct Optics {
     pub camera_blur_px: f64,
     /// Exponent of the projector's response: light = (grey / 255)^gamma, 0.1…10.
     pub gamma: f64,
-    /// Factor on all light before the camera clips it; above 1 saturates, below 1 darkens. 0…100.
+    /// Factor on all light before the camera clips it, 0…100.
     pub gain: f64,
 }
 
-/// Where a part lies: turned about x, then y (tilt), then z (rotation), then shifted.
+/// How a part lies: rotated about x, then y (tilt), then z (rotation), then shifted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Placement {
@@ -120,7 +120,7 @@ impl Default for Scenario {
             sub_rays: 4,
             refresh_hz: 60.0,
             rig: Rig::default(),
-            light: Light::default(),
+            light: Lighting::default(),
             noise: Noise::default(),
             optics: Optics::default(),
             part: Part::default(),
@@ -134,7 +134,7 @@ impl Default for Scenario {
 impl Default for Rig {
     fn default() -> Self {
         Self {
-            camera: Device {
+            camera: RigDevice {
                 width: 512,
                 height: 512,
                 fov_deg: [20.0, 20.0],
@@ -142,7 +142,7 @@ impl Default for Rig {
                 distance_mm: 600.0,
                 distortion: [-0.12, 0.15, 2e-4, -3e-4, 0.0],
             },
-            projector: Device {
+            projector: RigDevice {
                 width: 1024,
                 height: 768,
                 fov_deg: [43.6, 33.4],
@@ -154,7 +154,7 @@ impl Default for Rig {
     }
 }
 
-impl Default for Light {
+impl Default for Lighting {
     fn default() -> Self {
         Self {
             ambient: 0.04,
@@ -183,8 +183,8 @@ impl Default for Optics {
     }
 }
 
-impl Device {
-    /// The exact geometry of this device, as files state it.
+impl RigDevice {
+    /// The exact geometry of this device, in the form of files.
     #[must_use]
     pub fn model(&self) -> DeviceModel {
         let (sin, cos) = self.angle_deg.to_radians().sin_cos();
@@ -198,13 +198,13 @@ impl Device {
             cy: centre(self.height),
             distortion: self.distortion,
             rotation: [cos, 0.0, -sin, 0.0, -1.0, 0.0, -sin, 0.0, -cos],
-            // The device stands at distance · (sin, 0, cos) and looks at the origin along its own z.
+            // The device is at distance · (sin, 0, cos) and looks at the origin along its own z axis.
             translation_mm: [0.0, 0.0, self.distance_mm],
         }
     }
 }
 
-/// A device of a file: every key may be left out.
+/// A device in a file: every key may be left out.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct DeviceFile {
@@ -217,8 +217,8 @@ struct DeviceFile {
 }
 
 impl DeviceFile {
-    fn over(self, base: Device) -> Device {
-        Device {
+    fn over(self, base: RigDevice) -> RigDevice {
+        RigDevice {
             width: self.width.unwrap_or(base.width),
             height: self.height.unwrap_or(base.height),
             fov_deg: self.fov_deg.unwrap_or(base.fov_deg),
@@ -229,11 +229,11 @@ impl DeviceFile {
     }
 }
 
-fn camera_from<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Device, D::Error> {
+fn camera_from<'de, D: Deserializer<'de>>(deserializer: D) -> Result<RigDevice, D::Error> {
     DeviceFile::deserialize(deserializer).map(|file| file.over(Rig::default().camera))
 }
 
-fn projector_from<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Device, D::Error> {
+fn projector_from<'de, D: Deserializer<'de>>(deserializer: D) -> Result<RigDevice, D::Error> {
     DeviceFile::deserialize(deserializer).map(|file| file.over(Rig::default().projector))
 }
 
@@ -248,7 +248,7 @@ pub struct ScenarioError {
 }
 
 impl Scenario {
-    /// Reads and checks a scenario; `place` is only named in messages.
+    /// Reads and checks a scenario; `place` is its file, for messages.
     ///
     /// # Errors
     /// [`ScenarioError`] for text that is not TOML, an unknown key, or a value out of its range.
@@ -262,7 +262,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// Standard deviation of one sample in counts of this camera: uniform noise and rounding.
+    /// Standard deviation of one sample in counts of this camera, from uniform noise and rounding.
     #[must_use]
     pub fn noise_sigma_counts(&self) -> f64 {
         let half_width = self.noise.noise_counts * self.full_scale() / 255.0;

@@ -1,4 +1,4 @@
-//! What the simulated camera sees of what the simulated projector shows: light, blur, noise and counts.
+//! The frames of the simulated camera, from the rasters in view: light, blur, noise and counts.
 //!
 //! Measured in release on one core for 512 × 512 pixels: about 3 ms per frame including noise (the test
 //! `speed_of_building_a_transport_and_of_one_frame` prints it).
@@ -17,7 +17,7 @@ use hal::projector::Raster;
 use hal::units::Timestamp;
 use hal::virtual_head::Scene;
 
-/// Frames that a user may keep before each new one costs an allocation.
+/// How many frames may be kept before each further one costs an allocation.
 const MAX_KEPT_FRAMES: usize = 64;
 
 /// Part, rasters and sensor of a simulated head.
@@ -26,9 +26,9 @@ pub(crate) struct SimScene {
     transport: Arc<Transport>,
     /// The light of each loaded raster, 1 = white, row by row.
     rasters: Vec<Vec<f32>>,
-    /// The light on the camera, used again for each frame.
+    /// The light on the camera; the memory is reused for each frame.
     picture: Vec<f32>,
-    /// The light of one of several patterns on the camera.
+    /// The light on the camera of one pattern, where several were in view.
     part: Vec<f32>,
     pool: Pool,
     seed: u64,
@@ -61,7 +61,7 @@ impl SimScene {
         Arc::clone(&self.transport)
     }
 
-    /// Starts the noise anew.
+    /// Restarts the noise with another seed.
     pub(super) fn reseed(&mut self, seed: u64) {
         self.seed = seed;
         self.exposed = 0;
@@ -111,7 +111,7 @@ impl Scene for SimScene {
         &mut self,
         seen: &[(Option<usize>, f32)],
         timestamp: Timestamp,
-        sequence: u64,
+        count: u64,
     ) -> Result<Frame, Error> {
         let raster = |shown: Option<usize>| {
             let raster = shown.and_then(|index| self.rasters.get(index));
@@ -147,22 +147,22 @@ impl Scene for SimScene {
         let random = noise_of(self.seed, self.exposed);
         self.exposed += 1;
         let picture = &self.picture;
-        self.pool.frame(timestamp, sequence, |pixels| match pixels {
+        self.pool.frame(timestamp, count, |pixels| match pixels {
             Pixels::Eight(samples) => sensor.read(picture, random, samples, |count| count as u8),
             Pixels::Sixteen(samples) => sensor.read(picture, random, samples, |count| count as u16),
         })
     }
 }
 
-/// The noise of frame number `frame` under `seed`. Both are spread over all bits, so that neighbouring frames and
-/// seeds have nothing in common. Xoshiro256++ stays here, while everything else draws from SplitMix64: the demonstration's verdicts
-/// and many measured figures rest on these frames.
+/// The random numbers of frame number `frame` with `seed`. The frame number is spread over all bits, so that neighbouring frames and
+/// seeds are uncorrelated. Everything else draws from SplitMix64; Xoshiro256++ stays here because the demonstration's verdicts
+/// and many measured figures depend on these frames.
 fn noise_of(seed: u64, frame: u64) -> Xoshiro256PlusPlus {
     let spread = frame.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     Xoshiro256PlusPlus::seed_from_u64(seed ^ spread.rotate_left(17))
 }
 
-/// How light becomes counts.
+/// Conversion of light to counts.
 struct Sensor {
     full_scale: f32,
     gain: f32,

@@ -1,4 +1,4 @@
-//! The simulated head and its stage: parts are placed in front of it, and what is true of them is known.
+//! The simulated head and its stage, on which parts are placed and which knows their true heights.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -7,12 +7,12 @@ use super::parts::Part;
 use super::scenario::{Placement, Scenario};
 use super::scene::SimScene;
 use super::transport::{Transport, Truth};
-use hal::error::{Device, Error};
+use hal::error::{DeviceKind, Error};
 use hal::head::DynHead;
 use hal::model::DeviceModel;
 use hal::virtual_head::{self, Control, Scene as _};
 
-/// Placed parts whose transport is remembered; one of 512 × 512 takes about 20 MB.
+/// Placed parts whose light transport is kept; one of 512 × 512 pixels takes about 20 MB.
 const MAX_REMEMBERED: usize = 8;
 
 /// The part in front of a simulated head. Clones place parts in front of the same head.
@@ -21,11 +21,11 @@ pub struct Stage {
     control: Control<SimScene>,
     scenario: Arc<Scenario>,
     placed: Arc<Mutex<(Part, Placement)>>,
-    /// The one used last stands at the end.
+    /// Light transports of the last placed parts; the most recent is the last.
     remembered: Arc<Mutex<Vec<Staged>>>,
 }
 
-/// A part whose light is worked out where it is to lie, ready to be put in place.
+/// A placed part with its light transport, ready to be put in place.
 #[derive(Clone, Debug)]
 pub struct Staged {
     part: Part,
@@ -41,7 +41,7 @@ pub fn head(scenario: &Scenario) -> Result<(DynHead, Stage), Error> {
     head_with_progress(scenario, &|_| ())
 }
 
-/// As [`head`]; `progress` is told the share of the light transport that is worked out, 0…1, from any thread.
+/// As [`head`]; `progress` is called with the share of the light transport that is computed, 0…1, from any thread.
 ///
 /// # Errors
 /// As [`head`].
@@ -76,8 +76,8 @@ pub fn head_with_progress(
 }
 
 impl Stage {
-    /// Puts `part` in place of the one before; the next exposure sees it. The transport of the last few placed parts is
-    /// remembered, so going back to one of them costs nothing.
+    /// Replaces the part; the next exposure sees the new one. The light transport of the last few parts is
+    /// kept, so going back to one of them takes no time.
     ///
     /// # Errors
     /// `Unsupported` if a measure of the part or the placement is out of its range.
@@ -85,7 +85,7 @@ impl Stage {
         self.place_with_progress(part, placement, &|_| ())
     }
 
-    /// As [`Stage::place`]; `progress` is told the share done, 0…1, from any thread.
+    /// As [`Stage::place`]; `progress` is called with the share done, 0…1, from any thread.
     ///
     /// # Errors
     /// As [`Stage::place`].
@@ -104,8 +104,8 @@ impl Stage {
         Ok(())
     }
 
-    /// Works out the light of `part` without putting it in place, which takes the longest: frames may be taken of the part before
-    /// meanwhile. `progress` is told the share done, 0…1, from any thread.
+    /// Computes the light transport of `part` without putting it in place. This is what takes long; meanwhile frames may be taken of
+    /// the present part. `progress` is called with the share done, 0…1, from any thread.
     ///
     /// # Errors
     /// `Unsupported` if a measure of the part or the placement is out of its range.
@@ -126,14 +126,14 @@ impl Stage {
         })
     }
 
-    /// Puts a part in place whose light is worked out; the next exposure sees it.
+    /// Puts a part in place whose light transport is computed; the next exposure sees it.
     pub fn show(&self, staged: Staged) {
         let mut placed = self.placed.lock().unwrap_or_else(PoisonError::into_inner);
         self.control.scene(|scene| scene.place(staged.transport));
         *placed = (staged.part, staged.placement);
     }
 
-    /// The part that is in place, and where it lies.
+    /// The part that is in place, and how it lies.
     #[must_use]
     pub fn placed(&self) -> (Part, Placement) {
         let placed = self.placed.lock().unwrap_or_else(PoisonError::into_inner);
@@ -162,36 +162,36 @@ impl Stage {
         remembered.push(staged.clone());
     }
 
-    /// Pulls a device's cable out: every call of it fails from now on, until it is plugged in and the head opened again.
-    pub fn unplug(&self, device: Device) {
+    /// Unplugs a device: each of its calls fails until it is plugged in and the head opened again.
+    pub fn unplug(&self, device: DeviceKind) {
         self.control.plug(device, false);
-        if device == Device::Projector {
-            // Patterns live in the projector's memory. A simulated one refuses no load.
+        if device == DeviceKind::Projector {
+            // The projector loses the patterns in its memory. Loading none never fails.
             let _ = self.control.scene(|scene| scene.load(Vec::new()));
         }
     }
 
     /// Plugs a device in again.
-    pub fn plug(&self, device: Device) {
+    pub fn plug(&self, device: DeviceKind) {
         self.control.plug(device, true);
     }
 
     /// Opens the head again, in front of the same part.
     ///
     /// # Errors
-    /// `Disconnected` if camera or projector is pulled out.
+    /// `Disconnected` if camera or projector is unplugged.
     pub fn reopen(&self) -> Result<DynHead, Error> {
         self.control.reopen()
     }
 
-    /// What is true of the part that is in place.
+    /// The true heights and classes of the part that is in place.
     #[must_use]
     pub fn truth(&self) -> Truth {
         let transport = self.control.scene(|scene| scene.transport());
         transport.truth.clone()
     }
 
-    /// Starts the noise anew from `seed`: the next frame is frame 0 of it.
+    /// Restarts the noise with `seed`: the next frame has the noise of frame 0.
     pub fn reseed(&self, seed: u64) {
         self.control.scene(|scene| scene.reseed(seed));
     }

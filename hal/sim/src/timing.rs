@@ -1,4 +1,4 @@
-//! How time goes on a simulated head: exposure, readout and delays, and what its calibration believes of them.
+//! The times of a simulated head: exposure, readout and delays, and the delay that its calibration states.
 
 use std::time::Duration;
 
@@ -9,18 +9,18 @@ use super::scenario::Scenario;
 use hal::head::Stamp;
 use hal::virtual_head::Mechanics;
 
-/// Times of a simulated head. By default the camera is triggered, exposes two refreshes and is read out in no time, and a
-/// pattern's light is there with its flip.
+/// Times of a simulated head. By default the camera is triggered, exposes for two refreshes and needs no time for its readout, and a
+/// pattern's light comes with its flip.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Timing {
     /// Exposure, refreshes of the projector, 0.01…100. A micromirror device makes grey levels over whole refreshes.
     pub exposure_refreshes: f64,
-    /// From the end of an exposure to its frame, 0…1 000 000 µs.
+    /// From the end of an exposure until its frame can be fetched, 0…1 000 000 µs.
     pub readout_us: u64,
     /// From a flip to its pattern's light, 0…1 000 000 µs.
     pub flip_to_light_us: u64,
-    /// What the head's calibration believes of that; left out: the truth.
+    /// The flip-to-light delay according to the head's calibration; if left out, the true one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibrated_flip_to_light_us: Option<u64>,
     /// Period of a camera that runs by itself, at least exposure or readout, up to 10 000 000 µs; 0: the camera is triggered.
@@ -52,7 +52,7 @@ impl Scenario {
         Duration::from_secs_f64(1.0 / self.refresh_hz)
     }
 
-    /// The times and faults as the virtual devices have them.
+    /// The times and faults in the form of the virtual devices.
     pub(super) fn mechanics(&self) -> Mechanics {
         let (timing, refresh) = (&self.timing, self.refresh());
         let us = Duration::from_micros;
@@ -70,7 +70,8 @@ impl Scenario {
         }
     }
 
-    /// Whole refreshes are exact; a float's rounding would let an exposure end after the flip that is due at its end.
+    /// The exposure. Whole refreshes are computed exactly, as a rounding error could let an exposure end after the flip that is due at
+    /// its end.
     fn exposure(&self) -> Duration {
         let refreshes = self.timing.exposure_refreshes;
         if refreshes.fract() == 0.0 {
@@ -79,7 +80,7 @@ impl Scenario {
         self.refresh().mul_f64(refreshes)
     }
 
-    /// What is wrong with the times and faults, if anything.
+    /// Checks the times and faults; the error names the key and its range.
     pub(super) fn check_timing(&self) -> Result<(), String> {
         let (timing, faults) = (&self.timing, &self.faults);
         within(

@@ -1,28 +1,28 @@
-//! Where a ray meets a surface, and whether a point of it sees the projector.
+//! Ray tracing: where a ray meets a surface, and whether a point of the surface sees the projector.
 //!
-//! Sphere tracing (J. C. Hart, 1996) on f(t) = z(t) − height(x(t), y(t)): with slopes of at most L, f changes by at
-//! most |d_z| + L·|d_xy| per unit of t, so a step of |f| over that rate crosses nothing. Close to the surface a
-//! Newton step is tried and kept if it brackets the crossing; the crossing is then closed in on.
+//! Sphere tracing (J. C. Hart, 1996) of f(t) = z(t) − height(x(t), y(t)) along a ray with direction d: with slopes of at most L, f
+//! changes by at most |d_z| + L·|d_xy| per unit of t, so a step of |f| divided by that rate crosses nothing. Close to the surface a
+//! Newton step is tried and kept if it brackets the crossing; regula falsi then refines the crossing.
 
 use super::optics::{Vector, along, dot, normalised};
 use super::parts::Surface;
 
-/// Crossings are met this well along the ray, mm.
+/// Accuracy of a crossing along the ray, mm.
 const TOLERANCE_MM: f64 = 1e-7;
-/// No step is smaller: a fold thinner than this may be missed, mm.
+/// Smallest step along a ray, mm; a fold thinner than this may be missed.
 const MIN_STEP_MM: f64 = 1e-3;
 /// Newton steps are tried closer to the surface than this, mm.
 const NEAR_MM: f64 = 1.0;
-/// Shadow rays leave the surface by this before they look back, mm.
+/// Shadow rays start at this distance from the surface, mm.
 const LIFT_MM: f64 = 0.02;
 /// The box around the material is widened by this, mm.
 const MARGIN_MM: f64 = 1e-3;
-/// Half the distance over which slopes are taken, mm.
+/// Half the distance over which slopes are computed, mm.
 const SLOPE_STEP_MM: f64 = 1e-4;
-/// More steps than any ray needs; a ray that takes them all sees nothing.
-const MAX_STEPS: usize = 100_000;
+/// Most steps along a ray, more than any ray needs; a ray that takes them all meets nothing.
+const MAX_RAY_STEPS: usize = 100_000;
 
-/// A surface with what every ray asks of it.
+/// A surface with its bounds, computed once for all rays.
 pub(super) struct Traced<'a> {
     surface: &'a dyn Surface,
     bounds: [Vector; 2],
@@ -33,7 +33,7 @@ pub(super) struct Traced<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hit {
     pub point: Vector,
-    /// The unit normal on the side that the ray came from.
+    /// The unit normal, on the side from which the ray came.
     pub normal: Vector,
 }
 
@@ -61,7 +61,7 @@ impl<'a> Traced<'a> {
         Some(Hit { point, normal })
     }
 
-    /// Whether material lies between `hit` and a far point in direction `towards` (a unit vector on the hit's side).
+    /// Whether material lies between `hit` and a distant point in direction `towards`, a unit vector on the side of the normal.
     pub fn shadowed(&self, hit: &Hit, towards: Vector) -> bool {
         let Some((_, end)) = self.clip(hit.point, towards) else {
             return false;
@@ -73,7 +73,7 @@ impl<'a> Traced<'a> {
                 .is_some()
     }
 
-    /// The stretch of the ray inside the box around the material, from t = 0 on.
+    /// The interval of t ≥ 0 in which the ray is inside the box around the material.
     fn clip(&self, origin: Vector, direction: Vector) -> Option<(f64, f64)> {
         let (mut start, mut end) = (0.0_f64, f64::INFINITY);
         for axis in 0..3 {
@@ -95,8 +95,8 @@ impl<'a> Traced<'a> {
         (start < end && end.is_finite()).then_some((start, end))
     }
 
-    /// The first crossing with material in start…end, and whether the ray came from above the surface. `side`
-    /// tells it where the ray starts on the surface itself, where its own sign is rounding.
+    /// The first crossing with material in start…end, and whether the ray came from above the surface. `side` states whether the ray
+    /// starts above the surface if it starts on the surface itself, where the sign of f is only rounding error.
     fn crossing(
         &self,
         origin: Vector,
@@ -116,17 +116,18 @@ impl<'a> Traced<'a> {
         if let Some(above) = side
             && (value > 0.0) != above
         {
-            // The surface curves up between the point and the first look back.
+            // The surface rises between the point and the start of the shadow ray.
             let [x, y, _] = along(origin, direction, t);
             if self.surface.present(x, y) {
                 return Some((t, above));
             }
         }
-        // Away from the surface, and steeper than it is anywhere: nothing follows. So are most rays to the projector.
+        // The ray leaves the surface at a steeper slope than the surface has anywhere, so it never meets it again. This holds for most
+        // rays to the projector.
         if direction[2] * value.signum() > steepest {
             return None;
         }
-        for _ in 0..MAX_STEPS {
+        for _ in 0..MAX_RAY_STEPS {
             if t >= end {
                 return None;
             }
@@ -139,7 +140,7 @@ impl<'a> Traced<'a> {
                 let falling = (value.abs() - ahead_value.abs()) / safe;
                 if falling > 0.0 {
                     let newton = ahead + ahead_value.abs() / falling * 1.01 + TOLERANCE_MM;
-                    // A step that does not bracket may have jumped over something and is forgotten.
+                    // A Newton step that does not bracket a crossing may have passed one, so it is discarded.
                     if newton - ahead < 2.0 * NEAR_MM {
                         let value_there = over(newton);
                         if (value_there > 0.0) != above {
@@ -184,7 +185,7 @@ fn close_in(over: &impl Fn(f64) -> f64, near: (f64, f64), far: (f64, f64)) -> f6
     b
 }
 
-/// The share of a light from direction `towards` that a surface with `normal` catches, or none behind it.
+/// The cosine between normal and direction to the light: the share of the light that the surface receives; none from behind.
 pub(super) fn facing(normal: Vector, towards: Vector) -> Option<f64> {
     let cosine = dot(normal, towards);
     (cosine > 0.0).then_some(cosine)

@@ -1,11 +1,11 @@
 //! Light transport of a placed part: how much of each projector pixel arrives in each camera pixel.
 //!
-//! A frame is linear in the raster, so everything geometric is worked out once per placed part: n × n sub-rays per
-//! camera pixel find their point of the surface, its normal, whether it sees the projector, and the projector
+//! A frame is linear in the raster, so the geometry is computed once per placed part: for each of n × n sub-rays per
+//! camera pixel the point of the surface, its normal, whether it sees the projector, and the projector
 //! point (ξ, η) that lights it. The bilinear taps of all sub-rays of a pixel are merged into one row of a sparse
-//! matrix; a frame is then matrix × raster. The model of light:
-//! I = ambient + diffuse · max(0, n·l) · pattern, averaged over the sub-rays, no fall-off with distance; the
-//! ambient part reaches shadowed points too, and a sub-ray that meets nothing sees 0.
+//! matrix; a frame is then matrix × raster. The model of light is
+//! I = ambient + diffuse · max(0, n·l) · pattern, averaged over the sub-rays, without fall-off with distance. Ambient light
+//! reaches shadowed points, too; a sub-ray that meets nothing has I = 0.
 //!
 //! The result does not depend on the number of threads: every pixel is computed by itself.
 
@@ -16,11 +16,11 @@ use super::parts::Part;
 use super::scenario::{Placement, Scenario};
 use super::trace::{Hit, Traced, facing};
 
-/// Sub-rays of one pixel whose distances differ by more than the pixel's own slope explains see a depth edge:
-/// the largest departure from the tangent plane of the central ray's hit, mm.
+/// A pixel has a depth edge if a sub-ray meets the surface farther than this from the tangent plane at the central ray's hit,
+/// measured along the ray, mm.
 const DEPTH_EDGE_MM: f64 = 2.0;
 
-/// What is true of a placed part, per camera pixel, row by row.
+/// The ground truth of a placed part, per camera pixel, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Truth {
     /// World z in mm where the pixel's central ray meets the part; NaN where camera and projector do not both see it.
@@ -29,12 +29,12 @@ pub struct Truth {
     pub class: Vec<u8>,
 }
 
-/// The sparse matrix from rasters to frames, and the truth. Light is in units of full scale.
+/// The sparse matrix from rasters to frames, and the ground truth. Light is in units of full scale.
 #[derive(Debug)]
 pub(super) struct Transport {
-    /// Light of each camera pixel that needs no projector.
+    /// Ambient light of each camera pixel.
     ambient: Vec<f32>,
-    /// Where each pixel's taps start; one more than there are pixels.
+    /// Where each pixel's taps start, and where the last pixel's end.
     starts: Vec<u32>,
     /// Projector pixel and weight.
     taps: Vec<(u32, f32)>,
@@ -42,7 +42,7 @@ pub(super) struct Transport {
 }
 
 /// One camera row of a transport.
-struct Row {
+struct CameraRow {
     ambient: Vec<f32>,
     ends: Vec<u32>,
     taps: Vec<(u32, f32)>,
@@ -96,7 +96,7 @@ fn rotation_of(placement: &Placement) -> [f64; 9] {
 }
 
 impl Transport {
-    /// Traces `part` at `placement` under the rig and light of `scenario`; `progress` is told the share done, 0…1, from
+    /// Traces `part` at `placement` with the rig and lighting of `scenario`; `progress` is called with the share done, 0…1, from
     /// any thread.
     pub fn build(
         scenario: &Scenario,
@@ -117,7 +117,7 @@ impl Transport {
         };
         let height = scenario.rig.camera.height;
         let done = std::sync::atomic::AtomicU32::new(0);
-        let rows: Vec<Row> = (0..height)
+        let rows: Vec<CameraRow> = (0..height)
             .into_par_iter()
             .map(|v| {
                 let row = tracer.row(v);
@@ -129,7 +129,7 @@ impl Transport {
         Self::join(rows)
     }
 
-    fn join(rows: Vec<Row>) -> Self {
+    fn join(rows: Vec<CameraRow>) -> Self {
         let pixels = rows.iter().map(|row| row.ambient.len()).sum();
         let taps = rows.iter().map(|row| row.taps.len()).sum();
         let mut whole = Self {
@@ -154,7 +154,7 @@ impl Transport {
     }
 
     /// The light of each camera pixel while the projector shows `raster` (light per projector pixel, 1 = white), or
-    /// nothing.
+    /// is dark.
     pub fn light(&self, raster: Option<&[f32]>, picture: &mut [f32]) {
         let Some(raster) = raster else {
             picture.copy_from_slice(&self.ambient);
@@ -175,7 +175,7 @@ impl Transport {
     }
 }
 
-/// Everything that a row needs to be traced.
+/// What tracing a row needs.
 struct Tracer<'a> {
     scenario: &'a Scenario,
     camera: &'a Lens,
@@ -184,19 +184,19 @@ struct Tracer<'a> {
     traced: Option<Traced<'a>>,
 }
 
-/// A point of the part that the projector lights: where on the raster, and how strongly.
+/// A point of the part that the projector lights: its place on the raster, and the cosine of its angle to the light.
 struct Lit {
     raster: [f64; 2],
     cosine: f64,
 }
 
 impl Tracer<'_> {
-    fn row(&self, v: u32) -> Row {
+    fn row(&self, v: u32) -> CameraRow {
         let device = &self.scenario.rig.camera;
         let n = self.scenario.sub_rays;
         let share = 1.0 / f64::from(n * n);
         let width = device.width as usize;
-        let mut row = Row {
+        let mut row = CameraRow {
             ambient: Vec::with_capacity(width),
             ends: Vec::with_capacity(width),
             taps: Vec::with_capacity(width * 8),
@@ -255,7 +255,7 @@ impl Tracer<'_> {
         Some((hit, direction))
     }
 
-    /// How the projector lights this point, if it does.
+    /// How the projector lights this point; none if it does not.
     fn lit(&self, hit: &Hit) -> Option<Lit> {
         let towards = normalised(minus(self.placed.lamp, hit.point));
         let cosine = facing(hit.normal, towards)?;
@@ -268,7 +268,7 @@ impl Tracer<'_> {
         (!self.traced.as_ref()?.shadowed(hit, towards)).then_some(Lit { raster, cosine })
     }
 
-    /// The four bilinear taps of a lit point; beyond the outermost pixel centres the edge pixels go on.
+    /// The four bilinear taps of a lit point; beyond the outermost pixel centres the edge pixels are repeated.
     fn taps(&self, lit: &Lit, share: f64, pixel: &mut Vec<(u32, f64)>) {
         let device = &self.scenario.rig.projector;
         let split = |place: f64, pixels: u32| {
@@ -287,14 +287,14 @@ impl Tracer<'_> {
     }
 }
 
-/// Whether `hit` lies off the tangent plane at `at` by more than a smooth surface would, seen along `direction`.
+/// Whether `hit` is off the tangent plane at `at`, along `direction`, by more than [`DEPTH_EDGE_MM`].
 fn depth_edge(at: &Hit, hit: &Hit, direction: Vector) -> bool {
     let off = dot(at.normal, minus(hit.point, at.point));
     let along_ray = off / dot(at.normal, direction).abs().max(1e-3);
     along_ray.abs() > DEPTH_EDGE_MM
 }
 
-/// Adds the taps of one pixel, each projector pixel once and in order, to the row's.
+/// Appends the taps of one pixel to those of the row, each projector pixel once and in order.
 fn merge(pixel: &mut [(u32, f64)], taps: &mut Vec<(u32, f32)>) {
     // A stable sort, so that equal indices are always summed in the same order.
     pixel.sort_by_key(|(index, _)| *index);

@@ -8,8 +8,8 @@ use nix::errno::Errno;
 use super::CONSUMER;
 use super::failure::{LineError, errno, means};
 
-/// A line that was found; nobody holds it for us yet.
-pub(super) struct Found {
+/// A line that was found but not yet requested from the kernel.
+pub(super) struct FoundLine {
     line: Line,
     name: String,
 }
@@ -17,8 +17,8 @@ pub(super) struct Found {
 /// Finds the line `name` of the chip labelled `label`.
 ///
 /// # Errors
-/// Why there is none, or not exactly one.
-pub(super) fn find(label: &str, name: &str) -> Result<Found, LineError> {
+/// If there is no such chip or line, or more than one.
+pub(super) fn find(label: &str, name: &str) -> Result<FoundLine, LineError> {
     let chips = open_chips(name)?;
     let labelled: Vec<&Chip> = chips.iter().filter(|chip| chip.label() == label).collect();
     if labelled.is_empty() {
@@ -31,7 +31,7 @@ pub(super) fn find(label: &str, name: &str) -> Result<Found, LineError> {
     let (mut lines, mut names) = (Vec::new(), Vec::new());
     for line in labelled.into_iter().flat_map(Chip::lines) {
         let info = line.info().map_err(|error| match errno(&error) {
-            // The line is there and so is the request, in version 1.
+            // The line exists; the kernel does not know the request of version 1 of the interface.
             Some(Errno::EINVAL | Errno::ENOTTY) => LineError::NoVersion1 { line: name.into() },
             _ => means(&error, name, None),
         })?;
@@ -42,7 +42,7 @@ pub(super) fn find(label: &str, name: &str) -> Result<Found, LineError> {
         }
     }
     match (lines.len(), lines.pop()) {
-        (1, Some(line)) => Ok(Found {
+        (1, Some(line)) => Ok(FoundLine {
             line,
             name: name.into(),
         }),
@@ -59,7 +59,7 @@ pub(super) fn find(label: &str, name: &str) -> Result<Found, LineError> {
     }
 }
 
-/// Every chip once: old names of a chip may be links to it.
+/// All chips, each once: a second name in /dev may be a link to the same chip.
 fn open_chips(line: &str) -> Result<Vec<Chip>, LineError> {
     let failed = |error: gpio_cdev::Error| LineError::Failed {
         line: line.into(),
@@ -73,7 +73,7 @@ fn open_chips(line: &str) -> Result<Vec<Chip>, LineError> {
             Ok(_) => {}
             Err(error) => match errno(&error) {
                 Some(Errno::EACCES | Errno::EPERM) => denied = true,
-                // It went while we looked.
+                // The chip was removed in the meantime.
                 Some(Errno::ENOENT | Errno::ENODEV | Errno::ENXIO) => {}
                 _ => return Err(failed(error)),
             },
@@ -88,15 +88,15 @@ fn open_chips(line: &str) -> Result<Vec<Chip>, LineError> {
     Ok(found)
 }
 
-impl Found {
-    /// Takes the line as an output that is on or off from the first.
+impl FoundLine {
+    /// Requests the line as an output, initially on or off.
     pub fn output(&self, active_low: bool, on: bool) -> Result<LineHandle, LineError> {
         let flags = flags(LineRequestFlags::OUTPUT, active_low);
         let taken = self.line.request(flags, u8::from(on), CONSUMER);
         taken.map_err(|error| self.refused(&error))
     }
 
-    /// Takes the line as an input that reports its edges.
+    /// Requests the line as an input that reports its edges.
     pub fn edges(&self, active_low: bool) -> Result<LineEventHandle, LineError> {
         let flags = flags(LineRequestFlags::INPUT, active_low);
         let edges = EventRequestFlags::BOTH_EDGES;

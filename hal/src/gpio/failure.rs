@@ -1,6 +1,6 @@
-//! What can be wrong with a line, each with its own remedy.
+//! Errors of lines, each with its own remedy.
 
-use crate::error::{Device, Error};
+use crate::error::{DeviceKind, Error};
 use nix::errno::Errno;
 use std::error::Error as _;
 
@@ -45,14 +45,14 @@ pub enum LineError {
         /// How many.
         lines: usize,
     },
-    /// Somebody else holds the line.
+    /// Another program or a kernel driver holds the line.
     #[error(
         "open line {line}: {} uses it: end that program, remove the overlay that takes the line, or use another line", user.as_deref().unwrap_or("somebody else")
     )]
     Busy {
         /// The line asked for.
         line: String,
-        /// Who holds it, as far as the kernel says.
+        /// What holds it, if the kernel tells.
         user: Option<String>,
     },
     /// The kernel speaks only version 2 of the interface.
@@ -63,7 +63,7 @@ pub enum LineError {
         /// The line asked for.
         line: String,
     },
-    /// This user may not.
+    /// This user may not open the chip.
     #[error(
         "open line {line}: this user may not open {path}: add the user to the group that owns it (`gpio` on a Raspberry Pi)"
     )]
@@ -73,25 +73,25 @@ pub enum LineError {
         /// The chip's device file.
         path: String,
     },
-    /// The chip is gone while its line was in use.
+    /// The chip was removed while its line was in use.
     #[error("use line {line}: its GPIO chip is gone: connect it again")]
     Removed {
         /// The line.
         line: String,
     },
-    /// Anything else that the system says.
+    /// Any other error of the system.
     #[error(
         "use line {line}: {cause}: look into the kernel's log, and whether `gpioinfo` shows the line"
     )]
     Failed {
         /// The line.
         line: String,
-        /// The system's words.
+        /// The system's message.
         cause: String,
     },
 }
 
-/// What a list of names is cut to, so that a message stays readable.
+/// Most names that a message lists.
 const LISTED: usize = 32;
 
 fn listed(names: &[String]) -> String {
@@ -103,11 +103,11 @@ fn listed(names: &[String]) -> String {
 }
 
 impl From<LineError> for Error {
-    /// For those who know devices only. What can be wrong with a line that is open is that it is gone; the rest keeps its words.
+    /// A removed chip is a disconnected device; every other error is `Unsupported` and keeps its message.
     fn from(error: LineError) -> Self {
         match error {
             LineError::Removed { line } => {
-                Self::disconnected(Device::Lines, format!("using line {line}"))
+                Self::disconnected(DeviceKind::Lines, format!("using line {line}"))
             }
             other => Self::unsupported(
                 "a line of the GPIO chip as it is set up".to_string(),
@@ -117,7 +117,7 @@ impl From<LineError> for Error {
     }
 }
 
-/// What an error of the library means for `line`, whose holder is `user`.
+/// The `LineError` for an error of the library; `user` is what holds the line, if known.
 pub(super) fn means(error: &gpio_cdev::Error, line: &str, user: Option<String>) -> LineError {
     let line = line.to_owned();
     match errno(error) {
@@ -130,7 +130,7 @@ pub(super) fn means(error: &gpio_cdev::Error, line: &str, user: Option<String>) 
     }
 }
 
-/// The system's number in an error of the library, which shows it as a source only.
+/// The system's error number, which the library's error has only as its source.
 pub(super) fn errno(error: &gpio_cdev::Error) -> Option<Errno> {
     let source = error.source()?;
     if let Some(errno) = source.downcast_ref::<Errno>() {

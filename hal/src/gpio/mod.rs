@@ -1,14 +1,13 @@
 //! Lines of the kernel's GPIO chips: the camera's trigger, the start line, and busy, ok and fault.
 //!
 //! A line is found by the label of its chip and its own name (`gpioinfo` lists both), because the numbers of chips change with
-//! the kernel. It is spoken to through version 1 of the kernel's interface.
+//! the kernel. Version 1 of the kernel's interface is used.
 //!
-//! What that version can promise: edges are stamped by the kernel on `CLOCK_MONOTONIC` (since Linux 5.7); 16 of them are queued, and what
-//! comes on top is lost without a sign; the kernel does not debounce. So [`Debounce`](crate::lines::Debounce) does it here and looks at
-//! the level in the end.
+//! In this version the kernel stamps edges on `CLOCK_MONOTONIC` (since Linux 5.7), queues 16 of them, drops further ones without
+//! notice, and does not debounce. So [`Debounce`](crate::lines::Debounce) debounces here, and reads the level at the end.
 //!
-//! A line is left at its idle level when its owner is dropped, also by a panic. A process that is killed cannot do that: then
-//! the kernel turns the line into an input, and a resistor has to hold it.
+//! A line is left at its idle level when its owner is dropped, also by a panic. When the process is killed, the kernel turns the
+//! line into an input, and a resistor has to hold its level.
 
 mod chip;
 mod failure;

@@ -1,4 +1,4 @@
-//! A line out that tells a state: busy, ok or fault.
+//! An output line that shows a state: busy, ok or fault.
 
 use gpio_cdev::LineHandle;
 
@@ -7,7 +7,7 @@ use super::failure::{LineError, means};
 use crate::error::Error;
 use crate::lines::OutputLine;
 
-/// A line out. Dropped, it goes back to what it was opened with.
+/// An output line. When dropped, it returns to its idle state.
 #[derive(Debug)]
 pub struct Output {
     handle: LineHandle,
@@ -16,10 +16,10 @@ pub struct Output {
 }
 
 impl Output {
-    /// Takes the line `name` of the chip labelled `chip`; it is `idle` until it is set, and again in the end.
+    /// Opens the line `name` of the chip labelled `chip`; it has the state `idle` until it is set, and again after it is dropped.
     ///
     /// # Errors
-    /// Why it cannot be taken.
+    /// Why it cannot be opened.
     pub fn open(chip: &str, name: &str, active_low: bool, idle: bool) -> Result<Self, LineError> {
         Ok(Self {
             handle: find(chip, name)?.output(active_low, idle)?,
@@ -42,7 +42,7 @@ impl OutputLine for Output {
 
 impl Drop for Output {
     fn drop(&mut self) {
-        // Nobody is left to be told.
+        // An error could not be reported any more.
         let _ = self.put(self.idle);
     }
 }

@@ -1,11 +1,10 @@
-//! A line out that starts exposures: a pulse of a given width.
+//! An output line that starts exposures with pulses of a given width.
 //!
-//! The caller begins a pulse, a thread of its own ends it. A camera may expose for as long as the pulse lasts, so the width must
-//! not wander with the time that a sleeping thread takes to wake: the thread wakes a little early and watches the clock. Either
-//! may still be interrupted by whatever else the computer does, so the clock is read around both edges, and a pulse that did not
-//! last as long as it should is told.
+//! The caller begins a pulse, and a thread of this module ends it. A camera may expose for as long as the pulse lasts, so the width
+//! must not depend on how long a sleeping thread takes to wake: the thread wakes a little early and then polls the clock. Both
+//! threads may still be interrupted by other work of the computer, so the clock is read before and after each edge, and a pulse
+//! that was too long or too short is reported.
 
-use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -14,14 +13,15 @@ use super::chip::find;
 use super::failure::{LineError, means};
 use crate::clock::monotonic;
 use crate::error::Error;
+use crate::latest;
 use crate::setup::TriggerSetup;
-use crate::trigger::{Edges, REMEMBERED, Spoiled, Trigger};
+use crate::trigger::{Edges, Spoiled, SpoiledPulses, Trigger};
 use crate::units::Timestamp;
 
-/// How much too early the thread wakes: more than what it usually takes to, and little processor time to watch the clock for.
+/// How long before the end of a pulse the thread wakes: longer than waking usually takes, short enough to poll the clock meanwhile.
 const EARLY: Duration = Duration::from_micros(200);
 
-/// A trigger of pulses. Dropped, its line is idle, also in the middle of a pulse.
+/// A trigger that makes pulses. When dropped, its line becomes idle, also in the middle of a pulse.
 pub struct Pulse {
     line: Arc<Pulsed>,
     ending: Option<JoinHandle<()>>,
@@ -30,31 +30,31 @@ pub struct Pulse {
 /// Begins a pulse, or ends it.
 type Put = dyn Fn(bool) -> Result<(), LineError> + Send + Sync;
 
-/// The line and what both threads know of it.
+/// The line and the state that both threads share.
 struct Pulsed {
     put: Box<Put>,
     width: Duration,
-    /// Locked from before an edge until what is known of it is written down: whoever locks it later knows it.
+    /// Locked from before an edge until its times are stored, so that a thread that locks it later knows them.
     state: Mutex<State>,
     changed: Condvar,
 }
 
 struct State {
-    /// The clock before and after the rise of the pulse that is on.
+    /// Times before and after the rising edge of the pulse that is on.
     rise: Option<(Timestamp, Timestamp)>,
-    /// Pulses that nobody has asked about.
-    spoiled: VecDeque<Spoiled>,
-    /// Why the last one could not be ended.
+    /// Spoiled pulses that were not fetched yet.
+    spoiled: SpoiledPulses,
+    /// Why the last pulse could not be ended.
     failed: Option<LineError>,
-    /// Nobody fires any more.
+    /// The trigger is being dropped.
     over: bool,
 }
 
 impl Pulse {
-    /// Takes the line `name` of the chip as it is set up; it is idle.
+    /// Opens the line `name` of the chip as it is set up; it is idle.
     ///
     /// # Errors
-    /// Why it cannot be taken.
+    /// Why it cannot be opened.
     pub fn open(setup: &TriggerSetup, name: &str) -> Result<Self, LineError> {
         let handle = find(&setup.chip, name)?.output(setup.active_low, false)?;
         let line: Box<str> = name.into();
@@ -74,7 +74,7 @@ impl Pulse {
             width,
             state: Mutex::new(State {
                 rise: None,
-                spoiled: VecDeque::with_capacity(REMEMBERED),
+                spoiled: SpoiledPulses::new(),
                 failed: None,
                 over: false,
             }),
@@ -92,7 +92,7 @@ impl Pulse {
 }
 
 impl Trigger for Pulse {
-    /// A pulse while the one before is still on is lost, as it is to a camera that still exposes.
+    /// A pulse while the previous one is still on is lost, as it would be to a camera that still exposes.
     fn fire(&mut self) -> Result<Timestamp, Error> {
         let mut state = self.line.lock();
         if let Some(failed) = &state.failed {
@@ -119,10 +119,10 @@ impl Drop for Pulse {
         self.line.lock().over = true;
         self.line.changed.notify_one();
         if let Some(ending) = self.ending.take() {
-            // A panic there leaves nothing behind that the next line would not set right.
+            // If the thread panicked, the line is set idle below all the same.
             let _ = ending.join();
         }
-        // Nobody is left to be told.
+        // An error could not be reported any more.
         let _ = (self.line.put)(false);
     }
 }
@@ -132,7 +132,7 @@ impl Pulsed {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Ends every pulse in its time, until nobody fires any more.
+    /// Ends every pulse at its time, until the trigger is dropped.
     fn end_pulses(&self) {
         let mut state = self.lock();
         while !state.over {
@@ -140,7 +140,7 @@ impl Pulsed {
                 state = self.wait(state, Duration::MAX);
                 continue;
             };
-            // From the reading before the rise to the one before the fall, so that the way into the kernel counts for neither.
+            // From the reading before the rise to the reading before the fall: both edges are delayed alike by their system calls.
             let ends = rise.0 + self.width;
             let left = ends.since(monotonic());
             if left > EARLY {
@@ -155,7 +155,9 @@ impl Pulsed {
             state.failed = (self.put)(false).err();
             let fall = (before, monotonic());
             state.rise = None;
-            state.judge(&Edges { rise, fall }, self.width);
+            if let Some(spoiled) = Spoiled::by(&Edges { rise, fall }, self.width) {
+                latest::keep(&mut state.spoiled, spoiled);
+            }
         }
     }
 
@@ -165,32 +167,22 @@ impl Pulsed {
     }
 }
 
-impl State {
-    /// Remembers a pulse that did not last as long as it should.
-    fn judge(&mut self, edges: &Edges, width: Duration) {
-        if let Some(spoiled) = Spoiled::by(edges, width) {
-            if self.spoiled.len() == REMEMBERED {
-                self.spoiled.pop_front();
-            }
-            self.spoiled.push_back(spoiled);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::trigger::REMEMBERED;
 
     const WIDTH: Duration = Duration::from_millis(20);
     /// How long an edge is interrupted.
     const STALL: Duration = Duration::from_millis(5);
 
-    /// The first pulse of a line whose edges take so long, if it was spoiled; asked as soon as its end has begun.
+    /// Fires one pulse on a line whose edges take so long; its time, and the report of it if it was spoiled, fetched as soon as its
+    /// falling edge has begun.
     fn first(rise: Duration, fall: Duration) -> (Timestamp, Option<Spoiled>) {
         let (ends, ended) = std::sync::mpsc::channel();
         let put = move |on: bool| {
             if !on {
-                // The last one, of the drop, is awaited by nobody.
+                // The receiver is gone at the falling edge that the drop makes.
                 let _ = ends.send(());
             }
             std::thread::sleep(if on { rise } else { fall });
@@ -206,7 +198,7 @@ mod tests {
 
     #[test]
     fn a_pulse_with_an_interrupted_edge_is_told_once_it_ended_and_by_how_much_it_was_off() {
-        // Whatever else this computer does can only make it worse.
+        // Other work of this computer can only make the error larger.
         let (fired, told) = first(STALL, Duration::ZERO);
         let told = told.expect("an interrupted rise");
         assert_eq!((told.fired, told.width), (fired, WIDTH));

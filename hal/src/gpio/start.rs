@@ -1,4 +1,4 @@
-//! A line in that starts cycles: its edges with the kernel's stamps, debounced.
+//! An input line that starts cycles: its edges with the kernel's time stamps, debounced.
 
 use std::os::fd::{AsFd, BorrowedFd};
 
@@ -23,10 +23,10 @@ pub struct Start {
 }
 
 impl Start {
-    /// Takes the line `name` of the chip as it is set up. A line that is active already has started nothing.
+    /// Opens the line `name` of the chip as it is set up. A line that is active already does not start a cycle.
     ///
     /// # Errors
-    /// Why it cannot be taken.
+    /// Why it cannot be opened.
     pub fn open(setup: &LinesSetup, name: &str) -> Result<Self, LineError> {
         let edges = find(&setup.chip, name)?.edges(setup.start_active_low)?;
         let unblocked =
@@ -51,7 +51,7 @@ impl Start {
         Ok(level != 0)
     }
 
-    /// The next edge that is queued, with the level after it.
+    /// The next queued edge, with the level after it.
     fn edge(&mut self) -> Result<Option<(Timestamp, bool)>, LineError> {
         match self.edges.get_event() {
             Ok(event) => {
@@ -60,7 +60,7 @@ impl Start {
             }
             Err(error) => match errno(&error) {
                 Some(Errno::EAGAIN) => Ok(None),
-                // How the library names an end of the file.
+                // The library reports the end of the file as EIO.
                 Some(Errno::EIO) => Err(LineError::Removed {
                     line: self.name.clone(),
                 }),

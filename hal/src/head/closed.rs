@@ -1,18 +1,18 @@
-//! A head whose devices are closed: it remembers what they were like, and every call says that they are gone.
+//! A head whose devices are closed: it keeps their properties, and every call fails with `Disconnected`.
 //!
-//! A device can be held once only, so who opens a lost head again has to let go of it first.
+//! A device can be open only once, so a lost head must be closed before it can be opened again.
 
 use std::time::Duration;
 
 use super::{DynHead, Head};
 use crate::camera::{Camera, CameraTiming, Encoding};
 use crate::clock::{Clock, Monotonic};
-use crate::error::{Device, Error};
+use crate::error::{DeviceKind, Error};
 use crate::frame::{Frame, FrameFormat};
 use crate::projector::{Flip, Projector, Raster};
 use crate::trigger::{NoTrigger, Trigger};
 
-/// What the devices were like.
+/// The properties of the devices that were closed.
 #[derive(Clone, Debug)]
 struct Closed {
     format: FrameFormat,
@@ -23,7 +23,7 @@ struct Closed {
 }
 
 impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
-    /// What is left of this head when its devices are closed.
+    /// A closed head with the properties of this one.
     pub fn closed(&self) -> DynHead {
         let like = Closed {
             format: self.camera_format(),
@@ -42,7 +42,7 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
     }
 }
 
-fn gone<T>(device: Device) -> Result<T, Error> {
+fn gone<T>(device: DeviceKind) -> Result<T, Error> {
     Err(Error::disconnected(device, "using a head that is closed"))
 }
 
@@ -60,15 +60,15 @@ impl Camera for Closed {
     }
 
     fn present(&self) -> Result<(), Error> {
-        gone(Device::Camera)
+        gone(DeviceKind::Camera)
     }
 
     fn start(&mut self) -> Result<(), Error> {
-        gone(Device::Camera)
+        gone(DeviceKind::Camera)
     }
 
     fn poll_frame(&mut self) -> Result<Option<Frame>, Error> {
-        gone(Device::Camera)
+        gone(DeviceKind::Camera)
     }
 
     fn stop(&mut self) -> Result<(), Error> {
@@ -86,19 +86,19 @@ impl Projector for Closed {
     }
 
     fn present(&self) -> Result<(), Error> {
-        gone(Device::Projector)
+        gone(DeviceKind::Projector)
     }
 
     fn load(&mut self, _: Vec<Raster>) -> Result<(), Error> {
-        gone(Device::Projector)
+        gone(DeviceKind::Projector)
     }
 
     fn queue(&mut self, _: usize) -> Result<(), Error> {
-        gone(Device::Projector)
+        gone(DeviceKind::Projector)
     }
 
     fn poll_flip(&mut self) -> Result<Option<Flip>, Error> {
-        gone(Device::Projector)
+        gone(DeviceKind::Projector)
     }
 
     fn blank(&mut self) -> Result<(), Error> {

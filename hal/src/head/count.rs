@@ -1,9 +1,9 @@
-//! The camera's count of frames: gaps are lost frames, a count that comes again is the same frame.
+//! The camera's count of frames: a gap means lost frames, a repeated count means the same frame.
 
-/// Counts below the newest that are remembered.
+/// How far below the newest count a count is remembered.
 const REMEMBERED: u64 = 64;
 
-/// What has been seen of a camera's count.
+/// Which counts of a camera have arrived.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct FrameCount {
     newest: Option<u64>,
@@ -14,21 +14,21 @@ pub(super) struct FrameCount {
 }
 
 impl FrameCount {
-    /// Takes a frame's count; whether it is a frame that was not seen before.
+    /// Records a frame's count and returns whether it is new.
     pub fn see(&mut self, count: u64) -> bool {
         let Some(newest) = self.newest else {
             (self.newest, self.lowest, self.seen) = (Some(count), count, 1);
             return true;
         };
         if count > newest {
-            let step = count - newest;
-            self.seen = if step < REMEMBERED {
-                self.seen << step | 1
+            let ahead = count - newest;
+            self.seen = if ahead < REMEMBERED {
+                self.seen << ahead | 1
             } else {
                 1
             };
             self.newest = Some(count);
-            let gap = u32::try_from(step - 1).unwrap_or(u32::MAX);
+            let gap = u32::try_from(ahead - 1).unwrap_or(u32::MAX);
             self.missing = self.missing.saturating_add(gap);
             return true;
         }
@@ -42,17 +42,17 @@ impl FrameCount {
         true
     }
 
-    /// Frames that have not come, by the gaps.
+    /// Frames that have not arrived, by the gaps in the count.
     pub fn missing(&self) -> u32 {
         self.missing
     }
 
-    /// How many frames are known to have been exposed before the one of this count, since the first that came.
+    /// How many frames were exposed before the one with this count, from the lowest count that arrived on.
     pub fn before(&self, count: u64) -> u64 {
         count.saturating_sub(self.lowest)
     }
 
-    /// Whether any frame has come.
+    /// Whether any frame has arrived.
     pub fn any(&self) -> bool {
         self.newest.is_some()
     }

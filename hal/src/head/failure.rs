@@ -1,27 +1,27 @@
-//! Why a sequence ended without all its frames: the counts, as an error with its remedy.
+//! Why a sequence ended without all its frames, as an error with the counts and the remedy.
 
 use std::time::Duration;
 
 use super::Exposure;
 use crate::error::Error;
 
-/// What the sequence waited for in vain.
+/// What prevented the sequence from ending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Blocked {
     /// The projector never flipped.
     NoFlip,
     /// The camera gave no frame at all.
     NoFrame,
-    /// A pattern was shown as often as allowed, and no frame was wholly its.
+    /// A pattern was shown as often as allowed, and no frame was exposed while only it was in view.
     Retakes,
-    /// A pattern was shown as often as allowed, and most frames were spoiled by the trigger's pulses.
+    /// A pattern was shown as often as allowed, and most of the rejected frames were spoiled by the trigger's pulses.
     Pulses,
-    /// Time was up.
+    /// The time was over.
     Late,
 }
 
 impl Blocked {
-    /// Why frames that came were not what was wanted: mostly the one thing, or the other.
+    /// `Pulses` if most of the rejected frames were spoiled by pulses, else `Retakes`.
     pub fn misfit(so_far: &Exposure) -> Self {
         if so_far.spoiled > so_far.unfit() / 2 {
             Self::Pulses
@@ -37,24 +37,24 @@ pub(super) struct Failure {
     pub blocked: Blocked,
     /// The pattern that has no frame.
     pub index: usize,
-    pub shots: u32,
+    pub attempts: u32,
     pub taken: usize,
     pub of: usize,
     pub so_far: Exposure,
 }
 
 impl Failure {
-    /// The error; `timeout` is what the caller allowed beyond the plan.
+    /// The error; `timeout` is the time that the caller allowed beyond the plan.
     pub fn error(self, timeout: Duration) -> Error {
         let Self {
             index,
-            shots,
+            attempts,
             taken,
             of,
             so_far,
             ..
         } = self;
-        let attempt = format!("acquiring pattern {index} ({taken} of {of} taken)");
+        let acquiring = format!("acquiring pattern {index} ({taken} of {of} taken)");
         let counts = format!(
             "{} frames straddled two patterns, {} were older, {} began at no trigger, {} were spoiled by their pulses, {} were lost, \
              {} refreshes were missed",
@@ -67,25 +67,25 @@ impl Failure {
         );
         match self.blocked {
             Blocked::NoFlip => Error::timeout(
-                format!("{attempt}: no flip came, which"),
+                format!("{acquiring}: no flip came, which"),
                 timeout,
                 "check the projector's connection and mode",
             ),
             Blocked::NoFrame => Error::timeout(
-                format!("{attempt}: shown {shots} times, no frame came, which"),
+                format!("{acquiring}: shown {attempts} times, no frame came, which"),
                 timeout,
                 "check the trigger's wire and the camera's trigger mode",
             ),
             Blocked::Retakes => Error::protocol(
                 format!(
-                    "{attempt}: shown {shots} times, no frame was wholly exposed in its view ({counts}), which"
+                    "{acquiring}: shown {attempts} times, no frame was wholly exposed in its view ({counts}), which"
                 ),
                 "check the flip-to-light delay, what the camera's stamp marks, and the load of the processor",
             ),
-            // A pulse that ended too late, so it is one of time; another time it may do better.
+            // A time-out, because repeating the sequence may succeed: the pulses were too long since the computer was busy.
             Blocked::Pulses => Error::timeout(
                 format!(
-                    "{attempt}: shown {shots} times, pulses of the trigger were up to {:.2} ms off their length, \
+                    "{acquiring}: shown {attempts} times, pulses of the trigger were up to {:.2} ms off their length, \
                      and with them the brightness of frames ({counts}), which",
                     so_far.pulse_error.as_secs_f64() * 1e3
                 ),
@@ -93,7 +93,7 @@ impl Failure {
                 "stop what else loads the computer, or give fringed a real-time priority",
             ),
             Blocked::Late => Error::timeout(
-                format!("{attempt} after {shots} tries ({counts})"),
+                format!("{acquiring} after {attempts} tries ({counts})"),
                 timeout,
                 "check the load of the processor and the cables",
             ),

@@ -1,34 +1,35 @@
-//! Which pattern a frame shows: proved by when patterns were in view and when the frame was exposed.
+//! Which pattern a frame shows, decided from when patterns were in view and when the frame was exposed.
 //!
-//! A pattern is in view from its flip plus the flip-to-light delay until the next flip plus that delay. A frame is a pattern's
-//! if its whole exposure lies within that, widened by the tolerance. When the next flip has not come yet, the view lasts at
-//! least until that flip was queued: no flip comes before it is asked for. What cannot be decided yet waits for the flip.
+//! A pattern is in view from its flip plus the flip-to-light delay until the next flip plus that delay. A frame shows a pattern
+//! if its whole exposure lies within that time, widened by the tolerance. Before the next flip has been reported, the view lasts
+//! at least until that flip was queued, because no flip happens before it is queued. A frame that cannot be decided yet waits for
+//! the flip.
 
-use std::collections::VecDeque;
 use std::time::Duration;
 
+use crate::latest;
 use crate::projector::Flip;
 use crate::units::Timestamp;
 
-/// Views that are remembered. A frame that is older than all of them is stale.
+/// Views that are remembered. A frame older than all of them is stale.
 const MAX_VIEWS: usize = 16;
-/// A count of refreshes tells the time of the next flip only over so many: the nominal period is not exact.
+/// Over how many refreshes the time of a flip is computed from its count: the nominal period is not exact.
 const MAX_COUNTED: u64 = 8;
 
-/// What a frame turned out to be.
+/// What a frame shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Identity {
-    /// Wholly exposed while this position of the sequence was in view, which came into view at that time.
+    /// Exposed while only the pattern of this position was in view; the time is when it came into view.
     Of(usize, Timestamp),
-    /// Exposed over a change of patterns.
+    /// Exposed during a change of patterns.
     Straddles,
     /// Begun before the first pattern that is remembered.
     Stale,
-    /// The flip that ends the view has been queued and has not come yet.
+    /// The flip that ends the view has been queued but not yet reported.
     Undecided,
 }
 
-/// A pattern in view. By time and by count its light may come at two different times; the truth lies between.
+/// A pattern in view. The time of its light by the flip's stamp and that by the flip's count may differ; the truth lies between.
 #[derive(Clone, Copy, Debug)]
 struct View {
     position: usize,
@@ -40,8 +41,8 @@ struct View {
 /// The latest patterns in view, oldest first.
 #[derive(Debug)]
 pub(super) struct Views {
-    views: VecDeque<View>,
-    /// When the flip that has not come yet was queued.
+    views: heapless::Deque<View, MAX_VIEWS>,
+    /// When the flip that was not yet reported was queued.
     queued: Option<Timestamp>,
     flip_to_light: Duration,
     tolerance: Duration,
@@ -51,7 +52,7 @@ pub(super) struct Views {
 impl Views {
     pub fn new() -> Self {
         Self {
-            views: VecDeque::with_capacity(MAX_VIEWS),
+            views: heapless::Deque::new(),
             queued: None,
             flip_to_light: Duration::ZERO,
             tolerance: Duration::ZERO,
@@ -59,7 +60,7 @@ impl Views {
         }
     }
 
-    /// Forgets all views; from now on this is how light follows flips.
+    /// Forgets all views and takes new times: from a flip to its light, tolerance, and refresh period.
     pub fn restart(&mut self, flip_to_light: Duration, tolerance: Duration, refresh: Duration) {
         self.views.clear();
         self.queued = None;
@@ -71,7 +72,7 @@ impl Views {
         self.queued = Some(now);
     }
 
-    /// The queued flip came and shows `position`. Answers how far its time is off what the count of refreshes says.
+    /// The queued flip happened and shows `position`. Returns the difference of its stamp from its time by the count of refreshes.
     pub fn flipped(&mut self, position: usize, flip: Flip) -> Duration {
         let queued = self.queued.take().unwrap_or(flip.timestamp);
         let known = self.counted(flip);
@@ -82,38 +83,37 @@ impl Views {
             .max(counted.since(flip.timestamp));
         let (mut earliest, mut latest) = (flip.timestamp, flip.timestamp);
         if known.is_none() {
-            // Nothing confirms the stamp, but no flip comes before it is queued.
+            // Nothing confirms the stamp, but no flip happens before it is queued.
             earliest = earliest.min(queued);
         } else if off > self.tolerance {
-            // One of the two is wrong. Only what holds for both is proved.
+            // Stamp or count is wrong. Only what holds for both is certain.
             (earliest, latest) = (earliest.min(counted), latest.max(counted));
         }
-        if self.views.len() == MAX_VIEWS {
-            self.views.pop_front();
-        }
-        self.views.push_back(View {
+        let view = View {
             position,
             earliest: earliest + self.flip_to_light,
             latest: latest + self.flip_to_light,
             flip,
-        });
+        };
+        latest::keep(&mut self.views, view);
         off
     }
 
-    /// When the flip should have come by its count, told from the ones before. Stamps are taken at a flip or too late, so the
-    /// one that says the earliest is believed: one right stamp among them is enough.
+    /// The time of a flip by its count, from the stamps of the flips before it. A stamp is taken at its flip or too late, never too
+    /// early, so the earliest time that follows from any of them is used: one correct stamp is enough.
     fn counted(&self, flip: Flip) -> Option<Timestamp> {
-        let told = |view: &View| {
-            let steps = flip.sequence.saturating_sub(view.flip.sequence);
-            // At most 8 periods.
-            (steps <= MAX_COUNTED).then(|| view.flip.timestamp + self.refresh * steps as u32)
+        let expected = |view: &View| {
+            let refreshes = flip.count.saturating_sub(view.flip.count);
+            // At most 8, so the cast loses nothing.
+            (refreshes <= MAX_COUNTED)
+                .then(|| view.flip.timestamp + self.refresh * refreshes as u32)
         };
-        self.views.iter().filter_map(told).min()
+        self.views.iter().filter_map(expected).min()
     }
 
-    /// What a frame exposed from `start` to `end` shows, as far as it is known `now`.
+    /// What a frame exposed from `start` to `end` shows, as far as is known at `now`.
     pub fn identify(&self, start: Timestamp, end: Timestamp, now: Timestamp) -> Identity {
-        // No flip that has not come yet can change what is in view before this.
+        // The flip that was not yet reported cannot change what is in view before this.
         let open = self.queued.unwrap_or(now) + self.flip_to_light;
         let mut until = (open, false);
         for view in self.views.iter().rev() {
@@ -129,7 +129,7 @@ impl Views {
             until = (view.earliest, true);
         }
         match until {
-            // Before any flip: what ends after the first one could have come may be the first pattern's.
+            // Before any flip was reported: a frame that ends after the first light is possible may show the first pattern.
             (open, false) if end > open => Identity::Undecided,
             (_, false) => Identity::Stale,
             (first, true) if end > first => Identity::Straddles,

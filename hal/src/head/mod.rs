@@ -1,6 +1,6 @@
 //! A head (camera, projector and trigger) and the acquisition of one sequence with it.
 //!
-//! The decisions are the `sequencer`'s, which knows no device; this loop carries them out.
+//! The `sequencer` decides and knows no device; the loop here carries its decisions out.
 
 mod closed;
 mod count;
@@ -24,15 +24,15 @@ use crate::units::Timestamp;
 use pacing::Pacing;
 use sequencer::{Act, Sequencer};
 pub use timing::{Stamp, TOLERANCE, Timing};
-pub use watch::{Seen, Showing, Watched};
+pub use watch::{Showing, Watched, WatchedFrame};
 
-/// A device may go without a word to whoever waits for it; on a real clock it is asked at least so often.
+/// A device may disappear without ending a wait; on a real clock the devices are polled at least this often.
 const UNNOTICED: Duration = Duration::from_millis(100);
 
 /// A head of any back-end.
 pub type DynHead = Head<Box<dyn Camera>, Box<dyn Projector>, Box<dyn Trigger>, Box<dyn Clock>>;
 
-/// Camera, projector and trigger that look at the same part, and the clock that they share.
+/// Camera, projector and trigger in front of the same part, and the clock that they share.
 #[derive(Debug)]
 pub struct Head<C, P, T, K> {
     devices: Devices<C, P, T, K>,
@@ -57,32 +57,32 @@ pub struct Exposure {
     pub done: Timestamp,
     /// Longest time from a pattern's coming into view to the start of its exposure.
     pub lag: Duration,
-    /// Largest departure of a flip from its count, and of an exposure from its trigger.
+    /// Largest difference of a flip's stamp from its time by the count, and of an exposure's start from its trigger.
     pub sync_error: Duration,
-    /// Shots that gave no frame, and whose pattern was shown again.
+    /// How often a pattern was shown again because it had given no usable frame.
     pub retaken: u32,
-    /// Refreshes by which flips came later than planned.
+    /// Refreshes by which flips were later than planned.
     pub missed_flips: u32,
-    /// Frames that were exposed and never came: gaps in the camera's count.
+    /// Frames that were exposed and never arrived: gaps in the camera's count.
     pub dropped: u32,
-    /// Frames that came again.
+    /// Frames that arrived more than once.
     pub duplicated: u32,
-    /// Frames that were exposed over a change of patterns.
+    /// Frames that were exposed during a change of patterns.
     pub straddled: u32,
-    /// Frames that were exposed before the first pattern, or came much too late.
+    /// Frames that were exposed before the first pattern, or arrived much too late.
     pub stale: u32,
     /// Frames whose exposure started at no trigger.
     pub unexplained: u32,
     /// Frames of patterns that had their frame already.
     pub surplus: u32,
-    /// Frames that were exposed for too long or too short, by a pulse of the trigger that was spoiled.
+    /// Frames that were exposed for too long or too short because the trigger's pulse was.
     pub spoiled: u32,
-    /// By how much such a pulse may have been off, at most.
+    /// Largest possible error of the length of such a pulse.
     pub pulse_error: Duration,
 }
 
 impl Exposure {
-    /// Frames that came and proved to be no pattern's.
+    /// Frames that arrived and could not be used.
     fn unfit(&self) -> u32 {
         [self.straddled, self.stale, self.unexplained, self.spoiled]
             .into_iter()
@@ -91,7 +91,7 @@ impl Exposure {
 }
 
 impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
-    /// A head of these devices, which stand in this relation of time.
+    /// A head of these devices with these measured times.
     pub fn new(camera: C, projector: P, trigger: T, clock: K, timing: Timing) -> Self {
         Self {
             devices: Devices {
@@ -110,7 +110,7 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
         self.devices.camera.format()
     }
 
-    /// How the camera's samples come over the wire.
+    /// How the camera's samples are encoded.
     pub fn encoding(&self) -> Encoding {
         self.devices.camera.encoding()
     }
@@ -120,12 +120,12 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
         self.devices.camera.timing()
     }
 
-    /// The measured relation of flips, light and stamps.
+    /// The measured times between flips, light and stamps.
     pub fn timing(&self) -> Timing {
         self.timing
     }
 
-    /// Replaces the measured relation of flips, light and stamps.
+    /// Replaces the measured times between flips, light and stamps.
     pub fn set_timing(&mut self, timing: Timing) {
         self.timing = timing;
     }
@@ -140,10 +140,10 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
         self.devices.projector.refresh()
     }
 
-    /// Asks whether camera and projector are still there, without disturbing them.
+    /// Checks that camera and projector are still connected, without disturbing them.
     ///
     /// # Errors
-    /// `Disconnected` of the first one that is gone.
+    /// `Disconnected` for the first one that is gone.
     pub fn present(&self) -> Result<(), Error> {
         self.devices.camera.present()?;
         self.devices.projector.present()
@@ -157,18 +157,18 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
         self.devices.projector.load(rasters)
     }
 
-    /// Shows the patterns `indices` in this order, exposes one frame of each, and hands each to `sink` with
-    /// its pattern's index as soon as it and all before it are there, stamped with the start of its exposure.
+    /// Shows the patterns `indices` in this order, exposes one frame of each, and passes each frame to `sink` with
+    /// its pattern's index as soon as it and all frames before it have arrived, stamped with the start of its exposure.
     ///
-    /// A frame is a pattern's if its whole exposure lies within the pattern's time in view, by the times and
+    /// A frame belongs to a pattern if its whole exposure lies within the pattern's time in view, by the times and
     /// counts of flips and frames and never by the order of arrival, and if no pulse of the trigger spoiled it. A pattern
-    /// without such a frame is shown again. The sequence ends at the latest `timeout` after it would have without a fault.
-    /// However it ends, the camera is stopped and the projector blank afterwards. `sink` delays no flip: devices are served by
-    /// another thread while it works.
+    /// without such a frame is shown again. The sequence ends at the latest `timeout` after its planned end.
+    /// However it ends, the camera is stopped and the projector blank afterwards. `sink` delays no flip: another thread serves the
+    /// devices while `sink` runs.
     ///
     /// # Errors
     /// The first error of a device; `Protocol` if `indices` is empty or frames never fit their patterns; `Timeout` if
-    /// time is up, or flips or frames do not come at all. `sink` has then seen the frames before it.
+    /// the time is over, or no flips or no frames arrive at all. `sink` has then received the frames before the failure.
     pub fn acquire(
         &mut self,
         indices: &[usize],
@@ -182,10 +182,10 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
         self.acquire_while(indices, timeout, &mut all)
     }
 
-    /// As [`Head::acquire`], but `sink` ends the sequence early by answering `false`.
+    /// As [`Head::acquire`], but `sink` can end the sequence early by returning `false`.
     ///
     /// # Errors
-    /// As [`Head::acquire`]; ending early is none.
+    /// As [`Head::acquire`]; ending early is not an error.
     pub fn acquire_while(
         &mut self,
         indices: &[usize],
@@ -231,14 +231,14 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
         })
     }
 
-    /// The devices, for the contract checks and for looking at a head without a sequence.
+    /// The devices, for the contract checks and for [`Head::watch`].
     pub(crate) fn devices(&mut self) -> &mut Devices<C, P, T, K> {
         &mut self.devices
     }
 }
 
 impl<C: Camera, P: Projector, T: Trigger, K: Clock> Devices<C, P, T, K> {
-    /// Does `work` with a running camera. However it ends, the camera is stopped and the projector blank afterwards.
+    /// Calls `work` with a running camera. However it ends, the camera is stopped and the projector blank afterwards.
     pub fn exposing<R>(
         &mut self,
         work: impl FnOnce(&mut Self) -> Result<R, Error>,
@@ -247,7 +247,7 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Devices<C, P, T, K> {
             Ok(()) => work(self),
             Err(error) => Err(error),
         };
-        // Both are told, whatever the first one answers; the work's own error says more than theirs.
+        // Both calls are made even if the first fails; an error of `work` is more useful than theirs and goes first.
         let stopped = self.camera.stop();
         let blanked = self.projector.blank();
         let result = result?;
@@ -257,7 +257,7 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Devices<C, P, T, K> {
     }
 }
 
-/// Tells the sequencer what happens and does what it answers, until the sequence ends or `hand` answers `false`.
+/// Passes events to the sequencer and does what it decides, until the sequence ends or `hand` returns `false`.
 fn carry_out<C: Camera, P: Projector, T: Trigger, K: Clock>(
     devices: &mut Devices<C, P, T, K>,
     sequencer: &mut Sequencer<Frame>,
@@ -276,10 +276,10 @@ fn carry_out<C: Camera, P: Projector, T: Trigger, K: Clock>(
             sequencer.flipped(flip);
         }
         while let Some(frame) = camera.poll_frame()? {
-            let (start, count) = (start_of(&frame), frame.sequence());
+            let (start, count) = (start_of(&frame), frame.count());
             sequencer.frame(start, count, frame.restamped(start, count));
         }
-        // After the frames and before anything is decided: the pulse of a frame that is there has ended.
+        // After the frames and before any decision: the pulse of a frame that has arrived has ended and is known.
         while let Some(pulse) = trigger.poll_spoiled() {
             sequencer.spoiled(pulse);
         }
@@ -298,7 +298,7 @@ fn carry_out<C: Camera, P: Projector, T: Trigger, K: Clock>(
     }
 }
 
-/// Waits for a flip or a frame, but not longer than a device that is gone may stay unnoticed.
+/// Waits for a flip or a frame, but not longer than the absence of a device may stay unnoticed.
 fn wait(clock: &mut impl Clock, until: Timestamp) {
     let soon = clock.now() + UNNOTICED;
     clock.wait(if clock.stands_still() {

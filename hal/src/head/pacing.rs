@@ -1,42 +1,41 @@
-//! When to flip and when to trigger: planned from the refresh, the flip-to-light delay and the camera's way of taking frames.
+//! When to flip and when to trigger: planned from the refresh, the flip-to-light delay and the timing of the camera.
 //!
-//! The next pattern's light may come when the exposure of the one in view ends. With the flip-to-light delay L and refreshes
+//! The next pattern's light may come when the exposure of the pattern in view ends. With the flip-to-light delay L and refreshes
 //! of period r after the flip at T, an exposure that ends at E allows the flip at T + m r, where m is the smallest whole
 //! number with T + m r + L ≥ E (within the tolerance). So the flip is often queued while this pattern's frame is still being
-//! exposed or read out, and with a delay of more than an exposure even before it is triggered. None of this decides whose a
-//! frame is: a plan that fails costs a retake.
+//! exposed or read out, and with a delay longer than an exposure even before the trigger fires. These plans do not decide which
+//! pattern a frame shows (`identity` does): a plan that fails costs a retake.
 
 use std::time::Duration;
 
 use super::Timing;
 use crate::camera::{CameraTiming, Starts};
+use crate::latest;
 use crate::projector::Flip;
-use crate::trigger::{REMEMBERED, Spoiled};
+use crate::trigger::{REMEMBERED, Spoiled, SpoiledPulses};
 use crate::units::Timestamp;
 
-/// Triggers that are remembered; a frame that comes later than so many others is nobody's.
-const TRIGGERS: usize = REMEMBERED;
-
-/// One showing of a pattern.
+/// One attempt to take the frame of a position: its pattern is shown and the camera triggered once.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shot {
+pub(super) struct Attempt {
     pub position: usize,
     pub flip: Flip,
-    /// When its light comes.
+    /// When its light comes into view.
     pub light: Timestamp,
+    /// When its trigger fired.
     pub fired: Option<Timestamp>,
-    /// Nothing is awaited of it any more.
+    /// Its frame has arrived or is no longer expected.
     pub done: bool,
 }
 
-impl Shot {
+impl Attempt {
     pub fn waits_for_trigger(&self) -> bool {
         !self.done && self.fired.is_none()
     }
 }
 
-/// The times of a head, and what of the camera is known so far.
-#[derive(Clone, Copy, Debug, Default)]
+/// The times of a head, and what is known of its camera so far.
+#[derive(Debug, Default)]
 pub(super) struct Pacing {
     pub refresh: Duration,
     pub flip_to_light: Duration,
@@ -46,15 +45,13 @@ pub(super) struct Pacing {
     period: Duration,
     delivery: Duration,
     triggered: bool,
-    /// A triggered camera can start its next exposure.
+    /// When a triggered camera can start its next exposure.
     free: Timestamp,
-    /// The latest triggers, and how many there were.
-    triggers: [Timestamp; TRIGGERS],
+    /// The latest triggers, and how many there were in all.
+    triggers: heapless::Deque<Timestamp, REMEMBERED>,
     count: usize,
-    /// The latest of their pulses that were spoiled, and how many there were.
-    spoiled: [Option<Spoiled>; TRIGGERS],
-    told: usize,
-    /// An exposure starts this soon after its trigger, or never.
+    spoiled: SpoiledPulses,
+    /// The longest time from a trigger to the start of its exposure.
     promptness: Duration,
     /// The start of the latest exposure of a camera that runs by itself.
     phase: Option<Timestamp>,
@@ -72,16 +69,15 @@ impl Pacing {
             delivery: camera.delivery,
             triggered: camera.starts == Starts::OnTrigger,
             free: Timestamp(0),
-            triggers: [Timestamp(0); TRIGGERS],
+            triggers: heapless::Deque::new(),
             count: 0,
-            spoiled: [None; TRIGGERS],
-            told: 0,
+            spoiled: SpoiledPulses::new(),
             promptness: timing.tolerance,
             phase: None,
         }
     }
 
-    /// How long a sequence of so many patterns takes when nothing goes wrong, at most.
+    /// The longest time that a sequence of so many patterns takes when nothing goes wrong.
     pub fn planned(&self, patterns: usize) -> Duration {
         // A camera that runs by itself starts up to a period after the light.
         let waits = if self.triggered {
@@ -103,48 +99,47 @@ impl Pacing {
         start + self.exposure
     }
 
-    /// How much of the tolerance a plan may use. The rest is for a trigger that fires a little late, and for the jitter of a camera that
-    /// runs by itself.
+    /// The part of the tolerance that a plan may use. The rest is left for a trigger that fires a little late, and for the jitter of a
+    /// camera that runs by itself.
     fn slack(&self) -> Duration {
         self.tolerance / 2
     }
 
     pub fn fired(&mut self, at: Timestamp) {
         self.free = at + self.period;
-        self.triggers[self.count % TRIGGERS] = at;
+        latest::keep(&mut self.triggers, at);
         self.count += 1;
     }
 
-    /// Whether a frame's exposure may have started then, with so many exposures before it in this sequence: a triggered camera starts
-    /// one at a trigger, and each takes a trigger of its own. Else the stamp is not to be believed.
+    /// Whether a trigger explains an exposure that started at `start`, with `before` exposures before it in this sequence: a triggered
+    /// camera starts an exposure at a trigger, and each exposure needs a trigger of its own. Otherwise its stamp is wrong.
     pub fn explains(&self, start: Timestamp, before: u64) -> bool {
-        let known = self.count.saturating_sub(TRIGGERS)..self.count;
+        let oldest = self.count - self.triggers.len();
         let prompt = |at: Timestamp| start.0.abs_diff(at.0) <= self.promptness.as_nanos() as u64;
         !self.triggered
-            || known
-                .filter(|index| *index as u64 >= before)
-                .any(|index| prompt(self.triggers[index % TRIGGERS]))
+            || (oldest as u64..)
+                .zip(&self.triggers)
+                .any(|(index, at)| index >= before && prompt(*at))
     }
 
-    /// A pulse did not last as long as it should. That matters to a camera that exposes for as long as its pulses last.
+    /// A pulse was too long or too short. This matters to a camera that exposes for as long as its pulses last.
     pub fn spoiled(&mut self, pulse: Spoiled) {
         if !self.triggered || !pulse.decides(self.exposure) {
             return;
         }
-        // The camera is busy for as much longer.
+        // The camera is busy for that much longer.
         self.free = self.free.max(pulse.fired + (pulse.longer + self.period));
-        self.spoiled[self.told % TRIGGERS] = Some(pulse);
-        self.told += 1;
+        latest::keep(&mut self.spoiled, pulse);
     }
 
-    /// The pulse that spoiled an exposure that seems to have started then, if one did.
+    /// The pulse that spoiled an exposure which started at `start` by its stamp, if one did.
     pub fn spoiled_by(&self, start: Timestamp) -> Option<Spoiled> {
-        let mut known = self.spoiled.iter().flatten();
+        let mut known = self.spoiled.iter();
         known.find(|pulse| self.spoils(pulse, start)).copied()
     }
 
-    /// Whether this pulse spoiled an exposure that seems to have started then: its own, whose stamp may mark the end and so be off
-    /// by as much as the pulse; or the next one, if that was triggered while the camera was busy for longer than planned.
+    /// Whether this pulse spoiled an exposure which started at `start` by its stamp: its own exposure, whose stamp may mark the end and
+    /// then is off by as much as the pulse; or the next one, if it was triggered while the camera was busy for longer than planned.
     pub fn spoils(&self, pulse: &Spoiled, start: Timestamp) -> bool {
         let from = pulse.fired - (pulse.shorter + self.promptness);
         let busy = self.period.saturating_sub(self.promptness);
@@ -156,55 +151,55 @@ impl Pacing {
         self.phase = self.phase.max(Some(start));
     }
 
-    /// When the trigger of this shot is due, if all before it were fired; none for a camera that runs by itself.
-    pub fn trigger(&self, shot: &Shot) -> Option<Timestamp> {
-        self.triggered.then(|| shot.light.max(self.free))
+    /// When the trigger of this attempt is due, provided that all earlier ones have fired; none for a camera that runs by itself.
+    pub fn trigger(&self, attempt: &Attempt) -> Option<Timestamp> {
+        self.triggered.then(|| attempt.light.max(self.free))
     }
 
-    /// When the exposure of this shot starts, as far as that is known.
-    pub fn expected(&self, shot: &Shot) -> Option<Timestamp> {
+    /// When the exposure of this attempt starts, as far as that is known.
+    pub fn expected(&self, attempt: &Attempt) -> Option<Timestamp> {
         if self.triggered {
-            return shot.fired;
+            return attempt.fired;
         }
         self.phase
-            .map(|phase| self.next_exposure(phase, shot.light - self.slack()))
+            .map(|phase| self.next_exposure(phase, attempt.light - self.slack()))
     }
 
-    /// The first exposure of a camera that runs by itself that starts at `from` or later.
+    /// When a camera that runs by itself starts its first exposure at `from` or later.
     fn next_exposure(&self, phase: Timestamp, from: Timestamp) -> Timestamp {
         // Nanoseconds of u64 fit i128 with room for their sums.
         let period = i128::try_from(self.period.as_nanos()).unwrap_or(i128::MAX);
         let ahead = i128::from(from.0) - i128::from(phase.0);
-        let steps = ahead.div_euclid(period) + i128::from(ahead.rem_euclid(period) != 0);
-        let at = i128::from(phase.0) + steps * period;
+        let periods = ahead.div_euclid(period) + i128::from(ahead.rem_euclid(period) != 0);
+        let at = i128::from(phase.0) + periods * period;
         Timestamp(u64::try_from(at.max(0)).unwrap_or(u64::MAX))
     }
 
-    /// When nothing is to be hoped for from this shot any more.
-    pub fn overdue(&self, shot: &Shot) -> Option<Timestamp> {
-        if shot.done {
+    /// When this attempt is given up; none if that is not known yet or it is done.
+    pub fn overdue(&self, attempt: &Attempt) -> Option<Timestamp> {
+        if attempt.done {
             return None;
         }
-        // One period and a half more: its frame may come after the next one.
+        // One and a half periods more, as its frame may arrive after the next one.
         let patience = self.exposure + self.delivery + self.period * 3 / 2 + self.tolerance;
-        match self.expected(shot) {
+        match self.expected(attempt) {
             Some(start) => Some(start + patience),
             None if self.triggered => None,
-            None => Some(shot.light + (self.period + patience)),
+            None => Some(attempt.light + (self.period + patience)),
         }
     }
 
-    /// When to queue the flip after `last`, and the count it should come with; none while that cannot be planned.
+    /// When to queue the flip after `last`, and the count of the refresh with which it should happen; none while that cannot be planned.
     pub fn next_flip<'a>(
         &self,
-        shots: impl Iterator<Item = &'a Shot>,
-        last: &Shot,
+        attempts: impl Iterator<Item = &'a Attempt>,
+        last: &Attempt,
         now: Timestamp,
     ) -> Option<(Timestamp, u64)> {
         let refreshes = if last.done {
             1
         } else {
-            let start = self.planned_start(shots, last, now)?;
+            let start = self.planned_start(attempts, last, now)?;
             let light_until = self.end(start) - self.slack();
             let shown = light_until.since(last.light).as_nanos();
             u64::try_from(shown.div_ceil(self.refresh.as_nanos())).unwrap_or(u64::MAX)
@@ -213,20 +208,20 @@ impl Pacing {
         let before = u32::try_from(refreshes - 1).unwrap_or(u32::MAX);
         let mut due = last.flip.timestamp + self.refresh.saturating_mul(before);
         if before > 0 {
-            // Not before the refresh that this flip is to come after, whatever the jitter of its stamp.
+            // Not before the refresh that precedes this flip, whatever the jitter of its stamp.
             due = due + self.refresh / 8;
         }
-        // Queued late it comes with the next refresh after now.
+        // If it is queued late, it happens with the next refresh after now.
         let passed = now.since(last.flip.timestamp).as_nanos() / self.refresh.as_nanos();
         let comes = refreshes.max(u64::try_from(passed).unwrap_or(u64::MAX).saturating_add(1));
-        Some((due, last.flip.sequence.saturating_add(comes)))
+        Some((due, last.flip.count.saturating_add(comes)))
     }
 
-    /// When the exposure of the last shot will start if all goes to plan.
+    /// When the exposure of the last attempt will start according to plan.
     fn planned_start<'a>(
         &self,
-        shots: impl Iterator<Item = &'a Shot>,
-        last: &Shot,
+        attempts: impl Iterator<Item = &'a Attempt>,
+        last: &Attempt,
         now: Timestamp,
     ) -> Option<Timestamp> {
         if !self.triggered || last.fired.is_some() {
@@ -234,18 +229,18 @@ impl Pacing {
         }
         let mut free = self.free.max(now);
         let mut start = free;
-        for shot in shots.filter(|shot| shot.waits_for_trigger()) {
-            start = shot.light.max(free);
+        for attempt in attempts.filter(|attempt| attempt.waits_for_trigger()) {
+            start = attempt.light.max(free);
             free = start + self.period;
         }
         Some(start)
     }
 
-    /// The first refresh after `now`, counted from this shot's flip.
-    pub fn next_refresh(&self, shot: &Shot, now: Timestamp) -> Timestamp {
-        let passed = now.since(shot.flip.timestamp).as_nanos() / self.refresh.as_nanos();
-        let steps = u32::try_from(passed + 1).unwrap_or(u32::MAX);
-        shot.flip.timestamp + self.refresh.saturating_mul(steps)
+    /// The first refresh after `now`, counted from this attempt's flip.
+    pub fn next_refresh(&self, attempt: &Attempt, now: Timestamp) -> Timestamp {
+        let passed = now.since(attempt.flip.timestamp).as_nanos() / self.refresh.as_nanos();
+        let refreshes = u32::try_from(passed + 1).unwrap_or(u32::MAX);
+        attempt.flip.timestamp + self.refresh.saturating_mul(refreshes)
     }
 }
 
@@ -257,7 +252,7 @@ mod tests {
         Duration::from_micros(us)
     }
 
-    /// The reference head: a camera that exposes for 16 667 µs and then is read out.
+    /// The reference head: a camera that exposes for 16 667 µs and is then read out.
     fn pacing(starts: Starts) -> Pacing {
         let camera = CameraTiming {
             starts,

@@ -1,10 +1,9 @@
-//! The sequencer: which pattern to show when, when to trigger, and whose each frame is. Decisions only.
+//! The sequencer decides which pattern to show when, when to trigger, and which pattern each frame shows.
 //!
-//! It gets what happened and the time as arguments ([`Sequencer::flipped`], [`Sequencer::fired`], [`Sequencer::spoiled`],
-//! [`Sequencer::frame`]) and answers what to do next ([`Sequencer::act`]); the head's loop carries it out. What comes in one after
-//! the other is called so: a *position* is a place in the sequence and has one pattern; a *shot* is one showing of it. A position
-//! whose shot gave no frame is shown again, before the positions that come after it. Frames are handed over in the order of the
-//! sequence.
+//! It receives events and the time as arguments ([`Sequencer::flipped`], [`Sequencer::fired`], [`Sequencer::spoiled`],
+//! [`Sequencer::frame`]) and returns what to do next ([`Sequencer::act`]); the head's loop carries that out. A *position* is a place
+//! in the sequence and has one pattern; an *attempt* is one showing of that pattern, with one trigger. A position whose attempt gave
+//! no frame is shown again, before the positions that follow it. Frames are handed over in the order of the sequence.
 
 use std::collections::VecDeque;
 
@@ -12,28 +11,29 @@ use super::Exposure;
 use super::count::FrameCount;
 use super::failure::{Blocked, Failure};
 use super::identity::{Identity, Views};
-use super::pacing::{Pacing, Shot};
+use super::pacing::{Attempt, Pacing};
+use crate::latest;
 use crate::projector::Flip;
 use crate::trigger::Spoiled;
 use crate::units::Timestamp;
 
-/// Shows of one pattern before the sequence is given up.
-const MAX_SHOTS: u32 = 12;
+/// Attempts at one position before the sequence is given up.
+const MAX_ATTEMPTS: u32 = 12;
 /// Frames that may wait for the flip that decides them.
 const MAX_UNDECIDED: usize = 8;
-/// Room for shots; more than are ever on their way, as each gives up in time.
-const SHOTS: usize = 16;
+/// Capacity for attempts; more than are ever pending, as each is given up after some time.
+const ATTEMPTS: usize = 16;
 
 /// What to do next.
 #[derive(Debug)]
 pub(super) enum Act<F> {
     /// Queue the pattern of this index.
     Queue(usize),
-    /// Fire the trigger and say when it began.
+    /// Fire the trigger and report when the pulse began.
     Fire,
     /// Hand over the frame of the pattern of this index.
     Hand(usize, F),
-    /// Wait until then, or until a flip or a frame comes.
+    /// Wait until this time, or until a flip or a frame arrives.
     Wait(Timestamp),
     /// All frames were handed over.
     Done,
@@ -45,7 +45,7 @@ pub(super) enum Act<F> {
 #[derive(Debug)]
 struct Position<F> {
     index: usize,
-    shots: u32,
+    attempts: u32,
     frame: Taken<F>,
 }
 
@@ -56,11 +56,11 @@ enum Taken<F> {
     Handed,
 }
 
-/// A flip that was asked for and has not come.
+/// A flip that was queued and not yet reported.
 #[derive(Clone, Copy, Debug)]
 struct Queued {
     position: usize,
-    /// The count it should come with, where there was one before.
+    /// The planned count of its refresh; none for the first flip.
     wanted: Option<u64>,
 }
 
@@ -72,7 +72,7 @@ struct Exposed<F> {
     frame: F,
 }
 
-/// The state of one sequence. Used again for the next one, so that it allocates nothing in a steady state.
+/// The state of one sequence. It is reused for the next one, so that repeated sequences allocate nothing.
 #[derive(Debug)]
 pub(super) struct Sequencer<F> {
     pacing: Pacing,
@@ -80,12 +80,12 @@ pub(super) struct Sequencer<F> {
     /// Positions to be shown, the next one first.
     todo: VecDeque<usize>,
     queued: Option<Queued>,
-    /// The count that the next flip is planned to come with.
+    /// The planned count of the next flip.
     planned: Option<u64>,
-    /// Shots whose frames are awaited; the last one is the pattern in view, done or not.
-    shots: VecDeque<Shot>,
+    /// Attempts whose frames are expected; the last one is the pattern in view, done or not.
+    attempts: VecDeque<Attempt>,
     views: Views,
-    undecided: VecDeque<Exposed<F>>,
+    undecided: heapless::Deque<Exposed<F>, MAX_UNDECIDED>,
     count: FrameCount,
     handed: usize,
     exhausted: Option<usize>,
@@ -103,9 +103,9 @@ impl<F> Sequencer<F> {
             todo: VecDeque::new(),
             queued: None,
             planned: None,
-            shots: VecDeque::with_capacity(SHOTS),
+            attempts: VecDeque::with_capacity(ATTEMPTS),
             views: Views::new(),
-            undecided: VecDeque::with_capacity(MAX_UNDECIDED),
+            undecided: heapless::Deque::new(),
             count: FrameCount::default(),
             handed: 0,
             exhausted: None,
@@ -121,13 +121,13 @@ impl<F> Sequencer<F> {
         self.positions.clear();
         self.positions.extend(indices.iter().map(|index| Position {
             index: *index,
-            shots: 0,
+            attempts: 0,
             frame: Taken::Not,
         }));
         self.todo.clear();
         self.todo.extend(0..indices.len());
         (self.queued, self.planned, self.exhausted) = (None, None, None);
-        self.shots.clear();
+        self.attempts.clear();
         let p = &self.pacing;
         self.views.restart(p.flip_to_light, p.tolerance, p.refresh);
         self.undecided.clear();
@@ -138,7 +138,7 @@ impl<F> Sequencer<F> {
         self.so_far = Exposure::default();
     }
 
-    /// What has been reached so far.
+    /// The counts and times of the sequence so far.
     pub fn so_far(&self) -> Exposure {
         Exposure {
             started: self.started.unwrap_or_default(),
@@ -147,7 +147,7 @@ impl<F> Sequencer<F> {
         }
     }
 
-    /// The queued flip has come. One that nobody queued says nothing.
+    /// The queued flip has happened. A flip that was not queued is ignored.
     pub fn flipped(&mut self, flip: Flip) {
         let Some(queued) = self.queued.take() else {
             return;
@@ -155,18 +155,18 @@ impl<F> Sequencer<F> {
         let off = self.views.flipped(queued.position, flip);
         let late = queued
             .wanted
-            .map_or(0, |wanted| flip.sequence.saturating_sub(wanted));
+            .map_or(0, |wanted| flip.count.saturating_sub(wanted));
         let so_far = &mut self.so_far;
         so_far.sync_error = so_far.sync_error.max(off);
         so_far.missed_flips = so_far
             .missed_flips
             .saturating_add(u32::try_from(late).unwrap_or(u32::MAX));
-        // Only the last one may be done and stay: it says when the next flip may come.
-        while self.shots.front().is_some_and(|shot| shot.done) {
-            self.shots.pop_front();
+        // Of the attempts that are done only the last may stay: the next flip is planned from it.
+        while self.attempts.front().is_some_and(|attempt| attempt.done) {
+            self.attempts.pop_front();
         }
-        self.positions[queued.position].shots += 1;
-        self.shots.push_back(Shot {
+        self.positions[queued.position].attempts += 1;
+        self.attempts.push_back(Attempt {
             position: queued.position,
             flip,
             light: flip.timestamp + self.pacing.flip_to_light,
@@ -175,35 +175,38 @@ impl<F> Sequencer<F> {
         });
     }
 
-    /// The trigger fired at this time.
+    /// The trigger has fired at this time.
     pub fn fired(&mut self, at: Timestamp) {
-        if let Some(shot) = self.shots.iter_mut().find(|shot| shot.waits_for_trigger()) {
-            shot.fired = Some(at);
+        if let Some(attempt) = self
+            .attempts
+            .iter_mut()
+            .find(|attempt| attempt.waits_for_trigger())
+        {
+            attempt.fired = Some(at);
         }
         self.pacing.fired(at);
     }
 
-    /// This pulse of the trigger was spoiled: to be told before the next question what to do, so that its frame is not decided yet.
+    /// This pulse of the trigger was spoiled. Must be called before the next [`Sequencer::act`], which may decide its frame.
     pub fn spoiled(&mut self, pulse: Spoiled) {
         self.pacing.spoiled(pulse);
     }
 
-    /// A frame came whose exposure started then, under this count of the camera.
+    /// A frame has arrived whose exposure started at `start`, with this count of the camera.
     pub fn frame(&mut self, start: Timestamp, count: u64, frame: F) {
         if !self.count.see(count) {
             self.so_far.duplicated = self.so_far.duplicated.saturating_add(1);
             return;
         }
         self.pacing.exposed(start);
-        if self.undecided.len() == MAX_UNDECIDED {
-            self.undecided.pop_front();
-            self.so_far.stale = self.so_far.stale.saturating_add(1);
-        }
-        self.undecided.push_back(Exposed {
+        let exposed = Exposed {
             start,
             count,
             frame,
-        });
+        };
+        if latest::keep(&mut self.undecided, exposed).is_some() {
+            self.so_far.stale = self.so_far.stale.saturating_add(1);
+        }
     }
 
     /// What to do now. Flips and triggers come before frames, so that handing over delays none of them.
@@ -221,7 +224,7 @@ impl<F> Sequencer<F> {
             self.views.queue(now);
             return Act::Queue(self.positions[position].index);
         }
-        // A flip that comes later than it was planned before its time has been missed.
+        // A flip counts as late if it happens after the refresh that was planned before its time.
         self.planned = flip.and_then(|(_, planned)| planned);
         if fire.is_some_and(|due| due <= now) {
             return Act::Fire;
@@ -241,15 +244,15 @@ impl<F> Sequencer<F> {
         }
         let flip = flip.map(|(due, _)| due);
         let overdue = self
-            .shots
+            .attempts
             .iter()
-            .filter_map(|shot| self.pacing.overdue(shot));
+            .filter_map(|attempt| self.pacing.overdue(attempt));
         let decided = self
             .undecided
             .iter()
             .map(|exposed| self.pacing.end(exposed.start));
         let next = [flip, fire].into_iter().flatten().chain(overdue);
-        // A frame that ends in the future is decided then, if the next flip does not do it.
+        // A frame whose exposure ends in the future is decided at that time, unless the next flip decides it earlier.
         let next = next.chain(decided.filter(|end| *end > now));
         Act::Wait(
             next.min()
@@ -257,7 +260,7 @@ impl<F> Sequencer<F> {
         )
     }
 
-    /// Gives frames to their positions, as far as is known.
+    /// Assigns frames to their positions, as far as they can be decided.
     fn decide(&mut self, now: Timestamp) {
         for _ in 0..self.undecided.len() {
             let Some(exposed) = self.undecided.pop_front() else {
@@ -268,7 +271,7 @@ impl<F> Sequencer<F> {
             if let Some(pulse) = self.pacing.spoiled_by(start) {
                 self.so_far.spoiled = self.so_far.spoiled.saturating_add(1);
                 self.so_far.pulse_error = self.so_far.pulse_error.max(pulse.off());
-                self.retake_the_shot_spoiled_by(&pulse);
+                self.retake_the_attempt_spoiled_by(&pulse);
                 continue;
             }
             if !self
@@ -280,31 +283,33 @@ impl<F> Sequencer<F> {
             }
             match self.views.identify(start, end, now) {
                 Identity::Of(position, light) => self.take(position, light, exposed),
-                Identity::Undecided => self.undecided.push_back(exposed),
+                Identity::Undecided => {
+                    latest::keep(&mut self.undecided, exposed);
+                }
                 Identity::Stale => self.so_far.stale = self.so_far.stale.saturating_add(1),
                 Identity::Straddles => {
                     self.so_far.straddled = self.so_far.straddled.saturating_add(1);
-                    self.retake_the_shot_of(start);
+                    self.retake_the_attempt_of(start);
                 }
             }
         }
     }
 
-    /// The frame is this position's.
+    /// Assigns a frame to this position.
     fn take(&mut self, position: usize, light: Timestamp, exposed: Exposed<F>) {
-        for shot in self
-            .shots
+        for attempt in self
+            .attempts
             .iter_mut()
-            .filter(|shot| shot.position == position)
+            .filter(|attempt| attempt.position == position)
         {
-            if let Some(expected) = shot.fired {
+            if let Some(expected) = attempt.fired {
                 let off = exposed
                     .start
                     .since(expected)
                     .max(expected.since(exposed.start));
                 self.so_far.sync_error = self.so_far.sync_error.max(off);
             }
-            shot.done = true;
+            attempt.done = true;
         }
         let slot = &mut self.positions[position].frame;
         if !matches!(slot, Taken::Not) {
@@ -313,7 +318,7 @@ impl<F> Sequencer<F> {
         }
         *slot = Taken::Waits(exposed.frame);
         self.todo.retain(|waiting| *waiting != position);
-        // Within the tolerance an exposure may begin before its light.
+        // Within the tolerance an exposure may begin before its pattern's light.
         let began = light.min(exposed.start);
         self.started = Some(self.started.map_or(began, |first| first.min(began)));
         let so_far = &mut self.so_far;
@@ -321,14 +326,14 @@ impl<F> Sequencer<F> {
         so_far.lag = so_far.lag.max(exposed.start.since(light));
     }
 
-    /// A frame exposed from `start` was nobody's: the shot that it was meant for is taken again at once.
-    fn retake_the_shot_of(&mut self, start: Timestamp) {
+    /// A frame exposed from `start` showed no pattern alone: the position of its attempt is shown again at once.
+    fn retake_the_attempt_of(&mut self, start: Timestamp) {
         let near = self.pacing.exposure / 2;
-        let meant = self.shots.iter().position(|shot| {
-            let expected = if shot.done {
+        let meant = self.attempts.iter().position(|attempt| {
+            let expected = if attempt.done {
                 None
             } else {
-                self.pacing.expected(shot)
+                self.pacing.expected(attempt)
             };
             expected.is_some_and(|at| at.since(start).max(start.since(at)) < near)
         });
@@ -337,38 +342,38 @@ impl<F> Sequencer<F> {
         }
     }
 
-    /// The frame of a spoiled pulse came: its shot is taken again at once, if nobody does that already.
-    fn retake_the_shot_spoiled_by(&mut self, pulse: &Spoiled) {
+    /// The frame of a spoiled pulse has arrived: the position of its attempt is shown again at once, unless that is planned already.
+    fn retake_the_attempt_spoiled_by(&mut self, pulse: &Spoiled) {
         let spoiled = |at| self.pacing.spoils(pulse, at);
-        let meant = |shot: &Shot| !shot.done && shot.fired.is_some_and(spoiled);
-        if let Some(at) = self.shots.iter().position(meant) {
+        let meant = |attempt: &Attempt| !attempt.done && attempt.fired.is_some_and(spoiled);
+        if let Some(at) = self.attempts.iter().position(meant) {
             self.retake(at);
         }
     }
 
     fn give_up_overdue(&mut self, now: Timestamp) {
-        let overdue = |shot: &Shot| self.pacing.overdue(shot).is_some_and(|at| at <= now);
-        if let Some(at) = self.shots.iter().position(overdue) {
+        let overdue = |attempt: &Attempt| self.pacing.overdue(attempt).is_some_and(|at| at <= now);
+        if let Some(at) = self.attempts.iter().position(overdue) {
             self.retake(at);
         }
     }
 
-    /// Shows the position of a shot once more.
+    /// Shows the position of an attempt once more, unless it is planned or done already.
     fn retake(&mut self, at: usize) {
-        let shot = &mut self.shots[at];
-        shot.done = true;
-        let place = shot.position;
+        let attempt = &mut self.attempts[at];
+        attempt.done = true;
+        let place = attempt.position;
         let again = self.queued.is_some_and(|queued| queued.position == place)
             || self.todo.contains(&place)
             || self
-                .shots
+                .attempts
                 .iter()
-                .any(|shot| shot.position == place && !shot.done);
+                .any(|attempt| attempt.position == place && !attempt.done);
         let position = &self.positions[place];
         if again || !matches!(position.frame, Taken::Not) {
             return;
         }
-        if position.shots >= MAX_SHOTS {
+        if position.attempts >= MAX_ATTEMPTS {
             self.exhausted = Some(place);
             return;
         }
@@ -376,27 +381,27 @@ impl<F> Sequencer<F> {
         self.todo.push_front(place);
     }
 
-    /// When the next flip is to be queued, and the count it should come with.
+    /// When the next flip is to be queued, and the planned count of its refresh.
     fn flip_due(&self, now: Timestamp) -> Option<(Timestamp, Option<u64>)> {
         if self.queued.is_some() || self.todo.is_empty() {
             return None;
         }
-        let Some(last) = self.shots.back() else {
+        let Some(last) = self.attempts.back() else {
             return Some((now, None));
         };
-        let (due, count) = self.pacing.next_flip(self.shots.iter(), last, now)?;
+        let (due, count) = self.pacing.next_flip(self.attempts.iter(), last, now)?;
         Some((due, Some(count)))
     }
 
-    /// When the next trigger is due. A shot whose exposure would not end in its view is taken again instead.
+    /// When the next trigger is due. If the exposure would not end while the pattern is in view, its position is shown again instead.
     fn trigger_due(&mut self, now: Timestamp) -> Option<Timestamp> {
         loop {
-            let at = self.shots.iter().position(Shot::waits_for_trigger)?;
-            let due = self.pacing.trigger(&self.shots[at])?;
-            let until = match self.shots.get(at + 1) {
+            let at = self.attempts.iter().position(Attempt::waits_for_trigger)?;
+            let due = self.pacing.trigger(&self.attempts[at])?;
+            let until = match self.attempts.get(at + 1) {
                 Some(next) => Some(next.light),
                 None => self.queued.map(|_| {
-                    self.pacing.next_refresh(&self.shots[at], now) + self.pacing.flip_to_light
+                    self.pacing.next_refresh(&self.attempts[at], now) + self.pacing.flip_to_light
                 }),
             };
             let end = self.pacing.end(due.max(now));
@@ -413,9 +418,9 @@ impl<F> Sequencer<F> {
             .iter()
             .position(|p| matches!(p.frame, Taken::Not));
         let blocked = match (self.exhausted, self.queued, self.count.any()) {
-            (_, Some(_), _) if self.shots.is_empty() => Blocked::NoFlip,
+            (_, Some(_), _) if self.attempts.is_empty() => Blocked::NoFlip,
             (_, _, false) => Blocked::NoFrame,
-            // Or frames come, and not one fits: more time would not help.
+            // Also when frames arrive and none fits: more time would not help.
             (Some(_), ..) => Blocked::misfit(&self.so_far),
             _ if self.started.is_none() && self.so_far.unfit() > 0 => Blocked::misfit(&self.so_far),
             _ => Blocked::Late,
@@ -424,7 +429,7 @@ impl<F> Sequencer<F> {
         Failure {
             blocked,
             index: self.positions.get(position).map_or(0, |p| p.index),
-            shots: self.positions.get(position).map_or(0, |p| p.shots),
+            attempts: self.positions.get(position).map_or(0, |p| p.attempts),
             taken: self
                 .positions
                 .iter()

@@ -1,4 +1,4 @@
-//! What calibration knows of a head's time: the way from a flip to its light, and what a camera's stamp marks.
+//! The measured times of a head: the delay from a flip to its light, and the moment that a camera's stamp marks.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use crate::units::Timestamp;
 /// Default of [`Timing::tolerance`]: an exposure of exactly one refresh leaves no slack for jitter otherwise.
 pub const TOLERANCE: Duration = Duration::from_micros(200);
 
-/// The moment that a camera's stamp marks. Drivers disagree, so it is measured.
+/// The moment that a camera's stamp marks. It depends on the driver, so it is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stamp {
@@ -21,14 +21,14 @@ pub enum Stamp {
     ReadoutEnd,
 }
 
-/// Measured parameters of a head that turn counters and stamps into what was in view when.
+/// Measured times of a head, from which follows what was in view when.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
     /// From the time of a flip to the light of its pattern.
     pub flip_to_light: Duration,
     /// What the camera's stamps mark.
     pub stamp: Stamp,
-    /// From the end of an exposure to the end of its readout; matters where stamps mark that.
+    /// From the end of an exposure to the end of its readout; used only where stamps mark the end of the readout.
     pub readout: Duration,
     /// How far an exposure may reach beyond its pattern's time in view, at each end.
     pub tolerance: Duration,

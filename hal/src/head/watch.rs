@@ -1,7 +1,8 @@
-//! Looking at a head without a sequence: show patterns by the refresh, expose all the while, and keep what comes.
+//! Watching a head without a sequence: patterns are shown for whole refreshes, the camera exposes continuously, and everything that
+//! arrives is kept.
 //!
-//! Nothing is proved, discarded or taken again here. It is for those who want to know whether a head is well, and for those
-//! who measure what a sequence takes for given.
+//! No frame is assigned to a pattern, discarded or taken again. The doctor uses this to examine a head, and calibration to measure
+//! the times on which a sequence relies.
 
 use std::time::Duration;
 
@@ -19,31 +20,31 @@ use crate::units::Timestamp;
 pub struct Showing {
     /// The loaded pattern.
     pub index: usize,
-    /// For so many refreshes, at least 1.
+    /// How many refreshes it is shown for, at least 1.
     pub refreshes: u32,
-    /// Not triggered for so many refreshes after the flip, so that light has settled. A camera that runs by itself exposes anyway.
+    /// How many refreshes after the flip no trigger fires, so that the light has settled. A camera that runs by itself exposes anyway.
     pub settle: u32,
 }
 
-/// What came while patterns were shown.
+/// What happened while patterns were shown.
 #[derive(Clone, Debug)]
 pub struct Watched<M> {
     /// The flips, in the order of the showings; fewer if the projector stopped.
     pub flips: Vec<Flip>,
     /// When the trigger fired.
     pub triggers: Vec<Timestamp>,
-    /// Pulses of the trigger that did not last as long as they should, and decided an exposure.
+    /// Spoiled pulses of the trigger that determined the length of an exposure.
     pub spoiled: Vec<Spoiled>,
     /// The frames in the order of their arrival.
-    pub frames: Vec<Seen<M>>,
+    pub frames: Vec<WatchedFrame<M>>,
 }
 
-/// What was measured in a frame.
+/// A frame that arrived: its times, its count, and what was measured in it.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen<M> {
-    /// Start of the exposure, as its stamp is understood.
+pub struct WatchedFrame<M> {
+    /// Start of the exposure, computed from the stamp with the head's timing.
     pub start: Timestamp,
-    /// When the frame was there to be fetched, at the latest.
+    /// When the frame was fetched.
     pub arrived: Timestamp,
     /// The camera's count.
     pub count: u64,
@@ -52,8 +53,8 @@ pub struct Seen<M> {
 }
 
 impl<M> Watched<M> {
-    /// Whether a spoiled pulse may have had a part in an exposure that seems to have started then: its own or a neighbour's, as stamps
-    /// of ends are off by as much as the pulse.
+    /// Whether a spoiled pulse may have affected an exposure that started at `start` by its stamp: its own or a neighbouring one, as
+    /// stamps of the end are off by as much as the pulse.
     pub fn spoiled_near(&self, start: Timestamp) -> bool {
         let near = |pulse: &Spoiled| {
             let reach = u128::from(start.0.abs_diff(pulse.fired.0));
@@ -65,7 +66,7 @@ impl<M> Watched<M> {
 
 impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
     /// Shows `showings` one after the other while the camera exposes as often as it can, and measures every frame. Flips and
-    /// frames that do not come are missing in the answer: that is no error. Ends at the latest `timeout` after the plan.
+    /// frames that do not arrive are missing in the result, without an error. Ends at the latest `timeout` after its planned end.
     ///
     /// # Errors
     /// The first error of a device.
@@ -84,7 +85,7 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
             frames: Vec::new(),
         };
         let refreshes: u32 = showings.iter().map(|showing| showing.refreshes + 1).sum();
-        // The last exposure and its frame come after the last pattern.
+        // The last exposure ends, and its frame arrives, after the last pattern.
         let rest = camera.exposure + camera.period + camera.delivery + timing.flip_to_light;
         self.devices.exposing(|devices| {
             let deadline = devices.clock.now() + (refresh * refreshes + rest + timeout);
@@ -102,19 +103,19 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
                     settled = Some(flip.timestamp + refresh * showing.settle);
                 }
                 while let Some(frame) = devices.camera.poll_frame()? {
-                    seen.frames.push(Seen {
+                    seen.frames.push(WatchedFrame {
                         start: timing.exposure_start(&camera, frame.timestamp()),
                         arrived: devices.clock.now(),
-                        count: frame.sequence(),
+                        count: frame.count(),
                         measured: measure(&frame),
                     });
                 }
-                // One of before is nobody's any more.
+                // A pulse that fired before this watch is ignored.
                 let fired = |pulse: &Spoiled| {
                     pulse.decides(camera.exposure) && seen.triggers.contains(&pulse.fired)
                 };
-                let told = std::iter::from_fn(|| devices.trigger.poll_spoiled());
-                seen.spoiled.extend(told.filter(fired));
+                let spoiled = std::iter::from_fn(|| devices.trigger.poll_spoiled());
+                seen.spoiled.extend(spoiled.filter(fired));
                 let now = devices.clock.now();
                 let shown = seen.flips.len() == showings.len();
                 let end = next_flip + (refresh + timing.flip_to_light);

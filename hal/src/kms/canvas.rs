@@ -1,4 +1,4 @@
-//! A picture in the card's own memory, ready to be shown without copying.
+//! A picture in the display card's memory, which is shown without copying.
 
 use drm::buffer::{Buffer, DrmFourcc};
 use drm::control::dumbbuffer::DumbBuffer;
@@ -8,7 +8,7 @@ use super::card::{Card, refused};
 use crate::error::Error;
 use crate::projector::Raster;
 
-/// How grey levels lie in memory: blue, green, red, nothing. Every driver shows it.
+/// Pixel format: bytes blue, green, red, unused. Every driver supports it.
 pub(super) const FORMAT: DrmFourcc = DrmFourcc::Xrgb8888;
 /// Bytes of a pixel.
 const PIXEL: usize = 4;
@@ -21,7 +21,7 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// A buffer of the card for pictures of this size; what it holds is not defined.
+    /// A buffer of the card for pictures of this size; its content is undefined.
     pub fn new(card: &Card, (width, height): (u32, u32)) -> Result<Self, Error> {
         let attempt = || format!("making a display buffer of {width}×{height} pixels");
         let buffer = card
@@ -46,7 +46,7 @@ impl Canvas {
         Ok(())
     }
 
-    /// Gives the memory back. A card that is gone has done so already.
+    /// Frees the memory. If the card is gone, this fails and nothing remains to be done.
     pub fn free(&self, card: &Card) {
         let _ = card.destroy_framebuffer(self.shown_as);
         let _ = card.destroy_dumb_buffer(self.buffer);
@@ -56,7 +56,7 @@ impl Canvas {
 /// Writes grey levels as pixels, `pitch` bytes from row to row.
 fn draw(raster: &Raster, pitch: usize, memory: &mut [u8]) {
     let width = raster.width() as usize;
-    // Row by row through ordinary memory: the card's may be slow to write in pieces.
+    // Whole rows are copied from ordinary memory, as single bytes may be slow to write to the card's.
     let mut line = vec![0; width * PIXEL];
     for (row, into) in raster
         .pixels()

@@ -1,4 +1,4 @@
-//! A display card of the kernel: opening it, asking it, and what its refusals mean.
+//! A display card of the kernel: opening it, its properties, and what its errors mean.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -35,7 +35,7 @@ impl Device for Card {}
 impl ControlDevice for Card {}
 
 impl Card {
-    /// Opens a card with all its planes, for atomic commits. None if it displays nothing, as the 3-D part of a processor.
+    /// Opens a card with all its planes, for atomic commits. None if it has no display outputs, such as a 3-D accelerator.
     pub fn open(path: &Path) -> Result<Option<Self>, Error> {
         let attempt = || format!("opening the display card {}", path.display());
         let flags = OFlags::NONBLOCK | OFlags::CLOEXEC;
@@ -66,7 +66,7 @@ impl Card {
             .map_err(|_| {
                 Error::unsupported(
                     format!("{}: atomic mode setting", attempt()),
-                    "use a driver that has it, as vc4-kms-v3d on a Raspberry Pi (not fkms)",
+                    "use a driver that has it, such as vc4-kms-v3d on a Raspberry Pi (not fkms)",
                 )
             })?;
         let monotonic = card.get_driver_capability(DriverCapability::MonotonicTimestamp);
@@ -79,7 +79,7 @@ impl Card {
         Ok(Some(card))
     }
 
-    /// Makes this program the one that sets modes; with it the console is off.
+    /// Makes this program the one that sets modes (DRM master); the console is then not shown.
     pub fn own(&self) -> Result<(), Error> {
         self.acquire_master_lock().map_err(|_| {
             Error::unsupported(
@@ -92,7 +92,7 @@ impl Card {
         })
     }
 
-    /// A duplicate of the descriptor: readable when a flip has come.
+    /// A duplicate of the descriptor, which is readable when a flip has happened.
     pub fn descriptor(&self) -> Result<OwnedFd, Error> {
         let duplicate = self.as_fd().try_clone_to_owned();
         duplicate.map_err(|error| {
@@ -125,7 +125,7 @@ impl Card {
     }
 }
 
-/// A property of an object and the value that it has.
+/// A property of an object and its current value.
 #[derive(Clone, Debug)]
 pub(super) struct Property {
     pub name: String,
@@ -159,7 +159,7 @@ impl Properties {
     }
 }
 
-/// The cards that there are, in the order of their numbers.
+/// All cards, in the order of their numbers.
 pub(super) fn paths() -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(CARDS) else {
         return Vec::new();
@@ -177,7 +177,7 @@ pub(super) fn paths() -> Vec<PathBuf> {
     all
 }
 
-/// "is a, b", or "are none".
+/// A list for a message that begins with "there": "is a, b", or "are none".
 pub(super) fn listed(things: &[impl AsRef<Path>]) -> String {
     if things.is_empty() {
         return "are none".into();
@@ -189,12 +189,12 @@ pub(super) fn listed(things: &[impl AsRef<Path>]) -> String {
     format!("is {}", names.join(", "))
 }
 
-/// What a refusal of the kernel means.
+/// The error for a call that the kernel refused.
 pub(super) fn refused(attempt: impl Into<String>, why: &io::Error) -> Error {
     let attempt = attempt.into();
     match Errno::from_io_error(why) {
         Some(Errno::NODEV | Errno::NXIO | Errno::IO) => {
-            Error::disconnected(error::Device::Projector, attempt)
+            Error::disconnected(error::DeviceKind::Projector, attempt)
         }
         Some(Errno::ACCESS | Errno::PERM) => Error::unsupported(
             attempt,

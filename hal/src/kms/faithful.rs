@@ -1,23 +1,23 @@
-//! What a display driver may do to grey levels, and the setting with which it does not.
+//! Display settings with which a driver leaves grey levels unchanged.
 //!
-//! A pattern is measured, not looked at: 0…255 must reach the projector as 0…255, every pixel on its own. Drivers offer what
-//! pictures need instead. Each property is set only where the driver has it and has it otherwise.
+//! A pattern is measured, not looked at: 0…255 must reach the projector as 0…255, pixel by pixel. Drivers may scale, dither or
+//! convert colours for better pictures. A property is set only if the driver has it with another value.
 
 use drm::control::property::ValueType;
 
-/// The value of this name of a list of names, or the number.
+/// A value by its name in a list of names, or a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Wanted {
     Named(&'static str),
     Number(u64),
 }
 
-/// Properties of a connector by the kernel's names of them, in the order of the drivers that have them.
+/// Properties of a connector by the kernel's names, grouped by driver.
 const CONNECTOR: [(&str, Wanted); 11] = [
     // Black is 0 and white is 255, also on television modes.
     ("Broadcast RGB", Wanted::Named("Full")),
     ("output_csc", Wanted::Named("bypass")),
-    // No dots instead of grey levels.
+    // No dithering.
     ("dithering mode", Wanted::Named("off")),
     ("dither", Wanted::Named("off")),
     // No borders and no scaling: pixel for pixel.
@@ -30,7 +30,7 @@ const CONNECTOR: [(&str, Wanted); 11] = [
     ("Colorspace", Wanted::Named("Default")),
 ];
 
-/// Properties of a CRTC: no tables and matrices between buffer and connector, and refreshes at even times.
+/// Properties of a CRTC: no look-up tables and colour matrices between buffer and connector, and a constant refresh rate.
 const CRTC: [(&str, Wanted); 4] = [
     ("DEGAMMA_LUT", Wanted::Number(0)),
     ("CTM", Wanted::Number(0)),
@@ -38,9 +38,9 @@ const CRTC: [(&str, Wanted); 4] = [
     ("VRR_ENABLED", Wanted::Number(0)),
 ];
 
-/// Properties of a plane: as it lies in memory and nothing of what lies behind it, whatever a program before has left.
+/// Properties of a plane: not rotated and opaque, whatever another program has set before.
 const PLANE: [(&str, Wanted); 2] = [
-    // The bit of no rotation.
+    // The bit for 0°.
     ("rotation", Wanted::Number(1)),
     ("alpha", Wanted::Number(0xffff)),
 ];

@@ -1,4 +1,4 @@
-//! Finding a way to the projector: the connector that a setup names, and what can drive it.
+//! Finding the projector's connector, and the CRTC and plane that can drive it.
 
 use std::io;
 
@@ -11,7 +11,7 @@ use super::modes::Timings;
 use crate::error::{self, Error};
 use crate::setup::ProjectorSetup;
 
-/// The connector that a setup names, or the only one that something is plugged into.
+/// The connector that a setup names, or the only one that is connected.
 pub(super) fn the_connector(setup: &ProjectorSetup) -> Result<(Card, Info), Error> {
     let cards = setup.card.clone().map_or_else(paths, |card| vec![card]);
     let (mut there, mut fitting, mut closed) = (Vec::new(), Vec::new(), None);
@@ -72,7 +72,7 @@ pub(super) fn the_connector(setup: &ProjectorSetup) -> Result<(Card, Info), Erro
         return Err(match (closed, &setup.connector) {
             (Some(error), _) => error,
             (None, None) if !there.is_empty() => Error::disconnected(
-                error::Device::Projector,
+                error::DeviceKind::Projector,
                 format!("{attempt} (there {}, all empty)", listed(&there)),
             ),
             (None, _) => {
@@ -81,12 +81,12 @@ pub(super) fn the_connector(setup: &ProjectorSetup) -> Result<(Card, Info), Erro
         });
     };
     if connector.state() == State::Disconnected {
-        return Err(Error::disconnected(error::Device::Projector, attempt));
+        return Err(Error::disconnected(error::DeviceKind::Projector, attempt));
     }
     Ok((card, connector))
 }
 
-/// Why none of the modes fits, with those that there are.
+/// The error when no mode fits; it lists the modes.
 pub(super) fn no_mode(name: &str, modes: &[Timings], setup: &ProjectorSetup) -> Error {
     let asked = |number: Option<u32>| number.map_or("any".into(), |number| number.to_string());
     let rate = setup
@@ -104,7 +104,7 @@ pub(super) fn no_mode(name: &str, modes: &[Timings], setup: &ProjectorSetup) -> 
             asked(setup.height)
         ),
         format!(
-            "there {}; another one comes by video={name}:WIDTHxHEIGHT@RATE on the kernel's command line",
+            "there {}; add another one with video={name}:WIDTHxHEIGHT@RATE on the kernel's command line",
             listed(&all)
         ),
     )
@@ -144,7 +144,7 @@ pub(super) fn crtc_for(
         .copied())
 }
 
-/// The plane at the bottom of a CRTC, if it shows our pixels.
+/// The primary plane of a CRTC, if it supports our pixel format.
 pub(super) fn primary_plane(
     card: &Card,
     all: &ResourceHandles,

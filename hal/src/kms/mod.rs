@@ -1,10 +1,10 @@
 //! A projector on a display connector of this computer, through the kernel's mode setting (KMS).
 //!
-//! [`open`] finds card, connector and mode, takes the console and everything else off the connector, and shows black. Patterns are drawn
-//! into the card's memory when they are loaded; a flip copies nothing. Each flip is one atomic commit that does not wait; its
-//! event brings the kernel's count and time of the refresh at which the pattern was taken up.
+//! [`open`] finds card, connector and mode, removes the console and everything else from the connector, and shows black. Patterns are
+//! drawn into the card's memory when they are loaded; a flip copies nothing. Each flip is one atomic commit that does not wait; its
+//! event has the kernel's count and time of the refresh with which the pattern is shown.
 //!
-//! Whoever drops it switches the connector off and leaves the card to the console again.
+//! Dropping a [`Display`] switches the connector off and returns the card to the console.
 
 mod canvas;
 mod card;
@@ -29,25 +29,25 @@ use crate::units::Timestamp;
 use canvas::Canvas;
 use output::Output;
 
-/// A flip that has not come after so many refreshes does not come any more.
+/// How many refreshes to wait for a flip before it is an error.
 const PATIENCE: u32 = 10;
 
-/// A display that shows patterns by the refresh.
+/// A display that shows patterns, each for whole refreshes.
 #[derive(Debug)]
 pub struct Display {
     output: Output,
     black: Canvas,
-    /// In the order of the patterns, and more from a longer sequence before.
+    /// In the order of the patterns; there may be more, from a longer sequence before.
     canvases: Vec<Canvas>,
     loaded: usize,
     shown: Picture,
-    /// The commit whose event has not come.
+    /// The commit whose event has not arrived.
     waiting: Option<Commit>,
-    /// The pattern to be committed once black has come.
+    /// The pattern to be committed once black is shown.
     next: Option<usize>,
-    /// Has come and was not fetched.
+    /// A flip that has happened and was not fetched.
     came: Option<Flip>,
-    /// The kernel's count of refreshes, which has 32 bits, continued.
+    /// The kernel's count of refreshes, continued beyond its 32 bits.
     count: Option<u64>,
     missed: u64,
 }
@@ -67,8 +67,8 @@ struct Commit {
 /// Opens the display of a setup in its mode and shows black.
 ///
 /// # Errors
-/// `Unsupported` if card, connector or mode is not there, or another program shows something on the card; `Disconnected` if nothing is
-/// plugged in. The message lists what there is.
+/// `Unsupported` if card, connector or mode does not exist, or another program uses the card; `Disconnected` if nothing is
+/// plugged in. The message lists what exists.
 pub fn open(setup: &ProjectorSetup) -> Result<Display, Error> {
     let output = Output::find(setup)?;
     let size = (output.timings.width, output.timings.height);
@@ -90,16 +90,17 @@ pub fn open(setup: &ProjectorSetup) -> Result<Display, Error> {
 }
 
 impl Display {
-    /// A duplicate of its descriptor, which is readable when a flip has come.
+    /// A duplicate of its descriptor, which is readable when a flip has happened.
     ///
     /// # Errors
-    /// What the kernel says.
+    /// The kernel's error.
     pub fn descriptor(&self) -> Result<OwnedFd, Error> {
         self.output.card.descriptor()
     }
 
-    /// Refreshes that the driver missed: those that passed between asking for a flip and its coming. A quarter of a refresh, in which
-    /// a commit may be too late for the next one, is no miss. Refreshes for which nobody asked in time are in the count of the flips.
+    /// Refreshes that the driver missed: whole refreshes that passed between the commit of a flip and the flip. A commit in the last
+    /// quarter of a refresh may be too late for the next one and is not counted. Refreshes for which no flip was queued in time show
+    /// in the count of the flips instead.
     #[must_use]
     pub fn missed(&self) -> u64 {
         self.missed
@@ -118,7 +119,7 @@ impl Display {
         Ok(())
     }
 
-    /// Takes the events that have come.
+    /// Reads the events that have arrived.
     fn take_events(&mut self) -> Result<(), Error> {
         loop {
             let events = match self.output.card.receive_events() {
@@ -145,17 +146,14 @@ impl Display {
         };
         self.shown = commit.picture;
         if let Picture::Pattern(_) = commit.picture {
-            // Called a duration by the crate, it is the time.
+            // The crate calls it a duration; it is the time on CLOCK_MONOTONIC.
             let timestamp = Timestamp(0) + event.duration;
             let beyond = timestamp
                 .since(commit.asked)
                 .saturating_sub(self.refresh() / 4);
             let missed = beyond.as_nanos() / self.refresh().as_nanos();
             self.missed += u64::try_from(missed).unwrap_or(u64::MAX);
-            self.came = Some(Flip {
-                timestamp,
-                sequence: count,
-            });
+            self.came = Some(Flip { timestamp, count });
         }
         match self.next.take() {
             Some(index) => self.commit(Picture::Pattern(index)),
@@ -163,7 +161,7 @@ impl Display {
         }
     }
 
-    /// Waits for the commit that is on its way: up to a refresh, if all is well.
+    /// Waits for the pending commit: up to one refresh, normally.
     fn settle(&mut self) -> Result<(), Error> {
         let patience = self.refresh() * PATIENCE;
         let end = monotonic() + patience;
@@ -178,11 +176,11 @@ impl Display {
                 return Err(Error::timeout(
                     "waiting for a flip",
                     patience,
-                    "check the display's mode; if it stays so, start the computer again",
+                    "check the display's mode; if that does not help, restart the computer",
                 ));
             }
             let mut news = [PollFd::new(&self.output.card, PollFlags::IN)];
-            // A signal ends it early, and nothing else is wrong with a descriptor of ours.
+            // A signal ends the wait early; nothing else can fail with a descriptor that we own.
             let _ = poll(&mut news, Some(&timespec(left)));
         }
     }
@@ -201,7 +199,7 @@ impl Projector for Display {
         self.output.present("looking for the projector")
     }
 
-    /// Waits until black is shown, at most a few refreshes: nothing is drawn that is in view.
+    /// Waits until black is shown, at most a few refreshes, so that no visible picture is drawn over.
     fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
         let size = self.size();
         all_of_size(&rasters, size)?;
@@ -261,13 +259,13 @@ impl Projector for Display {
         self.take_events()?;
         let flip = self.came.take();
         if flip.is_none() && self.waiting.is_some() {
-            // Of a display that is gone no event ever comes.
+            // A display that is gone sends no events.
             self.output.present("waiting for a flip")?;
         }
         Ok(flip)
     }
 
-    /// A pattern that is on its way is waited for, at most a few refreshes: the kernel takes back no commit.
+    /// Waits for a pattern that is queued, at most a few refreshes: a commit cannot be cancelled.
     fn blank(&mut self) -> Result<(), Error> {
         self.next = None;
         if !matches!(
@@ -295,15 +293,15 @@ impl Drop for Display {
             canvas.free(card);
         }
         self.black.free(card);
-        // Descriptors that were handed out would keep the card for this program.
+        // Duplicates of the descriptor that are still open would otherwise keep this program the card's master.
         let _ = card.release_master_lock();
     }
 }
 
-/// The count that goes on where the kernel's starts again, after 2³² refreshes.
+/// The kernel's count of refreshes, continued where its 32 bits wrap around.
 fn continued(last: Option<u64>, counted: u32) -> u64 {
     last.map_or(u64::from(counted), |last| {
-        // Truncation is the point: the low 32 bits are the kernel's.
+        // Truncation is intended: the low 32 bits are the kernel's count.
         last + u64::from(counted.wrapping_sub(last as u32))
     })
 }

@@ -1,4 +1,4 @@
-//! Which of a connector's modes: size and refresh as asked for, or the preferred one.
+//! Choosing one of a connector's modes: size and refresh rate as asked for, or the preferred mode.
 
 use std::fmt;
 use std::time::Duration;
@@ -7,20 +7,20 @@ use drm::control::{Mode, ModeFlags, ModeTypeFlags};
 
 use crate::setup::ProjectorSetup;
 
-/// A mode is taken for the rate that was asked for up to this share away. Modes are called by rounded rates: 59.94 Hz is 60, and so is
-/// the 60.32 Hz of the VESA mode 800×600, the farthest off (0.53 %). Rates that are different are 4 % apart at least (24 and 25).
+/// A mode fits if its rate differs by at most this share from the rate asked for. Modes are named by rounded rates: 59.94 Hz is called
+/// 60, and so is the 60.32 Hz of the VESA mode 800×600, the largest difference (0.53 %). Different rates are at least 4 % apart (24 and 25).
 const NEAR: f64 = 0.01;
 
-/// What matters of a mode.
+/// Size and timing of a mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Timings {
     pub width: u32,
     pub height: u32,
     /// From one refresh to the next.
     pub period: Duration,
-    /// By the display's own description.
+    /// Whether the display's own description (EDID) prefers it.
     pub preferred: bool,
-    /// Whole pictures, not every other line.
+    /// Not interlaced.
     pub progressive: bool,
 }
 
@@ -61,8 +61,8 @@ impl fmt::Display for Timings {
     }
 }
 
-/// The mode to use of those that the connector has: of those that fit, the nearest to the rate that was asked for, else the
-/// preferred one, else the first. None if none fits.
+/// The index of the mode to use: among the modes that fit, the nearest to the rate asked for; without a rate the preferred one, else
+/// the first. None if no mode fits.
 pub(super) fn choose(modes: &[Timings], setup: &ProjectorSetup) -> Option<usize> {
     let off = |mode: &Timings| {
         setup

@@ -1,4 +1,4 @@
-//! The way from a buffer to the projector: a connector, the CRTC that drives it and the plane that it shows.
+//! The display pipeline from a buffer to the projector: a plane, the CRTC that shows it, and the connector.
 
 use std::fs::File;
 use std::io;
@@ -15,7 +15,7 @@ use super::{canvas, faithful};
 use crate::error::{self, Error};
 use crate::setup::ProjectorSetup;
 
-/// Where the kernel tells the state of its connectors.
+/// Where the kernel shows the state of its connectors.
 const CONNECTORS: &str = "/sys/class/drm";
 
 /// A connector in its mode.
@@ -31,12 +31,12 @@ pub(super) struct Output {
     driver: Properties,
     plane: Properties,
     picture: property::Handle,
-    /// Tells whether something is plugged in, without asking the display; none where the kernel does not.
+    /// The kernel's status file of the connector, which does not probe the display; none if there is no such file.
     status: Option<File>,
 }
 
 impl Output {
-    /// Finds the card, connector and mode of a setup, and owns the card. Sets nothing yet.
+    /// Finds the card, connector and mode of a setup, and becomes the card's master. Sets nothing yet.
     pub fn find(setup: &ProjectorSetup) -> Result<Self, Error> {
         let (card, connector) = the_connector(setup)?;
         card.own()?;
@@ -78,7 +78,7 @@ impl Output {
         })
     }
 
-    /// Whether the projector is plugged in; asks the kernel only, which knows.
+    /// Checks that the projector is plugged in, by what the kernel knows; the display is not probed.
     pub fn present(&self, attempt: &str) -> Result<(), Error> {
         let Some(status) = &self.status else {
             return Ok(());
@@ -87,14 +87,14 @@ impl Output {
         let attempt = || format!("{attempt} on {}", self.name);
         match status.read_at(&mut text, 0) {
             Ok(_) if text.starts_with(b"disconnected") => {
-                Err(Error::disconnected(error::Device::Projector, attempt()))
+                Err(Error::disconnected(error::DeviceKind::Projector, attempt()))
             }
             Ok(_) => Ok(()),
             Err(error) => Err(refused(attempt(), &error)),
         }
     }
 
-    /// Switches the mode on and shows `canvas`. Waits for the display.
+    /// Sets the mode and shows `canvas`. Waits for the display.
     pub fn switch_on(&self, canvas: &canvas::Canvas) -> Result<(), Error> {
         let attempt = format!("setting {} on {}", self.timings, self.name);
         let failed = |error| refused(attempt.clone(), &error);
@@ -107,7 +107,7 @@ impl Output {
         set.map_err(failed)
     }
 
-    /// Shows another canvas with the next refresh, whose event follows. Does not wait.
+    /// Shows another canvas with the next refresh; an event follows. Does not wait.
     pub fn flip(&self, canvas: &canvas::Canvas) -> io::Result<()> {
         let mut request = AtomicModeReq::new();
         request.add_raw_property(
@@ -141,7 +141,7 @@ impl Output {
         self.card.atomic_commit(flags, request)
     }
 
-    /// All that the mode needs, with the settings under which grey levels stay what they are, and nobody else on the CRTC.
+    /// The commit that sets the mode, with the settings that leave grey levels unchanged and nothing else on the CRTC.
     fn mode_request(&self, mode: u64, canvas: &canvas::Canvas) -> Result<AtomicModeReq, Error> {
         let mut request = AtomicModeReq::new();
         let (width, height) = (
@@ -149,7 +149,7 @@ impl Output {
             u64::from(self.timings.height),
         );
         let crtc = u64::from(u32::from(self.crtc));
-        // The part of the buffer in 1/65536 pixels, the place on the display in pixels.
+        // SRC: the part of the buffer, in 1/65536 pixels. CRTC: the place on the display, in pixels.
         for (name, value) in [
             ("FB_ID", u32::from(canvas.shown_as).into()),
             ("CRTC_ID", crtc),
@@ -194,7 +194,7 @@ impl Output {
         }
     }
 
-    /// Takes cursors, overlays and other connectors off this CRTC.
+    /// Removes cursors, overlays and other connectors from this CRTC.
     fn be_alone(&self, request: &mut AtomicModeReq) -> Result<(), Error> {
         let failed = |error| {
             refused(

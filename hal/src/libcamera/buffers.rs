@@ -1,4 +1,4 @@
-//! The memory of a camera's buffers: mapped once, lent with a frame, given back when the last of its clones is dropped.
+//! The memory of a camera's buffers: mapped once, lent with a frame, returned when the last clone of the frame is dropped.
 
 use std::os::fd::{AsRawFd, OwnedFd};
 use std::sync::Arc;
@@ -14,9 +14,9 @@ use super::owner::Order;
 use crate::error::Error;
 use crate::frame::{Lent, Samples};
 
-/// Maps the first `length` bytes of the first plane of a buffer, for as long as the answer or a clone of it lives.
+/// Maps the first `length` bytes of the first plane of a buffer; the mapping lasts as long as the result or a clone of it.
 ///
-/// The mapping has descriptors of its own, so it outlives buffer, camera and library.
+/// The mapping has its own descriptors, so it may outlive buffer, camera and library.
 ///
 /// # Errors
 /// `Protocol` if the plane is shorter or cannot be mapped.
@@ -46,7 +46,7 @@ pub(super) fn map(buffer: &impl AsFrameBuffer, length: usize) -> Result<Bytes, E
     let given = fd.as_raw_fd();
     let planes = vec![FrameBufferPlane { fd, offset, length }];
     let own = OwnedFrameBuffer::new(planes, None).map_err(|cause| failed(cause.to_string()))?;
-    // libcamera 0.7.0 of Rust says that it takes the descriptor, gives a duplicate of it to the library, and loses it.
+    // The crate libcamera 0.7.0 takes the descriptor, gives a duplicate of it to the library, and leaks the original.
     if own.planes().get(0).is_some_and(|plane| plane.fd() != given) {
         let _ = nix::unistd::close(given);
     }
@@ -73,7 +73,8 @@ pub(super) struct Lease {
 }
 
 impl Lease {
-    /// Takes buffer `index`, whose memory is `bytes`, of words if `wide`; it goes back to `home`. `out` counts the buffers in use.
+    /// Lends buffer `index`, whose memory is `bytes`, holding 16-bit words if `wide`. It is returned to `home`; `out` counts the
+    /// buffers in use.
     pub fn new(
         index: usize,
         bytes: Bytes,
@@ -91,7 +92,7 @@ impl Lease {
         }
     }
 
-    /// The buffer as it is.
+    /// The bytes of the buffer.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
@@ -102,7 +103,7 @@ impl Lent for Lease {
         if !self.wide {
             return Samples::Eight(&self.bytes);
         }
-        // A mapping starts at a page and a plane at an even offset; where not, the frame is refused as one of another size.
+        // A mapping starts at a page and a plane at an even offset; otherwise the cast fails, and `Frame::lent` refuses the empty frame.
         Samples::Sixteen(bytemuck::try_cast_slice(&self.bytes).unwrap_or_default())
     }
 }
@@ -110,7 +111,7 @@ impl Lent for Lease {
 impl Drop for Lease {
     fn drop(&mut self) {
         self.out.fetch_sub(1, Ordering::Relaxed);
-        // Without its camera a buffer has nowhere to go.
+        // Fails if the camera was closed; then there is nowhere to return the buffer to.
         let _ = self.home.send(Order::Free(self.index));
     }
 }

@@ -1,4 +1,4 @@
-//! The camera as the head sees it: it gives orders to the thread that owns the library, and fetches what comes.
+//! The camera as the head uses it: it sends orders to the thread that owns the library, and fetches frames and errors from it.
 
 use std::os::fd::OwnedFd;
 use std::sync::Arc;
@@ -12,21 +12,21 @@ use rustix::event::{EventfdFlags, eventfd};
 
 use super::open::Configured;
 use super::owner::{Arrived, Event, Order, Wires, own, with_manager};
-use super::report::Count;
+use super::report::ContinuedCount;
 use super::{Reading, Settings};
 use crate::camera::{Camera, CameraTiming, Encoding};
-use crate::error::{Device, Error};
+use crate::error::{DeviceKind, Error};
 use crate::frame::{Frame, FrameFormat, Pool};
 
-/// The longest that opening, starting and stopping a camera may take: its sensor is powered up and programmed over I²C. Beyond,
-/// its driver hangs.
+/// Longest time for opening, starting and stopping a camera, in which the sensor is powered up and programmed over I²C. If it takes
+/// longer, the driver hangs.
 const PATIENCE: Duration = Duration::from_secs(15);
-/// Buffers that the camera needs to write without a gap: one being written, one waiting in the driver, one on its way there.
+/// Buffers that the camera needs to write without a gap: one being written, one queued in the driver, one on its way there.
 const IN_FLIGHT: usize = 3;
-/// Copied frames whose memory is used again.
+/// Copied frames whose memory is reused.
 const COPIES: usize = 64;
 
-/// A camera that libcamera knows.
+/// A camera that libcamera lists.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Listed {
     /// Its id, for [`Settings::id`].
@@ -49,7 +49,7 @@ pub struct LibCamera {
     in_flight: Arc<AtomicUsize>,
     ended: Receiver<()>,
     copies: Pool,
-    count: Count,
+    count: ContinuedCount,
     running: bool,
 }
 
@@ -73,11 +73,11 @@ impl LibCamera {
         })
     }
 
-    /// Opens a camera: finds it by its id, agrees on a format, and maps its buffers.
+    /// Opens a camera: finds it by its id, negotiates a format, and maps its buffers.
     ///
     /// # Errors
-    /// `Disconnected` if there is no camera of that id; `Unsupported` if it cannot do what is set, with what it can; `Protocol`
-    /// if another program uses it, one is open in this program, or the library refuses; `Timeout` if its driver hangs.
+    /// `Disconnected` if there is no camera of that id; `Unsupported` if it does not support the settings, listing what it supports;
+    /// `Protocol` if another program uses it, one is open in this program, or the library fails; `Timeout` if its driver hangs.
     pub fn open(settings: Settings) -> Result<Self, Error> {
         let system = |cause: &dyn std::fmt::Display| {
             Error::protocol(
@@ -130,12 +130,12 @@ impl LibCamera {
             out,
             in_flight,
             ended,
-            count: Count::default(),
+            count: ContinuedCount::default(),
             running: false,
         })
     }
 
-    /// A descriptor that is readable as long as there is a frame that was not fetched, or an error to tell.
+    /// A descriptor that is readable as long as there is a frame or an error that was not fetched.
     ///
     /// # Errors
     /// `Protocol` if the system is out of descriptors.
@@ -151,13 +151,13 @@ impl LibCamera {
         })
     }
 
-    /// The library's id of it.
+    /// The library's id of the camera.
     #[must_use]
     pub fn id(&self) -> &str {
         &self.id
     }
 
-    /// Buffers that the camera has; three less can be kept without a copy.
+    /// Buffers that the camera has; three fewer frames can be kept without a copy.
     #[must_use]
     pub fn buffers(&self) -> usize {
         self.configured.buffers
@@ -169,12 +169,12 @@ impl LibCamera {
         order: impl FnOnce(Sender<Result<(), Error>>) -> Order,
     ) -> Result<(), Error> {
         let (answer, answers) = mpsc::channel();
-        // If the thread has ended, nobody answers.
+        // If the thread has ended, `answered` finds its channel closed.
         let _ = self.orders.send(order(answer));
         answered(&answers, format!("{attempt} the camera `{}`", self.id))
     }
 
-    /// Takes the next event and its stroke of the bell.
+    /// Takes the next event and decrements the eventfd, which counts the events that were not fetched.
     fn fetch(&mut self) -> Result<Option<Event>, Error> {
         match self.events.try_recv() {
             Ok(event) => {
@@ -188,10 +188,10 @@ impl LibCamera {
 
     fn lost(&self) -> Error {
         let attempt = format!("waiting for a frame of the camera `{}`", self.id);
-        Error::disconnected(Device::Camera, attempt)
+        Error::disconnected(DeviceKind::Camera, attempt)
     }
 
-    /// Lends the buffer, or copies it if the camera would be left without room to write.
+    /// Makes a frame that borrows the buffer, or a copy of it if the camera would have too few buffers left.
     fn frame(&mut self, arrived: Arrived) -> Result<Frame, Error> {
         let Configured {
             readable,
@@ -199,7 +199,7 @@ impl LibCamera {
             stride,
             buffers,
         } = self.configured;
-        let count = self.count.of(arrived.sequence);
+        let count = self.count.of(arrived.count);
         if readable.is_plain() && self.out.load(Ordering::Relaxed) + IN_FLIGHT <= buffers {
             return Frame::lent(format, Arc::new(arrived.lease), arrived.stamp, count);
         }
@@ -209,7 +209,7 @@ impl LibCamera {
     }
 }
 
-/// What the thread answers to `attempt`, within [`PATIENCE`].
+/// The thread's answer to `attempt`, within [`PATIENCE`].
 fn answered<T>(answers: &Receiver<Result<T, Error>>, attempt: String) -> Result<T, Error> {
     match answers.recv_timeout(PATIENCE) {
         Ok(answer) => answer,
@@ -219,7 +219,7 @@ fn answered<T>(answers: &Receiver<Result<T, Error>>, attempt: String) -> Result<
             "its driver hangs: see the system's log, and restart the computer",
         )),
         Err(mpsc::RecvTimeoutError::Disconnected) => {
-            Err(Error::disconnected(Device::Camera, attempt))
+            Err(Error::disconnected(DeviceKind::Camera, attempt))
         }
     }
 }
@@ -262,7 +262,7 @@ impl Camera for LibCamera {
         }
         self.count.restart();
         self.ask("starting", Order::Start).inspect_err(|_| {
-            // It may run without a queue.
+            // The camera may be running, and queueing its requests may have failed.
             let _ = self.ask("stopping", Order::Stop);
         })?;
         self.running = true;
@@ -296,7 +296,7 @@ impl Camera for LibCamera {
         while let Ok(Some(_)) = self.fetch() {}
         stopped?;
         if in_flight > 0 {
-            // Whatever they bring would count as the next sequence's.
+            // Their frames would be taken for those of the next sequence.
             return Err(Error::protocol(
                 format!(
                     "stopping the camera `{}` that keeps {in_flight} requests",
@@ -312,7 +312,7 @@ impl Camera for LibCamera {
 impl Drop for LibCamera {
     fn drop(&mut self) {
         let _ = self.orders.send(Order::Close);
-        // Until the library is closed no other camera can be opened; a driver that hangs is left behind.
+        // No other camera can be opened before the library is closed. If the driver hangs, the thread is left behind.
         let _ = self.ended.recv_timeout(PATIENCE);
     }
 }

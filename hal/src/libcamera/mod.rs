@@ -1,11 +1,11 @@
-//! A camera through libcamera, as the Raspberry Pi's are: chosen by its id, set before it starts, each frame verified.
+//! A camera through libcamera, such as the Raspberry Pi's: chosen by its id, configured before it starts, each frame verified.
 //!
-//! One thread owns everything of the library ([`LibCamera::open`] starts it, dropping the camera ends it); frames come from there
-//! by a channel, and buffers go back to it. A frame borrows the buffer that the camera wrote, mapped once at opening; a frame
-//! that is kept may outlive the camera. Only where too few buffers would be left for the camera to write into, or where samples
-//! are packed, are they copied.
+//! One thread owns all objects of the library ([`LibCamera::open`] starts it, dropping the camera ends it); frames arrive from it
+//! through a channel, and buffers return to it. A frame borrows the buffer that the camera wrote, which is mapped once when the camera
+//! is opened; a frame that is kept may outlive the camera. Samples are copied only if the camera would have too few buffers left,
+//! or if they are packed.
 //!
-//! The choice of the format, the check of metadata and the conversion of stamps know nothing of the library.
+//! The choice of the format, the check of metadata and the conversion of stamps do not depend on the library.
 
 #[cfg(feature = "libcamera")]
 mod buffers;
@@ -27,34 +27,34 @@ pub use device::{LibCamera, Listed};
 pub use layout::Reading;
 pub use report::Exposing;
 
-/// Buffers to ask for: frames of the longest sequence, of which none is copied then, and those that the camera writes meanwhile.
+/// Buffers to ask for: enough for the frames of the longest sequence without a copy, and for those that the camera writes meanwhile.
 const BUFFERS: u32 = 16;
 
-/// Which camera, and how it is to take its frames.
+/// Which camera, and how it takes its frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// The library's id of it, which names the way that it is connected. Never an index: the order of cameras changes with
-    /// the library's version. None takes the only camera that is there.
+    /// The library's id of the camera, which names its connection. Never an index: the order of cameras changes with the library's
+    /// version. None selects the only camera.
     pub id: Option<String>,
-    /// What is taken of its images.
+    /// Which samples of its images are used.
     pub reading: Reading,
-    /// Columns and rows; none takes the largest.
+    /// Columns and rows; none selects the largest size.
     pub size: Option<(u32, u32)>,
-    /// Who starts an exposure. That a sensor waits for its trigger is set in its driver, not here.
+    /// Who starts an exposure. The sensor's trigger mode is set in its driver, not here.
     pub starts: Starts,
     /// Exposure, gain and frame length.
     pub exposing: Exposing,
-    /// Whether these are set, and verified in each frame's metadata. Only for trials with a camera that has no such controls:
-    /// then they are taken on trust.
+    /// Whether `exposing` is set, and verified in each frame's metadata. False only for trials with a camera that has no such
+    /// controls.
     pub controlled: bool,
-    /// From the end of an exposure until its frame can be fetched when nothing is late.
+    /// From the end of an exposure until its frame can be fetched, without any delay.
     pub delivery: Duration,
-    /// Buffers to ask for. A camera may grant less, and what is kept beyond them is copied.
+    /// Buffers to ask for. A camera may grant fewer; frames that are kept beyond them are copied.
     pub buffers: u32,
 }
 
 impl Settings {
-    /// As configured, each frame verified.
+    /// Settings as configured, with each frame verified.
     #[must_use]
     pub fn new(setup: &CameraSetup, starts: Starts) -> Self {
         let microseconds = |us: u32| Duration::from_micros(us.into());

@@ -1,4 +1,4 @@
-//! Opening a camera: found by its id, acquired, asked for formats, configured, its buffers allocated and mapped.
+//! Opening a camera: find it by its id, acquire it, negotiate a format, configure it, allocate and map its buffers.
 
 use std::io;
 
@@ -15,30 +15,30 @@ use bytes::Bytes;
 
 use super::layout::{Granted, Readable, Reading, choose, sensor_bits, worth_asking};
 use super::{Settings, buffers};
-use crate::error::{Device, Error};
+use crate::error::{DeviceKind, Error};
 use crate::frame::FrameFormat;
 
-/// What is known of a camera once it is configured.
+/// The format and buffers of a configured camera.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Configured {
     pub readable: Readable,
     pub format: FrameFormat,
-    /// Bytes from row to row of a buffer.
+    /// Bytes from the start of one row of a buffer to the next.
     pub stride: usize,
     /// Buffers that the camera has.
     pub buffers: usize,
 }
 
-/// A request with its buffer, and the memory of that.
+/// A request and the memory of its buffer.
 pub(super) struct Slot {
     /// None while the library has it.
     pub request: Option<Request>,
     pub bytes: Bytes,
-    /// Whether a frame is in it that somebody keeps.
+    /// Whether its buffer is lent with a frame.
     pub lent: bool,
 }
 
-/// A configured camera. Its parts are dropped in this order, the manager of all cameras after them.
+/// A configured camera. Its parts must be dropped in this order, and the camera manager after them.
 pub(super) struct Opened {
     pub slots: Vec<Slot>,
     pub stream: Stream,
@@ -48,10 +48,9 @@ pub(super) struct Opened {
     pub configured: Configured,
 }
 
-/// The error for what the library refused.
+/// The error for a call that the library refused.
 pub(super) fn refused(id: &str, attempt: &str, cause: &io::Error) -> Error {
     let attempt = format!("{attempt} the camera `{id}`");
-    // EBUSY and its kin.
     match cause.kind() {
         io::ErrorKind::ResourceBusy => Error::protocol(
             format!("{attempt}: another program uses it"),
@@ -59,27 +58,27 @@ pub(super) fn refused(id: &str, attempt: &str, cause: &io::Error) -> Error {
         ),
         io::ErrorKind::PermissionDenied => Error::protocol(
             format!("{attempt}: {cause}"),
-            "let the user of this program into the group `video`",
+            "add the user of this program to the group `video`",
         ),
         io::ErrorKind::OutOfMemory => Error::unsupported(
             attempt,
             "there is not enough memory for its buffers: give more (on a Raspberry Pi \"dtoverlay=vc4-kms-v3d,cma-512\")",
         ),
         _ if cause.raw_os_error() == Some(rustix::io::Errno::NODEV.raw_os_error()) => {
-            Error::disconnected(Device::Camera, attempt)
+            Error::disconnected(DeviceKind::Camera, attempt)
         }
         _ => Error::protocol(
             format!("{attempt}: {cause}"),
-            "see what libcamera says on the standard error output",
+            "see libcamera's messages on the standard error output",
         ),
     }
 }
 
-/// Opens the camera as set.
+/// Opens the camera with these settings.
 ///
 /// # Errors
-/// `Disconnected` if there is no camera of that id; `Unsupported` if it cannot do what is set; `Protocol` if it is in use or
-/// the library refuses.
+/// `Disconnected` if there is no camera of that id; `Unsupported` if it does not support the settings; `Protocol` if it is in use or
+/// the library fails.
 pub(super) fn open(manager: &CameraManager, settings: &Settings) -> Result<Opened, Error> {
     let found = find(manager, settings.id.as_deref())?;
     let id = found.id();
@@ -168,7 +167,7 @@ fn find(manager: &CameraManager, id: Option<&str>) -> Result<Camera<'static>, Er
         return Ok(all.swap_remove(at));
     }
     Err(Error::Disconnected {
-        device: Device::Camera,
+        device: DeviceKind::Camera,
         attempt: id.map_or("opening a camera".into(), |id| {
             format!("opening the camera `{id}`")
         }),
@@ -183,7 +182,7 @@ fn find(manager: &CameraManager, id: Option<&str>) -> Result<Camera<'static>, Er
 fn no_stream(id: &str) -> Error {
     Error::protocol(
         format!("configuring the camera `{id}`: the library gave no stream"),
-        "see what libcamera says on the standard error output",
+        "see libcamera's messages on the standard error output",
     )
 }
 
@@ -202,11 +201,11 @@ fn must_be_settable(camera: &Camera<'_>, id: &str) -> Result<(), Error> {
     }
     Err(Error::unsupported(
         format!("setting the {} of the camera `{id}`", missing.join(", ")),
-        "take a camera that has these controls: nothing can be measured with an exposure that nobody knows",
+        "use a camera that has these controls: nothing can be measured with an unknown exposure",
     ))
 }
 
-/// Asks for every format that can be read that way, and returns the configuration of the best that was granted.
+/// Asks for every format that this reading can use, and returns the configuration of the best one that was granted.
 fn agree(
     camera: &Camera<'_>,
     id: &str,
@@ -225,7 +224,7 @@ fn agree(
         }
     }
     if offers.is_empty() {
-        // For the words of the refusal: what it gives unasked.
+        // For the error message: the format that the camera proposes by itself.
         let unasked = camera.generate_configuration(&[StreamRole::VideoRecording]);
         offers.extend(unasked.and_then(|configuration| ask(configuration, None, settings)));
     }
@@ -248,7 +247,7 @@ fn agree(
     Ok((configuration, readable.of_sensor(bits)))
 }
 
-/// Asks for a format; the camera may grant another one, or none.
+/// Asks for a format; the camera may grant another format, or none.
 fn ask(
     mut configuration: CameraConfiguration,
     format: Option<PixelFormat>,

@@ -1,4 +1,4 @@
-//! The thread that owns a camera and the library: it starts, stops, fills the camera's queue and reads what comes of it.
+//! The thread that owns a camera and the library: it starts and stops the camera, queues requests, and reads completed ones.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
@@ -20,28 +20,28 @@ use super::layout::Layout;
 use super::open::{Configured, Opened, open, refused};
 use super::report::{Clocks, Reported, on_the_heads_clock};
 use crate::clock::monotonic;
-use crate::error::{Device, Error};
+use crate::error::{DeviceKind, Error};
 use crate::units::Timestamp;
 
-/// Requests that the library has come back within this, once it has stopped.
+/// Longest time in which the library returns its requests after it has stopped.
 const CANCELLED: Duration = Duration::from_secs(2);
 
-/// The library allows one manager of cameras in a process.
+/// The library allows one camera manager in a process.
 static ONE_MANAGER: Mutex<()> = Mutex::new(());
 
-/// What the thread is told.
+/// A message to the thread.
 pub(super) enum Order {
     Start(Sender<Result<(), Error>>),
     Stop(Sender<Result<(), Error>>),
-    /// The library is done with a request.
+    /// The library has completed a request.
     Done(Request),
-    /// Nobody keeps a frame in this buffer any more.
+    /// The last frame in this buffer was dropped.
     Free(usize),
-    /// End.
+    /// Close the camera and end.
     Close,
 }
 
-/// What came of a running camera.
+/// An event of a running camera.
 #[derive(Debug)]
 pub(super) enum Event {
     Frame(Arrived),
@@ -55,25 +55,26 @@ pub(super) struct Arrived {
     pub lease: Lease,
     pub stamp: Timestamp,
     /// The camera's count since its start.
-    pub sequence: u32,
+    pub count: u32,
 }
 
-/// The ends of what connects the thread with the camera's other half.
+/// The settings, channels and counters that the thread shares with `LibCamera`.
 pub(super) struct Wires {
     pub settings: Settings,
     pub orders: Receiver<Order>,
     pub home: Sender<Order>,
     pub events: Sender<Event>,
-    /// Counts the events that were not fetched, so that it is readable as long as there is one.
+    /// An eventfd that counts the events that were not fetched, so that it is readable as long as there is one.
     pub ready: Arc<OwnedFd>,
+    /// Whether the camera is disconnected.
     pub gone: Arc<AtomicBool>,
-    /// Buffers with frames that were not dropped.
+    /// Number of buffers that are lent with frames.
     pub out: Arc<AtomicUsize>,
-    /// Requests that the library has.
+    /// Number of requests that the library has.
     pub in_flight: Arc<AtomicUsize>,
 }
 
-/// Does `work` with the manager of all cameras; two at a time would end the process.
+/// Calls `work` with the camera manager; a second one at the same time would abort the process.
 ///
 /// # Errors
 /// `Protocol` if another camera is open in this process or the library does not start; that of `work`.
@@ -100,7 +101,7 @@ pub(super) fn with_manager<R>(
     work(&manager)
 }
 
-/// Opens the camera, answers how, and serves it until it is told to end.
+/// Opens the camera, answers with its id and configuration, and serves orders until it is to close.
 pub(super) fn own(wires: Wires, answer: &Sender<Result<(String, Configured), Error>>) {
     let served = with_manager(|manager| {
         let mut opened = open(manager, &wires.settings)?;
@@ -108,7 +109,7 @@ pub(super) fn own(wires: Wires, answer: &Sender<Result<(String, Configured), Err
             .send(Ok((opened.id.clone(), opened.configured)))
             .is_err()
         {
-            // Nobody waited so long, and nobody would ever close it.
+            // `LibCamera::open` has given up waiting, so nothing would ever close the camera.
             return Ok(());
         }
         let home = wires.home.clone();
@@ -134,7 +135,7 @@ pub(super) fn own(wires: Wires, answer: &Sender<Result<(String, Configured), Err
     }
 }
 
-/// Makes the descriptor readable once more.
+/// Increments the eventfd.
 fn ring(ready: &OwnedFd) {
     let _ = rustix::io::write(ready, &1_u64.to_ne_bytes());
 }
@@ -165,7 +166,7 @@ impl Owner<'_> {
                 Order::Close => self.closing = true,
             }
         }
-        // A request must not outlive its camera: neither one that the library has nor one that comes back unread.
+        // A request must not outlive its camera, so `stop` takes back those in the library, and those still in the channel are dropped.
         let _ = self.stop();
         while self.wires.orders.try_recv().is_ok() {}
     }
@@ -182,14 +183,14 @@ impl Owner<'_> {
         (0..self.opened.slots.len()).try_for_each(|index| self.queue(index))
     }
 
-    /// Everything automatic off, and the values that hold from the first frame.
+    /// Controls that switch everything automatic off and set the values from the first frame on.
     fn controls(&self) -> ::libcamera::utils::UniquePtr<ControlList> {
         let exposing = &self.wires.settings.exposing;
         let microseconds = |time: Duration| i64::try_from(time.as_micros()).unwrap_or(i64::MAX);
         let period = microseconds(exposing.period);
         let exposure = i32::try_from(exposing.exposure.as_micros()).unwrap_or(i32::MAX);
         let mut set = ControlList::new();
-        // A list that is not bound to a camera takes every control; whether the values were taken shows in the metadata.
+        // A list that is not bound to a camera accepts every control; whether the values took effect is verified in the metadata.
         let _ = set.set(controls::AeEnable(false));
         let _ = set.set(controls::ExposureTime(exposure));
         let _ = set.set(controls::AnalogueGain(exposing.gain));
@@ -197,7 +198,7 @@ impl Owner<'_> {
         set
     }
 
-    /// Stops the camera and takes back the requests that it had.
+    /// Stops the camera and takes its requests back.
     fn stop(&mut self) -> Result<(), Error> {
         if !self.running {
             return Ok(());
@@ -213,7 +214,7 @@ impl Owner<'_> {
                     self.keep(request);
                 }
                 Ok(Order::Free(index)) => self.free(index),
-                // Its other half did not wait for this one's answer.
+                // `LibCamera` was dropped without waiting for an answer.
                 Ok(Order::Close) => self.closing = true,
                 Ok(Order::Start(_) | Order::Stop(_)) => {}
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
@@ -249,7 +250,7 @@ impl Owner<'_> {
         }
     }
 
-    /// Gives a request to the library, unless somebody keeps its buffer or the library has it.
+    /// Queues a request, unless its buffer is lent or the library has it already.
     fn queue(&mut self, index: usize) -> Result<(), Error> {
         let slot = &mut self.opened.slots[index];
         if slot.lent {
@@ -259,7 +260,7 @@ impl Owner<'_> {
             return Ok(());
         };
         request.reuse(ReuseFlag::REUSE_BUFFERS);
-        // Before it is queued: it may be back before that returns.
+        // Counted before it is queued, as it may be completed before `queue_request` returns.
         self.wires.in_flight.fetch_add(1, Ordering::Relaxed);
         let queued = self.opened.camera.queue_request(request);
         queued.map_err(|(request, cause)| {
@@ -278,10 +279,13 @@ impl Owner<'_> {
             return;
         }
         if status == RequestStatus::Cancelled {
-            // Nobody stopped it: libcamera gives up a camera that no longer answers.
+            // The camera was not stopped: libcamera cancels requests when a camera no longer answers.
             self.wires.gone.store(true, Ordering::Relaxed);
             let attempt = format!("waiting for a frame of the camera `{}`", self.opened.id);
-            self.tell(Event::Refused(Error::disconnected(Device::Camera, attempt)));
+            self.tell(Event::Refused(Error::disconnected(
+                DeviceKind::Camera,
+                attempt,
+            )));
             return;
         }
         match self.read(index) {
@@ -293,12 +297,12 @@ impl Owner<'_> {
                     self.free(index);
                 }
             }
-            // A frame that the sensor spoiled, or one of its start-up: a gap in the count.
+            // An erroneous frame, or one of the sensor's start-up: it shows as a gap in the count.
             None => self.free(index),
         }
     }
 
-    /// What a completed request holds; none if its frame is no good.
+    /// The event of a completed request; none if its frame is erroneous.
     fn read(&self, index: usize) -> Option<Event> {
         let clocks = Clocks::of(&[(); 3].map(|()| (monotonic(), boot(), monotonic())));
         let slot = &self.opened.slots[index];
@@ -334,7 +338,7 @@ impl Owner<'_> {
                     &self.wires.out,
                 ),
                 stamp,
-                sequence: frame.sequence(),
+                count: frame.sequence(),
             }),
             Err(error) => Event::Refused(error),
         })

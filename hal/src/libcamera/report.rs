@@ -1,29 +1,29 @@
-//! What a request's metadata must say: the exposure, gain and frame length that were set, and a time on the head's clock.
+//! Checking a request's metadata: exposure, gain and frame length must be as set, and the stamp is converted to the head's clock.
 
 use std::time::Duration;
 
 use crate::error::Error;
 use crate::units::Timestamp;
 
-/// Sensors set their gain in steps; the coarsest common ones are of 0.3 dB, 3.5 %, and drivers round to the next one.
-const GAIN_STEP: f32 = 0.035;
-/// Metadata counts whole microseconds.
+/// Sensors quantise their gain; the coarsest common increment is 0.3 dB, 3.5 %, and drivers round to the next value.
+const GAIN_INCREMENT: f32 = 0.035;
+/// Metadata has whole microseconds.
 const MICROSECOND: Duration = Duration::from_micros(1);
-/// No frame that is fetched can be older: libcamera would have given the camera up.
+/// No frame can be older when it is fetched: libcamera would have given the camera up before.
 const OLDEST: Duration = Duration::from_secs(60);
 
-/// How a camera is set before it starts. Nothing of it changes until it stops.
+/// The exposure settings of a camera. They are set before it starts and do not change until it stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exposing {
     /// How long a frame is exposed.
     pub exposure: Duration,
     /// Gain of the sensor's amplifier; 1 is none.
     pub gain: f32,
-    /// From the start of one exposure to the next.
+    /// From the start of one exposure to the start of the next.
     pub period: Duration,
 }
 
-/// What a request's metadata says of its frame, in its units; none where it says nothing.
+/// The metadata of a request, in libcamera's units; none where a value is missing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Reported {
     /// µs.
@@ -36,11 +36,11 @@ pub(crate) struct Reported {
 impl Exposing {
     /// Checks that a frame of `rows` rows was taken as set.
     ///
-    /// A sensor exposes for a whole number of lines, and a line lasts at most the frame's length over its rows: times may differ by
-    /// one line.
+    /// A sensor exposes for a whole number of lines, and a line lasts at most the frame length divided by the number of rows, so times
+    /// may differ by one line.
     ///
     /// # Errors
-    /// `Protocol` if metadata says something else, or nothing.
+    /// `Protocol` if a value in the metadata differs or is missing.
     pub(crate) fn verify(&self, rows: u32, reported: &Reported) -> Result<(), Error> {
         let line = self.period / rows.max(1) + MICROSECOND;
         let time = |us: i64| Duration::from_micros(u64::try_from(us).unwrap_or(0));
@@ -65,8 +65,8 @@ impl Exposing {
             let found = period.map(|found| format!("{found:?}"));
             return wrong("frame length", format!("{:?}", self.period), found);
         }
-        // Not a number is wrong, too.
-        if !gain_off.is_some_and(|off| off <= GAIN_STEP) {
+        // NaN is refused, too.
+        if !gain_off.is_some_and(|off| off <= GAIN_INCREMENT) {
             let found = reported.gain.map(|found| found.to_string());
             return wrong("gain", self.gain.to_string(), found);
         }
@@ -74,7 +74,7 @@ impl Exposing {
     }
 }
 
-/// What `CLOCK_MONOTONIC` says, and how far `CLOCK_BOOTTIME` is ahead of it: the time that the computer was suspended.
+/// The time on `CLOCK_MONOTONIC`, and how far `CLOCK_BOOTTIME` is ahead of it: the time for which the computer was suspended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Clocks {
     pub monotonic: Timestamp,
@@ -82,8 +82,8 @@ pub(crate) struct Clocks {
 }
 
 impl Clocks {
-    /// Out of readings of the monotonic clock, the other one, and the first again. Whoever reads may be interrupted in between, so the
-    /// closest reading counts.
+    /// From readings of the monotonic clock, the boot-time clock, and the monotonic clock again. The reading thread may be interrupted
+    /// in between, so the reading with the shortest time between its two monotonic times is used.
     pub fn of(readings: &[(Timestamp, Timestamp, Timestamp)]) -> Self {
         let spread = |(before, _, after): &&(Timestamp, Timestamp, Timestamp)| after.since(*before);
         let closest = readings.iter().min_by_key(spread);
@@ -96,10 +96,10 @@ impl Clocks {
     }
 }
 
-/// A stamp on the head's clock. Libcamera documents `CLOCK_BOOTTIME`; most drivers stamp with `CLOCK_MONOTONIC`.
+/// Converts a stamp to the head's clock. Libcamera documents `CLOCK_BOOTTIME`; most drivers stamp with `CLOCK_MONOTONIC`.
 ///
-/// A frame is stamped before it is fetched, so a stamp that is later than the monotonic clock is one of the other: the
-/// difference of the clocks is then more than a frame's way. `clocks` are what they say when it is fetched.
+/// A frame is stamped before it is fetched, so a stamp later than the monotonic clock must be from the boot-time clock: the
+/// difference of the clocks then exceeds the age of the frame. `clocks` is read when the frame is fetched.
 ///
 /// # Errors
 /// `Protocol` if the stamp fits neither.
@@ -115,27 +115,27 @@ pub(crate) fn on_the_heads_clock(stamp: u64, clocks: Clocks) -> Result<Timestamp
         .ok_or_else(|| {
             Error::protocol(
                 format!("a frame stamped {stamp}, fetched at {monotonic} of CLOCK_MONOTONIC and {} of CLOCK_BOOTTIME", monotonic + suspended),
-                "the camera's driver stamps with a clock of its own: take a camera whose driver does not",
+                "the camera's driver stamps with another clock: use a camera whose driver stamps with one of these",
             )
         })
 }
 
-/// The count of a camera that starts at 0 each time, going on over all its starts.
+/// The count of a camera that begins at 0 with each start, continued over all starts.
 #[derive(Debug, Default)]
-pub(crate) struct Count {
+pub(crate) struct ContinuedCount {
     base: u64,
     next: u64,
 }
 
-impl Count {
-    /// The camera starts again.
+impl ContinuedCount {
+    /// The camera is started again.
     pub fn restart(&mut self) {
         self.base = self.next;
     }
 
-    /// The count of the frame that the camera counts `sequence` since its start.
-    pub fn of(&mut self, sequence: u32) -> u64 {
-        let count = self.base + u64::from(sequence);
+    /// The continued count of the frame with this count since the camera's start.
+    pub fn of(&mut self, since_start: u32) -> u64 {
+        let count = self.base + u64::from(since_start);
         self.next = self.next.max(count + 1);
         count
     }
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn counts_go_on_over_a_restart_and_keep_their_gaps() {
-        let mut count = Count::default();
+        let mut count = ContinuedCount::default();
         let first: Vec<u64> = [0, 1, 4, 3].map(|n| count.of(n)).into();
         count.restart();
         let second: Vec<u64> = [2, 3].map(|n| count.of(n)).into();

@@ -1,24 +1,24 @@
-//! A line that bounces: which of its edges is a start.
+//! Debouncing of a start line: which of its edges is a start.
 //!
-//! A level counts once the line has kept it for a while, so neither the bounces of a contact nor the spike of a press's motor
-//! start anything. The kernel queues 16 edges and drops the rest without a sign; so what the edges say is believed only if the
-//! line is found at that level when it has settled.
+//! A level counts when the line has kept it for the debounce time, so neither the bounces of a contact nor the spike of a press's
+//! motor start a cycle. The kernel queues 16 edges and drops further ones without notice. So the level after the last edge
+//! counts only if the line is read at the same level when it has settled.
 
 use std::time::Duration;
 
 use crate::units::Timestamp;
 
-/// What is known of a line from its edges.
+/// The state of a line, from its edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Debounce {
     quiet: Duration,
     settled: bool,
-    /// The last edge since then, and the level after it.
+    /// The last edge since the line settled, and the level after it.
     moved: Option<(Timestamp, bool)>,
 }
 
 impl Debounce {
-    /// A line at rest at `active`, which counts once it has been still for `quiet`.
+    /// A line that is settled at `active`; a new level counts once the line has kept it for `quiet`.
     #[must_use]
     pub fn new(quiet: Duration, active: bool) -> Self {
         Self {
@@ -33,20 +33,20 @@ impl Debounce {
         self.moved = Some((at, active));
     }
 
-    /// When the line will have settled if no other edge comes.
+    /// When the line will have settled if no further edge comes.
     #[must_use]
     pub fn due(&self) -> Option<Timestamp> {
         self.moved.map(|(at, _)| at + self.quiet)
     }
 
-    /// The line is found at `active` now, after all its edges. Answers since when it is active, if that is a start.
+    /// The line was read at `active` at time `now`, after all its edges. Returns since when it is active, if that is a start.
     pub fn found(&mut self, now: Timestamp, active: bool) -> Option<Timestamp> {
-        let (at, told) = self.moved?;
+        let (at, level) = self.moved?;
         if now < at + self.quiet {
             return None;
         }
-        if told != active {
-            // An edge was lost. When it came is not known: the line has to be still from now on.
+        if level != active {
+            // An edge was lost, at an unknown time: the line has to keep its level from now on.
             self.moved = Some((now, active));
             return None;
         }
@@ -67,7 +67,7 @@ mod tests {
         Timestamp(ms * 1_000_000)
     }
 
-    /// The starts of a line with these edges (ms, level after it), asked every millisecond; it ends at its last level.
+    /// The starts of a line with these edges (ms, level after the edge), read every millisecond.
     fn starts(edges: &[(u64, bool)]) -> Vec<u64> {
         let mut line = Debounce::new(QUIET, false);
         let mut found = Vec::new();
@@ -109,7 +109,7 @@ mod tests {
 
     #[test]
     fn edges_that_the_kernel_names_alike_are_still_edges() {
-        // Both are named by the level at which the kernel found the line afterwards.
+        // The kernel names each edge by the level that it read afterwards.
         assert_eq!(starts(&[(10, true), (13, true)]), [13]);
     }
 

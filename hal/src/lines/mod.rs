@@ -1,4 +1,4 @@
-//! The lines between a station and whoever starts it by wire, as traits: a start in, and busy, ok and fault out.
+//! The lines between a station and the machine that starts it by wire, as traits: start as input; busy, ok and fault as outputs.
 
 mod debounce;
 
@@ -10,17 +10,17 @@ pub use debounce::Debounce;
 
 /// A line that starts cycles. Its descriptor is readable as long as there are edges that were not fetched.
 pub trait StartLine: AsFd + Send {
-    /// The start that has come since the last call: the time from which on the line was active. Does not wait.
+    /// The start that has come since the last call, if any: the time since which the line is active. Does not wait.
     ///
     /// # Errors
     /// `Disconnected` if the line's chip is gone.
     fn poll_start(&mut self) -> Result<Option<Timestamp>, Error>;
 
-    /// When to ask again even if the descriptor says nothing: the line is moving, and may have settled by then.
+    /// When to call [`StartLine::poll_start`] again even if the descriptor is not readable: the line may have settled by then.
     fn settles(&self) -> Option<Timestamp>;
 }
 
-/// A line that tells something to whoever is at its other end.
+/// A line that shows a state of the station.
 pub trait OutputLine: Send {
     /// Switches it on or off.
     ///

@@ -1,4 +1,4 @@
-//! What must hold for the manifest of a recording, whether it is read or about to be written.
+//! Checks of a recording's manifest, both when it is read and before it is written.
 
 use std::path::{Component, Path};
 
@@ -12,21 +12,21 @@ use crate::model::DeviceModel;
 
 /// Longest description, characters.
 const MAX_TEXT: usize = 4096;
-/// Longest part id and name of a file, characters.
+/// Longest part id and file name, characters.
 const MAX_NAME: usize = 255;
-/// Most frames in a recording: two patterns of a hundred frames are plenty.
+/// Most frames in a recording; two patterns of a hundred frames each would be many.
 const MAX_FRAMES: usize = 1024;
 /// Most bytes of decoded samples in a recording.
 const MAX_BYTES: u64 = 2 << 30;
-/// The shifts of a level may be off their even spacing by this much, turns.
+/// How far the shifts of a level may be off even spacing, turns.
 pub(crate) const SHIFT_TOLERANCE_TURNS: f64 = 1e-6;
 /// Fewest frames that determine offset, modulation and phase.
 const MIN_SHIFTS: usize = 3;
 
-/// Checks everything that can be said without opening another file; `path` is the manifest's.
+/// Checks everything that can be checked without opening another file; `path` is the manifest's.
 pub(crate) fn manifest(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
     values(manifest).map_err(|problem| {
-        let remedy = "a value of no use in a recording is left out";
+        let remedy = "correct the value, or leave it out if it is optional";
         RecordingError::content(path, problem, remedy)
     })?;
     patterns(manifest, path)?;
@@ -34,7 +34,7 @@ pub(crate) fn manifest(manifest: &Manifest, path: &Path) -> Result<(), Recording
     levels(manifest, path)
 }
 
-/// The values that stand for themselves.
+/// Checks the values that do not depend on others.
 fn values(manifest: &Manifest) -> Result<(), String> {
     let (camera, projector) = (&manifest.camera, &manifest.projector);
     for (key, pixels) in [
@@ -158,7 +158,7 @@ fn frames(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
     Ok(())
 }
 
-/// A file a manifest names must lie inside the recording's folder.
+/// Checks that a file that the manifest names lies inside the recording's folder.
 fn inside(file: &str, path: &Path) -> Result<(), RecordingError> {
     let plain = !file.is_empty()
         && file.len() <= MAX_NAME
@@ -179,7 +179,7 @@ fn inside(file: &str, path: &Path) -> Result<(), RecordingError> {
     ))
 }
 
-/// Frames of equal ratio and pattern form a level, whose shifts divide one turn evenly.
+/// Checks that the frames of equal ratio and pattern form a level whose shifts divide one turn evenly.
 fn levels(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
     let mut seen: Vec<(u64, usize)> = Vec::new();
     for frame in &manifest.frames {
@@ -228,7 +228,7 @@ fn levels(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
 fn evenly_spaced(shifts: &[f64]) -> bool {
     let mut turns: Vec<f64> = shifts.iter().map(|shift| shift.rem_euclid(1.0)).collect();
     turns.sort_by(f64::total_cmp);
-    let step = 1.0 / turns.len() as f64;
+    let spacing = 1.0 / turns.len() as f64;
     let Some(&first) = turns.first() else {
         return false;
     };
@@ -237,7 +237,7 @@ fn evenly_spaced(shifts: &[f64]) -> bool {
     turns
         .iter()
         .zip(next)
-        .all(|(here, next)| (next - here - step).abs() <= SHIFT_TOLERANCE_TURNS)
+        .all(|(here, next)| (next - here - spacing).abs() <= SHIFT_TOLERANCE_TURNS)
 }
 
 #[cfg(test)]

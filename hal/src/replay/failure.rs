@@ -1,4 +1,4 @@
-//! Why a recording cannot be opened: it is not there, or its content is wrong.
+//! Errors of opening a recording: it does not exist, or its content is wrong.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ pub enum RecordingError {
         /// "folder" or "recording.json".
         what: &'static str,
     },
-    /// Something in the folder is wrong, including a file that the manifest names and that is not there.
+    /// Something in the folder is wrong; this includes a missing file that the manifest names.
     #[error("open recording {}: {problem}: {remedy}", path.display())]
     Content {
         /// The file that is wrong.
@@ -28,13 +28,13 @@ pub enum RecordingError {
 }
 
 impl RecordingError {
-    /// Whether the recording does not exist at all (as against existing with wrong content).
+    /// Whether the recording does not exist at all, as opposed to having wrong content.
     #[must_use]
     pub fn is_missing(&self) -> bool {
         matches!(self, Self::Missing { .. })
     }
 
-    /// `path` is wrong in that `problem`; do `remedy`.
+    /// The content of `path` is wrong.
     pub(crate) fn content(
         path: &Path,
         problem: impl Into<String>,

@@ -8,13 +8,13 @@ use png::{BitDepth, ColorType};
 use super::failure::RecordingError;
 use crate::frame::{FrameFormat, Pixels, Samples};
 
-/// What a decoder may allocate beside the samples themselves.
+/// Bytes that the decoder may allocate in addition to the samples.
 const DECODER_BYTES: usize = 64 << 20;
 
-/// Decodes the PNG in `bytes`, which must be grey, whole, and of exactly `format`.
+/// Decodes the PNG in `bytes`, which must be grey, complete, and of exactly `format`.
 ///
 /// # Errors
-/// Content, naming `path` and what was found: not a PNG, cut off, colour, another size or depth, or a sample
+/// [`RecordingError::Content`], naming `path` and what is wrong: not a PNG, cut off, colour, another size or depth, or a sample
 /// above 2^bits − 1.
 pub(crate) fn decode(
     bytes: &[u8],
@@ -74,7 +74,7 @@ pub(crate) fn decode(
     }
     let mut raw = vec![0_u8; size];
     reader.next_frame(&mut raw).map_err(broken)?;
-    // Reads on to the end mark, so that a file that is cut off behind its samples is noticed too.
+    // Reads on to the end chunk, so that a file that is cut off after its samples is refused too.
     reader.finish().map_err(broken)?;
 
     if format.bit_depth == 8 {
@@ -96,10 +96,10 @@ pub(crate) fn decode(
     }
 }
 
-/// The PNG of samples in `format`; padding between rows is left out.
+/// Encodes samples of `format` as PNG; padding between rows is left out.
 ///
 /// # Errors
-/// What the encoder says.
+/// The encoder's error.
 pub(crate) fn encode(
     format: &FrameFormat,
     samples: Samples<'_>,

@@ -1,4 +1,4 @@
-//! The file form of `recording.json`, format 1: what may stand in it, before anything is checked.
+//! The file form of `recording.json`, format 1: its keys and types, before any value is checked.
 
 use std::path::Path;
 
@@ -9,9 +9,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use super::failure::RecordingError;
 use crate::model::DeviceModel;
 
-/// The name every recording carries.
+/// The name of the format, in every manifest.
 pub const FORMAT: &str = "fringed-recording";
-/// The version this program reads and writes.
+/// The version that this program reads and writes.
 pub const VERSION: u64 = 1;
 
 /// The whole of `recording.json`.
@@ -79,7 +79,7 @@ pub(crate) struct FrameEntry {
     pub pattern: usize,
 }
 
-/// The recipe a production measurement was made with.
+/// The recipe of a measurement in production.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecipeReference {
@@ -99,7 +99,7 @@ fn is_first(pattern: &usize) -> bool {
 
 /// One pattern, or a list of them.
 ///
-/// Not an untagged enum: serde's answer to a wrong key in one does not name the key.
+/// Not an untagged enum, because serde's error for a wrong key in one does not name the key.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PatternEntries(pub Vec<PatternEntry>);
 
@@ -135,10 +135,10 @@ impl<'de> Deserialize<'de> for PatternEntries {
     }
 }
 
-/// Reads the manifest in `text`; `path` is for messages only.
+/// Reads the manifest in `text`; `path` is used in messages only.
 ///
-/// Name and version are looked at first, by themselves, so that a newer version is called that and not a
-/// list of unknown keys.
+/// Format and version are checked first, so that a newer version is reported as such and not as
+/// unknown keys.
 pub(crate) fn parse(text: &str, path: &Path) -> Result<Manifest, RecordingError> {
     let value: serde_json::Value = serde_json::from_str(text).map_err(|error| {
         RecordingError::content(path, format!("not valid JSON: {error}"), "mend the file")
@@ -181,7 +181,7 @@ pub(crate) fn parse(text: &str, path: &Path) -> Result<Manifest, RecordingError>
         RecordingError::content(
             path,
             error.to_string(),
-            "correct or remove that key; recording format 1 lists the keys there are",
+            "correct or remove that key; docs/formats.md lists the keys of recording format 1",
         )
     })
 }

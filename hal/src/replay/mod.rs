@@ -1,4 +1,4 @@
-//! The replay back-end: recordings in format 1 are read, written, and played as if they came from a head.
+//! The replay back-end: recordings in format 1 are read, written, and played as a head.
 
 mod check;
 pub mod failure;

@@ -1,4 +1,4 @@
-//! The scene of a replay head: the pattern shown decides which recorded frame the camera gives.
+//! The scene of a replay head: the index of the pattern in view selects the recorded frame.
 
 use std::time::Duration;
 
@@ -12,13 +12,13 @@ use crate::virtual_head::{self, Mechanics, Scene};
 
 /// Refresh period of the replayed projector, 60 Hz.
 const REFRESH: Duration = Duration::from_nanos(16_666_667);
-/// Exposure of the replayed camera.
+/// Exposure of the replayed camera, refreshes.
 const EXPOSURE_REFRESHES: u32 = 2;
 
 /// A head that plays `recordings` one after the other, then from the first again.
 ///
-/// Pattern k gives recorded frame k under the time and count of the replay. As many rasters must be loaded as a
-/// recording has frames. After each frame of a recording was given at least once, the next recording's turn has come.
+/// Pattern k gives recorded frame k, with the time and count of the replay. As many rasters must be loaded as a
+/// recording has frames. When each frame of a recording was given at least once, the next recording is played.
 ///
 /// # Errors
 /// `Unsupported` if there is no recording, or if they differ in camera format, projector size, number of frames, or ratio and
@@ -129,7 +129,7 @@ impl Scene for Played {
         &mut self,
         seen: &[(Option<usize>, f32)],
         timestamp: Timestamp,
-        sequence: u64,
+        count: u64,
     ) -> Result<Frame, Error> {
         let index = match seen {
             [(Some(index), _)] if *index < self.played.len() => *index,
@@ -142,7 +142,7 @@ impl Scene for Played {
         };
         let frame = self.recordings[self.current].frames[index]
             .frame
-            .restamped(timestamp, sequence);
+            .restamped(timestamp, count);
         self.played[index] = true;
         if self.played.iter().all(|played| *played) {
             self.played.fill(false);

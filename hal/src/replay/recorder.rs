@@ -1,4 +1,4 @@
-//! Writes a recording in format 1: under a temporary name beside its place, files and folders synced, then renamed.
+//! Writing a recording in format 1: to a folder with a temporary name, which is synced and then renamed.
 
 use std::fs;
 use std::io::{self, ErrorKind, Write};
@@ -15,16 +15,16 @@ use super::{check, grey};
 use crate::frame::Samples;
 use crate::npy;
 
-/// A recording that could not be written. Nothing is left behind.
+/// Errors of writing a recording. Nothing is left behind.
 #[derive(Debug, thiserror::Error)]
 pub enum RecorderError {
-    /// There is something under that name already.
+    /// The name exists already.
     #[error("write recording {}: it exists already: name a folder that does not exist", path.display())]
     Exists {
         /// The folder.
         path: PathBuf,
     },
-    /// The recording would not be one that can be opened again.
+    /// The recording could not be opened again.
     #[error("write recording {}: {problem}", path.display())]
     Content {
         /// The folder.
@@ -37,7 +37,7 @@ pub enum RecorderError {
     Create {
         /// What was to be created.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
 }
@@ -45,13 +45,12 @@ pub enum RecorderError {
 /// Writes `recording` as the new folder `folder`, whose parent must exist.
 ///
 /// # Errors
-/// [`RecorderError`]; the folder is then not there.
+/// [`RecorderError`]; the folder does not exist then.
 pub fn write(recording: &Recording, folder: &Path) -> Result<(), RecorderError> {
     write_with(recording, folder, |_| ())
 }
 
-/// The same; `add` may put synced files of its own beside those of the recording, into the folder that it is given, before
-/// the recording gets its name.
+/// As [`write()`]; before the folder gets its name, `add` may add synced files of its own to it. It is given the temporary folder.
 ///
 /// # Errors
 /// As [`write()`].
@@ -70,20 +69,20 @@ pub fn write_with(
     check_samples(recording, folder)?;
 
     let partial = partial_name(folder);
-    // Made here and not in `fill`: what somebody else made is not ours to remove.
+    // Created here and not in `fill`: if this fails, the folder is not ours and must not be removed.
     fs::create_dir(&partial).map_err(|source| create(&partial, source))?;
     let written = fill(recording, &manifest, &partial).and_then(|()| {
         add(&partial);
         settle(&partial, folder).map_err(|source| create(folder, source))
     });
     if written.is_err() {
-        // What matters is the first error; a temporary folder that cannot be removed either adds nothing to it.
+        // The first error is returned; that the temporary folder cannot be removed either is not worth another.
         let _ = fs::remove_dir_all(&partial);
     }
     written
 }
 
-/// A hidden name beside `folder` that no other recorder uses at the same time.
+/// A hidden name in the same place as `folder` that no other recorder uses at the same time.
 fn partial_name(folder: &Path) -> PathBuf {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
@@ -111,8 +110,8 @@ fn create(path: &Path, source: io::Error) -> RecorderError {
     }
 }
 
-/// Gives a folder of synced files its name: whoever pulls the plug finds all of it under that name, or nothing. So the
-/// names of its files are synced before the rename, and the rename after it.
+/// Renames a folder of synced files to its final name, so that after a loss of power all of it has this name or nothing has. For
+/// this the folders are synced before the rename, and the parent folder after it.
 fn settle(partial: &Path, folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(partial)? {
         let entry = entry?;
@@ -130,7 +129,7 @@ fn settle(partial: &Path, folder: &Path) -> io::Result<()> {
     )
 }
 
-/// Syncs the names in a folder. Where a file system cannot, nothing is lost that was promised.
+/// Syncs the names in a folder. That a file system does not support this is not an error.
 fn sync_folder(folder: &Path) -> io::Result<()> {
     match fs::File::open(folder)?.sync_all() {
         Err(error)
@@ -149,7 +148,7 @@ fn frame_file(index: usize) -> String {
     format!("frames/{index:03}.png")
 }
 
-/// The first pattern from a file has the name that the format gives; a second one is numbered.
+/// File name of a pattern: the format's name for the first pattern from a file, a numbered name for the second.
 fn phase_file(patterns: &[PatternSpec], index: usize) -> String {
     let first = patterns
         .iter()
@@ -326,7 +325,7 @@ mod tests {
     use rustix::fs::inotify;
     use std::mem::MaybeUninit;
 
-    /// What was done in the watched folders, in order.
+    /// What happened in the watched folders, in order.
     fn events(watch: &impl std::os::fd::AsFd) -> Vec<String> {
         let mut buffer = [MaybeUninit::uninit(); 4096];
         let mut reader = inotify::Reader::new(watch, &mut buffer);
@@ -364,7 +363,7 @@ mod tests {
             let found = events.iter().rposition(|event| event == wanted);
             found.unwrap_or_else(|| panic!("no {wanted:?} in {events:?}"))
         };
-        // A folder is opened to be synced.
+        // A folder is synced by opening it.
         let renamed = last("rename to 7");
         for folder in ["open frames", "open truth"] {
             assert!(last(folder) < last("open .7.partial"), "{events:?}");

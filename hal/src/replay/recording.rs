@@ -1,4 +1,4 @@
-//! A recording, loaded whole and checked: frames from a camera with everything needed to measure from them again.
+//! A recording, loaded completely and checked: frames of a camera with everything that is needed to measure from them.
 
 use std::fs;
 use std::io::Read;
@@ -17,11 +17,11 @@ pub use super::manifest::RecipeReference;
 
 /// Name of the manifest in a recording's folder.
 pub(crate) const MANIFEST: &str = "recording.json";
-/// Longest manifest that is read: 1024 frames need a tenth of it.
+/// Longest manifest that is read; 1024 frames need a tenth of it.
 const MAX_MANIFEST_BYTES: u64 = 4 << 20;
 /// Longest frame or array that is read.
 const MAX_FILE_BYTES: u64 = 4 << 30;
-/// Names of the truth in a recording's folder.
+/// Names of the ground truth's files in a recording's folder.
 pub(crate) const TRUTH_HEIGHT: &str = "truth/height.npy";
 pub(crate) const TRUTH_CLASS: &str = "truth/class.npy";
 
@@ -60,7 +60,7 @@ pub enum PatternSpec {
     },
 }
 
-/// One frame of a recording and what the projector showed during it:
+/// One frame of a recording, and the ratio and shift of the pattern that the projector showed:
 /// I_max/2 · (1 + sin 2π(ratio · Φ_P + shift)).
 #[derive(Clone, Debug)]
 pub struct RecordedFrame {
@@ -72,7 +72,7 @@ pub struct RecordedFrame {
     pub pattern: usize,
     /// Start of the exposure, if it was recorded, in ns of the recording head's clock.
     pub timestamp_ns: Option<u64>,
-    /// The image; its sequence number is the frame's place in the recording.
+    /// The image; its count is the frame's place in the recording.
     pub frame: Frame,
 }
 
@@ -105,7 +105,7 @@ pub struct Recording {
     pub exposure_us: Option<f64>,
     /// The part that was measured.
     pub part_id: Option<String>,
-    /// The recipe it was measured with.
+    /// The recipe that it was measured with.
     pub recipe: Option<RecipeReference>,
     /// True z in mm on each pixel's central ray, row by row; NaN where camera and projector do not both see.
     pub truth_height: Option<Vec<f32>>,
@@ -194,12 +194,12 @@ fn frames(
     format: FrameFormat,
 ) -> Result<Vec<RecordedFrame>, RecordingError> {
     let mut frames = Vec::with_capacity(manifest.frames.len());
-    for (sequence, entry) in manifest.frames.iter().enumerate() {
+    for (place, entry) in manifest.frames.iter().enumerate() {
         let path = folder.join(&entry.file);
         let pixels = grey::decode(&read(folder, &entry.file, MAX_FILE_BYTES)?, &format, &path)?;
         let timestamp = Timestamp(entry.timestamp_ns.unwrap_or(0));
         let frame =
-            Frame::new(format, Arc::new(pixels), timestamp, sequence as u64).map_err(|error| {
+            Frame::new(format, Arc::new(pixels), timestamp, place as u64).map_err(|error| {
                 RecordingError::content(&path, error.to_string(), "save the frame again")
             })?;
         frames.push(RecordedFrame {
@@ -282,7 +282,7 @@ fn shaped<T>(
     ))
 }
 
-/// Reads one file of the folder, which must be a file, be no longer than `limit`, and not be reached
+/// Reads one file of the folder. It must be a regular file of at most `limit` bytes, and must not be reached
 /// through a link that leads out of the folder.
 fn read(folder: &Path, name: &str, limit: u64) -> Result<Vec<u8>, RecordingError> {
     let path = folder.join(name);
@@ -311,7 +311,7 @@ fn read(folder: &Path, name: &str, limit: u64) -> Result<Vec<u8>, RecordingError
     if !length.is_file() || length.len() > limit {
         return Err(wrong(
             format!("not a plain file of at most {limit} bytes"),
-            "replace it by what the recording format asks for",
+            "replace it by a file as the recording format requires",
         ));
     }
     let mut bytes = Vec::with_capacity(usize::try_from(length.len()).unwrap_or(0));

@@ -1,4 +1,4 @@
-//! Recordings of our own: written, opened, played, and damaged in every way that format 1 forbids.
+//! Tests with small recordings: written, opened, played, and damaged in every way that format 1 forbids.
 
 use std::fs;
 use std::path::Path;
@@ -43,19 +43,14 @@ fn small(bit_depth: u8, seed: u64) -> Recording {
                     (random.next_u32() % (u32::from(format.full_scale()) + 1)) as u16
                 }),
             }
-            let sequence = frames.len() as u64;
+            let count = frames.len() as u64;
             frames.push(RecordedFrame {
                 ratio,
                 shift_turns: f64::from(shift) / f64::from(shifts) - 0.3,
                 pattern,
-                timestamp_ns: Some(1000 * sequence),
-                frame: Frame::new(
-                    format,
-                    Arc::new(pixels),
-                    Timestamp(1000 * sequence),
-                    sequence,
-                )
-                .unwrap(),
+                timestamp_ns: Some(1000 * count),
+                frame: Frame::new(format, Arc::new(pixels), Timestamp(1000 * count), count)
+                    .unwrap(),
             });
         }
     }

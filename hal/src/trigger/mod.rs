@@ -6,24 +6,27 @@ use crate::error::Error;
 use crate::units::Timestamp;
 pub use spoiled::{Edges, Spoiled};
 
-/// Spoiled pulses that a trigger remembers until it is asked. Whoever asks looks at no frame that is older than so many triggers.
+/// How many triggers back a frame may belong to: so many pulses are remembered, and so many spoiled ones are kept until fetched.
 pub const REMEMBERED: usize = 16;
+
+/// The latest spoiled pulses, oldest first; filled with [`crate::latest::keep`].
+pub(crate) type SpoiledPulses = heapless::Deque<Spoiled, REMEMBERED>;
 
 /// Starts one camera exposure per call.
 pub trait Trigger: Send {
-    /// Begins one pulse and answers when it began, without waiting for its end.
+    /// Begins one pulse and returns the time at which it began, without waiting for its end.
     ///
-    /// Whether the camera took it shows in its frames only: a pulse on an open wire, or to a camera that is
+    /// Only the frames show whether the camera took it: a pulse on an open wire, or to a camera that is
     /// stopped or busy, is lost.
     ///
     /// # Errors
-    /// What the device says.
+    /// The device's error.
     fn fire(&mut self) -> Result<Timestamp, Error>;
 
-    /// The next pulse that was spoiled and has not been told; at most the latest [`REMEMBERED`] are.
+    /// The next spoiled pulse that was not fetched yet; at most the latest [`REMEMBERED`] are kept.
     ///
-    /// It can be told as soon as the pulse has ended. So whoever fetches a frame and then asks here knows of the pulse that
-    /// exposed it. A trigger that knows nothing of its pulses tells none.
+    /// A spoiled pulse is known as soon as it has ended. So a caller that first fetches a frame and then calls this learns of the
+    /// pulse that exposed it. A trigger that does not measure its pulses returns `None`.
     fn poll_spoiled(&mut self) -> Option<Spoiled> {
         None
     }
@@ -39,7 +42,7 @@ impl<T: Trigger + ?Sized> Trigger for Box<T> {
     }
 }
 
-/// No trigger: of a camera that runs by itself.
+/// No trigger, for a camera that runs by itself.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoTrigger;
 

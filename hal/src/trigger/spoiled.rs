@@ -1,58 +1,58 @@
-//! How long a pulse lasted, as far as that is known, and whether its exposure can be used.
+//! Bounds of how long a pulse lasted, and whether the frame that it exposed can be used.
 //!
-//! To many cameras the pulse is the exposure, and a program that makes pulses may be interrupted at any instruction, for as long
-//! as it pleases the others on the computer. Readings of the clock around both edges tell: a pulse lasted at least from after its
-//! rise to before its fall, and at most from before its rise to after its fall. An interruption between the edges moves these
-//! bounds, one inside an edge widens them. None goes unnoticed.
+//! Many cameras expose for as long as the pulse lasts, and the program that makes the pulses may be interrupted at any instruction
+//! for any time. Therefore the clock is read before and after each edge: a pulse lasted at least from after its rise to before its
+//! fall, and at most from before its rise to after its fall. An interruption between the edges moves these bounds, one inside an
+//! edge widens them, so every interruption is noticed.
 //!
 //! # How much a pulse may be off
 //!
 //! N-step phase shifting (docs/measurement.md, *Pattern and wrapped phase*) has frames I_k = A + B sin(2πφ + θ_k), θ_k = 2πk/N, and φ = atan2(S, C) / 2π
-//! of S = Σ I_k cos θ_k and C = Σ I_k sin θ_k, which are NB/2 · (sin 2πφ, cos 2πφ). Is one frame k brighter by the share e, S and C
+//! with S = Σ I_k cos θ_k and C = Σ I_k sin θ_k, which are NB/2 · (sin 2πφ, cos 2πφ). If one frame k is brighter by the share e, S and C
 //! change by e I_k (cos θ_k, sin θ_k), and to first order
 //!
 //! > Δφ = (C ΔS − S ΔC) / (S² + C²) / 2π = e / (πN) · (A/B + sin x) cos x turns, with x = 2πφ + θ_k,
 //!
-//! which is at most e / (πN) · (A/B + 1/2). All pixels of one phase have the same error, so no mean over an area betters it.
+//! which is at most e / (πN) · (A/B + 1/2). All pixels of one phase have the same error, so averaging over an area does not reduce it.
 //! With e = 0.5 %, N = 4 and A = B (a pattern down to black, no other light) that is 0.0006 turn, a twelfth of the noise of one
 //! pixel in such a level (0.0074 turn, 0.056 mm in docs/measurement.md, *Noise*), or 0.0045 mm; with three steps and as much other
-//! light as the pattern's mean (A = 2 B) it is 0.0013 turn or 0.01 mm. A pulse that ends 200 µs of 16.7 ms late, which no stamp
-//! tells from a good one, is 2.4 times as bad.
+//! light as the pattern's mean (A = 2 B) it is 0.0013 turn or 0.01 mm. A pulse of 16.7 ms that ends 200 µs late, which cannot be
+//! told from a good one by the frame's time stamp, causes 2.4 times that error.
 
 use std::time::Duration;
 
 use crate::units::Timestamp;
 
-/// A pulse may be off by one part in so many of its width: 0.5 %.
+/// A pulse may be off by 1/SHARE of its width: 0.5 %.
 const SHARE: u32 = 200;
-/// It may be off by this in any case: no two edges are known better on a computer that has nothing else to do (some µs each, the way
-/// into the kernel and out of it). It is more than the share for pulses below 4 ms, shorter than any refresh that makes grey levels.
+/// It may be off by this in any case: even on an idle computer two edges are not known better (a system call for each takes some
+/// µs). It exceeds the share for pulses below 4 ms, which is shorter than any refresh that makes grey levels.
 const LEAST: Duration = Duration::from_micros(20);
 
 /// Readings of the head's clock around the two edges of a pulse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Edges {
-    /// Before the line was told to begin the pulse, and after it did.
+    /// Before and after the call that began the pulse.
     pub rise: (Timestamp, Timestamp),
-    /// Before the line was told to end the pulse, and after it did.
+    /// Before and after the call that ended the pulse.
     pub fall: (Timestamp, Timestamp),
 }
 
-/// A pulse that did not last as long as it should, or of which that is not known.
+/// A pulse that was too long or too short, or that may have been.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Spoiled {
-    /// When it began, as [`super::Trigger::fire`] answered.
+    /// When it began, as [`super::Trigger::fire`] returned.
     pub fired: Timestamp,
     /// How long it should have lasted.
     pub width: Duration,
-    /// It may have been shorter by so much.
+    /// By how much it may have been too short.
     pub shorter: Duration,
-    /// It may have been longer by so much.
+    /// By how much it may have been too long.
     pub longer: Duration,
 }
 
 impl Spoiled {
-    /// What a pulse is that should have lasted `width` and has these edges; none if it lasted so long.
+    /// Judges a pulse with these edges that should have lasted `width`; `None` if it was good.
     #[must_use]
     pub fn by(edges: &Edges, width: Duration) -> Option<Self> {
         let (rise, fall) = (edges.rise, edges.fall);
@@ -66,7 +66,7 @@ impl Spoiled {
         (pulse.off() > (width / SHARE).max(LEAST)).then_some(pulse)
     }
 
-    /// Whether it decided an exposure of this length. A pulse that only starts one is shorter than half of it.
+    /// Whether it determined the length of an exposure. A pulse shorter than half the exposure only starts it.
     #[must_use]
     pub fn decides(&self, exposure: Duration) -> bool {
         self.width * 2 >= exposure
@@ -76,6 +76,12 @@ impl Spoiled {
     #[must_use]
     pub fn off(&self) -> Duration {
         self.shorter.max(self.longer)
+    }
+
+    /// The latest time at which it may have ended.
+    #[must_use]
+    pub fn ended(&self) -> Timestamp {
+        self.fired + (self.width + self.longer)
     }
 }
 
@@ -91,7 +97,7 @@ mod tests {
         Duration::from_micros(us)
     }
 
-    /// A pulse whose rise took `rise`, whose fall began `after` the readings before the rise and took `fall`.
+    /// A pulse whose rising edge took `rise`, whose falling edge began `after` the reading before the rise and took `fall`.
     fn pulse(rise: Duration, after: Duration, fall: Duration) -> Edges {
         let begun = Timestamp(1_000_000_000);
         Edges {
@@ -119,7 +125,7 @@ mod tests {
         let (stall, edge) = (us(100), us(2));
         let fired = Timestamp(1_000_000_000);
         for (what, edges, began, shorter, longer) in [
-            // The fall is planned from the reading before the rise, so that here the pulse may have lost what the rise took.
+            // The fall is timed from the reading before the rise, so the pulse may be shorter by the time that the rise took.
             ("in the rise", pulse(stall, WIDTH, edge), stall, stall, edge),
             (
                 "before the fall",
@@ -161,7 +167,7 @@ mod tests {
 
     #[test]
     fn what_a_pulse_may_be_off_costs_the_phase_that_the_doc_says() {
-        // Nothing but the formulas of the doc, by trial over all phases: N, A/B, and the bound in turns.
+        // The formulas of the module's doc, tried over all phases: N, A/B, and the bound in turns.
         let e = 1.0 / f64::from(SHARE);
         for (steps, ambient, bound) in [(4, 1.0, 0.0006), (3, 2.0, 0.00135)] {
             let mut worst = 0.0_f64;

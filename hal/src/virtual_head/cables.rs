@@ -1,22 +1,22 @@
-//! The cables of a virtual head: what is pulled out is gone until the head is opened again.
+//! The cables of a virtual head: a device that was unplugged fails until the head is opened again.
 
 use std::sync::MutexGuard;
 
-use super::{Bench, Control, Device, Scene, lock};
+use super::{Bench, Control, Scene, VirtualDevice, lock};
 use crate::error::{self, Error};
 
 /// The cable of one device.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Line {
+pub(super) struct Cable {
     out: bool,
-    /// How often it was pulled out. Devices that were opened before the last time are dead for ever.
+    /// How often it was pulled out. A device that was opened before the last time fails for ever.
     pub pulled: u64,
 }
 
-impl Line {
+impl Cable {
     fn check(
         self,
-        device: error::Device,
+        device: error::DeviceKind,
         opened: u64,
         attempt: impl FnOnce() -> String,
     ) -> Result<(), Error> {
@@ -27,22 +27,24 @@ impl Line {
     }
 }
 
-impl<S> Device<S> {
-    /// The bench, if the camera is the one that was opened.
+impl<S> VirtualDevice<S> {
+    /// The bench, if the camera was not unplugged since it was opened.
     pub(super) fn as_camera(&self, attempt: &str) -> Result<MutexGuard<'_, Bench<S>>, Error> {
         let bench = lock(&self.bench);
         bench
             .camera
-            .check(error::Device::Camera, self.camera, || attempt.to_owned())?;
+            .check(error::DeviceKind::Camera, self.camera, || {
+                attempt.to_owned()
+            })?;
         Ok(bench)
     }
 
-    /// The bench, if the projector is the one that was opened.
+    /// The bench, if the projector was not unplugged since it was opened.
     pub(super) fn as_projector(&self, attempt: &str) -> Result<MutexGuard<'_, Bench<S>>, Error> {
         let bench = lock(&self.bench);
         bench
             .projector
-            .check(error::Device::Projector, self.projector, || {
+            .check(error::DeviceKind::Projector, self.projector, || {
                 attempt.to_owned()
             })?;
         Ok(bench)
@@ -50,28 +52,28 @@ impl<S> Device<S> {
 }
 
 impl<S> Control<S> {
-    /// Pulls a device's cable out, or plugs it `into` the device again. What was opened before stays dead.
-    pub fn plug(&self, device: error::Device, into: bool) {
+    /// Plugs a device in, or unplugs it. A device that was opened before it was unplugged keeps failing.
+    pub fn plug(&self, device: error::DeviceKind, plugged: bool) {
         let mut bench = lock(&self.bench);
-        let line = match device {
-            error::Device::Camera => &mut bench.camera,
-            error::Device::Projector => &mut bench.projector,
-            // Its trigger needs no chip.
-            error::Device::Lines => return,
+        let cable = match device {
+            error::DeviceKind::Camera => &mut bench.camera,
+            error::DeviceKind::Projector => &mut bench.projector,
+            // The virtual trigger has no GPIO chip.
+            error::DeviceKind::Lines => return,
         };
-        line.pulled += u64::from(!into);
-        line.out = !into;
+        cable.pulled += u64::from(!plugged);
+        cable.out = !plugged;
     }
 }
 
 impl<S: Scene> Bench<S> {
-    /// A stopped camera and a blank projector, if both are there.
+    /// Stops the camera and blanks the projector, if both are plugged in.
     pub(super) fn reset(&mut self) -> Result<(), Error> {
-        for (line, device) in [
-            (self.camera, error::Device::Camera),
-            (self.projector, error::Device::Projector),
+        for (cable, device) in [
+            (self.camera, error::DeviceKind::Camera),
+            (self.projector, error::DeviceKind::Projector),
         ] {
-            line.check(device, line.pulled, || {
+            cable.check(device, cable.pulled, || {
                 format!("opening the {}", device.word())
             })?;
         }

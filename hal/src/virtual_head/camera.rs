@@ -1,39 +1,39 @@
-//! The virtual camera: exposures start by trigger or by themselves, and their frames come after the readout.
+//! The virtual camera: exposures start by trigger or by themselves, and their frames arrive after the readout.
 //!
-//! A frame is worked out when it is fetched, so what nobody fetches costs nothing and moves no noise.
+//! A frame is computed when it is fetched, so a frame that is not fetched costs no time and uses no random numbers.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::faults::{Dice, Kind};
 use super::timing::Mechanics;
-use super::{Bench, Device, Scene, lock};
+use super::{Bench, Scene, VirtualDevice, lock};
 use crate::camera::{Camera, CameraTiming, Encoding};
 use crate::error::Error;
 use crate::frame::{Frame, FrameFormat};
 use crate::head::Stamp;
 use crate::units::Timestamp;
 
-/// Frames that wait to be fetched; when one more comes the oldest is lost, as in a real driver.
+/// Most frames that wait to be fetched; when one more arrives, the oldest is lost, as in a real driver.
 const MAX_WAITING: usize = 4;
 
 /// The exposures of a camera.
 pub(super) struct Sensor {
     armed: bool,
-    /// A triggered camera takes no trigger before this.
+    /// A triggered camera ignores triggers before this.
     busy_until: Timestamp,
     /// When a camera that runs by itself was started, and its exposures since.
     started: Timestamp,
     since: u64,
     count: u64,
-    /// In the order of their frames' arrival.
-    exposures: VecDeque<Exposure>,
-    /// The frame that came last, if it comes once more.
+    /// In the order in which their frames arrive.
+    exposures: VecDeque<PendingExposure>,
+    /// The last frame, if it is to arrive a second time.
     again: Option<Frame>,
 }
 
 #[derive(Clone, Copy)]
-struct Exposure {
+struct PendingExposure {
     start: Timestamp,
     length: Duration,
     count: u64,
@@ -60,7 +60,7 @@ impl Sensor {
         self.again = None;
     }
 
-    /// A trigger's pulse of this length. It is lost on an open wire and on a camera that is stopped or busy.
+    /// Receives a trigger pulse of this length. It is lost on an open wire, and if the camera is stopped or busy.
     pub fn fire(&mut self, now: Timestamp, length: Duration, mechanics: &Mechanics, dice: Dice) {
         let faults = &mechanics.faults;
         let lost = !self.armed
@@ -94,7 +94,7 @@ impl Sensor {
         if dice.happens(Kind::Swapped, n, faults.swapped) {
             ready = ready + (mechanics.camera().period + mechanics.exposure / 4);
         }
-        let exposure = Exposure {
+        let exposure = PendingExposure {
             start,
             length,
             count: n,
@@ -117,7 +117,7 @@ impl Sensor {
         Some(self.started + phase + Duration::from_nanos((drifted * self.since as f64) as u64))
     }
 
-    /// Lets a camera that runs by itself expose until `now`.
+    /// Makes the exposures until `now` of a camera that runs by itself.
     fn run(&mut self, now: Timestamp, mechanics: &Mechanics, dice: Dice) {
         let jitter = Duration::from_micros(mechanics.faults.trigger_jitter_us);
         while let Some(start) = self
@@ -128,13 +128,13 @@ impl Sensor {
             let off = dice.up_to(Kind::TriggerJitter, self.count, 1.0, jitter);
             self.expose(start + off, mechanics.exposure, mechanics, dice);
         }
-        // What nobody fetched in time is lost.
+        // Frames that were not fetched in time are lost.
         while self.exposures.len() > MAX_WAITING && self.exposures[MAX_WAITING].ready <= now {
             self.exposures.pop_front();
         }
     }
 
-    /// When the next frame can be fetched, or something else happens on the way to it.
+    /// When the next frame can be fetched, or the next exposure starts.
     pub fn next(&self, mechanics: &Mechanics) -> Option<Timestamp> {
         let jitter = Duration::from_micros(mechanics.faults.trigger_jitter_us);
         let start = self.next_start(mechanics).map(|start| start + jitter);
@@ -142,7 +142,7 @@ impl Sensor {
         [start, frame].into_iter().flatten().min()
     }
 
-    /// The start of the oldest exposure that may still be asked for its light.
+    /// The start of the oldest exposure whose light may still be computed.
     pub fn oldest(&self, now: Timestamp, mechanics: &Mechanics) -> Timestamp {
         let starts = self.exposures.iter().map(|exposure| exposure.start);
         starts
@@ -191,7 +191,7 @@ impl<S: Scene> Bench<S> {
     }
 }
 
-impl<S: Scene> Camera for Device<S> {
+impl<S: Scene> Camera for VirtualDevice<S> {
     fn format(&self) -> FrameFormat {
         lock(&self.bench).scene.format()
     }

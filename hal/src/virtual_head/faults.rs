@@ -1,4 +1,4 @@
-//! What may go wrong on a virtual head, and the dice that decide when.
+//! Faults of a virtual head, and the random numbers that decide when they happen.
 
 use std::time::Duration;
 
@@ -6,11 +6,11 @@ use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-/// Faults of a simulated head. Chances are 0…1 per event, times are the longest that may happen; all are 0 by default.
+/// Faults of a simulated head. Chances are 0…1 per event, times are upper limits; all are 0 by default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Faults {
-    /// Seed of all that follows.
+    /// Seed of all random faults.
     pub seed: u64,
     /// Chance that a flip comes 1…`late_refreshes` refreshes late.
     pub late_flip: f64,
@@ -18,20 +18,20 @@ pub struct Faults {
     pub late_refreshes: u32,
     /// Jitter of the flips' stamps, ± µs.
     pub flip_jitter_us: u64,
-    /// Chance that the news of a flip comes late, by up to `late_news_us`. Its stamp stays true.
+    /// Chance that a flip is reported late, by up to `late_news_us`. Its stamp stays true.
     pub late_news: f64,
     /// How late, at most, µs.
     pub late_news_us: u64,
-    /// Chance that the projector's driver stamps a flip one refresh late; never two in a row, which nothing could tell from
-    /// a longer flip-to-light delay.
+    /// Chance that the projector's driver stamps a flip one refresh late; never two in a row, which could not be distinguished
+    /// from a longer flip-to-light delay.
     pub wrong_stamp: f64,
     /// Chance that a frame is lost on its way.
     pub dropped: f64,
-    /// Chance that a frame comes twice.
+    /// Chance that a frame arrives twice.
     pub duplicated: f64,
-    /// Chance that a frame comes after the next one.
+    /// Chance that a frame arrives after the next one.
     pub swapped: f64,
-    /// Chance that a frame comes late, by up to `late_frame_us`.
+    /// Chance that a frame arrives late, by up to `late_frame_us`.
     pub late_frame: f64,
     /// How late, at most, µs.
     pub late_frame_us: u64,
@@ -39,13 +39,13 @@ pub struct Faults {
     pub stamp_jitter_us: u64,
     /// Chance that a trigger is lost.
     pub lost_trigger: f64,
-    /// An exposure starts up to so much after its trigger, or off its period, µs.
+    /// Longest delay of an exposure after its trigger, or after its time by the camera's period, µs.
     pub trigger_jitter_us: u64,
     /// Chance that a trigger's pulse, and so the exposure, lasts too long, by up to `long_pulse_us`: the computer was busy.
     pub long_pulse: f64,
     /// How much too long, at most, µs.
     pub long_pulse_us: u64,
-    /// A camera that runs by itself is so much slower than it says, parts per million.
+    /// By how much the period of a camera that runs by itself is longer than stated, parts per million.
     pub drift_ppm: i32,
     /// Chance that a wait lasts too long, by up to `stall_us`: the computer was busy.
     pub stall: f64,
@@ -53,15 +53,15 @@ pub struct Faults {
     pub stall_us: u64,
     /// The trigger's wire is open: no pulse arrives.
     pub wire_open: bool,
-    /// The projector stops flipping after so many flips; 0 = never.
+    /// After how many flips the projector stops flipping; 0 = never.
     pub flips_until_stuck: u64,
-    /// The camera stops exposing after so many exposures; 0 = never.
+    /// After how many exposures the camera stops exposing; 0 = never.
     pub frames_until_stuck: u64,
-    /// The camera grants a compressed format only.
+    /// The camera offers only a compressed format.
     pub compressed: bool,
 }
 
-/// What the dice are thrown for: each kind has its own.
+/// A kind of random event; each has random numbers of its own.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Kind {
     LateFlip = 1,
@@ -79,7 +79,7 @@ pub(super) enum Kind {
     LongPulse,
 }
 
-/// Dice whose n-th throw of a kind depends on the seed, the kind and n alone.
+/// Random numbers: the n-th of a kind depends only on the seed, the kind and n.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Dice {
     seed: u64,
@@ -106,7 +106,7 @@ impl Dice {
         chance > 0.0 && self.throw(kind, n).0 < chance
     }
 
-    /// A time up to `most` if the n-th event of a kind happens, else none.
+    /// A random time up to `most` if the n-th event of a kind happens, else zero.
     pub fn up_to(self, kind: Kind, n: u64, chance: f64, most: Duration) -> Duration {
         if chance <= 0.0 || most.is_zero() {
             return Duration::ZERO;

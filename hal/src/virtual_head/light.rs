@@ -1,30 +1,30 @@
-//! Which pattern's light was in view when, and what an exposure saw of it.
+//! Which pattern's light was in view when, and how much of it an exposure received.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use crate::units::Timestamp;
 
-/// Changes of light that are remembered before old ones are looked through.
-const ROOM: usize = 64;
+/// Capacity for changes of light; more than are normally remembered.
+const CAPACITY: usize = 64;
 
 /// The changes of light, oldest first.
-pub(super) struct Light {
+pub(super) struct LightHistory {
     changes: VecDeque<(Timestamp, Option<usize>)>,
     seen: Vec<(Option<usize>, f32)>,
 }
 
-impl Light {
+impl LightHistory {
     pub fn new() -> Self {
-        let mut changes = VecDeque::with_capacity(ROOM);
+        let mut changes = VecDeque::with_capacity(CAPACITY);
         changes.push_back((Timestamp(0), None));
         Self {
             changes,
-            seen: Vec::with_capacity(ROOM),
+            seen: Vec::with_capacity(CAPACITY),
         }
     }
 
-    /// From `at` on, `pattern` is in view; later changes are forgotten, and those that no exposure since `needed` can see.
+    /// From `at` on, `pattern` is in view. Later changes are removed, and those that no exposure since `needed` can receive.
     pub fn change(&mut self, at: Timestamp, pattern: Option<usize>, needed: Timestamp) {
         while self.changes.len() > 1 && self.changes[1].0 <= needed {
             self.changes.pop_front();
@@ -35,7 +35,7 @@ impl Light {
         self.changes.push_back((at, pattern));
     }
 
-    /// Which patterns were in view for `length` from `start` on, in turn, each for which share of the time `planned`.
+    /// The patterns that were in view for `length` from `start` on, in order, each with its time as a share of `planned`.
     pub fn seen(
         &mut self,
         start: Timestamp,
@@ -47,7 +47,7 @@ impl Light {
         let whole = planned.as_nanos().max(1) as f64;
         let last = self.changes.len() - 1;
         for (at, (from, pattern)) in self.changes.iter().enumerate() {
-            // What came first was always there, what came last stays.
+            // The first state has no beginning, the last no end.
             let from = if at == 0 { start } else { (*from).max(start) };
             let until = if at == last {
                 end
@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn an_exposure_sees_each_pattern_for_its_share_of_the_planned_time_and_one_alone_for_all() {
-        let mut light = Light::new();
+        let mut light = LightHistory::new();
         light.change(Timestamp(100), Some(3), Timestamp(0));
         light.change(Timestamp(200), Some(4), Timestamp(0));
         light.change(Timestamp(300), Some(4), Timestamp(0));
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn what_no_exposure_can_see_any_more_is_forgotten() {
-        let mut light = Light::new();
+        let mut light = LightHistory::new();
         for at in 1..1000 {
             light.change(
                 Timestamp(100 * at),

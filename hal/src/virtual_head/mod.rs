@@ -1,9 +1,9 @@
-//! Camera, projector, trigger and clock around one scene, without hardware: what simulation and replay have in common.
+//! A virtual head: camera, projector, trigger and clock around one scene, without hardware; the common part of simulation and replay.
 //!
-//! A back-end implements [`Scene`], which says what the camera sees of what the projector shows, and gets a head from [`head`].
+//! A back-end implements [`Scene`], which computes the camera's frames from the patterns in view, and gets a head from [`head`].
 //!
-//! Nothing here waits in real time. The clock stands still between waits and jumps to the next thing that happens, at most to
-//! the end of the wait. So a sequence has the times of a real head, at the speed of the computer, and the same every
+//! Nothing here waits in real time. The clock stands still between waits, and a wait sets it to the next event, at most to
+//! the end of the wait. So a sequence has the times of a real head, runs as fast as the computer can, and is the same every
 //! time. Light is integrated over each exposure: a frame that straddles two patterns shows both.
 
 mod cables;
@@ -24,11 +24,11 @@ use crate::head::{DynHead, Head};
 use crate::projector::Raster;
 use crate::trigger::{Spoiled, Trigger};
 use crate::units::Timestamp;
-use cables::Line;
+use cables::Cable;
 use camera::Sensor;
 use faults::Dice;
 pub use faults::Faults;
-use light::Light;
+use light::LightHistory;
 use projector::Screen;
 use pulse::Pulses;
 pub use timing::Mechanics;
@@ -44,23 +44,23 @@ pub trait Scene: Send {
     /// Replaces the patterns, whose size has been checked.
     ///
     /// # Errors
-    /// Where the scene cannot show them.
+    /// If the scene cannot show them.
     fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error>;
 
     /// Patterns loaded.
     fn loaded(&self) -> usize;
 
-    /// The frame of an exposure. `seen` says which patterns (or none) were in view, in turn, for which share of the planned
+    /// The frame of an exposure. `seen` lists the patterns (or none) that were in view, in order, each with its share of the planned
     /// exposure; it is not empty, and its shares sum to 1, or to more if the exposure lasted longer. `timestamp` and
-    /// `sequence` are the frame's.
+    /// `count` are the frame's.
     ///
     /// # Errors
-    /// Where the scene has no frame of that.
+    /// If the scene has no frame for this.
     fn expose(
         &mut self,
         seen: &[(Option<usize>, f32)],
         timestamp: Timestamp,
-        sequence: u64,
+        count: u64,
     ) -> Result<Frame, Error>;
 }
 
@@ -71,18 +71,18 @@ struct Bench<S> {
     dice: Dice,
     now: Timestamp,
     screen: Screen,
-    light: Light,
+    light: LightHistory,
     sensor: Sensor,
     pulses: Pulses,
     waits: u64,
-    camera: Line,
-    projector: Line,
+    camera: Cable,
+    projector: Cable,
 }
 
 /// One bench, shared by the devices and the [`Control`].
 type Shared<S> = Arc<Mutex<Bench<S>>>;
 
-/// Changes the scene of a virtual head and plugs its cables. Clones act on the same head.
+/// Changes the scene of a virtual head, and plugs and unplugs its devices. Clones act on the same head.
 pub struct Control<S> {
     bench: Shared<S>,
 }
@@ -104,7 +104,7 @@ impl<S: Scene + 'static> Control<S> {
     /// Opens the devices anew: a stopped camera and a blank projector.
     ///
     /// # Errors
-    /// `Disconnected` if one of them is pulled out.
+    /// `Disconnected` if one of them is unplugged.
     pub fn reopen(&self) -> Result<DynHead, Error> {
         lock(&self.bench).reset()?;
         Ok(devices(&self.bench))
@@ -118,19 +118,19 @@ pub fn head<S: Scene + 'static>(scene: S, mechanics: Mechanics) -> (DynHead, Con
         dice: Dice::new(mechanics.faults.seed),
         now: Timestamp(0),
         screen: Screen::default(),
-        light: Light::new(),
+        light: LightHistory::new(),
         sensor: Sensor::new(),
         pulses: Pulses::new(),
         waits: 0,
-        camera: Line::default(),
-        projector: Line::default(),
+        camera: Cable::default(),
+        projector: Cable::default(),
         mechanics,
     }));
     let head = devices(&bench);
     (head, Control { bench })
 }
 
-/// The devices, opened as the cables are now.
+/// A head of the devices, opened with the cables in their present state.
 fn devices<S: Scene + 'static>(bench: &Shared<S>) -> DynHead {
     let (camera, projector, timing) = {
         let bench = lock(bench);
@@ -141,7 +141,7 @@ fn devices<S: Scene + 'static>(bench: &Shared<S>) -> DynHead {
         )
     };
     let device = || {
-        Box::new(Device {
+        Box::new(VirtualDevice {
             bench: Arc::clone(bench),
             camera,
             projector,
@@ -150,19 +150,19 @@ fn devices<S: Scene + 'static>(bench: &Shared<S>) -> DynHead {
     Head::new(device(), device(), device(), device(), timing)
 }
 
-/// Locks a bench. A panic of another thread leaves no half-done state behind that would matter here.
+/// Locks a bench. A lock that is poisoned by a panic is used all the same.
 fn lock<S>(bench: &Shared<S>) -> MutexGuard<'_, Bench<S>> {
     bench.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The bench seen as any of the devices, with the state of the cables when it was opened.
-struct Device<S> {
+/// Any of the devices of the bench, with the state of the cables when it was opened.
+struct VirtualDevice<S> {
     bench: Shared<S>,
     camera: u64,
     projector: u64,
 }
 
-impl<S: Scene> Clock for Device<S> {
+impl<S: Scene> Clock for VirtualDevice<S> {
     fn now(&self) -> Timestamp {
         lock(&self.bench).now
     }
@@ -173,7 +173,7 @@ impl<S: Scene> Clock for Device<S> {
         let flip = bench.screen.next();
         let frame = bench.sensor.next(&bench.mechanics);
         let next = [flip, frame].into_iter().flatten();
-        // What can be fetched already does not end a wait.
+        // A flip or frame that could be fetched already does not end a wait.
         let next = next
             .filter(|at| *at > bench.now)
             .fold(until, Timestamp::min);
@@ -192,7 +192,7 @@ impl<S: Scene> Clock for Device<S> {
     }
 }
 
-impl<S: Scene> Trigger for Device<S> {
+impl<S: Scene> Trigger for VirtualDevice<S> {
     fn fire(&mut self) -> Result<Timestamp, Error> {
         let mut bench = lock(&self.bench);
         let bench = &mut *bench;

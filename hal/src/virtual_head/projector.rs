@@ -1,14 +1,14 @@
-//! The virtual projector: flips come with its refreshes, their news and their light with their delays.
+//! The virtual projector: flips happen with its refreshes; their reports and their light follow with delays.
 
 use std::time::Duration;
 
 use super::faults::Kind;
-use super::{Bench, Device, Scene, lock};
+use super::{Bench, Scene, VirtualDevice, lock};
 use crate::error::Error;
 use crate::projector::{Flip, Projector, Raster, all_of_size};
 use crate::units::Timestamp;
 
-/// What the projector is about to do.
+/// The state of the projector's flips.
 #[derive(Default)]
 pub(super) struct Screen {
     waiting: Option<Waiting>,
@@ -19,7 +19,7 @@ pub(super) struct Screen {
 #[derive(Clone, Copy)]
 struct Waiting {
     flip: Flip,
-    /// When it can be fetched; none if it never comes.
+    /// When it can be fetched; none if it never happens.
     news: Option<Timestamp>,
 }
 
@@ -37,7 +37,7 @@ impl<S: Scene> Bench<S> {
         self.light.change(self.now, None, self.now);
     }
 
-    /// The flip that a pattern queued now comes with.
+    /// Queues a pattern: computes the flip with which it will be shown, and its light.
     fn flip(&mut self, index: usize) {
         let (faults, dice) = (&self.mechanics.faults, self.dice);
         self.screen.flips += 1;
@@ -45,7 +45,7 @@ impl<S: Scene> Bench<S> {
         if faults.flips_until_stuck > 0 && n > faults.flips_until_stuck {
             let flip = Flip {
                 timestamp: self.now,
-                sequence: 0,
+                count: 0,
             };
             self.screen.waiting = Some(Waiting { flip, news: None });
             return;
@@ -53,7 +53,7 @@ impl<S: Scene> Bench<S> {
         let period = u64::try_from(self.mechanics.refresh.as_nanos())
             .unwrap_or(u64::MAX)
             .max(1);
-        let mut sequence = self.now.0 / period + 1;
+        let mut count = self.now.0 / period + 1;
         if dice.happens(Kind::LateFlip, n, faults.late_flip) {
             let more = dice.up_to(
                 Kind::LateFlip,
@@ -61,9 +61,9 @@ impl<S: Scene> Bench<S> {
                 1.0,
                 Duration::from_nanos(1 << 20),
             );
-            sequence += 1 + ((more.as_nanos() as u64 * u64::from(faults.late_refreshes)) >> 20);
+            count += 1 + ((more.as_nanos() as u64 * u64::from(faults.late_refreshes)) >> 20);
         }
-        let at = Timestamp(sequence.saturating_mul(period));
+        let at = Timestamp(count.saturating_mul(period));
         let news = dice.up_to(
             Kind::LateNews,
             n,
@@ -77,10 +77,7 @@ impl<S: Scene> Bench<S> {
             timestamp = timestamp + self.mechanics.refresh;
         }
         self.screen.waiting = Some(Waiting {
-            flip: Flip {
-                timestamp,
-                sequence,
-            },
+            flip: Flip { timestamp, count },
             news: Some(at + news),
         });
         let needed = self.sensor.oldest(self.now, &self.mechanics);
@@ -89,7 +86,7 @@ impl<S: Scene> Bench<S> {
     }
 }
 
-impl<S: Scene> Projector for Device<S> {
+impl<S: Scene> Projector for VirtualDevice<S> {
     fn size(&self) -> (u32, u32) {
         lock(&self.bench).scene.projector_size()
     }

@@ -1,20 +1,20 @@
-//! The pulses of the virtual trigger: how long each lasts, and what is told of those that last too long.
+//! The pulses of the virtual trigger: how long each lasts, and reports of those that last too long.
 
-use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::Mechanics;
 use super::faults::{Dice, Kind};
-use crate::trigger::{Edges, REMEMBERED, Spoiled};
+use crate::latest;
+use crate::trigger::{Edges, Spoiled, SpoiledPulses};
 use crate::units::Timestamp;
 
-/// The line of the trigger. A pulse lasts as long as the exposure that it makes.
+/// The line of the trigger. The exposure lasts as long as the pulse.
 pub(super) struct Pulses {
     begun: u64,
-    /// The end of the latest pulse that lasts too long. All others end before the camera takes the next one.
+    /// The end of the latest pulse that lasts too long. All other pulses end before the camera can take the next one.
     on_until: Timestamp,
-    /// Spoiled pulses that nobody has asked about, and when they end.
-    spoiled: VecDeque<(Timestamp, Spoiled)>,
+    /// Spoiled pulses that were not fetched yet.
+    spoiled: SpoiledPulses,
 }
 
 impl Pulses {
@@ -22,11 +22,11 @@ impl Pulses {
         Self {
             begun: 0,
             on_until: Timestamp(0),
-            spoiled: VecDeque::with_capacity(REMEMBERED),
+            spoiled: SpoiledPulses::new(),
         }
     }
 
-    /// Begins a pulse and answers how long it will last; none if one is still on.
+    /// Begins a pulse and returns how long it will last; none if one is still on.
     pub fn begin(&mut self, now: Timestamp, mechanics: &Mechanics, dice: Dice) -> Option<Duration> {
         if now < self.on_until {
             return None;
@@ -45,18 +45,13 @@ impl Pulses {
             fall: (end, end),
         };
         if let Some(spoiled) = Spoiled::by(&edges, mechanics.exposure) {
-            if self.spoiled.len() == REMEMBERED {
-                self.spoiled.pop_front();
-            }
-            self.spoiled.push_back((end, spoiled));
+            latest::keep(&mut self.spoiled, spoiled);
         }
         Some(mechanics.exposure + longer)
     }
 
     /// The next spoiled pulse that has ended.
     pub fn poll(&mut self, now: Timestamp) -> Option<Spoiled> {
-        let ended = |(end, _): &(Timestamp, Spoiled)| *end <= now;
-        self.spoiled.front().is_some_and(ended).then_some(())?;
-        self.spoiled.pop_front().map(|(_, spoiled)| spoiled)
+        self.spoiled.pop_front_if(|pulse| pulse.ended() <= now)
     }
 }

@@ -1,4 +1,4 @@
-//! How time goes on a virtual head: refresh, exposure, readout, and what its calibration believes.
+//! The times of a virtual head: refresh, exposure, readout and delays, and the delay that its calibration states.
 
 use std::time::Duration;
 
@@ -13,13 +13,13 @@ pub struct Mechanics {
     pub refresh: Duration,
     /// From a flip to its pattern's light.
     pub flip_to_light: Duration,
-    /// What the head's calibration believes of that.
+    /// The flip-to-light delay according to the head's calibration.
     pub calibrated_flip_to_light: Duration,
     /// Planned exposure.
     pub exposure: Duration,
-    /// From the end of an exposure to its frame.
+    /// From the end of an exposure until its frame can be fetched.
     pub readout: Duration,
-    /// Period and first exposure after the start of a camera that runs by itself.
+    /// Of a camera that runs by itself: its period, and the time from its start to its first exposure.
     pub free_running: Option<(Duration, Duration)>,
     /// What the camera's stamps mark.
     pub stamp: Stamp,
@@ -28,7 +28,8 @@ pub struct Mechanics {
 }
 
 impl Mechanics {
-    /// A triggered camera that exposes `refreshes` whole refreshes, as a digital micromirror device needs it, and is read out in no time.
+    /// A triggered camera that exposes for `refreshes` whole refreshes, as a digital micromirror device requires, and needs no time for
+    /// its readout.
     pub(crate) fn plain(refresh: Duration, refreshes: u32) -> Self {
         Self {
             refresh,

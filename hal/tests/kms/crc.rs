@@ -1,4 +1,4 @@
-//! What the virtual display shows, by its own checksum of every refresh.
+//! The virtual display's checksum of every refresh, which shows what the display really showed.
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
@@ -8,10 +8,10 @@ use std::os::unix::fs::OpenOptionsExt;
 use hal::projector::Raster;
 use rustix::fs::OFlags;
 
-/// Where the kernel tells the checksums of the first display of a card.
+/// Where the kernel reports the checksums of the first display of a card.
 const FOLDER: &str = "/sys/kernel/debug/dri/0/crtc-0/crc";
 
-/// The checksums since it was made, by the count of the refresh.
+/// The checksums since its creation, by the count of the refresh.
 pub struct Checksums {
     lines: File,
     pub seen: HashMap<u64, u32>,
@@ -34,7 +34,7 @@ impl Checksums {
         }
     }
 
-    /// Takes what has come; the kernel keeps the last 128 only.
+    /// Reads the checksums so far; the kernel keeps only the last 128.
     pub fn take(&mut self) {
         let mut line = [0; 64];
         while let Ok(length @ 1..) = self.lines.read(&mut line) {

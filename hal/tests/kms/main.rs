@@ -1,4 +1,4 @@
-//! The display back-end against the kernel's virtual display; runs in the machine of `tests/vm` only.
+//! The display back-end with the kernel's virtual display; runs in the machine of `tests/vm` only.
 
 #![allow(clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
 
@@ -21,7 +21,7 @@ use hal::setup::ProjectorSetup;
 
 /// The virtual display stamps flips by an ideal clock, in whole microseconds.
 const STAMP: Duration = Duration::from_micros(1);
-/// Longer than anything takes that works.
+/// Longer than any wait here lasts normally.
 const PATIENT: Duration = Duration::from_secs(5);
 
 fn setup(width: u32, height: u32, hertz: f64) -> ProjectorSetup {
@@ -67,7 +67,7 @@ fn next_flip(display: &mut Display, clock: &mut Monotonic) -> Flip {
     panic!("no flip within {PATIENT:?}");
 }
 
-/// Lets time go by.
+/// Waits for `span`.
 fn rest(clock: &mut Monotonic, span: Duration) {
     let until = clock.now() + span;
     while clock.now() < until {
@@ -101,8 +101,8 @@ fn a_pattern_is_shown_with_every_refresh_at_60_and_at_120_hertz() {
         let mut late = Duration::ZERO;
         for pair in flips.windows(2) {
             assert_eq!(
-                pair[1].sequence,
-                pair[0].sequence + 1,
+                pair[1].count,
+                pair[0].count + 1,
                 "{hertz} Hz: a refresh was missed"
             );
             let step = pair[1].timestamp.since(pair[0].timestamp);
@@ -129,7 +129,7 @@ fn a_stall_is_in_the_count_of_the_flips_as_so_many_missed_refreshes() {
     let (mut display, mut clock) = open(&setup(1280, 720, 60.0));
     display.load(rasters(&display, 2)).unwrap();
     let mut last = show(&mut display, &mut clock, 0);
-    // From a flip: so many refreshes go by before the next one can be asked for.
+    // Time in ms from a flip until the next one is queued, and the refreshes that are missed by that.
     for (stall, missed) in [(0, 0), (10, 0), (20, 1), (40, 2), (60, 3), (95, 5)] {
         let spent = clock.now().since(last.timestamp);
         rest(
@@ -137,11 +137,7 @@ fn a_stall_is_in_the_count_of_the_flips_as_so_many_missed_refreshes() {
             Duration::from_millis(stall).saturating_sub(spent),
         );
         let flip = show(&mut display, &mut clock, 1);
-        assert_eq!(
-            flip.sequence - last.sequence,
-            missed + 1,
-            "after {stall} ms"
-        );
+        assert_eq!(flip.count - last.count, missed + 1, "after {stall} ms");
         let steps = u32::try_from(missed + 1).unwrap();
         let off = flip
             .timestamp
@@ -168,10 +164,10 @@ fn each_flip_shows_its_own_pattern_from_the_refresh_that_it_names() {
     let mut checksums = Checksums::record();
     let mut flips = Vec::new();
     for k in [0, 1, 2, 3, 1, 3, 0, 2, 2, 0] {
-        flips.push((show(&mut display, &mut clock, k).sequence, k));
+        flips.push((show(&mut display, &mut clock, k).count, k));
         checksums.take();
     }
-    // The last one is summed a while after its flip.
+    // The last checksum is computed some time after its flip.
     rest(&mut clock, PATIENT / 5);
     checksums.take();
     let (mut right, mut until) = (0, u64::MAX);
@@ -249,7 +245,7 @@ fn whatever_would_change_grey_levels_is_switched_off_where_the_driver_has_it() {
         return;
     }
     const FULL: u64 = 1;
-    // As the kernel counts its bits: not turned, and by half a turn.
+    // The kernel's bits for rotations by 0° and by 180°.
     const UPRIGHT: u64 = 1;
     const UPSIDE_DOWN: u64 = 4;
     let margins = ["left margin", "right margin", "top margin", "bottom margin"];
@@ -260,13 +256,13 @@ fn whatever_would_change_grey_levels_is_switched_off_where_the_driver_has_it() {
         FULL,
         "it is 0, automatic, at first"
     );
-    // What another program leaves behind is not kept.
+    // Settings of another program must not persist.
     client.set("Broadcast RGB", 2);
     for margin in margins {
         client.set(margin, 24);
     }
     client.set("rotation", UPSIDE_DOWN);
-    // The card stays open, so that the console does not come back and set it right.
+    // The card stays open, so that the console does not come back and reset the properties.
     drop(display);
     let before = client;
     let (display, _) = open(&setup(1280, 720, 60.0));
@@ -352,7 +348,7 @@ fn a_projector_that_is_unplugged_is_an_error_at_once_and_is_found_again() {
     if !in_the_machine() {
         return;
     }
-    // The cable: the card goes on without it, and says so only when asked.
+    // The cable: the card continues without it, and shows it only in its status.
     let cable =
         |state: &str| std::fs::write("/sys/class/drm/card0-Virtual-1/status", state).unwrap();
     let (mut display, mut clock) = open(&setup(1280, 720, 60.0));
@@ -380,7 +376,7 @@ fn a_projector_that_is_unplugged_is_an_error_at_once_and_is_found_again() {
     display.load(rasters(&display, 2)).unwrap();
     show(&mut display, &mut clock, 0);
 
-    // The whole card, while a flip is on its way.
+    // The whole card, while a flip is pending.
     let card = |state: &str| std::fs::write("/sys/module/vkms/parameters/plugged", state).unwrap();
     display.queue(1).unwrap();
     card("0");

@@ -1,4 +1,4 @@
-//! What the virtual display shows, read back pixel by pixel through the client that shows it.
+//! Reading back pixel by pixel what the virtual display shows, through the descriptor of the client that shows it.
 
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::thread::sleep;
@@ -12,10 +12,10 @@ use drm::control::{
 };
 use drm::{ClientCapability, Device};
 
-/// Longer than the virtual display composes a picture.
+/// Longer than the virtual display takes to compose a picture.
 const COMPOSED: Duration = Duration::from_secs(2);
 
-/// The client of a display: what it did to the card can be asked, and what it shows read back.
+/// The client of a display, whose properties and picture can be read back.
 pub struct Client(OwnedFd);
 
 impl AsFd for Client {
@@ -81,7 +81,7 @@ impl Client {
         self.named(name).2
     }
 
-    /// Gives a property of the display's connector or plane another value.
+    /// Sets a property of the display's connector or plane.
     pub fn set(&self, name: &str, value: u64) {
         let (object, handle, _) = self.named(name);
         let mut request = AtomicModeReq::new();
@@ -95,7 +95,7 @@ impl Client {
         self.resource_handles().unwrap().framebuffers().len()
     }
 
-    /// Which refreshes the display gives its CRTC: none if it is off.
+    /// Whether a CRTC has a mode, so that the display is on.
     pub fn is_on(&self) -> bool {
         let all = self.resource_handles().unwrap();
         all.crtcs()

@@ -1,4 +1,4 @@
-//! A GPIO chip of one line that the kernel simulates, and the wire at that line: when it went high, by the kernel's own record.
+//! A GPIO chip with one line that the kernel simulates, and the wire at that line: when it went high, by the kernel's own record.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::Read;
@@ -8,9 +8,9 @@ use std::path::PathBuf;
 use hal::units::Timestamp;
 use rustix::fs::OFlags;
 
-/// Where such chips are made.
+/// Where such chips are configured.
 const MADE: &str = "/sys/kernel/config/gpio-sim/rig";
-/// Where the kernel records.
+/// Where the kernel's trace is.
 const TRACING: &str = "/sys/kernel/debug/tracing";
 
 /// The label of the chip.
@@ -18,7 +18,7 @@ pub const LABEL: &str = "rig";
 /// The name of its line.
 pub const LINE: &str = "trigger";
 
-/// Made in its life, gone with it.
+/// The chip; it exists as long as this value.
 pub struct Chip;
 
 impl Chip {
@@ -44,7 +44,7 @@ impl Drop for Chip {
     }
 }
 
-/// The wire at the only line that is set meanwhile.
+/// The wire, by the kernel's record of all lines that are set; no other line may be set meanwhile.
 pub struct Wire(File);
 
 impl Wire {
@@ -60,7 +60,7 @@ impl Wire {
         Self(options.open(format!("{TRACING}/trace_pipe")).unwrap())
     }
 
-    /// When it last went high, if it has since the last call; to the µs.
+    /// When it last went high since the last call, if it did; to the µs.
     pub fn pulse(&mut self) -> Option<Timestamp> {
         let mut record = [0; 4096];
         let length = self.0.read(&mut record).ok()?;

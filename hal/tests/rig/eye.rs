@@ -1,8 +1,8 @@
-//! A camera that looks at the virtual display: it exposes when the wire goes high, or by itself, and its frames say which pattern was
+//! A camera for the virtual display: it exposes when the wire goes high, or by itself, and its frames state which pattern was
 //! really in view.
 //!
-//! What was in view it knows from the kernel alone: the count of refreshes when an exposure begins and ends, and the checksum of
-//! what the display showed in each. It shares nothing with the back-ends that show, count and trigger.
+//! It knows what was in view from the kernel alone: the count of refreshes when an exposure begins and ends, and the checksum of
+//! what the display showed in each refresh. It shares no code with the back-ends that show, count and trigger.
 
 use std::collections::HashMap;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
@@ -25,21 +25,21 @@ use rustix::pipe::{PipeFlags, pipe_with};
 use crate::chip::Wire;
 use crate::crc::Checksums;
 
-/// What a frame says where more than one picture was in view.
+/// The sample of a frame during which more than one picture was in view.
 pub const MIXED: u8 = 255;
-/// What a frame says where the picture is none of the patterns.
+/// The sample of a frame whose picture is none of the patterns.
 pub const NO_PATTERN: u8 = 254;
 
-/// How often the wire is looked at, which is seldom late for the end of an exposure.
+/// How often the wire is polled; often enough to be in time for the end of an exposure, mostly.
 const LOOK: Duration = Duration::from_micros(500);
-/// Within a refresh, and room for the ways into the kernel and out of it.
+/// Shorter than a refresh, with time left for system calls.
 const EXPOSURE: Duration = Duration::from_millis(10);
 /// A little less than two refreshes, so that a triggered camera keeps up with every second one.
 const PERIOD: Duration = Duration::from_millis(30);
 /// From the end of an exposure to its frame: longer than the display takes for a checksum.
 const READOUT: Duration = Duration::from_millis(8);
 
-/// The display's count of refreshes, asked of the kernel.
+/// The display's count of refreshes, from the kernel.
 struct Refreshes(OwnedFd);
 
 impl AsFd for Refreshes {
@@ -51,7 +51,7 @@ impl AsFd for Refreshes {
 impl Device for Refreshes {}
 
 impl Refreshes {
-    /// The count at a time that is not long ago.
+    /// The count at a time in the recent past.
     fn at(&self, time: Timestamp, period: Duration) -> u64 {
         let newest = self.wait_vblank(
             VblankWaitTarget::Relative(0),
@@ -65,11 +65,11 @@ impl Refreshes {
     }
 }
 
-/// What the camera looks at.
+/// The display that the camera looks at, and the wire that triggers it.
 pub struct View {
     /// A descriptor of the display's card.
     pub display: OwnedFd,
-    /// The pattern of a checksum.
+    /// The pattern with each checksum.
     pub patterns: HashMap<u32, u8>,
     /// Time between its refreshes.
     pub refresh: Duration,
@@ -79,11 +79,11 @@ pub struct View {
     pub wire: Option<Wire>,
 }
 
-/// The camera; a thread of its own is the sensor.
+/// The camera; its sensor is a thread.
 pub struct Eye {
     starts: Starts,
     armed: Arc<AtomicBool>,
-    /// How often it was started: frames of another start are forgotten.
+    /// How often it was started; frames of an earlier start are discarded.
     start: Arc<AtomicU64>,
     frames: Receiver<Frame>,
     news: OwnedFd,
@@ -122,7 +122,7 @@ impl Eye {
         }
     }
 
-    /// Readable when a frame has come.
+    /// A descriptor that is readable when a frame has arrived.
     pub fn descriptor(&self) -> OwnedFd {
         self.news.try_clone().unwrap()
     }
@@ -217,7 +217,7 @@ impl Sensor {
                 None => (monotonic() >= free).then(monotonic),
             };
             let start = self.start.load(Ordering::SeqCst);
-            // A pulse while it is busy is lost; started again, it is not.
+            // A pulse while the sensor is busy is lost; a start makes the sensor free.
             if let Some(began) = began.filter(|began| *began >= free || start != last)
                 && self.armed.load(Ordering::SeqCst)
             {
@@ -231,7 +231,7 @@ impl Sensor {
     fn expose(&mut self, began: Timestamp) {
         let start = self.start.load(Ordering::SeqCst);
         sleep_until(began + EXPOSURE);
-        // Without checksums nothing is to be known, also of a display that is gone.
+        // Without checksums the count is not needed, and must not be read: the display may be gone.
         let seen = self.checksums.is_some().then(|| {
             [TOLERANCE, EXPOSURE - TOLERANCE]
                 .map(|into| self.refreshes.at(began + into, self.view.refresh))
@@ -249,7 +249,7 @@ impl Sensor {
         }
     }
 
-    /// The pattern whose light was there from one refresh to the other.
+    /// The pattern whose light was in view from refresh `first` to refresh `last`.
     fn in_view(&mut self, first: u64, last: u64) -> u8 {
         let Some(checksums) = &mut self.checksums else {
             return NO_PATTERN;

@@ -1,4 +1,4 @@
-//! A whole head in the machine of `tests/vm`: the display shows, the trigger fires, the wire exposes, the frame has its pattern.
+//! A whole head in the machine of `tests/vm`: display, trigger line, and a camera that knows which pattern was in view.
 
 #![allow(clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
 
@@ -29,10 +29,10 @@ const PATIENT: Duration = Duration::from_secs(5);
 
 type Rig = Head<Eye, Late, Pulse, Monotonic>;
 
-/// A display whose commits come late now and then, as those of a busy computer.
+/// A display whose flips are sometimes queued late, as on a busy computer.
 struct Late {
     display: Display,
-    /// Every so many flips; 0 = never.
+    /// Every how many flips; 0 = never.
     every: u32,
     by: Duration,
     queued: u32,
@@ -72,7 +72,7 @@ impl Projector for Late {
     }
 }
 
-/// How a rig differs from one that is well.
+/// How a rig differs from one without faults.
 #[derive(Clone, Copy, Default)]
 struct Kind {
     by_itself: bool,
@@ -134,11 +134,11 @@ fn rig(_: &Chip, kind: Kind, knows_patterns: bool) -> Rig {
     )
 }
 
-/// Takes sequences of all patterns, each in another order; every frame must be of the pattern that it is said to be. The sums.
+/// Takes sequences of all patterns, each in another order, checks that every frame shows its pattern, and sums the counts up.
 fn take(rig: &mut Rig, sequences: usize) -> Exposure {
     let mut sum = Exposure::default();
     for start in 0..sequences {
-        // 3 and 8 have no common divisor, so all patterns come.
+        // 3 and 8 have no common divisor, so each pattern is shown once.
         let wanted: Vec<usize> = (0..PATTERNS).map(|k| (start + 3 * k) % PATTERNS).collect();
         let mut got = Vec::new();
         let exposure = rig.acquire(&wanted, PATIENT, &mut |index, frame| {
@@ -245,7 +245,10 @@ fn a_pattern_whose_flip_came_late_is_taken_again_and_never_mislabelled() {
         );
         again += sum.retaken + sum.straddled;
     }
-    assert!(again > 0, "late flips cost no shot, so nothing was proved");
+    assert!(
+        again > 0,
+        "late flips cost no attempt, so nothing was proved"
+    );
 }
 
 #[test]

@@ -111,11 +111,11 @@ pub(super) fn cadence(head: &mut DynHead) -> Result<Finding, Error> {
             json!({ "flips": 0 }),
         ));
     };
-    let counted = last.sequence - first.sequence;
+    let counted = last.count - first.count;
     let missed = counted.saturating_sub(u64::from(FLIPS) - 1);
     let period = last.timestamp.since(first.timestamp).as_secs_f64() / counted.max(1) as f64;
     let off_grid = |flip: &Flip| {
-        let expected = period * (flip.sequence - first.sequence) as f64;
+        let expected = period * (flip.count - first.count) as f64;
         (flip.timestamp.since(first.timestamp).as_secs_f64() - expected).abs()
     };
     let jitter = flips.iter().map(off_grid).fold(0.0, f64::max);
@@ -169,7 +169,7 @@ pub(super) fn trigger(head: &mut DynHead, calibrated: bool) -> Result<Finding, E
 
 fn triggered(seen: &Watched<()>) -> Finding {
     let (pulses, frames) = (seen.triggers.len(), seen.frames.len());
-    let latest = |frame: &hal::head::Seen<()>| {
+    let latest = |frame: &hal::head::WatchedFrame<()>| {
         let off = seen.triggers.iter().map(|at| at.0.abs_diff(frame.start.0));
         off.min().unwrap_or(u64::MAX)
     };

@@ -7,7 +7,7 @@
 use super::PATIENCE;
 use hal::camera::{CameraTiming, Starts};
 use hal::error::Error;
-use hal::head::{DynHead, Seen, Showing, Stamp, TOLERANCE, Timing};
+use hal::head::{DynHead, Showing, Stamp, TOLERANCE, Timing, WatchedFrame};
 use hal::projector::Raster;
 use hal::units::Timestamp;
 use std::time::Duration;
@@ -70,11 +70,11 @@ fn showings(camera: &CameraTiming, refresh: Duration) -> [Showing; SHOWINGS] {
 fn by_triggers(
     camera: &CameraTiming,
     triggers: &[Timestamp],
-    frames: &[Seen<()>],
+    frames: &[WatchedFrame<()>],
 ) -> Result<Stamps, Error> {
     let tolerance = TOLERANCE.min(camera.exposure / 4);
     // The latest trigger before the stamp whose exposure had ended when the frame was there.
-    let trigger_of = |frame: &Seen<()>| {
+    let trigger_of = |frame: &WatchedFrame<()>| {
         let own = triggers.iter().rev().find(|at| {
             **at <= frame.start + tolerance && **at + camera.exposure <= frame.arrived + tolerance
         });
@@ -132,7 +132,7 @@ fn nanoseconds(time: Duration) -> i128 {
 }
 
 /// From the time that frames take from their stamp until they are there.
-fn by_waiting(camera: &CameraTiming, frames: &[Seen<()>]) -> Result<Stamps, Error> {
+fn by_waiting(camera: &CameraTiming, frames: &[WatchedFrame<()>]) -> Result<Stamps, Error> {
     let (exposure, delivery) = (camera.exposure, camera.delivery);
     let waits = frames.iter().map(|frame| frame.arrived.since(frame.start));
     let wait = waits.min().unwrap_or_default();
@@ -184,8 +184,8 @@ mod tests {
     }
 
     /// Frames stamped and there at these times, ms.
-    fn frames(times: &[(u64, u64)]) -> Vec<Seen<()>> {
-        let frame = |(start, arrived): &(u64, u64)| Seen {
+    fn frames(times: &[(u64, u64)]) -> Vec<WatchedFrame<()>> {
+        let frame = |(start, arrived): &(u64, u64)| WatchedFrame {
             start: Timestamp(0) + ms(*start),
             arrived: Timestamp(0) + ms(*arrived),
             count: 0,

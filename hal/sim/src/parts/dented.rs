@@ -1,14 +1,14 @@
-//! A surface with round, smooth dents along its normal, however steep it is where they are.
+//! A surface with round, smooth dents along its normal, also where the surface is steep.
 //!
-//! A dent of depth d and diameter D about the point c of the surface lowers it by d/n_z · cos²(π/2 · r / (D/2)), r the distance in
-//! space from c to the undented surface and n its unit normal at c: d is measured along the normal, and D across the surface.
+//! A dent of depth d and diameter D at the point c of the surface lowers z by d/n_z · cos²(π/2 · r / (D/2)), where r is the distance in
+//! space from c to the undented surface, and n the unit normal at c: d is measured along the normal, and D across the surface.
 
 use super::Surface;
 use super::sheet_metal::{BUMP_SLOPE, Defect, bump};
 use crate::optics::Vector;
 
-/// Half the step of the derivative that a normal is worked out from, mm.
-const STEP_MM: f64 = 1e-3;
+/// Half the distance over which slopes are computed, mm.
+const SLOPE_MM: f64 = 1e-3;
 
 /// A surface and its dents.
 pub(super) struct Dented<S> {
@@ -18,13 +18,13 @@ pub(super) struct Dented<S> {
 
 struct Dent {
     centre: Vector,
-    /// How far it goes down in z.
+    /// Its depth in z.
     drop: f64,
     half_width: f64,
 }
 
 impl<S: Surface> Dented<S> {
-    /// The surface with those of the defects that are dents.
+    /// The surface with the dents among the defects; other defects are ignored.
     pub fn new(surface: S, defects: &[Defect]) -> Self {
         let dent = |defect: &Defect| match *defect {
             Defect::Dent {
@@ -33,9 +33,9 @@ impl<S: Surface> Dented<S> {
                 depth_mm,
                 diameter_mm,
             } => {
-                let along = surface.height(x + STEP_MM, y) - surface.height(x - STEP_MM, y);
-                let down = surface.height(x, y + STEP_MM) - surface.height(x, y - STEP_MM);
-                let slope = along.hypot(down) / (2.0 * STEP_MM);
+                let along = surface.height(x + SLOPE_MM, y) - surface.height(x - SLOPE_MM, y);
+                let down = surface.height(x, y + SLOPE_MM) - surface.height(x, y - SLOPE_MM);
+                let slope = along.hypot(down) / (2.0 * SLOPE_MM);
                 Some(Dent {
                     centre: [x, y, surface.height(x, y)],
                     drop: depth_mm * slope.hypot(1.0),
@@ -55,7 +55,7 @@ impl<S: Surface> Surface for Dented<S> {
         let drop = |dent: &Dent| {
             let [cx, cy, cz] = dent.centre;
             let (dx, dy) = (x - cx, y - cy);
-            // Most rays are far away, and need no root.
+            // Most rays are far away; skip the square root for them.
             match dx.abs().max(dy.abs()) < dent.half_width {
                 true => dent.drop * bump(dx.hypot(dy).hypot(z - cz), dent.half_width),
                 false => 0.0,

@@ -1,6 +1,6 @@
 //! The parts that can be measured: thin surfaces z(x, y) of bounded slope, with nothing behind them.
 //!
-//! Sizes of the study's parts are those of its `parts.toml`; a part in a scenario may change them.
+//! The sizes of the study's parts (docs/measurement.md, *The study's head and parts*) are defaults; a scenario may change them.
 
 mod dented;
 mod shapes;
@@ -16,7 +16,7 @@ pub use shapes::{Cone, Flowerpot, Plane, Sawtooth, Sphere, Tube};
 pub use sheet_metal::{Defect, SheetMetal};
 pub use spline::Spline;
 
-/// A part by name, with its measures in mm.
+/// A part by kind, with its measures in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Part {
@@ -49,7 +49,7 @@ impl Default for Part {
 /// A thin surface z(x, y) in the part's own coordinates, mm.
 ///
 /// `height` is defined and has bounded slope everywhere, also where the part is not `present` (outside its
-/// outline, in its holes): there a ray passes through.
+/// outline, in its holes), where a ray passes through.
 pub(crate) trait Surface: Send + Sync {
     /// z at (x, y).
     fn height(&self, x: f64, y: f64) -> f64;
@@ -65,7 +65,7 @@ pub(crate) trait Surface: Send + Sync {
 }
 
 impl Part {
-    /// One of each kind with its usual measures, good.
+    /// One good part of each kind with its default measures.
     #[must_use]
     pub fn stock() -> [Self; 9] {
         [
@@ -81,7 +81,7 @@ impl Part {
         ]
     }
 
-    /// What is wrong with the measures, if anything.
+    /// Checks the measures; the error names the key and its range.
     pub(crate) fn check(&self) -> Result<(), String> {
         let positive = |key: &str, value: f64| within(&format!("part.{key}"), value, 1e-3, 1000.0);
         let finite = |key: &str, value: f64| within(&format!("part.{key}"), value, -1000.0, 1000.0);
@@ -103,7 +103,7 @@ impl Part {
             Self::Sphere(part) => {
                 positive("radius", part.radius)?;
                 finite("centre_z", part.centre_z)?;
-                // Below a tenth of the radius above the centre the surface is too steep to be a height field.
+                // Lower than a tenth of the radius above the centre, the surface is too steep for a height field.
                 let low = part.centre_z + 0.1 * part.radius;
                 within("part.cut", part.cut, low, part.centre_z + part.radius)
             }
@@ -135,7 +135,7 @@ impl Part {
         }
     }
 
-    /// The surface to trace, or none where there is no part.
+    /// The surface to trace; none for an empty stage.
     pub(crate) fn surface(&self) -> Option<Box<dyn Surface>> {
         Some(match self {
             Self::Cone(part) => Box::new(part.clone()),

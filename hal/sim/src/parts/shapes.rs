@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 use super::{Defect, Surface};
 use crate::optics::Vector;
 
-/// A lying cylinder is vertical at its sides; what is steeper than this is left away.
+/// Largest slope of the tube: a lying cylinder is vertical at its sides, so its steeper parts are cut off.
 const TUBE_SLOPE: f64 = 6.0;
 
-/// A square block with a cone-shaped hole: z = top, and inside the radius top − depth · (1 − r / radius).
+/// A square block with a cone-shaped hole: z = top, and within the radius z = top − depth · (1 − r / radius).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Cone {
@@ -118,7 +118,7 @@ pub struct Sphere {
     pub radius: f64,
     /// z of the centre.
     pub centre_z: f64,
-    /// z below which there is nothing.
+    /// z below which the sphere is cut off.
     pub cut: f64,
 }
 
@@ -180,7 +180,7 @@ impl Default for Tube {
 }
 
 impl Tube {
-    /// Distance from the axis where the slope reaches the cap.
+    /// Distance from the axis at which the slope reaches [`TUBE_SLOPE`].
     fn side(&self) -> f64 {
         self.diameter / 2.0 * TUBE_SLOPE / TUBE_SLOPE.hypot(1.0)
     }
@@ -208,7 +208,7 @@ impl Surface for Tube {
     }
 }
 
-/// An open truncated cone, axis along z, half its depth above z = 0: the wall only, wider at the rim.
+/// The wall of an open truncated cone, wider at the rim; its axis is along z, and half its depth lies above z = 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Flowerpot {
@@ -218,7 +218,7 @@ pub struct Flowerpot {
     pub bottom_diameter: f64,
     /// Height of the wall.
     pub depth: f64,
-    /// Dents of its wall, each as deep along the wall's normal and as wide across the wall as it says.
+    /// Dents of its wall; depth is along the wall's normal, diameter across the wall.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub defects: Vec<Defect>,
 }

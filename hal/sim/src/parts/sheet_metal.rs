@@ -1,7 +1,7 @@
 //! The default part: a stamped sheet-metal bracket with holes, a slot, a bead, a flange, and its defects.
 //!
 //! 150 × 110 mm seen from above, upper side of the plate at z = 8 mm: three round holes and a slot, a raised
-//! bead, drawn edges, and the +x edge bent down as a flange. Measures are our own choice.
+//! bead, drawn edges, and the +x edge bent down as a flange. The measures are made up for this project.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ use hal::bounds::length;
 
 /// z of the plate's upper side.
 const PLATE_Z: f64 = 8.0;
-/// The plate's outline before the flange: x from −75 to the bend line and |y| ≤ 55, corners rounded.
+/// The plate's outline without the flange: x from −75 to the bend line and |y| ≤ 55, corners rounded.
 const LEFT: f64 = -75.0;
 const BEND_LINE: f64 = 50.0;
 const HALF_HEIGHT: f64 = 55.0;
@@ -44,11 +44,11 @@ const EDGE_WIDTH: f64 = 1.6;
 /// Most defects of a scenario.
 const MAX_DEFECTS: usize = 64;
 
-/// The bracket and what is wrong with it.
+/// The bracket and its defects.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SheetMetal {
-    /// Defects; none is a good part.
+    /// Defects; a good part has none.
     pub defects: Vec<Defect>,
 }
 
@@ -72,15 +72,15 @@ pub enum Defect {
         /// 0 and 1 are the small ones at −x, +y and −y; 2 is the large one.
         index: usize,
     },
-    /// A flange that is bent too far.
+    /// A flange that is bent too far or too little.
     BentFlange {
-        /// Degrees more than the flange should have; negative is less.
+        /// Degrees in excess of the nominal angle; negative if bent too little.
         degrees: f64,
     },
 }
 
 impl Defect {
-    /// What is wrong with the measures of a dent, if anything; nothing of other defects.
+    /// Checks the measures of a dent; other defects pass. The error names the key and its range.
     pub(super) fn check_dent(&self) -> Result<(), String> {
         let Self::Dent {
             x,
@@ -125,8 +125,8 @@ struct Run {
 }
 
 impl Run {
-    /// Distance from the feature's middle line where that is less than the half-width, and else the half-width: most rays
-    /// are far away, and a root for each would be a third of the time of a scene.
+    /// Distance from the feature's centre line, at most the half-width. Most rays are farther away, and a square root for each of them
+    /// would take a third of the time of a scene.
     fn distance(&self, x: f64, y: f64) -> f64 {
         let (along, across) = (x - x.clamp(self.from, self.to), y - self.y);
         match along.abs().max(across.abs()) < self.half_width {
@@ -180,7 +180,7 @@ impl Stamping {
         }
     }
 
-    /// How far the flange has dropped at `x`: a circular arc, then its tangent.
+    /// The drop of the flange at `x`: a circular arc, then its tangent.
     fn flange_drop(&self, x: f64) -> f64 {
         if x <= BEND_LINE {
             return 0.0;
@@ -191,7 +191,7 @@ impl Stamping {
         on_arc + (beyond - arc) * self.sin / self.cos
     }
 
-    /// Distance inside the rounded outline; negative outside.
+    /// Distance from the rounded outline; positive inside, negative outside.
     fn inside(&self, x: f64, y: f64) -> f64 {
         let middle = (LEFT + self.right) / 2.0;
         let across = (x - middle).abs() - ((self.right - LEFT) / 2.0 - CORNER);
@@ -204,7 +204,7 @@ impl Stamping {
     }
 }
 
-/// cos² from 1 in the middle to 0 at `half_width`: smooth at both; its slope is at most π / (2 · half_width).
+/// cos² from 1 at distance 0 to 0 at `half_width`, smooth at both; its slope is at most π / (2 · half_width).
 pub(super) fn bump(distance: f64, half_width: f64) -> f64 {
     if distance >= half_width {
         return 0.0;
@@ -213,7 +213,7 @@ pub(super) fn bump(distance: f64, half_width: f64) -> f64 {
     cos * cos
 }
 
-/// Of [`bump`], times the half-width.
+/// The largest slope of [`bump`], multiplied by the half-width.
 pub(super) const BUMP_SLOPE: f64 = std::f64::consts::FRAC_PI_2;
 
 impl Surface for Stamping {
@@ -243,7 +243,7 @@ impl Surface for Stamping {
             .iter()
             .map(|[_, _, depth, diameter]| depth.abs() * BUMP_SLOPE * 2.0 / diameter)
             .sum();
-        // The bead ends before the bend and keeps off the drawn edges, so only the larger of its slope and theirs acts.
+        // The bead ends before the bend and away from the drawn edges, so its slope and theirs never add up.
         let bead = BEAD_HEIGHT * BUMP_SLOPE / BEAD.half_width;
         let edge = 2.0 * EDGE_DROP / EDGE_WIDTH;
         (self.sin / self.cos + edge).max(bead) + dents

@@ -7,7 +7,7 @@ use super::shapes::{in_square, square};
 use crate::limits::within;
 use crate::optics::Vector;
 
-/// Control values along each side: 8 patches of cubics.
+/// Control values along each side, for 8 cubic patches.
 const CONTROL: usize = 11;
 const PATCHES: f64 = (CONTROL - 3) as f64;
 
@@ -39,7 +39,7 @@ impl Spline {
         Ok(())
     }
 
-    /// The first of the four control values that act at `x`, and the four weights.
+    /// The index of the first of the four control values that contribute at `x`, and the four weights.
     fn weights(&self, x: f64) -> (usize, [f64; 4]) {
         let u = ((x / self.half_size + 1.0) * PATCHES / 2.0).clamp(0.0, PATCHES);
         let first = u.floor().min(PATCHES - 1.0);
@@ -78,7 +78,8 @@ impl Surface for Spline {
         in_square(self.half_size, x, y)
     }
 
-    /// The derivative of a uniform B-spline averages the differences of neighbouring control values.
+    /// The derivative of a uniform B-spline is a weighted mean of the differences of neighbouring control values, so their largest
+    /// difference bounds it.
     fn slope_bound(&self) -> f64 {
         let spacing = 2.0 * self.half_size / PATCHES;
         let largest = |differences: &mut dyn Iterator<Item = f64>| {

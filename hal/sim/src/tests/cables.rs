@@ -1,13 +1,13 @@
-//! A head whose cables are pulled out.
+//! A head whose devices are unplugged.
 
 use super::{PATIENT, frames, small};
 use crate::parts::Plane;
 use crate::{Part, head};
-use hal::error::{Device, ErrorKind};
+use hal::error::{DeviceKind, ErrorKind};
 
 #[test]
 fn a_device_that_is_pulled_out_is_gone_until_the_head_is_opened_again() {
-    for device in [Device::Camera, Device::Projector] {
+    for device in [DeviceKind::Camera, DeviceKind::Projector] {
         let (mut lost, stage) = head(&small(Part::Plane(Plane::default()))).unwrap();
         assert_eq!(frames(&mut lost, &[0, 255]).len(), 2);
         assert_eq!(lost.present(), Ok(()));
@@ -32,8 +32,8 @@ fn a_device_that_is_pulled_out_is_gone_until_the_head_is_opened_again() {
 fn a_projector_that_lost_its_power_has_lost_its_patterns() {
     let (mut lost, stage) = head(&small(Part::Plane(Plane::default()))).unwrap();
     frames(&mut lost, &[0, 255]);
-    stage.unplug(Device::Projector);
-    stage.plug(Device::Projector);
+    stage.unplug(DeviceKind::Projector);
+    stage.plug(DeviceKind::Projector);
     let mut found = stage.reopen().unwrap();
     let error = found.acquire(&[0], PATIENT, &mut |_, _| ()).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Protocol);

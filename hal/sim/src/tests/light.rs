@@ -56,7 +56,7 @@ fn a_long_pulse_makes_a_frame_brighter_and_is_told() {
             pulse.longer.as_secs_f64() / pulse.width.as_secs_f64()
         });
         let expected = planned * (1.0 + longer);
-        // Rounding, and what spoils no frame.
+        // Rounding, and pulses that are off by too little to be reported.
         assert!(
             (frame.measured - expected).abs() <= 1.0 + 0.005 * planned,
             "{} instead of {expected}",

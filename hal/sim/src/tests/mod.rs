@@ -1,4 +1,4 @@
-//! Promises of the simulated head: the contract, any number of threads, scenarios, speed; the rest by topic.
+//! Promises of the simulated head: the contract, any number of threads, scenarios, speed; the submodules have the other topics.
 
 mod cables;
 mod light;
@@ -67,14 +67,14 @@ fn wall_dent(depth_mm: f64) -> Defect {
     }
 }
 
-/// One frame per level, each level shown uniformly.
-fn frames(head: &mut DynHead, levels: &[u8]) -> Vec<Frame> {
+/// One frame for each grey, shown uniformly.
+fn frames(head: &mut DynHead, greys: &[u8]) -> Vec<Frame> {
     let (width, height) = head.projector_size();
-    let rasters = levels
+    let rasters = greys
         .iter()
-        .map(|level| Raster::uniform(width, height, *level).unwrap());
+        .map(|grey| Raster::uniform(width, height, *grey).unwrap());
     head.load(rasters.collect()).unwrap();
-    let indices: Vec<usize> = (0..levels.len()).collect();
+    let indices: Vec<usize> = (0..greys.len()).collect();
     let mut frames = Vec::new();
     head.acquire(&indices, PATIENT, &mut |_, frame| frames.push(frame))
         .unwrap();
@@ -168,8 +168,8 @@ fn frames_and_truth_are_the_same_for_any_number_of_threads() {
     assert!(with_threads(1) == with_threads(2));
 }
 
-/// Prints what the README states. Run with
-/// `cargo test --release -p hal --lib -- --ignored --nocapture speed`.
+/// Prints the times that the README states. Run with
+/// `cargo test --release -p sim --lib -- --ignored --nocapture speed`.
 #[test]
 #[ignore = "a measurement, not a promise: run it alone and in release"]
 fn speed_of_building_a_transport_and_of_one_frame() {

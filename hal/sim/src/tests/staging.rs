@@ -1,4 +1,4 @@
-//! Parts on the stage: defects, placements, and what is remembered.
+//! Parts on the stage: defects, placements, and light transports that are kept.
 
 use super::{all_parts, small};
 use crate::parts::{Defect, Plane, SheetMetal};

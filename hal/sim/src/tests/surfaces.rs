@@ -1,4 +1,4 @@
-//! Surfaces and rays: slopes stay in their bounds, and rays meet what small steps meet.
+//! Surfaces and rays: slopes stay within their bounds, and traced rays meet the surface where a march in small steps does.
 
 use super::{all_parts, wall_dent};
 use crate::optics::{Lens, Vector, along};
@@ -56,7 +56,7 @@ fn a_dent_of_a_wall_is_as_deep_along_its_normal_and_as_wide_across_it_as_it_says
     let normal_z = 1.0 / good.slope_bound().hypot(1.0);
     let depth = |x: f64, y: f64| (good.height(x, y) - dented.height(x, y)) * normal_z;
     assert!((depth(centre[0], centre[1]) - 0.3).abs() < 1e-6);
-    // Up the wall and along it: half as deep at a quarter of the diameter, none beyond its half.
+    // Up the wall and around it: half as deep at a quarter of the diameter from the centre, not deep beyond half the diameter.
     let radius = centre[0].hypot(centre[1]);
     let [outwards, around] = [
         [centre[0] / radius, centre[1] / radius],
@@ -65,7 +65,7 @@ fn a_dent_of_a_wall_is_as_deep_along_its_normal_and_as_wide_across_it_as_it_says
     for ([x, y], per_mm) in [(outwards, normal_z), (around, 1.0)] {
         let at = |mm: f64| depth(centre[0] + x * mm * per_mm, centre[1] + y * mm * per_mm);
         for side in [-1.0, 1.0] {
-            // The wall is bent: over 2 mm along it, it leaves its tangent by 0.02 mm, and falls by 0.1 mm in z.
+            // The wall is curved: 2 mm away it is 0.02 mm off its tangent, and 0.1 mm lower in z.
             assert!((at(2.0 * side) - 0.15).abs() < 0.005, "{}", at(2.0 * side));
             assert_eq!(at(4.01 * side), 0.0);
         }

@@ -1,4 +1,4 @@
-//! Promises of the head: what is handed over is what was in view, whatever the devices do.
+//! Promises of the head: each frame that is handed over shows the pattern that it is said to show, whatever the devices do.
 
 mod schedules;
 mod sequences;
@@ -13,16 +13,16 @@ use crate::virtual_head::{self, Faults, Mechanics, Scene};
 const REFRESH: Duration = Duration::from_micros(16_667);
 const TIMEOUT: Duration = Duration::from_millis(500);
 const SHARES: f32 = 65535.0;
-/// By as much an exposure may be too long, and the rounding of a label.
+/// How much longer than planned an exposure may be, plus the rounding of a label.
 const HALF_A_PERCENT: f32 = 0.005 + 1.0 / SHARES;
 
-/// A scene whose frames say in their samples which pattern they show, how much of others, and for how much too long.
+/// A scene whose samples state which pattern a frame shows, how much of others, and how much too long it was exposed.
 ///
-/// That is told from the light alone, so it judges the sequencer without its stamps and counts.
+/// They are computed from the light alone, so they judge the sequencer independently of its stamps and counts.
 #[derive(Default)]
 struct Labels {
     loaded: usize,
-    /// Is told of each exposure.
+    /// Receives a message for each exposure.
     exposed: Option<mpsc::Sender<()>>,
 }
 
@@ -55,7 +55,7 @@ impl Scene for Labels {
         &mut self,
         seen: &[(Option<usize>, f32)],
         timestamp: Timestamp,
-        sequence: u64,
+        count: u64,
     ) -> Result<Frame, Error> {
         if let Some(exposed) = &self.exposed {
             exposed.send(()).unwrap();
@@ -63,21 +63,21 @@ impl Scene for Labels {
         let (shown, share) = *seen.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         let label = shown.map_or(0, |index| index as u16 + 1);
         let sum: f32 = seen.iter().map(|(_, share)| share).sum();
-        // Saturating: a share of more than all is all that needs to be told.
-        let told = |share: f32| (share * SHARES).round() as u16;
-        let pixels = Pixels::Sixteen(vec![label, told(sum - share), told(sum - 1.0)]);
-        Frame::new(FORMAT, Arc::new(pixels), timestamp, sequence)
+        // The cast saturates at a share of 1, which is enough.
+        let sample = |share: f32| (share * SHARES).round() as u16;
+        let pixels = Pixels::Sixteen(vec![label, sample(sum - share), sample(sum - 1.0)]);
+        Frame::new(FORMAT, Arc::new(pixels), timestamp, count)
     }
 }
 
-/// What a frame says of itself.
+/// What the samples of a frame state.
 #[derive(Debug, PartialEq)]
 struct Label {
     /// The pattern that it shows.
     shown: Option<usize>,
-    /// For which share of the planned exposure it shows others.
+    /// The share of the planned exposure for which it shows other patterns.
     others: f32,
-    /// By which share its exposure was too long.
+    /// How much too long its exposure was, as a share of the planned exposure.
     longer: f32,
 }
 
@@ -92,7 +92,7 @@ fn label(frame: &Frame) -> Label {
     }
 }
 
-/// A head in front of labels, with so many patterns loaded.
+/// A head in front of a `Labels` scene, with so many patterns loaded.
 pub(super) fn labelled(mechanics: Mechanics, patterns: usize) -> DynHead {
     in_front_of(Labels::default(), mechanics, patterns)
 }
@@ -108,7 +108,7 @@ pub(super) fn plain() -> Mechanics {
     Mechanics::plain(REFRESH, 1)
 }
 
-/// The index and the label of each frame of a sequence, and how it went.
+/// The index and label of each frame of a sequence, and the result of the sequence.
 type Taken = (Vec<(usize, Label)>, Result<Exposure, Error>);
 
 fn take(head: &mut DynHead, indices: &[usize]) -> Taken {

@@ -1,4 +1,4 @@
-//! Thousands of seeded fault schedules: no frame under another pattern's name or of a spoiled pulse, and an end within the deadline.
+//! Thousands of seeded fault schedules: no frame is assigned to a wrong pattern or was exposed by a spoiled pulse, and each sequence ends in time.
 
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -10,7 +10,7 @@ use crate::clock::Clock as _;
 const QUICK: u64 = 400;
 const ALL: u64 = 10_000;
 
-/// Numbers of a schedule, from its seed.
+/// Random values for a schedule, from its seed.
 struct Draw(SplitMix64);
 
 impl Draw {
@@ -81,7 +81,7 @@ fn schedule(seed: u64) -> (Mechanics, usize) {
         lost_trigger: draw.chance(0.2),
         trigger_jitter_us: draw.below(2) * draw.below(100),
         long_pulse: draw.chance(0.3),
-        // About as much as makes a difference, as the tolerance of stamps, as an exposure, and as several.
+        // About the error that is tolerated, the tolerance of stamps, one exposure, and several exposures.
         long_pulse_us: {
             let longest = [150, 400, 20_000, 80_000][draw.below(4) as usize];
             draw.below(longest)
@@ -117,7 +117,7 @@ fn schedule(seed: u64) -> (Mechanics, usize) {
     (mechanics, patterns)
 }
 
-/// What a batch of schedules came to.
+/// Totals over all schedules.
 #[derive(Debug, Default)]
 struct Tally {
     results: u64,
@@ -136,14 +136,14 @@ fn run(seed: u64, tally: &mut Tally) {
     let (mechanics, patterns) = schedule(seed);
     let exposure = mechanics.exposure;
     let jitter = mechanics.faults.flip_jitter_us + mechanics.faults.stamp_jitter_us;
-    // By its stamps an exposure may reach beyond its view by the tolerance at both ends; the stamps are off by the jitter.
+    // By its stamps, an exposure may reach beyond its pattern's view by the tolerance at both ends; stamps are off by the jitter.
     let others = (2 * TOLERANCE.min(exposure / 4) + Duration::from_micros(2 * jitter))
         .as_secs_f32()
         / exposure.as_secs_f32()
         + 1.0 / SHARES;
     // Half a percent, or 20 µs of an exposure of less than 4 ms.
     let longer = HALF_A_PERCENT.max(20e-6 / exposure.as_secs_f32() + 1.0 / SHARES);
-    // The last wait may oversleep, and a clock's end is met only then.
+    // The last wait may last too long, and the deadline is checked only after it.
     let oversleep = Duration::from_micros(mechanics.faults.stall_us);
     let stuck = mechanics.faults.flips_until_stuck + mechanics.faults.frames_until_stuck > 0;
     let mut head = labelled(mechanics, patterns);
@@ -202,7 +202,7 @@ fn run_all(seeds: u64) -> Tally {
         run(seed, &mut tally);
     }
     println!("{seeds} schedules: {tally:?}");
-    // The faults did happen, and most sequences got through them.
+    // The faults did happen, and most sequences succeeded in spite of them.
     assert!(
         tally.retaken > seeds && tally.straddled > seeds / 10,
         "{tally:?}"

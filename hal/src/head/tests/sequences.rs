@@ -1,4 +1,4 @@
-//! Sequences with a fault of one kind, and how fast a sequence is without any.
+//! Sequences with faults of one kind each, and the speed of a sequence without faults.
 
 use super::*;
 use crate::clock::Clock as _;
@@ -6,7 +6,7 @@ use crate::error::ErrorKind;
 
 const COUNT: usize = 12;
 
-/// Each pattern gives its frame in turn, wholly its.
+/// Takes a sequence and checks that each pattern gives a frame, in order, that shows only this pattern.
 fn all_right(head: &mut DynHead) -> Exposure {
     let indices: Vec<usize> = (0..COUNT).collect();
     let (frames, result) = take(head, &indices);
@@ -23,7 +23,7 @@ fn all_right(head: &mut DynHead) -> Exposure {
     result.unwrap()
 }
 
-/// As [`all_right`], but for pulses of the trigger that are off by less than what spoils a frame, and for stamps of their ends.
+/// As [`all_right`], but tolerates pulses of the trigger that are off by less than what spoils a frame.
 fn all_but_half_a_percent(head: &mut DynHead) -> Exposure {
     let indices: Vec<usize> = (0..COUNT).collect();
     let (frames, result) = take(head, &indices);
@@ -91,8 +91,8 @@ fn a_camera_that_runs_by_itself_is_followed_from_any_phase() {
                 ..plain()
             };
             let exposure = all_right(&mut labelled(mechanics, COUNT));
-            // Two refreshes each; up to four more until the first frame has told the phase. A phase that drifts past a
-            // flip may cost a frame.
+            // Two refreshes each, and up to four more until the first frame shows the camera's phase. When the phase drifts past a
+            // flip, one frame may have to be taken again.
             assert!(
                 refreshes(&exposure) < 26.1 && exposure.retaken <= 1,
                 "{phase_us} {drift_ppm} {exposure:?}"
@@ -112,7 +112,7 @@ fn stamps_mean_what_calibration_says() {
         let mut head = labelled(mechanics, COUNT);
         let exposure = all_right(&mut head);
         assert!(exposure.sync_error < TOLERANCE, "{exposure:?}");
-        // Taken for something else, no frame fits its pattern.
+        // With the wrong kind of stamp in the calibration no frame fits its pattern.
         let wrong = if stamp == Stamp::ExposureStart {
             Stamp::ReadoutEnd
         } else {
@@ -218,10 +218,10 @@ fn a_frame_whose_pulse_was_too_long_is_taken_again_once() {
         long_pulse_us,
         ..Faults::default()
     };
-    // So short that the camera is free again long before the next light.
+    // Short, so that the camera is free again long before the next pattern's light.
     let (exposure, readout) = (REFRESH / 2, Duration::from_millis(4));
     for stamp in [Stamp::ExposureStart, Stamp::ExposureEnd, Stamp::ReadoutEnd] {
-        // Below the tolerance of time stamps, above it, and on into the next patterns.
+        // Below the tolerance of time stamps, above it, and into the next patterns.
         for longest in [180, 2_000, 50_000] {
             let mechanics = Mechanics {
                 stamp,
@@ -321,7 +321,7 @@ fn a_pattern_may_be_taken_several_times_in_a_sequence() {
     );
 }
 
-/// A virtual clock that says that it goes on by itself.
+/// A virtual clock that claims to run by itself.
 struct Running(Box<dyn Clock>);
 
 impl Clock for Running {

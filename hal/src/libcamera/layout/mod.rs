@@ -1,43 +1,43 @@
-//! Which pixel format to take of a camera, which to refuse and why, and how its samples lie in a buffer.
+//! Pixel formats of cameras: which one to use, which to refuse and why, and how samples are stored in a buffer.
 //!
-//! Nothing here knows the library: formats are its words for them ("R16", "NV12").
+//! The code here does not use the library; formats are known by its names for them ("R16", "NV12").
 
 use crate::error::Error;
 use crate::frame::{FrameFormat, Pixels};
 
-/// What is taken of a camera's images.
+/// Which samples of a camera's images are used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reading {
-    /// What a monochrome sensor counted, as it is.
+    /// The raw counts of a monochrome sensor.
     #[default]
     Raw,
-    /// The same, or else the luma plane of a YUV format: what an image processor made of it.
+    /// Raw counts if available, else the luma plane of a YUV format, which an image processor has computed.
     Luma,
     /// The green samples of an RGB format. For trials with a camera that has nothing else.
     Green,
 }
 
-/// How the samples of a row lie in a buffer.
+/// How the samples of a row are stored in a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Layout {
     /// A byte each.
     Bytes,
     /// Two bytes each, the lower one first.
     Words,
-    /// Likewise, but only so many upper bits are the sensor's: 8 to 15.
+    /// Two bytes each, the lower one first; only so many upper bits are the sensor's: 8 to 15.
     UpperBits(u8),
-    /// Four of 10 bits in five bytes: four upper bytes, then the lower bits of all four.
+    /// Four samples of 10 bits in five bytes: four upper bytes, then the lower bits of all four.
     FourInFive,
-    /// Two of 12 bits in three bytes: two upper bytes, then the lower bits of both.
+    /// Two samples of 12 bits in three bytes: two upper bytes, then the lower bits of both.
     TwoInThree,
-    /// The middle one of every three bytes.
+    /// The middle byte of every three.
     MiddleOfThree,
 }
 
 /// A pixel format that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Readable {
-    /// The library's word for it.
+    /// The library's name of the format.
     pub name: &'static str,
     pub reading: Reading,
     pub layout: Layout,
@@ -76,24 +76,24 @@ const FORMATS: [Readable; 19] = [
     readable("RGB888", Reading::Green, Layout::MiddleOfThree, 8),
 ];
 
-/// What a camera granted when it was asked for a format.
+/// The format that a camera granted when it was asked for one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Granted {
-    /// The library's word for the format.
+    /// The library's name of the format.
     pub name: String,
     /// Columns and rows.
     pub size: (u32, u32),
 }
 
-/// The formats to ask a camera for. It may grant another one, so all of them are asked for before one is chosen.
+/// The formats to ask a camera for. It may grant a different one, so all are asked for before one is chosen.
 pub(crate) fn worth_asking(reading: Reading) -> impl Iterator<Item = &'static Readable> {
     FORMATS.iter().filter(move |f| reading.takes(f.reading))
 }
 
-/// The best of what a camera granted, by its place among `granted`, and how to read it.
+/// The index in `granted` of the best format, and how to read it.
 ///
 /// # Errors
-/// `Unsupported` if none can be read, or none has the wanted size; it names what is wrong with each.
+/// `Unsupported` if no format can be read, or none has the wanted size; the message says what is wrong with each.
 pub(crate) fn choose(
     camera: &str,
     reading: Reading,
@@ -129,8 +129,8 @@ pub(crate) fn choose(
     })
 }
 
-/// The bits of a monochrome sensor in frames of `size`, by the raw formats that its camera lists with their sizes: those of its deepest
-/// mode of that size, which is the one that a camera takes when it is asked for 16.
+/// The bits of a monochrome sensor in frames of `size`, from the raw formats that its camera lists with their sizes: those of the
+/// deepest mode of that size, which a camera uses when it is asked for 16 bits.
 pub(crate) fn sensor_bits(listed: &[(String, Vec<(u32, u32)>)], size: (u32, u32)) -> Option<u8> {
     let format = |name: &str| {
         FORMATS
@@ -141,7 +141,7 @@ pub(crate) fn sensor_bits(listed: &[(String, Vec<(u32, u32)>)], size: (u32, u32)
     modes.filter_map(|(name, _)| Some(format(name)?.bits)).max()
 }
 
-/// Why a format is not taken; none if it can be.
+/// Why a format cannot be used; none if it can.
 pub(crate) fn objection(reading: Reading, name: &str) -> Option<String> {
     if let Some(format) = FORMATS.iter().find(|format| format.name == name) {
         return (!reading.takes(format.reading))
@@ -165,7 +165,7 @@ impl Reading {
         self == format || (self, format) == (Self::Luma, Self::Raw)
     }
 
-    /// The word for it.
+    /// Its name in messages.
     fn word(self) -> &'static str {
         match self {
             Self::Raw => "raw",
@@ -176,8 +176,8 @@ impl Reading {
 }
 
 impl Readable {
-    /// The same for a sensor of `bits`. Where a format has more, as a Pi 5's R16, samples are its upper ones; left there, full scale
-    /// would not be 2^bits − 1, and nobody would see that a pixel is saturated.
+    /// The same format for a sensor of `bits`. If a format has more bits (R16 of a Pi 5), the sensor's are the upper ones. They must be
+    /// shifted down: otherwise full scale would not be 2^bits − 1, and saturated pixels would not be recognised.
     pub fn of_sensor(self, bits: Option<u8>) -> Self {
         match (self.layout, bits) {
             (Layout::Words, Some(bits)) if (8..self.bits).contains(&bits) => Self {
@@ -189,12 +189,12 @@ impl Readable {
         }
     }
 
-    /// Whether samples lie as a frame has them, so that it can borrow them.
+    /// Whether samples are stored as in a frame, so that a frame can borrow them.
     pub fn is_plain(&self) -> bool {
         matches!(self.layout, Layout::Bytes | Layout::Words)
     }
 
-    /// The format of frames from buffers with `stride` bytes from row to row, and the bytes that a frame takes there.
+    /// The format of frames from buffers with `stride` bytes per row, and the number of bytes of a frame in a buffer.
     ///
     /// # Errors
     /// `Protocol` if a row does not fit into `stride` bytes or `stride` holds no whole number of samples.
@@ -232,7 +232,7 @@ impl Readable {
         }
     }
 
-    /// Copies the samples of a whole frame of `format` out of a buffer with `stride` bytes from row to row.
+    /// Copies the samples of a whole frame of `format` out of a buffer with `stride` bytes per row.
     pub fn copy(&self, buffer: &[u8], stride: usize, format: &FrameFormat, pixels: &mut Pixels) {
         let (columns, width) = (format.width as usize, format.stride);
         let rows = buffer.chunks(stride.max(1));
@@ -276,8 +276,8 @@ fn words(row: &[u8], into: &mut [u16], unused: u32) {
     }
 }
 
-/// Unpacks groups of `BYTES`: one upper byte per sample, then one byte with the lower `bits` of each, the first one's lowest
-/// (MIPI CSI-2, "RAW10" and "RAW12").
+/// Unpacks groups of `BYTES` bytes: one upper byte per sample, then one byte with the lower `bits` of each sample, those of the first
+/// sample in the lowest bits (MIPI CSI-2, "RAW10" and "RAW12").
 fn unpack<const BYTES: usize>(row: &[u8], into: &mut [u16], bits: usize) {
     for (group, into) in row.chunks_exact(BYTES).zip(into.chunks_mut(BYTES - 1)) {
         let lower = u16::from(group[BYTES - 1]);

@@ -195,7 +195,7 @@ fn the_upper_bits_of_a_wider_format_are_the_sensors() {
     upper.copy(&buffer, 6, &frames, &mut pixels);
     assert_eq!(pixels, Pixels::Sixteen(vec![1023, 1, 512, 0]));
 
-    // What has as many bits as its sensor, or is not known, is left as it is.
+    // A format with as many bits as its sensor, or with an unknown sensor, is left as it is.
     assert_eq!(format("R10").of_sensor(Some(10)), format("R10"));
     assert_eq!(format("R16").of_sensor(None), format("R16"));
 
