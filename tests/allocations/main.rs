@@ -1,5 +1,5 @@
-//! How often a trigger allocates, after the first ones (not at all, until its result is handed over), and what a plan takes: a binary of its own, because it counts every
-//! allocation of a thread.
+//! How often a trigger allocates after the first ones (not at all until its result is handed over), and how much memory a plan takes. A binary of its own, because it
+//! counts every allocation of a thread.
 
 mod plans;
 
@@ -19,13 +19,13 @@ use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// Triggers before counting: buffers find their sizes.
+/// Triggers before counting, in which buffers reach their sizes.
 const WARM_UP: usize = 4;
-/// Frames are written to the memory of those before.
+/// Frames are written to the memory of earlier ones.
 const TAKING: u64 = 0;
-/// Levels are decoded, the part's motion is taken back, and gauges of every kind are judged in rooms made with the plan.
+/// Decoding, alignment and gauges of every kind use memory that was allocated with the plan.
 const JUDGING: u64 = 0;
-/// Of the station, at most: a snapshot per event, the result. They are handed to whoever asks, and kept by them.
+/// Most allocations of the station: a snapshot per event, and the result. Their readers may keep them, so they cannot be reused.
 const PUBLISHING: u64 = 2 * 14;
 
 fn naming() -> Naming {
@@ -53,7 +53,7 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
     let (bytes, _) = archive::pack(&file, &taught.recipe.arrays).unwrap();
     let plan = Plan::new(Recipe::from_bytes(&bytes).unwrap(), &calibration, true).unwrap();
     head.load(plan.rasters(&calibration).unwrap()).unwrap();
-    // One thread, so that what it counts is all there is.
+    // One thread, because allocations are counted per thread.
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
@@ -97,7 +97,7 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
     assert!(publishing.count_total <= PUBLISHING, "{publishing:?}");
 }
 
-/// One of every kind, all of one region.
+/// One gauge of every kind, all in one region.
 fn gauges(region: &str) -> Vec<GaugeFile> {
     let smoothing_px = 5;
     let kinds = [
@@ -133,7 +133,7 @@ fn gauges(region: &str) -> Vec<GaugeFile> {
     kinds.map(gauge).into()
 }
 
-/// What the station takes for the measuring task's events of a cycle of twelve frames.
+/// The allocations of the station for the measuring task's events of a cycle with twelve frames.
 fn publishing() -> allocation_counter::AllocationInfo {
     let settings = Settings {
         next_seq: 1,
@@ -152,7 +152,7 @@ fn publishing() -> allocation_counter::AllocationInfo {
         Station::new(settings, Micros(0)),
         Instant::now(),
         move |effect| {
-            // Whoever does not look loses nothing.
+            // Effects that are not received may be lost.
             let _ = sink.send(effect);
             None
         },

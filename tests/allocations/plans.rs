@@ -1,4 +1,4 @@
-//! What a plan takes, and what making one takes for a while: counted, so that no other thread and no system blurs it.
+//! Memory that a plan keeps, and memory while it is made, by counting allocations, so that neither other threads nor the system affect the figures.
 
 use super::{TIMEOUT, naming};
 use allocation_counter::measure;
@@ -11,16 +11,16 @@ use sim::Scenario;
 const PIXELS: usize = 320 * 240;
 /// Samples of the phase function, in f64.
 const FUNCTION: usize = 512 * 384 * 8;
-/// A plan's bytes per pixel: Φ₀ and z₀ 8, its cubic 9, what is taught 2.
+/// A plan's bytes per pixel: Φ₀ and z₀ 8, the cubic 9, taught values 2.
 const PLAN: usize = 19;
-/// With two shorter sequences in front: each has what is taught for its noise, and a map of its own.
+/// With two shorter sequences first: each has taught values for its noise, and a map.
 const LONG_PLAN: usize = PLAN + 2 * (2 + 4);
-/// At most so many bytes per pixel while it is made: 29 of the recipe's file without the 4 of the curvature, 8 of the surface
-/// and, of each sequence, 2 and 4; another 4 while a map is made.
+/// Most bytes per pixel while a plan is made: the recipe's file 29 without the curvature's 4, the surface 8,
+/// each sequence 2 and 4, and another 4 while a map is made.
 const MAKING: usize = 25 + 8 + 3 * 2 + 2 * 4 + 4;
-/// And the phase function, once as it was read and once as it is used.
+/// Copies of the phase function: as it was read, and as it is used.
 const FUNCTIONS: usize = 2;
-/// Whatever does not grow with the frame: strips of rows, cells and spans of regions, the manifest.
+/// Memory that does not grow with the frame: strips of rows, cells and spans of regions, the manifest.
 const BESIDE: usize = 1 << 20;
 
 #[test]

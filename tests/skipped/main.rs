@@ -1,5 +1,5 @@
-//! The last program of `cargo test`: says how many tests were skipped because the shared recordings are not beside the
-//! project. It has no tests of its own; the suite marks which were skipped.
+//! The last program of `cargo test`: prints how many tests were skipped because the shared recordings are not beside the
+//! project. It has no tests of its own; the suite marks the tests that it skips.
 
 use std::fs;
 use tests::{files, shared};
@@ -7,7 +7,7 @@ use tests::{files, shared};
 fn main() {
     let marks = shared::marks();
     let skipped = files::names(&marks);
-    // Counted once: a later run with the recordings finds nothing here.
+    // Removed, so that a later run with the recordings finds no marks.
     let _ = fs::remove_dir_all(&marks);
     if !skipped.is_empty() {
         println!(

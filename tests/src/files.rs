@@ -1,4 +1,4 @@
-//! Reads what the program writes, with other people's code or by hand.
+//! Reading the files that the program writes, with libraries other than the program's own code.
 
 use std::path::Path;
 
@@ -37,7 +37,7 @@ pub struct Picture {
     pub height: usize,
     /// Samples per pixel.
     pub channels: usize,
-    /// Samples; those of 16 bits are joined.
+    /// Samples, row by row.
     pub samples: Vec<u16>,
 }
 
@@ -76,7 +76,7 @@ pub struct Vertex {
     pub sigma: f32,
 }
 
-/// Reads a cloud in the form that formats.md promises: binary little-endian PLY with float x, y, z,
+/// Reads a cloud in the form that docs/formats.md states: binary little-endian PLY with float x, y, z,
 /// uchar intensity, float sigma.
 pub fn cloud(path: &Path) -> Vec<Vertex> {
     const END: &[u8] = b"end_header\n";

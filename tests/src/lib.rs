@@ -1,14 +1,14 @@
-//! The harness of the integration suite: what judges the program and shares no code with it.
+//! The harness of the integration suite, which judges the program and shares no code with it.
 //!
-//! - [`oracle`]: the textbook in `f64`, from frames to heights.
-//! - [`rig`], [`render`]: small recordings of our own, with their truth.
+//! - [`oracle`]: the textbook implementation in `f64`, from frames to heights.
+//! - [`rig`], [`render`]: small rendered recordings with ground truth.
 //! - [`small_head`]: a simulated head that is quick to examine and to calibrate.
-//! - [`shared`]: the recordings that lie beside the project, where they are.
-//! - [`program`]: runs the binary and keeps what it says.
-//! - [`files`]: reads what it writes, [`score`]: compares it with the truth, [`plane`]: fits planes.
+//! - [`shared`]: the shared recordings beside the project, if they are there.
+//! - [`program`]: runs the binary and keeps its output.
+//! - [`files`]: reads its files; [`score`]: compares heights with the truth; [`plane`]: fits planes.
 //! - [`random`]: a seeded generator.
 //! - [`fuzz`]: functions of bytes that must not panic.
-//! - [`power`]: what a loss of power leaves of a folder.
+//! - [`power`]: a model of what a loss of power leaves of a folder.
 
 pub mod files;
 pub mod fuzz;

@@ -9,7 +9,7 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// By least squares in z; none for fewer than 3 points or points along a line.
+    /// The least-squares plane in z; none for fewer than 3 points or collinear points.
     pub fn fit(points: &[[f64; 3]]) -> Option<Self> {
         if points.len() < 3 {
             return None;

@@ -1,4 +1,4 @@
-//! Runs the program and keeps what it says.
+//! Running the program and keeping its output.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -10,14 +10,14 @@ pub struct Program {
     path: PathBuf,
 }
 
-/// What a run of it left behind.
+/// Exit code and output of a run.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// The exit code; −1 if a signal ended it.
     pub code: i32,
-    /// What it printed.
+    /// Its standard output.
     pub stdout: String,
-    /// What it complained about.
+    /// Its standard error.
     pub stderr: String,
 }
 
@@ -27,7 +27,7 @@ impl Program {
         Self { path: path.into() }
     }
 
-    /// Runs it with arguments to its end.
+    /// Runs it with arguments until it ends; fails if it panicked.
     pub fn run<A: AsRef<OsStr>>(&self, arguments: &[A]) -> Run {
         let output = Command::new(&self.path)
             .args(arguments)
@@ -42,7 +42,7 @@ impl Program {
         run
     }
 
-    /// `measure RECORDING --out OUT` and more.
+    /// Runs `measure RECORDING --out OUT`, followed by `more` arguments.
     pub fn measure(&self, recording: &Path, out: &Path, more: &[&str]) -> Run {
         let mut arguments = vec![
             OsStr::new("measure"),
@@ -56,7 +56,7 @@ impl Program {
 }
 
 impl Run {
-    /// Checks that all went well.
+    /// Checks that the exit code is 0.
     pub fn succeeded(self) -> Self {
         assert_eq!(self.code, 0, "{}", self.stderr);
         self

@@ -1,9 +1,9 @@
-//! Small recordings of our own: equation 1 sampled on an analytic surface, with seeded noise.
+//! Small rendered recordings: the pattern's equation (docs/measurement.md) sampled on an analytic surface, with seeded noise.
 //!
 //! Each pixel is one point sample on its central ray (no pixel integration, no blur, no shadows), so
-//! the truth is exact and the only errors are the noise's. Patches are spoilt on purpose: one is
-//! dark, one over full scale, one has no contrast in its finest level, and one fades through the
-//! modulation threshold.
+//! the truth is exact and the only errors are those of the noise. Some patches are spoilt on purpose: one is
+//! dark, one over full scale, one has no contrast in its finest level, and in one the modulation fades
+//! through the threshold.
 
 use crate::oracle::{Pattern, Rig};
 use crate::random::Random;
@@ -30,9 +30,9 @@ pub struct Scene {
     pub frames: Vec<(f64, f64)>,
     /// Half width of the uniform noise, as a share of full scale.
     pub noise: f64,
-    /// Whether the spoilt patches are there.
+    /// Whether to render the spoilt patches.
     pub patches: bool,
-    /// Of the noise.
+    /// Seed of the noise.
     pub seed: u64,
 }
 
@@ -129,29 +129,29 @@ impl Scene {
     }
 
     /// Offset and modulation of a pixel's light, as shares of full scale.
-    fn light(&self, (u, v): (f64, f64), finest: bool) -> Light {
-        // An even part lit a little more on one side; at 8 bit B is 82 to 113 counts.
+    fn light(&self, (u, v): (f64, f64), finest: bool) -> PixelLight {
+        // A uniform part, lit a little more on one side; at 8 bit B is 82 to 113 counts.
         let albedo = 0.32 + 0.12 * u / f64::from(self.size);
-        let even = Light {
+        let even = PixelLight {
             offset: 0.06 + albedo,
             modulation: albedo,
         };
         match self.spoilt((u, v)) {
             Patch::None => even,
-            Patch::Dark => Light {
+            Patch::Dark => PixelLight {
                 offset: 0.06,
                 modulation: 0.01,
             },
-            Patch::Bright => Light {
+            Patch::Bright => PixelLight {
                 offset: 0.62,
                 modulation: 0.45,
             },
-            Patch::Flat if finest => Light {
+            Patch::Flat if finest => PixelLight {
                 modulation: 0.02,
                 ..even
             },
             Patch::Flat => even,
-            Patch::Fading => Light {
+            Patch::Fading => PixelLight {
                 offset: 0.3,
                 modulation: 0.02 + 0.1 * v / f64::from(self.size),
             },
@@ -179,8 +179,8 @@ impl Scene {
     }
 }
 
-/// Shares of full scale.
-struct Light {
+/// Offset and modulation, as shares of full scale.
+struct PixelLight {
     offset: f64,
     modulation: f64,
 }
@@ -193,7 +193,7 @@ enum Patch {
     Fading,
 }
 
-/// A frame of given samples, the `place`-th.
+/// Frame number `place`, with these samples.
 fn frame(format: FrameFormat, samples: Vec<u16>, place: u64) -> Frame {
     let pixels = if format.bit_depth == 8 {
         Pixels::Eight(samples.iter().map(|sample| *sample as u8).collect())
@@ -204,7 +204,7 @@ fn frame(format: FrameFormat, samples: Vec<u16>, place: u64) -> Frame {
     Frame::new(format, Arc::new(pixels), timestamp, place).expect("a frame of its own format")
 }
 
-/// The part: a plane tilted both ways and, on it, a bump of one cosine arch. Steepest slope 0.35, so
+/// The part: a plane tilted about both axes, with a bump in the form of one cosine arch. Its steepest slope is 0.35, so
 /// that camera and projector see all of it.
 pub fn surface(x: f64, y: f64) -> f64 {
     let (top, radius) = BUMP;
@@ -217,7 +217,7 @@ pub fn surface(x: f64, y: f64) -> f64 {
     0.03 * x - 0.02 * y + bump - 1.0
 }
 
-/// Where the ray of a pixel meets the part: bisection, the ray being steeper than the part.
+/// The height at which the ray of a pixel meets the part, by bisection; the ray is steeper than the part.
 fn height_on_ray(geometry: &Rig, (u, v): (f64, f64)) -> f64 {
     let above = |z: f64| {
         let [x, y, z] = geometry.camera.point_at(u, v, z);
@@ -235,10 +235,10 @@ fn height_on_ray(geometry: &Rig, (u, v): (f64, f64)) -> f64 {
     (low + high) / 2.0
 }
 
-/// Frames of several levels of `steps` shifts k/N, in the order of the ratios.
-pub fn levels(ratios: &[f64], steps: usize) -> Vec<(f64, f64)> {
+/// Ratio and shift of the frames of several levels with `shifts` shifts k/N each, in the order of the ratios.
+pub fn levels(ratios: &[f64], shifts: usize) -> Vec<(f64, f64)> {
     ratios
         .iter()
-        .flat_map(|&ratio| (0..steps).map(move |k| (ratio, k as f64 / steps as f64)))
+        .flat_map(|&ratio| (0..shifts).map(move |k| (ratio, k as f64 / shifts as f64)))
         .collect()
 }

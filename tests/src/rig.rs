@@ -1,4 +1,4 @@
-//! The rig of the study (docs/measurement.md, *The study's head and parts*) at any size.
+//! The rig of the study (docs/measurement.md, *The study's head and parts*) with any number of pixels.
 
 use hal::model::DeviceModel;
 
@@ -12,7 +12,7 @@ pub fn camera(size: u32) -> DeviceModel {
     )
 }
 
-/// The projector: −7°, 43.6° × 33.4°.
+/// The projector: −7° from +z towards +x, 600 mm from the origin, 43.6° × 33.4°.
 pub fn projector(columns: u32, rows: u32) -> DeviceModel {
     looking_at_origin(
         (columns, rows),

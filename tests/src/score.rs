@@ -1,4 +1,4 @@
-//! Measured heights against the truth, after docs/measurement.md, *Which pixels count*.
+//! Comparing measured heights with the truth (docs/measurement.md, *Which pixels count*).
 
 /// |e| above this is a gross error, mm.
 const GROSS_MM: f64 = 1.0;
@@ -6,7 +6,7 @@ const GROSS_MM: f64 = 1.0;
 /// Errors of heights, e = z − truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Score {
-    /// Scored pixels.
+    /// Number of pixels that were compared.
     pub scored: usize,
     /// RMS without gross errors, mm.
     pub rms_mm: f64,
@@ -14,9 +14,9 @@ pub struct Score {
     pub bias_mm: f64,
     /// Median of |e|, mm.
     pub median_mm: f64,
-    /// 99 % of |e|, mm.
+    /// 99 % quantile of |e|, mm.
     pub p99_mm: f64,
-    /// Gross errors.
+    /// Number of gross errors.
     pub gross: usize,
 }
 

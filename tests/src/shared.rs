@@ -1,15 +1,15 @@
-//! The recordings that lie beside the project, and which tests were skipped because they do not.
+//! The shared recordings beside the project, and the marks of tests that were skipped for want of them.
 
 use hal::replay::Recording;
 use std::path::PathBuf;
 use std::{env, fs, thread};
 
-/// Where the recordings lie.
+/// The folder of the shared recordings.
 pub fn recordings() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/recordings")
 }
 
-/// The folder of a shared recording; none where it is absent: the test that asks counts as skipped.
+/// The folder of a shared recording. If it is absent, returns none and marks the calling test as skipped.
 pub fn folder(name: &str) -> Option<PathBuf> {
     let folder = recordings().join(name);
     if folder.join("recording.json").is_file() {
@@ -22,14 +22,14 @@ pub fn folder(name: &str) -> Option<PathBuf> {
     None
 }
 
-/// A shared recording, opened; none where it is absent, as with [`folder`].
+/// A shared recording, opened; none if it is absent, as with [`folder`].
 pub fn recording(name: &str) -> Option<(PathBuf, Recording)> {
     let folder = folder(name)?;
     let recording = Recording::open(&folder).expect("a shared recording is valid");
     Some((folder, recording))
 }
 
-/// The folder with one empty file per skipped test: beside the programs that hold the tests, in the target folder.
+/// The folder with one empty file per skipped test, in the target folder beside the test programs.
 pub fn marks() -> PathBuf {
     let program = env::current_exe().expect("a program knows its file");
     program.with_file_name("skipped")

@@ -1,6 +1,6 @@
-//! A small simulated head: its camera sees the projector's pixels one by one, as the default one does, on a small part of its picture.
+//! A small simulated head: its camera has fewer pixels and a smaller field of view than the default one, with the same resolution on the part.
 
-/// Its scenario, to which tests add timing, light and faults.
+/// Its scenario, to which tests add timing, lighting and faults.
 pub const SMALL_HEAD: &str = "sub_rays = 2
 part = { kind = \"plane\" }
 [rig.camera]

@@ -1,4 +1,4 @@
-//! Targets of files that hold pixels: arrays, frames, recordings.
+//! Targets for files with pixels: arrays, frames, recordings.
 
 use super::bounded;
 use crate::render::{Scene, levels};
@@ -10,7 +10,7 @@ use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// NumPy arrays of each kind that is read; what was read can be written and read again.
+/// NumPy arrays of each kind that is read; an array that was read can be written and read again.
 pub fn npy(data: &[u8]) {
     bounded(16 * data.len() + (1 << 16), || {
         if let Ok(array) = npy::read::<u8>(data) {
@@ -36,7 +36,7 @@ pub fn npy(data: &[u8]) {
     });
 }
 
-/// A recording of few pixels with every optional part, in a folder of its own.
+/// A recording with few pixels and every optional part, in a temporary folder.
 struct Kept {
     folder: TempDir,
 }
@@ -88,7 +88,7 @@ thread_local! {
     static TWELVE: Kept = Kept::new(12);
 }
 
-/// A frame of a recording: the first byte says of how many bits the recording is.
+/// A frame of a recording: the first byte selects the recording's bit depth.
 pub fn png_frame(data: &[u8]) {
     let Some((depth, picture)) = data.split_first() else {
         return;
@@ -97,7 +97,7 @@ pub fn png_frame(data: &[u8]) {
     kept.with(|kept| kept.opened("frames/000.png", picture, drop));
 }
 
-/// A recording, measured: the first byte says which of its files is replaced.
+/// A recording, opened and measured: the first byte selects which of its files is replaced.
 pub fn recording(data: &[u8]) {
     const FILES: [&str; 5] = [
         "recording.json",

@@ -1,4 +1,4 @@
-//! Targets of what describes a station: calibration, models of OpenCV, scenario, configuration.
+//! Targets for the files that describe a station: calibration, OpenCV models, scenario, configuration.
 
 use super::bounded;
 use appliance::config::Config;
@@ -10,12 +10,12 @@ use sim::Scenario;
 use std::fs;
 use tempfile::TempDir;
 
-/// Memory that reading a text of this length may take.
+/// Most memory for reading a text of this length.
 fn of_text(data: &[u8]) -> usize {
     1024 * data.len() + (64 << 20)
 }
 
-/// A calibration: read as it is, and with the checksum that anybody can compute.
+/// A calibration, read as it is, and with a correct checksum, which anyone can compute.
 pub fn calibration(data: &[u8]) {
     bounded(of_text(data), || {
         if let Ok(file) = CalibrationFile::read(data) {
@@ -34,7 +34,7 @@ thread_local! {
     static MODELS: TempDir = tempfile::tempdir().expect("a folder");
 }
 
-/// Models of OpenCV: the first byte says unit and axis. Every number that comes through is finite.
+/// OpenCV models: the first byte selects unit and axis. Every number of an accepted model is finite.
 pub fn opencv(data: &[u8]) {
     let Some((declared, text)) = data.split_first() else {
         return;
@@ -66,7 +66,7 @@ fn finite(model: &DeviceModel) {
     assert!(all.all(f64::is_finite), "{model:?}");
 }
 
-/// A scenario of a simulated head: what is taken has a calibration that can be used.
+/// A scenario of a simulated head: an accepted one has a calibration.
 pub fn scenario(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else {
         return;
@@ -79,7 +79,7 @@ pub fn scenario(data: &[u8]) {
     });
 }
 
-/// A configuration: what is taken can be written.
+/// A configuration: an accepted one can be written.
 pub fn config(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else {
         return;

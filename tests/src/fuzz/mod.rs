@@ -1,6 +1,6 @@
-//! Fuzz targets: what a file, a PLC or a browser may send, as functions of bytes. None may panic, whatever the bytes are.
+//! Fuzz targets: the parsers of files, Modbus and HTTP, as functions of bytes. None may panic, whatever the bytes are.
 //!
-//! `tests/fuzz` calls them under libFuzzer; the suite calls them with the inputs that lie there.
+//! `tests/fuzz` calls them under libFuzzer; the suite calls them with the inputs stored there.
 
 mod folder;
 mod head;
@@ -9,10 +9,10 @@ mod part;
 mod plant;
 mod recipe;
 
-/// A target: fails by a panic.
+/// A target; it panics if a promise is not kept.
 pub type Target = fn(&[u8]);
 
-/// All targets with their names, which are those of the folders of their inputs.
+/// All targets with their names, which are also the names of the folders of their inputs.
 pub const TARGETS: [(&str, Target); 12] = [
     ("npy", folder::npy),
     ("png_frame", folder::png_frame),
@@ -28,13 +28,13 @@ pub const TARGETS: [(&str, Target); 12] = [
     ("http", page::http),
 ];
 
-/// The target of a name; none where there is no such target.
+/// The target of this name, if there is one.
 pub fn target(name: &str) -> Option<Target> {
     let found = TARGETS.iter().find(|(other, _)| *other == name);
     found.map(|(_, target)| *target)
 }
 
-/// Runs `work` and fails if this thread held more than `most` bytes at a time for it: a small file must not take much memory.
+/// Runs `work` and panics if this thread held more than `most` bytes at a time: a small file must not take much memory.
 fn bounded<T>(most: usize, work: impl FnOnce() -> T) -> T {
     let mut answer = None;
     let counted = allocation_counter::measure(|| answer = Some(work()));

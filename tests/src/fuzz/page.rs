@@ -1,4 +1,4 @@
-//! The target of what a browser sends: bytes of one connection to the page's server.
+//! The target for HTTP: the bytes of one connection to the page's server.
 
 use super::part::PART;
 use super::plant::{runtime, settings};
@@ -22,13 +22,14 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::runtime::Runtime;
 use tokio::time::timeout;
 
-/// Where sessions are opened from: not the address of the inputs, whose wrong guesses of the secret make it wait.
+/// The address from which sessions are opened: another one than that of the inputs, which may be blocked after wrong guesses of the
+/// secret.
 const ELSEWHERE: IpAddr = IpAddr::V4(Ipv4Addr::new(127, 0, 0, 2));
-/// Stands in an input for the token of a session.
+/// Placeholder in an input for the token of a session.
 const TOKEN: &[u8] = b"@T@";
-/// Longest wait for a server that neither answers nor closes.
+/// Longest wait for the server to answer or close.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// How long events are followed.
+/// How long a stream of events is read.
 const FOLLOWED: Duration = Duration::from_millis(20);
 
 /// A station that has measured nothing yet, and its page.
@@ -88,16 +89,16 @@ impl Page {
         }
     }
 
-    /// Exactly the taught recipe is stored.
+    /// Restores the store, so that it holds exactly the taught recipe.
     fn put_back(&self) {
         for entry in fs::read_dir(&self.recipes).into_iter().flatten().flatten() {
-            // A reader that has it open keeps its content.
+            // A reader that has the file open can still read it.
             let _ = fs::remove_file(entry.path());
         }
         fs::write(self.recipes.join("0001.recipe"), &PART.bytes).expect("put back");
     }
 
-    /// The bytes with the token of an open session in them.
+    /// The bytes, with each placeholder replaced by the token of an open session.
     fn signed(&self, data: &[u8]) -> Vec<u8> {
         if !data.windows(TOKEN.len()).any(|window| window == TOKEN) {
             return data.to_vec();
@@ -110,7 +111,7 @@ impl Page {
         }
         let mut bytes = Vec::new();
         let mut rest = data;
-        // From the front: of two marks that overlap the first one counts.
+        // From the front: of two placeholders that overlap, the first one is replaced.
         while let Some((&first, behind)) = rest.split_first() {
             match rest.strip_prefix(TOKEN) {
                 Some(behind) => {
@@ -143,8 +144,8 @@ impl Page {
     }
 }
 
-/// The way to the last cycle, where a thread answers for the measuring task that there was none: without it each picture that is
-/// asked for would wait for seconds.
+/// The maps of the last cycle, with a thread that answers in place of the measuring task that there was no cycle: without it each
+/// request for a picture would wait for seconds.
 fn maps_of_no_cycle() -> LastMaps {
     let maps = LastMaps::default();
     let asked = maps.clone();
@@ -159,7 +160,7 @@ fn maps_of_no_cycle() -> LastMaps {
     maps
 }
 
-/// Bytes of one browser; `@T@` stands for the token of a session. The page answers or closes, and none of its workers panics.
+/// The bytes of one connection; `@T@` stands for the token of a session. The page answers or closes, and none of its workers panics.
 pub fn http(data: &[u8]) {
     PAGE.with(|page| {
         page.put_back();

@@ -1,4 +1,4 @@
-//! A head of few pixels with a part that was taught on it: what the targets of recipes start from.
+//! A head with few pixels, and a part that was taught on it, for the targets of recipes.
 
 use appliance::head::calibration::Calibration;
 use appliance::recipe::plan::Plan;
@@ -26,7 +26,7 @@ fov_deg = [8.0, 6.0]
 
 /// The part as taught.
 pub struct Part {
-    /// What is known of the head.
+    /// The calibration of the head.
     pub calibration: Calibration,
     /// The recipe, number 1.
     pub recipe: Recipe,
@@ -36,7 +36,7 @@ pub struct Part {
     frames: Vec<Frame>,
 }
 
-/// Taught once.
+/// The part, taught once.
 pub static PART: LazyLock<Part> = LazyLock::new(Part::taught);
 
 impl Part {
@@ -70,7 +70,7 @@ impl Part {
         }
     }
 
-    /// Judges the part by another recipe: with each of its sequences, as far as there are frames for them.
+    /// Judges the part by another recipe, with each of its sequences for which there are enough frames.
     pub fn judge(&self, plan: &Plan) {
         for step in 0..plan.steps() {
             if let Some(frames) = self.frames.get(..plan.indices(step).len()) {

@@ -1,4 +1,4 @@
-//! The target of what a PLC sends: bytes of one connection to the Modbus server, with a worker that carries out every order.
+//! The target for Modbus: the bytes of one connection to the server, with a worker that carries out every effect.
 
 use appliance::config::WordOrder;
 use appliance::modbus::{Clients, Options, Refusals, serve};
@@ -16,12 +16,12 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::runtime::{self, Runtime};
 use tokio::time::timeout;
 
-/// Longest wait for a server that neither answers nor closes.
+/// Longest wait for the server to answer or close.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// A frame that is not whole by then is given up.
+/// After this time the server gives up an incomplete Modbus frame.
 const FRAME: Duration = Duration::from_millis(200);
 
-/// A station, for a server to stand in front of.
+/// Settings of the station behind a server.
 pub fn settings() -> Settings {
     let identity = Identity {
         vendor: "fringed".into(),
@@ -38,13 +38,13 @@ pub fn settings() -> Settings {
     }
 }
 
-/// A runtime of one thread.
+/// A runtime with one thread.
 pub fn runtime() -> Runtime {
     let mut builder = runtime::Builder::new_current_thread();
     builder.enable_all().build().expect("a runtime")
 }
 
-/// A station behind two servers: one lenient, one that swaps words and wants its unit id.
+/// A station behind two servers: a lenient one, and one that swaps words and requires its unit id.
 struct Plant {
     runtime: Runtime,
     addresses: [SocketAddr; 2],
@@ -66,7 +66,7 @@ impl Plant {
                 Effect::PersistSeq(seq) => Some(Event::Stored { seq, failed: None }),
                 _ => None,
             };
-            // The plant's last order may come when nobody works any more.
+            // The last effect may come after the receiver was dropped.
             let _ = sink.send(effect);
             stored
         });
@@ -104,7 +104,7 @@ impl Plant {
         plant
     }
 
-    /// Carries out all orders; answers how many parts were measured.
+    /// Carries out all effects; returns how many parts were measured.
     fn work(&self) -> u32 {
         let mut measured = 0;
         while let Ok(order) = self.orders.try_recv() {
@@ -160,7 +160,7 @@ fn recipe(number: u16, part_number: Arc<str>) -> ActiveRecipe {
     }
 }
 
-/// Bytes of one PLC. The first byte chooses the server and where the bytes are cut in two.
+/// The bytes of one PLC. The first byte selects the server, and where the bytes are cut in two.
 ///
 /// The server closes, answers in whole frames, and as many parts are measured as triggers were counted.
 pub fn modbus(data: &[u8]) {
@@ -173,7 +173,7 @@ pub fn modbus(data: &[u8]) {
         let before = plant.handle.snapshot().triggers;
         let answer = plant.runtime.block_on(plant.exchange(address, pieces));
         let mut measured = plant.work();
-        // An order may follow from the answer to another.
+        // An effect may follow from an event of the first round.
         measured += plant.work();
         let counted = plant.handle.snapshot().triggers.wrapping_sub(before);
         assert_eq!(counted, measured, "as many measurements as triggers");
@@ -181,7 +181,7 @@ pub fn modbus(data: &[u8]) {
     });
 }
 
-/// Fails unless an answer is made of whole frames of Modbus TCP.
+/// Panics unless an answer consists of whole Modbus TCP frames.
 fn whole(mut answer: &[u8]) {
     while !answer.is_empty() {
         let length = match answer {

@@ -1,4 +1,4 @@
-//! Targets of recipes: what somebody imports, and what the page changes.
+//! Targets for recipes: imported files, and changes from the page.
 
 use super::bounded;
 use super::part::PART;
@@ -9,7 +9,7 @@ use std::fs;
 use std::io::Cursor;
 use tempfile::TempDir;
 
-/// A recipe file of any bytes: what is taken can be packed and read again.
+/// A recipe file: an accepted one can be packed and read again.
 pub fn zip(data: &[u8]) {
     bounded(16 * data.len() + (16 << 20), || {
         let _ = archive::manifest(Cursor::new(data));
@@ -23,13 +23,13 @@ pub fn zip(data: &[u8]) {
     });
 }
 
-/// A manifest of any content around the arrays of a taught part: checked, packed, planned, and the part judged by it.
+/// A manifest, with the arrays of a taught part: it is checked, packed and planned, and the part judged by it.
 pub fn json(data: &[u8]) {
     let part = &*PART;
     let Ok(mut file) = serde_json::from_slice::<RecipeFile>(data) else {
         return;
     };
-    // Anybody can fill these in.
+    // Anyone can fill these in correctly.
     file.format.clone_from(&part.recipe.file.format);
     file.version = part.recipe.file.version;
     file.fingerprint.clone_from(&part.recipe.file.fingerprint);
@@ -59,7 +59,7 @@ thread_local! {
     };
 }
 
-/// A change from the page: what is taken can be loaded, planned, and the part judged by it.
+/// A change from the page: after an accepted one the recipe can be loaded and planned, and the part judged by it.
 pub fn edit(data: &[u8]) {
     let part = &*PART;
     let Ok(mut wanted) = serde_json::from_slice::<Edit>(data) else {
@@ -67,7 +67,7 @@ pub fn edit(data: &[u8]) {
     };
     wanted.fingerprint.clone_from(&part.recipe.file.fingerprint);
     STORED.with(|stored| {
-        // Written past the store: a sync for each input would be most of the time.
+        // Written directly and not through the store, which would spend most of the time in syncs.
         fs::write(stored.folder.path().join("0001.recipe"), &part.bytes).expect("put back");
         let fits = |recipe| {
             let tried = Plan::try_out(recipe, &part.calibration);

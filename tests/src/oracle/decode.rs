@@ -1,4 +1,4 @@
-//! Frames → absolute phase and mask of a whole recording.
+//! Decoding a whole recording: frames → absolute phase and mask.
 
 use super::demodulate::demodulate;
 use super::unwrap::{Form, recognise};
@@ -14,7 +14,7 @@ pub struct Level {
     pub ratio: f64,
     /// The shift of each frame, turns.
     pub shifts: Vec<f64>,
-    /// The place of each frame in the recording.
+    /// The index of each frame in the recording.
     pub frames: Vec<usize>,
 }
 
@@ -25,11 +25,11 @@ pub struct PhaseTwin {
     pub form: Form,
     /// Φ in turns, NaN where rejected.
     pub phase: Vec<f64>,
-    /// Σ N r² · B² behind the phase, B of the finest level, counts².
+    /// Σ N r² · B², B of the finest level, counts²: the weight of the levels that the phase was computed from.
     pub information: Vec<f64>,
-    /// Resolved or why not; heights have not been looked at yet.
+    /// Resolved or why not, before heights are computed.
     pub reason: Vec<Reason>,
-    /// Whether a level's modulation is exactly the least that is trusted, to rounding.
+    /// Whether a level's modulation is exactly at the threshold, to rounding.
     pub tie: Vec<bool>,
 }
 
@@ -60,11 +60,11 @@ pub fn levels_from(frames: impl Iterator<Item = (usize, f64, f64)>) -> Vec<Level
     levels
 }
 
-/// Decodes pattern `at` of a recording; dense and single levels are unwrapped about the reference map
+/// Decodes pattern `at` of a recording; dense and single levels are unwrapped about the reference phase map
 /// of the recording's models.
 ///
 /// # Panics
-/// If the recording's levels are of no form or need a map that its models do not give.
+/// If the recording's levels have no known form, or need a map and the recording has no models.
 pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
     let pattern = Pattern::of(recording, at);
     let levels = levels_of(recording, at);
@@ -99,27 +99,27 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
     }
 }
 
-/// σ of one sample in counts: the recording's, else from what N ≥ 4 shifts leave over after offset,
-/// modulation and phase are fitted (N − 3 degrees of freedom), over all pixels that `reason` resolves.
+/// σ of one sample in counts: the recording's, else estimated from the residuals of N ≥ 4 shifts after fitting offset,
+/// modulation and phase (N − 3 degrees of freedom), over all pixels that are resolved by `reason`.
 pub fn sample_noise(recording: &Recording, at: usize, reason: &[Reason]) -> Option<f64> {
     if recording.noise_counts.is_some() {
         return recording.noise_counts;
     }
     let (mut squares, mut freedom) = (0.0, 0.0);
     for level in levels_of(recording, at) {
-        let steps = level.shifts.len() as f64;
-        if steps < 4.0 {
+        let shifts = level.shifts.len() as f64;
+        if shifts < 4.0 {
             continue;
         }
         for pixel in (0..reason.len()).filter(|&pixel| reason[pixel] == Reason::Resolved) {
             let samples = samples(recording, &level, pixel);
-            let offset = samples.iter().sum::<f64>() / steps;
+            let offset = samples.iter().sum::<f64>() / shifts;
             let fit = demodulate(&samples, &level.shifts);
             for (sample, shift) in samples.iter().zip(&level.shifts) {
                 let sine = (std::f64::consts::TAU * (fit.turns + shift)).sin();
                 squares += (sample - offset - fit.modulation * sine).powi(2);
             }
-            freedom += steps - 3.0;
+            freedom += shifts - 3.0;
         }
     }
     (freedom > 0.0).then(|| (squares / freedom).sqrt())

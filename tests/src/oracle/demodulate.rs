@@ -1,11 +1,11 @@
-//! N-step demodulation, straight from the equations.
+//! Demodulation by N shifts, directly from the equations.
 //!
 //! I_k = A + B sin 2π(φ + s_k); S = Σ I_k cos 2πs_k, C = Σ I_k sin 2πs_k, φ = atan2(S, C) / 2π,
 //! B = (2/N) √(S² + C²), for N shifts that divide the turn evenly.
 
 use std::f64::consts::TAU;
 
-/// What one level says about one pixel.
+/// The demodulated samples of one level at one pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Demodulated {
     /// φ in turns, −½ … ½.
@@ -44,9 +44,9 @@ mod tests {
 
     #[test]
     fn a_sine_gives_back_its_phase_and_modulation() {
-        for steps in 3..12 {
-            let shifts: Vec<f64> = (0..steps)
-                .map(|k| 0.3 - f64::from(k) / f64::from(steps))
+        for count in 3..12 {
+            let shifts: Vec<f64> = (0..count)
+                .map(|k| 0.3 - f64::from(k) / f64::from(count))
                 .collect();
             let samples: Vec<f64> = shifts
                 .iter()

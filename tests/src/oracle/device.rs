@@ -1,18 +1,18 @@
-//! Pinhole and Brown distortion in OpenCV's convention (recording format 1).
+//! Pinhole camera with Brown distortion in OpenCV's convention (recording format 1).
 
 use hal::model::DeviceModel;
 
 /// A point or direction: x, y, z.
 pub type Point = [f64; 3];
 
-/// A camera, or a projector run backwards.
+/// A camera or a projector; a projector has the model of a camera.
 #[derive(Clone, Debug)]
 pub struct Device {
     model: DeviceModel,
 }
 
 impl Device {
-    /// The device of a model that has been found to be one.
+    /// The device of a valid model.
     pub fn new(model: &DeviceModel) -> Self {
         Self {
             model: model.clone(),
@@ -36,7 +36,7 @@ impl Device {
         [0, 1, 2].map(|i| r[i] * d[0] + r[3 + i] * d[1] + r[6 + i] * d[2])
     }
 
-    /// World point → pixel (u, v).
+    /// The pixel (u, v) of a world point.
     pub fn project(&self, point: Point) -> (f64, f64) {
         let (r, t) = (&self.model.rotation, &self.model.translation_mm);
         let [x, y, z] = [0, 1, 2].map(|i| {
@@ -49,11 +49,11 @@ impl Device {
         )
     }
 
-    /// Pixel (u, v) → direction in the world.
+    /// The direction in the world of pixel (u, v).
     pub fn ray(&self, u: f64, v: f64) -> Point {
         let xd = (u - self.model.cx) / self.model.fx;
         let yd = (v - self.model.cy) / self.model.fy;
-        // x = x_d − (what the distortion adds at x), again and again until nothing moves.
+        // Fixed-point iteration: x = x_d − (the distortion at x), until x does not change any more.
         let (mut x, mut y) = (xd, yd);
         for _ in 0..1000 {
             let (bent_x, bent_y) = self.distort(x, y);

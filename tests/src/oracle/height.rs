@@ -1,4 +1,4 @@
-//! Triangulation: the height whose point on the pixel's ray is lit with the measured phase.
+//! Triangulation: the height of the point on a pixel's ray that is lit with the measured phase.
 
 use super::Pattern;
 use super::device::{Device, on_ray};
@@ -18,13 +18,13 @@ pub struct Rig {
 /// Pieces of the working range in which a sampled phase function is searched for a change of sign; a
 /// change in more than one of them leaves the pixel unresolved. Part of the definition.
 const PIECES: usize = 16;
-/// Halvings of the bracket: 500 mm · 2⁻⁶⁰ is below any rounding.
+/// Halvings of the bracket: 500 mm · 2⁻⁶⁰ is less than any rounding error.
 const HALVINGS: usize = 60;
-/// A phase that changes by less than this over ± 0.2 × the camera's height tells no height: one level of
+/// If the phase changes by less than this over ± 0.2 × the camera's height, it does not determine a height: one level of
 /// 4 frames has 7.4e-3 turn of noise. Part of the definition.
 const LEAST_TURNS: f64 = 0.01;
-/// Half the step of the slope ∂Φ/∂z, mm.
-const SLOPE_STEP: f64 = 0.005;
+/// Half the distance over which the slope ∂Φ/∂z is computed, mm.
+const SLOPE_MM: f64 = 0.005;
 
 impl Rig {
     /// The rig of a recording that has both models.
@@ -46,19 +46,19 @@ impl Rig {
         })
     }
 
-    /// Φ that pixel (u, v) would see at height z.
+    /// The phase Φ that pixel (u, v) would see at height z.
     pub fn phase_at(&self, pattern: &Pattern, u: f64, v: f64, z: f64) -> f64 {
         let (xi, eta) = self.projector.project(self.camera.point_at(u, v, z));
         pattern.at(xi, eta)
     }
 
-    /// Φ_R, the reference phase of a pixel: what it sees on the plane z = 0.
+    /// Φ_R, the phase that a pixel sees on the reference plane z = 0.
     pub fn reference(&self, pattern: &Pattern, u: f64, v: f64) -> f64 {
         self.phase_at(pattern, u, v, 0.0)
     }
 
-    /// The height in the working range at which pixel (u, v) sees `phase`, by bisection; none where
-    /// there is no such height, the search finds several, or the phase hardly depends on it. With it the slope ∂Φ/∂z in turns per mm.
+    /// The height in the working range at which pixel (u, v) sees `phase`, by bisection, and the slope ∂Φ/∂z there in turns per mm;
+    /// none if there is no such height, there are several, or the phase hardly depends on the height.
     pub fn height(&self, pattern: &Pattern, u: f64, v: f64, phase: f64) -> Option<(f64, f64)> {
         let (eye, ray) = (self.camera.centre(), self.camera.ray(u, v));
         let off = |z: f64| {
@@ -88,9 +88,9 @@ impl Rig {
             }
         }
         let z = (a + b) / 2.0;
-        let slope = (off(z + SLOPE_STEP) - off(z - SLOPE_STEP)) / (2.0 * SLOPE_STEP);
-        let told = slope.abs() * 0.4 * eye[2];
-        (told >= LEAST_TURNS).then_some((z, slope))
+        let slope = (off(z + SLOPE_MM) - off(z - SLOPE_MM)) / (2.0 * SLOPE_MM);
+        let change = slope.abs() * 0.4 * eye[2];
+        (change >= LEAST_TURNS).then_some((z, slope))
     }
 }
 

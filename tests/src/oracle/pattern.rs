@@ -30,12 +30,12 @@ impl Pattern {
         }
     }
 
-    /// Whether it is given by samples.
+    /// Whether the phase function is given by samples.
     pub fn is_sampled(&self) -> bool {
         matches!(self.spec, PatternSpec::File { .. })
     }
 
-    /// Φ_P in turns anywhere.
+    /// Φ_P in turns at any point.
     pub fn at(&self, xi: f64, eta: f64) -> f64 {
         match &self.spec {
             PatternSpec::Vertical { fringes } => fringes * xi / self.columns,

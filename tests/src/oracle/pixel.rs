@@ -1,36 +1,36 @@
-//! One pixel: its samples → its absolute phase, or the reason why it has none.
+//! Decoding one pixel: its samples → its absolute phase, or the reason why it has none.
 
 use super::demodulate::{Demodulated, demodulate};
 use super::unwrap::{Doubt, Form, Wrapped, unwrap_with_doubt};
 use super::{Level, Reason};
 
-/// What the textbook says about a pixel.
+/// A pixel as the textbook decodes it.
 #[derive(Clone, Debug)]
 pub struct PixelTwin {
     /// Φ in turns, NaN where rejected.
     pub phase: f64,
-    /// Σ N r² · B² behind the phase, B of the finest level, counts².
+    /// Σ N r² · B², B of the finest level, counts²: the weight of the levels that the phase was computed from.
     pub information: f64,
-    /// Resolved or why not; heights have not been looked at.
+    /// Resolved or why not, before heights are computed.
     pub reason: Reason,
     /// The levels, from coarse to fine.
     pub levels: Vec<Demodulated>,
-    /// How near the unwrapping came to another answer; none where it was not reached.
+    /// How close the unwrapping was to another result; none if the pixel was rejected before.
     pub doubt: Option<Doubt>,
 }
 
-/// Sums of sines of 16-bit counts are exact to about 1e-11 of a count: a modulation of exactly 16 is not
-/// below 16.
+/// Tolerance at the modulation threshold, counts. Sums of sines of 16-bit counts are exact to about 1e-11 counts, so with it a
+/// modulation of exactly 16 is not below 16.
 const TIE: f64 = 1e-9;
 
-/// The least modulation that is trusted, in counts: 16 of 255.
+/// The modulation threshold in counts: 16 of 255.
 pub fn least_modulation(full_scale: f64) -> f64 {
     16.0 * full_scale / 255.0
 }
 
 impl PixelTwin {
-    /// Judges a pixel: `samples[i]` are those of `levels[i]`, levels from coarse to fine; `map` gives Φ₀ for
-    /// the forms that need one, NaN where it is not known.
+    /// Decodes a pixel: `samples[i]` are those of `levels[i]`, levels from coarse to fine; `map` gives Φ₀ for
+    /// the forms that need one, NaN where it is unknown.
     pub fn of(
         form: Form,
         levels: &[Level],
@@ -81,20 +81,20 @@ impl PixelTwin {
         twin
     }
 
-    /// Whether a level's modulation is the least that is trusted, to within `counts`.
+    /// Whether a level's modulation is within `counts` of the threshold.
     pub fn on_the_threshold(&self, full_scale: f64, counts: f64) -> bool {
         let least = least_modulation(full_scale);
         let near = |seen: &Demodulated| (seen.modulation - least).abs() < counts;
         self.levels.iter().any(near)
     }
 
-    /// Whether a level's modulation is exactly the least that is trusted, to rounding.
+    /// Whether a level's modulation is exactly at the threshold, to rounding.
     pub fn is_tie(&self, full_scale: f64) -> bool {
         self.on_the_threshold(full_scale, TIE)
     }
 }
 
-/// The first reason in the samples not to trust a pixel; `levels` go from coarse to fine.
+/// The first reason in the samples for which a pixel is rejected; `levels` go from coarse to fine.
 fn distrust(levels: &[Level], seen: &[Demodulated], full_scale: f64) -> Option<Reason> {
     let least = least_modulation(full_scale);
     let weak = |seen: &Demodulated| seen.modulation < least - TIE;

@@ -1,26 +1,26 @@
 //! Why a pixel has no height.
 
-/// Resolved, or the first reason why not, in the order in which they are looked for.
+/// Resolved, or the first reason why not, in the order in which they are checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Reason {
     /// Phase and height are valid.
     Resolved,
-    /// The map that the levels are unwrapped about knows nothing here.
+    /// The map about which the levels are unwrapped has no phase here.
     Unexpected,
     /// The coarsest level's modulation is below 16 counts of 255.
     Dark,
-    /// Another level's modulation is.
+    /// The modulation of another level is below 16 counts of 255.
     LowModulation,
     /// A sample is at full scale in a level of fewer than 8 shifts.
     Saturated,
-    /// A rounding step of the unwrapping left more than 0.40 turn over.
+    /// A residual of the unwrapping is above 0.40 turn.
     Residual,
     /// No height in the working range has this phase, or several have.
     OutOfRange,
 }
 
 impl Reason {
-    /// The word that reports use.
+    /// Its name in reports.
     pub fn word(self) -> &'static str {
         match self {
             Self::Resolved => "resolved",

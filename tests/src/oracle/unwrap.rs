@@ -3,7 +3,7 @@
 /// How the ratios of a sequence combine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Form {
-    /// From coarse to fine, absolute by itself.
+    /// From coarse to fine; the coarsest level is absolute.
     Geometric {
         /// Lowest phase of the coarsest level, turns of that level.
         lowest: f64,
@@ -22,15 +22,15 @@ pub enum Form {
     Single,
 }
 
-/// Largest residual of a rounding step, turns.
+/// Largest residual, turns.
 const MAX_RESIDUAL: f64 = 0.40;
 
 /// Recognises the form of `ratios`, from coarse to fine, for a pattern with this range of phases.
-/// `None` for ratios of no form.
+/// `None` for ratios of no known form.
 pub fn recognise(ratios: &[f64], (min, max): (f64, f64)) -> Option<Form> {
     let span = ratios[0] * (max - min);
     if span <= 1.001 {
-        // The coarsest level keeps what it leaves free of its turn as a margin for noise.
+        // The part of the turn that the coarsest level does not use is a margin for noise.
         let margin = ((1.0 - span) / 2.0).max(0.0);
         return Some(Form::Geometric {
             lowest: ratios[0] * min - margin,
@@ -65,43 +65,43 @@ pub struct Wrapped {
 }
 
 impl Wrapped {
-    /// N r² B², in counts², of levels that weigh as much together.
+    /// `weight` · B² in counts², where `weight` is Σ N r² of one or more levels.
     fn information(&self, weight: f64) -> f64 {
         weight * self.modulation * self.modulation
     }
 }
 
-/// How near a pixel came to another answer.
+/// How close a pixel's unwrapping was to another result.
 #[derive(Clone, Copy, Debug)]
 pub struct Doubt {
-    /// The least error of the wrapped phases, in turns, that could have turned a decision (a fringe
+    /// The smallest error of the wrapped phases, in turns, that could have changed a decision (a fringe
     /// order, a wrap, a residual at its limit).
     pub slack: f64,
-    /// How far apart the averaged levels lie, in turns.
+    /// The difference between the lowest and highest phase of the averaged levels, turns.
     pub spread: f64,
 }
 
 impl Doubt {
-    /// Before anything was decided.
+    /// Before any decision.
     const NONE: Self = Self {
         slack: f64::INFINITY,
         spread: 0.0,
     };
 
-    /// A decision that is `distance` turns from its threshold, made from a sum of wrapped phases whose
+    /// Records a decision that is `distance` turns from its threshold, made from a sum of wrapped phases whose
     /// factors add up to `gain`.
     fn look(&mut self, distance: f64, gain: f64) {
         self.slack = self.slack.min(distance / gain);
     }
 
-    /// The short way round, −½ ≤ x < ½.
+    /// Wraps to −½ ≤ x < ½.
     fn wrap(&mut self, turns: f64, gain: f64) -> f64 {
         let wrapped = turns - (turns + 0.5).floor();
         self.look(0.5 - wrapped.abs(), gain);
         wrapped
     }
 
-    /// The whole number next to x, unless too much is left over.
+    /// x rounded to a whole number; none if the residual is too large.
     fn order(&mut self, x: f64, gain: f64) -> Option<f64> {
         let whole = x.round();
         let residual = (x - whole).abs();
@@ -110,13 +110,13 @@ impl Doubt {
     }
 }
 
-/// Φ in turns and the information Σ N r² · B² behind it, B that of the finest level, or none where a rounding step leaves more
-/// than 0.40 turn over. `levels` go from coarse to fine; `map` is Φ₀ for the forms that need one.
+/// Φ in turns and its information Σ N r² · B², B that of the finest level; none if a residual is above 0.40 turn.
+/// `levels` go from coarse to fine; `map` is Φ₀ for the forms that need one.
 pub fn unwrap(form: Form, levels: &[Wrapped], map: f64) -> Option<(f64, f64)> {
     unwrap_with_doubt(form, levels, map).0
 }
 
-/// As [`unwrap`], and how near the pixel came to another answer.
+/// As [`unwrap`], with how close the pixel was to another result.
 pub fn unwrap_with_doubt(form: Form, levels: &[Wrapped], map: f64) -> (Option<(f64, f64)>, Doubt) {
     let mut doubt = Doubt::NONE;
     let found = match form {
@@ -126,7 +126,7 @@ pub fn unwrap_with_doubt(form: Form, levels: &[Wrapped], map: f64) -> (Option<(f
     (found, doubt)
 }
 
-/// The forms that are unwrapped about a map.
+/// Unwraps the forms that need a map.
 fn about(form: Form, levels: &[Wrapped], map: f64, doubt: &mut Doubt) -> Option<(f64, f64)> {
     let q = |level: Wrapped| relative(level, map);
     match form {
@@ -172,7 +172,7 @@ fn relative(level: Wrapped, map: f64) -> f64 {
 }
 
 /// D_i = (q_i + round(r_i D − q_i)) / r_i for each level in turn, the finest first, D the mean of those so far with weights N r².
-/// `gain` is what an error of the wrapped phases becomes in `start`.
+/// `gain` is the factor by which an error of the wrapped phases is amplified in `start`.
 fn average(
     levels: &[Wrapped],
     start: f64,
@@ -192,7 +192,7 @@ fn average(
         delta = sum / weights;
         (low, high) = (low.min(here), high.max(here));
         doubt.spread = high - low;
-        // A mean is off by no more than the worst of its parts.
+        // The error of a mean is at most that of its worst part.
         let own = 1.0 / level.ratio;
         gain = if low == high { own } else { gain.max(own) };
     }

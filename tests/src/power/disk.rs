@@ -1,8 +1,8 @@
-//! A file system that loses power.
+//! A model of a file system that loses power.
 //!
-//! What has not been synced may be lost: of a file any of its writes, in pieces of a sector; of a folder its latest changes of
+//! Changes that have not been synced may be lost: of a file any of its writes, sector by sector; of a folder its latest changes of
 //! names, in their order. Syncing a file also keeps its own name and those of the folders above it, as the journals of ext4,
-//! XFS and btrfs do; it says nothing of other files. Shared memory that is mapped is never on the medium.
+//! XFS and btrfs do, but no other files. Mapped shared memory is never on the medium.
 
 use super::{Operation, What};
 use crate::random::Random;
@@ -10,15 +10,15 @@ use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 use std::{fs, io};
 
-/// What is written whole or not at all, in bytes.
+/// Bytes that are written completely or not at all.
 const SECTOR: u64 = 512;
 
 type Names = BTreeMap<String, usize>;
 
-/// Everything that has been done so far, and how much of it is certain.
+/// The state after all operations so far, and how much of it is certainly on the medium.
 #[derive(Clone, Debug)]
 pub struct Disk {
-    /// The first is the folder that is looked at, which is always there.
+    /// The first node is the root folder, which always exists.
     nodes: Vec<Node>,
 }
 
@@ -30,9 +30,9 @@ enum Node {
 
 #[derive(Clone, Debug, Default)]
 struct File {
-    /// On the medium.
+    /// The content that is certainly on the medium.
     certain: Vec<u8>,
-    /// Since the last sync, each with the time at which it had been done.
+    /// Changes since the last sync, each with the time when it was done.
     since: Vec<(u64, Change)>,
     length: u64,
 }
@@ -43,25 +43,25 @@ enum Change {
     Length(u64),
 }
 
-/// A name, and the node that it is given; taken away if there is none.
+/// A name, and the node that it is given to; none if the name is removed.
 type Naming = (String, Option<usize>);
 
 #[derive(Clone, Debug, Default)]
 struct Folder {
     certain: Names,
-    /// Since the last sync: names that are given (to a node) or taken away, together or not at all.
+    /// Since the last sync: names that were given to a node or removed; those of one operation happen together or not at all.
     since: Vec<(u64, Vec<Naming>)>,
     now: Names,
 }
 
-/// How much of what is not certain a loss of power leaves.
+/// How much of the uncertain changes a loss of power leaves.
 #[derive(Debug)]
 pub enum Left<'a> {
     /// All.
     All,
     /// None.
     Nothing,
-    /// Some, by chance.
+    /// A random part.
     Some(&'a mut Random),
 }
 
@@ -74,10 +74,10 @@ impl Default for Disk {
 }
 
 impl Disk {
-    /// Carries out an operation. What concerns a file that has no name any more is forgotten.
+    /// Carries out an operation. Operations on a file that has no name any more are ignored.
     ///
     /// # Panics
-    /// If it is impossible: the operations are then not those of one run.
+    /// If it is impossible, so the operations are not those of one run.
     pub fn apply(&mut self, operation: &Operation) {
         let done = operation.done;
         match &operation.what {
@@ -135,7 +135,7 @@ impl Disk {
         }
     }
 
-    /// Gives and takes names; within one folder as one change.
+    /// Gives and removes names; within one folder this is one change.
     fn name(&mut self, done: u64, changes: Vec<(&PathBuf, Option<usize>)>) {
         for (path, node) in changes {
             let parent = path.parent().expect("a name stands in a folder");
@@ -164,7 +164,7 @@ impl Disk {
         file.since.push((done, change));
     }
 
-    /// Makes certain what had been done when it was asked for.
+    /// Makes certain what was done before `asked`.
     fn sync(&mut self, asked: u64, path: &Path) {
         let Some(at) = self.find(path) else {
             return;
@@ -192,7 +192,7 @@ impl Disk {
     /// Writes what a loss of power leaves into a new folder.
     ///
     /// # Errors
-    /// Whatever the file system answers.
+    /// Those of the file system.
     pub fn leave(&self, left: &mut Left<'_>, target: &Path) -> io::Result<()> {
         self.leave_node(0, left, target)
     }
@@ -225,7 +225,7 @@ impl Change {
         }
     }
 
-    /// A write as pieces of a sector.
+    /// A write, split at sector boundaries.
     fn pieces(&self) -> Vec<Self> {
         let Self::Write { at, bytes } = self else {
             return vec![self.clone()];
@@ -251,7 +251,7 @@ impl File {
                 Left::All => change.apply(&mut content),
                 Left::Nothing => {}
                 Left::Some(random) => {
-                    // A whole write more often than a torn one.
+                    // Mostly the whole write is kept or lost, sometimes a part of its sectors.
                     let torn = random.below(4) == 0;
                     let kept = random.below(2) == 0;
                     for piece in change.pieces() {
@@ -267,7 +267,7 @@ impl File {
 }
 
 impl Folder {
-    /// Makes certain what had been done when it was asked for, up to the last change of a name that is `wanted`.
+    /// Makes certain what was done before `asked`, up to the last change of a name that is `wanted`.
     fn settle(&mut self, asked: u64, wanted: impl Fn(&str) -> bool) {
         let last = self.since.iter().rposition(|(done, names)| {
             *done <= asked && names.iter().any(|(name, _)| wanted(name))

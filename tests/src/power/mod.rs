@@ -1,6 +1,6 @@
 //! What a loss of power leaves of a folder: a run of the program is traced, and replayed up to any of its operations.
 //!
-//! [`trace`] reads the operations from a log of `strace`, [`disk`] knows which of them are on the medium for certain and which may
+//! [`trace`] reads the operations from a log of `strace`; [`disk`] models which of them are certainly on the medium and which may
 //! be lost.
 
 pub mod disk;
@@ -11,12 +11,12 @@ mod tests;
 
 use std::path::PathBuf;
 
-/// One operation on files. Paths are relative to the folder that is looked at; times are in µs since 1970.
+/// One operation on files. Paths are relative to the root folder; times are in µs since 1970.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Operation {
-    /// When it was asked for.
+    /// When the call began.
     pub asked: u64,
-    /// When it had been done.
+    /// When the call returned.
     pub done: u64,
     /// What it did.
     pub what: What,
@@ -25,11 +25,11 @@ pub struct Operation {
 /// What an operation does.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum What {
-    /// Opens a file for writing: makes it where there is none, and empties it if `empty`.
+    /// Opens a file for writing; creates it if it does not exist, and empties it if `empty`.
     Open {
         /// The file.
         path: PathBuf,
-        /// Whether what it held goes.
+        /// Whether its content is removed.
         empty: bool,
     },
     /// Writes into a file, at its end if `at` is none.
@@ -41,16 +41,16 @@ pub enum What {
         /// The bytes.
         bytes: Vec<u8>,
     },
-    /// Cuts a file off or makes it longer.
+    /// Sets the length of a file.
     Length {
         /// The file.
         path: PathBuf,
-        /// Bytes.
+        /// Its new length.
         bytes: u64,
     },
     /// Syncs a file or a folder.
     Sync(PathBuf),
-    /// Makes a folder.
+    /// Creates a folder.
     Folder(PathBuf),
     /// Gives a file a second name.
     Link {
@@ -59,7 +59,7 @@ pub enum What {
         /// The second.
         to: PathBuf,
     },
-    /// Gives a file or folder another name, in place of what has it.
+    /// Renames a file or folder, replacing a file that has the new name.
     Rename {
         /// The old one.
         from: PathBuf,

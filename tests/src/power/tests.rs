@@ -1,4 +1,4 @@
-//! The model of a disk by itself: what is synced stays, and what is not may be lost in part.
+//! Tests of the model of a disk: what is synced stays, and what is not may be lost in part.
 
 use super::disk::{Disk, Left};
 use super::{Operation, What};
@@ -32,7 +32,7 @@ fn write(path: &str, bytes: &[u8]) -> What {
     }
 }
 
-/// What is left of `name` after all of it, in every way that is tried; none where it is not there.
+/// The different contents of `name` that losses of power after all operations may leave; none where it does not exist.
 fn left_of(name: &str, all: Vec<What>) -> Vec<Option<Vec<u8>>> {
     let folder = tempfile::tempdir().unwrap();
     let mut disk = Disk::default();
@@ -73,7 +73,7 @@ fn what_is_not_synced_may_be_lost_and_what_is_synced_stays() {
         renamed(),
     ];
     let replaced: Vec<What> = synced().into_iter().chain(whole.clone()).collect();
-    // The old one or the new one, and after the folder's sync the new one.
+    // The old or the new content; after the folder's sync only the new one.
     assert_eq!(left_of("a", replaced.clone()), [new(), old()]);
     let certain = replaced
         .into_iter()

@@ -1,4 +1,4 @@
-//! Operations on files from a log of `strace`, with the options of [`OPTIONS`].
+//! Reading operations on files from a log of `strace` with [`OPTIONS`].
 
 use super::{Operation, What};
 use std::collections::HashMap;
@@ -7,8 +7,8 @@ use std::fs;
 use std::os::unix::ffi::OsStringExt as _;
 use std::path::{Path, PathBuf};
 
-/// All threads; times of start and end; descriptors with their paths; every string whole and in hexadecimal. The tracer is no
-/// parent of the program, so that the program can be ended as without it.
+/// All threads; times of start and end; descriptors with their paths; complete strings in hexadecimal. The tracer is not the
+/// program's parent (-D), so that the program can be killed as usual.
 pub const OPTIONS: [&str; 11] = [
     "-D",
     "-f",
@@ -34,13 +34,13 @@ struct Call<'a> {
     done: u64,
 }
 
-/// Where a descriptor stands in its file; none if it always writes at the end.
+/// The file position of each descriptor; none if it always writes at the end.
 type Places = HashMap<String, Option<u64>>;
 
 /// The operations below `root` in the order in which they were done.
 ///
 /// # Panics
-/// If the log holds something that is not modelled.
+/// If the log contains a call that is not modelled.
 pub fn operations(log: &str, root: &Path) -> Vec<Operation> {
     let mut unfinished: HashMap<&str, (u64, &str)> = HashMap::new();
     let mut places = Places::new();
@@ -84,7 +84,7 @@ fn micros(time: &str) -> u64 {
     seconds.parse::<u64>().expect("seconds") * 1_000_000 + micros.parse::<u64>().expect("µs")
 }
 
-/// A call that succeeded; none where the line is none, or it failed.
+/// The call in a line; none if the line is no call, or the call failed.
 fn call(text: &str, asked: u64, resumed: Option<u64>) -> Option<Call<'_>> {
     let (name, rest) = text.split_once('(')?;
     let (arguments, end) = rest.rsplit_once(") = ")?;
@@ -116,7 +116,7 @@ fn path(text: &str) -> PathBuf {
     PathBuf::from(OsString::from_vec(bytes(text)))
 }
 
-/// The number of a descriptor, and its file; none where that has no name any more.
+/// The number of a descriptor, and its file; none if that has no name any more.
 fn descriptor(text: &str) -> (&str, Option<PathBuf>) {
     let (number, rest) = text.split_once('<').unwrap_or((text, ""));
     (number, (!rest.contains("(deleted)")).then(|| path(rest)))
@@ -127,7 +127,7 @@ fn at(folder: &str, name: &str) -> PathBuf {
     descriptor(folder).1.unwrap_or_default().join(path(name))
 }
 
-/// Where a descriptor stood before a transfer of so many bytes; none if it always writes at the end.
+/// The position of a descriptor before a transfer of so many bytes; none if it always writes at the end.
 fn passed(places: &mut Places, text: &str, bytes: i64) -> Option<u64> {
     let place = places
         .entry(descriptor(text).0.to_owned())
