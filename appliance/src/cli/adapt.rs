@@ -2,7 +2,7 @@
 
 use super::names;
 use super::numbers::number;
-use super::options::{Json, Quiet, Threads, answer};
+use super::options::{Output, Threads};
 use crate::error::{Exit, Failure};
 use crate::measure::adapt::{Choice, Method, adapt};
 use crate::storage::folder::OutputFolder;
@@ -39,9 +39,7 @@ pub struct Adapt {
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
-    quiet: Quiet,
-    #[command(flatten)]
-    json: Json,
+    output: Output,
 }
 
 impl Adapt {
@@ -66,7 +64,7 @@ impl Adapt {
             let table = adapted.report.table();
             format!("{}\nwritten to {}", table.trim_end(), self.out.display())
         };
-        answer(self.json, self.quiet, || json, text);
+        self.output.answer(|| json, text);
         Ok(())
     }
 

@@ -1,6 +1,6 @@
 //! `fringed config check [FILE]` and `fringed config keys`.
 
-use super::options::{Json, Quiet};
+use super::options::{Json, Output};
 use crate::config::{Backend, Config, keys, table};
 use crate::error::{Exit, Failure};
 use crate::head::calibration::place::Place;
@@ -16,9 +16,7 @@ pub enum ConfigCommand {
         /// The file.
         file: PathBuf,
         #[command(flatten)]
-        quiet: Quiet,
-        #[command(flatten)]
-        json: Json,
+        output: Output,
     },
     /// List every key with its unit, range and default.
     Keys {
@@ -50,7 +48,7 @@ impl ConfigCommand {
                 say!("{}", table().trim_end());
                 Ok(())
             }
-            Self::Check { file, quiet, json } => {
+            Self::Check { file, output } => {
                 let checked = check(file);
                 let problem = checked.as_ref().err();
                 let document = || {
@@ -60,10 +58,8 @@ impl ConfigCommand {
                     });
                     format!("{document:#}")
                 };
-                if json.json {
-                    say!("{}", document());
-                } else if checked.is_ok() {
-                    quiet.say(|| format!("{} is right", file.display()));
+                if output.is_json() || checked.is_ok() {
+                    output.answer(document, || format!("{} is right", file.display()));
                 }
                 checked
             }

@@ -1,6 +1,6 @@
 //! `fringed doctor`: examines the head step by step, with a verdict and a remedy for each.
 
-use super::options::{Files, Json, Quiet, Threads, answer};
+use super::options::Measuring;
 use crate::config::Backend;
 use crate::error::{Exit, Failure};
 use crate::head::doctor::{Step, Verdict, examine};
@@ -15,13 +15,7 @@ pub struct Doctor {
     #[arg(long, value_name = "FILE", conflicts_with = "state")]
     scenario: Option<PathBuf>,
     #[command(flatten)]
-    files: Files,
-    #[command(flatten)]
-    threads: Threads,
-    #[command(flatten)]
-    quiet: Quiet,
-    #[command(flatten)]
-    json: Json,
+    measuring: Measuring,
 }
 
 impl Doctor {
@@ -30,8 +24,13 @@ impl Doctor {
     /// # Errors
     /// If the head cannot be opened, or a step failed (69).
     pub fn run(&self) -> Result<(), Failure> {
-        let mut config = self.files.configuration()?;
-        config.head = self.files.head(&config);
+        let Measuring {
+            files,
+            threads,
+            output,
+        } = &self.measuring;
+        let mut config = files.configuration()?;
+        config.head = files.head(&config);
         if let Some(scenario) = &self.scenario {
             (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
             // The stored one is the configured head's.
@@ -43,9 +42,9 @@ impl Doctor {
                 "doctor: a recording cannot be examined: configure another head or name a scenario with --scenario",
             ));
         }
-        let progress = self.quiet.progress();
+        let progress = output.progress();
         let told = |share: f64| progress.tell(0.5 * share, "working out the light of the scene");
-        let pool = self.threads.pool(config.threads)?;
+        let pool = threads.pool(config.threads)?;
         let mut opened = pool.install(|| backend::open_as_it_is(&config.head, &told))?;
         let calibrated = opened.problem.is_none();
         let told = |share: f64, name: &str| progress.tell(0.5 + 0.5 * share, name);
@@ -54,7 +53,7 @@ impl Doctor {
         progress.clear();
         let failed: Vec<&str> = failed(&steps).collect();
         let document = || format!("{:#}", as_json(&steps));
-        answer(self.json, self.quiet, document, || table(&steps));
+        output.answer(document, || table(&steps));
         if failed.is_empty() {
             return Ok(());
         }

@@ -1,7 +1,7 @@
 //! `fringed measure RECORDING [--recipe FILE] --out DIR`.
 
 use super::names;
-use super::options::{Json, Quiet, Threads, answer};
+use super::options::{Output, Threads};
 use crate::error::{Exit, Failure};
 use crate::history::kept;
 use crate::measure::{Measurement, measure_with};
@@ -27,9 +27,7 @@ pub struct Measure {
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
-    quiet: Quiet,
-    #[command(flatten)]
-    json: Json,
+    output: Output,
 }
 
 impl Measure {
@@ -53,7 +51,7 @@ impl Measure {
             let table = measurement.report.table();
             format!("{}\nwritten to {}", table.trim_end(), self.out.display())
         };
-        answer(self.json, self.quiet, || json, text);
+        self.output.answer(|| json, text);
         Ok(())
     }
 }

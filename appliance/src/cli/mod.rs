@@ -27,7 +27,7 @@ mod serve;
 mod teach;
 
 pub use completions::Completions;
-pub use options::{Json, Quiet, Threads, answer};
+pub use options::{Output, Threads};
 
 use crate::VERSION;
 use crate::error::{Exit, Failure};
@@ -35,6 +35,7 @@ use crate::modbus::{registers_csv, registers_json};
 use crate::system::journal::{self, Severity};
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory as _, Parser, Subcommand};
+use options::Json;
 use std::process::ExitCode;
 
 /// The open 3-D smart sensor.

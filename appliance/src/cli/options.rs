@@ -56,6 +56,37 @@ pub struct Json {
     pub json: bool,
 }
 
+/// How the result of a command is printed.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Output {
+    #[command(flatten)]
+    quiet: Quiet,
+    #[command(flatten)]
+    json: Json,
+}
+
+/// The options of commands that run the station.
+#[derive(Clone, Debug, Args)]
+pub struct Serving {
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    listen: Listen,
+    #[command(flatten)]
+    pub threads: Threads,
+}
+
+/// The options of commands that measure once with the station's configuration and state.
+#[derive(Clone, Debug, Args)]
+pub struct Measuring {
+    #[command(flatten)]
+    pub files: Files,
+    #[command(flatten)]
+    pub threads: Threads,
+    #[command(flatten)]
+    pub output: Output,
+}
+
 impl Files {
     /// The configuration file, if one is named, with the command line's state folder over it.
     ///
@@ -95,15 +126,20 @@ impl Files {
     }
 }
 
-impl Listen {
-    /// Puts the command line's addresses over the configured ones.
-    pub fn over(&self, config: &mut Config) {
-        if let Some(listen) = self.modbus {
+impl Serving {
+    /// The configuration, with the command line's addresses over the configured ones.
+    ///
+    /// # Errors
+    /// If the file is missing or wrong.
+    pub fn configuration(&self) -> Result<Config, Failure> {
+        let mut config = self.files.configuration()?;
+        if let Some(listen) = self.listen.modbus {
             config.modbus.listen = listen;
         }
-        if let Some(listen) = self.http {
+        if let Some(listen) = self.listen.http {
             config.http.listen = listen;
         }
+        Ok(config)
     }
 }
 
@@ -135,17 +171,31 @@ impl Quiet {
     }
 }
 
-/// Prints the answer of a command: as JSON for programs, else as text for people, unless it is to be quiet.
-pub fn answer(
-    json: Json,
-    quiet: Quiet,
-    document: impl FnOnce() -> String,
-    text: impl FnOnce() -> String,
-) {
-    if json.json {
-        say!("{}", document().trim_end());
-    } else {
-        quiet.say(text);
+impl Output {
+    /// As [`Quiet::progress`].
+    pub fn progress(self) -> Progress {
+        self.quiet.progress()
+    }
+
+    /// Prints the result: as JSON for programs, else as text for people, unless `--quiet` is given.
+    pub fn answer(self, document: impl FnOnce() -> String, text: impl FnOnce() -> String) {
+        if self.is_json() {
+            say!("{}", document().trim_end());
+        } else {
+            self.quiet.say(text);
+        }
+    }
+
+    /// Prints a remark for people: neither beside JSON nor with `--quiet`.
+    pub fn remark(self, words: impl FnOnce() -> String) {
+        if !self.is_json() {
+            self.quiet.say(words);
+        }
+    }
+
+    /// Whether the result is printed as JSON.
+    pub fn is_json(self) -> bool {
+        self.json.json
     }
 }
 

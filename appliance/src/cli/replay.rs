@@ -1,7 +1,7 @@
 //! `fringed replay RECORDING`: judges a kept part again and compares with what the history says, bit by bit.
 
 use super::history::failure;
-use super::options::{Files, Json, Quiet, Threads, answer};
+use super::options::Measuring;
 use crate::error::{Exit, Failure};
 use crate::history::kept::{self, Kept, missing};
 use crate::history::{Entry, Reader, difference, seq_of};
@@ -23,13 +23,7 @@ pub struct Replay {
     #[arg(long, value_name = "FILE|stored")]
     recipe: Option<PathBuf>,
     #[command(flatten)]
-    files: Files,
-    #[command(flatten)]
-    threads: Threads,
-    #[command(flatten)]
-    quiet: Quiet,
-    #[command(flatten)]
-    json: Json,
+    measuring: Measuring,
 }
 
 /// What a part is judged by again.
@@ -47,6 +41,11 @@ impl Replay {
     /// # Errors
     /// If recording, recipe or stored result cannot be had (65, 66), or the result is not the stored one (70).
     pub fn run(&self) -> Result<(), Failure> {
+        let Measuring {
+            files,
+            threads,
+            output,
+        } = &self.measuring;
         let unpacked = Unpacked::of(&self.recording)?;
         let state = self.state()?;
         let kept = Kept::open(unpacked.folder())?;
@@ -56,8 +55,8 @@ impl Replay {
         let stored = stored(&state, unpacked.name(), &kept)?;
         let flags = stored.as_ref().map_or(0, |entry| entry.flags);
         let (frames, shots) = (kept.frames(), kept.shots());
-        let threads = self.files.configuration()?.threads;
-        let judged = self.threads.pool(threads)?.install(|| {
+        let configured = files.configuration()?.threads;
+        let judged = threads.pool(configured)?.install(|| {
             let plan = kept.plan(recipe, flags & SIMULATED != 0)?;
             let inspect = |step| plan.inspect(step, &frames, Instant::now());
             Ok::<_, PlanError>(plan.step_that_shows(&shots).map(inspect))
@@ -79,10 +78,10 @@ impl Replay {
                 serde_json::json!({ "replayed": replayed, "stored": stored, "recipe": recipe });
             format!("{all:#}")
         };
-        answer(self.json, self.quiet, document, || table(&replayed, &from));
+        output.answer(document, || table(&replayed, &from));
         if !same {
-            if let Some(stored) = stored.filter(|_| !self.json.json) {
-                self.quiet.say(|| {
+            if let Some(stored) = stored {
+                output.remark(|| {
                     format!(
                         "result {} in the history is {}{}, judged by another recipe: the two are not compared",
                         stored.seq,
@@ -102,14 +101,12 @@ impl Replay {
         };
         match difference(&stored, &replayed) {
             None => {
-                if !self.json.json {
-                    self.quiet.say(|| {
-                        format!(
-                            "the same as result {} in the history, bit by bit",
-                            stored.seq
-                        )
-                    });
-                }
+                output.remark(|| {
+                    format!(
+                        "the same as result {} in the history, bit by bit",
+                        stored.seq
+                    )
+                });
                 Ok(())
             }
             Some(difference) => {
@@ -124,13 +121,12 @@ impl Replay {
 
     /// The state folder that the recording lies in, else the configured one.
     fn state(&self) -> Result<PathBuf, Failure> {
+        let files = &self.measuring.files;
         let own = self.recording.canonicalize().ok();
         let own = own.and_then(|folder| Some(folder.parent()?.parent()?.to_path_buf()));
         match own {
-            Some(state) if self.files.state.is_none() && Reader::of(&state).path().exists() => {
-                Ok(state)
-            }
-            _ => self.files.state_folder(),
+            Some(state) if files.state.is_none() && Reader::of(&state).path().exists() => Ok(state),
+            _ => files.state_folder(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! `fringed serve`: the station, until the stop signal.
 
-use super::options::{Files, Listen, Quiet, Threads};
+use super::options::{Quiet, Serving};
 use super::part::SimulatedPart;
 use crate::error::Failure;
 use crate::service::{Caller, Daemon};
@@ -21,11 +21,7 @@ const TOGETHER: Duration = Duration::from_secs(20);
 #[derive(Debug, clap::Args)]
 pub struct Serve {
     #[command(flatten)]
-    files: Files,
-    #[command(flatten)]
-    listen: Listen,
-    #[command(flatten)]
-    threads: Threads,
+    serving: Serving,
     #[command(flatten)]
     quiet: Quiet,
     #[command(flatten)]
@@ -38,8 +34,7 @@ impl Serve {
     /// # Errors
     /// If it cannot start.
     pub fn run(&self) -> Result<(), Failure> {
-        let mut config = self.files.configuration()?;
-        self.listen.over(&mut config);
+        let mut config = self.serving.configuration()?;
         config.head.part = self.part.placed(&config.head)?;
         let progress = self.quiet.progress();
         let caller = Caller {
@@ -48,7 +43,7 @@ impl Serve {
             stop: StopSignal::listen()?,
         };
         caller.notify.status("starting");
-        let pool = self.threads.pool(config.threads)?;
+        let pool = self.serving.threads.pool(config.threads)?;
         let daemon = Daemon::start_for(&config, pool, progress.clone(), &caller)?;
         runtime()?.block_on(async {
             tokio::select! {

@@ -2,7 +2,7 @@
 
 use super::names;
 use super::numbers::number;
-use super::options::{Files, Json, Quiet, Threads, answer};
+use super::options::Measuring;
 use crate::config::Config;
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
@@ -58,13 +58,7 @@ pub struct Teach {
     #[arg(long, value_name = "FILE.recipe", value_parser = names::file("recipe"))]
     out: Option<PathBuf>,
     #[command(flatten)]
-    files: Files,
-    #[command(flatten)]
-    threads: Threads,
-    #[command(flatten)]
-    quiet: Quiet,
-    #[command(flatten)]
-    json: Json,
+    measuring: Measuring,
 }
 
 /// Where the recipe goes.
@@ -118,12 +112,17 @@ impl Teach {
     /// # Errors
     /// If the part cannot be taught, the number is taken, or the recipe not be stored; a recipe stored before is untouched.
     pub fn run(&self) -> Result<(), Failure> {
-        let config = self.files.configuration()?;
+        let Measuring {
+            files,
+            threads,
+            output,
+        } = &self.measuring;
+        let config = files.configuration()?;
         // Before anything is measured, and held until the recipe is stored.
         let target = match &self.out {
             Some(out) => Target::File(out),
             None => Target::State(StateFolder::open_unless_used(
-                &self.files.state_folder()?,
+                &files.state_folder()?,
                 Exit::CannotCreate,
                 "use *Recipes*, *Teach* on its page",
             )?),
@@ -133,7 +132,7 @@ impl Teach {
             Target::State(state) => self.replaced(&Store::of_state(state)?)?,
         };
         let naming = self.naming(replaced.as_ref());
-        let pool = self.threads.pool(config.threads)?;
+        let pool = threads.pool(config.threads)?;
         let taught = match &self.golden {
             Some(golden) => pool.install(|| self.teach_recordings(golden, &naming))?,
             None => self.teach_head(&config, &pool, &naming)?,
@@ -165,7 +164,7 @@ impl Teach {
             ));
             lines.join("\n")
         };
-        answer(self.json, self.quiet, summary, text);
+        output.answer(summary, text);
         Ok(())
     }
 
@@ -213,9 +212,10 @@ impl Teach {
         pool: &rayon::ThreadPool,
         naming: &Naming,
     ) -> Result<Taught, Failure> {
-        let progress = self.quiet.progress();
+        let Measuring { files, output, .. } = &self.measuring;
+        let progress = output.progress();
         let told = |share: f64| progress.tell(share, "working out the light of the scene");
-        let opened = pool.install(|| backend::open(&self.files.head(config), &told))?;
+        let opened = pool.install(|| backend::open(&files.head(config), &told))?;
         opened.calibrated()?;
         let Opened {
             mut head,

@@ -1,7 +1,7 @@
 //! `fringed-lab bench`: the kernel table, run time against error, and the budget from trigger to verdict.
 
 use crate::benchmark::{self, Effort, Machine, Report, Study};
-use appliance::cli::{Json, Quiet, Threads, answer, names};
+use appliance::cli::{Output, Threads, names};
 use appliance::error::{Exit, Failure};
 use appliance::storage::folder::OutputFolder;
 use std::path::PathBuf;
@@ -25,9 +25,7 @@ pub struct Bench {
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
-    quiet: Quiet,
-    #[command(flatten)]
-    json: Json,
+    output: Output,
 }
 
 /// A part of the benchmark.
@@ -57,7 +55,7 @@ impl Bench {
         // Made first: a folder that cannot be written is found before minutes of measuring.
         let folder = self.out.as_deref().map(OutputFolder::create);
         let folder = folder.transpose()?;
-        let progress = self.quiet.progress();
+        let progress = self.output.progress();
         let told = |share: f64, words: &str| progress.tell(share, words);
         let report = self.measure(&told);
         progress.clear();
@@ -74,7 +72,7 @@ impl Bench {
                 folder.write(&name, &bytes)?;
             }
         }
-        answer(self.json, self.quiet, || json, || tables);
+        self.output.answer(|| json, || tables);
         Ok(())
     }
 
@@ -132,8 +130,8 @@ impl Bench {
         for (name, bytes) in benchmark::frame_files(self.effort().size) {
             folder_of_frames.write(&name, &bytes)?;
         }
-        self.quiet
-            .say(|| format!("written to {}", folder.display()));
+        self.output
+            .remark(|| format!("written to {}", folder.display()));
         Ok(())
     }
 }

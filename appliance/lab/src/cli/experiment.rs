@@ -1,7 +1,7 @@
 //! `fringed-lab experiment --out DIR`: the paper's experiments as tables, plots and pictures.
 
 use crate::experiment::{Campaign, OpticsKind, PARTS, Results, Row, Scene, csv, figures, means};
-use appliance::cli::{Json, Quiet, Threads, answer, names, numbers};
+use appliance::cli::{Output, Threads, names, numbers};
 use appliance::error::{Exit, Failure};
 use appliance::storage::folder::OutputFolder;
 use std::path::PathBuf;
@@ -24,9 +24,7 @@ pub struct Experiment {
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
-    quiet: Quiet,
-    #[command(flatten)]
-    json: Json,
+    output: Output,
 }
 
 impl Experiment {
@@ -42,7 +40,7 @@ impl Experiment {
         };
         let folder = OutputFolder::create(&self.out)?;
         let pool = self.threads.pool(0)?;
-        let progress = self.quiet.progress();
+        let progress = self.output.progress();
         let told = |share: f64, words: &str| progress.tell(share, words);
         let results = pool.install(|| campaign.run(&told));
         progress.clear();
@@ -56,7 +54,7 @@ impl Experiment {
             let tables = tables(&campaign, &means);
             format!("{}\nwritten to {}", tables.trim_end(), self.out.display())
         };
-        answer(self.json, self.quiet, || json, text);
+        self.output.answer(|| json, text);
         Ok(())
     }
 

@@ -3,7 +3,7 @@
 mod report;
 
 use super::numbers::number;
-use super::options::{Files, Json, Quiet, Threads, answer};
+use super::options::Measuring;
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::head::calibrate::{Known, MakeError, make};
@@ -48,13 +48,7 @@ pub struct Calibrate {
     #[arg(long, value_name = "CELSIUS", allow_negative_numbers = true, value_parser = number(COLDEST_C, HOTTEST_C))]
     temperature: Option<f64>,
     #[command(flatten)]
-    files: Files,
-    #[command(flatten)]
-    threads: Threads,
-    #[command(flatten)]
-    quiet: Quiet,
-    #[command(flatten)]
-    json: Json,
+    measuring: Measuring,
 }
 
 /// Where models came from, if not from a file.
@@ -67,7 +61,12 @@ impl Calibrate {
     /// If a model cannot be imported (65, 66), the head not be measured (69), or the calibration not be written (73). The
     /// calibration before is then untouched.
     pub fn run(&self) -> Result<(), Failure> {
-        let mut config = self.files.configuration()?;
+        let Measuring {
+            files,
+            threads,
+            output,
+        } = &self.measuring;
+        let mut config = files.configuration()?;
         if let Some(scenario) = &self.scenario {
             (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
         }
@@ -78,7 +77,7 @@ impl Calibrate {
             ));
         }
         // Held until all is written: no station measures meanwhile by what is being replaced.
-        let state = StateFolder::open(&self.files.state_folder()?)?;
+        let state = StateFolder::open(&files.state_folder()?)?;
         let head = config.head_in(state.path());
         let place = Place::at(head.calibration.as_deref().unwrap_or(Path::new("")));
         let mut notes = Vec::new();
@@ -87,9 +86,9 @@ impl Calibrate {
             None
         });
         let before = before.map(|loaded| loaded.file);
-        let progress = self.quiet.progress();
+        let progress = output.progress();
         let told = |share: f64| progress.tell(0.3 * share, "working out the light of the scene");
-        let pool = self.threads.pool(config.threads)?;
+        let pool = threads.pool(config.threads)?;
         // As if nothing were known of it.
         let bare = HeadConfig {
             calibration: None,
@@ -121,7 +120,7 @@ impl Calibrate {
             notes: &notes,
         };
         let document = || format!("{:#}", report.json());
-        answer(self.json, self.quiet, document, || report.table());
+        output.answer(document, || report.table());
         Ok(())
     }
 

@@ -4,14 +4,14 @@ mod parts;
 mod plc;
 mod table;
 
-use super::options::{Files, Json, Listen, Quiet, Threads, answer};
+use super::options::{Output, Serving};
 use crate::config::Backend;
 use crate::error::{Exit, Failure};
 use crate::service::Daemon;
 use crate::storage::state::StateFolder;
 use crate::system::runtime;
 use crate::system::stop_signal::StopSignal;
-use parts::{PARTS, Placed};
+use parts::{DemoPart, PARTS};
 use plc::{Plc, PlcResult};
 use std::io::IsTerminal;
 
@@ -22,23 +22,17 @@ pub struct Demo {
     #[arg(long)]
     exit: bool,
     #[command(flatten)]
-    files: Files,
+    serving: Serving,
     #[command(flatten)]
-    listen: Listen,
-    #[command(flatten)]
-    threads: Threads,
-    #[command(flatten)]
-    quiet: Quiet,
-    #[command(flatten)]
-    json: Json,
+    output: Output,
 }
 
 /// Seed of the noise of the demonstration's frames.
 const NOISE_SEED: u64 = 2008;
 
 /// One part of the demonstration and what came of it.
-struct Row {
-    placed: &'static Placed,
+struct MeasuredPart {
+    placed: &'static DemoPart,
     result: PlcResult,
     /// Names of the gauges outside their limits.
     outside: Vec<String>,
@@ -51,8 +45,7 @@ impl Demo {
     /// # Errors
     /// If the station cannot start or answer, or judges a part wrongly.
     pub fn run(&self) -> Result<(), Failure> {
-        let mut config = self.files.configuration()?;
-        self.listen.over(&mut config);
+        let mut config = self.serving.configuration()?;
         if config.head.backend != Backend::Sim || config.head.scenario.is_some() {
             return Err(Failure::new(
                 Exit::Usage,
@@ -63,8 +56,8 @@ impl Demo {
             // Recipes that somebody taught stay untouched.
             config.state = Some(StateFolder::default_path()?.join("demo"));
         }
-        let progress = self.quiet.progress();
-        let pool = self.threads.pool(config.threads)?;
+        let progress = self.output.progress();
+        let pool = self.serving.threads.pool(config.threads)?;
         let daemon = Daemon::start(&config, pool, progress.clone())?;
         daemon.wait_until_ready()?;
         progress.log(&format!(
@@ -76,9 +69,9 @@ impl Demo {
         progress.clear();
         let rows = rows?;
         let document = || format!("{:#}", table::json(&rows));
-        answer(self.json, self.quiet, document, || table::text(&rows));
+        self.output.answer(document, || table::text(&rows));
         if !self.exit && std::io::stdout().is_terminal() {
-            if !self.json.json {
+            if !self.output.is_json() {
                 say!("\nThe page stays on http://{} until Ctrl-C.", daemon.http);
             }
             runtime()?.block_on(StopSignal::listen()?.wait());
@@ -93,7 +86,7 @@ impl Demo {
     }
 }
 
-impl Row {
+impl MeasuredPart {
     /// A good part that did not pass, or a defective one that did.
     fn is_wrong(&self) -> bool {
         self.placed.defect.is_some() == self.result.passed()
@@ -105,7 +98,7 @@ async fn play(
     daemon: &Daemon,
     recipe: u16,
     progress: &crate::system::progress::Progress,
-) -> Result<Vec<Row>, Failure> {
+) -> Result<Vec<MeasuredPart>, Failure> {
     let Some(stage) = &daemon.stage else {
         return Err(Failure::new(
             Exit::Software,
@@ -133,7 +126,7 @@ async fn play(
             .filter(|(_, pass)| !**pass)
             .map(|(gauge, _)| gauge.name.to_string())
             .collect();
-        rows.push(Row {
+        rows.push(MeasuredPart {
             placed,
             result,
             outside,

@@ -4,23 +4,23 @@ use sim::Part;
 use sim::parts::{Defect, SheetMetal};
 
 /// A part that is put in front of the head.
-pub struct Placed {
+pub struct DemoPart {
     /// For people.
     pub what: &'static str,
     /// What is wrong with it.
     pub defect: Option<Defect>,
 }
 
-const GOOD: Placed = Placed {
+const GOOD: DemoPart = DemoPart {
     what: "good",
     defect: None,
 };
 
 /// Seven good parts, and one each with a dent, a missing hole and a bent flange.
-pub const PARTS: [Placed; 10] = [
+pub const PARTS: [DemoPart; 10] = [
     GOOD,
     GOOD,
-    Placed {
+    DemoPart {
         what: "dent 0.6 mm",
         defect: Some(Defect::Dent {
             x: 0.0,
@@ -31,12 +31,12 @@ pub const PARTS: [Placed; 10] = [
     },
     GOOD,
     GOOD,
-    Placed {
+    DemoPart {
         what: "missing hole",
         defect: Some(Defect::MissingHole { index: 1 }),
     },
     GOOD,
-    Placed {
+    DemoPart {
         what: "bent flange 3°",
         defect: Some(Defect::BentFlange { degrees: 3.0 }),
     },
@@ -44,7 +44,7 @@ pub const PARTS: [Placed; 10] = [
     GOOD,
 ];
 
-impl Placed {
+impl DemoPart {
     /// The part as the simulator takes it.
     pub fn part(&self) -> Part {
         Part::SheetMetal(SheetMetal {

@@ -1,11 +1,11 @@
 //! The table of the demonstration.
 
-use super::Row;
+use super::MeasuredPart;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
 /// As aligned text.
-pub fn text(rows: &[Row]) -> String {
+pub fn text(rows: &[MeasuredPart]) -> String {
     let mut table = String::from(
         "part  placed           verdict  deviation  coverage  exposed    result  outside its limits\n",
     );
@@ -34,7 +34,7 @@ pub fn text(rows: &[Row]) -> String {
 }
 
 /// As JSON: one object per part.
-pub fn json(rows: &[Row]) -> Value {
+pub fn json(rows: &[MeasuredPart]) -> Value {
     rows.iter()
         .enumerate()
         .map(|(at, row)| {
