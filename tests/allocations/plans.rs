@@ -37,9 +37,9 @@ fn a_plan_keeps_nothing_twice_and_making_it_takes_little_more_than_its_file() {
         .num_threads(1)
         .build()
         .unwrap();
-    let last = taught.recipe.file.sequences.len() - 1;
+    let last = taught.file.sequences.len() - 1;
     for (production, each) in [(last, PLAN), (0, LONG_PLAN)] {
-        let mut file = taught.recipe.file.clone();
+        let mut file = taught.file.clone();
         file.production = production;
         let (bytes, _) = archive::pack(&file, &taught.recipe.arrays).unwrap();
         let (plan, taken) = pool.install(|| {
@@ -53,7 +53,7 @@ fn a_plan_keeps_nothing_twice_and_making_it_takes_little_more_than_its_file() {
         println!(
             "a file of {} bytes, a plan of {} steps with maps of {}: {} bytes kept, {} at most while it was made",
             bytes.len(),
-            plan.steps(),
+            plan.sequence_count(),
             plan.bytes(),
             taken.bytes_current,
             taken.bytes_max

@@ -1,6 +1,14 @@
 //! Reading the files that the program writes, with libraries other than the program's own code.
 
+use appliance::recipe::RecipeFile;
+use appliance::recipe::archive::{Arrays, unpack};
+use std::io::Cursor;
 use std::path::Path;
+
+/// The manifest and the arrays of a recipe's file, to be changed and packed again.
+pub fn recipe(bytes: &[u8]) -> (RecipeFile, Arrays) {
+    unpack(Cursor::new(bytes), bytes.len() as u64).expect("a whole recipe")
+}
 
 /// A two-dimensional array of `f32`.
 #[derive(Clone, Debug)]

@@ -3,10 +3,11 @@
 use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, TRIGGER, long, trigger};
 use appliance::head::calibration::Calibration;
 use appliance::recipe::plan::Plan;
-use appliance::recipe::{Recipe, Store, archive};
+use appliance::recipe::{Store, archive};
 use sim::Scenario;
 use std::fs;
 use std::time::{Duration, Instant};
+use tests::files;
 use tests::random::Random;
 
 /// Good recipes.
@@ -40,9 +41,7 @@ fn changed(
     number: u16,
     change: impl Fn(&mut appliance::recipe::RecipeFile),
 ) -> Vec<u8> {
-    let Recipe {
-        mut file, arrays, ..
-    } = Recipe::from_bytes(bytes).unwrap();
+    let (mut file, arrays) = files::recipe(bytes);
     file.number = number;
     file.part_number = part_number(number);
     if expected(number) == FAIL {

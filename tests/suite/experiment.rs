@@ -1,7 +1,7 @@
 //! `fringed-lab experiment`: what it promises of the better pattern, and its files.
 
 use crate::written::laboratory;
-use fringed_lab::experiment::{Frames, HEADER, Method, OpticsKind, Runner, Scene};
+use fringed_lab::experiment::{BetterSequence, HEADER, Method, OpticsKind, Runner, Scene};
 
 /// Columns and rows of the camera: the study's picture, or its middle quarter with pixels of the same size.
 const WHOLE: u32 = 512;
@@ -12,15 +12,15 @@ const ERROR_OVER_SIGMA: std::ops::RangeInclusive<f64> = 0.9..=1.2;
 /// Promised limits of RMS against the paper's own adaptive run (p_I = 5).
 struct Limits {
     part: &'static str,
-    ratios: [(Frames, f64); 4],
+    ratios: [(BetterSequence, f64); 4],
 }
 
 const fn limits(part: &'static str, [twelve, nine, six, four]: [f64; 4]) -> Limits {
     let ratios = [
-        (Frames::Twelve, twelve),
-        (Frames::Nine, nine),
-        (Frames::Six, six),
-        (Frames::Four, four),
+        (BetterSequence::Twelve, twelve),
+        (BetterSequence::Nine, nine),
+        (BetterSequence::Six, six),
+        (BetterSequence::Four, four),
     ];
     Limits { part, ratios }
 }
@@ -30,7 +30,7 @@ const SAWTOOTH: Limits = limits("sawtooth", [0.54, 0.61, 0.75, 0.83]);
 const SPHERE: Limits = limits("sphere", [0.62, 0.71, 0.89, 1.0]);
 const SPLINE: Limits = limits("spline", [0.62, 0.71, 0.89, 1.0]);
 
-fn check(limits: &Limits, camera: u32, shots: &[Frames]) {
+fn check(limits: &Limits, camera: u32, shots: &[BetterSequence]) {
     let part = limits.part;
     let scene = Scene {
         camera,
@@ -59,15 +59,24 @@ fn check(limits: &Limits, camera: u32, shots: &[Frames]) {
 /// The sawtooth is not among these: in its middle the paper's pattern is spared the part's ends, where it is worst.
 #[test]
 fn the_better_pattern_beats_the_papers_own_in_the_middle_of_cone_and_spline() {
-    check(&CONE, MIDDLE, &[Frames::Twelve, Frames::Four]);
-    check(&SPLINE, MIDDLE, &[Frames::Twelve]);
+    check(
+        &CONE,
+        MIDDLE,
+        &[BetterSequence::Twelve, BetterSequence::Four],
+    );
+    check(&SPLINE, MIDDLE, &[BetterSequence::Twelve]);
 }
 
 #[test]
 #[ignore = "half a minute: whole pictures of all parts"]
 fn the_better_pattern_beats_the_papers_own_on_every_part() {
     for limits in [&CONE, &SAWTOOTH, &SPHERE, &SPLINE] {
-        let all = [Frames::Twelve, Frames::Nine, Frames::Six, Frames::Four];
+        let all = [
+            BetterSequence::Twelve,
+            BetterSequence::Nine,
+            BetterSequence::Six,
+            BetterSequence::Four,
+        ];
         check(limits, WHOLE, &all);
     }
 }

@@ -3,11 +3,12 @@
 use crate::history::{place_with_a_dent, program, reader, recording};
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, long};
-use appliance::recipe::{Recipe, archive};
+use appliance::recipe::archive;
 use appliance::station::Verdict;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
+use tests::files;
 use tests::program::Run;
 
 /// Word of VERDICT.
@@ -145,9 +146,7 @@ fn a_kept_part_is_judged_again_by_its_own_recipe_after_that_was_edited_or_delete
 
 /// The recipe in a file projects this of its sequences in production.
 fn project(recipe: &Path, production: usize) {
-    let Recipe {
-        mut file, arrays, ..
-    } = Recipe::from_bytes(&fs::read(recipe).unwrap()).unwrap();
+    let (mut file, arrays) = files::recipe(&fs::read(recipe).unwrap());
     file.production = production;
     fs::write(recipe, archive::pack(&file, &arrays).unwrap().0).unwrap();
 }

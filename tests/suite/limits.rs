@@ -63,7 +63,7 @@ fn line(scenario: &Scenario) -> Line {
     };
     let (head, calibration) = (&mut bed.head, &bed.calibration);
     let taught = teach(head, calibration, &naming, TIMEOUT, &|_, _| ()).unwrap();
-    let predicted = taught.recipe.file.good_parts.unwrap();
+    let predicted = taught.file.good_parts.unwrap();
     let words = predicted.words();
     assert!(
         words
@@ -83,15 +83,15 @@ fn line(scenario: &Scenario) -> Line {
 impl Line {
     /// A cycle as production runs it: longer sequences while one asks for them.
     fn judge(&mut self) -> Inspection {
-        let mut step = 0;
+        let mut sequence = 0;
         loop {
             let mut frames = Vec::new();
             let mut keep = |_, frame| frames.push(frame);
-            let indices = self.plan.indices(step);
+            let indices = self.plan.indices(sequence);
             self.bed.head.acquire(indices, TIMEOUT, &mut keep).unwrap();
-            let found = self.plan.inspect(step, &frames, Instant::now());
-            step += 1;
-            if found.step_up.is_none() || step == self.plan.steps() {
+            let found = self.plan.inspect(sequence, &frames, Instant::now());
+            sequence += 1;
+            if found.step_up.is_none() || sequence == self.plan.sequence_count() {
                 return found;
             }
         }
@@ -130,7 +130,7 @@ impl Line {
 
     /// The point that a pixel sees, where it sees one.
     fn point(&self, heights: &[f32], at: usize) -> Option<Vector> {
-        let width = self.plan.file().camera.width as usize;
+        let width = self.plan.conditions().camera.0 as usize;
         let z = f64::from(*heights.get(at)?);
         let triangulator = self.plan.production().triangulator();
         let height = z.is_finite().then(|| Height::from_mm(z))?;
@@ -140,7 +140,7 @@ impl Line {
     /// Places uniform over the surface that is seen, by its area, that keep the dent's radius from the flowerpot's rim, from the
     /// sheet metal's edges and from its openings, and are no pixels at a silhouette.
     fn places(&self, pot: bool, count: usize, seed: u64) -> Vec<Vector> {
-        let width = self.plan.file().camera.width as usize;
+        let width = self.plan.conditions().camera.0 as usize;
         let heights = self.bed.stage.truth().height;
         let point = |at: usize| self.point(&heights, at);
         let area = |at: usize| match (point(at), point(at + 1), point(at + width)) {

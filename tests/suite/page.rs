@@ -2,11 +2,12 @@
 
 use super::written::program;
 use crate::station_plc::{Daemon, PATIENCE, Place, Plc, long};
-use appliance::recipe::{Recipe, Store, archive};
+use appliance::recipe::{Store, archive};
 use serde_json::{Value, json};
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::time::Instant;
+use tests::files;
 
 const PASS: u16 = 1;
 const FAIL: u16 = 2;
@@ -202,11 +203,10 @@ fn a_recipe_with_inverted_limits_is_refused_by_the_gauges_name_wherever_it_comes
     let mut browser = Browser::new(&daemon);
     browser.sign_in(&daemon);
     let taught = std::fs::read(place.recipe()).unwrap();
-    let recipe = Recipe::from_bytes(&taught).unwrap();
-    let mut file = recipe.file;
+    let (mut file, arrays) = files::recipe(&taught);
     let limits = file.gauges.clone();
     (file.gauges[0].low, file.gauges[0].high) = (Some(0.5), Some(-0.5));
-    let (inverted, fingerprint) = archive::pack(&file, &recipe.arrays).unwrap();
+    let (inverted, fingerprint) = archive::pack(&file, &arrays).unwrap();
     let names = |words: &str| {
         let named = words.contains("deviation") && words.contains("passes no part");
         assert!(named, "{words}");

@@ -3,7 +3,7 @@
 use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, STOPPING, command, long};
 use appliance::history::{self, Bounds, Filter, Numbering, Reader};
 use appliance::recipe::Store;
-use appliance::recipe::{Recipe, archive};
+use appliance::recipe::archive;
 use appliance::storage::state::StateFolder;
 use appliance::web::access::Access;
 use hal::replay::Recording;
@@ -17,23 +17,12 @@ use tests::power::Operation;
 use tests::power::disk::{Disk, Left};
 use tests::power::trace::{OPTIONS, operations};
 use tests::random::Random;
+use tests::small_head::tiny_head;
 
 const SEED: u64 = 0x0FF_0FF;
 /// Numbers that a loss of power may skip.
 const SKIPPED: u32 = 64;
 
-/// Few pixels: what counts here are files.
-const HEAD: &str = "sub_rays = 1
-part = { kind = \"plane\" }
-[rig.camera]
-width = 48
-height = 36
-fov_deg = [5.0, 3.75]
-[rig.projector]
-width = 96
-height = 72
-fov_deg = [8.0, 6.0]
-";
 /// The part lies outside its tolerance: nothing passes, and every part's frames are kept.
 const MOVED: &str = "[placement]\nshift_mm = [0.0, 0.0, 4.0]\n";
 /// Recordings that are made of them; those of the first go when those of the last come.
@@ -120,7 +109,9 @@ impl Run {
     /// Teaches, measures good parts, imports and deletes recipes, measures parts that are kept, and is killed.
     fn recorded() -> Self {
         let place = Place::new();
-        fs::write(place.path("small.toml"), HEAD).unwrap();
+        // Few pixels: what counts here are files.
+        let head = tiny_head(48, 36);
+        fs::write(place.path("small.toml"), &head).unwrap();
         let config =
             "state = \"state\"\n[head]\nscenario = \"small.toml\"\n[history]\nrecordings_mib = 1\n";
         fs::write(place.path("fringed.toml"), config).unwrap();
@@ -131,15 +122,15 @@ impl Run {
         };
         let daemon = run.measure(0, |run| run.told.len() == 3);
         let taught = fs::read(run.place.recipe()).unwrap();
-        let taught = Recipe::from_bytes(&taught).unwrap();
+        let (taught, arrays) = files::recipe(&taught);
         run.told
-            .push((now(), Told::Stored(1, taught.file.fingerprint.clone())));
+            .push((now(), Told::Stored(1, taught.fingerprint.clone())));
         assert!(daemon.terminate().success());
         for (log, number, name) in [(1, 2, "second"), (2, 1, "first"), (3, 1, "first again")] {
-            let mut file = taught.file.clone();
+            let mut file = taught.clone();
             (file.number, file.name) = (number, name.into());
             file.part_number = format!("P-{number}");
-            let (bytes, fingerprint) = archive::pack(&file, &taught.arrays).unwrap();
+            let (bytes, fingerprint) = archive::pack(&file, &arrays).unwrap();
             let path = run.place.path(&format!("{log}.recipe"));
             fs::write(&path, bytes).unwrap();
             run.recipe(
@@ -149,7 +140,7 @@ impl Run {
             );
         }
         run.recipe(4, &["delete", "2"], Told::Deleted(2));
-        fs::write(run.place.path("small.toml"), format!("{HEAD}{MOVED}")).unwrap();
+        fs::write(run.place.path("small.toml"), format!("{head}{MOVED}")).unwrap();
         let mut kept = BTreeSet::new();
         let daemon = run.measure(5, |run| {
             let names = files::names(&run.place.path("state/recordings"));
@@ -301,7 +292,7 @@ impl Promise {
                     {
                         return Err(fallback);
                     }
-                    Some(loaded.recipe.file.fingerprint)
+                    Some(loaded.recipe.id.fingerprint)
                 }
                 Err(_) => None,
             };

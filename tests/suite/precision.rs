@@ -80,7 +80,7 @@ fn gauges_repeat_as_well_as_they_say() {
     ];
     let mut file = RecipeFile {
         gauges,
-        ..taught.recipe.file.clone()
+        ..taught.file.clone()
     };
     file.regions.extend(regions(plate, bead));
     let plan = plan(&bed, &file, &taught.recipe.arrays);
@@ -136,7 +136,7 @@ const FAINT: [f64; 2] = [0.25, 0.3];
 #[test]
 fn a_coverage_in_faint_light_repeats_as_well_as_it_says() {
     let (bed, taught) = small();
-    let mut file = taught.recipe.file.clone();
+    let mut file = taught.file.clone();
     file.gauges = vec![gauge("coverage", "frame", GaugeKind::Coverage)];
     for share in FAINT {
         let mut scenario = bed.stage.scenario().clone();
@@ -158,7 +158,7 @@ fn a_coverage_in_faint_light_repeats_as_well_as_it_says() {
 /// Good parts that were rejected, and dents that were missed, of so many of each; where the worst of them lay.
 fn rejects(good: usize, dented: usize) {
     let (mut bed, taught) = small();
-    let mut file = taught.recipe.file.clone();
+    let mut file = taught.file.clone();
     let deviation = &mut file.gauges[0];
     deviation.measures = GaugeKind::Deviation { smoothing_px: SIDE };
     (deviation.low, deviation.high) = (Some(-LIMIT_MM), Some(LIMIT_MM));

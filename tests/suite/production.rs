@@ -48,7 +48,7 @@ pub(crate) fn plan_with(
     sequence: usize,
     alignment: AlignmentKind,
 ) -> (Plan, Recipe) {
-    let mut file = taught.recipe.file.clone();
+    let mut file = taught.file.clone();
     file.production = sequence;
     file.alignment = alignment;
     let (bytes, _) = pack(&file, &taught.recipe.arrays).unwrap();
@@ -73,7 +73,7 @@ fn heights_about_golden_are_exact_to_micrometres_within_the_declared_range() {
     for (name, part) in parts() {
         let mut bed = bed(&scenario(part));
         let taught = taught(&mut bed).unwrap();
-        let full = taught.recipe.file.sequences.len() - 1;
+        let full = taught.file.sequences.len() - 1;
         let (plan, _) = plan(&bed, &taught, full);
         let (rises, exact) = (plan.production().rises(), plan.production().triangulator());
         let surface = rises.surface();
@@ -134,7 +134,7 @@ fn strips_find_what_the_comparison_of_whole_maps_finds() {
             ..Placement::default()
         };
         bed.stage.place(&part, &placement).unwrap();
-        for sequence in 0..taught.recipe.file.sequences.len() {
+        for sequence in 0..taught.file.sequences.len() {
             let (plan, recipe) = plan(&bed, &taught, sequence);
             let frames = frames(&mut bed, &plan);
             compare(
@@ -176,7 +176,7 @@ pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]
             .unwrap();
         compared += 1;
         gross += u32::from((exact.point.z - f64::from(mm)).abs() > MAX_ERROR_MM + SINGLE_MM);
-        let turns = decoder.phase_noise(phases.modulation[at], recipe.file.noise_counts);
+        let turns = decoder.phase_noise(phases.modulation[at], recipe.conditions.noise_counts);
         sigma[at] = (turns / exact.slope.abs()) as f32;
     }
     assert_eq!(
@@ -195,13 +195,7 @@ pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]
     let golden = golden(recipe);
     let comparison = Comparison::new(&golden, &measured);
     let close = |a: f64, b: f64, share: f64| (a - b).abs() <= share * b.abs();
-    for ((gauge, planned), reading) in recipe
-        .file
-        .gauges
-        .iter()
-        .zip(&recipe.gauges)
-        .zip(&found.readings)
-    {
+    for (planned, reading) in recipe.gauges.iter().zip(&found.readings) {
         let reading = reading.unwrap();
         let expected = expected(&comparison, &planned.measure, &planned.region);
         let tolerance = if expected.sigma.is_some() {
@@ -212,8 +206,8 @@ pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]
         let difference = (reading.value - expected.value).abs();
         assert!(
             difference <= tolerance,
-            "{name}, {}: {reading:?} {expected:?}",
-            gauge.name
+            "{name}, {:?}: {reading:?} {expected:?}",
+            planned.measure
         );
         if let (Some(sigma), Some(expected)) = (reading.sigma, expected.sigma) {
             assert!(
@@ -285,7 +279,7 @@ fn golden_sigma(recipe: &Recipe, plan: &Plan) -> Vec<f32> {
         .map(|(&counts, &slope)| {
             let share = (f64::from(counts) / full_scale * 65_535.0).round() as u16;
             let modulation = algo::units::Modulation::from_bits(share);
-            let turns = decoder.phase_noise(modulation, recipe.file.noise_counts);
+            let turns = decoder.phase_noise(modulation, recipe.conditions.noise_counts);
             (turns * f64::from(slope).abs()) as f32
         })
         .collect()
@@ -295,7 +289,7 @@ fn golden(recipe: &Recipe) -> Golden {
     let arrays = &recipe.arrays;
     let heights = arrays.golden_height.iter().zip(&arrays.valid);
     Golden {
-        width: recipe.file.camera.width as usize,
+        width: recipe.conditions.camera.0 as usize,
         height: heights
             .map(|(&mm, &valid)| match valid {
                 0 => Height::UNKNOWN,
@@ -330,7 +324,7 @@ fn rms(sigma: &[f32], heights: &[Height], width: usize) -> f64 {
 fn findings_depend_neither_on_strips_nor_on_threads_nor_on_the_back_end() {
     let mut bed = bed(&scenario(Part::SheetMetal(SheetMetal::default())));
     let taught = taught(&mut bed).unwrap();
-    for sequence in [1, taught.recipe.file.sequences.len() - 1] {
+    for sequence in [1, taught.file.sequences.len() - 1] {
         let (plan, _) = plan(&bed, &taught, sequence);
         let frames = frames(&mut bed, &plan);
         let views: Vec<_> = frames
@@ -376,7 +370,7 @@ fn findings_depend_neither_on_strips_nor_on_threads_nor_on_the_back_end() {
 fn levels_decoded_on_arrival_give_the_same_inspection() {
     let mut bed = bed(&scenario(Part::SheetMetal(SheetMetal::default())));
     let taught = taught(&mut bed).unwrap();
-    for sequence in 0..taught.recipe.file.sequences.len() {
+    for sequence in 0..taught.file.sequences.len() {
         let (plan, _) = plan_with(&bed, &taught, sequence, AlignmentKind::Rigid);
         let frames = frames(&mut bed, &plan);
         let levels = plan.sequence().levels().len();

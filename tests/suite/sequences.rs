@@ -16,11 +16,13 @@ fn the_shortest_sequence_will_do_for_a_part_in_place_and_not_for_one_out_of_it()
     let taught = taught(&mut bed).unwrap();
     let file = RecipeFile {
         production: 0,
-        ..taught.recipe.file.clone()
+        ..taught.file.clone()
     };
     let plan = plan(&bed, &file, &taught.recipe.arrays);
-    assert_eq!(plan.steps(), 3);
-    let counts: Vec<usize> = (0..3).map(|step| plan.indices(step).len()).collect();
+    assert_eq!(plan.sequence_count(), 3);
+    let counts: Vec<usize> = (0..3)
+        .map(|sequence| plan.indices(sequence).len())
+        .collect();
     assert_eq!(counts, [3, 6, 12]);
     let place = |bed: &Bed, z: f64| {
         let placement = Placement {
@@ -31,9 +33,11 @@ fn the_shortest_sequence_will_do_for_a_part_in_place_and_not_for_one_out_of_it()
     };
     let flags = |found: &Inspection| found.flags & 0b1110;
     place(&bed, 0.3);
-    let found: Vec<Inspection> = (0..3).map(|step| inspect(&mut bed, &plan, step)).collect();
+    let found: Vec<Inspection> = (0..3)
+        .map(|sequence| inspect(&mut bed, &plan, sequence))
+        .collect();
     assert_eq!(
-        [0, 1, 2].map(|step| flags(&found[step])),
+        [0, 1, 2].map(|sequence| flags(&found[sequence])),
         [0b10, 0b100, 0b1000]
     );
     let z = |found: &Inspection| found.placement.unwrap().shift_mm[2];
@@ -58,30 +62,30 @@ fn sequences_of_the_same_length_and_of_different_kinds_are_all_run() {
     let taught = taught(&mut bed).unwrap();
     let mut file = RecipeFile {
         production: 0,
-        ..taught.recipe.file.clone()
+        ..taught.file.clone()
     };
     // As many shifts of its one level as the two levels behind it have together.
     file.sequences[0].frames = Shot::level(1.0, 6).collect();
     let plan = plan(&bed, &file, &taught.recipe.arrays);
-    let counts: Vec<usize> = (0..plan.steps())
-        .map(|step| plan.indices(step).len())
+    let counts: Vec<usize> = (0..plan.sequence_count())
+        .map(|sequence| plan.indices(sequence).len())
         .collect();
     assert_eq!(counts, [6, 6, 12]);
     let flags: Vec<u16> = (0..3)
-        .map(|step| inspect(&mut bed, &plan, step).flags & 0b1110)
+        .map(|sequence| inspect(&mut bed, &plan, sequence).flags & 0b1110)
         .collect();
     assert_eq!(flags, [0b10, 0b100, 0b1000]);
-    for step in 0..3 {
-        let shots: Vec<_> = plan.shots(step).collect();
-        assert_eq!(plan.step_that_shows(&shots), Some(step));
-        let frames = frames(&mut bed, &plan, step);
-        let layers = plan.layers(step, &frames).unwrap();
+    for sequence in 0..3 {
+        let shots: Vec<_> = plan.shots(sequence).collect();
+        assert_eq!(plan.sequence_of(&shots), Some(sequence));
+        let frames = frames(&mut bed, &plan, sequence);
+        let layers = plan.layers(sequence, &frames).unwrap();
         let resolved = layers.height_mm.iter().filter(|z| !z.is_nan()).count();
-        assert!(resolved > 5000, "step {step}: {resolved}");
+        assert!(resolved > 5000, "sequence {sequence}: {resolved}");
     }
     // What is recorded names its frames, so a part that was judged by the second is judged by the second again.
     let other: Vec<_> = Shot::level(1.0, 1).collect();
-    assert_eq!(plan.step_that_shows(&other), None);
+    assert_eq!(plan.sequence_of(&other), None);
     let none = plan.inspect(3, &[], Instant::now());
     assert_eq!((none.verdict(), none.error_code), (Verdict::Invalid, 103));
 }

@@ -3,12 +3,13 @@
 use crate::page::Browser;
 use crate::station_plc::{Daemon, ONLINE, PATIENCE, Place, Plc, READY, long, trigger};
 use appliance::history::{Filter, Reader};
-use appliance::recipe::{Recipe, Store, archive};
+use appliance::recipe::{Store, archive};
 use std::collections::BTreeMap;
 use std::fs;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Instant;
+use tests::files;
 
 /// Tokens of each PLC.
 const TOKENS: u16 = 12;
@@ -69,9 +70,7 @@ fn two_plcs_that_trigger_at_the_same_time_get_one_result_for_each_token() {
 fn place_with_two_recipes() -> Place {
     let place = Place::new();
     Daemon::start(&place).terminate();
-    let Recipe {
-        mut file, arrays, ..
-    } = Recipe::from_bytes(&fs::read(place.recipe()).unwrap()).unwrap();
+    let (mut file, arrays) = files::recipe(&fs::read(place.recipe()).unwrap());
     file.number = 2;
     file.part_number = "SECOND".into();
     let (bytes, _) = archive::pack(&file, &arrays).unwrap();

@@ -2,11 +2,11 @@
 
 use super::Tally;
 use crate::head::calibration::Calibration;
-use crate::recipe::archive::{members, parse, seal};
+use crate::recipe::archive::{members, pack, parse, seal};
 use crate::recipe::golden::Naming;
 use crate::recipe::plan::Plan;
 use crate::recipe::teach::teach;
-use crate::recipe::{Recipe, Store};
+use crate::recipe::{Recipe, RecipeFile, Store};
 use hal::frame::Frame;
 use serde_json::Value;
 use sim::Scenario;
@@ -28,6 +28,7 @@ height = 192
 /// A small head with a recipe, and the frames of a part.
 pub(crate) struct Bed {
     pub calibration: Calibration,
+    pub file: RecipeFile,
     pub recipe: Recipe,
     pub bytes: Vec<u8>,
     frames: Vec<Frame>,
@@ -56,6 +57,7 @@ impl Bed {
         .unwrap();
         Self {
             calibration,
+            file: taught.file,
             recipe: taught.recipe,
             bytes: taught.bytes,
             frames,
@@ -65,12 +67,12 @@ impl Bed {
     /// Plans a recipe and judges a part with it, as the station would.
     pub fn use_recipe(&self, recipe: Recipe) -> Result<(), String> {
         let plan = Plan::new(recipe, &self.calibration, true).map_err(|error| error.to_string())?;
-        for step in 0..plan.steps() {
+        for sequence in 0..plan.sequence_count() {
             // As many frames as the sequence has, of whatever shift.
-            let count = plan.indices(step).len();
+            let count = plan.indices(sequence).len();
             let frames: Vec<Frame> = self.frames.iter().cloned().cycle().take(count).collect();
-            drop(plan.inspect(step, &frames, Instant::now()));
-            drop(plan.heights(step, &frames));
+            drop(plan.inspect(sequence, &frames, Instant::now()));
+            drop(plan.heights(sequence, &frames));
         }
         Ok(())
     }
@@ -79,7 +81,7 @@ impl Bed {
 #[test]
 fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_part() {
     let bed = Bed::new();
-    let Recipe { file, arrays, .. } = &bed.recipe;
+    let (file, arrays) = (&bed.file, &bed.recipe.arrays);
     let mut full = file.clone();
     full.fingerprint = "0".repeat(64);
     full.exposure_us = Some(5000.0);
@@ -138,8 +140,7 @@ fn arrays_of_any_numbers_never_panic() {
     ] {
         // One array at a time, one place of it, every third, or all.
         for (array, every) in (0..8).flat_map(|array| [1, 3, 1500].map(|every| (array, every))) {
-            let mut recipe = bed.recipe.clone();
-            let arrays = &mut recipe.arrays;
+            let mut arrays = bed.recipe.arrays.clone();
             let single = [
                 &mut arrays.golden_height,
                 &mut arrays.height_slope,
@@ -160,7 +161,7 @@ fn arrays_of_any_numbers_never_panic() {
                 places.for_each(|value| *value = number as u8);
             }
             // Whatever it answers, it answers.
-            drop(Recipe::check(recipe.file, recipe.arrays).map(|recipe| bed.use_recipe(recipe)));
+            drop(Recipe::check(&bed.file, arrays).map(|recipe| bed.use_recipe(recipe)));
             cases += 1;
         }
     }
@@ -171,7 +172,7 @@ fn arrays_of_any_numbers_never_panic() {
 #[test]
 fn a_recipe_for_a_projector_of_a_whole_turn_of_pixels_is_refused_and_does_not_replace_a_good_one() {
     let bed = Bed::new();
-    let mut file = bed.recipe.file.clone();
+    let mut file = bed.file.clone();
     file.fingerprint = "0".repeat(64);
     (file.projector.width, file.projector.height) = (u32::MAX, u32::MAX);
     file.pattern = serde_json::from_str(r#"{ "kind": "vertical", "fringes": 20.0 }"#).unwrap();
@@ -216,12 +217,10 @@ fn a_recipe_is_tried_out_on_the_head_before_it_is_taken() {
             .import(&arriving, try_out)
             .map_err(|error| error.to_string())
     };
-    let changed = |change: fn(&mut crate::recipe::RecipeFile)| {
-        let Recipe {
-            mut file, arrays, ..
-        } = bed.recipe.clone();
+    let changed = |change: fn(&mut RecipeFile)| {
+        let mut file = bed.file.clone();
         change(&mut file);
-        crate::recipe::archive::pack(&file, &arrays).unwrap().0
+        pack(&file, &bed.recipe.arrays).unwrap().0
     };
     // Each value is within its bounds; together they do not fit this head.
     let beside = import(&changed(|file| file.range_mm = [-10.0, 9000.0])).unwrap_err();

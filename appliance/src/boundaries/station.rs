@@ -4,8 +4,8 @@ use super::Bed;
 use super::recipes::HEAD;
 use crate::config::Config;
 use crate::production::caught;
+use crate::recipe::Store;
 use crate::recipe::archive::pack;
-use crate::recipe::{Recipe, Store};
 use crate::service::Daemon;
 use crate::station::snapshot::status;
 use crate::station::{
@@ -30,13 +30,11 @@ fn a_station_whose_recipe_cannot_be_used_stays_reachable_and_loads_another() {
     fs::write(&path, text).unwrap();
     let store = Store::open(&folder.path().join("state/recipes")).unwrap();
     // As an older program may have stored it: every value is within its bounds, and no head measures 9 m above itself.
-    let Recipe {
-        mut file, arrays, ..
-    } = bed.recipe.clone();
+    let (mut file, arrays) = (bed.file.clone(), &bed.recipe.arrays);
     file.range_mm = [-10.0, 9000.0];
-    store.save(1, &pack(&file, &arrays).unwrap().0).unwrap();
-    (file.number, file.range_mm) = (2, bed.recipe.file.range_mm);
-    store.save(2, &pack(&file, &arrays).unwrap().0).unwrap();
+    store.save(1, &pack(&file, arrays).unwrap().0).unwrap();
+    (file.number, file.range_mm) = (2, bed.file.range_mm);
+    store.save(2, &pack(&file, arrays).unwrap().0).unwrap();
 
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let config = Config::read(&path).unwrap();

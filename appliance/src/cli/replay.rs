@@ -51,15 +51,15 @@ impl Replay {
         let kept = Kept::open(unpacked.folder())?;
         let Chosen { recipe, from, same } =
             self.choose(&kept, &Store::at(&state.join("recipes")))?;
-        let (number, fingerprint) = (recipe.file.number, recipe.file.fingerprint.clone());
+        let (number, fingerprint) = (recipe.id.number, recipe.id.fingerprint.clone());
         let stored = stored(&state, unpacked.name(), &kept)?;
         let flags = stored.as_ref().map_or(0, |entry| entry.flags);
         let (frames, shots) = (kept.frames(), kept.shots());
         let configured = files.configuration()?.threads;
         let judged = threads.pool(configured)?.install(|| {
             let plan = kept.plan(recipe, flags & SIMULATED != 0)?;
-            let inspect = |step| plan.inspect(step, &frames, Instant::now());
-            Ok::<_, PlanError>(plan.step_that_shows(&shots).map(inspect))
+            let inspect = |sequence| plan.inspect(sequence, &frames, Instant::now());
+            Ok::<_, PlanError>(plan.sequence_of(&shots).map(inspect))
         });
         let judged = judged.map_err(|error| Failure::new(Exit::Content, error.to_string()))?;
         let inspection = judged.ok_or_else(|| {
@@ -147,7 +147,7 @@ impl Replay {
             }
             Some(path) => (kept::read(path)?, path.display().to_string()),
         };
-        let same = recipe.file.fingerprint == kept.reference().fingerprint;
+        let same = recipe.id.fingerprint == kept.reference().fingerprint;
         Ok(Chosen { recipe, from, same })
     }
 }

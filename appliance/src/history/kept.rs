@@ -94,14 +94,14 @@ impl Kept {
             };
         };
         let recipe = read(own)?;
-        if recipe.file.fingerprint == *fingerprint {
+        if recipe.id.fingerprint == *fingerprint {
             return Ok((recipe, true));
         }
         let words = format!(
             "read recipe {}: its fingerprint is {:.8}, the part was judged by {fingerprint:.8}: copy the whole recording \
              again, or name a recipe",
             own.display(),
-            recipe.file.fingerprint
+            recipe.id.fingerprint
         );
         Err(Failure::new(Exit::Content, words))
     }
@@ -111,8 +111,8 @@ impl Kept {
     /// # Errors
     /// If it was made for another head or does not fit the frames.
     pub fn plan(&self, recipe: Recipe, simulated: bool) -> Result<Plan, PlanError> {
-        let judged = recipe.file.fingerprint == self.reference.fingerprint;
-        if judged || self.calibration_then().as_ref() == Some(&recipe.file.calibration) {
+        let judged = recipe.id.fingerprint == self.reference.fingerprint;
+        if judged || self.calibration_then().as_ref() == Some(&recipe.id.calibration) {
             return Plan::again(recipe, &self.calibration, simulated);
         }
         Plan::new(recipe, &self.calibration, simulated)

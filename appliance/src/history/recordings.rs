@@ -28,8 +28,8 @@ pub const RECIPE: &str = "recipe.recipe";
 pub struct FailedPart {
     /// The result.
     pub record: Arc<ResultRecord>,
-    /// Which of the recipe's sequences it was judged by: the step of the plan.
-    pub step: usize,
+    /// Which of the recipe's sequences it was judged by.
+    pub sequence: usize,
     /// The frames of that sequence.
     pub frames: Vec<Frame>,
     /// What judged it.
@@ -50,7 +50,7 @@ impl FailedPart {
         recipes: &[PathBuf],
         most: u64,
     ) -> Result<(), RecorderError> {
-        let fingerprint = &self.plan.file().fingerprint;
+        let fingerprint = &self.plan.id().fingerprint;
         recorder::write_with(&recording(self), folder, |partial| {
             let room = most.saturating_sub(bytes_in(partial));
             let fits = |path: &&PathBuf| fs::metadata(path).is_ok_and(|file| file.len() <= room);
@@ -146,7 +146,7 @@ impl Recordings {
         // First the file that the recording before shares, so that a recipe imported twice is kept once.
         let before = self.kept.back().filter(|kept| kept.recipe.is_some());
         let before = before.map(|kept| self.folder.join(&kept.name).join(RECIPE));
-        let stored = self.recipes.generations(part.plan.file().number);
+        let stored = self.recipes.generations(part.plan.id().number);
         let recipes: Vec<_> = before.into_iter().chain(stored).collect();
         part.write(&folder, &recipes, self.quota)?;
         self.kept.push_back(Kept::at(&folder, name.clone()));
@@ -211,13 +211,13 @@ fn bytes_in(folder: &Path) -> u64 {
 fn recording(part: &FailedPart) -> Recording {
     let FailedPart {
         record,
-        step,
+        sequence,
         frames,
         plan,
         calibration,
     } = part;
-    let file = plan.file();
-    let shown = plan.shots(*step).zip(frames);
+    let (id, conditions) = (plan.id(), plan.conditions());
+    let shown = plan.shots(*sequence).zip(frames);
     Recording {
         description: format!(
             "result {}, recipe {}, {}",
@@ -230,19 +230,19 @@ fn recording(part: &FailedPart) -> Recording {
         frames: shown
             .map(|(shot, frame)| seam::recorded(shot, frame.clone()))
             .collect(),
-        range_mm: Some(file.range_mm),
-        exposure_us: file.exposure_us,
+        range_mm: Some(conditions.range_mm),
+        exposure_us: conditions.exposure_us,
         part_id: Some(record.part_id.to_string()),
         recipe: Some(RecipeReference {
-            number: u32::from(file.number),
-            fingerprint: file.fingerprint.clone(),
+            number: u32::from(id.number),
+            fingerprint: id.fingerprint.clone(),
         }),
         ..calibration.recording()
     }
 }
 
 fn pattern(plan: &Plan) -> PatternSpec {
-    match plan.file().pattern {
+    match plan.conditions().pattern {
         PatternFile::Vertical { fringes } => PatternSpec::Vertical { fringes },
         PatternFile::Horizontal { fringes } => PatternSpec::Horizontal { fringes },
         PatternFile::File => {

@@ -1,8 +1,8 @@
 //! From a preliminary recording to a phase function made for its part: what `fringed adapt` does.
 
-use crate::error::{Exit, Failure};
+use crate::error::Failure;
 use crate::head::seam;
-use crate::measure::measure;
+use crate::measure::{measure, wrong};
 use algo::adaptive::{ProjectorMap, noise, paper};
 use algo::pattern::PhaseFunction;
 use hal::replay::Recording;
@@ -65,10 +65,7 @@ pub struct Report {
 /// # Errors
 /// If it cannot be measured, lacks a pattern or a model that the method needs, or shows nothing.
 pub fn adapt(recording: &Recording, folder: &Path, choice: &Choice) -> Result<Adapted, Failure> {
-    let wrong = |error: &dyn std::fmt::Display| {
-        let manifest = folder.join("recording.json");
-        Failure::because(Exit::Content, manifest.display(), error)
-    };
+    let wrong = |error: &dyn std::fmt::Display| wrong(folder, error);
     let channels = Channels::of(recording, choice.method).map_err(|error| wrong(&error))?;
     let measurement = measure(recording, folder)?;
     let surface = measurement.heights.as_ref().map_err(|missing| {

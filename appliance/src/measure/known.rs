@@ -74,13 +74,13 @@ impl Known {
     /// # Errors
     /// If the frames are of another size, or no pattern is the recipe's; both are named.
     pub fn of(recipe: &Recipe, recording: &Recording) -> Result<Self, AnyError> {
-        let number = recipe.file.number;
-        let camera = &recipe.file.camera;
-        if (camera.width, camera.height) != (recording.width, recording.height) {
+        let number = recipe.id.number;
+        let (width, height, _) = recipe.conditions.camera;
+        if (width, height) != (recording.width, recording.height) {
             return Err(format!(
-                "recipe {number} is for frames of {}x{}, the recording has {}x{}: name the recipe that \
+                "recipe {number} is for frames of {width}x{height}, the recording has {}x{}: name the recipe that \
                  was taught with this camera",
-                camera.width, camera.height, recording.width, recording.height
+                recording.width, recording.height
             )
             .into());
         }

@@ -6,7 +6,7 @@ mod report;
 mod score;
 
 pub use report::{RecipeName, Report, StageTimes};
-pub use score::{Score, Truth};
+pub use score::{GROSS_MM, Score, Truth};
 
 use crate::error::{Exit, Failure};
 use crate::head::scan::Scan;
@@ -141,7 +141,7 @@ fn measure_about(
     };
     let started = Instant::now();
     let stated = recording.noise_counts;
-    let stated = stated.or_else(|| recipe.map(|recipe| recipe.file.noise_counts));
+    let stated = stated.or_else(|| recipe.map(|recipe| recipe.conditions.noise_counts));
     let noise = stated.or_else(|| {
         let Scan {
             sequence, frames, ..
@@ -165,8 +165,8 @@ fn measure_about(
             ratios: channel.ratios(),
             map,
             recipe: recipe.map(|recipe| RecipeName {
-                number: recipe.file.number,
-                fingerprint: recipe.file.fingerprint.clone(),
+                number: recipe.id.number,
+                fingerprint: recipe.id.fingerprint.clone(),
             }),
         },
         noise,
@@ -258,7 +258,7 @@ impl Rig {
             devices: devices.map_err(String::from),
             range: recording
                 .range_mm
-                .or_else(|| recipe.map(|recipe| recipe.file.range_mm))
+                .or_else(|| recipe.map(|recipe| recipe.conditions.range_mm))
                 .map(|[low, high]| HeightRange { low, high }),
         })
     }

@@ -6,7 +6,7 @@ use hal::replay::Recording;
 use serde::Serialize;
 
 /// |e| above this is a gross error (a wrong fringe order, not noise), in mm.
-const GROSS_MM: f64 = 1.0;
+pub const GROSS_MM: f64 = 1.0;
 /// Truth class of a pixel that is wholly lit and holds no depth edge.
 const WHOLE_PIXEL: u8 = 2;
 
@@ -36,6 +36,15 @@ pub struct Score {
     pub gross: usize,
 }
 
+impl<'a> From<&'a sim::Truth> for Truth<'a> {
+    fn from(truth: &'a sim::Truth) -> Self {
+        Self {
+            height: Some(&truth.height),
+            class: Some(&truth.class),
+        }
+    }
+}
+
 impl<'a> Truth<'a> {
     /// The truth beside a recording's frames.
     pub fn of(recording: &'a Recording) -> Self {
@@ -48,6 +57,11 @@ impl<'a> Truth<'a> {
     /// Whether truth says that pixel `at` is wholly lit and holds no depth edge.
     pub fn whole(&self, at: usize) -> bool {
         self.class.is_some_and(|class| class[at] == WHOLE_PIXEL)
+    }
+
+    /// The pixels that truth calls wholly lit without a depth edge, in order.
+    pub fn whole_pixels(&self) -> impl Iterator<Item = usize> {
+        (0..self.class.map_or(0, <[u8]>::len)).filter(|&at| self.whole(at))
     }
 
     /// Scores measured heights; `None` without a truth or without a pixel to score.

@@ -17,8 +17,8 @@ use std::time::{Duration, Instant};
 /// What a part was judged by.
 #[derive(Default)]
 pub(super) struct JudgedBy {
-    /// Which of the recipe's sequences: the step of the plan.
-    pub step: usize,
+    /// Which of the recipe's sequences.
+    pub sequence: usize,
     /// Its frames; none if there was no judgement.
     pub frames: Vec<Frame>,
 }
@@ -41,14 +41,14 @@ impl Worker {
             self.station.event(failed(id, error_code::RIG, message));
             return JudgedBy::default();
         };
-        let (mut step, mut flags, mut cpu) = (0, 0, Duration::ZERO);
+        let (mut sequence, mut flags, mut cpu) = (0, 0, Duration::ZERO);
         let mut stages = Stages::default();
         let waited = self.station.now().since(job.accepted);
         stages.add(Stage::Waiting, waited.to_u32());
         loop {
             let began = Instant::now();
-            let mut arriving = plan.arriving(step);
-            let Some(taken) = self.take(plan, step, &mut arriving, id) else {
+            let mut arriving = plan.arriving(sequence);
+            let Some(taken) = self.take(plan, sequence, &mut arriving, id) else {
                 return JudgedBy::default();
             };
             let Taken {
@@ -61,7 +61,7 @@ impl Worker {
             if exposure.retaken > 0 {
                 flags |= RETRIED;
             }
-            let last = step + 1 >= plan.steps();
+            let last = sequence + 1 >= plan.sequence_count();
             // The part must stay while another sequence may follow.
             if last {
                 self.station.event(Event::ExposureDone { job: id });
@@ -74,7 +74,7 @@ impl Worker {
                 self.progress
                     .log(&format!("measuring again with more frames: {reason}"));
                 flags |= STEPPED_UP;
-                step += 1;
+                sequence += 1;
                 continue;
             }
             if !last {
@@ -83,7 +83,7 @@ impl Worker {
             inspection.flags |= flags;
             inspection.stages = stages;
             inspection.cpu_us = us(cpu);
-            let judged_by = JudgedBy { step, frames };
+            let judged_by = JudgedBy { sequence, frames };
             self.publish(id, inspection, plan, &judged_by);
             return judged_by;
         }
@@ -94,11 +94,11 @@ impl Worker {
     fn take(
         &mut self,
         plan: &Plan,
-        step: usize,
+        sequence: usize,
         arriving: &mut Arriving,
         job: JobId,
     ) -> Option<Taken> {
-        let indices = plan.indices(step);
+        let indices = plan.indices(sequence);
         let mut frames: Vec<Frame> = Vec::with_capacity(indices.len());
         let mut spent = Duration::ZERO;
         let (station, aborts, pool) = (&self.station, &self.aborts, &self.pool);
@@ -148,7 +148,7 @@ impl Worker {
         if let Some(record) = after.result.clone().filter(published) {
             self.history.keep(&record, || FailedPart {
                 record: record.clone(),
-                step: judged_by.step,
+                sequence: judged_by.sequence,
                 frames: judged_by.frames.clone(),
                 plan: plan.clone(),
                 calibration: self.opened.calibration.clone(),

@@ -23,8 +23,8 @@ pub struct LastCycle<'a> {
     pub record: &'a Arc<ResultRecord>,
     /// The recipe that it was judged by.
     pub plan: &'a Arc<Plan>,
-    /// Which of the recipe's sequences it was judged by: the step of the plan.
-    pub step: usize,
+    /// Which of the recipe's sequences it was judged by.
+    pub sequence: usize,
     /// The frames of that sequence, in its order.
     pub frames: &'a [Frame],
     /// The head's calibration.
@@ -87,7 +87,7 @@ impl LastMaps {
         let asked = self.ask(|cycle| {
             Some((
                 cycle.seq(),
-                Arc::new(cycle.plan.layers(cycle.step, cycle.frames)?),
+                Arc::new(cycle.plan.layers(cycle.sequence, cycle.frames)?),
             ))
         });
         let newest = asked.flatten().or(made);

@@ -5,11 +5,11 @@ pub mod backend;
 mod cycle;
 pub mod latest;
 pub mod opening;
-mod placing;
 mod recovery;
 pub mod shelf;
 pub mod simulation;
 pub mod stopwatch;
+mod teaching;
 
 pub use aborts::Aborts;
 
@@ -23,9 +23,7 @@ use crate::production::shelf::Shelf;
 use crate::production::simulation::Placing;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::store::Stamp;
-use crate::recipe::teach::{TeachError, teach_while};
-use crate::recipe::{LoadError, Store, replace};
-use crate::station::error_code;
+use crate::recipe::{LoadError, Store};
 use crate::station::{
     ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
 };
@@ -181,7 +179,7 @@ impl Worker {
         let cycle = measured.map(|(plan, record)| LastCycle {
             record,
             plan,
-            step: last.step,
+            sequence: last.sequence,
             frames: &last.frames,
             calibration,
         });
@@ -290,108 +288,6 @@ impl Worker {
             })?;
         Ok((plan, fallback))
     }
-
-    fn teach(&mut self, job: JobId, number: u16, keep_gauges: bool, plan: &mut Option<Arc<Plan>>) {
-        let replaced = self.recipes.present(number);
-        let naming = replace::naming(number, replaced.as_ref());
-        let kept = replaced.filter(|_| keep_gauges);
-        let (station, bar) = (self.station.clone(), self.progress.clone());
-        let (aborts, pulse) = (self.aborts.clone(), &self.pulse);
-        let computing = &self.computing;
-        let progress = |fraction: f64, words: &str| {
-            pulse.beat();
-            bar.tell(fraction, words);
-            station.event(Event::Progress {
-                job,
-                fraction: fraction as f32,
-                words: words.into(),
-            });
-            !aborts.has(job)
-        };
-        let problem = self.opened.problem.clone();
-        let Opened {
-            head, calibration, ..
-        } = &mut self.opened;
-        let (width, height, _) = calibration.frames();
-        let fit = kept
-            .as_ref()
-            .map_or(Ok(()), |file| replace::check_kept(file, (width, height)));
-        let taught = match (problem, fit) {
-            (Some(problem), _) => Err(TeachError::NotCalibrated(problem)),
-            (None, Err(words)) => Err(TeachError::Rig(words)),
-            (None, Ok(())) => self.pool.install(|| {
-                teach_while(
-                    head,
-                    calibration,
-                    &naming,
-                    DEVICE_TIMEOUT,
-                    computing,
-                    &progress,
-                )
-            }),
-        };
-        let taught = taught.and_then(|taught| match &kept {
-            Some(file) => replace::keep_gauges(taught, file).map_err(TeachError::Rig),
-            None => Ok(taught),
-        });
-        self.progress.clear();
-        let stored = taught
-            .map_err(|error| {
-                let words = match error {
-                    TeachError::Ended => format!("teach: {ABORTED}"),
-                    _ => error.to_string(),
-                };
-                let failed = (error.code(), words);
-                if let TeachError::Device(error) = error {
-                    self.lost = Some(error).filter(recovery::is_lost);
-                }
-                failed
-            })
-            .and_then(|taught| {
-                for reason in &taught.choice.reasons {
-                    self.progress.log(reason);
-                }
-                let bytes = &taught.bytes;
-                let stored = match &kept {
-                    None => self.recipes.save(number, bytes).map(|()| true),
-                    // Whoever changed its gauges while it was taught was told that they are stored.
-                    Some(file) => self.recipes.replace(number, &file.fingerprint, bytes),
-                };
-                let problem = match stored {
-                    Ok(true) => return Ok(()),
-                    Ok(false) => "it was changed while it was taught: teach it again".into(),
-                    Err(error) => format!("{error}: free space"),
-                };
-                Err((
-                    error_code::NOT_STORED,
-                    format!("store recipe {number}: {problem}"),
-                ))
-            });
-        let ready = stored.and_then(|()| {
-            let key = RecipeKey::Number(number);
-            // Teaching has shown patterns of its own.
-            self.prepare(&key, None)
-                .map_err(|(_, message)| (error_code::RIG, message))
-        });
-        match ready {
-            Ok((ready, _)) => {
-                let recipe = active(&ready);
-                *plan = Some(ready);
-                self.place_waiting(job);
-                self.station.event(Event::Taught { job, recipe });
-            }
-            Err((error_code, message)) => {
-                self.restore(plan);
-                if self.lost.is_none() {
-                    self.station.event(Event::TeachFailed {
-                        job,
-                        error_code,
-                        message: message.into(),
-                    });
-                }
-            }
-        }
-    }
 }
 
 fn refuse_plan(error: PlanError) -> (RecipeResult, String) {
@@ -425,10 +321,11 @@ fn broken(panic: &(dyn Any + Send)) -> (RecipeResult, String) {
 }
 
 fn active(plan: &Plan) -> ActiveRecipe {
+    let id = plan.id();
     ActiveRecipe {
-        number: plan.file().number,
-        crc: plan.crc(),
-        part_number: plan.file().part_number.as_str().into(),
-        name: plan.file().name.as_str().into(),
+        number: id.number,
+        crc: id.crc(),
+        part_number: id.part_number.as_str().into(),
+        name: id.name.as_str().into(),
     }
 }

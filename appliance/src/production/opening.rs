@@ -1,7 +1,7 @@
 //! The head at the start: opened once, or, where a service manager started the program, until it is there.
 
 use super::Order;
-use super::recovery::{FIRST_WAIT, LONGEST_WAIT, REMEDY, wait};
+use super::recovery::{Pause, REMEDY};
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::production::backend::{self, Opened};
@@ -44,7 +44,7 @@ impl Opening<'_> {
             self.progress
                 .tell(share, "working out the light of the scene");
         };
-        let mut pause = FIRST_WAIT;
+        let mut pause = Pause::default();
         let mut said = String::new();
         loop {
             self.pulse.beat();
@@ -78,10 +78,9 @@ impl Opening<'_> {
                     return None;
                 }
             }
-            if wait(pause, orders, self.station, self.pulse).is_break() {
+            if pause.wait(orders, self.station, self.pulse).is_break() {
                 return None;
             }
-            pause = (2 * pause).min(LONGEST_WAIT);
         }
     }
 

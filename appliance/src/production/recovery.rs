@@ -10,9 +10,8 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
-/// Waits before the head is opened again, in signs of life: doubled after each attempt, from the first to the last.
-pub(super) const FIRST_WAIT: u32 = 1;
-pub(super) const LONGEST_WAIT: u32 = 16;
+/// Longest wait before the head is opened again, in signs of life.
+const LONGEST_WAIT: u32 = 16;
 /// What to do about a head that is not there.
 pub(super) const REMEDY: &str = "the head is opened again by itself as soon as it is there; the cable and the power of camera and projector are what to check";
 
@@ -46,11 +45,10 @@ impl Worker {
             remedy: REMEDY.into(),
         });
         let before = self.opened.calibration.fingerprint();
-        let mut pause = FIRST_WAIT;
+        let mut pause = Pause::default();
         let mut said = String::new();
         loop {
-            wait(pause, orders, &self.station, &self.pulse)?;
-            pause = (2 * pause).min(LONGEST_WAIT);
+            pause.wait(orders, &self.station, &self.pulse)?;
             let problem = match self.opened.reopen(&self.config) {
                 Err(failure) => failure.message,
                 Ok(()) => {
@@ -77,26 +75,40 @@ impl Worker {
     }
 }
 
-/// Waits for a head, giving signs of life, until it is time to try again; `Break` when the daemon ends. Orders that come are
-/// dropped: the fault has ended their jobs.
-pub(super) fn wait(
+/// The pause between two attempts to open a head: from one sign of life to [`LONGEST_WAIT`], doubled after each attempt.
+pub(super) struct Pause {
     signs: u32,
-    orders: &Receiver<Order>,
-    station: &StationHandle,
-    pulse: &Pulse,
-) -> ControlFlow<()> {
-    for _ in 0..signs {
-        match orders.recv_timeout(SIGN_OF_LIFE) {
-            Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => {
-                return ControlFlow::Break(());
-            }
-            Ok(_) | Err(RecvTimeoutError::Timeout) => {
-                station.event(Event::Alive);
-                pulse.beat();
+}
+
+impl Default for Pause {
+    fn default() -> Self {
+        Self { signs: 1 }
+    }
+}
+
+impl Pause {
+    /// Waits until it is time to try again, giving signs of life; `Break` when the daemon ends. Orders that come are dropped:
+    /// the fault has ended their jobs.
+    pub(super) fn wait(
+        &mut self,
+        orders: &Receiver<Order>,
+        station: &StationHandle,
+        pulse: &Pulse,
+    ) -> ControlFlow<()> {
+        for _ in 0..self.signs {
+            match orders.recv_timeout(SIGN_OF_LIFE) {
+                Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => {
+                    return ControlFlow::Break(());
+                }
+                Ok(_) | Err(RecvTimeoutError::Timeout) => {
+                    station.event(Event::Alive);
+                    pulse.beat();
+                }
             }
         }
+        self.signs = (2 * self.signs).min(LONGEST_WAIT);
+        ControlFlow::Continue(())
     }
-    ControlFlow::Continue(())
 }
 
 #[cfg(test)]

@@ -2,9 +2,10 @@
 //!
 //! They hold for a file that is read as for an edit that is to be stored; `docs/formats.md` lists them.
 
-use super::check::{MAX_GAUGES, MAX_REGIONS};
+use super::check::MAX_REGIONS;
 use super::comparison::QualityFile;
 use super::file::{GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFile};
+use crate::station::MAX_GAUGES;
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use hal::bounds::{
     FINGERPRINT_DIGITS, MAX_EXPOSURE_US, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_RANGE_MM,

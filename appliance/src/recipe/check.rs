@@ -1,25 +1,76 @@
 //! From the file form of a recipe to a checked one.
 
 use super::archive::{ArchiveError, Arrays, short, unpack};
-use super::file::{PatternFile, RecipeFile};
+use super::demands::Demands;
+use super::file::{PatternFile, RecipeFile, SequenceKind};
 use super::gauge::{check_limits, gauges};
 use algo::inspect::Gauge;
-use algo::pattern::{PhaseFunction, Sequence};
+use algo::pattern::{PhaseFunction, Sequence, Shot};
 use std::io::{Cursor, Read, Seek};
 
-/// A recipe whose parts fit each other.
+/// A recipe whose parts fit each other, parsed into what planning and measuring need.
 #[derive(Clone, Debug)]
 pub struct Recipe {
-    /// The manifest.
-    pub file: RecipeFile,
-    /// The arrays, each of the size that the manifest says.
-    pub arrays: Arrays,
+    /// What it is called.
+    pub id: RecipeId,
+    /// How its part is measured.
+    pub conditions: Conditions,
+    /// What it demands of a part.
+    pub demands: Demands,
     /// Φ_P.
     pub function: PhaseFunction,
-    /// Levels and shifts of each of its sequences, in the order of the manifest.
-    pub sequences: Vec<Sequence>,
+    /// The sequences that a part is measured with in turn, until one is good enough: the one for production, and behind it
+    /// those that unwrap further.
+    pub sequences: Vec<RecipeSequence>,
     /// What its gauges measure.
     pub gauges: Vec<Gauge>,
+    /// The arrays, each of the size of the camera's frames or the projector's raster.
+    pub arrays: Arrays,
+}
+
+/// What a recipe is called, and which calibration it was made for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecipeId {
+    /// 1–9999.
+    pub number: u16,
+    /// The key that a PLC may select by.
+    pub part_number: String,
+    /// For people.
+    pub name: String,
+    /// SHA-256, 64 hexadecimal digits.
+    pub fingerprint: String,
+    /// Fingerprint of the calibration that it was made for.
+    pub calibration: String,
+}
+
+/// How a part is measured: the head that the recipe was made on, and what it was set to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Conditions {
+    /// Columns, rows and bits of the camera's frames.
+    pub camera: (u32, u32, u8),
+    /// Columns and rows of the projector's raster.
+    pub raster: (u32, u32),
+    /// How Φ_P is given.
+    pub pattern: PatternFile,
+    /// Working range of z in mm.
+    pub range_mm: [f64; 2],
+    /// Exposure in µs; none where the head has no such setting.
+    pub exposure_us: Option<f64>,
+    /// σ of one sample in counts.
+    pub noise_counts: f64,
+    /// |ΔΦ| in turns up to which the expansion of the height holds.
+    pub expansion_range_turns: f64,
+}
+
+/// A sequence that a part is measured with.
+#[derive(Clone, Debug)]
+pub struct RecipeSequence {
+    /// What it can unwrap.
+    pub kind: SequenceKind,
+    /// What each frame shows.
+    pub shots: Vec<Shot>,
+    /// Its levels.
+    pub levels: Sequence,
 }
 
 /// A recipe that cannot be used.
@@ -36,8 +87,6 @@ pub enum RecipeError {
     Limits(String),
 }
 
-/// Gauges of a recipe: bits and registers of the Modbus map.
-pub const MAX_GAUGES: usize = crate::station::MAX_GAUGES;
 /// Regions of a recipe.
 pub const MAX_REGIONS: usize = 32;
 
@@ -55,35 +104,42 @@ impl Recipe {
     /// # Errors
     /// As there.
     pub fn read(source: impl Read + Seek, size: u64) -> Result<Self, RecipeError> {
-        let recipe = Self::read_to_edit(source, size)?;
-        check_limits(&recipe.file.gauges).map_err(RecipeError::Limits)?;
+        let (file, recipe) = Self::read_to_edit(source, size)?;
+        check_limits(&file.gauges).map_err(RecipeError::Limits)?;
         Ok(recipe)
     }
 
-    /// As [`Self::read`], but whatever the limits of its gauges are: they may be what is going to be changed.
+    /// As [`Self::from_bytes`], with the manifest.
+    pub(super) fn from_bytes_with_manifest(bytes: &[u8]) -> Result<(RecipeFile, Self), String> {
+        let read = Self::read_to_edit(Cursor::new(bytes), bytes.len() as u64);
+        let (file, recipe) = read.map_err(|error| error.to_string())?;
+        check_limits(&file.gauges)?;
+        Ok((file, recipe))
+    }
+
+    /// As [`Self::read`], with the manifest, and whatever the limits of its gauges are: an edit may be about to correct them.
     ///
     /// # Errors
     /// As there.
-    pub(super) fn read_to_edit(source: impl Read + Seek, size: u64) -> Result<Self, RecipeError> {
+    pub(super) fn read_to_edit(
+        source: impl Read + Seek,
+        size: u64,
+    ) -> Result<(RecipeFile, Self), RecipeError> {
         let (file, arrays) = unpack(source, size)?;
-        Self::fit(file, arrays).map_err(RecipeError::Inconsistent)
-    }
-
-    /// First 32 bits of the fingerprint.
-    pub fn crc(&self) -> u32 {
-        short(&self.file.fingerprint)
+        let recipe = Self::fit(&file, arrays).map_err(RecipeError::Inconsistent)?;
+        Ok((file, recipe))
     }
 
     /// Checks that manifest and arrays fit each other, and the limits of the gauges; the error says what does not.
     ///
     /// # Errors
     /// In words.
-    pub fn check(file: RecipeFile, arrays: Arrays) -> Result<Self, String> {
+    pub fn check(file: &RecipeFile, arrays: Arrays) -> Result<Self, String> {
         check_limits(&file.gauges)?;
         Self::fit(file, arrays)
     }
 
-    fn fit(file: RecipeFile, arrays: Arrays) -> Result<Self, String> {
+    fn fit(file: &RecipeFile, arrays: Arrays) -> Result<Self, String> {
         file.check_bounds()?;
         let (width, height) = (file.camera.width as usize, file.camera.height as usize);
         let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
@@ -116,17 +172,67 @@ impl Recipe {
             }
         };
         let function = function.map_err(|error| format!("projector and pattern: {error}"))?;
-        let sequences = file.sequences.iter();
-        let sequences = sequences.map(|sequence| Sequence::from_frames(&sequence.frames));
-        let sequences = sequences.collect::<Result<_, _>>();
-        let sequences = sequences.map_err(|error| error.to_string())?;
-        let gauges = gauges(&file.regions, &file.gauges, (width, height))?;
         Ok(Self {
-            file,
-            arrays,
+            sequences: sequences(file)?,
+            gauges: gauges(&file.regions, &file.gauges, (width, height))?,
+            id: file.into(),
+            conditions: file.into(),
+            demands: file.into(),
             function,
-            sequences,
-            gauges,
+            arrays,
         })
+    }
+}
+
+/// The sequence for production, and behind it those that unwrap further than the one before.
+fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, String> {
+    let mut chain: Vec<RecipeSequence> = Vec::new();
+    for sequence in file.sequences.iter().skip(file.production) {
+        if chain
+            .last()
+            .is_none_or(|before| before.kind < sequence.kind)
+        {
+            let levels = Sequence::from_frames(&sequence.frames);
+            chain.push(RecipeSequence {
+                kind: sequence.kind,
+                shots: sequence.frames.clone(),
+                levels: levels.map_err(|error| error.to_string())?,
+            });
+        }
+    }
+    Ok(chain)
+}
+
+impl RecipeId {
+    /// First 32 bits of the fingerprint.
+    pub fn crc(&self) -> u32 {
+        short(&self.fingerprint)
+    }
+}
+
+impl From<&RecipeFile> for RecipeId {
+    fn from(file: &RecipeFile) -> Self {
+        Self {
+            number: file.number,
+            part_number: file.part_number.clone(),
+            name: file.name.clone(),
+            fingerprint: file.fingerprint.clone(),
+            calibration: file.calibration.clone(),
+        }
+    }
+}
+
+impl From<&RecipeFile> for Conditions {
+    fn from(file: &RecipeFile) -> Self {
+        let (camera, projector) = (&file.camera, &file.projector);
+        Self {
+            camera: (camera.width, camera.height, camera.bit_depth),
+            raster: (projector.width, projector.height),
+            pattern: file.pattern.clone(),
+            range_mm: file.range_mm,
+            exposure_us: file.exposure_us,
+            noise_counts: file.noise_counts,
+            expansion_range_turns: file.expansion_range_turns,
+        }
     }
 }

@@ -3,6 +3,7 @@
 use super::archive;
 use super::bounds::LONGEST_NAME;
 use super::planner;
+use super::store::Loaded;
 use super::{GaugeFile, LoadError, Recipe, RegionFile, Store};
 use hal::bounds::clipped;
 use serde::Deserialize;
@@ -56,9 +57,9 @@ pub fn edit(
     edit: Edit,
     fits: impl FnOnce(Recipe) -> Result<(), String>,
 ) -> Result<String, EditError> {
-    let Recipe {
-        mut file, arrays, ..
-    } = store.load_to_edit(number)?.recipe;
+    let Loaded {
+        mut file, recipe, ..
+    } = store.load_to_edit(number)?;
     if file.fingerprint != edit.fingerprint {
         return Err(EditError::Outdated(number));
     }
@@ -74,8 +75,8 @@ pub fn edit(
     check_names("recipe", std::iter::once(&file.name))?;
     // Tighter limits may need more frames, wider ones fewer.
     file.production = planner::choose(&file.sequences, &file.gauges).production;
-    let checked = Recipe::check(file, arrays).map_err(EditError::Unfit)?;
-    let (bytes, fingerprint) = archive::pack(&checked.file, &checked.arrays)
+    let checked = Recipe::check(&file, recipe.arrays).map_err(EditError::Unfit)?;
+    let (bytes, fingerprint) = archive::pack(&file, &checked.arrays)
         .map_err(|error| EditError::Unfit(error.to_string()))?;
     fits(checked).map_err(EditError::Unfit)?;
     // It was read without the lock: somebody else may have stored another one meanwhile.

@@ -1,12 +1,12 @@
 //! Recipes on their way in and out: list, export, import. Nothing damaged or foreign comes in.
 
 use super::archive::{self, ArchiveError};
-use super::store::{LoadError, Store};
-use super::{Recipe, RecipeFile, SequenceKind};
+use super::store::{LoadError, Store, is_sound};
+use super::{Recipe, RecipeFile, RecipeId, SequenceKind};
 use crate::storage::folder::rename_whole;
 use serde::Serialize;
 use std::fs::{self, File};
-use std::io::{self, BufReader};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// A stored recipe, for lists.
@@ -131,13 +131,8 @@ impl Store {
     /// If there is no such recipe or no generation is whole.
     pub fn whole(&self, number: u16) -> Result<PathBuf, LoadError> {
         let path = self.path(number);
-        let sound = |path: &PathBuf| {
-            File::open(path).is_ok_and(|file| archive::is_sound(BufReader::new(file)))
-        };
-        match [path.clone(), self.previous(number)]
-            .into_iter()
-            .find(sound)
-        {
+        let files = [path.clone(), self.previous(number)];
+        match files.into_iter().find(|file| is_sound(file)) {
             Some(whole) => Ok(whole),
             None if path.exists() => Err(LoadError::Corrupt {
                 path,
@@ -157,7 +152,7 @@ impl Store {
         &self,
         source: &Path,
         fits: impl FnOnce(Recipe) -> Result<(), String>,
-    ) -> Result<RecipeFile, ImportError> {
+    ) -> Result<RecipeId, ImportError> {
         let refused = |reason: String| ImportError::Refused {
             path: source.to_path_buf(),
             reason,
@@ -177,12 +172,12 @@ impl Store {
         let mut arriving = self.arriving(size).map_err(write(&self.folder))?;
         io::copy(&mut opened, &mut arriving).map_err(write(arriving.path()))?;
         let recipe = arriving.recipe().map_err(&refused)?;
-        let file = recipe.file.clone();
+        let id = recipe.id.clone();
         fits(recipe).map_err(&refused)?;
-        let target = self.path(file.number);
-        let taken = self.take_locked(arriving, file.number);
+        let target = self.path(id.number);
+        let taken = self.take_locked(arriving, id.number);
         taken.map_err(write(&target))?;
-        Ok(file)
+        Ok(id)
     }
 }
 

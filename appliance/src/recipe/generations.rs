@@ -3,12 +3,12 @@
 //! Beside `NNNN.recipe` stands `NNNN.recipe.previous`, the generation before it. `NNNN.recipe.kept` holds what has neither
 //! name: a deleted recipe, or, while generations are exchanged, the newest one. A kill between two steps loses none of them.
 
+use super::RecipeFile;
 use super::gauge::check_limits;
-use super::store::{LoadError, Store};
-use super::{Recipe, RecipeFile, archive};
+use super::store::{LoadError, Store, is_sound, manifest_at};
 use crate::storage::folder::{name_also, rename_whole, sync_folder_of};
-use std::fs::{self, File};
-use std::io::{self, BufReader};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// A generation that was not brought back, or a recipe that was not deleted; the recipes are as before.
@@ -53,8 +53,7 @@ impl Store {
     /// generation behind it.
     pub(super) fn keep_previous(&self, number: u16) -> io::Result<()> {
         let (path, previous) = (self.path(number), self.previous(number));
-        let sound = |file: File| archive::is_sound(BufReader::new(file));
-        if !File::open(&path).is_ok_and(sound) {
+        if !is_sound(&path) {
             return Ok(());
         }
         // The current one stands until it is replaced.
@@ -71,13 +70,13 @@ impl Store {
 
     /// The manifest of what [`Store::undo`] brings back: the generation before the newest, or the deleted recipe.
     pub fn manifest_before(&self, number: u16) -> Option<RecipeFile> {
-        manifest(&self.before(number)?)
+        manifest_at(&self.before(number)?)
     }
 
     /// The manifest of the newest generation that can be read; none if the number is free.
     pub fn present(&self, number: u16) -> Option<RecipeFile> {
         let files = [self.path(number), self.previous(number)];
-        files.iter().find_map(|file| manifest(file))
+        files.iter().find_map(|file| manifest_at(file))
     }
 
     /// The numbers under which there is only a deleted recipe, in order.
@@ -108,7 +107,7 @@ impl Store {
         let unfit = |reason| GenerationError::Unfit { number, reason };
         let restored = read(&before, number).map_err(unfit)?;
         let (path, previous, kept) = (self.path(number), self.previous(number), self.kept(number));
-        if let Some(newest) = manifest(&path)
+        if let Some(newest) = manifest_at(&path)
             && newest.calibration != restored.calibration
         {
             return Err(unfit(
@@ -178,14 +177,10 @@ fn remove(file: &Path) -> io::Result<bool> {
     }
 }
 
-fn manifest(file: &Path) -> Option<RecipeFile> {
-    archive::manifest(File::open(file).ok()?).ok()
-}
-
 /// The manifest of a whole recipe file of this number; else why it is none.
 fn read(path: &Path, number: u16) -> Result<RecipeFile, String> {
     match Store::read(path, number) {
-        Some(Ok(Recipe { file, .. })) => match check_limits(&file.gauges) {
+        Some(Ok((file, _))) => match check_limits(&file.gauges) {
             Ok(()) => Ok(file),
             Err(reason) => Err(format!("cannot be used: {reason}")),
         },
@@ -197,7 +192,7 @@ fn read(path: &Path, number: u16) -> Result<RecipeFile, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recipe::archive::Arrays;
+    use crate::recipe::archive::{self, Arrays};
     use serde_json::json;
 
     /// A small whole recipe.
@@ -244,7 +239,7 @@ mod tests {
         }
 
         fn newest(&self) -> String {
-            self.store.load(7).unwrap().recipe.file.name
+            self.store.load(7).unwrap().file.name
         }
 
         fn before(&self) -> Option<String> {

@@ -81,6 +81,8 @@ pub struct GoldenPart<'a> {
 pub struct Taught {
     /// The file.
     pub bytes: Vec<u8>,
+    /// Its manifest.
+    pub file: RecipeFile,
     /// Its checked form.
     pub recipe: Recipe,
     /// Why which sequence was chosen.
@@ -153,9 +155,10 @@ impl GoldenPart<'_> {
         let (bytes, _) = archive::pack(&file, &arrays).map_err(|error| error.to_string())?;
         drop(arrays);
         // Read back as it will be after a restart: what was just taught is known to load.
-        let recipe = Recipe::from_bytes(&bytes).map_err(|error| error.to_string())?;
+        let (file, recipe) = Recipe::from_bytes_with_manifest(&bytes)?;
         Ok(Taught {
             bytes,
+            file,
             recipe,
             choice,
         })

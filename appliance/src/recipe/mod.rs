@@ -10,6 +10,7 @@ pub mod arriving;
 pub mod bounds;
 pub mod check;
 pub mod comparison;
+mod demands;
 pub mod edit;
 pub mod exchange;
 pub mod file;
@@ -24,7 +25,8 @@ pub mod store;
 pub mod teach;
 
 pub use archive::short;
-pub use check::Recipe;
+pub use check::{Conditions, Recipe, RecipeId, RecipeSequence};
+pub use demands::Demands;
 pub use file::{
     AlignmentKind, AxisFile, ComponentFile, GaugeFile, GaugeKind, PatternFile, RecipeFile,
     RegionFile, SequenceFile, SequenceKind, safe,

@@ -63,10 +63,9 @@ pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<
 /// # Errors
 /// In words, if they do not fit what was taught.
 pub fn keep_gauges(taught: Taught, replaced: &RecipeFile) -> Result<Taught, String> {
-    let Recipe {
-        mut file, arrays, ..
-    } = taught.recipe;
-    drop(taught.bytes);
+    let Taught {
+        mut file, recipe, ..
+    } = taught;
     check_kept(replaced, (file.camera.width, file.camera.height))?;
     file.regions.clone_from(&replaced.regions);
     file.gauges.clone_from(&replaced.gauges);
@@ -75,12 +74,14 @@ pub fn keep_gauges(taught: Taught, replaced: &RecipeFile) -> Result<Taught, Stri
     file.good_parts = None;
     let choice = planner::choose(&file.sequences, &file.gauges);
     file.production = choice.production;
-    let mut recipe = Recipe::check(file, arrays)?;
+    let mut recipe = Recipe::check(&file, recipe.arrays)?;
     let (bytes, fingerprint) =
-        archive::pack(&recipe.file, &recipe.arrays).map_err(|error| error.to_string())?;
-    recipe.file.fingerprint = fingerprint;
+        archive::pack(&file, &recipe.arrays).map_err(|error| error.to_string())?;
+    recipe.id.fingerprint.clone_from(&fingerprint);
+    file.fingerprint = fingerprint;
     Ok(Taught {
         bytes,
+        file,
         recipe,
         choice,
     })

@@ -50,7 +50,9 @@ impl Stamp {
 /// A loaded recipe.
 #[derive(Clone, Debug)]
 pub struct Loaded {
-    /// It.
+    /// Its manifest.
+    pub file: RecipeFile,
+    /// Its checked form.
     pub recipe: Recipe,
     /// Why the newest generation could not be used and this is the one before.
     pub fallback: Option<String>,
@@ -130,10 +132,8 @@ impl Store {
 
     /// Whether the newest generation that is whole has this fingerprint.
     fn is_newest(&self, number: u16, fingerprint: &str) -> bool {
-        let has = |path: &Path| {
-            let manifest = fs::File::open(path).map(archive::manifest);
-            matches!(manifest, Ok(Ok(file)) if file.fingerprint == fingerprint)
-        };
+        let has =
+            |path: &Path| manifest_at(path).is_some_and(|file| file.fingerprint == fingerprint);
         // Most often it is the newest; hashing all of a file is for one that is damaged.
         has(&self.path(number)) || self.whole(number).is_ok_and(|whole| has(&whole))
     }
@@ -153,7 +153,7 @@ impl Store {
     /// have other limits, so it does not stand in for that.
     pub fn load(&self, number: u16) -> Result<Loaded, LoadError> {
         let loaded = self.load_to_edit(number)?;
-        refuse_limits(&self.path(number), &loaded.recipe)?;
+        refuse_limits(&self.path(number), &loaded.file)?;
         Ok(loaded)
     }
 
@@ -164,15 +164,17 @@ impl Store {
     pub fn load_to_edit(&self, number: u16) -> Result<Loaded, LoadError> {
         let path = self.path(number);
         let newest = Self::read(&path, number);
-        if let Some(Ok(recipe)) = newest {
+        if let Some(Ok((file, recipe))) = newest {
             return Ok(Loaded {
+                file,
                 recipe,
                 fallback: None,
             });
         }
         let reason = newest.and_then(Result::err);
         match Self::read(&self.previous(number), number) {
-            Some(Ok(recipe)) => Ok(Loaded {
+            Some(Ok((file, recipe))) => Ok(Loaded {
+                file,
                 recipe,
                 fallback: Some(format!(
                     "recipe file {} {}; the generation before it is used",
@@ -192,17 +194,16 @@ impl Store {
     /// # Errors
     /// If none has it any more.
     pub fn load_fingerprint(&self, number: u16, fingerprint: &str) -> Result<Recipe, LoadError> {
-        let same = |recipe: &Recipe| recipe.file.fingerprint == fingerprint;
+        let same = |(file, _): &(RecipeFile, Recipe)| file.fingerprint == fingerprint;
         let paths = self.generations(number);
-        let found = paths.iter().find_map(|path| {
-            let recipe = Self::read(path, number)?.ok().filter(same)?;
-            Some((path, recipe))
-        });
-        let (path, recipe) = found.ok_or_else(|| {
+        let found = paths
+            .iter()
+            .find_map(|path| Some((path, Self::read(path, number)?.ok().filter(same)?)));
+        let (path, (file, recipe)) = found.ok_or_else(|| {
             let digits = fingerprint.get(..8).unwrap_or(fingerprint);
             LoadError::Unknown(format!("{number} with fingerprint {digits}"))
         })?;
-        refuse_limits(path, &recipe)?;
+        refuse_limits(path, &file)?;
         Ok(recipe)
     }
 
@@ -218,8 +219,8 @@ impl Store {
         })
     }
 
-    /// The recipe in a file, if the file exists.
-    pub(super) fn read(path: &Path, number: u16) -> Option<Result<Recipe, String>> {
+    /// The recipe in a file and its manifest, if the file exists.
+    pub(super) fn read(path: &Path, number: u16) -> Option<Result<(RecipeFile, Recipe), String>> {
         let opened = fs::File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (size, file) = match opened {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
@@ -228,11 +229,11 @@ impl Store {
         };
         Some(match Recipe::read_to_edit(io::BufReader::new(file), size) {
             Err(error) => Err(error.to_string()),
-            Ok(recipe) if recipe.file.number != number => Err(format!(
+            Ok((file, _)) if file.number != number => Err(format!(
                 "holds recipe {}: rename it to {:04}.recipe",
-                recipe.file.number, recipe.file.number
+                file.number, file.number
             )),
-            Ok(recipe) => Ok(recipe),
+            Ok(read) => Ok(read),
         })
     }
 
@@ -266,8 +267,7 @@ impl Store {
         self.numbers()
             .into_iter()
             .find(|&number| {
-                let manifest = fs::File::open(self.path(number)).map(archive::manifest);
-                matches!(manifest, Ok(Ok(file)) if file.part_number == part_number)
+                manifest_at(&self.path(number)).is_some_and(|file| file.part_number == part_number)
             })
             .ok_or_else(unknown)
     }
@@ -294,9 +294,19 @@ impl Store {
     }
 }
 
+/// The manifest of a recipe's file, if it can be read.
+pub(super) fn manifest_at(path: &Path) -> Option<RecipeFile> {
+    archive::manifest(fs::File::open(path).ok()?).ok()
+}
+
+/// Whether the content of a recipe's file agrees with its fingerprint.
+pub(super) fn is_sound(path: &Path) -> bool {
+    fs::File::open(path).is_ok_and(|file| archive::is_sound(io::BufReader::new(file)))
+}
+
 /// Refuses a stored recipe whose gauges have limits that they cannot have.
-fn refuse_limits(path: &Path, recipe: &Recipe) -> Result<(), LoadError> {
-    check_limits(&recipe.file.gauges).map_err(|reason| LoadError::Corrupt {
+fn refuse_limits(path: &Path, file: &RecipeFile) -> Result<(), LoadError> {
+    check_limits(&file.gauges).map_err(|reason| LoadError::Corrupt {
         path: path.to_path_buf(),
         reason: format!("{reason}: edit its limits on the page (Recipes, Edit)"),
     })

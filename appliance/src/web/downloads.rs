@@ -191,7 +191,7 @@ fn as_it_is_taken(
 pub(super) async fn cloud(State(site): State<Site>) -> Result<Response, Problem> {
     file(&site, "application/octet-stream", |site| {
         let asked = site.maps.ask(|cycle| {
-            let cloud = cycle.plan.cloud(cycle.step, cycle.frames)?;
+            let cloud = cycle.plan.cloud(cycle.sequence, cycle.frames)?;
             Some((format!("{}.ply", cycle.seq()), cloud))
         });
         asked.flatten().ok_or_else(|| Problem::missing(GONE))
@@ -207,14 +207,14 @@ pub(super) async fn recording(State(site): State<Site>) -> Result<Response, Prob
     folder(&site, |site| {
         let asked = site.maps.ask(|cycle| FailedPart {
             record: cycle.record.clone(),
-            step: cycle.step,
+            sequence: cycle.sequence,
             frames: cycle.frames.to_vec(),
             plan: cycle.plan.clone(),
             calibration: cycle.calibration.clone(),
         });
         let part = asked.ok_or_else(|| Problem::missing(GONE))?;
         let scratch = site.history.scratch();
-        let recipes = site.recipes.generations(part.plan.file().number);
+        let recipes = site.recipes.generations(part.plan.id().number);
         let written = part.write(&scratch, &recipes, u64::MAX);
         let packed = written
             .map_err(|error| error.to_string())

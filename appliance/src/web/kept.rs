@@ -85,8 +85,8 @@ fn maps(site: &Site, seq: u32) -> Result<[Map; 3], Problem> {
         let (recipe, _) = kept.recipe(&site.recipes).map_err(broken)?;
         let plan = kept.plan(recipe, false);
         let plan = plan.map_err(|error| Problem::broken(error.to_string()))?;
-        let step = plan.step_that_shows(&kept.shots());
-        let layers = step.and_then(|step| plan.layers(step, &kept.frames()));
+        let sequence = plan.sequence_of(&kept.shots());
+        let layers = sequence.and_then(|sequence| plan.layers(sequence, &kept.frames()));
         let words = "the recording's frames are not those of its recipe";
         let layers = layers.ok_or_else(|| Problem::broken(words))?;
         let [height, deviation, modulation] = LAYERS.map(|name| map_of(&layers, name, seq));

@@ -16,7 +16,7 @@ use crate::recipe::edit::{self, Edit, EditError};
 use crate::recipe::generations::GenerationError;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::store::Loaded;
-use crate::recipe::{LoadError, Recipe, RecipeFile, Store};
+use crate::recipe::{LoadError, Recipe, RecipeFile, RecipeId, Store};
 
 impl From<LoadError> for Problem {
     fn from(error: LoadError) -> Self {
@@ -110,7 +110,7 @@ pub(super) async fn picture(
 ) -> Result<Map, Problem> {
     site.aside(move |site| {
         let Loaded { recipe, .. } = site.recipes.load_to_edit(number)?;
-        let width = recipe.file.camera.width as usize;
+        let width = recipe.conditions.camera.0 as usize;
         match layer.as_str() {
             "height" => Ok(map(&recipe.arrays.golden_height, width, "mm", false, None)),
             "modulation" => Ok(map(&recipe.arrays.modulation, width, "counts", false, None)),
@@ -197,8 +197,12 @@ pub(super) async fn import(
     let upload = body::file(&site, request.into_body()).await?;
     let stored = site.change(move |site| {
         let recipe = upload.file.recipe().map_err(Problem::unfit)?;
-        let (number, name) = (recipe.file.number, recipe.file.name.clone());
-        let fingerprint = recipe.file.fingerprint.clone();
+        let RecipeId {
+            number,
+            name,
+            fingerprint,
+            ..
+        } = recipe.id.clone();
         let note = tried(site, recipe).map_err(Problem::unfit)?;
         let saved = site.recipes.take(upload.file, number);
         saved.map_err(|error| {

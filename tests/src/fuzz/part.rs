@@ -1,9 +1,10 @@
 //! A head with few pixels, and a part that was taught on it, for the targets of recipes.
 
+use crate::small_head::tiny_head;
 use appliance::head::calibration::Calibration;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, teach};
-use appliance::recipe::{Recipe, archive};
+use appliance::recipe::{Recipe, RecipeFile};
 use hal::frame::Frame;
 use sim::Scenario;
 use std::sync::LazyLock;
@@ -12,23 +13,13 @@ use std::time::{Duration, Instant};
 /// Longest wait for a frame of the simulated head.
 const TIMEOUT: Duration = Duration::from_secs(5);
 
-const HEAD: &str = "sub_rays = 1
-part = { kind = \"plane\" }
-[rig.camera]
-width = 24
-height = 18
-fov_deg = [5.0, 3.75]
-[rig.projector]
-width = 48
-height = 36
-fov_deg = [8.0, 6.0]
-";
-
 /// The part as taught.
 pub struct Part {
     /// The calibration of the head.
     pub calibration: Calibration,
-    /// The recipe, number 1.
+    /// The manifest of the recipe, number 1.
+    pub file: RecipeFile,
+    /// Its checked form.
     pub recipe: Recipe,
     /// Its file.
     pub bytes: Vec<u8>,
@@ -41,7 +32,8 @@ pub static PART: LazyLock<Part> = LazyLock::new(Part::taught);
 
 impl Part {
     fn taught() -> Self {
-        let scenario = Scenario::from_toml(HEAD, "the fuzz targets' head").expect("a scenario");
+        let scenario =
+            Scenario::from_toml(&tiny_head(24, 18), "the fuzz targets' head").expect("a scenario");
         let (mut head, stage) = sim::head(&scenario).expect("a head");
         let calibration = Calibration::of_stage(&stage).expect("models that can be used");
         let naming = Naming {
@@ -52,9 +44,8 @@ impl Part {
             placement_tolerance_mm: 0.5,
         };
         let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &|_, _| ());
-        let recipe = taught.expect("a plane can be taught").recipe;
-        let (bytes, _) = archive::pack(&recipe.file, &recipe.arrays).expect("packed");
-        let recipe = Recipe::from_bytes(&bytes).expect("and read again");
+        let taught = taught.expect("a plane can be taught");
+        let (file, recipe, bytes) = (taught.file, taught.recipe, taught.bytes);
         let plan = Plan::new(recipe.clone(), &calibration, true).expect("a plan");
         let rasters = plan.rasters(&calibration).expect("rasters");
         let all: Vec<usize> = (0..rasters.len()).collect();
@@ -64,6 +55,7 @@ impl Part {
         head.acquire(&all, TIMEOUT, &mut keep).expect("frames");
         Self {
             calibration,
+            file,
             recipe,
             bytes,
             frames,
@@ -72,9 +64,9 @@ impl Part {
 
     /// Judges the part by another recipe, with each of its sequences for which there are enough frames.
     pub fn judge(&self, plan: &Plan) {
-        for step in 0..plan.steps() {
-            if let Some(frames) = self.frames.get(..plan.indices(step).len()) {
-                std::hint::black_box(plan.inspect(step, frames, Instant::now()));
+        for sequence in 0..plan.sequence_count() {
+            if let Some(frames) = self.frames.get(..plan.indices(sequence).len()) {
+                std::hint::black_box(plan.inspect(sequence, frames, Instant::now()));
             }
         }
     }

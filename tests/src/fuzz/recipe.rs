@@ -14,10 +14,12 @@ pub fn zip(data: &[u8]) {
     bounded(16 * data.len() + (16 << 20), || {
         let _ = archive::manifest(Cursor::new(data));
         let _ = archive::is_sound(Cursor::new(data));
-        if let Ok(recipe) = Recipe::from_bytes(data) {
-            let (bytes, _) = archive::pack(&recipe.file, &recipe.arrays).expect("packed");
+        if Recipe::from_bytes(data).is_ok() {
+            let unpack = |bytes: &[u8]| archive::unpack(Cursor::new(bytes), bytes.len() as u64);
+            let (file, arrays) = unpack(data).expect("what was read can be unpacked");
+            let (bytes, _) = archive::pack(&file, &arrays).expect("packed");
             let again = Recipe::from_bytes(&bytes).expect("and read again");
-            assert_eq!(again.file.gauges.len(), recipe.file.gauges.len());
+            assert_eq!(again.gauges.len(), file.gauges.len());
             assert!(archive::is_sound(Cursor::new(&bytes[..])));
         }
     });
@@ -30,14 +32,14 @@ pub fn json(data: &[u8]) {
         return;
     };
     // Anyone can fill these in correctly.
-    file.format.clone_from(&part.recipe.file.format);
-    file.version = part.recipe.file.version;
-    file.fingerprint.clone_from(&part.recipe.file.fingerprint);
-    file.calibration.clone_from(&part.recipe.file.calibration);
-    let Ok(recipe) = Recipe::check(file, part.recipe.arrays.clone()) else {
+    file.format.clone_from(&part.file.format);
+    file.version = part.file.version;
+    file.fingerprint.clone_from(&part.file.fingerprint);
+    file.calibration.clone_from(&part.file.calibration);
+    let Ok(recipe) = Recipe::check(&file, part.recipe.arrays.clone()) else {
         return;
     };
-    let (bytes, _) = archive::pack(&recipe.file, &recipe.arrays).expect("packed");
+    let (bytes, _) = archive::pack(&file, &recipe.arrays).expect("packed");
     let recipe = Recipe::from_bytes(&bytes).expect("and read again");
     if let Ok(plan) = Plan::new(recipe, &part.calibration, true) {
         plan.rasters(&part.calibration).expect("rasters");
@@ -65,7 +67,7 @@ pub fn edit(data: &[u8]) {
     let Ok(mut wanted) = serde_json::from_slice::<Edit>(data) else {
         return;
     };
-    wanted.fingerprint.clone_from(&part.recipe.file.fingerprint);
+    wanted.fingerprint.clone_from(&part.file.fingerprint);
     STORED.with(|stored| {
         // Written directly and not through the store, which would spend most of the time in syncs.
         fs::write(stored.folder.path().join("0001.recipe"), &part.bytes).expect("put back");

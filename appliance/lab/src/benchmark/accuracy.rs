@@ -6,6 +6,7 @@ use super::kernel::{Effort, FloorSets, Kernel, interleaved};
 use super::median::median;
 use super::point::Point;
 use super::variants::{Variant, decoders, references};
+use super::words;
 use crate::experiment::{OpticsKind, Pattern, Runner, Scene};
 use algo::pattern::{PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
@@ -34,7 +35,7 @@ struct Compared {
     name: &'static str,
     pattern: Pattern,
     levels: usize,
-    steps: usize,
+    shifts: usize,
 }
 
 /// Fringes of the fixed pattern.
@@ -44,12 +45,12 @@ const DENSE_N: f64 = 4.0;
 /// The noise of all measurements.
 const SEED: u64 = 1;
 
-const fn compared(name: &'static str, pattern: Pattern, levels: usize, steps: usize) -> Compared {
+const fn compared(name: &'static str, pattern: Pattern, levels: usize, shifts: usize) -> Compared {
     Compared {
         name,
         pattern,
         levels,
-        steps,
+        shifts,
     }
 }
 
@@ -68,10 +69,10 @@ const SEQUENCES: [Compared; 10] = [
 
 impl Compared {
     fn frames(&self, range: PhaseRange) -> Vec<Shot> {
-        let level = |ratio| Shot::level(ratio, self.steps);
+        let level = |ratio| Shot::level(ratio, self.shifts);
         match (self.pattern, self.levels) {
-            (Pattern::Fixed { .. }, levels) => Sequence::geometric(range, levels, self.steps),
-            (_, 3) => Sequence::dense(DENSE_N, self.steps),
+            (Pattern::Fixed { .. }, levels) => Sequence::geometric(range, levels, self.shifts),
+            (_, 3) => Sequence::dense(DENSE_N, self.shifts),
             (_, 2) => level(1.0).chain(level(0.8)).collect(),
             _ => level(1.0).collect(),
         }
@@ -124,7 +125,7 @@ impl Study {
                 for compared in &SEQUENCES {
                     let told = format!(
                         "{part}, {bit_depth} bit, {} {}x{}",
-                        compared.name, compared.levels, compared.steps
+                        compared.name, compared.levels, compared.shifts
                     );
                     progress(done / total, &told);
                     points.extend(self.compare(
@@ -157,6 +158,7 @@ impl Study {
         let sequence = Sequence::from_frames(&compared.frames(range)).map_err(words)?;
         let set = FrameSet::of(&measured.frames, map);
         let truth = runner.truth();
+        let lit = Truth::from(truth).whole_pixels().count();
         let pixels = set.pixels();
         let mut variants = Vec::new();
         let mut named = Vec::new();
@@ -188,8 +190,8 @@ impl Study {
                 part,
                 implementation,
                 sequence: compared.name,
-                frames: compared.levels * compared.steps,
-                steps: compared.steps,
+                frames: compared.levels * compared.shifts,
+                shifts: compared.shifts,
                 bits,
                 skipping,
                 ns_per_px,
@@ -198,7 +200,7 @@ impl Study {
                 rms_mm: score.as_ref().map_or(f64::NAN, |score| score.rms_mm),
                 unresolved_px: score
                     .as_ref()
-                    .map_or(f64::NAN, |score| (lit(truth) - score.scored) as f64),
+                    .map_or(f64::NAN, |score| (lit - score.scored) as f64),
                 gross_px: score.map_or(f64::NAN, |score| score.gross as f64),
             });
         }
@@ -211,17 +213,6 @@ fn variant(name: &str, kernel: Box<dyn Kernel>) -> Variant {
         name: name.to_owned(),
         kernel,
     }
-}
-
-/// Truth class of a pixel that is wholly lit.
-const WHOLE_PIXEL: u8 = 2;
-
-fn lit(truth: &sim::Truth) -> usize {
-    truth
-        .class
-        .iter()
-        .filter(|&&class| class == WHOLE_PIXEL)
-        .count()
 }
 
 /// The columns of each row to decode: all where the part is seen, none elsewhere.
@@ -254,13 +245,5 @@ fn score(measured: &Measured, truth: &sim::Truth, turns: &[f64]) -> Option<Score
     };
     let (triangulator, decoder) = (&measured.triangulator, &measured.decoder);
     let heights = pipeline::triangulate(triangulator, decoder, None, None, None, &mut phases);
-    let known = Truth {
-        height: Some(&truth.height),
-        class: Some(&truth.class),
-    };
-    known.score(&phases, &heights)
-}
-
-fn words(error: impl std::fmt::Display) -> String {
-    error.to_string()
+    Truth::from(truth).score(&phases, &heights)
 }

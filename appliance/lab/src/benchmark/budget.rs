@@ -4,6 +4,7 @@ use super::decoding::{Decoding, Inspecting};
 use super::frames::{FrameSet, Rotation};
 use super::kernel::{Effort, Kernel, rotate};
 use super::median::median;
+use super::words;
 use appliance::head::calibration::Calibration;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, teach};
@@ -74,7 +75,7 @@ pub fn budgets(
     };
     let told = |share: f64, words: &str| progress(0.3 + 0.4 * share, &format!("{about}: {words}"));
     let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &told).map_err(words)?;
-    let sequences = &taught.recipe.file.sequences;
+    let sequences = &taught.file.sequences;
     let full = sequences.len().saturating_sub(1);
     let four = sequences
         .iter()
@@ -87,19 +88,16 @@ pub fn budgets(
             0.8,
             &format!("{about}: {} frames", sequences[production].frames.len()),
         );
-        let mut file = taught.recipe.file.clone();
+        let mut file = taught.file.clone();
         file.production = production;
         file.alignment = alignment;
         let (bytes, _) = archive::pack(&file, &taught.recipe.arrays).map_err(words)?;
         let recipe = Recipe::from_bytes(&bytes).map_err(words)?;
         let plan = Plan::new(recipe, &calibration, true).map_err(words)?;
-        found.push(budget(
-            &plan,
-            &mut head,
-            &calibration,
-            stage.refresh(),
-            effort,
-        )?);
+        found.push(Budget {
+            aligned: alignment == AlignmentKind::Rigid,
+            ..budget(&plan, &mut head, &calibration, stage.refresh(), effort)?
+        });
     }
     Ok(found)
 }
@@ -151,7 +149,7 @@ fn budget(
         width,
         height,
         frames: frames.len(),
-        aligned: plan.file().alignment == AlignmentKind::Rigid,
+        aligned: false,
         exposure_ms,
         stages,
         verdict_ms,
@@ -190,8 +188,4 @@ fn on_one_thread(plan: &Plan, frames: &[Frame], effort: &Effort) -> Result<[f64;
 
 fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
-}
-
-fn words(error: impl std::fmt::Display) -> String {
-    error.to_string()
 }

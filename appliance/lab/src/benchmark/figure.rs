@@ -69,14 +69,14 @@ fn label(point: &Point) -> String {
     let Point {
         sequence,
         frames,
-        steps,
+        shifts,
         bits,
         implementation,
         ..
     } = point;
     let skipping = if point.skipping { ", skipping" } else { "" };
-    let levels = frames / steps.max(&1);
-    format!("{sequence} {levels}×{steps}, {bits} bit, {implementation}{skipping}")
+    let levels = frames / shifts.max(&1);
+    format!("{sequence} {levels}×{shifts}, {bits} bit, {implementation}{skipping}")
 }
 
 /// The Pareto front, from fast to slow: no other point is both faster and more accurate.

@@ -25,3 +25,8 @@ pub use machine::Machine;
 pub use median::median;
 pub use point::{Point, means};
 pub use report::{HEADER, Report};
+
+/// An error in words.
+fn words(error: impl std::fmt::Display) -> String {
+    error.to_string()
+}

@@ -14,7 +14,8 @@ pub struct Point {
     /// Frames of a set.
     pub frames: usize,
     /// Shifts per level, N.
-    pub steps: usize,
+    #[serde(rename = "steps")]
+    pub shifts: usize,
     /// Bits of a sample.
     pub bits: u8,
     /// Whether rows in which the part is not seen are skipped.
@@ -36,8 +37,8 @@ pub struct Point {
 impl Point {
     /// Whether both are of the same pattern, frames and depth.
     pub fn same_frames(&self, other: &Self) -> bool {
-        (self.sequence, self.frames, self.steps, self.bits)
-            == (other.sequence, other.frames, other.steps, other.bits)
+        (self.sequence, self.frames, self.shifts, self.bits)
+            == (other.sequence, other.frames, other.shifts, other.bits)
     }
 }
 

@@ -19,7 +19,7 @@ const MAX_RESIDUAL: f64 = 0.40;
 
 /// A decoder of whole frames in the precision `T`.
 pub struct Textbook<T> {
-    levels: Vec<Step<T>>,
+    levels: Vec<LevelWeights<T>>,
     unwrapping: Unwrapping,
     /// Lowest phase of the coarsest level of a geometric sequence, turns of that level.
     lowest: T,
@@ -33,19 +33,19 @@ pub struct Textbook<T> {
     weights: Vec<T>,
 }
 
-/// One level.
-struct Step<T> {
+/// One level: its frames, and what each sample counts in S and C.
+struct LevelWeights<T> {
     frames: Vec<usize>,
     cos: Vec<T>,
     sin: Vec<T>,
     ratio: T,
 }
 
-impl<T: Real> Step<T> {
+impl<T: Real> LevelWeights<T> {
     fn new(level: &Level) -> Self {
-        let steps = level.steps();
-        let angles = (0..steps).map(|k| {
-            let turns = level.start + k as f64 / steps as f64;
+        let shifts = level.steps();
+        let angles = (0..shifts).map(|k| {
+            let turns = level.start + k as f64 / shifts as f64;
             std::f64::consts::TAU * turns
         });
         Self {
@@ -56,7 +56,7 @@ impl<T: Real> Step<T> {
         }
     }
 
-    fn steps(&self) -> T {
+    fn shifts(&self) -> T {
         T::of(self.frames.len() as f64)
     }
 }
@@ -80,7 +80,7 @@ impl<T: Real> Textbook<T> {
         // Not zero, so that the system provides the memory before the first run.
         let buffer = || vec![T::of(1.0); pixels];
         Ok(Self {
-            levels: sequence.levels().iter().map(Step::new).collect(),
+            levels: sequence.levels().iter().map(LevelWeights::new).collect(),
             unwrapping,
             lowest: T::of(coarsest * range.min - margin),
             full_scale: T::of(full_scale),
@@ -110,7 +110,7 @@ impl<T: Real> Textbook<T> {
             for (wrapped, (&s, &c)) in self.wrapped[at].iter_mut().zip(s.iter().zip(c)) {
                 *wrapped = s.atan2(c) / tau;
             }
-            let scale = T::of(2.0) / level.steps();
+            let scale = T::of(2.0) / level.shifts();
             for (modulation, (&s, &c)) in self.modulation[at].iter_mut().zip(s.iter().zip(c)) {
                 *modulation = scale * (s * s + c * c).sqrt();
             }
@@ -186,7 +186,7 @@ impl<T: Real> Textbook<T> {
         self.weights.fill(T::of(0.0));
         for at in std::iter::once(last).chain(0..last) {
             let level = &self.levels[at];
-            let share = level.steps() * level.ratio * level.ratio;
+            let share = level.shifts() * level.ratio * level.ratio;
             for pixel in 0..self.phase.len() {
                 let q = self.wrapped[at][pixel];
                 let (order, fits) = order(level.ratio * self.phase[pixel] - q);

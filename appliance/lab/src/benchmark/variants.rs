@@ -3,6 +3,7 @@
 use super::decoding::Decoding;
 use super::kernel::Kernel;
 use super::reference::Textbook;
+use super::words;
 use super::workload::{RANGE, Workload};
 use algo::pattern::{PhaseRange, Sequence};
 use algo::phase::Decoder;
@@ -74,8 +75,4 @@ pub fn of(workload: &Workload, size: (usize, usize)) -> Result<Vec<Variant>, Str
         }
     }
     Ok(variants)
-}
-
-fn words(error: impl std::fmt::Display) -> String {
-    error.to_string()
 }

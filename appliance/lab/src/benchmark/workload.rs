@@ -55,9 +55,9 @@ impl Workload {
 
     /// All kinds.
     pub fn all() -> Vec<Self> {
-        let geometric = |name, steps| Self {
+        let geometric = |name, shifts| Self {
             name,
-            frames: Sequence::geometric(RANGE, 3, steps),
+            frames: Sequence::geometric(RANGE, 3, shifts),
             has_references: false,
             ..Self::geometric()
         };

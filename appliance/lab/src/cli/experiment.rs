@@ -1,6 +1,6 @@
 //! `fringed-lab experiment --out DIR`: the paper's experiments as tables, plots and pictures.
 
-use crate::experiment::{Campaign, OpticsKind, PARTS, Results, Row, Scene, csv, figures, means};
+use crate::experiment::{Campaign, OpticsKind, PARTS, Results, RunRow, Scene, csv, figures, means};
 use appliance::cli::{Output, Threads, names, numbers};
 use appliance::error::{Exit, Failure};
 use appliance::storage::folder::OutputFolder;
@@ -84,7 +84,7 @@ fn write(
     folder: &OutputFolder,
     campaign: &Campaign,
     results: &Results,
-    means: &[Row],
+    means: &[RunRow],
 ) -> Result<(), Failure> {
     folder.write("experiments.csv", csv(&results.rows).as_bytes())?;
     for scene in &campaign.scenes {
@@ -99,12 +99,12 @@ fn write(
 }
 
 /// A table for each part and each of its optics.
-fn tables(campaign: &Campaign, means: &[Row]) -> String {
+fn tables(campaign: &Campaign, means: &[RunRow]) -> String {
     let mut tables = Vec::new();
     for scene in &campaign.scenes {
         for optics in scene.optics(campaign.optics) {
-            let same = |row: &&Row| row.part == scene.name && row.optics == optics.word();
-            let rows: Vec<&Row> = means.iter().filter(same).collect();
+            let same = |row: &&RunRow| row.part == scene.name && row.optics == optics.word();
+            let rows: Vec<&RunRow> = means.iter().filter(same).collect();
             tables.push(crate::experiment::table(scene, &rows));
         }
     }

@@ -4,7 +4,7 @@ use super::gallery::{self, View};
 use super::methods::{SHOWN_ADAPTIVE, SHOWN_FIXED};
 use super::runner::Runner;
 use super::scenes::{OpticsKind, Scene};
-use super::table::{self, Row};
+use super::table::{self, RunRow};
 use appliance::head::rig::RigError;
 
 /// What is to be run.
@@ -22,7 +22,7 @@ pub struct Campaign {
 #[derive(Debug, Default)]
 pub struct Results {
     /// One row per run.
-    pub rows: Vec<Row>,
+    pub rows: Vec<RunRow>,
     /// File names and PNGs of the pictures.
     pub pictures: Vec<(String, Vec<u8>)>,
 }
@@ -53,7 +53,7 @@ impl Campaign {
                     let words = format!("{about}, seed {seed}: {}", method.name());
                     progress(done / total, &words);
                     let run = runner.run(method, seed)?;
-                    let row = Row::new(scene, optics, method, seed, &run.outcome);
+                    let row = RunRow::new(scene, optics, method, seed, &run.outcome);
                     results.rows.push(row);
                     if seed == 1 && [SHOWN_FIXED, SHOWN_ADAPTIVE].contains(&method) {
                         views.push(View::of(method, &run));

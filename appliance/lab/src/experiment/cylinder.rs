@@ -18,7 +18,7 @@ pub struct Cylinder {
 /// Points further off than this are left out, round by round, mm.
 const CUTS: [f64; 4] = [f64::INFINITY, 5.0, 1.0, 1.0];
 /// Steps of one round; the fit converges quadratically in three or four.
-const STEPS: usize = 12;
+const ITERATIONS: usize = 12;
 /// x₀, a, z₀, c, radius.
 const UNKNOWNS: usize = 5;
 
@@ -35,7 +35,7 @@ pub fn fit(points: &[[f64; 3]]) -> Option<Cylinder> {
     let radius = (right - left) / 2.0;
     let mut shape = [(left + right) / 2.0, 0.0, top - radius, 0.0, radius];
     for cut in CUTS {
-        for _ in 0..STEPS {
+        for _ in 0..ITERATIONS {
             shape = step(points, shape, cut)?;
         }
     }

@@ -1,7 +1,7 @@
 //! The figures of the experiments: what is plotted for each part.
 
 use super::scenes::{Judged, Scene};
-use super::table::Row;
+use super::table::RunRow;
 use crate::plot::{Kind, Plot, Series};
 
 const FIXED: &str = "#1f5fa8";
@@ -10,8 +10,8 @@ const BETTER: &str = "#15803d";
 const SECOND: &str = "#7c3aed";
 
 /// File names and SVGs of the figures of one part, from its mean rows.
-pub fn figures(scene: &Scene, means: &[Row]) -> Vec<(String, String)> {
-    let rows: Vec<&Row> = means.iter().filter(|row| row.part == scene.name).collect();
+pub fn figures(scene: &Scene, means: &[RunRow]) -> Vec<(String, String)> {
+    let rows: Vec<&RunRow> = means.iter().filter(|row| row.part == scene.name).collect();
     let Some(first) = rows.first() else {
         return Vec::new();
     };
@@ -49,7 +49,7 @@ pub fn figures(scene: &Scene, means: &[Row]) -> Vec<(String, String)> {
 }
 
 /// RMS error over unresolved pixels: the paper's way to compare patterns.
-fn errors(rows: &[&Row]) -> Vec<Series> {
+fn errors(rows: &[&RunRow]) -> Vec<Series> {
     let kinds = [
         ("fixed-", "fixed pitch, n_F", FIXED, Kind::Line, "n_F ", ""),
         (
@@ -86,7 +86,7 @@ fn errors(rows: &[&Row]) -> Vec<Series> {
 }
 
 /// A quantity over the number of fringes, for each of the optics; adaptive patterns as levels.
-fn over_fringes(rows: &[&Row], quantity: fn(&Row) -> f64) -> Vec<Series> {
+fn over_fringes(rows: &[&RunRow], quantity: fn(&RunRow) -> f64) -> Vec<Series> {
     let mut optics: Vec<&str> = rows.iter().map(|row| row.optics).collect();
     optics.dedup();
     let mut series = Vec::new();
@@ -112,7 +112,7 @@ fn over_fringes(rows: &[&Row], quantity: fn(&Row) -> f64) -> Vec<Series> {
         ("better-12", "better adaptive, 12 frames", BETTER),
     ] {
         let of = rows.iter().filter(|row| row.method == prefix);
-        let middle = |row: &&&Row| (MIDDLE, quantity(row), row.optics.to_owned());
+        let middle = |row: &&&RunRow| (MIDDLE, quantity(row), row.optics.to_owned());
         series.push(Series {
             name: name.to_owned(),
             colour,

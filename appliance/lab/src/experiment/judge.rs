@@ -4,7 +4,7 @@ use super::cylinder::{self, Cylinder};
 use super::scenes::Judged;
 use algo::phase::Trust;
 use appliance::head::rig::Measured;
-use appliance::measure::{Score, Truth};
+use appliance::measure::{GROSS_MM, Score, Truth};
 
 /// What a method reached on a part.
 #[derive(Clone, Debug)]
@@ -21,9 +21,6 @@ pub struct Outcome {
     pub cylinder: Option<Cylinder>,
 }
 
-/// |e| above this is a gross error, mm.
-const GROSS_MM: f64 = 1.0;
-
 impl Outcome {
     /// Share of the lit pixels that are resolved.
     pub fn coverage(&self) -> f64 {
@@ -33,14 +30,9 @@ impl Outcome {
 
 /// Compares a measurement of a simulated part with the truth.
 pub fn judge(truth: &sim::Truth, measured: &Measured, judged: Judged) -> Outcome {
-    let known = Truth {
-        height: Some(&truth.height),
-        class: Some(&truth.class),
-    };
+    let known = Truth::from(truth);
     let (phases, heights) = (&measured.phases, &measured.heights);
-    let whole: Vec<usize> = (0..truth.class.len())
-        .filter(|&at| known.whole(at))
-        .collect();
+    let whole: Vec<usize> = known.whole_pixels().collect();
     let resolved: Vec<usize> = whole
         .iter()
         .copied()

@@ -5,39 +5,39 @@ use algo::pattern::{PhaseFunction, Sequence, Shot};
 /// A way to measure a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Fixed pitch, three geometric levels of four steps.
+    /// Fixed pitch, three geometric levels of four shifts.
     Fixed {
         /// Fringes over the projector's width.
         fringes: u32,
     },
-    /// The paper's adaptive pattern, three geometric levels of four steps.
+    /// The paper's adaptive pattern, three geometric levels of four shifts.
     Paper {
         /// p_I in camera pixels.
         image_pitch: u32,
     },
     /// The better pattern.
-    Better(Frames),
+    Better(BetterSequence),
 }
 
 /// The sequences of the better method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Frames {
-    /// Three dense levels of four steps about the map of the preliminary measurement.
+pub enum BetterSequence {
+    /// Three dense levels of four shifts about the map of the preliminary measurement.
     Twelve,
-    /// Three dense levels of three steps.
+    /// Three dense levels of three shifts.
     Nine,
-    /// Two dense levels of three steps about the golden map.
+    /// Two dense levels of three shifts about the golden map.
     Six,
-    /// One level of four steps about the golden map.
+    /// One level of four shifts about the golden map.
     Four,
-    /// One level of three steps about the golden map.
+    /// One level of three shifts about the golden map.
     Three,
 }
 
 /// The fixed pattern that pictures show.
 pub const SHOWN_FIXED: Method = Method::Fixed { fringes: 100 };
 /// The adaptive pattern that pictures show.
-pub const SHOWN_ADAPTIVE: Method = Method::Better(Frames::Twelve);
+pub const SHOWN_ADAPTIVE: Method = Method::Better(BetterSequence::Twelve);
 /// What all ratios refer to: the paper's own adaptive run.
 pub const PAPER: Method = Method::Paper { image_pitch: 5 };
 
@@ -46,7 +46,7 @@ impl Method {
     pub fn table(fringes: &[u32]) -> Vec<Self> {
         let fixed = fringes.iter().map(|&fringes| Self::Fixed { fringes });
         let papers = [PAPER, Self::Paper { image_pitch: 4 }];
-        let better = Frames::ALL.map(Self::Better);
+        let better = BetterSequence::ALL.map(Self::Better);
         fixed.chain(papers).chain(better).collect()
     }
 
@@ -68,7 +68,7 @@ impl Method {
     }
 }
 
-impl Frames {
+impl BetterSequence {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Twelve, Self::Nine, Self::Six, Self::Four, Self::Three];
 

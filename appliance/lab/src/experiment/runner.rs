@@ -4,7 +4,7 @@
 //! is measured once per noise seed and shared by the runs that need it.
 
 use super::judge::{Outcome, judge};
-use super::methods::{self, Frames, Method};
+use super::methods::{self, BetterSequence, Method};
 use super::scenes::{Judged, OpticsKind, Scene};
 use algo::adaptive::{ProjectorMap, noise, paper};
 use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
@@ -265,13 +265,13 @@ impl Runner {
         }
         let better = self.better()?;
         let about = About::Map(&better.expected);
-        let shots = Frames::Twelve.shots();
+        let shots = BetterSequence::Twelve.shots();
         let measured = self.measure(GOLDEN_STREAM, &better.function, &shots, about)?;
         let found = Arc::new(measured.phases.phase);
         Ok(Arc::clone(self.learnt.golden.insert(found)))
     }
 
-    fn better_frames(&mut self, method: Method, frames: Frames) -> Result<Run, RigError> {
+    fn better_frames(&mut self, method: Method, frames: BetterSequence) -> Result<Run, RigError> {
         let better = self.better()?;
         let golden = if frames.needs_golden() {
             Some(self.golden()?)

@@ -8,7 +8,7 @@ use appliance::output::canvas::Canvas;
 const ELEVATION: f64 = 0.96;
 const TURN: f64 = 0.35;
 /// Facets with a larger step in z span a depth edge, mm.
-const MAX_STEP_MM: f64 = 10.0;
+const DEPTH_EDGE_MM: f64 = 10.0;
 /// Direction to the lamp (x, y, z), flat enough that noise is seen.
 const LAMP: [f64; 3] = [-0.70, -0.30, 0.65];
 /// Grey of a facet that turns away from the lamp, and what facing it adds.
@@ -23,7 +23,7 @@ pub fn render(measured: &Measured, size: usize) -> Canvas<1> {
     let points = points(measured);
     let mut canvas = Canvas::new(size, size);
     let mut nearest = vec![f64::NEG_INFINITY; size * size];
-    let Some(frame) = Frame::around(&points, size) else {
+    let Some(viewport) = Viewport::around(&points, size) else {
         return canvas;
     };
     for at in 0..points.len().saturating_sub(width + 1) {
@@ -38,8 +38,8 @@ pub fn render(measured: &Measured, size: usize) -> Canvas<1> {
                 continue;
             };
             let low = a[2].min(b[2]).min(c[2]);
-            if a[2].max(b[2]).max(c[2]) - low <= MAX_STEP_MM {
-                let seen = [a, b, c].map(|point| frame.seen(point));
+            if a[2].max(b[2]).max(c[2]) - low <= DEPTH_EDGE_MM {
+                let seen = [a, b, c].map(|point| viewport.seen(point));
                 facet(&mut canvas, &mut nearest, seen, grey(a, b, c));
             }
         }
@@ -78,13 +78,13 @@ fn grey(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> u8 {
 }
 
 /// Where a point is in the picture: x, y in pixels, and how near it is.
-struct Frame {
+struct Viewport {
     scale: f64,
     centre: [f64; 2],
     half: f64,
 }
 
-impl Frame {
+impl Viewport {
     fn around(points: &[Option<[f64; 3]>], size: usize) -> Option<Self> {
         let seen: Vec<_> = points
             .iter()

@@ -13,7 +13,7 @@ pub const HEADER: &str = "part,optics,method,frames,seed,scored_px,lit_px,unreso
 
 /// A run, or the mean of some.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct RunRow {
     /// Name of the part.
     pub part: &'static str,
     /// Word of the optics.
@@ -29,35 +29,60 @@ pub struct Row {
     pub values: Values,
 }
 
-/// The measured quantities of a row; NaN where there is no value (an empty cell in CSV, null in JSON).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Values {
-    /// Resolved pixels that truth calls wholly lit.
-    pub scored_px: f64,
-    /// Pixels that truth calls wholly lit.
-    pub lit_px: f64,
-    /// Those that are not resolved.
-    pub unresolved_px: f64,
-    /// Errors above 1 mm.
-    pub gross_px: f64,
-    /// RMS error without gross errors, mm.
-    pub rms_mm: f64,
-    /// Mean error without gross errors, mm.
-    pub bias_mm: f64,
-    /// Median of |e|, mm.
-    pub median_mm: f64,
-    /// 99 % of |e| lie below this, mm.
-    pub p99_mm: f64,
-    /// RMS of error / σ_z.
-    pub error_over_sigma: f64,
-    /// RMS error as a share of the paper's adaptive run (p_I = 5) with the same noise seed.
-    pub ratio_to_paper: f64,
-    /// Resolved share of the lit pixels.
-    pub coverage: f64,
-    /// RMS distance from the fitted cylinder, mm.
-    pub fit_residual_mm: f64,
-    /// Radius of the fitted cylinder, mm.
-    pub fit_radius_mm: f64,
+/// Number of measured quantities of a row.
+const QUANTITIES: usize = 13;
+
+/// A struct of `f64` that can also be had as an array, in the order of its fields.
+macro_rules! quantities {
+    ($(#[$about:meta])* $name:ident { $($(#[$what:meta])* $field:ident,)* }) => {
+        $(#[$about])*
+        pub struct $name {
+            $($(#[$what])* pub $field: f64,)*
+        }
+
+        impl $name {
+            fn array(&self) -> [f64; QUANTITIES] {
+                [$(self.$field),*]
+            }
+
+            fn from_array([$($field),*]: [f64; QUANTITIES]) -> Self {
+                Self { $($field),* }
+            }
+        }
+    };
+}
+
+quantities! {
+    /// The measured quantities of a row; NaN where there is no value (an empty cell in CSV, null in JSON).
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+    Values {
+        /// Resolved pixels that truth calls wholly lit.
+        scored_px,
+        /// Pixels that truth calls wholly lit.
+        lit_px,
+        /// Those that are not resolved.
+        unresolved_px,
+        /// Errors above 1 mm.
+        gross_px,
+        /// RMS error without gross errors, mm.
+        rms_mm,
+        /// Mean error without gross errors, mm.
+        bias_mm,
+        /// Median of |e|, mm.
+        median_mm,
+        /// 99 % of |e| lie below this, mm.
+        p99_mm,
+        /// RMS of error / σ_z.
+        error_over_sigma,
+        /// RMS error as a share of the paper's adaptive run (p_I = 5) with the same noise seed.
+        ratio_to_paper,
+        /// Resolved share of the lit pixels.
+        coverage,
+        /// RMS distance from the fitted cylinder, mm.
+        fit_residual_mm,
+        /// Radius of the fitted cylinder, mm.
+        fit_radius_mm,
+    }
 }
 
 impl Values {
@@ -81,60 +106,9 @@ impl Values {
             fit_radius_mm: fitted.map_or(f64::NAN, |fit| fit.radius_mm),
         }
     }
-
-    fn array(&self) -> [f64; 13] {
-        [
-            self.scored_px,
-            self.lit_px,
-            self.unresolved_px,
-            self.gross_px,
-            self.rms_mm,
-            self.bias_mm,
-            self.median_mm,
-            self.p99_mm,
-            self.error_over_sigma,
-            self.ratio_to_paper,
-            self.coverage,
-            self.fit_residual_mm,
-            self.fit_radius_mm,
-        ]
-    }
-
-    fn from_array(values: [f64; 13]) -> Self {
-        let [
-            scored_px,
-            lit_px,
-            unresolved_px,
-            gross_px,
-            rms_mm,
-            bias_mm,
-            median_mm,
-            p99_mm,
-            error_over_sigma,
-            ratio_to_paper,
-            coverage,
-            fit_residual_mm,
-            fit_radius_mm,
-        ] = values;
-        Self {
-            scored_px,
-            lit_px,
-            unresolved_px,
-            gross_px,
-            rms_mm,
-            bias_mm,
-            median_mm,
-            p99_mm,
-            error_over_sigma,
-            ratio_to_paper,
-            coverage,
-            fit_residual_mm,
-            fit_radius_mm,
-        }
-    }
 }
 
-impl Row {
+impl RunRow {
     /// Of one run.
     pub fn new(
         scene: &Scene,
@@ -172,8 +146,8 @@ impl Row {
 }
 
 /// Fills in the ratio to the paper's run of the same part, optics and seed.
-pub fn set_ratios(rows: &mut [Row]) {
-    let paper: Vec<Row> = rows
+pub fn set_ratios(rows: &mut [RunRow]) {
+    let paper: Vec<RunRow> = rows
         .iter()
         .filter(|row| row.method == PAPER.name())
         .cloned()
@@ -187,8 +161,8 @@ pub fn set_ratios(rows: &mut [Row]) {
 }
 
 /// All runs as CSV.
-pub fn csv(rows: &[Row]) -> String {
-    let lines = rows.iter().map(Row::line);
+pub fn csv(rows: &[RunRow]) -> String {
+    let lines = rows.iter().map(RunRow::line);
     let mut text = HEADER.to_owned();
     for line in lines {
         text.push('\n');
@@ -199,8 +173,8 @@ pub fn csv(rows: &[Row]) -> String {
 }
 
 /// The means over the seeds, in the order of the first runs.
-pub fn means(rows: &[Row]) -> Vec<Row> {
-    let mut means: Vec<(Row, [f64; 13], f64)> = Vec::new();
+pub fn means(rows: &[RunRow]) -> Vec<RunRow> {
+    let mut means: Vec<(RunRow, [f64; QUANTITIES], f64)> = Vec::new();
     for row in rows {
         let known = means.iter_mut().find(|(mean, ..)| {
             (mean.part, mean.optics, &mean.method) == (row.part, row.optics, &row.method)
@@ -218,7 +192,7 @@ pub fn means(rows: &[Row]) -> Vec<Row> {
     }
     means
         .into_iter()
-        .map(|(row, sums, count)| Row {
+        .map(|(row, sums, count)| RunRow {
             seed: 0,
             values: Values::from_array(sums.map(|sum| sum / count)),
             ..row
@@ -227,7 +201,7 @@ pub fn means(rows: &[Row]) -> Vec<Row> {
 }
 
 /// The means of one part under one optics, as a table for people.
-pub fn table(scene: &Scene, means: &[&Row]) -> String {
+pub fn table(scene: &Scene, means: &[&RunRow]) -> String {
     let fitted = scene.judged == Judged::CylinderFit;
     let optics = means.first().map_or("", |row| row.optics);
     let mut text = format!(
@@ -274,11 +248,11 @@ pub fn table(scene: &Scene, means: &[&Row]) -> String {
 mod tests {
     use super::*;
 
-    fn row(method: &str, seed: u64, rms_mm: f64) -> Row {
-        let mut values = [1.0; 13];
+    fn row(method: &str, seed: u64, rms_mm: f64) -> RunRow {
+        let mut values = [1.0; QUANTITIES];
         values[4] = rms_mm;
         values[11] = f64::NAN;
-        Row {
+        RunRow {
             part: "cone",
             optics: "ideal",
             method: method.to_owned(),

@@ -61,7 +61,7 @@ impl Played {
     /// # Errors
     /// If the recipe was made for another calibration or does not fit the frames.
     pub fn plan(&self, recipe: Recipe, calibration: &Calibration) -> Result<Plan, PlanError> {
-        let plan = match self.calibration.as_ref() == Some(&recipe.file.calibration) {
+        let plan = match self.calibration.as_ref() == Some(&recipe.id.calibration) {
             true => Plan::again(recipe, calibration, false),
             false => Plan::new(recipe, calibration, false),
         };
@@ -70,6 +70,18 @@ impl Played {
 }
 
 impl Opened {
+    /// A head and what is known of it, before a stored calibration is looked for.
+    fn new(head: DynHead, calibration: Calibration) -> Self {
+        Self {
+            head,
+            calibration,
+            stage: None,
+            problem: None,
+            fallback: None,
+            played: None,
+        }
+    }
+
     /// Opens the head again after it was lost. It may be another one then: what is known of it is read anew.
     ///
     /// # Errors
@@ -259,14 +271,9 @@ fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Ope
     }
     let (head, stage) = sim::head_with_progress(&scenario, progress)
         .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
-    let calibration = exact(&scenario)?;
     Ok(Opened {
-        head,
-        calibration,
         stage: Some(stage),
-        problem: None,
-        fallback: None,
-        played: None,
+        ..Opened::new(head, exact(&scenario)?)
     })
 }
 
@@ -281,12 +288,8 @@ fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened, Failure> {
     let head = hal::replay::head(recordings)
         .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
     Ok(Opened {
-        head,
-        calibration,
-        stage: None,
-        problem: None,
-        fallback: None,
         played,
+        ..Opened::new(head, calibration)
     })
 }
 

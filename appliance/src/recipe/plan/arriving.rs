@@ -13,37 +13,38 @@ use std::sync::PoisonError;
 /// What the levels of a sequence said that have arrived so far.
 #[derive(Debug)]
 pub struct Arriving {
-    step: usize,
+    sequence: usize,
     /// None where there is nothing to decode before the last frame.
     arrived: Option<Arrived>,
 }
 
 impl Arriving {
     /// A measurement with a sequence of which nothing is decoded on arrival.
-    pub(super) fn none(step: usize) -> Self {
+    pub(super) fn none(sequence: usize) -> Self {
         let arrived = None;
-        Self { step, arrived }
+        Self { sequence, arrived }
     }
 
     /// Which sequence.
-    pub(super) fn step(&self) -> usize {
-        self.step
+    pub(super) fn sequence(&self) -> usize {
+        self.sequence
     }
 }
 
 impl Plan {
     /// Begins a measurement with a sequence.
-    pub fn arriving(&self, step: usize) -> Arriving {
-        let room = self.runs.get(step).and_then(Run::room);
+    pub fn arriving(&self, sequence: usize) -> Arriving {
+        let room = self.runs.get(sequence).and_then(Run::room);
         Arriving {
-            step,
+            sequence,
             arrived: room,
         }
     }
 
     /// Whether the frames so far complete a level that can be decoded now.
     pub fn can_arrive(&self, arriving: &Arriving, frames: usize) -> bool {
-        let (Some(run), Some(arrived)) = (self.runs.get(arriving.step), &arriving.arrived) else {
+        let (Some(run), Some(arrived)) = (self.runs.get(arriving.sequence), &arriving.arrived)
+        else {
             return false;
         };
         let places = run.coarser().nth(arrived.levels());
@@ -52,7 +53,7 @@ impl Plan {
 
     /// Decodes the level that the frames so far complete.
     pub fn arrive(&self, arriving: &mut Arriving, frames: &[Frame]) {
-        let (Some(run), Some(arrived)) = (self.runs.get(arriving.step), &mut arriving.arrived)
+        let (Some(run), Some(arrived)) = (self.runs.get(arriving.sequence), &mut arriving.arrived)
         else {
             return;
         };
@@ -73,7 +74,7 @@ impl Plan {
         inspect: impl FnOnce(Option<(&Arrived, &[FrameView<'_>])>) -> R,
     ) -> R {
         let Arriving {
-            step,
+            sequence,
             arrived: Some(arrived),
         } = arriving
         else {
@@ -81,7 +82,7 @@ impl Plan {
         };
         let Some(run) = self
             .runs
-            .get(step)
+            .get(sequence)
             .filter(|run| run.indices.len() == frames.len())
         else {
             return inspect(None);

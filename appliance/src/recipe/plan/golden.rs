@@ -1,7 +1,7 @@
 //! The part as taught, in the form that production needs.
 
 use crate::recipe::archive::Arrays;
-use crate::recipe::{RecipeFile, SequenceKind, safe};
+use crate::recipe::{SequenceKind, safe};
 use algo::adaptive::Field;
 use algo::inspect::{Taught, Weight};
 use algo::phase::Decoder;
@@ -11,12 +11,12 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Where the part is compared, how much deviations count there, and how certain its taught heights are.
-pub(super) fn taught(file: &RecipeFile, arrays: &Arrays, decoder: &Decoder) -> Taught {
+pub(super) fn taught(noise_counts: f64, arrays: &Arrays, decoder: &Decoder) -> Taught {
     let full_scale = f64::from(decoder.full_scale());
     let noises = arrays.modulation.iter().zip(&arrays.height_slope);
     let sigmas = noises.map(|(&counts, &slope)| {
         let share = (f64::from(counts) / full_scale * 65_535.0).round() as u16;
-        let turns = decoder.phase_noise(Modulation::from_bits(share), file.noise_counts);
+        let turns = decoder.phase_noise(Modulation::from_bits(share), noise_counts);
         turns * f64::from(slope).abs()
     });
     let valid = arrays.valid.iter().zip(&arrays.golden_height);

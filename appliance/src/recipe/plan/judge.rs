@@ -1,31 +1,10 @@
 //! From what was found to a verdict.
 
-use crate::recipe::{AlignmentKind, RecipeFile};
-use crate::station::{GaugeValue, Inspection, Placement, Skipped, Unit, Verdict};
+use crate::recipe::Demands;
+use crate::station::{GaugeValue, Inspection, Placement, Skipped, Verdict};
 use algo::inspect::Findings;
 use algo::inspect::align::Placed;
 use std::sync::Arc;
-
-/// What a recipe demands of a part.
-#[derive(Debug)]
-pub(super) struct Demands {
-    gauges: Vec<Limits>,
-    /// Least share of the golden pixels that must be resolved.
-    min_coverage: f64,
-    /// How far the part may lie from where it was taught, mm.
-    tolerance_mm: f64,
-    /// Whether the part's motion is found.
-    aligned: bool,
-}
-
-/// The limits of a gauge, with the name that every result shares.
-#[derive(Debug)]
-struct Limits {
-    name: Arc<str>,
-    unit: Unit,
-    low: Option<f64>,
-    high: Option<f64>,
-}
 
 /// More than this share of the pixels that are lit contradict themselves: 1 % is what silhouettes give.
 const CONTRADICTING: f64 = 0.03;
@@ -35,24 +14,9 @@ const UNFIT: f64 = 0.67;
 const OUTLIERS: f64 = 0.2;
 
 impl Demands {
-    pub(super) fn of(file: &RecipeFile) -> Self {
-        let limits = file.gauges.iter().map(|gauge| Limits {
-            name: Arc::from(&*gauge.name),
-            unit: gauge.measures.unit(),
-            low: gauge.low,
-            high: gauge.high,
-        });
-        Self {
-            gauges: limits.collect(),
-            min_coverage: file.min_coverage,
-            tolerance_mm: file.placement_tolerance_mm,
-            aligned: file.alignment == AlignmentKind::Rigid,
-        }
-    }
-
     /// Judges the findings.
     pub(super) fn judge(&self, findings: &Findings, inspection: &mut Inspection) {
-        for (limits, reading) in self.gauges.iter().zip(&findings.readings) {
+        for (limits, reading) in self.limits.iter().zip(&findings.readings) {
             let judged = GaugeValue::judged(
                 Arc::clone(&limits.name),
                 limits.unit,

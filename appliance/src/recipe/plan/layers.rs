@@ -21,10 +21,10 @@ pub struct Layers {
 }
 
 impl Plan {
-    /// The maps of a part from the frames of sequence `step`; `None` if the frames are not those.
-    pub fn layers(&self, step: usize, frames: &[Frame]) -> Option<Layers> {
-        let maps = self.heights(step, frames)?;
-        let production = &self.runs.get(step)?.production;
+    /// The maps of a part from the frames of a sequence; `None` if the frames are not those.
+    pub fn layers(&self, sequence: usize, frames: &[Frame]) -> Option<Layers> {
+        let maps = self.heights(sequence, frames)?;
+        let production = &self.runs.get(sequence)?.production;
         let golden = &production.rises().surface().height;
         let deviation = maps.height_mm.iter().zip(golden).map(|(&here, golden)| {
             if golden.is_known() {
@@ -48,9 +48,9 @@ impl Plan {
     }
 
     /// The point cloud of a part as binary PLY, with its modulation as intensity; `None` as for [`Self::layers`].
-    pub fn cloud(&self, step: usize, frames: &[Frame]) -> Option<Vec<u8>> {
-        let layers = self.layers(step, frames)?;
-        let production = &self.runs.get(step)?.production;
+    pub fn cloud(&self, sequence: usize, frames: &[Frame]) -> Option<Vec<u8>> {
+        let layers = self.layers(sequence, frames)?;
+        let production = &self.runs.get(sequence)?.production;
         let full_scale = f32::from(production.decoder().full_scale());
         let triangulator = production.triangulator();
         let known = layers

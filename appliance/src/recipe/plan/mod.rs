@@ -14,7 +14,7 @@ pub use layers::Layers;
 use crate::head::calibration::Calibration;
 use crate::head::rasters::rasters;
 use crate::head::seam;
-use crate::recipe::{AlignmentKind, Recipe, RecipeFile, SequenceKind, short};
+use crate::recipe::{Conditions, Demands, Recipe, RecipeId, SequenceKind};
 use crate::station::error_code::WRONG_FRAMES;
 use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
 use crate::station::{Inspection, Stage, Stages, Verdict};
@@ -27,7 +27,6 @@ use algo::pipeline::Rises;
 use algo::units::{AbsolutePhase, Height};
 use hal::frame::Frame;
 use hal::projector::Raster;
-use judge::Demands;
 use run::{Run, Shared, Unjoined};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -36,7 +35,8 @@ use std::time::Instant;
 /// A recipe joined with the head's calibration. Of the recipe's arrays only what production needs is kept.
 #[derive(Debug)]
 pub struct Plan {
-    file: RecipeFile,
+    id: RecipeId,
+    conditions: Conditions,
     /// What it demands of a part.
     demands: Demands,
     /// What is projected, each once; first the shots of the first run.
@@ -101,13 +101,13 @@ impl Plan {
         calibration: &Calibration,
         simulated: bool,
     ) -> Result<Self, PlanError> {
-        let number = recipe.file.number;
+        let number = recipe.id.number;
         let present = calibration.fingerprint();
-        if recipe.file.calibration != present {
+        if recipe.id.calibration != present {
             let digits = |fingerprint: &str| fingerprint.chars().take(8).collect();
             return Err(PlanError::OtherCalibration {
                 number,
-                made_for: digits(&recipe.file.calibration),
+                made_for: digits(&recipe.id.calibration),
                 present: digits(&present),
             });
         }
@@ -125,7 +125,7 @@ impl Plan {
         calibration: &Calibration,
         simulated: bool,
     ) -> Result<Self, PlanError> {
-        let number = recipe.file.number;
+        let number = recipe.id.number;
         Self::join(recipe, calibration, simulated)
             .map_err(|reason| PlanError::Unfit { number, reason })
     }
@@ -133,8 +133,8 @@ impl Plan {
     /// Leaves only the sequence of these shots: a head that plays a recording has no others. Where no sequence does, nothing
     /// changes.
     pub fn only(mut self, shots: &[Shot]) -> Self {
-        if let Some(step) = self.step_that_shows(shots) {
-            let mut run = self.runs.swap_remove(step);
+        if let Some(sequence) = self.sequence_of(shots) {
+            let mut run = self.runs.swap_remove(sequence);
             run.indices = (0..shots.len()).collect();
             self.runs = vec![run];
             self.shots = shots.to_vec();
@@ -144,38 +144,44 @@ impl Plan {
 
     fn join(recipe: Recipe, calibration: &Calibration, simulated: bool) -> Result<Self, String> {
         let Recipe {
-            file,
-            mut arrays,
+            id,
+            conditions,
+            demands,
             function,
             sequences,
             gauges,
+            mut arrays,
         } = recipe;
         // They are large, and production does not read them.
         arrays.phase_function = Vec::new();
         arrays.height_curvature = Vec::new();
-        let camera = (file.camera.width, file.camera.height, file.camera.bit_depth);
+        let camera = conditions.camera;
         if camera != calibration.frames() {
             return Err(format!(
                 "it is for a camera of {camera:?}, the head's has {:?}: teach it again",
                 calibration.frames()
             ));
         }
-        let raster = (file.projector.width, file.projector.height);
+        let raster = conditions.raster;
         if raster != calibration.raster() {
             return Err(format!(
                 "it is for a projector of {raster:?}, the head's has {:?}: teach it again",
                 calibration.raster()
             ));
         }
-        let (camera, projector) = (calibration.camera.clone(), calibration.projector.clone());
-        let [low, high] = file.range_mm;
-        let range = Some(HeightRange { low, high });
-        let triangulator = Triangulator::new(camera, projector, Reference::Models, function, range)
-            .map_err(|error| error.to_string())?;
-        let size = (file.camera.width as usize, file.camera.height as usize);
-        let aligned = file.alignment == AlignmentKind::Rigid;
+        let size = (camera.0 as usize, camera.1 as usize);
+        let [low, high] = conditions.range_mm;
+        let triangulator = Triangulator::new(
+            calibration.camera.clone(),
+            calibration.projector.clone(),
+            Reference::Models,
+            function,
+            Some(HeightRange { low, high }),
+        );
+        let triangulator = triangulator.map_err(|error| error.to_string())?;
+        let aligned = demands.aligned;
         let away = match aligned {
-            true => pixels(&triangulator, file.placement_tolerance_mm),
+            true => pixels(&triangulator, demands.tolerance_mm),
             false => 0,
         };
         let mut window = window::of(&gauges, size, away);
@@ -183,12 +189,11 @@ impl Plan {
             golden::widen(&mut window, &arrays, size.0);
         }
         let range = triangulator.function().range();
-        let chain = run::chain(&file);
         let mut shots = Vec::new();
         let sequences = || {
-            let chained = chain.into_iter();
-            let chained = chained.map(|at| (&file.sequences[at], sequences[at].clone()));
-            let runs = chained.map(|of| Unjoined::new(&file, &arrays, range, of, &mut shots));
+            let unjoined =
+                |sequence| Unjoined::new(sequence, &conditions, &arrays, range, &mut shots);
+            let runs = sequences.into_iter().map(unjoined);
             runs.collect::<Result<Vec<_>, _>>()
         };
         let (sequences, surface) = rayon::join(sequences, || golden::surface(size.0, &arrays));
@@ -204,10 +209,11 @@ impl Plan {
         }
         // What is left of the recipe is no longer needed where the most memory is.
         drop(arrays);
-        let range = file.expansion_range_turns;
+        let range = conditions.expansion_range_turns;
         let rises = Rises::new(&triangulator, surface, range, &window, away.max(AROUND));
         let shared = Shared {
-            file: &file,
+            conditions: &conditions,
+            aligned,
             triangulator: Arc::new(triangulator),
             rises: Arc::new(rises),
             gauges,
@@ -219,22 +225,23 @@ impl Plan {
         let strips = first.production.strips(size.1.div_ceil(STRIPS));
         Ok(Self {
             strips: Mutex::new(strips),
-            demands: Demands::of(&file),
-            file,
+            id,
+            conditions,
+            demands,
             shots,
             runs,
             simulated,
         })
     }
 
-    /// The recipe's manifest.
-    pub fn file(&self) -> &RecipeFile {
-        &self.file
+    /// What the recipe is called.
+    pub fn id(&self) -> &RecipeId {
+        &self.id
     }
 
-    /// First 32 bits of the recipe's fingerprint.
-    pub fn crc(&self) -> u32 {
-        short(&self.file.fingerprint)
+    /// How the recipe's part is measured.
+    pub fn conditions(&self) -> &Conditions {
+        &self.conditions
     }
 
     /// Bytes of its maps and of its phase function: nearly all that it takes.
@@ -251,28 +258,28 @@ impl Plan {
 
     /// Levels and shifts of the sequence that is tried first.
     pub fn sequence(&self) -> &Sequence {
-        &self.runs[0].sequence
+        &self.runs[0].levels
     }
 
     /// How many sequences there are to try, one after the other until one is good enough.
-    pub fn steps(&self) -> usize {
+    pub fn sequence_count(&self) -> usize {
         self.runs.len()
     }
 
     /// Which of the plan's rasters the frames of a sequence show; none if there is no such sequence.
-    pub fn indices(&self, step: usize) -> &[usize] {
-        self.runs.get(step).map_or(&[], |run| &run.indices)
+    pub fn indices(&self, sequence: usize) -> &[usize] {
+        self.runs.get(sequence).map_or(&[], |run| &run.indices)
     }
 
     /// What each frame of a sequence shows, in their order; nothing if there is no such sequence.
-    pub fn shots(&self, step: usize) -> impl ExactSizeIterator<Item = Shot> {
-        let indices = self.indices(step).iter();
+    pub fn shots(&self, sequence: usize) -> impl ExactSizeIterator<Item = Shot> {
+        let indices = self.indices(sequence).iter();
         indices.map(|&index| self.shots[index])
     }
 
     /// Which sequence consists of these shots; `None` if none does.
-    pub fn step_that_shows(&self, shots: &[Shot]) -> Option<usize> {
-        (0..self.steps()).find(|&step| self.shots(step).eq(shots.iter().copied()))
+    pub fn sequence_of(&self, shots: &[Shot]) -> Option<usize> {
+        (0..self.sequence_count()).find(|&sequence| self.shots(sequence).eq(shots.iter().copied()))
     }
 
     /// The columns of each row that some gauge looks at.
@@ -301,10 +308,10 @@ impl Plan {
         rasters(function, &self.shots, calibration)
     }
 
-    /// Judges a part from the frames of sequence `step`; its stages begin at `exposed`. Always ends in an inspection; what
+    /// Judges a part from the frames of a sequence; its stages begin at `exposed`. Always ends in an inspection; what
     /// cannot be measured is INVALID with a reason.
-    pub fn inspect(&self, step: usize, frames: &[Frame], exposed: Instant) -> Inspection {
-        self.inspect_arrived(frames, Arriving::none(step), exposed)
+    pub fn inspect(&self, sequence: usize, frames: &[Frame], exposed: Instant) -> Inspection {
+        self.inspect_arrived(frames, Arriving::none(sequence), exposed)
     }
 
     /// The same, with the levels that were decoded on arrival.
@@ -314,21 +321,21 @@ impl Plan {
         arriving: Arriving,
         exposed: Instant,
     ) -> Inspection {
-        let step = arriving.step();
+        let sequence = arriving.sequence();
         let simulated = if self.simulated { SIMULATED } else { 0 };
-        let kind = self.runs.get(step).map(|run| run.kind);
+        let kind = self.runs.get(sequence).map(|run| run.kind);
         let mut inspection = Inspection {
             flags: kind.map_or(0, sequence_flag) | simulated,
             ..Inspection::default()
         };
         let mut laps = Laps::since(exposed);
         let found = self.with_arrived(arriving, frames, |finest| {
-            self.run(step, frames, finest, None, &mut laps)
+            self.run(sequence, frames, finest, None, &mut laps)
         });
         match found {
             Ok(findings) => {
                 self.demands.judge(&findings, &mut inspection);
-                if step + 1 < self.runs.len() {
+                if sequence + 1 < self.runs.len() {
                     inspection.step_up = self.demands.step_up(&findings);
                 }
             }
@@ -343,26 +350,27 @@ impl Plan {
         inspection
     }
 
-    /// The heights of the part from the frames of sequence `step`, for the page; `None` if the frames are not those.
-    pub fn heights(&self, step: usize, frames: &[Frame]) -> Option<Maps> {
-        let width = self.file.camera.width as usize;
-        let mut height_mm = vec![f32::NAN; width * self.file.camera.height as usize];
+    /// The heights of the part from the frames of a sequence, for the page; `None` if the frames are not those.
+    pub fn heights(&self, sequence: usize, frames: &[Frame]) -> Option<Maps> {
+        let (columns, rows, _) = self.conditions.camera;
+        let width = columns as usize;
+        let mut height_mm = vec![f32::NAN; width * rows as usize];
         let mut laps = Laps::since(Instant::now());
         let heights = Some(&mut height_mm[..]);
-        self.run(step, frames, None, heights, &mut laps).ok()?;
+        self.run(sequence, frames, None, heights, &mut laps).ok()?;
         Some(Maps { width, height_mm })
     }
 
     fn run(
         &self,
-        step: usize,
+        sequence: usize,
         frames: &[Frame],
         finest: Option<(&Arrived, &[FrameView<'_>])>,
         heights: Option<&mut [f32]>,
         laps: &mut Laps,
     ) -> Result<Findings, String> {
-        let run = self.runs.get(step);
-        let run = run.ok_or_else(|| format!("the recipe has no sequence {step}"))?;
+        let run = self.runs.get(sequence);
+        let run = run.ok_or_else(|| format!("the recipe has no sequence {sequence}"))?;
         // Made for every trigger, so not on the heap.
         let mut views: heapless::Vec<FrameView<'_>, MAX_FRAMES> = heapless::Vec::new();
         for frame in frames {

@@ -2,7 +2,7 @@
 
 use super::golden;
 use crate::recipe::archive::Arrays;
-use crate::recipe::{AlignmentKind, RecipeFile, SequenceFile, SequenceKind};
+use crate::recipe::{Conditions, RecipeSequence, SequenceKind};
 use algo::geometry::Triangulator;
 use algo::inspect::{Gauge, Parts, Production, Taught};
 use algo::pattern::{PhaseRange, Sequence, Shot};
@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex};
 #[derive(Debug)]
 pub(super) struct Run {
     pub kind: SequenceKind,
-    pub sequence: Sequence,
+    pub levels: Sequence,
     /// Which of the plan's rasters its frames show.
     pub indices: Vec<usize>,
     pub production: Production,
@@ -29,7 +29,7 @@ pub(super) struct Run {
 /// A sequence of a recipe before it is known how phases become heights.
 pub(super) struct Unjoined {
     kind: SequenceKind,
-    sequence: Sequence,
+    levels: Sequence,
     indices: Vec<usize>,
     decoder: Decoder,
     taught: Taught,
@@ -38,57 +38,49 @@ pub(super) struct Unjoined {
 
 /// What all runs of a recipe share.
 pub(super) struct Shared<'a> {
-    pub file: &'a RecipeFile,
+    pub conditions: &'a Conditions,
+    pub aligned: bool,
     pub triangulator: Arc<Triangulator>,
     pub rises: Arc<Rises>,
     pub gauges: Vec<Gauge>,
     pub window: Vec<Range<usize>>,
 }
 
-/// The sequences that a part is measured with in turn, as places in the recipe's list: the one for production, and behind
-/// it those that unwrap further, until one is good enough.
-pub(super) fn chain(file: &RecipeFile) -> Vec<usize> {
-    let mut chain: Vec<usize> = Vec::new();
-    for at in file.production..file.sequences.len() {
-        let kind = |at: usize| file.sequences[at].kind;
-        if chain.last().is_none_or(|&before| kind(before) < kind(at)) {
-            chain.push(at);
-        }
-    }
-    chain
-}
-
 impl Unjoined {
-    /// A sequence of the recipe, for phases of `range`. `shots` are those of all runs; those of this one are added.
+    /// A sequence of the recipe, for phases of `range`. `rasters` are what all runs show; what only this one shows is added.
     pub fn new(
-        file: &RecipeFile,
+        sequence: RecipeSequence,
+        conditions: &Conditions,
         arrays: &Arrays,
         range: PhaseRange,
-        (SequenceFile { kind, frames, .. }, sequence): (&SequenceFile, Sequence),
-        shots: &mut Vec<Shot>,
+        rasters: &mut Vec<Shot>,
     ) -> Result<Self, String> {
-        let decoder = Decoder::new(&sequence, range, file.camera.bit_depth)
-            .map_err(|error| error.to_string())?;
-        let indices = frames.iter().map(|shot| {
-            let shown = shots.iter().position(|known| known == shot);
+        let RecipeSequence {
+            kind,
+            shots,
+            levels,
+        } = sequence;
+        let (_, _, bit_depth) = conditions.camera;
+        let decoder = Decoder::new(&levels, range, bit_depth).map_err(|error| error.to_string())?;
+        let indices = shots.into_iter().map(|shot| {
+            let shown = rasters.iter().position(|known| *known == shot);
             shown.unwrap_or_else(|| {
-                shots.push(*shot);
-                shots.len() - 1
+                rasters.push(shot);
+                rasters.len() - 1
             })
         });
         Ok(Self {
-            kind: *kind,
+            kind,
             indices: indices.collect(),
-            sequence,
-            taught: golden::taught(file, arrays, &decoder),
-            map: golden::safe_map(arrays, *kind),
+            levels,
+            taught: golden::taught(conditions.noise_counts, arrays, &decoder),
+            map: golden::safe_map(arrays, kind),
             decoder,
         })
     }
 
     /// Joins it with what all have in common.
     pub fn join(self, shared: &Shared<'_>) -> Result<Run, String> {
-        let file = shared.file;
         let map = size_of_val(self.map.as_deref().unwrap_or(&[]));
         let bytes = map + self.taught.bytes();
         let production = Production::new(Parts {
@@ -99,12 +91,12 @@ impl Unjoined {
             taught: self.taught,
             gauges: shared.gauges.clone(),
             window: shared.window.clone(),
-            noise_counts: file.noise_counts,
-            aligned: file.alignment == AlignmentKind::Rigid,
+            noise_counts: shared.conditions.noise_counts,
+            aligned: shared.aligned,
         });
         Ok(Run {
             kind: self.kind,
-            sequence: self.sequence,
+            levels: self.levels,
             indices: self.indices,
             bytes,
             production: production.map_err(|error| error.to_string())?,

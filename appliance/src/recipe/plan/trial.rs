@@ -14,7 +14,7 @@ impl Plan {
     /// # Errors
     /// As [`Plan::new`].
     pub fn try_out(recipe: Recipe, calibration: &Calibration) -> Result<(), PlanError> {
-        let number = recipe.file.number;
+        let number = recipe.id.number;
         let _alone = ONE.lock().unwrap_or_else(PoisonError::into_inner);
         let thread = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         let thread = thread.map_err(|error| PlanError::Unfit {

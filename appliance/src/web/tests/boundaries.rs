@@ -36,7 +36,7 @@ async fn a_boundary_value_in_an_edit_is_refused_by_its_key_or_the_recipe_judges_
     served.site.calibration.set(Some(&bed.calibration));
     let store = &served.site.recipes;
     store.save(1, &bed.bytes).unwrap();
-    let file = serde_json::to_value(&bed.recipe.file).unwrap();
+    let file = serde_json::to_value(&bed.file).unwrap();
     let mut edit = Value::default();
     for key in [
         "fingerprint",

@@ -80,14 +80,7 @@ pub(super) fn rpi(config: &HeadConfig) -> Result<Opened, Failure> {
     built_for_head(config)?;
     let head = head(config, trigger(&config.trigger)?)?;
     let calibration = nominal(head.camera_format(), head.projector_size())?;
-    Ok(Opened {
-        head,
-        calibration,
-        stage: None,
-        problem: None,
-        fallback: None,
-        played: None,
-    })
+    Ok(Opened::new(head, calibration))
 }
 
 #[cfg(all(feature = "kms", feature = "libcamera"))]

@@ -1,0 +1,154 @@
+//! Teaching on the station: from the part in front of the head to a stored recipe that is ready to measure.
+
+use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, recovery};
+use crate::recipe::plan::Plan;
+use crate::recipe::teach::{Taught, TeachError, teach_while};
+use crate::recipe::{RecipeFile, replace};
+use crate::station::{Event, JobId, RecipeKey, StationHandle, error_code};
+use std::sync::Arc;
+
+impl Worker {
+    /// Teaches the part in front of the head and stores it as recipe `number`; it is the active one then. Where that fails the
+    /// recipe before stays active.
+    pub(super) fn teach(
+        &mut self,
+        job: JobId,
+        number: u16,
+        keep_gauges: bool,
+        plan: &mut Option<Arc<Plan>>,
+    ) {
+        let replaced = self.recipes.present(number);
+        let taught = self.taught(job, number, replaced.as_ref(), keep_gauges);
+        self.progress.clear();
+        let stored = match taught {
+            Ok(taught) => self.store(&taught, replaced.filter(|_| keep_gauges)),
+            Err(error) => Err(self.refuse_teaching(error)),
+        };
+        let ready = stored.and_then(|()| {
+            // Teaching has shown patterns of its own.
+            self.prepare(&RecipeKey::Number(number), None)
+                .map_err(|(_, message)| (error_code::RIG, message))
+        });
+        match ready {
+            Ok((ready, _)) => {
+                let recipe = active(&ready);
+                *plan = Some(ready);
+                self.place_waiting(job);
+                self.station.event(Event::Taught { job, recipe });
+            }
+            Err((error_code, message)) => {
+                self.restore(plan);
+                // The fault of a lost head ends the job.
+                if self.lost.is_none() {
+                    self.station.event(Event::TeachFailed {
+                        job,
+                        error_code,
+                        message: message.into(),
+                    });
+                }
+            }
+        }
+    }
+
+    /// Measures the part and makes its recipe.
+    fn taught(
+        &mut self,
+        job: JobId,
+        number: u16,
+        replaced: Option<&RecipeFile>,
+        keep_gauges: bool,
+    ) -> Result<Taught, TeachError> {
+        if let Some(problem) = &self.opened.problem {
+            return Err(TeachError::NotCalibrated(problem.clone()));
+        }
+        let (width, height, _) = self.opened.calibration.frames();
+        let kept = replaced.filter(|_| keep_gauges);
+        if let Some(file) = kept {
+            replace::check_kept(file, (width, height)).map_err(TeachError::Rig)?;
+        }
+        let naming = replace::naming(number, replaced);
+        let (station, bar, aborts) = (&self.station, &self.progress, &self.aborts);
+        let (pulse, computing) = (&self.pulse, &self.computing);
+        let progress = |fraction: f64, words: &str| {
+            pulse.beat();
+            bar.tell(fraction, words);
+            tell(station, job, fraction, words);
+            !aborts.has(job)
+        };
+        let (head, calibration) = (&mut self.opened.head, &self.opened.calibration);
+        let taught = self.pool.install(|| {
+            teach_while(
+                head,
+                calibration,
+                &naming,
+                DEVICE_TIMEOUT,
+                computing,
+                &progress,
+            )
+        })?;
+        match kept {
+            Some(file) => replace::keep_gauges(taught, file).map_err(TeachError::Rig),
+            None => Ok(taught),
+        }
+    }
+
+    /// ERROR_CODE and words of a failure; a lost head is remembered.
+    fn refuse_teaching(&mut self, error: TeachError) -> (u16, String) {
+        let words = match error {
+            TeachError::Ended => format!("teach: {ABORTED}"),
+            _ => error.to_string(),
+        };
+        let failed = (error.code(), words);
+        if let TeachError::Device(error) = error {
+            self.lost = Some(error).filter(recovery::is_lost);
+        }
+        failed
+    }
+
+    /// Stores a recipe. `kept` is the one whose gauges it has taken over: if somebody edited that meanwhile, the edit was
+    /// reported as stored, and it must not be lost.
+    fn store(&self, taught: &Taught, kept: Option<RecipeFile>) -> Result<(), (u16, String)> {
+        for reason in &taught.choice.reasons {
+            self.progress.log(reason);
+        }
+        let (number, bytes) = (taught.file.number, &taught.bytes);
+        let stored = match kept {
+            None => self.recipes.save(number, bytes).map(|()| true),
+            Some(file) => self.recipes.replace(number, &file.fingerprint, bytes),
+        };
+        let problem = match stored {
+            Ok(true) => return Ok(()),
+            Ok(false) => "it was changed while it was taught: teach it again".into(),
+            Err(error) => format!("{error}: free space"),
+        };
+        let words = format!("store recipe {number}: {problem}");
+        Err((error_code::NOT_STORED, words))
+    }
+
+    /// Puts the part that was to wait for teaching in front of a simulated head.
+    fn place_waiting(&mut self, job: JobId) {
+        let Some((stage, placed)) = self.opened.stage.as_ref().zip(self.waiting.take()) else {
+            return;
+        };
+        let (station, pulse) = (&self.station, &self.pulse);
+        let progress = |share: f64| {
+            pulse.beat();
+            let words = "putting the part in front of the head";
+            tell(station, job, share, words);
+        };
+        let place = || stage.place_with_progress(&placed.part, &placed.placement, &progress);
+        let shown = self.computing.on(|| self.pool.install(place));
+        if let Err(error) = shown {
+            self.progress.warn(&error.to_string());
+        }
+    }
+}
+
+/// Tells the station how far a job is.
+fn tell(station: &StationHandle, job: JobId, fraction: f64, words: &str) {
+    station.event(Event::Progress {
+        job,
+        fraction: fraction as f32,
+        words: words.into(),
+    });
+}

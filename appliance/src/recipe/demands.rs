@@ -1,0 +1,44 @@
+//! What a recipe demands of a part: limits of its gauges, least coverage, and where it may lie.
+
+use super::file::{AlignmentKind, RecipeFile};
+use crate::station::Unit;
+use std::sync::Arc;
+
+/// What a recipe demands of a part.
+#[derive(Clone, Debug)]
+pub struct Demands {
+    /// In the order of the recipe's gauges.
+    pub(super) limits: Vec<GaugeLimits>,
+    /// Least share of the golden pixels that must be resolved.
+    pub(super) min_coverage: f64,
+    /// How far the part may lie from where it was taught, mm.
+    pub(super) tolerance_mm: f64,
+    /// Whether the part's motion is found and taken back before it is gauged.
+    pub(super) aligned: bool,
+}
+
+/// The limits of a gauge, with the name that every result shares.
+#[derive(Clone, Debug)]
+pub(super) struct GaugeLimits {
+    pub name: Arc<str>,
+    pub unit: Unit,
+    pub low: Option<f64>,
+    pub high: Option<f64>,
+}
+
+impl From<&RecipeFile> for Demands {
+    fn from(file: &RecipeFile) -> Self {
+        let limits = file.gauges.iter().map(|gauge| GaugeLimits {
+            name: Arc::from(&*gauge.name),
+            unit: gauge.measures.unit(),
+            low: gauge.low,
+            high: gauge.high,
+        });
+        Self {
+            limits: limits.collect(),
+            min_coverage: file.min_coverage,
+            tolerance_mm: file.placement_tolerance_mm,
+            aligned: file.alignment == AlignmentKind::Rigid,
+        }
+    }
+}
