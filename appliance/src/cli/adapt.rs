@@ -46,7 +46,7 @@ impl Adapt {
     /// Measures the recording, makes the phase function, writes it and prints the report.
     ///
     /// # Errors
-    /// If the recording cannot be opened or lacks what the method needs, or the file not be written.
+    /// If the recording cannot be opened or lacks what the method needs, or the file cannot be written.
     pub fn run(&self) -> Result<(), Failure> {
         let choice = self.choice()?;
         let Some(name) = self.out.file_name().and_then(|name| name.to_str()) else {

@@ -1,4 +1,4 @@
-//! `fringed completions SHELL`: what makes a shell complete the command line.
+//! `fringed completions SHELL`: a script with which a shell completes the command line.
 
 use clap_complete::{Shell, generate};
 

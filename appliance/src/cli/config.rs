@@ -75,7 +75,7 @@ fn check_named_files(config: &Config) -> Result<(), Failure> {
     backend::built_for(config)?;
     if let Some(calibration) = &config.head.calibration {
         let wrong = |problem| Failure::new(Exit::Content, problem);
-        // It need not be there yet.
+        // The file need not exist yet.
         Place::at(calibration).load().map_err(wrong)?;
     }
     match config.head.backend {
@@ -85,7 +85,7 @@ fn check_named_files(config: &Config) -> Result<(), Failure> {
                 Recording::open(folder)?;
             }
         }
-        // It names no files. Its devices are not opened: a station that runs may hold them.
+        // This back-end names no files. Its devices are not opened, because a running station may hold them.
         Backend::Rpi => {}
     }
     Ok(())

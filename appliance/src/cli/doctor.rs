@@ -1,4 +1,4 @@
-//! `fringed doctor`: examines the head step by step, with a verdict and a remedy for each.
+//! `fringed doctor`: runs the checks of the head, and prints a verdict and a remedy for each.
 
 use super::options::Measuring;
 use crate::config::Backend;
@@ -22,7 +22,7 @@ impl Doctor {
     /// Opens the head, examines it and prints what was found.
     ///
     /// # Errors
-    /// If the head cannot be opened, or a step failed (69).
+    /// If the head cannot be opened, or a check failed (69).
     pub fn run(&self) -> Result<(), Failure> {
         let Measuring {
             files,
@@ -33,7 +33,7 @@ impl Doctor {
         config.head = files.head(&config);
         if let Some(scenario) = &self.scenario {
             (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
-            // The stored one is the configured head's.
+            // The stored calibration belongs to the configured head.
             config.head.calibration = None;
         }
         if config.head.backend == Backend::Replay {

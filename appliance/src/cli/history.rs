@@ -112,14 +112,14 @@ impl History {
     fn csv(&self, reader: &Reader, filter: &Filter) -> Result<(), Failure> {
         let mut out = std::io::BufWriter::new(std::io::stdout().lock());
         match reader.csv(filter, &mut out) {
-            // Whoever closes the pipe early has read enough.
+            // A pipe that the reader has closed is not an error.
             Err(error) if !error.reason.starts_with("write as CSV") => Err(failure(error)),
             _ => Ok(()),
         }
     }
 }
 
-/// A history that cannot be read, as an exit code.
+/// The failure of a history that cannot be read.
 pub fn failure(error: HistoryError) -> Failure {
     let exit = match (error.path.exists(), error.damaged) {
         (false, _) => Exit::Missing,
@@ -129,7 +129,7 @@ pub fn failure(error: HistoryError) -> Failure {
     Failure::new(exit, error.to_string())
 }
 
-/// When a result was, to the second: by the clock, by a browser's, or how long after the start of the daemon.
+/// The time of a result, to the second: by the clock, else by a browser's clock, else since the start of the daemon.
 fn moment(entry: &Entry) -> String {
     let second = |us| format!("{:.19}", time::utc(us));
     match (entry.time_utc_us, entry.browser_utc_us, entry.uptime_s) {

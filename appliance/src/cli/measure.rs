@@ -34,7 +34,7 @@ impl Measure {
     /// Measures, writes the results and prints the report.
     ///
     /// # Errors
-    /// If the recording cannot be opened or measured, or the results not be written.
+    /// If the recording cannot be opened or measured, or the results cannot be written.
     pub fn run(&self) -> Result<(), Failure> {
         let unpacked = Unpacked::of(&self.recording)?;
         let recording = Recording::open(unpacked.folder())?;
@@ -56,7 +56,7 @@ impl Measure {
     }
 }
 
-/// Files of a measurement whose heights are known.
+/// Files that are written only if there are heights.
 const SURFACE: [&str; 4] = ["height.npy", "sigma.npy", "height.png", "cloud.ply"];
 
 /// The file of one pattern's phase, where a recording has several.
@@ -73,7 +73,7 @@ fn write(folder: &OutputFolder, measurement: &Measurement) -> Result<(), Failure
     for (at, phase) in phases[..patterns].iter().enumerate() {
         array(&phase_of(at), phase.width, &turns(phase))?;
     }
-    // Results of an earlier measurement that this one does not have would pass for its own.
+    // Files of an earlier measurement that this one does not write would be taken for its results.
     let mut beyond = patterns;
     while folder.remove(&phase_of(beyond))? {
         beyond += 1;
@@ -97,7 +97,7 @@ fn write(folder: &OutputFolder, measurement: &Measurement) -> Result<(), Failure
     Ok(())
 }
 
-/// Absolute phase in turns, NaN exactly where modulation, saturation or residual reject.
+/// Absolute phase in turns, NaN where modulation, saturation or residual reject the pixel.
 fn turns(phases: &PhaseMap) -> Vec<f32> {
     let pixels = phases.phase.iter().zip(&phases.trust);
     pixels

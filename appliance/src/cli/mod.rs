@@ -1,6 +1,6 @@
 //! The command line.
 
-/// Prints a line of the answer. Whoever closes the pipe early has read enough: that is no error.
+/// Prints a line of the result. A pipe that the reader has closed is not an error.
 macro_rules! say {
     ($($argument:tt)*) => {{
         use std::io::Write as _;
@@ -95,8 +95,7 @@ pub fn main() -> ExitCode {
     start(run)
 }
 
-/// Parses the arguments of this process, runs the command that they name and answers with its exit code. Options may stand before the
-/// command as well as behind it.
+/// Parses the arguments of this process, runs the command and returns its exit code. Options may stand before the command or after it.
 pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<(), Failure>) -> ExitCode {
     let words = options::behind_the_command(&A::command(), std::env::args_os());
     let arguments = match A::try_parse_from(words) {
@@ -116,7 +115,7 @@ pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<(), Failure>) -> ExitCode 
     }
 }
 
-/// Says what is wrong with the arguments, or prints the help or the version that they ask for.
+/// Reports what is wrong with the arguments, or prints the help or version that they ask for.
 fn refused(error: &clap::Error) -> ExitCode {
     if let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidSubcommand)
         && LABORATORY.contains(&name.as_str())
@@ -125,7 +124,7 @@ fn refused(error: &clap::Error) -> ExitCode {
         journal::write(Severity::Error, &remedy);
         return Exit::Usage.into();
     }
-    // Nothing can be done where stdout and stderr are closed.
+    // If stdout or stderr is closed, there is nothing to do about it.
     let _ = error.print();
     if error.use_stderr() {
         Exit::Usage.into()

@@ -1,4 +1,4 @@
-//! Names of outputs: none that says another kind of content than what is written.
+//! Names of outputs: a name whose ending contradicts the content is refused.
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Endings of the files that this program writes.
 const ENDINGS: [&str; 8] = ["csv", "json", "npy", "ply", "png", "recipe", "svg", "zip"];
 
-/// A file whose name ends like its content, `npy` or `recipe`.
+/// A file whose name must have the ending of its content, `npy` or `recipe`.
 pub(super) fn file(ending: &'static str) -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(move |path| match ends_in(&path, ending) {
         true => Ok(path),
@@ -14,7 +14,7 @@ pub(super) fn file(ending: &'static str) -> impl TypedValueParser<Value = PathBu
     })
 }
 
-/// A folder, whose name does not end like that of a file.
+/// A folder, whose name must not have the ending of a file.
 pub fn folder() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(|path| {
         let file = ENDINGS.into_iter().find(|ending| ends_in(&path, ending));

@@ -1,11 +1,11 @@
-//! Numbers on the command line: each has bounds, and what lies outside is refused with them.
+//! Numbers on the command line: each has bounds, which a refusal names.
 
 use clap::builder::TypedValueParser;
 use std::fmt::Display;
 use std::net::SocketAddr;
 use std::str::FromStr;
 
-/// A number from `low` to `high`; a NaN is none.
+/// A number from `low` to `high`; NaN is refused.
 pub fn number<T>(low: T, high: T) -> impl TypedValueParser<Value = T>
 where
     T: FromStr + PartialOrd + Display + Copy + Send + Sync + 'static,
@@ -18,7 +18,7 @@ where
     }
 }
 
-/// `N` numbers with commas between them, each at most `most` from 0.
+/// `N` numbers with commas between them, each from -`most` to `most`.
 pub fn numbers<const N: usize>(most: f64) -> impl TypedValueParser<Value = [f64; N]> {
     move |text: &str| {
         let numbers = text.split(',').map(|number| number.trim().parse().ok());

@@ -1,4 +1,4 @@
-//! Options that several commands share, in the groups in which commands take them.
+//! Options that several commands share, in groups.
 
 use super::numbers::{address, number};
 use crate::config::{Config, HeadConfig};
@@ -10,7 +10,7 @@ use std::ffi::OsString;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-/// Which station it is: its configuration and its state.
+/// The station: its configuration and its state.
 #[derive(Clone, Debug, Args)]
 pub struct Files {
     /// Configuration file (TOML); `fringed config keys` lists its keys.
@@ -21,7 +21,7 @@ pub struct Files {
     pub state: Option<PathBuf>,
 }
 
-/// Where the station is served.
+/// The addresses on which the station serves.
 #[derive(Clone, Debug, Args)]
 pub struct Listen {
     /// Where to serve Modbus TCP.
@@ -32,7 +32,7 @@ pub struct Listen {
     http: Option<SocketAddr>,
 }
 
-/// How much of the computer is used.
+/// The number of computing threads.
 #[derive(Clone, Debug, Args)]
 pub struct Threads {
     /// Computing threads; 0 = one per core.
@@ -40,7 +40,7 @@ pub struct Threads {
     threads: Option<u16>,
 }
 
-/// Whether anything is said on the way.
+/// Whether progress, log and tables are printed.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct Quiet {
     /// No progress, no log, no table.
@@ -48,7 +48,7 @@ pub struct Quiet {
     quiet: bool,
 }
 
-/// Whether programs or people read the answer.
+/// Whether the result is printed as JSON.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct Json {
     /// Print JSON where a table would be printed.
@@ -88,7 +88,7 @@ pub struct Measuring {
 }
 
 impl Files {
-    /// The configuration file, if one is named, with the command line's state folder over it.
+    /// The configuration: the named file or the defaults, with the state folder of the command line.
     ///
     /// # Errors
     /// If the file is missing or wrong.
@@ -106,10 +106,10 @@ impl Files {
         Ok(config)
     }
 
-    /// The state folder as configured, else the platform's.
+    /// The configured state folder, else the default one of the platform.
     ///
     /// # Errors
-    /// If the configuration is wrong or the platform has none.
+    /// If the configuration is wrong, or the platform has no default.
     pub fn state_folder(&self) -> Result<PathBuf, Failure> {
         match self.configuration()?.state {
             Some(path) => Ok(path),
@@ -117,7 +117,7 @@ impl Files {
         }
     }
 
-    /// The devices, with the calibration in the state folder unless the configuration names another.
+    /// The configured head, with the calibration in the state folder unless the configuration names another.
     pub fn head(&self, config: &Config) -> HeadConfig {
         match self.state_folder() {
             Ok(state) => config.head_in(&state),
@@ -127,7 +127,7 @@ impl Files {
 }
 
 impl Serving {
-    /// The configuration, with the command line's addresses over the configured ones.
+    /// The configuration, with the addresses of the command line.
     ///
     /// # Errors
     /// If the file is missing or wrong.
@@ -144,10 +144,10 @@ impl Serving {
 }
 
 impl Threads {
-    /// A pool of computing threads: as many as the command line says, else as configured; 0 = one per core.
+    /// A pool of computing threads: as many as the command line says, else `configured`; 0 = one per core.
     ///
     /// # Errors
-    /// If the system gives no threads (exit code 70).
+    /// If threads cannot be started (exit code 70).
     pub fn pool(&self, configured: usize) -> Result<rayon::ThreadPool, Failure> {
         rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads.map_or(configured, usize::from))
@@ -158,12 +158,12 @@ impl Threads {
 }
 
 impl Quiet {
-    /// Progress as the user wants it.
+    /// Progress, silent with `--quiet`.
     pub fn progress(self) -> Progress {
         Progress::new(self.quiet)
     }
 
-    /// Prints what was done, unless it is to be quiet.
+    /// Prints what was done, unless `--quiet` is given.
     pub fn say(self, words: impl FnOnce() -> String) {
         if !self.quiet {
             say!("{}", words().trim_end());
@@ -199,8 +199,8 @@ impl Output {
     }
 }
 
-/// Moves options that stand before a command behind it, where clap takes them: `fringed --state DIR recipe list` is read as
-/// `fringed recipe list --state DIR`. Whether the command has these options is for clap to say.
+/// Moves options that stand before a command behind it, where clap expects them: `fringed --state DIR recipe list` becomes
+/// `fringed recipe list --state DIR`. Clap then checks that the command has these options.
 pub fn behind_the_command(
     tree: &Command,
     arguments: impl Iterator<Item = OsString>,
@@ -237,7 +237,7 @@ pub fn behind_the_command(
     words
 }
 
-/// The option of this name; the command does not matter.
+/// The option of this name, of whichever command.
 fn option<'a>(tree: &'a Command, long: &str) -> Option<&'a Arg> {
     let own = tree
         .get_arguments()

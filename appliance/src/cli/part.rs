@@ -1,4 +1,4 @@
-//! The part in front of a simulated head, from the command line.
+//! Options for the part in front of a simulated head.
 
 use super::numbers::{number, numbers};
 use crate::config::{Backend, HeadConfig};
@@ -7,7 +7,7 @@ use crate::head::placed::Placed;
 use crate::production::backend;
 use hal::bounds::{MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG, clipped};
 
-/// Which part lies in front of a simulated head, instead of the scenario's.
+/// The part in front of a simulated head, if not the scenario's.
 #[derive(Clone, Debug, clap::Args)]
 pub struct SimulatedPart {
     /// Put this stock part in front of the simulated head: sheet_metal, flowerpot, cone, sawtooth, sphere, tube, spline, plane or empty.
@@ -28,10 +28,10 @@ pub struct SimulatedPart {
 }
 
 impl SimulatedPart {
-    /// The part that is asked for, if one is.
+    /// The part that the options describe, if any is given.
     ///
     /// # Errors
-    /// If the configured head is not simulated, or there is no such part, defect or place (64).
+    /// If the configured head is not simulated, or there is no such part, defect or placement (64).
     pub fn placed(&self, head: &HeadConfig) -> Result<Option<Placed>, Failure> {
         let asked = self.part.is_some() || !self.defect.is_empty();
         if !asked && self.shift.is_none() && self.tilt.is_none() && self.rotate.is_none() {

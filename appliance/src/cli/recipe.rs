@@ -1,5 +1,7 @@
-//! `fringed recipe`: list, export, import, delete the station's recipes, and undo that. While a station runs, it takes up an
-//! imported recipe when it is selected; what would take a recipe from under it is done on its page.
+//! `fringed recipe`: lists, exports, imports and deletes the station's recipes, and undoes changes.
+//!
+//! A running station uses an imported recipe when it is selected next. Deleting and undoing need a stopped station or its page,
+//! because the recipe may be active.
 
 use super::names;
 use super::numbers::number;
@@ -115,7 +117,9 @@ impl RecipeCommand {
                 quiet,
             } => {
                 let state = at_rest(files, "Delete")?;
-                Store::of_state(&state)?.delete(*number).map_err(kept)?;
+                Store::of_state(&state)?
+                    .delete(*number)
+                    .map_err(unchanged)?;
                 let undo = format!("`fringed recipe undo {number}` brings it back");
                 quiet.say(|| format!("recipe {number} is deleted; {undo}"));
                 Ok(())
@@ -126,7 +130,7 @@ impl RecipeCommand {
                 quiet,
             } => {
                 let state = at_rest(files, "Undo")?;
-                let file = Store::of_state(&state)?.undo(*number).map_err(kept)?;
+                let file = Store::of_state(&state)?.undo(*number).map_err(unchanged)?;
                 let digits = file.fingerprint.get(..8).unwrap_or_default();
                 quiet.say(|| {
                     format!(
@@ -149,13 +153,13 @@ fn store(files: &Files) -> Result<Store, Failure> {
     })
 }
 
-/// The state folder, which no station uses meanwhile.
+/// The state folder, locked against stations.
 fn at_rest(files: &Files, button: &str) -> Result<StateFolder, Failure> {
     let instead = format!("use *Recipes*, *{button}* on its page");
     StateFolder::open_unless_used(&files.state_folder()?, Exit::Unavailable, &instead)
 }
 
-fn kept(error: GenerationError) -> Failure {
+fn unchanged(error: GenerationError) -> Failure {
     let exit = match &error {
         GenerationError::Load(LoadError::Unknown(_)) | GenerationError::Nothing(_) => Exit::Missing,
         GenerationError::Load(LoadError::Corrupt { .. }) | GenerationError::Unfit { .. } => {

@@ -45,7 +45,7 @@ impl Record {
     /// Opens the head, takes the sequence and writes it.
     ///
     /// # Errors
-    /// If the head or the folder cannot be had, or the pattern not be shown.
+    /// If the head cannot be opened, the pattern cannot be shown, or the folder cannot be written.
     pub fn run(&self) -> Result<(), Failure> {
         let config = self.files.configuration()?;
         let progress = self.quiet.progress();

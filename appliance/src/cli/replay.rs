@@ -1,4 +1,4 @@
-//! `fringed replay RECORDING`: judges a kept part again and compares with what the history says, bit by bit.
+//! `fringed replay RECORDING`: judges a kept part again and compares the result with the stored one, bit by bit.
 
 use super::history::failure;
 use super::options::Measuring;
@@ -26,12 +26,12 @@ pub struct Replay {
     measuring: Measuring,
 }
 
-/// What a part is judged by again.
+/// The recipe that a part is judged by again.
 struct Chosen {
     recipe: Recipe,
-    /// Where it is from, in words.
+    /// Where it comes from, in words.
     from: String,
-    /// Whether it is the one that judged the part then.
+    /// Whether it is the one that judged the part before.
     same: bool,
 }
 
@@ -39,7 +39,7 @@ impl Replay {
     /// Judges and compares.
     ///
     /// # Errors
-    /// If recording, recipe or stored result cannot be had (65, 66), or the result is not the stored one (70).
+    /// If recording, recipe or stored result cannot be read (65, 66), or the results differ (70).
     pub fn run(&self) -> Result<(), Failure> {
         let Measuring {
             files,
@@ -152,8 +152,8 @@ impl Replay {
     }
 }
 
-/// The stored result of a recording: the one that names it, or that of the SEQ in its name. One of another part is that of
-/// another device.
+/// The stored result of a recording: the one that names the recording, else the one with the SEQ in the recording's name. A result
+/// with another recipe or PART_ID belongs to another device and is ignored.
 fn stored(state: &Path, name: Option<&str>, kept: &Kept) -> Result<Option<Entry>, Failure> {
     let reader = Reader::of(state);
     let Some(name) = name.filter(|_| reader.path().exists()) else {
@@ -182,7 +182,7 @@ fn entry(inspection: Inspection, recipe: u16, fingerprint: &str) -> Entry {
     })
 }
 
-/// The verdict, the recipe that it comes from, and a line for each gauge.
+/// The verdict, the recipe, and a line for each gauge.
 fn table(entry: &Entry, from: &str) -> String {
     let number = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:+.4}"));
     let recipe = format!("recipe {}, fingerprint {}", entry.recipe, entry.fingerprint);

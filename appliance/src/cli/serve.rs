@@ -14,7 +14,7 @@ use crate::system::runtime;
 use crate::system::stop_signal::StopSignal;
 use std::time::Duration;
 
-/// READY waits so long for devices that are switched on together with the computer.
+/// How long the start waits for devices that are switched on together with the computer.
 const TOGETHER: Duration = Duration::from_secs(20);
 
 /// Run the station.
@@ -39,7 +39,7 @@ impl Serve {
         let progress = self.quiet.progress();
         let caller = Caller {
             notify: Notify::from_environment(),
-            // Before anything is done: whatever it does then, the end that is asked for is clean.
+            // Installed first, so that a signal at any time ends the program cleanly.
             stop: StopSignal::listen()?,
         };
         caller.notify.status("starting");
@@ -58,12 +58,12 @@ impl Serve {
     }
 }
 
-/// Says how the start ended, and from then on how things stand.
+/// Reports how the start ended, and from then on each change of the station's status.
 async fn serve(daemon: &Daemon, notify: &Notify, progress: &Progress) {
     let mut settled = daemon.settled().await;
     let faulted = || daemon.station.snapshot().fault.is_some();
     if notify.is_connected() && settled.is_err() && faulted() {
-        notify.status(&standing(&daemon.station.snapshot()));
+        notify.status(&status_line(&daemon.station.snapshot()));
         let there = async {
             let mut snapshots = daemon.station.subscribe();
             drop(snapshots.wait_for(|now| now.fault.is_none()).await);
@@ -81,7 +81,7 @@ async fn serve(daemon: &Daemon, notify: &Notify, progress: &Progress) {
                 progress.warn(&format!("no trigger is accepted yet: {words}"));
             }
         }
-        // Without a recipe the station still serves: the PLC loads or teaches one.
+        // The station serves without a recipe as well: the PLC loads or teaches one.
         Err(failure) => progress.warn(&failure.message),
     }
     progress.log(&format!(
@@ -92,20 +92,20 @@ async fn serve(daemon: &Daemon, notify: &Notify, progress: &Progress) {
     let mut snapshots = daemon.station.subscribe();
     let mut said = String::new();
     loop {
-        let words = standing(&snapshots.borrow_and_update());
+        let words = status_line(&snapshots.borrow_and_update());
         if words != said {
             notify.status(&words);
             said = words;
         }
-        // The daemon holds the other end as long as this runs.
+        // Fails only after the daemon, which holds the sender, is gone.
         if snapshots.changed().await.is_err() {
             return;
         }
     }
 }
 
-/// How things stand, in one line; the same from cycle to cycle.
-fn standing(snapshot: &Snapshot) -> String {
+/// The station's status in one line, which does not change from cycle to cycle.
+fn status_line(snapshot: &Snapshot) -> String {
     match (&snapshot.fault, &snapshot.recipe) {
         (Some(fault), _) => format!("fault {}: {}; {}", fault.code, fault.cause, fault.remedy),
         (None, Some(_)) if snapshot.refusal == Some(reject::OTHER_RECIPE) => {

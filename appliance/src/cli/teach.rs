@@ -64,12 +64,12 @@ pub struct Teach {
 /// Where the recipe goes.
 enum Target<'a> {
     File(&'a Path),
-    /// Held until it is there.
+    /// Locked until the recipe is stored.
     State(StateFolder),
 }
 
 impl Target<'_> {
-    /// Writes the recipe; answers where it is, in words.
+    /// Writes the recipe; returns where, in words.
     fn store(&self, taught: &Taught) -> Result<String, Failure> {
         let (written, what, place) = match self {
             Self::File(out) => (
@@ -107,10 +107,10 @@ fn name(given: &str) -> Result<String, String> {
 }
 
 impl Teach {
-    /// Teaches, stores the recipe and says why which sequence was chosen.
+    /// Teaches, stores the recipe and prints which sequence was chosen and why.
     ///
     /// # Errors
-    /// If the part cannot be taught, the number is taken, or the recipe not be stored; a recipe stored before is untouched.
+    /// If the part cannot be taught, the number is taken, or the recipe cannot be stored; a recipe stored before is unchanged.
     pub fn run(&self) -> Result<(), Failure> {
         let Measuring {
             files,
@@ -118,7 +118,7 @@ impl Teach {
             output,
         } = &self.measuring;
         let config = files.configuration()?;
-        // Before anything is measured, and held until the recipe is stored.
+        // Opened before anything is measured, and locked until the recipe is stored.
         let target = match &self.out {
             Some(out) => Target::File(out),
             None => Target::State(StateFolder::open_unless_used(
@@ -171,7 +171,7 @@ impl Teach {
     /// The recipe that is replaced, if any.
     ///
     /// # Errors
-    /// The number is taken and nothing was said of replacing.
+    /// If the number is taken and `--replace` is not given, or there are no gauges to keep.
     fn replaced(&self, recipes: &Store) -> Result<Option<RecipeFile>, Failure> {
         let number = self.number;
         let replaced = recipes.present(number);

@@ -1,4 +1,4 @@
-//! From a preliminary recording to a phase function made for its part: what `fringed adapt` does.
+//! Makes a phase function for the part of a preliminary recording (`fringed adapt`).
 
 use crate::error::Failure;
 use crate::head::seam;
@@ -10,13 +10,13 @@ use hal::replay::recording::PatternSpec;
 use serde::Serialize;
 use std::path::Path;
 
-/// How a phase function is made.
+/// The method and its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
-    /// By which method.
+    /// The method.
     pub method: Method,
-    /// Blur and smallest pitches. The paper's method knows only the image pitch; its own projector
-    /// pitch is [`paper::PROJECTOR_PITCH`], and the blur is only that of the prediction.
+    /// Blur and smallest pitches. The paper's method uses only the image pitch: its projector pitch is
+    /// [`paper::PROJECTOR_PITCH`], and the blur only enters the prediction.
     pub optics: noise::Optics,
 }
 
@@ -52,7 +52,7 @@ pub struct Report {
     pub pitch_px: [f64; 2],
     /// Largest Φ_P in turns; the smallest is 0.
     pub max_turns: f64,
-    /// RMS of the preliminary measurement's σ_z, mm; none where the noise is not known.
+    /// RMS of the preliminary measurement's σ_z, mm; `None` if the noise is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub preliminary_sigma_mm: Option<f64>,
     /// The same with the preliminary sequence's levels and shifts of the new phase function.
@@ -63,7 +63,7 @@ pub struct Report {
 /// Measures a preliminary recording and makes a phase function for its part.
 ///
 /// # Errors
-/// If it cannot be measured, lacks a pattern or a model that the method needs, or shows nothing.
+/// If it cannot be measured, lacks a pattern or a model that the method needs, or has no resolved pixels.
 pub fn adapt(recording: &Recording, folder: &Path, choice: &Choice) -> Result<Adapted, Failure> {
     let wrong = |error: &dyn std::fmt::Display| wrong(folder, error);
     let channels = Channels::of(recording, choice.method).map_err(|error| wrong(&error))?;
@@ -106,17 +106,16 @@ pub fn adapt(recording: &Recording, folder: &Path, choice: &Choice) -> Result<Ad
     Ok(Adapted { function, report })
 }
 
-/// The patterns of a recording that a method works from; the vertical one is the measurement's
-/// primary one.
+/// The patterns of a recording that a method uses; the vertical one is the measurement's primary pattern.
 struct Channels {
-    /// For the paper's method.
+    /// For the paper's method only.
     across: Option<Across>,
 }
 
 /// Vertical and horizontal fringes of a recording.
 #[derive(Clone, Copy)]
 struct Across {
-    /// Places of the vertical and the horizontal pattern.
+    /// Indices of the vertical and the horizontal pattern.
     at: [usize; 2],
     /// Pitch of each, projector pixels.
     pitch: [f64; 2],

@@ -1,5 +1,4 @@
-//! What is known of a recording's phase beforehand: a recipe's golden map, or where a preliminary
-//! measurement expects it.
+//! The phase that is expected in a recording: a recipe's golden map, or the prediction from a preliminary measurement.
 
 use crate::head::seam;
 use crate::recipe::{Recipe, SequenceKind, safe};
@@ -10,10 +9,10 @@ use hal::replay::Recording;
 
 type AnyError = Box<dyn std::error::Error>;
 
-/// Phase functions that differ by no more than this are the same one, in turns: files hold `f64`.
+/// Phase functions that differ by no more than this are the same, in turns: files hold `f64`.
 const SAME: f64 = 1e-9;
 
-/// A known map that fits a recording.
+/// An expected phase map that fits a recording.
 #[derive(Debug)]
 pub(super) struct Known {
     /// "golden" or "preliminary", for reports.
@@ -22,14 +21,12 @@ pub(super) struct Known {
     pub pattern: usize,
     /// Φ, row-major over the camera's frame, unknown where it was not resolved.
     phase: Vec<AbsolutePhase>,
-    /// How far a placement inside the recipe's tolerance can move the phase, turns; none where
-    /// nothing is declared.
+    /// How far a placement within the recipe's tolerance can move the phase, turns; `None` without a recipe.
     reach: Option<Vec<f32>>,
 }
 
 impl Known {
-    /// The map for levels that are unwrapped in this way: those of limited reach know nothing
-    /// outside their safe mask.
+    /// The map for levels that are unwrapped in this way; for those of limited reach it is unknown outside of their safe mask.
     pub fn map(&self, unwrapping: Unwrapping) -> Vec<AbsolutePhase> {
         let limit = match unwrapping {
             Unwrapping::Single => SequenceKind::SingleLevel.reach(),
@@ -115,8 +112,7 @@ impl Known {
     }
 }
 
-/// The largest difference of two phase functions over the pixels of the raster, in turns; none if
-/// their rasters differ.
+/// The largest difference of two phase functions over the pixels of the raster, in turns; `None` if their rasters differ.
 fn difference(a: &PhaseFunction, b: &PhaseFunction) -> Option<f64> {
     let (columns, rows) = (a.columns(), a.rows());
     let differences = (0..rows).flat_map(|row| {

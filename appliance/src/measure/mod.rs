@@ -1,4 +1,4 @@
-//! From a recording to phase, height and report: what `fringed measure` does.
+//! Measures a recording: phase, height and report (`fringed measure`).
 
 pub mod adapt;
 mod known;
@@ -52,8 +52,7 @@ pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement, Fail
     measure_with(recording, folder, None)
 }
 
-/// As [`measure`], with levels that need a map unwrapped about where a preliminary measurement of the
-/// part expects their phase.
+/// As [`measure`], with levels that need a map unwrapped about the phase that a preliminary measurement of the part predicts.
 ///
 /// # Errors
 /// As for [`measure`], and if the preliminary map is of frames of another size.
@@ -66,9 +65,8 @@ pub fn measure_after(
     measure_about(recording, folder, None, Some(known))
 }
 
-/// As [`measure`], with what a recipe knows: the pattern that it is made of gives the height, and
-/// levels that need a map are unwrapped about its golden phase instead of the reference map. Noise
-/// and working range come from it where the recording has none.
+/// As [`measure`], with a recipe: the height comes from the recipe's pattern, and levels that need a map are unwrapped about its
+/// golden phase instead of the reference map. Noise and working range are the recipe's where the recording has none.
 ///
 /// # Errors
 /// As for [`measure`], and if the recipe is of another pattern or of frames of another size.
@@ -82,7 +80,7 @@ pub fn measure_with(
     measure_about(recording, folder, recipe, known)
 }
 
-/// A recording's content is wrong.
+/// The failure of a recording with wrong content.
 fn wrong(folder: &Path, error: &dyn std::fmt::Display) -> Failure {
     let manifest = folder.join("recording.json");
     Failure::because(Exit::Content, manifest.display(), error)
@@ -263,7 +261,7 @@ impl Rig {
         })
     }
 
-    /// The inner error says why there is no geometry, the outer one that what there is is absurd.
+    /// The outer error: the geometry is impossible. The inner one: why there is none.
     fn triangulator(
         &self,
         function: &PhaseFunction,

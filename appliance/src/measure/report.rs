@@ -12,7 +12,7 @@ use std::time::Duration;
 /// Wall time of each stage.
 #[derive(Clone, Debug, Default)]
 pub struct StageTimes {
-    /// The known map that dense levels are unwrapped about.
+    /// The map that dense levels are unwrapped about.
     pub map: Duration,
     /// Frames to absolute phase.
     pub phase: Duration,
@@ -53,14 +53,13 @@ pub struct Report {
     pub resolved: usize,
     /// The others, by their first failing reason.
     pub unresolved: BTreeMap<&'static str, usize>,
-    /// Pixels that were not looked at, because the known map has nothing there.
+    /// Pixels that were not decoded, because the expected map is unknown there.
     pub skipped: usize,
     /// How the levels were unwrapped: geometric, dense or single.
     pub kind: &'static str,
     /// The levels' ratios from coarse to fine.
     pub ratios: Vec<f64>,
-    /// The known map that they were unwrapped about: reference or golden; none where they are
-    /// absolute by themselves.
+    /// The map that they were unwrapped about: reference, golden or preliminary; `None` if they are absolute by themselves.
     pub map: Option<&'static str>,
     /// The recipe that was given.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -95,7 +94,7 @@ impl Report {
         truth: &Truth<'_>,
         stages: &StageTimes,
     ) -> Self {
-        // A pixel that is dark although truth calls it wholly lit is lit and unresolved.
+        // A dark pixel that truth calls wholly lit counts as lit and unresolved.
         let dark_but_lit = (0..phases.trust.len())
             .filter(|&at| phases.trust[at] == Trust::Dark && truth.whole(at))
             .count();

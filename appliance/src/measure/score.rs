@@ -10,7 +10,7 @@ pub const GROSS_MM: f64 = 1.0;
 /// Truth class of a pixel that is wholly lit and holds no depth edge.
 const WHOLE_PIXEL: u8 = 2;
 
-/// What a recording knows of the truth.
+/// The true heights of a recording or of a simulated scene, as far as they are known.
 #[derive(Debug, Default)]
 pub struct Truth<'a> {
     /// z in mm on each pixel's central ray, NaN = unseen.
@@ -19,7 +19,7 @@ pub struct Truth<'a> {
     pub class: Option<&'a [u8]>,
 }
 
-/// Errors of height over the resolved pixels that truth calls whole; e = z − truth.
+/// Errors of the height over the resolved pixels that truth calls wholly lit; e = z − truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Score {
     /// Resolved pixels with a truth of class 2 (of any finite truth where there are no classes).

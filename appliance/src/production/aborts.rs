@@ -1,10 +1,10 @@
-//! Which job is to be ended early.
+//! The job that the station wants to be ended early.
 
 use crate::station::JobId;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Which job was aborted last; told by the station, asked by the worker between two frames. Cheap to clone.
+/// The last aborted job: set by the station, read by the measuring task between two frames. Cheap to clone.
 #[derive(Clone, Debug, Default)]
 pub struct Aborts(Arc<AtomicU64>);
 
@@ -14,6 +14,7 @@ impl Aborts {
         self.0.fetch_max(job.0, Ordering::Relaxed);
     }
 
+    /// Whether this job is to be ended.
     pub(super) fn has(&self, job: JobId) -> bool {
         self.0.load(Ordering::Relaxed) == job.0
     }

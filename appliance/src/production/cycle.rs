@@ -1,4 +1,4 @@
-//! A cycle of the measuring task: sequence after sequence until one is good enough, then the result.
+//! A cycle of the measuring task: one sequence after the other until one is good enough, then the result.
 
 use super::stopwatch::timed_on;
 use super::{ABORTED, DEVICE_TIMEOUT, Worker};
@@ -14,12 +14,12 @@ use hal::head::Exposure;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// What a part was judged by.
+/// The sequence that a part was judged by.
 #[derive(Default)]
 pub(super) struct JudgedBy {
     /// Which of the recipe's sequences.
     pub sequence: usize,
-    /// Its frames; none if there was no judgement.
+    /// Its frames; empty if the part was not judged.
     pub frames: Vec<Frame>,
 }
 
@@ -27,16 +27,16 @@ pub(super) struct JudgedBy {
 struct Taken {
     frames: Vec<Frame>,
     exposure: Exposure,
-    /// Processor time of what was decoded meanwhile.
+    /// Processor time of the decoding on arrival.
     spent: Duration,
 }
 
 impl Worker {
-    /// Runs a cycle; the frames that its part was judged by.
+    /// Runs a cycle; returns the frames that the part was judged by.
     pub(super) fn measure(&mut self, plan: Option<&Arc<Plan>>, job: &Job) -> JudgedBy {
         let id = job.job;
         let Some(plan) = plan else {
-            // The station triggers only with an active recipe, and that is this plan's.
+            // Not reached: the station accepts triggers only with an active recipe, whose plan this is.
             let message = "measure: no recipe is loaded".into();
             self.station.event(failed(id, error_code::RIG, message));
             return JudgedBy::default();
@@ -62,7 +62,7 @@ impl Worker {
                 flags |= RETRIED;
             }
             let last = sequence + 1 >= plan.sequence_count();
-            // The part must stay while another sequence may follow.
+            // Not before the judgement if another sequence may follow: the part must stay in place until then.
             if last {
                 self.station.event(Event::ExposureDone { job: id });
             }
@@ -89,8 +89,8 @@ impl Worker {
         }
     }
 
-    /// The frames of a sequence, each level decoded as soon as it is there; none if there are not all of them, and then the
-    /// station knows why.
+    /// Takes the frames of a sequence and decodes each level on arrival. `None` if some are missing; the station has then been
+    /// told why.
     fn take(
         &mut self,
         plan: &Plan,
@@ -143,7 +143,7 @@ impl Worker {
             job,
             inspection: inspection.clone(),
         });
-        // Not where the station no longer waited for it.
+        // The station ignores an inspection that it no longer waits for.
         let published = |record: &Arc<ResultRecord>| Arc::ptr_eq(&record.inspection, &inspection);
         if let Some(record) = after.result.clone().filter(published) {
             self.history.keep(&record, || FailedPart {
@@ -156,7 +156,7 @@ impl Worker {
         }
     }
 
-    /// Says how well the head kept time.
+    /// Reports how well the head kept its timing.
     fn paced(&self, frames: usize, exposure: &Exposure) {
         let span = exposure.done.since(exposure.started).as_secs_f64();
         let refresh = self.opened.head.refresh().as_secs_f64();

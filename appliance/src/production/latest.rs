@@ -1,7 +1,7 @@
-//! What somebody wants to know of the last cycle, worked out only when it is wanted.
+//! Pictures and downloads of the last cycle, computed only on request.
 //!
-//! The measuring task keeps the plan and the frames of the last cycle. Whoever wants something of them asks and waits;
-//! the measuring task answers when it has nothing more urgent to do.
+//! The measuring task keeps the plan and the frames of the last cycle. A request for something computed from them is queued, and
+//! its thread waits; the measuring task answers when it has nothing more urgent to do.
 
 use crate::head::calibration::Calibration;
 use crate::recipe::plan::{Layers, Plan};
@@ -11,9 +11,9 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Longest wait for the measuring task: it may be in the middle of a cycle.
+/// Longest wait for the measuring task, which may be in the middle of a cycle.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// The most that wait at a time.
+/// Most requests that wait at a time.
 const MOST_WAITING: usize = 8;
 
 /// The last cycle as the measuring task holds it.
@@ -38,17 +38,17 @@ impl LastCycle<'_> {
     }
 }
 
-/// A question, and the way back for its answer.
+/// A request, which sends its own answer.
 type Question = Box<dyn FnOnce(Option<LastCycle<'_>>) + Send>;
 
-/// The way to the last cycle. Cheap to clone.
+/// Requests about the last cycle. Cheap to clone.
 #[derive(Clone, Default)]
 pub struct LastMaps(Arc<Mutex<Inside>>);
 
 #[derive(Default)]
 struct Inside {
     waiting: Vec<Question>,
-    /// The maps that were worked out last, and of which result.
+    /// The maps that were computed last, with the SEQ of their result.
     layers: Option<(u32, Arc<Layers>)>,
 }
 
@@ -57,7 +57,8 @@ impl LastMaps {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Asks the measuring task, and waits, but not for ever. None if there are no frames, too many ask, or it is too busy.
+    /// Has the measuring task compute `answer`, and waits for it, 3 s at most. `None` if there are no frames, too many requests
+    /// wait, or the task is busy.
     pub fn ask<T: Send + 'static>(
         &self,
         answer: impl FnOnce(LastCycle<'_>) -> T + Send + 'static,
@@ -76,7 +77,7 @@ impl LastMaps {
         receiver.recv_timeout(PATIENCE).ok().flatten()
     }
 
-    /// The maps of the last cycle and the SEQ of its result; of the last one that had any, where the frames are gone.
+    /// The maps of the last cycle and the SEQ of its result. If the frames are gone: the maps that were computed last.
     pub fn layers(&self, seq: u32) -> Option<(u32, Arc<Layers>)> {
         let made = self.inside().layers.clone();
         if let Some((of, _)) = &made
@@ -95,14 +96,14 @@ impl LastMaps {
         newest
     }
 
-    /// Answers those who wait.
+    /// Answers all waiting requests.
     pub fn answer(&self, cycle: Option<LastCycle<'_>>) {
         for question in std::mem::take(&mut self.inside().waiting) {
             question(cycle);
         }
     }
 
-    /// Whether somebody waits.
+    /// Whether a request waits.
     pub fn wanted(&self) -> bool {
         !self.inside().waiting.is_empty()
     }

@@ -38,14 +38,14 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::time::Duration;
 
-/// What the worker is told to do.
+/// What the measuring task is to do.
 #[derive(Debug)]
 pub enum Order {
     /// Measure a part.
     Measure(Job),
     /// Load a recipe.
     Load(JobId, RecipeKey),
-    /// Teach a recipe from the part in front of the head; whether the gauges of the one that it replaces stay.
+    /// Teach the part in front of the head as the recipe of this number; whether to keep the gauges of the one that it replaces.
     Teach(JobId, u16, bool),
     /// Put another part in front of a simulated head.
     Place(Placing),
@@ -53,51 +53,51 @@ pub enum Order {
     Stop,
 }
 
-/// Idle, the worker gives a sign of life this often.
+/// Period of the signs of life while the task is idle.
 const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
 /// Longest wait for one flip, one pulse or one frame.
 const DEVICE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Words of what an abort ended.
+/// Why an aborted job ended.
 const ABORTED: &str = "the PLC or a stop ended it";
 
 /// Everything that the measuring task owns.
 pub struct Worker {
     /// The head and its calibration.
     pub opened: Opened,
-    /// Who else is told what is known of it.
+    /// Where the calibration is published for the page.
     pub calibration: Current,
     /// Computing threads.
     pub pool: rayon::ThreadPool,
     /// The station's recipes.
     pub recipes: Store,
-    /// The way to the station.
+    /// The station.
     pub station: StationHandle,
-    /// Where the last maps go.
+    /// Requests about the last cycle.
     pub maps: LastMaps,
     /// Where the frames of failed parts go.
     pub history: History,
-    /// Shows how far teaching is, and the log.
+    /// Progress and log.
     pub progress: Progress,
-    /// How the head is opened again.
+    /// The configured head, to open it again.
     pub config: HeadConfig,
-    /// What the station wants to be ended early.
+    /// The job that the station wants to be ended early.
     pub aborts: Aborts,
-    /// The head is gone since this error.
+    /// The error since which the head is lost.
     pub lost: Option<Error>,
-    /// Recipes made ready.
+    /// The plans used last.
     pub shelf: Shelf,
-    /// What the service manager's watchdog is fed by.
+    /// The heartbeat for the service manager's watchdog.
     pub pulse: Pulse,
-    /// Told while it only computes.
+    /// Marked while the task computes without using a device.
     pub computing: Computing,
-    /// The part that comes in front of a simulated head once a good one is taught.
+    /// The part that is put in front of a simulated head once a good one is taught.
     pub waiting: Option<Placed>,
 }
 
 impl Worker {
-    /// Works until told to stop, or until nobody can tell it anything any more. `begin` tells the station that it can, and
-    /// `first` is asked of the station then.
+    /// Works until [`Order::Stop`] or until all senders of orders are gone. `begin` tells the station that the task is ready;
+    /// `first` is then requested of the station.
     pub fn run(mut self, orders: &Receiver<Order>, begin: Event, first: Option<Request>) {
         self.progress.clear();
         self.tell_condition();
@@ -109,7 +109,7 @@ impl Worker {
         let mut last = JudgedBy::default();
         loop {
             self.pulse.beat();
-            // A trigger that is there already waits for no picture.
+            // Pictures are computed only while no order waits.
             let order = match orders.try_recv() {
                 Err(TryRecvError::Empty) => {
                     if self.maps.wanted() {
@@ -122,7 +122,7 @@ impl Worker {
             };
             match order {
                 Ok(Order::Measure(job)) => {
-                    // The memory of the frames before is what these are written to.
+                    // Freed first: the head reuses the memory for the new frames.
                     drop(last);
                     last = self.measure(plan.as_ref(), &job);
                 }
@@ -150,7 +150,7 @@ impl Worker {
         }
     }
 
-    /// Says whether the head's calibration can be trusted.
+    /// Reports whether the head's calibration can be trusted.
     fn tell_condition(&self) {
         let Opened {
             problem,
@@ -169,7 +169,7 @@ impl Worker {
         }));
     }
 
-    /// Answers those who want to know more of the last cycle.
+    /// Answers the requests about the last cycle.
     fn tell(&self, plan: Option<&Arc<Plan>>, last: &JudgedBy) {
         let (maps, calibration) = (&self.maps, &self.opened.calibration);
         let result = self.station.snapshot().result.clone();
@@ -186,7 +186,7 @@ impl Worker {
         self.pool.install(|| maps.answer(cycle));
     }
 
-    /// Loads a recipe; the one before stays active unless everything went well.
+    /// Loads a recipe; if that fails, the one before stays active.
     fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Arc<Plan>>) {
         let (result, message) = match caught(|| self.prepare(key, plan.as_ref())) {
             Ok(_) if self.aborts.has(job) => (RecipeResult::Busy, format!("load: {ABORTED}")),
@@ -202,7 +202,7 @@ impl Worker {
             Err(refused) => refused,
         };
         self.restore(plan);
-        // A lost head ends the job by itself.
+        // The fault of a lost head ends the job.
         if self.lost.is_none() {
             let message = Arc::from(message);
             self.station.event(Event::LoadFailed {
@@ -213,8 +213,8 @@ impl Worker {
         }
     }
 
-    /// Puts the patterns of the active recipe back into the projector, after another one's may have
-    /// replaced them. Without them the recipe cannot measure: then each trigger ends INVALID.
+    /// Loads the patterns of the active recipe into the projector again, after those of another one may have replaced them. If that
+    /// fails, there is no plan any more, and each trigger ends INVALID.
     fn restore(&mut self, plan: &mut Option<Arc<Plan>>) {
         let Some(before) = plan else { return };
         let shown = self
@@ -230,8 +230,8 @@ impl Worker {
         }
     }
 
-    /// Makes a recipe ready to measure. `shown` is the plan whose patterns the head holds: if its recipe is asked for and has not
-    /// changed, there is nothing left to do.
+    /// Makes a recipe ready to measure: plans it and loads its patterns. `shown` is the plan whose patterns the head holds; if it is
+    /// the one that is asked for, there is nothing to do. The second result warns that an older generation of the recipe is used.
     fn prepare(
         &mut self,
         key: &RecipeKey,
@@ -260,7 +260,7 @@ impl Worker {
         let (plan, fallback) = match kept {
             Some(plan) => (plan, None),
             None => {
-                // Before the arrays of the next take their place.
+                // Before the arrays of the next recipe are read.
                 self.shelf.make_room(stamp.as_ref().map_or(0, Stamp::bytes));
                 let loaded = self.recipes.load(number).map_err(refuse)?;
                 let (played, simulated) = (&self.opened.played, self.opened.stage.is_some());
@@ -269,7 +269,7 @@ impl Worker {
                     None => Plan::new(loaded.recipe, calibration, simulated),
                 });
                 let plan = Arc::new(planned.map_err(refuse_plan)?);
-                // What stands in for a damaged file is not that file's plan.
+                // The plan of an older generation does not belong to the stamp of the newest file.
                 if let Some(stamp) = stamp.filter(|_| loaded.fallback.is_none()) {
                     self.shelf.put(stamp, fingerprint, plan.clone());
                 }
@@ -298,17 +298,17 @@ fn refuse_plan(error: PlanError) -> (RecipeResult, String) {
     (result, error.to_string())
 }
 
-/// Runs what makes a recipe ready; a panic is an answer that refuses the recipe.
+/// Runs what makes a recipe ready, and turns a panic into a refusal of the recipe.
 ///
-/// Recipes come from elsewhere. One that breaks the computation must not end the process, which would load it again at its next
-/// start, for ever.
+/// Recipes are imported from outside. One that makes the computation panic must not end the process: the next start would load it
+/// again, and so on.
 pub(crate) fn caught<T>(
     prepare: impl FnOnce() -> Result<T, (RecipeResult, String)>,
 ) -> Result<T, (RecipeResult, String)> {
     catch_unwind(AssertUnwindSafe(prepare)).unwrap_or_else(|panic| Err(broken(&*panic)))
 }
 
-/// What a panic says of a recipe.
+/// The refusal of a recipe that made the computation panic.
 fn broken(panic: &(dyn Any + Send)) -> (RecipeResult, String) {
     let said = panic.downcast_ref::<String>().map(String::as_str);
     let said = said.or(panic.downcast_ref::<&str>().copied());

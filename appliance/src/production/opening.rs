@@ -1,4 +1,4 @@
-//! The head at the start: opened once, or, where a service manager started the program, until it is there.
+//! Opens the head at the start: once, or again and again until it is there if a service manager started the program.
 
 use super::Order;
 use super::recovery::{Pause, REMEDY};
@@ -12,28 +12,28 @@ use crate::system::progress::Progress;
 use sim::Stage;
 use std::sync::mpsc::{Receiver, Sender};
 
-/// What opens the head.
+/// Opens the head at the start.
 pub struct Opening<'a> {
-    /// Which.
+    /// The configured head.
     pub config: &'a HeadConfig,
     /// Computing threads.
     pub pool: &'a rayon::ThreadPool,
-    /// Shows how far it is, and the log.
+    /// Progress and log.
     pub progress: &'a Progress,
-    /// Who is told that it is not there.
+    /// The station, which shows a missing head as a fault.
     pub station: &'a StationHandle,
-    /// The measuring task's signs of life.
+    /// The measuring task's heartbeat.
     pub pulse: &'a Pulse,
-    /// Whether a head that is not there is waited for.
+    /// Whether to wait for a head that is not there.
     pub patient: bool,
-    /// Told while the light of a simulated head is worked out.
+    /// Marked while the light of a simulated head is computed.
     pub computing: &'a Computing,
 }
 
 impl Opening<'_> {
-    /// Opens the head and answers with it and with what the station is to be told when it can work. Whoever waits for the start hears through
-    /// `heard` how the first attempt ended; a head that is waited for is as good as none that can be placed in front of.
-    /// None if there is nothing to work with.
+    /// Opens the head; returns it with the event that tells the station that it can work. `heard` gets the outcome of the first
+    /// attempt for the caller of the start: where parts are placed in front of a simulated head, or `None` as long as the head is
+    /// waited for. Returns `None` if the head cannot be opened or the daemon ends.
     pub fn run(
         &self,
         orders: &Receiver<Order>,
@@ -48,7 +48,6 @@ impl Opening<'_> {
         let mut said = String::new();
         loop {
             self.pulse.beat();
-            // Nobody hears any more only if the start was given up.
             let open = || self.pool.install(|| backend::open(self.config, &told));
             let opened = match self.config.backend {
                 Backend::Sim => self.computing.on(open),
@@ -56,6 +55,7 @@ impl Opening<'_> {
             };
             match opened {
                 Ok(head) => {
+                    // The receiver is gone if the start was given up.
                     drop(heard.send(Ok(head.stage.clone())));
                     let event = match said.is_empty() {
                         true => Event::Started,
@@ -63,7 +63,7 @@ impl Opening<'_> {
                     };
                     return Some((head, event));
                 }
-                // While it is waited for, files of it may come and go as well.
+                // Once it is waited for, errors of its files are waited out as well.
                 Err(failure)
                     if self.patient && (failure.exit == Exit::Unavailable || !said.is_empty()) =>
                 {

@@ -1,4 +1,4 @@
-//! Recovery of a lost head: a fault that says what to do, and opening it again until it is there.
+//! Recovery of a lost head: reports a fault with its remedy, and opens the head again until it is there.
 
 use super::{Order, SIGN_OF_LIFE, Worker, active};
 use crate::error::code_of;
@@ -12,27 +12,26 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
 /// Longest wait before the head is opened again, in signs of life.
 const LONGEST_WAIT: u32 = 16;
-/// What to do about a head that is not there.
+/// The remedy for a head that is not there.
 pub(super) const REMEDY: &str = "the head is opened again by itself as soon as it is there; the cable and the power of camera and projector are what to check";
 
-/// Whether the head has to be opened again: a device is gone, or one did not answer in time and nobody knows in what state
-/// it is.
+/// Whether the head has to be opened again: a device is gone, or one did not answer in time and is in an unknown state.
 pub fn is_lost(error: &Error) -> bool {
     matches!(error, Error::Disconnected { .. } | Error::Timeout { .. })
 }
 
 impl Worker {
-    /// Reports an error of a job: a lost head as such, anything else as `failed`.
+    /// Handles an error of a job: a lost head is remembered, anything else is reported as `failed`.
     pub(super) fn fail(&mut self, error: Error, failed: Event) {
         if is_lost(&error) {
-            // The fault that follows ends the job.
+            // `recover` reports the fault, which ends the job.
             self.lost = Some(error);
         } else {
             self.station.event(failed);
         }
     }
 
-    /// Opens the head until it is there again; ends early with `Break` when the daemon does.
+    /// Tries to open the head until it is there again; `Break` if the daemon ends before.
     pub(super) fn recover(
         &mut self,
         error: &Error,

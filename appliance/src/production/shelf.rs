@@ -1,14 +1,14 @@
-//! Recipes made ready: those used last stay, so that a line that changes back and forth does not wait.
+//! A cache of plans: those used last stay, so that a line that changes back and forth between recipes does not wait.
 
 use crate::recipe::plan::Plan;
 use crate::recipe::store::Stamp;
 use std::sync::Arc;
 
-/// Bytes of the plans that are kept, the active one's included, and of the file that is being read beside them: two recipes
-/// of a camera of 1.6 megapixels, or dozens of a small one.
+/// Most bytes of the kept plans, including the active one, and of the file that is being read beside them: two recipes for a
+/// camera of 1.6 megapixels, or dozens for a small one.
 const ROOM: u64 = 112 << 20;
 
-/// The plans, the one used last at the end.
+/// The plans; the most recently used one is the last.
 #[derive(Debug, Default)]
 pub struct Shelf {
     ready: Vec<Ready>,
@@ -29,7 +29,7 @@ impl Ready {
 }
 
 impl Shelf {
-    /// The plan of a recipe file as it is now, joined with this calibration, if it is there.
+    /// The plan of this recipe file, joined with this calibration, if it is kept.
     pub fn take(&mut self, stamp: &Stamp, calibration: &str) -> Option<Arc<Plan>> {
         let same = |ready: &Ready| ready.stamp == *stamp && ready.calibration == calibration;
         let found = self.ready.iter().position(same)?;
@@ -39,7 +39,7 @@ impl Shelf {
         Some(plan)
     }
 
-    /// Drops the plans used longest ago until another `bytes` have room.
+    /// Drops the least recently used plans until there is room for `bytes` more.
     pub fn make_room(&mut self, bytes: u64) {
         let taken = |ready: &[Ready]| ready.iter().map(Ready::bytes).sum::<u64>();
         while !self.ready.is_empty() && taken(&self.ready).saturating_add(bytes) > ROOM {
@@ -47,7 +47,7 @@ impl Shelf {
         }
     }
 
-    /// Keeps a plan that was just made.
+    /// Keeps a new plan.
     pub fn put(&mut self, stamp: Stamp, calibration: String, plan: Arc<Plan>) {
         self.make_room(plan.bytes() as u64);
         self.ready.push(Ready {

@@ -1,4 +1,4 @@
-//! A recipe as one file: a ZIP (stored) of `recipe.json` and NumPy arrays, with a fingerprint.
+//! A recipe as one file: an uncompressed ZIP of `recipe.json` and NumPy arrays, with a fingerprint.
 
 use super::file::{FORMAT, RecipeFile, VERSION};
 use crate::storage::archive::Members;
@@ -17,7 +17,7 @@ const MANIFEST: &str = "recipe.json";
 const MAX_MEMBERS: usize = 9;
 /// The largest manifest that is read, in bytes.
 const MAX_MANIFEST: u64 = 1 << 20;
-/// The fingerprint's value while it is computed.
+/// The fingerprint in the manifest while the fingerprint is computed.
 const NO_FINGERPRINT: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
 /// The arrays of a recipe, row-major over the camera's frame except the phase function.
@@ -33,25 +33,24 @@ pub struct Arrays {
     pub height_slope: Vec<f32>,
     /// ∂²z/∂Φ² in mm per turn².
     pub height_curvature: Vec<f32>,
-    /// How much the part's deviation from golden counts ([`algo::inspect::Weight::bits`]); 0 where it is not compared.
+    /// Weight of a pixel's deviation from golden ([`algo::inspect::Weight::bits`]); 0 where it is not compared.
     pub valid: Vec<u8>,
     /// Modulation as taught, in counts.
     pub modulation: Vec<f32>,
-    /// Largest |ΔΦ| in turns that a placement inside the tolerance can cause; infinite where golden
-    /// knows nothing.
+    /// Largest |ΔΦ| in turns that a placement within the tolerance can cause; infinite where golden is not resolved.
     pub phase_reach: Vec<f32>,
 }
 
-/// An archive that is no recipe of this version.
+/// An archive that is not a recipe of this version.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ArchiveError {
-    /// It is no ZIP, a member is missing or broken, or the manifest cannot be read.
+    /// It is not a ZIP, a member is missing or broken, or the manifest cannot be read.
     #[error("{0}: export the recipe again or teach it")]
     Broken(String),
     /// It was written by a newer program.
     #[error("version {0} is newer than this program reads ({VERSION}): update fringed")]
     Newer(u64),
-    /// Its content is not what it was when it was written.
+    /// Its content was changed or damaged since it was written.
     #[error(
         "its fingerprint is {found}, its content has {computed}: the file was changed or damaged; export \
          it again or teach it"
@@ -68,7 +67,7 @@ fn broken(what: impl std::fmt::Display) -> ArchiveError {
     ArchiveError::Broken(shortened(&what.to_string()))
 }
 
-/// Packs a recipe; its fingerprint is filled in and returned beside the bytes.
+/// Packs a recipe; its fingerprint is filled in. Returns the bytes and the fingerprint.
 ///
 /// # Errors
 /// If the archive cannot be made.
@@ -131,11 +130,11 @@ pub(crate) fn seal(
     Ok((bytes, fingerprint))
 }
 
-/// Unpacks a recipe of `size` bytes and checks its fingerprint. No more than one member is in memory beside what
-/// has been read from the others.
+/// Unpacks a recipe of `size` bytes and checks its fingerprint. The bytes of one member at a time are in memory, beside the
+/// arrays read so far.
 ///
 /// # Errors
-/// If it is no recipe, of a newer version, or not what was written.
+/// If it is not a recipe, of a newer version, or changed.
 pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays), ArchiveError> {
     let mut zip = Members::open(source, MAX_MEMBERS).map_err(broken)?;
     let (file, zeroed) = read_manifest(&mut zip)?;
@@ -147,7 +146,7 @@ pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays
             .content(&name, size)
             .map_err(|error| broken(format!("member {name}: {error}")))?;
         hash.add(&name, &content);
-        // That the file was damaged explains more than what the damage broke.
+        // A wrong fingerprint, checked below, is the better message: the file as a whole was damaged.
         problem = problem.or(read_array(&mut arrays, &name, &content).err());
     }
     let computed = hash.finish();
@@ -198,7 +197,7 @@ fn arrays_of<R: Read + Seek>(zip: &Members<R>) -> Vec<String> {
 /// Reads only the manifest of a recipe, without checking the fingerprint: for lists.
 ///
 /// # Errors
-/// If it is no recipe or of a newer version.
+/// If it is not a recipe or of a newer version.
 pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, ArchiveError> {
     let mut zip = Members::open(file, MAX_MEMBERS).map_err(broken)?;
     Ok(read_manifest(&mut zip)?.0)
@@ -207,9 +206,9 @@ pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, ArchiveError> {
 /// Reads the text of a manifest and checks the bounds of its values.
 ///
 /// # Errors
-/// If it is no manifest, of a newer version, or a value is out of its bounds.
+/// If it is not a manifest, of a newer version, or a value is out of its bounds.
 pub fn parse(text: &str) -> Result<RecipeFile, ArchiveError> {
-    /// What every version has. Other values are not looked at: one that cannot be read is refused by its key below.
+    /// What every version has, read first: a newer version is reported as such, whatever else it contains.
     #[derive(serde::Deserialize)]
     struct Header {
         #[serde(default)]
@@ -258,8 +257,8 @@ fn read<T: npy::Element>(name: &str, bytes: &[u8]) -> Result<Vec<T>, ArchiveErro
         .map_err(|error| broken(format!("member {name}: {error}")))
 }
 
-/// SHA-256 over the manifest and all other members in the order of their names, each with its name
-/// and length in front.
+/// SHA-256 over the manifest and then all other members in the order of their names; the name and the content of each are
+/// preceded by their lengths.
 struct Fingerprint(Sha256);
 
 impl Fingerprint {
@@ -276,7 +275,7 @@ impl Fingerprint {
         }
     }
 
-    /// As [`Self::add`], without the whole content in memory.
+    /// As [`Self::add`], without holding the whole content in memory.
     fn stream<R: Read>(&mut self, name: &str, mut member: ZipFile<'_, R>) -> std::io::Result<()> {
         self.0.update((name.len() as u64).to_le_bytes());
         self.0.update(name.as_bytes());

@@ -1,5 +1,6 @@
-//! A recipe file on its way into the store: beside the recipes, on their storage, under a name that is no recipe's. Dropped,
-//! it is gone; what a kill leaves behind, the next start removes.
+//! A recipe file that is being received: written beside the stored recipes under a temporary name, checked, then renamed.
+//!
+//! Dropping it removes the file; files that a kill leaves behind are removed at the next start.
 
 use super::{Recipe, Store};
 use crate::station::FULL_STORAGE_MIB;
@@ -10,12 +11,12 @@ use std::io::{self, BufReader, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// How the name of a file on its way begins.
+/// Prefix of the temporary names.
 const PREFIX: &str = "arriving-";
-/// The free storage is looked at each time so many bytes more have come.
+/// The free storage is checked each time this many more bytes were written.
 const STRETCH: u64 = 1 << 20;
 
-/// A file that is being written, and then read and taken.
+/// A file that is being received.
 #[derive(Debug)]
 pub struct Arriving {
     path: PathBuf,
@@ -24,10 +25,10 @@ pub struct Arriving {
 }
 
 impl Store {
-    /// Begins a file of `expected` bytes, or 0 where that is not known.
+    /// Begins a file of `expected` bytes; 0 if the size is not known.
     ///
     /// # Errors
-    /// Whatever the file system answers, or that the file would leave less free storage than the station needs.
+    /// Errors of the file system, or that the file would leave less free storage than the station needs.
     pub fn arriving(&self, expected: u64) -> io::Result<Arriving> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         loop {
@@ -48,10 +49,10 @@ impl Store {
         }
     }
 
-    /// Stores a file that has come under a number; the recipe before stays as the previous generation.
+    /// Stores a received file under a number; the recipe before stays as the previous generation.
     ///
     /// # Errors
-    /// Whatever the file system answers; then the stored recipe is the one before.
+    /// Errors of the file system; the stored recipe is then unchanged.
     pub fn take(&self, arriving: Arriving, number: u16) -> io::Result<()> {
         let _alone = self.lock()?;
         self.take_locked(arriving, number)
@@ -63,12 +64,12 @@ impl Store {
         rename_whole(&arriving.path, &self.path(number))
     }
 
-    /// Removes the files on their way that a kill left behind.
+    /// Removes the temporary files that a kill left behind.
     ///
     /// # Errors
-    /// Whatever the file system answers.
+    /// Errors of the file system.
     pub fn remove_left_behind(&self) -> io::Result<()> {
-        // Another process may be importing just now.
+        // Another process may be importing at this moment.
         let _alone = self.lock()?;
         for entry in fs::read_dir(&self.folder)? {
             let entry = entry?;
@@ -81,22 +82,22 @@ impl Store {
 }
 
 impl Arriving {
-    /// Where it lies.
+    /// Its temporary path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Reads and checks what has come.
+    /// Reads and checks the received recipe.
     ///
     /// # Errors
-    /// In words: it is no recipe.
+    /// In words: why it is not a usable recipe.
     pub fn recipe(&self) -> Result<Recipe, String> {
         let file = File::open(&self.path).map_err(|error| error.to_string())?;
         let read = Recipe::read(BufReader::new(file), self.bytes);
         read.map_err(|error| error.to_string())
     }
 
-    /// Checks that `more` bytes leave what the station needs.
+    /// Checks that `more` bytes leave as much free storage as the station needs.
     fn check_room(&self, more: u64) -> io::Result<()> {
         let storage = fstatvfs(&self.file)?;
         let free = storage.f_bavail.saturating_mul(storage.f_frsize);
@@ -128,7 +129,7 @@ impl Write for Arriving {
 
 impl Drop for Arriving {
     fn drop(&mut self) {
-        // Nothing is there if it was taken; what cannot be removed now, the next start removes.
+        // After `take` there is nothing to remove; what cannot be removed now is removed at the next start.
         let _ = fs::remove_file(&self.path);
     }
 }

@@ -1,6 +1,6 @@
-//! Bounds of every value of `recipe.json`: what lies outside is refused by its key before anything is computed with it.
+//! Bounds of every value of `recipe.json`: a value outside is refused, naming its key, before anything is computed with it.
 //!
-//! They hold for a file that is read as for an edit that is to be stored; `docs/formats.md` lists them.
+//! The same bounds hold for files that are read and for edits; `docs/formats.md` lists them.
 
 use super::check::MAX_REGIONS;
 use super::comparison::QualityFile;
@@ -28,7 +28,7 @@ const LAST_SECOND: u64 = 253_402_300_799;
 const MAX_SIGMA_MM: f64 = 1000.0;
 
 impl RecipeFile {
-    /// Checks each value by itself; whether they fit each other and the arrays is for [`Recipe::check`](super::Recipe::check).
+    /// Checks each value by itself; [`Recipe::check`](super::Recipe::check) checks that they fit each other and the arrays.
     ///
     /// # Errors
     /// In words that name the key, the value and the bounds.
@@ -103,10 +103,10 @@ impl RecipeFile {
         Ok(())
     }
 
-    /// Checks the text that stands for the whole content; while a recipe is being made it has none.
+    /// Checks the form of the fingerprint; a recipe that is being made has none yet.
     ///
     /// # Errors
-    /// If it cannot be a fingerprint.
+    /// If it is not 64 hexadecimal digits.
     pub fn check_fingerprint(&self) -> Result<(), String> {
         fingerprint("fingerprint", &self.fingerprint)
     }
@@ -133,7 +133,7 @@ impl RegionFile {
     fn check_bounds(&self) -> Result<(), String> {
         text("name", &self.name, LONGEST_NAME)?;
         length("polygon", self.polygon.len(), 3, MAX_CORNERS)?;
-        // What lies outside of the frame is cut off: a frame's width on either side is enough for any polygon.
+        // Polygons are clipped to the frame: corners up to one frame's width outside of it are enough for any shape.
         let far = f64::from(MAX_SIDE);
         for corner in self.polygon.as_flattened() {
             within("polygon", *corner, -far, 2.0 * far)?;
@@ -143,7 +143,7 @@ impl RegionFile {
 }
 
 impl GaugeFile {
-    /// For frames of which the longer side has `largest` pixels.
+    /// For frames whose longer side has `largest` pixels.
     fn check_bounds(&self, largest: usize) -> Result<(), String> {
         text("name", &self.name, LONGEST_NAME)?;
         text("region", &self.region, LONGEST_NAME)?;

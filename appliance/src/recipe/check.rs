@@ -99,7 +99,7 @@ impl Recipe {
         Self::read(Cursor::new(bytes), bytes.len() as u64)
     }
 
-    /// As [`Self::from_bytes`], from a file of `size` bytes that need not be in memory.
+    /// As [`Self::from_bytes`], from a file of `size` bytes that is not read into memory as a whole.
     ///
     /// # Errors
     /// As there.
@@ -117,7 +117,7 @@ impl Recipe {
         Ok((file, recipe))
     }
 
-    /// As [`Self::read`], with the manifest, and whatever the limits of its gauges are: an edit may be about to correct them.
+    /// As [`Self::read`], with the manifest and without checking the limits of gauges: an edit may be about to correct them.
     ///
     /// # Errors
     /// As there.
@@ -130,10 +130,10 @@ impl Recipe {
         Ok((file, recipe))
     }
 
-    /// Checks that manifest and arrays fit each other, and the limits of the gauges; the error says what does not.
+    /// Checks that manifest and arrays fit each other, and the limits of the gauges.
     ///
     /// # Errors
-    /// In words.
+    /// In words: what does not fit.
     pub fn check(file: &RecipeFile, arrays: Arrays) -> Result<Self, String> {
         check_limits(&file.gauges)?;
         Self::fit(file, arrays)

@@ -1,4 +1,4 @@
-//! What teaching gained: the part with straight fringes and with its own, measured with equally many frames.
+//! The fixed pattern against the adaptive one on the taught part, as measured while teaching with equally many frames.
 
 use crate::head::rig::Measured;
 use algo::phase::Trust;
@@ -8,13 +8,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ComparisonFile {
-    /// With straight fringes.
+    /// With straight, equidistant fringes.
     pub fixed: QualityFile,
-    /// With the part's own.
+    /// With the part's adaptive pattern.
     pub adaptive: QualityFile,
 }
 
-/// What one measurement was worth.
+/// Noise and coverage of one measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct QualityFile {
@@ -27,7 +27,7 @@ pub struct QualityFile {
 }
 
 impl ComparisonFile {
-    /// Compares a measurement with a fixed pattern and one with the part's own.
+    /// Compares a measurement with the fixed pattern and one with the adaptive pattern.
     pub fn of(fixed: &Measured, adaptive: &Measured) -> Self {
         let resolved = |of: &Measured, at: usize| of.phases.trust[at] == Trust::Resolved;
         let both: Vec<usize> = (0..fixed.phases.trust.len())

@@ -1,4 +1,4 @@
-//! Changing what may be changed in a taught recipe: its names, regions and gauges.
+//! Edits a taught recipe: names, regions, gauges and least coverage.
 
 use super::archive;
 use super::bounds::LONGEST_NAME;
@@ -9,11 +9,11 @@ use hal::bounds::clipped;
 use serde::Deserialize;
 use std::collections::HashSet;
 
-/// What shall be different; what is left out stays.
+/// A change to a recipe; what is `None` stays as it is.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Edit {
-    /// Fingerprint of the recipe that was looked at: somebody else may have changed it since.
+    /// Fingerprint of the recipe that the change is based on; if another one is stored, the change is refused.
     pub fingerprint: String,
     /// For people.
     pub name: Option<String>,
@@ -33,12 +33,12 @@ pub enum EditError {
     /// There is no such recipe, or it is damaged.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// Somebody else was faster.
+    /// Another change was stored since the recipe was read.
     #[error(
         "recipe {0} was changed or deleted by somebody else: load it again and repeat the change"
     )]
     Outdated(u16),
-    /// The recipe would not be one that can be used.
+    /// The changed recipe could not be used.
     #[error("{0}")]
     Unfit(String),
     /// It could not be stored.
@@ -46,8 +46,8 @@ pub enum EditError {
     Store(String),
 }
 
-/// Changes a stored recipe; its previous generation stays beside it. `fits` tries out what would be stored and says in words
-/// why it cannot be used. Answers with the new fingerprint.
+/// Changes a stored recipe; what was stored before stays as the previous generation. `fits` tries the changed recipe on the
+/// head and says in words why it cannot be used there. Returns the new fingerprint.
 ///
 /// # Errors
 /// The recipe cannot be read, was changed since, would not be usable, or cannot be stored.
@@ -73,13 +73,13 @@ pub fn edit(
     check_names("region", regions)?;
     check_names("gauge", gauges)?;
     check_names("recipe", std::iter::once(&file.name))?;
-    // Tighter limits may need more frames, wider ones fewer.
+    // Tighter limits may need a longer sequence, wider ones a shorter one.
     file.production = planner::choose(&file.sequences, &file.gauges).production;
     let checked = Recipe::check(&file, recipe.arrays).map_err(EditError::Unfit)?;
     let (bytes, fingerprint) = archive::pack(&file, &checked.arrays)
         .map_err(|error| EditError::Unfit(error.to_string()))?;
     fits(checked).map_err(EditError::Unfit)?;
-    // It was read without the lock: somebody else may have stored another one meanwhile.
+    // The recipe was read without the lock: another change may have been stored meanwhile.
     match store.replace(number, &edit.fingerprint, &bytes) {
         Ok(true) => Ok(fingerprint),
         Ok(false) => Err(EditError::Outdated(number)),

@@ -1,4 +1,4 @@
-//! Recipes on their way in and out: list, export, import. Nothing damaged or foreign comes in.
+//! Lists, exports and imports stored recipes. A file is imported only if it is whole and can be used on this head.
 
 use super::archive::{self, ArchiveError};
 use super::store::{LoadError, Store, is_sound};
@@ -34,19 +34,19 @@ pub struct Listed {
     pub gauges: usize,
     /// Bytes of the newest generation.
     pub bytes: u64,
-    /// Whether there is a generation before it.
+    /// Whether a generation before it is stored.
     pub previous: bool,
     /// Why the newest generation cannot be read.
     pub problem: Option<String>,
 }
 
-/// A recipe that was not taken or given.
+/// An import or export that failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// It is not in the store, or damaged there.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// It must not come in.
+    /// The file is not a usable recipe.
     #[error("import {path}: {reason}", path = path.display())]
     Refused {
         /// The file.
@@ -73,7 +73,7 @@ pub enum ImportError {
 }
 
 impl Store {
-    /// All stored recipes, by their manifests; the fingerprints are checked when a recipe is loaded.
+    /// All stored recipes by their manifests. Fingerprints are not checked here but when a recipe is loaded.
     pub fn list(&self) -> Vec<Listed> {
         let numbers = self.numbers().into_iter();
         numbers.map(|number| self.listed(number)).collect()
@@ -103,10 +103,10 @@ impl Store {
         }
     }
 
-    /// Writes a recipe to a file as it is stored: the newest generation that is whole.
+    /// Copies the newest sound generation of a recipe to a file.
     ///
     /// # Errors
-    /// If there is no such recipe, no generation is whole, or the file cannot be written.
+    /// If there is no such recipe, no generation is sound, or the file cannot be written.
     pub fn export(&self, number: u16, target: &Path) -> Result<(), ImportError> {
         let failed = |source| ImportError::Write {
             path: target.to_path_buf(),
@@ -119,16 +119,16 @@ impl Store {
         let written =
             copy_synced(&whole, &temporary).and_then(|()| rename_whole(&temporary, target));
         if written.is_err() {
-            // There may be nothing to remove.
+            // The temporary file may not exist.
             let _ = fs::remove_file(&temporary);
         }
         written.map_err(failed)
     }
 
-    /// The file of the newest generation that is whole, to be read or sent as it is.
+    /// The file of the newest sound generation: its content agrees with its fingerprint.
     ///
     /// # Errors
-    /// If there is no such recipe or no generation is whole.
+    /// If there is no such recipe or no generation is sound.
     pub fn whole(&self, number: u16) -> Result<PathBuf, LoadError> {
         let path = self.path(number);
         let files = [path.clone(), self.previous(number)];
@@ -142,12 +142,12 @@ impl Store {
         }
     }
 
-    /// Takes a recipe from a file, under the number that it has; what had this number before stays as the previous
-    /// generation. `fits` tries it out on the head and says in words why it cannot be used there: then it is refused.
+    /// Imports a recipe from a file under the number in its manifest; the recipe with this number before stays as the previous
+    /// generation. `fits` tries the recipe on the head and says in words why it cannot be used there.
     ///
     /// # Errors
-    /// If the file is no whole recipe, of a newer version does not fit the head, or the store cannot be written. The
-    /// store is then as it was.
+    /// If the file is not a whole recipe, of a newer version, or does not fit the head, or if the store cannot be written. The
+    /// store is then unchanged.
     pub fn import(
         &self,
         source: &Path,
@@ -161,7 +161,7 @@ impl Store {
             path: source.to_path_buf(),
             source: error,
         };
-        // Copied first: what is checked is then what is stored, whatever happens to the source meanwhile.
+        // Copied first, so that what is stored is what was checked, even if the source changes meanwhile.
         let write = |path: &Path| {
             let path = path.to_path_buf();
             move |source| ImportError::Write { path, source }

@@ -1,4 +1,4 @@
-//! `recipe.json` inside a recipe, version 1, as it stands on disk. Frozen: see `docs/formats.md`.
+//! The manifest `recipe.json` of a recipe, version 1. Frozen: see `docs/formats.md`.
 
 use super::comparison::ComparisonFile;
 use super::good_parts::GoodPartsFile;
@@ -45,12 +45,12 @@ pub struct RecipeFile {
     pub production: usize,
     /// How far a part may lie from where it was taught, in any direction, mm.
     pub placement_tolerance_mm: f64,
-    /// Whether the part's motion is found and taken back before it is gauged.
+    /// Whether the part's motion is measured and compensated before it is gauged.
     #[serde(default, skip_serializing_if = "AlignmentKind::is_none")]
     pub alignment: AlignmentKind,
     /// Working range of z in mm.
     pub range_mm: [f64; 2],
-    /// Exposure in µs; none where the head has no such setting.
+    /// Exposure in µs; `None` if the head has no such setting.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure_us: Option<f64>,
     /// σ of one sample in counts.
@@ -63,10 +63,10 @@ pub struct RecipeFile {
     pub regions: Vec<RegionFile>,
     /// At most 16.
     pub gauges: Vec<GaugeFile>,
-    /// What teaching gained; none where it was taught from a recording.
+    /// Fixed against adaptive pattern, as measured when it was taught; `None` if it was taught from a recording.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub comparison: Option<ComparisonFile>,
-    /// The deviation of good parts, as predicted when it was taught; none where it was taught before that was done.
+    /// The deviation of good parts, as predicted when it was taught; `None` in recipes of older programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub good_parts: Option<GoodPartsFile>,
 }
@@ -111,7 +111,7 @@ pub enum PatternFile {
     File,
 }
 
-/// A sequence and what it is worth on this part.
+/// A sequence and its predicted noise and safe mask on this part.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SequenceFile {
@@ -156,8 +156,8 @@ pub enum SequenceKind {
 }
 
 impl SequenceKind {
-    /// Largest |ΔΦ| about the golden map that is unwrapped rightly, in turns; none for the full
-    /// sequence, whose own residuals tell.
+    /// Largest |ΔΦ| about the golden map that is unwrapped correctly, in turns; `None` for the full sequence, whose residuals
+    /// show wrong fringe orders.
     pub fn reach(self) -> Option<f32> {
         match self {
             Self::SingleLevel => Some(0.4),
@@ -167,8 +167,8 @@ impl SequenceKind {
     }
 }
 
-/// A phase map inside the safe mask of a sequence that unwraps less than `limit` turns about it:
-/// unknown where a placement could move the phase further.
+/// A phase map within the safe mask of a sequence that unwraps less than `limit` turns about it: unknown where a placement
+/// within the tolerance may move the phase (`reach`) further.
 pub fn safe(phase: &[AbsolutePhase], reach: &[f32], limit: f32) -> Vec<AbsolutePhase> {
     let pairs = phase.iter().zip(reach);
     pairs
@@ -211,19 +211,19 @@ pub struct GaugeFile {
     pub high: Option<f64>,
 }
 
-/// How parts are brought to where they were taught before they are gauged.
+/// How a part's motion against the taught one is compensated before it is gauged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlignmentKind {
     /// Not at all.
     #[default]
     None,
-    /// By a small rigid motion.
+    /// As a small rigid motion.
     Rigid,
 }
 
 impl AlignmentKind {
-    /// Whether there is none.
+    /// Whether it is [`Self::None`].
     pub fn is_none(&self) -> bool {
         *self == Self::None
     }
@@ -310,7 +310,7 @@ pub enum GaugeKind {
     },
     /// How the part lies, in mm or degrees.
     Placement {
-        /// Which part of it.
+        /// Which component of the motion.
         component: ComponentFile,
     },
 }

@@ -1,4 +1,4 @@
-//! What a recipe's gauges measure: as the computation takes it, in which unit, and what cannot be measured.
+//! The gauges of a recipe: from the file form to what is computed, their units, and which limits are refused.
 
 use super::file::{AxisFile, ComponentFile, GaugeFile, GaugeKind, RegionFile};
 use crate::station::Unit;
@@ -9,8 +9,8 @@ use serde_json::value::RawValue;
 use std::collections::HashMap;
 use std::fmt::Display;
 
-/// A gauge as it is written. Its limits are read when its name and unit are known, so that a refusal says which gauge it is
-/// about: the message of a parser has only a place in the text.
+/// A gauge as it is written. Its limits are parsed once its name and unit are known, so that a refusal can name the gauge and
+/// its bounds; the parser's message would only give the line and column.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GaugeText {
@@ -95,7 +95,7 @@ impl GaugeKind {
         }
     }
 
-    /// As the computation takes it.
+    /// The measure that is computed.
     pub fn measure(&self) -> Measure {
         match *self {
             Self::Deviation { smoothing_px } => Measure::Deviation { side: smoothing_px },
@@ -202,7 +202,7 @@ pub(super) fn check_limits(gauges: &[GaugeFile]) -> Result<(), String> {
     gauges.iter().try_for_each(GaugeFile::check_limits)
 }
 
-/// The gauges of a recipe as the computation takes them, for a camera of `size` pixels.
+/// The gauges that are computed, for frames of (width, height) pixels.
 ///
 /// # Errors
 /// Naming the gauge or region that cannot be used, and why.

@@ -1,7 +1,7 @@
-//! Generations of a recipe: the one before the newest, deletion, and how either is undone.
+//! Generations of a recipe: keeping the one before the newest, deleting, and undoing both.
 //!
-//! Beside `NNNN.recipe` stands `NNNN.recipe.previous`, the generation before it. `NNNN.recipe.kept` holds what has neither
-//! name: a deleted recipe, or, while generations are exchanged, the newest one. A kill between two steps loses none of them.
+//! Beside `NNNN.recipe` lies `NNNN.recipe.previous`, the generation before it. `NNNN.recipe.kept` is a deleted recipe or, while
+//! two generations are being exchanged, a second link to the newest one. A kill between any two renames loses no generation.
 
 use super::RecipeFile;
 use super::gauge::check_limits;
@@ -11,13 +11,13 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A generation that was not brought back, or a recipe that was not deleted; the recipes are as before.
+/// An undo or a deletion that failed; the recipes are unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum GenerationError {
     /// There is no such recipe.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// There is nothing to bring back.
+    /// There is no generation to restore.
     #[error(
         "undo recipe {0}: no generation before it is stored, and it was not deleted: teach or import it"
     )]
@@ -49,31 +49,31 @@ impl Store {
         self.folder.join(format!("{number:04}.recipe.kept"))
     }
 
-    /// Makes the current generation the previous one, unless it is damaged: a damaged file never pushes out the good
-    /// generation behind it.
+    /// Makes the current generation the previous one, unless it is damaged: a damaged file must not replace the sound
+    /// generation before it.
     pub(super) fn keep_previous(&self, number: u16) -> io::Result<()> {
         let (path, previous) = (self.path(number), self.previous(number));
         if !is_sound(&path) {
             return Ok(());
         }
-        // The current one stands until it is replaced.
+        // A second link: the current generation keeps its name until it is replaced.
         name_also(&path, &previous)?;
-        // A recipe that was deleted before the current one was stored is two generations back now.
+        // A recipe that was deleted before the current one was stored would be two generations back now.
         remove(&self.kept(number)).map(drop)
     }
 
-    /// The file that [`Store::undo`] brings back.
+    /// The file that [`Store::undo`] restores.
     fn before(&self, number: u16) -> Option<PathBuf> {
         let files = [self.previous(number), self.kept(number)];
         files.into_iter().find(|file| file.exists())
     }
 
-    /// The manifest of what [`Store::undo`] brings back: the generation before the newest, or the deleted recipe.
+    /// The manifest of what [`Store::undo`] restores: the generation before the newest, or the deleted recipe.
     pub fn manifest_before(&self, number: u16) -> Option<RecipeFile> {
         manifest_at(&self.before(number)?)
     }
 
-    /// The manifest of the newest generation that can be read; none if the number is free.
+    /// The manifest of the newest generation that can be read; `None` if there is none.
     pub fn present(&self, number: u16) -> Option<RecipeFile> {
         let files = [self.path(number), self.previous(number)];
         files.iter().find_map(|file| manifest_at(file))
@@ -87,18 +87,18 @@ impl Store {
         kept
     }
 
-    /// The first number under which nothing is stored and nothing was deleted; none if all 9999 are taken.
+    /// The lowest number without a stored or deleted recipe; `None` if all 9999 are taken.
     pub fn free(&self) -> Option<u16> {
         let taken = self.numbers_with(&["", ".previous", ".kept"]);
         (1..=9999).find(|number| taken.binary_search(number).is_err())
     }
 
-    /// Exchanges the newest generation and the one before it, or brings a deleted recipe back. The same again takes it back.
-    /// Answers with the manifest of what is the newest generation now.
+    /// Exchanges the newest generation and the one before it, or restores a deleted recipe. A second undo reverses the first.
+    /// Returns the manifest of what is now the newest generation.
     ///
     /// # Errors
-    /// If there is nothing to bring back, it is damaged or made for another calibration than the newest generation, or the
-    /// files cannot be renamed.
+    /// If there is nothing to restore, it is damaged or made for another calibration than the newest generation, or the files
+    /// cannot be renamed.
     pub fn undo(&self, number: u16) -> Result<RecipeFile, GenerationError> {
         let _alone = self.lock().map_err(write(&self.folder))?;
         let before = self
@@ -128,8 +128,8 @@ impl Store {
         Ok(restored)
     }
 
-    /// Deletes a recipe. Its newest generation that is whole is kept apart until another recipe with this number has been
-    /// replaced or deleted: [`Store::undo`] brings it back. No station may have it active.
+    /// Deletes a recipe. Its newest sound generation is kept, for [`Store::undo`], until another recipe with this number is
+    /// replaced or deleted. The caller makes sure that no station has the recipe active.
     ///
     /// # Errors
     /// If there is no such recipe or its files cannot be renamed or removed.
@@ -141,7 +141,7 @@ impl Store {
             return Err(error.into());
         }
         let removed = |file: &Path| remove(file).map_err(write(file));
-        // A kill in between leaves the newest generation or none, not an old one that comes back.
+        // In this order a kill in between never leaves an old generation as the newest.
         match whole {
             Ok(whole) if whole == path => {
                 removed(&previous)?;
@@ -168,7 +168,7 @@ fn write(path: &Path) -> impl Fn(io::Error) -> GenerationError {
     }
 }
 
-/// Removes a file; answers whether it was there.
+/// Removes a file; returns whether it existed.
 fn remove(file: &Path) -> io::Result<bool> {
     match fs::remove_file(file) {
         Ok(()) => Ok(true),
@@ -177,7 +177,10 @@ fn remove(file: &Path) -> io::Result<bool> {
     }
 }
 
-/// The manifest of a whole recipe file of this number; else why it is none.
+/// The manifest of a recipe file that can be used under this number.
+///
+/// # Errors
+/// In words: why it cannot be used.
 fn read(path: &Path, number: u16) -> Result<RecipeFile, String> {
     match Store::read(path, number) {
         Some(Ok((file, _))) => match check_limits(&file.gauges) {

@@ -1,4 +1,4 @@
-//! From a golden measurement to a recipe, whether it came from a head or from a recording.
+//! Makes a recipe from a golden measurement, which comes from a head or from a recording.
 
 use super::archive::{self, Arrays};
 use super::comparison::ComparisonFile;
@@ -17,7 +17,7 @@ use algo::pattern::Shot;
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
 
-/// Pixels at silhouettes mix two surfaces: the golden map is eroded by this much.
+/// The golden map is eroded by this many pixels: those at silhouettes mix two surfaces.
 const EROSION_PX: usize = 2;
 /// Pixels whose taught height is less certain than this are not compared, mm (1 σ).
 const MAX_SIGMA_MM: f64 = 0.25;
@@ -25,21 +25,22 @@ const MAX_SIGMA_MM: f64 = 0.25;
 pub(super) const SMOOTHING_PX: usize = 9;
 /// Limit of the deviation where the part can be measured that well, mm: see [`super::good_parts`].
 const DEVIATION_MM: f64 = 0.15;
-/// The part's coverage may fall by this share of the frame: noise alone takes less from 200,000 pixels even if the modulation of
-/// all of them is the least that is trusted (6 σ of as many coins, twice).
+/// The coverage of a good part may be lower than golden's by this share of the frame. Noise alone causes less: of 200,000 pixels
+/// that are all just at the least trusted modulation, the number of resolved ones has σ = √200,000 / 2, and 6 σ of the difference
+/// of two such numbers is 1,900.
 const COVERAGE_CHANGE: f64 = 0.01;
 /// Least share of the golden surface that must be resolved.
 const MIN_COVERAGE: f64 = 0.80;
-/// An opening has at least this many pixels, and at most this share of it may be resolved.
+/// An opening has at least this many pixels, and at most this share of its region may be resolved.
 const OPENING_PIXELS: usize = 60;
 const OPENING_COVERAGE: f64 = 0.25;
-/// Openings that get a gauge of their own, and the least reach of their regions in pixels.
+/// At most this many openings get a gauge, each with a region of at least this reach in pixels.
 const MAX_OPENINGS: usize = 8;
 const OPENING_REACH: usize = 4;
 /// |ΔΦ| up to which the expansion of the height is used, turns.
 const EXPANSION_TURNS: f64 = 0.5;
 
-/// What to call a recipe, and how carefully parts are placed.
+/// Names of a recipe, and its placement tolerance.
 #[derive(Clone, Debug)]
 pub struct Naming {
     /// 1–9999.
@@ -72,7 +73,7 @@ pub struct GoldenPart<'a> {
     pub heights: &'a HeightMap,
     /// σ of one sample in counts.
     pub noise: f64,
-    /// What its own pattern gained, if a fixed one was measured as well.
+    /// Fixed against adaptive pattern, if a fixed one was measured as well.
     pub comparison: Option<ComparisonFile>,
 }
 
@@ -85,17 +86,16 @@ pub struct Taught {
     pub file: RecipeFile,
     /// Its checked form.
     pub recipe: Recipe,
-    /// Why which sequence was chosen.
+    /// The production sequence, with the reasons.
     pub choice: Choice,
 }
 
 impl GoldenPart<'_> {
-    /// Makes the recipe: expansion, safe mask, regions, gauges and plan. Gauges are made for what
-    /// the part shows: deviation from golden and coverage of the whole part, and that each of its
-    /// openings stays open.
+    /// Makes the recipe: expansion of the height, safe mask, sequences, regions and gauges. The gauges are the deviation from
+    /// golden and the coverage of the whole frame, and for each opening of the part that it stays open.
     ///
     /// # Errors
-    /// In words, if the parts do not make a recipe that loads.
+    /// In words, if the recipe could not be loaded again.
     pub fn recipe(&self, naming: &Naming) -> Result<Taught, String> {
         let resolved: Vec<bool> = self
             .phases
@@ -154,7 +154,7 @@ impl GoldenPart<'_> {
         };
         let (bytes, _) = archive::pack(&file, &arrays).map_err(|error| error.to_string())?;
         drop(arrays);
-        // Read back as it will be after a restart: what was just taught is known to load.
+        // Read back as after a restart, so that what was taught is known to load.
         let (file, recipe) = Recipe::from_bytes_with_manifest(&bytes)?;
         Ok(Taught {
             bytes,
@@ -226,10 +226,10 @@ impl GoldenPart<'_> {
         }
     }
 
-    /// The sequences that the part can be measured with, and what each is worth.
+    /// The sequences that the part can be measured with, each with its predicted noise and safe share.
     fn sequences(&self, arrays: &Arrays) -> Vec<SequenceFile> {
         let mut full = self.full.to_vec();
-        // The finest last: the others are decoded while it is being exposed.
+        // The finest level last: the coarser ones are decoded while it is being exposed.
         full.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
         let candidates = [
             (SequenceKind::SingleLevel, Shot::level(1.0, 3).collect()),
@@ -252,7 +252,7 @@ impl GoldenPart<'_> {
         frames: &[Shot],
         arrays: &Arrays,
     ) -> impl Fn(usize) -> f64 {
-        // Of a geometric sequence only the finest level carries the accuracy.
+        // Of a geometric sequence only the finest level contributes to the accuracy.
         let absolute = !self.decoder.unwrapping().needs_map() && kind == SequenceKind::Full;
         let carries = |ratio: f64| !absolute || ratio >= 0.999;
         let squares = frames
@@ -317,7 +317,7 @@ impl GoldenPart<'_> {
     }
 }
 
-/// The regions and gauges that a taught part gets by itself.
+/// The regions and gauges that every taught part gets.
 fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) {
     let rows = resolved.len() / width.max(1);
     let (right, bottom) = (width as f64 - 0.5, rows as f64 - 0.5);

@@ -1,9 +1,9 @@
-//! What the deviation gauge reads on good parts by prediction, and the limit that follows.
+//! Predicts what the deviation gauge reads on good parts, and sets its limit accordingly.
 //!
-//! The limit is the tolerance that is asked for, as far as the part can be measured that well. Where squares are too noisy for it,
-//! deviations count with less weight, and teaching says on how much of the surface and how much larger they must be to be found;
-//! where that would be more than a small share of the pixels, the limit is wider instead, and teaching says that the tolerance
-//! cannot be held.
+//! The limit is the requested tolerance if the part can be measured that well. In squares that are too noisy for it, deviations
+//! get less weight, and teaching reports on how much of the surface, and by which factor a deviation must be larger there to be
+//! found. If that concerned more than a small share of the pixels, the limit is wider instead, and teaching reports that the
+//! tolerance cannot be held.
 
 use super::golden::SMOOTHING_PX;
 use crate::station::Unit;
@@ -19,9 +19,10 @@ use serde::{Deserialize, Serialize};
 const WEIGHED: f64 = 0.05;
 /// Squares have at most a σ of the limit by this: of a part with 10⁴ squares of just this σ, one in 10⁶ exceeds the limit.
 const SIGMAS: f64 = 6.5;
-/// At most this share of good parts exceeds the limit, by prediction.
+/// At most this share of good parts is predicted to exceed the limit.
 const BEYOND: f64 = 1e-6;
-/// Limits that are not asked for are rounded up to this, mm, tried in steps by this factor, and at most so many times the tolerance.
+/// Limits wider than the tolerance are rounded up to a multiple of this, mm; each is wider than the one before by this factor,
+/// and at most so many times the tolerance.
 const STEP_MM: f64 = 0.01;
 const WIDER: f64 = 1.1;
 const WIDEST: f64 = 20.0;
@@ -160,7 +161,7 @@ fn count(mask: &[bool]) -> f64 {
 }
 
 fn rounded_up(mm: f64) -> f64 {
-    // A whole number of hundredths reads as such.
+    // A division by 100 prints as hundredths: 0.29, not 0.29000000000000004.
     (mm / STEP_MM).ceil() / (1.0 / STEP_MM).round()
 }
 
@@ -181,7 +182,7 @@ impl GoodPartsFile {
         within("least_weight", self.least_weight, 1.0 / 256.0, 1.0)
     }
 
-    /// What is held, in words: a line, and further ones where something is not.
+    /// The prediction in words: one line, and further ones if the tolerance is not held everywhere.
     pub fn words(&self) -> Vec<String> {
         let Self {
             tolerance_mm,

@@ -1,9 +1,11 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
-//! `file` is the form on disk, `bounds` what its values may be, `archive` the ZIP around it with its fingerprint, `check` turns the
-//! one into a [`Recipe`] that can be planned, `gauge` says what its gauges measure, `store` keeps the files of a station,
-//! `arriving` those on their way into it, `generations` those before the newest, `replace` what stays of a recipe that is
-//! taught again.
+//! - On disk: [`file`] is the manifest, [`bounds`] the bounds of its values, [`archive`] the ZIP with its fingerprint.
+//! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], [`plan`] joins that with the head's calibration.
+//! - Stored: [`store`] keeps the files of a station, [`generations`] the one before the newest and deleted ones, [`arriving`]
+//!   files that are being uploaded; [`exchange`] lists, exports and imports, [`edit`] changes.
+//! - Made: [`teach`] measures the part, [`golden`] makes the recipe, [`planner`] chooses the sequence, [`good_parts`] the limit of
+//!   the deviation; [`replace`] keeps names and gauges of a recipe that is taught again.
 
 pub mod archive;
 pub mod arriving;

@@ -1,4 +1,4 @@
-//! Which sequence is good enough for a part, and what it would cost to be better.
+//! Chooses the cheapest sequence whose noise and safe mask are good enough for a part's gauges.
 
 use super::GaugeFile;
 use super::file::{GaugeKind, SequenceFile, SequenceKind};
@@ -9,17 +9,17 @@ pub(super) const SIGMAS: f64 = 6.0;
 /// Share of the golden surface that must be safe for a sequence that is not full.
 const SAFE_SHARE: f64 = 0.98;
 
-/// What each sequence would give.
+/// The chosen sequence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// Which sequence to project.
+    /// Its index.
     pub production: usize,
-    /// One line per sequence, cheapest first: what it gives and why it was taken or not.
+    /// One line per sequence, cheapest first: its noise and safe share, and why it was chosen or not.
     pub reasons: Vec<String>,
 }
 
-/// The largest σ_z, RMS over the surface, that the limits of a recipe's gauges of single places allow: deviations, flatness,
-/// peak-to-valley. Means over regions are quieter by far.
+/// The largest σ_z, RMS over the surface, in mm, that is allowed by the limits of gauges with a smoothing square (deviations,
+/// flatness, peak-to-valley). Gauges that average over regions are far less noisy and do not count.
 pub fn allowed_sigma(gauges: &[GaugeFile]) -> f64 {
     let allowed = gauges.iter().filter_map(|gauge| {
         let side = gauge.measures.smoothing_px()?;
@@ -39,10 +39,10 @@ pub fn allowed_sigma(gauges: &[GaugeFile]) -> f64 {
     allowed.fold(f64::INFINITY, f64::min)
 }
 
-/// Picks the cheapest sequence that is good enough; the full one, the last, if none is.
+/// Chooses the cheapest sequence that is good enough; the full one, which is the last, if none is.
 pub fn choose(sequences: &[SequenceFile], gauges: &[GaugeFile]) -> Choice {
     let allowed = allowed_sigma(gauges);
-    // Only the full sequence sees material where golden has none.
+    // Only the full sequence resolves material where golden has none.
     let looks_for_more = gauges
         .iter()
         .any(|gauge| gauge.measures == GaugeKind::Coverage && gauge.high.is_some());

@@ -1,4 +1,4 @@
-//! Teaching onto a number that is taken: what stays of the recipe that is replaced.
+//! Teaching under a number that is taken: what the new recipe keeps of the one that it replaces.
 
 use super::archive;
 use super::gauge::check_limits;
@@ -6,10 +6,10 @@ use super::golden::{Naming, Taught};
 use super::planner;
 use super::{Recipe, RecipeFile};
 
-/// How far parts may lie from where they were taught, unless the recipe before says otherwise, mm.
+/// Placement tolerance of a recipe that replaces none, mm.
 pub const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
 
-/// What to call a recipe that is taught under a number, and its tolerance of placement: as the one that it replaces, if any.
+/// Names and placement tolerance of a recipe that is taught under a number: those of the recipe that it replaces, if any.
 pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
     let kept = replaced.cloned();
     let (part_number, name, placement_tolerance_mm) = match kept {
@@ -29,7 +29,7 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
     }
 }
 
-/// What a recipe that is replaced has of regions and gauges, in words.
+/// How many regions and gauges a recipe has, in words.
 pub fn gauges_of(file: &RecipeFile) -> String {
     let count = |number: usize, what: &str| match number {
         1 => format!("1 {what}"),
@@ -42,10 +42,10 @@ pub fn gauges_of(file: &RecipeFile) -> String {
     )
 }
 
-/// Whether the gauges of a recipe can stay for frames (width, height) of the head that teaches the next one.
+/// Checks that the gauges of a recipe can be kept on a head with frames of (width, height).
 ///
 /// # Errors
-/// In words: regions are polygons in camera pixels, so another size of frames has no place for them; or a limit cannot be kept.
+/// In words: the frames have another size (regions are polygons in camera pixels), or a limit is refused.
 pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<(), String> {
     let camera = &replaced.camera;
     if (camera.width, camera.height) == (width, height) {
@@ -70,7 +70,7 @@ pub fn keep_gauges(taught: Taught, replaced: &RecipeFile) -> Result<Taught, Stri
     file.regions.clone_from(&replaced.regions);
     file.gauges.clone_from(&replaced.gauges);
     file.min_coverage = replaced.min_coverage;
-    // It was predicted for the limits that teaching sets.
+    // The prediction is for the limits that teaching sets.
     file.good_parts = None;
     let choice = planner::choose(&file.sequences, &file.gauges);
     file.production = choice.production;

@@ -1,4 +1,4 @@
-//! The recipes of a station: a folder of `NNNN.recipe` files with the generation before each.
+//! The stored recipes of a station: a folder with a file `NNNN.recipe` for each and the generation before it.
 
 use super::gauge::check_limits;
 use super::{Recipe, RecipeFile, archive};
@@ -9,7 +9,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The folder.
+/// The folder of recipes.
 #[derive(Clone, Debug)]
 pub struct Store {
     pub(super) folder: PathBuf,
@@ -31,7 +31,7 @@ pub enum LoadError {
     },
 }
 
-/// Which file a recipe was loaded from.
+/// Identifies the content of a stored recipe's file without reading all of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stamp {
     number: u16,
@@ -54,12 +54,12 @@ pub struct Loaded {
     pub file: RecipeFile,
     /// Its checked form.
     pub recipe: Recipe,
-    /// Why the newest generation could not be used and this is the one before.
+    /// If this is the generation before: why the newest could not be used.
     pub fallback: Option<String>,
 }
 
 impl Store {
-    /// The store in a folder that may not exist yet: then it has no recipes.
+    /// The store in a folder; one that does not exist yet has no recipes.
     pub fn at(folder: &Path) -> Self {
         Self {
             folder: folder.to_path_buf(),
@@ -69,7 +69,7 @@ impl Store {
     /// Opens the folder, creating it where it does not exist.
     ///
     /// # Errors
-    /// Whatever the file system answers.
+    /// Errors of the file system.
     pub fn open(folder: &Path) -> io::Result<Self> {
         fs::create_dir_all(folder)?;
         Ok(Self {
@@ -77,7 +77,7 @@ impl Store {
         })
     }
 
-    /// Opens the recipes of a state folder, without what an import that was killed left behind.
+    /// Opens the recipes of a state folder and removes what an interrupted import left behind.
     ///
     /// # Errors
     /// If the folder cannot be created or written (exit code 73).
@@ -96,7 +96,7 @@ impl Store {
         self.folder.join(format!("{number:04}.recipe"))
     }
 
-    /// Where the generations of a recipe lie, the newest first; there may be none.
+    /// The paths of a recipe's generations, the newest first; the files need not exist.
     pub fn generations(&self, number: u16) -> [PathBuf; 3] {
         [self.path(number), self.previous(number), self.kept(number)]
     }
@@ -104,15 +104,15 @@ impl Store {
     /// Stores a packed recipe under its number; the one before stays as the previous generation.
     ///
     /// # Errors
-    /// Whatever the file system answers; then the stored recipe is the one before.
+    /// Errors of the file system; the stored recipe is then unchanged.
     pub fn save(&self, number: u16, bytes: &[u8]) -> io::Result<()> {
         let _alone = self.lock()?;
         self.put(number, bytes)
     }
 
-    /// Stores a packed recipe in place of the one with the fingerprint `base`. Answers whether it did: not if another one was
-    /// stored, or the recipe deleted, since `base` was read. Comparing and storing happen under one lock, so that of two
-    /// clients with the same base one is refused.
+    /// Stores a packed recipe in place of the one with the fingerprint `base`. Returns `false`, storing nothing, if another one
+    /// was stored or the recipe was deleted since `base` was read. Comparing and storing happen under one lock, so that one of two
+    /// clients with the same base is refused.
     ///
     /// # Errors
     /// As [`Store::save`].
@@ -134,30 +134,30 @@ impl Store {
     fn is_newest(&self, number: u16, fingerprint: &str) -> bool {
         let has =
             |path: &Path| manifest_at(path).is_some_and(|file| file.fingerprint == fingerprint);
-        // Most often it is the newest; hashing all of a file is for one that is damaged.
+        // Almost always it is the newest file; the whole file is hashed only if that one does not have the fingerprint.
         has(&self.path(number)) || self.whole(number).is_ok_and(|whole| has(&whole))
     }
 
-    /// Keeps other processes from changing the same recipes, as long as the answer lives.
+    /// Keeps other processes from changing the recipes until the returned file is dropped.
     pub(super) fn lock(&self) -> io::Result<fs::File> {
         let lock = fs::File::create(self.folder.join("lock"))?;
         lock.lock()?;
         Ok(lock)
     }
 
-    /// Loads a recipe by number. Where the newest generation is damaged, the one before is used,
-    /// and the answer says so.
+    /// Loads a recipe by number. If the newest generation is damaged, the one before is loaded, and [`Loaded::fallback`] says
+    /// why.
     ///
     /// # Errors
-    /// If there is none, no generation can be used, or a gauge has limits that it cannot have: the generation before may
-    /// have other limits, so it does not stand in for that.
+    /// If there is none, no generation can be used, or a gauge has limits that it cannot have. The generation before is not used
+    /// in the last case: it may judge by other limits.
     pub fn load(&self, number: u16) -> Result<Loaded, LoadError> {
         let loaded = self.load_to_edit(number)?;
         refuse_limits(&self.path(number), &loaded.file)?;
         Ok(loaded)
     }
 
-    /// As [`Self::load`], but whatever the limits of its gauges are: they may be what is going to be changed.
+    /// As [`Self::load`] without checking the limits of gauges: an edit may be about to correct them.
     ///
     /// # Errors
     /// If there is none, or no generation can be used.
@@ -189,10 +189,10 @@ impl Store {
         }
     }
 
-    /// Loads that generation of a recipe which has this fingerprint.
+    /// Loads the generation of a recipe that has this fingerprint.
     ///
     /// # Errors
-    /// If none has it any more.
+    /// If no stored generation has it.
     pub fn load_fingerprint(&self, number: u16, fingerprint: &str) -> Result<Recipe, LoadError> {
         let same = |(file, _): &(RecipeFile, Recipe)| file.fingerprint == fingerprint;
         let paths = self.generations(number);
@@ -207,7 +207,7 @@ impl Store {
         Ok(recipe)
     }
 
-    /// What loading a recipe depends on: an equal answer means that the files are the same as before.
+    /// The stamp of a recipe's newest file; while it stays equal, loading gives the same recipe.
     pub fn stamp(&self, number: u16) -> Option<Stamp> {
         let file = fs::File::open(self.path(number)).ok()?;
         let found = file.metadata().ok()?;
@@ -247,10 +247,10 @@ impl Store {
         archive::manifest(file).map_err(|error| error.to_string())
     }
 
-    /// The file of a recipe as it is, to be exported.
+    /// Opens the newest file of a recipe as it is, to be exported.
     ///
     /// # Errors
-    /// Whatever the file system answers.
+    /// Errors of the file system.
     pub fn file(&self, number: u16) -> io::Result<fs::File> {
         fs::File::open(self.path(number))
     }
@@ -284,7 +284,7 @@ impl Store {
             .filter_map(|entry| {
                 let name = entry.file_name();
                 let (number, rest) = name.to_str()?.split_once(".recipe")?;
-                // A file that was being written when the plug was pulled is no recipe.
+                // Other endings are files that a loss of power left half written.
                 endings.contains(&rest).then(|| number.parse().ok())?
             })
             .collect();

@@ -20,12 +20,13 @@ use std::time::Duration;
 
 /// Projector pitch of the preliminary pattern, in pixels (c·p_P of the paper).
 const PRELIMINARY_PITCH_PX: f64 = 20.0;
-/// Levels and steps of the preliminary sequence.
+/// Levels of the preliminary sequence.
 const LEVELS: usize = 3;
-const STEPS: usize = 4;
-/// n of the dense levels about the expected map: unwraps ± (n²/2 − n) = ± 4 turns.
+/// Shifts per level of both sequences.
+const SHIFTS: usize = 4;
+/// n of the dense levels about the expected map: they unwrap ± (n²/2 − n) = ± 4 turns.
 const DENSE_N: f64 = 4.0;
-/// A scene that resolves less than this share of the frame cannot be taught.
+/// A scene of which less than this share of the frame is resolved cannot be taught.
 const LEAST_RESOLVED: f64 = 0.005;
 
 /// A part that could not be taught.
@@ -34,22 +35,22 @@ pub enum TeachError {
     /// A device failed.
     #[error("teach: {0}")]
     Device(hal::error::Error),
-    /// The scene does not make a recipe.
+    /// No recipe can be made of this scene.
     #[error("teach: {0}")]
     Scene(String),
-    /// The rig or the pattern is impossible.
+    /// The geometry or the pattern is impossible.
     #[error("teach: {0}")]
     Rig(String),
     /// The head's calibration cannot be used.
     #[error("teach: {0}")]
     NotCalibrated(String),
-    /// Whoever was told of the progress wanted no more.
+    /// The progress callback asked for the end.
     #[error("teach: it was ended early")]
     Ended,
 }
 
 impl TeachError {
-    /// ERROR_CODE of it.
+    /// The value of register ERROR_CODE.
     pub fn code(&self) -> u16 {
         match self {
             Self::Device(error) => code_of(error),
@@ -76,11 +77,11 @@ impl From<AdaptError> for TeachError {
     }
 }
 
-/// Measures the part in front of the head with a fixed pattern, makes its own pattern, measures it
-/// again with that, and makes it a recipe. `progress` is told the share done and what is being done.
+/// Measures the part in front of the head with a fixed pattern, makes its adaptive pattern, measures it again with that one, and
+/// makes the recipe; nothing is stored here. `progress` gets the share done and the current stage in words.
 ///
 /// # Errors
-/// If a device fails or the scene cannot be taught. Nothing is stored here.
+/// If a device fails or the scene cannot be taught.
 pub fn teach(
     head: &mut DynHead,
     calibration: &Calibration,
@@ -96,10 +97,11 @@ pub fn teach(
     teach_while(head, calibration, naming, timeout, &computing, &all)
 }
 
-/// As [`teach`], but `progress` ends it before the next step by answering `false`; `computing` is told of steps that use no device.
+/// As [`teach`], but it ends before the next stage when `progress` returns `false`. `computing` marks the stages that use no
+/// device.
 ///
 /// # Errors
-/// As [`teach`]; [`TeachError::Ended`] where it was ended.
+/// As [`teach`]; [`TeachError::Ended`] if `progress` ended it.
 pub fn teach_while(
     head: &mut DynHead,
     calibration: &Calibration,
@@ -108,11 +110,11 @@ pub fn teach_while(
     computing: &Computing,
     progress: &dyn Fn(f64, &str) -> bool,
 ) -> Result<Taught, TeachError> {
-    let step = |share: f64, words: &str| match progress(share, words) {
+    let stage = |share: f64, words: &str| match progress(share, words) {
         true => Ok(()),
         false => Err(TeachError::Ended),
     };
-    step(0.0, "measuring the part")?;
+    stage(0.0, "measuring the part")?;
     let mut rig = Rig {
         head,
         calibration,
@@ -125,13 +127,13 @@ pub fn teach_while(
     );
     let preliminary = PhaseFunction::vertical(columns, rows, columns as f64 / PRELIMINARY_PITCH_PX)
         .map_err(|error| TeachError::Rig(error.to_string()))?;
-    let shots = Sequence::geometric(preliminary.range(), LEVELS, STEPS);
+    let shots = Sequence::geometric(preliminary.range(), LEVELS, SHIFTS);
     let first = rig.measure(&preliminary, &shots, About::Reference, &|share| {
-        // The sequence goes on; the next step does not.
+        // Checked before the next stage: a sequence is not interrupted.
         progress(0.3 * share, "measuring the part");
     })?;
     refuse_empty(&first.phases)?;
-    step(0.35, "making the part's own pattern")?;
+    stage(0.35, "making the part's own pattern")?;
     let map = ProjectorMap::from_heights(&first.triangulator, &first.heights);
     let function = computing.on(|| {
         let optics = noise::Optics {
@@ -142,16 +144,16 @@ pub fn teach_while(
         };
         noise::adapt(&map, columns, rows, &optics).map_err(TeachError::from)
     })?;
-    step(0.4, "measuring the part with its own pattern")?;
+    stage(0.4, "measuring the part with its own pattern")?;
     let expected = map.expected_phase(&function);
-    let full = Sequence::dense(DENSE_N, STEPS);
+    let full = Sequence::dense(DENSE_N, SHIFTS);
     let golden = rig.measure(&function, &full, About::Map(&expected), &|share| {
         progress(0.4 + 0.3 * share, "measuring the part with its own pattern");
     })?;
     refuse_empty(&golden.phases)?;
-    step(0.75, "working out the expansion and the safe mask")?;
+    stage(0.75, "working out the expansion and the safe mask")?;
     let comparison = ComparisonFile::of(&first, &golden);
-    // Before the recipe's arrays take their place.
+    // Their memory is free before the recipe's arrays are made.
     drop((first, map, expected));
     let Measured {
         phases,
@@ -173,12 +175,12 @@ pub fn teach_while(
     };
     let taught = computing.on(|| part.recipe(naming));
     let taught = taught.map_err(TeachError::Rig)?;
-    step(1.0, "taught")?;
+    stage(1.0, "taught")?;
     Ok(taught)
 }
 
-/// The blur of the head in front of this part, projector pixels, from the contrast of the preliminary
-/// measurement's coarsest and finest level.
+/// σ of the projector's blur on this part, projector pixels, from the modulation of the finest and the coarsest level of the
+/// preliminary measurement.
 fn blur(
     first: &Measured,
     shots: &[Shot],
@@ -186,7 +188,7 @@ fn blur(
     columns: f64,
 ) -> Result<f64, TeachError> {
     let function = first.triangulator.function();
-    let coarse = Scan::new(function.range(), &shots[..STEPS], &first.frames[..STEPS])
+    let coarse = Scan::new(function.range(), &shots[..SHIFTS], &first.frames[..SHIFTS])
         .and_then(|coarse| coarse.phases(None))
         .map_err(TeachError::Rig)?;
     let slopes = map.slopes(noise::MAX_STEP);
@@ -203,10 +205,10 @@ fn blur(
     Ok(noise::measured_blur(samples, frequency, frequency * shots[0].ratio).unwrap_or(0.0))
 }
 
-/// Says what keeps an unusable scene from being taught.
+/// Refuses a scene that shows too little to be taught.
 ///
 /// # Errors
-/// If less than half a per cent of the frame is resolved: why.
+/// If less than half a per cent of the frame is resolved: the most frequent reason, with the remedy.
 pub fn refuse_empty(phases: &PhaseMap) -> Result<(), TeachError> {
     let pixels = phases.trust.len() as f64;
     if phases.count(Trust::Resolved) as f64 >= LEAST_RESOLVED * pixels {

@@ -1,7 +1,7 @@
 //! The running daemon: starts and stops its threads, and connects them.
 //!
-//! One OS thread measures ([`crate::production`]), one serves sockets on a current-thread runtime, and the station is plain values
-//! behind a handle that both use.
+//! One OS thread measures ([`crate::production`]), one serves the sockets on a current-thread runtime, and others write the history,
+//! serve the lines and survey the machine. They share the station through its handle.
 
 mod caller;
 mod serving;
@@ -51,7 +51,7 @@ const POLLING: std::time::Duration = std::time::Duration::from_millis(20);
 
 /// A running daemon.
 pub struct Daemon {
-    /// Access to the station.
+    /// The station.
     pub station: StationHandle,
     /// Where Modbus TCP is served.
     pub modbus: SocketAddr,
@@ -62,13 +62,13 @@ pub struct Daemon {
     /// Whether a recipe is loaded or taught at the start.
     awaited: bool,
     stopping: Stopping,
-    /// Held as long as the daemon runs.
+    /// Locked as long as the daemon runs.
     _state: StateFolder,
 }
 
 impl Daemon {
-    /// Starts everything and returns when the head is open. The station is then on its way to READY:
-    /// it loads its recipe, or teaches it where a simulated head has none.
+    /// Starts everything and returns when the head is open. The station then loads its recipe; on a simulated head without one, it
+    /// teaches one.
     ///
     /// # Errors
     /// If the state folder cannot be used (73), a port is in use or the head missing (69), or the
@@ -81,8 +81,8 @@ impl Daemon {
         Self::start_for(config, pool, progress, &Caller::default())
     }
 
-    /// The same for a caller. For a service manager it also returns when the head is missing; the measuring task then waits for it
-    /// as for a lost one. It returns at once on the stop signal: the daemon can then only be stopped.
+    /// As [`Daemon::start`], for a caller. With a service manager it also returns if the head is missing; the measuring task then
+    /// waits for the head as for a lost one. On the stop signal it returns at once; the daemon can then only be stopped.
     ///
     /// # Errors
     /// As [`Daemon::start`].
@@ -285,7 +285,7 @@ fn open_access(state: &StateFolder) -> Result<Access, Failure> {
         std::env::var_os("CREDENTIALS_DIRECTORY").map(|given| Path::new(&given).join(SECRET));
     let (access, secret) = Access::open_given(&folder, given.as_deref())?;
     if let Some(secret) = secret {
-        // Also with `--quiet`: without the secret nobody could sign in.
+        // Also with `--quiet`: without the secret it is impossible to sign in.
         let words = format!(
             "the secret of this device, shown this once: {secret} (sign in on the page with it; for another one \
              delete {} and start again)",
@@ -359,7 +359,7 @@ fn station(config: &Config, state: &StateFolder, next_seq: u32) -> Result<Statio
     Ok(Station::new(settings, Micros(0)))
 }
 
-/// Carries out the station's effects. Called with the station locked, so it only passes them on and never waits.
+/// Carries out the station's effects. It is called with the station locked, so it only hands them over and never waits.
 fn effects(
     orders: mpsc::Sender<Order>,
     aborts: Aborts,
@@ -367,7 +367,7 @@ fn effects(
     progress: Progress,
     tally: Tally,
 ) -> impl FnMut(Effect) -> Option<Event> {
-    // If the measuring task is gone the order is lost; the station notices by the deadline of its wait.
+    // If the measuring task is gone, the order is lost, and the station's deadline for the job passes.
     let order = move |order| drop(orders.send(order));
     move |effect| {
         match effect {

@@ -25,7 +25,7 @@ pub(super) async fn serve(
     let stop = || {
         let mut stopped = stopped.clone();
         async move {
-            // An error means that the daemon is gone: stop as well.
+            // An error means that the daemon is gone, which is a reason to stop too.
             let _ = stopped.wait_for(|stop| *stop).await;
         }
     };

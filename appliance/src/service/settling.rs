@@ -1,4 +1,4 @@
-//! The end of a start: the station has its recipe, or the reason why not.
+//! Waits for the end of the start: the station has its recipe, or there is a reason why not.
 
 use super::{Daemon, runtime};
 use crate::error::{Exit, Failure};
@@ -7,8 +7,8 @@ use crate::station::{RecipeResult, Snapshot};
 use std::sync::Arc;
 
 impl Daemon {
-    /// Waits until the station has its recipe or cannot get it. It is READY then, unless the PLC does not ask for ONLINE or asks
-    /// for another recipe.
+    /// Waits until the station has its recipe or cannot get it. With a recipe it is READY, unless the PLC has not set ONLINE or
+    /// selects another recipe.
     ///
     /// # Errors
     /// The station has a fault, or its recipe could be neither loaded nor taught.
@@ -16,7 +16,7 @@ impl Daemon {
         runtime()?.block_on(self.settled())
     }
 
-    /// The same as a future, to wait for something else as well.
+    /// The same as a future.
     ///
     /// # Errors
     /// As [`Daemon::wait_until_ready`].

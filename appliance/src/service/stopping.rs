@@ -1,4 +1,4 @@
-//! The stop of the daemon: every thread is asked to end, and each wait for one has a limit.
+//! Stops the daemon: asks every thread to end, and waits for each with a limit.
 
 use crate::history::History;
 use crate::production::Order;
@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
-/// The daemon's threads and what makes each of them end.
+/// The daemon's threads, and the senders that end them.
 pub(super) struct Stopping {
     pub(super) orders: mpsc::Sender<Order>,
     pub(super) sockets: watch::Sender<bool>,
@@ -35,7 +35,7 @@ impl Stopping {
     pub(super) fn stop(self) {
         let began = Instant::now();
         let until = began + STOPPING;
-        // A receiver that is gone has ended already.
+        // Fails only if the measuring task has ended already.
         drop(self.orders.send(Order::Stop));
         let [measuring, serving, surveying, wiring] = self.threads;
         let needed = || !self.computing.is_under_way();
@@ -57,12 +57,12 @@ impl Stopping {
     }
 }
 
-/// Waits for a thread to end, at most until `until`: one that hangs in a device or a storage must not keep the program alive.
+/// Waits for a thread to end, until `until` at most: a thread that hangs in a device or the storage must not keep the program alive.
 fn join(name: &str, thread: JoinHandle<()>, until: Instant, progress: &Progress) {
     join_while(&|| true, name, thread, until, progress);
 }
 
-/// The same while the thread is `needed`: one that only computes may end with the program.
+/// The same as long as the thread is `needed`: one that only computes may end with the program.
 fn join_while(
     needed: &dyn Fn() -> bool,
     name: &str,
@@ -82,6 +82,6 @@ fn join_while(
         }
         std::thread::sleep(POLLING);
     }
-    // A panic has already written its message.
+    // The message of a panic is in the log already.
     drop(thread.join());
 }

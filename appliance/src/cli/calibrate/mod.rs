@@ -1,4 +1,4 @@
-//! `fringed calibrate`: imports models, measures on the head what they do not say, and writes `calibration.json`.
+//! `fringed calibrate`: imports the models, measures the rest of the calibration on the head, and writes `calibration.json`.
 
 mod report;
 
@@ -51,15 +51,15 @@ pub struct Calibrate {
     measuring: Measuring,
 }
 
-/// Where models came from, if not from a file.
+/// The origin of models that do not come from a file.
 const OF_SCENARIO: &str = "scenario";
 
 impl Calibrate {
     /// Opens the head, measures it, writes the calibration and prints what was found.
     ///
     /// # Errors
-    /// If a model cannot be imported (65, 66), the head not be measured (69), or the calibration not be written (73). The
-    /// calibration before is then untouched.
+    /// If a model cannot be imported (65, 66), the head cannot be measured (69), or the calibration cannot be written (73). The
+    /// calibration before is then unchanged.
     pub fn run(&self) -> Result<(), Failure> {
         let Measuring {
             files,
@@ -76,7 +76,7 @@ impl Calibrate {
                 "calibrate: a recording carries its own calibration: configure another head or name a scenario with --scenario",
             ));
         }
-        // Held until all is written: no station measures meanwhile by what is being replaced.
+        // Locked until all is written: no station measures meanwhile with the calibration that is being replaced.
         let state = StateFolder::open(&files.state_folder()?)?;
         let head = config.head_in(state.path());
         let place = Place::at(head.calibration.as_deref().unwrap_or(Path::new("")));
@@ -89,7 +89,7 @@ impl Calibrate {
         let progress = output.progress();
         let told = |share: f64| progress.tell(0.3 * share, "working out the light of the scene");
         let pool = threads.pool(config.threads)?;
-        // As if nothing were known of it.
+        // Without the stored calibration, which is being replaced.
         let bare = HeadConfig {
             calibration: None,
             ..head
@@ -206,7 +206,7 @@ impl Calibrate {
     }
 }
 
-/// Whether camera and projector make a head that looks down at the plane z = 0 from two places.
+/// Checks that camera and projector look down at the plane z = 0 from two different places.
 fn fits(calibration: &Calibration) -> Result<(), String> {
     let (camera, projector) = (calibration.camera.clone(), calibration.projector.clone());
     let (columns, rows) = (projector.width(), projector.height());
@@ -221,7 +221,7 @@ fn fits(calibration: &Calibration) -> Result<(), String> {
     }
 }
 
-/// In front of a simulated head a plate needs nobody to lay it.
+/// Puts a flat plate in front of a simulated head, where nobody can lay one.
 fn lay_plate(stage: Option<&Stage>, notes: &mut Vec<String>) -> Result<(), Failure> {
     let Some(stage) = stage else {
         return Ok(());

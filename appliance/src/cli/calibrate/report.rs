@@ -1,4 +1,4 @@
-//! What `fringed calibrate` says: a table for people, JSON for programs.
+//! The report of `fringed calibrate`, as a table and as JSON.
 
 use crate::head::calibration::file::{CalibrationFile, MapFile};
 use hal::head::Stamp;
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// A calibration that was written, and what to say of it.
+/// A calibration that was written.
 pub(super) struct Report<'a> {
     pub file: &'a CalibrationFile,
     /// Fingerprint of the calibration before.
@@ -16,7 +16,7 @@ pub(super) struct Report<'a> {
 }
 
 impl Report<'_> {
-    /// Whether recipes that were made before still fit.
+    /// Whether recipes that were made before stay valid.
     fn recipes_stay(&self) -> bool {
         self.before
             .is_none_or(|before| before == self.file.fingerprint)

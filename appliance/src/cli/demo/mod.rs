@@ -1,4 +1,4 @@
-//! `fringed demo`: the station, and the PLC in front of it, over real Modbus TCP.
+//! `fringed demo`: runs the station and plays its PLC over real Modbus TCP.
 
 mod parts;
 mod plc;
@@ -30,7 +30,7 @@ pub struct Demo {
 /// Seed of the noise of the demonstration's frames.
 const NOISE_SEED: u64 = 2008;
 
-/// One part of the demonstration and what came of it.
+/// One part of the demonstration and its result.
 struct MeasuredPart {
     placed: &'static DemoPart,
     result: PlcResult,
@@ -39,8 +39,7 @@ struct MeasuredPart {
 }
 
 impl Demo {
-    /// Starts the station, measures ten parts, prints the table, and leaves the page running unless
-    /// told to end.
+    /// Starts the station, measures ten parts, prints the table, and on a terminal serves the page until Ctrl-C.
     ///
     /// # Errors
     /// If the station cannot start or answer, or judges a part wrongly.
@@ -53,7 +52,7 @@ impl Demo {
             ));
         }
         if config.state.is_none() {
-            // Recipes that somebody taught stay untouched.
+            // Not the state of the real station, whose recipes stay unchanged.
             config.state = Some(StateFolder::default_path()?.join("demo"));
         }
         let progress = self.output.progress();
@@ -93,7 +92,7 @@ impl MeasuredPart {
     }
 }
 
-/// Lets ten parts come by and triggers a measurement of each.
+/// Places ten parts one after the other and triggers a measurement of each.
 async fn play(
     daemon: &Daemon,
     recipe: u16,
@@ -105,7 +104,7 @@ async fn play(
             "demo: there is no simulated head",
         ));
     };
-    // Other noise than the golden map was taught with.
+    // Other noise than that of the golden measurement.
     stage.reseed(NOISE_SEED);
     let mut plc = Plc::connect(daemon.modbus, recipe).await?;
     let mut rows = Vec::with_capacity(PARTS.len());
@@ -115,7 +114,7 @@ async fn play(
             .place(&placed.part(), &sim::Placement::default())
             .map_err(|error| Failure::new(Exit::Software, error.to_string()))?;
         let result = plc.measure(at as u16 + 1).await?;
-        // The registers number the gauges; their names are the recipe's.
+        // The registers only number the gauges; their names are taken from the station.
         let snapshot = daemon.station.snapshot();
         let names = snapshot
             .result

@@ -7,7 +7,7 @@ use sim::parts::{Defect, SheetMetal};
 pub struct DemoPart {
     /// For people.
     pub what: &'static str,
-    /// What is wrong with it.
+    /// Its defect, if it has one.
     pub defect: Option<Defect>,
 }
 

@@ -12,7 +12,7 @@ const STATUS: u16 = 100;
 const READY: u16 = 1 << 1;
 /// TRIGGER_TOKEN; RECIPE_SELECT, PLC_HEARTBEAT, PART_ID and PRESS_STROKE follow.
 const TRIGGER_TOKEN: u16 = 1;
-/// How often the PLC asks, and how long it waits for a result.
+/// Period of polling, and longest wait for a result.
 const POLL: Duration = Duration::from_millis(20);
 const PATIENCE: Duration = Duration::from_secs(30);
 
@@ -84,7 +84,7 @@ impl Plc {
     /// Connects to the station, to measure parts with this recipe.
     ///
     /// # Errors
-    /// If nobody answers there.
+    /// If there is no answer.
     pub async fn connect(address: SocketAddr, recipe: u16) -> Result<Self, Failure> {
         let context = tcp::connect(address).await.map_err(lost)?;
         Ok(Self { context, recipe })
@@ -95,8 +95,8 @@ impl Plc {
         answer.map_err(lost)?.map_err(lost)
     }
 
-    /// Waits for READY, triggers by token with the token as PART_ID, and waits for the result. RECIPE_SELECT goes with the
-    /// trigger, so that no part is measured with another recipe.
+    /// Waits for READY, triggers with the token, which is also the PART_ID, and waits for the result. RECIPE_SELECT is written with
+    /// the trigger, so that no part is measured with another recipe.
     ///
     /// # Errors
     /// If the station does not answer in time.

@@ -1,4 +1,4 @@
-//! The command line as clap takes it: each command offers what it uses.
+//! The command line: each command offers exactly the options that it uses, before and behind its name.
 
 mod numbers;
 
@@ -9,8 +9,8 @@ use clap::{Arg, Command, CommandFactory as _, Parser as _};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 
-/// What each shared option does in each command that offers it; the options that one command has for itself say so in its help. A
-/// pair that is not here is refused.
+/// What each shared option does in each command that offers it. A shared option that a command offers without an entry here fails the
+/// test; options of a single command are described in its help.
 const SHARED: &[(&str, &str, &str)] = &[
     ("serve", "config", "everything that is configured"),
     ("serve", "state", "where recipes, history and counter are"),
@@ -129,6 +129,11 @@ fn parse(line: &str) -> Result<Arguments, clap::Error> {
     Arguments::try_parse_from(behind_the_command(&tree, arguments))
 }
 
+/// The error of a line that must be refused.
+fn refused(line: &str) -> clap::Error {
+    parse(line).expect_err(line)
+}
+
 #[test]
 fn every_command_offers_exactly_the_shared_options_that_do_something_there() {
     let names: BTreeSet<String> = shared().into_iter().map(|(_, option)| option).collect();
@@ -162,7 +167,7 @@ fn an_option_that_a_command_does_not_offer_is_refused_in_front_of_it_and_behind_
             (option.get_long().unwrap_or_default().to_owned(), takes)
         })
         .collect();
-    let mut refused = 0;
+    let mut count = 0;
     for (command, tree) in leaves() {
         let own: BTreeSet<_> = options(&tree).filter_map(Arg::get_long).collect();
         for (option, takes) in names
@@ -174,17 +179,17 @@ fn an_option_that_a_command_does_not_offer_is_refused_in_front_of_it_and_behind_
                 format!("fringed --{option}{value} {command}"),
                 format!("fringed {command} --{option}{value}"),
             ] {
-                let error = parse(&line).expect_err(&line);
+                let error = refused(&line);
                 assert_eq!(error.kind(), ErrorKind::UnknownArgument, "{line}: {error}");
                 assert!(
                     error.to_string().contains(&format!("--{option}")),
                     "{error}"
                 );
-                refused += 1;
+                count += 1;
             }
         }
     }
-    assert!(refused > 500, "{refused}");
+    assert!(count > 500, "{count}");
 }
 
 #[test]
@@ -265,7 +270,7 @@ fn an_output_is_refused_whose_name_says_another_content() {
         ("fringed measure r --out cloud.ply", "folder"),
         ("fringed record part.zip", "folder"),
     ] {
-        let error = parse(line).expect_err(line);
+        let error = refused(line);
         assert_eq!(error.kind(), ErrorKind::ValueValidation, "{line}");
         assert!(error.to_string().contains(remedy), "{line}: {error}");
     }
@@ -291,7 +296,7 @@ fn options_that_contradict_each_other_are_refused() {
         "fringed calibrate --z-away",
         "fringed history --csv --json",
     ] {
-        let error = parse(line).expect_err(line);
+        let error = refused(line);
         let kinds = [
             ErrorKind::ArgumentConflict,
             ErrorKind::MissingRequiredArgument,

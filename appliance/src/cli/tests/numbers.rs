@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-/// What an option takes.
+/// The kind of value that an option takes.
 #[derive(Clone, Copy, PartialEq)]
 enum Takes {
     /// A number within bounds.
@@ -24,7 +24,7 @@ enum Takes {
     Date,
     /// A defect of a simulated part.
     Defect,
-    /// Words: nothing counts with them.
+    /// Text, which has no numeric bounds.
     Words,
 }
 use Takes::{Address, Date, Defect, List, Number, Words};
@@ -79,7 +79,7 @@ const VALUES: [&str; 16] = [
 ];
 
 impl Takes {
-    /// What is written for a boundary value.
+    /// The arguments that are tried for a boundary value.
     fn texts(self, value: &str) -> Vec<String> {
         let beside = |others: &[&str]| {
             (0..others.len())
@@ -104,7 +104,7 @@ impl Takes {
         }
     }
 
-    /// What a refusal says beside the option.
+    /// What a refusal says in addition to the option's name.
     fn bounds(self) -> Vec<String> {
         match self {
             Number(low, high) => vec![format!("from {low} to {high}")],
@@ -178,7 +178,7 @@ fn a_boundary_value_of_an_option_is_refused_with_its_bounds_or_lies_within_them(
     assert_eq!(cases, 731);
 }
 
-/// Checks what came of a case; whether its value was taken.
+/// Checks the outcome of a case; returns whether its value was accepted.
 fn check(
     argument: &Arg,
     takes: Takes,

@@ -1,4 +1,4 @@
-//! The head that the configuration names: the one place that knows which back-ends there are.
+//! Opens the configured head. Only this module knows which back-ends there are.
 
 mod devices;
 
@@ -23,16 +23,15 @@ use std::path::Path;
 pub struct Opened {
     /// The devices.
     pub head: DynHead,
-    /// What is known of them.
+    /// Their calibration.
     pub calibration: Calibration,
     /// Where parts are placed in front of a simulated head.
     pub stage: Option<Stage>,
-    /// Why what is known of it cannot be trusted: it is nominal only, or the stored calibration cannot be used. Then nothing must be
-    /// measured.
+    /// Why the calibration cannot be trusted: it is nominal only, or the stored one cannot be used. Nothing may be measured then.
     pub problem: Option<String>,
-    /// Why the newest calibration could not be used and the one before is.
+    /// If the calibration is the one before the newest: why the newest could not be used.
     pub fallback: Option<String>,
-    /// What a replay head plays.
+    /// The recordings of a replay head.
     pub played: Option<Played>,
 }
 
@@ -41,7 +40,7 @@ pub struct Opened {
 pub struct Played {
     /// What each frame of a recording shows.
     shots: Vec<Shot>,
-    /// Fingerprint of the calibration that they were taken with, where a station kept them with their recipe.
+    /// Fingerprint of the calibration that they were taken with, if a station kept them with their recipe.
     calibration: Option<String>,
 }
 
@@ -55,8 +54,8 @@ impl Played {
         }
     }
 
-    /// Makes a recipe ready to judge these recordings: of its sequences only the one that they show. A recording does not say
-    /// all of the calibration, so its own recipe's is believed.
+    /// Plans a recipe to judge these recordings, with only the sequence that they show. A recording does not hold the whole
+    /// calibration, so its fingerprint is taken from the recipe that was kept with it.
     ///
     /// # Errors
     /// If the recipe was made for another calibration or does not fit the frames.
@@ -82,10 +81,10 @@ impl Opened {
         }
     }
 
-    /// Opens the head again after it was lost. It may be another one then: what is known of it is read anew.
+    /// Opens the head again after it was lost. It may be another one by then, so its calibration is read again.
     ///
     /// # Errors
-    /// As long as a device of it is not there.
+    /// If a device is not there.
     pub fn reopen(&mut self, config: &HeadConfig) -> Result<(), Failure> {
         match &self.stage {
             Some(stage) => {
@@ -96,7 +95,7 @@ impl Opened {
                 self.adopt(config);
             }
             None => {
-                // Who holds a device cannot open it again.
+                // A device must be closed before it can be opened again.
                 self.head = self.head.closed();
                 *self = open(config, &|_| ())?;
             }
@@ -104,7 +103,7 @@ impl Opened {
         Ok(())
     }
 
-    /// Whether what is known of the head can be trusted.
+    /// Checks that the calibration can be trusted.
     ///
     /// # Errors
     /// Why not (exit code 65).
@@ -115,11 +114,11 @@ impl Opened {
         }
     }
 
-    /// Goes by the stored calibration, where there is one; else by what the back-end knows.
+    /// Uses the stored calibration if there is one, else that of the back-end.
     fn adopt(&mut self, config: &HeadConfig) {
         self.fallback = None;
         self.problem = match stored(config) {
-            // Of real devices nothing is known but this.
+            // Without a stored calibration, that of real devices is nominal only.
             Ok(None) => (config.backend == Backend::Rpi).then(|| devices::uncalibrated().message),
             Ok(Some((loaded, calibration))) => {
                 let misfit = misfit(config, &self.calibration, &calibration);
@@ -142,7 +141,7 @@ impl Opened {
 pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
     let opened = open_as_it_is(config, progress)?;
     let encoding = opened.head.encoding();
-    // Luma is what an image processor made of the light; who asks for it gets it.
+    // Luma has passed an image processor, so it is used only if the configuration asks for it.
     let luma = config.backend == Backend::Rpi && config.camera.luma;
     if !(encoding.exact || luma) {
         let message = format!(
@@ -185,7 +184,7 @@ fn stored(config: &HeadConfig) -> Result<Option<(Loaded, Calibration)>, String> 
     Ok(Some((loaded, calibration)))
 }
 
-/// Why a stored calibration is not this head's, if it is not.
+/// Why a stored calibration does not fit the head; `None` if it does.
 fn misfit(config: &HeadConfig, head: &Calibration, stored: &Calibration) -> Option<String> {
     let sizes = |calibration: &Calibration| (calibration.frames(), calibration.raster());
     if sizes(head) == sizes(stored) {
@@ -207,7 +206,7 @@ fn misfit(config: &HeadConfig, head: &Calibration, stored: &Calibration) -> Opti
     ))
 }
 
-/// What is known of the configured head, without opening it.
+/// The calibration of the configured head, without opening it.
 ///
 /// # Errors
 /// If a file of the head is missing or wrong.
@@ -240,7 +239,7 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
 /// The scenario of a file, or the default one.
 ///
 /// # Errors
-/// If the file does not exist or is no scenario.
+/// If the file does not exist or is not a scenario.
 pub fn scenario(path: Option<&Path>) -> Result<Scenario, Failure> {
     let Some(path) = path else {
         return Ok(Scenario::default());
@@ -258,7 +257,7 @@ pub fn scenario(path: Option<&Path>) -> Result<Scenario, Failure> {
         .map_err(|error| Failure::new(Exit::Configuration, error.to_string()))
 }
 
-/// What is known of a simulated head: everything.
+/// The exact calibration of a simulated head.
 fn exact(scenario: &Scenario) -> Result<Calibration, Failure> {
     Calibration::of_scenario(scenario)
         .map_err(|error| Failure::because(Exit::Configuration, "simulate the head", error))

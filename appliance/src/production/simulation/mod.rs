@@ -1,7 +1,7 @@
-//! The part in front of a simulated head: which one lies there, which there are, and putting another in its place.
+//! The part in front of a simulated head: shows which one it is and which there are, and replaces it by another.
 //!
-//! The light of a part is worked out aside, which takes seconds, while the station goes on with the part before. Then the measuring
-//! task puts it in place between two cycles: frames of one cycle never show two parts.
+//! The light of a new part is computed on the caller's thread, which takes seconds, while the station measures the part before. Then
+//! the measuring task puts the part in place between two cycles, so that the frames of a cycle never show two parts.
 
 use crate::head::placed::{Placed, kinds};
 use crate::production::Order;
@@ -11,20 +11,21 @@ use std::sync::mpsc::{self, RecvTimeoutError, Sender, SyncSender};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
-/// Longest wait for the measuring task: it may be in the middle of a cycle.
+/// Longest wait for the measuring task, which may be in the middle of a cycle.
 const PATIENCE: Duration = Duration::from_secs(3);
+
 /// Why a part was not put in place, in words with the remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PutError {
     /// There is no such part, or the head is not simulated.
     #[error("{0}")]
     Unfit(String),
-    /// Not now.
+    /// The measuring task is busy, or another part is being put in place.
     #[error("{0}")]
     Busy(String),
 }
 
-/// The way to the part in front of a simulated head. Cheap to clone.
+/// Access to the part in front of a simulated head. Cheap to clone.
 #[derive(Clone)]
 pub struct Simulation {
     stage: Arc<OnceLock<Stage>>,
@@ -33,7 +34,7 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Of a measuring task that takes these orders.
+    /// For the measuring task that takes these orders.
     pub fn new(orders: Sender<Order>) -> Self {
         Self {
             stage: Arc::default(),
@@ -42,10 +43,10 @@ impl Simulation {
         }
     }
 
-    /// The head is open: where parts are placed in front of it, if it is simulated.
+    /// The head is open; `stage` is where parts are placed if it is simulated.
     pub fn opened(&self, stage: Option<&Stage>) {
         if let Some(stage) = stage {
-            // A second time it is the same one.
+            // A head that is opened again has the same stage.
             let _ = self.stage.set(stage.clone());
         }
     }
@@ -61,10 +62,10 @@ impl Simulation {
         }
     }
 
-    /// Puts a part in place, and returns when the next cycle sees it. Takes seconds.
+    /// Puts a part in place; returns when the next cycle sees it, after seconds.
     ///
     /// # Errors
-    /// The head is not simulated, the part cannot be, or the measuring task has something else to do.
+    /// If the head is not simulated, the part is impossible, or the measuring task is busy.
     pub fn put(&self, placed: &Placed) -> Result<(), PutError> {
         let unfit = |words: String| PutError::Unfit(format!("put the part in place: {words}"));
         let stage = self.stage.get().ok_or_else(|| {
@@ -86,7 +87,7 @@ impl Simulation {
             waiting: waiting.clone(),
             done,
         };
-        // Where nobody takes it, nobody answers.
+        // If the measuring task is gone, `placing` and with it the sender of the answer are dropped.
         drop(self.orders.send(Order::Place(placing)));
         let busy = || {
             let words = "put the part in place: the measuring task is busy or its head is lost; try again when it is ready";
@@ -95,7 +96,7 @@ impl Simulation {
         match told.recv_timeout(PATIENCE) {
             Ok(()) => Ok(()),
             Err(RecvTimeoutError::Disconnected) => busy(),
-            // It is taken back, unless it is being put in place at this moment.
+            // The part is taken back, unless it is being put in place at this moment.
             Err(RecvTimeoutError::Timeout) => match taken(&waiting) {
                 Some(_) => busy(),
                 None => told.recv().or_else(|_| busy()),
@@ -104,7 +105,7 @@ impl Simulation {
     }
 }
 
-/// A part on its way in front of the head, for the measuring task.
+/// A part that the measuring task is to put in front of the head.
 pub struct Placing {
     stage: Stage,
     waiting: Arc<Mutex<Option<Staged>>>,
@@ -112,7 +113,7 @@ pub struct Placing {
 }
 
 impl Placing {
-    /// Puts it in place, unless whoever asked has given up.
+    /// Puts it in place, unless the requester has given up.
     pub fn carry_out(self) {
         if let Some(staged) = taken(&self.waiting) {
             self.stage.show(staged);

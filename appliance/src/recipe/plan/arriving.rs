@@ -1,4 +1,4 @@
-//! Decoding on arrival: each level while the next is being exposed.
+//! Decoding on arrival: each level is decoded while the next one is being exposed.
 
 use super::Plan;
 use super::run::Run;
@@ -10,22 +10,22 @@ use algo::pipeline::arrive;
 use hal::frame::Frame;
 use std::sync::PoisonError;
 
-/// What the levels of a sequence said that have arrived so far.
+/// The decoded levels of a sequence that is being exposed.
 #[derive(Debug)]
 pub struct Arriving {
     sequence: usize,
-    /// None where there is nothing to decode before the last frame.
+    /// `None` if nothing can be decoded before the last frame.
     arrived: Option<Arrived>,
 }
 
 impl Arriving {
-    /// A measurement with a sequence of which nothing is decoded on arrival.
+    /// A measurement without decoding on arrival.
     pub(super) fn none(sequence: usize) -> Self {
         let arrived = None;
         Self { sequence, arrived }
     }
 
-    /// Which sequence.
+    /// The index of the sequence.
     pub(super) fn sequence(&self) -> usize {
         self.sequence
     }
@@ -60,13 +60,14 @@ impl Plan {
         let decoder = run.production.decoder();
         let places = run.coarser().nth(arrived.levels()).unwrap_or(&[]);
         let views = views(places, frames);
-        // What does not fit says so when all frames are there.
+        // Frames that do not fit are reported when all of them are inspected.
         if views.is_none_or(|views| arrive(decoder, &views, arrived).is_err()) {
             arriving.arrived = None;
         }
     }
 
-    /// Inspects with what the levels said that have arrived, if these are all but the finest; their room goes back to its run.
+    /// Calls `inspect` with the decoded levels and the frames of the finest one, if all levels but the finest are decoded. Their
+    /// memory goes back to the run.
     pub(super) fn with_arrived<R>(
         &self,
         arriving: Arriving,
@@ -104,7 +105,7 @@ impl Run {
         levels.take(coarser)
     }
 
-    /// Room for them; none if there are none.
+    /// Memory for them; `None` if the sequence has one level only.
     fn room(&self) -> Option<Arrived> {
         if self.coarser().len() == 0 {
             return None;
@@ -122,7 +123,7 @@ impl Run {
     }
 }
 
-/// Some of the frames as computation takes them; none if one is not there or not what it says.
+/// Views of some of the frames; `None` if a frame is missing or inconsistent.
 fn views<'a>(
     places: &[usize],
     frames: &'a [Frame],

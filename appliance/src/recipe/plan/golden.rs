@@ -1,4 +1,4 @@
-//! The part as taught, in the form that production needs.
+//! The taught part in the form that production needs: weights, safe maps and the golden surface.
 
 use crate::recipe::archive::Arrays;
 use crate::recipe::{SequenceKind, safe};
@@ -10,7 +10,7 @@ use algo::units::{AbsolutePhase, Height, Modulation};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Where the part is compared, how much deviations count there, and how certain its taught heights are.
+/// The weight of each pixel's deviation, and the uncertainty of its taught height.
 pub(super) fn taught(noise_counts: f64, arrays: &Arrays, decoder: &Decoder) -> Taught {
     let full_scale = f64::from(decoder.full_scale());
     let noises = arrays.modulation.iter().zip(&arrays.height_slope);
@@ -27,7 +27,8 @@ pub(super) fn taught(noise_counts: f64, arrays: &Arrays, decoder: &Decoder) -> T
     Taught::new(weights.zip(sigmas))
 }
 
-/// The phase that a sequence of limited reach is unwrapped about: golden, but where the placement could move it further.
+/// The phase that a sequence of limited reach is unwrapped about: golden's, unknown where a placement could move the phase
+/// further than the sequence reaches. `None` for the full sequence.
 pub(super) fn safe_map(arrays: &Arrays, kind: SequenceKind) -> Option<Vec<AbsolutePhase>> {
     let limit = kind.reach()?;
     let phase: Vec<_> = arrays
@@ -39,8 +40,8 @@ pub(super) fn safe_map(arrays: &Arrays, kind: SequenceKind) -> Option<Vec<Absolu
     Some(safe(&phase, &arrays.phase_reach, limit))
 }
 
-/// The surface that heights are counted from: golden. Where golden has nothing, an opening say, it is at the height of the
-/// surface around: material where there should be none must be seen, by the full sequence at least.
+/// The surface that deviations refer to. Where golden has none, such as in an opening, it is interpolated from the surface
+/// around: material that should not be there must be found, by the full sequence at least.
 pub(super) fn surface(width: usize, arrays: &Arrays) -> KnownSurface {
     let turns = arrays.golden_phase.par_iter().copied();
     let mut height = vec![Height::UNKNOWN; arrays.golden_height.len()];
@@ -62,7 +63,7 @@ pub(super) fn surface(width: usize, arrays: &Arrays) -> KnownSurface {
     }
 }
 
-/// Widens a window by what parts are compared with: their motion is found from all of it.
+/// Widens the window of a plan to all pixels that are compared: the part's motion is estimated from all of them.
 pub(super) fn widen(window: &mut [Range<usize>], arrays: &Arrays, width: usize) {
     for (seen, valid) in window.iter_mut().zip(arrays.valid.chunks(width.max(1))) {
         let first = valid.iter().position(|&valid| valid != 0);

@@ -1,4 +1,4 @@
-//! From what was found to a verdict.
+//! From findings to a verdict, or to the reason why a longer sequence should be tried.
 
 use crate::recipe::Demands;
 use crate::station::{GaugeValue, Inspection, Placement, Skipped, Verdict};
@@ -6,11 +6,11 @@ use algo::inspect::Findings;
 use algo::inspect::align::Placed;
 use std::sync::Arc;
 
-/// More than this share of the pixels that are lit contradict themselves: 1 % is what silhouettes give.
+/// Largest share of lit pixels whose levels contradict each other; silhouettes cause about 1 %.
 const CONTRADICTING: f64 = 0.03;
-/// The pattern has lost this much of its contrast: a level's noise has grown by half.
+/// Least fitness (taught noise over measured noise of the height); below it the noise has grown by half.
 const UNFIT: f64 = 0.67;
-/// More than this share of the points lie off the taught surface: a defect is smaller, a wrong fringe order is not.
+/// Largest share of points off the taught surface: a defect covers less, wrong fringe orders more.
 const OUTLIERS: f64 = 0.2;
 
 impl Demands {
@@ -24,7 +24,7 @@ impl Demands {
                 reading.and_then(|reading| reading.sigma),
                 (limits.low, limits.high),
             );
-            // The recipe was checked for at most as many gauges as fit.
+            // Cannot be full: the recipe was checked for MAX_GAUGES.
             let _ = inspection.gauges.push(judged);
         }
         let coverage = findings.coverage;
@@ -49,7 +49,7 @@ impl Demands {
         };
     }
 
-    /// Why the part cannot be judged, from an inspection that lacks only its verdict; none if it can.
+    /// Why the part cannot be judged; `None` if it can. The inspection lacks only its verdict.
     fn not_judged(&self, inspection: &Inspection, coverage: f64) -> Option<String> {
         if coverage < self.min_coverage {
             return Some(format!(
@@ -91,7 +91,7 @@ impl Demands {
         ))
     }
 
-    /// Why a longer sequence should be tried; none if this one will do.
+    /// Why a longer sequence should be tried; `None` if this one is good enough.
     pub(super) fn step_up(&self, findings: &Findings) -> Option<&'static str> {
         let placed = findings.placed.as_ref();
         let fitness = findings.taught_noise_mm / findings.height_noise_mm.max(f64::MIN_POSITIVE);
@@ -111,7 +111,7 @@ impl Demands {
     }
 }
 
-/// How the part lies, for those who look.
+/// The placement that is shown with the result.
 fn placement(placed: &Placed) -> Placement {
     let values = placed.motion.values();
     Placement {

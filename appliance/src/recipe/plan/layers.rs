@@ -1,4 +1,4 @@
-//! Pictures of a measured part: height, deviation from golden and modulation of every pixel, and its point cloud.
+//! Maps of a measured part for the page (height, deviation from golden, modulation), and its point cloud.
 
 use super::Plan;
 use crate::head::seam;
@@ -14,14 +14,14 @@ pub struct Layers {
     pub width: usize,
     /// z in mm, NaN where not resolved.
     pub height_mm: Vec<f32>,
-    /// z above golden in mm, NaN where either is not known.
+    /// Height above golden in mm, NaN where either is not known.
     pub deviation_mm: Vec<f32>,
     /// Modulation of the finest level in counts.
     pub modulation: Vec<f32>,
 }
 
 impl Plan {
-    /// The maps of a part from the frames of a sequence; `None` if the frames are not those.
+    /// The maps of a part from the frames of a sequence; `None` if the frames do not fit.
     pub fn layers(&self, sequence: usize, frames: &[Frame]) -> Option<Layers> {
         let maps = self.heights(sequence, frames)?;
         let production = &self.runs.get(sequence)?.production;

@@ -1,4 +1,4 @@
-//! A recipe made ready to run: from frames to an inspection without anything that can fail.
+//! A recipe joined with the head's calibration. Planning can fail; judging a part with the plan always ends in an inspection.
 
 mod arriving;
 mod golden;
@@ -32,19 +32,19 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-/// A recipe joined with the head's calibration. Of the recipe's arrays only what production needs is kept.
+/// A recipe joined with the head's calibration. Of the recipe's arrays only what production reads is kept.
 #[derive(Debug)]
 pub struct Plan {
     id: RecipeId,
     conditions: Conditions,
     /// What it demands of a part.
     demands: Demands,
-    /// What is projected, each once; first the shots of the first run.
+    /// What the rasters show, each once; those of the first run come first.
     shots: Vec<Shot>,
-    /// The sequences in the order in which they are tried; each unwraps further than the one before. Their indices are the
-    /// steps of a cycle.
+    /// The sequences in the order in which they are tried; each unwraps further than the one before. Methods take the index of
+    /// one as `sequence`.
     runs: Vec<Run>,
-    /// The buffers of a cycle, made once.
+    /// The buffers of an inspection, allocated once.
     strips: Mutex<Strips>,
     simulated: bool,
 }
@@ -84,9 +84,9 @@ pub struct Maps {
     pub height_mm: Vec<f32>,
 }
 
-/// A frame is inspected in this many strips: work for four threads, and few rows that two of them need.
+/// A frame is inspected in this many strips: enough for four threads, with few rows that two strips both need.
 pub const STRIPS: usize = 4;
-/// Heights are planned at least so many pixels around the part as taught: what a part that is not aligned may be moved by.
+/// Heights are planned this many pixels around the taught part at least: a part that is not aligned may be displaced by that.
 const AROUND: usize = 16;
 /// Most bytes of a recipe's patterns: 64 of a projector of 1920 × 1080 pixels take half of it.
 const MAX_PATTERN_BYTES: usize = 256 << 20;
@@ -114,7 +114,7 @@ impl Plan {
         Self::again(recipe, calibration, simulated)
     }
 
-    /// The same, to judge a recorded part again: `calibration` is read from the recording. A recording does not hold the
+    /// As [`Self::new`], to judge a recorded part again: `calibration` is read from the recording. A recording does not hold the
     /// projector's grey response, so the calibration's fingerprint cannot be computed from it and is not compared here;
     /// it was compared when the part was measured. Judging frames does not use the response.
     ///
@@ -130,8 +130,8 @@ impl Plan {
             .map_err(|reason| PlanError::Unfit { number, reason })
     }
 
-    /// Leaves only the sequence of these shots: a head that plays a recording has no others. Where no sequence does, nothing
-    /// changes.
+    /// Keeps only the sequence that consists of these shots: a head that plays a recording has no other frames. If there is no
+    /// such sequence, nothing changes.
     pub fn only(mut self, shots: &[Shot]) -> Self {
         if let Some(sequence) = self.sequence_of(shots) {
             let mut run = self.runs.swap_remove(sequence);
@@ -152,7 +152,7 @@ impl Plan {
             gauges,
             mut arrays,
         } = recipe;
-        // They are large, and production does not read them.
+        // Large arrays that production does not read.
         arrays.phase_function = Vec::new();
         arrays.height_curvature = Vec::new();
         let camera = conditions.camera;
@@ -207,7 +207,7 @@ impl Plan {
                 MAX_PATTERN_BYTES >> 20
             ));
         }
-        // What is left of the recipe is no longer needed where the most memory is.
+        // Freed before the expansion of the height is allocated, which takes the most memory.
         drop(arrays);
         let range = conditions.expansion_range_turns;
         let rises = Rises::new(&triangulator, surface, range, &window, away.max(AROUND));
@@ -244,7 +244,7 @@ impl Plan {
         &self.conditions
     }
 
-    /// Bytes of its maps and of its phase function: nearly all that it takes.
+    /// Bytes of its maps and of its phase function: nearly all of its memory.
     pub fn bytes(&self) -> usize {
         let production = self.production();
         let function = production.triangulator().function();
@@ -256,33 +256,33 @@ impl Plan {
         production.rises().bytes() + samples * size_of::<f64>() + runs
     }
 
-    /// Levels and shifts of the sequence that is tried first.
+    /// Levels of the sequence that is tried first.
     pub fn sequence(&self) -> &Sequence {
         &self.runs[0].levels
     }
 
-    /// How many sequences there are to try, one after the other until one is good enough.
+    /// Number of sequences; they are tried one after the other until one is good enough.
     pub fn sequence_count(&self) -> usize {
         self.runs.len()
     }
 
-    /// Which of the plan's rasters the frames of a sequence show; none if there is no such sequence.
+    /// Which of the plan's rasters the frames of a sequence show; empty if there is no such sequence.
     pub fn indices(&self, sequence: usize) -> &[usize] {
         self.runs.get(sequence).map_or(&[], |run| &run.indices)
     }
 
-    /// What each frame of a sequence shows, in their order; nothing if there is no such sequence.
+    /// What each frame of a sequence shows, in their order; empty if there is no such sequence.
     pub fn shots(&self, sequence: usize) -> impl ExactSizeIterator<Item = Shot> {
         let indices = self.indices(sequence).iter();
         indices.map(|&index| self.shots[index])
     }
 
-    /// Which sequence consists of these shots; `None` if none does.
+    /// The sequence that consists of these shots, if there is one.
     pub fn sequence_of(&self, shots: &[Shot]) -> Option<usize> {
         (0..self.sequence_count()).find(|&sequence| self.shots(sequence).eq(shots.iter().copied()))
     }
 
-    /// The columns of each row that some gauge looks at.
+    /// The columns of each row that some gauge needs.
     pub fn window(&self) -> &[Range<usize>] {
         self.production().window()
     }
@@ -292,29 +292,29 @@ impl Plan {
         self.production().map()
     }
 
-    /// From frames of the first sequence to findings.
+    /// What computes findings from frames of the first sequence.
     pub fn production(&self) -> &Production {
         &self.runs[0].production
     }
 
-    /// The same, for its own sake.
+    /// The same by value.
     pub fn into_production(mut self) -> Production {
         self.runs.swap_remove(0).production
     }
 
-    /// The patterns of all sequences; those of the first stand first, in the order of its frames.
+    /// The rasters of all sequences; those of the first come first, in the order of its frames.
     pub fn rasters(&self, calibration: &Calibration) -> Result<Vec<Raster>, hal::error::Error> {
         let function = self.production().triangulator().function();
         rasters(function, &self.shots, calibration)
     }
 
-    /// Judges a part from the frames of a sequence; its stages begin at `exposed`. Always ends in an inspection; what
-    /// cannot be measured is INVALID with a reason.
+    /// Judges a part from the frames of a sequence; the times of its stages begin at `exposed`. A part that cannot be measured
+    /// is INVALID with a reason.
     pub fn inspect(&self, sequence: usize, frames: &[Frame], exposed: Instant) -> Inspection {
         self.inspect_arrived(frames, Arriving::none(sequence), exposed)
     }
 
-    /// The same, with the levels that were decoded on arrival.
+    /// As [`Self::inspect`], with the levels that were decoded on arrival.
     pub fn inspect_arrived(
         &self,
         frames: &[Frame],
@@ -350,7 +350,7 @@ impl Plan {
         inspection
     }
 
-    /// The heights of the part from the frames of a sequence, for the page; `None` if the frames are not those.
+    /// The heights of the part from the frames of a sequence, for the page; `None` if the frames do not fit.
     pub fn heights(&self, sequence: usize, frames: &[Frame]) -> Option<Maps> {
         let (columns, rows, _) = self.conditions.camera;
         let width = columns as usize;
@@ -371,7 +371,7 @@ impl Plan {
     ) -> Result<Findings, String> {
         let run = self.runs.get(sequence);
         let run = run.ok_or_else(|| format!("the recipe has no sequence {sequence}"))?;
-        // Made for every trigger, so not on the heap.
+        // On the stack: a trigger allocates nothing.
         let mut views: heapless::Vec<FrameView<'_>, MAX_FRAMES> = heapless::Vec::new();
         for frame in frames {
             let view = seam::view(frame).map_err(|error| error.to_string())?;
@@ -382,7 +382,7 @@ impl Plan {
             Some((arrived, last)) => Light::Finest(arrived, last),
             None => Light::Frames(&views),
         };
-        // A strip is cleared before it is used, whatever was left in it.
+        // A poisoned lock does no harm: strips are cleared before they are used.
         let mut strips = self.strips.lock().unwrap_or_else(PoisonError::into_inner);
         let production = &run.production;
         let placed = production.place(light, &mut strips);
@@ -395,7 +395,7 @@ impl Plan {
     }
 }
 
-/// Stamps the stages of an inspection, each from the end of the one before.
+/// Measures how long the stages of an inspection take, each from the end of the one before.
 struct Laps {
     stages: Stages,
     since: Instant,
@@ -416,17 +416,17 @@ impl Laps {
     }
 }
 
-/// How many pixels a part that is moved by `mm` moves at most, about.
+/// About how many pixels the image of a part that is displaced by `mm` moves at most.
 fn pixels(triangulator: &Triangulator, mm: f64) -> usize {
     let camera = triangulator.camera();
     let (u, v) = (camera.width() as f64 / 2.0, camera.height() as f64 / 2.0);
     let at = |u: f64, v: f64| triangulator.point(u as usize, v as usize, Height::from_nm(0));
     let pitch = at(u, v).zip(at(u + 1.0, v)).map(|(a, b)| (b - a).length());
-    // A pixel more for the rounding of corners.
+    // One pixel more for rounding.
     pitch.map_or(0, |pitch| (mm / pitch).ceil().min(u) as usize + 1)
 }
 
-/// The bit of RESULT's flags that says which sequence was used.
+/// The flag of a result that says which kind of sequence was used.
 fn sequence_flag(kind: SequenceKind) -> u16 {
     match kind {
         SequenceKind::SingleLevel => SINGLE_LEVEL,

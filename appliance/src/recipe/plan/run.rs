@@ -1,4 +1,4 @@
-//! One sequence of a recipe made ready to run.
+//! One sequence of a recipe, ready to judge parts.
 
 use super::golden;
 use crate::recipe::archive::Arrays;
@@ -20,13 +20,13 @@ pub(super) struct Run {
     /// Which of the plan's rasters its frames show.
     pub indices: Vec<usize>,
     pub production: Production,
-    /// Room for the levels that are decoded on arrival, since there first were some.
+    /// Memory for the levels that are decoded on arrival, allocated by the first cycle.
     pub arrived: Mutex<Option<Arrived>>,
     /// Bytes of its maps.
     pub bytes: usize,
 }
 
-/// A sequence of a recipe before it is known how phases become heights.
+/// A sequence of a recipe before it is joined with the geometry.
 pub(super) struct Unjoined {
     kind: SequenceKind,
     levels: Sequence,
@@ -79,7 +79,7 @@ impl Unjoined {
         })
     }
 
-    /// Joins it with what all have in common.
+    /// Joins it with what all sequences share.
     pub fn join(self, shared: &Shared<'_>) -> Result<Run, String> {
         let map = size_of_val(self.map.as_deref().unwrap_or(&[]));
         let bytes = map + self.taught.bytes();

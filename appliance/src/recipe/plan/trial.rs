@@ -1,4 +1,4 @@
-//! Whether a recipe can be run on a head: it is planned once, before it is stored, and the plan dropped.
+//! Checks whether a recipe can be used on a head by planning it; the plan is dropped.
 
 use super::{Plan, PlanError};
 use crate::head::calibration::Calibration;

@@ -1,10 +1,10 @@
-//! The part of the frame that some gauge looks at.
+//! The part of the frame that the gauges need.
 
 use algo::inspect::{Gauge, Measure};
 use std::ops::Range;
 
-/// The columns of each row of a frame of (width, height) that some gauge looks at: its region with half its smoothing and
-/// `away` pixels around, how far the part may have been moved. Nothing else is computed.
+/// The columns of each row of a frame of (width, height) that some gauge needs: its region, half of its smoothing square and
+/// `away` pixels around it, by which the part may be displaced. Nothing outside is computed.
 pub(super) fn of(
     gauges: &[Gauge],
     (width, height): (usize, usize),

@@ -8,7 +8,7 @@ use std::path::Path;
 /// The file: starts, unclean starts, the daemon's condition, and starts after it hung, e.g. `12 1 running 0`.
 const FILE: &str = "boots";
 
-/// The daemon's condition. An end without a stop leaves the last one in the file.
+/// The daemon's condition. If it ends without a stop, the file keeps the last one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Condition {
     /// It was stopped.
@@ -16,7 +16,7 @@ pub enum Condition {
     Stopped,
     /// It runs.
     Running,
-    /// It runs, but its measuring task has missed its deadlines for a while, for which a watchdog ends it.
+    /// It runs, but its measuring task has missed its deadlines for so long that a watchdog will end it.
     Hanging,
 }
 
@@ -39,14 +39,14 @@ pub struct Boots {
     pub starts: u32,
     /// Starts after an end without a stop.
     pub unclean: u32,
-    /// Of the unclean starts, those after a daemon that hung, as a rule ended by a watchdog.
+    /// Unclean starts after a daemon that hung, usually ended by a watchdog.
     pub after_hanging: u32,
-    /// Now.
+    /// The current condition.
     pub condition: Condition,
 }
 
 impl Boots {
-    /// The counts with this start. With a damaged file they begin anew: they are for people, and no decision depends on them.
+    /// The counts including this start. They begin at zero if the file is damaged: no decision depends on them.
     pub fn begin(folder: &Path) -> Self {
         let text = fs::read_to_string(folder.join(FILE)).unwrap_or_default();
         let mut words = text.split_whitespace();

@@ -1,6 +1,6 @@
 //! The survey: load, memory, storage, temperature, stored recipes and Modbus clients, once a second.
 //!
-//! It has a thread of its own, because a storage that hangs must delay neither sockets nor measuring.
+//! It has its own thread, so that a storage that hangs delays neither sockets nor measuring.
 
 mod boots;
 mod system;
@@ -17,8 +17,8 @@ use std::time::Duration;
 
 /// Time between two surveys.
 const PERIOD: Duration = Duration::from_secs(1);
-/// A measuring task that missed its deadlines for this many surveys hangs. Opening a lost head again takes less, so it causes no
-/// write to the card.
+/// A measuring task that missed its deadlines in this many surveys in a row hangs. Opening a lost head again takes less time, so
+/// that it does not cause writes to the card.
 const HANGING: u32 = 10;
 
 /// What is surveyed.

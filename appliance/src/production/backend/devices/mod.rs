@@ -1,4 +1,4 @@
-//! Real devices: what this build has of their libraries, and how they are opened.
+//! Real devices: which of their libraries this build has, and how they are opened.
 
 #[cfg(all(feature = "kms", feature = "libcamera"))]
 mod rpi;
@@ -19,25 +19,25 @@ use hal::trigger::{NoTrigger, Trigger};
 pub struct Wires {
     /// In: starts a cycle.
     pub start: Option<Box<dyn StartLine>>,
-    /// Out: the station works.
+    /// Out: the station is working on a job.
     pub busy: Option<Box<dyn OutputLine>>,
     /// Out: the last part passed.
     pub ok: Option<Box<dyn OutputLine>>,
-    /// Out: a start would not be taken, and not for being busy.
+    /// Out: a start would be refused for another reason than being busy.
     pub fault: Option<Box<dyn OutputLine>>,
 }
 
-/// The libraries of devices, and whether this build has them.
+/// The device libraries, and whether this build has them.
 const LIBRARIES: [(&str, bool); 3] = [
     ("libcamera", cfg!(feature = "libcamera")),
     ("kms", cfg!(feature = "kms")),
     ("gpio", cfg!(feature = "gpio")),
 ];
 
-/// Whether this build has what a configuration needs.
+/// Checks that this build has the device libraries that a configuration needs.
 ///
 /// # Errors
-/// What it lacks, and how it is built with it (78).
+/// What it lacks, and how to build it (78).
 pub fn built_for(config: &Config) -> Result<(), Failure> {
     built_for_head(&config.head)?;
     built_for_lines(&config.lines)
@@ -72,7 +72,7 @@ fn built_with(key: &str, needed: &[&str], feature: &str) -> Result<(), Failure> 
     Err(Failure::new(Exit::Configuration, message))
 }
 
-/// Opens camera, projector and trigger. What is known of them is nominal, so nothing may be measured with it.
+/// Opens camera, projector and trigger. Their calibration is nominal, so nothing may be measured with it.
 ///
 /// # Errors
 /// If this build has no such devices (78), or one of them is not there (69).
@@ -88,7 +88,7 @@ fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<DynHead, Failu
     rpi::head(config, trigger).map_err(|error| Failure::of_device(&error))
 }
 
-/// [`built_for_head`] has refused it before.
+/// Not reached: [`built_for_head`] refuses the head in this build.
 #[cfg(not(all(feature = "kms", feature = "libcamera")))]
 fn head(_: &HeadConfig, _: Box<dyn Trigger>) -> Result<DynHead, Failure> {
     Err(uncalibrated())
@@ -105,13 +105,13 @@ fn trigger(setup: &TriggerSetup) -> Result<Box<dyn Trigger>, Failure> {
     }
 }
 
-/// None is named: [`built_for_head`] has refused one.
+/// Without GPIO no trigger line is configured: [`built_for_head`] refuses one.
 #[cfg(not(feature = "gpio"))]
 fn trigger(_: &TriggerSetup) -> Result<Box<dyn Trigger>, Failure> {
     Ok(Box::new(NoTrigger))
 }
 
-/// Something that can be worked with until the head is calibrated: lenses and places like those of the reference head. No height may be made of it.
+/// A placeholder until the head is calibrated: lenses and poses like those of the reference head. No height may be computed with it.
 fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Result<Calibration, Failure> {
     let model = |width: u32, height: u32, aside_mm: f64| DeviceModel {
         fx: 1.6 * f64::from(width),
@@ -135,7 +135,7 @@ fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Result<Calibration, Fa
     .map_err(|error| Failure::because(Exit::Unavailable, "open the head", error))
 }
 
-/// The failure of a head of which nothing is known yet.
+/// The failure of a head without a calibration.
 pub(super) fn uncalibrated() -> Failure {
     let message = "the head is not calibrated: calibrate it with `fringed calibrate`";
     Failure::new(Exit::Missing, message)
@@ -166,14 +166,14 @@ fn wired(setup: &LinesSetup) -> Result<Wires, Failure> {
             start: start.map(|line| -> Box<dyn StartLine> { Box::new(line) }),
             busy: output(&setup.busy, false)?,
             ok: output(&setup.ok, false)?,
-            // Without a station nothing is measured.
+            // A fault until the station says otherwise.
             fault: output(&setup.fault, true)?,
         })
     };
     open().map_err(|error: LineError| Failure::new(Exit::Unavailable, error.to_string()))
 }
 
-/// None is named: [`lines`] has refused those that are.
+/// Without GPIO no line is configured: [`lines`] refuses those that are.
 #[cfg(not(feature = "gpio"))]
 fn wired(_: &LinesSetup) -> Result<Wires, Failure> {
     Ok(Wires::default())

@@ -11,10 +11,10 @@ use hal::trigger::Trigger;
 /// Refreshes that each pattern stays in view: an exposure of one whole refresh fits two from wherever it starts.
 const HOLD: u32 = 2;
 
-/// Opens camera and projector. They stand in the relation of time that calibration measures, which is not known here.
+/// Opens camera and projector. The delays between them are set later, from the calibration.
 ///
 /// # Errors
-/// Of the device that is not there.
+/// That of the device that is not there.
 pub fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<DynHead, Error> {
     let starts = match config.trigger.line {
         Some(_) => Starts::OnTrigger,
