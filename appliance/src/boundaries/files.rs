@@ -99,7 +99,7 @@ fn a_boundary_value_in_a_calibration_is_refused_by_its_key_or_the_head_is_known_
     tally.walk(&tree, |place, value| {
         let text = place.replaced(&tree, value, write);
         let read = CalibrationFile::read(text.as_bytes());
-        // What is well formed would be refused for its checksum alone: it gets the right one.
+        // A well-formed file would be refused for its checksum alone, so it gets the right one.
         let Ok(file) = serde_json::from_str::<CalibrationFile>(&text) else {
             return read.map(drop);
         };
@@ -159,7 +159,7 @@ unit: mm
     for word in words.into_iter().filter(|word| !word.is_empty()) {
         let at = from + YAML[from..].find(word).unwrap();
         from = at + word.len();
-        // Words of the file stand for themselves in its messages: any node's name will do.
+        // Nodes have no keys that messages repeat, but every message names the file, which is called `camera`.
         let place = Place(vec!["camera".into()]);
         for value in values()
             .iter()
@@ -218,7 +218,7 @@ fn a_boundary_value_in_a_recording_is_refused_by_its_key_or_it_is_measured() {
     tally.walk(&tree, |place_of_value, value| {
         fs::write(&manifest, place_of_value.replaced(&tree, value, write)).unwrap();
         let recording = Recording::open(&place).map_err(|error| error.to_string())?;
-        // Whether there is something to see in the frames is another question.
+        // The frames may show nothing; that is not checked here.
         drop(measure(&recording, &place));
         Ok(())
     });

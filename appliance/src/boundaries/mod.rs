@@ -1,7 +1,7 @@
-//! Boundary values in every key of every file and request: each is refused by its key, or what it makes can be used.
+//! Boundary values in every key of every file and request: each is refused, naming its key, or the result can be used.
 //!
-//! A valid example of a format is walked as a tree: each value in turn, each element of a list and each list as a whole is
-//! replaced by each of [`VALUES`]. What a test counts is printed with `--nocapture`.
+//! In a valid example of a format, each value, each element of a list and each list as a whole is replaced by each of [`VALUES`] in
+//! turn. The tests print their counts with `--nocapture`.
 
 mod files;
 mod recipes;
@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 pub(crate) use recipes::Bed;
 
-/// What stands in for a value, as JSON: the ends of every type, what lies beyond, and what no JSON holds.
+/// The replacements of a value, as JSON text: the ends of every type, values beyond them, and text that is not JSON.
 const VALUES: [&str; 30] = [
     "0",
     "1",
@@ -48,21 +48,21 @@ const VALUES: [&str; 30] = [
     "[]",
     "{}",
 ];
-/// What marks the place of a value while a tree is written.
+/// Marks the place of the replaced value while a tree is written as text.
 const MARK: &str = "@here@";
 /// Most bytes of a message.
 const LONGEST_WORDS: usize = 3000;
-/// Longest time that a case may take.
+/// Longest time of a case.
 const LONGEST: Duration = Duration::from_secs(5);
 
-/// All values, and 900 kB of text; a manifest of a megabyte and more is not read at all.
+/// All values, and a text of 900 kB: manifests of a megabyte or more are not read at all.
 pub(crate) fn values() -> Vec<String> {
     let long = format!("\"{}\"", "x".repeat(900_000));
     let short = VALUES.iter().map(|value| (*value).to_owned());
     short.chain([long]).collect()
 }
 
-/// The place of a value in a tree: keys, and for elements of lists their index.
+/// The path of a value in a tree: keys, and indices of list elements.
 #[derive(Clone, Debug)]
 pub(crate) struct Place(Vec<String>);
 
@@ -73,7 +73,7 @@ impl std::fmt::Display for Place {
 }
 
 impl Place {
-    /// Whether a message about a value names one of its keys, or the line that it stands in; of a limit, gauge and key.
+    /// Whether a message about a value names one of the keys of its path or its line; for a limit of a gauge, the gauge and the key.
     pub fn is_named(&self, value: &str, words: &str) -> bool {
         if let [gauges, _, limit] = &self.0[..]
             && gauges == "gauges"
@@ -83,7 +83,7 @@ impl Place {
             return words.contains("gauge \"") && words.contains(limit);
         }
         let keys = self.0.iter().filter(|key| key.parse::<usize>().is_err());
-        // Of a list one member may be named.
+        // A message about a list may name one element: `gauge` for `gauges`.
         words.contains("line ")
             || keys
                 .clone()
@@ -105,7 +105,7 @@ impl Place {
         write(&tree).replacen(&format!("\"{MARK}\""), value, 1)
     }
 
-    /// The list at this place with its first element ten thousand times, if it is a list.
+    /// If there is a list at this place: a list of its first element ten thousand times.
     fn repeated(&self, tree: &Value) -> Option<String> {
         let mut tree = tree.clone();
         let first = self.of(&mut tree)?.as_array()?.first()?.to_string();
@@ -117,7 +117,7 @@ impl Place {
     }
 }
 
-/// The places of everything below the root.
+/// The places of all values below the root.
 pub(crate) fn places(tree: &Value) -> Vec<Place> {
     fn collect(node: &Value, at: &[String], all: &mut Vec<Place>) {
         if !at.is_empty() {
@@ -139,7 +139,7 @@ pub(crate) fn places(tree: &Value) -> Vec<Place> {
     all
 }
 
-/// How many cases there were, and of how many what they make could be used.
+/// Counts the cases of a test, and those whose result could be used.
 #[derive(Debug, Default)]
 pub(crate) struct Tally {
     cases: usize,
@@ -149,7 +149,7 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    /// Takes the answer of a case: whether it could be used, or why it was refused.
+    /// Adds the outcome of a case: its result could be used, or why it was refused.
     pub fn take(&mut self, place: &Place, value: &str, answer: Result<(), String>) {
         let named = |words: &str| place.is_named(value, words);
         let short: String = value.chars().take(60).collect();
@@ -184,7 +184,7 @@ impl Tally {
         }
     }
 
-    /// Walks a tree: each place with each value.
+    /// Runs a case for each place of a tree with each value.
     pub fn walk(&mut self, tree: &Value, case: impl Fn(&Place, &str) -> Result<(), String>) {
         let values = values();
         for place in places(tree) {
@@ -195,7 +195,7 @@ impl Tally {
         }
     }
 
-    /// Prints the count and checks that there were as many cases as there should be, and some of either answer.
+    /// Prints the counts, and checks that there were at least `least` cases, and that some were used and some refused.
     pub fn end(&self, what: &str, least: usize) {
         let Self { cases, used, wrong } = self;
         println!("{what}: {cases} boundary values, {used} of them can be used");

@@ -1,4 +1,4 @@
-//! Boundary values in a recipe: its manifest, its arrays, its ZIP.
+//! Boundary values in the manifest and the arrays of a recipe.
 
 use super::Tally;
 use crate::head::calibration::Calibration;
@@ -68,7 +68,7 @@ impl Bed {
     pub fn use_recipe(&self, recipe: Recipe) -> Result<(), String> {
         let plan = Plan::new(recipe, &self.calibration, true).map_err(|error| error.to_string())?;
         for sequence in 0..plan.sequence_count() {
-            // As many frames as the sequence has, of whatever shift.
+            // As many frames as the sequence has; their shifts do not matter.
             let count = plan.indices(sequence).len();
             let frames: Vec<Frame> = self.frames.iter().cloned().cycle().take(count).collect();
             drop(plan.inspect(sequence, &frames, Instant::now()));
@@ -106,7 +106,7 @@ fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_par
     let write = |tree: &Value| serde_json::to_string_pretty(tree).unwrap();
     let members = members(file, arrays);
     let read = |text: &str| {
-        // What parsing refuses is refused before a member is read.
+        // What parsing refuses is refused before any array is read.
         parse(text).map_err(|error| error.to_string())?;
         let (bytes, _) = seal(text, members.clone()).unwrap();
         Recipe::from_bytes(&bytes).map_err(|error| error.to_string())
@@ -160,7 +160,7 @@ fn arrays_of_any_numbers_never_panic() {
                 let places = arrays.valid.iter_mut().step_by(every);
                 places.for_each(|value| *value = number as u8);
             }
-            // Whatever it answers, it answers.
+            // Either result is right, as long as nothing panics.
             drop(Recipe::check(&bed.file, arrays).map(|recipe| bed.use_recipe(recipe)));
             cases += 1;
         }
@@ -185,7 +185,7 @@ fn a_recipe_for_a_projector_of_a_whole_turn_of_pixels_is_refused_and_does_not_re
         words.contains("projector.width is 4294967295: write 1 to 8192"),
         "{words}"
     );
-    // As an older program stored it: it is listed with its problem, the one before is used, and it pushes out nothing.
+    // Stored by an older program: it is listed with its problem, the generation before is used, and stays when another is stored.
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).unwrap();
     store.save(1, &bed.bytes).unwrap();
@@ -222,7 +222,7 @@ fn a_recipe_is_tried_out_on_the_head_before_it_is_taken() {
         change(&mut file);
         pack(&file, &bed.recipe.arrays).unwrap().0
     };
-    // Each value is within its bounds; together they do not fit this head.
+    // Each value is within its bounds, but together they do not fit this head.
     let beside = import(&changed(|file| file.range_mm = [-10.0, 9000.0])).unwrap_err();
     assert!(beside.contains("range"), "{beside}");
     let foreign = import(&changed(|file| file.calibration = "0".repeat(64))).unwrap_err();

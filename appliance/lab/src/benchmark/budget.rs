@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 const FOV_DEG: [f64; 2] = [22.28, 16.77];
 /// Longest wait for a frame.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// How far parts may lie from where they were taught, mm: careful enough for single levels.
+/// Placement tolerance, mm: small enough for single levels.
 const PLACEMENT_MM: f64 = 0.5;
 
 /// The time of one cycle, stage by stage.
@@ -31,7 +31,7 @@ pub struct Budget {
     pub height: u32,
     /// Frames of the production sequence.
     pub frames: usize,
-    /// Whether the part's motion is found and taken back.
+    /// Whether the part's motion is measured and compensated.
     pub aligned: bool,
     /// From the trigger to the end of the last exposure at the projector's refresh rate, ms.
     pub exposure_ms: f64,
@@ -49,8 +49,8 @@ pub struct Budget {
     pub x_kernel: f64,
 }
 
-/// Budgets of a camera of this size: with four frames of one level about the golden map, and with the full sequence; each
-/// for a part that lies as taught, and for one whose motion is taken back.
+/// Budgets of a camera of this size: with four frames of one level about the golden map, and with the full sequence; each without and
+/// with compensation of the part's motion.
 ///
 /// # Errors
 /// If something cannot be simulated or taught.
@@ -160,8 +160,8 @@ fn budget(
     })
 }
 
-/// Processor time of frames → verdict and of the phase kernel alone, ms, and their ratio. The two are timed in turn, each on
-/// so many frame sets that no cache holds them.
+/// Processor time of frames → verdict and of the phase kernel alone, ms, and their ratio. The two are timed in turn, each on more
+/// frame sets than fit into any cache.
 fn on_one_thread(plan: &Plan, frames: &[Frame], effort: &Effort) -> Result<[f64; 3], String> {
     let map = plan.golden_phase().to_vec();
     let mut sets = Rotation::of(FrameSet::of(frames, Some(map)), effort.bytes);

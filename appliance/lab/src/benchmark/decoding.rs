@@ -1,4 +1,4 @@
-//! The product's decoder, and all of production from frames to readings, as something to time.
+//! Kernels of the product: its decoder, and all of production from frames to readings.
 
 use super::frames::{FrameSet, Output};
 use super::kernel::Kernel;
@@ -80,7 +80,7 @@ impl Kernel for Inspecting<'_> {
         timed(|| drop(black_box(production.inspect(&frames, strips, None))))
     }
 
-    /// None: production keeps no phase map.
+    /// Empty: production keeps no phase map.
     fn turns(&self, _: &FrameSet) -> Vec<f64> {
         Vec::new()
     }

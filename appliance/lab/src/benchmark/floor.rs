@@ -1,8 +1,8 @@
 //! The floor: a loop that only reads twelve frames of 8 bits and writes one map of 32 bits.
 //!
-//! Every decoder has to do this as well, so none can be faster. Times are given as multiples of it, which makes machines
-//! comparable. It is bound by memory: a block of pixels is an exclusive or over twelve streams, and four copies of that,
-//! each with another constant, are the block's 32-bit values.
+//! Every decoder reads and writes at least this, so none can be faster. Times are given as multiples of the floor, which makes machines
+//! comparable. It is limited by memory: each block of pixels is the exclusive or of twelve streams, and four copies of that, each
+//! combined with another constant, are the bytes of the block's 32-bit values.
 
 /// Frames that the floor reads.
 pub const FRAMES: usize = 12;
@@ -10,8 +10,7 @@ pub const FRAMES: usize = 12;
 /// Pixels of a block: one line of a cache.
 const BLOCK: usize = 64;
 
-/// Reads all of `frames` (equally long) and writes all of `map`, a value for each pixel. What is left over behind the
-/// last whole block is not touched.
+/// Reads `frames` (of equal length) and writes `map`, a value for each pixel. Pixels after the last whole block are left out.
 pub fn floor(frames: &[&[u8]; FRAMES], map: &mut [[u8; 4]]) {
     let mut blocks = frames.map(|frame| frame.as_chunks::<BLOCK>().0.iter());
     let (out, _) = map.as_chunks_mut::<BLOCK>();

@@ -1,4 +1,4 @@
-//! Sets of frames that kernels are timed on, and a rotation through so many copies that no cache holds them.
+//! Sets of frames that kernels are timed on, and a rotation through more copies than fit into any cache.
 
 use algo::frame::{FrameView, Samples};
 use algo::phase::Trust;
@@ -12,7 +12,7 @@ pub struct FrameSet {
     height: usize,
     samples: Buffer,
     map: Option<Vec<AbsolutePhase>>,
-    /// What the kernel found.
+    /// The result of the kernel.
     pub out: Output,
 }
 
@@ -25,7 +25,7 @@ pub enum Buffer {
     Sixteen(Vec<u16>),
 }
 
-/// What a kernel finds in each pixel, row-major.
+/// The result of a kernel in each pixel, row-major.
 #[derive(Clone)]
 pub struct Output {
     /// Φ.
@@ -44,7 +44,7 @@ impl FrameSet {
         map: Option<Vec<AbsolutePhase>>,
     ) -> Self {
         let pixels = width * height;
-        // No value is zero, so that the system provides the memory before the first run.
+        // Not zero, so that the system maps the memory before the first run.
         let out = Output {
             phase: vec![AbsolutePhase::UNKNOWN; pixels],
             modulation: vec![Modulation::from_bits(1); pixels],

@@ -1,4 +1,4 @@
-//! The kernel table: processor time per pixel of every variant, and how many floors that is.
+//! The kernel table: processor time per pixel of every variant, in ns and in multiples of the floor.
 
 use super::floor::{self, floor};
 use super::frames::{FrameSet, Rotation};
@@ -11,8 +11,8 @@ use std::time::Duration;
 
 /// An implementation that computes the phases of a set of frames.
 pub trait Kernel {
-    /// Decodes a set and returns the processor time of the part that is timed: all of it, or only what remains once the
-    /// last frame has arrived, where the coarser levels are decoded before.
+    /// Decodes a set and returns the processor time of the timed part: of everything, or, where the coarser levels are decoded on
+    /// arrival, only of what remains after the last frame.
     fn run(&mut self, set: &mut FrameSet) -> Duration;
     /// Φ in turns that the last run found in `set`, NaN where rejected.
     fn turns(&self, set: &FrameSet) -> Vec<f64>;
@@ -27,7 +27,7 @@ pub struct Effort {
     pub bytes: usize,
     /// Rounds; figures are medians over them.
     pub rounds: usize,
-    /// A time is measured over a whole rotation, or over fewer sets once it has taken this long.
+    /// A time is measured over a whole rotation, or over fewer sets if these take this long already.
     pub patience: Duration,
 }
 
@@ -61,7 +61,7 @@ pub struct Timing {
     pub x_floor: f64,
     /// The least and the most of these ratios.
     pub x_floor_range: [f64; 2],
-    /// Share of the pixels that come out as they went in: the phase within 0.05 turn, or rejected where it is dark.
+    /// Share of the pixels with the right result: the phase within 0.05 turn, or rejected where it is dark.
     pub right: f64,
 }
 
@@ -186,7 +186,7 @@ fn share_right(
     right.count() as f64 / found.len().max(1) as f64
 }
 
-/// What the floor reads and writes.
+/// The memory that the floor reads and writes.
 pub(super) struct FloorSets {
     sets: Vec<(Vec<u8>, Vec<[u8; 4]>)>,
     pixels: usize,

@@ -1,11 +1,11 @@
-//! Which machine the times are of.
+//! The machine on which times are measured.
 
 use std::fs;
 
 /// The machine in words and numbers.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Machine {
-    /// The processor's model, or its architecture where the system does not tell.
+    /// The processor's model, or its architecture if the system does not name it.
     pub processor: String,
     /// Cores that this program may use.
     pub cores: usize,

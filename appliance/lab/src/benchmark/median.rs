@@ -1,6 +1,6 @@
-//! The middle of some measurements: one that another program disturbed does not move it.
+//! The median of some measurements, which a single disturbed one does not change.
 
-/// The middle value; of an even number the upper of the two, of none NaN.
+/// The median; for an even number of values the upper of the two middle ones, for no values NaN.
 pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)

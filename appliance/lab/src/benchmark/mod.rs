@@ -1,4 +1,4 @@
-//! `fringed-lab bench`: how fast the kernels are, what accuracy costs, and the time from trigger to verdict.
+//! `fringed-lab bench`: times the kernels, run time against error, and trigger to verdict.
 
 mod accuracy;
 mod budget;

@@ -11,9 +11,9 @@ pub trait Real:
     + Mul<Output = Self>
     + Div<Output = Self>
 {
-    /// The nearest to a number.
+    /// The nearest value to a number.
     fn of(x: f64) -> Self;
-    /// Of a sample, which is exact.
+    /// The value of a sample, exactly.
     fn count(sample: u16) -> Self;
     /// As `f64`.
     fn wide(self) -> f64;

@@ -1,9 +1,8 @@
-//! The reference that kernels are compared with: the textbook's formulas in floating point, one pass over whole frames
-//! per step, as a first implementation has them.
+//! The reference that kernels are compared with: the textbook's formulas in floating point, one pass over whole frames per operation,
+//! as in a first implementation.
 //!
-//! The sums S and C, atan2, modulation and one unwrapping step per level each walk over the frame and store an
-//! intermediate of its size. The intermediates are allocated once and reused, which favours the reference. It runs in
-//! `f64` and in `f32`.
+//! The sums S and C, atan2, modulation and the unwrapping of each level each pass over the frame and store an intermediate result of
+//! its size. The intermediate results are allocated once and reused, which favours the reference. It runs in `f64` and in `f32`.
 
 use super::frames::{Buffer, FrameSet};
 use super::kernel::Kernel;
@@ -14,7 +13,7 @@ use algo::units::AbsolutePhase;
 use appliance::production::stopwatch::timed;
 use std::time::Duration;
 
-/// Largest residual of an unwrapping step, turns.
+/// Largest residual of a level that is unwrapped, turns.
 const MAX_RESIDUAL: f64 = 0.40;
 
 /// A decoder of whole frames in the precision `T`.
@@ -77,7 +76,7 @@ impl<T: Real> Textbook<T> {
         let margin = (1.0 - coarsest * range.span()).max(0.0) / 2.0;
         let full_scale = f64::from((1_u32 << bit_depth) - 1);
         let count = sequence.levels().len();
-        // Not zero, so that the system provides the memory before the first run.
+        // Not zero, so that the system maps the memory before the first run.
         let buffer = || vec![T::of(1.0); pixels];
         Ok(Self {
             levels: sequence.levels().iter().map(LevelWeights::new).collect(),

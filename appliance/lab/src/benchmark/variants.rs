@@ -1,4 +1,4 @@
-//! Every variant that is timed: an implementation on a workload. New ones are added here.
+//! Every variant that is timed, which is an implementation on a workload. New variants are added here.
 
 use super::decoding::Decoding;
 use super::kernel::Kernel;

@@ -1,4 +1,4 @@
-//! What the kernels are timed on: synthetic frames of every kind of sequence, and the phase that is in them.
+//! The input of the kernels: synthetic frames of every kind of sequence, and their true phase.
 
 use super::frames::{Buffer, FrameSet};
 use algo::pattern::{PhaseRange, Sequence, Shot};
@@ -41,7 +41,7 @@ const NOISE: f64 = 0.025;
 const MAP_OFFSET: f64 = 0.25;
 
 impl Workload {
-    /// The first of them: twelve frames of three geometric levels, all of it lit.
+    /// The first one: twelve frames of three geometric levels, all pixels lit.
     pub fn geometric() -> Self {
         Self {
             name: "geometric_12",

@@ -1,8 +1,7 @@
-//! The cylinder that fits a point cloud best.
+//! Fits a cylinder to a point cloud by least squares.
 //!
-//! Gauss–Newton over the five parameters of a cylinder that lies along y: its axis
-//! (x₀ + a y, y, z₀ + c y) and its radius. Points far off are left out in rounds, so that wrong
-//! fringe orders do not bend the fit.
+//! Gauss–Newton over the five parameters of a cylinder along y: its axis (x₀ + a y, y, z₀ + c y) and its radius. Outliers are left
+//! out round by round, so that wrong fringe orders do not bias the fit.
 
 /// A fitted cylinder.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,9 +14,9 @@ pub struct Cylinder {
     pub left_out: usize,
 }
 
-/// Points further off than this are left out, round by round, mm.
+/// In each round, points further than this from the surface are left out, mm.
 const CUTS: [f64; 4] = [f64::INFINITY, 5.0, 1.0, 1.0];
-/// Steps of one round; the fit converges quadratically in three or four.
+/// Iterations of one round; the fit converges quadratically in three or four.
 const ITERATIONS: usize = 12;
 /// x₀, a, z₀, c, radius.
 const UNKNOWNS: usize = 5;
@@ -36,7 +35,7 @@ pub fn fit(points: &[[f64; 3]]) -> Option<Cylinder> {
     let mut shape = [(left + right) / 2.0, 0.0, top - radius, 0.0, radius];
     for cut in CUTS {
         for _ in 0..ITERATIONS {
-            shape = step(points, shape, cut)?;
+            shape = iterate(points, shape, cut)?;
         }
     }
     let [.., last] = CUTS;
@@ -56,7 +55,7 @@ pub fn fit(points: &[[f64; 3]]) -> Option<Cylinder> {
 fn distance(point: &[f64; 3], shape: &[f64; UNKNOWNS]) -> (f64, [f64; UNKNOWNS]) {
     let [x0, a, z0, c, radius] = *shape;
     let (x, y, z) = (point[0] - x0, point[1], point[2] - z0);
-    // The foot on the axis, as multiples of (a, 1, c).
+    // The foot of the perpendicular on the axis, in multiples of (a, 1, c).
     let foot = (a * x + y + c * z) / (a * a + 1.0 + c * c);
     let (wx, wy, wz) = (x - foot * a, y - foot, z - foot * c);
     let across = (wx * wx + wy * wy + wz * wz).sqrt().max(1e-12);
@@ -64,8 +63,8 @@ fn distance(point: &[f64; 3], shape: &[f64; UNKNOWNS]) -> (f64, [f64; UNKNOWNS])
     (across - radius, [-nx, -foot * nx, -nz, -foot * nz, -1.0])
 }
 
-/// One Gauss–Newton step over the points within `cut` of the surface.
-fn step(points: &[[f64; 3]], shape: [f64; UNKNOWNS], cut: f64) -> Option<[f64; UNKNOWNS]> {
+/// One Gauss–Newton iteration over the points within `cut` of the surface.
+fn iterate(points: &[[f64; 3]], shape: [f64; UNKNOWNS], cut: f64) -> Option<[f64; UNKNOWNS]> {
     let mut normal = [[0.0; UNKNOWNS + 1]; UNKNOWNS];
     for point in points {
         let (error, slopes) = distance(point, &shape);

@@ -1,4 +1,4 @@
-//! What a run reached: errors against truth, coverage, and the fit of a cylinder.
+//! Judges a run: errors against truth, coverage, and the fit of a cylinder.
 
 use super::cylinder::{self, Cylinder};
 use super::scenes::Judged;
@@ -6,14 +6,14 @@ use algo::phase::Trust;
 use appliance::head::rig::Measured;
 use appliance::measure::{GROSS_MM, Score, Truth};
 
-/// What a method reached on a part.
+/// The quality of one measurement of a part.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Errors against truth; `None` where nothing was resolved.
     pub score: Option<Score>,
-    /// Pixels that truth calls wholly lit. Everything here is counted over them, as in the study.
+    /// Pixels that truth calls wholly lit. All figures are over these pixels, as in the study.
     pub lit: usize,
-    /// Those of them that are not resolved.
+    /// Those that are not resolved.
     pub unresolved: usize,
     /// RMS of error / predicted σ_z over scored pixels without gross errors.
     pub error_over_sigma: f64,

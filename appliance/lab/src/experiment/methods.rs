@@ -38,7 +38,7 @@ pub enum BetterSequence {
 pub const SHOWN_FIXED: Method = Method::Fixed { fringes: 100 };
 /// The adaptive pattern that pictures show.
 pub const SHOWN_ADAPTIVE: Method = Method::Better(BetterSequence::Twelve);
-/// What all ratios refer to: the paper's own adaptive run.
+/// The run that ratios refer to: the paper's adaptive pattern with its own image pitch.
 pub const PAPER: Method = Method::Paper { image_pitch: 5 };
 
 impl Method {
@@ -59,7 +59,7 @@ impl Method {
         }
     }
 
-    /// Frames of its measurement; what is measured once per part is not counted.
+    /// Frames of its measurement, without the preliminary ones that are measured once per part.
     pub fn frame_count(self) -> u32 {
         match self {
             Self::Fixed { .. } | Self::Paper { .. } => 12,

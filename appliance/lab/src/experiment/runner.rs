@@ -1,7 +1,7 @@
 //! A simulated head in front of one part, and one run of each method.
 //!
-//! What a method learns of the part before it measures (preliminary maps, patterns, the golden map)
-//! is measured once per noise seed and shared by the runs that need it.
+//! Preliminary maps, patterns and the golden map of the part are measured once per noise seed, and shared by the runs that need
+//! them.
 
 use super::judge::{Outcome, judge};
 use super::methods::{self, BetterSequence, Method};
@@ -17,7 +17,7 @@ use sim::{Stage, Truth};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A simulated head in front of one part, with what has been learnt of it.
+/// A simulated head in front of one part, with the preliminary measurements of the part.
 pub struct Runner {
     head: DynHead,
     stage: Stage,
@@ -28,7 +28,7 @@ pub struct Runner {
     learnt: Learnt,
 }
 
-/// What has been learnt of the part with the noise of one seed.
+/// The preliminary measurements and patterns with the noise of one seed, made when first needed.
 #[derive(Default)]
 struct Learnt {
     seed: u64,
@@ -44,7 +44,7 @@ struct Preliminary {
     map: ProjectorMap,
 }
 
-/// The better pattern and the phase that each pixel will have if the surface is where it was measured.
+/// The better pattern, and the phase that it has in each camera pixel on the measured surface.
 struct Better {
     function: PhaseFunction,
     expected: Vec<AbsolutePhase>,
@@ -64,7 +64,7 @@ pub enum Pattern {
     Golden,
 }
 
-/// A run: what it reached and what it saw.
+/// A run: its measurement and how good it is.
 pub struct Run {
     /// Against truth.
     pub outcome: Outcome,
@@ -80,8 +80,7 @@ const TIMEOUT: Duration = Duration::from_secs(5);
 /// Pitch of the preliminary patterns, projector pixels.
 const PRELIMINARY_PITCH: f64 = paper::PROJECTOR_PITCH * paper::PRELIMINARY;
 
-/// Noise streams: each measurement of a seed has its own, so that a result does not depend on which
-/// other methods run.
+/// Noise streams: each measurement of a seed has its own, so that its result does not depend on which other methods are run.
 const STREAMS: u64 = 1000;
 const PRELIMINARY_STREAM: u64 = 0;
 const HORIZONTAL_STREAM: u64 = 1;
@@ -97,7 +96,7 @@ fn stream(method: Method) -> u64 {
 }
 
 impl Runner {
-    /// Sets the head up in front of the part.
+    /// Sets up the head in front of the part.
     ///
     /// # Errors
     /// If the scene cannot be simulated.

@@ -12,7 +12,7 @@ pub struct Scene {
     pub name: &'static str,
     /// The paper's figure.
     pub figure: &'static str,
-    /// What its measurement is judged by.
+    /// The quantity that its measurement is judged by.
     pub judged: Judged,
     /// The part.
     pub part: Part,

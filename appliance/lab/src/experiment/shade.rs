@@ -4,17 +4,17 @@ use algo::phase::Trust;
 use appliance::head::rig::Measured;
 use appliance::output::canvas::Canvas;
 
-/// The view comes from this far above the plane z = 0, after a turn about z, radians.
+/// Elevation of the view above the plane z = 0, after a turn about z, radians.
 const ELEVATION: f64 = 0.96;
 const TURN: f64 = 0.35;
-/// Facets with a larger step in z span a depth edge, mm.
+/// Facets whose corners differ more in z span a depth edge and are not drawn, mm.
 const DEPTH_EDGE_MM: f64 = 10.0;
-/// Direction to the lamp (x, y, z), flat enough that noise is seen.
+/// Direction to the lamp (x, y, z), low enough that noise is visible.
 const LAMP: [f64; 3] = [-0.70, -0.30, 0.65];
-/// Grey of a facet that turns away from the lamp, and what facing it adds.
+/// Grey of a facet that faces away from the lamp, and what is added to it if it faces the lamp.
 const DARK: f64 = 50.0;
 const BRIGHT: f64 = 200.0;
-/// Share of points at each end that do not decide how large the picture is.
+/// Share of the points at each end of an axis that may lie outside of the picture.
 const TAIL: f64 = 0.002;
 
 /// The picture, `size` pixels wide and high.
@@ -77,7 +77,7 @@ fn grey(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> u8 {
     (DARK + BRIGHT * facing.max(0.0)) as u8
 }
 
-/// Where a point is in the picture: x, y in pixels, and how near it is.
+/// Projects points into the picture: x and y in pixels, and how near the point is.
 struct Viewport {
     scale: f64,
     centre: [f64; 2],
@@ -117,7 +117,7 @@ impl Viewport {
     }
 }
 
-/// A world point as the view has it: to the right, up, towards the eye.
+/// A world point in the coordinates of the view: right, up, towards the eye.
 fn turned([x, y, z]: [f64; 3]) -> [f64; 3] {
     let (sin, cos) = TURN.sin_cos();
     let (x, y) = (cos * x - sin * y, sin * x + cos * y);

@@ -24,7 +24,7 @@ pub struct RunRow {
     pub frames: u32,
     /// Noise seed; 0 = the mean over all.
     pub seed: u64,
-    /// What was reached.
+    /// The measured quantities.
     #[serde(flatten)]
     pub values: Values,
 }

@@ -1,4 +1,4 @@
-//! Axes: where a value stands, and which values get a tick.
+//! Axes: from values to pixels, and the values of ticks.
 
 /// An axis.
 pub struct Axis {
@@ -42,7 +42,7 @@ impl Axis {
         }
     }
 
-    /// Where a value stands, pixels.
+    /// The pixel of a value.
     pub fn at(&self, value: f64) -> f64 {
         let value = if self.logarithmic {
             value.log10()

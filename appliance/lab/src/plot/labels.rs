@@ -1,11 +1,11 @@
-//! Where labels go: near their dots, and clear of everything else.
+//! Places labels near their dots, clear of everything else.
 
 use super::{BOTTOM, LABEL, LEFT, LETTER, RIGHT, TOP};
 
 /// x from, y from, x to, y to.
 pub type Area = [f64; 4];
 
-/// Keeps labels off a line.
+/// Marks the pixels of a line as taken.
 pub fn block(taken: &mut Vec<Area>, from: (f64, f64), to: (f64, f64)) {
     let steps = (f64::hypot(to.0 - from.0, to.1 - from.1) / 4.0)
         .ceil()
