@@ -24,13 +24,9 @@ impl Doctor {
     /// # Errors
     /// If the head cannot be opened, or a check failed (69).
     pub fn run(&self) -> Result<(), Failure> {
-        let Measuring {
-            files,
-            threads,
-            output,
-        } = &self.measuring;
-        let mut config = files.configuration()?;
-        config.head = files.head(&config);
+        let options = &self.measuring;
+        let mut config = options.files.configuration()?;
+        config.head = options.files.head(&config);
         if let Some(scenario) = &self.scenario {
             (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
             // The stored calibration belongs to the configured head.
@@ -42,9 +38,9 @@ impl Doctor {
                 "doctor: a recording cannot be examined: configure another head or name a scenario with --scenario",
             ));
         }
-        let progress = output.progress();
+        let progress = options.output.progress();
         let told = |share: f64| progress.tell(0.5 * share, "working out the light of the scene");
-        let pool = threads.pool(config.threads)?;
+        let pool = options.threads.pool(config.threads)?;
         let mut opened = pool.install(|| backend::open_as_it_is(&config.head, &told))?;
         let calibrated = opened.problem.is_none();
         let told = |share: f64, name: &str| progress.tell(0.5 + 0.5 * share, name);
@@ -53,7 +49,7 @@ impl Doctor {
         progress.clear();
         let failed: Vec<&str> = failed(&steps).collect();
         let document = || format!("{:#}", as_json(&steps));
-        output.answer(document, || table(&steps));
+        options.output.answer(document, || table(&steps));
         if failed.is_empty() {
             return Ok(());
         }

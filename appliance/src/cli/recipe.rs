@@ -28,16 +28,11 @@ pub enum RecipeCommand {
     },
     /// Write a recipe to a file.
     Export {
-        /// Its number.
-        #[arg(value_parser = number(1, MAX_RECIPE))]
-        number: u16,
+        #[command(flatten)]
+        recipe: Numbered,
         /// The file, NAME.recipe; one that is there is replaced.
         #[arg(value_parser = names::file("recipe"))]
         file: PathBuf,
-        #[command(flatten)]
-        files: Files,
-        #[command(flatten)]
-        quiet: Quiet,
     },
     /// Take a recipe from a file; the one of the same number stays as the previous generation.
     Import {
@@ -49,26 +44,22 @@ pub enum RecipeCommand {
         quiet: Quiet,
     },
     /// Delete a recipe; `undo` brings it back. Not while a station runs: its page deletes recipes as well.
-    Delete {
-        /// Its number.
-        #[arg(value_parser = number(1, MAX_RECIPE))]
-        number: u16,
-        #[command(flatten)]
-        files: Files,
-        #[command(flatten)]
-        quiet: Quiet,
-    },
+    Delete(Numbered),
     /// Bring back a deleted recipe, or the generation before the newest; the same again takes it back. Not while a station
     /// runs: its page undoes as well.
-    Undo {
-        /// Its number.
-        #[arg(value_parser = number(1, MAX_RECIPE))]
-        number: u16,
-        #[command(flatten)]
-        files: Files,
-        #[command(flatten)]
-        quiet: Quiet,
-    },
+    Undo(Numbered),
+}
+
+/// A stored recipe by its number.
+#[derive(Debug, clap::Args)]
+pub struct Numbered {
+    /// Its number.
+    #[arg(value_parser = number(1, MAX_RECIPE))]
+    number: u16,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    quiet: Quiet,
 }
 
 impl RecipeCommand {
@@ -83,14 +74,12 @@ impl RecipeCommand {
                 list(&store(files)?.list(), json.json);
                 Ok(())
             }
-            Self::Export {
-                number,
-                file,
-                files,
-                quiet,
-            } => {
-                store(files)?.export(*number, file).map_err(refused)?;
-                quiet.say(|| format!("recipe {number} is in {}", file.display()));
+            Self::Export { recipe, file } => {
+                let number = recipe.number;
+                let exported = store(&recipe.files)?.export(number, file);
+                exported.map_err(refused)?;
+                let words = || format!("recipe {number} is in {}", file.display());
+                recipe.quiet.say(words);
                 Ok(())
             }
             Self::Import { file, files, quiet } => {
@@ -111,28 +100,22 @@ impl RecipeCommand {
                 });
                 Ok(())
             }
-            Self::Delete {
-                number,
-                files,
-                quiet,
-            } => {
-                let state = at_rest(files, "Delete")?;
-                Store::of_state(&state)?
-                    .delete(*number)
-                    .map_err(unchanged)?;
+            Self::Delete(recipe) => {
+                let number = recipe.number;
+                let state = at_rest(&recipe.files, "Delete")?;
+                let deleted = Store::of_state(&state)?.delete(number);
+                deleted.map_err(unchanged)?;
                 let undo = format!("`fringed recipe undo {number}` brings it back");
-                quiet.say(|| format!("recipe {number} is deleted; {undo}"));
+                let words = || format!("recipe {number} is deleted; {undo}");
+                recipe.quiet.say(words);
                 Ok(())
             }
-            Self::Undo {
-                number,
-                files,
-                quiet,
-            } => {
-                let state = at_rest(files, "Undo")?;
-                let file = Store::of_state(&state)?.undo(*number).map_err(unchanged)?;
+            Self::Undo(recipe) => {
+                let number = recipe.number;
+                let state = at_rest(&recipe.files, "Undo")?;
+                let file = Store::of_state(&state)?.undo(number).map_err(unchanged)?;
                 let digits = file.fingerprint.get(..8).unwrap_or_default();
-                quiet.say(|| {
+                recipe.quiet.say(|| {
                     format!(
                         "recipe {number} ({}) is the one with fingerprint {digits} again",
                         file.name

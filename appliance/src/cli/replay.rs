@@ -41,11 +41,7 @@ impl Replay {
     /// # Errors
     /// If recording, recipe or stored result cannot be read (65, 66), or the results differ (70).
     pub fn run(&self) -> Result<(), Failure> {
-        let Measuring {
-            files,
-            threads,
-            output,
-        } = &self.measuring;
+        let options = &self.measuring;
         let unpacked = Unpacked::of(&self.recording)?;
         let state = self.state()?;
         let kept = Kept::open(unpacked.folder())?;
@@ -55,8 +51,8 @@ impl Replay {
         let stored = stored(&state, unpacked.name(), &kept)?;
         let flags = stored.as_ref().map_or(0, |entry| entry.flags);
         let (frames, shots) = (kept.frames(), kept.shots());
-        let configured = files.configuration()?.threads;
-        let judged = threads.pool(configured)?.install(|| {
+        let configured = options.files.configuration()?.threads;
+        let judged = options.threads.pool(configured)?.install(|| {
             let plan = kept.plan(recipe, flags & SIMULATED != 0)?;
             let inspect = |sequence| plan.inspect(sequence, &frames, Instant::now());
             Ok::<_, PlanError>(plan.sequence_of(&shots).map(inspect))
@@ -78,10 +74,10 @@ impl Replay {
                 serde_json::json!({ "replayed": replayed, "stored": stored, "recipe": recipe });
             format!("{all:#}")
         };
-        output.answer(document, || table(&replayed, &from));
+        options.output.answer(document, || table(&replayed, &from));
         if !same {
             if let Some(stored) = stored {
-                output.remark(|| {
+                options.output.remark(|| {
                     format!(
                         "result {} in the history is {}{}, judged by another recipe: the two are not compared",
                         stored.seq,
@@ -101,7 +97,7 @@ impl Replay {
         };
         match difference(&stored, &replayed) {
             None => {
-                output.remark(|| {
+                options.output.remark(|| {
                     format!(
                         "the same as result {} in the history, bit by bit",
                         stored.seq

@@ -112,17 +112,13 @@ impl Teach {
     /// # Errors
     /// If the part cannot be taught, the number is taken, or the recipe cannot be stored; a recipe stored before is unchanged.
     pub fn run(&self) -> Result<(), Failure> {
-        let Measuring {
-            files,
-            threads,
-            output,
-        } = &self.measuring;
-        let config = files.configuration()?;
+        let options = &self.measuring;
+        let config = options.files.configuration()?;
         // Opened before anything is measured, and locked until the recipe is stored.
         let target = match &self.out {
             Some(out) => Target::File(out),
             None => Target::State(StateFolder::open_unless_used(
-                &files.state_folder()?,
+                &options.files.state_folder()?,
                 Exit::CannotCreate,
                 "use *Recipes*, *Teach* on its page",
             )?),
@@ -132,7 +128,7 @@ impl Teach {
             Target::State(state) => self.replaced(&Store::of_state(state)?)?,
         };
         let naming = self.naming(replaced.as_ref());
-        let pool = threads.pool(config.threads)?;
+        let pool = options.threads.pool(config.threads)?;
         let taught = match &self.golden {
             Some(golden) => pool.install(|| self.teach_recordings(golden, &naming))?,
             None => self.teach_head(&config, &pool, &naming)?,
@@ -164,7 +160,7 @@ impl Teach {
             ));
             lines.join("\n")
         };
-        output.answer(summary, text);
+        options.output.answer(summary, text);
         Ok(())
     }
 
@@ -212,10 +208,10 @@ impl Teach {
         pool: &rayon::ThreadPool,
         naming: &Naming,
     ) -> Result<Taught, Failure> {
-        let Measuring { files, output, .. } = &self.measuring;
-        let progress = output.progress();
+        let options = &self.measuring;
+        let progress = options.output.progress();
         let told = |share: f64| progress.tell(share, "working out the light of the scene");
-        let opened = pool.install(|| backend::open(&files.head(config), &told))?;
+        let opened = pool.install(|| backend::open(&options.files.head(config), &told))?;
         opened.calibrated()?;
         let Opened {
             mut head,

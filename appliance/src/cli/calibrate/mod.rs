@@ -61,12 +61,8 @@ impl Calibrate {
     /// If a model cannot be imported (65, 66), the head cannot be measured (69), or the calibration cannot be written (73). The
     /// calibration before is then unchanged.
     pub fn run(&self) -> Result<(), Failure> {
-        let Measuring {
-            files,
-            threads,
-            output,
-        } = &self.measuring;
-        let mut config = files.configuration()?;
+        let options = &self.measuring;
+        let mut config = options.files.configuration()?;
         if let Some(scenario) = &self.scenario {
             (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
         }
@@ -77,7 +73,7 @@ impl Calibrate {
             ));
         }
         // Locked until all is written: no station measures meanwhile with the calibration that is being replaced.
-        let state = StateFolder::open(&files.state_folder()?)?;
+        let state = StateFolder::open(&options.files.state_folder()?)?;
         let head = config.head_in(state.path());
         let place = Place::at(head.calibration.as_deref().unwrap_or(Path::new("")));
         let mut notes = Vec::new();
@@ -86,9 +82,9 @@ impl Calibrate {
             None
         });
         let before = before.map(|loaded| loaded.file);
-        let progress = output.progress();
+        let progress = options.output.progress();
         let told = |share: f64| progress.tell(0.3 * share, "working out the light of the scene");
-        let pool = threads.pool(config.threads)?;
+        let pool = options.threads.pool(config.threads)?;
         // Without the stored calibration, which is being replaced.
         let bare = HeadConfig {
             calibration: None,
@@ -120,7 +116,7 @@ impl Calibrate {
             notes: &notes,
         };
         let document = || format!("{:#}", report.json());
-        output.answer(document, || report.table());
+        options.output.answer(document, || report.table());
         Ok(())
     }
 
