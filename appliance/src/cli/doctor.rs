@@ -3,7 +3,7 @@
 use super::options::Measuring;
 use crate::config::Backend;
 use crate::error::{Exit, Failure};
-use crate::head::doctor::{Step, Verdict, examine};
+use crate::head::doctor::{Check, Verdict, examine};
 use crate::production::backend;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -44,12 +44,12 @@ impl Doctor {
         let mut opened = pool.install(|| backend::open_as_it_is(&config.head, &told))?;
         let calibrated = opened.problem.is_none();
         let told = |share: f64, name: &str| progress.tell(0.5 + 0.5 * share, name);
-        let steps =
+        let checks =
             pool.install(|| examine(&mut opened.head, &opened.calibration, calibrated, &told));
         progress.clear();
-        let failed: Vec<&str> = failed(&steps).collect();
-        let document = || format!("{:#}", as_json(&steps));
-        options.output.answer(document, || table(&steps));
+        let failed: Vec<&str> = failed(&checks).collect();
+        let document = || format!("{:#}", as_json(&checks));
+        options.output.answer(document, || table(&checks));
         if failed.is_empty() {
             return Ok(());
         }
@@ -60,30 +60,36 @@ impl Doctor {
     }
 }
 
-fn failed(steps: &[Step]) -> impl Iterator<Item = &str> {
-    let failed = steps.iter().filter(|step| step.verdict == Verdict::Fail);
-    failed.map(|step| step.name)
+fn failed(checks: &[Check]) -> impl Iterator<Item = &str> {
+    let failed = checks.iter().filter(|check| check.verdict == Verdict::Fail);
+    failed.map(|check| check.name)
 }
 
-fn as_json(steps: &[Step]) -> Value {
-    let rows: Vec<Value> = steps
+fn as_json(checks: &[Check]) -> Value {
+    let rows: Vec<Value> = checks
         .iter()
-        .map(|step| {
+        .map(|check| {
+            // The names of JSON are a format: docs/doctor.md.
             json!({
-                "step": step.name, "verdict": step.verdict.word(), "found": step.found,
-                "remedy": step.remedy, "measured": step.measured,
+                "step": check.name, "verdict": check.verdict.word(), "found": check.found,
+                "remedy": check.remedy, "measured": check.measured,
             })
         })
         .collect();
-    json!({ "healthy": failed(steps).next().is_none(), "steps": rows })
+    json!({ "healthy": failed(checks).next().is_none(), "steps": rows })
 }
 
-fn table(steps: &[Step]) -> String {
+fn table(checks: &[Check]) -> String {
     let mut lines = String::new();
-    for step in steps {
-        lines += &format!("{:9} {:8} {}\n", step.name, step.verdict.word(), step.found);
-        if !step.remedy.is_empty() {
-            lines += &format!("{:18} → {}\n", "", step.remedy);
+    for check in checks {
+        lines += &format!(
+            "{:9} {:8} {}\n",
+            check.name,
+            check.verdict.word(),
+            check.found
+        );
+        if !check.remedy.is_empty() {
+            lines += &format!("{:18} → {}\n", "", check.remedy);
         }
     }
     lines

@@ -1,4 +1,5 @@
-//! A calibration measured on a head, from what its stamps mark to the reference plane. Each step uses what those before it found.
+//! Measures a calibration: time stamps, light, flip-to-light delay, grey response, noise, contrast and reference plane, in this order, since
+//! each measurement uses the results of those before it.
 
 use super::calibration::Calibration;
 use super::calibration::file::{
@@ -17,31 +18,32 @@ use hal::error::Error;
 use hal::head::{DynHead, Timing};
 use std::time::Duration;
 
-/// Rounds of the delay, at most: 100 s where stamps jitter or the camera has few pixels.
+/// Most rounds of the delay: 100 s, where stamps jitter or the camera has few pixels.
 const ROUNDS: u32 = 24;
-/// A delay below zero by more than this is none: light does not come before its flip.
+/// A measured delay below this is refused: light does not come before its flip.
 const LEAST_DELAY_S: f64 = -200e-6;
-/// Refreshes that light is given beyond its delay.
+/// Refreshes that light gets to settle beyond its delay.
 const BEYOND: u32 = 2;
 /// Longest wait for a flip or a frame beyond the plan.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// Models may be off the measured plane by this, RMS, projector pixels: a millimetre of height, with devices 27° apart 600 mm away.
+/// Largest RMS distance of the models from the measured plane, projector pixels: a millimetre of height, with devices 27° apart
+/// 600 mm away.
 const MOST_OFF_PX: f64 = 2.0;
-/// A response that is off the one before by less than this many levels is the same: recipes stay valid.
+/// A response that differs from the previous one by less than this many levels replaces nothing, so recipes stay valid.
 const SAME_RESPONSE: f64 = 1.0;
 
-/// What is known before.
+/// What a calibration starts from.
 #[derive(Debug)]
-pub struct Known {
-    /// The models, and what else is known; noise and response are measured.
+pub struct Basis {
+    /// Sizes and models; noise and response are measured.
     pub calibration: Calibration,
     /// Where the models come from.
     pub models_from: String,
-    /// The response of the calibration before.
+    /// The response of the previous calibration.
     pub response: Option<Vec<f64>>,
-    /// How warm the head is.
+    /// Temperature of the head.
     pub temperature_c: Option<f64>,
-    /// A flat plate lies in the plane z = 0.
+    /// Whether a flat plate lies in the plane z = 0.
     pub plate: bool,
 }
 
@@ -54,7 +56,7 @@ pub struct Made {
     pub bytes: Vec<u8>,
     /// Names and bytes of the reference phase maps.
     pub maps: Vec<(String, Vec<u8>)>,
-    /// What else there is to say.
+    /// Remarks for the user.
     pub notes: Vec<String>,
 }
 
@@ -64,10 +66,10 @@ pub enum MakeError {
     /// A device failed.
     #[error("{0}")]
     Device(#[from] Error),
-    /// What stands in front of the head, or how it is set.
+    /// The scene in front of the head or the head's settings do not allow it.
     #[error("{0}")]
     Scene(String),
-    /// The models are not this head's.
+    /// The models are those of another head.
     #[error("{0}")]
     Models(String),
 }
@@ -81,14 +83,18 @@ impl From<PlateError> for MakeError {
     }
 }
 
-/// Measures everything. `told` is told the share done and what is measured. The head's time goes by the calibration afterwards.
+/// Measures a calibration. `progress` gets the share done and what is measured next. Afterwards the head's timing is the calibrated one.
 ///
 /// # Errors
-/// Of a device; if too little light comes back, or too much; if the plate is none or the models do not fit it.
-pub fn make(head: &mut DynHead, known: Known, told: &dyn Fn(f64, &str)) -> Result<Made, MakeError> {
-    let mut calibration = known.calibration;
+/// Of a device; if too little light comes back, or too much; if there is no flat plate or the models do not fit it.
+pub fn make(
+    head: &mut DynHead,
+    basis: Basis,
+    progress: &dyn Fn(f64, &str),
+) -> Result<Made, MakeError> {
+    let mut calibration = basis.calibration;
     let mut notes = Vec::new();
-    told(0.0, "camera stamps");
+    progress(0.0, "camera stamps");
     let stamps = Stamps::measure(head)?;
     head.set_timing(Timing {
         flip_to_light: Duration::ZERO,
@@ -96,10 +102,10 @@ pub fn make(head: &mut DynHead, known: Known, told: &dyn Fn(f64, &str)) -> Resul
         readout: stamps.readout,
         ..head.timing()
     });
-    told(0.05, "light");
+    progress(0.05, "light");
     let lit = Lit::take(head, SETTLE)?;
     bright_enough(&lit)?;
-    told(0.1, "flip-to-light delay");
+    progress(0.1, "flip-to-light delay");
     let delay = Delay::measure(head, &lit, ROUNDS)?
         .filter(|delay| delay.seconds >= LEAST_DELAY_S)
         .ok_or_else(|| {
@@ -115,33 +121,33 @@ pub fn make(head: &mut DynHead, known: Known, told: &dyn Fn(f64, &str)) -> Resul
         .as_nanos()
         .div_ceil(head.refresh().as_nanos().max(1));
     let settle = u32::try_from(refreshes).unwrap_or(SETTLE) + BEYOND;
-    let share = |share: f64| told(0.2 + 0.4 * share, "grey response");
+    let share = |share: f64| progress(0.2 + 0.4 * share, "grey response");
     let mut greys = response(head, settle, &lit, &share)?.to_vec();
-    if let Some(before) = known.response.filter(|before| same(before, &greys)) {
+    if let Some(before) = basis.response.filter(|before| same(before, &greys)) {
         notes.push(
-            "the grey response is that of before, within noise: it stays, and recipes stay valid"
+            "the grey response equals the previous one within noise: that one is kept, and recipes stay valid"
                 .into(),
         );
         greys = before;
     }
     calibration.response = inverted(&greys).map_err(MakeError::Scene)?;
-    told(0.6, "noise");
+    progress(0.6, "noise");
     let noise = noise(head, settle, &lit)?;
     calibration.noise_counts = noise.counts;
-    told(0.65, "contrast");
+    progress(0.65, "contrast");
     let contrast = contrast(head, &calibration, settle, &lit)?;
     let mut maps = Vec::new();
-    let reference = if known.plate {
-        told(0.75, "reference plane, vertical fringes");
+    let reference = if basis.plate {
+        progress(0.75, "reference plane, vertical fringes");
         let vertical = plate(head, &calibration, true, TIMEOUT)?;
-        told(0.88, "reference plane, horizontal fringes");
+        progress(0.88, "reference plane, horizontal fringes");
         let horizontal = plate(head, &calibration, false, TIMEOUT)?;
         Some(reference(&calibration, &vertical, &horizontal, &mut maps)?)
     } else {
         notes.push("no plate was measured: the reference plane is that of the models".into());
         None
     };
-    told(1.0, "calibrated");
+    progress(1.0, "calibrated");
     let coarsest = contrast.first().map_or(0.0, |first| first.1);
     let (width, height, bit_depth) = calibration.frames();
     let (columns, rows) = calibration.raster();
@@ -152,8 +158,8 @@ pub fn make(head: &mut DynHead, known: Known, told: &dyn Fn(f64, &str)) -> Resul
         checksum: String::new(),
         made_by: concat!("fringed ", env!("CARGO_PKG_VERSION")).into(),
         made_at_unix_s: crate::system::clock::utc_us().unwrap_or(0) / 1_000_000,
-        temperature_c: known.temperature_c,
-        models_from: known.models_from,
+        temperature_c: basis.temperature_c,
+        models_from: basis.models_from,
         camera: CameraFile {
             width,
             height,
@@ -167,7 +173,6 @@ pub fn make(head: &mut DynHead, known: Known, told: &dyn Fn(f64, &str)) -> Resul
         },
         timing: TimingFile {
             flip_to_light_ns: nanoseconds(delay.duration()),
-            // At most seconds.
             sigma_ns: (delay.error * 1e9).ceil() as u64,
             stamp: stamps.stamp,
             readout_ns: nanoseconds(stamps.readout),
@@ -241,7 +246,7 @@ fn bright_enough(lit: &Lit) -> Result<(), MakeError> {
     )))
 }
 
-/// The maps' part of the file; their bytes go to `maps`.
+/// The description of the reference phase maps; their bytes go to `maps`.
 fn reference(
     calibration: &Calibration,
     vertical: &Plate,
@@ -251,7 +256,7 @@ fn reference(
     let models_off_px = models_off(calibration, vertical, horizontal).map_err(MakeError::Models)?;
     if !(models_off_px <= MOST_OFF_PX) {
         return Err(MakeError::Models(format!(
-            "the models are off the measured plate by {models_off_px:.1} projector pixels, at most {MOST_OFF_PX} are right: put the \
+            "the models are off the measured plate by {models_off_px:.1} projector pixels, more than {MOST_OFF_PX}: put the \
              plate into the plane z = 0 of the models, or import the models of this head"
         )));
     }
@@ -276,7 +281,7 @@ fn reference(
     })
 }
 
-/// How far the projector point that the models say is off the measured one, RMS over a grid of camera pixels, projector pixels.
+/// RMS distance between the projector points that the models predict and those measured, over a grid of camera pixels, projector pixels.
 fn models_off(
     calibration: &Calibration,
     vertical: &Plate,
@@ -285,16 +290,18 @@ fn models_off(
     const GRID: u32 = 16;
     let (camera, projector) = (&calibration.camera, &calibration.projector);
     let (width, height, _) = calibration.frames();
-    let eye = camera.centre();
+    let centre = camera.centre();
     let (mut squares, mut points) = (0.0, 0.0);
     for at in 0..GRID * GRID {
         let place =
             |at: u32, pixels: u32| (f64::from(at) + 0.5) / f64::from(GRID) * f64::from(pixels);
         let u = place(at % GRID, width);
         let v = place(at / GRID, height);
-        let on_plane = camera.ray(u, v).map(|ray| eye + ray * (-eye.z / ray.z));
-        let lights = on_plane.and_then(|point: Vector| projector.project(point));
-        let Some((xi, eta)) = lights else { continue };
+        let on_plane = camera
+            .ray(u, v)
+            .map(|ray| centre + ray * (-centre.z / ray.z));
+        let predicted = on_plane.and_then(|point: Vector| projector.project(point));
+        let Some((xi, eta)) = predicted else { continue };
         let off = (
             xi - PLATE_PITCH * vertical.turns(u, v),
             eta - PLATE_PITCH * horizontal.turns(u, v),

@@ -1,4 +1,4 @@
-//! The head as a measuring instrument: its calibration, what can be measured on it, and the doctor who judges that.
+//! The head as a measuring instrument: its calibration, what can be measured on it, and the doctor that checks it.
 
 pub mod calibrate;
 pub mod calibration;

@@ -1,4 +1,4 @@
-//! What the projector shows of a phase function: grey rasters through the inverse of the head's response.
+//! The grey rasters that the projector shows for a phase function, corrected by the inverse of its measured grey response.
 
 use crate::head::calibration::Calibration;
 use algo::pattern::{Encoder, PhaseFunction, Shot};

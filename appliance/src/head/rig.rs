@@ -1,8 +1,8 @@
-//! A head, a part and the measurements that teaching and experiments are made of.
+//! Measures a part with a pattern of the caller's choice, where no recipe describes the measurement: for teaching and experiments.
 
 use crate::head::calibration::Calibration;
 use crate::head::scan::{self, Scan};
-use algo::geometry::{HeightRange, Reference, Triangulator};
+use algo::geometry::{Reference, Triangulator};
 use algo::pattern::{PhaseFunction, Shot};
 use algo::phase::Decoder;
 use algo::pipeline::{HeightMap, PhaseMap};
@@ -11,25 +11,14 @@ use hal::frame::Frame;
 use hal::head::DynHead;
 use std::time::Duration;
 
-/// A head with its calibration, for measurements that no recipe describes yet.
+/// A head with its calibration, in front of a part.
 pub struct Rig<'a> {
     /// The devices.
     pub head: &'a mut DynHead,
-    /// What is known of them.
+    /// The calibration of the head.
     pub calibration: &'a Calibration,
-    /// Working range; none = the default.
-    pub range: Option<HeightRange>,
     /// Longest wait for a device.
     pub timeout: Duration,
-}
-
-/// What a sequence is unwrapped about.
-#[derive(Clone, Copy, Debug)]
-pub enum About<'a> {
-    /// Nothing: the sequence is absolute, or is unwrapped about the reference phase map.
-    Reference,
-    /// A known map, row-major.
-    Map(&'a [AbsolutePhase]),
 }
 
 /// A measured part.
@@ -49,61 +38,52 @@ pub struct Measured {
 
 /// A measurement that failed.
 #[derive(Debug, thiserror::Error)]
-pub enum RigError {
+pub enum MeasureError {
     /// A device failed.
     #[error(transparent)]
     Device(#[from] hal::error::Error),
-    /// The pattern, the sequence or the rig is impossible.
+    /// The pattern, the sequence or the geometry is impossible.
     #[error("{0}")]
     Impossible(String),
 }
 
-fn rig(error: impl std::fmt::Display) -> RigError {
-    RigError::Impossible(error.to_string())
+fn impossible(error: impl std::fmt::Display) -> MeasureError {
+    MeasureError::Impossible(error.to_string())
 }
 
 impl Rig<'_> {
-    /// The geometry for a phase function.
+    /// Projects the shots of a phase function and measures the part in the default working range. Levels that are unwrapped about a
+    /// known map take `map` (row-major), or without one the reference phase map. `progress` gets the share of the frames taken.
     ///
     /// # Errors
-    /// If the devices do not look down at the plane from two places, or the range is unusable.
-    pub fn triangulator(&self, function: &PhaseFunction) -> Result<Triangulator, RigError> {
-        Triangulator::new(
-            self.calibration.camera.clone(),
-            self.calibration.projector.clone(),
-            Reference::Models,
-            function.clone(),
-            self.range,
-        )
-        .map_err(rig)
-    }
-
-    /// Projects the shots of a phase function and measures the part.
-    /// `progress` is told the share of the frames taken.
-    ///
-    /// # Errors
-    /// If a device fails or the sequence cannot be decoded.
+    /// If a device fails, the sequence cannot be decoded, or the devices do not look down at the plane from two places.
     pub fn measure(
         &mut self,
         function: &PhaseFunction,
         shots: &[Shot],
-        about: About<'_>,
+        map: Option<&[AbsolutePhase]>,
         progress: &dyn Fn(f64),
-    ) -> Result<Measured, RigError> {
-        let triangulator = self.triangulator(function)?;
+    ) -> Result<Measured, MeasureError> {
         let (calibration, timeout) = (self.calibration, self.timeout);
+        let triangulator = Triangulator::new(
+            calibration.camera.clone(),
+            calibration.projector.clone(),
+            Reference::Models,
+            function.clone(),
+            None,
+        )
+        .map_err(impossible)?;
         let frames = scan::take(self.head, calibration, function, shots, timeout, progress)?;
-        let scan = Scan::new(function.range(), shots, &frames).map_err(rig)?;
+        let scan = Scan::new(function.range(), shots, &frames).map_err(impossible)?;
         let reference;
-        let map = match about {
-            _ if !scan.needs_map() => None,
-            About::Map(map) => Some(map),
-            About::Reference => {
+        let map = match map {
+            None if scan.needs_map() => {
                 reference = triangulator.reference_map();
                 Some(&reference[..])
             }
+            map => map.filter(|_| scan.needs_map()),
         };
-        let mut phases = scan.phases(map).map_err(rig)?;
+        let mut phases = scan.phases(map).map_err(impossible)?;
         let noise = Some(calibration.noise_counts);
         let heights = scan.heights(&triangulator, noise, &mut phases);
         Ok(Measured {

@@ -1,4 +1,5 @@
-//! One sequence of a pattern: frames from the head, and phases and heights from frames. Everything but production measures so.
+//! One sequence of a pattern: takes its frames with the head, and turns them into phases and heights. Everything but production, which
+//! measures in strips, measures in this way.
 
 use super::calibration::Calibration;
 use super::rasters::rasters;
@@ -13,7 +14,7 @@ use hal::frame::Frame;
 use hal::head::DynHead;
 use std::time::Duration;
 
-/// Projects the shots of a phase function and takes a frame of each, in their order. `told` is told the share of the frames taken.
+/// Projects the shots of a phase function and takes a frame of each, in their order. `progress` gets the share of the frames taken.
 ///
 /// # Errors
 /// Of the device that failed.
@@ -23,14 +24,14 @@ pub fn take(
     function: &PhaseFunction,
     shots: &[Shot],
     timeout: Duration,
-    told: &dyn Fn(f64),
+    progress: &dyn Fn(f64),
 ) -> Result<Vec<Frame>, hal::error::Error> {
     head.load(rasters(function, shots, calibration)?)?;
     let mut taken = Vec::with_capacity(shots.len());
     let indices: Vec<usize> = (0..shots.len()).collect();
     head.acquire(&indices, timeout, &mut |_, frame| {
         taken.push(frame);
-        told(taken.len() as f64 / shots.len() as f64);
+        progress(taken.len() as f64 / shots.len() as f64);
     })?;
     Ok(taken)
 }
@@ -50,7 +51,7 @@ impl<'a> Scan<'a> {
     /// The frames of `shots`, in their order, of a phase function of `range`.
     ///
     /// # Errors
-    /// In words: the shots are no sequence that can be decoded, or there are no such frames.
+    /// In words: the shots make no sequence that can be decoded, or a frame is not one of its format.
     pub fn new(
         range: PhaseRange,
         shots: &[Shot],
@@ -76,7 +77,7 @@ impl<'a> Scan<'a> {
     /// The phases, unwrapped about `map` (row-major) where one is needed.
     ///
     /// # Errors
-    /// In words: frames or map do not fit each other.
+    /// In words: frames and map do not fit each other.
     pub fn phases(&self, map: Option<&[AbsolutePhase]>) -> Result<PhaseMap, String> {
         pipeline::decode(&self.decoder, &self.frames, map, None).map_err(words)
     }

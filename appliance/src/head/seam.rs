@@ -1,4 +1,4 @@
-//! The seam between devices and computation: `hal`'s frames and models as `algo` takes them.
+//! Converts between devices and computation: `hal`'s frames, models and patterns, and the types of `algo`.
 
 use algo::frame::{FrameError, FrameView, Samples};
 use algo::geometry::{Pinhole, PinholeModel};
@@ -25,6 +25,19 @@ pub fn view(frame: &Frame) -> Result<FrameView<'_>, FrameError> {
     )
 }
 
+/// A device with frames or rasters of `(columns, rows)`, its model checked: each pixel has one ray.
+///
+/// # Errors
+/// In words that name the `device`: a number of its model is absurd.
+pub fn pinhole(
+    device: &str,
+    model: &DeviceModel,
+    (columns, rows): (u32, u32),
+) -> Result<Pinhole, String> {
+    Pinhole::new(pinhole_model(model), columns as usize, rows as usize)
+        .map_err(|error| format!("the {device}'s model: {error}"))
+}
+
 /// A device model as geometry takes it.
 pub fn pinhole_model(model: &DeviceModel) -> PinholeModel {
     PinholeModel {
@@ -38,7 +51,7 @@ pub fn pinhole_model(model: &DeviceModel) -> PinholeModel {
     }
 }
 
-/// A checked device as files store its model.
+/// The model of a checked device, as files store it.
 pub fn device_model(device: &Pinhole) -> DeviceModel {
     let model = device.model();
     DeviceModel {
@@ -68,7 +81,7 @@ pub fn phase_function(
     }
 }
 
-/// What a recorded frame shows of its pattern.
+/// Ratio and shift of a recorded frame.
 pub fn shot(recorded: &RecordedFrame) -> Shot {
     Shot {
         ratio: recorded.ratio,

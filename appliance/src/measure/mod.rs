@@ -93,7 +93,7 @@ fn measure_about(
     known: Option<Known>,
 ) -> Result<Measurement, Failure> {
     let wrong = |error: &dyn std::fmt::Display| wrong(folder, error);
-    let rig = Rig::of(recording, recipe).map_err(|error| wrong(&error))?;
+    let devices = Geometry::of(recording, recipe).map_err(|error| wrong(&error))?;
     let primary = known
         .as_ref()
         .map_or_else(|| primary_of(recording), |known| known.pattern);
@@ -103,7 +103,7 @@ fn measure_about(
     for at in 0..recording.patterns.len() {
         let channel = Channel::new(recording, at).map_err(|error| wrong(&error))?;
         let started = Instant::now();
-        let geometry = rig.triangulator(&channel.function);
+        let geometry = devices.triangulator(&channel.function);
         let geometry = geometry.map_err(|error| wrong(&error))?;
         let golden = known.as_ref().filter(|known| known.pattern == at);
         let made;
@@ -230,23 +230,21 @@ impl<'a> Channel<'a> {
     }
 }
 
-/// The devices of a recording, as far as it has models of them.
-struct Rig {
+/// The devices of a recording, where it has models of them, and its working range.
+struct Geometry {
     devices: Result<(Pinhole, Pinhole), String>,
     range: Option<HeightRange>,
 }
 
-impl Rig {
+impl Geometry {
     fn of(recording: &Recording, recipe: Option<&Recipe>) -> Result<Self, String> {
-        let checked = |name: &str, model: &hal::model::DeviceModel, width: u32, height: u32| {
-            Pinhole::new(seam::pinhole_model(model), width as usize, height as usize)
-                .map_err(|error| format!("the {name}'s model: {error}"))
-        };
         let projector = &recording.projector;
+        let frames = (recording.width, recording.height);
+        let raster = (projector.width, projector.height);
         let devices = match (&recording.camera_model, &projector.model) {
-            (Some(camera), Some(lamp)) => Ok((
-                checked("camera", camera, recording.width, recording.height)?,
-                checked("projector", lamp, projector.width, projector.height)?,
+            (Some(camera), Some(projector)) => Ok((
+                seam::pinhole("camera", camera, frames)?,
+                seam::pinhole("projector", projector, raster)?,
             )),
             (None, None) => Err("the recording has no model of camera and projector"),
             (None, _) => Err("the recording has no model of the camera"),
@@ -261,7 +259,7 @@ impl Rig {
         })
     }
 
-    /// The outer error: the geometry is impossible. The inner one: why there is none.
+    /// The inner error says which model is missing, the outer one what is wrong with those that are there.
     fn triangulator(
         &self,
         function: &PhaseFunction,

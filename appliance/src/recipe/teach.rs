@@ -7,7 +7,7 @@ use super::comparison::ComparisonFile;
 use super::golden::GoldenPart;
 use crate::error::code_of;
 use crate::head::calibration::Calibration;
-use crate::head::rig::{About, Measured, Rig, RigError};
+use crate::head::rig::{MeasureError, Measured, Rig};
 use crate::head::scan::Scan;
 use crate::station::error_code;
 use crate::system::computing::Computing;
@@ -62,11 +62,11 @@ impl TeachError {
     }
 }
 
-impl From<RigError> for TeachError {
-    fn from(error: RigError) -> Self {
+impl From<MeasureError> for TeachError {
+    fn from(error: MeasureError) -> Self {
         match error {
-            RigError::Device(error) => Self::Device(error),
-            RigError::Impossible(error) => Self::Rig(error),
+            MeasureError::Device(error) => Self::Device(error),
+            MeasureError::Impossible(error) => Self::Rig(error),
         }
     }
 }
@@ -118,7 +118,6 @@ pub fn teach_while(
     let mut rig = Rig {
         head,
         calibration,
-        range: None,
         timeout,
     };
     let (columns, rows) = (
@@ -128,7 +127,7 @@ pub fn teach_while(
     let preliminary = PhaseFunction::vertical(columns, rows, columns as f64 / PRELIMINARY_PITCH_PX)
         .map_err(|error| TeachError::Rig(error.to_string()))?;
     let shots = Sequence::geometric(preliminary.range(), LEVELS, SHIFTS);
-    let first = rig.measure(&preliminary, &shots, About::Reference, &|share| {
+    let first = rig.measure(&preliminary, &shots, None, &|share| {
         // Checked before the next stage: a sequence is not interrupted.
         progress(0.3 * share, "measuring the part");
     })?;
@@ -147,7 +146,7 @@ pub fn teach_while(
     stage(0.4, "measuring the part with its own pattern")?;
     let expected = map.expected_phase(&function);
     let full = Sequence::dense(DENSE_N, SHIFTS);
-    let golden = rig.measure(&function, &full, About::Map(&expected), &|share| {
+    let golden = rig.measure(&function, &full, Some(&expected), &|share| {
         progress(0.4 + 0.3 * share, "measuring the part with its own pattern");
     })?;
     refuse_empty(&golden.phases)?;

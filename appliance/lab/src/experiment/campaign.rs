@@ -5,7 +5,7 @@ use super::methods::{SHOWN_ADAPTIVE, SHOWN_FIXED};
 use super::runner::Runner;
 use super::scenes::{OpticsKind, Scene};
 use super::table::{self, RunRow};
-use appliance::head::rig::RigError;
+use appliance::head::rig::MeasureError;
 
 /// What is to be run.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ impl Campaign {
     ///
     /// # Errors
     /// If the simulated head or a pattern fails.
-    pub fn run(&self, progress: &dyn Fn(f64, &str)) -> Result<Results, RigError> {
+    pub fn run(&self, progress: &dyn Fn(f64, &str)) -> Result<Results, MeasureError> {
         let mut results = Results::default();
         let settings = self.scenes.iter().flat_map(|scene| {
             let kinds = scene.optics(self.optics);

@@ -11,7 +11,7 @@ use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use appliance::head::calibration::Calibration;
-use appliance::head::rig::{About, Measured, Rig, RigError};
+use appliance::head::rig::{MeasureError, Measured, Rig};
 use hal::head::DynHead;
 use sim::{Stage, Truth};
 use std::sync::Arc;
@@ -100,7 +100,7 @@ impl Runner {
     ///
     /// # Errors
     /// If the scene cannot be simulated.
-    pub fn new(scene: &Scene, optics: OpticsKind) -> Result<Self, RigError> {
+    pub fn new(scene: &Scene, optics: OpticsKind) -> Result<Self, MeasureError> {
         let scenario = scene.scenario(optics, 1);
         let (head, stage) = sim::head(&scenario)?;
         let calibration = Calibration::of_stage(&stage).map_err(rig)?;
@@ -119,7 +119,7 @@ impl Runner {
     ///
     /// # Errors
     /// If the head or the pattern fails.
-    pub fn run(&mut self, method: Method, seed: u64) -> Result<Run, RigError> {
+    pub fn run(&mut self, method: Method, seed: u64) -> Result<Run, MeasureError> {
         self.learn_with(seed);
         let (columns, rows) = self.size();
         match method {
@@ -145,7 +145,7 @@ impl Runner {
         pattern: Pattern,
         shots: impl Fn(PhaseRange) -> Vec<Shot>,
         seed: u64,
-    ) -> Result<(Measured, Option<Vec<AbsolutePhase>>), RigError> {
+    ) -> Result<(Measured, Option<Vec<AbsolutePhase>>), MeasureError> {
         self.learn_with(seed);
         let (function, map) = match pattern {
             Pattern::Fixed { fringes } => (self.vertical(f64::from(fringes))?, None),
@@ -158,9 +158,8 @@ impl Runner {
                 (self.better()?.function.clone(), Some(golden.to_vec()))
             }
         };
-        let about = map.as_deref().map_or(About::Reference, About::Map);
         let shots = shots(function.range());
-        let measured = self.measure(CHOSEN_STREAM, &function, &shots, about)?;
+        let measured = self.measure(CHOSEN_STREAM, &function, &shots, map.as_deref())?;
         Ok((measured, map))
     }
 
@@ -188,31 +187,30 @@ impl Runner {
         noise_stream: u64,
         function: &PhaseFunction,
         shots: &[Shot],
-        about: About<'_>,
-    ) -> Result<Measured, RigError> {
+        map: Option<&[AbsolutePhase]>,
+    ) -> Result<Measured, MeasureError> {
         self.stage.reseed(self.learnt.seed * STREAMS + noise_stream);
         let mut rig = Rig {
             head: &mut self.head,
             calibration: &self.calibration,
-            range: None,
             timeout: TIMEOUT,
         };
-        rig.measure(function, shots, about, &|_| ())
+        rig.measure(function, shots, map, &|_| ())
     }
 
-    fn vertical(&self, fringes: f64) -> Result<PhaseFunction, RigError> {
+    fn vertical(&self, fringes: f64) -> Result<PhaseFunction, MeasureError> {
         let (columns, rows) = self.size();
         PhaseFunction::vertical(columns, rows, fringes).map_err(rig)
     }
 
     /// The preliminary measurement of both adaptive methods: one vertical sequence at 20 px pitch.
-    fn preliminary(&mut self) -> Result<Arc<Preliminary>, RigError> {
+    fn preliminary(&mut self) -> Result<Arc<Preliminary>, MeasureError> {
         if let Some(known) = &self.learnt.preliminary {
             return Ok(Arc::clone(known));
         }
         let function = self.vertical(self.size().0 as f64 / PRELIMINARY_PITCH)?;
         let shots = Sequence::geometric(function.range(), 3, 4);
-        let measured = self.measure(PRELIMINARY_STREAM, &function, &shots, About::Reference)?;
+        let measured = self.measure(PRELIMINARY_STREAM, &function, &shots, None)?;
         let map = ProjectorMap::from_heights(&measured.triangulator, &measured.heights);
         let phase = measured.phases.phase;
         let found = Arc::new(Preliminary { phase, map });
@@ -220,7 +218,7 @@ impl Runner {
     }
 
     /// The paper's preliminary maps: vertical and horizontal at 20 px, each measured by itself.
-    fn paper_map(&mut self) -> Result<Arc<ProjectorMap>, RigError> {
+    fn paper_map(&mut self) -> Result<Arc<ProjectorMap>, MeasureError> {
         if let Some(known) = &self.learnt.paper {
             return Ok(Arc::clone(known));
         }
@@ -229,7 +227,7 @@ impl Runner {
         let fringes = rows as f64 / PRELIMINARY_PITCH;
         let function = PhaseFunction::horizontal(columns, rows, fringes).map_err(rig)?;
         let shots = Sequence::geometric(function.range(), 3, 4);
-        let horizontal = self.measure(HORIZONTAL_STREAM, &function, &shots, About::Reference)?;
+        let horizontal = self.measure(HORIZONTAL_STREAM, &function, &shots, None)?;
         let phases = [&vertical.phase[..], &horizontal.phases.phase];
         let width = horizontal.phases.width;
         let map = ProjectorMap::from_phases(phases, [PRELIMINARY_PITCH; 2], width);
@@ -237,7 +235,7 @@ impl Runner {
     }
 
     /// The better pattern, made for the blur of the scenario.
-    fn better(&mut self) -> Result<Arc<Better>, RigError> {
+    fn better(&mut self) -> Result<Arc<Better>, MeasureError> {
         if let Some(known) = &self.learnt.better {
             return Ok(Arc::clone(known));
         }
@@ -258,19 +256,19 @@ impl Runner {
     }
 
     /// The golden map: the full sequence of the better pattern.
-    fn golden(&mut self) -> Result<Arc<Vec<AbsolutePhase>>, RigError> {
+    fn golden(&mut self) -> Result<Arc<Vec<AbsolutePhase>>, MeasureError> {
         if let Some(known) = &self.learnt.golden {
             return Ok(Arc::clone(known));
         }
         let better = self.better()?;
-        let about = About::Map(&better.expected);
+        let map = Some(&better.expected[..]);
         let shots = BetterSequence::Twelve.shots();
-        let measured = self.measure(GOLDEN_STREAM, &better.function, &shots, about)?;
+        let measured = self.measure(GOLDEN_STREAM, &better.function, &shots, map)?;
         let found = Arc::new(measured.phases.phase);
         Ok(Arc::clone(self.learnt.golden.insert(found)))
     }
 
-    fn better_frames(&mut self, method: Method, frames: BetterSequence) -> Result<Run, RigError> {
+    fn better_frames(&mut self, method: Method, frames: BetterSequence) -> Result<Run, MeasureError> {
         let better = self.better()?;
         let golden = if frames.needs_golden() {
             Some(self.golden()?)
@@ -279,14 +277,18 @@ impl Runner {
         };
         let map = golden.as_deref().unwrap_or(&better.expected);
         let shots = frames.shots();
-        let measured = self.measure(stream(method), &better.function, &shots, About::Map(map))?;
+        let measured = self.measure(stream(method), &better.function, &shots, Some(map))?;
         Ok(self.judged(better.function.clone(), &shots, measured))
     }
 
     /// The paper's chain with its own criterion of image pitch.
-    fn paper_chain(&mut self, method: Method, function: PhaseFunction) -> Result<Run, RigError> {
+    fn paper_chain(
+        &mut self,
+        method: Method,
+        function: PhaseFunction,
+    ) -> Result<Run, MeasureError> {
         let shots = methods::geometric(&function);
-        let mut measured = self.measure(stream(method), &function, &shots, About::Reference)?;
+        let mut measured = self.measure(stream(method), &function, &shots, None)?;
         let fine = too_fine(&measured.phases.phase, measured.phases.width);
         for (trust, fine) in measured.phases.trust.iter_mut().zip(fine) {
             if fine && *trust == Trust::Resolved {
@@ -306,8 +308,8 @@ impl Runner {
     }
 }
 
-fn rig(error: impl std::fmt::Display) -> RigError {
-    RigError::Impossible(error.to_string())
+fn rig(error: impl std::fmt::Display) -> MeasureError {
+    MeasureError::Impossible(error.to_string())
 }
 
 /// Smallest image pitch along u that the paper's chain resolves, camera pixels.

@@ -6,7 +6,7 @@ use super::numbers::number;
 use super::options::Measuring;
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
-use crate::head::calibrate::{Known, MakeError, make};
+use crate::head::calibrate::{Basis, MakeError, make};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::bounds::{COLDEST_C, HOTTEST_C};
 use crate::head::calibration::file::CalibrationFile;
@@ -91,13 +91,13 @@ impl Calibrate {
             ..head
         };
         let mut opened = pool.install(|| backend::open(&bare, &told))?;
-        let known = self.known(&opened, before.as_ref())?;
-        if known.plate {
+        let basis = self.basis(&opened, before.as_ref())?;
+        if basis.plate {
             let stage = opened.stage.clone();
             pool.install(|| lay_plate(stage.as_ref(), &mut notes))?;
         }
         let told = |share: f64, words: &str| progress.tell(0.3 + 0.7 * share, words);
-        let made = pool.install(|| make(&mut opened.head, known, &told));
+        let made = pool.install(|| make(&mut opened.head, basis, &told));
         progress.clear();
         let mut made = made.map_err(refused)?;
         place.save(&made.bytes, &made.maps).map_err(|error| {
@@ -120,8 +120,8 @@ impl Calibrate {
         Ok(())
     }
 
-    /// What is known before anything is measured.
-    fn known(&self, opened: &Opened, before: Option<&CalibrationFile>) -> Result<Known, Failure> {
+    /// What the calibration starts from.
+    fn basis(&self, opened: &Opened, before: Option<&CalibrationFile>) -> Result<Basis, Failure> {
         let mut calibration = opened.calibration.clone();
         let content = |error: String| Failure::new(Exit::Content, error);
         let stored = before
@@ -156,7 +156,7 @@ impl Calibrate {
             return Err(Failure::new(Exit::Usage, message));
         }
         calibration.response = None;
-        Ok(Known {
+        Ok(Basis {
             calibration,
             models_from,
             response: stored.map(|(file, _)| file.response.clone()),

@@ -1,15 +1,15 @@
-//! Bounds of every value of `calibration.json`; whether the models are cameras at all is for the geometry.
+//! Bounds of every value of `calibration.json`. Whether the models are usable cameras is checked by the geometry.
 
 use super::file::{CalibrationFile, ContrastFile, MapFile, NoiseFile, ReferenceFile, TimingFile};
 use hal::bounds::{
     MAX_FRINGES, MAX_NOISE_COUNTS, MAX_SIDE, MIN_NOISE_COUNTS, fingerprint, length, text, within,
 };
 
-/// What a head may be warm, °C.
+/// Lowest temperature of a head, °C.
 pub const COLDEST_C: f64 = -100.0;
-/// The same.
+/// Highest temperature of a head, °C.
 pub const HOTTEST_C: f64 = 200.0;
-/// Longest delay, readout and scatter of one, ns.
+/// Longest delay, standard deviation of it, and readout, ns.
 const MAX_TIME_NS: u64 = 10_000_000_000;
 /// Longest name of a program or a file, characters.
 const MAX_NAME: usize = 255;
@@ -17,7 +17,7 @@ const MAX_NAME: usize = 255;
 const MAX_SOURCES: usize = 8192;
 /// The last second of the year 9999.
 const LAST_SECOND: u64 = 253_402_300_799;
-/// Levels and pitches that are measured, at most.
+/// Most levels of noise and pitches of contrast.
 const MAX_LEVELS: usize = 256;
 
 impl CalibrationFile {

@@ -1,4 +1,4 @@
-//! The calibration of the head that is open, for those who do not own the head.
+//! The calibration of the head that is open, for threads that do not own the head.
 
 use super::Calibration;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,13 +8,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub struct Current(Arc<Mutex<Option<Arc<Calibration>>>>);
 
 impl Current {
-    /// Of the head that was just opened; none if it has none that can be trusted.
+    /// Sets that of the head that was just opened; none if it has none that can be trusted.
     pub fn set(&self, calibration: Option<&Calibration>) {
         let calibration = calibration.cloned().map(Arc::new);
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = calibration;
     }
 
-    /// None before a head is open, and for one without a calibration that can be trusted.
+    /// The calibration; none before a head is open, and for one without a calibration that can be trusted.
     pub fn get(&self) -> Option<Arc<Calibration>> {
         let current = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         current.clone()

@@ -14,7 +14,7 @@ use std::time::Duration;
 pub const FORMAT: &str = "fringed-calibration";
 /// Its version.
 pub const VERSION: u32 = 1;
-/// A checksum is worked out with this in its place.
+/// Stands in place of the checksum while it is computed.
 const NO_CHECKSUM: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
 /// The file. docs/formats.md lists the keys.
@@ -25,15 +25,15 @@ pub struct CalibrationFile {
     pub format: String,
     /// [`VERSION`].
     pub version: u32,
-    /// Of what heights depend on: recipes carry it.
+    /// Fingerprint of everything that heights depend on; recipes carry it.
     pub fingerprint: String,
-    /// Of the whole file.
+    /// SHA-256 of the whole file.
     pub checksum: String,
-    /// The program.
+    /// The program that made it.
     pub made_by: String,
-    /// When, 0 if the clock was not synchronised.
+    /// When it was made, 0 if the clock was not synchronised.
     pub made_at_unix_s: u64,
-    /// How warm the head was, if somebody said it.
+    /// Temperature of the head, if it was given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
     /// Where the models come from.
@@ -48,7 +48,7 @@ pub struct CalibrationFile {
     pub noise: NoiseFile,
     /// The light of each of the 256 grey levels, 0 for black, 255 for white.
     pub response: Vec<f64>,
-    /// What fringes keep of their modulation.
+    /// Contrast of fringes against their pitch.
     pub contrast: ContrastFile,
     /// The reference phase maps, if a plate was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -65,7 +65,7 @@ pub struct CameraFile {
     pub height: u32,
     /// Bits per sample.
     pub bit_depth: u8,
-    /// MODEL.
+    /// Intrinsic numbers and pose.
     pub model: DeviceModel,
 }
 
@@ -77,17 +77,17 @@ pub struct ProjectorFile {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// MODEL.
+    /// Intrinsic numbers and pose.
     pub model: DeviceModel,
 }
 
-/// How flips, light and stamps follow each other.
+/// Timing of flips, light and stamps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimingFile {
     /// From a flip to its light.
     pub flip_to_light_ns: u64,
-    /// 1 σ of it.
+    /// 1 σ of that.
     pub sigma_ns: u64,
     /// What the camera's stamps mark.
     pub stamp: Stamp,
@@ -103,9 +103,9 @@ pub struct NoiseFile {
     pub counts: f64,
     /// σ in the dark, counts.
     pub read_counts: f64,
-    /// Variance that light adds, counts² per count.
+    /// Shot noise: variance that light adds, counts² per count.
     pub shot: f64,
-    /// As measured.
+    /// The measured levels.
     pub levels: Vec<LevelFile>,
 }
 
@@ -125,7 +125,7 @@ pub struct LevelFile {
 pub struct ContrastFile {
     /// Median modulation of the coarsest pitch, counts.
     pub modulation_counts: f64,
-    /// The coarsest first.
+    /// Contrast of each pitch, the coarsest first.
     pub pitches: Vec<PitchFile>,
 }
 
@@ -145,7 +145,7 @@ pub struct PitchFile {
 pub struct ReferenceFile {
     /// Projector pixels per fringe.
     pub pitch_px: f64,
-    /// How far the models are off the measured plane, RMS, projector pixels.
+    /// RMS distance of the models from the measured plane, projector pixels.
     pub models_off_px: f64,
     /// Under vertical fringes.
     pub vertical: MapFile,
@@ -161,11 +161,11 @@ pub struct MapFile {
     pub file: String,
     /// SHA-256 of that file.
     pub sha256: String,
-    /// How far the fit is off the plate, RMS.
+    /// Estimated RMS error of the fit, see [`algo::pipeline::Plate`].
     pub residual_turns: f64,
     /// Scatter of the pixels about the fit.
     pub noise_turns: f64,
-    /// Share of the frame that told it.
+    /// Share of the frame that was fitted.
     pub filled: f64,
 }
 
@@ -215,7 +215,7 @@ impl CalibrationFile {
         Ok(())
     }
 
-    /// What is known of the head.
+    /// The calibration.
     ///
     /// # Errors
     /// If a value is out of its bounds, a model is absurd, or the response cannot be inverted.
@@ -234,7 +234,7 @@ impl CalibrationFile {
         })
     }
 
-    /// How the head's time goes, by this; what is no matter of calibration stays as it is.
+    /// The head's timing by this calibration; what is not calibrated stays as `before`.
     pub fn timing(&self, before: Timing) -> Timing {
         Timing {
             flip_to_light: Duration::from_nanos(self.timing.flip_to_light_ns),
@@ -249,13 +249,13 @@ impl CalibrationFile {
     /// # Errors
     /// If a number in it is not finite or the response cannot be inverted.
     pub fn sealed(mut self) -> Result<(Self, Vec<u8>), String> {
-        // Of the right form until there is one.
+        // The bounds ask for a fingerprint's form before there is one.
         self.fingerprint = NO_CHECKSUM.into();
         self.fingerprint = self.calibration()?.fingerprint();
         self.checksum = self.checksummed();
         let mut bytes = serde_json::to_vec_pretty(&self).map_err(|error| error.to_string())?;
         bytes.push(b'\n');
-        // What cannot be read again is not written.
+        // A file that could not be read again is never written.
         let again = Self::read(&bytes)?;
         Ok((again, bytes))
     }

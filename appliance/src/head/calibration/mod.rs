@@ -1,4 +1,4 @@
-//! What is known of a head: geometry, noise, grey response; how it is measured, imported and kept.
+//! The calibration of a head: geometry, noise and grey response; its file and where it is stored; models imported from OpenCV.
 
 pub mod bounds;
 mod current;
@@ -38,22 +38,17 @@ impl Calibration {
     /// is linear.
     ///
     /// # Errors
-    /// If the model of the camera or of the projector is absurd: which one, and why.
+    /// In words: the model of the camera or of the projector is absurd, and why.
     pub fn new(
         (width, height, bit_depth): (u32, u32, u8),
         raster: (u32, u32),
         (camera, projector): (&DeviceModel, &DeviceModel),
         noise_counts: f64,
     ) -> Result<Self, String> {
-        let checked = |device: &str, model, (columns, rows): (u32, u32)| {
-            let model = seam::pinhole_model(model);
-            Pinhole::new(model, columns as usize, rows as usize)
-                .map_err(|error| format!("the {device}'s calibration: {error}"))
-        };
         Ok(Self {
-            camera: checked("camera", camera, (width, height))?,
+            camera: seam::pinhole("camera", camera, (width, height))?,
             bit_depth,
-            projector: checked("projector", projector, raster)?,
+            projector: seam::pinhole("projector", projector, raster)?,
             noise_counts,
             response: None,
         })
@@ -67,7 +62,7 @@ impl Calibration {
         Self::of_scenario(stage.scenario())
     }
 
-    /// The same, of a head that need not be there.
+    /// The exact calibration of the head of a scenario, which need not be simulated.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -81,23 +76,21 @@ impl Calibration {
         )
     }
 
-    /// What a recording says of the head that took it, with the noise of a sample in counts.
+    /// The calibration of the head that took a recording, from its models, with the noise of a sample in counts.
     ///
     /// # Errors
-    /// What is the matter with the recording, as a predicate: "has no camera model".
+    /// What is wrong with the recording, as a predicate: "has no camera model".
     pub fn of(recording: &Recording, noise_counts: f64) -> Result<Self, String> {
         let projector = &recording.projector;
-        let lens = projector.model.as_ref();
+        let camera = recording.camera_model.as_ref();
+        let models = (
+            camera.ok_or("has no camera model")?,
+            projector.model.as_ref().ok_or("has no projector model")?,
+        );
         Self::new(
             (recording.width, recording.height, recording.bit_depth),
             (projector.width, projector.height),
-            (
-                recording
-                    .camera_model
-                    .as_ref()
-                    .ok_or("has no camera model")?,
-                lens.ok_or("has no projector model")?,
-            ),
+            models,
             noise_counts,
         )
         .map_err(|error| format!("has an absurd model: {error}"))
@@ -142,8 +135,7 @@ impl Calibration {
         size(&self.projector)
     }
 
-    /// A strong hash over everything that heights depend on: a recipe made for another calibration
-    /// is refused by it.
+    /// SHA-256 over everything that heights depend on, so that a recipe made for another calibration is refused.
     pub fn fingerprint(&self) -> String {
         let mut hash = Sha256::new();
         let (width, height, bits) = self.frames();
@@ -161,7 +153,7 @@ impl Calibration {
                 hash.update(number.to_le_bytes());
             }
         }
-        // What is linear by itself is projected as it was before anybody measured it.
+        // A linear response changes nothing that is projected, so it leaves the fingerprint as it was.
         if let Some(response) = &self.response {
             let levels: Vec<u8> = (0..=u8::MAX)
                 .map(|level| response.level_for(level))
@@ -172,7 +164,7 @@ impl Calibration {
     }
 }
 
-/// Columns and rows of a device's pictures, which were given as `u32`.
+/// Columns and rows of a device; they were given as `u32`.
 fn size(device: &Pinhole) -> (u32, u32) {
     (device.width() as u32, device.height() as u32)
 }

@@ -1,4 +1,4 @@
-//! Where a head's calibration lies: `calibration.json`, the generation before it, and the phase maps beside them.
+//! The files of a calibration: `calibration.json`, its previous generation, and the phase maps beside them.
 
 use super::file::CalibrationFile;
 use crate::storage::folder::{name_also, sync_folder_of, write_whole};
@@ -8,9 +8,9 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Where it lies in a state folder.
+/// Its path in a state folder.
 pub const IN_STATE: &str = "calibration/calibration.json";
-/// Digits of a map's checksum in its name: maps of two generations never have the same.
+/// Digits of a map's checksum in its file name, so that maps of two generations never share a name.
 const DIGITS: usize = 16;
 
 /// The place of a `calibration.json`.
@@ -22,9 +22,9 @@ pub struct Place {
 /// A calibration that was read.
 #[derive(Clone, Debug)]
 pub struct Loaded {
-    /// It.
+    /// The newest generation that is whole.
     pub file: CalibrationFile,
-    /// Why the newest generation could not be used and this is the one before.
+    /// Why it is the previous generation, where it is.
     pub fallback: Option<String>,
 }
 
@@ -83,8 +83,8 @@ impl Place {
         (format!("{name}-{}.npy", &sum[..DIGITS]), sum)
     }
 
-    /// Writes a calibration with its maps (name, bytes); the one before stays as the previous generation. Whenever the plug is
-    /// pulled, the old one is whole or the new one is: maps have names of their own, and count once `calibration.json` names them.
+    /// Writes a calibration with its maps (name, bytes) and keeps the one before as the previous generation. After a loss of power at any
+    /// moment either the old one or the new one is whole: maps have names of their own, and count only once `calibration.json` names them.
     ///
     /// # Errors
     /// Whatever the file system answers; then the calibration is the one before.
@@ -117,7 +117,7 @@ impl Place {
         name_also(&self.path, &self.previous())
     }
 
-    /// Removes maps that no generation names, and what a kill has left. What cannot be removed only takes room.
+    /// Removes maps that no generation names, and unfinished files. A file that cannot be removed only takes room.
     fn forget_maps(&self) {
         let generations = [read(&self.path), read(&self.previous())];
         let named: Vec<&str> = generations
@@ -139,7 +139,7 @@ impl Place {
     }
 }
 
-/// The calibration in a file, if there is one.
+/// Reads the calibration in a file, if there is one.
 fn read(path: &Path) -> Option<Result<CalibrationFile, String>> {
     match fs::read(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,

@@ -1,4 +1,4 @@
-//! The doctor's steps about light: there at all, exposed well, sharp at several pitches, and in proportion to grey.
+//! The doctor's checks of light: there is some, it is exposed well, fringes are sharp, and light is proportional to grey.
 
 use super::Finding;
 use crate::head::calibration::Calibration;
@@ -10,11 +10,11 @@ use serde_json::{Value, json};
 
 /// Grey levels whose response is measured, besides black and white.
 const GREYS: [u8; 7] = [32, 64, 96, 128, 160, 192, 224];
-/// The pitch that must be sharp: teaching starts with it.
+/// The pitch whose contrast is judged, projector pixels: teaching starts with it.
 const SHARP_PITCH: u32 = 12;
 /// Least contrast at that pitch, relative to the coarsest. A blur of σ pixels leaves exp(−2 (π σ / pitch)²): 0.5 is σ = 2.2 px.
 const LEAST_CONTRAST: f64 = 0.5;
-/// Grey may answer off proportion by this share of white. Of gamma 1.1 it is 0.035.
+/// Largest deviation of light from proportionality to grey, share of white. A gamma of 1.1 deviates by 0.035.
 const MOST_NONLINEAR: f64 = 0.03;
 
 pub(super) fn light(lit: &Lit) -> Finding {
@@ -104,7 +104,7 @@ pub(super) fn response(
     calibration: &Calibration,
     lit: &Lit,
 ) -> Result<Finding, Error> {
-    // As patterns are projected: through the inverse of the response that is known.
+    // Projected as patterns are: through the inverse of the calibrated response.
     let asked = GREYS.map(|grey| {
         let response = calibration.response.as_ref();
         response.map_or(grey, |response| response.level_for(grey))

@@ -1,7 +1,7 @@
-//! Examines a head step by step: what is well, what is not, and what to do about it.
+//! The doctor: checks a head item by item, and says what is wrong and what to do about it.
 //!
-//! A step is judged only where what it needs is well, so a fault is named once and its consequences are not. Pictures are taken
-//! long after each flip, so nothing but the step about the flip-to-light delay depends on that delay.
+//! A check runs only if the checks that it depends on have passed, so a fault is reported once and its consequences are not. Pictures are
+//! taken long after each flip, so only the check of the flip-to-light delay depends on that delay.
 
 mod light;
 mod time;
@@ -12,14 +12,14 @@ use hal::error::Error;
 use hal::head::DynHead;
 use serde_json::{Value, json};
 
-/// How a step went.
+/// The verdict of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// It is well.
+    /// What was checked is as it must be.
     Pass,
     /// It is not.
     Fail,
-    /// It cannot be judged before another step passes.
+    /// A check that this one depends on has not passed.
     Skipped,
 }
 
@@ -34,12 +34,12 @@ impl Verdict {
     }
 }
 
-/// A step with its verdict.
+/// One check with its verdict.
 #[derive(Clone, Debug)]
-pub struct Step {
+pub struct Check {
     /// Its name.
     pub name: &'static str,
-    /// How it went.
+    /// Its verdict.
     pub verdict: Verdict,
     /// What was found, in a sentence with its numbers.
     pub found: String,
@@ -49,7 +49,7 @@ pub struct Step {
     pub measured: Value,
 }
 
-/// What a step found, before it has a name.
+/// What a check found; [`Check`] adds its name.
 struct Finding {
     found: String,
     remedy: Option<String>,
@@ -74,8 +74,8 @@ impl Finding {
     }
 }
 
-/// The steps in their order, each with the steps that must have passed before it can be judged.
-const STEPS: [(&str, &[&str]); 10] = [
+/// The checks in their order, each with the checks that must have passed before it.
+const CHECKS: [(&str, &[&str]); 10] = [
     ("devices", &[]),
     ("format", &["devices"]),
     ("mode", &["devices"]),
@@ -88,28 +88,28 @@ const STEPS: [(&str, &[&str]); 10] = [
     ("response", &["devices", "trigger", "light", "exposure"]),
 ];
 
-/// Examines a head in front of any part, best a flat bright one. `progress` is told the share done. What the stamps of a head that is not
-/// `calibrated` mark is measured first, and told to the head.
+/// Checks a head in front of any part, best a flat bright one. `progress` gets the share done and the name of the next check. For a head
+/// that is not `calibrated`, what the camera's time stamps mark is measured first, and the head is set accordingly.
 pub fn examine(
     head: &mut DynHead,
     calibration: &Calibration,
     calibrated: bool,
     progress: &dyn Fn(f64, &str),
-) -> Vec<Step> {
-    let mut steps: Vec<Step> = Vec::with_capacity(STEPS.len());
+) -> Vec<Check> {
+    let mut checks: Vec<Check> = Vec::with_capacity(CHECKS.len());
     let mut lit: Option<Result<Lit, Error>> = None;
-    for (at, (name, needs)) in STEPS.into_iter().enumerate() {
-        progress(at as f64 / STEPS.len() as f64, name);
+    for (at, (name, needs)) in CHECKS.into_iter().enumerate() {
+        progress(at as f64 / CHECKS.len() as f64, name);
         let missing = needs.iter().find(|need| {
-            steps
+            checks
                 .iter()
-                .any(|step| step.name == **need && step.verdict != Verdict::Pass)
+                .any(|check| check.name == **need && check.verdict != Verdict::Pass)
         });
         if let Some(missing) = missing {
-            steps.push(Step {
+            checks.push(Check {
                 name,
                 verdict: Verdict::Skipped,
-                found: format!("cannot be judged before the step {missing} passes"),
+                found: format!("cannot be judged before the check {missing} passes"),
                 remedy: String::new(),
                 measured: json!({}),
             });
@@ -138,7 +138,7 @@ pub fn examine(
             let (found, remedy) = text.rsplit_once(": ").unwrap_or((&text, ""));
             Finding::fail(found, remedy, json!({}))
         });
-        steps.push(Step {
+        checks.push(Check {
             name,
             verdict: match finding.remedy {
                 Some(_) => Verdict::Fail,
@@ -150,5 +150,5 @@ pub fn examine(
         });
     }
     progress(1.0, "examined");
-    steps
+    checks
 }

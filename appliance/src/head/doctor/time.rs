@@ -1,4 +1,4 @@
-//! The doctor's steps about devices and time: there, right format and mode, flips, triggers, flip-to-light delay.
+//! The doctor's checks of devices and time: devices answer, format and mode, flips, triggers, flip-to-light delay.
 
 use super::Finding;
 use crate::head::examine::{Delay, Lit, PATIENCE, Stamps};
@@ -12,13 +12,13 @@ use std::time::Duration;
 
 /// Flips whose cadence is judged.
 const FLIPS: u32 = 60;
-/// The period of flips may be off the mode's by this share: a mode says 60 Hz where it is 59.94.
+/// Largest relative deviation of the period of flips from the mode's: a mode that says 60 Hz may run at 59.94.
 const PERIOD_TOLERANCE: f64 = 2e-3;
 /// Refreshes over which the trigger is judged.
 const TRIGGERED: u32 = 24;
-/// The patterns that are loaded for it.
+/// The index of white among the patterns of [`load`].
 const WHITE: usize = 1;
-/// How far the delay may be off even where it was measured well, ms: what one round of a small camera leaves.
+/// Least uncertainty of the measured delay, ms: that of one round with a camera of few pixels.
 const LEAST_OFF_MS: f64 = 0.05;
 
 fn ms(time: Duration) -> f64 {
@@ -85,7 +85,7 @@ pub(super) fn mode(head: &DynHead) -> Finding {
     Finding::pass(found, measured)
 }
 
-/// Black and white.
+/// Loads black and white.
 fn load(head: &mut DynHead) -> Result<(), Error> {
     let (columns, rows) = head.projector_size();
     head.load(vec![
@@ -151,7 +151,7 @@ pub(super) fn trigger(head: &mut DynHead, calibrated: bool) -> Result<Finding, E
     };
     let mut seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
     if !calibrated && !seen.frames.is_empty() {
-        // Calibrating comes after the doctor: what it will find is what frames are judged by here.
+        // The doctor runs before the head is calibrated, so it measures the stamps as calibrating will.
         let Stamps { stamp, readout } = Stamps::measure(head)?;
         head.set_timing(Timing {
             stamp,
@@ -191,7 +191,7 @@ fn triggered(seen: &Watched<()>) -> Finding {
     if let Some(off) = pulse_off {
         return Finding::fail(
             format!(
-                "{spoiled} of {pulses} pulses were not as long as they should be, by up to {:.2} ms: so far off is the exposure",
+                "{spoiled} of {pulses} pulses were too long or too short, by up to {:.2} ms, and so was the exposure",
                 ms(off)
             ),
             "stop what else loads the computer, and give fringed a real-time priority",
@@ -250,7 +250,7 @@ fn by_itself(seen: &Watched<()>, nominal: Duration) -> Finding {
     Finding::pass(found, measured)
 }
 
-/// The time from a flip to its light, by how bright the frames around many flips are.
+/// The time from a flip to its light, from the brightness of the frames around many flips.
 pub(super) fn delay(head: &mut DynHead, lit: &Lit) -> Result<Finding, Error> {
     let believed = head.timing().flip_to_light.as_secs_f64();
     let refresh = head.refresh().as_secs_f64();
@@ -272,7 +272,7 @@ pub(super) fn delay(head: &mut DynHead, lit: &Lit) -> Result<Finding, Error> {
         delay * 1e3,
         believed * 1e3
     );
-    // Finer than this the calibration measures it, with more flips.
+    // The calibration measures it with more flips, so a difference below an eighth of a refresh is no error of its.
     if (delay - believed).abs() > (off_ms * 1e-3).max(refresh / 8.0) {
         let remedy = format!(
             "the calibration is off by {:.1} refreshes: switch off the projector's picture processing, or calibrate anew",

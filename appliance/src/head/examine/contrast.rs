@@ -1,4 +1,4 @@
-//! Contrast against pitch: what fringes keep of the projector's light on their way to the camera.
+//! Contrast against pitch: how much blur of projector and camera weakens fringes.
 //!
 //! Contrast is the modulation B of four shifts by a quarter of a turn, B = ½ √((I₀ − I₂)² + (I₁ − I₃)²) (Creath 1988), relative to
 //! that of the coarsest pitch, so neither brightness nor the projector's response changes it.
@@ -11,9 +11,9 @@ use hal::error::Error;
 use hal::head::DynHead;
 use hal::projector::Raster;
 
-/// Pitches whose contrast is measured, projector pixels, the coarsest first: the others are relative to it.
+/// Pitches whose contrast is measured, projector pixels. The first is the coarsest: contrasts are relative to it.
 pub const PITCHES: [u32; 6] = [64, 32, 24, 16, 12, 8];
-/// Quarter turns of a pitch.
+/// Shifts of each pitch, a quarter of a turn each.
 const SHIFTS: usize = 4;
 
 /// The median modulation over the lit pixels for each of [`PITCHES`], counts.

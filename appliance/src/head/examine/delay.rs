@@ -1,9 +1,10 @@
-//! The time from a flip to its light, from how bright frames are while black and white change at random.
+//! The flip-to-light delay, from the brightness of frames while black and white alternate at random intervals.
 //!
-//! A frame exposed from s to s + T sees white for a share p(d) of its time, if light comes d after its flip: p is known from
-//! the flips' times. Its mean is b + a·p(d). The three are found by least squares over all frames: d coarsely by trial first (black
-//! and white change after random times, so one d fits alone), then all by Gauss–Newton. Each change inside an exposure tells d;
-//! noise of a mean moves it by T times its share of white, less with the root of the changes seen.
+//! A frame exposed from s to s + T sees white for a share p(d) of its time if light comes d after its flip; p follows from the times
+//! of the flips. The frame's mean is b + a·p(d). Black b, white above black a, and d are fitted to all frames by least squares: d
+//! first by trial on a grid (intervals are random, so only one d fits), then all three by Gauss–Newton. Each change inside an
+//! exposure determines d: a relative noise ε of the mean, as a share of white, gives an error of ε·T, which falls with the square
+//! root of the number of such changes.
 
 use super::PATIENCE;
 use super::pictures::{Lit, counts};
@@ -16,31 +17,31 @@ use std::time::Duration;
 
 /// Changes between black and white in a round.
 const CHANGES: u32 = 80;
-/// Longest delay that is looked for, refreshes.
+/// Longest delay that is tried, refreshes.
 const LONGEST: u32 = 16;
-/// Steps of the trial in the shorter of refresh and exposure.
+/// Points of the trial grid in the shorter of refresh and exposure.
 const TRIALS: f64 = 8.0;
-/// Steps of Gauss–Newton; the share of white is linear but for kinks.
-const STEPS: usize = 12;
-/// Rounds end when the delay is known so well, s: its microsecond is certain then (3.3 σ to half of one).
+/// Iterations of Gauss–Newton; p is piecewise linear in d, so few are needed.
+const ITERATIONS: usize = 12;
+/// 1 σ of the delay at which measuring ends, s: 3.3 σ are half a microsecond, to which the delay is rounded.
 const GOAL_S: f64 = 0.15e-6;
-/// White must lie so many times the scatter of the means above black, else there is no light to be seen.
+/// White must lie this many times the scatter of the means above black, else no light follows the flips.
 const LEAST_SIGNAL: f64 = 5.0;
 
-/// When light comes.
+/// The measured delay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Delay {
-    /// After its flip, s, rounded to a microsecond; below zero if the stamps of flips or frames do not mean what is believed.
+    /// From a flip to its light, s, rounded to a microsecond; negative if the time stamps of flips or frames are misinterpreted.
     pub seconds: f64,
     /// 1 σ of it, s.
     pub error: f64,
-    /// Scatter of the frames' means about what the delay says, share of white.
+    /// Scatter of the frames' means about the fit, share of white.
     pub scatter: f64,
-    /// Frames that were looked at.
+    /// Frames in the fit.
     pub frames: usize,
 }
 
-/// What the frames of one round saw.
+/// The flips and frames of one round.
 struct Round {
     /// Each change: its flip after the first one, s, and whether it is to white.
     changes: Vec<(f64, bool)>,
@@ -49,8 +50,8 @@ struct Round {
 }
 
 impl Delay {
-    /// Measures it in at most so many rounds of about four seconds each; none if no light follows the flips. The meaning of
-    /// the camera's stamps is the head's.
+    /// Measures it in at most `rounds` of about four seconds each; none if no light follows the flips. The camera's stamps are
+    /// interpreted as the head's timing says.
     ///
     /// # Errors
     /// Of a device.
@@ -62,19 +63,19 @@ impl Delay {
         ])?;
         let exposure = head.camera_timing().exposure.as_secs_f64();
         let refresh = head.refresh().as_secs_f64();
-        let mut seen = Vec::new();
-        let mut found = None;
+        let mut taken = Vec::new();
+        let mut fitted = None;
         for round in 0..rounds.max(1) {
-            seen.push(Round::take(head, lit, round)?);
-            found = fit(&seen, exposure, refresh);
-            if found.is_none_or(|delay: Self| delay.error <= GOAL_S) {
+            taken.push(Round::take(head, lit, round)?);
+            fitted = fit(&taken, exposure, refresh);
+            if fitted.is_none_or(|delay: Self| delay.error <= GOAL_S) {
                 break;
             }
         }
-        Ok(found)
+        Ok(fitted)
     }
 
-    /// As a duration; zero if it is below.
+    /// As a duration; zero if it is negative.
     pub fn duration(&self) -> Duration {
         Duration::from_micros((self.seconds * 1e6).round().max(0.0) as u64)
     }
@@ -93,7 +94,7 @@ impl Round {
                 settle: 0,
             })
             .collect();
-        // Black at both ends; at the last one until the longest delay has passed.
+        // Black at both ends; the last one stays until the longest delay has passed.
         showings.push(Showing {
             index: 0,
             refreshes: whole + LONGEST,
@@ -124,13 +125,13 @@ impl Round {
         })
     }
 
-    /// Of each frame its mean, the share of its exposure in which white is in view if light comes `delay` after its flip, and
-    /// the share's derivative by the delay.
+    /// For each frame its mean, the share p of its exposure in which white is in view if light comes `delay` after its flip, and
+    /// dp/d(delay).
     fn shares(&self, exposure: f64, delay: f64) -> impl Iterator<Item = (f64, f64, f64)> {
         self.frames.iter().map(move |(start, mean)| {
             let (mut share, mut slope) = (0.0, 0.0);
             for (flip, white) in &self.changes {
-                // White from a change on counts for what is left of the exposure, black takes it away again.
+                // A change to white adds the rest of the exposure, a change to black subtracts it.
                 let left = start + exposure - (flip + delay);
                 let sign = if *white { 1.0 } else { -1.0 };
                 share += sign * (left / exposure).clamp(0.0, 1.0);
@@ -143,7 +144,7 @@ impl Round {
     }
 }
 
-/// The delay that explains the rounds best; none if no light follows the flips.
+/// The delay that fits the rounds best; none if no light follows the flips.
 fn fit(rounds: &[Round], exposure: f64, refresh: f64) -> Option<Delay> {
     let shares = |delay: f64| {
         rounds
@@ -160,7 +161,7 @@ fn fit(rounds: &[Round], exposure: f64, refresh: f64) -> Option<Delay> {
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
     let mut delay = best.0;
     let mut known = None;
-    for _ in 0..STEPS {
+    for _ in 0..ITERATIONS {
         let (black, white, _) = straight(shares(delay))?;
         let mut normal = [[0.0; 3]; 3];
         let mut right = [0.0; 3];
@@ -177,8 +178,8 @@ fn fit(rounds: &[Round], exposure: f64, refresh: f64) -> Option<Delay> {
             squares += off * off;
             frames += 1;
         }
-        // Black and white are at their best already: right is nought but for the delay.
-        let inverse = corner_of_inverse(&normal)?;
+        // Black and white are fitted already, so the right-hand side is zero except for the delay.
+        let inverse = last_of_inverse(&normal)?;
         delay += (inverse * right[2]).clamp(-step, step);
         let scatter = (squares / f64::from((frames - 3).max(1))).sqrt();
         known = Some((black, white, scatter, scatter * inverse.sqrt(), frames));
@@ -194,7 +195,7 @@ fn fit(rounds: &[Round], exposure: f64, refresh: f64) -> Option<Delay> {
     })
 }
 
-/// Black, white above black, and the sum of squares that is left, of means against shares.
+/// The straight line of means over shares: black, white above black, and the sum of squared residuals.
 fn straight(shares: impl Iterator<Item = (f64, f64, f64)>) -> Option<(f64, f64, f64)> {
     let (mut n, mut x, mut y, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for (mean, share, _) in shares {
@@ -215,8 +216,8 @@ fn straight(shares: impl Iterator<Item = (f64, f64, f64)>) -> Option<(f64, f64, 
     Some((black, white, left))
 }
 
-/// The last element of the inverse of a symmetric matrix; none if it has none.
-fn corner_of_inverse(m: &[[f64; 3]; 3]) -> Option<f64> {
+/// The last diagonal element of the inverse of a symmetric matrix; none if it cannot be inverted.
+fn last_of_inverse(m: &[[f64; 3]; 3]) -> Option<f64> {
     let minor = m[0][0] * m[1][1] - m[0][1] * m[1][0];
     let determinant = m[2][2] * minor - m[0][2] * (m[0][2] * m[1][1] - m[0][1] * m[1][2])
         + m[1][2] * (m[0][2] * m[0][1] - m[0][0] * m[1][2]);
@@ -230,11 +231,11 @@ mod tests {
 
     #[test]
     fn the_last_element_of_an_inverse() {
-        // Two blocks: the inverse's corner is 1 / 4; then a full matrix, by hand: 1.5 (determinant 2, minor 3).
+        // Two blocks: the element is 1 / 4. Then a full matrix, by hand: 1.5.
         let blocks = [[2.0, 1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 4.0]];
-        assert_eq!(corner_of_inverse(&blocks), Some(0.25));
+        assert_eq!(last_of_inverse(&blocks), Some(0.25));
         let full = [[2.0, 1.0, 1.0], [1.0, 2.0, 1.0], [1.0, 1.0, 4.0 / 3.0]];
-        assert!((corner_of_inverse(&full).unwrap() - 1.5).abs() < 1e-12);
-        assert_eq!(corner_of_inverse(&[[1.0; 3]; 3]), None);
+        assert!((last_of_inverse(&full).unwrap() - 1.5).abs() < 1e-12);
+        assert_eq!(last_of_inverse(&[[1.0; 3]; 3]), None);
     }
 }

@@ -1,7 +1,7 @@
-//! What can be measured on a head: the doctor judges it, calibration keeps it.
+//! Measurements of a head: the doctor judges them, calibration stores them.
 //!
-//! Every measurement takes its pictures long after each flip ([`Lit`], [`pictures`]), but for the two that are about time
-//! itself: what the camera's stamps mark ([`Stamps`]), and when a flip's light comes ([`Delay`]). Those need no calibration.
+//! Pictures are taken long after each flip ([`Lit`], [`pictures`]), so their measurements need no timing. The two measurements of time
+//! itself, what the camera's stamps mark ([`Stamps`]) and when the light of a flip comes ([`Delay`]), need no calibration.
 
 mod contrast;
 mod delay;
@@ -21,5 +21,5 @@ pub use stamps::Stamps;
 
 use std::time::Duration;
 
-/// Longest wait beyond the plan for flips and frames that do not come.
+/// Longest wait for flips and frames beyond their planned time.
 pub const PATIENCE: Duration = Duration::from_millis(500);

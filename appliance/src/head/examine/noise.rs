@@ -1,11 +1,11 @@
-//! The camera's noise, measured on the head: two pictures of each of several greys.
+//! The camera's noise, from two pictures of each of several grey levels.
 
 use super::pictures::{Lit, greys, pictures};
 use algo::frame::{Noise, PhotonTransfer};
 use hal::error::Error;
 use hal::head::DynHead;
 
-/// Greys that are pictured twice.
+/// Grey levels of which two pictures are taken.
 const GREYS: [u8; 8] = [16, 48, 80, 112, 144, 176, 208, 240];
 
 /// The camera's noise from two pictures of each of eight greys, with its σ at half the light of white.

@@ -1,4 +1,4 @@
-//! Pictures of patterns, each exposed after the light of its flip has settled, and what of them the projector lights.
+//! Pictures of patterns, each exposed after the light of its flip has settled, and the pixels that the projector lights.
 
 use super::PATIENCE;
 use hal::error::Error;
@@ -6,18 +6,18 @@ use hal::frame::{Frame, Samples};
 use hal::head::{DynHead, Showing};
 use hal::projector::Raster;
 
-/// Share of the picture that must be lit.
+/// Least share of the picture that must be lit.
 pub const LEAST_LIT: f64 = 0.01;
-/// Share of the lit pixels that may be saturated: glints.
+/// Largest share of the lit pixels that may be saturated, by glints.
 pub const MOST_SATURATED: f64 = 0.01;
-/// Median of white over the lit pixels, share of full scale: below, noise is a large part of the signal.
+/// Least median of white over the lit pixels, share of full scale: below it, noise is a large part of the signal.
 pub const LEAST_BRIGHT: f64 = 0.2;
 
-/// After so many refreshes the light of a flip has come and stays, on any head that can be used.
+/// Refreshes after which the light of a flip has come and is stable, on any head that can be used.
 pub const SETTLE: u32 = 12;
 /// Patterns that are loaded at a time: a projector's memory holds a sequence, not 256 greys.
 const BATCH: usize = 8;
-/// A lost frame loses a picture, and so does a pulse of the wrong length: so often all of a batch are taken.
+/// How often a batch is taken before giving up: a lost frame or a pulse of the wrong length loses a picture.
 const ATTEMPTS: u32 = 3;
 /// A pixel is lit if white is this share of full scale above black.
 const LIT: f64 = 0.05;
@@ -37,7 +37,7 @@ fn rows<T: Copy + Into<f32>>(all: &[T], width: usize, stride: usize) -> Vec<f32>
     rows.map(|sample| (*sample).into()).collect()
 }
 
-/// Shows each pattern until its light has stood for `settle` refreshes, and hands a picture of it to `keep`, in order, in counts.
+/// Shows each pattern, waits `settle` refreshes for its light, and hands a picture of it to `keep`, in order, in counts.
 ///
 /// # Errors
 /// Of a device, or `Timeout` if the picture of a pattern did not come.
@@ -69,7 +69,7 @@ fn take(
     let count = patterns.len();
     head.load(patterns)?;
     let (camera, refresh) = (head.camera_timing(), head.refresh());
-    // Wherever a camera that runs by itself stands, one whole exposure fits behind the settled light.
+    // Long enough for one whole exposure of settled light, whatever the phase of a free-running camera.
     let room = (camera.exposure + camera.period)
         .as_nanos()
         .div_ceil(refresh.as_nanos().max(1));
@@ -104,10 +104,10 @@ fn take(
     ))
 }
 
-/// The pixels that the projector lights, and what they see of black and white.
+/// The pixels that the projector lights, and their samples of black and white.
 #[derive(Clone, Debug)]
 pub struct Lit {
-    /// Row-major places of the lit pixels.
+    /// Row-major indices of the lit pixels.
     places: Vec<usize>,
     /// The pictures of black and white, counts.
     black: Vec<f32>,
@@ -118,7 +118,7 @@ pub struct Lit {
 }
 
 impl Lit {
-    /// Looks at black and white.
+    /// Takes pictures of black and white.
     ///
     /// # Errors
     /// As [`pictures`].
@@ -152,7 +152,7 @@ impl Lit {
         Ok(lit)
     }
 
-    /// Row-major places of the lit pixels.
+    /// Row-major indices of the lit pixels.
     pub fn places(&self) -> &[usize] {
         &self.places
     }
@@ -162,7 +162,7 @@ impl Lit {
         self.places.len() as f64 / self.white.len().max(1) as f64
     }
 
-    /// What the lit pixels see of white, counts.
+    /// Samples of the lit pixels under white, counts.
     pub fn white(&self) -> impl Iterator<Item = f64> {
         self.places.iter().map(|at| f64::from(self.white[*at]))
     }
@@ -178,7 +178,7 @@ impl Lit {
         median(self.white().collect())
     }
 
-    /// What each pixel sees of a light between black and white, counts, row-major.
+    /// Expected sample of each pixel under a light between black (0) and white (1), counts, row-major.
     pub fn levels(&self, share: f64) -> impl Iterator<Item = f64> {
         let pairs = self.black.iter().zip(&self.white);
         pairs.map(move |(black, white)| {
@@ -197,7 +197,7 @@ impl Lit {
         sum / self.places.len().max(1) as f64
     }
 
-    /// How light a mean over the lit pixels is, 0 as black, 1 as white.
+    /// The light of a mean over the lit pixels: 0 is that of black, 1 that of white.
     pub fn share_of_white(&self, mean: f64) -> f64 {
         (mean - self.black_mean) / (self.white_mean - self.black_mean)
     }

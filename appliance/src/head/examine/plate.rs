@@ -1,4 +1,4 @@
-//! The two reference phase maps, measured on the head: a flat plate in the plane z = 0 under vertical and horizontal fringes.
+//! Measures the reference phase maps: a flat plate in the plane z = 0 under vertical and horizontal fringes.
 
 use crate::head::calibration::Calibration;
 use crate::head::scan::{self, Scan};
@@ -7,9 +7,11 @@ use algo::pipeline::Plate;
 use hal::head::DynHead;
 use std::time::Duration;
 
-/// Levels, and shifts of each but the finest, whose many shifts make noise and harmonics small.
+/// Levels of the sequence.
 const LEVELS: usize = 3;
+/// Shifts of each level but the finest.
 const SHIFTS: usize = 4;
+/// Shifts of the finest level: many, so that noise and harmonics are small.
 const FINEST_SHIFTS: usize = 16;
 /// Pitch of both patterns, projector pixels.
 pub const PITCH: f64 = 20.0;
@@ -20,7 +22,7 @@ pub enum PlateError {
     /// A device failed.
     #[error(transparent)]
     Device(#[from] hal::error::Error),
-    /// It is no flat plate, or the projector cannot show its patterns.
+    /// There is no flat plate, or the projector cannot show the patterns.
     #[error("measure the reference plane: {0}")]
     Unfit(String),
 }
@@ -29,7 +31,7 @@ fn unfit(error: impl std::fmt::Display) -> PlateError {
     PlateError::Unfit(error.to_string())
 }
 
-/// The reference phase map under vertical fringes, or under horizontal ones. The head's time is known already.
+/// Measures the reference phase map under vertical or under horizontal fringes. The head's timing must be calibrated.
 ///
 /// # Errors
 /// Of a device, or if too little of the frame shows a plate.

@@ -4,10 +4,10 @@ use super::pictures::{Lit, greys, pictures};
 use hal::error::Error;
 use hal::head::DynHead;
 
-/// A fall of the response by this share of white is none that noise could explain.
+/// Largest decrease of the response that noise can explain, share of white.
 const MOST_FALL: f64 = 0.02;
 
-/// The light of grey levels over the lit pixels, 0 as black, 1 as white. `progress` is told the share done.
+/// The light of grey levels over the lit pixels: 0 is that of black, 1 that of white. `progress` gets the share done.
 ///
 /// # Errors
 /// Of a device.
@@ -27,9 +27,9 @@ pub fn lights(
     Ok(lights)
 }
 
-/// The light of all 256 grey levels in linear levels: 0 for black, 255 for white, never falling.
+/// The light of all 256 grey levels on a linear scale: 0 for black, 255 for white, non-decreasing.
 ///
-/// What falls by less than noise can explain is levelled: the non-decreasing sequence nearest in least squares is the answer
+/// Noise is removed by isotonic regression: the result is the non-decreasing sequence nearest to the measured one in least squares
 /// (pool adjacent violators: Ayer et al. 1955).
 ///
 /// # Errors
@@ -42,8 +42,8 @@ pub fn response(
 ) -> Result<[f64; 256], Error> {
     let levels: Vec<u8> = (0..=u8::MAX).collect();
     let raw = lights(head, settle, lit, &levels, progress)?;
-    let level = levelled(&raw);
-    let off = |at: &usize| (raw[*at] - level[*at]).abs();
+    let monotonic = isotonic(&raw);
+    let off = |at: &usize| (raw[*at] - monotonic[*at]).abs();
     if let Some(at) = (0..raw.len()).find(|at| !(off(at) <= MOST_FALL)) {
         return Err(Error::unsupported(
             format!("a projector whose light falls where grey rises (near level {at})"),
@@ -51,16 +51,16 @@ pub fn response(
         ));
     }
     // Black and white may have been pooled with their neighbours.
-    let (dark, bright) = (level[0], level[level.len() - 1]);
+    let (dark, bright) = (monotonic[0], monotonic[monotonic.len() - 1]);
     let mut linear = [0.0; 256];
-    for (out, light) in linear.iter_mut().zip(&level) {
+    for (out, light) in linear.iter_mut().zip(&monotonic) {
         *out = 255.0 * (light - dark) / (bright - dark);
     }
     Ok(linear)
 }
 
 /// The non-decreasing sequence nearest to `values` in least squares.
-fn levelled(values: &[f64]) -> Vec<f64> {
+fn isotonic(values: &[f64]) -> Vec<f64> {
     let mut pools: Vec<(f64, usize)> = Vec::with_capacity(values.len());
     for value in values {
         let mut pool = (*value, 1);
@@ -85,11 +85,11 @@ mod tests {
     #[test]
     fn what_falls_is_levelled_to_its_mean_and_what_rises_is_kept() {
         assert_eq!(
-            levelled(&[0.0, 1.0, 3.0, 2.0, 4.0]),
+            isotonic(&[0.0, 1.0, 3.0, 2.0, 4.0]),
             [0.0, 1.0, 2.5, 2.5, 4.0]
         );
-        assert_eq!(levelled(&[3.0, 2.0, 1.0]), [2.0, 2.0, 2.0]);
-        assert_eq!(levelled(&[1.0, 2.0]), [1.0, 2.0]);
-        assert!(levelled(&[]).is_empty());
+        assert_eq!(isotonic(&[3.0, 2.0, 1.0]), [2.0, 2.0, 2.0]);
+        assert_eq!(isotonic(&[1.0, 2.0]), [1.0, 2.0]);
+        assert!(isotonic(&[]).is_empty());
     }
 }

@@ -1,8 +1,8 @@
-//! What moment of the exposure the camera's stamps mark: its start, its end, or the end of the readout.
+//! Which moment the camera's time stamps mark: the start of the exposure, its end, or the end of the readout.
 //!
-//! Where the camera is triggered, its triggers tell: a stamp comes as long after its trigger as what it marks. Where it runs by itself, only
-//! the time from a stamp until its frame can be fetched is known: exposure and readout, the readout, or nothing. How long a readout
-//! takes is then believed as configured, and a time that fits none of the three is no answer.
+//! For a triggered camera it follows from the time between trigger and stamp. For a free-running camera only the time from the stamp to the
+//! delivery of its frame is known: exposure and readout, the readout, or zero. The length of a readout is then taken as configured,
+//! and a time that fits none of the three is an error.
 
 use super::PATIENCE;
 use hal::camera::{CameraTiming, Starts};
@@ -15,32 +15,32 @@ use std::time::Duration;
 /// Showings over which frames are taken.
 const SHOWINGS: usize = 6;
 
-/// What the stamps mark.
+/// What the time stamps mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamps {
     /// The moment.
     pub stamp: Stamp,
-    /// From the end of an exposure to the end of its readout, or to its frame's being there.
+    /// From the end of an exposure to the end of its readout, or to the delivery of its frame.
     pub readout: Duration,
 }
 
 impl Stamps {
-    /// Takes frames of whatever stands there. What the head is told of its time is not used, and is the same afterwards.
+    /// Takes frames of any scene. The head's timing is not used, and is as before afterwards.
     ///
     /// # Errors
     /// Of a device; `Protocol` if no frame comes or no meaning explains the stamps.
     pub fn measure(head: &mut DynHead) -> Result<Self, Error> {
         let (columns, rows) = head.projector_size();
         head.load(vec![Raster::uniform(columns, rows, u8::MAX)?])?;
-        let told = head.timing();
-        // So that the start of an exposure is its stamp.
+        let before = head.timing();
+        // With this, `start` of a frame is its stamp.
         head.set_timing(Timing {
             stamp: Stamp::ExposureStart,
-            ..told
+            ..before
         });
         let camera = head.camera_timing();
         let seen = head.watch(&showings(&camera, head.refresh()), PATIENCE, &mut |_| ());
-        head.set_timing(told);
+        head.set_timing(before);
         let seen = seen?;
         if seen.frames.is_empty() {
             return Err(Error::protocol(
@@ -55,7 +55,7 @@ impl Stamps {
     }
 }
 
-/// One or two triggers for each, and then none for longer than the camera needs: one that runs by itself does not keep such a pace.
+/// Showings with one or two triggers each, and then a pause longer than the camera's period, which a free-running camera does not keep.
 fn showings(camera: &CameraTiming, refresh: Duration) -> [Showing; SHOWINGS] {
     let whole = camera.period.as_nanos().div_ceil(refresh.as_nanos().max(1));
     let whole = u32::try_from(whole).unwrap_or(1).clamp(1, 1000);
@@ -66,14 +66,14 @@ fn showings(camera: &CameraTiming, refresh: Duration) -> [Showing; SHOWINGS] {
     }; SHOWINGS]
 }
 
-/// From the time that the stamps come after their triggers.
+/// From the times between triggers and stamps.
 fn by_triggers(
     camera: &CameraTiming,
     triggers: &[Timestamp],
     frames: &[WatchedFrame<()>],
 ) -> Result<Stamps, Error> {
     let tolerance = TOLERANCE.min(camera.exposure / 4);
-    // The latest trigger before the stamp whose exposure had ended when the frame was there.
+    // The latest trigger before the stamp whose exposure had ended when the frame was delivered.
     let trigger_of = |frame: &WatchedFrame<()>| {
         let own = triggers.iter().rev().find(|at| {
             **at <= frame.start + tolerance && **at + camera.exposure <= frame.arrived + tolerance
@@ -131,12 +131,12 @@ fn nanoseconds(time: Duration) -> i128 {
     i128::try_from(time.as_nanos()).unwrap_or(i128::MAX)
 }
 
-/// From the time that frames take from their stamp until they are there.
+/// From the time between the stamp of a frame and its delivery.
 fn by_waiting(camera: &CameraTiming, frames: &[WatchedFrame<()>]) -> Result<Stamps, Error> {
     let (exposure, delivery) = (camera.exposure, camera.delivery);
     let waits = frames.iter().map(|frame| frame.arrived.since(frame.start));
     let wait = waits.min().unwrap_or_default();
-    // The first of equals: a readout in no time ends with the exposure.
+    // Of equal ones the first wins: with a readout of zero, the stamp marks the end of the exposure.
     let all = [
         (Stamp::ExposureStart, exposure + delivery, exposure),
         (Stamp::ExposureEnd, delivery, Duration::ZERO),
@@ -155,13 +155,13 @@ fn by_waiting(camera: &CameraTiming, frames: &[WatchedFrame<()>]) -> Result<Stam
         }),
         _ => Err(Error::protocol(
             format!(
-                "a camera that runs by itself and whose frames are there {:.1} ms after their stamps, which fits neither start nor end of an exposure of \
-                 {:.1} ms nor the end of a readout of {:.1} ms",
+                "a free-running camera whose frames come {:.1} ms after their stamps, which fits neither start nor end of an exposure of \
+                 {:.1} ms nor the end of a readout of {:.1} ms,",
                 wait.as_secs_f64() * 1e3,
                 exposure.as_secs_f64() * 1e3,
                 delivery.as_secs_f64() * 1e3
             ),
-            "set head.camera.delivery_us to what its readout takes (where stamps mark the end of the exposure, as on a Raspberry Pi, to the first number)",
+            "set head.camera.delivery_us to the time of its readout (where stamps mark the end of the exposure, as on a Raspberry Pi, to the first number)",
         )),
     }
 }
@@ -183,7 +183,7 @@ mod tests {
         }
     }
 
-    /// Frames stamped and there at these times, ms.
+    /// Frames stamped and delivered at these times, ms.
     fn frames(times: &[(u64, u64)]) -> Vec<WatchedFrame<()>> {
         let frame = |(start, arrived): &(u64, u64)| WatchedFrame {
             start: Timestamp(0) + ms(*start),
@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn a_wait_that_nothing_explains_is_told_and_not_guessed_at() {
-        // It delivers within 50 ms, but takes 20: neither is the readout.
+        // A frame takes 20 ms where a readout of 50 ms is configured.
         let error = by_waiting(&camera(17, 50), &frames(&[(100, 120), (133, 154)])).unwrap_err();
         let words = error.to_string();
         assert!(
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn triggers_tell_what_the_stamps_mark_however_soon_the_frames_are_there() {
-        // Exposed for 17 ms, read out for 16, and said to be there after 50.
+        // Exposed for 17 ms and read out for 16, with a configured delivery of 50 ms.
         let (camera, triggers) = (camera(17, 50), at(&[100, 133, 183, 216]));
         for (mark, readout, stamp) in [
             (0, 18, Stamp::ExposureStart),
@@ -260,7 +260,7 @@ mod tests {
             &[(108, 135), (141, 168)],
             // Before any trigger.
             &[(50, 90)],
-            // So late that it is none of this camera's.
+            // Too long after any trigger.
             &[(220, 240), (303, 310)],
         ] {
             let error = by_triggers(&camera, &triggers, &frames(seen)).unwrap_err();

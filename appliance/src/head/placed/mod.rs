@@ -1,4 +1,4 @@
-//! The part in front of a simulated head: its kind, its defects and where it lies, checked.
+//! The part in front of a simulated head: its kind, its defects and its pose, checked.
 
 use hal::bounds::clipped;
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use sim::{Part, Placement, Scenario};
 
 /// The most defects of a part: each ray is traced against all of them.
 const MAX_DEFECTS: usize = 16;
-/// The defects that there are, each with the names of its numbers in their order, and an example of it.
+/// Every kind of defect with the names of its numbers in their order, and an example of each.
 const DEFECTS: [(&str, &[(&str, f64)]); 3] = [
     (
         "dent",
@@ -22,22 +22,22 @@ const DEFECTS: [(&str, &[(&str, f64)]); 3] = [
     ("bent_flange", &[("degrees", 3.0)]),
 ];
 
-/// A part and where it lies, as a scenario has them.
+/// A part and its placement, as a scenario has them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Placed {
     /// The part with its defects.
     pub part: Part,
-    /// Where it lies; as it was designed, if left out.
+    /// Where it lies; in its designed pose, if left out.
     #[serde(default)]
     pub placement: Placement,
 }
 
 impl Placed {
-    /// The stock part of a kind, good, where it was designed to lie.
+    /// The stock part of a kind, without defects, in its designed pose.
     ///
     /// # Errors
-    /// If there is no such kind: those that there are.
+    /// If there is no such kind, naming those that there are.
     pub fn stock(kind: &str) -> Result<Self, String> {
         let mut stock = Part::stock().into_iter();
         let found = stock.find(|part| self::kind(part) == kind);
@@ -51,20 +51,21 @@ impl Placed {
         })
     }
 
-    /// The same part without its defects, where it was designed to lie.
+    /// The same part without its defects, in its designed pose.
     pub fn good(&self) -> Self {
         let mut value = value(&self.part);
         if let Some(defects) = value.get_mut("defects") {
             *defects = json!([]);
         }
         Self {
-            // What was one stays one.
+            // A part without defects is still valid JSON of a part.
             part: serde_json::from_value(value).unwrap_or_default(),
             ..Self::default()
         }
     }
 
-    /// Puts a good part of the kind in the place of the one that was `asked` for, to be taught; that one comes afterwards.
+    /// Replaces the part that was `asked` for by a good one of its kind, which is taught first. Answers with the one that was asked
+    /// for, which is placed afterwards.
     pub fn after_teaching(asked: &mut Option<Self>) -> Option<Self> {
         let placed = asked.take()?;
         *asked = Some(placed.good());
@@ -74,7 +75,7 @@ impl Placed {
     /// Adds a defect, `KIND:NUMBER,NUMBER,…`, as in `dent:10,5,0.3,8`.
     ///
     /// # Errors
-    /// If it is none, or the part has none of this kind.
+    /// If the text is not a defect, or the part has none of this kind.
     pub fn add_defect(&mut self, text: &str) -> Result<(), String> {
         let form = |(kind, keys): &(&str, &[(&str, f64)])| {
             let names: Vec<&str> = keys.iter().map(|(name, _)| *name).collect();
@@ -102,7 +103,7 @@ impl Placed {
             || !named.all(|((name, _), &n)| *name != "index" || is_place(n))
         {
             let (text, form) = (clipped(text), form(known));
-            return Err(format!("{text:?} is no defect: write {form}"));
+            return Err(format!("{text:?} is not a defect: write {form}"));
         }
         let named = known.1.iter().zip(numbers).map(|((name, _), n)| (*name, n));
         self.part = with_defect(&self.part, defect(kind, named))
@@ -141,7 +142,7 @@ fn kind(part: &Part) -> String {
 fn defect<'a>(kind: &str, numbers: impl Iterator<Item = (&'a str, f64)>) -> Value {
     let mut defect = Map::from_iter([("kind".to_owned(), json!(kind))]);
     for (name, number) in numbers {
-        // Places are counted in whole numbers.
+        // Indices are whole numbers.
         let whole = name == "index" && number.fract() == 0.0 && number >= 0.0;
         let number = if whole {
             json!(number as u64)
@@ -153,13 +154,11 @@ fn defect<'a>(kind: &str, numbers: impl Iterator<Item = (&'a str, f64)>) -> Valu
     defect.into()
 }
 
-/// The part with one more defect, if it has any of this kind.
+/// The part with one more defect, if it can have one of this kind.
 fn with_defect(part: &Part, defect: Value) -> Result<Part, String> {
     let mut value = value(part);
     let defects = value.get_mut("defects").and_then(Value::as_array_mut);
-    defects
-        .ok_or("it has no defects to choose from")?
-        .push(defect);
+    defects.ok_or("it can have no defects")?.push(defect);
     serde_json::from_value(value).map_err(|error| error.to_string())
 }
 

@@ -1,8 +1,8 @@
-//! A matrix of numbers of a FileStorage: shape and elements, checked.
+//! A matrix in a file of OpenCV's FileStorage: its shape and elements, checked.
 
 use super::tree::Node;
 
-/// Most elements that any matrix of a model has: 14 coefficients of distortion.
+/// Most elements of a matrix; the largest of a model are 14 coefficients of distortion.
 const MAX_ELEMENTS: usize = 64;
 
 /// A matrix, row-major.
@@ -18,9 +18,9 @@ impl Matrix {
     /// Reads one; `name` is only for messages.
     ///
     /// # Errors
-    /// In words: it is no matrix, has elements of another number than its shape, or one that is not finite.
+    /// In words: it is not a matrix, its number of elements contradicts its shape, or one is not finite.
     pub fn read(name: &str, node: &Node) -> Result<Self, String> {
-        let no_matrix = || format!("{name} is no matrix: write it as one with cv2.FileStorage");
+        let no_matrix = || format!("{name} is not a matrix: write it as one with cv2.FileStorage");
         let (shape, elements) = match node {
             Node::Map(_) => {
                 let whole = |key: &str| {
@@ -99,7 +99,7 @@ impl Matrix {
     }
 }
 
-/// The words of a matrix's data: a list of them, or as XML has it one text.
+/// The words of a matrix's data: a list of them, or in XML one text.
 fn words(node: &Node) -> Option<Vec<&str>> {
     match node {
         Node::Value(text) => Some(text.split_whitespace().collect()),
@@ -118,7 +118,7 @@ fn words(node: &Node) -> Option<Vec<&str>> {
 fn number(name: &str, word: &str) -> Result<f64, String> {
     let not_finite = || {
         format!(
-            "{name} holds {word}, which is no finite number: the calibration did not converge, take more and \
+            "{name} holds {word}, which is not finite: the calibration did not converge, take more and \
              sharper pictures of the board"
         )
     };
@@ -131,7 +131,7 @@ fn number(name: &str, word: &str) -> Result<f64, String> {
             .as_str()
         {
             "nan" | "inf" => Err(not_finite()),
-            _ => Err(format!("{name} holds {word:?}, which is no number")),
+            _ => Err(format!("{name} holds {word:?}, which is not a number")),
         },
     }
 }

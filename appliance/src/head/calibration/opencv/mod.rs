@@ -1,6 +1,6 @@
-//! Camera and projector models that were made with OpenCV, imported.
+//! Imports camera and projector models that were made with OpenCV.
 //!
-//! Two layouts are read. Either each device has a file of its own with its pose against the world (X_device = R·X_world + t); or
+//! Two layouts are read. Either each device has a file of its own with its pose in the world (X_device = R·X_world + t); or
 //! one file has both, with R and T from the camera to the projector as `stereoCalibrate` gives them, and the pose of the plate that
 //! lies in the reference plane as `solvePnP` gives it. docs/calibration.md lists the names.
 
@@ -16,14 +16,14 @@ use std::fs;
 use std::path::Path;
 use tree::Node;
 
-/// Names of a device's nodes; any of each list is read.
+/// Names of a device's nodes: the first one of each list that is there is read.
 struct Names {
     device: &'static str,
     matrix: &'static [&'static str],
     distortion: &'static [&'static str],
 }
 
-/// In a file of its own.
+/// Names of matrix and distortion in a file of one device.
 const ALONE: [&[&str]; 2] = [
     &["camera_matrix", "cameraMatrix", "K", "projector_matrix"],
     &[
@@ -34,13 +34,13 @@ const ALONE: [&[&str]; 2] = [
         "projector_distortion",
     ],
 ];
-/// The camera in a file of both.
+/// The camera's nodes in a file of both devices.
 const CAMERA: Names = Names {
     device: "camera",
     matrix: &["cam_K", "camInt", "camera_matrix", "M1", "K1"],
     distortion: &["cam_kc", "camDist", "distortion_coefficients", "D1"],
 };
-/// The projector in a file of both.
+/// The projector's nodes in a file of both devices.
 const PROJECTOR: Names = Names {
     device: "projector",
     matrix: &["proj_K", "projInt", "projector_matrix", "M2", "K2"],
@@ -51,12 +51,12 @@ const TRANSLATION: &[&str] = &["T", "t", "translation", "tvec"];
 const PLATE_ROTATION: &[&str] = &["plate_R", "plate_rvec"];
 const PLATE_TRANSLATION: &[&str] = &["plate_T", "plate_tvec"];
 
-/// What the files do not say.
+/// What the user says about the files.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Declared {
     /// The unit of lengths; none: a node `unit` says it.
     pub unit: Option<Unit>,
-    /// The world's z points away from the head, as on OpenCV's boards: turn it round.
+    /// Whether the world's z points away from the head, as on OpenCV's boards: then it is turned round.
     pub z_away: bool,
 }
 
@@ -94,7 +94,7 @@ impl Unit {
     }
 }
 
-/// Columns and rows of camera and projector, which the files must fit where they say theirs.
+/// Columns and rows of camera and projector; a size that a file states must be the same.
 #[derive(Clone, Copy, Debug)]
 pub struct Sizes {
     /// Of the camera.
@@ -188,7 +188,7 @@ fn millimetres(tree: &Node, declared: Declared) -> Result<f64, String> {
             Unit::named(word)
                 .ok_or_else(|| format!("unit is {word:?}: write mm, cm, m or inch"))?,
         ),
-        Some(_) => return Err("unit is no word: write mm, cm, m or inch".into()),
+        Some(_) => return Err("unit is not a word: write mm, cm, m or inch".into()),
     };
     match (declared.unit, written) {
         (Some(said), Some(written)) if said != written => Err(format!(
@@ -202,7 +202,7 @@ fn millimetres(tree: &Node, declared: Declared) -> Result<f64, String> {
     }
 }
 
-/// Where the file says a size, it must be the device's.
+/// Checks the size that the file states, if it does, against the device's.
 fn right_size(tree: &Node, size: (u32, u32)) -> Result<(), String> {
     for (name, expected) in [("image_width", size.0), ("image_height", size.1)] {
         if let Some(Node::Value(word)) = tree.get(name)
@@ -216,7 +216,7 @@ fn right_size(tree: &Node, size: (u32, u32)) -> Result<(), String> {
     Ok(())
 }
 
-/// The same pose against a world whose z and y point the other way.
+/// The same pose, with the world turned round where its z points away from the head.
 fn turned(pose: Pose, declared: Declared) -> Pose {
     if declared.z_away {
         pose.about_x()
@@ -232,7 +232,7 @@ fn model(tree: &Node, names: &Names, pose: Pose) -> Result<DeviceModel, String> 
     let [fx, skew, cx, below, fy, cy, ..] = k;
     if below != 0.0 || k[6..] != [0.0, 0.0, 1.0] {
         return Err(format!(
-            "{name} is no camera matrix: its rows are fx 0 cx, 0 fy cy, 0 0 1"
+            "{name} is not a camera matrix: its rows are fx 0 cx, 0 fy cy, 0 0 1"
         ));
     }
     if skew != 0.0 {

@@ -1,10 +1,10 @@
-//! A pose: rotation and translation, as a matrix or a rotation vector, checked for what is no rotation.
+//! A pose: translation, and rotation as a matrix or a rotation vector, checked to be a rotation.
 
 use super::matrix::Matrix;
 use super::node;
 use super::tree::Node;
 
-/// A rotation matrix that was rounded to six digits is off by less.
+/// Largest element of R·Rᵀ − 1: a rotation matrix that was rounded to six digits has less.
 const TOLERANCE: f64 = 1e-4;
 
 /// X_to = R · X_from + t.
@@ -17,10 +17,10 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Reads one by any of the names of its rotation and its translation; lengths are `mm` millimetres.
+    /// Reads one by any of the names of its rotation and its translation; a unit of length is `mm` millimetres.
     ///
     /// # Errors
-    /// In words: a node is missing or of another shape, R is no rotation, or it mirrors.
+    /// In words: a node is missing or has another shape, R is not a rotation, or it mirrors.
     pub fn read(
         tree: &Node,
         (rotation, translation): (&[&'static str], &[&'static str]),
@@ -58,7 +58,7 @@ impl Pose {
         }
     }
 
-    /// The same pose against a world that is turned half about its x axis: y and z point the other way.
+    /// The same pose with respect to a world turned by 180° about its x axis: y and z point the other way.
     pub fn about_x(&self) -> Self {
         let half_turn = [1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0];
         Self {
@@ -89,7 +89,7 @@ fn is_rotation(name: &str, r: &[f64; 9]) -> Result<(), String> {
         + r[2] * (r[3] * r[7] - r[4] * r[6]);
     if !(off <= TOLERANCE) {
         return Err(format!(
-            "{name} is no rotation: R·Rᵀ is off the unit matrix by {off:.1e}; write R as OpenCV gives it, with all its digits"
+            "{name} is not a rotation matrix: R·Rᵀ differs from the unit matrix by {off:.1e}; write R as OpenCV gives it, with all its digits"
         ));
     }
     if determinant < 0.0 {

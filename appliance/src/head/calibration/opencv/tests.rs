@@ -299,7 +299,7 @@ fn what_is_broken_is_refused_with_the_node_and_the_remedy() {
         ),
         (change("600.", "-.Inf"), &["T ", "finite"]),
         (change("600.", "1e999"), &["T ", "finite"]),
-        (change("600.", "six hundred"), &["T ", "no number"]),
+        (change("600.", "six hundred"), &["T ", "not a number"]),
         (change("600.", "600., 0."), &["T ", "3×1", "4 numbers"]),
         (
             change("   rows: 3\n   cols: 3", "   rows: 9\n   cols: 1"),
@@ -337,7 +337,7 @@ fn what_is_broken_is_refused_with_the_node_and_the_remedy() {
         ),
         (
             change("0., -1., 0.", "0., -1.1, 0."),
-            &["R is no rotation", "digits"],
+            &["R is not a rotation matrix", "digits"],
         ),
         (
             change("1451.8499999999999, 0.,", "1451.8499999999999, 3.,"),
@@ -365,10 +365,7 @@ fn what_is_broken_is_refused_with_the_node_and_the_remedy() {
             change("unit: mm", "unit: furlong"),
             &["furlong", "mm, cm, m or inch"],
         ),
-        (
-            change("unit: mm", "T: 5\nunit: mm"),
-            &["T stands there twice"],
-        ),
+        (change("unit: mm", "T: 5\nunit: mm"), &["T is there twice"]),
         (
             YAML.replace("R: !!opencv-matrix\n", "R: 5\nX:\n"),
             &["R is 1×1", "3×3"],
@@ -378,10 +375,13 @@ fn what_is_broken_is_refused_with_the_node_and_the_remedy() {
         (deep_xml, &["deep"]),
         (deep_yaml, &["recursion limit", "FileStorage"]),
         (large, &["bytes", "no pictures"]),
-        (XML.replace("</R>", "</S>"), &["no XML", "FileStorage"]),
+        (
+            XML.replace("</R>", "</S>"),
+            &["not valid XML", "FileStorage"],
+        ),
         (
             JSON.replace("\"T\": {", "\"T\": {{"),
-            &["no word", "FileStorage"],
+            &["not a word", "FileStorage"],
         ),
         (
             JSON.replacen("1451.8499999999999", ".Nan", 1),
@@ -391,7 +391,7 @@ fn what_is_broken_is_refused_with_the_node_and_the_remedy() {
         ("just words".into(), &["names no values"]),
         ("<a/>".into(), &["names no values"]),
         ("- 1\n- 2\n".into(), &["names no values"]),
-        ("? [a, b]\n: c\n".into(), &["no word"]),
+        ("? [a, b]\n: c\n".into(), &["not a word"]),
     ];
     for (text, words) in cases {
         let read = read(&text, Declared::default());
@@ -409,7 +409,7 @@ fn what_is_broken_is_refused_with_the_node_and_the_remedy() {
 fn no_prefix_and_no_changed_byte_of_a_file_makes_the_import_panic_or_hang() {
     for text in [YAML, XML, JSON] {
         for end in (0..text.len()).step_by(7) {
-            // A file that was cut is refused, or has all that is needed already.
+            // A truncated file is refused, or has everything that is needed already.
             let _ = read(&text[..end], Declared::default());
         }
         for at in (0..text.len()).step_by(11) {

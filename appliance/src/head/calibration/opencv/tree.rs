@@ -1,8 +1,7 @@
-//! The tree of names and values in a file of OpenCV's FileStorage, whichever of its three languages it is written in.
+//! The tree of names and values in a file of OpenCV's FileStorage, written in YAML, XML or JSON.
 //!
-//! JSON is read as YAML, of which it is a part: so the `.Nan` that OpenCV writes into its JSON is read as what it is. Files are
-//! small, and nothing in them is repeated by reference: aliases of YAML and document types of XML, with which a few lines unfold to
-//! gigabytes, are refused.
+//! JSON is read as YAML, which includes it, so that the `.Nan` that OpenCV writes into JSON is read too. Aliases of YAML and document
+//! types of XML are refused: OpenCV writes none, and with them a few lines expand to gigabytes.
 
 use saphyr_parser::{Event, Parser};
 
@@ -41,7 +40,7 @@ impl Node {
 /// In words: what is wrong with it and where, and what to do.
 pub fn read(bytes: &[u8]) -> Result<Node, String> {
     let text = std::str::from_utf8(bytes).map_err(|_| {
-        "it is no text: unpack it if it is compressed; cv2.FileStorage writes .yml, .xml or .json"
+        "it is not a text file: unpack it if it is compressed; cv2.FileStorage writes .yml, .xml or .json"
             .to_owned()
     })?;
     let text = text.trim_start_matches('\u{feff}');
@@ -56,14 +55,14 @@ pub fn read(bytes: &[u8]) -> Result<Node, String> {
     }
 }
 
-/// Something that is being read, and the name that waits for its value.
+/// A list or map that is being read; a map with the name whose value comes next.
 enum Open {
     List(Vec<Node>),
     Map(Vec<(String, Node)>, Option<String>),
 }
 
 fn yaml(text: &str) -> Result<Node, String> {
-    // OpenCV 4 writes "%YAML:1.0", which is no directive of YAML.
+    // OpenCV 4 writes "%YAML:1.0", which is not a valid YAML directive.
     let text = match text.strip_prefix("%YAML:") {
         Some(rest) => rest.split_once('\n').map_or("", |(_, rest)| rest),
         None => text,
@@ -106,7 +105,7 @@ fn yaml(text: &str) -> Result<Node, String> {
                 (None, Node::Value(name)) => *waiting = Some(name),
                 (None, _) => {
                     return Err(format!(
-                        "line {line}: a name that is no word: write it with cv2.FileStorage"
+                        "line {line}: a name that is not a word: write it with cv2.FileStorage"
                     ));
                 }
                 (Some(name), done) => put(all, name, done, line)?,
@@ -128,7 +127,7 @@ fn deep(depth: usize, line: usize) -> Result<(), String> {
 fn put(all: &mut Vec<(String, Node)>, name: String, node: Node, line: usize) -> Result<(), String> {
     if all.iter().any(|(known, _)| *known == name) {
         return Err(format!(
-            "line {line}: {name} stands there twice: leave one of them"
+            "line {line}: {name} is there twice: leave one of them"
         ));
     }
     all.push((name, node));
@@ -136,7 +135,7 @@ fn put(all: &mut Vec<(String, Node)>, name: String, node: Node, line: usize) -> 
 }
 
 fn xml(text: &str) -> Result<Node, String> {
-    // Recursion inside the library is bounded before it starts.
+    // The library recurses, so the depth is checked first.
     let (mut depth, mut deepest) = (0_usize, 0);
     for (at, _) in text.match_indices('<') {
         match text.as_bytes().get(at + 1) {
@@ -151,7 +150,7 @@ fn xml(text: &str) -> Result<Node, String> {
         roxmltree::Error::DtdDetected => {
             "it has a document type (<!DOCTYPE), which OpenCV does not write: remove it".to_owned()
         }
-        error => format!("it is no XML: {error}: write it with cv2.FileStorage"),
+        error => format!("it is not valid XML: {error}: write it with cv2.FileStorage"),
     })?;
     let root = document.root_element();
     let line =
