@@ -233,7 +233,8 @@ impl Promise {
         }
         let words = |error: &dyn std::fmt::Display| error.to_string();
         let folder = StateFolder::open(state).map_err(|error| words(&error))?;
-        let (_, new_secret) = Access::open(&state.join("access")).map_err(|error| words(&error))?;
+        let (_, new_secret) =
+            Access::open(&state.join("access"), None).map_err(|error| words(&error))?;
         if self.begun && new_secret.is_some() {
             return Err("the secret is gone".into());
         }

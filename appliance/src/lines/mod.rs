@@ -1,7 +1,7 @@
-//! Wires beside the network: a start line in, and busy, ok and fault out, for presses without Modbus and for lamps.
+//! Digital lines: start in, and busy, ok and fault out, for presses without Modbus and for lamps.
 //!
 //! One thread serves them. It follows the station's snapshots, as Modbus and the page do, and its start is a trigger by edge, as
-//! the page's is. When the chip of the lines goes it is opened again until it is there; meanwhile resistors say fault.
+//! the page's is. When the GPIO chip is lost it is opened again until that succeeds; meanwhile pull resistors hold the fault line on.
 
 mod signals;
 
@@ -23,14 +23,15 @@ use std::time::Duration;
 use tokio::io::unix::AsyncFd;
 use tokio::sync::watch;
 
-/// Waits before the lines are opened again: doubled after each attempt, from the first to the last.
+/// Wait before the first attempt to open the lines again; it doubles with each attempt.
 const FIRST_WAIT: Duration = Duration::from_millis(100);
+/// Longest of these waits.
 const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
-/// How the lines are opened again.
+/// Opens the lines again.
 pub type Open = Box<dyn Fn() -> Result<Wires, Failure> + Send + Sync>;
 
-/// Serves the lines until `stopped` says so; then they go back to what they are without a station.
+/// Serves the lines until `stopped` is true; then they are released.
 ///
 /// # Errors
 /// If the system gives no runtime.
@@ -52,7 +53,7 @@ pub fn serve(
     Ok(())
 }
 
-/// Follows the station for ever.
+/// Follows the station for ever, and opens the lines again when they fail.
 async fn follow(mut wires: Wires, open: &Open, station: &StationHandle, progress: &Progress) {
     loop {
         if let Err(error) = wires.follow(station).await {
@@ -99,7 +100,7 @@ impl Wires {
                         self.say(signals)?;
                     }
                     if changed.is_err() {
-                        // Nobody tells anything any more.
+                        // The station is gone; the stop follows.
                         pending::<()>().await;
                     }
                 }
@@ -128,7 +129,7 @@ impl Wires {
         Ok(())
     }
 
-    /// Puts the signals on the lines. Busy is last: whoever sees it fall finds the others right.
+    /// Sets the lines. Busy is set last, so that ok and fault are right when it falls.
     fn say(&mut self, signals: Signals) -> Result<(), Error> {
         let Signals { busy, ok, fault } = signals;
         for (line, on) in [
@@ -157,11 +158,11 @@ fn descriptor(start: &dyn StartLine) -> Result<AsyncFd<OwnedFd>, Error> {
     })
 }
 
-/// Ends when the start line has edges, or may have settled.
+/// Waits until the start line has edges, or may have settled.
 async fn moved(descriptor: Option<&AsyncFd<OwnedFd>>, settles: Option<Timestamp>) {
     let edges = async {
         match descriptor {
-            // All edges are taken after this, so it is not readable until others come.
+            // The caller takes all edges, so the descriptor is not readable until others come.
             Some(descriptor) => {
                 if let Ok(mut ready) = descriptor.readable().await {
                     ready.clear_ready();

@@ -1,20 +1,20 @@
-//! What the lines out say of a station: pure, from one snapshot to the next.
+//! The signals of the output lines, computed from one snapshot to the next without side effects.
 
 use crate::station::snapshot::status;
 use crate::station::{Snapshot, Verdict};
 
-/// What busy, ok and fault say. A start is taken exactly while busy and fault are both off.
+/// The output lines. A start is taken exactly while busy and fault are both off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Signals {
-    /// It works: measures, loads, teaches, starts or ends.
+    /// The station measures, loads, teaches, starts or stops.
     pub busy: bool,
-    /// It has measured a part since the last start, and that passed.
+    /// The part of the last start was measured and passed.
     pub ok: bool,
-    /// It waits, but not for a start: somebody has to do something first.
+    /// The station is idle, but takes no start: somebody has to do something first.
     pub fault: bool,
 }
 
-/// Follows a station. What was not measured never reads as ok: not a part of before, not one whose start was missed.
+/// Follows a station. Ok is never on for a part that was not measured: not for the part before, nor for one whose start was missed.
 #[derive(Clone, Copy, Debug)]
 pub struct Follower {
     seq: u32,
@@ -24,7 +24,7 @@ pub struct Follower {
 }
 
 impl Follower {
-    /// From this snapshot on, and what it says. A result from before says nothing of the part that lies there now.
+    /// Starts with a snapshot and its signals. Its result is of an earlier part, so it does not count.
     pub fn new(snapshot: &Snapshot) -> (Self, Signals) {
         let mut follower = Self {
             seq: snapshot.result_seq,
@@ -36,7 +36,7 @@ impl Follower {
         (follower, follower.said)
     }
 
-    /// What is to be said after this snapshot, in turn; nothing if nothing changed. Snapshots may have been left out.
+    /// The signals to set after this snapshot, in order; none if nothing changed. Snapshots in between may be missing.
     pub fn follow(&mut self, snapshot: &Snapshot) -> impl Iterator<Item = Signals> + use<> {
         let finished = snapshot.result_seq != self.seq;
         let missed = snapshot.missed != self.missed;
@@ -44,10 +44,10 @@ impl Follower {
         if finished {
             self.passed = verdict == Some(Verdict::Pass);
         }
-        // Whatever it works at by now comes after that part.
+        // Work in this snapshot is on a later part.
         self.passed &= !snapshot.is_working() && !missed;
         (self.seq, self.missed) = (snapshot.result_seq, snapshot.missed);
-        // A whole cycle between two looks: whoever waits for busy must see it.
+        // A whole cycle may pass between two snapshots; a machine that waits for busy must still see it.
         let unseen = (finished && !self.said.busy).then_some(Signals {
             busy: true,
             ..Signals::default()

@@ -153,6 +153,20 @@ fn serving(wires: Wires, open: Open, station: &StationHandle, course: impl FnOnc
     });
 }
 
+/// A start line and the end at which it is pressed.
+fn button() -> (Option<Box<dyn StartLine>>, OwnedFd) {
+    let (line, finger) = pipe_with(PipeFlags::NONBLOCK).unwrap();
+    (Some(Box::new(Button(line))), finger)
+}
+
+/// Waits until a trigger was missed.
+fn missed(station: &StationHandle) {
+    let begun = Instant::now();
+    while station.snapshot().missed == 0 && begun.elapsed() < PATIENCE {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
 fn never() -> Open {
     Box::new(|| panic!("nothing is to be opened again"))
 }
@@ -161,9 +175,9 @@ fn never() -> Open {
 fn a_start_by_wire_measures_one_part_and_the_lamps_follow() {
     let (station, orders) = ready();
     let panel = Panel::default();
-    let (line, finger) = pipe_with(PipeFlags::NONBLOCK).unwrap();
+    let (start, finger) = button();
     let wires = Wires {
-        start: Some(Box::new(Button(line))),
+        start,
         ..panel.wires()
     };
     serving(wires, never(), &station, || {
@@ -186,18 +200,15 @@ fn a_start_by_wire_measures_one_part_and_the_lamps_follow() {
 #[test]
 fn a_start_while_busy_is_counted_as_missed() {
     let (station, orders) = ready();
-    let (line, finger) = pipe_with(PipeFlags::NONBLOCK).unwrap();
+    let (start, finger) = button();
     let wires = Wires {
-        start: Some(Box::new(Button(line))),
+        start,
         ..Wires::default()
     };
     serving(wires, never(), &station, || {
         write(&finger, b"!!").unwrap();
         orders.recv_timeout(PATIENCE).unwrap();
-        let begun = Instant::now();
-        while station.snapshot().missed == 0 && begun.elapsed() < PATIENCE {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        missed(&station);
     });
     let snapshot = station.snapshot();
     assert_eq!((snapshot.triggers, snapshot.missed), (1, 1));
@@ -207,9 +218,9 @@ fn a_start_while_busy_is_counted_as_missed() {
 fn a_start_while_another_recipe_is_selected_measures_nothing_and_ok_goes_off() {
     let (station, orders) = ready();
     let panel = Panel::default();
-    let (line, finger) = pipe_with(PipeFlags::NONBLOCK).unwrap();
+    let (start, finger) = button();
     let wires = Wires {
-        start: Some(Box::new(Button(line))),
+        start,
         ..panel.wires()
     };
     serving(wires, never(), &station, || {
@@ -229,10 +240,7 @@ fn a_start_while_another_recipe_is_selected_measures_nothing_and_ok_goes_off() {
             .unwrap();
         assert!(panel.until("+fault").ends_with("-ok +fault"));
         write(&finger, b"!").unwrap();
-        let begun = Instant::now();
-        while station.snapshot().missed == 0 && begun.elapsed() < PATIENCE {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        missed(&station);
     });
     let snapshot = station.snapshot();
     assert_eq!((snapshot.triggers, snapshot.missed), (1, 1));

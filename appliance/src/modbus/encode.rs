@@ -3,6 +3,7 @@
 use super::map::{self, Block, at};
 use crate::config::WordOrder;
 use crate::station::{GaugeValue, Health, ResultRecord, Snapshot};
+use std::sync::Arc;
 
 /// `i32` of a missing value.
 pub const INVALID_I32: u32 = 0x8000_0000;
@@ -91,34 +92,18 @@ impl Words {
 /// The words of a block, `block.last - block.first + 1` of them; zeros for a block that is not served.
 pub fn block_words(snapshot: &Snapshot, block: &Block, order: WordOrder) -> Vec<u16> {
     let mut words = Words::of(block, order);
+    // Without a result the block shows an empty one, all of whose gauges are invalid.
+    let shown = |record: &Option<Arc<ResultRecord>>| record.clone().unwrap_or_default();
     match *block {
         map::CONTROL => control(&mut words, snapshot),
         map::STATUS => status(&mut words, snapshot),
-        map::RESULT => result(
-            &mut words,
-            snapshot
-                .result
-                .as_deref()
-                .unwrap_or(&ResultRecord::default()),
-        ),
+        map::RESULT => result(&mut words, &shown(&snapshot.result)),
         map::OLDEST => {
             // The same layout: written at RESULT's addresses, read at its own.
             words.first = map::RESULT.first;
-            result(
-                &mut words,
-                snapshot
-                    .oldest
-                    .as_deref()
-                    .unwrap_or(&ResultRecord::default()),
-            );
+            result(&mut words, &shown(&snapshot.oldest));
         }
-        map::GAUGE_DETAIL => gauge_detail(
-            &mut words,
-            snapshot
-                .result
-                .as_deref()
-                .unwrap_or(&ResultRecord::default()),
-        ),
+        map::GAUGE_DETAIL => gauge_detail(&mut words, &shown(&snapshot.result)),
         map::HEALTH => health(&mut words, &snapshot.health),
         map::RECIPE_DIRECTORY => recipe_directory(&mut words, &snapshot.health.system.recipes),
         map::IDENTITY => {

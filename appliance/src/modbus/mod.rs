@@ -14,6 +14,7 @@
 //! - A frame whose header is no Modbus TCP (protocol not 0, length not 2–254, function code above 127) closes the connection:
 //!   it is not known where the next frame begins. A request that only contradicts itself (byte count, length, coil
 //!   value) gets exception 3; `tokio-modbus` alone would close the connection or panic, so the guard checks first.
+
 pub mod decode;
 pub mod encode;
 pub mod guard;

@@ -1,6 +1,6 @@
 //! Places: the limit on connections, and which one is closed for a new one.
 //!
-//! One place is kept for a client that may write. When all places are taken, the connection that has been idle for longest is closed;
+//! One place is kept for a client that may write. When all connections are in use, the one idle for longest is closed for the new one;
 //! if none is idle, the new one is refused. Readers never displace writers.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::oneshot;
 
-/// A connection is idle if its last request is older than this: three missed polls of a slow PLC.
+/// A connection is idle if its last request is older than this: a slow PLC has then missed three polls.
 const IDLE: Duration = Duration::from_secs(5);
-/// A connection that never sent a complete request is idle after this: far more than a round trip.
+/// A connection that has sent no complete request yet is idle after this, which is far longer than a round trip.
 const MUTE: Duration = Duration::from_millis(250);
 
 /// The places of one server. Cheap to clone.

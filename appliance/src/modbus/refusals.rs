@@ -13,7 +13,7 @@ const PAUSE: Duration = Duration::from_secs(10);
 pub enum Refused {
     /// A connection from outside the subnets that may read.
     Connection,
-    /// A connection while all places are taken and none is idle.
+    /// A connection while all others are in use and none is idle.
     Full,
     /// A write of a client that may not write.
     Write,
@@ -25,7 +25,7 @@ impl Refused {
             Self::Connection => {
                 "a connection was refused: modbus.readers does not list its address"
             }
-            Self::Full => "a connection was refused: all are taken and none is idle",
+            Self::Full => "a connection was refused: all connections are in use and none is idle",
             Self::Write => "a write was refused: modbus.writers does not list its address",
         }
     }
@@ -79,13 +79,7 @@ impl Refusals {
     /// Logs a refusal, or counts it for the next line.
     pub(super) fn note(&self, refused: Refused, peer: IpAddr) {
         let mut limits = self.limits.lock().unwrap_or_else(PoisonError::into_inner);
-        let [connection, full, write] = &mut *limits;
-        let limit = match refused {
-            Refused::Connection => connection,
-            Refused::Full => full,
-            Refused::Write => write,
-        };
-        match limit.pass(Instant::now()) {
+        match limits[refused as usize].pass(Instant::now()) {
             None => {}
             Some(0) => (self.say)(&format!("Modbus, {peer}: {}", refused.words())),
             Some(silent) => (self.say)(&format!(

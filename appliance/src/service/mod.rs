@@ -283,7 +283,7 @@ fn open_access(state: &StateFolder) -> Result<Access, Failure> {
     let folder = state.place("access");
     let given =
         std::env::var_os("CREDENTIALS_DIRECTORY").map(|given| Path::new(&given).join(SECRET));
-    let (access, secret) = Access::open_given(&folder, given.as_deref())?;
+    let (access, secret) = Access::open(&folder, given.as_deref())?;
     if let Some(secret) = secret {
         // Also with `--quiet`: without the secret it is impossible to sign in.
         let words = format!(

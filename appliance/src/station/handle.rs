@@ -2,7 +2,7 @@
 
 use std::future::Future;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 use tokio::time::MissedTickBehavior;
@@ -66,12 +66,7 @@ impl StationHandle {
     ) -> Result<Arc<Snapshot>, RefusedWrite> {
         write.check()?;
         let rising = edges.rise(write.control);
-        Ok(self.take(Event::Write { write, rising }))
-    }
-
-    /// Takes an event from the worker or the daemon; answers with the snapshot after it.
-    pub fn event(&self, event: Event) -> Arc<Snapshot> {
-        self.take(event)
+        Ok(self.event(Event::Write { write, rising }))
     }
 
     /// The latest snapshot.
@@ -84,7 +79,8 @@ impl StationHandle {
         self.snapshots.subscribe()
     }
 
-    fn take(&self, event: Event) -> Arc<Snapshot> {
+    /// Takes an event, carries out its effects, and answers with the snapshot after it.
+    pub fn event(&self, event: Event) -> Arc<Snapshot> {
         let mut guarded = self.lock();
         let mut next = Some(event);
         while let Some(event) = next.take() {
@@ -109,7 +105,7 @@ impl StationHandle {
 
 /// Lets the station's time pass: a [`Event::Tick`] every 100 ms until `shutdown`.
 ///
-/// `utc_us` answers with the time in µs since 1970 if the clock is synchronised (see [`system_utc_us`]).
+/// `utc_us` answers with the time in µs since 1970 UTC if the clock is synchronised.
 pub async fn tick(
     handle: StationHandle,
     utc_us: impl Fn() -> Option<u64>,
@@ -124,12 +120,6 @@ pub async fn tick(
             _ = interval.tick() => { handle.event(Event::Tick { utc_us: utc_us() }); }
         }
     }
-}
-
-/// The system clock in µs since 1970 UTC, taken as synchronised.
-pub fn system_utc_us() -> Option<u64> {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
-    u64::try_from(since.as_micros()).ok()
 }
 
 #[cfg(test)]

@@ -37,6 +37,7 @@
 //! - Full storage is a fault only between two jobs: the cycle in flight still gets its result. A result whose SEQ could not be
 //!   stored is shown, but no further trigger is accepted until that SEQ is stored.
 //! - REJECT_REASON stays until the next rejected request.
+
 pub mod clock;
 pub mod control;
 pub mod error_code;
@@ -75,7 +76,7 @@ pub use control::{ConnectionEdges, ControlRegisters, ControlWrite, Masked, Refus
 pub use event::{Condition, Effect, Effects, Event, Job, JobId, Request, Unstored};
 pub use fault::Fault;
 pub use gauge::{Decision, GaugeValue, Unit};
-pub use handle::{StationHandle, system_utc_us, tick};
+pub use handle::{StationHandle, tick};
 pub use health::{FULL_STORAGE_MIB, Health, Pace, System};
 pub use machine::{Limits, Settings, Station};
 pub use recipes::{ActiveRecipe, RecipeKey, RecipeResult};

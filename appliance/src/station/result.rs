@@ -97,7 +97,7 @@ pub struct Placement {
     pub turn_deg: [f64; 3],
     /// Which of the six components the part's shape does not determine: they are taken as 0.
     pub left_out: [bool; 6],
-    /// Displacement of the corner that moved farthest.
+    /// Displacement of the corner of the part's bounding box that moved farthest.
     pub reach_mm: f64,
     /// Share of the sampled points that do not fit: they lie on defects, or their fringe order is wrong.
     pub outliers: f64,

@@ -1,7 +1,6 @@
 //! The system clock, and whether it is synchronised.
 
-use crate::station::system_utc_us;
-
+use std::time::{SystemTime, UNIX_EPOCH};
 /// The beginning of the year 10000, µs since 1970 UTC: dates in HTTP (RFC 9110), SQLite and most programs that read CSV have
 /// four digits for the year. Linux itself sets no clock past 2232.
 const YEAR_10000_US: u64 = 253_402_300_800_000_000;
@@ -13,12 +12,18 @@ const YEAR_2100_MS: u64 = 4_102_444_800_000;
 /// The time in µs since 1970 UTC. `None` while no time service has synchronised the clock, or from the year 10000 on: a wrong
 /// time is worse than none.
 pub fn utc_us() -> Option<u64> {
-    in_calendars(system_utc_us()).filter(|_| synchronised())
+    in_calendars(system_us()).filter(|_| synchronised())
 }
 
 /// Whether the system clock shows a time for which there is no date in HTTP: before 1970, or from the year 10000 on.
 pub fn is_past_calendars() -> bool {
-    in_calendars(system_utc_us()).is_none()
+    in_calendars(system_us()).is_none()
+}
+
+/// The system clock, µs since 1970 UTC; none before 1970.
+fn system_us() -> Option<u64> {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
+    u64::try_from(since.as_micros()).ok()
 }
 
 fn in_calendars(utc_us: Option<u64>) -> Option<u64> {

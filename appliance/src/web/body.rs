@@ -1,4 +1,4 @@
-//! Reading what a request carries: bounded in size, in time and in memory.
+//! Reads the body of a request, with limits of size, time and memory.
 
 use std::io::{ErrorKind, Write as _};
 use std::time::Duration;
@@ -14,25 +14,25 @@ use super::site::Site;
 use crate::error::shortened;
 use crate::recipe::arriving::Arriving;
 
-/// The most of a request in JSON, in bytes: 32 regions of 100 corners are a tenth of it.
+/// Largest body in JSON, bytes: 32 regions of 100 corners take a tenth of it.
 const MAX_JSON: usize = 64 << 10;
 /// Longest wait for it.
 const JSON_TIME: Duration = Duration::from_secs(10);
-/// The most of a file, in bytes: a recipe for 2048 × 2048 pixels has 160 MB.
+/// Largest file, bytes: a recipe for 2048 × 2048 pixels has 160 MB.
 const MAX_FILE: u64 = 256 << 20;
 /// Longest wait for it.
 const FILE_TIME: Duration = Duration::from_secs(120);
 
-/// A request's JSON.
+/// Reads a body in JSON.
 ///
 /// # Errors
-/// It is too long, too slow or not what is expected.
+/// It is too long, too slow, or not the JSON of a `T`.
 pub async fn json<T: DeserializeOwned>(body: Body) -> Result<T, Problem> {
     let bytes = read(body, MAX_JSON, JSON_TIME).await?;
     parsed(&bytes)
 }
 
-/// A request's JSON, or what `T` is without any where the request carries none.
+/// Reads a body in JSON; an empty body gives the default.
 ///
 /// # Errors
 /// As [`json`].
@@ -51,17 +51,17 @@ fn parsed<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     })
 }
 
-/// A file that has come, and its place among those that arrive at a time.
+/// A received file, and its place among those that are received at the same time.
 pub struct Upload {
     /// The file.
     pub file: Arriving,
     _place: OwnedSemaphorePermit,
 }
 
-/// A request's file, which goes to the recipes' storage as it comes: it is never in memory as a whole.
+/// Reads a body that is a file. It is written to the recipes' storage as it comes, so it is never in memory as a whole.
 ///
 /// # Errors
-/// Too many arrive already; it is too long or too slow; or there is no room for it.
+/// Too many files are being received; it is too long or too slow; or there is no room for it.
 pub async fn file(site: &Site, body: Body) -> Result<Upload, Problem> {
     let place = site.arriving.clone().try_acquire_owned().map_err(|_| {
         Problem::crowded("other files are being imported: wait until they are done")
@@ -70,18 +70,18 @@ pub async fn file(site: &Site, body: Body) -> Result<Upload, Problem> {
     if expected > MAX_FILE {
         return Err(too_long(MAX_FILE));
     }
-    let (chunks, mut come) = mpsc::channel::<Bytes>(1);
+    let (chunks, mut received) = mpsc::channel::<Bytes>(1);
     let store = site.recipes.clone();
     let storing = tokio::task::spawn_blocking(move || {
         let mut file = store.arriving(expected)?;
-        while let Some(chunk) = come.blocking_recv() {
+        while let Some(chunk) = received.blocking_recv() {
             file.write_all(&chunk)?;
         }
         Ok(file)
     });
-    let came = in_time(FILE_TIME, hand_over(body, chunks)).await;
+    let sent = in_time(FILE_TIME, send(body, chunks)).await;
     let stored = storing.await;
-    came?;
+    sent?;
     let stored = stored.unwrap_or_else(|_| Err(ErrorKind::Other.into()));
     let file = stored.map_err(|error: std::io::Error| {
         let status = match error.kind() {
@@ -94,8 +94,8 @@ pub async fn file(site: &Site, body: Body) -> Result<Upload, Problem> {
     Ok(Upload { file, _place })
 }
 
-/// Hands a body over piece by piece, as far as somebody takes it.
-async fn hand_over(body: Body, chunks: mpsc::Sender<Bytes>) -> Result<(), Problem> {
+/// Sends a body to `chunks` piece by piece, until the receiver is gone.
+async fn send(body: Body, chunks: mpsc::Sender<Bytes>) -> Result<(), Problem> {
     let mut body = body.into_data_stream();
     let mut left = MAX_FILE;
     while let Some(chunk) = body.next().await {
@@ -105,7 +105,7 @@ async fn hand_over(body: Body, chunks: mpsc::Sender<Bytes>) -> Result<(), Proble
             .checked_sub(chunk.len() as u64)
             .ok_or_else(|| too_long(MAX_FILE))?;
         if chunks.send(chunk).await.is_err() {
-            // It could not be stored: the storing thread says why.
+            // It could not be stored; the storing thread answers why.
             break;
         }
     }

@@ -1,4 +1,4 @@
-//! Files to take along: point cloud, gauges, and everything that a distant colleague needs.
+//! Downloads: point cloud, recording and gauges of the last result, and the diagnostic bundle.
 
 use std::fs::File;
 use std::io::{self, Cursor, Write as _};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use axum::body::{Body, Bytes};
 use axum::extract::State;
-use axum::http::{HeaderName, StatusCode, header};
+use axum::http::{HeaderName, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::{Value, json};
 use tokio::sync::{OwnedSemaphorePermit, mpsc};
@@ -20,43 +20,32 @@ use super::site::Site;
 use super::{metrics, view};
 use crate::history::{FailedPart, Filter, name_of};
 
-/// Bytes of a file that are handed to a connection at a time.
+/// Bytes of a file that are sent to its client at a time.
 const CHUNK: usize = 64 << 10;
 
-/// A file to be stored under a name, both made by `work`; a few at a time.
+/// Sends a file whose name and bytes `work` makes; a few at a time.
 ///
 /// # Errors
-/// Too many are on their way, or what `work` answers.
+/// Too many files are being sent, or what `work` answers.
 pub(super) async fn file(
     site: &Site,
     kind: &'static str,
     work: impl FnOnce(&Site) -> Result<(String, Vec<u8>), Problem> + Send + 'static,
 ) -> Result<Response, Problem> {
-    let permit = place(site)?;
+    let permit = permit(site)?;
     let (name, bytes) = site.aside(work).await?;
-    let length = (header::CONTENT_LENGTH, bytes.len().to_string());
-    let (sender, receiver) = mpsc::channel::<Result<Bytes, io::Error>>(1);
-    tokio::spawn(async move {
-        // Held until the client has taken the file or is gone.
-        let _permit = permit;
-        let mut rest = Bytes::from(bytes);
-        while !rest.is_empty() {
-            let chunk = rest.split_to(CHUNK.min(rest.len()));
-            if sender.send(Ok(chunk)).await.is_err() {
-                return;
-            }
-        }
+    let length = [(header::CONTENT_LENGTH, bytes.len().to_string())];
+    let body = streamed(permit, move |to| {
+        bytes
+            .chunks(CHUNK)
+            .try_for_each(|chunk| to.write_all(chunk))
     });
-    let body = Body::from_stream(ReceiverStream::new(receiver));
-    Ok((attached(kind, &name), [length], body).into_response())
+    Ok((attached(kind, &name), length, body).into_response())
 }
 
-/// A place among the files that are on their way.
-fn place(site: &Site) -> Result<OwnedSemaphorePermit, Problem> {
-    site.files.clone().try_acquire_owned().map_err(|_| {
-        let words = "too many files are being taken along already: wait until one is done";
-        Problem::new(StatusCode::SERVICE_UNAVAILABLE, words)
-    })
+fn permit(site: &Site) -> Result<OwnedSemaphorePermit, Problem> {
+    let permit = site.files.clone().try_acquire_owned();
+    permit.map_err(|_| Problem::crowded("too many files are being sent: wait until one is done"))
 }
 
 fn attached(kind: &str, name: &str) -> [(HeaderName, String); 2] {
@@ -69,7 +58,7 @@ fn attached(kind: &str, name: &str) -> [(HeaderName, String); 2] {
     ]
 }
 
-/// A folder that goes as a ZIP, piece by piece: with its recipe a recording is too large to be in memory for each client.
+/// The files of a folder, to be sent as a ZIP piece by piece: a recording with its recipe is too large to be in memory for each client.
 pub(super) struct Packed {
     /// The folder's name in the ZIP.
     name: String,
@@ -77,7 +66,7 @@ pub(super) struct Packed {
 }
 
 impl Packed {
-    /// Opens every file in a folder and the folders in it, so that they can be read even if the folder goes meanwhile.
+    /// Opens every file in a folder and its subfolders, so that they can be read even if the folder is removed meanwhile.
     ///
     /// # Errors
     /// Whatever the file system answers.
@@ -98,7 +87,7 @@ impl Packed {
         Ok(Self { name, members })
     }
 
-    fn write(self, to: ToClient) -> Result<(), ZipError> {
+    fn write(self, to: &mut ToClient) -> Result<(), ZipError> {
         let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
         let mut zip = ZipWriter::new_stream(to);
         for (inside, mut file) in self.members {
@@ -106,12 +95,11 @@ impl Packed {
             zip.start_file(format!("{}/{}", self.name, parts.join("/")), stored)?;
             io::copy(&mut file, &mut zip)?;
         }
-        zip.finish()?.into_inner().flush()?;
-        Ok(())
+        zip.finish().map(drop)
     }
 }
 
-/// Hands the bytes of a file to its client as it takes them.
+/// Sends bytes to a client, no faster than it receives them.
 struct ToClient {
     sender: mpsc::Sender<Result<Bytes, io::Error>>,
     chunk: Vec<u8>,
@@ -134,55 +122,52 @@ impl io::Write for ToClient {
     }
 }
 
-/// A folder as a ZIP, as `work` finds it; a few at a time.
+/// Sends a folder that `work` finds as a ZIP; a few at a time.
 ///
 /// # Errors
-/// Too many are on their way, or what `work` answers.
+/// Too many files are being sent, or what `work` answers.
 pub(super) async fn folder(
     site: &Site,
     work: impl FnOnce(&Site) -> Result<(String, Packed), Problem> + Send + 'static,
 ) -> Result<Response, Problem> {
-    let permit = place(site)?;
+    let permit = permit(site)?;
     let (name, packed) = site.aside(work).await?;
-    let body = as_it_is_taken(permit, |to| packed.write(to).map_err(io::Error::other));
+    let body = streamed(permit, |to| packed.write(to).map_err(io::Error::other));
     Ok((attached("application/zip", &name), body).into_response())
 }
 
-/// A stored file, as `work` finds it; a few at a time.
+/// Sends a stored file that `work` opens; a few at a time.
 ///
 /// # Errors
-/// Too many are on their way, or what `work` answers.
+/// Too many files are being sent, or what `work` answers.
 pub(super) async fn stored(
     site: &Site,
     kind: &'static str,
     work: impl FnOnce(&Site) -> Result<(String, File), Problem> + Send + 'static,
 ) -> Result<Response, Problem> {
-    let permit = place(site)?;
+    let permit = permit(site)?;
     let (name, mut file) = site.aside(work).await?;
     let failed = |error: io::Error| Problem::broken(format!("read {name}: {error}"));
     let length = file.metadata().map_err(failed)?.len().to_string();
-    let body = as_it_is_taken(permit, move |mut to| {
-        io::copy(&mut file, &mut to)?;
-        to.flush()
-    });
+    let body = streamed(permit, move |to| io::copy(&mut file, to).map(drop));
     let length = [(header::CONTENT_LENGTH, length)];
     Ok((attached(kind, &name), length, body).into_response())
 }
 
-/// A body that `write` hands over piece by piece, no faster than its client takes it.
-fn as_it_is_taken(
+/// A body that `write` sends piece by piece, no faster than its client receives it.
+fn streamed(
     permit: OwnedSemaphorePermit,
-    write: impl FnOnce(ToClient) -> io::Result<()> + Send + 'static,
+    write: impl FnOnce(&mut ToClient) -> io::Result<()> + Send + 'static,
 ) -> Body {
     let (sender, receiver) = mpsc::channel(1);
     tokio::task::spawn_blocking(move || {
-        // Held until the client has taken the file or is gone.
+        // Held until the client has received the file or is gone.
         let _permit = permit;
-        let (sender, broken) = (sender.clone(), sender);
         let chunk = Vec::with_capacity(CHUNK);
-        if let Err(error) = write(ToClient { sender, chunk }) {
-            // The answer breaks off, and the client knows that it is not whole.
-            let _ = broken.blocking_send(Err(error));
+        let mut to = ToClient { sender, chunk };
+        if let Err(error) = write(&mut to).and_then(|()| to.flush()) {
+            // The answer breaks off, so the client knows that it is not whole.
+            let _ = to.sender.blocking_send(Err(error));
         }
     });
     Body::from_stream(ReceiverStream::new(receiver))
@@ -199,7 +184,7 @@ pub(super) async fn cloud(State(site): State<Site>) -> Result<Response, Problem>
     .await
 }
 
-/// Without frames there is nothing to take along.
+/// The answer where the frames of the last result are needed and missing.
 const GONE: &str =
     "the frames of the last result are gone, or the station is busy; trigger a measurement";
 
@@ -219,7 +204,7 @@ pub(super) async fn recording(State(site): State<Site>) -> Result<Response, Prob
         let packed = written
             .map_err(|error| error.to_string())
             .and_then(|()| Packed::of(&scratch, name_of(&part.record)).map_err(unpacked));
-        // Its files are open. Whatever cannot be removed now, the next start removes.
+        // Its files are open. What cannot be removed now is removed at the next start.
         let _ = std::fs::remove_dir_all(&scratch);
         let name = format!("{}-recording.zip", part.record.seq);
         Ok((name, packed.map_err(Problem::broken)?))

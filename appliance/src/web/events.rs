@@ -1,6 +1,6 @@
-//! Server-sent events: the snapshot when it changes, and a heartbeat that shows that the page is not looking at the past.
+//! Server-sent events: the snapshot whenever it changes, and once a second so that the page knows that it is current.
 //!
-//! The connection of a follower ends with its stream, and that of a refused one with the refusal: its place is free again.
+//! The connection of a follower ends with its stream, and that of a refused one with the refusal, so its slot is free again.
 
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
@@ -20,16 +20,16 @@ use super::slots::Slot;
 use super::view;
 use crate::station::{Micros, Snapshot, StationHandle};
 
-/// An event comes at least this often.
-pub const HEARTBEAT: Duration = Duration::from_secs(1);
-/// And at most this often.
-pub const SHORTEST: Duration = Duration::from_millis(200);
+/// Longest time between two events.
+const HEARTBEAT: Duration = Duration::from_secs(1);
+/// Shortest time between two events.
+const SHORTEST: Duration = Duration::from_millis(200);
 
-/// Put into an answer that goes on until its page goes away.
+/// Marks an answer that goes on until its page is closed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Following;
 
-/// The stream of one page; ends when the page goes away, or when another address gets its place.
+/// The stream of one page; ends when the page is closed, or when another address gets its slot.
 pub(super) async fn follow(
     State(site): State<Site>,
     Extension(Peer(address)): Extension<Peer>,
@@ -73,7 +73,7 @@ async fn send(handle: StationHandle, sender: mpsc::Sender<Result<Event, Infallib
         }
         let heartbeat = tokio::time::sleep(HEARTBEAT);
         tokio::time::sleep(SHORTEST).await;
-        // Only time has passed: wait for something to see.
+        // An event that only shows the time is not worth sending before the heartbeat.
         let something = snapshots.wait_for(|now| timeless(now) != timeless(&shown));
         tokio::select! {
             () = heartbeat => {}
@@ -83,7 +83,7 @@ async fn send(handle: StationHandle, sender: mpsc::Sender<Result<Event, Infallib
     }
 }
 
-/// The snapshot without what changes with every tick.
+/// The snapshot without the values that change with every tick.
 fn timeless(snapshot: &Snapshot) -> Snapshot {
     Snapshot {
         at: Micros(0),

@@ -1,4 +1,4 @@
-//! The gate in front of everything that changes something: Origin, session, and the record of what was done.
+//! The gate in front of every change: checks origin and session, and records what was done.
 
 use std::net::IpAddr;
 use std::time::Instant;
@@ -18,15 +18,15 @@ use crate::web::access::{Change, MAX_AGE_S, Token};
 /// The session's cookie.
 const COOKIE: &str = "fringed-session";
 
-/// Who asks, put there by the server.
+/// The client's address, added to each request by the server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Peer(pub IpAddr);
 
-/// What a changing request is called in the record.
+/// The name of a change in the record.
 #[derive(Clone, Copy, Debug)]
 pub struct Action(pub &'static str);
 
-/// The session's token of a request, if it carries one.
+/// The session token of a request, if it has one.
 pub fn token(headers: &HeaderMap) -> Option<&str> {
     let cookies = headers.get_all(header::COOKIE).into_iter();
     let mut pairs = cookies
@@ -38,20 +38,19 @@ pub fn token(headers: &HeaderMap) -> Option<&str> {
         .map(|(_, value)| value)
 }
 
-/// Whether a request comes from somebody who signed in.
+/// Whether a request belongs to an open session.
 pub fn is_signed_in(site: &Site, headers: &HeaderMap) -> bool {
     token(headers).is_some_and(|token| site.access.is_signed_in(token, Instant::now()))
 }
 
-/// The cookie that keeps a session, or that ends one.
+/// The cookie that holds a session's token, or without one the cookie that deletes it.
 pub fn cookie(token: Option<&Token>) -> Option<HeaderValue> {
     let (value, age) = token.map_or(("", 0), |token| (token.text(), MAX_AGE_S));
     let text = format!("{COOKIE}={value}; Path=/; HttpOnly; SameSite=Strict; Max-Age={age}");
     HeaderValue::from_str(&text).ok()
 }
 
-/// Lets a request through if it comes from this device's own page: a browser names the page that a request comes from,
-/// and no page can choose that name.
+/// Lets a request through only if it comes from this device's own page. The browser sets the Origin header, and no page can forge it.
 pub async fn own_page_only(request: Request, next: Next) -> Response {
     if is_own(request.headers()) {
         return next.run(request).await;
@@ -66,7 +65,7 @@ fn is_own(headers: &HeaderMap) -> bool {
     origin.is_some_and(|(_, place)| Some(place) == only(headers, &header::HOST))
 }
 
-/// Lets only those through who signed in, and records what came of it.
+/// Lets a request through only with an open session, and records its outcome.
 pub async fn signed_in_only(State(site): State<Site>, request: Request, next: Next) -> Response {
     let peer = request.extensions().get::<Peer>().copied();
     let action = request.extensions().get::<Action>().copied();
@@ -86,7 +85,7 @@ pub async fn signed_in_only(State(site): State<Site>, request: Request, next: Ne
     response
 }
 
-/// Writes a line of the record of changes; a record that cannot be written is told to the log.
+/// Adds a line to the record of changes; if that fails, the log says so.
 pub async fn record(
     site: &Site,
     peer: Option<Peer>,

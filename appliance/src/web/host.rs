@@ -1,21 +1,21 @@
-//! Which Host headers are answered.
+//! Checks the Host header of requests.
 //!
-//! A page of another site can point its own name at this device (DNS rebinding) and then read it with its visitor's browser.
-//! It cannot forge the Host header: so only IP addresses, `localhost` and configured names are answered.
+//! Another site can let its own name resolve to this device (DNS rebinding) and then read it through its visitor's browser. It cannot
+//! forge the Host header, so only IP addresses, `localhost` and configured names are answered.
 
 use axum::http::{HeaderMap, HeaderName, StatusCode, Uri, header};
 use std::net::{IpAddr, Ipv6Addr};
 
 use super::problem::Problem;
 
-/// Checks that a request names one host, and that it is this device.
+/// Checks that a request names one host, and that this is the device.
 ///
 /// # Errors
 /// 400 where it names several, 421 where it names none or another.
 pub fn check(uri: &Uri, headers: &HeaderMap, configured: &[String]) -> Result<(), Problem> {
     let host = only(headers, &header::HOST);
     let several = headers.get_all(header::HOST).iter().count() > 1;
-    // A request line may name a host too.
+    // The request line may name a host, too.
     let named = uri.authority().map(|authority| authority.as_str());
     if several || named.is_some_and(|named| host.is_some_and(|host| host != named)) {
         let words = "the request names more than one host: send one Host header, and in the request line a path only";
@@ -28,7 +28,7 @@ pub fn check(uri: &Uri, headers: &HeaderMap, configured: &[String]) -> Result<()
     Err(Problem::new(StatusCode::MISDIRECTED_REQUEST, words))
 }
 
-/// The text of a header that comes once; none if it is missing, comes several times, or is no text.
+/// The text of a header; none if it is missing, repeated, or not text.
 pub fn only<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
     let mut values = headers.get_all(name).into_iter();
     let first = values.next()?;

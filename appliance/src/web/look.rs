@@ -1,4 +1,4 @@
-//! Answers that only look: snapshot, pictures, trends, registers, log, and whether all is well.
+//! Answers that change nothing: snapshot, pictures, registers, log, record of changes, health and readiness.
 
 use axum::extract::{Path, State};
 use axum::http::{StatusCode, header};
@@ -55,7 +55,7 @@ pub(super) async fn picture(
             let words = format!("there are {}", LAYERS.join(", "));
             return Err(Problem::missing(words));
         }
-        // No error: the page looks for a picture whenever there is a result.
+        // Not an error: the page asks for a picture of every result.
         let Some((seq, layers)) = site.maps.layers(site.last_seq()) else {
             let words = "the frames are gone, or nothing was measured yet: trigger a measurement";
             return Ok((StatusCode::NO_CONTENT, [("x-none", words)]).into_response());
@@ -91,9 +91,9 @@ pub(super) async fn log(State(site): State<Site>) -> Result<Json<Value>, Problem
     Ok(Json(json!({ "lines": lines })))
 }
 
-/// Lines of this start or of that of their `boot_id`, those without a time with what a browser's clock says of it.
+/// Adds to lines without a time the time by a browser's clock, if the start of their `boot_id`, or this one, was dated by one.
 fn dated(site: &Site, mut lines: Vec<Value>) -> Vec<Value> {
-    // Without a history nothing is known of it.
+    // The times of starts are in the history.
     let starts = site.history.starts().unwrap_or_default();
     let this = format!("{:08x}", site.station.snapshot().boot_id);
     for line in lines.iter_mut().filter(|line| line["utc_us"].is_null()) {

@@ -1,14 +1,14 @@
-//! A map as the page draws it and reads from it: 16-bit steps with everything needed to turn them into mm or counts.
+//! A map for the page: 16-bit words, and the description that turns them into mm or counts.
 
 use axum::http::{HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
 
-/// The page's map is at most this wide; wider ones are thinned out.
+/// Maps are subsampled to at most this many columns.
 const MAX_WIDTH: usize = 640;
-/// Stands for "no value".
+/// The word for "no value".
 const NONE: u16 = u16::MAX;
-/// The colours leave out this share of the values at each end, so that one stray pixel does not take them.
+/// Share of the values at each end that the colour scale leaves out, so that single outliers do not stretch it.
 const TAIL: f64 = 0.005;
 /// The header that describes the map.
 const MAP: HeaderName = HeaderName::from_static("x-map");

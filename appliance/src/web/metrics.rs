@@ -1,4 +1,4 @@
-//! `/metrics`: the station in numbers, as OpenMetrics text.
+//! `/metrics`: counters and values of the station, as OpenMetrics text.
 
 use std::fmt::Write as _;
 
@@ -7,6 +7,7 @@ use axum::http::header;
 use axum::response::IntoResponse;
 
 use super::site::Site;
+use crate::station::ResultRecord;
 use crate::station::snapshot::status;
 
 const KIND: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
@@ -15,7 +16,7 @@ pub(super) async fn metrics(State(site): State<Site>) -> impl IntoResponse {
     ([(header::CONTENT_TYPE, KIND)], text(&site))
 }
 
-/// The text: families one after the other, each with its type and what it means.
+/// The text: one family of samples after the other, each with its type and meaning.
 pub(super) fn text(site: &Site) -> String {
     let now = site.station.snapshot();
     let mut out = Text(String::new());
@@ -27,47 +28,32 @@ pub(super) fn text(site: &Site) -> String {
         ("serial", &*identity.serial),
     ];
     out.sample("fringed_build_info", &labels, 1.0);
-    for (name, value, meaning) in [
-        (
-            "fringed_ready",
-            truth(now.is(status::READY)),
-            "1 if a trigger would be accepted.",
-        ),
-        (
-            "fringed_fault",
-            truth(now.fault.is_some()),
-            "1 while there is a fault.",
-        ),
-        (
-            "fringed_measuring_task_alive",
-            truth(now.worker_alive),
-            "1 while the measuring task meets its deadlines.",
-        ),
-        ("fringed_state", f64::from(now.state), "Register 104."),
-        (
-            "fringed_error_code",
-            f64::from(now.error_code),
-            "Register 102.",
-        ),
-        (
-            "fringed_reject_reason",
-            f64::from(now.reject_reason),
-            "Register 120: why the last rejected request was rejected.",
-        ),
-        (
-            "fringed_buffered_results",
-            f64::from(now.buffered),
-            "Results that wait for RESULT_ACK.",
-        ),
-        (
-            "fringed_uptime_seconds",
-            f64::from(now.uptime_s),
-            "Time since the start.",
-        ),
-    ] {
-        out.family(name, "gauge", meaning);
-        out.sample(name, &[], value);
-    }
+    let ready = truth(now.is(status::READY));
+    out.gauge("fringed_ready", ready, "1 if a trigger would be accepted.");
+    let fault = truth(now.fault.is_some());
+    out.gauge("fringed_fault", fault, "1 while there is a fault.");
+    out.gauge(
+        "fringed_measuring_task_alive",
+        truth(now.worker_alive),
+        "1 while the measuring task meets its deadlines.",
+    );
+    out.gauge("fringed_state", now.state, "Register 104.");
+    out.gauge("fringed_error_code", now.error_code, "Register 102.");
+    out.gauge(
+        "fringed_reject_reason",
+        now.reject_reason,
+        "Register 120: why the last rejected request was rejected.",
+    );
+    out.gauge(
+        "fringed_buffered_results",
+        now.buffered,
+        "Results that wait for RESULT_ACK.",
+    );
+    out.gauge(
+        "fringed_uptime_seconds",
+        now.uptime_s,
+        "Time since the start.",
+    );
     let counts = site.tally.counts();
     out.family(
         "fringed_results",
@@ -85,94 +71,18 @@ pub(super) fn text(site: &Site) -> String {
             count as f64,
         );
     }
-    for (name, value, meaning) in [
-        (
-            "fringed_triggers",
-            now.triggers,
-            "Accepted triggers since the start.",
-        ),
-        (
-            "fringed_missed_triggers",
-            now.missed,
-            "Rejected triggers since the start.",
-        ),
-    ] {
-        out.family(name, "counter", meaning);
-        out.sample(&format!("{name}_total"), &[], f64::from(value));
-    }
-    let Some(result) = now.result.as_deref() else {
-        return out.end();
-    };
-    let found = &result.inspection;
-    out.family("fringed_cycle_seconds", "gauge", "Times of the last cycle.");
-    for (part, us) in [("exposure", result.exposure_us), ("total", result.total_us)] {
-        out.sample(
-            "fringed_cycle_seconds",
-            &[("part", part)],
-            f64::from(us) / 1e6,
-        );
-    }
-    out.family(
-        "fringed_stage_seconds",
-        "gauge",
-        "Wall times of the last cycle's stages.",
+    out.counter(
+        "fringed_triggers",
+        now.triggers,
+        "Accepted triggers since the start.",
     );
-    for time in result.stages().iter() {
-        out.sample(
-            "fringed_stage_seconds",
-            &[("stage", time.stage.name())],
-            f64::from(time.us) / 1e6,
-        );
-    }
-    out.family(
-        "fringed_processing_cpu_seconds",
-        "gauge",
-        "Processor time of the last cycle's processing on all computing threads.",
+    out.counter(
+        "fringed_missed_triggers",
+        now.missed,
+        "Rejected triggers since the start.",
     );
-    out.sample(
-        "fringed_processing_cpu_seconds",
-        &[],
-        f64::from(found.cpu_us) / 1e6,
-    );
-    out.family(
-        "fringed_coverage_ratio",
-        "gauge",
-        "Share of the regions that the last cycle resolved.",
-    );
-    out.sample(
-        "fringed_coverage_ratio",
-        &[],
-        f64::from(found.coverage_permille) / 1e3,
-    );
-    out.family(
-        "fringed_pattern_fitness_ratio",
-        "gauge",
-        "1 = the pattern fits the part as taught.",
-    );
-    out.sample(
-        "fringed_pattern_fitness_ratio",
-        &[],
-        f64::from(found.fitness_permille) / 1e3,
-    );
-    out.family(
-        "fringed_height_noise_meters",
-        "gauge",
-        "Height noise of the last cycle, 1 sigma.",
-    );
-    out.sample(
-        "fringed_height_noise_meters",
-        &[],
-        found.height_noise_mm / 1e3,
-    );
-    out.family(
-        "fringed_gauge",
-        "gauge",
-        "Values of the last cycle in the unit of the label; NaN if not measured.",
-    );
-    for gauge in &found.gauges {
-        let value = gauge.value.filter(|_| gauge.decision.valid);
-        let labels = [("gauge", &*gauge.name), ("unit", gauge.unit.symbol())];
-        out.sample("fringed_gauge", &labels, value.unwrap_or(f64::NAN));
+    if let Some(result) = now.result.as_deref() {
+        out.result(result);
     }
     out.end()
 }
@@ -180,6 +90,62 @@ pub(super) fn text(site: &Site) -> String {
 struct Text(String);
 
 impl Text {
+    /// The metrics of the last cycle.
+    fn result(&mut self, result: &ResultRecord) {
+        let seconds = |us: u32| f64::from(us) / 1e6;
+        let share = |permille: u16| f64::from(permille) / 1e3;
+        let found = &result.inspection;
+        let name = "fringed_cycle_seconds";
+        self.family(name, "gauge", "Times of the last cycle.");
+        self.sample(name, &[("part", "exposure")], seconds(result.exposure_us));
+        self.sample(name, &[("part", "total")], seconds(result.total_us));
+        let name = "fringed_stage_seconds";
+        self.family(name, "gauge", "Wall times of the last cycle's stages.");
+        for time in result.stages().iter() {
+            self.sample(name, &[("stage", time.stage.name())], seconds(time.us));
+        }
+        self.gauge(
+            "fringed_processing_cpu_seconds",
+            seconds(found.cpu_us),
+            "Processor time of the last cycle's processing on all computing threads.",
+        );
+        self.gauge(
+            "fringed_coverage_ratio",
+            share(found.coverage_permille),
+            "Share of the regions that the last cycle resolved.",
+        );
+        self.gauge(
+            "fringed_pattern_fitness_ratio",
+            share(found.fitness_permille),
+            "1 = the pattern fits the part as taught.",
+        );
+        self.gauge(
+            "fringed_height_noise_meters",
+            found.height_noise_mm / 1e3,
+            "Height noise of the last cycle, 1 sigma.",
+        );
+        let name = "fringed_gauge";
+        let meaning = "Values of the last cycle in the unit of the label; NaN if not measured.";
+        self.family(name, "gauge", meaning);
+        for gauge in &found.gauges {
+            let value = gauge.value.filter(|_| gauge.decision.valid);
+            let labels = [("gauge", &*gauge.name), ("unit", gauge.unit.symbol())];
+            self.sample(name, &labels, value.unwrap_or(f64::NAN));
+        }
+    }
+
+    /// A family of one gauge without labels.
+    fn gauge(&mut self, name: &str, value: impl Into<f64>, meaning: &str) {
+        self.family(name, "gauge", meaning);
+        self.sample(name, &[], value.into());
+    }
+
+    /// A family of one counter without labels.
+    fn counter(&mut self, name: &str, count: u32, meaning: &str) {
+        self.family(name, "counter", meaning);
+        self.sample(&format!("{name}_total"), &[], f64::from(count));
+    }
+
     fn family(&mut self, name: &str, kind: &str, meaning: &str) {
         // Writing to a string cannot fail.
         let _ = writeln!(self.0, "# TYPE {name} {kind}\n# HELP {name} {meaning}");

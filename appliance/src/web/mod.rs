@@ -1,9 +1,10 @@
-//! The technician's page and its API: what the station does, what it found, and what may be changed about it.
+//! The technician's page and its API: shows the station and its results, and changes what may be changed.
 //!
-//! [`router`] is the table of all paths, described for others in `openapi.json`. Looking needs no login; whatever changes
-//! something passes the gate: Origin, session, record. [`events`] are the server-sent events, [`view`] the JSON of a
-//! snapshot, [`host`] keeps requests away that were meant for another name, [`server`] listens and [`slots`] bounds its
-//! connections. The page itself is a handful of files in `assets/`, compiled in.
+//! [`router`] is the table of all paths, described in `openapi.json`. Reading needs no login; every change passes the gate:
+//! Origin, session, record of changes. [`events`] are the server-sent events, [`view`] the JSON of a snapshot, [`host`] refuses
+//! requests for another host name, [`server`] listens and [`slots`] limits its connections. The files of the page are in
+//! `assets/` and compiled in.
+
 pub mod access;
 pub mod assets;
 pub mod body;

@@ -16,7 +16,7 @@ use crate::recipe::{Store, replace};
 use crate::station::control::{ERROR_RESET, TRIGGER};
 use crate::station::{ControlWrite, Event, RecipeKey, RecipeResult, Request, Snapshot};
 
-/// What an accepted order answers: it is under way, the events tell the rest.
+/// The answer to an accepted order; its progress comes with the events.
 type Accepted = (StatusCode, Json<Value>);
 
 fn accepted() -> Accepted {
@@ -36,7 +36,7 @@ fn rejected(snapshot: &Snapshot) -> Problem {
     Problem::busy(format!("trigger: {}", words.unwrap_or_default()))
 }
 
-/// An edge without a write: the registers of the PLC stay as it wrote them.
+/// A rising edge without a write, so the PLC's registers stay as it wrote them.
 fn edge(site: &Site, rising: u16) -> std::sync::Arc<Snapshot> {
     let write = ControlWrite::default();
     site.station.event(Event::Write { write, rising })
@@ -67,17 +67,17 @@ pub(super) async fn load(
 /// Longest wait for a cycle to end before a changed recipe is loaded.
 const REST: Duration = Duration::from_secs(5);
 
-/// A recipe of which another version was stored.
+/// What the station does with a recipe of which another version was stored.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reload {
     /// Whether it is the active one.
     pub active: bool,
-    /// Whether the version that is stored now is being loaded; an active recipe that is not goes on as it was.
+    /// Whether the stored version is being loaded; if not, the station keeps using the one before.
     pub loading: bool,
 }
 
-/// Loads a recipe whose file was changed, if it is the active one, as soon as no cycle is in flight. After a load that failed
-/// nobody has said yet that the active recipe is the right one, and a change of its file does not say so either.
+/// Loads a recipe whose file was changed, if it is the active one, as soon as no cycle is in flight. Not after a load that failed: then
+/// it is not known whether the active recipe is the right one, and loading it would clear that.
 pub(super) async fn reload(site: &Site, number: u16) -> Reload {
     let is_active = |snapshot: &Snapshot| snapshot.active() == Some(number);
     let mut snapshots = site.station.subscribe();
@@ -86,7 +86,7 @@ pub(super) async fn reload(site: &Site, number: u16) -> Reload {
             let rest = snapshots.wait_for(|now| !is_active(now) || at_rest(now));
             match rest.await.map(|now| is_active(&now)) {
                 Ok(true) if begin_load(site, number).is_ok() => return true,
-                // A trigger was faster.
+                // A trigger came first.
                 Ok(true) => {}
                 Ok(false) | Err(_) => return false,
             }
@@ -131,13 +131,13 @@ pub(super) fn begin_load(site: &Site, number: u16) -> Result<(), Problem> {
     }
 }
 
-/// How a recipe is taught whose number may be taken; without a body none is replaced.
+/// What may happen to a recipe that has the number already; without a body it is not replaced.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Teaching {
-    /// The recipe that has the number may be replaced; it stays as the generation before.
+    /// It may be replaced; it stays as the previous generation.
     replace: bool,
-    /// Regions, gauges and limits of the recipe that is replaced stay.
+    /// Its regions, gauges and limits stay.
     keep_gauges: bool,
 }
 

@@ -1,13 +1,13 @@
-//! An answer that says what went wrong: a status and words with the remedy, as JSON.
+//! An answer about an error: a status, and as JSON what was attempted and the remedy.
 
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde_json::json;
 
-/// Seconds in Retry-After, where a request is refused because others are in hand.
+/// Seconds in Retry-After, where too many requests are being answered.
 const RETRY_AFTER_S: &str = "5";
 
-/// What went wrong.
+/// An error that the client gets.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
     /// The HTTP status.
@@ -17,7 +17,7 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// With a status and words.
+    /// A problem with any status.
     pub fn new(status: StatusCode, words: impl Into<String>) -> Self {
         let words = words.into();
         Self { status, words }
@@ -33,17 +33,17 @@ impl Problem {
         Self::new(StatusCode::NOT_FOUND, words)
     }
 
-    /// 503: too many do the same at the moment.
+    /// 503: too many requests do the same at the moment.
     pub fn crowded(words: impl Into<String>) -> Self {
         Self::new(StatusCode::SERVICE_UNAVAILABLE, words)
     }
 
-    /// 409: not now.
+    /// 409: not possible in the present state.
     pub fn busy(words: impl Into<String>) -> Self {
         Self::new(StatusCode::CONFLICT, words)
     }
 
-    /// 422: understood, but it cannot be used.
+    /// 422: understood, but its content cannot be used.
     pub fn unfit(words: impl Into<String>) -> Self {
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, words)
     }

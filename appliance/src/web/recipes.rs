@@ -1,4 +1,4 @@
-//! Recipes: list, look, export, import, edit, delete, and undo of that.
+//! Recipes: list, show, export, import, edit, delete, and undo.
 
 use axum::body::Body;
 use axum::extract::{Path, Request, State};
@@ -81,7 +81,7 @@ fn summary(file: &RecipeFile) -> Value {
     })
 }
 
-/// Everything of a recipe that is no array: `recipe.json`.
+/// `recipe.json`: everything of a recipe except its arrays.
 pub(super) async fn one(
     State(site): State<Site>,
     Path(number): Path<u16>,
@@ -142,7 +142,7 @@ pub(super) async fn edit(
     ))
 }
 
-/// Brings back the generation before the newest, or a deleted recipe.
+/// Brings back the previous generation, or a deleted recipe.
 pub(super) async fn undo(
     State(site): State<Site>,
     Path(number): Path<u16>,
@@ -173,10 +173,10 @@ pub(super) async fn delete(
     Ok(Json(json!({ "number": number })))
 }
 
-/// Tries out a recipe that is to be stored; where that cannot be done here, words that say why.
+/// Checks that a recipe that is to be stored can be used; answers with the reason where that cannot be checked on this head.
 ///
 /// # Errors
-/// In words: it cannot be used on this head, though it was made for it.
+/// In words: it was made for this head and cannot be used on it.
 fn tried(site: &Site, recipe: Recipe) -> Result<Option<String>, String> {
     let Some(calibration) = site.calibration.get() else {
         let words =

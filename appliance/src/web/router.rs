@@ -1,4 +1,4 @@
-//! The table of all paths, and what holds for every answer.
+//! The table of all paths, and the headers of every answer.
 
 use axum::Router;
 use axum::extract::{Request, State};
@@ -16,7 +16,7 @@ use super::{
     simulation,
 };
 
-/// Only files of this device, nothing inline, in nobody's frame.
+/// Only files of this device, nothing inline, not inside a frame of another page.
 const CONTENT_SECURITY_POLICY: &str =
     "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
@@ -24,9 +24,9 @@ const CONTENT_SECURITY_POLICY: &str =
 pub struct Route {
     /// GET, POST, PUT or DELETE.
     pub method: Method,
-    /// With parameters in braces.
+    /// The path, with parameters in braces.
     pub path: &'static str,
-    /// What it is called in the record of changes; none if it changes nothing.
+    /// Its name in the record of changes; none if it changes nothing.
     pub changes: Option<&'static str>,
     answer: MethodRouter<Site>,
 }
@@ -44,7 +44,7 @@ where
     }
 }
 
-/// A change: only for those who signed in, and recorded as `action`.
+/// A change: needs a session, and is recorded as `action`.
 fn change<H, T>(
     (method, filter): (Method, MethodFilter),
     path: &'static str,
@@ -150,7 +150,7 @@ pub fn router(site: Site) -> Router {
     for route in routes() {
         let answer = match route.changes {
             None => route.answer,
-            // The last layer is asked first: origin, then session.
+            // The layer that is added last runs first: origin, then session.
             Some(action) => route
                 .answer
                 .route_layer(from_fn_with_state(site.clone(), signed_in_only))
@@ -169,7 +169,7 @@ pub fn router(site: Site) -> Router {
         .with_state(site)
 }
 
-/// Refuses requests without one Host of this device, and puts the headers that every answer has.
+/// Refuses requests that do not name this device as their only host, and adds the headers of every answer.
 async fn guarded(State(site): State<Site>, request: Request, next: Next) -> Response {
     let mut response = match host::check(request.uri(), request.headers(), &site.hosts) {
         Ok(()) => next.run(request).await,
@@ -180,7 +180,7 @@ async fn guarded(State(site): State<Site>, request: Request, next: Next) -> Resp
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
         (header::X_FRAME_OPTIONS, "DENY"),
         (header::REFERRER_POLICY, "no-referrer"),
-        // A page or picture from yesterday must never look like today's.
+        // An old page or picture must never be shown as the present one.
         (header::CACHE_CONTROL, "no-store"),
     ];
     for (name, value) in fixed {

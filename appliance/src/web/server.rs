@@ -1,4 +1,4 @@
-//! The socket of the page.
+//! The HTTP server: accepts connections within their limits, and closes those that are too slow.
 
 use std::convert::Infallible;
 use std::future::Future;
@@ -27,13 +27,13 @@ use crate::system::clock;
 const MOST_CONNECTIONS: usize = 64;
 /// The most of them from one address: a browser opens 6.
 const MOST_EACH: usize = 16;
-/// A request's header must come within this time; a connection without a request for as long is closed.
+/// Longest wait for a request and its header.
 const HEADER_TIME: Duration = Duration::from_secs(10);
-/// A client must take the next bytes of an answer within this time.
+/// Longest wait for a client to accept the next bytes of an answer.
 const WRITE_TIME: Duration = Duration::from_secs(15);
 /// The most header lines of a request.
 const MOST_HEADERS: usize = 64;
-/// The most bytes of a request that are read ahead of what is being done with it.
+/// The most bytes of a connection that are buffered.
 const READ_AHEAD: usize = 64 << 10;
 /// Pause after a connection that could not be accepted.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
@@ -45,13 +45,13 @@ pub async fn serve(listener: TcpListener, site: Site, shutdown: impl Future<Outp
     let accepting = async {
         loop {
             match listener.accept().await {
-                // Without a place it is closed at once: everybody else is being answered.
+                // Without a slot it is closed at once: all others are being answered.
                 Ok((stream, peer)) => {
                     if let Some(slot) = slots.enter(site.holder(peer.ip()), Instant::now()) {
                         tokio::spawn(answer(stream, peer, Arc::new(slot), router.clone()));
                     }
                 }
-                // Out of file descriptors, or a client that is gone already: others can still be served.
+                // No file descriptor is left, or the client is gone: others can still be served.
                 Err(_) => tokio::time::sleep(ACCEPT_PAUSE).await,
             }
         }
@@ -65,7 +65,7 @@ pub async fn serve(listener: TcpListener, site: Site, shutdown: impl Future<Outp
 /// Answers the requests of one connection.
 async fn answer(stream: TcpStream, peer: SocketAddr, slot: Arc<Slot>, router: Router) {
     if clock::is_past_calendars() {
-        // The library works out a date for its answers, and panics.
+        // hyper would panic: it puts a date into each answer.
         refuse(&stream).await;
         return;
     }
@@ -91,14 +91,14 @@ async fn answer(stream: TcpStream, peer: SocketAddr, slot: Arc<Slot>, router: Ro
         .max_headers(MOST_HEADERS)
         .max_buf_size(READ_AHEAD)
         .serve_connection(TokioIo::new(Box::pin(stream)), service);
-    // A client that breaks off is no failure of ours.
+    // A connection that the client breaks off is not an error of the server.
     tokio::select! {
         _ = connection => {}
         () = slot.left() => {}
     }
 }
 
-/// Answers a connection where the system clock shows a time for which HTTP has no date.
+/// Answers a connection while the system clock shows a time that HTTP cannot express.
 pub(super) async fn refuse(stream: &TcpStream) {
     let words =
         r#"{"error":"the clock of this device is before 1970 or past the year 9999: set it"}"#;
@@ -113,6 +113,6 @@ pub(super) async fn refuse(stream: &TcpStream) {
         stream.writable().await?;
         stream.try_write(answer.as_bytes())
     };
-    // A client that breaks off or says nothing is no failure of ours.
+    // A client that breaks off or sends nothing is not an error of the server.
     let _ = tokio::time::timeout(HEADER_TIME, answered).await;
 }

@@ -36,19 +36,8 @@ pub(super) async fn begin(
     State(site): State<Site>,
     peer: Option<Extension<Peer>>,
     request: extract::Request<Body>,
-) -> Response {
-    let peer = peer.map(|Extension(peer)| peer);
-    match enter(&site, peer, request).await {
-        Ok(response) => response,
-        Err(problem) => problem.into_response(),
-    }
-}
-
-async fn enter(
-    site: &Site,
-    peer: Option<Peer>,
-    request: extract::Request<Body>,
 ) -> Result<Response, Problem> {
+    let peer = peer.map(|Extension(peer)| peer);
     let SignIn { secret, time_ms } = body::json(request.into_body()).await?;
     let received = site.station.now();
     let from = peer.map_or(IpAddr::from([0, 0, 0, 0]), |Peer(address)| address);
@@ -60,9 +49,9 @@ async fn enter(
             (Err(refused), words)
         }
     };
-    // Who has to wait is not written down each time: that would be a way to fill the disk.
+    // A guess that has to wait is not recorded, so that guessing cannot fill the record.
     if !matches!(token, Err(Refused::Wait(_))) {
-        gate::record(site, peer, "sign in", "session".into(), outcome).await;
+        gate::record(&site, peer, "sign in", "session".into(), outcome).await;
     }
     match token {
         Ok(token) => {
@@ -99,8 +88,8 @@ pub(super) async fn end(State(site): State<Site>, headers: HeaderMap) -> Respons
     with_cookie(gate::cookie(None), json!({ "signed_in": false }))
 }
 
-/// Dates this start by the clock of a browser whose user has signed in, where the device's own is not synchronised; answers with
-/// what came of it. The last sign-in counts: whoever finds a wrong time corrects it from a browser with the right one.
+/// Dates this start by the clock of a browser whose user has signed in, where the device's own clock is not synchronised; answers with
+/// the outcome. The last sign-in counts, so a wrong time is corrected by signing in from a browser with the right one.
 fn date(site: &Site, ms: u64, received: Micros) -> &'static str {
     if site.station.snapshot().warnings & warning::CLOCK_UNSYNCED == 0 {
         return "not needed";

@@ -1,4 +1,4 @@
-//! The part in front of a simulated head: which one it is, and putting another in its place.
+//! The part in front of a simulated head: shows it, and replaces it.
 
 use axum::body::Body;
 use axum::extract::State;
@@ -31,7 +31,7 @@ pub(super) async fn put(State(site): State<Site>, body: Body) -> Result<Json<Val
     let simulation = site.simulation.clone();
     let (done, told) = oneshot::channel();
     let broken = || Problem::broken("putting the part in place failed; see the log");
-    // A thread of its own, which a stop does not wait for as it would for the runtime's.
+    // A thread of its own: a stop would wait for one of the runtime's.
     std::thread::Builder::new()
         .name("staging".into())
         .spawn(move || {

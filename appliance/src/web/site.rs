@@ -1,4 +1,4 @@
-//! What the page shows and may change: everything that its answers need, in one place.
+//! Everything that the answers of the page need, and the limits of concurrent work.
 
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -23,34 +23,34 @@ use crate::web::access::Access;
 
 /// The most pages that follow the events at a time.
 pub const MAX_FOLLOWERS: usize = 16;
-/// The most of them from one address: half of its connections stay for requests.
+/// The most of them from one address: half of its connections are left for requests.
 pub const MAX_FOLLOWERS_EACH: usize = 8;
-/// The most pictures, files and recipes that are worked on at a time; the measuring task needs the cores.
+/// The most pictures, files and recipes that are computed at a time; the measuring task needs the cores.
 const MAX_ASIDE: usize = 2;
-/// The most sign-ins, changes and records of them at a time: whoever only looks must not keep them waiting.
+/// The most sign-ins, changes and records of them at a time. They have a limit of their own, so that reading does not delay them.
 const MAX_CHANGES: usize = 2;
-/// The most files that arrive at a time: each takes storage, and memory while it is checked.
+/// The most files that are received at a time: each takes storage, and memory while it is checked.
 const MAX_ARRIVING: usize = 2;
-/// The most files that are on their way at a time: each is in memory until its client has taken it.
+/// The most files that are sent at a time: each is in memory until its client has received it.
 const MAX_FILES: usize = 4;
 
-/// What the page is made of, handed in by the daemon.
+/// What the daemon hands to the page.
 pub struct Parts {
-    /// The way to the station.
+    /// The station.
     pub station: StationHandle,
-    /// Who may change something.
+    /// The secret, the sessions and the record of changes.
     pub access: Access,
     /// The station's recipes.
     pub recipes: Store,
-    /// What is known of the head that recipes are for.
+    /// The calibration of the open head.
     pub calibration: Current,
-    /// The way to the last cycle.
+    /// Frames and plan of the last cycle, for its maps.
     pub maps: LastMaps,
     /// The part in front of a simulated head.
     pub simulation: Simulation,
     /// The stored results.
     pub history: Reader,
-    /// Stores when this start of the daemon was, µs since 1970 UTC, by the clock of a signed-in user's browser; answers whether
+    /// Stores the time of this start of the daemon, µs since 1970 UTC, by the clock of a signed-in user's browser; answers whether
     /// it is stored.
     pub date: Box<dyn Fn(u64) -> bool + Send + Sync>,
     /// Results since the start.
@@ -61,23 +61,23 @@ pub struct Parts {
     pub registers: fn(&Snapshot) -> Value,
     /// The configuration as TOML, for the diagnostic bundle.
     pub configuration: String,
-    /// Names, besides IP addresses and `localhost`, under which the page is asked for.
+    /// Host names of the page, besides IP addresses and `localhost`.
     pub hosts: Vec<String>,
-    /// Networks of proxies: there are many behind one address.
+    /// Networks of proxies: one such address stands for many clients.
     pub proxies: Vec<IpNet>,
 }
 
-/// The same, shared by all requests. Cheap to clone.
+/// The parts with the limits of concurrent work, shared by all requests. Cheap to clone.
 #[derive(Clone)]
 pub struct Site {
     parts: Arc<Parts>,
-    /// Places for pages that follow the events.
+    /// Slots of pages that follow the events.
     pub(super) followers: Slots,
-    /// Places for files that arrive.
+    /// Permits to receive a file.
     pub(super) arriving: Arc<Semaphore>,
-    /// Places for files that are being taken along.
+    /// Permits to send a file.
     pub(super) files: Arc<Semaphore>,
-    /// The pictures of a kept part that were worked out last; held while others are.
+    /// The pictures of a kept part that were computed last; locked while others are computed.
     pub(super) kept: Arc<Mutex<LastKept>>,
     looking: Arc<Semaphore>,
     changing: Arc<Semaphore>,
@@ -105,12 +105,12 @@ impl Site {
         }
     }
 
-    /// Who holds the places of connections from this address; none for a proxy.
+    /// The address or network to which connections from this address are counted; none for a proxy.
     pub(super) fn holder(&self, address: IpAddr) -> Option<IpAddr> {
         (!socket::holds(&self.proxies, address)).then(|| socket::network(address))
     }
 
-    /// Looks for what takes its time on another thread, a few at a time.
+    /// Reads or computes something on a blocking thread, a few at a time.
     ///
     /// # Errors
     /// What `work` answers.
@@ -121,7 +121,7 @@ impl Site {
         self.queued(self.looking.clone(), work).await
     }
 
-    /// Changes something on another thread, a few at a time.
+    /// Changes something on a blocking thread, a few at a time.
     ///
     /// # Errors
     /// What `work` answers.

@@ -1,9 +1,8 @@
-//! The places for connections and for pages that follow the events: bounded, and shared fairly between addresses.
+//! Slots for connections and for pages that follow the events: a limited number, shared fairly between addresses.
 //!
-//! A connection waits until its next request has come; then it is being answered. One address holds only some of the places.
-//! Where they are taken, the place that has been waiting for longest goes to the newcomer, so a crowd of silent connections
-//! only pushes out itself. Where none waits, the address that holds most gives one up to an address that holds fewer, so
-//! nobody can keep another address out.
+//! A slot is either waiting for a request or being answered. One address holds at most its share of the slots. When all are in use,
+//! the one waiting for longest is closed for the new one, so a crowd of silent connections displaces only itself. If none is
+//! waiting, the address with most slots loses one to an address with fewer, so no address can keep another out.
 
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,7 +10,7 @@ use std::time::Instant;
 
 use tokio::sync::Notify;
 
-/// All places.
+/// All slots.
 #[derive(Clone, Debug)]
 pub struct Slots(Arc<Inside>);
 
@@ -24,23 +23,23 @@ struct Inside {
 
 #[derive(Debug, Default)]
 struct Table {
-    /// The number of the next place.
+    /// The number of the next slot.
     next: u64,
-    /// Oldest first.
+    /// The slots in use, oldest first.
     taken: Vec<Taken>,
 }
 
 #[derive(Debug)]
 struct Taken {
     number: u64,
-    /// The address that holds it; none for a proxy, behind which there are many.
+    /// The address that holds it; none for a proxy, which stands for many clients.
     holder: Option<IpAddr>,
     /// Since when it has been waiting for a request; none while it is being answered.
     waiting: Option<Instant>,
     leave: Arc<Notify>,
 }
 
-/// One place, held until it is dropped.
+/// One slot, held until it is dropped.
 #[derive(Debug)]
 pub struct Slot {
     number: u64,
@@ -54,14 +53,14 @@ impl Table {
         holder.map_or(0, |_| held.count())
     }
 
-    /// Whose place a newcomer gets: the one that has been waiting for longest, of those that `may` leave.
+    /// The slot that has been waiting for longest, of those that `may` be closed.
     fn waiting_longest(&self, may: impl Fn(&Taken) -> bool) -> Option<u64> {
         let waiting = self.taken.iter().filter(|taken| may(taken));
         let longest = waiting.filter_map(|taken| Some((taken.waiting?, taken.number)));
         longest.min().map(|(_, number)| number)
     }
 
-    /// The newest place of the address that holds most, if that is more than a newcomer would hold who has `held` now.
+    /// The newest slot of the address with most slots, if those are more than one that holds `held` now would have with another.
     fn of_the_largest(&self, held: usize) -> Option<u64> {
         let counted = self.taken.iter().map(|taken| self.held_by(taken.holder));
         let (most, at) = counted.zip(0..).max()?;
@@ -70,14 +69,14 @@ impl Table {
 }
 
 impl Slots {
-    /// So many places, and so many of them for each address.
+    /// `most` slots, of which each address holds at most `each`.
     pub fn new(most: usize, each: usize) -> Self {
         let table = Mutex::default();
         Self(Arc::new(Inside { most, each, table }))
     }
 
-    /// A place for `holder`, which waits from `now` on; none for a proxy, behind which there are many. There is no place if
-    /// every one that could be given up is being answered.
+    /// A slot for `holder` (none for a proxy), which waits from `now` on. There is none if every slot that could be closed for it is
+    /// being answered.
     pub fn enter(&self, holder: Option<IpAddr>, now: Instant) -> Option<Slot> {
         let mut table = self.table();
         let held = table.held_by(holder);
@@ -116,7 +115,7 @@ impl Slots {
 }
 
 impl Slot {
-    /// Its request has come, or it waits for the next one since `waiting`.
+    /// Its request has come (`None`), or it has been waiting for the next one since `waiting`.
     pub fn mark(&self, waiting: Option<Instant>) {
         let mut table = self.slots.table();
         let mut taken = table.taken.iter_mut();
@@ -125,7 +124,7 @@ impl Slot {
         }
     }
 
-    /// Ends when somebody else gets this place.
+    /// Waits until this slot is given to another connection.
     pub async fn left(&self) {
         self.leave.notified().await;
     }
@@ -147,7 +146,7 @@ mod tests {
         Some(IpAddr::from([10, 0, 0, number]))
     }
 
-    /// A place that is being answered.
+    /// A slot that is being answered.
     fn answered(slots: &Slots, holder: Option<IpAddr>) -> Option<Slot> {
         let slot = slots.enter(holder, Instant::now())?;
         slot.mark(None);
@@ -194,7 +193,7 @@ mod tests {
         let crowd: Vec<_> = (0..8_u8)
             .map(|at| answered(&slots, host(at % 2)).unwrap())
             .collect();
-        // Places are given up until both hold as many as the newcomer.
+        // Slots are taken away until both hold as many as the newcomer.
         let mut late = Vec::new();
         for _ in 0..8 {
             late.extend(answered(&slots, host(9)));

@@ -53,7 +53,7 @@ pub fn snapshot(snapshot: &Snapshot) -> Value {
     })
 }
 
-/// What the device says of itself; null where it is not known.
+/// Measured values of system, head and clients; null where not known.
 fn health(snapshot: &Snapshot) -> Value {
     let (system, pace) = (&snapshot.health.system, &snapshot.health.pace);
     json!({

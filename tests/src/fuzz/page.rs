@@ -54,7 +54,7 @@ impl Page {
         let folder = tempfile::tempdir().expect("a folder");
         let station = Station::new(settings(), Micros(0));
         let station = StationHandle::new(station, Instant::now(), |_| None);
-        let (access, secret) = Access::open(&folder.path().join("access")).expect("access");
+        let (access, secret) = Access::open(&folder.path().join("access"), None).expect("access");
         let recipes = folder.path().join("recipes");
         let site = Site::new(Parts {
             station,

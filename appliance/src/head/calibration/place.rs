@@ -72,11 +72,6 @@ impl Place {
         }
     }
 
-    /// The generation before, if there is a whole one.
-    pub fn load_previous(&self) -> Option<CalibrationFile> {
-        read(&self.previous())?.ok()
-    }
-
     /// The name of a map in the file, by its bytes.
     pub fn name_of_map(name: &str, bytes: &[u8]) -> (String, String) {
         let sum = hex(&Sha256::digest(bytes));

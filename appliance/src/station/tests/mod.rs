@@ -152,6 +152,15 @@ impl Bench {
         })
     }
 
+    /// Begins to teach a recipe.
+    fn teach(&mut self, number: u16) -> JobId {
+        self.event(Event::Request(Request::Teach {
+            number,
+            keep_gauges: false,
+        }));
+        self.job()
+    }
+
     pub(super) fn job(&self) -> JobId {
         self.station.worker.last_job
     }

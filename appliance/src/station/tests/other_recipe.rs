@@ -213,11 +213,7 @@ fn a_recipe_loaded_on_the_page_is_not_measured_for_a_plc_that_selects_another() 
 fn a_recipe_taught_beside_the_selected_one_is_not_measured_for_it() {
     let mut bench = Bench::ready();
     bench.select(1);
-    bench.event(Event::Request(Request::Teach {
-        number: 5,
-        keep_gauges: false,
-    }));
-    let job = bench.job();
+    let job = bench.teach(5);
     bench.event(Event::Taught {
         job,
         recipe: recipe(5),
@@ -231,11 +227,7 @@ fn a_recipe_taught_beside_the_selected_one_is_not_measured_for_it() {
 fn after_a_teach_that_failed_the_active_recipe_goes_on() {
     let mut bench = Bench::ready();
     bench.select(1);
-    bench.event(Event::Request(Request::Teach {
-        number: 5,
-        keep_gauges: false,
-    }));
-    let job = bench.job();
+    let job = bench.teach(5);
     bench.event(Event::TeachFailed {
         job,
         error_code: 401,

@@ -9,11 +9,7 @@ fn boot_ends_when_the_head_is_open_and_ready_needs_a_recipe() {
     let snapshot = bench.event(Event::Started);
     assert_eq!((snapshot.state, snapshot.is(status::READY)), (1, false));
     assert_eq!(bench.token(5).reject_reason, reject::NO_RECIPE);
-    bench.event(Event::Request(Request::Teach {
-        number: 1,
-        keep_gauges: false,
-    }));
-    let job = bench.job();
+    let job = bench.teach(1);
     let snapshot = bench.event(Event::Progress {
         job,
         fraction: 0.5,
@@ -176,11 +172,7 @@ fn the_plc_teaches_only_where_the_config_allows_it() {
 #[test]
 fn progress_extends_the_deadline_of_teaching() {
     let mut bench = Bench::ready();
-    bench.event(Event::Request(Request::Teach {
-        number: 2,
-        keep_gauges: false,
-    }));
-    let job = bench.job();
+    let job = bench.teach(2);
     for _ in 0..3 {
         assert_eq!(bench.tick_after(20_000).state, 5);
         bench.event(Event::Progress {

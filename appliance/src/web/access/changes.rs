@@ -1,4 +1,4 @@
-//! The record of changes: who changed what and when, as JSON lines, of bounded size.
+//! The record of changes: from which address what was changed and when, as JSON lines, of limited size.
 
 use serde_json::{Value, json};
 use std::fs::{self, File, OpenOptions};
@@ -7,31 +7,31 @@ use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// When the file reaches this size it becomes the previous one, whose predecessor is deleted.
+/// When the file reaches this size it is renamed, and the file that had that name is deleted.
 const FULL_BYTES: u64 = 512 << 10;
-/// How much of its end is read for the page.
+/// How much of the end of the file is read for the page.
 const SHOWN_BYTES: u64 = 64 << 10;
 
-/// One change, or one that was refused.
+/// One change, done or refused.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change<'a> {
     /// When, in µs since 1970 UTC; none if the clock is not synchronised.
     pub utc_us: Option<u64>,
     /// When, in s since the start of the daemon.
     pub uptime_s: u32,
-    /// Which start that was.
+    /// BOOT_ID of that start.
     pub boot_id: u32,
-    /// From where.
+    /// The client's address.
     pub from: IpAddr,
     /// What was done, e.g. `"edit recipe"`.
     pub action: &'a str,
-    /// To what; no secrets.
+    /// What was changed; never a secret.
     pub subject: &'a str,
     /// `"done"`, or why it was refused.
     pub outcome: &'a str,
 }
 
-/// The file.
+/// The file with the record.
 #[derive(Debug)]
 pub struct Changes {
     path: PathBuf,
@@ -65,7 +65,7 @@ impl Changes {
             .read(true)
             .append(true)
             .open(&self.path)?;
-        // A loss of power can leave half a line behind: it must not swallow this one.
+        // A loss of power can leave an unfinished line, which this line must not continue.
         let begin = if ends_in_line(&mut file)? { "" } else { "\n" };
         file.write_all(format!("{begin}{line}\n").as_bytes())?;
         file.sync_data()

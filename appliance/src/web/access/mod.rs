@@ -1,8 +1,9 @@
-//! Who may change something: the device's secret, sessions, patience with wrong guesses, and the record of what was changed.
+//! Access control: the device's secret, sessions, limits on wrong guesses, and the record of changes.
 //!
-//! Looking needs no login. Changing needs a session, which [`Access::sign_in`] gives for the secret that was given to the
-//! device, or else was shown once at the first start. Everything of it lies in the folder `access` of the state folder: `secret`, the argon2id hash, and
-//! `changes.jsonl`, the record. Whoever can delete `secret` owns the device anyway: the next start makes a new one.
+//! Reading needs no login. A change needs a session, which [`Access::sign_in`] opens for the device's secret: the one that was
+//! configured, else the one that was made and shown once at the first start. The folder `access` of the state folder holds `secret`, the
+//! argon2id hash, and `changes.jsonl`, the record. If `secret` is deleted, the next start makes a new one; only the owner of the device
+//! can delete it.
 
 mod changes;
 mod patience;
@@ -20,21 +21,21 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The way in. Cheap to clone.
+/// Access control of one device. Cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Access(Arc<Inside>);
 
 #[derive(Debug)]
 struct Inside {
     hash: String,
-    doors: Mutex<Doors>,
+    logins: Mutex<Logins>,
     /// One guess is hashed at a time: argon2id takes 19 MiB and a core.
     guessing: Mutex<()>,
     changes: Changes,
 }
 
 #[derive(Debug, Default)]
-struct Doors {
+struct Logins {
     sessions: Sessions,
     patience: Patience,
 }
@@ -56,23 +57,12 @@ pub enum Refused {
 }
 
 impl Access {
-    /// Opens the folder, creating it where it does not exist. At the first start it makes the device's secret and
-    /// answers with it: show it, nobody can read it again.
+    /// Opens the folder, creating it where it does not exist. The secret is that of the file `given`, if it exists. Otherwise the first
+    /// start makes one and answers with it: it must be shown, because only its hash is stored.
     ///
     /// # Errors
-    /// If the folder cannot be read or written (exit code 73).
-    pub fn open(folder: &Path) -> Result<(Self, Option<String>), Failure> {
-        Self::open_given(folder, None)
-    }
-
-    /// The same, with the secret that a file gives, if it exists; then none is made and none is stored.
-    ///
-    /// # Errors
-    /// As [`Access::open`]; if the given secret cannot be used (exit code 78).
-    pub fn open_given(
-        folder: &Path,
-        given: Option<&Path>,
-    ) -> Result<(Self, Option<String>), Failure> {
+    /// If the folder cannot be read or written (exit code 73), or the given secret cannot be used (78).
+    pub fn open(folder: &Path, given: Option<&Path>) -> Result<(Self, Option<String>), Failure> {
         let failed = |error: String| {
             let what = format!("open {}", folder.display());
             Failure::because(Exit::CannotCreate, what, error)
@@ -87,45 +77,45 @@ impl Access {
         let changes = Changes::open(&folder.join("changes.jsonl"));
         let inside = Inside {
             hash,
-            doors: Mutex::default(),
+            logins: Mutex::default(),
             guessing: Mutex::default(),
             changes,
         };
         Ok((Self(Arc::new(inside)), shown))
     }
 
-    /// A session for the secret. Takes some ten milliseconds of a core: not for the socket thread.
+    /// Opens a session for the secret. It takes some ten milliseconds of a core, so the socket thread must not call it.
     ///
     /// # Errors
     /// The secret is wrong, or this address guessed too often.
     pub fn sign_in(&self, from: IpAddr, secret: &str, now: Instant) -> Result<Token, Refused> {
-        // Held over check and verdict, so that many guesses at once are still counted one by one.
+        // Locked from the check to the verdict, so that concurrent guesses are counted one by one.
         let _one = self
             .0
             .guessing
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        if let Some(wait) = self.doors().patience.wait(from, now) {
+        if let Some(wait) = self.logins().patience.wait(from, now) {
             return Err(Refused::Wait(wait));
         }
         let right = secret::is_right(secret, &self.0.hash).map_err(Refused::Broken)?;
-        let mut doors = self.doors();
+        let mut logins = self.logins();
         if !right {
-            doors.patience.wrong(from, now);
+            logins.patience.wrong(from, now);
             return Err(Refused::Wrong);
         }
-        doors.patience.right(from);
-        doors.sessions.begin(now).map_err(Refused::Broken)
+        logins.patience.right(from);
+        logins.sessions.begin(now).map_err(Refused::Broken)
     }
 
     /// Whether a session is still open; each use keeps it open.
     pub fn is_signed_in(&self, token: &str, now: Instant) -> bool {
-        self.doors().sessions.touch(token, now)
+        self.logins().sessions.touch(token, now)
     }
 
     /// Ends a session.
     pub fn sign_out(&self, token: &str) {
-        self.doors().sessions.end(token);
+        self.logins().sessions.end(token);
     }
 
     /// The record of changes.
@@ -133,8 +123,8 @@ impl Access {
         &self.0.changes
     }
 
-    fn doors(&self) -> MutexGuard<'_, Doors> {
-        self.0.doors.lock().unwrap_or_else(PoisonError::into_inner)
+    fn logins(&self) -> MutexGuard<'_, Logins> {
+        self.0.logins.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -148,13 +138,13 @@ mod tests {
     fn the_secret_is_shown_once_and_opens_after_every_restart() {
         let folder = tempfile::tempdir().unwrap();
         let now = Instant::now();
-        let (access, shown) = Access::open(folder.path()).unwrap();
+        let (access, shown) = Access::open(folder.path(), None).unwrap();
         let secret = shown.unwrap();
         let token = access.sign_in(HERE, &secret, now).unwrap();
         assert!(access.is_signed_in(token.text(), now));
         access.sign_out(token.text());
         assert!(!access.is_signed_in(token.text(), now));
-        let (access, shown) = Access::open(folder.path()).unwrap();
+        let (access, shown) = Access::open(folder.path(), None).unwrap();
         assert_eq!(shown, None);
         // As people write it down: without dashes, in small letters.
         let typed = secret.replace('-', " ").to_lowercase();
@@ -165,7 +155,7 @@ mod tests {
     fn a_secret_that_was_given_goes_before_the_stored_one_and_leaves_it_alone() {
         let (folder, given) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let file = given.path().join("secret");
-        let open = || Access::open_given(folder.path(), Some(&file)).unwrap();
+        let open = || Access::open(folder.path(), Some(&file)).unwrap();
         let now = Instant::now();
         std::fs::write(&file, "0123A-BCDEF-GHJKM").unwrap();
         let (access, shown) = open();
@@ -180,7 +170,7 @@ mod tests {
     #[test]
     fn wrong_guesses_make_their_address_wait_and_no_other() {
         let folder = tempfile::tempdir().unwrap();
-        let (access, secret) = Access::open(folder.path()).unwrap();
+        let (access, secret) = Access::open(folder.path(), None).unwrap();
         let (secret, now) = (secret.unwrap(), Instant::now());
         for _ in 0..patience::FREE {
             assert_eq!(access.sign_in(HERE, "guess", now), Err(Refused::Wrong));
@@ -198,7 +188,7 @@ mod tests {
         let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
         let secrets = folders
             .each_ref()
-            .map(|folder| Access::open(folder.path()).unwrap().1.unwrap());
+            .map(|folder| Access::open(folder.path(), None).unwrap().1.unwrap());
         assert_ne!(secrets[0], secrets[1]);
         let stored = std::fs::read_to_string(folders[0].path().join("secret")).unwrap();
         assert!(stored.starts_with("$argon2id$"), "{stored}");
@@ -209,7 +199,7 @@ mod tests {
     fn a_damaged_secret_file_is_an_error_with_the_remedy_and_lets_nobody_in() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("secret"), "$argon2id$broken").unwrap();
-        let refused = Access::open(folder.path()).unwrap_err();
+        let refused = Access::open(folder.path(), None).unwrap_err();
         assert!(refused.message.contains("delete it"), "{refused}");
     }
 }

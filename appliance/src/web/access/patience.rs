@@ -1,4 +1,4 @@
-//! Patience with wrong guesses: each address may guess a few times, then waits, twice as long each time.
+//! Limits wrong guesses of the secret: each address has a few, then waits twice as long after each.
 
 use crate::system::socket::network;
 use std::net::IpAddr;
@@ -12,7 +12,7 @@ const FIRST: Duration = Duration::from_secs(2);
 pub(super) const LONGEST: Duration = Duration::from_secs(300);
 /// Guesses are forgotten after this time.
 const MEMORY: Duration = Duration::from_secs(3600);
-/// The most addresses remembered; a further one takes the place of the one that waits least.
+/// The most addresses remembered; another one replaces the one with the shortest wait left.
 const MOST: usize = 256;
 
 #[derive(Debug)]
@@ -23,7 +23,7 @@ struct Guesser {
     until: Instant,
 }
 
-/// Who guessed wrongly.
+/// The addresses that guessed wrongly.
 #[derive(Debug, Default)]
 pub(super) struct Patience(Vec<Guesser>);
 

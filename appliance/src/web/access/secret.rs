@@ -1,4 +1,4 @@
-//! The device's secret: given to it, or made at the first start and kept as an argon2id hash.
+//! The device's secret: configured, or made at the first start and stored as an argon2id hash.
 
 use crate::storage::folder::write_whole;
 use argon2::Argon2;
@@ -12,12 +12,12 @@ const DIGITS: &[u8; 32] = b"0123456789ABCDEFGHJKMNPQRSTVWXYZ";
 /// 4 groups of 5 digits of 5 bits each: 100 bits, far beyond guessing.
 const LENGTH: usize = 20;
 const GROUP: usize = 5;
-/// Nobody types more; longer text is not hashed.
+/// Longest text that is hashed; a secret is shorter.
 const LONGEST: usize = 64;
 /// Letters and digits of the shortest secret that may be given: 60 bits where they are random.
 const SHORTEST: usize = 12;
 
-/// The hash of the secret that this file gives, as such or as its argon2id hash; none if there is no such file.
+/// The hash of the secret in this file, which holds it in plain text or as an argon2id hash; none if there is no such file.
 ///
 /// # Errors
 /// In words, with the remedy.
@@ -31,7 +31,7 @@ pub(super) fn given(file: &Path) -> Result<Option<String>, String> {
         return match PasswordHash::new(text) {
             Ok(_) => Ok(Some(text.to_owned())),
             Err(error) => Err(format!(
-                "the secret that was given is no hash ({error}): give a new one"
+                "the secret that was given begins with $ but is not a hash ({error}): give a new one"
             )),
         };
     }
@@ -43,7 +43,7 @@ pub(super) fn given(file: &Path) -> Result<Option<String>, String> {
     hash(text).map(Some)
 }
 
-/// The stored hash, and the secret itself if it was made just now.
+/// The stored hash; without one, a new secret with its hash.
 ///
 /// # Errors
 /// In words, with the remedy.
@@ -68,7 +68,7 @@ pub(super) fn open(file: &Path) -> Result<(String, Option<String>), String> {
     }
 }
 
-/// Whether somebody typed the secret; dashes, spaces and small letters do not matter.
+/// Whether a text is the secret; dashes, spaces and the case of letters do not matter.
 ///
 /// # Errors
 /// If the stored hash cannot be read.
@@ -101,8 +101,8 @@ fn hash(secret: &str) -> Result<String, String> {
         .map_err(|error| error.to_string())
 }
 
-/// As it is hashed: only letters and digits, capital, with the letters that Crockford's digits leave out read as what
-/// they look like.
+/// The form that is hashed: only letters and digits, in capitals, with the letters that Crockford's digits leave out replaced by the
+/// digits that they look like.
 fn plain(typed: &str) -> String {
     let kept = typed.chars().filter(char::is_ascii_alphanumeric);
     kept.map(|digit| match digit.to_ascii_uppercase() {

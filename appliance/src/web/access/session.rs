@@ -1,16 +1,16 @@
-//! Sessions: random tokens that a browser keeps in a cookie; only their hashes are kept here.
+//! Sessions: random tokens that a browser keeps in a cookie, and of which the device keeps only the hashes.
 
 use sha2::{Digest, Sha256};
 use std::time::{Duration, Instant};
 
-/// A session ends when it was not used for so long.
+/// A session ends when it was not used for this long.
 const IDLE: Duration = Duration::from_secs(30 * 60);
-/// And in any case after this: a shift.
+/// A session ends at this age in any case: a shift.
 pub const MAX_AGE_S: u64 = 12 * 3600;
-/// The most sessions at a time; a further one ends the one that was not used for longest.
+/// The most sessions at a time; another one ends the one that was unused for longest.
 const MOST: usize = 16;
 
-/// What the browser keeps: 256 random bits in hexadecimal digits.
+/// The token of a session: 256 random bits in hexadecimal digits.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
 
@@ -22,7 +22,7 @@ impl Token {
 }
 
 impl std::fmt::Debug for Token {
-    // A token in a log would be a way in.
+    // A token in a log would give access.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("Token")
     }
@@ -71,7 +71,7 @@ impl Sessions {
     /// Whether the session is open; then it was used now.
     pub(super) fn touch(&mut self, token: &str, now: Instant) -> bool {
         self.0.retain(|session| session.is_open(now));
-        // The hash is compared, so the time that it takes says nothing about the token.
+        // Hashes are compared, so the time of a comparison reveals nothing about the token.
         let wanted = hash(token);
         let found = self.0.iter_mut().find(|session| session.hash == wanted);
         found.map(|session| session.used = now).is_some()

@@ -35,7 +35,7 @@ macro_rules! assets {
     };
 }
 
-/// The icon under the name by which browsers look for one where an answer is no page.
+/// The icon under the name by which browsers ask for one where an answer is not a page.
 pub const ICON: Asset = Asset {
     path: "/favicon.ico",
     kind: "image/svg+xml",

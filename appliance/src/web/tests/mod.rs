@@ -49,7 +49,7 @@ async fn served() -> Served {
     };
     let folder = tempfile::tempdir().unwrap();
     let handle = StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| None);
-    let (access, secret) = Access::open(&folder.path().join("access")).unwrap();
+    let (access, secret) = Access::open(&folder.path().join("access"), None).unwrap();
     let (dates, dated) = mpsc::channel();
     let site = Site::new(Parts {
         station: handle.clone(),
