@@ -33,12 +33,12 @@ pub struct Failure {
     pub exit: Exit,
     /// What was attempted with what, and the remedy.
     pub message: String,
-    /// ERROR_CODE of the device that is at fault, if one is.
+    /// ERROR_CODE, if a device is at fault.
     pub code: Option<u16>,
 }
 
 impl Failure {
-    /// With an exit code and a message.
+    /// A failure with any exit code.
     pub fn new(exit: Exit, message: impl Into<String>) -> Self {
         Self {
             exit,

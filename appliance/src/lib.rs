@@ -1,21 +1,7 @@
 //! The daemon `fringed` and its command line: joins devices (`hal`) and computation (`algo`).
 //!
-//! The rooms, each of which imports only those below it (`tests/suite/house.rs` holds the order):
-//!
-//! ```text
-//! cli                    one file per command
-//! service                the running daemon: start, stop, what it looks at once a second
-//! web | modbus | lines   the station for people, for a PLC, for wires
-//! production             the measuring task: cycles, recovery of the head, recipes made ready
-//! history | measure      stored results and recordings | a recording to heights and a report
-//! recipe                 what one part number needs; taught, stored, planned
-//! config                 the configuration file
-//! head                   calibration, what can be measured on a head, the doctor
-//! output                 pictures, plots, point clouds
-//! storage                the state folder, whole files, archives
-//! system                 clock, log, signals, sockets, service manager
-//! station                decisions, results, snapshot: pure
-//! ```
+//! ARCHITECTURE.md describes the modules below, here called rooms, and the order in which they may import each other;
+//! `tests/suite/rooms.rs` checks it.
 
 #[cfg(test)]
 mod boundaries;

@@ -1,4 +1,4 @@
-//! What may be written for real devices: the ranges that the types do not hold.
+//! Checks the configuration of real devices: the ranges that the types do not express.
 
 use super::{Config, HeadConfig};
 use hal::bounds::{MAX_SIDE, text, within};
@@ -7,7 +7,7 @@ use hal::setup::{CameraSetup, ProjectorSetup, TriggerSetup};
 /// Longest name of a device or a line, characters.
 const LONGEST_NAME: usize = 255;
 
-/// Both or neither.
+/// Checks a width and a height, of which both or neither must be written.
 fn size(section: &str, width: Option<u32>, height: Option<u32>) -> Result<(), String> {
     match (width, height) {
         (None, None) => Ok(()),
@@ -62,7 +62,7 @@ pub(super) fn check(config: &Config) -> Result<(), String> {
     let TriggerSetup { pulse_us, .. } = trigger;
     within("head.trigger.pulse_us", *pulse_us, 1, 1_000_000)?;
     if trigger.line.is_some() && pulse_us > exposure_us {
-        // Such a frame may show two patterns, and nothing in it would tell.
+        // Such a frame may show two patterns, which could not be seen in it.
         return Err(format!(
             "head.trigger.pulse_us = {pulse_us}: write at most head.camera.exposure_us = {exposure_us}: a camera that exposes while the pulse \
              lasts would expose longer than it is said to"

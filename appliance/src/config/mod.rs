@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 const CONNECTIONS: u16 = 8;
 /// This machine.
 const LOOPBACK: [&str; 2] = ["127.0.0.0/8", "::1/128"];
-/// Networks that are nobody else's: RFC 1918, 3927, 4193 and 4291.
+/// Private and link-local networks: RFC 1918, 3927, 4193 and 4291.
 const PRIVATE: [&str; 6] = [
     "10.0.0.0/8",
     "172.16.0.0/12",
@@ -38,15 +38,15 @@ pub struct Config {
     pub state: Option<PathBuf>,
     /// Computing threads; 0 = one per core.
     pub threads: usize,
-    /// What the station does by itself.
+    /// The station.
     pub station: StationConfig,
-    /// The PLC's side.
+    /// Modbus TCP, for the PLC.
     pub modbus: ModbusConfig,
-    /// The technician's side.
+    /// The page, for the technician.
     pub http: HttpConfig,
     /// The devices.
     pub head: HeadConfig,
-    /// Wires to whoever starts the station without a network.
+    /// Digital lines: start, busy, ok and fault.
     pub lines: LinesSetup,
     /// What is kept of results.
     pub history: HistoryConfig,
@@ -55,7 +55,7 @@ pub struct Config {
 /// The most results that a history can be told to keep.
 pub const MAX_RESULTS: u32 = 10_000_000;
 
-/// What is kept of results; the oldest go first.
+/// What is kept of results; the oldest are deleted first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct HistoryConfig {
@@ -65,7 +65,7 @@ pub struct HistoryConfig {
     pub recordings_mib: u32,
 }
 
-/// What the station does by itself.
+/// The station.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StationConfig {
@@ -89,9 +89,9 @@ pub struct ModbusConfig {
     pub strict_unit_id: Option<u8>,
     /// The most connections at a time.
     pub connections: u16,
-    /// Networks from where it may be read.
+    /// Networks whose clients may read.
     pub readers: Vec<IpNet>,
-    /// Networks from where it may be written.
+    /// Networks whose clients may write.
     pub writers: Vec<IpNet>,
 }
 
@@ -112,7 +112,7 @@ pub enum WordOrder {
 pub struct HttpConfig {
     /// Address and port.
     pub listen: SocketAddr,
-    /// Names by which the page is asked for, beside IP addresses and localhost.
+    /// Host names of the page, besides IP addresses and localhost.
     pub hosts: Vec<String>,
     /// Networks of proxies in front of the page.
     pub proxies: Vec<IpNet>,
@@ -222,7 +222,7 @@ impl Config {
     /// Reads and checks a file. Paths in it are relative to its folder.
     ///
     /// # Errors
-    /// If it does not exist (66), is no TOML, has an unknown key or a value out of range (78); the
+    /// If it does not exist (66), is not TOML, has an unknown key or a value out of range (78); the
     /// message names the file, the key and the remedy.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let place = path.display();
@@ -255,14 +255,14 @@ impl Config {
         Ok(config)
     }
 
-    /// The devices, with the calibration in this state folder unless another one is named.
+    /// The devices, with the calibration in this state folder unless another one is configured.
     pub fn head_in(&self, state: &Path) -> HeadConfig {
         let mut head = self.head.clone();
         head.calibration.get_or_insert_with(|| state.join(IN_STATE));
         head
     }
 
-    /// Checks the ranges that the types do not hold.
+    /// Checks the ranges that the types do not express.
     ///
     /// # Errors
     /// Naming the key and its range.
@@ -380,7 +380,7 @@ mod tests {
             let row = format!("| {signal} | {} |", line.as_deref().unwrap());
             assert!(wiring.contains(&row), "no wire for {row}");
         }
-        // The camera exposes for its pulse and 14.26 µs more, and that is what it is said to expose.
+        // The camera exposes 14.26 µs longer than its pulse, and the configured exposure is that time.
         let exposed = f64::from(trigger.pulse_us) + 14.26;
         assert!((exposed - f64::from(config.head.camera.exposure_us)).abs() < 1.0);
     }

@@ -1,4 +1,4 @@
-//! A raster that pixels and text are put on, and its PNG.
+//! A raster for pixels and text, and its PNG.
 
 use embedded_graphics::Drawable;
 use embedded_graphics::mono_font::iso_8859_1::FONT_7X14;
@@ -92,7 +92,7 @@ impl<const N: usize> Canvas<N> {
     }
 }
 
-/// A canvas that is written on in one colour.
+/// A canvas on which text is drawn in one colour.
 struct Ink<'a, const N: usize> {
     canvas: &'a mut Canvas<N>,
     colour: [u8; N],

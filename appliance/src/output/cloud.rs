@@ -50,7 +50,7 @@ pub fn ply(surface: &Surface, intensity: &[u8]) -> Vec<u8> {
     binary_ply(&vertices)
 }
 
-/// The same of any points.
+/// The same format for any points.
 pub fn binary_ply(vertices: &[Vertex]) -> Vec<u8> {
     let count = vertices.len();
     let mut ply = format!(

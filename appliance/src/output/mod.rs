@@ -1,4 +1,4 @@
-//! What a measurement leaves behind for people: pictures and clouds, each file whole.
+//! Output of a measurement for people: pictures and point clouds.
 
 pub mod canvas;
 pub mod cloud;

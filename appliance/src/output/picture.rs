@@ -3,16 +3,15 @@
 use super::canvas::{Canvas, LINE};
 use super::colour::{UNRESOLVED, viridis};
 
-/// Pictures are shrunk until the map is at most this wide.
+/// Maps are subsampled to at most this many columns.
 const MAX_WIDTH: usize = 1024;
 /// Room for the scale bar, its ticks and their numbers.
 const SCALE_WIDTH: usize = 96;
-/// A picture of a low map still has room for the scale.
+/// Least height of a picture, for its scale.
 const MIN_HEIGHT: usize = 120;
 const MARGIN: usize = 12;
 const BAR_WIDTH: usize = 16;
-/// The scale leaves out this share of the heights at each end, so that one stray pixel does not
-/// take the colours.
+/// Share of the heights at each end that the scale leaves out, so that single outliers do not stretch it.
 const TAIL: f64 = 0.005;
 
 /// A PNG of `mm` (row-major, NaN = unresolved), coloured by height, with a scale bar in mm.

@@ -48,7 +48,7 @@ impl Problem {
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, words)
     }
 
-    /// 500: this program or its machine is at fault.
+    /// 500: the program or its machine is at fault.
     pub fn broken(words: impl Into<String>) -> Self {
         Self::new(StatusCode::INTERNAL_SERVER_ERROR, words)
     }

@@ -2,7 +2,7 @@
 
 use super::Key;
 
-/// The table's part.
+/// These keys.
 pub(super) const KEYS: [Key; 25] = [
     Key {
         name: "head.camera.id",
@@ -51,14 +51,14 @@ pub(super) const KEYS: [Key; 25] = [
         unit: "µs",
         range: "0 to 1000000",
         default: "20000",
-        meaning: "from the end of an exposure until its frame is there when nothing is late: what the readout takes, and a few ms",
+        meaning: "from the end of an exposure to the delivery of its frame: the time of the readout, and a few ms",
     },
     Key {
         name: "head.camera.luma",
         unit: "true or false",
         range: "true, false",
         default: "false",
-        meaning: "take the luminance of a YUV format where the camera has no raw one, although an image processor has been at it: `fringed doctor` complains",
+        meaning: "use the luminance of a YUV format if the camera has no raw format; an image processor has changed it, and `fringed doctor` reports it",
     },
     Key {
         name: "head.projector.card",
@@ -149,7 +149,7 @@ pub(super) const KEYS: [Key; 25] = [
         unit: "ms",
         range: "0 to 1000",
         default: "5",
-        meaning: "the start line counts once it has been still for so long",
+        meaning: "the start line counts once it has been stable for this long",
     },
     Key {
         name: "lines.busy",

@@ -19,21 +19,21 @@ pub struct Key {
     pub meaning: &'static str,
 }
 
-/// The table's part beside the devices; a test compares the whole with the structs.
+/// All keys but those of the devices; a test compares them with the structs.
 const KEYS: [Key; 20] = [
     Key {
         name: "state",
         unit: "folder",
         range: "any that can be written",
         default: "the platform's state folder",
-        meaning: "recipes, result counter, serial; `--state` goes before",
+        meaning: "recipes, result counter, serial; `--state` takes precedence",
     },
     Key {
         name: "threads",
         unit: "threads",
         range: "0 to 256",
         default: "0",
-        meaning: "computing threads, 0 = one per core; `--threads` goes before",
+        meaning: "computing threads, 0 = one per core; `--threads` takes precedence",
     },
     Key {
         name: "station.recipe",
@@ -61,7 +61,7 @@ const KEYS: [Key; 20] = [
         unit: "address:port",
         range: "any of this machine",
         default: "127.0.0.1:1502",
-        meaning: "where Modbus TCP is served; `--modbus` goes before",
+        meaning: "where Modbus TCP is served; `--modbus` takes precedence",
     },
     Key {
         name: "modbus.word_order",
@@ -82,28 +82,28 @@ const KEYS: [Key; 20] = [
         unit: "connections",
         range: "2 to 64",
         default: "8",
-        meaning: "the most at a time; one of them is kept for a client that may write",
+        meaning: "the most at a time; one of them is reserved for a client that may write",
     },
     Key {
         name: "modbus.readers",
         unit: "networks",
         range: "addresses with their prefix, as in 10.1.2.0/24",
         default: "[127.0.0.0/8, ::1/128, 10.0.0.0/8, 172.16.0.0/12, 192.168.0.0/16, 169.254.0.0/16, fc00::/7, fe80::/10]",
-        meaning: "from where Modbus connections are taken: this machine and private networks",
+        meaning: "networks from which Modbus connections are accepted: this machine and private networks",
     },
     Key {
         name: "modbus.writers",
         unit: "networks",
         range: "addresses with their prefix, as in 10.1.2.7/32",
         default: "[127.0.0.0/8, ::1/128]",
-        meaning: "from where writes are taken, so who may trigger; other clients get exception 1. List the PLC here",
+        meaning: "networks whose clients may write, and so trigger; others get exception 1. List the PLC here",
     },
     Key {
         name: "http.listen",
         unit: "address:port",
         range: "any of this machine",
         default: "127.0.0.1:8080",
-        meaning: "where the page is served; `--http` goes before",
+        meaning: "where the page is served; `--http` takes precedence",
     },
     Key {
         name: "http.hosts",
@@ -117,7 +117,7 @@ const KEYS: [Key; 20] = [
         unit: "networks",
         range: "addresses with their prefix, as in 127.0.0.1/32",
         default: "[]",
-        meaning: "proxies in front of the page, behind which there are many: any other address has at most 16 of the page's 64 connections",
+        meaning: "proxies in front of the page, each of which stands for many clients: any other address has at most 16 of the page's 64 connections",
     },
     Key {
         name: "head.backend",
@@ -145,21 +145,21 @@ const KEYS: [Key; 20] = [
         unit: "file",
         range: "a calibration.json",
         default: "calibration/calibration.json in the state folder",
-        meaning: "what is known of the head; `fringed calibrate` writes it, and keeps the one before beside it",
+        meaning: "the calibration of the head; `fringed calibrate` writes it, and keeps the previous one beside it",
     },
     Key {
         name: "history.results",
         unit: "results",
         range: "1 to 10000000",
         default: "100000",
-        meaning: "the most results in the history; the oldest go first",
+        meaning: "the most results in the history; the oldest are deleted first",
     },
     Key {
         name: "history.recordings_mib",
         unit: "MiB",
         range: "0 to 4294967295",
         default: "1024",
-        meaning: "the most room for frames of parts that did not pass; the oldest go first; 0 = none are kept",
+        meaning: "the most storage for frames of parts that did not pass; the oldest are deleted first; 0 = none are kept",
     },
 ];
 

@@ -1,4 +1,13 @@
-// Requests to this device. What goes wrong comes back as words for people.
+// Requests to this device. Errors carry words for people.
+
+// The error that an answer reports.
+async function failure(response) {
+  const content = await response.json().catch(() => null);
+  const error = new Error(content && content.error ? content.error : `the sensor answers ${response.status}`);
+  error.status = response.status;
+  return error;
+}
+
 export async function ask(method, path, body) {
   const options = { method, credentials: "same-origin", headers: {} };
   if (body instanceof Blob) options.body = body;
@@ -8,20 +17,14 @@ export async function ask(method, path, body) {
   }
   let response;
   try { response = await fetch(path, options); } catch (gone) { throw new Error("the sensor does not answer; check the network"); }
-  const content = await response.json().catch(() => null);
-  if (response.ok) return content;
-  const error = new Error(content && content.error ? content.error : `the sensor answers ${response.status}`);
-  error.status = response.status;
-  throw error;
+  if (!response.ok) throw await failure(response);
+  return response.json().catch(() => null);
 }
 
 // A map: its description and its values, NaN where there is none. Where there is no map, the error says why.
 export async function map(path) {
   const response = await fetch(path, { credentials: "same-origin" });
-  if (!response.ok) {
-    const content = await response.json().catch(() => null);
-    throw new Error(content && content.error ? content.error : `the sensor answers ${response.status}`);
-  }
+  if (!response.ok) throw await failure(response);
   if (response.status === 204) throw new Error(response.headers.get("x-none"));
   const about = JSON.parse(response.headers.get("x-map"));
   const view = new DataView(await response.arrayBuffer());

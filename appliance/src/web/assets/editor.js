@@ -1,4 +1,4 @@
-// Editing a recipe: regions by dragging on the part as taught, limits and names as fields.
+// Edits a recipe: regions by dragging on the picture of the part as taught, limits and names in fields.
 import { $, draw, fill, make, show, text } from "./element.js";
 import { ask, map } from "./api.js";
 import { paint } from "./colour.js";
@@ -6,7 +6,7 @@ import { change, notice } from "./session.js";
 
 const state = { recipe: null, map: null, chosen: [0, 0], drag: null, wide: 1 };
 
-// Factor and symbol of a gauge's limits as people write them, and the least and the largest that there are (as the station has them).
+// Factor and symbol of a gauge's limits as people write them, and the smallest and largest limit that the station accepts.
 function unit(measures) {
   const kind = measures.kind;
   if (kind === "coverage" || kind === "out_of_tolerance") return [100, "%", 0, 100];
@@ -46,12 +46,12 @@ export async function edit(number) {
   $("editor").scrollIntoView();
 }
 
-// Side of what a finger hits of a corner, and radius of the grip that is drawn there, in pixels of the screen.
+// Side of a corner's touch target, and radius of the grip that is drawn in it, in pixels of the screen.
 const TARGET = 26;
 const GRIP = 8;
 
-// The middle of a corner's grip: outside the region, so far that the grips of a small one do not overlap and its inside
-// stays free.
+// The middle of a corner's grip: outside the region, and far enough that the grips of a small region overlap neither each other nor
+// its inside.
 function outside(polygon, corner, scale) {
   const middle = [0, 1].map((axis) => polygon.reduce((sum, point) => sum + point[axis], 0) / polygon.length);
   const [u, v] = polygon[corner];
@@ -65,7 +65,7 @@ function outside(polygon, corner, scale) {
 
 function drawRegions() {
   const { recipe, chosen } = state;
-  // Camera pixels per pixel of the screen: a finger needs the same size on every screen.
+  // Camera pixels per pixel of the screen, so that touch targets have the same size on every screen.
   const scale = state.wide / ($("editor-regions").getBoundingClientRect().width || state.wide);
   const parts = [];
   recipe.regions.forEach((region, at) => {
@@ -157,7 +157,7 @@ function drawGauges() {
     const limit = (key) => (value) => { if (value === null) delete gauge[key]; else gauge[key] = value; check(); };
     const low = field(gauge.low, `lowest ${gauge.name}`, units, limit("low"));
     const high = field(gauge.high, `highest ${gauge.name}`, units, limit("high"));
-    // What is refused names the gauge: the browser's own words do not.
+    // The browser's own messages do not name the gauge.
     const refused = ({ validity }) => validity.badInput || validity.rangeUnderflow || validity.rangeOverflow;
     const check = () => {
       const crossed = gauge.low > gauge.high ? `the lowest ${gauge.name} is above the highest: no part would pass` : "";
@@ -177,7 +177,7 @@ function drawGauges() {
   fill($("editor-gauges"), ...recipe.gauges.map(row));
 }
 
-// A new region in the middle of the part, with a gauge that sees whether the part deviates there.
+// Adds a region in the middle of the part, with a gauge of the deviation there.
 function addRegion() {
   const { recipe } = state;
   const { width, height } = recipe.camera;
@@ -220,7 +220,7 @@ function save(event) {
     const stored = await ask("PUT", `/api/recipes/${recipe.number}`, body);
     recipe.fingerprint = stored.fingerprint;
     show("editor", false);
-    if (stored.active && !stored.loading) notice(`recipe ${recipe.number} is stored, but the station goes on with the version that it has: load it`, true);
+    if (stored.active && !stored.loading) notice(`recipe ${recipe.number} is stored, but the station still uses the version before: load it`, true);
     else notice(`recipe ${recipe.number} is stored${stored.loading ? " and is being loaded" : ""}`);
     if (!stored.loading) window.dispatchEvent(new Event("recipes"));
   });

@@ -1,4 +1,4 @@
-// Elements of the page: found, filled and made. Text goes in as text only.
+// Finds, makes and fills elements of the page. Text is inserted as text, never as HTML.
 export const $ = (id) => document.getElementById(id);
 
 export function text(id, words) {
@@ -30,7 +30,7 @@ export function fill(element, ...children) {
   element.append(...children);
 }
 
-// A button that does something; it cannot be pressed twice while it does.
+// A button that does something; it is disabled until that has ended.
 export function button(words, kind, act) {
   const made = make("button", kind, words);
   made.type = "button";

@@ -3,9 +3,10 @@ import { $, fill, make, show, text } from "./element.js";
 import { limits, quantity } from "./number.js";
 import { ask } from "./api.js";
 import { trend } from "./trend.js";
+import { decided, tag } from "./verdict.js";
 
+// Values of a trend.
 const KEPT = 100;
-const PASS_BIT = 1;
 let trends = new Map();
 let of = "";
 
@@ -37,22 +38,20 @@ function row(gauge) {
   value.append(make("small", sigma === "\u00a0" ? "room" : "", sigma));
   const range = make("td", "limits", bar(gauge), make("small", "", limits(gauge.lowest, gauge.highest, gauge.unit)));
   const points = trends.get(gauge.name) || [];
-  const kind = !gauge.valid ? "invalid" : gauge.pass ? "pass" : "fail";
-  const words = !gauge.valid ? "? invalid" : gauge.pass ? "✓ pass" : gauge.low ? "✗ low" : gauge.high ? "✗ high" : "✗ fail";
-  const verdict = make("td", "", make("span", `tag ${kind}`, words));
+  const verdict = make("td", "", tag(gauge));
   verdict.append(gauge.doubtful ? make("small", "", "close to a limit") : make("small", "room", "\u00a0"));
   const name = make("th", "", gauge.name);
   name.scope = "row";
   return make("tr", "", name, value, range, make("td", "trend-cell", trend(points, gauge)), verdict);
 }
 
-// The last values from the device's history; what came since is added here.
+// Reads the last values from the device's history; later ones are added as they come.
 async function load(result) {
   trends = new Map();
   try {
     const stored = await ask("GET", "/api/trends");
     for (const gauge of stored.gauges) {
-      trends.set(gauge.name, gauge.points.map((point) => ({ seq: point.seq, value: point.value, pass: (point.decision & PASS_BIT) !== 0 })));
+      trends.set(gauge.name, gauge.points.map((point) => ({ seq: point.seq, value: point.value, pass: decided(point).pass })));
     }
   } catch (none) { /* Without a history the trends begin now. */ }
   add(result);

@@ -1,16 +1,16 @@
-// Stored results with a filter, a page at a time.
+// Stored results, filtered, a page at a time.
 import { $, button, fill, make, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { openKept } from "./kept.js";
 import { about, count, milliseconds, moment, quantity } from "./number.js";
+import { decided } from "./verdict.js";
 
 const PAGE = 50;
-const PASS = 1, VALID = 2, LOW = 4;
 let oldest = null;
 let boot = "";
 let seen = false;
 
-// When a day that somebody chose begins where the browser is, `more` days later; µs since 1970 UTC.
+// The beginning of the chosen day in the browser's time zone, or of the day `more` days later, µs since 1970 UTC.
 function day(id, more) {
   const [year, month, date] = $(id).value.split("-").map(Number);
   return 1000 * Math.max(0, new Date(year, month - 1, date + more).getTime());
@@ -28,8 +28,8 @@ function filter() {
 
 function outside(entry) {
   if (entry.reason) return entry.reason;
-  const bad = entry.gauges.filter((gauge) => !(gauge.decision & PASS) || !(gauge.decision & VALID));
-  return bad.map((gauge) => (gauge.value === null ? `${gauge.name} not measured` : `${gauge.name} ${quantity(gauge.value, gauge.unit)} ${gauge.decision & LOW ? "too low" : "too high"}`)).join(", ");
+  const bad = entry.gauges.filter((gauge) => !decided(gauge).pass);
+  return bad.map((gauge) => (gauge.value === null ? `${gauge.name} not measured` : `${gauge.name} ${quantity(gauge.value, gauge.unit)} ${decided(gauge).low ? "too low" : "too high"}`)).join(", ");
 }
 
 function row(entry) {
@@ -64,7 +64,7 @@ async function load(more) {
     const all = counts.pass + counts.fail + counts.invalid;
     const share = all ? ` (${(100 * counts.pass / all).toFixed(1)} %)` : "";
     const notes = [all ? `${count(all)} results: ${count(counts.pass)} PASS${share}, ${count(counts.fail)} FAIL, ${count(counts.invalid)} INVALID` : "no result passes this filter"];
-    if (undated) notes.push(`${count(undated)} left out, of which the time is not known`);
+    if (undated) notes.push(`${count(undated)} left out because their time is not known`);
     if (results.some(about)) notes.push("≈ time from the browser of a signed-in user");
     text("history-counts", notes.join(" · "));
   } catch (error) {

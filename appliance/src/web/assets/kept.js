@@ -1,21 +1,19 @@
-// One stored result: its values, and the pictures of its part where the frames were kept.
+// One stored result: its values, and the pictures of its part if the frames were kept.
 import { $, fill, make, show, text } from "./element.js";
 import { ask, map } from "./api.js";
 import { paint } from "./colour.js";
-import { about, count, limits, milliseconds, moment, quantity, signed } from "./number.js";
+import { about, limits, measures, milliseconds, moment, quantity, signed } from "./number.js";
 import { drawScale } from "./scale.js";
 import { nameOf } from "./times.js";
+import { decided, tag } from "./verdict.js";
 
-const PASS = 1, VALID = 2, LOW = 4, HIGH = 8, DOUBTFUL = 16;
 const COMPONENTS = ["x", "y", "z", "about x", "about y", "about z"];
 const state = { seq: 0, layer: "height", asked: 0 };
 
 function gauge(entry) {
-  const is = (bit) => (entry.decision & bit) !== 0;
-  const kind = !is(VALID) ? "invalid" : is(PASS) ? "pass" : "fail";
-  const words = !is(VALID) ? "? invalid" : is(PASS) ? "✓ pass" : is(LOW) ? "✗ low" : is(HIGH) ? "✗ high" : "✗ fail";
-  const verdict = make("td", "", make("span", `tag ${kind}`, words));
-  if (is(DOUBTFUL)) verdict.append(make("small", "", "close to a limit"));
+  const decision = decided(entry);
+  const verdict = make("td", "", tag(decision));
+  if (decision.doubtful) verdict.append(make("small", "", "close to a limit"));
   const value = make("td", "nowrap", entry.value === null ? "not measured" : quantity(entry.value, entry.unit));
   if (entry.value !== null && entry.sigma !== null) value.append(make("small", "", `± ${quantity(entry.sigma, entry.unit, 1)}`));
   const name = make("th", "", entry.name);
@@ -23,14 +21,14 @@ function gauge(entry) {
   return make("tr", "", name, value, make("td", "", limits(entry.low, entry.high, entry.unit)), verdict);
 }
 
-// How the part lay; a component that its shape does not determine is left out.
+// The pose of the part relative to its taught pose; a component that its shape does not determine is left out.
 function placement({ values, reach_mm }) {
   const known = values.flatMap((value, at) => (value === null ? [] : [`${COMPONENTS[at]} ${signed(value, 3)}${at < 3 ? " mm" : "°"}`]));
   return [...known, `${reach_mm.toFixed(3)} mm at its farthest corner`].join(", ");
 }
 
 function facts({ result, flags }, boot) {
-  const measured = result.valid_points > 0;
+  const { points, coverage, noise, fitness } = measures(result);
   const when = make("dd", "", moment(result, boot));
   when.title = about(result);
   const pairs = [
@@ -40,10 +38,10 @@ function facts({ result, flags }, boot) {
     ["Press stroke", String(result.press_stroke)],
     ["Token", result.token ? String(result.token) : "none"],
     ["Trigger to result", milliseconds(result.total_us)],
-    ["Points", measured ? count(result.valid_points) : "none"],
-    ["Resolved of the part", measured ? `${(result.coverage_permille / 10).toFixed(1)} %` : "–"],
-    ["Height noise (1 σ)", measured && result.height_noise_mm !== null ? `${(1000 * result.height_noise_mm).toFixed(1)} µm` : "–"],
-    ["Pattern fitness", measured ? `${(result.fitness_permille / 10).toFixed(1)} %` : "–"],
+    ["Points", points],
+    ["Coverage of the regions", coverage],
+    ["Height noise (1 σ)", noise],
+    ["Pattern fitness", fitness],
     ["Stages", result.stages.map((stage) => `${nameOf(stage)} ${milliseconds(stage.us)}`).join(" · ") || "–"],
     ["Placement", result.placement ? placement(result.placement) : "not known"],
     ["How it was measured", flags.length ? flags.join(", ") : "–"],
@@ -61,7 +59,7 @@ function empty(words) {
 
 async function picture() {
   const turn = state.asked += 1;
-  empty("working out the picture");
+  empty("computing the picture");
   let loaded;
   try { loaded = await map(`/api/history/${state.seq}/picture/${state.layer}`); } catch (error) {
     if (turn === state.asked) empty(error.message);
@@ -85,8 +83,7 @@ export async function openKept(seq, boot) {
   if (state.seq !== seq) return;
   const { result, no_frames } = found;
   text("kept-number", `no. ${seq}`);
-  const tag = $("kept-verdict");
-  tag.className = `tag ${result.verdict.toLowerCase()}`;
+  $("kept-verdict").className = `tag ${result.verdict.toLowerCase()}`;
   text("kept-verdict", result.verdict);
   text("kept-reason", result.reason || "");
   fill($("kept-gauges"), ...result.gauges.map(gauge));

@@ -1,4 +1,4 @@
-// The page: follows the snapshots and shows each one in the view that is open.
+// The page: follows the snapshots, and shows each in the view that is open.
 import { $, show, text } from "./element.js";
 import { follow } from "./stale.js";
 import { isOfOtherRecipe, showVerdict } from "./verdict.js";
@@ -15,7 +15,7 @@ import { start as startQuestion } from "./question.js";
 import { showSimulation, start as startSimulation } from "./simulation.js";
 import { change, start as startSession } from "./session.js";
 import { ask } from "./api.js";
-import { count, duration } from "./number.js";
+import { count, duration, measures } from "./number.js";
 
 const VIEWS = ["live", "history", "recipes", "registers", "device"];
 const STATES = {
@@ -32,12 +32,8 @@ let shown = null;
 function showCounters(now) {
   for (const name of ["triggers", "missed", "sequence", "buffered"]) text(name, count(now.counters[name]));
   $("missed-cell").classList.toggle("latched", now.missed_trigger);
-  const result = now.result;
-  const measured = result && result.valid_points > 0;
-  text("points", measured ? count(result.valid_points) : "–");
-  text("coverage", measured ? `${(result.coverage_permille / 10).toFixed(1)} %` : "–");
-  text("noise", measured ? `${(1000 * result.height_noise_mm).toFixed(1)} µm` : "–");
-  text("fitness", measured ? `${(result.fitness_permille / 10).toFixed(1)} %` : "–");
+  const measured = measures(now.result);
+  for (const name of ["points", "coverage", "noise", "fitness"]) text(name, measured[name]);
   const notes = now.warnings.map((warning) => `warning: ${warning}`);
   if (now.buffer_overflow) notes.push("a result was not queued: the PLC does not acknowledge");
   if (now.warming_up) notes.push("warming up");
@@ -66,7 +62,7 @@ function showSnapshot(now) {
   showRecipes(now, view === "recipes");
   showDevice(now, view === "device");
   showSimulation(now);
-  // Times without a clock are told from the start, so lists are read again when that is known.
+  // Times without a clock count from the start, so lists are read again when BOOT_ID is known.
   if (restarted) { openHistory(view === "history", now); openDevice(view === "device", now); }
   const key = `${now.boot_id}/${now.result ? now.result.seq : "none"}`;
   if (key !== shown) {

@@ -1,4 +1,4 @@
-// Numbers as people read them: always with their unit, with as many digits as mean something.
+// Numbers as people read them: with their unit, and with as many digits as are significant.
 const MINUS = "\u2212";
 const THIN = "\u202f";
 
@@ -16,7 +16,7 @@ export function signed(value, places) {
   return value.toFixed(places).replace("-", MINUS);
 }
 
-// What a unit needs: a factor, digits and its symbol. A share is shown in per cent.
+// Factor, decimal places and symbol of a unit. A share is shown in per cent.
 function form(unit) {
   if (unit === "mm") return [1, 3, " mm"];
   if (unit === "mm³") return [1, 2, " mm³"];
@@ -38,6 +38,18 @@ export function limits(low, high, unit) {
   return has(high) ? `≤ ${quantity(high, unit)}` : "no limits";
 }
 
+// What a result measured besides its gauges; dashes where it measured nothing.
+export function measures(result) {
+  const measured = result && result.valid_points > 0;
+  const percent = (permille) => `${(permille / 10).toFixed(1)} %`;
+  return {
+    points: measured ? count(result.valid_points) : "–",
+    coverage: measured ? percent(result.coverage_permille) : "–",
+    noise: measured && result.height_noise_mm !== null ? `${(1000 * result.height_noise_mm).toFixed(1)} µm` : "–",
+    fitness: measured ? percent(result.fitness_permille) : "–",
+  };
+}
+
 export function clock(utc_us) {
   return utc_us ? new Date(utc_us / 1000).toLocaleTimeString("en-GB") : "";
 }
@@ -47,13 +59,12 @@ export function duration(s) {
   return `${hours} h ${String(minutes).padStart(2, "0")} min`;
 }
 
-// Where the time of something is known only by the clock of a browser, the words for it.
+// A remark where a time is known only by the clock of a browser, else nothing.
 export function about(entry) {
   return !entry.utc_us && !entry.time_utc_us && entry.browser_utc_us ? "time from the browser of a signed-in user: the clock was not synchronised" : "";
 }
 
-// When something happened; where the clock was not synchronised, by that of a browser, else how long after which start of
-// the device.
+// When something happened. If the clock was not synchronised: by the clock of a browser, else the time since that start of the device.
 export function moment(entry, boot) {
   const utc_us = entry.utc_us || entry.time_utc_us || entry.browser_utc_us;
   if (!utc_us) {

@@ -8,7 +8,7 @@ import { signed } from "./number.js";
 const UNITS = { mm: 3, counts: 1 };
 const state = { layer: "height", map: null, deviation: null, result: null, key: "", recipe: null, recipeKey: "", asked: 0, at: [0, 0] };
 
-// The gauges of the result that failed or could not be measured, as the recipe has them.
+// The recipe's gauges that failed or could not be measured in the result.
 function failing() {
   const { recipe, result } = state;
   if (!recipe || !result) return [];
@@ -18,7 +18,7 @@ function failing() {
   });
 }
 
-// Regions in camera pixels; those of failed gauges are drawn strongly.
+// Draws the regions; those of failed gauges are emphasised.
 function drawOutlines() {
   const svg = $("outlines");
   if (!state.map) { fill(svg); return; }
@@ -39,16 +39,16 @@ function drawOutlines() {
   fill(svg, ...quiet, ...loud.map((region) => outline(region, "under")), ...loud.map((region) => outline(region, bad.get(region.name))), ...(state.deviation ? most(state.deviation) : []));
 }
 
-// Measures that compare the part with golden, pixel by pixel: where they fail, a place of the picture says why.
+// Measures that compare the part with golden pixel by pixel, so that a place in the picture explains why they fail.
 const COMPARING = ["deviation", "rms_deviation", "out_of_tolerance"];
 
-// The regions in which a gauge failed that compares the part with golden.
+// The regions of failed gauges that compare the part with golden.
 function deviating() {
   const names = failing().filter(({ gauge, kind }) => kind === "fail" && COMPARING.includes(gauge.measures.kind)).map(({ gauge }) => gauge.region);
   return state.recipe ? state.recipe.regions.filter((region) => names.includes(region.name)) : [];
 }
 
-// Whether a place lies inside a polygon: an odd number of its edges lies to the left.
+// Whether a point lies inside a polygon: then an odd number of edges lies on one side of it.
 function inside(polygon, u, v) {
   let within = false;
   polygon.forEach(([u1, v1], at) => {
@@ -58,8 +58,8 @@ function inside(polygon, u, v) {
   return within;
 }
 
-// A ring around the place of the failing regions that deviates most, averaged over squares of some pixels so that no single
-// one decides.
+// A ring around the place in the failing regions that deviates most. Deviations are averaged over squares of some pixels, so that
+// single outliers do not count.
 function most(map) {
   const { width, height, stride } = map.about;
   const regions = deviating();
@@ -113,7 +113,7 @@ function move(event) {
 async function load() {
   const turn = state.asked += 1;
   const result = state.result;
-  // Without a single point the picture would be that of an older part.
+  // Without resolved pixels there is no new picture; the last one is that of an older part.
   if (!result || !result.valid_points) { empty(result ? "no height was measured" : "no picture yet"); return; }
   const layer = state.layer;
   let loaded;
@@ -147,7 +147,7 @@ function empty(words) {
   drawOutlines();
 }
 
-// The recipe of a result; none where it was changed since: its regions say nothing about this result.
+// Loads the recipe of a result; none if it was changed since, because its regions need not be those of the result.
 async function loadRecipe(result) {
   const keyOf = (of) => `${of.recipe}/${of.fingerprint}`;
   const key = keyOf(result);
@@ -156,12 +156,12 @@ async function loadRecipe(result) {
   state.recipeKey = "";
   let recipe;
   try {
-    // It may be deleted or another version by now.
+    // It may have been deleted or replaced since.
     const { recipes } = await ask("GET", "/api/recipes");
     if (!recipes.some((one) => one.number === result.recipe && !one.error && one.fingerprint.startsWith(result.fingerprint))) return;
     recipe = await ask("GET", `/api/recipes/${result.recipe}`);
   } catch (none) { return; }
-  // Meanwhile there may be a result of another one.
+  // Meanwhile there may be a result of another recipe.
   if (!state.result || keyOf(state.result) !== key) return;
   state.recipeKey = key;
   state.recipe = recipe.fingerprint.startsWith(result.fingerprint) ? recipe : null;

@@ -1,4 +1,4 @@
-// A question before something is replaced or deleted. It keeps the keyboard until it is answered; Escape is Cancel.
+// A question before something is replaced or deleted. It keeps the keyboard focus until it is answered; Escape is Cancel.
 import { $, button, fill, show, text } from "./element.js";
 
 let answer = null;
@@ -9,7 +9,7 @@ function close(value) {
   answer = null;
   show("question", false);
   resolve(value);
-  // The button that asked may be disabled until its work has ended.
+  // The button that asked may be disabled until its action has ended.
   setTimeout(() => { if (opener && opener.focus) opener.focus(); }, 0);
 }
 
@@ -22,7 +22,7 @@ function keys(event) {
   choices[(at + by + choices.length) % choices.length].focus();
 }
 
-// Asks; `choices` are pairs of words and value. Answers with the value that was chosen, null for Cancel.
+// Asks; `choices` are pairs of a label and a value. Answers with the chosen value, null for Cancel.
 export function choose(title, words, choices) {
   close(null);
   return new Promise((resolve) => {

@@ -1,4 +1,4 @@
-// The recipes: list, load, teach with what it gained, export, import, delete, and undo of that.
+// The recipes: list, load, teach and compare, export, import, delete and undo.
 import { $, button, fill, make, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { change, notice } from "./session.js";
@@ -8,7 +8,7 @@ import { edit } from "./editor.js";
 
 let active = null;
 let taught = "";
-// What the list shows, and the number that the page proposed to teach.
+// The listed recipes, and the number that the page proposed to teach.
 let stored = [];
 let proposed = "";
 
@@ -61,12 +61,12 @@ function remover(recipe) {
   return remove;
 }
 
-// A line below a recipe, or instead of a deleted one, that brings back what was there before.
+// A line below a recipe, or in place of a deleted one, that restores the version before.
 function undoer(number, before, words) {
   const undo = button(words, "plain", () => change(async () => {
     const now = await ask("POST", `/api/recipes/${number}/undo`);
     const crc = `RECIPE_CRC32 is 0x${now.fingerprint.slice(0, 8).toUpperCase()}`;
-    if (now.active && !now.loading) notice(`recipe ${number} is undone, but the station goes on with the version that it has: load it`, true);
+    if (now.active && !now.loading) notice(`recipe ${number} is undone, but the station still uses the version before: load it`, true);
     else notice(`recipe ${number} · ${now.name} is back${now.loading ? " and is being loaded" : ""}: its ${crc}`);
     list();
   }));
@@ -104,30 +104,30 @@ export async function list() {
   } catch (error) { notice(error.message, true); }
 }
 
-// What the request to teach a number carries; none where a recipe has the number and shall stay.
+// The body of a request to teach a number; none if a recipe has the number and is to stay.
 async function consent(number) {
   await list();
   const taken = stored.find((recipe) => recipe.number === number);
   if (!taken) return {};
-  const words = `It is ${content(taken)}. New gauges take their place; regions that are kept stay where they are in the picture. Name and part number stay, and Undo in the list of recipes brings this version back.`;
+  const words = `It is ${content(taken)}. Regions and gauges are made anew, or kept; regions that are kept stay where they are in the picture. Name and part number stay, and Undo in the list of recipes brings this version back.`;
   const keep = taken.error ? [] : [["Replace, keep regions and gauges", { replace: true, keep_gauges: true }]];
   return choose(`Replace recipe ${number}?`, words, keep.concat([["Replace, with new gauges", { replace: true }]]));
 }
 
-// What the limit of the deviation holds, as predicted when the part was taught.
+// How the limit of the deviation was set when the part was taught.
 function held(good) {
   if (!good) return "";
   const limit = `±${good.limit_mm.toFixed(2)} mm`;
   const expected = `Good parts deviate by up to ${good.largest_mm.toFixed(3)} ± ${good.scatter_mm.toFixed(3)} mm`;
   const words = [good.limit_mm > good.tolerance_mm
-    ? `The deviation of ±${good.tolerance_mm.toFixed(2)} mm that is asked for cannot be held: the limit was set to ${limit}. ${expected}. More light, less noise or another pose narrows it.`
+    ? `The requested limit of ±${good.tolerance_mm.toFixed(2)} mm would reject good parts: it was set to ${limit}. ${expected}. More light, less noise or another pose narrows it.`
     : `${expected}; the limit was set to ${limit}.`];
-  if (good.weighed > 0) words.push(`${(100 * good.weighed).toFixed(2)} % of the surface is seen so faintly or flatly that a deviation there must be larger to be found, by a factor of ${(1 / good.least_weight).toFixed(1)} at its worst place: another pose or more light lowers it.`);
-  if (good.left_out > 0) words.push(`${(100 * good.left_out).toFixed(2)} % of the surface's pixels are seen too faintly or too flatly for that and are not compared: another pose brings them back.`);
+  if (good.weighed > 0) words.push(`${(100 * good.weighed).toFixed(2)} % of the surface is so dark or so steep that a deviation there must be larger to be found, by a factor of ${(1 / good.least_weight).toFixed(1)} at its worst place: another pose or more light lowers it.`);
+  if (good.left_out > 0) words.push(`${(100 * good.left_out).toFixed(2)} % of the surface's pixels are too dark or too steep to be compared: another pose brings them back.`);
   return words.join(" ");
 }
 
-// Before and after: the same number of frames with straight fringes and with the part's own.
+// Compares straight fringes with the part's adaptive pattern, at the same number of frames.
 export async function compare(number) {
   const recipe = await ask("GET", `/api/recipes/${number}`);
   const { comparison } = recipe;
@@ -146,7 +146,7 @@ export async function compare(number) {
   text("comparison-words", `${signed(less, 0)} % less noise where both see the part. In production ${production.frames.length} frames are projected: predicted height noise ${(1000 * production.sigma_mm).toFixed(1)} µm.`);
 }
 
-// Follows the snapshot: what is active, how far teaching is, and what it gained when it is done.
+// Follows the snapshot: the active recipe, the progress of teaching, and the comparison when it has ended.
 export function showRecipes(now, visible) {
   const number = now.recipe ? now.recipe.number : null;
   const changed = number !== active || `${number}/${now.recipe ? now.recipe.fingerprint : ""}` !== taught;

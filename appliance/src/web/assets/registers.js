@@ -1,4 +1,4 @@
-// The registers as the PLC reads them, once a second while somebody looks.
+// The registers as the PLC reads them, refreshed once a second while the view is open.
 import { $, fill, make } from "./element.js";
 import { ask } from "./api.js";
 import { notice } from "./session.js";

@@ -33,7 +33,7 @@ function open(next) {
   window.scrollTo(0, 0);
 }
 
-// Does something that needs a session: asks for the secret first where there is none, and says what came of it.
+// Does something that needs a session: asks for the secret first if there is none, and shows the outcome.
 export async function change(act, done) {
   const attempt = async () => {
     try {
@@ -59,7 +59,7 @@ export function start() {
   $("sign-in").addEventListener("submit", async (event) => {
     event.preventDefault();
     try {
-      // The time counts where the device's own clock is not synchronised.
+      // The device uses the time if its own clock is not synchronised.
       const { time } = await ask("POST", "/api/session", { secret: $("secret").value, time_ms: Date.now() });
       if (time === "refused") notice("the clock of this computer is wrong: set it, then sign in again to date results", true);
       if (time === "taken") window.dispatchEvent(new Event("dated"));

@@ -1,4 +1,4 @@
-// The part in front of a simulated head: which one lies there, and putting another in its place.
+// The part in front of a simulated head: shows it, and replaces it.
 import { $, button, fill, make, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { change } from "./session.js";
@@ -12,7 +12,7 @@ let asked = "";
 const copy = (value) => JSON.parse(JSON.stringify(value));
 const words = (name) => name.replace(/_(mm|deg)$/, "").replace(/_/g, " ");
 
-// A number with its name and unit, as wide as it needs to be.
+// A field for a number, with its name and unit.
 function field(name, value, take) {
   const input = make("input");
   input.type = "number";
@@ -50,13 +50,13 @@ function showPart(answer) {
 async function put() {
   const number = (at) => Number($(`place-${at}`).value);
   const placement = { shift_mm: [0, 1, 2].map(number), tilt_deg: [3, 4].map(number), rotation_deg: number(5) };
-  text("simulation-words", "the light of the part is being worked out…");
+  text("simulation-words", "the light of the part is being computed…");
   const answer = await change(() => ask("PUT", PLACE, { part, placement }), "the part is in place: the next cycle sees it");
   text("simulation-words", "");
   if (answer) showPart(answer);
 }
 
-// Follows the snapshot: after a start, and when teaching has put the part in place that was asked for.
+// Shows the part again after a start, and after teaching, which places the part that was asked for.
 export async function showSimulation(now) {
   const key = `${now.boot_id}/${now.state === "boot"}/${Boolean(now.teach)}`;
   if (key === asked) return;

@@ -1,15 +1,15 @@
-// Follows the events, and never trusts what the page shows: when the one-second heartbeat is missed twice, or the
-// measuring task's heartbeat stands still for as long, the verdict is covered. The cover also comes by itself, by CSS,
-// unless a whole event pushes it back: also when these scripts hang or fail.
+// Follows the events, and covers the verdict when it may be old: when two of the one-second heartbeats are missed, or the measuring
+// task's heartbeat stands still for as long. A CSS animation also covers it after three seconds unless each event restarts it, so the
+// cover comes even if these scripts hang or fail.
 import { $, text } from "./element.js";
 
-// Two beats of one second and what a network may be late by.
+// Two heartbeats of one second, and a margin for the network.
 const STALE_MS = 2400;
-// The page itself slept (a closed tablet): what it shows is as old as its sleep.
+// A longer pause between two checks means that the page itself slept, as on a closed tablet.
 const SLEPT_MS = 1600;
 
 const state = { source: null, event: -Infinity, beat: null, beatAt: -Infinity, checked: 0, boot: null, phase: false };
-// Time that also passes while the device sleeps; the larger step of both clocks counts.
+// Time that also passes while the device sleeps: whichever of the two clocks advanced more counts.
 let offset = 0, lastMono = performance.now(), lastWall = Date.now();
 function now() {
   const mono = performance.now(), wall = Date.now();
@@ -43,7 +43,7 @@ function check() {
   if (state.source.readyState === EventSource.CLOSED) open();
 }
 
-// Begins the time of the cover anew.
+// Restarts the animation of the cover.
 function push() {
   state.phase = !state.phase;
   $("stale").className = state.phase ? "one" : "two";
@@ -59,7 +59,7 @@ function open() {
     state.boot = snapshot.boot_id;
     state.beat = snapshot.heartbeat;
     shown(snapshot);
-    // Only what was shown whole counts as fresh.
+    // An event counts only after it was shown completely.
     state.event = at;
     state.checked = at;
     if (at - state.beatAt <= STALE_MS) push();

@@ -1,8 +1,8 @@
-// Where the time of a cycle goes.
+// The cycle time and its stages.
 import { $, fill, make, text } from "./element.js";
 import { milliseconds } from "./number.js";
 
-// What the stages are called here.
+// Names of stages on the page, where they differ.
 const NAMES = { strips: "phase, height, gauges" };
 export const nameOf = (stage) => NAMES[stage.name] || stage.name;
 
@@ -11,7 +11,7 @@ export function showTimes(result) {
   const { stages } = result;
   text("total", milliseconds(result.total_us));
   text("processing", stages.length ? milliseconds(result.processing_us) : "–");
-  // What the computing threads spent, however busy the device was besides.
+  // Unlike the times above, processor time does not depend on the load of the device.
   text("processor-time", result.cpu_us ? milliseconds(result.cpu_us) : "–");
   const sum = Math.max(1, stages.reduce((total, stage) => total + stage.us, 0));
   fill($("stages-bar"), ...stages.map((stage, at) => {

@@ -1,5 +1,5 @@
-// The verdict in shape, words and colour, readable from across the hall.
-import { $, text } from "./element.js";
+// The verdict in shape, words and colour, readable from a distance.
+import { $, make, text } from "./element.js";
 import { clock, quantity } from "./number.js";
 
 const SENTENCES = {
@@ -8,8 +8,21 @@ const SENTENCES = {
   INVALID: "not everything could be measured",
 };
 
+// The decision about a stored gauge by its bits, which are those of the register GAUGE_DECISION.
+export function decided({ decision }) {
+  const [pass, valid, low, high, doubtful] = [1, 2, 4, 8, 16].map((bit) => (decision & bit) !== 0);
+  return { pass, valid, low, high, doubtful };
+}
+
+// The tag that shows the decision about a gauge.
+export function tag({ pass, valid, low, high }) {
+  const kind = !valid ? "invalid" : pass ? "pass" : "fail";
+  const words = !valid ? "? invalid" : pass ? "✓ pass" : low ? "✗ low" : high ? "✗ high" : "✗ fail";
+  return make("span", `tag ${kind}`, words);
+}
+
 // "deviation +0.612 mm, opening 4 too high"
-export function outside(result) {
+function outside(result) {
   const failed = result.gauges.filter((gauge) => gauge.valid && !gauge.pass);
   return failed.map((gauge) => `${gauge.name} ${quantity(gauge.value, gauge.unit)} ${gauge.low ? "too low" : "too high"}`).join(", ");
 }
@@ -28,7 +41,7 @@ const recipeName = (recipe) => (recipe ? `recipe ${recipe.number} · ${recipe.na
 // The recipe that a result was measured with, as it was at its trigger.
 const recipeOf = (result) => ({ number: result.recipe, name: result.recipe_name, fingerprint: result.fingerprint });
 
-// Whether the verdict is of another recipe than the active one, or of the same before it was changed.
+// Whether the verdict is of another recipe than the active one, or of an earlier version of it.
 export function isOfOtherRecipe(now) {
   const { recipe, result, state } = now;
   if (!result || state === "acquiring" || state === "processing") return false;
@@ -51,7 +64,7 @@ export function showVerdict(now) {
   const result = now.result;
   const measuring = now.state === "acquiring" || now.state === "processing";
   const other = isOfOtherRecipe(now);
-  // An old verdict keeps its words but loses its colour: it says nothing about what lies under the head now.
+  // A verdict that is not about the part under the head keeps its words but loses its colour.
   const past = Boolean(result) && !measuring && (!now.ready || other);
   // The recipe beside a verdict is the one that measured it.
   const recipe = result && !measuring ? recipeOf(result) : now.recipe;
