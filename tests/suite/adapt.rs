@@ -4,7 +4,7 @@ use crate::measured::SPHERE;
 use crate::written::{Written, geometric, program};
 use algo::pattern::Shot;
 use appliance::head::calibration::Calibration;
-use appliance::head::rig::{self, About};
+use appliance::head::rig;
 use appliance::head::seam;
 use appliance::recipe::Recipe;
 use appliance::recipe::teach::{Naming, teach};
@@ -307,12 +307,11 @@ fn record(
     let mut rig = rig::Rig {
         head,
         calibration,
-        range: None,
         timeout: TIMEOUT,
     };
     let function = &recipe.function;
     let measured = rig
-        .measure(function, shots, About::Reference, &|_| ())
+        .measure(function, shots, None, &|_| ())
         .expect("a measurement");
     let (columns, rows) = (function.columns(), function.rows());
     let turns = (0..columns * rows).map(|at| function.at_pixel(at % columns, at / columns));

@@ -4,7 +4,7 @@ use algo::pattern::Shot;
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use appliance::head::calibration::Calibration;
-use appliance::head::rig::{About, Rig};
+use appliance::head::rig::Rig;
 use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, Taught, teach};
@@ -74,13 +74,10 @@ fn wrong_orders(bed: &mut Bed, taught: &Taught, shots: &[Shot], reach: f32) -> (
     let mut rig = Rig {
         head: &mut bed.head,
         calibration: &bed.calibration,
-        range: None,
         timeout: TIMEOUT,
     };
     let function = &taught.recipe.function;
-    let measured = rig
-        .measure(function, shots, About::Map(&map), &|_| ())
-        .unwrap();
+    let measured = rig.measure(function, shots, Some(&map), &|_| ()).unwrap();
     let truth = bed.stage.truth();
     let width = measured.phases.width;
     let (mut wrong, mut compared) = (0, 0);

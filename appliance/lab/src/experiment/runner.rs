@@ -268,7 +268,11 @@ impl Runner {
         Ok(Arc::clone(self.learnt.golden.insert(found)))
     }
 
-    fn better_frames(&mut self, method: Method, frames: BetterSequence) -> Result<Run, MeasureError> {
+    fn better_frames(
+        &mut self,
+        method: Method,
+        frames: BetterSequence,
+    ) -> Result<Run, MeasureError> {
         let better = self.better()?;
         let golden = if frames.needs_golden() {
             Some(self.golden()?)
