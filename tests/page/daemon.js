@@ -32,7 +32,7 @@ export class Place {
   }
 
   remove() {
-    // A daemon that was killed leaves its mark of the last SEQ in shared memory.
+    // A daemon that was killed leaves its last results in shared memory.
     const serial = join(this.folder, "state", "serial");
     if (existsSync(serial)) rmSync(`/dev/shm/fringed-${readFileSync(serial, "utf8").trim()}`, { force: true });
     rmSync(this.folder, { recursive: true, force: true });

@@ -55,7 +55,7 @@ impl Place {
     }
 }
 
-/// A killed daemon leaves its mark of the last SEQ in shared memory; no later one of this place needs it.
+/// A killed daemon leaves its last results in shared memory; no later one of this place needs them.
 impl Drop for Place {
     fn drop(&mut self) {
         if let Ok(serial) = fs::read_to_string(self.path("state/serial")) {

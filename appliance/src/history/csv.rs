@@ -2,7 +2,7 @@
 
 use super::HistoryError;
 use super::entry::{Entry, Filter};
-use super::reader::{Reader, condition};
+use super::reader::{Reader, condition, rows};
 use super::time::utc;
 use rusqlite::params_from_iter;
 use std::fmt::{Display, Write as _};
@@ -13,8 +13,8 @@ const COLUMNS: &str = "seq,time_utc,recipe,fingerprint,part_id,press_stroke,toke
     valid_points,coverage_permille,temperature_c,height_noise_mm,fitness_permille,exposure_us,total_us,stages_us,recording,time_source";
 
 impl Reader {
-    /// Writes the results that pass the filter, newest first, with the names of all their gauges in the head line. A
-    /// gauge has five columns: value with its unit, σ, limits and decision bits.
+    /// Writes the results that pass the filter, newest first, with the names of all their gauges in the header line. A gauge
+    /// has five columns: value with its unit, σ, two limits and decision bits.
     ///
     /// # Errors
     /// [`HistoryError`], also where `out` takes no more.
@@ -52,22 +52,18 @@ impl Reader {
 
     /// Name and unit of every gauge of the results that pass the filter.
     fn gauges(&self, filter: &Filter) -> Result<Vec<(String, String)>, HistoryError> {
-        let connection = self.open()?;
         let (condition, mut values) = condition(filter);
         values.push(i64::try_from(filter.limit).unwrap_or(i64::MAX).into());
         let query = format!(
             "SELECT DISTINCT name, unit FROM gauge WHERE result IN
                 (SELECT id FROM dated WHERE {condition} ORDER BY id DESC LIMIT ?) ORDER BY place, name"
         );
-        connection
-            .prepare(&query)
-            .and_then(|mut statement| {
-                let row = |row: &rusqlite::Row<'_>| Ok((row.get(0)?, row.get(1)?));
-                statement
-                    .query_map(params_from_iter(values), row)?
-                    .collect()
+        let values = params_from_iter(values);
+        self.read(|connection| {
+            rows(connection, &query, values, |row| {
+                Ok((row.get(0)?, row.get(1)?))
             })
-            .map_err(self.failed())
+        })
     }
 }
 
@@ -137,7 +133,7 @@ fn number(line: &mut String, number: Option<impl Display>) {
     }
 }
 
-/// A text: quoted where it must be, and never one that a spreadsheet takes for a formula.
+/// Adds a text, quoted where it must be; what a spreadsheet would take for a formula gets an apostrophe in front.
 fn text(line: &mut String, text: &str) {
     let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
     let guard = if formula { "'" } else { "" };

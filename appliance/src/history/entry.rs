@@ -1,4 +1,4 @@
-//! A result as the history keeps it, and which results somebody wants to see.
+//! A result as the history keeps it, and a filter of results.
 
 use crate::station::result::flag;
 use crate::station::{Placement, ResultRecord, Verdict};
@@ -9,9 +9,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 pub struct Entry {
     /// RESULT_SEQ.
     pub seq: u32,
-    /// Trigger time in µs since 1970 UTC; none if the clock was not synchronised.
+    /// Trigger time in µs since 1970 UTC; `None` if the clock was not synchronised.
     pub time_utc_us: Option<u64>,
-    /// Trigger time since the start of the daemon, s; none in results of older programs.
+    /// Trigger time since the start of the daemon, s; `None` in results of older programs.
     pub uptime_s: Option<u32>,
     /// Which start that was: BOOT_ID as 8 hexadecimal digits.
     pub boot_id: Option<String>,
@@ -55,28 +55,28 @@ pub struct Entry {
     pub stages: Vec<StageEntry>,
     /// The gauges, in the recipe's order.
     pub gauges: Vec<GaugeEntry>,
-    /// How the part lay; none where it was not aligned, and in results of older programs.
+    /// How the part lay; `None` where it was not aligned, and in results of older programs.
     pub placement: Option<PlacementEntry>,
     /// The folder in `recordings/` that holds the frames, if they were kept.
     pub recording: Option<String>,
-    /// Why those of a part that did not pass are not kept, as far as known; see [`super::Unkept`].
+    /// Why the frames of a part that did not pass were not kept, as far as known; see [`super::Unkept`].
     pub unkept: Option<String>,
 }
 
 /// How a part lay against how it was taught.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlacementEntry {
-    /// Shifts along x, y, z in mm and the rotation vector about x, y, z in degrees; none where the part's shape does not
+    /// Translation along x, y, z in mm and rotation vector about x, y, z in degrees; `None` where the part's shape does not
     /// determine it.
     pub values: [Option<f64>; 6],
-    /// How far its farthest corner went, mm.
+    /// How far its farthest corner moved, mm.
     pub reach_mm: f64,
-    /// Share of the points looked at that do not fit.
+    /// Share of the sampled points that do not fit.
     pub outliers: f64,
 }
 
 impl PlacementEntry {
-    /// None where it is not finite, which JSON cannot hold.
+    /// `None` where reach or outliers are not finite, which JSON cannot hold.
     fn of(placement: &Placement) -> Option<Self> {
         let values = [placement.shift_mm, placement.turn_deg];
         let mut values = values.as_flattened().iter().zip(placement.left_out);
@@ -218,8 +218,8 @@ fn gauges(record: &ResultRecord) -> Vec<GaugeEntry> {
 /// Flags that say how a cycle went, not what its frames show.
 const COURSE: u16 = flag::RETRIED | flag::STEPPED_UP | flag::WARM_UP;
 
-/// What a replay found otherwise than the history has it, in words; `None` if it is the same bit by bit. What belongs to
-/// the cycle and not to its frames is not compared: numbers, times, temperature, the flags of its course.
+/// How a replayed result differs from the stored one, in words; `None` if it is the same bit by bit. What belongs to the cycle
+/// and not to its frames is not compared: numbers, times, temperature, the flags of its course.
 pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
     let same = Entry {
         seq: stored.seq,
@@ -251,10 +251,18 @@ pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
     })
 }
 
+/// All verdicts.
+const VERDICTS: [Verdict; 4] = [
+    Verdict::None,
+    Verdict::Pass,
+    Verdict::Fail,
+    Verdict::Invalid,
+];
+
 /// The verdict of a number of register 208; anything unknown counts as not judged.
 pub(super) fn verdict_of(number: u16) -> Verdict {
-    [Verdict::Pass, Verdict::Fail, Verdict::Invalid]
-        .into_iter()
+    let mut known = VERDICTS.into_iter();
+    known
         .find(|verdict| verdict.number() == number)
         .unwrap_or_default()
 }
@@ -265,15 +273,9 @@ fn word<S: Serializer>(verdict: &Verdict, serializer: S) -> Result<S::Ok, S::Err
 
 fn of_word<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Verdict, D::Error> {
     let word = String::deserialize(deserializer)?;
-    let mut verdicts = [
-        Verdict::None,
-        Verdict::Pass,
-        Verdict::Fail,
-        Verdict::Invalid,
-    ]
-    .into_iter();
-    let unknown = || serde::de::Error::custom(format!("{word:?} is no verdict"));
-    verdicts
+    let mut known = VERDICTS.into_iter();
+    let unknown = || serde::de::Error::custom(format!("{word:?} is not a verdict"));
+    known
         .find(|verdict| verdict.word() == word)
         .ok_or_else(unknown)
 }

@@ -1,5 +1,5 @@
-//! Writes the frames of failed parts as recordings: a thread beside the history's, because a recording takes as long as
-//! many results.
+//! The thread `recordings`: writes the frames of failed parts. It is not the history's thread, because a recording takes as long
+//! as many results.
 
 use super::recordings::{FailedPart, Recordings};
 use super::task::Message;
@@ -10,32 +10,31 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-/// What the keeper is told: one part at a time, a request for room, the end.
+/// What the thread is asked to do.
 enum Order {
     Keep(Box<FailedPart>),
     MakeRoom,
     Stop,
 }
 
-/// The way to the keeper; nothing here waits.
+/// The way to the thread; nothing here waits.
 #[derive(Clone)]
 pub(super) struct Keeper {
     orders: SyncSender<Order>,
-    /// A failed part waits or is being written: its frames are memory that the head cannot use.
+    /// A failed part waits or is being written: its frames are memory that the head cannot use, so there is one at a time.
     busy: Arc<AtomicBool>,
     quota: u64,
 }
 
-/// The keeper's own side.
+/// The thread's own side.
 pub(super) struct Keeping {
     orders: Receiver<Order>,
     busy: Arc<AtomicBool>,
     recordings: Recordings,
-    told: SyncSender<Message>,
+    history: SyncSender<Message>,
 }
 
-/// Opens the folder of recordings; `recipes` are those of the station. What happens to the recordings is `told` to the
-/// history's thread.
+/// Opens the folder of recordings; `recipes` are those of the station. What happens to the recordings is sent to the `history`.
 ///
 /// # Errors
 /// Whatever the file system answers.
@@ -43,7 +42,7 @@ pub(super) fn open(
     folder: &Path,
     recipes: Store,
     quota: u64,
-    told: SyncSender<Message>,
+    history: SyncSender<Message>,
 ) -> std::io::Result<(Keeper, Keeping)> {
     let recordings = Recordings::open(folder, recipes, quota)?;
     let (sender, orders) = sync_channel(3);
@@ -57,7 +56,7 @@ pub(super) fn open(
         orders,
         busy,
         recordings,
-        told,
+        history,
     };
     Ok((keeper, keeping))
 }
@@ -80,13 +79,13 @@ impl Keeper {
 
     /// Asks for the oldest recording to be removed: results are worth more than the frames of old parts.
     pub(super) fn make_room(&self) {
-        // If it has much to do already it will make room by itself.
+        // With a full queue of orders it is asked again with the next result.
         let _ = self.orders.try_send(Order::MakeRoom);
     }
 
-    /// Ends the thread when it has done what it has in hand; it says so.
+    /// Ends the thread once the orders before are done; it sends a message then.
     pub(super) fn stop(&self) {
-        // One that has its hands full is not waited for.
+        // With a full queue of orders the daemon ends without waiting for it.
         let _ = self.orders.try_send(Order::Stop);
     }
 }
@@ -97,7 +96,7 @@ impl Keeping {
         &self.recordings
     }
 
-    /// Works until told to stop.
+    /// Works until [`Keeper::stop`].
     pub(super) fn run(mut self) {
         self.bound();
         while let Ok(order) = self.orders.recv() {
@@ -107,39 +106,33 @@ impl Keeping {
                     let kept = self.recordings.keep(&part);
                     drop(part);
                     self.busy.store(false, Ordering::Release);
-                    self.tell(match kept {
-                        Ok(name) => Message::Kept { seq, name },
-                        Err(error) => Message::NotKept {
-                            seq,
-                            why: Unkept::from(&error),
-                            problem: Some(error.to_string()),
-                        },
-                    });
+                    let kept = kept.map_err(|error| Unkept::from(&error));
+                    self.send(Message::Frames { seq, kept });
                     self.bound();
                 }
                 Order::MakeRoom => {
                     if let Some(name) = self.recordings.remove_oldest() {
                         let why = Unkept::Room;
-                        self.tell(Message::Removed { name, why });
+                        self.send(Message::Removed { name, why });
                     }
                 }
                 Order::Stop => break,
             }
         }
-        self.tell(Message::KeeperEnded);
+        self.send(Message::RecordingsEnded);
     }
 
     /// Removes what is over the quota.
     fn bound(&mut self) {
         while let Some(name) = self.recordings.over_quota() {
             let why = Unkept::Quota;
-            self.tell(Message::Removed { name, why });
+            self.send(Message::Removed { name, why });
         }
     }
 
-    fn tell(&self, message: Message) {
-        // Links that nobody hears of are put right at the next start.
-        let _ = self.told.send(message);
+    fn send(&self, message: Message) {
+        // Links that are not brought up to date now are at the next start.
+        let _ = self.history.send(message);
     }
 }
 
@@ -150,10 +143,12 @@ mod tests {
     #[test]
     fn frames_that_are_not_kept_are_not_even_copied_and_the_reason_is_told() {
         let folder = tempfile::tempdir().unwrap();
-        let (told, _) = sync_channel(1);
+        let (history, _) = sync_channel(1);
         let keeper = |quota| {
             let recipes = Store::at(folder.path());
-            open(folder.path(), recipes, quota, told.clone()).unwrap().0
+            open(folder.path(), recipes, quota, history.clone())
+                .unwrap()
+                .0
         };
         assert_eq!(keeper(0).keep(|| unreachable!()), Err(Unkept::Off));
         let busy = keeper(1);

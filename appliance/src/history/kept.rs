@@ -1,4 +1,4 @@
-//! A part that a station kept, opened again to be judged: its frames, what its recording says of the head, its recipe.
+//! Opens the recording of a part that a station judged, so that it can be judged again: frames, calibration, recipe.
 
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
@@ -80,7 +80,7 @@ impl Kept {
     /// The answer says whether it is the recording's.
     ///
     /// # Errors
-    /// If there is none any more (66), or the recording's is damaged or another one (65).
+    /// If neither the recording nor the store has it (66), or the recording's is damaged or another one (65).
     pub fn recipe(&self, stored: &Store) -> Result<(Recipe, bool), Failure> {
         let RecipeReference {
             number,
@@ -118,14 +118,14 @@ impl Kept {
         Plan::new(recipe, &self.calibration, simulated)
     }
 
-    /// Fingerprint of the calibration that the part was measured with, as far as the recording's own recipe says.
+    /// Fingerprint of the calibration that the part was measured with, if the recording has its recipe.
     fn calibration_then(&self) -> Option<String> {
         let file = File::open(self.own.as_ref()?).ok()?;
         Some(archive::manifest(file).ok()?.calibration)
     }
 }
 
-/// A recipe that the station has not, as an exit code.
+/// The failure of a command that needs a recipe which the station does not have.
 pub fn missing(error: &LoadError) -> Failure {
     let exit = match error {
         LoadError::Unknown(_) => Exit::Missing,

@@ -1,34 +1,32 @@
 //! The history: every result in an SQLite database, and the frames of failed parts as recordings.
 //!
-//! Threads of its own write ([`Task`]); the station and the measuring task hand over through a bounded queue and never
-//! wait. Whoever wants to read, the page and the command line, opens a [`Reader`]: it sees every committed result, holds
-//! nobody up and is held up by nobody (SQLite's write-ahead log). All of its calls block: call them from
-//! `tokio::task::spawn_blocking` where a socket runtime must go on.
+//! Threads of its own write ([`Task`]); the station and the measuring task hand over through a bounded queue ([`History`]) and
+//! never wait. The page and the command line read with a [`Reader`], which sees every stored result; reader and writer do not
+//! hold each other up (SQLite's write-ahead log). All calls of a reader block: call them from `tokio::task::spawn_blocking`
+//! where a socket runtime must go on.
 //!
 //! ```text
-//! station ───result──► spool     in memory that kill -9 does not touch
-//!                     queue ──► history's thread ──► history.db       ◄── Reader ◄── page, `fringed history`
-//!                       "         syncing        ──► the card
-//! SEQ in use ──────────────────► reserving        ──► result-seq       SEQs that may be in use, reserved ahead
-//! measuring ──frames──► one slot ──► keeper's thread ─► recordings/NAME  ◄── Entry::recording, `fringed replay`
+//! station ───result──► spool                            shared memory, which kill -9 does not touch
+//!                     queue ──► thread `history`    ──► history.db      ──► Reader ──► page, `fringed history`
+//! SEQ in use ──────────────────► thread `reserving`  ──► result-seq      SEQs reserved ahead of their use
+//! measuring ──frames──► one slot ─► thread `recordings` ─► recordings/NAME ──► `fringed replay`
 //! ```
 //!
-//! A result is on its way to the PLC before it is on its way to the card: a card that takes a second makes no verdict late.
-//! Each result is put into memory of the system as it is shown, and the next start stores what the database lacks: kill -9
-//! costs at most the result in flight, however busy the card was. A loss of power costs what was not synced yet: what came in the time that the card takes for one sync.
+//! A result is shown before it is stored: a card that takes a second makes no verdict late. Each result is put into the spool
+//! before it is shown, and the next start stores what the database lacks: kill -9 costs at most the result in flight, however
+//! busy the card was. A loss of power costs what was not synced yet: what came in the time that the card takes for one sync.
+
 pub mod csv;
 pub mod entry;
+mod handle;
 mod keeper;
 pub mod kept;
-mod mark;
-mod message;
 pub mod reader;
 mod recordings;
 pub mod schema;
 pub mod seqs;
 mod spool;
-mod syncing;
-pub mod task;
+mod task;
 pub mod time;
 mod unkept;
 pub mod writer;
@@ -39,10 +37,11 @@ mod log_tests;
 mod tests;
 
 pub use entry::{Entry, Filter, GaugeEntry, PlacementEntry, StageEntry, difference};
+pub use handle::{History, open};
 pub use reader::{Counts, Reader, Trend, TrendPoint};
 pub use recordings::{FailedPart, RECIPE, name_of, seq_of};
 pub use seqs::Numbering;
-pub use task::{History, Task, open};
+pub use task::Task;
 pub use unkept::{Unkept, why_no_frames};
 pub use writer::{Opening, Writer};
 

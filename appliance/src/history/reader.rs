@@ -1,10 +1,10 @@
-//! Reads the history: what the page and the command line ask for. Nothing here can change it.
+//! Reads the history for the page and the command line. Nothing here can change it.
 
 use super::entry::{Entry, Filter, GaugeEntry, verdict_of};
 use super::{HistoryError, schema};
 use crate::station::Verdict;
 use rusqlite::types::Value;
-use rusqlite::{Connection, Row, params_from_iter};
+use rusqlite::{Connection, OptionalExtension as _, Params, Row, params_from_iter};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,8 +13,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Results that are read from the database at a time.
 const BATCH: usize = 256;
 
-/// A way to read one history. Cheap to clone; each call opens the database anew, so that it also sees a new one that was
-/// begun in place of a damaged one. Every call blocks.
+/// Reads one history. Cheap to clone; each call opens the database, so that it also sees a new one that was begun in place of
+/// a damaged one. Every call blocks.
 #[derive(Clone, Debug)]
 pub struct Reader {
     path: PathBuf,
@@ -74,7 +74,7 @@ impl Reader {
         &self.path
     }
 
-    /// A new name for a folder that is only needed for a moment; what a kill leaves of it, the next start removes.
+    /// A new name for a temporary folder; what a kill leaves of it, the next start removes.
     pub fn scratch(&self) -> PathBuf {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -92,8 +92,12 @@ impl Reader {
         schema::open_read_only(&self.path)
     }
 
-    pub(super) fn failed(&self) -> impl Fn(rusqlite::Error) -> HistoryError {
-        |error| HistoryError::of(&self.path, &error)
+    /// Opens the database for one piece of `work`.
+    pub(super) fn read<T>(
+        &self,
+        work: impl FnOnce(&Connection) -> rusqlite::Result<T>,
+    ) -> Result<T, HistoryError> {
+        work(&self.open()?).map_err(|error| HistoryError::of(&self.path, &error))
     }
 
     /// The results that pass the filter, newest first.
@@ -132,12 +136,10 @@ impl Reader {
     }
 
     fn first(&self, query: &str, key: impl rusqlite::ToSql) -> Result<Option<Entry>, HistoryError> {
-        let connection = self.open()?;
-        match connection.query_row(query, [key], |row| with_gauges(&connection, row)) {
-            Ok(entry) => Ok(Some(entry)),
-            Err(rusqlite::Error::QueryReturnedNoRows) => Ok(None),
-            Err(error) => Err(self.failed()(error)),
-        }
+        self.read(|connection| {
+            let found = connection.query_row(query, [key], |row| with_gauges(connection, row));
+            found.optional()
+        })
     }
 
     /// Where the frames of a result are kept, if they are.
@@ -149,35 +151,29 @@ impl Reader {
         Ok(found.map(|name| self.recordings.join(name)))
     }
 
-    /// Hands each result that passes the filter to `take`, newest first; stops at its first error. Some are read at a time,
-    /// and nothing of the database is held meanwhile: whoever takes slowly does not let its log grow.
+    /// Hands each result that passes the filter to `take`, newest first; stops at its first error. Results are read in batches
+    /// and nothing of the database is held between them, so that its log does not grow while `take` is slow.
     pub(super) fn each(
         &self,
         filter: &Filter,
         mut take: impl FnMut(Entry) -> Result<(), HistoryError>,
     ) -> Result<(), HistoryError> {
         let connection = self.open()?;
-        let failed = self.failed();
         let (condition, values) = condition(filter);
         let query =
             format!("SELECT * FROM dated WHERE {condition} AND id < ? ORDER BY id DESC LIMIT ?");
-        let mut statement = connection.prepare(&query).map_err(&failed)?;
         let mut below = i64::MAX;
         let mut left = filter.limit;
         while left > 0 {
             let most = left.min(BATCH);
             let bounds = [Value::from(below), Value::from(most as i64)];
-            let values = values.iter().cloned().chain(bounds);
-            let batch = statement
-                .query_map(params_from_iter(values), |row| {
-                    Ok((row.get("id")?, with_gauges(&connection, row)?))
-                })
-                .and_then(|rows| rows.collect::<rusqlite::Result<Vec<(i64, Entry)>>>())
-                .map_err(&failed)?;
-            left -= batch.len();
-            if batch.len() < most {
-                left = 0;
-            }
+            let values = params_from_iter(values.iter().cloned().chain(bounds));
+            let batch = rows(&connection, &query, values, |row| {
+                Ok((row.get("id")?, with_gauges(&connection, row)?))
+            });
+            let batch: Vec<(i64, Entry)> =
+                batch.map_err(|error| HistoryError::of(&self.path, &error))?;
+            left = if batch.len() < most { 0 } else { left - most };
             for (id, entry) in batch {
                 below = id;
                 take(entry)?;
@@ -191,25 +187,26 @@ impl Reader {
     /// # Errors
     /// As [`Self::results`].
     pub fn counts(&self, filter: &Filter) -> Result<Counts, HistoryError> {
-        let connection = self.open()?;
-        let failed = self.failed();
         let (condition, values) = condition(filter);
         let query =
             format!("SELECT verdict, count(*) FROM dated WHERE {condition} GROUP BY verdict");
-        let mut statement = connection.prepare(&query).map_err(&failed)?;
-        let mut rows = statement.query(params_from_iter(values)).map_err(&failed)?;
-        let mut counts = Counts::default();
-        while let Some(row) = rows.next().map_err(&failed)? {
-            let read = || Ok((row.get::<_, u16>(0)?, row.get::<_, u64>(1)?));
-            let (verdict, count) = read().map_err(&failed)?;
-            match verdict_of(verdict) {
-                Verdict::Pass => counts.pass = count,
-                Verdict::Fail => counts.fail = count,
-                Verdict::Invalid => counts.invalid = count,
-                Verdict::None => {}
-            }
-        }
-        Ok(counts)
+        let counted: Vec<(u16, u64)> = self.read(|connection| {
+            let values = params_from_iter(values);
+            rows(connection, &query, values, |row| {
+                Ok((row.get(0)?, row.get(1)?))
+            })
+        })?;
+        let of = |verdict: Verdict| {
+            let found = counted
+                .iter()
+                .find(|(number, _)| *number == verdict.number());
+            found.map_or(0, |(_, count)| *count)
+        };
+        Ok(Counts {
+            pass: of(Verdict::Pass),
+            fail: of(Verdict::Fail),
+            invalid: of(Verdict::Invalid),
+        })
     }
 
     /// How many results a filter by time leaves out because it is not known when they were; 0 for one that asks for no time.
@@ -230,9 +227,8 @@ impl Reader {
         let query = format!(
             "SELECT count(*) FROM dated WHERE {condition} AND coalesce(time_utc_us, browser_utc_us) IS NULL"
         );
-        let connection = self.open()?;
-        let count = connection.query_row(&query, params_from_iter(values), |row| row.get(0));
-        count.map_err(self.failed())
+        let values = params_from_iter(values);
+        self.read(|connection| connection.query_row(&query, values, |row| row.get(0)))
     }
 
     /// When starts of the daemon were, in µs since 1970 UTC by the clock of a signed-in user's browser, by BOOT_ID.
@@ -240,13 +236,8 @@ impl Reader {
     /// # Errors
     /// As [`Self::results`], and in a database of an older program.
     pub fn starts(&self) -> Result<BTreeMap<String, u64>, HistoryError> {
-        let connection = self.open()?;
-        let read = |mut statement: rusqlite::Statement<'_>| {
-            let starts = statement.query_map((), |row| Ok((row.get(0)?, row.get(1)?)))?;
-            starts.collect()
-        };
-        let starts = connection.prepare("SELECT boot_id, browser_utc_us FROM start");
-        starts.and_then(read).map_err(self.failed())
+        let query = "SELECT boot_id, browser_utc_us FROM start";
+        self.read(|connection| rows(connection, query, (), |row| Ok((row.get(0)?, row.get(1)?))))
     }
 
     /// The gauges of a recipe over its last results, in the order in which the newest of them has them.
@@ -293,18 +284,26 @@ impl Reader {
     /// # Errors
     /// As [`Self::results`].
     pub fn fitness(&self, recipe: u16, last: usize) -> Result<Vec<(u32, u16)>, HistoryError> {
-        let connection = self.open()?;
         let query = "SELECT seq, fitness_permille FROM result
             WHERE recipe = ?1 AND error_code = 0 ORDER BY id DESC LIMIT ?2";
-        let read = |mut statement: rusqlite::Statement<'_>| {
-            let rows = statement.query_map((recipe, last), |row| Ok((row.get(0)?, row.get(1)?)))?;
-            rows.collect::<rusqlite::Result<Vec<_>>>()
-        };
-        let newest_first = connection.prepare(query).and_then(read);
-        let mut points = newest_first.map_err(self.failed())?;
+        let mut points: Vec<_> = self.read(|connection| {
+            let read = |row: &Row<'_>| Ok((row.get(0)?, row.get(1)?));
+            rows(connection, query, (recipe, last), read)
+        })?;
         points.reverse();
         Ok(points)
     }
+}
+
+/// The rows that a query finds.
+pub(super) fn rows<T, All: FromIterator<T>>(
+    connection: &Connection,
+    query: &str,
+    values: impl Params,
+    read: impl FnMut(&Row<'_>) -> rusqlite::Result<T>,
+) -> rusqlite::Result<All> {
+    let mut statement = connection.prepare_cached(query)?;
+    statement.query_map(values, read)?.collect()
 }
 
 /// The condition of a filter in SQL, and the values of its question marks.
@@ -341,8 +340,7 @@ fn with_gauges(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry
     let placement: Option<String> = row.get("placement").unwrap_or_default();
     let of_result = "SELECT name, unit, value, sigma, low, high, decision FROM gauge
         WHERE result = ?1 ORDER BY place";
-    let mut gauges = connection.prepare_cached(of_result)?;
-    let gauges = gauges.query_map([id], |row| {
+    let gauges = rows(connection, of_result, [id], |row| {
         Ok(GaugeEntry {
             name: row.get(0)?,
             unit: row.get(1)?,
@@ -352,11 +350,11 @@ fn with_gauges(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry
             high: row.get(5)?,
             decision: row.get(6)?,
         })
-    })?;
+    });
     Ok(Entry {
         seq: row.get("seq")?,
         time_utc_us: row.get("time_utc_us")?,
-        // Columns that a database of an older program has not got yet.
+        // Columns that a database of an older program lacks.
         uptime_s: row.get("uptime_s").unwrap_or_default(),
         boot_id: row.get("boot_id").unwrap_or_default(),
         browser_utc_us: row.get("browser_utc_us")?,
@@ -376,9 +374,9 @@ fn with_gauges(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry
         fitness_permille: row.get("fitness_permille")?,
         exposure_us: row.get("exposure_us")?,
         total_us: row.get("total_us")?,
-        // Times are shown, nothing hangs on them: what cannot be read is left out.
+        // Times are only shown: what cannot be read is left out.
         stages: serde_json::from_str(&stages).unwrap_or_default(),
-        gauges: gauges.collect::<rusqlite::Result<_>>()?,
+        gauges: gauges?,
         placement: placement.and_then(|text| serde_json::from_str(&text).ok()),
         recording: row.get("recording")?,
         unkept: row.get("unkept").unwrap_or_default(),

@@ -1,8 +1,8 @@
-//! The recordings of failed parts: a folder with a quota, the oldest go first.
+//! The recordings of failed parts: a folder with a quota, from which the oldest are removed.
 //!
-//! Each holds the recipe that judged it, so that it can be judged again after the recipe was edited or deleted. The file is a
-//! second name (hard link) of the store's, which replaces its files and never changes them: it takes no room while the store
-//! or another recording has it, counts once however many have it, and goes with the last one.
+//! Each recording holds the recipe that judged the part, so that the part can be judged again after the recipe was edited or
+//! deleted. The recipe is a hard link to the store's file, which the store replaces and never changes: it takes no room while
+//! the store or another recording has it, counts once towards the quota, and goes with its last link.
 
 use crate::head::calibration::Calibration;
 use crate::head::seam;
@@ -39,8 +39,8 @@ pub struct FailedPart {
 }
 
 impl FailedPart {
-    /// Writes the frames as the new folder `folder`, with the recipe: the first of the files `recipes` that is the one that
-    /// judged the part. Where none is, or recording and recipe would take more than `most` bytes, it is left out.
+    /// Writes the frames as the new folder `folder`, with the recipe that judged the part, if it is among the files `recipes`.
+    /// The recipe is left out where it is not among them, or where it and the frames would take more than `most` bytes.
     ///
     /// # Errors
     /// [`RecorderError`]; nothing of it is left then.
@@ -56,11 +56,11 @@ impl FailedPart {
             let fits = |path: &&PathBuf| fs::metadata(path).is_ok_and(|file| file.len() <= room);
             let own = partial.join(RECIPE);
             let added = recipes.iter().filter(fits).any(|path| {
-                // Looked at under its new name: the store may give the old one to another file at any time.
+                // Checked under its new name: the store may give the old one to another file at any time.
                 name_also(path, &own).is_ok() && fingerprint_of(&own).as_ref() == Some(fingerprint)
             });
             if !added {
-                // There may be none. A recording without its recipe is judged again by the store's.
+                // There may be nothing to remove. A recording without a recipe is judged again by the store's.
                 let _ = fs::remove_file(&own);
             }
         })
@@ -78,13 +78,13 @@ pub(super) struct Recordings {
     folder: PathBuf,
     recipes: Store,
     /// Oldest first.
-    kept: VecDeque<Kept>,
+    kept: VecDeque<OnDisk>,
     quota: u64,
 }
 
 /// One recording.
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Kept {
+struct OnDisk {
     name: String,
     /// Without its recipe.
     bytes: u64,
@@ -92,7 +92,7 @@ struct Kept {
     recipe: Option<(u64, u64)>,
 }
 
-impl Kept {
+impl OnDisk {
     fn at(folder: &Path, name: String) -> Self {
         let recipe = fs::metadata(folder.join(RECIPE)).ok();
         let recipe = recipe.map(|file| (file.ino(), file.len()));
@@ -119,7 +119,7 @@ impl Recordings {
             if name.starts_with('.') && name.contains(".partial-") {
                 fs::remove_dir_all(entry.path())?;
             } else if seq_of(&name).is_some() {
-                kept.push(Kept::at(&entry.path(), name));
+                kept.push(OnDisk::at(&entry.path(), name));
             }
         }
         kept.sort();
@@ -143,13 +143,13 @@ impl Recordings {
     pub(super) fn keep(&mut self, part: &FailedPart) -> Result<String, RecorderError> {
         let name = name_of(&part.record);
         let folder = self.folder.join(&name);
-        // First the file that the recording before shares, so that a recipe imported twice is kept once.
+        // First the one of the recording before, so that a recipe that was imported twice is kept once.
         let before = self.kept.back().filter(|kept| kept.recipe.is_some());
         let before = before.map(|kept| self.folder.join(&kept.name).join(RECIPE));
         let stored = self.recipes.generations(part.plan.id().number);
         let recipes: Vec<_> = before.into_iter().chain(stored).collect();
         part.write(&folder, &recipes, self.quota)?;
-        self.kept.push_back(Kept::at(&folder, name.clone()));
+        self.kept.push_back(OnDisk::at(&folder, name.clone()));
         Ok(name)
     }
 
@@ -164,10 +164,10 @@ impl Recordings {
         }
     }
 
-    /// Removes the oldest recording; answers with its name. It loses its name first, so that a loss of power meanwhile leaves a
-    /// whole recording or none.
+    /// Removes the oldest recording; answers with its name. It is renamed first, so that a loss of power leaves a whole recording
+    /// or none.
     pub(super) fn remove_oldest(&mut self) -> Option<String> {
-        let Kept { name, .. } = self.kept.pop_front()?;
+        let OnDisk { name, .. } = self.kept.pop_front()?;
         let nameless = self.folder.join(format!(".{name}.partial-removed"));
         // What stays of it is removed at the next start, or counted again where it has kept its name.
         let _ = rename_whole(&self.folder.join(&name), &nameless)
@@ -176,7 +176,7 @@ impl Recordings {
     }
 }
 
-/// `0000000042-0003-fail`: SEQ, recipe, verdict. In the order of their names they are in the order of their SEQs.
+/// The name of a result's recording, `0000000042-0003-fail`: SEQ, recipe, verdict. Sorted by name they are sorted by SEQ.
 pub fn name_of(record: &ResultRecord) -> String {
     let verdict = match record.verdict {
         Verdict::Pass => "pass",
@@ -196,7 +196,7 @@ pub fn seq_of(name: &str) -> Option<u32> {
     }
 }
 
-/// Bytes of all files below a folder; what cannot be read counts nothing.
+/// Bytes of all files below a folder, as far as they can be read.
 fn bytes_in(folder: &Path) -> u64 {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     entries

@@ -13,8 +13,8 @@ pub const VERSION: i64 = 1;
 /// Longest wait for another process that holds the database, the command line's for instance.
 const BUSY: Duration = Duration::from_secs(2);
 
-/// Longest wait for readers while nothing can be stored: most queries take some milliseconds, and half of a fast line's queue
-/// is filled by then.
+/// Longest wait for readers while nothing is stored: most queries take some milliseconds, and a sixth of a fast line's queue is
+/// filled by then.
 const READING: Duration = Duration::from_secs(1);
 /// The log's file is not made shorter than this many bytes.
 const LOG_KEPT: u64 = 1 << 20;
@@ -69,21 +69,21 @@ const ADDED: [(&str, &str); 4] = [
     ("unkept", "TEXT"),
     ("placement", "TEXT"),
 ];
-/// A table that came later as well: when a start of the daemon was, by the clock of a signed-in user's browser.
+/// A table that came later: when a start of the daemon was, by the clock of a signed-in user's browser.
 const STARTS: &str =
     "CREATE TABLE IF NOT EXISTS start (boot_id TEXT PRIMARY KEY, browser_utc_us INTEGER NOT NULL)";
-/// What a reader sees of a result: also the time of its trigger by that clock, where nothing better is known of it.
+/// What readers see of a result: where the clock was not synchronised, also the time of its trigger by that browser's clock.
 const DATED: &str = "CREATE TEMP VIEW dated AS SELECT result.*, CASE WHEN time_utc_us IS NULL THEN
     (SELECT browser_utc_us FROM start WHERE start.boot_id = result.boot_id) + uptime_s * 1000000 END
     AS browser_utc_us FROM result";
-/// The same of a database in which older programs have left that out.
+/// The same for a database of an older program, which has no such times.
 const UNDATED: &str =
     "CREATE TEMP VIEW dated AS SELECT result.*, NULL AS browser_utc_us FROM result";
 
-/// Opens the database for writing; makes it where there is none.
+/// Opens the database for writing; creates it where the file does not exist.
 ///
 /// # Errors
-/// [`HistoryError`]; `damaged` if the file is there and is no history of this version.
+/// [`HistoryError`]; `damaged` if the file is there and is not a history of this version.
 pub(super) fn open(path: &Path) -> Result<Connection, HistoryError> {
     let failed = |error: rusqlite::Error| HistoryError::of(path, &error);
     let mut connection = Connection::open(path).map_err(failed)?;
@@ -110,7 +110,7 @@ fn complete(connection: &Connection) -> rusqlite::Result<()> {
     connection.execute_batch(STARTS)
 }
 
-/// Makes the view that readers read.
+/// Creates the view that readers read.
 fn date(connection: &Connection) -> rusqlite::Result<()> {
     let known = "SELECT (SELECT count(*) FROM pragma_table_info('result') WHERE name IN ('uptime_s', 'boot_id')) = 2
         AND EXISTS (SELECT 1 FROM sqlite_schema WHERE name = 'start')";
@@ -121,7 +121,7 @@ fn date(connection: &Connection) -> rusqlite::Result<()> {
 /// Opens the database for reading only.
 ///
 /// # Errors
-/// [`HistoryError`], also where there is none.
+/// [`HistoryError`], also where the file does not exist.
 pub(super) fn open_read_only(path: &Path) -> Result<Connection, HistoryError> {
     let failed = |error: rusqlite::Error| HistoryError::of(path, &error);
     // Read and write for the log's shared index; the pragma below keeps the content as it is.
@@ -147,12 +147,12 @@ pub(super) fn open_read_only(path: &Path) -> Result<Connection, HistoryError> {
 
 fn settle(connection: &Connection) -> rusqlite::Result<()> {
     connection.busy_timeout(BUSY)?;
-    // The answer is the mode that it got; a file system that cannot have a log works without.
+    // The answer is the mode that is used: a file system that cannot have a log works without.
     let _: String =
         connection.pragma_update_and_check(None, "journal_mode", "wal", |row| row.get(0))?;
-    // A commit is handed to the system, not waited for: `syncing` brings it onto the card. The database stays whole
-    // whenever the power goes, because the log is synced before it is brought into the database.
-    connection.pragma_update(None, "synchronous", "normal")?;
+    // Each commit is synced: what is stored is safe from a loss of power.
+    connection.pragma_update(None, "synchronous", "full")?;
+    // The log is brought into the database by `checkpoint`.
     connection.pragma_update(None, "wal_autocheckpoint", 0)?;
     connection.pragma_update(None, "foreign_keys", true)?;
     connection.pragma_update(None, "journal_size_limit", LOG_KEPT)?;
@@ -170,39 +170,20 @@ pub(super) fn log_bytes(path: &Path) -> u64 {
     fs::metadata(log_of(path)).map_or(0, |found| found.len())
 }
 
-/// Brings the log into the database, as far as no reader needs it, and syncs both.
-///
-/// Results are stored meanwhile, so that on a fast line there are always some more in the log than in the database, and it
-/// would never begin anew. Where it is longer than `most` bytes after that, the rest is brought in while nothing is stored:
-/// results wait in the queue for as long as the card takes for two syncs.
+/// Brings the log into the database, syncs both, and begins the log anew. Where a reader still needs it after [`READING`] the
+/// log stays as it is.
 ///
 /// # Errors
-/// [`HistoryError`].
-pub(super) fn checkpoint(path: &Path, most: u64) -> Result<(), HistoryError> {
-    let brought = || {
-        let connection = Connection::open(path)?;
-        settle(&connection)?;
-        let bring = |how: &str| {
-            let pragma = format!("PRAGMA wal_checkpoint({how})");
-            connection.query_row(&pragma, (), |_| Ok(()))
-        };
-        bring("PASSIVE")?;
-        begin_log(&connection)?;
-        if log_bytes(path) <= most {
-            return Ok(());
-        }
-        // It holds up whoever stores results, so it does not wait long for whoever reads them.
-        connection.busy_timeout(READING)?;
-        bring("RESTART")?;
-        connection.busy_timeout(BUSY)?;
-        begin_log(&connection)
-    };
-    brought().map_err(|error| HistoryError::of(path, &error))
-}
-
-/// Begins the log anew where all of it is in the database. That is the one write that SQLite syncs by itself, so it is done
-/// before a result could have to wait for it.
-pub(super) fn begin_log(connection: &Connection) -> rusqlite::Result<()> {
+/// Whatever SQLite answers.
+pub(super) fn checkpoint(connection: &Connection) -> rusqlite::Result<()> {
+    connection.busy_timeout(READING)?;
+    let restart = "PRAGMA wal_checkpoint(RESTART)";
+    let blocked = connection.query_row(restart, (), |row| row.get(0));
+    connection.busy_timeout(BUSY)?;
+    if blocked? {
+        return Ok(());
+    }
+    // The log begins anew, and gets shorter, with the next write.
     connection.pragma_update(None, "user_version", VERSION)
 }
 
@@ -245,7 +226,7 @@ pub(super) fn means_damage(error: &rusqlite::Error) -> bool {
         .is_some_and(|code| codes.contains(&code))
 }
 
-/// Whether all pages of the database hang together; the first complaint if not.
+/// What SQLite's check of the database finds wrong first.
 pub(super) fn complaint(connection: &Connection) -> Option<String> {
     let check = connection.query_row("PRAGMA quick_check(1)", (), |row| row.get::<_, String>(0));
     match check {
@@ -255,8 +236,8 @@ pub(super) fn complaint(connection: &Connection) -> Option<String> {
     }
 }
 
-/// Renames a damaged database, with its log, so that a new one can be begun; answers with its new name. The one that
-/// was set aside before goes.
+/// Renames a damaged database, with its log, so that a new one can be begun; answers with its new name. One that was set aside
+/// before is replaced.
 ///
 /// # Errors
 /// Whatever the file system answers.
@@ -264,7 +245,7 @@ pub(super) fn set_aside(path: &Path) -> std::io::Result<PathBuf> {
     let aside = path.with_extension("damaged.db");
     for suffix in ["-wal", "-shm"] {
         let (from, to) = (with_suffix(path, suffix), with_suffix(&aside, suffix));
-        // Where there is no log, none of another database may stay beside the one that is set aside.
+        // Without a log of its own the database must not get that of the one that was set aside before.
         if fs::rename(&from, &to).is_err() {
             let _ = fs::remove_file(&to);
         }

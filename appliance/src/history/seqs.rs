@@ -1,18 +1,15 @@
-//! Reserves RESULT_SEQs ahead of their use, so that none is used twice and none waits for the card.
+//! Reserves RESULT_SEQs on the card ahead of their use, so that no number is used twice and no result waits for the card.
 //!
-//! The counter's file says which SEQs may be in use: at the start, and whenever a quarter of them are gone, up to [`AHEAD`]
-//! are reserved by a thread of its own (`reserving`), so that no other sync of the history comes before. Besides, each SEQ
-//! is marked in memory that a kill does not touch (`mark`). So after kill -9 counting goes on behind the last number that was
-//! in use; after a loss of power behind the reservation, so that at most [`AHEAD`] numbers are skipped; after a stop the file
-//! holds the SEQ of the last result and none is.
+//! The counter's file says which SEQs may be in use. As soon as a quarter of the reserved numbers are used, a thread of its own
+//! (`reserving`) reserves [`AHEAD`] again; nothing else that waits for the card runs on it. After a loss of power numbers go on
+//! behind the reservation, so that at most [`AHEAD`] are skipped; after kill -9 behind the last result in shared memory
+//! ([`super::spool`]). A stop writes the SEQ of the last result, so that none is skipped.
 
-use super::mark::Mark;
+use super::spool::Spool;
 use crate::station::Unstored;
 use crate::storage::state::{Counted, Counter};
 use std::io;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// The most numbers that are reserved: at 86 results a second the storage may take half a second for one sync.
@@ -25,7 +22,7 @@ const FEW: i32 = (AHEAD / 4 * 3) as i32;
 pub struct Numbering {
     /// What the card said at the start.
     pub counted: Counted,
-    /// How the card is told.
+    /// The counter on the card.
     pub counter: Counter,
     /// The device's.
     pub serial: String,
@@ -33,22 +30,57 @@ pub struct Numbering {
     pub run: u32,
 }
 
-/// The SEQ to go on with after the run that left `counted` on the card and, as far as the system lived on, `marked` in memory.
-pub fn next_after(counted: Counted, marked: Option<Counted>) -> u32 {
-    // A mark of another run says nothing of this card: it may be of a copy of the folder.
-    let same = marked.filter(|mark| counted.run != 0 && mark.run == counted.run);
-    same.map_or(counted.last, |mark| mark.last).wrapping_add(1)
+impl Numbering {
+    /// Reserves the first numbers from `next` on, before anything is measured, and begins this run in the spool. The answer has
+    /// no spool where it cannot be written.
+    ///
+    /// # Errors
+    /// Whatever the file system answers.
+    pub(super) fn reserve(
+        self,
+        spool: Option<Spool>,
+        next: u32,
+    ) -> io::Result<(Seqs, Option<Spool>)> {
+        let (used, reserved) = (next.wrapping_sub(1), next.wrapping_add(AHEAD - 1));
+        let (before, run) = (self.counted.run, self.run);
+        // Killed before the card names this run, the next start still finds the run before.
+        let spool = spool.filter(|spool| {
+            let begun = spool.begin([before, run], used).is_ok();
+            if !begun {
+                spool.remove();
+            }
+            begun
+        });
+        let last = reserved;
+        self.counter.store(Counted { last, run })?;
+        if let Some(spool) = &spool {
+            // Otherwise the run before is believed as well.
+            let _ = spool.begin([run, run], used);
+        }
+        let numbers = Numbers {
+            used,
+            reserved,
+            asked: None,
+            refused: None,
+            exhausted: false,
+            stopping: false,
+        };
+        let seqs = Seqs {
+            counter: self.counter,
+            run,
+            shared: Arc::new((Mutex::new(numbers), Condvar::new())),
+        };
+        Ok((seqs, spool))
+    }
 }
 
 /// The reservation; clones share it.
 #[derive(Clone, Debug)]
 pub struct Seqs {
     counter: Counter,
-    mark: Option<Arc<Mark>>,
     run: u32,
-    wake: SyncSender<()>,
-    stopping: Arc<AtomicBool>,
-    numbers: Arc<Mutex<Numbers>>,
+    /// The condition is that more numbers are asked for, or the thread is to stop.
+    shared: Arc<(Mutex<Numbers>, Condvar)>,
 }
 
 /// How far numbers are used and reserved.
@@ -58,12 +90,13 @@ struct Numbers {
     used: u32,
     /// The last SEQ that is reserved on the card.
     reserved: u32,
-    /// Since when the card has been asked for more, while it does not answer.
+    /// Since when the card is asked for more, until it answers.
     asked: Option<Instant>,
     /// What the card answered last, if it refused.
     refused: Option<Arc<str>>,
-    /// Whether the station was told that there is no number left.
+    /// Whether the station was told that no number is left.
     exhausted: bool,
+    stopping: bool,
 }
 
 impl Numbers {
@@ -73,87 +106,22 @@ impl Numbers {
     }
 }
 
-/// The thread that asks the card for more numbers.
-pub(super) struct Reserving {
-    seqs: Seqs,
-    woken: Receiver<()>,
-}
-
-impl Reserving {
-    /// Works until told to stop. `again` is told the last SEQ in use when the station waited for numbers and there are some.
-    pub(super) fn run(self, again: impl Fn(u32)) {
-        while self.woken.recv().is_ok() && !self.seqs.stopping.load(Ordering::Acquire) {
-            if let Some(seq) = self.seqs.refill() {
-                again(seq);
-            }
-        }
-    }
-}
-
 impl Seqs {
-    /// Reserves the first numbers from `next` on for this `run`, before anything is measured. Answers with the thread's side.
-    ///
-    /// # Errors
-    /// Whatever the file system answers.
-    pub(super) fn reserve(
-        counter: Counter,
-        mark: Option<Mark>,
-        run: u32,
-        next: u32,
-    ) -> io::Result<(Self, Reserving)> {
-        let (used, reserved) = (next.wrapping_sub(1), next.wrapping_add(AHEAD - 1));
-        // The mark first: from then on neither is believed without the other.
-        let mark = mark.filter(|mark| mark.write(Counted { last: used, run }).is_ok());
-        let last = reserved;
-        counter.store(Counted { last, run })?;
-        let (wake, woken) = sync_channel(1);
-        let numbers = Numbers {
-            used,
-            reserved,
-            asked: None,
-            refused: None,
-            exhausted: false,
-        };
-        let seqs = Self {
-            counter,
-            mark: mark.map(Arc::new),
-            run,
-            wake,
-            stopping: Arc::default(),
-            numbers: Arc::new(Mutex::new(numbers)),
-        };
-        let reserving = Reserving {
-            seqs: seqs.clone(),
-            woken,
-        };
-        Ok((seqs, reserving))
-    }
-
     fn numbers(&self) -> MutexGuard<'_, Numbers> {
-        self.numbers.lock().unwrap_or_else(PoisonError::into_inner)
+        self.shared.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Takes a SEQ into use; it waits for nothing.
     ///
     /// # Errors
-    /// There is no reserved number after it: none must be used until the card has answered.
+    /// No number is reserved after it: none must be used until the card has answered.
     pub fn take(&self, seq: u32) -> Result<(), Unstored> {
-        let counted = Counted {
-            last: seq,
-            run: self.run,
-        };
-        if let Some(mark) = &self.mark
-            && mark.write(counted).is_err()
-        {
-            // None is better than an old one.
-            mark.remove();
-        }
         let mut numbers = self.numbers();
         numbers.used = seq;
         let left = numbers.left();
-        if left <= FEW {
-            // It is awake already.
-            let _ = self.wake.try_send(());
+        if left <= FEW && numbers.asked.is_none() {
+            numbers.asked = Some(Instant::now());
+            self.shared.1.notify_one();
         }
         numbers.exhausted = left <= 0;
         if left > 0 {
@@ -171,18 +139,29 @@ impl Seqs {
         Some(format!("reserve result numbers: {words}: free space"))
     }
 
-    /// Reserves more where few are left: it waits for the card. Answers with the last SEQ in use if the station was told
-    /// that there is none left, and now there is.
-    fn refill(&self) -> Option<u32> {
-        let used = {
-            let mut numbers = self.numbers();
-            if numbers.left() > FEW {
-                return None;
+    /// Reserves numbers whenever more are asked for, until [`Self::stop`]. `again` gets the last SEQ in use when the station was
+    /// told that no number is left and now there are some.
+    pub(super) fn run(&self, again: impl Fn(u32)) {
+        loop {
+            let idle = |numbers: &mut Numbers| numbers.asked.is_none() && !numbers.stopping;
+            let numbers = self.shared.1.wait_while(self.numbers(), idle);
+            if numbers.unwrap_or_else(PoisonError::into_inner).stopping {
+                return;
             }
-            numbers.asked = Some(Instant::now());
-            numbers.used
+            if let Some(seq) = self.refill() {
+                again(seq);
+            }
+        }
+    }
+
+    /// Reserves more where they are asked for: it waits for the card. Answers with the last SEQ in use if the station was told
+    /// that no number is left and now there are some.
+    fn refill(&self) -> Option<u32> {
+        let last = {
+            let numbers = self.numbers();
+            numbers.asked?;
+            numbers.used.wrapping_add(AHEAD)
         };
-        let last = used.wrapping_add(AHEAD);
         let run = self.run;
         let stored = self.counter.store(Counted { last, run });
         let mut numbers = self.numbers();
@@ -192,13 +171,15 @@ impl Seqs {
             return None;
         }
         numbers.reserved = last;
+        // Many were used while the card was busy.
+        numbers.asked = (numbers.left() <= FEW).then(Instant::now);
         std::mem::take(&mut numbers.exhausted).then_some(numbers.used)
     }
 
     /// Ends the thread.
     pub(super) fn stop(&self) {
-        self.stopping.store(true, Ordering::Release);
-        let _ = self.wake.try_send(());
+        self.numbers().stopping = true;
+        self.shared.1.notify_one();
     }
 
     /// Gives back what was not used, once the thread has ended: `seq` is the last of all.
@@ -207,86 +188,104 @@ impl Seqs {
     /// Whatever the file system answers.
     pub(super) fn settle(&self, seq: u32) -> io::Result<()> {
         let run = self.run;
-        self.counter.store(Counted { last: seq, run })?;
-        if let Some(mark) = &self.mark {
-            mark.remove();
-        }
-        Ok(())
+        self.counter.store(Counted { last: seq, run })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::history::Entry;
     use crate::storage::state::StateFolder;
     use std::os::unix::fs::MetadataExt as _;
     use std::path::Path;
 
-    /// The mark of a folder; of none where the power was lost.
-    fn mark(folder: &Path, state: &StateFolder) -> Option<Mark> {
-        let owner = std::fs::metadata(folder).unwrap().uid();
-        Some(Mark::open(&state.serial().unwrap(), owner).unwrap())
+    /// Reserves without shared memory.
+    fn reserved(state: &StateFolder, next: u32) -> Seqs {
+        let numbering = Numbering {
+            counted: Counted::default(),
+            counter: state.counter(),
+            serial: String::new(),
+            run: 1,
+        };
+        numbering.reserve(None, next).unwrap().0
     }
 
     #[test]
     fn after_a_kill_counting_goes_on_and_after_a_loss_of_power_behind_the_reservation() {
         let folder = tempfile::tempdir().unwrap();
         let state = StateFolder::open(folder.path()).unwrap();
+        let serial = state.serial().unwrap();
+        let spool = || {
+            let owner = std::fs::metadata(folder.path()).unwrap().uid();
+            Spool::open(&serial, owner).unwrap()
+        };
+        // What the next start finds.
+        let after = || {
+            let counted = state.counted().unwrap();
+            let shown = spool().of_run(counted.run).map(|(last, _)| last);
+            shown.unwrap_or(counted.last) + 1
+        };
+        let begin = |run, next| {
+            let numbering = Numbering {
+                counted: state.counted().unwrap(),
+                counter: state.counter(),
+                serial: serial.clone(),
+                run,
+            };
+            let (seqs, spool) = numbering.reserve(Some(spool()), next).unwrap();
+            (seqs, spool.unwrap())
+        };
+        let show = |spool: &Spool, seq| {
+            let entry = Entry {
+                seq,
+                ..Entry::default()
+            };
+            spool.put(&entry).unwrap();
+        };
         let (mut next, mut skipped) = (1, 0);
         for run in 1..=6_u32 {
-            let own = mark(folder.path(), &state);
-            let (seqs, _) = Seqs::reserve(state.counter(), own, run, next).unwrap();
+            let (seqs, own) = begin(run, next);
             for _ in 0..50 * (run - 1) {
                 seqs.take(next).unwrap();
                 assert_eq!(seqs.refill(), None);
+                show(&own, next);
                 next += 1;
             }
-            // What the next start finds.
             let lost_power = run % 2 == 0;
-            let found = mark(folder.path(), &state).filter(|_| !lost_power);
-            let marked = found.and_then(|mark| mark.read());
-            let after = next_after(state.counted().unwrap(), marked);
-            match lost_power {
-                true => assert!(after >= next && after - next <= AHEAD, "{next} {after}"),
-                false => assert_eq!(after, next),
+            if lost_power {
+                own.remove();
             }
-            skipped += after - next;
-            next = after;
+            drop(own);
+            let found = after();
+            match lost_power {
+                true => assert!(found >= next && found - next <= AHEAD, "{next} {found}"),
+                false => assert_eq!(found, next),
+            }
+            skipped += found - next;
+            next = found;
         }
         assert!(skipped > 0);
-        let own = mark(folder.path(), &state);
-        let (seqs, _) = Seqs::reserve(state.counter(), own, 9, next).unwrap();
+        let (seqs, own) = begin(9, next);
         seqs.take(next + AHEAD - 2).unwrap();
         // The last one that is reserved: it does not come back, also after a loss of power, and no other may follow.
         let last = next + AHEAD - 1;
-        assert_eq!(seqs.take(last), Err(Unstored::Busy(0)));
-        let marked = mark(folder.path(), &state).and_then(|mark| mark.read());
-        for marked in [marked, None] {
-            let after = next_after(state.counted().unwrap(), marked);
-            assert_eq!(after, last + 1);
-        }
+        assert!(matches!(seqs.take(last), Err(Unstored::Busy(_))));
+        show(&own, last);
+        drop(own);
+        assert_eq!(after(), last + 1);
+        spool().remove();
+        assert_eq!(after(), last + 1);
         seqs.settle(next).unwrap();
-        let marked = mark(folder.path(), &state).and_then(|mark| mark.read());
-        assert_eq!(next_after(state.counted().unwrap(), marked), next + 1);
-        mark(folder.path(), &state).unwrap().remove();
-    }
-
-    #[test]
-    fn a_mark_of_another_run_is_not_believed() {
-        let counted = Counted { last: 64, run: 5 };
-        let mark = |last, run| Some(Counted { last, run });
-        assert_eq!(next_after(counted, mark(10, 5)), 11);
-        assert_eq!(next_after(counted, mark(10, 6)), 65);
-        assert_eq!(next_after(counted, None), 65);
-        let by_hand = Counted { last: 64, run: 0 };
-        assert_eq!(next_after(by_hand, mark(10, 0)), 65);
+        assert_eq!(after(), next + 1);
+        spool().remove();
     }
 
     #[test]
     fn numbers_that_start_anew_are_taken_too() {
         let folder = tempfile::tempdir().unwrap();
         let state = StateFolder::open(folder.path()).unwrap();
-        let (seqs, _) = Seqs::reserve(state.counter(), None, 1, u32::MAX - 1).unwrap();
+        let seqs = reserved(&state, u32::MAX - 1);
         assert!(seqs.take(u32::MAX).is_ok() && seqs.take(3).is_ok() && seqs.take(100).is_err());
         assert_eq!(seqs.refill(), Some(100));
         assert!(seqs.take(101).is_ok());
@@ -305,10 +304,11 @@ mod tests {
      {
         let folder = tempfile::tempdir().unwrap();
         let state = StateFolder::open(folder.path()).unwrap();
-        let (seqs, reserving) = Seqs::reserve(state.counter(), None, 1, 1).unwrap();
+        let seqs = reserved(&state, 1);
         let file = folder.path().join("result-seq");
         hang(&file);
         let (told, again) = std::sync::mpsc::channel();
+        let reserving = seqs.clone();
         let thread = std::thread::spawn(move || reserving.run(|seq| told.send(seq).unwrap()));
         // Numbers go on as far as they are reserved.
         for seq in 1..AHEAD {
@@ -343,7 +343,8 @@ mod tests {
         }
         assert!(seqs.refused().unwrap().contains("reserve result numbers"));
         std::fs::remove_dir_all(&file).unwrap();
-        assert!(seqs.take(3 * AHEAD).is_err());
+        // It is asked again, unless it has just been.
+        let _ = seqs.take(3 * AHEAD);
         assert_eq!(again.recv_timeout(patience), Ok(3 * AHEAD));
         assert_eq!(seqs.refused(), None);
         seqs.stop();

@@ -1,8 +1,8 @@
-//! Times of results in words after ISO 8601, UTC, and back.
+//! Times of results as text in ISO 8601, UTC, and back.
 
 use rusqlite::Connection;
 
-/// A time in µs since 1970 UTC in words. Years behind 9999 have a sign, as ISO 8601 asks for.
+/// A time in µs since 1970 UTC as text. Years after 9999 have a sign, as ISO 8601 asks for.
 pub fn utc(us: u64) -> String {
     let (days, rest) = (us / 86_400_000_000, us % 86_400_000_000);
     let (year, month, day) = civil(days);
@@ -33,7 +33,7 @@ fn civil(days: u64) -> (u64, u64, u64) {
 /// a zone it is UTC), as SQLite reads it.
 ///
 /// # Errors
-/// In words, if it is none.
+/// In words, if the text is not a date or time.
 pub fn utc_us(text: &str) -> Result<u64, String> {
     let calendar = || {
         let query = "SELECT CAST(round(unixepoch(?1, 'subsec') * 1e6) AS INTEGER)";

@@ -1,4 +1,4 @@
-//! Why the frames of a part are not kept, as the database has it and in words.
+//! Why the frames of a part are not kept: as text in the database, and in words for people.
 
 use super::entry::Entry;
 use crate::station::Verdict;
@@ -19,10 +19,20 @@ pub enum Unkept {
     Room,
     /// Found missing at a start.
     Gone,
-    /// The storage was full.
-    Full,
+    /// The storage was full; with the error in words.
+    Full(String),
     /// They could not be written, for a reason in words.
     Failed(String),
+}
+
+impl Unkept {
+    /// What went wrong, in words, where something did.
+    pub fn problem(&self) -> Option<&str> {
+        match self {
+            Self::Full(words) | Self::Failed(words) => Some(words),
+            _ => None,
+        }
+    }
 }
 
 impl fmt::Display for Unkept {
@@ -33,7 +43,7 @@ impl fmt::Display for Unkept {
             Self::Quota => "quota",
             Self::Room => "room",
             Self::Gone => "gone",
-            Self::Full => "full",
+            Self::Full(_) => "full",
             Self::Failed(words) => return write!(f, "failed: {words}"),
         })
     }
@@ -48,7 +58,7 @@ impl From<&RecorderError> for Unkept {
                     ErrorKind::StorageFull | ErrorKind::QuotaExceeded
                 ) =>
             {
-                Self::Full
+                Self::Full(error.to_string())
             }
             error => Self::Failed(error.to_string()),
         }

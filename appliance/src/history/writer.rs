@@ -1,12 +1,13 @@
 //! Writes results into the database, bounds their number, and links recordings to them.
 
 use super::entry::{Entry, GaugeEntry};
+use super::reader::rows;
 use super::unkept::Unkept;
 use super::{HistoryError, schema};
-use rusqlite::{Connection, Transaction, params};
+use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 use std::path::{Path, PathBuf};
 
-/// Starts of the daemon whose time is kept: more than a history of a year has.
+/// Starts of the daemon whose time is kept: more than there are in a year.
 const MOST_STARTS: u32 = 1000;
 
 /// The one writer of a database.
@@ -23,7 +24,7 @@ pub struct Writer {
 pub struct Opening {
     /// The writer.
     pub writer: Writer,
-    /// Why the database that was there was set aside, and where to.
+    /// Why the database that was there was set aside, and its new name.
     pub complaint: Option<String>,
 }
 
@@ -61,7 +62,6 @@ impl Writer {
         let count = connection
             .query_row("SELECT count(*) FROM result", (), |row| row.get(0))
             .map_err(|error| HistoryError::of(path, &error))?;
-        schema::begin_log(&connection).map_err(|error| HistoryError::of(path, &error))?;
         Ok(Self {
             connection,
             path: path.to_path_buf(),
@@ -76,11 +76,10 @@ impl Writer {
     /// If that is not possible; then nothing can be stored until it is.
     pub fn begin_anew(&mut self, why: &HistoryError) -> Result<String, HistoryError> {
         let failed = |error| HistoryError::of(&self.path, &error);
-        // Closed before it is renamed: a log that is still open would go with the new database.
+        // Closed before it is renamed: a log that is still open would be taken for the new database's.
         self.connection = Connection::open_in_memory().map_err(failed)?;
         let aside = set_aside(&self.path, &why.reason)?;
         self.connection = schema::open(&self.path)?;
-        schema::begin_log(&self.connection).map_err(failed)?;
         self.count = 0;
         Ok(said(why, &aside))
     }
@@ -100,11 +99,8 @@ impl Writer {
     /// [`HistoryError`].
     pub fn last_seq(&self) -> Result<Option<u32>, HistoryError> {
         let newest = "SELECT seq FROM result ORDER BY id DESC LIMIT 1";
-        match self.connection.query_row(newest, (), |row| row.get(0)) {
-            Ok(seq) => Ok(Some(seq)),
-            Err(rusqlite::Error::QueryReturnedNoRows) => Ok(None),
-            Err(error) => Err(self.failed(&error)),
-        }
+        let seq = self.connection.query_row(newest, (), |row| row.get(0));
+        seq.optional().map_err(|error| self.failed(&error))
     }
 
     /// Stores results in one transaction and removes the oldest above the limit: all of it happens, or nothing.
@@ -134,6 +130,24 @@ impl Writer {
         });
         self.count = stored.map_err(|error| self.failed(&error))?;
         Ok(())
+    }
+
+    /// The write-ahead log.
+    pub fn log(&self) -> PathBuf {
+        schema::log_of(&self.path)
+    }
+
+    /// The bytes of the log.
+    pub fn log_bytes(&self) -> u64 {
+        schema::log_bytes(&self.path)
+    }
+
+    /// Brings the log into the database and begins it anew, unless a reader needs it.
+    ///
+    /// # Errors
+    /// [`HistoryError`].
+    pub fn checkpoint(&mut self) -> Result<(), HistoryError> {
+        schema::checkpoint(&self.connection).map_err(|error| self.failed(&error))
     }
 
     /// Notes that the frames of the newest result with this SEQ are kept under `name`.
@@ -184,10 +198,8 @@ impl Writer {
     /// [`HistoryError`].
     pub fn linked(&self) -> Result<Vec<String>, HistoryError> {
         let linked = "SELECT DISTINCT recording FROM result WHERE recording IS NOT NULL";
-        self.connection
-            .prepare(linked)
-            .and_then(|mut names| names.query_map((), |row| row.get(0))?.collect())
-            .map_err(|error| self.failed(&error))
+        let names = rows(&self.connection, linked, (), |row| row.get(0));
+        names.map_err(|error| self.failed(&error))
     }
 
     fn change(
@@ -195,10 +207,7 @@ impl Writer {
         statement: &str,
         values: impl rusqlite::Params,
     ) -> Result<(), HistoryError> {
-        let changed = self
-            .connection
-            .prepare_cached(statement)
-            .and_then(|mut statement| statement.execute(values));
+        let changed = self.connection.execute(statement, values);
         changed.map_err(|error| self.failed(&error))?;
         Ok(())
     }
