@@ -3,7 +3,7 @@
 use super::archive::{self, ArchiveError};
 use super::store::{LoadError, Store, is_sound};
 use super::{Recipe, RecipeFile, RecipeId, SequenceKind};
-use crate::storage::folder::rename_whole;
+use crate::storage::folder::copy_whole;
 use serde::Serialize;
 use std::fs::{self, File};
 use std::io;
@@ -112,17 +112,7 @@ impl Store {
             path: target.to_path_buf(),
             source,
         };
-        let whole = self.whole(number)?;
-        let mut temporary = target.as_os_str().to_owned();
-        temporary.push(".new");
-        let temporary = PathBuf::from(temporary);
-        let written =
-            copy_synced(&whole, &temporary).and_then(|()| rename_whole(&temporary, target));
-        if written.is_err() {
-            // The temporary file may not exist.
-            let _ = fs::remove_file(&temporary);
-        }
-        written.map_err(failed)
+        copy_whole(&self.whole(number)?, target).map_err(failed)
     }
 
     /// The file of the newest sound generation: its content agrees with its fingerprint.
@@ -179,12 +169,6 @@ impl Store {
         taken.map_err(write(&target))?;
         Ok(id)
     }
-}
-
-fn copy_synced(source: &Path, target: &Path) -> io::Result<()> {
-    let mut file = File::create(target)?;
-    io::copy(&mut File::open(source)?, &mut file)?;
-    file.sync_all()
 }
 
 fn of_manifest(file: RecipeFile) -> Listed {

@@ -24,7 +24,7 @@ impl<R: Read + Seek> Members<R> {
     /// Opens a ZIP of at most `most` members (folders count). Takes memory for the directory only.
     ///
     /// # Errors
-    /// In words: it is no ZIP, has too many members, two of one name or two that share bytes, or one is compressed.
+    /// In words: it is not a ZIP, has too many members, two of one name or two that share bytes, or one is compressed.
     pub fn open(mut source: R, most: usize) -> Result<Self, String> {
         let listed = listed(&mut source).map_err(|error| format!("read its end: {error}"))?;
         let listed = listed.ok_or("it is no ZIP, or was cut off")?;
@@ -105,8 +105,8 @@ impl<R: Read + Seek> Members<R> {
     }
 }
 
-/// How many members the record at the end says that there are; none if the file does not end in such a record with the
-/// directory right before it. A ZIP with a comment or with 64-bit sizes is refused: this program writes neither.
+/// The number of members in the record at the end; `None` if the file does not end in such a record with the directory right
+/// before it. A ZIP with a comment or with 64-bit sizes is refused: this program writes neither.
 fn listed(source: &mut (impl Read + Seek)) -> io::Result<Option<usize>> {
     let size = source.seek(SeekFrom::End(0))?;
     let Some(start) = size.checked_sub(END_BYTES as u64) else {

@@ -1,12 +1,11 @@
-//! A folder of results in which every file is whole.
+//! Files that a loss of power leaves whole, and a folder of them.
 
 use crate::error::{Exit, Failure};
 use std::fs;
-use std::io::Write as _;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-/// An output folder. Each file is written under a temporary name and renamed, so that what stands
-/// under a name is always whole; an older result of the same name is replaced.
+/// An output folder. Each file in it is whole at any time; an older one of the same name is replaced.
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
@@ -55,7 +54,7 @@ impl OutputFolder {
         let target = self.path.join(name);
         match fs::remove_file(&target) {
             Ok(()) => Ok(true),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(false),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
             Err(error) => {
                 let what = format!(
                     "remove {}, which is of another measurement",
@@ -68,63 +67,80 @@ impl OutputFolder {
     }
 }
 
-/// Writes a file under a temporary name, syncs it, and renames it: whoever pulls the plug finds the
-/// old file or the new one.
+/// Writes a file so that a loss of power leaves the old one or the new one, whole: see [`write_whole_with`].
 ///
 /// # Errors
 /// Whatever the file system answers.
-pub fn write_whole(target: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut temporary = target.as_os_str().to_owned();
-    temporary.push(".new");
-    let temporary = PathBuf::from(temporary);
+pub fn write_whole(target: &Path, bytes: &[u8]) -> io::Result<()> {
+    write_whole_with(target, |file| file.write_all(bytes))
+}
+
+/// Writes a file under a temporary name with `fill`, syncs it, renames it, and syncs the folder. What cannot be finished is
+/// removed.
+///
+/// # Errors
+/// Whatever `fill` or the file system answers; then the old file stands.
+pub fn write_whole_with(
+    target: &Path,
+    fill: impl FnOnce(&mut fs::File) -> io::Result<()>,
+) -> io::Result<()> {
+    let temporary = temporary(target);
     let written = fs::File::create(&temporary)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
+        .and_then(|mut file| fill(&mut file).and_then(|()| file.sync_all()))
         .and_then(|()| rename_whole(&temporary, target));
     if written.is_err() {
-        // What cannot be finished is not left behind; there may be nothing to remove.
+        // There may be nothing to remove.
         let _ = fs::remove_file(&temporary);
     }
     written
+}
+
+/// Copies a file: see [`write_whole_with`].
+///
+/// # Errors
+/// Whatever the file system answers; then the old file stands.
+pub fn copy_whole(file: &Path, target: &Path) -> io::Result<()> {
+    let mut source = fs::File::open(file)?;
+    write_whole_with(target, |copy| io::copy(&mut source, copy).map(drop))
+}
+
+/// The name under which a file is written.
+fn temporary(target: &Path) -> PathBuf {
+    let mut temporary = target.as_os_str().to_owned();
+    temporary.push(".new");
+    temporary.into()
 }
 
 /// Gives a synced file its name, and syncs the folder.
 ///
 /// # Errors
 /// Whatever the file system answers.
-pub fn rename_whole(from: &Path, target: &Path) -> std::io::Result<()> {
+pub fn rename_whole(from: &Path, target: &Path) -> io::Result<()> {
     fs::rename(from, target)?;
     sync_folder_of(target)
 }
 
-/// Gives a file a second name, in place of whatever had it; the first one stays. Whoever pulls the plug finds what had the name
-/// before, or this file.
+/// Gives a file a second name (hard link), in place of whatever had it; the first one stays. A loss of power leaves under the
+/// second name what was there before, or this file.
 ///
 /// # Errors
 /// Whatever the file system answers.
-pub fn name_also(file: &Path, second: &Path) -> std::io::Result<()> {
-    let mut temporary = second.as_os_str().to_owned();
-    temporary.push(".new");
-    let temporary = PathBuf::from(temporary);
+pub fn name_also(file: &Path, second: &Path) -> io::Result<()> {
+    let temporary = temporary(second);
     // Left by a kill; there may be none.
     let _ = fs::remove_file(&temporary);
-    let copied = |_| {
-        fs::copy(file, &temporary)?;
-        fs::File::open(&temporary)?.sync_all()
-    };
-    // Not every file system gives a file two names.
-    let named = fs::hard_link(file, &temporary)
-        .or_else(copied)
-        .and_then(|()| rename_whole(&temporary, second));
+    let named = fs::hard_link(file, &temporary).and_then(|()| rename_whole(&temporary, second));
     // Two names of one file are not renamed, and a kill may have made this file the second one already.
     let _ = fs::remove_file(&temporary);
-    named
+    // Not every file system gives a file two names.
+    named.or_else(|_| copy_whole(file, second))
 }
 
 /// Syncs the folder that a file lies in, so that its name is there after a loss of power, or gone.
 ///
 /// # Errors
 /// Whatever the file system answers.
-pub fn sync_folder_of(file: &Path) -> std::io::Result<()> {
+pub fn sync_folder_of(file: &Path) -> io::Result<()> {
     let folder = file
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty());

@@ -1,4 +1,4 @@
-//! What is stored: the state folder, files that are whole whatever happens, and archives that came from elsewhere.
+//! Storage: the state folder, files that a loss of power leaves whole, and archives that came from elsewhere.
 
 pub mod archive;
 pub mod folder;

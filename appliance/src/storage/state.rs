@@ -1,4 +1,4 @@
-//! The state folder: its lock, the result counter, the device's serial, and where the rest of the state lies.
+//! The state folder: its lock, the result counter and the device's serial.
 
 use crate::error::{Exit, Failure};
 use crate::storage::folder::write_whole;
@@ -10,11 +10,11 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct StateFolder {
     path: PathBuf,
-    /// Held until the daemon ends; the system drops it with the process, however that ends.
+    /// Held until the daemon ends; the system releases it with the process, also by a kill.
     _lock: File,
 }
 
-/// The counter's file: the last SEQ that may be in use, in decimal, and behind it the run that says so, in hexadecimal.
+/// The counter's file: the last SEQ that may be in use, in decimal, and the run that wrote it, in hexadecimal.
 const COUNTER: &str = "result-seq";
 /// The serial's file.
 const SERIAL: &str = "serial";
@@ -84,12 +84,12 @@ impl StateFolder {
         &self.path
     }
 
-    /// Where a part of the state lies that somebody else opens.
+    /// The path of a file or folder in it.
     pub fn place(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
 
-    /// What the counter's file says: the last SEQ that may be in use, and which run says so; 0 without a file.
+    /// What the counter's file says; 0 without a file.
     ///
     /// # Errors
     /// If it is damaged: guessing would let a SEQ be used twice.
@@ -147,7 +147,7 @@ impl StateFolder {
     }
 }
 
-/// The last SEQ that may be in use, and which run of the daemon says so.
+/// The last SEQ that may be in use, and which run of the daemon wrote it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counted {
     /// The SEQ.
@@ -157,7 +157,7 @@ pub struct Counted {
 }
 
 impl Counted {
-    /// From text; none if it is not that.
+    /// Reads the content of the counter's file.
     pub fn read(text: &str) -> Option<Self> {
         let mut words = text.split_whitespace();
         let last = words.next()?.parse().ok()?;
@@ -166,21 +166,21 @@ impl Counted {
         words.next().is_none().then_some(Self { last, run })
     }
 
-    /// As text, always as long: whoever writes it over another needs no more room.
+    /// The content of the counter's file. Its length is always the same, so that overwriting it needs no room.
     pub fn text(self) -> String {
         format!("{:010} {:08x}\n", self.last, self.run)
     }
 }
 
-/// Stores which SEQs may be in use, before anybody sees their results, so that none is used twice.
+/// Stores which SEQs may be in use before their results are shown, so that none is used twice.
 #[derive(Clone, Debug)]
 pub struct Counter {
     file: PathBuf,
 }
 
 impl Counter {
-    /// Stores that SEQs up to this one may be in use. Written in place, a few digits in one sector: it needs no room on a
-    /// full card, and whoever pulls the plug finds the old numbers or the new ones.
+    /// Stores that SEQs up to this one may be in use. It is written in place, within one sector: it needs no room on a full card,
+    /// and a loss of power leaves the old numbers or the new ones.
     ///
     /// # Errors
     /// Whatever the file system answers.
@@ -191,7 +191,7 @@ impl Counter {
                 file.write_all(text.as_bytes())?;
                 file.sync_data()
             }
-            // The first time, or another program's or a person's file.
+            // The first time, or a file of an older program or a person.
             _ => write_whole(&self.file, text.as_bytes()),
         }
     }

@@ -1,4 +1,4 @@
-//! A recording that comes as the ZIP that the page gives: checked, and unpacked for as long as it is needed.
+//! Unpacks a recording from the ZIP that the page gives, for as long as it is needed.
 
 use crate::error::{Exit, Failure};
 use crate::storage::archive::Members;
@@ -13,7 +13,7 @@ const MOST_MEMBERS: usize = 2048;
 /// What a recording's folder must hold.
 const MANIFEST: &str = "recording.json";
 
-/// The folder of a recording; what was unpacked for it goes when this is dropped.
+/// The folder of a recording; what was unpacked for it is removed when this is dropped.
 #[derive(Debug)]
 pub struct Unpacked {
     folder: PathBuf,
@@ -25,7 +25,7 @@ impl Unpacked {
     /// The recording at `path`: a folder as it is, a ZIP unpacked into a temporary folder.
     ///
     /// # Errors
-    /// If a file is no ZIP, or not one of a recording (65), or cannot be unpacked for want of room (73).
+    /// If a file is not a ZIP of a recording (65), or there is no room to unpack it (73).
     pub fn of(path: &Path) -> Result<Self, Failure> {
         if !path.is_file() {
             let real = path.canonicalize().ok();
@@ -99,7 +99,7 @@ fn is_inside(name: &str) -> bool {
     !name.contains(['\\', '\0']) && parts.all(|part| matches!(part, Component::Normal(_)))
 }
 
-/// A temporary folder that nobody else can look into; it goes when this is dropped.
+/// A temporary folder that other users cannot read; it is removed when this is dropped.
 #[derive(Debug)]
 struct Scratch(PathBuf);
 

@@ -4,7 +4,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// The beginning of the year 10000, µs since 1970 UTC: dates in HTTP (RFC 9110), SQLite and most programs that read CSV have
 /// four digits for the year. Linux itself sets no clock past 2232.
 const YEAR_10000_US: u64 = 253_402_300_800_000_000;
-/// The beginning of 2026, ms since 1970 UTC: this program is not older.
+/// The beginning of 2026, ms since 1970 UTC: this program was not there before.
 const YEAR_2026_MS: u64 = 1_767_225_600_000;
 /// The beginning of 2100.
 const YEAR_2100_MS: u64 = 4_102_444_800_000;
@@ -30,8 +30,8 @@ fn in_calendars(utc_us: Option<u64>) -> Option<u64> {
     utc_us.filter(|&us| us < YEAR_10000_US)
 }
 
-/// The time in µs of a browser's clock, given in ms since 1970 UTC; `None` before this program was written and from 2100 on,
-/// where that clock is certainly wrong.
+/// The time of a browser's clock in µs since 1970 UTC, given in ms; `None` before 2026 and from 2100 on, where that clock is
+/// certainly wrong.
 pub fn of_browser(ms: u64) -> Option<u64> {
     (YEAR_2026_MS..YEAR_2100_MS)
         .contains(&ms)

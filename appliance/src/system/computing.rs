@@ -1,4 +1,4 @@
-//! Whether the measuring task only computes. It then uses no device and stores nothing, so the program may end without waiting for it.
+//! Whether the measuring task only computes: it then uses no device and stores nothing, so the program may end without waiting for it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct Computing(Arc<AtomicBool>);
 
 impl Computing {
-    /// Runs work of seconds whose result is of no use once the program ends.
+    /// Runs work that takes seconds and whose result is not needed once the program ends.
     pub fn on<T>(&self, work: impl FnOnce() -> T) -> T {
         self.0.store(true, Ordering::Relaxed);
         let result = work();
@@ -16,7 +16,7 @@ impl Computing {
         result
     }
 
-    /// Whether it is under way.
+    /// Whether such work is under way.
     pub fn is_under_way(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

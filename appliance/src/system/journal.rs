@@ -1,4 +1,4 @@
-//! Lines on stderr: for people with the program's name in front; for a journal, which adds name and time itself, with their priority.
+//! Lines on stderr: with the program's name in front for people, with a priority for a journal, which adds name and time itself.
 
 use std::sync::OnceLock;
 

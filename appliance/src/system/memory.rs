@@ -1,6 +1,6 @@
-//! How freed memory goes back to the system.
+//! Gives the memory of large arrays back to the system when they are dropped.
 
-/// Arrays from this many bytes on go back to the system as soon as they are dropped.
+/// Bytes from which on an array goes back to the system as soon as it is dropped.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const LARGE: libc::c_int = 1 << 20;
 

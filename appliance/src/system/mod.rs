@@ -1,4 +1,4 @@
-//! What comes from the operating system: clock, signals, sockets, thread priorities, memory, the service manager; and the log on stderr.
+//! The operating system: clock, signals, sockets, thread priorities, memory, the service manager; and the log on stderr.
 
 use crate::error::{Exit, Failure};
 
@@ -13,7 +13,7 @@ pub mod progress;
 pub mod socket;
 pub mod stop_signal;
 
-/// A current-thread runtime.
+/// A current-thread runtime for sockets.
 ///
 /// # Errors
 /// If the system refuses its resources (exit code 70).

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Signs of life sent per watchdog period.
+/// Signs of life that are sent per watchdog period.
 const BEATS: u32 = 4;
 
 /// The connection to the service manager. Cheap to clone; clones share the phase.

@@ -1,4 +1,4 @@
-//! Progress of anything longer than a second, and the daemon's log above it: on stderr, the bar only on a terminal, neither with `--quiet`.
+//! A progress bar, and the log above it: both on stderr and not with `--quiet`, the bar only on a terminal.
 
 use crate::system::journal::{self, Severity};
 use crate::system::logbook::Logbook;

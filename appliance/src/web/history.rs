@@ -23,7 +23,7 @@ impl From<HistoryError> for Problem {
     }
 }
 
-/// Which results somebody asks for.
+/// The query of a request for results.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Wanted {
@@ -69,7 +69,7 @@ pub(super) async fn list(
     filter.limit = filter.limit.min(limit);
     let found = site.aside(move |site| {
         let results = site.history.results(&filter)?;
-        // A page more of a list is still part of the same list.
+        // Counts are of the whole list, also where the request is for its next page.
         let whole = Filter {
             before_seq: None,
             ..filter

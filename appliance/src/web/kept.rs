@@ -1,7 +1,7 @@
 //! One stored result in full, and the pictures of its part where the frames were kept.
 //!
-//! Pictures are worked out of the recording, by the code that makes those of the last part. That takes as much memory as a
-//! recipe does, so it is done for one part at a time, on a thread that gives way to the measuring task.
+//! Pictures are computed from the recording by the code that makes those of the last part. That takes as much memory as a
+//! recipe, so it is done for one part at a time, on a thread with a lower priority than the measuring task.
 
 use axum::extract::{Path, State};
 use axum::response::Json;
@@ -17,10 +17,10 @@ use crate::history::why_no_frames;
 use crate::station::result::flag;
 use crate::system::priority;
 
-/// The pictures that were worked out last, and of which result: height, deviation, modulation.
+/// The pictures that were computed last, height, deviation, modulation, and the SEQ of their result.
 pub(super) type LastKept = Option<(u32, [Map; 3])>;
 
-/// What can be asked for, in the order of [`LastKept`].
+/// The names of the pictures, in the order of [`LastKept`].
 const LAYERS: [&str; 3] = ["height", "deviation", "modulation"];
 
 pub(super) async fn one(
@@ -50,7 +50,7 @@ pub(super) async fn picture(
 ) -> Result<Map, Problem> {
     let at = LAYERS.iter().position(|known| *known == layer);
     let at = at.ok_or_else(|| Problem::missing("there are height, deviation and modulation"))?;
-    // Whoever waits here takes no place from those who look at something else.
+    // Waiting here takes no thread from other requests.
     let mut last = site.kept.clone().lock_owned().await;
     if let Some((_, maps)) = last.as_ref().filter(|(of, _)| *of == seq) {
         return Ok(maps[at].clone());
