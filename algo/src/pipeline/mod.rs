@@ -1,18 +1,18 @@
 //! Who computes which row: in turn or on a rayon pool, with the same bits.
 
+mod cubic;
 mod measure;
 mod noise;
 mod plate;
-mod rise;
 mod rows;
 
-pub use measure::{Guess, HeightMap, PhaseMap, Window, arrive, decode, decode_last, triangulate};
-pub use noise::sample_noise;
-pub use plate::{Plate, PlateError};
-pub(crate) use rise::{
+pub(crate) use cubic::{
     COMPARED, Risen, RowTally, SIGMA, SQUARE, Seen, UNKNOWN as NO_RISE, VARIANCE_UNIT_NM, rise_row,
     weigh_row,
 };
-pub use rise::{KnownSurface, Rises};
+pub use cubic::{KnownSurface, Rises};
+pub use measure::{Guess, HeightMap, PhaseMap, Window, arrive, decode, decode_last, triangulate};
+pub use noise::sample_noise;
+pub use plate::{Plate, PlateError};
 pub use rows::for_each_row;
 pub(crate) use rows::{for_each, for_each_item, for_each_row_of, map_rows};

@@ -1,9 +1,9 @@
 //! What the strips of a frame found together.
 
-use super::coins;
-use super::columns::TRUSTS;
-use super::extreme::Extreme;
-use super::stance::Stance;
+use super::counts::TRUSTS;
+use super::coverage;
+use super::pose::Stance;
+use super::squares::extreme::Extreme;
 use super::{CellRoom, Light, MAX_GAUGES, Measure, Production, Strip, Strips};
 use crate::inspect::Reading;
 use crate::inspect::align::Placed;
@@ -120,7 +120,7 @@ impl Production {
                 }
                 (pixels > 0).then(|| Reading {
                     value: covered as f64 / pixels as f64,
-                    sigma: Some(coins::sigma(coins, pixels)),
+                    sigma: Some(coverage::sigma(coins, pixels)),
                 })
             }
             Measure::Deviation { side } => {

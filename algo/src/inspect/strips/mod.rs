@@ -9,22 +9,21 @@
 //! Where the part's motion is wanted, some rows are decoded beforehand and a few points of each kept: the motion is found
 //! from these, in the order of the rows, and the strips then compare every pixel with the place of golden where the part had it.
 
-mod coins;
-mod columns;
+mod coordinates;
+mod counts;
+mod coverage;
 mod displaced;
-mod exact;
-mod extreme;
 mod findings;
-mod light;
-mod spots;
+mod height;
+mod input;
+mod pose;
 mod squares;
-mod stance;
 mod strip;
 mod taught;
 mod weighted;
 
 pub use findings::{Findings, Skipped};
-pub use light::Light;
+pub use input::Light;
 pub use taught::Taught;
 
 use super::Region;
@@ -39,9 +38,9 @@ use crate::units::{AbsolutePhase, Modulation};
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
-use coins::Threshold;
 use core::ops::Range;
-use stance::Stance;
+use coverage::Threshold;
+use pose::Stance;
 use strip::Strip;
 use weighted::WeightedTiles;
 
@@ -211,7 +210,7 @@ impl Production {
             if let Measure::Deviation { side } = gauge.measure
                 && !sides.contains(&side)
             {
-                if !extreme::fits(side, span_nm) {
+                if !squares::extreme::fits(side, span_nm) {
                     return Err(Unmeasurable::TooSmooth { side });
                 }
                 sides.push(side);

@@ -1,11 +1,11 @@
 //! One strip of rows: its buffers, and the walk down its rows.
 
-use super::coins::add_coins;
-use super::columns::{TRUSTS, count_known, count_trusts, slide};
-use super::extreme::{Extreme, SquareRow};
-use super::spots::{Seen, Spots};
-use super::squares::{MAX_TAME, Squares};
-use super::stance::Stance;
+use super::coordinates::{Seen, Spots};
+use super::counts::{TRUSTS, count_known, count_trusts, slide};
+use super::coverage::add_coins;
+use super::pose::Stance;
+use super::squares::extreme::{Extreme, SquareRow};
+use super::squares::narrow::{MAX_TAME, Squares};
 use super::{Light, Measure, Production};
 use crate::inspect::align::Sample;
 use crate::inspect::gauge::Sum;

@@ -4,8 +4,8 @@
 //! worked on together: plain loops over slices, compiled for each back-end's instructions, with the bits of one pixel after
 //! the other.
 
-use super::squares::MAX_TAME;
-use super::stance::{Node, SPACING};
+use super::pose::{Node, SPACING};
+use super::squares::narrow::MAX_TAME;
 use crate::math::nearest::{nearest, whole};
 use crate::pipeline::{NO_RISE, SQUARE};
 use crate::simd::{Lanes, back_end_entry};

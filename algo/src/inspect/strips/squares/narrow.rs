@@ -1,7 +1,7 @@
 //! Which squares of a row can have the largest deviation at all: sums in 32 bits, many pixels at a time.
 
-use super::columns::COUNT_BIT;
 use super::extreme::{Extreme, SquareRow, floor_of, least_support};
+use crate::inspect::strips::counts::COUNT_BIT;
 use crate::pipeline::NO_RISE;
 use crate::simd::{Backend, Lanes, back_end_entry};
 use alloc::vec;
@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 /// Rises up to this many nm are summed in 32 bits: more than a cubic gives.
-pub(super) const MAX_TAME: u32 = 1 << 22;
+pub(in super::super) const MAX_TAME: u32 = 1 << 22;
 /// Squares of up to so many pixels of them.
 const MAX_PIXELS: usize = (i32::MAX as u32 / MAX_TAME) as usize;
 /// Squares that are looked at together.
@@ -17,7 +17,7 @@ const BLOCK: usize = 64;
 
 /// Sums over the squares around the pixels of a row.
 #[derive(Debug)]
-pub(super) struct Squares {
+pub(in super::super) struct Squares {
     /// Of columns of the square's height.
     columns: Vec<i32>,
     /// Of some columns.

@@ -1,13 +1,13 @@
 //! The square with the largest mean deviation, found from sums down the columns.
 
-use super::columns::COUNT_BIT;
 use crate::inspect::deviation::MIN_SUPPORT;
+use crate::inspect::strips::counts::COUNT_BIT;
 use crate::pipeline::NO_RISE;
 use core::ops::Range;
 
 /// A square and the deviations in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Extreme {
+pub(in super::super) struct Extreme {
     /// Σ of the deviations in nm.
     pub sum: i64,
     /// How many there are.
@@ -26,7 +26,7 @@ impl Extreme {
 }
 
 /// Whether sums over squares of `side` pixels of deviations up to `span_nm` fit beside their count.
-pub(super) fn fits(side: usize, span_nm: f64) -> bool {
+pub(in super::super) fn fits(side: usize, span_nm: f64) -> bool {
     let side = (side | 1) as f64;
     let pixels = side * side;
     // A signed sum of 44 bits; a count of 19 bits.
@@ -34,12 +34,12 @@ pub(super) fn fits(side: usize, span_nm: f64) -> bool {
 }
 
 /// Least number of deviations in a square that counts.
-pub(super) fn least_support(side: usize) -> i64 {
+pub(in super::super) fn least_support(side: usize) -> i64 {
     libm::ceil(MIN_SUPPORT * (side * side) as f64) as i64
 }
 
 /// The squares around the pixels of one row.
-pub(super) struct SquareRow<'a> {
+pub(in super::super) struct SquareRow<'a> {
     /// Packed sums down the columns, with half a side of padding in front.
     pub sums: &'a [i64],
     /// Deviations of the row itself.
@@ -84,7 +84,7 @@ impl SquareRow<'_> {
 }
 
 /// No sum of at least `least` deviations below this reaches the best.
-pub(super) fn floor_of(best: Option<Extreme>, least: i64) -> i64 {
+pub(in super::super) fn floor_of(best: Option<Extreme>, least: i64) -> i64 {
     // Rounded down, so nothing that could reach it is left out.
     best.map_or(0, |best| best.sum.abs() * least / best.count)
 }

@@ -2,7 +2,7 @@
 
 use super::Production;
 use super::displaced::{Found, Golden, Row, find_row};
-use super::stance::{Node, Stance};
+use super::pose::{Node, Stance};
 use crate::inspect::Weight;
 use crate::inspect::gauge::{Grid, Sum};
 use crate::pipeline::NO_RISE;
@@ -35,14 +35,14 @@ impl Spots {
     pub fn new(width: usize) -> Self {
         let room = || vec![0; width];
         Self {
-            nodes: super::stance::room(width),
+            nodes: super::pose::room(width),
             column: room(),
             row: room(),
         }
     }
 
     /// Works out the spots, and turns deviations into those from golden where the part had the spot; the answer is whether
-    /// one of them is too large for the sums of [`super::squares::MAX_TAME`].
+    /// one of them is too large for the sums of [`super::squares::narrow::MAX_TAME`].
     pub fn find(&mut self, seen: &Seen<'_>, deviation: &mut [i32]) -> bool {
         let plan = seen.plan;
         let (width, height) = plan.size();

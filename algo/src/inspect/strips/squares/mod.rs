@@ -1,0 +1,4 @@
+//! Sums over squares.
+
+pub(super) mod extreme;
+pub(super) mod narrow;
