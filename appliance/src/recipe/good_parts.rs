@@ -4,6 +4,9 @@
 //! get less weight, and teaching reports on how much of the surface, and by which factor a deviation must be larger there to be
 //! found. If that concerned more than a small share of the pixels, the limit is wider instead, and teaching reports that the
 //! tolerance cannot be held.
+//!
+//! Leaving such pixels out instead misses nearly all dents among them
+//! (`dents_where_pixels_have_weights_are_found_and_would_be_missed_without_these_pixels`).
 
 use super::golden::SMOOTHING_PX;
 use crate::station::Unit;
