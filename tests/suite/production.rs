@@ -75,8 +75,8 @@ fn heights_about_golden_are_exact_to_micrometres_within_the_declared_range() {
         let taught = taught(&mut bed).unwrap();
         let full = taught.file.sequences.len() - 1;
         let (plan, _) = plan(&bed, &taught, full);
-        let (rises, exact) = (plan.production().rises(), plan.production().triangulator());
-        let surface = rises.surface();
+        let (cubics, exact) = (plan.production().cubics(), plan.production().triangulator());
+        let surface = cubics.surface();
         let width = surface.width;
         let mut heights = vec![Height::UNKNOWN; width];
         let (mut all, mut reached) = (0, 0);
@@ -86,7 +86,7 @@ fn heights_about_golden_are_exact_to_micrometres_within_the_declared_range() {
             for v in (0..surface.phase.len() / width).step_by(3) {
                 let row = &surface.phase[v * width..(v + 1) * width];
                 let moved: Vec<_> = row.iter().map(|&phase| phase + delta).collect();
-                rises.heights(Backend::best(), v, &moved, &mut heights);
+                cubics.heights(Backend::best(), v, &moved, &mut heights);
                 for (u, height) in heights.iter().enumerate() {
                     if taught.recipe.arrays.valid[v * width + u] == 0 {
                         continue;
@@ -411,9 +411,9 @@ fn unknown_phases_have_no_height() {
     let mut bed = bed(&scenario(Part::Cone(Cone::default())));
     let taught = taught(&mut bed).unwrap();
     let (plan, _) = plan(&bed, &taught, 0);
-    let rises = plan.production().rises();
+    let cubics = plan.production().cubics();
     let mut heights = vec![Height::from_nm(0); 256];
-    rises.heights(
+    cubics.heights(
         Backend::best(),
         128,
         &[AbsolutePhase::UNKNOWN; 256],

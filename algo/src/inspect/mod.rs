@@ -16,6 +16,6 @@ pub use mask::eroded;
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
 pub use strips::{
-    Findings, Gauge, Light, MAX_GAUGES, Parts, Production, Skipped, Strips, Taught, Unmeasurable,
+    Findings, Gauge, Input, MAX_GAUGES, Parts, Production, Skipped, Strips, Taught, Unmeasurable,
 };
 pub use weight::Weight;

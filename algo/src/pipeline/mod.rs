@@ -7,10 +7,10 @@ mod plate;
 mod rows;
 
 pub(crate) use cubic::{
-    COMPARED, Risen, RowTally, SIGMA, SQUARE, Seen, UNKNOWN as NO_RISE, VARIANCE_UNIT_NM, rise_row,
-    weigh_row,
+    COMPARED, CubicInput, CubicOutput, HeightTally, NO_OFFSET, SIGMA, SQUARE, VARIANCE_UNIT_NM,
+    offset_row, sum_variances,
 };
-pub use cubic::{KnownSurface, Rises};
+pub use cubic::{HeightCubics, KnownSurface};
 pub use measure::{Guess, HeightMap, PhaseMap, Window, arrive, decode, decode_last, triangulate};
 pub use noise::sample_noise;
 pub use plate::{Plate, PlateError};

@@ -1,97 +1,101 @@
-//! A row of rises → where its pixels lie on the part as taught, and how far they deviate from golden there.
+//! Stage 3, align: the taught coordinates of a row's pixels, and how far they deviate from golden there.
 
 use super::Production;
-use super::displaced::{Found, Golden, Row, find_row};
-use super::pose::{Node, Stance};
+use super::displaced::{AlignedRow, GoldenMap, OffsetRow, align_row};
+use super::height::HeightRow;
+use super::pose::{Node, PoseField};
+use super::recent::RecentRows;
+use super::{common, pose};
 use crate::inspect::Weight;
 use crate::inspect::gauge::{Grid, Sum};
-use crate::pipeline::NO_RISE;
+use crate::pipeline::NO_OFFSET;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// A row of pixels with the part's motion taken back: the pixel that saw each when the part was taught.
+/// For each pixel of a row the pixel of golden's frame that saw the same point of the part.
 #[derive(Debug)]
-pub(super) struct Spots {
+pub(super) struct TaughtCoordinates {
     nodes: Vec<Node>,
     column: Vec<i32>,
     row: Vec<i32>,
 }
 
-/// What a row of spots is worked out from.
-pub(super) struct Seen<'a> {
-    pub plan: &'a Production,
-    pub stance: &'a Stance,
-    /// The row.
-    pub v: usize,
-    /// Its columns.
-    pub columns: Range<usize>,
-    /// Rises above golden's surface on the pixels' own rays.
-    pub rise: &'a [i32],
-}
-
-impl Spots {
-    /// Room for a row of `width` pixels.
+impl TaughtCoordinates {
+    /// Of `width` pixels.
     pub fn new(width: usize) -> Self {
-        let room = || vec![0; width];
         Self {
-            nodes: super::pose::room(width),
-            column: room(),
-            row: room(),
+            nodes: pose::nodes_of_row(width),
+            column: vec![0; width],
+            row: vec![0; width],
         }
     }
 
-    /// Works out the spots, and turns deviations into those from golden where the part had the spot; the answer is whether
-    /// one of them is too large for the sums of [`super::squares::narrow::MAX_TAME`].
-    pub fn find(&mut self, seen: &Seen<'_>, deviation: &mut [i32]) -> bool {
-        let plan = seen.plan;
+    /// Takes the part's motion back in row `v`, whose heights were found last: its deviations become those from golden at the
+    /// taught coordinates. Those of a part that lies as taught stay; its coordinates are needed for cells and weights only.
+    pub fn align(
+        &mut self,
+        plan: &Production,
+        pose: &PoseField,
+        v: usize,
+        columns: Range<usize>,
+        (heights, recent): (&HeightRow, &mut RecentRows),
+    ) {
+        if pose.placed.is_some() {
+            let columns = common(&columns, &recent.extent(v));
+            self.displace(plan, pose, v, columns, (heights, recent));
+        } else if !plan.gauges.patches.is_empty() || plan.weighted.is_some() {
+            self.row[columns.clone()].fill(v as i32);
+            for u in columns {
+                self.column[u] = u as i32;
+            }
+        }
+    }
+
+    fn displace(
+        &mut self,
+        plan: &Production,
+        pose: &PoseField,
+        v: usize,
+        columns: Range<usize>,
+        (heights, recent): (&HeightRow, &mut RecentRows),
+    ) {
         let (width, height) = plan.size();
-        seen.stance.row(seen.v, height, &mut self.nodes);
-        let golden = Golden {
-            height: &plan.rises.surface().height,
-            taught: &plan.taught.pixels,
+        pose.row(v, height, &mut self.nodes);
+        let golden = GoldenMap {
+            height: &plan.cubics.surface().height,
+            taught: plan.taught.pixels(),
             width,
         };
-        let row = Row {
-            v: seen.v,
-            rise: seen.rise,
+        let row = OffsetRow {
+            v,
+            offset: &heights.offset,
             nodes: &self.nodes,
             middle: plan.levels.0 as f32,
         };
-        let mut wild = false;
-        let found = Found {
-            deviation,
+        let mut overflow = false;
+        let aligned = AlignedRow {
+            deviation: recent.row_mut(v).0,
             column: &mut self.column,
             row: &mut self.row,
-            wild: &mut wild,
+            overflow: &mut overflow,
         };
-        find_row(
-            plan.decoder.backend(),
-            golden,
-            row,
-            seen.columns.clone(),
-            found,
-        );
-        wild
-    }
-
-    /// The spots of row `v` of a part that lies as taught.
-    pub fn stay(&mut self, v: usize, columns: Range<usize>) {
-        self.row[columns.clone()].fill(v as i32);
-        for u in columns {
-            self.column[u] = u as i32;
+        align_row(plan.decoder.backend(), golden, row, columns, aligned);
+        if overflow {
+            recent.overflow = Some(v);
         }
     }
 
-    /// Multiplies the deviations of a span by the weights of golden where the part had them.
-    pub fn weigh(&self, plan: &Production, deviation: &mut [i32], span: Range<usize>) {
+    /// Multiplies the deviations of row `v`, which was aligned last, by golden's weights at the taught coordinates.
+    pub fn weigh(&self, plan: &Production, v: usize, recent: &mut RecentRows) {
         if let Some(weighted) = &plan.weighted {
+            let span = recent.extent(v);
             let (columns, rows) = (&self.column[span.clone()], &self.row[span.clone()]);
-            weighted.apply(&plan.taught, columns, rows, &mut deviation[span]);
+            weighted.apply(&plan.taught, columns, rows, &mut recent.row_mut(v).0[span]);
         }
     }
 
-    /// The weight of golden where the part had what pixel `u` sees.
+    /// Golden's weight at the taught coordinates of pixel `u`.
     pub fn weight(&self, plan: &Production, u: usize) -> Weight {
         match plan.weighted {
             Some(_) => {
@@ -102,15 +106,21 @@ impl Spots {
         }
     }
 
-    /// Adds the compared pixels of a span to the cells in which the part had them.
-    pub fn gather(&self, grid: &Grid, deviation: &[i32], span: Range<usize>, sums: &mut [Sum]) {
+    /// Adds the compared pixels of a span to the cells that hold their taught coordinates.
+    pub fn add_to_cells(
+        &self,
+        grid: &Grid,
+        deviation: &[i32],
+        span: Range<usize>,
+        cells: &mut [Sum],
+    ) {
         for u in span {
-            if deviation[u] == NO_RISE {
+            if deviation[u] == NO_OFFSET {
                 continue;
             }
-            let sum = &mut sums[grid.cell(self.column[u], self.row[u])];
-            sum.count += 1;
-            sum.deviation += i64::from(deviation[u]);
+            let cell = &mut cells[grid.cell(self.column[u], self.row[u])];
+            cell.count += 1;
+            cell.deviation += i64::from(deviation[u]);
         }
     }
 }

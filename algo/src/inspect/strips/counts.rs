@@ -1,8 +1,98 @@
-//! Counts along a row, and sums down the columns: plain loops, compiled for each back-end's instructions.
+//! Stage 4, accumulate: what the rows of a strip count: pixels of each trust, heights, coverage, and cells of gauges.
 
+use super::coordinates::TaughtCoordinates;
+use super::coverage::{add_variances, count_known};
+use super::decode::DecodedRow;
+use super::height::HeightRow;
+use super::pose::PoseField;
+use super::recent::RecentRows;
+use super::{Measure, Production, common};
+use crate::inspect::gauge::Sum;
 use crate::phase::Trust;
-use crate::pipeline::NO_RISE;
+use crate::pipeline::HeightTally;
 use crate::simd::{Lanes, back_end_entry};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// Sums over the rows of a strip. Whole numbers, so that the order of summation does not matter.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Counts {
+    /// Heights and their variances.
+    pub tally: HeightTally,
+    /// Pixels of each trust.
+    pub trusts: [u64; TRUSTS],
+    /// Heights that were triangulated exactly.
+    pub exact: u64,
+    /// Per gauge: pixels with a height.
+    pub covered: Vec<u64>,
+    /// Per gauge: the variance of that number, see [`super::coverage`].
+    pub variance: Vec<u64>,
+    /// Per patch: its cells.
+    pub cells: Vec<Vec<Sum>>,
+}
+
+impl Counts {
+    pub fn new(plan: &Production) -> Self {
+        let (gauges, patches) = (plan.gauges.list.len(), &plan.gauges.patches);
+        let cells = patches.iter();
+        Self {
+            covered: vec![0; gauges],
+            variance: vec![0; gauges],
+            cells: cells
+                .map(|patch| vec![Sum::default(); patch.grid.len()])
+                .collect(),
+            ..Self::default()
+        }
+    }
+
+    pub fn clear(&mut self) {
+        self.tally = HeightTally::default();
+        self.trusts = [0; TRUSTS];
+        self.exact = 0;
+        self.covered.fill(0);
+        self.variance.fill(0);
+        for cells in &mut self.cells {
+            cells.fill(Sum::default());
+        }
+    }
+
+    /// Adds row `v`, which was aligned last.
+    pub fn add(
+        &mut self,
+        plan: &Production,
+        pose: &PoseField,
+        v: usize,
+        (decoded, heights): (&DecodedRow, &HeightRow),
+        (coordinates, recent): (&TaughtCoordinates, &RecentRows),
+    ) {
+        let backend = plan.decoder.backend();
+        self.tally.add(&heights.tally);
+        self.exact += heights.exact;
+        let trusts = &decoded.trust[plan.window[v].clone()];
+        count_trusts(backend, trusts, &mut self.trusts);
+        let extent = recent.extent(v);
+        for (at, gauge) in plan.gauges.list.iter().enumerate() {
+            if gauge.measure != Measure::Coverage {
+                continue;
+            }
+            for (_, columns) in pose.region(plan, at).row(v) {
+                let span = common(columns, &extent);
+                let offsets = &heights.offset[span.clone()];
+                let modulations = &decoded.modulation[span];
+                count_known(backend, offsets, &mut self.covered[at]);
+                let (threshold, variance) = (&plan.gauges.threshold, &mut self.variance[at]);
+                add_variances(backend, threshold, offsets, modulations, variance);
+            }
+        }
+        let deviation = recent.row(v);
+        for (patch, cells) in plan.gauges.patches.iter().zip(&mut self.cells) {
+            for (_, columns) in pose.region(plan, patch.region).row(v) {
+                let span = common(columns, &extent);
+                coordinates.add_to_cells(&patch.grid, deviation, span, cells);
+            }
+        }
+    }
+}
 
 /// Number of trusts.
 pub(super) const TRUSTS: usize = Trust::REASONS.len() + 1;
@@ -18,22 +108,10 @@ const ORDER: [Trust; TRUSTS] = [
 ];
 /// Pixels whose counts fit into a byte.
 const BLOCK: usize = 255;
-/// A packed sum holds the number of its terms above this bit, and their sum below it.
-pub(super) const COUNT_BIT: u32 = 44;
 
 back_end_entry! {
     /// Adds the number of pixels with each trust to `counts`.
     fn count_trusts [] = trusts(row: &[Trust], counts: &mut [u64; TRUSTS])
-}
-
-back_end_entry! {
-    /// Adds the number of known rises to `count`.
-    fn count_known [] = known(row: &[i32], count: &mut u64)
-}
-
-back_end_entry! {
-    /// Adds a row to packed sums down the columns, and takes one out of them.
-    fn slide [] = slide_columns(sums: &mut [i64], new: &[i32], old: &[i32])
 }
 
 #[inline(always)]
@@ -41,7 +119,7 @@ fn trusts<V: Lanes>(_: V, row: &[Trust], counts: &mut [u64; TRUSTS]) {
     for block in row.chunks(BLOCK) {
         let mut left = block.len() as u64;
         for trust in ORDER {
-            // Mostly there are only the first ones: it ends when all are counted.
+            // Most blocks have only the first ones: it ends when all pixels are counted.
             if left == 0 {
                 break;
             }
@@ -52,27 +130,5 @@ fn trusts<V: Lanes>(_: V, row: &[Trust], counts: &mut [u64; TRUSTS]) {
             counts[trust as usize] += u64::from(here);
             left -= u64::from(here);
         }
-    }
-}
-
-#[inline(always)]
-fn known<V: Lanes>(_: V, row: &[i32], count: &mut u64) {
-    let mut known = 0_u32;
-    for &rise in row {
-        known = known.wrapping_add(u32::from(rise != NO_RISE));
-    }
-    *count += u64::from(known);
-}
-
-#[inline(always)]
-fn slide_columns<V: Lanes>(_: V, sums: &mut [i64], new: &[i32], old: &[i32]) {
-    let length = sums.len();
-    let (new, old) = (&new[..length], &old[..length]);
-    for i in 0..length {
-        let (enters, leaves) = (new[i] != NO_RISE, old[i] != NO_RISE);
-        let rise =
-            i64::from(if enters { new[i] } else { 0 }) - i64::from(if leaves { old[i] } else { 0 });
-        let count = i64::from(i32::from(enters) - i32::from(leaves));
-        sums[i] = sums[i].wrapping_add(rise).wrapping_add(count << COUNT_BIT);
     }
 }

@@ -1,10 +1,10 @@
-//! What the strips of a frame found together.
+//! Stage 5, gauge: the sums of all strips → readings and their errors.
 
 use super::counts::TRUSTS;
 use super::coverage;
-use super::pose::Stance;
+use super::pose::PoseField;
 use super::squares::extreme::Extreme;
-use super::{CellRoom, Light, MAX_GAUGES, Measure, Production, Strip, Strips};
+use super::{CellRoom, Input, MAX_GAUGES, Measure, Production, Strip, Strips};
 use crate::inspect::Reading;
 use crate::inspect::align::Placed;
 use crate::inspect::gauge::{
@@ -27,7 +27,7 @@ pub struct Findings {
     pub height_noise_mm: f64,
     /// RMS of the taught σ_z over the pixels with a height, mm; 0 if there are none.
     pub taught_noise_mm: f64,
-    /// Share of the pixels that are lit whose levels contradict each other.
+    /// Share of the pixels with enough light whose levels contradict each other.
     pub contradicting: f64,
     /// How the part lies; none if it was not aligned.
     pub placed: Option<Placed>,
@@ -44,43 +44,43 @@ pub struct Skipped {
     pub unexpected: u64,
     /// Pixels that the pattern's light does not reach, without finer levels.
     pub dark: u64,
-    /// Heights too far from golden for the cubics, solved exactly.
+    /// Heights too far from golden for the cubics, triangulated exactly.
     pub exact: u64,
 }
 
 impl Production {
-    pub(super) fn findings(&self, light: Light<'_>, strips: &mut Strips) -> Findings {
+    pub(super) fn findings(&self, input: Input<'_>, strips: &mut Strips) -> Findings {
         let Strips {
             strips,
-            stance,
+            pose,
             cells,
             ..
         } = strips;
         let mut trusts = [0; TRUSTS];
-        let mut tally = crate::pipeline::RowTally::default();
+        let mut tally = crate::pipeline::HeightTally::default();
         let mut exact = 0;
         for strip in strips.iter() {
-            tally.add(&strip.found.tally);
-            exact += strip.found.exact;
-            for (all, here) in trusts.iter_mut().zip(&strip.found.trusts) {
+            tally.add(&strip.counts.tally);
+            exact += strip.counts.exact;
+            for (all, here) in trusts.iter_mut().zip(&strip.counts.trusts) {
                 *all += here;
             }
         }
         let seen: u64 = trusts.iter().sum();
-        let pixels = self.rises.surface().phase.len() as u64;
+        let pixels = self.cubics.surface().phase.len() as u64;
         let rms_mm = |sum: u64, count: u64| {
             libm::sqrt(sum as f64 / count.max(1) as f64) * VARIANCE_UNIT_NM * 1e-6
         };
         let (height_noise_mm, taught_noise_mm) = (
-            rms_mm(tally.variance, tally.weighed),
+            rms_mm(tally.variance, tally.summed),
             rms_mm(tally.taught_variance, tally.taught),
         );
-        // How much noisier than as taught the heights are.
+        // The ratio of σ_z to that as taught.
         let noisier = height_noise_mm / taught_noise_mm.max(f64::MIN_POSITIVE);
-        let readings = (0..self.gauges.len())
-            .map(|gauge| match self.patches_of[gauge].is_empty() {
-                true => self.reading(gauge, light, stance, strips),
-                false => self.of_cells(gauge, noisier, stance, strips, cells),
+        let readings = (0..self.gauges.list.len())
+            .map(|gauge| match self.gauges.patches_of[gauge].is_empty() {
+                true => self.reading(gauge, input, pose, strips),
+                false => self.of_cells(gauge, noisier, pose, strips, cells),
             })
             .collect();
         let count = |trust: Trust| trusts[trust as usize];
@@ -93,7 +93,7 @@ impl Production {
             taught_noise_mm,
             contradicting: contradicting as f64
                 / (contradicting + count(Trust::Resolved)).max(1) as f64,
-            placed: stance.placed.clone(),
+            placed: pose.placed.clone(),
             skipped: Skipped {
                 outside: pixels - seen,
                 unexpected: trusts[Trust::Unexpected as usize],
@@ -106,34 +106,34 @@ impl Production {
     fn reading(
         &self,
         gauge: usize,
-        light: Light<'_>,
-        stance: &Stance,
+        input: Input<'_>,
+        pose: &PoseField,
         strips: &mut [Strip],
     ) -> Option<Reading> {
-        match self.gauges[gauge].measure {
+        match self.gauges.list[gauge].measure {
             Measure::Coverage => {
-                let pixels = stance.region(self, gauge).len();
-                let (mut covered, mut coins) = (0, 0);
+                let pixels = pose.region(self, gauge).len();
+                let (mut covered, mut variance) = (0, 0);
                 for strip in strips {
-                    covered += strip.found.covered[gauge];
-                    coins += strip.found.coins[gauge];
+                    covered += strip.counts.covered[gauge];
+                    variance += strip.counts.variance[gauge];
                 }
                 (pixels > 0).then(|| Reading {
                     value: covered as f64 / pixels as f64,
-                    sigma: Some(coverage::sigma(coins, pixels)),
+                    sigma: Some(coverage::sigma(variance, pixels)),
                 })
             }
             Measure::Deviation { side } => {
                 let extremes = strips
                     .iter()
-                    .filter_map(|strip| strip.found.extremes[gauge]);
+                    .filter_map(|strip| strip.squares.extremes[gauge]);
                 let best =
                     extremes.reduce(|best, next| if next.reaches(&best) { next } else { best })?;
                 let strip = strips.first_mut()?;
-                Some(self.deviation(best, side, light, stance, strip))
+                Some(self.deviation(best, side, input, pose, strip))
             }
             Measure::Placement(component) => {
-                let (value, sigma) = stance.placed.as_ref()?.component(component)?;
+                let (value, sigma) = pose.placed.as_ref()?.component(component)?;
                 Some(Reading {
                     value,
                     sigma: Some(sigma),
@@ -143,21 +143,21 @@ impl Production {
         }
     }
 
-    /// The reading of a gauge of cells; `noisier` is how many times σ_z is that as taught.
+    /// The reading of a gauge of cells; `noisier` is the ratio of σ_z to that as taught.
     fn of_cells(
         &self,
         gauge: usize,
         noisier: f64,
-        stance: &Stance,
+        pose: &PoseField,
         strips: &[Strip],
         room: &mut CellRoom,
     ) -> Option<Reading> {
-        let measure = self.gauges[gauge].measure;
-        let patches = self.patches_of[gauge].clone();
+        let measure = self.gauges.list[gauge].measure;
+        let patches = self.gauges.patches_of[gauge].clone();
         let side = measure.cell_side()?;
         room.cells.clear();
         room.weights.clear();
-        let taught = &self.patches[patches.start].taught;
+        let taught = &self.gauges.patches[patches.start].taught;
         self.gather(patches.start, side, strips, room);
         let count = room.cells.len();
         if measure == Measure::Step {
@@ -172,8 +172,8 @@ impl Production {
         };
         let pixel = variance(taught);
         let cell = libm::sqrt(pixel) / side.max(1) as f64;
-        let placed = stance.placed.as_ref();
-        // Of those that are linear in height.
+        let placed = pose.placed.as_ref();
+        // The value of a gauge that is linear in height; the others return their readings.
         let value = match measure {
             Measure::Flatness { .. } => return flatness(cells, cell, placed, weights),
             Measure::PeakToValley { .. } => return peak_to_valley(cells, cell, placed, weights),
@@ -187,7 +187,10 @@ impl Production {
             Measure::Step => step(&cells[..count], &cells[count..], weights)?,
             _ => return None,
         };
-        let noises = [pixel, variance(&self.patches[patches.end - 1].taught)];
+        let noises = [
+            pixel,
+            variance(&self.gauges.patches[patches.end - 1].taught),
+        ];
         let noise = |at: usize| noises[usize::from(at >= count)];
         Some(Reading {
             value,
@@ -197,14 +200,14 @@ impl Production {
 
     /// Appends the cells of a patch.
     fn gather(&self, at: usize, side: usize, strips: &[Strip], room: &mut CellRoom) {
-        let patch = &self.patches[at];
+        let patch = &self.gauges.patches[at];
         let CellRoom {
             sums, cells: out, ..
         } = room;
         sums.clear();
         sums.resize(patch.grid.len(), Sum::default());
         for strip in strips {
-            for (sum, more) in sums.iter_mut().zip(&strip.found.cells[at]) {
+            for (sum, more) in sums.iter_mut().zip(&strip.counts.cells[at]) {
                 sum.add(more);
             }
         }
@@ -217,8 +220,8 @@ impl Production {
         &self,
         best: Extreme,
         side: usize,
-        light: Light<'_>,
-        stance: &Stance,
+        input: Input<'_>,
+        pose: &PoseField,
         strip: &mut Strip,
     ) -> Reading {
         let half = side / 2;
@@ -229,7 +232,7 @@ impl Production {
             let left = best.column.saturating_sub(half).max(window.start);
             let right = (best.column + half + 1).min(window.end);
             if left < right {
-                variance += strip.variance(self, stance, light, v, left..right);
+                variance += strip.variance(self, pose, input, v, left..right);
             }
         }
         let count = best.count as f64;

@@ -1,47 +1,189 @@
-//! Heights and errors of single pixels, and the points that a part's motion is found from.
+//! Stage 2, height: absolute phase → height offset, how far each pixel lies above the golden surface on its own ray.
+//!
+//! A cubic per pixel gives the offset ([`HeightCubics`](crate::pipeline::HeightCubics)); what it does not reach is triangulated
+//! exactly.
 
-use super::{Light, Production, Strip};
+use super::Production;
+use super::decode::DecodedRow;
+use super::recent::RecentRows;
+use super::squares::narrow::MAX_NARROW_NM;
 use crate::geometry::Solution;
-use crate::inspect::align::{Alignment, Sample};
-use crate::pipeline::{NO_RISE, RowTally};
+use crate::phase::Trust;
+use crate::pipeline::{
+    CubicInput, CubicOutput, HeightTally, NO_OFFSET, VARIANCE_UNIT_NM, offset_row, sum_variances,
+};
 use crate::units::{AbsolutePhase, Height, Modulation};
+use alloc::vec;
+use alloc::vec::Vec;
+use core::ops::Range;
 
-impl Strip {
-    /// Keeps the points of its rows that the part's motion is found from.
-    pub(super) fn sample(&mut self, plan: &Production, alignment: &Alignment, light: Light<'_>) {
-        self.samples.clear();
-        let (first, spots) = alignment.spots(self.rows());
-        let mut decoded = None;
-        for (at, spot) in spots.iter().enumerate() {
-            let (u, v) = (spot.u, spot.v);
-            if decoded != Some(v) {
-                let columns = plan.window[v].clone();
-                self.row(plan, light, v, columns, &mut RowTally::default());
-                decoded = Some(v);
-            }
-            if self.rise[u] == NO_RISE {
+/// The heights of the row that a strip works on.
+#[derive(Debug)]
+pub(super) struct HeightRow {
+    /// z − z₀ in nm; [`NO_OFFSET`] where there is no height.
+    pub offset: Vec<i32>,
+    /// Counts and variances of the row.
+    pub tally: HeightTally,
+    /// How many heights were triangulated exactly.
+    pub exact: u64,
+}
+
+/// Variances are summed in every so many rows: their mean needs no more.
+const VARIANCE_ROWS: usize = 4;
+/// The largest variance that is summed, (1 mm)², in units of [`VARIANCE_UNIT_NM`]².
+const MAX_VARIANCE: f64 = 4_000_000.0;
+
+impl HeightRow {
+    /// Of `width` pixels.
+    pub fn new(width: usize) -> Self {
+        Self {
+            offset: vec![NO_OFFSET; width],
+            tally: HeightTally::default(),
+            exact: 0,
+        }
+    }
+
+    /// Finds the heights of columns of row `v`, which has just been decoded. Where the part is compared, the offset is the
+    /// deviation of a part that lies as taught.
+    pub fn find(
+        &mut self,
+        plan: &Production,
+        decoded: &mut DecodedRow,
+        v: usize,
+        columns: Range<usize>,
+        recent: &mut RecentRows,
+    ) {
+        (self.tally, self.exact) = (HeightTally::default(), 0);
+        let (deviation, extent) = recent.row_mut(v);
+        for row in [&mut *deviation, &mut self.offset] {
+            row[..columns.start].fill(NO_OFFSET);
+            row[columns.end..].fill(NO_OFFSET);
+        }
+        *extent = 0..0;
+        if columns.is_empty() {
+            return;
+        }
+        let width = self.offset.len();
+        let input = CubicInput {
+            phase: &decoded.phase,
+            modulation: &decoded.modulation,
+            trust: &decoded.trust,
+            taught: plan.taught.row(v, width),
+            noise: plan.variance_scale,
+        };
+        let output = CubicOutput {
+            offset: &mut self.offset,
+            deviation,
+            tally: &mut self.tally,
+            extent,
+        };
+        let backend = plan.decoder.backend();
+        let mut cubics = plan.cubics.row(v);
+        let map = plan.map_row(v);
+        if !map.is_empty() {
+            // Equal wherever a pixel can be resolved, and already in the cache.
+            cubics.base = map;
+        }
+        offset_row(backend, cubics, input, columns.clone(), output);
+        if sums_variances(v) {
+            let extent = recent.extent(v);
+            sum_variances(
+                backend,
+                cubics,
+                input,
+                extent,
+                &self.offset,
+                &mut self.tally,
+            );
+        }
+        if self.tally.resolved != self.tally.measured {
+            self.triangulate(plan, decoded, v, columns, recent);
+        }
+    }
+
+    /// Triangulates what the cubics do not reach.
+    fn triangulate(
+        &mut self,
+        plan: &Production,
+        decoded: &mut DecodedRow,
+        v: usize,
+        columns: Range<usize>,
+        recent: &mut RecentRows,
+    ) {
+        let Self {
+            offset,
+            tally,
+            exact,
+        } = self;
+        let width = offset.len();
+        for u in columns {
+            if decoded.trust[u] != Trust::Resolved || offset[u] != NO_OFFSET {
                 continue;
             }
-            let base = plan.rises.surface().height[v * self.width + u];
-            let height = Height::from_nm(base.nm().saturating_add(self.rise[u]));
-            let slope = plan.slope((u, v), self.phase[u]);
-            if let Some(point) = plan.triangulator.point(u, v, height) {
-                self.samples.push(Sample {
-                    point,
-                    sigma: plan.sigma_nm(self.modulation[u], slope) * 1e-6,
-                    over: Some((first + at, f64::from(self.rise[u]) * 1e-6)),
-                });
+            *exact += 1;
+            let place = v * width + u;
+            let Some(solution) = plan.solve((u, v), decoded.phase[u]) else {
+                decoded.trust[u] = Trust::OutOfRange;
+                tally.resolved -= 1;
+                continue;
+            };
+            let height = Height::from_mm(solution.point.z).nm();
+            // One above the value for "no offset".
+            let base = base_nm(plan.cubics.surface().height[place]);
+            let nm = height.saturating_sub(base).max(NO_OFFSET + 1);
+            if nm.unsigned_abs() > MAX_NARROW_NM {
+                recent.overflow = Some(v);
             }
+            offset[u] = nm;
+            tally.measured += 1;
+            let compared = plan.taught.compared(place);
+            if compared {
+                recent.row_mut(v).0[u] = nm;
+                tally.compared += 1;
+            }
+            if sums_variances(v) {
+                let taught = u64::from(plan.taught.sigma(place));
+                tally.taught += u64::from(taught != 0);
+                tally.taught_variance += (taught * taught + 128) >> 8;
+            }
+            if sums_variances(v) && compared {
+                tally.summed += 1;
+                let sigma = plan.sigma_nm(decoded.modulation[u], 1.0 / solution.slope);
+                let units = sigma / VARIANCE_UNIT_NM;
+                tally.variance += libm::rint((units * units).min(MAX_VARIANCE)) as u64;
+            }
+        }
+    }
+
+    /// Writes z of row `v`, which was found last, in mm; NaN where there is no height.
+    pub fn store(&self, plan: &Production, v: usize, heights: &mut [f32]) {
+        let golden = &plan.cubics.surface().height[v * self.offset.len()..];
+        for ((mm, &nm), &golden) in heights.iter_mut().zip(&self.offset).zip(golden) {
+            *mm = if nm == NO_OFFSET {
+                f32::NAN
+            } else {
+                ((f64::from(base_nm(golden)) + f64::from(nm)) / 1e6) as f32
+            };
         }
     }
 }
 
+/// Whether the variances of row `v` are summed.
+fn sums_variances(v: usize) -> bool {
+    v.is_multiple_of(VARIANCE_ROWS)
+}
+
+/// z₀ that offsets count from: golden's height, 0 where that is not known.
+fn base_nm(golden: Height) -> i32 {
+    if golden.is_known() { golden.nm() } else { 0 }
+}
+
 impl Production {
     /// The exact height of a phase.
-    pub(super) fn solve(&self, (u, v): (usize, usize), phase: AbsolutePhase) -> Option<Solution> {
+    fn solve(&self, (u, v): (usize, usize), phase: AbsolutePhase) -> Option<Solution> {
         let (column, row) = (u as f64, v as f64);
-        let place = v * self.rises.surface().width + u;
-        match self.rises.near(place, phase) {
+        let place = v * self.cubics.surface().width + u;
+        match self.cubics.near(place, phase) {
             Some(near) => self
                 .triangulator
                 .solve_near(column, row, phase.turns(), near),
@@ -51,14 +193,14 @@ impl Production {
 
     /// ∂z/∂Φ in mm per turn.
     pub(super) fn slope(&self, (u, v): (usize, usize), phase: AbsolutePhase) -> f64 {
-        let place = v * self.rises.surface().width + u;
-        self.rises.slope(place, phase).unwrap_or_else(|| {
+        let place = v * self.cubics.surface().width + u;
+        self.cubics.slope(place, phase).unwrap_or_else(|| {
             self.solve((u, v), phase)
                 .map_or(0.0, |solution| 1.0 / solution.slope)
         })
     }
 
-    /// σ_z in nm.
+    /// σ_z in nm of a pixel with this modulation and ∂z/∂Φ.
     pub(super) fn sigma_nm(&self, modulation: Modulation, slope: f64) -> f64 {
         let turns = self.decoder.phase_noise(modulation, self.noise_counts);
         libm::fabs(turns * slope) * 1e6

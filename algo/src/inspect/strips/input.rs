@@ -1,25 +1,24 @@
-//! Input of an inspection: the frames, or the levels that were decoded on arrival.
+//! Input of an inspection: all frames, or those of the finest level and what was decoded of the others on arrival.
 
 use super::Production;
 use crate::frame::FrameView;
-use crate::phase::{Arrived, DecodeError, PhaseRow};
-use core::ops::Range;
+use crate::phase::{Arrived, DecodeError};
 
-/// What a part is inspected from; either way gives the same bits.
+/// What a part is inspected from; either form gives the same bits.
 #[derive(Clone, Copy, Debug)]
-pub enum Light<'a> {
+pub enum Input<'a> {
     /// All frames of the sequence.
     Frames(&'a [FrameView<'a>]),
-    /// The frames of the finest level, and what all others said when they arrived ([`crate::pipeline::arrive`]).
+    /// What was decoded of all other levels when they arrived ([`crate::pipeline::arrive`]), and the frames of the finest level.
     Finest(&'a Arrived, &'a [FrameView<'a>]),
 }
 
 impl Production {
-    /// Number and size of the frames.
-    pub(super) fn check(&self, light: Light<'_>) -> Result<(), DecodeError> {
-        let frames = match light {
-            Light::Frames(frames) => self.decoder.check(frames).map(|()| frames)?,
-            Light::Finest(arrived, frames) => {
+    /// Checks number and size of the frames.
+    pub(super) fn check(&self, input: Input<'_>) -> Result<(), DecodeError> {
+        let frames = match input {
+            Input::Frames(frames) => self.decoder.check(frames).map(|()| frames)?,
+            Input::Finest(arrived, frames) => {
                 self.decoder.check_last(frames, arrived).map(|()| frames)?
             }
         };
@@ -32,23 +31,6 @@ impl Production {
                 expected,
                 given,
             }),
-        }
-    }
-
-    /// Decodes columns of row `v`.
-    pub(super) fn decode(
-        &self,
-        light: Light<'_>,
-        v: usize,
-        columns: Range<usize>,
-        out: PhaseRow<'_>,
-    ) {
-        let (decoder, map) = (&self.decoder, self.map_row(v));
-        match light {
-            Light::Frames(frames) => decoder.row(frames, v, map, columns, out),
-            Light::Finest(arrived, frames) => {
-                decoder.last_row(arrived, frames, v, map, columns, out);
-            }
         }
     }
 }

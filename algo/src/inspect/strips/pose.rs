@@ -1,8 +1,8 @@
-//! Where each pixel of a cycle lies on the part as it was taught: the part's motion, taken back.
+//! The pose field: by how much the motion of a part displaces what each pixel sees.
 //!
-//! A pixel that sees height z sees the part's point p; taken back by the motion, p is seen at (u, v) + (du, dv) and lies
-//! dz higher. These are worked out at nodes, for two heights, and interpolated between: over the distance of two nodes and
-//! the heights of a part they are linear next to exactly.
+//! A pixel that sees height z sees the part's point p. With the motion taken back, p is seen at (u, v) + (du, dv) and lies dz higher.
+//! These three values are worked out at nodes, for two heights each, and interpolated between: over the distance of two nodes
+//! and the heights of a part they are linear in good approximation (0.003 pixels, see [`SPACING`]).
 
 use super::Production;
 use crate::geometry::Vector;
@@ -17,7 +17,7 @@ pub(super) const SPACING: usize = 64;
 /// Values of a node: du, dv (pixels), dz (mm).
 const VALUES: usize = 3;
 
-/// Values at the middle height, and their change per mm of height.
+/// The values of a node at the middle height, and their change per mm of height.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Node {
     pub value: [f32; VALUES],
@@ -25,7 +25,7 @@ pub(super) struct Node {
 }
 
 impl Node {
-    /// This node at 0 and another at 1.
+    /// Interpolates between this node (`share` 0) and another (1).
     pub fn between(&self, other: &Self, share: f32) -> Self {
         let mix = |a: [f32; VALUES], b: [f32; VALUES]| {
             core::array::from_fn(|i| a[i] + (b[i] - a[i]) * share)
@@ -37,27 +37,30 @@ impl Node {
     }
 }
 
-/// How the part of a cycle lies.
+/// How the part of a cycle lies, and what that does to every pixel.
 #[derive(Debug)]
-pub(super) struct Stance {
-    /// None if it is taken to lie as taught.
+pub(super) struct PoseField {
+    /// None if the part is taken to lie as taught; then regions and nodes are not used.
     pub placed: Option<Placed>,
-    /// Where the plan's regions are now, if it was placed.
+    /// The regions of the gauges, moved with the part.
     regions: Vec<Region>,
     crossings: Vec<f64>,
-    /// Row-major; of use if it was placed.
+    /// Row-major.
     nodes: Vec<Node>,
     columns: usize,
 }
 
-impl Stance {
-    /// As taught.
+impl PoseField {
+    /// Of a part that lies as taught.
     pub fn new(plan: &Production) -> Self {
         let (width, height) = plan.size();
         let columns = (width - 1).div_ceil(SPACING) + 1;
         let rows = (height - 1).div_ceil(SPACING) + 1;
         let (regions, nodes) = match plan.alignment {
-            Some(_) => (plan.regions.clone(), vec![Node::default(); columns * rows]),
+            Some(_) => (
+                plan.gauges.regions.clone(),
+                vec![Node::default(); columns * rows],
+            ),
             None => Default::default(),
         };
         Self {
@@ -69,10 +72,10 @@ impl Stance {
         }
     }
 
-    /// The part was found to lie so; none if it is taken to lie as taught.
-    pub fn place(&mut self, plan: &Production, placed: Option<Placed>) {
+    /// Takes the part to lie so; as taught if none.
+    pub fn set(&mut self, plan: &Production, placed: Option<Placed>) {
         let (width, height) = plan.size();
-        // Of a plan that does not align, parts lie as taught.
+        // Without an alignment parts are taken to lie as taught.
         self.placed = placed.filter(|_| plan.alignment.is_some());
         if let Some(Placed { motion, .. }) = &self.placed {
             for_each_row(&mut self.nodes, self.columns, |row, nodes| {
@@ -81,22 +84,22 @@ impl Stance {
                     *node = plan.node(motion, ((column * SPACING).min(width - 1), v));
                 }
             });
-            for (region, taught) in self.regions.iter_mut().zip(&plan.regions) {
+            for (region, taught) in self.regions.iter_mut().zip(&plan.gauges.regions) {
                 let to = |at| plan.moved(motion, at);
                 region.become_moved(taught, (width, height), to, &mut self.crossings);
             }
         }
     }
 
-    /// A region of the plan, where it is now.
+    /// A region of the plan, moved with the part.
     pub fn region<'a>(&'a self, plan: &'a Production, at: usize) -> &'a Region {
         match self.placed {
             Some(_) => &self.regions[at],
-            None => &plan.regions[at],
+            None => &plan.gauges.regions[at],
         }
     }
 
-    /// The nodes of row `v`.
+    /// The nodes of row `v` of a frame of `height` rows, interpolated between the rows of nodes above and below.
     pub fn row(&self, v: usize, height: usize, out: &mut Vec<Node>) {
         let (upper, lower) = (
             v / SPACING,
@@ -115,13 +118,13 @@ impl Stance {
     }
 }
 
-/// Room for the nodes of a row.
-pub(super) fn room(width: usize) -> Vec<Node> {
+/// Nodes for a row of `width` pixels.
+pub(super) fn nodes_of_row(width: usize) -> Vec<Node> {
     vec![Node::default(); width.div_ceil(SPACING) + 1]
 }
 
 impl Production {
-    /// A node at pixel (u, v); not a number where the pixel sees nothing.
+    /// The node at pixel (u, v); NaN where the pixel sees nothing.
     fn node(&self, motion: &Motion, (u, v): (usize, usize)) -> Node {
         let (middle, half) = self.levels;
         let at = |z: f64| {
@@ -146,12 +149,12 @@ impl Production {
             .point(u, v, crate::units::Height::from_mm(z))
     }
 
-    /// Where the place of the taught part that was seen at (u, v) is seen now.
+    /// Where the point of the part that was seen at (u, v) when it was taught is seen now.
     fn moved(&self, motion: &Motion, (u, v): (f64, f64)) -> (f64, f64) {
         let (width, height) = self.size();
         let column = libm::rint(u.clamp(0.0, (width - 1) as f64));
         let row = libm::rint(v.clamp(0.0, (height - 1) as f64));
-        let taught = self.rises.surface().height[row as usize * width + column as usize];
+        let taught = self.cubics.surface().height[row as usize * width + column as usize];
         let z = if taught.is_known() {
             taught.mm()
         } else {

@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Taught {
     /// [`COMPARED`], [`SQUARE`] and σ.
-    pub(super) pixels: Vec<u16>,
+    pixels: Vec<u16>,
     /// Empty where all that is compared counts in full.
     weights: Vec<Weight>,
 }
@@ -42,6 +42,16 @@ impl Taught {
         size_of_val(&*self.pixels) + size_of_val(&*self.weights)
     }
 
+    /// All pixels, row-major: [`COMPARED`], [`SQUARE`] and σ.
+    pub(super) fn pixels(&self) -> &[u16] {
+        &self.pixels
+    }
+
+    /// The pixels of row `v` of a frame of `width` columns.
+    pub(super) fn row(&self, v: usize, width: usize) -> &[u16] {
+        &self.pixels[v * width..(v + 1) * width]
+    }
+
     /// Marks the places where the four pixels to the right and below are all compared.
     pub(super) fn mark_squares(&mut self, width: usize) {
         for place in 0..self.pixels.len().saturating_sub(width + 1) {
@@ -72,7 +82,7 @@ impl Taught {
         self.pixels[place] & COMPARED != 0
     }
 
-    /// σ in its units.
+    /// σ in units of 32 nm, 0 where not known.
     pub(super) fn sigma(&self, place: usize) -> u16 {
         self.pixels[place] & SIGMA
     }

@@ -1,7 +1,7 @@
-//! Where golden's pixels have weights that are not 1: few places, found quickly.
+//! Stage 4, accumulate: weights of deviations. Few pixels have one that is not 1; tiles tell quickly where.
 
 use super::Taught;
-use crate::pipeline::NO_RISE;
+use crate::pipeline::NO_OFFSET;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::RangeInclusive;
@@ -18,7 +18,7 @@ pub(super) struct WeightedTiles {
 const TILE: usize = 32;
 
 impl WeightedTiles {
-    /// Of a frame of `width` columns; none where all that is compared counts in full.
+    /// Of a frame of `width` columns; none if every compared pixel counts in full.
     pub fn new(width: usize, taught: &Taught) -> Option<Self> {
         let weights = taught.weights();
         let across = width.div_ceil(TILE);
@@ -30,7 +30,7 @@ impl WeightedTiles {
         (!weights.is_empty()).then_some(Self { width, tiles })
     }
 
-    /// Multiplies deviations along a row by the weights of golden's pixels (column, row) that they were found at.
+    /// Multiplies deviations along a row by the weights at their taught coordinates.
     pub fn apply(&self, taught: &Taught, columns: &[i32], rows: &[i32], deviations: &mut [i32]) {
         let blocks = columns.chunks(TILE).zip(rows.chunks(TILE));
         for ((columns, rows), deviations) in blocks.zip(deviations.chunks_mut(TILE)) {
@@ -38,7 +38,7 @@ impl WeightedTiles {
                 continue;
             }
             for ((deviation, &column), &row) in deviations.iter_mut().zip(columns).zip(rows) {
-                if *deviation != NO_RISE {
+                if *deviation != NO_OFFSET {
                     let weight = taught.weight(row as usize * self.width + column as usize);
                     *deviation = weight.apply(i64::from(*deviation)) as i32;
                 }
@@ -46,10 +46,10 @@ impl WeightedTiles {
         }
     }
 
-    /// Whether a tile that these columns and rows touch has a weight that is not 1.
+    /// Whether a tile between these columns and rows has a weight that is not 1.
     fn any(&self, columns: RangeInclusive<i32>, rows: RangeInclusive<i32>) -> bool {
         let across = self.width.div_ceil(TILE);
-        // Pixels that no deviation was found at may be anywhere.
+        // Coordinates of pixels without a deviation may lie outside of the frame.
         let tile = |pixel: i32, tiles: usize| (pixel.max(0) as usize / TILE).min(tiles - 1);
         let down = self.tiles.len() / across;
         (tile(*rows.start(), down)..=tile(*rows.end(), down)).any(|row| {
@@ -89,7 +89,7 @@ mod tests {
             let inside = |column: i32| (0..WIDTH as i32).contains(&column);
             let before: Vec<i32> = columns
                 .iter()
-                .map(|&c| if inside(c) { 1000 } else { NO_RISE })
+                .map(|&c| if inside(c) { 1000 } else { NO_OFFSET })
                 .collect();
             let mut after = before.clone();
             tiles.apply(&taught, &columns, &[row; WIDTH], &mut after);

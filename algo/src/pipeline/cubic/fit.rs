@@ -7,7 +7,7 @@ use core::ops::Range;
 
 /// Coefficients of y² and y³ are stored in units of this many nm: their rounding is below 0.05 µm each.
 pub(super) const UNIT_NM: f64 = 100.0;
-/// The farthest a cubic is used from the known height, mm: rises in nm are rounded as singles below 2²².
+/// The farthest a cubic is used from the known height, mm: offsets in nm are rounded in single precision below 2²².
 const MAX_RISE_MM: f64 = 4.1;
 /// A cubic is off an exact height by at most this many mm. A fifth of the largest error that is allowed, as between the
 /// nodes it may be larger; its RMS is far smaller.
@@ -119,8 +119,8 @@ impl<'a> Fitting<'a> {
         let share = 1.0 / self.range;
         let mut nodes = [(0.0, 0.0); NODES.len()];
         for (node, part) in nodes.iter_mut().zip(NODES) {
-            let rise = part * step;
-            *node = ((sight.phase(height + rise)? - phase) * share, rise);
+            let offset = part * step;
+            *node = ((sight.phase(height + offset)? - phase) * share, offset);
         }
         let ends = [nodes[0].0, nodes[LAST].0];
         let rising = ends[1] > ends[0];
@@ -140,9 +140,9 @@ impl<'a> Fitting<'a> {
             third: stored(third)?,
             reach,
         };
-        let fits = nodes.iter().all(|&(y, rise)| {
+        let fits = nodes.iter().all(|&(y, offset)| {
             // Also catches what is not finite.
-            libm::fabs(cubic.rise(y) - rise) <= MAX_MISS_MM
+            libm::fabs(cubic.offset(y) - offset) <= MAX_MISS_MM
         });
         fits.then_some(cubic)
     }
@@ -158,26 +158,26 @@ fn stored(mm: f64) -> Option<i16> {
 
 impl Cubic {
     /// z − z₀ in mm.
-    fn rise(&self, y: f64) -> f64 {
+    fn offset(&self, y: f64) -> f64 {
         let [second, third] = [self.second, self.third].map(|units| f64::from(units) * UNIT_NM);
         y * (f64::from(self.first) + y * (second + y * third)) * 1e-6
     }
 }
 
-/// The coefficients of y, y² and y³ that fit (y, rise) best.
+/// The coefficients of y, y² and y³ that fit (y, offset) best.
 fn least_squares(nodes: &[(f64, f64)]) -> Option<[f64; 3]> {
-    // Sums of y² to y⁶, and of rise times y to y³.
+    // Sums of y² to y⁶, and of offset times y to y³.
     let (mut powers, mut right) = ([0.0; 5], [0.0; 3]);
-    for &(y, rise) in nodes {
+    for &(y, offset) in nodes {
         let square = y * y;
         let mut power = square;
         for sum in &mut powers {
             *sum += power;
             power *= y;
         }
-        right[0] += rise * y;
-        right[1] += rise * square;
-        right[2] += rise * square * y;
+        right[0] += offset * y;
+        right[1] += offset * square;
+        right[2] += offset * square * y;
     }
     let [a, b, c, d, e] = powers;
     // The matrix [a b c; b c d; c d e] by its cofactors.

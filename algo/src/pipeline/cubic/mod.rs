@@ -1,4 +1,4 @@
-//! Heights about a known surface: z − z₀ as a cubic of Φ − Φ₀, planned for every pixel.
+//! Height offsets from a known surface: z − z₀ as a cubic of Φ − Φ₀, planned for every pixel.
 //!
 //! The cubic is fitted to exact evaluations of Φ(z) on the pixel's line of sight, and holds within the pixel's own
 //! reach: the largest |Φ − Φ₀| up to the declared range for which it stays next to the exact height. Further away, and
@@ -9,8 +9,8 @@ mod near;
 mod row;
 
 pub(crate) use row::{
-    COMPARED, RiseRow, Risen, RowTally, SIGMA, SQUARE, Seen, UNKNOWN, VARIANCE_UNIT_NM, rise_row,
-    weigh_row,
+    COMPARED, CubicInput, CubicOutput, CubicRow, HeightTally, NO_OFFSET, SIGMA, SQUARE,
+    VARIANCE_UNIT_NM, offset_row, sum_variances,
 };
 
 use super::{Window, for_each};
@@ -34,9 +34,9 @@ pub struct KnownSurface {
     pub height: Vec<Height>,
 }
 
-/// The heights of every pixel about a known surface.
+/// The cubics of all pixels, which give their heights about a known surface.
 #[derive(Clone, Debug)]
-pub struct Rises {
+pub struct HeightCubics {
     surface: KnownSurface,
     /// The declared range in turns, of which y = 1 is the end.
     range: f64,
@@ -54,7 +54,7 @@ const REACH_UNIT: f64 = 1.0 / 128.0;
 /// The largest range that a reach can express, turns.
 const MAX_RANGE: f64 = 127.0 * REACH_UNIT;
 
-impl Rises {
+impl HeightCubics {
     /// Plans the pixels inside `window` for |Φ − Φ₀| up to `range` turns (or a little less than a turn).
     ///
     /// Where z₀ is known and Φ₀ is not, Φ₀ is worked out: exactly up to `around` pixels from the next place where it is
@@ -70,7 +70,7 @@ impl Rises {
         let width = surface.width.max(1);
         let range = range.clamp(REACH_UNIT, MAX_RANGE);
         let near = Near::new(&surface, around);
-        let mut rises = Self {
+        let mut cubics = Self {
             surface,
             range,
             first: vec![0.0; pixels],
@@ -79,15 +79,15 @@ impl Rises {
             reach: vec![0; pixels],
         };
         let fitting = Fitting::new(triangulator, range);
-        let heights = &rises.surface.height;
-        let rows = rises
+        let heights = &cubics.surface.height;
+        let rows = cubics
             .surface
             .phase
             .chunks_mut(width)
-            .zip(rises.first.chunks_mut(width))
-            .zip(rises.second.chunks_mut(width))
-            .zip(rises.third.chunks_mut(width))
-            .zip(rises.reach.chunks_mut(width))
+            .zip(cubics.first.chunks_mut(width))
+            .zip(cubics.second.chunks_mut(width))
+            .zip(cubics.third.chunks_mut(width))
+            .zip(cubics.reach.chunks_mut(width))
             .collect();
         for_each(
             rows,
@@ -113,7 +113,7 @@ impl Rises {
                 }
             },
         );
-        rises
+        cubics
     }
 
     /// Bytes that it takes.
@@ -138,30 +138,30 @@ impl Rises {
         f64::from(self.reach[place]) * REACH_UNIT
     }
 
-    /// The heights of phases of row `v`, [`Height::UNKNOWN`] where the cubic does not reach them: what production computes,
-    /// without anything around it. Slices are as long as the row.
+    /// The heights of phases of row `v`, [`Height::UNKNOWN`] where the cubic does not reach them, as production computes them.
+    /// Slices are as long as the row.
     pub fn heights(&self, backend: Backend, v: usize, phase: &[AbsolutePhase], out: &mut [Height]) {
         let width = self.surface.width;
-        let seen = Seen {
+        let seen = CubicInput {
             phase,
             modulation: &vec![Modulation::from_bits(1); width],
             trust: &vec![Trust::Resolved; width],
             taught: &vec![0; width],
             noise: 0.0,
         };
-        let mut rise = vec![UNKNOWN; width];
-        let risen = Risen {
-            rise: &mut rise,
-            deviation: &mut vec![UNKNOWN; width],
-            tally: &mut RowTally::default(),
+        let mut offset = vec![NO_OFFSET; width];
+        let output = CubicOutput {
+            offset: &mut offset,
+            deviation: &mut vec![NO_OFFSET; width],
+            tally: &mut HeightTally::default(),
             extent: &mut (0..0),
         };
-        rise_row(backend, self.row(v), seen, 0..width, risen);
+        offset_row(backend, self.row(v), seen, 0..width, output);
         let bases = &self.surface.height[v * width..];
-        for ((out, base), rise) in out.iter_mut().zip(bases).zip(rise) {
-            *out = match rise {
-                UNKNOWN => Height::UNKNOWN,
-                _ => Height::from_nm(base.nm() + rise),
+        for ((out, base), offset) in out.iter_mut().zip(bases).zip(offset) {
+            *out = match offset {
+                NO_OFFSET => Height::UNKNOWN,
+                _ => Height::from_nm(base.nm() + offset),
             };
         }
     }
@@ -199,11 +199,11 @@ impl Rises {
         .map(|nm| nm * 1e-6)
     }
 
-    /// What the rises of row `v` are computed from.
-    pub(crate) fn row(&self, v: usize) -> RiseRow<'_> {
+    /// The cubics of row `v`.
+    pub(crate) fn row(&self, v: usize) -> CubicRow<'_> {
         let width = self.surface.width;
         let row = v * width..(v + 1) * width;
-        RiseRow {
+        CubicRow {
             base: &self.surface.phase[row.clone()],
             first: &self.first[row.clone()],
             second: &self.second[row.clone()],

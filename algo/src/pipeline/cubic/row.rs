@@ -1,7 +1,7 @@
-//! A row of phases → a row of rises above the known surface, in nm.
+//! A row of phases → a row of height offsets from the known surface, in nm.
 //!
-//! Plain loops over slices, compiled for each back-end's instructions; singles with + − × ÷ only and whole-number sums,
-//! so that the bits are the same everywhere.
+//! z − z₀ = y (a + y (b + y c)), y = (Φ − Φ₀) / range. Plain loops over slices, compiled for each back-end's instructions; single
+//! precision with + − × ÷ only and sums of whole numbers, so that the bits are the same everywhere.
 
 use super::fit::UNIT_NM;
 use crate::math::nearest::whole;
@@ -10,28 +10,28 @@ use crate::simd::{Lanes, back_end_entry};
 use crate::units::{AbsolutePhase, Height, Modulation};
 use core::ops::Range;
 
-/// The bit of what is taught that says that the part is compared.
+/// The bit of a taught pixel that says that the part is compared there.
 pub(crate) const COMPARED: u16 = 1 << 15;
-/// The bit that says that it is at the pixels to the right, below and right below as well.
+/// The bit that says that it is compared at the pixels to the right, below and right below as well.
 pub(crate) const SQUARE: u16 = 1 << 14;
 /// The bits of σ.
 pub(crate) const SIGMA: u16 = SQUARE - 1;
 /// Variances are summed in units of the square of this many nm, each rounded to nearest.
 pub(crate) const VARIANCE_UNIT_NM: f64 = 512.0;
-/// Standard deviations of the known heights are given in sixteenths of that.
+/// Standard deviations of the known heights are given in 1/16 of that.
 const SIGMAS_PER_UNIT_BITS: u32 = 4;
-/// Half of the square of a unit, in squares of these.
+/// Half of the square of [`VARIANCE_UNIT_NM`], in squares of these.
 const HALF: u32 = 1 << (2 * SIGMAS_PER_UNIT_BITS - 1);
 /// The largest variance that is summed, (1 mm)²: no sum over a block exceeds 32 bits.
 const MAX_VARIANCE: f32 = 4_000_000.0;
 /// Pixels that are skipped together where none is resolved; sums over so many fit into 32 bits.
 const BLOCK: usize = 128;
-/// Pixels that one hint fetches.
+/// Pixels that one prefetch hint covers.
 const FETCHED: usize = 32;
 
-/// A row of the plan.
+/// The cubics of a row.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct RiseRow<'a> {
+pub(crate) struct CubicRow<'a> {
     /// Φ₀.
     pub base: &'a [AbsolutePhase],
     /// Coefficient of y in nm.
@@ -48,12 +48,12 @@ pub(crate) struct RiseRow<'a> {
 
 /// A decoded row and what else is known of its pixels.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen<'a> {
+pub(crate) struct CubicInput<'a> {
     /// Φ.
     pub phase: &'a [AbsolutePhase],
     /// B.
     pub modulation: &'a [Modulation],
-    /// Which to believe.
+    /// Which pixels are resolved.
     pub trust: &'a [Trust],
     /// σ of golden's heights in 32 nm ([`SIGMA`]), 0 where not known; [`COMPARED`] where the part is compared with golden.
     pub taught: &'a [u16],
@@ -61,44 +61,45 @@ pub(crate) struct Seen<'a> {
     pub noise: f32,
 }
 
-/// What a row of rises is written to, and counted in.
+/// What the offsets of a row are written to, and counted in.
 #[derive(Debug)]
-pub(crate) struct Risen<'a> {
-    /// z − z₀ in nm, [`Height::UNKNOWN`]'s bits where the cubic gives none.
-    pub rise: &'a mut [i32],
-    /// The same where the part is compared.
+pub(crate) struct CubicOutput<'a> {
+    /// z − z₀ in nm, [`NO_OFFSET`] where the cubic does not reach.
+    pub offset: &'a mut [i32],
+    /// The same where the part is compared, [`NO_OFFSET`] elsewhere.
     pub deviation: &'a mut [i32],
     /// Sums.
-    pub tally: &'a mut RowTally,
+    pub tally: &'a mut HeightTally,
     /// Columns outside of which no pixel is resolved.
     pub extent: &'a mut Range<usize>,
 }
 
-/// Counts and sums of rises.
+/// Counts and sums over rows of height offsets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct RowTally {
+pub(crate) struct HeightTally {
     /// Resolved pixels.
     pub resolved: u64,
     /// Pixels with a height.
     pub measured: u64,
-    /// Of these those that are compared.
+    /// Pixels with a height that are compared.
     pub compared: u64,
-    /// Of these those of the rows whose variances are summed, and Σ of σ_z² over them.
-    pub weighed: u64,
+    /// Compared pixels of the rows whose variances are summed.
+    pub summed: u64,
+    /// Σ of their σ_z².
     pub variance: u64,
     /// Pixels of these rows with a height whose golden σ is known.
     pub taught: u64,
-    /// Σ of its square.
+    /// Σ of the square of that σ.
     pub taught_variance: u64,
 }
 
-impl RowTally {
-    /// Adds what another counted.
+impl HeightTally {
+    /// Adds another tally.
     pub fn add(&mut self, other: &Self) {
         self.resolved += other.resolved;
         self.measured += other.measured;
         self.compared += other.compared;
-        self.weighed += other.weighed;
+        self.summed += other.summed;
         self.variance += other.variance;
         self.taught += other.taught;
         self.taught_variance += other.taught_variance;
@@ -106,22 +107,22 @@ impl RowTally {
 }
 
 back_end_entry! {
-    /// Rises of columns of a row; everything outside of them is left as it is.
-    fn rise_row [] = rise_columns(
-        plan: RiseRow<'_>,
-        seen: Seen<'_>,
+    /// Offsets of columns of a row; everything outside of them is left as it is.
+    fn offset_row [] = offset_columns(
+        plan: CubicRow<'_>,
+        seen: CubicInput<'_>,
         columns: Range<usize>,
-        out: Risen<'_>,
+        out: CubicOutput<'_>,
     )
 }
 
 #[inline(always)]
-fn rise_columns<V: Lanes>(
+fn offset_columns<V: Lanes>(
     v: V,
-    plan: RiseRow<'_>,
-    seen: Seen<'_>,
+    plan: CubicRow<'_>,
+    seen: CubicInput<'_>,
     columns: Range<usize>,
-    out: Risen<'_>,
+    out: CubicOutput<'_>,
 ) {
     let scale = scale(plan.range);
     let tally = &mut *out.tally;
@@ -131,15 +132,15 @@ fn rise_columns<V: Lanes>(
         let end = (start + BLOCK).min(columns.end);
         let length = end - start;
         let trust = &seen.trust[start..end][..length];
-        let rises = &mut out.rise[start..end][..length];
+        let offsets = &mut out.offset[start..end][..length];
         let deviations = &mut out.deviation[start..end][..length];
         let mut resolved = 0_u8;
         for &trust in trust {
             resolved += u8::from(trust as u8 == Trust::Resolved as u8);
         }
         if resolved == 0 {
-            rises.fill(UNKNOWN);
-            deviations.fill(UNKNOWN);
+            offsets.fill(NO_OFFSET);
+            deviations.fill(NO_OFFSET);
             start = end;
             continue;
         }
@@ -174,8 +175,8 @@ fn rise_columns<V: Lanes>(
             let (b, c) = (coefficient(second[i]), coefficient(third[i]));
             let nm = whole(y * (first[i] + y * (b + y * c)));
             let compare = inside & (taught[i] >= COMPARED);
-            rises[i] = if inside { nm } else { UNKNOWN };
-            deviations[i] = if compare { nm } else { UNKNOWN };
+            offsets[i] = if inside { nm } else { NO_OFFSET };
+            deviations[i] = if compare { nm } else { NO_OFFSET };
             measured += u32::from(inside);
             compared += u32::from(compare);
         }
@@ -186,24 +187,24 @@ fn rise_columns<V: Lanes>(
 }
 
 back_end_entry! {
-    /// Adds the variances of a row's rises to its tally.
-    fn weigh_row [] = weigh_columns(
-        plan: RiseRow<'_>,
-        seen: Seen<'_>,
+    /// Adds the variances of a row's heights, as measured and as taught, to its tally.
+    fn sum_variances [] = sum_columns(
+        plan: CubicRow<'_>,
+        seen: CubicInput<'_>,
         columns: Range<usize>,
-        rise: &[i32],
-        tally: &mut RowTally,
+        offset: &[i32],
+        tally: &mut HeightTally,
     )
 }
 
 #[inline(always)]
-fn weigh_columns<V: Lanes>(
+fn sum_columns<V: Lanes>(
     _: V,
-    plan: RiseRow<'_>,
-    seen: Seen<'_>,
+    plan: CubicRow<'_>,
+    seen: CubicInput<'_>,
     columns: Range<usize>,
-    rise: &[i32],
-    tally: &mut RowTally,
+    offset: &[i32],
+    tally: &mut HeightTally,
 ) {
     let scale = scale(plan.range);
     let mut start = columns.start;
@@ -217,11 +218,11 @@ fn weigh_columns<V: Lanes>(
         let phase = &seen.phase[start..end][..length];
         let taught = &seen.taught[start..end][..length];
         let modulation = &seen.modulation[start..end][..length];
-        let rises = &rise[start..end][..length];
+        let offsets = &offset[start..end][..length];
         let (mut compared, mut variances) = (0_u32, 0_u32);
         let (mut known, mut taught_variances) = (0_u32, 0_u32);
         for i in 0..length {
-            let inside = rises[i] != UNKNOWN;
+            let inside = offsets[i] != NO_OFFSET;
             let compare = inside & (taught[i] >= COMPARED);
             let delta = phase[i].to_bits().wrapping_sub(base[i].to_bits());
             let y = delta as f32 * scale;
@@ -242,7 +243,7 @@ fn weigh_columns<V: Lanes>(
             known += u32::from(inside & (sigma != 0));
             taught_variances = taught_variances.wrapping_add(if inside { square } else { 0 });
         }
-        tally.weighed += u64::from(compared);
+        tally.summed += u64::from(compared);
         tally.variance += u64::from(variances);
         tally.taught += u64::from(known);
         tally.taught_variance += u64::from(taught_variances);
@@ -262,5 +263,5 @@ fn coefficient(units: i16) -> f32 {
     f32::from(units) * UNIT_NM as f32
 }
 
-/// "No height" among rises.
-pub(crate) const UNKNOWN: i32 = Height::UNKNOWN.nm();
+/// "No height" among offsets.
+pub(crate) const NO_OFFSET: i32 = Height::UNKNOWN.nm();

@@ -113,7 +113,7 @@ impl Run {
         let mut kept = self.arrived.lock().unwrap_or_else(PoisonError::into_inner);
         let production = &self.production;
         let (width, height) = (
-            production.rises().surface().width,
+            production.cubics().surface().width,
             production.window().len(),
         );
         let room = kept.take();

@@ -25,7 +25,7 @@ impl Plan {
     pub fn layers(&self, sequence: usize, frames: &[Frame]) -> Option<Layers> {
         let maps = self.heights(sequence, frames)?;
         let production = &self.runs.get(sequence)?.production;
-        let golden = &production.rises().surface().height;
+        let golden = &production.cubics().surface().height;
         let deviation = maps.height_mm.iter().zip(golden).map(|(&here, golden)| {
             if golden.is_known() {
                 here - golden.mm() as f32

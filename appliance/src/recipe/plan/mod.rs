@@ -20,10 +20,10 @@ use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_L
 use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
-use algo::inspect::{Findings, Light, Production, Strips};
+use algo::inspect::{Findings, Input, Production, Strips};
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use algo::phase::Arrived;
-use algo::pipeline::Rises;
+use algo::pipeline::HeightCubics;
 use algo::units::{AbsolutePhase, Height};
 use hal::frame::Frame;
 use hal::projector::Raster;
@@ -210,12 +210,12 @@ impl Plan {
         // Freed before the expansion of the height is allocated, which takes the most memory.
         drop(arrays);
         let range = conditions.expansion_range_turns;
-        let rises = Rises::new(&triangulator, surface, range, &window, away.max(AROUND));
+        let cubics = HeightCubics::new(&triangulator, surface, range, &window, away.max(AROUND));
         let shared = Shared {
             conditions: &conditions,
             aligned,
             triangulator: Arc::new(triangulator),
-            rises: Arc::new(rises),
+            cubics: Arc::new(cubics),
             gauges,
             window,
         };
@@ -253,7 +253,7 @@ impl Plan {
             false => 0,
         };
         let runs: usize = self.runs.iter().map(|run| run.bytes).sum();
-        production.rises().bytes() + samples * size_of::<f64>() + runs
+        production.cubics().bytes() + samples * size_of::<f64>() + runs
     }
 
     /// Levels of the sequence that is tried first.
@@ -378,17 +378,17 @@ impl Plan {
             let full = |_| format!("{} frames are more than any sequence has", frames.len());
             views.push(view).map_err(full)?;
         }
-        let light = match finest {
-            Some((arrived, last)) => Light::Finest(arrived, last),
-            None => Light::Frames(&views),
+        let input = match finest {
+            Some((arrived, last)) => Input::Finest(arrived, last),
+            None => Input::Frames(&views),
         };
         // A poisoned lock does no harm: strips are cleared before they are used.
         let mut strips = self.strips.lock().unwrap_or_else(PoisonError::into_inner);
         let production = &run.production;
-        let placed = production.place(light, &mut strips);
+        let placed = production.place(input, &mut strips);
         laps.end(Stage::Alignment);
         let findings = placed
-            .and_then(|placed| production.inspect_placed(light, &mut strips, placed, heights))
+            .and_then(|placed| production.inspect_placed(input, &mut strips, placed, heights))
             .map_err(|error| error.to_string());
         laps.end(Stage::Strips);
         findings

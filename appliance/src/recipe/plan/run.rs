@@ -7,7 +7,7 @@ use algo::geometry::Triangulator;
 use algo::inspect::{Gauge, Parts, Production, Taught};
 use algo::pattern::{PhaseRange, Sequence, Shot};
 use algo::phase::{Arrived, Decoder};
-use algo::pipeline::Rises;
+use algo::pipeline::HeightCubics;
 use algo::units::AbsolutePhase;
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
@@ -41,7 +41,7 @@ pub(super) struct Shared<'a> {
     pub conditions: &'a Conditions,
     pub aligned: bool,
     pub triangulator: Arc<Triangulator>,
-    pub rises: Arc<Rises>,
+    pub cubics: Arc<HeightCubics>,
     pub gauges: Vec<Gauge>,
     pub window: Vec<Range<usize>>,
 }
@@ -86,7 +86,7 @@ impl Unjoined {
         let production = Production::new(Parts {
             decoder: self.decoder,
             triangulator: Arc::clone(&shared.triangulator),
-            rises: Arc::clone(&shared.rises),
+            cubics: Arc::clone(&shared.cubics),
             map: self.map,
             taught: self.taught,
             gauges: shared.gauges.clone(),

@@ -25,7 +25,7 @@ fn blocks_have_the_bits_of_one_pixel_after_the_other() {
         .clone()
         .map(|at| if scatter(at) % 9 == 0 { 0 } else { SQUARE })
         .collect();
-    let golden = Golden {
+    let golden = GoldenMap {
         height: &height,
         taught: &taught,
         width: WIDTH,
@@ -44,43 +44,43 @@ fn blocks_have_the_bits_of_one_pixel_after_the_other() {
         };
         let nodes: Vec<_> = (0..WIDTH.div_ceil(SPACING) + 1).map(node).collect();
         for v in 0..ROWS {
-            let rise: Vec<_> = (0..WIDTH)
+            let offset: Vec<_> = (0..WIDTH)
                 .map(|u| match scatter(u + v) % 5 {
-                    0 => NO_RISE,
+                    0 => NO_OFFSET,
                     _ => scatter(7 * u + v) >> 12,
                 })
                 .collect();
-            let row = Row {
+            let row = OffsetRow {
                 v,
-                rise: &rise,
+                offset: &offset,
                 nodes: &nodes,
                 middle: 0.3,
             };
             let found = |backend, columns: Range<usize>| {
-                let mut deviation = vec![NO_RISE; WIDTH];
+                let mut deviation = vec![NO_OFFSET; WIDTH];
                 let (mut column, mut line) = (vec![0; WIDTH], vec![0; WIDTH]);
-                let mut wild = false;
-                let out = Found {
+                let mut overflow = false;
+                let out = AlignedRow {
                     deviation: &mut deviation,
                     column: &mut column,
                     row: &mut line,
-                    wild: &mut wild,
+                    overflow: &mut overflow,
                 };
-                find_row(backend, golden, row, columns, out);
-                (deviation, column, line, wild)
+                align_row(backend, golden, row, columns, out);
+                (deviation, column, line, overflow)
             };
             for backend in Backend::available() {
                 let whole = found(backend, 0..WIDTH);
-                let mut wild = false;
+                let mut overflow = false;
                 for u in 0..WIDTH {
                     // A single pixel has the neighbours of no other.
                     let one = found(backend, u..u + 1);
                     assert_eq!(one.0[u], whole.0[u], "{shift} {bend}, {v} {u}");
                     assert_eq!((one.1[u], one.2[u]), (whole.1[u], whole.2[u]));
-                    wild |= one.3;
-                    kinds[usize::from(whole.0[u] == NO_RISE)] += 1;
+                    overflow |= one.3;
+                    kinds[usize::from(whole.0[u] == NO_OFFSET)] += 1;
                 }
-                assert_eq!(wild, whole.3);
+                assert_eq!(overflow, whole.3);
             }
         }
     }

@@ -1,8 +1,8 @@
-//! The square with the largest mean deviation, found from sums down the columns.
+//! The square of largest mean deviation, exactly, from packed sums down the columns.
 
+use super::COUNT_BIT;
 use crate::inspect::deviation::MIN_SUPPORT;
-use crate::inspect::strips::counts::COUNT_BIT;
-use crate::pipeline::NO_RISE;
+use crate::pipeline::NO_OFFSET;
 use core::ops::Range;
 
 /// A square and the deviations in it.
@@ -25,7 +25,7 @@ impl Extreme {
     }
 }
 
-/// Whether sums over squares of `side` pixels of deviations up to `span_nm` fit beside their count.
+/// Whether packed sums hold squares of `side` pixels with deviations of up to `span_nm`.
 pub(in super::super) fn fits(side: usize, span_nm: f64) -> bool {
     let side = (side | 1) as f64;
     let pixels = side * side;
@@ -44,14 +44,14 @@ pub(in super::super) struct SquareRow<'a> {
     pub sums: &'a [i64],
     /// Deviations of the row itself.
     pub centres: &'a [i32],
-    /// Of the squares.
+    /// Side of the squares.
     pub side: usize,
-    /// Its place.
+    /// The row.
     pub row: usize,
 }
 
 impl SquareRow<'_> {
-    /// Looks at the squares around the known pixels of a span. Of equals the last counts.
+    /// Searches the squares around the compared pixels of a span. Of equal ones the last counts.
     pub fn search(&self, best: &mut Option<Extreme>, span: Range<usize>) {
         let reach = self.side / 2 * 2;
         let least = least_support(self.side);
@@ -72,7 +72,7 @@ impl SquareRow<'_> {
                     row: self.row,
                     column,
                 };
-                let counts = found.count >= least && self.centres[column] != NO_RISE;
+                let counts = found.count >= least && self.centres[column] != NO_OFFSET;
                 if counts && best.is_none_or(|best| found.reaches(&best)) {
                     *best = Some(found);
                     floor = floor_of(*best, least);
@@ -83,8 +83,8 @@ impl SquareRow<'_> {
     }
 }
 
-/// No sum of at least `least` deviations below this reaches the best.
+/// A sum of at least `least` deviations whose magnitude is below this does not reach the best mean.
 pub(in super::super) fn floor_of(best: Option<Extreme>, least: i64) -> i64 {
-    // Rounded down, so nothing that could reach it is left out.
+    // Rounded down, so that a sum of just that mean still reaches it.
     best.map_or(0, |best| best.sum.abs() * least / best.count)
 }

@@ -1,33 +1,33 @@
-//! Which squares of a row can have the largest deviation at all: sums in 32 bits, many pixels at a time.
+//! Sums over squares in 32 bits, many pixels at a time: they tell where in a row the largest deviation may be.
 
+use super::COUNT_BIT;
 use super::extreme::{Extreme, SquareRow, floor_of, least_support};
-use crate::inspect::strips::counts::COUNT_BIT;
-use crate::pipeline::NO_RISE;
+use crate::pipeline::NO_OFFSET;
 use crate::simd::{Backend, Lanes, back_end_entry};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// Rises up to this many nm are summed in 32 bits: more than a cubic gives.
-pub(in super::super) const MAX_TAME: u32 = 1 << 22;
-/// Squares of up to so many pixels of them.
-const MAX_PIXELS: usize = (i32::MAX as u32 / MAX_TAME) as usize;
-/// Squares that are looked at together.
+/// Deviations up to this many nm are summed in 32 bits: more than a cubic gives.
+pub(in super::super) const MAX_NARROW_NM: u32 = 1 << 22;
+/// Sums over squares of up to so many such deviations do not overflow.
+const MAX_PIXELS: usize = (i32::MAX as u32 / MAX_NARROW_NM) as usize;
+/// Squares that are tested together.
 const BLOCK: usize = 64;
 
 /// Sums over the squares around the pixels of a row.
 #[derive(Debug)]
-pub(in super::super) struct Squares {
-    /// Of columns of the square's height.
+pub(super) struct NarrowSums {
+    /// Sums down single columns.
     columns: Vec<i32>,
-    /// Of some columns.
+    /// Sums over some neighbouring columns.
     some: Vec<i32>,
-    /// Of as many as the square has: around the first column and those behind it.
+    /// Sums over as many columns as a square has, from the square around column `first` on.
     all: Vec<i32>,
     first: usize,
 }
 
-impl Squares {
+impl NarrowSums {
     /// For so many columns with their padding.
     pub fn new(columns: usize) -> Self {
         Self {
@@ -38,7 +38,7 @@ impl Squares {
         }
     }
 
-    /// Whether sums over squares of this side fit.
+    /// Whether sums over squares of this side fit into 32 bits.
     pub fn hold(side: usize) -> bool {
         (side | 1) * (side | 1) < MAX_PIXELS
     }
@@ -57,7 +57,8 @@ impl Squares {
         if bits == 0 {
             all[..length].copy_from_slice(&columns[..length]);
         }
-        // From the highest bit of the side down: twice as many columns, and one more where the bit is set.
+        // Sums over `wide` neighbouring columns, from the highest bit of the side down: doubled, and one column more where the bit
+        // is set.
         let mut wide = 1;
         for bit in (0..bits).rev() {
             core::mem::swap(all, some);
@@ -74,7 +75,7 @@ impl Squares {
         }
     }
 
-    /// Looks closer where a sum is large enough to matter.
+    /// Searches a span for the largest deviation: exactly, in the blocks in which a sum is large enough.
     pub fn search(
         &self,
         backend: Backend,
@@ -93,7 +94,7 @@ impl Squares {
             let floor = floor_of(*best, least_support(row.side));
             sift(backend, sums, centres, floor, &mut reached);
             if reached {
-                // No square of the block has fewer deviations than this: mostly all that there can be.
+                // A larger floor, as no square of the block has fewer deviations than the least count allows.
                 let mut least = i64::MAX;
                 least_count(
                     backend,
@@ -111,17 +112,17 @@ impl Squares {
 }
 
 back_end_entry! {
-    /// Whether a sum around a known centre reaches a floor.
+    /// Whether the sum of a square whose middle is compared reaches ± `floor`.
     fn sift [] = sift_sums(sums: &[i32], centres: &[i32], floor: i64, reached: &mut bool)
 }
 
 back_end_entry! {
-    /// The smallest count of packed sums, or what was there if it is smaller.
+    /// Lowers `least` to the smallest count of packed sums.
     fn least_count [] = least_of(sums: &[i64], least: &mut i64)
 }
 
 back_end_entry! {
-    /// The low halves of packed sums: the sums themselves, as far as 32 bits hold them.
+    /// The low halves of packed sums: the sums themselves where 32 bits hold them.
     fn unpack [] = unpack_columns(sums: &[i64], out: &mut [i32])
 }
 
@@ -146,7 +147,7 @@ fn sift_sums<V: Lanes>(_: V, sums: &[i32], centres: &[i32], floor: i64, reached:
     let mut any = 0_u32;
     for i in 0..sums.len() {
         let far = (sums[i] >= floor) | (sums[i] <= -floor);
-        any |= u32::from(far & (centres[i] != NO_RISE));
+        any |= u32::from(far & (centres[i] != NO_OFFSET));
     }
     *reached = any != 0;
 }
@@ -155,7 +156,7 @@ fn sift_sums<V: Lanes>(_: V, sums: &[i32], centres: &[i32], floor: i64, reached:
 fn least_of<V: Lanes>(_: V, sums: &[i64], least: &mut i64) {
     let mut smallest = i64::MAX;
     for &packed in sums {
-        // Sums are of either sign: counts are next to whole.
+        // A negative sum borrows from the count: half a count is added.
         let lifted = packed + (1 << (COUNT_BIT - 1));
         smallest = if lifted < smallest { lifted } else { smallest };
     }

@@ -1,0 +1,160 @@
+//! What inspecting parts needs, worked out once.
+
+use super::coverage::Threshold;
+use super::gauges::{Gauge, Gauges, Unmeasurable};
+use super::taught::Taught;
+use super::weighted::WeightedTiles;
+use crate::geometry::Triangulator;
+use crate::inspect::align::{Alignment, GoldenSurface, levels};
+use crate::phase::Decoder;
+use crate::pipeline::{HeightCubics, VARIANCE_UNIT_NM};
+use crate::simd::Backend;
+use crate::units::{AbsolutePhase, Modulation};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::ops::Range;
+
+/// What production is made of.
+#[derive(Debug)]
+pub struct Parts {
+    /// How frames become phases.
+    pub decoder: Decoder,
+    /// Exact heights.
+    pub triangulator: Arc<Triangulator>,
+    /// How phases become heights.
+    pub cubics: Arc<HeightCubics>,
+    /// Φ₀ that phases are unwrapped about, row-major, where it is not that of the cubics; a part of it.
+    pub map: Option<Vec<AbsolutePhase>>,
+    /// The part as taught.
+    pub taught: Taught,
+    /// What is measured.
+    pub gauges: Vec<Gauge>,
+    /// The columns of each row that are looked at: every gauge's region with half its smoothing and the part's motion around.
+    pub window: Vec<Range<usize>>,
+    /// σ of one sample.
+    pub noise_counts: f64,
+    /// Whether the part's motion is found and taken back.
+    pub aligned: bool,
+}
+
+/// Everything that inspecting parts needs, worked out once.
+#[derive(Debug)]
+pub struct Production {
+    pub(super) decoder: Decoder,
+    /// Φ₀ that phases are unwrapped about, where it is not that of the cubics.
+    pub(super) map: Option<Vec<AbsolutePhase>>,
+    pub(super) triangulator: Arc<Triangulator>,
+    pub(super) cubics: Arc<HeightCubics>,
+    pub(super) taught: Taught,
+    /// None if every compared pixel counts in full.
+    pub(super) weighted: Option<WeightedTiles>,
+    /// Columns of each row that are looked at.
+    pub(super) window: Vec<Range<usize>>,
+    /// Pixels inside the window that are compared.
+    pub(super) compared: u64,
+    /// σ of one sample.
+    pub(super) noise_counts: f64,
+    /// The same as [`crate::pipeline::CubicInput::noise`].
+    pub(super) variance_scale: f32,
+    /// None where parts are taken to lie as taught.
+    pub(super) alignment: Option<Alignment>,
+    /// The middle of golden's heights and half their span, mm.
+    pub(super) levels: (f64, f64),
+    pub(super) gauges: Gauges,
+}
+
+impl Production {
+    /// Joins what is known of head and part.
+    ///
+    /// # Errors
+    /// If there are too many gauges, or one's squares are so large that sums of heights over them could overflow, or so small
+    /// that there are too many.
+    pub fn new(parts: Parts) -> Result<Self, Unmeasurable> {
+        let Parts {
+            decoder,
+            triangulator,
+            cubics,
+            map,
+            mut taught,
+            gauges,
+            window,
+            noise_counts,
+            aligned,
+        } = parts;
+        let width = cubics.surface().width;
+        taught.mark_squares(width.max(1));
+        let compared = window.iter().enumerate().map(|(v, columns)| {
+            let row = v * width + columns.start..v * width + columns.end;
+            row.filter(|&place| taught.compared(place)).count() as u64
+        });
+        let compared = compared.sum();
+        let turns = decoder.phase_noise(Modulation::from_bits(1), noise_counts) / cubics.range();
+        let golden = GoldenSurface {
+            triangulator: &triangulator,
+            surface: cubics.surface(),
+            taught: &taught,
+        };
+        let alignment = match aligned {
+            true => Alignment::new(golden, &window),
+            false => None,
+        };
+        let range = triangulator.range();
+        let span_nm = (range.high - range.low) * 1e6;
+        let threshold = Threshold::new(&decoder, noise_counts);
+        let gauges = Gauges::new(gauges, golden, alignment.as_ref(), span_nm, threshold)?;
+        Ok(Self {
+            levels: levels(&cubics.surface().height, width, &window),
+            variance_scale: ((turns / VARIANCE_UNIT_NM) * (turns / VARIANCE_UNIT_NM)) as f32,
+            decoder,
+            map,
+            triangulator,
+            cubics,
+            weighted: WeightedTiles::new(width, &taught),
+            taught,
+            window,
+            compared,
+            noise_counts,
+            alignment,
+            gauges,
+        })
+    }
+
+    /// Columns and rows of the frame.
+    pub(super) fn size(&self) -> (usize, usize) {
+        (self.cubics.surface().width, self.window.len())
+    }
+
+    pub(super) fn golden(&self) -> GoldenSurface<'_> {
+        GoldenSurface {
+            triangulator: &self.triangulator,
+            surface: self.cubics.surface(),
+            taught: &self.taught,
+        }
+    }
+
+    /// The same on another back-end of this machine, with the same bits.
+    pub fn with_backend(self, backend: Backend) -> Self {
+        let decoder = self.decoder.with_backend(backend);
+        Self { decoder, ..self }
+    }
+
+    /// The columns of each row that are looked at.
+    pub fn window(&self) -> &[Range<usize>] {
+        &self.window
+    }
+
+    /// How phases become heights.
+    pub fn cubics(&self) -> &HeightCubics {
+        &self.cubics
+    }
+
+    /// How frames become phases.
+    pub fn decoder(&self) -> &Decoder {
+        &self.decoder
+    }
+
+    /// Exact heights.
+    pub fn triangulator(&self) -> &Triangulator {
+        &self.triangulator
+    }
+}
