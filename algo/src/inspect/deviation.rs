@@ -22,15 +22,15 @@ pub struct Golden {
 pub struct Reading {
     /// The value in mm or as a share.
     pub value: f64,
-    /// Its error from measurement to measurement of the same part, 1 σ, where the noise is known. What golden's own noise
-    /// does to it is the same every time and not in it.
+    /// Its error over repeated measurements of the same part, 1 σ, where the noise is known. Golden's own noise adds the same error
+    /// every time and is not in it.
     pub sigma: Option<f64>,
 }
 
 /// A measured height map beside the golden one.
 ///
-/// Sums of deviations over rectangles come from integral tables, so that any number of gauges over
-/// any smoothing costs one pass each over their region.
+/// The comparison of whole maps that production by strips ([`Production`](super::Production)) is tested against. Sums over
+/// rectangles come from integral tables.
 #[derive(Clone, Debug)]
 pub struct Comparison<'a> {
     golden: &'a Golden,
@@ -41,7 +41,7 @@ pub struct Comparison<'a> {
     count: Vec<u32>,
 }
 
-/// A smoothed deviation needs at least this share of its square's pixels.
+/// A mean over a square needs at least this share of its pixels.
 pub(super) const MIN_SUPPORT: f64 = 0.5;
 
 impl<'a> Comparison<'a> {

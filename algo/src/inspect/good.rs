@@ -1,10 +1,10 @@
-//! What noise alone makes of the largest deviation: where a limit can be held, and how often a good part exceeds it.
+//! The largest deviation of good parts, which noise alone makes: which pixels can hold a limit, and how often a good part exceeds it.
 //!
 //! # Idea
 //! A good part deviates from golden by noise only: golden's own, the measurement's, and that of the motion that is taken back.
-//! [`Measure::Deviation`](super::Measure) averages over squares and takes the largest of all their means, so it is judged by
-//! the tail of an extreme, not by the noise of one square: among 10⁵ squares some are always 4 σ off. Where a surface is seen
-//! at a grazing angle or by little light, single squares are many times as noisy as the rest and decide the extreme alone.
+//! [`Measure::Deviation`](super::Measure) is the largest of the means over all squares, so a limit has to be held by the tail of an
+//! extreme, not by the noise of one square: among 10⁵ squares some are always 4 σ off. Where a surface is seen at a grazing angle or
+//! by little light, single squares are many times as noisy as the rest and make the extreme alone: their pixels get weights.
 //!
 //! # Equations
 //! The mean over a square with n compared pixels of weights w has
@@ -13,9 +13,9 @@
 //! σ² = (Σ w² σ_p² + (Σ w)² σ_m²) / n²
 //! ```
 //!
-//! σ_p of a pixel's deviation (√(golden² + measurement²)), σ_m of what an error of the motion does to it: that moves all
-//! pixels of a square together. Where a limit asks for a lower σ than the square about a pixel has, the pixel's weight is next to
-//! their ratio, else 1: noise there reaches as far as elsewhere.
+//! σ_p is that of a pixel's deviation (√(golden² + measurement²)), σ_m what an error of the motion does to it, which moves all pixels of a
+//! square together. Where the square about a pixel has a higher σ than the limit allows, the pixel's weight is about the ratio of the
+//! two, else 1: with weights, no square is noisier than the limit allows.
 //!
 //! There is a square about each pixel, so neighbours share pixels; along each axis the means
 //! correlate by 1 − k/L at k pixels, L the side. Excursions of such a field above t σ come in clumps, and the clumps are
@@ -28,10 +28,11 @@
 //! ν(μ) = (2/μ) (Φ(μ/2) − ½) / ((μ/2) Φ(μ/2) + φ(μ/2))
 //! ```
 //!
-//! The sum runs over the squares, Φ and φ are the normal distribution and its density (2 φ(t)/t is its two tails), and θ is the number of clumps per square along an axis:
-//! 1 where excursions are so short that every square has its own. Where excursions are not high (t of about 1) there are at least
-//! as many as in squares side by side, −ln(1 − 2 Q(t)) / L² each. Along an axis the first square of a run of n has a clump of its own
-//! (n θ + 1 − θ in all): its noisier end, which is where extremes are when the noise grows towards an edge.
+//! The sum runs over the squares; Φ and φ are the normal distribution and its density (2 φ(t)/t approximates its two tails). θ is the
+//! number of clumps per square along an axis, 1 where excursions are so short that every square has its own. For low excursions
+//! (t of about 1) there are at least as many clumps as in disjoint squares, −ln(1 − 2 Q(t)) / L² each, Q the upper tail. Along an axis a run
+//! of n squares has n θ + 1 − θ clumps: the noisier end of the run counts in full, which is where extremes are when the noise
+//! grows towards an edge.
 //!
 //! # Shapes and units
 //! Maps are row-major over the camera's frame; lengths mm, variances mm².
@@ -50,7 +51,7 @@ use alloc::vec::Vec;
 use core::array::from_fn;
 use core::f64::consts::{PI, SQRT_2};
 
-/// What a pixel's deviation varies by on a good part.
+/// The variances of each pixel's deviation on a good part, mm².
 #[derive(Clone, Copy, Debug)]
 pub struct DeviationNoise<'a> {
     /// Pixels per row.
@@ -62,9 +63,10 @@ pub struct DeviationNoise<'a> {
 }
 
 impl DeviationNoise<'_> {
-    /// The weights with which no mean over a square of `side` has a σ above `most`: the pixel in the middle of each square that
-    /// has one gets the ratio of the two. Where that is not enough, because pixels beside it are noisier, all
-    /// pixels of the square get what is missing. What would get less than 1/16 is not compared.
+    /// The weights with which no mean over a square of `side` has a σ above `most`. First the middle of each square whose σ is higher
+    /// gets the ratio of the two as its weight. While that is not enough, because pixels beside it are noisier, the weights
+    /// of all pixels of the square are multiplied by the ratio that is left. Pixels whose weight would be below 1/16 are not
+    /// compared.
     pub fn weights(&self, compared: &[bool], side: usize, most: f64) -> Vec<Weight> {
         let width = self.width.max(1);
         let rows = compared.len() / width;
@@ -99,8 +101,8 @@ impl DeviationNoise<'_> {
         }
     }
 
-    /// σ of the mean over the square of `side` pixels about each pixel; NaN where the pixel is not compared, or too few around it
-    /// are.
+    /// σ of the mean over the square of `side` pixels about each pixel; NaN where the pixel is not compared or too few pixels of the
+    /// square are.
     pub fn of_squares(&self, weights: &[Weight], side: usize) -> Vec<f32> {
         let width = self.width.max(1);
         let least = MIN_SUPPORT * (side * side) as f64;
@@ -120,7 +122,7 @@ impl DeviationNoise<'_> {
     }
 }
 
-/// Sums over squares from integral tables of (width + 1) × (rows + 1): how many of a square's pixels are compared, Σ w and Σ w² σ_p².
+/// Sums over squares from an integral table of (width + 1) × (rows + 1): the number of compared pixels, Σ w and Σ w² σ_p².
 struct Squares {
     width: usize,
     rows: usize,
@@ -177,11 +179,11 @@ impl Squares {
 }
 
 /// Variance of each pixel's deviation by the errors of the motion of golden and of a part, as far as both are found from
-/// heights with the noise of golden; 0 where no motion is found. `window` is where the part is looked at; the motion is found from
-/// what counts in full in `golden`, and lifts what is compared in `whole`.
+/// heights with the noise of golden; 0 where no motion is found. The motion is found inside `window` from the pixels that count in
+/// full in `golden`; the variance is that of the pixels that are compared in `whole`.
 ///
-/// An error δ of the motion lifts a pixel by j·δ ([`Fitting::row`](super::align::Fitting::row)), so it is 2 jᵀ C j with the covariance C of
-/// the motion of a part that lies as taught.
+/// An error δ of the motion lifts a pixel by j·δ ([`Fitting::jacobian`](super::align::Fitting::jacobian)), so the variance is 2 jᵀ C j, C the
+/// covariance of the motion of a part that lies as taught.
 pub fn motion_variance(
     golden: GoldenSurface<'_>,
     whole: GoldenSurface<'_>,
@@ -200,14 +202,14 @@ pub fn motion_variance(
     })
 }
 
-/// What each compared pixel sees of the surface, mm².
+/// The area of the surface that each compared pixel sees, mm².
 pub fn areas(golden: GoldenSurface<'_>) -> Vec<f32> {
     of_facets(golden, |facet, _| {
         facet.area * facet.lift.length() / libm::fabs(facet.lift.z)
     })
 }
 
-/// A value of the facet that each compared pixel sees, and of its point; 0 where there is none in its row.
+/// A value of the facet and point of each compared pixel; 0 in rows without any facet.
 fn of_facets(golden: GoldenSurface<'_>, value: impl Fn(&Facet, Vector) -> f64 + Sync) -> Vec<f32> {
     let width = golden.surface.width;
     let mut values = vec![0.0; golden.surface.height.len()];
@@ -224,7 +226,7 @@ fn of_facets(golden: GoldenSurface<'_>, value: impl Fn(&Facet, Vector) -> f64 + 
         for (u, value) in row.iter_mut().enumerate() {
             *value = of_pixel(u).unwrap_or(f32::NAN);
         }
-        // Next to an edge no normal is known: as beside it.
+        // A facet needs a whole square of pixels: pixels beside an edge get the value of the next one in the row.
         carry(row.iter_mut());
         carry(row.iter_mut().rev());
         for value in row.iter_mut().filter(|value| value.is_nan()) {
@@ -234,7 +236,7 @@ fn of_facets(golden: GoldenSurface<'_>, value: impl Fn(&Facet, Vector) -> f64 + 
     values
 }
 
-/// Gives what is not a number the value before it.
+/// Replaces each NaN by the value before it.
 fn carry<'a>(values: impl Iterator<Item = &'a mut f32>) {
     let mut before = f32::NAN;
     for value in values {
@@ -249,7 +251,7 @@ fn carry<'a>(values: impl Iterator<Item = &'a mut f32>) {
 #[derive(Clone, Debug, PartialEq)]
 pub struct LargestDeviation {
     side: f64,
-    /// How many squares have a σ in each bin, see [`sigma_of`]; by the number of axes along which they are the end of a run.
+    /// How many squares have a σ in each bin ([`sigma_of`]), by the number of axes along which they are the end of a run.
     bins: [Vec<u32>; 3],
 }
 
@@ -258,8 +260,9 @@ const BINS_PER_OCTAVE: f64 = 32.0;
 const LEAST_SIGMA_MM: f64 = 1e-6;
 /// 30 octaves: up to a metre.
 const BINS: usize = 960;
-/// Steps of the numerical integrals, over this many of the largest σ.
-const STEPS: usize = 600;
+/// Intervals of the numerical integrals.
+const INTERVALS: usize = 600;
+/// No deviation is expected beyond this many of the largest σ: the integrals end there.
 const REACH: f64 = 12.0;
 
 /// σ in the middle of a bin, mm.
@@ -268,7 +271,7 @@ fn sigma_of(bin: usize) -> f64 {
 }
 
 impl LargestDeviation {
-    /// Of squares of `side` pixels with these σ, mm, in a frame of `width` columns; those that are not a number are no squares.
+    /// Of squares of `side` pixels with these σ, mm, in a frame of `width` columns; places with NaN have no square.
     pub fn new(sigmas: &[f32], width: usize, side: usize) -> Self {
         let mut bins = [(); 3].map(|()| vec![0; BINS]);
         let width = width.max(1);
@@ -285,7 +288,7 @@ impl LargestDeviation {
             let right = known(column + 1 < width, place + 1);
             let above = known(row > 0, place.wrapping_sub(width));
             let below = known(true, place + width);
-            // Of a run's two ends the noisier counts.
+            // A run has one noisier end.
             let is_end = |(a, b): (Option<f32>, Option<f32>)| match (a, b) {
                 (Some(_), Some(_)) => false,
                 (Some(beside), None) | (None, Some(beside)) => sigma >= beside,
@@ -331,9 +334,9 @@ impl LargestDeviation {
 
     /// Mean and standard deviation of the largest |deviation| over good parts and goldens, mm.
     pub fn mean_and_scatter(&self) -> (f64, f64) {
-        let step = self.top() / STEPS as f64;
+        let step = self.top() / INTERVALS as f64;
         let (mut first, mut second) = (0.0, 0.0);
-        for i in 0..STEPS {
+        for i in 0..INTERVALS {
             let x = (i as f64 + 0.5) * step;
             let tail = self.beyond(x);
             first += tail * step;
@@ -342,7 +345,7 @@ impl LargestDeviation {
         (first, libm::sqrt((second - first * first).max(0.0)))
     }
 
-    /// What no deviation reaches.
+    /// The largest deviation that is expected, mm.
     fn top(&self) -> f64 {
         let largest = |bins: &Vec<u32>| bins.iter().rposition(|count| *count > 0);
         let largest = self.bins.iter().filter_map(largest).max();
@@ -350,8 +353,8 @@ impl LargestDeviation {
     }
 }
 
-/// Clumps above t > 0 of a square of `side` pixels that lies inside its run along so many `axes`: 2 φ(t)/t θ(t) for each of them, and
-/// at least those of one independent square in side².
+/// Clumps above t > 0 of a square of `side` pixels that lies inside its run along so many `axes`: 2 φ(t)/t with a factor θ(t) for each of
+/// these, at least those of one independent square in side².
 fn clumps_per_square(t: f64, side: f64, axes: i32) -> f64 {
     let half = t * libm::sqrt(2.0 / side) / 2.0;
     let below = 0.5 * libm::erfc(-half / SQRT_2);

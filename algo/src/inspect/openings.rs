@@ -52,7 +52,7 @@ pub fn openings(resolved: &[bool], width: usize, min_pixels: usize) -> Vec<Openi
     found
 }
 
-/// `None` where the centre itself is resolved: a ring is no opening that a region could be put on.
+/// `None` if the centre itself is resolved: no region fits into a ring.
 fn opening(component: &[usize], resolved: &[bool], width: usize) -> Option<Opening> {
     let count = component.len() as f64;
     let (columns, rows) = component.iter().fold((0.0, 0.0), |(u, v), place| {

@@ -87,7 +87,7 @@ impl Region {
         })
     }
 
-    /// Becomes another region with its corners carried elsewhere; it may hold no pixel of the frame of this size (width, height) then.
+    /// Becomes another region with its corners moved by `to`, in a frame of this size (width, height); it may hold no pixel then.
     pub(super) fn become_moved(
         &mut self,
         other: &Self,
@@ -106,8 +106,7 @@ impl Region {
         self.spans().iter().map(|(_, columns)| columns.len()).sum()
     }
 
-    /// Whether there are no pixels: so it is with the default, for gauges that look at none, and where a region was moved out
-    /// of the frame.
+    /// Whether there are no pixels: the default region, and one that was moved out of the frame.
     pub fn is_empty(&self) -> bool {
         self.spans().is_empty()
     }
@@ -124,7 +123,7 @@ impl Region {
         &self.spans.all
     }
 
-    /// The spans of one row.
+    /// The spans of row `v`.
     pub(super) fn row(&self, v: usize) -> &[(usize, Range<usize>)] {
         let Spans { all, firsts } = &self.spans;
         match firsts.get(v..v + 2) {
@@ -146,7 +145,7 @@ pub fn polygon_spans(
 }
 
 impl Spans {
-    /// Becomes those of a polygon in a frame (width, height); `crossings` is room.
+    /// Becomes those of a polygon in a frame (width, height); `crossings` is a buffer.
     fn fill(
         &mut self,
         corners: &[(f64, f64)],
@@ -160,7 +159,7 @@ impl Spans {
         let Self { all: spans, firsts } = self;
         spans.clear();
         firsts.clear();
-        // A span per row, mostly, and room for a part that moves by some rows.
+        // Most rows have one span; a part may move by some rows.
         let rows = ((bottom - top).max(0.0) as usize).min(height) + 1;
         if spans.capacity() < rows {
             spans.reserve(rows + rows / 8);

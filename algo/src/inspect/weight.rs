@@ -1,15 +1,16 @@
 //! How much a pixel's deviation counts in the mean over a square.
 
-/// The weight of a pixel, n/256 or 1, as a byte: 0 where it is not compared, 1 where its deviation counts in full, and from 2 on
-/// n, where it counts times n/256.
+/// The weight of a pixel as a byte: 0 if it is not compared, 1 if its deviation counts in full, n from 2 on if its deviation is
+/// multiplied by n/256.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Weight(u8);
 
-/// Weights are multiples of 1/256; one below 1/16 is 0.
-const UNITS: f64 = 256.0;
-const LEAST: f64 = 16.0;
 /// Binary digits of a weight.
 const BITS: u32 = 8;
+/// Weights are multiples of 1/256.
+const UNITS: f64 = 256.0;
+/// A weight of fewer units, below 1/16, is 0.
+const LEAST: f64 = 16.0;
 
 impl Weight {
     /// Not compared.
@@ -27,7 +28,7 @@ impl Weight {
         self.0
     }
 
-    /// The next weight that is not above a share; none below 1/16.
+    /// The largest weight that is not above a share.
     pub fn of_share(share: f64) -> Self {
         match libm::floor(share * UNITS) {
             units if units >= UNITS => Self::FULL,
@@ -41,7 +42,7 @@ impl Weight {
         self != Self::NONE
     }
 
-    /// Whether it counts, but not in full.
+    /// Whether it counts, with a weight below 1.
     pub fn partial(self) -> bool {
         self.0 > 1
     }
@@ -64,7 +65,7 @@ impl Weight {
 }
 
 impl From<bool> for Weight {
-    /// Whether it is compared, and then in full.
+    /// In full if it is compared.
     fn from(compared: bool) -> Self {
         match compared {
             true => Self::FULL,

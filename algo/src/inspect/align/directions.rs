@@ -53,16 +53,16 @@ pub fn form(u: &[f64; 6], matrix: &Six, v: &[f64; 6]) -> f64 {
 pub struct Directions {
     /// Eigenvalue and unit vector of each that is determined.
     kept: heapless::Vec<(f64, [f64; 6]), 6>,
-    /// Components of which the shape says nothing, or next to nothing.
+    /// Components that the shape does not determine.
     pub left_out: [bool; 6],
 }
 
-/// An eigenvalue counts if it is this many times what the noise of the normals alone would give.
+/// A direction is determined only if its eigenvalue is at least this many times what the noise of the normals alone gives.
 const OVER_NOISE: f64 = 10.0;
-/// A direction is determined if the noise of the points moves the part along it by at most this many mm (1 σ); turns are
+/// A direction is determined only if the noise of the points moves the part along it by at most this many mm (1 σ); turns are
 /// measured as the way of a point at the part's radius.
 const LARGEST_SIGMA_MM: f64 = 0.05;
-/// A component is left out if more than this share of it lies in directions that are.
+/// A component is left out if more than this share of it lies in directions that are not determined.
 const SHARE: f64 = 0.5;
 
 impl Directions {
@@ -93,12 +93,12 @@ impl Directions {
         Self { kept, left_out }
     }
 
-    /// How many there are.
+    /// How many directions are determined.
     pub fn count(&self) -> usize {
         self.kept.len()
     }
 
-    /// The step x with A x = b, as far as it is determined.
+    /// The x with A x = b along the directions that are determined, 0 along the others.
     pub fn solve(&self, b: &[f64; 6]) -> [f64; 6] {
         let mut x = [0.0; 6];
         for (value, vector) in &self.kept {
@@ -110,7 +110,7 @@ impl Directions {
         x
     }
 
-    /// A⁺ C A⁺, A⁺ being the inverse along what is determined: the covariance of x where b has covariance C.
+    /// A⁺ C A⁺, A⁺ the inverse along the directions that are determined: the covariance of x where b has covariance C.
     pub fn covariance(&self, of_right: &Six) -> Six {
         let mut covariance = [[0.0; 6]; 6];
         for (p, u) in &self.kept {

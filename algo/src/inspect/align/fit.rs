@@ -1,12 +1,23 @@
 //! The motion that brings measured points onto the golden surface: iterated, robust linear least squares.
 //!
-//! A point p that is brought back by a motion lies r = z − G(π(p)) above the golden surface G on its own ray π(p). A
-//! further shift τ and turn ω about c change that by −m·(τ + ω × (p − c)), m the facet's lift (point to plane: Y. Chen,
-//! G. Medioni, 1992). About one motion the problem is linear, and is solved by reweighting: 6 × 6 normal equations along the
-//! directions that the shape determines. Only where the solution leads far from there are residuals and lifts worked out
-//! anew; about no motion at all they are known beforehand. Weights are Huber's, then Tukey's (c = 1.345 and 4.685: 95 %
-//! efficient for normal errors; P. J. Huber, E. M. Ronchetti, *Robust Statistics*): a dent does not pull the part, and a bend
-//! is told from a motion by how many points agree with either. Sums run over the points in their order.
+//! # Idea
+//! Iteratively reweighted least squares of residuals along the camera's rays: a dent does not pull the part, and a bend is told
+//! from a motion by how many points agree with either.
+//!
+//! # Equations
+//! A point p, after a motion is taken back, lies r = z − G(π(p)) above the golden surface G on its own ray π(p). A further shift τ and
+//! turn ω about c change that by −m·(τ + ω × (p − c)), m the facet's lift (point to plane: Y. Chen, G. Medioni, 1992). About one motion
+//! the problem is linear: 6 × 6 normal equations, solved along the directions that the shape determines. Residuals and lifts
+//! are worked out anew only where the solution leads far from that motion; about no motion at all they are planned
+//! beforehand. Weights are Huber's, then Tukey's (c = 1.345 and 4.685: 95 % efficient for normal errors; P. J. Huber, E. M. Ronchetti,
+//! *Robust Statistics*).
+//!
+//! # Shapes and units
+//! The unknowns are shifts in mm and turns as the way, in mm, of a point at the part's radius. Sums run over the points in
+//! their order.
+//!
+//! # Accuracy
+//! `a_motion_of_a_shape_that_determines_it_is_found_in_all_six_components`, `a_dent_over_a_tenth_of_the_part_does_not_pull_it`.
 
 use super::Spot;
 use super::directions::{Directions, Six, form};
@@ -30,11 +41,11 @@ pub struct Sample {
 /// How a part lies.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
-    /// Against how it was taught.
+    /// The motion from where it was taught.
     pub motion: Motion,
-    /// Covariance of the motion from measurement to measurement in mm²; turns as the way of a point at the radius.
+    /// Covariance of the motion over repeated measurements, mm²; turns as the way of a point at the radius.
     pub covariance: Six,
-    /// That radius, mm.
+    /// The part's radius, mm.
     pub radius: f64,
     /// Components that the shape does not determine: they are taken as 0.
     pub left_out: [bool; 6],
@@ -42,7 +53,7 @@ pub struct Placed {
     pub points: usize,
     /// Share of the points that do not.
     pub outliers: f64,
-    /// How far the farthest corner of the part went, mm.
+    /// How far the motion takes the corner of the part's box that it takes farthest, mm.
     pub reach: f64,
 }
 
@@ -60,58 +71,61 @@ impl Placed {
     }
 }
 
-/// With fewer points there is no motion.
+/// Fewer points determine no motion.
 const LEAST_POINTS: usize = 24;
-/// Steps with each kind of weight; a step below this many mm ends them sooner: a fiftieth of the noise of the motion.
-const STEPS: usize = 8;
-const SMALL_STEP_MM: f64 = 1e-4;
-/// How often residuals and lifts are worked out, and how far from there the linear problem holds: a surface that is bent
-/// as a radius of 2 mm leaves its facet by 0.6 µm there.
+/// Reweightings with each kind of weight, and the change of the solution below which they end: a fiftieth of the noise of the
+/// motion.
+const REWEIGHTINGS: usize = 8;
+const SMALL_CHANGE_MM: f64 = 1e-4;
+/// How often the problem is linearised, and how far from there it is taken to be linear: a surface with a radius of curvature of
+/// 2 mm is 0.6 µm off its facet there.
 const ROUNDS: usize = 8;
 const NEAR_MM: f64 = 0.05;
-/// With a larger share of points that disagree, the motion is doubted.
+/// With a larger share of outliers a bent part may have been taken for a moved one.
 const SUSPICIOUS: f64 = 0.05;
 /// From the median of absolute deviations to σ of a normal distribution.
 const MEDIAN_TO_SIGMA: f64 = 1.4826;
 
-/// A point of the linear problem.
+/// The equation of a point in the linear problem.
 #[derive(Debug)]
-pub(super) struct Row {
-    /// About the motion that the problem is linear about, mm.
+pub(super) struct Equation {
+    /// At the motion about which the problem is linear, mm.
     pub residual: f64,
-    /// What a further motion takes off it, see [`Fitting::row`].
-    pub row: [f64; 6],
-    /// Error of the lift, and the lever of the point.
+    /// What a further motion takes off it, see [`Fitting::jacobian`].
+    pub jacobian: [f64; 6],
+    /// Error of the lift.
     pub lift_noise: f64,
+    /// From the centre to the point, in radii.
     pub lever: Vector,
-    /// Variance of the point's height, and of that with the surface's, mm².
+    /// Variance of the point's height, mm².
     pub variance: f64,
+    /// The same, with the variance of the surface's height, mm².
     pub both: f64,
 }
 
-impl Row {
-    /// What a further motion leaves of the residual.
+impl Equation {
+    /// The residual after a further motion.
     pub fn left(&self, further: &[f64; 6]) -> f64 {
-        let taken: f64 = self.row.iter().zip(further).map(|(r, x)| r * x).sum();
+        let taken: f64 = self.jacobian.iter().zip(further).map(|(r, x)| r * x).sum();
         self.residual - taken
     }
 }
 
-/// Room for a fit, for the next one to use again.
+/// Buffers of a fit, which the next one uses again.
 #[derive(Debug, Default)]
 pub struct Room {
-    rows: Vec<Row>,
+    equations: Vec<Equation>,
     sizes: Vec<f64>,
 }
 
-/// What the fit needs of the part.
+/// The fit of measured points to a part.
 #[derive(Clone, Copy, Debug)]
 pub struct Fitting<'a> {
     /// The surface to be met.
     pub golden: GoldenSurface<'a>,
     /// The point that is turned about.
     pub centre: Vector,
-    /// Typical distance of the surface from it, mm: turns weigh as the way of a point there.
+    /// RMS distance of the surface from it, mm: turns are measured as the way of a point at this radius.
     pub radius: f64,
     /// Corners of a box around the part.
     pub corners: &'a [Vector],
@@ -119,9 +133,10 @@ pub struct Fitting<'a> {
     pub spots: &'a [Spot],
 }
 
-/// Where a descent ended, and the largest residual of a point that agrees, mm.
+/// Where a descent ended.
 struct Descended {
     placed: Placed,
+    /// The largest residual of a point that agrees, mm.
     limit: f64,
 }
 
@@ -134,10 +149,10 @@ struct Solved {
 }
 
 impl Fitting<'_> {
-    /// The motion; none if too few points lie on the surface.
+    /// How the part lies; none if too few points lie on the surface.
     ///
-    /// Where many points disagree, a bent part may have been taken for a moved one: what then agrees better with a part that
-    /// lies about as it was taught is taken to lie so.
+    /// Where many points disagree, a bent part may have been taken for a moved one: a second descent with Tukey's weights alone stays near
+    /// the part as taught, and the motion with which more points agree is taken.
     pub fn fit(&self, samples: &[Sample], room: &mut Room) -> Option<Placed> {
         let moved = self.descend(Weights::Huber, samples, room)?;
         if moved.placed.outliers <= SUSPICIOUS {
@@ -148,9 +163,9 @@ impl Fitting<'_> {
         };
         let limit = moved.limit.min(bent.limit);
         let mut agreeing = |motion: &Motion| {
-            self.linearise(samples, motion, false, &mut room.rows);
-            let agrees = |row: &&Row| libm::fabs(row.residual) < limit;
-            room.rows.iter().filter(agrees).count()
+            self.linearise(samples, motion, false, &mut room.equations);
+            let agrees = |equation: &&Equation| libm::fabs(equation.residual) < limit;
+            room.equations.iter().filter(agrees).count()
         };
         let found = match agreeing(&bent.placed.motion) > agreeing(&moved.placed.motion) {
             true => bent,
@@ -168,8 +183,8 @@ impl Fitting<'_> {
     ) -> Option<Descended> {
         let mut motion = Motion::none(self.centre);
         for round in 1..=ROUNDS {
-            self.linearise(samples, &motion, round == 1, &mut room.rows);
-            if room.rows.len() < LEAST_POINTS {
+            self.linearise(samples, &motion, round == 1, &mut room.equations);
+            if room.equations.len() < LEAST_POINTS {
                 return None;
             }
             let mut solved = solve(weights, [0.0; 6], room);
@@ -181,7 +196,7 @@ impl Fitting<'_> {
             let found = weights == Weights::Tukey && is_near(&solved.further);
             if found || round == ROUNDS {
                 return Some(Descended {
-                    placed: self.placed(motion, &solved, &room.rows),
+                    placed: self.placed(motion, &solved, &room.equations),
                     limit: TUKEY * solved.scale,
                 });
             }
@@ -197,8 +212,8 @@ impl Fitting<'_> {
         Motion::new(self.centre, motion.shift + shift, motion.turn + turn)
     }
 
-    fn placed(&self, motion: Motion, solved: &Solved, rows: &[Row]) -> Placed {
-        let spread = Normal::covariance(rows, &solved.further, solved.scale);
+    fn placed(&self, motion: Motion, solved: &Solved, equations: &[Equation]) -> Placed {
+        let spread = Normal::covariance(equations, &solved.further, solved.scale);
         let farthest = |corner: &Vector| (motion.apply(*corner) - *corner).length();
         let inside = solved.normal.inside;
         Placed {
@@ -207,27 +222,33 @@ impl Fitting<'_> {
             radius: self.radius,
             left_out: solved.directions.left_out,
             points: inside,
-            outliers: 1.0 - inside as f64 / rows.len() as f64,
+            outliers: 1.0 - inside as f64 / equations.len() as f64,
             reach: self.corners.iter().map(farthest).fold(0.0, f64::max),
         }
     }
 
     /// −∂r/∂x of a facet at a point: what a shift and a turn (as the way at the radius) take off its residual.
-    pub fn row(&self, lift: Vector, point: Vector) -> [f64; 6] {
+    pub fn jacobian(&self, lift: Vector, point: Vector) -> [f64; 6] {
         let turning = (point - self.centre).cross(lift) * (1.0 / self.radius);
         [lift.x, lift.y, lift.z, turning.x, turning.y, turning.z]
     }
 
     /// Variance, mm², of how far the error of a motion lifts a facet at a point.
     pub fn lift_variance(&self, placed: &Placed, lift: Vector, point: Vector) -> f64 {
-        let row = self.row(lift, point);
-        form(&row, &placed.covariance, &row).max(0.0)
+        let jacobian = self.jacobian(lift, point);
+        form(&jacobian, &placed.covariance, &jacobian).max(0.0)
     }
 
-    /// The linear problem about a motion; `still` where that is the part as taught.
-    fn linearise(&self, samples: &[Sample], motion: &Motion, still: bool, rows: &mut Vec<Row>) {
-        rows.clear();
-        rows.extend(samples.iter().filter_map(|sample| {
+    /// The linear problem about a motion; `still` if that is none, where facets are planned.
+    fn linearise(
+        &self,
+        samples: &[Sample],
+        motion: &Motion,
+        still: bool,
+        equations: &mut Vec<Equation>,
+    ) {
+        equations.clear();
+        equations.extend(samples.iter().filter_map(|sample| {
             if let (true, Some((at, above))) = (still, sample.over) {
                 let spot = self.spots.get(at)?;
                 return Some(self.of_facet(sample, &spot.facet, spot.point, above));
@@ -240,11 +261,11 @@ impl Fitting<'_> {
         }));
     }
 
-    fn of_facet(&self, sample: &Sample, facet: &Facet, point: Vector, above: f64) -> Row {
+    fn of_facet(&self, sample: &Sample, facet: &Facet, point: Vector, above: f64) -> Equation {
         let variance = sample.sigma * sample.sigma;
-        Row {
+        Equation {
             residual: above,
-            row: self.row(facet.lift, point),
+            jacobian: self.jacobian(facet.lift, point),
             lift_noise: facet.lift_noise,
             lever: (point - self.centre) * (1.0 / self.radius),
             variance,
@@ -255,14 +276,14 @@ impl Fitting<'_> {
 
 /// Solves the linear problem by reweighting, from a first guess.
 fn solve(weights: Weights, guess: [f64; 6], room: &mut Room) -> Solved {
-    let Room { rows, sizes } = room;
-    let predicted = rows.iter().map(|row| row.both).sum::<f64>() / rows.len() as f64;
+    let Room { equations, sizes } = room;
+    let predicted = equations.iter().map(|e| e.both).sum::<f64>() / equations.len() as f64;
     let predicted = libm::sqrt(predicted);
     let mut further = guess;
-    let mut left = STEPS;
+    let mut left = REWEIGHTINGS;
     loop {
-        let scale = scale(rows, &further, sizes).max(predicted);
-        let normal = Normal::of(rows, weights, &further, scale);
+        let scale = scale(equations, &further, sizes).max(predicted);
+        let normal = Normal::of(equations, weights, &further, scale);
         let directions = Directions::of(&normal.matrix, &normal.noise, predicted);
         let next = directions.solve(&normal.right);
         let change: f64 = next
@@ -272,7 +293,7 @@ fn solve(weights: Weights, guess: [f64; 6], room: &mut Room) -> Solved {
             .sum();
         further = next;
         left -= 1;
-        if left == 0 || libm::sqrt(change) < SMALL_STEP_MM {
+        if left == 0 || libm::sqrt(change) < SMALL_CHANGE_MM {
             return Solved {
                 further,
                 directions,
@@ -289,9 +310,9 @@ fn is_near(further: &[f64; 6]) -> bool {
 }
 
 /// σ of the residuals by their median.
-fn scale(rows: &[Row], further: &[f64; 6], sizes: &mut Vec<f64>) -> f64 {
+fn scale(equations: &[Equation], further: &[f64; 6], sizes: &mut Vec<f64>) -> f64 {
     sizes.clear();
-    sizes.extend(rows.iter().map(|row| libm::fabs(row.left(further))));
+    sizes.extend(equations.iter().map(|e| libm::fabs(e.left(further))));
     let middle = sizes.len() / 2;
     let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
     MEDIAN_TO_SIGMA * *median

@@ -1,4 +1,4 @@
-//! How a part lies against how it was taught: a small rigid motion by linear least squares over points of both.
+//! How a part lies against how it was taught: a small rigid motion, by least squares of measured points to the golden surface.
 
 mod directions;
 mod fit;
@@ -17,20 +17,20 @@ use crate::units::Height;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// A place of the part that is looked at, as it was taught.
+/// A place of the taught part at which every part is measured to find its motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spot {
     /// The pixel that sees it.
     pub u: usize,
     /// Its row.
     pub v: usize,
-    /// Where it is, mm.
+    /// Its place, mm.
     pub point: Vector,
-    /// How the surface faces there.
+    /// The plane through it.
     pub facet: Facet,
 }
 
-/// The plan of an alignment: which pixels are looked at, and what the part's shape determines.
+/// The plan of an alignment: which pixels are used, and which components of a motion the part's shape determines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alignment {
     /// The point that is turned about: the mean of the surface's points, mm.
@@ -45,17 +45,18 @@ pub struct Alignment {
     spots: Vec<Spot>,
 }
 
-/// Rows of the part that are looked at, about, and pixels: their mean then has a hundredth of a pixel's noise, and the fit
-/// takes about half a millisecond.
+/// About so many rows of the part are used.
 const ROWS: usize = 48;
+/// About so many points are used: the error of their mean is about 1/40 of a pixel's, and the fit takes about half a millisecond.
 const POINTS: usize = 1800;
-/// Where a wall is seen at a grazing angle, an error of the motion of a µm lifts it by tens: there are as many more points, up to
-/// this factor, until no place is lifted by more than so many mm (1 σ).
+/// Where a wall is seen at a grazing angle, an error of the motion of a µm lifts it by tens of µm: the number of points is doubled, up
+/// to this factor, until no spot is lifted by more than [`MOST_LIFT_MM`].
 const MORE_POINTS: usize = 8;
+/// Largest error of a spot's height by that of the motion, mm (1 σ).
 const MOST_LIFT_MM: f64 = 0.01;
 
 impl Alignment {
-    /// Plans it; none where the surface inside the window has too few points for it.
+    /// Plans it; none if the surface inside the window has too few points.
     pub fn new(golden: GoldenSurface<'_>, window: Window<'_>) -> Option<Self> {
         let mut points = POINTS;
         loop {
@@ -70,7 +71,7 @@ impl Alignment {
         }
     }
 
-    /// With about so many points, and how a part is then found to lie that lies as taught.
+    /// Plans it with about so many points. The second value is how a part that lies as taught is then found to lie.
     fn of_points(
         points: usize,
         golden: GoldenSurface<'_>,
@@ -113,7 +114,7 @@ impl Alignment {
         Some((alignment, placed))
     }
 
-    /// How a part is found to lie that lies as taught, with the noise of golden; none where the surface has too few points.
+    /// How a part that lies as taught is found to lie, with the noise of golden; none if the surface has too few points.
     pub fn still(&self, golden: GoldenSurface<'_>) -> Option<Placed> {
         let still = |(at, spot): (usize, &Spot)| Sample {
             point: spot.point,
@@ -124,7 +125,7 @@ impl Alignment {
         self.fitting(golden).fit(&samples, &mut Room::default())
     }
 
-    /// The spots of some rows, with the number of the first.
+    /// The index of the first spot in some rows, and the spots in them.
     pub fn spots(&self, rows: Range<usize>) -> (usize, &[Spot]) {
         let first = self.spots.partition_point(|spot| spot.v < rows.start);
         let end = self.spots.partition_point(|spot| spot.v < rows.end);
@@ -157,7 +158,7 @@ fn corners(points: impl Iterator<Item = Vector>) -> Vec<Vector> {
         .collect()
 }
 
-/// The middle and half the span of heights inside a window, mm.
+/// The middle and half the span of the known heights inside a window, mm.
 pub(super) fn levels(heights: &[Height], width: usize, window: Window<'_>) -> (f64, f64) {
     let (mut low, mut high) = (i32::MAX, i32::MIN);
     for (v, columns) in window.iter().enumerate() {

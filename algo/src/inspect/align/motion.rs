@@ -1,4 +1,4 @@
-//! A small rigid motion: how a part lies, against how it lay when it was taught.
+//! A small rigid motion: from how a part lay when it was taught to how it lies now.
 
 use crate::geometry::Vector;
 
@@ -7,7 +7,7 @@ use crate::geometry::Vector;
 pub struct Motion {
     /// c, the point that is turned about, mm.
     pub centre: Vector,
-    /// t, how far c went, mm.
+    /// t, the shift of c, mm.
     pub shift: Vector,
     /// The rotation vector, rad.
     pub turn: Vector,
@@ -37,7 +37,7 @@ impl Motion {
         }
     }
 
-    /// None at all.
+    /// No motion.
     pub fn none(centre: Vector) -> Self {
         Self::new(centre, Vector::default(), Vector::default())
     }

@@ -1,13 +1,15 @@
-//! The normal equations of a motion, and the weights of their points.
+//! The normal equations of a motion, with robust weights.
 
 use super::directions::Six;
-use super::fit::Row;
+use super::fit::Equation;
+use crate::geometry::Vector;
 
-/// Where Huber's weights begin to fall, and where Tukey's are 0, in σ of the residuals.
+/// Residual from which Huber's weights fall, in σ.
 const HUBER: f64 = 1.345;
+/// Residual from which Tukey's weights are 0, in σ.
 pub(super) const TUKEY: f64 = 4.685;
 
-/// How much points off the surface weigh.
+/// The weight of a point by its residual.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Weights {
     Huber,
@@ -34,24 +36,27 @@ impl Weights {
 pub(super) struct Normal {
     pub matrix: Six,
     pub right: [f64; 6],
-    /// What errors of the lifts add to the matrix.
+    /// What errors of the lifts add to the matrix, in expectation.
     pub noise: Six,
-    /// Points with a weight.
+    /// Points with a weight above 0.
     pub inside: usize,
 }
 
 impl Normal {
-    /// Of points that a motion leaves residuals of, in units of `scale`.
-    pub fn of(rows: &[Row], weights: Weights, further: &[f64; 6], scale: f64) -> Self {
+    /// Of points by their residuals after a further motion, in units of `scale`.
+    pub fn of(equations: &[Equation], weights: Weights, further: &[f64; 6], scale: f64) -> Self {
         let (mut matrix, mut right, mut inside) = ([[0.0; 6]; 6], [0.0; 6], 0);
         let mut lifts = Lifts::default();
-        for row in rows {
-            let weight = weights.of(row.left(further) / scale);
+        for equation in equations {
+            let weight = weights.of(equation.left(further) / scale);
             inside += usize::from(weight > 0.0);
-            lifts.add(row, weight * row.lift_noise * row.lift_noise);
-            add_square(&mut matrix, &row.row, weight);
-            for (sum, r) in right.iter_mut().zip(row.row) {
-                *sum += weight * r * row.residual;
+            lifts.add(
+                equation.lever,
+                weight * equation.lift_noise * equation.lift_noise,
+            );
+            add_square(&mut matrix, &equation.jacobian, weight);
+            for (sum, r) in right.iter_mut().zip(equation.jacobian) {
+                *sum += weight * r * equation.residual;
             }
         }
         Self {
@@ -63,11 +68,15 @@ impl Normal {
     }
 
     /// Covariance of the right side, with Tukey's weights.
-    pub fn covariance(rows: &[Row], further: &[f64; 6], scale: f64) -> Six {
+    pub fn covariance(equations: &[Equation], further: &[f64; 6], scale: f64) -> Six {
         let mut covariance = [[0.0; 6]; 6];
-        for row in rows {
-            let weight = Weights::Tukey.of(row.left(further) / scale);
-            add_square(&mut covariance, &row.row, weight * weight * row.variance);
+        for equation in equations {
+            let weight = Weights::Tukey.of(equation.left(further) / scale);
+            add_square(
+                &mut covariance,
+                &equation.jacobian,
+                weight * weight * equation.variance,
+            );
         }
         mirrored(covariance)
     }
@@ -88,8 +97,8 @@ fn mirrored(upper: Six) -> Six {
     core::array::from_fn(|i| core::array::from_fn(|j| upper[i.min(j)][i.max(j)]))
 }
 
-/// Σ n (x xᵀ + y yᵀ), n the variance of a lift, x = (1, 0, 0, 0, q_z, −q_y) and y = (0, 1, 0, −q_z, 0, q_x) what the row of
-/// a point with the lever q gains with the lift's x and y.
+/// Σ n (x xᵀ + y yᵀ): n is the variance of a lift, x = (1, 0, 0, 0, q_z, −q_y) and y = (0, 1, 0, −q_z, 0, q_x) are the derivatives of
+/// the Jacobian of a point with the lever q with respect to x and y of the lift.
 #[derive(Default)]
 struct Lifts {
     n: f64,
@@ -103,8 +112,7 @@ struct Lifts {
 }
 
 impl Lifts {
-    fn add(&mut self, row: &Row, n: f64) {
-        let q = row.lever;
+    fn add(&mut self, q: Vector, n: f64) {
         let (x, y, z) = (n * q.x, n * q.y, n * q.z);
         self.n += n;
         self.x += x;

@@ -1,4 +1,4 @@
-//! The golden surface as alignment sees it: heights between pixels, and which way it faces.
+//! The golden surface between pixels: heights, and the planes through them.
 
 use crate::geometry::{Triangulator, Vector};
 use crate::inspect::Taught;
@@ -19,9 +19,9 @@ pub struct GoldenSurface<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facet {
     /// m: a point that moves by δ rises by m·δ above the surface, both heights taken on the point's own ray. It is the
-    /// normal n, scaled: n / (n·d), d the ray with d_z = 1.
+    /// scaled normal n / (n·d), d the ray with d_z = 1.
     pub lift: Vector,
-    /// What a pixel sees of it, as the area in x and y, mm².
+    /// The area in x and y that a pixel sees, mm².
     pub area: f64,
     /// Error of m's x and y from the noise of the taught heights, 1 σ.
     pub lift_noise: f64,
@@ -29,10 +29,10 @@ pub struct Facet {
     pub sigma: f64,
 }
 
-/// A normal is that of a plane through the square of this many pixels to each side.
+/// The plane is fitted to the heights of a square of this many pixels to each side.
 const REACH: usize = 2;
-/// Step of the camera's derivative, mm: small against the distance, large against rounding.
-const STEP_MM: f64 = 0.01;
+/// Distance over which the camera's derivatives are taken, mm: small against the working distance, large against rounding.
+const DELTA_MM: f64 = 0.01;
 /// Σ i² over that square.
 const SQUARES: f64 = 50.0;
 
@@ -59,12 +59,12 @@ impl GoldenSurface<'_> {
         Some(upper + (lower - upper) * fv)
     }
 
-    /// How the surface faces about the pixel next to where `point` is seen, (u, v); its whole neighbourhood must be compared.
+    /// The facet about the pixel next to (u, v), where `point` is seen; none unless all pixels of its square are compared.
     pub fn facet(&self, point: Vector, seen: (f64, f64)) -> Option<Facet> {
         self.facet_of(point, seen, Taught::compared)
     }
 
-    /// As [`Self::facet`], but its whole neighbourhood must count in full.
+    /// As [`Self::facet`]; none unless all pixels of its square count in full.
     pub(super) fn quiet_facet(&self, point: Vector, seen: (f64, f64)) -> Option<Facet> {
         self.facet_of(point, seen, Taught::full)
     }
@@ -98,8 +98,8 @@ impl GoldenSurface<'_> {
         let camera = self.triangulator.camera();
         let here = camera.project(point)?;
         let beside = |x, y, z| {
-            let (u, v) = camera.project(point + Vector::new(x, y, z) * STEP_MM)?;
-            Some(((u - here.0) / STEP_MM, (v - here.1) / STEP_MM))
+            let (u, v) = camera.project(point + Vector::new(x, y, z) * DELTA_MM)?;
+            Some(((u - here.0) / DELTA_MM, (v - here.1) / DELTA_MM))
         };
         let (x, y, z) = (
             beside(1.0, 0.0, 0.0)?,

@@ -15,7 +15,7 @@ pub struct Grid {
     rows: usize,
 }
 
-/// A region with more cells than are kept.
+/// A region with more cells than there are buffers for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooFine {
     /// Side of a cell in pixels.
@@ -39,17 +39,17 @@ impl core::error::Error for TooFine {}
 
 /// Cells of a region: 3 MB.
 const MAX_CELLS: usize = 1 << 16;
-/// Cells of a gauge that does not ask for a side of its own: about so many.
+/// A gauge that leaves the side of its cells to the grid has about so many.
 const CELLS: usize = 1024;
-/// A cell has at least this share of its square's pixels.
+/// A cell with fewer than this share of its square's pixels is left out, if the gauge asks for a side.
 const MIN_SUPPORT: f64 = 0.5;
-/// Such cells are at least this large.
+/// Least side of such cells in pixels.
 const MIN_SIDE: usize = 4;
-/// A region has at least this share of the pixels that it had as taught.
+/// A region with fewer than this share of the pixels that it had as taught has no cells.
 const MIN_SHARE: f64 = 0.5;
 
 impl Grid {
-    /// Over a region's pixels; a side of 0 leaves it to the grid.
+    /// Over a region's pixels; with a side of 0 the grid chooses one.
     ///
     /// # Errors
     /// If there are too many cells.
@@ -96,7 +96,7 @@ impl Grid {
         self.side
     }
 
-    /// The least number of pixels of a cell that stands for its square.
+    /// The least number of measured pixels of a cell.
     pub fn least(&self) -> i64 {
         let side = self.side as f64;
         libm::ceil(MIN_SUPPORT * side * side) as i64
@@ -131,9 +131,9 @@ impl Sum {
 /// The means of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// Pixels that its error follows from.
+    /// Pixels whose noise makes its error.
     pub pixels: f64,
-    /// Height, mm: as taught, and the mean deviation on top. So it does not depend on which pixels of the cell were measured.
+    /// Height, mm: as taught plus the mean deviation, so that it does not depend on which pixels of the cell were measured.
     pub height: f64,
     /// Deviation from golden, mm.
     pub deviation: f64,
@@ -141,9 +141,9 @@ pub struct Cell {
     pub taught: TaughtCell,
 }
 
-/// Appends the cells of a region to `out`; none if less than half of what it had as taught was measured. With `least`, those
-/// with at least so many pixels; else all that it had as taught: those that were not measured deviate by as much as the
-/// others on the mean, so that it does not matter which they are.
+/// Appends the cells of a region to `out`; none if less than half of the pixels that it had as taught were measured. With `least`,
+/// only cells with at least so many measured pixels. Without, all cells that it had as taught: one without a measured pixel
+/// gets the mean deviation of the others.
 pub fn cells(sums: &[Sum], taught: &[TaughtCell], least: Option<i64>, out: &mut Vec<Cell>) {
     let had: u64 = taught.iter().map(|cell| u64::from(cell.pixels)).sum();
     let has: i64 = sums.iter().map(|sum| sum.count).sum();

@@ -1,7 +1,7 @@
 //! Gauges that are not linear in height: flatness, peak-to-valley, RMS and share of deviations, with models of their errors.
 //!
-//! Cells do not share pixels, so the errors of their means are independent, of σ² = σ_z² / side² each. The models need no
-//! more than the cells' own values; `tests/suite/precision.rs` holds them against simulation.
+//! Cells do not share pixels, so the errors of their means are independent, with σ² = σ_z² / side² each. The models need the
+//! cells' values only; `tests/suite/precision.rs` compares them with simulation.
 
 use super::Cell;
 use super::level::Plane;
@@ -38,8 +38,8 @@ pub fn peak_to_valley(
     range(cells, room, sigma, placed)
 }
 
-/// Largest less smallest value, one per cell. The errors of both ends are those of the largest of many noisy values, and
-/// what an error of the motion does to the two cells.
+/// Largest less smallest value, one per cell. Its error is made of those of both ends, each the largest of many noisy values,
+/// and of what an error of the motion does to the difference of the two cells.
 fn range(
     cells: &[Cell],
     values: &mut [f64],
@@ -49,7 +49,7 @@ fn range(
     let by = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
     let (high, low) = ((0..values.len()).max_by(by)?, (0..values.len()).min_by(by)?);
     let value = values[high] - values[low];
-    let (upper, lower) = (cells[high].taught.row, cells[low].taught.row);
+    let (upper, lower) = (cells[high].taught.jacobian, cells[low].taught.jacobian);
     let motion = motion(&core::array::from_fn(|i| upper[i] - lower[i]), placed);
     let top = spread_of_largest(values, sigma);
     for value in values.iter_mut() {
@@ -62,18 +62,18 @@ fn range(
     })
 }
 
-/// Variance by the error of the motion of what changes by `row` with it.
-fn motion(row: &[f64; 6], placed: Option<&Placed>) -> f64 {
-    placed.map_or(0.0, |placed| form(row, &placed.covariance, row).max(0.0))
+/// The variance that the motion's error gives a value with this derivative over the motion.
+fn motion(g: &[f64; 6], placed: Option<&Placed>) -> f64 {
+    placed.map_or(0.0, |placed| form(g, &placed.covariance, g).max(0.0))
 }
 
-/// Bins per σ, and bins below the largest value that matter.
+/// Bins per σ, and bins from the largest value down that are counted.
 const BINS_PER_SIGMA: f64 = 4.0;
 const BINS: usize = 40;
 
-/// Standard deviation of the largest of values that were measured with an error of `sigma` each, if they were measured
-/// again: F(x) = Π Φ((x − mᵢ)/σ), Var = ∫∫ of it. The true values m are the measured ones drawn together so that what
-/// σ explains of their scatter is gone: what they scatter by error must not count twice.
+/// Standard deviation, over repeated measurements, of the largest of values with an error of `sigma` each, from its distribution
+/// F(x) = Π Φ((x − mᵢ)/σ). The true values m are the measured ones, moved towards their mean until their scatter is less by σ²: the
+/// scatter that the errors make must not count twice.
 fn spread_of_largest(values: &[f64], sigma: f64) -> f64 {
     if !(sigma > 0.0) {
         return 0.0;
@@ -91,7 +91,7 @@ fn spread_of_largest(values: &[f64], sigma: f64) -> f64 {
             bins[bin as usize] += 1.0;
         }
     }
-    // From 4 σ below the largest to 6 σ above, in steps of σ/8; the largest of a million reaches 5 σ.
+    // Integrated from 4 σ below the largest to 6 σ above in intervals of σ/8; the largest of a million reaches 5 σ.
     const STEP: f64 = 0.125;
     let (mut first, mut second) = (0.0, 0.0);
     for i in 0..80 {
@@ -112,25 +112,25 @@ fn below(x: f64) -> f64 {
     (0.5 * libm::erfc(-x / SQRT_2)).max(f64::MIN_POSITIVE)
 }
 
-/// Root of the mean square of the deviations, mm. Var(mean d²) = (4σ² Σd² − 2nσ⁴) / n² + gᵀ C g: the scatter of d² about
-/// fixed true deviations, with d² − σ² for the square of each, and the error of the motion, g = Σ 2dᵢ jᵢ / n.
+/// Root of the mean square of the deviations, mm. Var(mean d²) = (4σ² Σd² − 2nσ⁴) / n² + gᵀ C g: the scatter of d² about fixed true
+/// deviations, whose squares are estimated by d² − σ², and the error of the motion, g = Σ 2dᵢ jᵢ / n.
 pub fn rms(cells: &[Cell], sigma: f64, placed: Option<&Placed>) -> Option<Reading> {
     if cells.is_empty() {
         return None;
     }
     let count = cells.len() as f64;
-    let (mut squares, mut row) = (0.0, [0.0; 6]);
+    let (mut squares, mut g) = (0.0, [0.0; 6]);
     for cell in cells {
         squares += cell.deviation * cell.deviation;
-        for (sum, value) in row.iter_mut().zip(cell.taught.row) {
+        for (sum, value) in g.iter_mut().zip(cell.taught.jacobian) {
             *sum += 2.0 * cell.deviation * value / count;
         }
     }
     let variance = sigma * sigma;
-    // Never less than without any true deviation.
+    // At least what noise alone gives.
     let least = 2.0 * count * variance * variance;
     let own = (4.0 * variance * squares - least).max(least) / (count * count);
-    let scatter = own + motion(&row, placed);
+    let scatter = own + motion(&g, placed);
     let value = libm::sqrt(squares / count);
     Some(Reading {
         value,
@@ -138,9 +138,9 @@ pub fn rms(cells: &[Cell], sigma: f64, placed: Option<&Placed>) -> Option<Readin
     })
 }
 
-/// Share of the cells that deviate by more than `tolerance` mm. Each is a coin that falls by how near to the tolerance it
-/// lies: σ² = Σ p(1 − p) / n², p = Φ((|d| − T) / σ). As d itself is noisy, p(1 − p) is taken about d with √2 σ and scaled
-/// so that its integral over all d is σ/√π, what coins of known d have.
+/// Share of the cells that deviate by more than `tolerance` mm. A cell lies outside with p = Φ((|d| − T)/σ), so σ² = Σ p(1 − p) / n² for
+/// known d. Only the measured d is known: p(1 − p) is averaged over its error, e^(−x²/4)/(2π) with x = (|d| − T)/σ, which has the same
+/// integral over all d, σ/√π.
 pub fn share_outside(cells: &[Cell], sigma: f64, tolerance: f64) -> Option<Reading> {
     if cells.is_empty() {
         return None;
@@ -148,7 +148,7 @@ pub fn share_outside(cells: &[Cell], sigma: f64, tolerance: f64) -> Option<Readi
     let count = cells.len() as f64;
     let sizes = || cells.iter().map(|cell| libm::fabs(cell.deviation));
     let outside = sizes().filter(|size| *size > tolerance).count() as f64;
-    let coins: f64 = match sigma > 0.0 {
+    let variance: f64 = match sigma > 0.0 {
         true => sizes()
             .map(|size| (size - tolerance) / sigma)
             .map(|x| libm::exp(-x * x / 4.0) / (2.0 * PI))
@@ -157,6 +157,6 @@ pub fn share_outside(cells: &[Cell], sigma: f64, tolerance: f64) -> Option<Readi
     };
     Some(Reading {
         value: outside / count,
-        sigma: Some(libm::sqrt(coins) / count),
+        sigma: Some(libm::sqrt(variance) / count),
     })
 }

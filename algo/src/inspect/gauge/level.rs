@@ -7,9 +7,9 @@ use alloc::vec::Vec;
 /// How a value changes with the mean height of each cell: its derivatives.
 pub type Weights = Vec<f64>;
 
-/// Error (1 σ) of a value with these weights: σ² = Σ wᵢ² σ_z² / nᵢ + gᵀ C g, n a cell's pixels, `variance` σ_z² of one of
-/// the pixels of each cell, g = Σ wᵢ jᵢ how the value follows the motion and C the motion's covariance. That the pixels of the
-/// motion are some of the gauge's is left out: they are one in some dozens.
+/// Error (1 σ) of a value with these weights: σ² = Σ wᵢ² σ_z² / nᵢ + gᵀ C g. n are a cell's pixels, `variance` gives σ_z² of a single pixel
+/// of each cell, g = Σ wᵢ jᵢ is the derivative of the value over the motion, j a cell's Jacobian, and C the motion's covariance. The
+/// two terms are taken as independent: the pixels that the motion is found from are one in some dozens of the gauge's.
 pub fn sigma(
     weights: &[f64],
     cells: &[Cell],
@@ -22,8 +22,8 @@ pub fn sigma(
     let motion = placed.map_or(0.0, |placed| {
         let mut g = [0.0; 6];
         for (w, cell) in pairs() {
-            for (g, row) in g.iter_mut().zip(cell.taught.row) {
-                *g += w * row;
+            for (g, j) in g.iter_mut().zip(cell.taught.jacobian) {
+                *g += w * j;
             }
         }
         form(&g, &placed.covariance, &g)
@@ -31,12 +31,12 @@ pub fn sigma(
     libm::sqrt(pixels + motion.max(0.0))
 }
 
-/// What a cell counts: as much as it had pixels when it was taught, so that it is always the same.
+/// The weight of a cell: its pixels as taught, so that it is the same in every measurement.
 fn weight(cell: &Cell) -> f64 {
     f64::from(cell.taught.pixels)
 }
 
-/// The mean height, mm; each pixel as taught counts the same. Its weights are appended to `out`.
+/// The mean height over the pixels as taught, mm. Its weights are appended to `out`.
 pub fn mean(cells: &[Cell], out: &mut Weights) -> Option<f64> {
     let all: f64 = cells.iter().map(weight).sum();
     let sum: f64 = cells.iter().map(|cell| weight(cell) * cell.height).sum();

@@ -1,9 +1,9 @@
 //! What a gauge measures, and how its value and error follow from cells.
 //!
-//! A region is divided into square cells of pixels in golden's frame. A strip adds each measured pixel to the cell in which
-//! the part has it, after the part's motion was taken back. A cell is then as high as it was taught, and its pixels' mean
-//! deviation on top: whichever of them were measured, on a slope too. The values of all gauges but coverage, deviation and
-//! placement are worked out from these heights and deviations.
+//! A region is divided into square cells of pixels in golden's frame. A strip adds each measured pixel to the cell that holds its
+//! taught coordinates. The height of a cell is its taught height plus its pixels' mean deviation, so on a slope too it does not
+//! depend on which of them were measured. The values of all gauges but coverage, deviation and placement are worked out from
+//! these heights and deviations.
 
 mod cells;
 mod extreme;
@@ -29,7 +29,7 @@ pub enum Axis {
 /// are averaged over, in camera pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Measure {
-    /// The largest deviation from golden of squares of `side` pixels about every pixel, mm; see
+    /// The largest mean deviation from golden of squares of `side` pixels about every pixel, mm; see
     /// [`Comparison::deviation`](super::Comparison::deviation).
     Deviation {
         /// Odd; 1 = single pixels.
@@ -76,7 +76,7 @@ pub enum Measure {
 }
 
 impl Measure {
-    /// The side of the cells that it needs at least, if it is worked out from cells; 0 if any will do.
+    /// The side of its cells, if it is worked out from cells; 0 if the grid may choose it.
     pub(super) fn cell_side(&self) -> Option<usize> {
         match *self {
             Self::RmsDeviation { side }

@@ -1,10 +1,9 @@
-//! The cells of a region as they were taught: how large, and how they answer a motion of the part.
+//! The cells of a region as they were taught: place, size, and how their heights change with a motion of the part.
 
 use super::Grid;
 use crate::geometry::Vector;
 use crate::inspect::Region;
 use crate::inspect::align::GoldenSurface;
-
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -21,15 +20,15 @@ pub struct TaughtCell {
     pub y: f64,
     /// Their area in x and y, mm².
     pub area: f64,
-    /// What its height loses where the part's motion is taken to be larger: per mm along each axis, and per mm of the way of
-    /// a point at the radius about each.
-    pub row: [f64; 6],
+    /// −∂z/∂x of its height over the components x of the motion that is taken back: shifts in mm, turns as the way of a point at
+    /// the radius in mm ([`Fitting::jacobian`](crate::inspect::align::Fitting::jacobian)).
+    pub jacobian: [f64; 6],
     /// Σ of the variances of its pixels' heights, mm².
     pub variance: f64,
 }
 
-/// Pixels of a cell whose facets are looked at, in each direction.
-const LOOKS: usize = 4;
+/// Facets of a cell that are averaged, in each direction.
+const FACETS: usize = 4;
 
 /// The cells of a region. Turns are about `centre`, as ways at `radius`.
 pub(in crate::inspect) fn taught_cells(
@@ -40,8 +39,8 @@ pub(in crate::inspect) fn taught_cells(
 ) -> Vec<TaughtCell> {
     let width = golden.surface.width;
     let mut cells = vec![TaughtCell::default(); grid.len()];
-    let mut looks = vec![0.0; grid.len()];
-    let stride = (grid.side() / LOOKS).max(1);
+    let mut facets = vec![0.0; grid.len()];
+    let stride = (grid.side() / FACETS).max(1);
     for (v, columns) in region.spans() {
         for u in columns.clone() {
             let place = v * width + u;
@@ -68,28 +67,28 @@ pub(in crate::inspect) fn taught_cells(
                     facet.lift,
                     (point - centre).cross(facet.lift) * (1.0 / radius),
                 );
-                let row = [lift.x, lift.y, lift.z, turning.x, turning.y, turning.z];
-                for (sum, value) in cell.row.iter_mut().zip(row) {
+                let jacobian = [lift.x, lift.y, lift.z, turning.x, turning.y, turning.z];
+                for (sum, value) in cell.jacobian.iter_mut().zip(jacobian) {
                     *sum += value;
                 }
                 cell.area += facet.area;
-                looks[at] += 1.0;
+                facets[at] += 1.0;
             }
         }
     }
-    let all: f64 = looks.iter().sum();
+    let all: f64 = facets.iter().sum();
     let total = cells.iter().map(|cell| cell.area).sum::<f64>();
-    // A cell without a facet of its own is taken to be as large as the others, and flat.
+    // A cell without a facet is taken to have pixels as large as those of the others, and to be flat.
     let (mean, flat) = (total / all.max(1.0), [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
-    for (cell, looks) in cells.iter_mut().zip(looks) {
+    for (cell, facets) in cells.iter_mut().zip(facets) {
         let pixels = f64::from(cell.pixels);
         let each = 1.0 / pixels.max(1.0);
         (cell.height, cell.x, cell.y) = (cell.height * each, cell.x * each, cell.y * each);
-        if looks > 0.0 {
-            cell.row = cell.row.map(|sum| sum / looks);
-            cell.area *= pixels / looks;
+        if facets > 0.0 {
+            cell.jacobian = cell.jacobian.map(|sum| sum / facets);
+            cell.area *= pixels / facets;
         } else {
-            cell.row = flat;
+            cell.jacobian = flat;
             cell.area = pixels * mean;
         }
     }

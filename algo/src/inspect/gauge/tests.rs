@@ -21,7 +21,7 @@ fn grid(side: usize, height: impl Fn(f64, f64) -> f64) -> (Vec<Sum>, Vec<TaughtC
             x,
             y,
             area: 1.5,
-            row: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+            jacobian: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
             variance: 4.0 * 0.01,
         };
         (sum, taught)
