@@ -163,7 +163,7 @@ fn a_taught_recipe_has_exactly_the_documented_members_and_keys() {
 fn every_documented_gauge_is_read_and_written_as_it_stands_there() {
     let documented = document("formats.md");
     let (_, from) = documented
-        .split_once("all that there are:\n\n```json\n")
+        .split_once("possible values of `measures`:\n\n```json\n")
         .unwrap();
     let (list, _) = from.split_once("```").unwrap();
     let list: Vec<Value> = serde_json::from_str(list).unwrap();
