@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the list of crates that the recipe downloads, from Cargo.lock; or says whether it is still that of Cargo.lock.
+"""Writes the list of crates that the recipe downloads, from Cargo.lock; or checks that the list still matches Cargo.lock.
 
     yocto/crates.py            writes meta-fringed/recipes-fringed/fringed/fringed-crates.inc
     yocto/crates.py --check    ends with 1 and a difference where that file is not what would be written
@@ -21,7 +21,7 @@ LIST = HERE / "meta-fringed/recipes-fringed/fringed/fringed-crates.inc"
 
 
 def text(lock: Path) -> str:
-    """The list for a lock file; exits where a package comes from anywhere but crates.io or the workspace."""
+    """The list for a lock file; exits if a package is neither from crates.io nor from the workspace."""
     crates = []
     for package in tomllib.loads(lock.read_text())["package"]:
         name, version, source = package["name"], package["version"], package.get("source")

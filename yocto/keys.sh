@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Makes the keys of updates: a certificate authority, and a certificate that signs bundles.
+# Makes the keys for updates: a certificate authority, and a certificate that signs bundles.
 #
 #     yocto/keys.sh DIR
 #
-# fringed-ca.cert.pem goes into every image. Whoever has signing.key.pem can update every device with it, and whoever has
-# fringed-ca.key.pem can make such keys: keep both off the build machine where you can, and out of every repository.
+# fringed-ca.cert.pem goes into every image. Anyone with signing.key.pem can update every device that has it, and anyone with
+# fringed-ca.key.pem can make such keys: keep both off the build machine if possible, and out of every repository.
 set -euo pipefail
 dir=${1:?usage: keys.sh DIR}
 if [[ -e $dir/fringed-ca.key.pem ]]; then

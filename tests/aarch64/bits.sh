@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Compares the bits of every back-end of this machine and of aarch64 (under qemu) with each other and with the frozen ones.
+# Compares the results of every back-end, on this machine and on aarch64 (under qemu), with the frozen bits.
 #
-#     tests/aarch64/bits.sh DIR [PROFILE]      DIR as toolchain.sh made it; of the build that is shipped (dist) or of another
+#     tests/aarch64/bits.sh DIR [PROFILE]      DIR as made by toolchain.sh; built with dist or another profile
 set -euo pipefail
 shopt -s inherit_errexit
 dir=${1:?usage: bits.sh DIR [PROFILE]}

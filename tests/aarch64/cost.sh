@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Counts the instructions per pixel of what `ceilings.txt` names, exactly, and fails where a ceiling is exceeded. Part `row`: the
-# instructions that a row costs beside its pixels, all of them: those of the C library, which have no names, too.
+# Counts exactly the instructions per pixel of the functions in `ceilings.txt`, and fails if a ceiling is exceeded. Part `row` is the
+# number of instructions per row that do not depend on its length, including those of the C library, which has no symbols.
 #
 #     tests/aarch64/cost.sh DIR             DIR as toolchain.sh made it
 #     tests/aarch64/cost.sh DIR record      writes what is counted now, plus 2 %, as the new ceilings
 #
-# The program decodes two heights of the same frames; in the difference everything that does not grow with them cancels. What a row
-# costs follows from two widths, both whole blocks of every back-end: what does not grow with them is the row's.
+# The program decodes frames of two heights; in the difference everything cancels that does not grow with the height. The cost of a row
+# follows from two widths, both multiples of the block of every back-end: it is the part that does not grow with the width.
 set -euo pipefail
 shopt -s inherit_errexit
 dir=$(cd "${1:?usage: cost.sh DIR [record]}" && pwd)
@@ -15,9 +15,9 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 ceilings=tests/aarch64/ceilings.txt
 few=16 many=48 # rows
 narrow=64 wide=1408 # pixels
-# Another compiler may need a few instructions more: new ceilings stand this share above what was counted.
+# Another compiler may need a few more instructions, so new ceilings are this share above the count.
 headroom=0.02
-# A ceiling further above than this holds nothing.
+# A ceiling that is farther above the count than this should be lowered.
 slack=0.03
 
 build=(build --quiet --profile dist -p algo --no-default-features --features std --example probe)

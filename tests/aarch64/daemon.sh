@@ -2,7 +2,7 @@
 # Builds `fringed` for aarch64 with the devices that need no library, and runs it under qemu.
 #
 #     tests/aarch64/daemon.sh DIR            DIR as toolchain.sh made it
-#     tests/aarch64/daemon.sh DIR tests      and those of its tests that need no device: twice the time
+#     tests/aarch64/daemon.sh DIR tests      also runs the tests that need no device: twice the time
 set -euo pipefail
 shopt -s inherit_errexit
 dir=$(cd "${1:?usage: daemon.sh DIR [tests]}" && pwd)
@@ -12,21 +12,21 @@ features=kms,gpio
 # SQLite is written in C.
 export CC_aarch64_unknown_linux_gnu=$dir/bin/cc AR_aarch64_unknown_linux_gnu=$dir/bin/ar
 
-# Where tests follow, as these are built, so that nothing is built twice.
+# If tests follow, with their profile, so that nothing is built twice.
 profile=dev
 if [[ -n $tests ]]; then profile=test; fi
 "$dir/bin/cargo" build --profile "$profile" -p appliance --features "$features"
 fringed=("$dir/bin/qemu-aarch64" "$dir/build/aarch64-unknown-linux-gnu/debug/fringed")
 "${fringed[@]}" --version
 
-# This build has no camera, and says so with the remedy.
+# This build has no camera, and must say so with the remedy.
 had=0
 said=$("${fringed[@]}" config check docs/fringed.toml 2>&1) || had=$?
 if [[ $had != 78 || $said != *"built without libcamera:"*"--features rpi"* ]]; then
     echo "the configuration of a head with a camera ended with $had and said: $said" >&2
     exit 1
 fi
-# Lines it has, and a simulated head; there is no chip here.
+# It has lines and a simulated head; there is no chip here.
 config=$(mktemp)
 trap 'rm -f "$config"' EXIT
 printf '[lines]\nchip = "no-such-chip"\nstart = "START"\n' >"$config"

@@ -1,7 +1,7 @@
-"""Many cycles of a PLC with bad luck: repeated writes, lost answers, lost connections, results read in two halves.
+"""Many cycles of a PLC with communication faults: repeated writes, lost answers, lost connections, results read in two halves.
 
-Both handshakes, chosen at random. Every result is queued (BUFFERED) and taken from OLDEST; meanwhile a second client reads
-RESULT in two halves with pauses between them. What SEQ at both ends lets pass must be what was measured.
+The handshake is chosen at random. Every result is queued (BUFFERED) and taken from OLDEST; meanwhile a second client reads
+RESULT in two halves with pauses between them. A result whose SEQ is the same at both ends must be one that was measured.
 """
 
 import random
@@ -19,7 +19,7 @@ TORN_CYCLES = 0.2
 
 
 def halves(plc, block, pause=lambda: None):
-    """A block of 120 registers in two reads; nothing if SEQ tells that they do not belong together."""
+    """A block of 120 registers in two reads; None if SEQ shows that the halves are of different results."""
     first = plc.read(block, 60)
     pause()
     words = first + plc.read(block + 60, 60)
@@ -27,7 +27,7 @@ def halves(plc, block, pause=lambda: None):
 
 
 class Onlooker(threading.Thread):
-    """Reads RESULT in two halves all the time, and keeps what SEQ lets pass."""
+    """Reads RESULT in two halves continuously, and keeps the results whose SEQ is the same at both ends."""
 
     def __init__(self, port, seed):
         super().__init__(daemon=True)
@@ -45,7 +45,7 @@ class Onlooker(threading.Thread):
                 else:
                     known = self.accepted.setdefault(long(words, 0), words)
                     expect(known == words, f"result {long(words, 0)} reads the same every time")
-        except Exception as failure:  # Told to the main thread.
+        except Exception as failure:  # Raised again in the main thread.
             self.failure = failure
         self.plc.disconnect()
 
@@ -59,7 +59,7 @@ class Campaign:
         self.taken = []
 
     def write(self, address, values):
-        """A write; every tenth is sent again, as after a lost answer, half of them by another connection."""
+        """A write; every tenth is sent again as after a lost answer, half of these over another connection."""
         self.writes += 1
         self.plc.write(address, values)
         if self.writes % RETRIED_WRITE == 0:
@@ -74,14 +74,14 @@ class Campaign:
         self.plc.connect()
 
     def bad_luck(self):
-        """Now and then the connection is lost, with half a frame on the way or without."""
+        """Loses the connection now and then, with or without an incomplete request."""
         if self.luck.random() < DISCONNECTS:
             if self.luck.random() < 0.5:
                 self.plc.send_and_disconnect(0, [LEVEL], share=self.luck.uniform(0.1, 0.9))
             self.reconnect()
 
     def token(self, plc=None):
-        """Triggers by token; gives PART_ID."""
+        """Triggers by token; returns PART_ID."""
         self.number += 1
         self.by_token += 1
         token, part = self.number % 0xFFFF + 1, 0x30000 + self.number
@@ -97,12 +97,12 @@ class Campaign:
         return part
 
     def edge(self):
-        """Triggers by edge; gives PART_ID. A lost answer is cleared up by TRIGGERS."""
+        """Triggers by edge; returns PART_ID. After a lost answer TRIGGERS shows whether the trigger was counted."""
         self.number += 1
         self.by_edge += 1
         part = 0x10000 + self.number
         words = [LEVEL | TRIGGER, *trigger_fields(0, part, self.number)]
-        # The first write of a connection only sets the level that edges are counted from.
+        # The first write of a connection only sets the initial level.
         self.write(0, [LEVEL])
         before = self.plc.status().triggers
         if self.luck.random() < LOST_ANSWERS:
@@ -119,11 +119,11 @@ class Campaign:
         return part
 
     def wait_for(self, seq):
-        """The status with this result, or a later one, and READY."""
+        """Waits for this result or a later one, and READY; returns the status."""
         return self.plc.wait(f"result {seq}", lambda s: (s.seq - seq) & 0xFFFFFFFF < 0x80000000 and s.has(READY))
 
     def take(self, seq, part):
-        """Takes the oldest result, read in two halves, and acknowledges it however often that takes."""
+        """Reads the oldest result in two halves and acknowledges it, repeatedly if necessary."""
         words = halves(self.plc, 400)
         expect(words is not None, "OLDEST stands still until it is acknowledged")
         check_result(words)
@@ -139,7 +139,7 @@ class Campaign:
             self.write(0, [LEVEL])
 
     def tear(self, seq):
-        """Another client measures between the two halves of a read: the two SEQ must tell."""
+        """Another client measures between the two halves of a read: the two SEQ must differ."""
         first = self.plc.read(200, 60)
         part = self.token(self.other)
         self.wait_for(seq + 1)

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""NumPy and zipfile open what the program writes: a measured recording and a taught recipe.
+"""Opens the program's files with NumPy and zipfile: a measured recording and a taught recipe.
 
     python3 tests/clients/files.py target/release/fringed
 
-Ends with an exit code other than 0 at the first broken promise. Needs numpy and nothing else.
+Exits with a code other than 0 at the first broken promise. Needs only numpy.
 """
 
 import io
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy
 
-# Measured errors may exceed the predicted ones by this much: the prediction knows noise only, not how a pixel averages a slope.
+# Measured errors may exceed the predicted ones by this factor, because the prediction includes only noise and not the averaging of a slope within a pixel.
 RMS_OVER_SIGMA = 1.2
 
 

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Both handshakes of the register map with pymodbus, against the daemon: step by step, then in a campaign of bad luck.
+"""Both handshakes of the register map with pymodbus and the daemon: each in detail, then a campaign with communication faults.
 
     python3 tests/clients/handshakes.py target/release/fringed [CYCLES]
 
-Ends with an exit code other than 0 at the first broken promise. Needs pymodbus 3.16 and nothing else.
+Exits with a code other than 0 at the first broken promise. Needs only pymodbus 3.16.
 """
 
 import struct
@@ -15,7 +15,7 @@ from plc import (BUSY, EXPOSURE_DONE, MISSED_TRIGGER, ONLINE, PATIENCE_S, PROCES
                  RECIPE_OK, RESULT_ACK, RESULT_TOGGLE, RESULT_VALID, TRIGGER, TRIGGER_ACK, Broken, Plc, check_result,
                  daemon, expect, long, trigger_fields)
 
-# Cycles of each handshake that are looked at step by step.
+# Cycles of each handshake that are checked in detail.
 STEPS = 3
 SEED = 20261121
 
@@ -43,14 +43,14 @@ def identity(plc):
 def edge(plc, cycle):
     before = plc.wait("READY", lambda s: s.has(READY))
     part, stroke = 0x10000 + cycle, 0x20000 + cycle
-    # The first write of a connection only sets the level that edges are counted from.
+    # The first write of a connection only sets the initial level.
     plc.write(0, [ONLINE])
     fields = trigger_fields(0, part, stroke)
     after = plc.write_and_read_status(0, [ONLINE | TRIGGER, *fields])
     expect(after.has(BUSY | TRIGGER_ACK), "the snapshot after the write is BUSY with TRIGGER_ACK")
     expect(not after.bits & (READY | EXPOSURE_DONE | RESULT_VALID), "READY, EXPOSURE_DONE and RESULT_VALID fell")
     expect(after.triggers == before.triggers + 1, "the trigger was counted")
-    # TRIGGER may stay at 1 and be written again: that is no edge.
+    # Writing TRIGGER = 1 again while it is 1 is not an edge.
     plc.write(0, [ONLINE | TRIGGER, *fields])
     plc.write(0, [ONLINE])
     plc.wait("EXPOSURE_DONE", lambda s: s.has(EXPOSURE_DONE))
@@ -78,7 +78,7 @@ def token(plc, cycle):
     after = plc.write_and_read_status(1, fields)
     expect(after.has(BUSY) and not after.has(READY), "the snapshot after the write is BUSY")
     expect(after.last_token == number, "LAST_TOKEN echoes the token")
-    # The answer was lost, the PLC writes again: while it measures and when it is done.
+    # As after a lost answer, the PLC writes again: during the measurement and after it.
     plc.write(1, fields)
     until = time.monotonic() + PATIENCE_S
     while plc.read(200, 120)[2] != number:
@@ -95,7 +95,7 @@ def token(plc, cycle):
 
 
 def missed(plc):
-    """What is not ready is told in registers, never by an exception."""
+    """A station that is not ready says so in registers, never by an exception."""
     before = plc.wait("READY", lambda s: s.has(READY))
     offline = plc.write_and_read_status(0, [0, *trigger_fields(5001, 1, 1)])
     expect(offline.missed == before.missed + 1, "a trigger while offline is counted as missed")
@@ -127,7 +127,7 @@ def other_recipe(plc):
     failed = plc.load_recipe(77)
     expect((failed.recipe_result, failed.active_recipe) == (1, RECIPE), "the load failed, the recipe before is active")
     expect(not failed.bits & (READY | RECIPE_OK), "a failed load takes READY and RECIPE_OK away")
-    # Neither to leave the recipe nor to select the active one is a load.
+    # Neither RECIPE_SELECT 0 nor selecting the active recipe is a load.
     for at, select in enumerate([0, RECIPE]):
         fields = trigger_fields(5102 + at, 1, 1, recipe=select)
         rejected(plc.write_and_read_status(1, fields), 3 + at, f"after a failed load, with RECIPE_SELECT {select}")

@@ -20,7 +20,7 @@ PASS = 1
 # The recipe that the daemon teaches at its first start.
 RECIPE = 1
 PATIENCE_S = 30.0
-# What is tested is the protocol: few pixels, so that nothing waits for light.
+# Few pixels, so that rendering takes little time: only the protocol is tested.
 SCENARIO = "sub_rays = 2\n\n[rig.camera]\nwidth = 160\nheight = 160\n"
 
 
@@ -66,7 +66,7 @@ class Plc:
         self.client.close()
 
     def send_and_disconnect(self, address, values, share=1.0):
-        """Sends a write, or the first share of its bytes, and is gone before the answer comes."""
+        """Sends a write, or the first part of its bytes, and closes the connection before the answer comes."""
         data = struct.pack(f">{len(values)}H", *values)
         pdu = struct.pack(">BHHB", 16, address, len(values), len(data)) + data
         frame = struct.pack(">HHHB", 0x7777, 0, len(pdu) + 1, 1) + pdu
@@ -93,8 +93,8 @@ class Plc:
         return Status(self.read(100, 32))
 
     def load_recipe(self, number):
-        """A changeover: asks for a recipe and answers with the status when the load has ended."""
-        # The first write of a connection only sets the level that edges are counted from.
+        """A changeover: requests a recipe and returns the status when the load has ended."""
+        # The first write of a connection only sets the initial level.
         self.write(0, [ONLINE])
         self.write(0, [ONLINE | RECIPE_LOAD, 0, number])
         self.write(0, [ONLINE])
@@ -113,7 +113,7 @@ class Plc:
 
 
 def check_result(words):
-    """What holds for every result of a good part."""
+    """Checks what must hold for every result of a good part."""
     expect(len(words) == 120, "a result has 120 registers")
     expect(long(words, 0) == long(words, 118), "SEQ is the same at both ends of the block")
     expect(words[3] == RECIPE, f"it was measured with recipe {RECIPE}, not {words[3]}")
@@ -139,7 +139,7 @@ def trigger_fields(token, part, stroke, recipe=RECIPE):
 
 @contextlib.contextmanager
 def daemon(program):
-    """The daemon on a free port; gives the port."""
+    """Runs the daemon on a free port; yields the port."""
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "small.toml").write_text(SCENARIO)
         config = Path(folder, "fringed.toml")

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Triggers by token with mbpoll, as a PLC that connects anew for every call, and reads each result in one read of
+# Triggers by token with mbpoll, like a PLC that opens a new connection for every request, and reads each result in one read of
 # 120 registers.
 #
 #     tests/clients/tokens.sh target/release/fringed [CYCLES]
 #
-# Ends with an exit code other than 0 at the first broken promise.
+# Exits with a code other than 0 at the first broken promise.
 set -euo pipefail
 
 fringed=$1
@@ -89,7 +89,7 @@ triggers=$(((after[10] << 16 | after[11]) - (before[10] << 16 | before[11])))
 [[ $((after[14] << 16 | after[15])) -eq $((before[14] << 16 | before[15])) ]] || broken "triggers were missed"
 [[ ${after[16]} -eq $token ]] || broken "LAST_TOKEN is ${after[16]}, not $token"
 
-# The README's examples, word for word but for the port.
+# The README's examples, unchanged except for the port.
 examples=0
 while IFS= read -r example; do
     words=${example%%#*}

@@ -1,4 +1,4 @@
-//! libFuzzer around the targets of the crate `tests`; `--target=NAME` chooses one. `run` beside this file builds and starts it.
+//! Runs a target of the crate `tests` under libFuzzer; `--target=NAME` selects it. The script `run` builds and starts this program.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -7,7 +7,7 @@ use tests::fuzz::Target;
 
 static TARGET: OnceLock<Target> = OnceLock::new();
 
-/// libFuzzer leaves options that begin with two dashes to the program.
+/// The target named by `--target=NAME`; libFuzzer ignores options that begin with two dashes.
 fn chosen() -> Target {
     let mut names = std::env::args().filter_map(|argument| argument.strip_prefix("--target=").map(str::to_owned));
     let name = names.next().expect("--target=NAME");

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Makes the package for a Raspberry Pi, unpacks it, and runs its binary under qemu: its version, and a recording measured.
+# Builds the package for a Raspberry Pi, unpacks it, and runs its binary under qemu to show its version and to measure a recording.
 #
-#     tests/package/arm64.sh DIR OUT      DIR as tests/aarch64/toolchain.sh and libcamera.sh made it
+#     tests/package/arm64.sh DIR OUT      DIR as made by tests/aarch64/toolchain.sh and libcamera.sh
 set -euo pipefail
 shopt -s inherit_errexit
 usage='usage: arm64.sh DIR OUT'

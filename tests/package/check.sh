@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Checks what is in the package fringed and in fringed-lab beside it: the size of the binary, where the files lie, what belongs to the
-# user, what they need.
+# Checks the content of the packages fringed and fringed-lab: the size of the binary, the places of the files, the user's configuration,
+# and the dependencies.
 #
 #     tests/package/check.sh PACKAGE.deb            built with the profile dist
 #     tests/package/check.sh PACKAGE.deb quick      built otherwise: the size of its binary is not checked
@@ -29,12 +29,12 @@ done
 for file in fringed.service 60-fringed.rules; do
     cmp -s "systemd/$file" "$(find "$work/usr" -name "$file")" || broken "$file is not the one of this source"
 done
-# What is neither the program's nor its documentation's would be there after its removal as well.
+# Other files than those of the program and its documentation must not be in the package.
 stray=$(cd "$work" && find . -type f -not -path './DEBIAN/*' -not -path './usr/bin/fringed' -not -path './usr/share/doc/fringed/*' \
     -not -path ./usr/share/man/man1/fringed.1.gz -not -path './usr/lib/s*' -not -path './usr/lib/tmpfiles.d/*' -not -path './usr/lib/udev/*' -not -path './usr/share/*completions*/*fringed*' -not -path ./etc/fringed/fringed.toml)
 [[ -z $stray ]] || broken "nobody asked for $stray"
 
-# Each shell knows the commands and the options of one of them.
+# The completion of each shell has the commands, and the options of one command.
 for completion in bash-completion/completions/fringed zsh/vendor-completions/_fringed fish/vendor_completions.d/fringed.fish; do
     for word in serve doctor scenario; do
         grep -q -- "$word" "$work/usr/share/$completion" || broken "$completion does not know $word"
@@ -57,7 +57,7 @@ for step in 'postinst deb-systemd-helper enable' 'postinst systemd-sysusers' 'po
     grep -q -- "${step#* }" "$work/DEBIAN/${step%% *}" || broken "${step%% *} has no ${step#* }"
 done
 
-# Benchmarks and experiments: a program, its documentation, and nothing that a station would start or find.
+# fringed-lab has a program and its documentation, and nothing that would affect a station.
 stray=$(cd "$work-lab" && find . -type f -not -path './usr/share/doc/fringed-lab/*' | sort | tr '\n' ' ')
 [[ $stray == './DEBIAN/control ./DEBIAN/md5sums ./usr/bin/fringed-lab ./usr/share/bash-completion/completions/fringed-lab '\
 './usr/share/fish/vendor_completions.d/fringed-lab.fish ./usr/share/man/man1/fringed-lab.1.gz ./usr/share/zsh/vendor-completions/_fringed-lab ' ]] ||

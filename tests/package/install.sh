@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Installs a package in a clean Debian, upgrades it to a newer one, removes and purges it, and looks each time at what is there.
+# Installs a package in a clean Debian, upgrades it to a newer one, removes and purges it, and checks the files after each.
 #
-#     tests/package/install.sh DIR PACKAGE.deb      DIR as root.sh made it
+#     tests/package/install.sh DIR PACKAGE.deb      DIR as made by root.sh
 #
-# No service manager runs there, as in the making of an image: what it would do at the next start stands in its links.
+# No service manager runs there, as when a system image is built; the links to units show what it would start.
 set -euo pipefail
 shopt -s inherit_errexit
 usage='usage: install.sh DIR PACKAGE.deb'
@@ -15,7 +15,7 @@ broken() {
     echo "FAILED: $*" >&2
     exit 1
 }
-# Runs a command in the clean Debian; what it says is shown only where it fails.
+# Runs a command in the clean Debian; its output is shown only if it fails.
 inside() {
     chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin DEBIAN_FRONTEND=noninteractive "$@" >"$dir/said" 2>&1 || {
         cat "$dir/said" >&2
@@ -34,7 +34,7 @@ mkdir "$root"
 tar --extract --file "$dir/root.tar" --directory "$root"
 mount -t proc proc "$root/proc"
 cp "${2:?$usage}" "$root/old.deb"
-# A newer one, whose configuration as installed is another.
+# A newer package with a different default configuration.
 newer=$(dpkg-deb --field "$root/old.deb" Version)+1
 dpkg-deb --raw-extract "$root/old.deb" "$root/new"
 sed -i "s/^Version: .*/Version: $newer/" "$root/new/DEBIAN/control"
@@ -57,7 +57,7 @@ inside fringed --version
 [[ $(cat "$dir/said") =~ ^fringed\ [0-9.]+ ]] || broken "it calls itself $(cat "$dir/said")"
 sed 's/^/  /' "$dir/said"
 inside fringed config check /etc/fringed/fringed.toml
-# What the service would do: its first recipe, a part, and a secret that nobody else reads.
+# As the service would: teach the first recipe, measure parts, and make a secret that no other user can read.
 inside runuser -u fringed -- fringed demo --exit --config /etc/fringed/fringed.toml --modbus 127.0.0.1:0 --http 127.0.0.1:0
 [[ -s $root/var/lib/fringed/recipes/0001.recipe ]] || broken "the demonstration taught no recipe"
 
@@ -65,7 +65,7 @@ echo "upgraded, with a configuration of the user's:"
 before=$(cd "$root/var/lib/fringed" && find . -type f -exec sha256sum {} + | sort)
 sed -i 's/^listen = "0.0.0.0:80"/listen = "0.0.0.0:8080"/' "$root/etc/fringed/fringed.toml"
 edited=$(sha256sum <"$root/etc/fringed/fringed.toml")
-# dpkg asks which of the two it shall be; whoever only presses enter keeps their own.
+# dpkg asks which configuration to use; the default answer keeps the user's.
 inside dpkg --install /new.deb <<<''
 inside dpkg --status fringed
 grep -q "^Version: $newer$" "$dir/said" || broken "the newer one is not there: $(cat "$dir/said")"
@@ -73,7 +73,7 @@ grep -q "^Version: $newer$" "$dir/said" || broken "the newer one is not there: $
 [[ $(sha256sum <"$root/etc/fringed/fringed.toml") == "$edited" ]] || broken "the upgrade touched the configuration"
 [[ -f $root/etc/fringed/fringed.toml.dpkg-dist ]] || broken "the newer default is not beside the user's configuration"
 [[ -L $link ]] || broken "the service is no longer enabled"
-# Whoever switched it off finds it off after the next upgrade.
+# A service that was disabled stays disabled after an upgrade.
 inside systemctl disable fringed
 inside dpkg --install --force-confold /new.deb
 [[ ! -e $link && ! -L $link ]] || broken "an upgrade enables the service again"

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Makes a clean Debian in DIR/root.tar, with systemd's programs and nothing else, from the machine's sources.
+# Makes a minimal Debian with systemd's programs in DIR/root.tar, from the machine's package sources.
 #
 #     tests/package/root.sh DIR
 #
-# Ends with 69 (EX_UNAVAILABLE) and the reason where it cannot be had: it needs root, mmdebstrap and a Debian.
+# Exits with 69 (EX_UNAVAILABLE) and the reason if that is not possible: it needs root, mmdebstrap and a Debian.
 set -euo pipefail
 mkdir -p "${1:?usage: root.sh DIR}"
 dir=$(cd "$1" && pwd)

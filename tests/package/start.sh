@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Measures how long `fringed` takes from its start until a measurement can be triggered, with the reference head's camera
-# (1456 × 1088 pixels), and fails where it takes longer than promised.
+# Measures the time from the start of `fringed` until a measurement can be triggered, with the reference head's camera
+# (1456 × 1088 pixels), and fails if it is longer than promised.
 #
 #     tests/package/start.sh BINARY [RUNS]
 #
-# Three starts: of a replay head with a stored recipe, of the simulated head with one, and of the simulated head of a new device,
-# which teaches its first recipe and is promised nothing. Ready is when the log says so. The program's processor time stands
-# beside the wall's, which is everybody's: on a machine with other work the one still tells something.
+# Three starts: with a replay head and a stored recipe, with a simulated head and a stored recipe, and with the simulated head of a new
+# device, which teaches its first recipe and for which no time is promised. The station is ready when the log says so. The program's
+# processor time is printed as well, because wall time means little on a machine with other work.
 set -euo pipefail
 shopt -s inherit_errexit
 usage='usage: start.sh BINARY [RUNS]'
@@ -24,7 +24,7 @@ finish() {
 }
 trap finish EXIT
 
-# A camera with the pixels of the reference head's, and square ones.
+# A camera with the reference head's number of pixels, which are square.
 printf '[rig.camera]\nwidth = 1456\nheight = 1088\nfov_deg = [20.0, 15.0]\n' >"$work/scenario.toml"
 printf '[head]\nscenario = "scenario.toml"\n' >"$work/simulated.toml"
 printf '[head]\nbackend = "replay"\nrecordings = ["recording"]\n' >"$work/replay.toml"
@@ -45,7 +45,7 @@ start() {
     while IFS= read -r -u "$log" line; do
         case $line in
         *': ready, recipe 1 '*) ended=${EPOCHREALTIME/./} ;;&
-        # It serves also where it is not ready, and then says so before.
+        # A station that is not ready serves as well; the line about being ready comes before this one.
         *': ready'* | *': Modbus TCP on '*) break ;;
         esac
     done

@@ -1,4 +1,4 @@
-// The daemon under test: the real program on a small simulated head, with a state folder of its own.
+// The daemon under test: the real program with a small simulated head and its own state folder.
 import { spawn } from "node:child_process";
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { connect } from "node:net";
@@ -19,7 +19,7 @@ defects = [{ kind = "dent", x = 0.0, y = -8.0, depth_mm = 0.6, diameter_mm = 14.
 `;
 
 export class Place {
-  // A head with frames of so many pixels square.
+  // A head with frames of `pixels` × `pixels`.
   constructor(pixels = 256) {
     this.folder = mkdtempSync(join(tmpdir(), "fringed-page-"));
     this.put("good", head(pixels));
@@ -40,7 +40,7 @@ export class Place {
 }
 
 export class Daemon {
-  // Starts the program and waits until it says where it serves. `part` is what lies in front of the head.
+  // Starts the program and waits until it prints its addresses. `part` is the part in front of the head.
   static async start(program, place, part = "good", http = "127.0.0.1:0") {
     const child = spawn(program, ["serve", "--config", join(place.folder, `${part}.toml`), "--modbus", "127.0.0.1:0", "--http", http], { stdio: ["ignore", "ignore", "pipe"] });
     const daemon = new Daemon();
@@ -77,7 +77,7 @@ export class Daemon {
   async end(name = "SIGTERM") {
     if (this.child.exitCode !== null || this.child.signalCode !== null) return;
     const gone = new Promise((resolve) => this.child.once("exit", resolve));
-    // A stopped process hears nothing but SIGKILL and SIGCONT.
+    // A stopped process reacts only to SIGKILL and SIGCONT.
     this.child.kill("SIGCONT");
     this.child.kill(name);
     await gone;

@@ -1,6 +1,6 @@
 // Drives the page in a real headless Chromium, as a technician would: node drive.js PROGRAM CHROMIUM [PICTURES]
 //
-// With a third argument it also takes the pictures of the README into that folder.
+// With a third argument it also takes screenshots for the documentation, into that folder.
 import { strict as assert } from "node:assert";
 import { chromium } from "playwright-core";
 import { Daemon, Place } from "./daemon.js";
@@ -9,11 +9,11 @@ import { pictures } from "./pictures.js";
 import { recipes } from "./recipes.js";
 
 const [program, browserPath, folder] = process.argv.slice(2);
-// Longest wait for anything that must happen; nothing waits for so long when all is well.
+// Longest wait for anything that must happen.
 const PATIENCE = 30000;
-// Shift of the page's content by Chromium's measure; 0.1 is what is called good.
+// Largest layout shift of the page by Chromium's measure; up to 0.1 is rated good.
 const JUMPS = 0.02;
-// Two missed beats of one second, what the network may be late by, and one check of the page.
+// Two missing events of one second, the delay of the network, and one check by the page.
 const STALE_WITHIN = 4000;
 
 const place = new Place();
@@ -21,7 +21,7 @@ const browser = await chromium.launch({ executablePath: browserPath, args: ["--n
 let daemon = await Daemon.start(program, place);
 const page = await (await browser.newContext({ viewport: { width: 1280, height: 800 } })).newPage();
 page.setDefaultTimeout(PATIENCE);
-// Lets a test hold the measuring task's heartbeat still, and sums up how far things on the page jump.
+// Lets a test stop the heartbeat of the measuring task, and sums up the layout shifts of the page.
 await page.addInitScript(() => {
   const parse = JSON.parse;
   JSON.parse = (text) => {
@@ -140,14 +140,14 @@ try {
     await page.click("#recipe-rows tr button:has-text('Edit')");
     await page.waitForSelector("#editor-regions .handle");
     const limits = page.locator("#editor-gauges input[aria-label^='lowest deviation']");
-    // What the browser does not take for a number is refused at its field, by the name of the gauge.
+    // A text that is not a number is refused at its field, naming the gauge.
     await limits.first().fill("");
     await limits.first().pressSequentially("1e999");
     await page.click("#editor-form button[type=submit]");
     assert.match(await limits.first().evaluate((field) => field.validationMessage), /^lowest deviation.* in mm: write a number from -214748\.3647 to 214748\.3647$/);
     assert.ok(await page.isVisible("#editor"));
     await limits.first().fill("0.2");
-    // Above the other limit: no part would pass. The field says so, and nothing is sent.
+    // A lower limit above the upper one: no part would pass. The field shows this, and nothing is sent.
     await page.click("#editor-form button[type=submit]");
     assert.match(await limits.first().evaluate((field) => field.validationMessage), /above/);
     await page.locator("#editor-gauges input[aria-label^='highest deviation']").first().fill("0.3");
@@ -377,7 +377,7 @@ try {
   });
 
   await step("the cover comes by itself when the scripts hang", async () => {
-    // Nothing of the page runs any more: only the browser's own animation is left.
+    // The page's scripts are stopped; only the browser's animation still runs.
     await page.evaluate(() => { for (let id = 0; id < 10000; id += 1) clearInterval(id); });
     daemon.signal("SIGSTOP");
     await page.waitForFunction(() => getComputedStyle(document.querySelector("#stale")).opacity === "1", null, { timeout: STALE_WITHIN });

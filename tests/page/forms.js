@@ -1,11 +1,11 @@
-// The page on a phone, a tablet and a desktop, light and dark: what fingers, keyboards and screen readers need of it.
+// The page on a phone, a tablet and a desktop, light and dark: use with fingers, keyboard and screen reader.
 import { strict as assert } from "node:assert";
 
 const SIZES = [[390, 844], [820, 1180], [1280, 800]];
 const VIEWS = ["live", "history", "recipes", "registers", "device"];
 // Side of the smallest target that a finger hits (WCAG 2.5.8), in pixels of the screen.
 const FINGER = 24;
-// The longest that the header says of the station.
+// The longest text for the station's state in the header.
 const LONGEST = "offline: the PLC does not ask for it";
 
 async function everywhere(browser, url, cookies, touch, check) {
@@ -40,7 +40,7 @@ async function header(page, where) {
   assert.ok(found.over <= 0, `the page is ${found.over} px too wide at ${where}`);
 }
 
-// Every button and link that shows words is called by these words, and is large enough.
+// Every button and link with text has this text as its accessible name, and is large enough.
 async function controls(page, where) {
   for (const view of VIEWS) {
     await page.click(`nav a[href='#${view}']`);
@@ -60,7 +60,7 @@ async function controls(page, where) {
   }
 }
 
-// Corners of regions: a finger beside the corner hits it, and the inside of the smallest region is still the region's.
+// Corners of regions: a finger near a corner hits the corner, and the inside of the smallest region still hits the region.
 async function handles(page, where) {
   await page.click("nav a[href='#recipes']");
   await page.click("#recipe-rows tr button:has-text('Edit')");
@@ -88,7 +88,7 @@ async function handles(page, where) {
       assert.ok(reached, `corner ${corner + 1} of region ${index + 1} is smaller than ${FINGER} px at ${where}`);
     }
   }
-  // The chosen region is the smaller one: its middle is no corner.
+  // The smaller region is selected; its centre must not hit a corner.
   const inside = await page.locator("#editor-regions .region.chosen").evaluate((one) => {
     one.scrollIntoView({ block: "center" });
     const box = one.getBoundingClientRect();
@@ -103,7 +103,7 @@ async function handles(page, where) {
   await page.click("#editor-close");
 }
 
-// The log is longer than its place: the keyboard alone reads its end.
+// The log is longer than its box: its end can be reached with the keyboard alone.
 async function log(page, where) {
   await page.click("nav a[href='#device']");
   const place = page.locator(".log").first();
@@ -119,7 +119,7 @@ async function log(page, where) {
   assert.notEqual(await place.evaluate((one) => getComputedStyle(one).outlineStyle), "none", "its focus cannot be seen");
   await page.keyboard.press("End");
   await page.waitForFunction(() => { const one = document.querySelector(".log"); return one.scrollTop > 0 && one.scrollTop + one.clientHeight > one.scrollHeight - 2; });
-  // It is read anew every two seconds, and stays where it is.
+  // The log is reloaded every two seconds, and must keep its scroll position.
   if (!where.endsWith("dark")) return;
   await page.waitForResponse((response) => response.url().endsWith("/api/log"));
   await page.waitForTimeout(200);

@@ -51,7 +51,7 @@ export async function pictures(browser, program, folder) {
     await signIn(page, secret);
     await trigger(page, CYCLES);
     await shoot(browser, daemon.url, folder, "pass");
-    // Keeps the place that it scrolls to.
+    // Keeps its scroll position.
     const times = async (page) => {
       await page.evaluate(() => document.querySelector("#times").scrollIntoView({ block: "center" }));
       return true;

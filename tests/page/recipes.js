@@ -1,10 +1,10 @@
-// Recipes on the page: nobody loses a recipe by teaching, deleting or undoing.
+// Recipes on the page: no recipe is lost by teaching, deleting or undoing.
 import { strict as assert } from "node:assert";
 
 export async function recipes({ page, step, verdict, trigger }) {
   const rows = page.locator("#recipe-rows tr:not(.before)");
   const notice = (words) => page.waitForFunction((wanted) => !document.querySelector("#notice").hidden && document.querySelector("#notice").textContent.includes(wanted), words);
-  // The station is ready with this recipe; the banner goes on naming the one that measured the last part.
+  // The station is ready with this recipe; the banner still names the one that measured the last part.
   const active = (wanted) => page.waitForFunction(async (of) => {
     const { recipe, state } = await (await fetch("/api/snapshot")).json();
     return state === "ready" && Object.keys(of).every((key) => recipe[key] === of[key]);
@@ -24,7 +24,7 @@ export async function recipes({ page, step, verdict, trigger }) {
     assert.match(await page.textContent("#question-title"), /Replace recipe 1\?/);
     const words = await page.textContent("#question-words");
     for (const part of [before.name, `${before.regions.length} regions`, `${before.gauges.length} gauges`]) assert.ok(words.includes(part), words);
-    // The keyboard stays in the question, and Escape leaves everything as it is.
+    // The focus stays in the dialogue, and Escape changes nothing.
     for (let times = 0; times < 7; times += 1) {
       assert.ok(await page.evaluate(() => document.querySelector("#question").contains(document.activeElement)));
       await page.keyboard.press("Tab");

@@ -1,10 +1,10 @@
-"""Times what others offer for the same work on the same frames: fringes, OpenCV, NumPy.
+"""Times other implementations of the same computation on the same frames: fringes, OpenCV, NumPy.
 
     peers.py FRAMES BENCHMARKS [--docs FILE]
 
-FRAMES is the folder that `fringed-lab bench --frames` writes, BENCHMARKS the folder that `fringed-lab bench --out` writes: its
-floor of this machine is the unit, and its kernels stand in the same table. The table is printed and written there as
-peers.json and peers.md. With --docs, everything behind the marker line of FILE is replaced by both tables.
+FRAMES is the folder that `fringed-lab bench --frames` writes, BENCHMARKS the folder that `fringed-lab bench --out` writes: times are
+given in its floor for this machine, and its kernels are in the same table. The table is printed and written to BENCHMARKS as
+peers.json and peers.md. With --docs, everything after the marker line of FILE is replaced by both tables.
 
 Processor time of the process on one thread, medians of five, frame sets rotating through more than 200 MB.
 """
@@ -59,7 +59,7 @@ class Numpy:
 
 
 def opencv(ratios):
-    """The same with OpenCV's calls where it has one."""
+    """The same with OpenCV's functions where there is one."""
 
     def decode(frames):
         phase, bad, coarser = None, None, None
@@ -72,7 +72,7 @@ def opencv(ratios):
             weak = cv2.compare(modulation, 2.0 * LEAST_MODULATION, cv2.CMP_LT)
             bad = weak if bad is None else cv2.bitwise_or(bad, weak)
             if phase is None:
-                # The angle is 0 to 1 turn; what noise put below zero comes back.
+                # The angle is 0 to 1 turn; a phase that noise has moved below 0 is wrapped back.
                 above = cv2.compare(wrapped, 0.97, cv2.CMP_GT)
                 phase = cv2.subtract(wrapped, 1.0, mask=above, dst=wrapped.copy())
             else:
@@ -89,7 +89,7 @@ def opencv(ratios):
 
 
 def package(ratios, size, finest):
-    """The package fringes, told of our frames: its shifts run the other way, from a cosine."""
+    """The package fringes, set up for our frames: it uses a cosine, with shifts in the opposite direction."""
     height, width = size
     decoder = fringes.Fringes()
     decoder.X, decoder.Y, decoder.D, decoder.axes = width, height, 1, [1]
@@ -97,7 +97,7 @@ def package(ratios, size, finest):
     decoder.v = [finest * ratio for ratio in ratios]
 
     def decode(frames):
-        # It divides by the fractional part of its frequencies and says so on every call.
+        # It divides by the fractional part of its frequencies, and warns about it in every call.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             x = np.asarray(decoder.decode(frames, bmin=LEAST_MODULATION, threads=1).x)
@@ -112,7 +112,7 @@ def reordered(frames):
 
 
 def measured(decode, frames):
-    """Median processor time of one set, ns per pixel."""
+    """Median processor time of one set of frames, ns per pixel."""
     sets = [frames.copy() for _ in range(-(-ROTATION_BYTES // frames.nbytes))]
     pixels = frames.shape[1] * frames.shape[2]
     times = []

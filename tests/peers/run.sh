@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Times other people's decoders beside ours, in an own virtual environment.
+# Times other decoders and ours, in a virtual environment of its own.
 #
 #     tests/peers/run.sh target/dist/fringed-lab               kernels and peers, printed
-#     tests/peers/run.sh target/dist/fringed-lab docs          the whole benchmark; docs/benchmarks* are written anew
+#     tests/peers/run.sh target/dist/fringed-lab docs          the whole benchmark; rewrites docs/benchmarks*
 #
 # Needs python3 with venv, and the network for the first run.
 set -euo pipefail

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Checks the files in systemd/ without starting anything: systemd itself reads them, and rates how little the service may do.
+# Checks the files in systemd/ without starting anything: systemd's tools read them, and rate the exposure of the service.
 #
 #     tests/systemd/check.sh
 #
-# Ends with 69 (EX_UNAVAILABLE) and the reason where there is no systemd (Debian package systemd).
+# Exits with 69 (EX_UNAVAILABLE) and the reason if there is no systemd (Debian package systemd).
 set -euo pipefail
 shopt -s inherit_errexit
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-# Tenths; 2.0 is what an appliance that owns devices and a port can have at most.
+# The largest exposure level, in tenths. 2.0 is the best that a program can have which uses devices and a privileged port.
 most=20
 
 for program in systemd-analyze systemd-sysusers systemd-tmpfiles; do
@@ -17,7 +17,7 @@ for program in systemd-analyze systemd-sysusers systemd-tmpfiles; do
     }
 done
 
-# A system with nothing but systemd's own units, the service, and something to start.
+# A root folder with systemd's units, the service, and a program for it to start.
 root=$(mktemp -d)
 trap 'rm -rf "$root"' EXIT
 mkdir -p "$root"/{etc,var/lib,usr/bin,usr/lib/{systemd/system,sysusers.d,tmpfiles.d}}
@@ -35,7 +35,7 @@ complain() {
     failed=1
 }
 
-# Its words count: a key that it does not know is only a word to it.
+# Its output counts, not only its exit code: an unknown key is only a warning.
 said=$(systemd-analyze verify --man=no --root="$root" fringed.service 2>&1) || complain "systemd does not take the unit"
 [[ -z $said ]] || complain "systemd-analyze verify: $said"
 
@@ -43,7 +43,7 @@ rated=$(systemd-analyze security --no-pager --offline=true --threshold=$most sys
     complain "the service may do more than $((most / 10)).$((most % 10)) allows: systemd-analyze security --offline=true systemd/fringed.service"
 tail -n 1 <<<"$rated"
 
-# The user, its groups and its folders, made in that system.
+# The user, its groups and its folders, created in that root folder.
 systemd-sysusers --root="$root" fringed.conf >"$root/said" 2>&1 || complain "systemd does not take the users"
 grep -q '^fringed:[^:]*:[0-9]*:[0-9]*:[^:]*:/var/lib/fringed:[^:]*nologin$' "$root/etc/passwd" || complain "there is no user fringed"
 for group in gpio render video; do

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # Checks the Yocto layer without building it: the list of crates, a linter, kas, BitBake's own parser, the units, and the
-# script that chooses a slot; then breaks copies of the layer and sees that the checks find it.
+# script that chooses a slot; then breaks copies of the layer, and verifies that the checks find each defect.
 #
 #     tests/yocto/tools.sh DIR && tests/yocto/check.sh DIR
 #
 # Needs no network and no root.
-# What stands in single quotes is for sed.
+# Single quotes are for sed.
 # shellcheck disable=SC2016
 set -euo pipefail
 dir=$(cd "${1:?usage: check.sh DIR}" && pwd)
@@ -15,7 +15,7 @@ bin=$dir/python/bin
 
 crates() { "$bin/python" "$1/yocto/crates.py" --check; }
 
-# Hints are no findings. The two rules: the project has no home page, and small recipes have no sources of their own with a licence's text.
+# Hints are not errors. The two ignored rules: the project has no home page, and small recipes have no sources with a licence text.
 lint() {
     local files
     mapfile -t files < <(cd "$1" && find yocto/meta-fringed \( -name '*.bb' -o -name '*.bbappend' -o -name '*.inc' -o -path '*/conf/*.conf' \) | sort)
@@ -24,7 +24,7 @@ lint() {
         --suppress oelint.var.licenseremotefile -- "${files[@]}")
 }
 
-# configuration WORKSPACE FILES: what kas makes of them, in $dir/configuration.json.
+# configuration WORKSPACE FILES: writes the configuration that kas makes of the files to $dir/configuration.json.
 configuration() {
     mkdir -p "$dir/kas"
     (cd "$1" && KAS_WORK_DIR=$dir/kas "$bin/kas" --log-level warning dump --skip finish_setup_repos --skip repos_checkout \
@@ -37,7 +37,7 @@ machine() { configuration "$1" "$2" && parse "$1"; }
 
 slots() { "$here/slots.sh" "$1/yocto/meta-fringed/recipes-fringed/slots/files/boot-slot" "$dir/slots"; }
 
-# The units and what is added to others, with a service in place of the real one, whose program is not on this machine.
+# The units and drop-ins, with a substitute for the real service, whose program is not on this machine.
 units() {
     local from=$1/yocto/meta-fringed/recipes-fringed to=$dir/units
     rm -rf "$to"
@@ -66,7 +66,7 @@ else
     echo "units: SKIPPED, there is no systemd-analyze (Debian package systemd)"
 fi
 
-# broken CHECK FILE CHANGE: a copy with one file changed by sed, or moved with "mv TO"; CHECK must find that.
+# broken CHECK FILE CHANGE: makes a copy with one file changed by sed, or moved with "mv TO"; CHECK must find that.
 found=0
 broken() {
     local check=$1 file=$2 change=$3 copy=$dir/copy
@@ -145,7 +145,7 @@ broken parse $image '/^    rauc-mark-good /d'
 broken parse $image 's/debug-shell.service //'
 broken lint $image 's/^IMAGE_INSTALL = /IMAGE_INSTAL = /'
 
-# What has to fit together: releases, partitions, updates, the head, the kernel, state.
+# Consistency of releases, partitions, updates, the head, the kernel, state.
 broken parse yocto/meta-fringed/conf/layer.conf 's/"wrynose"/"scarthgap"/'
 broken parse yocto/meta-fringed/files/wic/fringed.wks.in 's/root-b/root-c/'
 broken parse yocto/meta-fringed/files/wic/fringed.wks.in "mv yocto/meta-fringed/wic/fringed.wks.in"
@@ -166,7 +166,7 @@ broken parse yocto/meta-fringed/recipes-kernel/linux/files/fringed.cfg 's/^CONFI
 broken parse yocto/meta-fringed/conf/distro/fringed-appliance.conf '/^INIT_MANAGER/d'
 broken parse yocto/meta-fringed/conf/distro/fringed-appliance.conf 's/create-spdx/create-sbom/'
 
-# A unit, and what is added to one.
+# A unit, and a drop-in.
 if command -v systemd-analyze >/dev/null; then
     broken units "" ""
     broken units $recipes/system/files/data.mount 's/^Where=.*/Where=\/dat/'
@@ -194,7 +194,7 @@ broken machine yocto/kas.yml '/meta-multimedia:/d'
 broken machine yocto/kas.yml '/commit: f62c/d'
 broken machine yocto/kas.yml 's/commit: \(ef022bf82d\).*/commit: \1/'
 
-# What yocto-check-layer asks of a layer.
+# Requirements of yocto-check-layer.
 broken parse yocto/meta-fringed/README.md "mv yocto/meta-fringed/notes.md"
 broken parse yocto/meta-fringed/README.md 's/<maintainers@.*>//'
 

@@ -1,4 +1,4 @@
-"""What the Pi's firmware makes of config.txt: the settings in force on one model, started from one partition.
+"""A model of how the Pi's firmware reads config.txt: the settings in force on one model, started from one partition.
 
 A filter stays in force until the next one of its kind; filters of different kinds have to fit together; `[all]` takes
 every filter back (Raspberry Pi's documentation of config.txt, "Conditional filters").
@@ -10,7 +10,7 @@ MODELS = ("pi4", "pi5")
 
 
 def settings(text: str, model: str, partition: int) -> dict[str, list[str]]:
-    """Every value that a key is given, in order; a filter that is not modelled here is a ValueError."""
+    """All values of each key, in order; raises ValueError for a filter that is not modelled here."""
     filters: dict[str, bool] = {}
     found: dict[str, list[str]] = {}
     for line in map(str.strip, text.splitlines()):

@@ -1,10 +1,10 @@
-"""Parses the layer with BitBake's own parser and says which promises its variables do not keep.
+"""Parses the layer with BitBake's own parser and reports which promises its variables do not keep.
 
     parse.py WORKSPACE FOLDER CONFIGURATION
 
-CONFIGURATION is what `kas dump --format json` prints, FOLDER is for BitBake's files. The other layers are stood in for
-by those in `layers`: the recipes that are appended to, and classes that do nothing. So this proves that the layer can be
-parsed and says what it should, not that it builds.
+CONFIGURATION is the output of `kas dump --format json`, FOLDER is for BitBake's files. The folder `layers` has substitutes for
+the other layers: the recipes that are appended to, and classes that do nothing. So this shows that the layer can be
+parsed and has the right content, not that it builds.
 """
 
 import json
@@ -16,7 +16,7 @@ import sys
 import types
 from pathlib import Path
 
-# PyPI's BitBake comes without its servers of hashes and revisions; parsing has no use for them.
+# PyPI's BitBake has no hash and revision servers; parsing does not need them.
 for absent in ("hashserv", "hashserv.client", "prserv", "prserv.serv"):
     sys.modules[absent] = types.ModuleType(absent)
 
@@ -74,14 +74,14 @@ class Layer:
         return self.text(recipe, variable).split()
 
     def run(self, recipe: str, task: str, variable: str) -> Path:
-        """Runs a shell task on the recipe's own files, as BitBake would; the folder that `variable` names after it."""
+        """Runs a shell task on the recipe's own files, as BitBake would; returns the folder in `variable` afterwards."""
         sources, result = Path(self.text(recipe, "UNPACKDIR")), Path(self.text(recipe, variable))
         for folder in (sources, result):
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir(parents=True)
         for uri in self.words(recipe, "SRC_URI"):
             path = Path(bb.fetch2.Fetch([uri], self.recipes[recipe]).localpath(uri))
-            # The certificate is made by yocto/keys.sh, for each product its own.
+            # The certificate is made by yocto/keys.sh, a different one for each product.
             (sources / path.name).write_bytes(path.read_bytes() if path.exists() else b"certificate\n")
         shell = f"set -eu\n{self.text(recipe, task)}"
         ended = subprocess.run(["sh", "-c", shell], cwd=sources, capture_output=True, text=True, check=False)

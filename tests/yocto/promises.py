@@ -1,4 +1,4 @@
-"""What the parsed layer must say. Each promise yields what is wrong; its doc is the sentence that is broken then."""
+"""Promises about the parsed layer. Each function yields what is wrong; its docstring is the promise."""
 
 import configparser
 import hashlib
@@ -15,17 +15,17 @@ SYSTEM = "recipes-fringed/system/files"
 SLOTS = "recipes-fringed/slots/files"
 BOOT = "recipes-fringed/boot/files"
 WKS = "files/wic"
-# Groups that openembedded-core's base-passwd always has, of those that the service needs.
+# Groups of the service that openembedded-core's base-passwd always has.
 BASE_GROUPS = {"video"}
 
 
 def missing(wanted, found):
-    """What of `wanted` is not in `found`."""
+    """The items of `wanted` that are not in `found`."""
     return [f"missing: {one}" for one in wanted if one not in found]
 
 
 def ini(text):
-    """A file of sections and keys, as systemd and RAUC have them; keys that stand twice keep their last value."""
+    """A file of sections and keys, as used by systemd and RAUC; the last value of a repeated key counts."""
     parser = configparser.RawConfigParser(strict=False)
     parser.optionxform = str
     parser.read_string(text)
@@ -33,7 +33,7 @@ def ini(text):
 
 
 def fetched(layer, recipe, uris, kind):
-    """What BitBake's fetcher makes of addresses."""
+    """The downloads that BitBake's fetcher derives from addresses."""
     return [one for one in bb.fetch2.Fetch(uris, layer.recipes[recipe]).ud.values() if one.type == kind]
 
 
@@ -61,7 +61,7 @@ def crates_are_those_of_the_lock_file(layer):
 
 
 def source_is_the_checked_out_commit(layer):
-    """The recipe builds the commit that is checked out, of the workspace that the layer stands in."""
+    """The recipe builds the commit that is checked out in the workspace that contains the layer."""
     uris = [uri for uri in layer.words("fringed", "SRC_URI") if uri.startswith("git://")]
     head = subprocess.run(
         ["git", "-C", layer.workspace, "rev-parse", "HEAD"], check=True, capture_output=True, text=True
@@ -99,7 +99,7 @@ def the_build_has_the_devices(layer):
 
 
 def files_are_there(layer):
-    """Every file that a recipe takes is there, and every file that it installs is one that it takes."""
+    """Every source file of a recipe exists, and a recipe installs only its source files."""
     for name, recipe in layer.recipes.items():
         local = [uri for uri in layer.words(name, "SRC_URI") if uri.startswith("file://")]
         for uri in local:
@@ -125,7 +125,7 @@ def services_are_installed(layer):
 
 
 def the_user_is_that_of_sysusers(layer):
-    """The user that the image is made with is the one that systemd/fringed.sysusers asks for, and its groups are there."""
+    """The image's user is the one in systemd/fringed.sysusers, and its groups exist."""
     parameters = layer.text("fringed", "USERADD_PARAM:fringed")
     home = re.search(r"--home-dir (\S+)", parameters)
     groups = re.search(r"--groups (\S+)", parameters)
@@ -144,7 +144,7 @@ def the_user_is_that_of_sysusers(layer):
 
 
 def the_image_has_what_it_needs(layer):
-    """The image is read-only and has the daemon, the updates and nothing to log in with."""
+    """The image is read-only, has the daemon and updates, and allows no login."""
     development = "allow-root-login" in layer.text("fringed-image", "IMAGE_FEATURES")
     if not development and layer.words("fringed-image", "IMAGE_FEATURES") != ["read-only-rootfs"]:
         yield f"IMAGE_FEATURES are {layer.text('fringed-image', 'IMAGE_FEATURES')}"
@@ -175,7 +175,7 @@ def the_distribution_is_an_appliances(layer):
 
 
 def layers_and_branches_are_of_one_release(layer):
-    """kas takes every layer that this one depends on, all of one release, and no append is without a recipe."""
+    """kas has every layer that this one depends on, all of one release, and every append has a recipe."""
     repositories = layer.configuration["repos"]
     taken = {one for repository in repositories.values() for one in repository.get("layers") or {}}
     needed = ["yocto/meta-fringed", "meta", "meta-oe", "meta-python", "meta-multimedia"]
@@ -206,7 +206,7 @@ def the_layer_says_whom_to_ask(layer):
 
 def partitions_have_one_name_everywhere(layer):
     """Partitions have the same names in the image, for RAUC, in the mounts and on the command lines."""
-    # BitBake refuses to start where a layer has a folder `wic`, as before wrynose.
+    # BitBake refuses to start if a layer has a folder `wic`, as was usual before wrynose.
     if (layer.root / "wic").exists() or not (layer.root / WKS / layer.text("fringed-image", "WKS_FILE")).is_file():
         yield f"{layer.text('fringed-image', 'WKS_FILE')} is not in {WKS}"
         return
@@ -231,7 +231,7 @@ def partitions_have_one_name_everywhere(layer):
 
 
 def updates_fit_the_device(layer):
-    """A bundle has the slots and the name that a device's RAUC looks for, and the backend is where RAUC looks for it."""
+    """A bundle has the slots and the name that a device's RAUC expects, and the backend is where RAUC expects it."""
     rauc = ini(layer.file("recipes-core/rauc/files/system.conf"))
     compatible = rauc["system"]["compatible"].replace("@MACHINE@", layer.configuration["machine"])
     if layer.text("fringed-bundle", "RAUC_BUNDLE_COMPATIBLE") != compatible:
@@ -259,7 +259,7 @@ def updates_fit_the_device(layer):
 
 
 def a_slot_is_good_when_fringed_is_ready(layer):
-    """A slot is marked good only when fringed has said READY."""
+    """A slot is marked good only after fringed has reported READY."""
     complete = ini(layer.file(f"{SYSTEM}/boot-complete.conf"))["Unit"]
     if (complete.get("Requires"), complete.get("After")) != ("fringed.service", "fringed.service"):
         yield "boot-complete.target does not wait for fringed.service"
@@ -291,7 +291,7 @@ def the_kernel_has_the_devices(layer):
 
 
 def limits_of_memory_hold(layer):
-    """The service's limits of memory hold: the Pi's kernel counts memory by service only when it is asked to."""
+    """The service's memory limits work: the Pi's kernel counts memory per service only if its command line enables this."""
     service = ini((layer.workspace / "systemd/fringed.service").read_text())["Service"]
     if any(key.startswith("Memory") for key in service):
         yield from missing(["cgroup_enable=memory"], layer.words("fringed-boot", "FRINGED_CMDLINE"))

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Signs a bundle with keys of yocto/keys.sh and plays two starts of a device with RAUC itself, this layer's system.conf
-# and its script for the slots: an activated slot is tried, and kept when it proved good.
+# Signs a bundle with keys of yocto/keys.sh, and simulates two starts of a device with RAUC itself, this layer's system.conf
+# and its script for the slots: an activated slot is tried, and kept after it was marked good.
 #
 #     tests/yocto/rauc.sh DIR
 #
 # RAUC and a D-Bus daemon come from Debian's packages, unpacked into DIR; no root is needed and nothing is installed.
-# Ends with 69 (EX_UNAVAILABLE) and the reason where they cannot be had.
+# Exits with 69 (EX_UNAVAILABLE) and the reason if they are not available.
 set -euo pipefail
 mkdir -p "${1:?usage: rauc.sh DIR}"
 dir=$(cd "$1" && pwd)
@@ -56,7 +56,7 @@ is() {
     fi
 }
 
-# A bundle as fringed-bundle has it.
+# A bundle like that of fringed-bundle.
 mkdir "$device/bundle"
 for name in boot rootfs; do head -c 100000 /dev/urandom >"$device/bundle/$name.img"; done
 cat >"$device/bundle/manifest.raucm" <<END
@@ -98,7 +98,7 @@ END
 dbus-daemon --config-file="$dir/bus.conf" --nofork 2>/dev/null &
 bus=$!
 
-# boots SLOT: RAUC's service as that slot has it.
+# boots SLOT: starts RAUC's service as in that slot.
 boots() {
     rm -f "$device/run/systemd/reboot-param"
     echo "root=PARTLABEL=root rauc.slot=$1 ro" >"$device/proc/cmdline"

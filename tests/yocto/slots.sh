@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Plays an update, a trial that ends well, one that does not, and what may come between, with the script that tells the
+# Simulates an update, a successful and a failed trial, and interruptions, with the script that tells the
 # firmware which slot to start.
 #
 #     tests/yocto/slots.sh SCRIPT FOLDER
 #
-# The firmware is played here: it takes the flag, once, and starts the slot that autoboot.txt names for it.
+# The firmware is simulated: it takes the flag once, and starts the slot that autoboot.txt names for it.
 set -euo pipefail
 script=$(realpath "${1:?usage: slots.sh SCRIPT FOLDER}")
 root=${2:?usage: slots.sh SCRIPT FOLDER}
@@ -12,7 +12,7 @@ rm -rf "$root"
 mkdir -p "$root"/{boot/select,run/systemd,proc,bin}
 root=$(realpath "$root")
 cp "$(dirname "$script")/../../boot/files/autoboot.txt" "$root/boot/select"
-# The partition is mounted read-only: nothing may be written while it is not mounted anew.
+# The partition is mounted read-only: nothing may be written before it is remounted.
 cat >"$root/bin/mount" <<END
 #!/bin/sh
 case "\$2" in
@@ -22,7 +22,7 @@ remount,ro) $(command -v chmod) u-w '$root/boot/select/autoboot.txt' ;;
 esac
 echo "\$2" >>'$root/mounts'
 END
-# As busybox has it in the image: built without FEATURE_DD_IBS_OBS, which `conv=` belongs to.
+# Like the image's busybox, which is built without FEATURE_DD_IBS_OBS and so without `conv=`.
 cat >"$root/bin/dd" <<END
 #!/bin/sh
 case " \$*" in *" conv="*) echo "dd: invalid argument 'conv'" >&2; exit 1 ;; esac
@@ -30,14 +30,14 @@ exec $(command -v dd) "\$@"
 END
 printf '#!/bin/sh\necho sync >>%s\n' "'$root/mounts'" >"$root/bin/sync"
 chmod +x "$root/bin"/*
-# Nothing but what the image's busybox has.
+# Only the programs of the image's busybox.
 for applet in grep head rm sed sh; do ln -s "$(command -v "$applet")" "$root/bin"; done
 before=$(stat -c %s "$root/boot/select/autoboot.txt")
 
 rauc() { FRINGED_ROOT=$root PATH=$root/bin sh "$script" "$@"; }
 partition() { sed -n "/^\[$1\]/,/^\[/s/^boot_partition=//p" "$root/boot/select/autoboot.txt"; }
 
-# Starts the machine: with the flag after a restart, without it after the plug was pulled.
+# Starts the machine: with the flag after a restart, without it after a loss of power.
 started=
 start() {
     local section=all
@@ -60,7 +60,7 @@ is "it knows that it is" "$(rauc get-current)" A
 is "its primary" "$(rauc get-primary)" A
 is "its other slot is" "$(rauc get-state B)" bad
 
-# What RAUC calls for an installation, in its order.
+# The calls of RAUC during an installation, in order.
 rauc set-state B bad
 rauc set-primary B
 is "an installed slot is primary" "$(rauc get-primary)" B
@@ -93,7 +93,7 @@ rauc set-state B bad
 start restart
 is "a good slot that turned bad gives way to" "$started" A
 
-# What is not understood must not be guessed.
+# Malformed content must be an error.
 for wrong in "get-state C" "set-state A perfect" "set-primary" "get-secondary" ""; do
     # shellcheck disable=SC2086
     if rauc $wrong 2>/dev/null; then is "'$wrong' ends" well badly; fi

@@ -1,7 +1,7 @@
 FILESEXTRAPATHS:prepend:fringed-appliance := "${THISDIR}/files:${FRINGED_KEYS}:"
 
-# The certificate that a device checks updates with, of yocto/keys.sh. It has a name of its own: meta-rauc's example
-# must not get into a product, so without this file the build ends.
+# The certificate with which a device verifies updates, made by yocto/keys.sh. It has a name of its own, so that the build
+# fails without this file instead of using meta-rauc's example.
 RAUC_KEYRING_FILE:fringed-appliance = "fringed-ca.cert.pem"
 
 PACKAGE_ARCH:fringed-appliance = "${MACHINE_ARCH}"

@@ -1,2 +1,2 @@
-# Services that a sensor has no use for: no backlight, no containers, no suspend, no keyboard, nobody to rename it.
+# Removes services that a sensor does not need: backlight, containers, suspend, keyboard, host name.
 PACKAGECONFIG:remove:fringed-appliance = "backlight binfmt hibernate hostnamed localed machined nss-mymachines quotacheck vconsole"

@@ -23,8 +23,8 @@ PACKAGE_ARCH = "${MACHINE_ARCH}"
 SLOT_SIZE = "131072"
 SELECT_SIZE = "16384"
 
-# The projector's mode, and nothing that draws on it; memory can be limited by service, which the Pi's kernel leaves off;
-# a kernel that stops restarts, which ends a trial.
+# The projector's mode, and nothing that draws on it; memory limits per service, which the Pi's kernel disables by default;
+# a restart after a kernel panic, which ends a trial.
 FRINGED_CMDLINE ?= "video=HDMI-A-1:1280x720@60D consoleblank=0 vt.global_cursor_default=0 console=serial0,115200 cgroup_enable=memory panic=10 quiet"
 ROOT_CMDLINE = "ro rootfstype=ext4 rootwait"
 
@@ -38,7 +38,7 @@ do_compile() {
     echo "root=PARTLABEL=root-b rauc.slot=B ${ROOT_CMDLINE} ${FRINGED_CMDLINE}" > ${B}/cmdline-b.txt
 }
 
-# The folder that the machine's list of boot files stands for.
+# The folder for the machine's list of boot files.
 python do_collect() {
     import shutil
     from oe.bootfiles import get_boot_files

@@ -2,7 +2,7 @@ SUMMARY = "Update of an image of fringed"
 DESCRIPTION = "A signed RAUC bundle with the root and the boot partition of one slot."
 LICENSE = "MIT"
 
-# Everything in it is made by other recipes.
+# All content is made by other recipes.
 SRC_URI = ""
 
 inherit bundle

@@ -8,7 +8,7 @@ LIC_FILES_CHKSUM = "\
     file://LICENSE-APACHE;md5=3b83ef96387f14655fc854ddc3c6bd57 \
 "
 
-# The workspace that this layer stands in, and the commit that is checked out there.
+# The workspace that contains this layer, and the commit that is checked out there.
 FRINGED_REPOSITORY ?= "${@os.path.abspath(os.path.join(d.getVar('FILE_DIRNAME'), '../../../..'))}"
 SRC_URI = "git://${FRINGED_REPOSITORY};protocol=file;nobranch=1"
 SRCREV = "${@fringed_commit(d)}"
@@ -24,11 +24,11 @@ PACKAGECONFIG ?= "rpi"
 PACKAGECONFIG[rpi] = "--features rpi,,clang-native libcamera,libcamera"
 
 CARGO_BUILD_FLAGS += "--package appliance --bin fringed"
-# The profile that is shipped, and its folder, in place of the class's `--release`.
+# The release profile of the project and its folder, in place of the class's `--release`.
 BUILD_MODE = "--profile dist"
 BUILD_DIR = "dist"
 
-# What --version says.
+# The commit shown by --version.
 export FRINGED_COMMIT = "${@d.getVar('SRCREV')[:12]}"
 
 # bindgen, which makes the bindings of libcamera, reads the headers with clang, for the target.
@@ -45,7 +45,7 @@ do_install() {
     install -D -m 0644 ${S}/docs/licences.txt ${D}${datadir}/fringed/licences.txt
     install -d -m 0750 -o fringed -g fringed ${D}${localstatedir}/lib/fringed
 }
-# The configuration is that of a Pi 5; the lines of a Pi 4 are on another chip.
+# The configuration is for a Pi 5; on a Pi 4 the lines are on another chip.
 do_install:append:raspberrypi4-64() {
     sed -i 's/"pinctrl-rp1"/"pinctrl-bcm2711"/' ${D}${sysconfdir}/fringed/fringed.toml
 }
@@ -63,7 +63,7 @@ CONFFILES:${PN} = "${sysconfdir}/fringed/fringed.toml"
 SYSTEMD_SERVICE:${PN} = "fringed.service"
 
 USERADD_PACKAGES = "${PN}"
-# Of the groups below only video is always there; those that another recipe makes as well are not made twice.
+# Of the groups below only video always exists; groups that another recipe also creates are not created twice.
 GROUPADD_PARAM:${PN} = "--system gpio; --system render; --system fringed"
 USERADD_PARAM:${PN} = "--system --no-create-home --home-dir ${localstatedir}/lib/fringed --shell ${base_sbindir}/nologin --gid fringed --groups video,render,gpio fringed"
 

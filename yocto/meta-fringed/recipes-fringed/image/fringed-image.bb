@@ -1,12 +1,12 @@
 SUMMARY = "Image of the reference head"
-DESCRIPTION = "Two slots with a read-only root, a data partition, fringed and what it needs; nobody can log in."
+DESCRIPTION = "Two slots with a read-only root, a data partition, fringed and its dependencies; nobody can log in."
 LICENSE = "MIT"
 
 inherit core-image
 
 IMAGE_FEATURES = "read-only-rootfs ${EXTRA_IMAGE_FEATURES}"
 
-# No packagegroup-base: it brings what a desktop or a server needs. No getty, no secure shell.
+# No packagegroup-base, which is for desktops and servers. No getty, no secure shell.
 IMAGE_INSTALL = "\
     fringed \
     fringed-slots \
@@ -19,7 +19,7 @@ IMAGE_INSTALL = "\
 "
 BAD_RECOMMENDATIONS += "busybox-syslog busybox-udhcpc systemd-vconsole-setup udev-hwdb"
 
-# The slots are files of their own, which the bundle takes as well.
+# The slots are separate files, which the bundle uses as well.
 IMAGE_FSTYPES = "ext4 wic.bmap wic.xz"
 WKS_FILE = "fringed.wks.in"
 do_image_wic[depends] += "fringed-boot:do_deploy"
@@ -29,7 +29,7 @@ FRINGED_ROOT_SIZE ?= "1024"
 FRINGED_DATA_SIZE ?= "4096"
 IMAGE_ROOTFS_MAXSIZE = "${@int(d.getVar('FRINGED_ROOT_SIZE')) * 1024}"
 
-# Nobody logs in: no password fits, and no terminal asks for one.
+# Nobody can log in: no password is valid, and there is no login prompt.
 ROOTFS_POSTPROCESS_COMMAND += "fringed_no_logins"
 fringed_no_logins() {
     if ${@bb.utils.contains('IMAGE_FEATURES', 'allow-root-login', 'false', 'true', d)}; then

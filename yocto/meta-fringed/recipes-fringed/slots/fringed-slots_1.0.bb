@@ -1,5 +1,5 @@
 SUMMARY = "Bootloader backend of RAUC for the slots of the Pi's firmware"
-DESCRIPTION = "Starts an installed slot once, on trial, and makes it the usual one when it has proved good."
+DESCRIPTION = "Starts an installed slot once, on trial, and makes it the default after it was marked good."
 SECTION = "base"
 LICENSE = "MIT"
 LIC_FILES_CHKSUM = "file://${COMMON_LICENSE_DIR}/MIT;md5=0835ade698e0bcf8506ecda2f7b4f302"

@@ -1,4 +1,4 @@
-SUMMARY = "What makes an image of fringed an appliance"
+SUMMARY = "System configuration of an image of fringed"
 DESCRIPTION = "The data partition and the state on it, the journal's bound, the watchdog, the network, the camera's \
 trigger, and when a slot counts as good."
 SECTION = "industrial"
@@ -25,7 +25,7 @@ inherit features_check systemd
 
 REQUIRED_DISTRO_FEATURES = "systemd"
 
-# The two generations of the Pi's camera pipeline, as libcamera calls them.
+# libcamera's names of the two generations of the Pi's camera pipeline.
 CAMERA_PIPELINE = "pisp"
 CAMERA_PIPELINE:raspberrypi4-64 = "bcm2835"
 

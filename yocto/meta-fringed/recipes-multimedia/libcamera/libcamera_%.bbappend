@@ -1,2 +1,2 @@
-# The pipelines of the Pi 4 and the Pi 5, whoever else asks for them.
+# The pipelines of the Pi 4 and the Pi 5.
 PACKAGECONFIG:append:fringed-appliance = " raspberrypi"
