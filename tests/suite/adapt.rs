@@ -25,7 +25,7 @@ use tests::{files, shared};
 
 const TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Runs `adapt RECORDING --out OUT --json` and more.
+/// Runs `adapt RECORDING --out OUT --json` with more arguments.
 fn adapt(recording: &Path, out: &Path, more: &[&str]) -> Run {
     let fixed = [OsStr::new("adapt"), recording.as_os_str()];
     let out = [OsStr::new("--json"), OsStr::new("--out"), out.as_os_str()];
@@ -38,7 +38,7 @@ fn json(run: &Run) -> serde_json::Value {
     serde_json::from_str(&run.stdout).expect("a report in JSON")
 }
 
-/// A phase function in a file of f64: rows, columns and turns.
+/// Reads a phase function from a file of f64: rows, columns and turns.
 fn turns(path: &Path) -> (usize, usize, Vec<f64>) {
     let bytes = std::fs::read(path).expect("a phase function");
     let file = npyz::NpyFile::new(&bytes[..]).expect("a NumPy array");
@@ -47,8 +47,8 @@ fn turns(path: &Path) -> (usize, usize, Vec<f64>) {
     (shape[0] as usize, shape[1] as usize, values)
 }
 
-/// Checks a phase function of the better method for a recording with truth: size, zero as its least
-/// value, rising along ξ, no pitch under the limits. Returns the pattern that it makes.
+/// Checks a phase function of the better method for a recording with truth: its size, a minimum of
+/// zero, rising along ξ, no pitch below the limits. Returns its pattern.
 fn check_fringed(recording: &Recording, run: &Run, out: &Path) -> PatternSpec {
     let projector = &recording.projector;
     let (rows, columns, values) = turns(out);
@@ -83,7 +83,7 @@ fn check_fringed(recording: &Recording, run: &Run, out: &Path) -> PatternSpec {
     close(&report["max_turns"], most);
     close(&report["pitch_px"][0], 1.0 / high);
     close(&report["pitch_px"][1], 1.0 / low);
-    // What the camera will see of it, from the truth and the oracle's geometry.
+    // What the camera sees of it, from the truth and the oracle's geometry.
     let spec = PatternSpec::File {
         rows,
         columns,
@@ -102,7 +102,7 @@ fn check_fringed(recording: &Recording, run: &Run, out: &Path) -> PatternSpec {
     for at in 1..truth.len() {
         if at % width != 0 && class[at] == 2 && class[at - 1] == 2 {
             seen += 1;
-            // 2.2 px, and the slope's own change within a cell and its smoothing.
+            // 2.2 px, plus the change of the slope within a cell and its smoothing.
             fine += usize::from((phase(at) - phase(at - 1)).abs() > 1.1 / 2.2);
         }
     }
@@ -125,7 +125,7 @@ fn adapt_makes_a_pattern_for_the_shared_sphere() {
     let out = room.path().join("new/phase.npy");
     let run = adapt(&folder, &out, &["--method", "fringed"]).succeeded();
     check_fringed(&recording, &run, &out);
-    // One vertical pattern is too little for the paper.
+    // The paper's method needs more than one vertical pattern.
     let other = room.path().join("paper.npy");
     let run = adapt(&folder, &other, &["--method", "paper"]);
     assert_eq!(run.code, 65, "{}", run.stderr);
@@ -135,8 +135,8 @@ fn adapt_makes_a_pattern_for_the_shared_sphere() {
 
 #[test]
 fn the_adapted_pattern_measures_as_much_better_as_adapt_predicts() {
-    // 20 px pitch, as preliminary patterns have; so little noise that none of 9,216 errors of σ 0.13 mm
-    // is gross.
+    // A pitch of 20 px, as preliminary patterns have, and so little noise that none of 9,216 errors of
+    // σ 0.13 mm is gross.
     let preliminary = Scene {
         patches: false,
         noise: 0.01,
@@ -166,7 +166,7 @@ fn the_adapted_pattern_measures_as_much_better_as_adapt_predicts() {
         "{before} mm, then {after} mm: {}, predicted {predicted}",
         after / before
     );
-    // The renderer samples points: it has none of the contrast that pixels lose, 10 to 15 % here.
+    // The renderer samples points, so its pixels do not lose contrast (10 to 15 % here).
     let share = after / before / predicted;
     assert!(predicted < 0.5 && (0.8..1.05).contains(&share), "{share}");
 }
@@ -194,7 +194,7 @@ fn the_papers_pattern_is_made_from_vertical_and_horizontal_fringes() {
             assert!((7.999..128.1).contains(&pitch), "{pitch}");
         }
     }
-    // p_I = 5 px on a slope of 1.3 px per px is coarser than no limit at all.
+    // On a slope of 1.3 px per px, p_I = 5 px is coarser than the pattern without a limit.
     let free = written.out().join("free.npy");
     let more = ["--method", "paper", "--image-pitch", "20"];
     let coarse = adapt(&written.recording(), &free, &more).succeeded();
@@ -234,7 +234,7 @@ fn adapt_says_what_a_recording_lacks() {
     assert!(!out.exists());
 }
 
-/// A simulated head that a sphere was taught on: the recipe's bytes, and recordings of the part.
+/// A simulated head on which a sphere was taught: the recipe's bytes, and recordings of the part.
 struct Taught {
     recipe: Vec<u8>,
     full: Recording,
@@ -242,7 +242,7 @@ struct Taught {
     dense: Recording,
 }
 
-/// The one place that knows how a recipe is made.
+/// Teaches a recipe. Only this function knows how.
 fn taught_recipe(head: &mut DynHead, calibration: &Calibration) -> (Vec<u8>, Recipe) {
     let naming = Naming {
         number: 7,
@@ -286,7 +286,7 @@ impl Taught {
         }
     }
 
-    /// The recipe in a folder of its own.
+    /// Writes the recipe into a new folder.
     fn file(&self) -> (TempDir, String) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("taught.recipe");
@@ -296,7 +296,7 @@ impl Taught {
     }
 }
 
-/// Frames of the recipe's phase function as a recording, without noise and range: the recipe has them.
+/// Frames of the recipe's phase function as a recording without noise and working range, which the recipe has.
 fn record(
     head: &mut DynHead,
     stage: &Stage,

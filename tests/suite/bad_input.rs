@@ -1,6 +1,6 @@
-//! Bad input gets a clear error and loses nothing.
+//! Bad input gives a clear error, and no file is lost.
 //!
-//! Exit codes: 64 usage, 65 wrong content, 66 not there, 73 output cannot be created.
+//! Exit codes: 64 usage, 65 wrong content, 66 missing input, 73 output cannot be created.
 
 use crate::written::{Written, geometric, program};
 use hal::replay::Recording;
@@ -11,7 +11,7 @@ use tests::files;
 use tests::program::Run;
 use tests::render::{Scene, levels};
 
-/// A few pixels: these recordings are never measured.
+/// A recording of a few pixels, as it is never measured.
 fn tiny() -> Recording {
     Scene {
         size: 16,
@@ -22,7 +22,7 @@ fn tiny() -> Recording {
     .record()
 }
 
-/// Damages a tiny recording, measures it, and expects 65 with a message that holds `words`.
+/// Damages a tiny recording, measures it, and expects exit code 65 and a message that contains `words`.
 fn refused(recording: &Recording, damage: impl FnOnce(&Written), words: &[&str]) {
     let written = Written::new(recording);
     damage(&written);
@@ -38,7 +38,7 @@ fn check(written: &Written, run: &Run, code: i32, words: &[&str]) {
     assert!(files::names(&written.out()).is_empty(), "{words:?}");
 }
 
-/// Damages the manifest.
+/// Changes the manifest and expects a refusal.
 fn refused_manifest(change: impl FnOnce(&mut Value), words: &[&str]) {
     let words: Vec<&str> = ["recording.json"].iter().chain(words).copied().collect();
     refused(&tiny(), |written| written.edit(change), &words);
@@ -217,7 +217,7 @@ fn numbers_that_are_none_are_refused() {
     }
 }
 
-/// Damages one model.
+/// Changes the model of a device and expects a refusal.
 fn refused_model(device: &str, change: impl Fn(&mut Value), words: &[&str]) {
     let words: Vec<&str> = [device].iter().chain(words).copied().collect();
     refused_manifest(|m| change(&mut m[device]["model"]), &words);
@@ -242,7 +242,7 @@ fn absurd_models_are_refused_by_device_and_number() {
             &["distortion"],
         );
         refused_model(device, |m| m["cx"] = json!(1e7), &["principal point"]);
-        // Below the plane, and beside it looking up.
+        // Below the plane, and above it but looking up.
         let below = |m: &mut Value| m["translation_mm"] = json!([0.0, 0.0, -600.0]);
         refused_model(device, below, &["above the plane"]);
         let upwards = |m: &mut Value| {
@@ -373,7 +373,7 @@ fn an_output_folder_that_cannot_be_made_is_code_73_and_nothing_is_lost() {
 #[test]
 fn a_result_that_cannot_be_written_is_code_73_by_name() {
     let written = Written::new(&tiny());
-    // A folder under the name of a result: it cannot be replaced by a file, whoever runs this.
+    // A folder with the name of a result: no user can replace it by a file.
     fs::create_dir_all(written.out().join("phase.npy/mine")).unwrap();
     let run = written.measure(&[]);
     assert_eq!(run.code, 73, "{}", run.stderr);

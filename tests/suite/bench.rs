@@ -1,10 +1,10 @@
-//! `fringed-lab bench`: its keys and files, on frames too small to say anything about speed.
+//! `fringed-lab bench`: its keys and files, with frames that are too small to measure the speed.
 
 use crate::written::laboratory;
 use serde_json::Value;
 use std::fs;
 
-/// A kernel gets nearly every pixel right; at the smallest size a handful of pixels stand on the edge of the part.
+/// Share of the pixels that a kernel gets right; at the smallest size a few pixels lie on the edge of the part.
 const RIGHT: f64 = 0.99;
 
 fn json(arguments: &[&str]) -> Value {
@@ -21,7 +21,7 @@ fn positive(value: &Value, key: &str) -> f64 {
 
 #[test]
 fn the_kernel_table_has_its_keys_and_every_variant_decodes_rightly() {
-    // People's scripts know these keys: if this fails, do not change the test.
+    // Users' scripts read these keys: if this fails, do not change the test.
     let all = json(&["bench", "kernel", "--quick", "--json"]);
     assert!(all["machine"]["processor"].is_string());
     assert!(positive(&all["machine"], "cores") >= 1.0);
@@ -90,7 +90,7 @@ fn time_stands_against_error_and_the_cycle_has_its_stages() {
     let csv = fs::read_to_string(out.join("accuracy.csv")).unwrap();
     let header = csv.lines().next().unwrap();
     assert_eq!(header, fringed_lab::benchmark::HEADER);
-    // One part: every line is a mean.
+    // With one part every line is a mean.
     assert_eq!(csv.lines().count(), points.len() + 1);
     for (name, start) in [("accuracy.svg", "<svg"), ("benchmarks.md", "Machine")] {
         let text = fs::read_to_string(out.join(name)).unwrap();

@@ -1,4 +1,4 @@
-//! `fringed calibrate` on simulated heads: what is measured is what the scenario says, and what is written survives.
+//! `fringed calibrate` on simulated heads: it measures the values of the scenario, and its files survive a kill.
 
 use appliance::head::calibration::place::Place;
 use serde_json::Value;
@@ -8,18 +8,18 @@ use std::path::Path;
 use tests::program::{Program, Run};
 use tests::small_head::SMALL_HEAD as HEAD;
 
-/// What the response may be off, levels of 255.
+/// Largest error of the response, levels of 255.
 const RESPONSE_TOLERANCE: f64 = 1.0;
-/// What the noise may be off, share of it.
+/// Largest error of the noise, relative.
 const NOISE_TOLERANCE: f64 = 0.05;
-/// What the reference plane may be off, turns.
+/// Largest error of the reference plane, turns.
 const RESIDUAL_TOLERANCE: f64 = 5e-4;
 
 fn program() -> Program {
     Program::at(env!("CARGO_BIN_EXE_fringed-under-test"))
 }
 
-/// Calibrates a head of this scenario into the folder's state.
+/// Calibrates a head of this scenario into the state folder in `folder`.
 fn calibrate(folder: &Path, scenario: &str, more: &[&str]) -> Run {
     let path = folder.join("scenario.toml");
     fs::write(&path, scenario).unwrap();
@@ -41,7 +41,7 @@ fn calibrated(folder: &Path, scenario: &str, more: &[&str]) -> Value {
     serde_json::from_str(&run.stdout).unwrap()
 }
 
-/// What everything that was measured is off the scenario.
+/// Compares everything that was measured with the scenario.
 fn check(text: &str, report: &Value) {
     let scenario = Scenario::from_toml(text, "here").unwrap();
     let found = &report["calibration"];
@@ -62,7 +62,7 @@ fn check(text: &str, report: &Value) {
         let residual = found["reference"][map]["residual_turns"].as_f64().unwrap();
         assert!(residual <= RESIDUAL_TOLERANCE, "{text}\n{map} {residual}");
     }
-    // The truth itself: the models of a simulated head are exact, and this is how far both maps are off them.
+    // The models of a simulated head are exact: this compares both maps with them.
     let pitch = found["reference"]["pitch_px"].as_f64().unwrap();
     let off = found["reference"]["models_off_px"].as_f64().unwrap() / pitch;
     let most = RESIDUAL_TOLERANCE * 2_f64.sqrt();
@@ -141,7 +141,7 @@ fn a_tilted_plate_saturation_darkness_and_a_recording_are_refused_with_the_remed
     assert!(run.stderr.contains("--scenario"), "{}", run.stderr);
 }
 
-/// A configuration of a head of this scenario, with a state folder beside it.
+/// Writes the configuration of a head of this scenario, and makes a state folder beside it.
 fn configured(folder: &Path, scenario: &str) -> String {
     fs::write(folder.join("scenario.toml"), scenario).unwrap();
     let config = folder.join("fringed.toml");
@@ -212,13 +212,13 @@ fn models_made_with_opencv_are_imported_and_stay() {
         "{}",
         run.stderr
     );
-    // A z that is turned looks from below.
+    // With z reversed the camera looks from below.
     let run = with(&["--unit", "m", "--z-away"]);
     assert_eq!(run.code, 65, "{}", run.stderr);
     assert!(run.stderr.contains("not above the plane"), "{}", run.stderr);
     let run = with(&["--unit", "m", "--models", "x"]);
     assert_eq!(run.code, 64, "{}", run.stderr);
-    // Models of another projector: the plate shows it.
+    // Models of another projector: the plate shows that they are wrong.
     let mut other = rig.projector.model();
     other.cx += 4.0;
     let other = write("other.yml", &other, 1e-3);
@@ -256,7 +256,7 @@ fn models_made_with_opencv_are_imported_and_stay() {
     }
 }
 
-/// Each generation that can be read is whole, with its maps; the newest one's fingerprint of the file.
+/// Checks that each readable generation is complete, with its maps; returns the file fingerprint of the newest.
 fn whole(folder: &Path) -> String {
     let json = folder.join("state/calibration/calibration.json");
     let loaded = Place::at(&json).load().unwrap().expect("a calibration");
@@ -291,7 +291,7 @@ fn kill_9_while_it_is_written_leaves_the_old_calibration_or_the_new_one() {
     };
     let mut kept = 0;
     for changes in 1..=6 {
-        // Another noise each time, so that every file changes.
+        // The noise differs each time, so every file changes.
         let scenario = format!("{HEAD}[noise]\nseed = {changes}\n");
         fs::write(folder.path().join("scenario.toml"), scenario).unwrap();
         let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_fringed-under-test"))
@@ -309,7 +309,7 @@ fn kill_9_while_it_is_written_leaves_the_old_calibration_or_the_new_one() {
             }
             std::thread::yield_now();
         }
-        // SIGKILL; it may have ended already.
+        // SIGKILL; the program may have ended already.
         let _ = child.kill();
         child.wait().unwrap();
         let now = whole(folder.path());
@@ -317,14 +317,14 @@ fn kill_9_while_it_is_written_leaves_the_old_calibration_or_the_new_one() {
         last = now;
     }
     println!("6 kills while writing: {kept} left the old calibration, the others the new one");
-    // What kills have left, here all that they can leave, counts for nothing and does not stay.
+    // Kills leave files behind. They are ignored and removed; here is every kind of them.
     for left in [
         "calibration.json.new",
         "calibration.json.previous.new",
         "reference_vertical-0123456789abcdef.npy.new",
         "reference_vertical-0123456789abcdef.npy",
     ] {
-        // A kill may have left it as another name of a file that counts.
+        // After a kill it may be a hard link to a valid file.
         let _ = fs::remove_file(place.join(left));
         fs::write(place.join(left), "half").unwrap();
     }
@@ -372,7 +372,7 @@ fn a_damaged_calibration_gives_way_to_the_one_before_and_is_never_guessed() {
         problem.contains("calibrate anew") && problem.contains("calibration.json"),
         "{problem}"
     );
-    // Calibrating again does not need it.
+    // Calibrating again works without it.
     let report = calibrated(folder.path(), HEAD, &[]);
     let notes = report["notes"].to_string();
     assert!(notes.contains("left behind"), "{notes}");

@@ -1,10 +1,10 @@
-//! The station goes by the stored calibration: CALIBRATION_VALID, recipes of another one, nothing guessed.
+//! The station uses the stored calibration: CALIBRATION_VALID, recipes of another calibration, no guessed values.
 
 use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, trigger};
 use std::fs;
 use tests::program::Program;
 
-/// CALIBRATION_VALID, STATUS bit 15; RECIPE_RESULT "made for another calibration".
+/// Bit 15 of STATUS, and the RECIPE_RESULT "made for another calibration".
 const CALIBRATION_VALID: u16 = 1 << 15;
 const OTHER_CALIBRATION: u16 = 3;
 const PASS: u16 = 1;
@@ -31,7 +31,7 @@ fn the_station_measures_by_the_stored_calibration_and_by_no_other() {
             .unwrap()
             .to_owned()
     };
-    // The head's response is bent, and it believes a wrong delay: only the calibration knows both.
+    // The head's response is not linear, and its configured delay is wrong: only the calibration has the right values.
     light(1.8, 1);
     let first = calibrate();
     let passes = |daemon: &Daemon| {
@@ -46,11 +46,11 @@ fn the_station_measures_by_the_stored_calibration_and_by_no_other() {
         assert_eq!(done.seq(), before.seq() + 1);
     };
     passes(&Daemon::start(&place));
-    // The same head, measured again with other noise: its recipe stays valid.
+    // The same head, calibrated again with other noise: its recipe stays valid.
     light(1.8, 2);
     assert_eq!(calibrate(), first);
     passes(&Daemon::start(&place));
-    // A part that fails is kept, and judged again by the calibration of its recipe, which recordings do not hold.
+    // The recording of a failed part is kept. It has no calibration, so it is judged again with that of its recipe.
     let good = fs::read_to_string(&scenario).unwrap();
     let dent = "[part]\nkind = \"sheet_metal\"\ndefects = [{ kind = \"dent\", x = 0.0, y = -8.0, depth_mm = 1.5, diameter_mm = 20.0 }]\n";
     fs::write(&scenario, format!("{good}{dent}")).unwrap();
@@ -69,7 +69,7 @@ fn the_station_measures_by_the_stored_calibration_and_by_no_other() {
             config.to_str().unwrap(),
         ])
         .succeeded();
-    // Another projector: the recipe is refused with the reason.
+    // With another projector the recipe is refused with the reason.
     light(1.5, 2);
     let second = calibrate();
     assert_ne!(second, first);
@@ -86,7 +86,7 @@ fn the_station_measures_by_the_stored_calibration_and_by_no_other() {
         }
     };
     refused(true, &["made for calibration", &first[..8], &second[..8]]);
-    // Damaged, with none before it.
+    // Damaged, and there is no earlier generation.
     let json = place.path("state/calibration/calibration.json");
     fs::remove_file(json.with_extension("json.previous")).unwrap();
     let text = fs::read_to_string(&json).unwrap();
@@ -96,7 +96,7 @@ fn the_station_measures_by_the_stored_calibration_and_by_no_other() {
     )
     .unwrap();
     refused(false, &["calibration.json", "checksum", "calibrate anew"]);
-    // Of another head.
+    // A calibration of another head.
     fs::write(&json, &text).unwrap();
     fs::write(&scenario, head.replace("width = 160", "width = 168")).unwrap();
     refused(false, &["of another head", "calibrate anew"]);

@@ -1,4 +1,4 @@
-//! Recordings of our own in every form that can be decoded.
+//! Rendered recordings of every form that can be decoded.
 
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use tests::render::{Scene, levels};
 
 /// Names and recordings: every form of levels, 8 to 16 bit, 3 to 8 shifts, vertical, horizontal and
-/// sampled patterns, finest ratios other than 1.
+/// sampled patterns, and finest ratios other than 1.
 pub fn all() -> Vec<(&'static str, Recording)> {
     let geometric = |fringes: f64| [0.94 / fringes, (0.94 / fringes).sqrt(), 1.0];
     let three = |n: f64| [1.0, 1.0 - 1.0 / (n * n), 1.0 - 1.0 / n];
@@ -72,7 +72,7 @@ fn deep(bit_depth: u8, scene: Scene) -> Recording {
     .record()
 }
 
-/// The frames of all levels mixed, their shifts running down from 0.37.
+/// The frames of all levels mixed, with shifts that decrease from 0.37.
 fn shuffled(ratios: &[f64]) -> Vec<(f64, f64)> {
     let mut frames: Vec<(f64, f64)> = levels(ratios, 5)
         .into_iter()
@@ -95,7 +95,7 @@ fn both() -> Recording {
     .record()
 }
 
-/// Fringes along the baseline tell next to nothing of the height: phase only.
+/// Fringes along the baseline give almost no information about the height, so only the phase is compared.
 fn horizontal() -> Recording {
     let mut recording = Scene {
         patterns: vec![PatternSpec::Horizontal { fringes: 48.0 }],
@@ -108,8 +108,8 @@ fn horizontal() -> Recording {
     recording
 }
 
-/// The least and the greatest phase lie where the camera looks, so that noise takes the coarsest level
-/// over both ends of its turn. Flat beyond them: phase only.
+/// The camera sees the smallest and the largest phase, so noise moves the coarsest level beyond both ends
+/// of its turn. The pattern is constant beyond them, so only the phase is compared.
 fn ends_in_view() -> Recording {
     let (columns, rows) = (256_usize, 192_usize);
     let turns = (0..rows * columns).map(|at| {
@@ -132,7 +132,7 @@ fn ends_in_view() -> Recording {
     recording
 }
 
-/// A pattern whose pitch varies along its rows and, a little, from row to row; its least phase is not 0.
+/// A pattern whose pitch varies along its rows and slightly from row to row; its smallest phase is not 0.
 fn sampled(ratios: &[f64]) -> Recording {
     let (columns, rows) = (256_usize, 192_usize);
     let turns = (0..rows * columns).map(|at| {

@@ -1,4 +1,4 @@
-//! A line that changes its part between triggers: the verdict is always that of the recipe that was asked for.
+//! A production line that changes its part between triggers: the verdict always comes from the selected recipe.
 
 use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, TRIGGER, long, trigger};
 use appliance::head::calibration::Calibration;
@@ -12,30 +12,30 @@ use tests::random::Random;
 
 /// Good recipes.
 const RECIPES: u16 = 20;
-/// Recipes that must not become active, and what RECIPE_RESULT says of them.
+/// Recipes that must not become active, and their RECIPE_RESULT.
 const UNKNOWN: (u16, u16) = (21, 1);
 const CORRUPT: (u16, u16) = (22, 2);
 const FOREIGN: (u16, u16) = (23, 3);
-/// CONTROL.
+/// Bits of CONTROL.
 const ONLINE: u16 = 1;
 const RECIPE_LOAD: u16 = 1 << 3;
 const RECIPE_LOADING: u16 = 1 << 8;
-/// RECIPE_SELECT: by PART_NUMBER.
+/// RECIPE_SELECT that selects by PART_NUMBER.
 const BY_PART_NUMBER: u16 = 0xFFFF;
-/// REJECT_REASON.
+/// The REJECT_REASON for a recipe that is selected but not active.
 const ANOTHER_RECIPE: u16 = 6;
-/// Words of VERDICT.
+/// Values of VERDICT.
 const PASS: u16 = 1;
 const FAIL: u16 = 2;
-/// Switching at 1456 × 1088 pixels.
+/// Longest time to switch recipes at 1456 × 1088 pixels.
 const SWITCHING: Duration = Duration::from_secs(1);
 
-/// What a recipe must judge the good part as: known from its limits, and far from the noise of any measurement.
+/// The verdict of a recipe on the good part. It follows from the recipe's limits, which are far from the noise of a measurement.
 fn expected(number: u16) -> u16 {
     [PASS, FAIL][usize::from(number % 2)]
 }
 
-/// A recipe as taught, under another number and with limits that lead to its verdict.
+/// The taught recipe with another number, and with limits that lead to the verdict of that number.
 fn changed(
     bytes: &[u8],
     number: u16,
@@ -45,7 +45,7 @@ fn changed(
     file.number = number;
     file.part_number = part_number(number);
     if expected(number) == FAIL {
-        // The deviation of a good part is far below.
+        // The deviation of a good part is far smaller.
         (file.gauges[0].low, file.gauges[0].high) = (Some(0.2), Some(0.3));
     }
     change(&mut file);
@@ -56,7 +56,7 @@ fn part_number(number: u16) -> String {
     format!("LINE-{number}")
 }
 
-/// A station with twenty recipes for the part in front of it, and three that it must refuse.
+/// A station with twenty recipes for its part, and three that it must refuse.
 fn place() -> Place {
     let place = Place::new();
     Daemon::start(&place).terminate();
@@ -76,7 +76,7 @@ fn place() -> Place {
     place
 }
 
-/// Selects a recipe, by number or by part number, and waits for the answer: RECIPE_RESULT.
+/// Selects a recipe by number or by part number, waits for the answer, and returns RECIPE_RESULT.
 fn select(plc: &mut Plc, number: u16, by_part_number: bool) -> u16 {
     let mut fields = vec![ONLINE | RECIPE_LOAD, 0, number, 0, 0, 0, 0, 0];
     if by_part_number {
@@ -96,14 +96,14 @@ fn select(plc: &mut Plc, number: u16, by_part_number: bool) -> u16 {
     done.recipe_result()
 }
 
-/// Changes the recipe at random between `cycles` triggers.
+/// Changes the recipe at random between triggers, for `cycles` cycles.
 fn change_over(cycles: u16) {
     let place = place();
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     plc.wait("READY", |status| status.has(READY | RECIPE_OK));
     plc.write(0, &[ONLINE]);
-    // Unhurried: each recipe once, in order.
+    // First each recipe once, in order.
     let mut token = 0;
     let mut crcs = Vec::new();
     for number in 1..=RECIPES {
@@ -159,7 +159,7 @@ fn change_over(cycles: u16) {
     );
 }
 
-/// After a load that failed: by token with the selected recipe, with none and with the active one, and by edge.
+/// Checks after a failed load that nothing is measured: triggers by token with the selected recipe, with none, with the active one, and by edge.
 fn nothing_is_measured(plc: &mut Plc, token: u16) {
     let before = plc.status();
     assert!(!before.has(READY) && !before.has(RECIPE_OK));
@@ -216,9 +216,9 @@ fn verdicts_of_five_hundred_changes_are_those_of_an_unhurried_run() {
     change_over(500);
 }
 
-/// A head with the camera of the reference hardware.
+/// A head with the camera size of the reference hardware.
 const FULL_HEAD: &str = "sub_rays = 1\n[rig.camera]\nwidth = 1456\nheight = 1088\n";
-/// Recipes of that size in turn: more than stay ready, so that each has to be read.
+/// Number of recipes of that size. More than stay loaded, so each has to be read.
 const MANY: u16 = 5;
 
 #[test]
@@ -270,14 +270,14 @@ fn recipes_at_full_resolution_are_switched_within_a_second() {
         "switching at 1456 x 1088, trigger in between: {cold:?} where the recipe is read, {warm:?} where it is ready, \
          {again:?} where it is active"
     );
-    // Of a machine that others use as well only the shortest says what the work takes.
+    // Other programs use this machine too, so only the shortest time shows the duration of the work.
     let shortest = |times: &[Duration]| times.iter().min().copied().unwrap();
     assert!(shortest(&warm) < SWITCHING, "{warm:?}");
     assert!(shortest(&again) < shortest(&warm) / 2, "{again:?}");
 }
 
-/// Prints what the parts of a switch to a recipe take, three times. What it takes of all processors together is within the
-/// second, so that a machine with nothing else to do switches within it.
+/// Prints the durations of the parts of a switch, three times. Checks that the processor time of all threads is less than a
+/// second, so an idle machine switches within a second.
 fn stages(store: &Store, bytes: usize) {
     let scenario = Scenario::from_toml(FULL_HEAD, "full").unwrap();
     let (mut head, stage) = sim::head(&scenario).unwrap();
@@ -311,10 +311,10 @@ fn stages(store: &Store, bytes: usize) {
     assert!(works.iter().min().unwrap() < &SWITCHING, "{works:?}");
 }
 
-/// What all threads of this process have worked, in steps of 10 ms.
+/// The processor time of all threads of this process, in units of 10 ms.
 fn processor_time() -> Duration {
     let stat = fs::read_to_string("/proc/self/stat").unwrap();
-    // Behind the name, which may hold blanks: state, ten numbers, then hundredths of a second in user and system.
+    // After the name, which may contain blanks: the state, ten numbers, then user and system time in hundredths of a second.
     let (_, fields) = stat.rsplit_once(')').unwrap();
     let fields = fields.split_whitespace().skip(11).take(2);
     let ticks: u64 = fields.map(|ticks| ticks.parse::<u64>().unwrap()).sum();

@@ -1,4 +1,4 @@
-//! The command line: what each command answers, and its exit code where it cannot.
+//! The command line: what each command prints, and its exit code if it fails.
 
 use crate::station_plc::{Daemon, Place};
 use crate::written::{laboratory, program};
@@ -8,8 +8,8 @@ use std::net::TcpListener;
 use std::path::Path;
 use tests::program::Run;
 
-/// A measured error may exceed the predicted one by this factor: the prediction knows the noise, not
-/// how a pixel averages over a slope.
+/// A measured error may exceed the prediction by this factor: the prediction includes the noise, but not
+/// that a pixel averages over a slope.
 const OVER_PREDICTION: f64 = 1.2;
 
 fn run(arguments: &[&str]) -> Run {
@@ -20,7 +20,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// Checks the exit code and that the message holds each word.
+/// Checks the exit code, and that the message contains each of `words`.
 fn check_refused(run: &Run, code: i32, words: &[&str]) {
     assert_eq!(run.code, code, "{}", run.stderr);
     for word in words {
@@ -61,7 +61,7 @@ fn the_demonstration_finds_exactly_the_defective_parts() {
     let defective = verdicts.iter().filter(|(placed, _)| *placed != "good");
     assert_eq!(defective.count(), 3);
     for (placed, verdict) in verdicts {
-        // A part that is bent has not been moved: INVALID would send somebody to put it in place.
+        // A bent part was not moved: INVALID would make somebody place it again.
         let expected = if placed == "good" { "PASS" } else { "FAIL" };
         assert_eq!(verdict, expected, "{placed}");
     }
@@ -92,7 +92,7 @@ fn what_is_recorded_is_measured_with_the_predicted_error() {
     );
     assert_eq!(score["gross"], 0);
     assert!(score["scored"].as_u64().unwrap() > 5_000, "{score}");
-    // A recording is never written over.
+    // A recording is never overwritten.
     let again = run(&["record", text(&recording), "--config", text(&config)]);
     check_refused(&again, 73, &["recording"]);
 }
@@ -106,7 +106,7 @@ fn the_register_map_is_the_same_as_csv_and_as_json() {
     let rows = json["registers"].as_array().unwrap();
     assert_eq!(rows.len(), csv.lines().count() - 1);
     for (line, row) in csv.lines().skip(1).zip(rows) {
-        // The last column is quoted and the only one that may hold commas.
+        // The last column is quoted, and only it may contain commas.
         let cells: Vec<&str> = line.splitn(keys.len(), ',').collect();
         for (key, cell) in keys.iter().zip(cells) {
             let value = match &row[key] {

@@ -1,4 +1,4 @@
-//! `fringed doctor` on the simulated head: a well head passes, each single fault is named and nothing else.
+//! `fringed doctor` on the simulated head: a head without faults passes, and of each single fault only that fault is reported.
 
 use appliance::head::calibration::Calibration;
 use appliance::head::doctor::{Verdict, examine};
@@ -21,7 +21,7 @@ fn doctor(folder: &Path, scenario: &str) -> Run {
     ])
 }
 
-/// The names of the steps with this verdict.
+/// The names of the checks with this verdict.
 fn with(report: &Value, verdict: &str) -> Vec<String> {
     let steps = report["steps"].as_array().unwrap().iter();
     let steps = steps.filter(|step| step["verdict"] == verdict);
@@ -105,7 +105,7 @@ fn each_single_fault_is_named_with_a_remedy_and_nothing_else_is() {
 
 #[test]
 fn a_head_that_nobody_has_calibrated_fails_in_nothing_but_what_calibration_measures() {
-    // As a Raspberry Pi's camera does: it stamps when the readout begins. Nothing is known of that yet, and nothing of the delay.
+    // As on a Raspberry Pi, stamps mark the start of the readout. Neither this nor the delay has been measured yet.
     let timing = "[timing]\nflip_to_light_us = 33333\nstamp = \"exposure_end\"\nreadout_us = 16000\nexposure_refreshes = 1.0\n";
     let scenario = Scenario::from_toml(&format!("{HEAD}{timing}"), "here").unwrap();
     for calibrated in [false, true] {
@@ -115,7 +115,7 @@ fn a_head_that_nobody_has_calibrated_fails_in_nothing_but_what_calibration_measu
         let steps = examine(&mut head, &known, calibrated, &|_, _| ());
         let failed = steps.iter().filter(|step| step.verdict == Verdict::Fail);
         let failed: Vec<&str> = failed.map(|step| step.name).collect();
-        // Where it is said to be calibrated, and so, its stamps are wrong.
+        // If the head is said to be calibrated with these values, its stamps are wrong.
         let wrong = if calibrated { "trigger" } else { "delay" };
         assert_eq!(failed, [wrong], "{steps:#?}");
     }
@@ -128,7 +128,7 @@ fn the_doctor_measures_what_it_names() {
     let run = doctor(folder.path(), &format!("{HEAD}{faults}"));
     let report: Value = serde_json::from_str(&run.stdout).unwrap();
     let number = |name: &str, key: &str| step(&report, name)["measured"][key].as_f64().unwrap();
-    // Within the accuracy that the doctor states.
+    // Within the accuracy that the doctor reports.
     let off = number("delay", "off_ms").max(0.5);
     assert!(
         (number("delay", "delay_ms") - 41.234).abs() < off,

@@ -1,15 +1,15 @@
-//! `fringed-lab experiment`: what it promises of the better pattern, and its files.
+//! `fringed-lab experiment`: what it promises about the better pattern, and its files.
 
 use crate::written::laboratory;
 use fringed_lab::experiment::{BetterSequence, HEADER, Method, OpticsKind, Runner, Scene};
 
-/// Columns and rows of the camera: the study's picture, or its middle quarter with pixels of the same size.
+/// Columns and rows of the camera: the study's picture, or the middle quarter of it with pixels of the same size.
 const WHOLE: u32 = 512;
 const MIDDLE: u32 = 256;
-/// RMS of error / σ_z; over some ten thousand pixels its own noise is below 0.01.
+/// RMS of error / σ_z; with about ten thousand pixels the noise of this value is below 0.01.
 const ERROR_OVER_SIGMA: std::ops::RangeInclusive<f64> = 0.9..=1.2;
 
-/// Promised limits of RMS against the paper's own adaptive run (p_I = 5).
+/// Promised limits of the RMS relative to the paper's own adaptive run (p_I = 5).
 struct Limits {
     part: &'static str,
     ratios: [(BetterSequence, f64); 4],
@@ -56,7 +56,7 @@ fn check(limits: &Limits, camera: u32, shots: &[BetterSequence]) {
     }
 }
 
-/// The sawtooth is not among these: in its middle the paper's pattern is spared the part's ends, where it is worst.
+/// Not for the sawtooth: the paper's pattern is worst at the part's ends, which its middle does not include.
 #[test]
 fn the_better_pattern_beats_the_papers_own_in_the_middle_of_cone_and_spline() {
     check(
@@ -103,7 +103,7 @@ fn an_unknown_part_is_a_usage_error_and_leaves_nothing() {
 
 #[test]
 fn the_columns_of_the_csv_are_frozen() {
-    // If this fails, do not change the test: people's spreadsheets know these names.
+    // If this fails, do not change the test: users' spreadsheets use these names.
     assert_eq!(
         HEADER,
         "part,optics,method,frames,seed,scored_px,lit_px,unresolved_px,gross_px,rms_mm,bias_mm,\

@@ -1,4 +1,4 @@
-//! The files that cross the border of the program are those that the documentation names.
+//! The files that the program reads and writes are as documented.
 
 use crate::station_plc::{Daemon, Place};
 use serde_json::Value;
@@ -24,7 +24,7 @@ const MEMBERS: [&str; 9] = [
     "phase_reach.npy",
 ];
 
-/// Keys of its `recipe.json`, version 1, as a taught recipe has them. The same holds for these.
+/// Keys of `recipe.json`, version 1, in a taught recipe. Do not change these either.
 const KEYS: [&str; 59] = [
     "alignment",
     "calibration",
@@ -86,7 +86,7 @@ const KEYS: [&str; 59] = [
     "taught_by",
     "version",
 ];
-/// What it may hold besides.
+/// Keys that `recipe.json` may have in addition.
 const OPTIONAL: [&str; 7] = [
     "exposure_us",
     "fringes",
@@ -111,7 +111,7 @@ fn collect(value: &Value, prefix: &str, keys: &mut BTreeSet<String>) {
     }
 }
 
-/// Name and content of each member of a ZIP that only stores (APPNOTE 6.3.10, section 4.3.7).
+/// Name and content of each member of a ZIP file without compression (APPNOTE 6.3.10, section 4.3.7).
 fn stored_members(mut zip: &[u8]) -> Vec<(String, Vec<u8>)> {
     let mut members = Vec::new();
     while let Some(header) = zip.strip_prefix(b"PK\x03\x04") {
@@ -186,7 +186,7 @@ fn the_documentation_holds_the_register_map() {
             Value::String(text) => text.clone(),
             other => other.to_string(),
         };
-        // The OLDEST block has the layout of RESULT and is documented by one sentence.
+        // The OLDEST block has the layout of RESULT, and one sentence documents it.
         if cell("block") == "OLDEST" {
             continue;
         }

@@ -1,6 +1,6 @@
-//! Damaged recordings end in a result or an error, never in a panic.
+//! Damaged recordings give a result or an error, never a panic.
 //!
-//! Seeded: a case that fails prints its number, and the same number damages the same bytes again.
+//! The random numbers are seeded: a failing case prints its number, and the same number gives the same damage again.
 
 use crate::written::{Written, geometric};
 use appliance::measure::measure;
@@ -18,7 +18,7 @@ const SEED: u64 = 20_260_401;
 const BYTE_CASES: u64 = 450;
 const NUMBER_CASES: u64 = 900;
 
-/// What stands in for a number of the manifest: the ends of every type, and what lies beyond.
+/// Replacements for a number of the manifest: the ends of every type, and values beyond them.
 const NUMBERS: [&str; 28] = [
     "0",
     "-0.0",
@@ -50,10 +50,10 @@ const NUMBERS: [&str; 28] = [
     "0.9999999999",
 ];
 
-/// Geometric, dense and single.
+/// Ratios of a geometric, a dense and a single sequence.
 const FORMS: [&[f64]; 3] = [&[0.03, 0.2, 1.0], &[1.0, 35.0 / 36.0, 5.0 / 6.0], &[1.0]];
 
-/// A recording with every optional part, of few pixels.
+/// A recording of few pixels, with every optional part.
 fn small(ratios: &[f64]) -> Recording {
     let (columns, rows) = (32, 24);
     let turns = (0..rows * columns).map(|at| f64::from(at % columns) + f64::from(at) / 999.0);
@@ -75,12 +75,12 @@ fn small(ratios: &[f64]) -> Recording {
     recording
 }
 
-/// Opens and measures a folder; the answer does not matter, that there is one does.
+/// Whether a folder can be opened and measured without a panic; the result does not matter.
 fn survives(case: u64, folder: &Path, damage: &str) -> bool {
     outcome(folder).unwrap_or_else(|| panic!("case {case} panicked: {damage}"))
 }
 
-/// Whether a folder could be measured; none if that panicked.
+/// Whether a folder could be measured; `None` if the program panicked.
 fn outcome(folder: &Path) -> Option<bool> {
     let outcome = catch_unwind(|| match Recording::open(folder) {
         Ok(recording) => measure(&recording, folder).is_ok(),
@@ -125,7 +125,7 @@ fn damaged_bytes_never_panic() {
                         let at = random.below(bytes.len());
                         bytes[at] = match random.below(3) {
                             0 => bytes[at] ^ (1 << random.below(8)),
-                            // Digits and what JSON is made of.
+                            // Digits and characters of JSON.
                             1 => b"0123456789eE+-.,:{}[]\"x"[random.below(23)],
                             _ => random.bits() as u8,
                         };
@@ -200,7 +200,7 @@ fn extreme_numbers_never_panic() {
     for ratios in FORMS {
         let written = Written::new(&small(ratios));
         let whole = fs::read_to_string(written.manifest()).unwrap();
-        // Ratios have a test of their own.
+        // Another test is for ratios.
         let mut places = numbers(&whole);
         places.retain(|place| !is_ratio(&whole, place));
         assert!(places.len() > 50, "{}", places.len());
@@ -210,7 +210,7 @@ fn extreme_numbers_never_panic() {
             let place = places[random.below(places.len())].clone();
             let number = NUMBERS[random.below(NUMBERS.len())];
             let old = whole[place.clone()].to_owned();
-            // The same number everywhere (a ratio stands at each of its frames), or once.
+            // Everywhere that the same number occurs (a ratio occurs with each of its frames), or once.
             if random.below(2) == 0 {
                 for place in places.iter().rev().filter(|p| whole[(*p).clone()] == old) {
                     text.replace_range(place.clone(), number);
@@ -239,7 +239,7 @@ fn frames_of_any_content_never_panic() {
             levels(&[0.8, 1.0], 5),
             levels(&[0.3], 8),
         ] {
-            // Noise over the whole scale, and then flat black and white.
+            // Noise over the full scale, then all black and all white.
             for noise in [3.0, 0.0] {
                 let scene = Scene {
                     size: 24,

@@ -1,4 +1,4 @@
-//! Gauges and alignment on parts in front of the simulated head.
+//! Gauges and alignment on parts of the simulated head.
 
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
 use super::station_plc::{Daemon, Place, Plc, READY, SMALL_HEAD, long};
@@ -17,13 +17,13 @@ use sim::{Part, Placement, Scenario};
 use std::fs;
 use std::time::Instant;
 
-/// Mean heights are off the true ones by at most this: 8-bit rounding without other noise is below 0.01 mm per pixel, and
-/// golden is measured alike.
+/// Largest error of mean heights: 8-bit rounding without other noise is below 0.01 mm per pixel, and
+/// golden has the same.
 const EXACT_MM: f64 = 0.01;
-/// The same after a motion was taken back: its own error comes on top.
+/// The same after a motion was taken back; includes the error of the motion.
 const ALIGNED_MM: f64 = 0.015;
 
-/// A region of the plate and one on the bead, in pixels of 256 × 256.
+/// A region on the plate and one on the bead, in pixels of 256 × 256.
 const PLATE: [[f64; 2]; 4] = [[82.0, 95.0], [130.0, 95.0], [130.0, 145.0], [82.0, 145.0]];
 const BEAD: [[f64; 2]; 4] = [[90.0, 160.0], [150.0, 160.0], [150.0, 168.0], [90.0, 168.0]];
 
@@ -37,7 +37,7 @@ pub(crate) fn gauge(name: &str, region: &str, measures: GaugeKind) -> GaugeFile 
     }
 }
 
-/// A gauge of every kind but coverage, of two regions `plate` and `bead`.
+/// A gauge of every kind except coverage, on the regions `plate` and `bead`.
 pub(crate) fn all_kinds(side: usize, tolerance_mm: f64) -> Vec<GaugeFile> {
     let smoothing_px = side;
     let component = |component| GaugeKind::Placement { component };
@@ -119,7 +119,7 @@ fn value(inspection: &Inspection, name: &str) -> f64 {
         .unwrap_or_else(|| panic!("{name} has no value: {:?}", inspection.reason))
 }
 
-/// Mean of the true heights inside an upright box of pixels.
+/// Mean of the true heights inside a rectangle of pixels.
 fn true_mean(bed: &Bed, corners: [[f64; 2]; 4]) -> f64 {
     let truth = bed.stage.truth();
     let (mut sum, mut count) = (0.0, 0.0);
@@ -175,7 +175,7 @@ fn gauges_give_what_is_true_of_the_part_wherever_it_lies_within_its_tolerance() 
         };
         off("mean", mean, exact);
         off("step", bead - mean, exact);
-        // A millimetre of error over the region of 40 mm would be 1.4 degrees.
+        // An error of 1 mm over the region of 40 mm would be 1.4 degrees.
         off("tilt x", 0.0, exact * 1.4);
         off("tilt y", 0.0, exact * 1.4);
         off("deviation", 0.0, 4.0 * exact);
@@ -184,11 +184,11 @@ fn gauges_give_what_is_true_of_the_part_wherever_it_lies_within_its_tolerance() 
         off("flatness", 0.0, 4.0 * exact);
         off("about x", place.tilt_deg[0], 0.02);
         off("about y", place.tilt_deg[1], 0.02);
-        // The part turns about the origin and the motion about the middle of its surface.
+        // The part turns about the origin, and the motion is about the middle of its surface.
         off("x", place.shift_mm[0], 0.1);
         off("y", place.shift_mm[1], 0.1);
         off("z", place.shift_mm[2], 0.1);
-        // The bead's region is 8 pixels of 0.83 mm wide, its top 2.2 mm over the plate and falling to the sides.
+        // The bead's region is 8 pixels of 0.83 mm wide. Its top is 2.2 mm above the plate, with slopes to both sides.
         let range = value(&found, "range");
         assert!((0.1..2.2).contains(&range), "{range}");
         volumes.push(value(&found, "volume"));
@@ -206,7 +206,7 @@ fn gauges_give_what_is_true_of_the_part_wherever_it_lies_within_its_tolerance() 
         let undetermined = found.placement.unwrap().undetermined();
         assert!(undetermined.is_empty(), "{undetermined:?}");
     }
-    // 60 × 8 pixels of 0.83 mm, foreshortened along u by cos 20°, under 1.9 mm on the mean.
+    // 60 × 8 pixels of 0.83 mm, foreshortened along u by cos 20°, with a mean height below 1.9 mm.
     let expected = (bead - 8.0) * 60.0 * 8.0 * 0.83 * 0.83 / 20_f64.to_radians().cos();
     assert!(
         (volumes[0] / expected - 1.0).abs() < 0.05,
@@ -251,7 +251,7 @@ fn findings_of_a_moved_part_depend_neither_on_strips_nor_on_threads_nor_on_the_b
         let mut strips = production.strips(rows);
         let mut found = || production.inspect(&views, &mut strips, None).unwrap();
         let first = pool.install(&mut found);
-        // Buffers that were used before change nothing.
+        // Used buffers give the same result.
         assert_eq!(pool.install(&mut found), first);
         first
     };
@@ -371,7 +371,7 @@ fn a_part_that_the_short_sequence_cannot_vouch_for_is_measured_again_within_the_
     fs::create_dir_all(place.recipe().parent().unwrap()).unwrap();
     let (bytes, _) = pack(&file, &taught.recipe.arrays).unwrap();
     fs::write(place.recipe(), bytes).unwrap();
-    // Twice as far as the recipe's tolerance.
+    // Twice the recipe's tolerance.
     let away = format!("{scene}\n[placement]\nshift_mm = [0.0, 0.0, 2.0]\n");
     fs::write(place.path("small.toml"), away).unwrap();
     let daemon = Daemon::start(&place);
@@ -384,10 +384,10 @@ fn a_part_that_the_short_sequence_cannot_vouch_for_is_measured_again_within_the_
         (1, 1),
         "one trigger, one result"
     );
-    // Full sequence, stepped up, simulated head; the part is found to lie outside.
+    // The full sequence after a shorter one, on a simulated head; the part is found outside its tolerance.
     assert_eq!(words[31] & 0b11_1110, 0b11_1000, "{:b}", words[31]);
     assert_eq!(words[8], Verdict::Invalid.number());
-    // What was judged before the longer sequence is processing too, though EXPOSURE_DONE came after it.
+    // Judging before the longer sequence counts as processing too, although EXPOSURE_DONE comes after it.
     let processing = long(&plc.read(610, 2).unwrap(), 0);
     let after_exposure = long(&words, 20) - long(&words, 18);
     assert!(processing > after_exposure, "{processing} {after_exposure}");

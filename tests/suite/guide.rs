@@ -1,4 +1,4 @@
-//! The operations guide knows every error code and speaks of no line that the program does not write; the manual page knows what there is.
+//! The operations guide has every error code, and only log lines that the program writes; the manual page is complete.
 
 use crate::written::{laboratory, program};
 use std::collections::BTreeSet;
@@ -13,12 +13,12 @@ fn root() -> PathBuf {
         .to_path_buf()
 }
 
-/// The first cells of the rows of the tables below a heading of the operations guide.
+/// The first cell of each table row below a heading of the operations guide.
 fn first_cells(heading: &str) -> Vec<String> {
     first_cells_of("operations.md", heading)
 }
 
-/// The same of a document in `docs`.
+/// The same for any document in `docs`.
 fn first_cells_of(document: &str, heading: &str) -> Vec<String> {
     let text = fs::read_to_string(root().join("docs").join(document)).unwrap();
     let (_, below) = text.split_once(&format!("\n## {heading}\n")).unwrap();
@@ -27,7 +27,7 @@ fn first_cells_of(document: &str, heading: &str) -> Vec<String> {
         .lines()
         .filter_map(|line| line.strip_prefix("| "))
         .filter_map(|row| row.split(" | ").next());
-    // Without the table's head.
+    // Without the header row.
     rows.skip(1).map(str::to_owned).collect()
 }
 
@@ -46,7 +46,7 @@ fn source(folder: &Path) -> String {
     all
 }
 
-/// The error codes that the program can show.
+/// The error codes in the program's source.
 fn error_codes() -> BTreeSet<String> {
     let file = root().join("appliance/src/station/error_code.rs");
     let text = fs::read_to_string(file).unwrap();
@@ -112,7 +112,7 @@ impl Page {
     }
 }
 
-/// The commands that a program's help lists.
+/// The commands in the help of a program.
 fn commands(help: &str) -> BTreeSet<String> {
     let (_, commands) = help.split_once("\nCommands:\n").unwrap();
     let lines = commands.split("\n\n").next().unwrap().lines();
@@ -120,7 +120,7 @@ fn commands(help: &str) -> BTreeSet<String> {
     first_words.map(str::to_owned).collect()
 }
 
-/// The long options that a help lists.
+/// The long options in a help text.
 fn options(help: &str) -> BTreeSet<String> {
     let (_, options) = help.split_once("\nOptions:\n").unwrap();
     let long = options.lines().filter_map(|line| line.split_once(" --"));
@@ -148,7 +148,7 @@ fn the_manual_page_has_exactly_the_commands_options_and_exit_codes_that_there_ar
     let mut options = options(&help);
     let mut told = page.items(".It Fl ");
     assert!(told.insert("-version".to_owned()));
-    // What runs without a command, serve, prints no table.
+    // `serve`, which runs without a command, prints no table.
     assert!(options.insert("-json".to_owned()));
     assert_eq!(told, options);
     assert!(exit_codes().contains(&78));

@@ -1,4 +1,4 @@
-//! The history across kill -9, and what it shows.
+//! The history: what it shows, and that it survives kill -9.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, READY, long, trigger};
@@ -10,7 +10,6 @@ use std::time::{Duration, Instant};
 use tests::program::Program;
 use tests::random::Random;
 
-/// Words of VERDICT.
 /// Longest wait for the history's own threads.
 const WRITTEN: Duration = Duration::from_secs(30);
 
@@ -29,12 +28,12 @@ fn all() -> Filter {
     }
 }
 
-/// Kills a measuring daemon `times` times at random moments; the PLC remembers every SEQ that it was shown.
+/// Kills a measuring daemon `times` times at random moments; the PLC remembers every SEQ that it read.
 fn kills(times: usize) {
     let place = Place::new();
     let mut random = Random::new(0x5EED_0019);
     let mut shown: Vec<u32> = Vec::new();
-    // The last that was shown before each kill: it may have been in flight.
+    // The last SEQ that the PLC read before each kill: it may not have been stored yet.
     let mut in_flight: Vec<u32> = Vec::new();
     let mut skipped = 0;
     for _ in 0..times {
@@ -49,7 +48,7 @@ fn kills(times: usize) {
         for token in 1..=1 + (random.below(4) as u16) {
             shown.push(long(&plc.measure(token), 0));
         }
-        // One more is under way, anywhere from its trigger to behind its result.
+        // One more cycle is running: it may be anywhere between its trigger and the time after its result.
         plc.wait("READY", |status| status.has(READY));
         plc.write(1, &trigger(100));
         let moment = Duration::from_micros(random.below(20_000) as u64);
@@ -86,7 +85,7 @@ fn kills(times: usize) {
         lost.iter().all(|seq| in_flight.contains(seq)),
         "lost: {lost:?}"
     );
-    // Of each kill at most the one in flight.
+    // Each kill loses at most the result of the running cycle.
     assert!(skipped <= times as u32, "{skipped}");
     println!(
         "{times} kills: {} results shown, {} of them in flight and lost, {skipped} SEQs skipped, none used twice",
@@ -106,7 +105,7 @@ fn many_kills_lose_at_most_the_result_in_flight_and_no_seq_comes_back() {
     kills(200);
 }
 
-/// A station that was taught a good part and then sees one with a dent.
+/// A station that was taught with a good part, and now sees a part with a dent.
 pub(crate) fn place_with_a_dent() -> Place {
     let place = Place::new();
     Daemon::start(&place).terminate();
@@ -117,7 +116,7 @@ pub(crate) fn place_with_a_dent() -> Place {
     place
 }
 
-/// The recording of a result, once it is linked.
+/// Waits for the recording of a result.
 pub(crate) fn recording(place: &Place, seq: u32) -> PathBuf {
     let started = Instant::now();
     loop {
@@ -235,7 +234,7 @@ fn recipes_are_listed_exported_imported_and_deleted_and_nothing_damaged_or_forei
 fn a_stored_result_opens_with_the_pictures_of_the_live_view_and_one_without_frames_says_why() {
     let place = place_with_a_dent();
     let config = fs::read_to_string(place.path("fringed.toml")).unwrap();
-    // Room for two parts with their pattern and one recipe.
+    // Space for two parts with their pattern, and for one recipe.
     let bounded = format!("{config}[history]\nrecordings_mib = 24\n");
     fs::write(place.path("fringed.toml"), bounded).unwrap();
     let daemon = Daemon::start(&place);
@@ -266,7 +265,7 @@ fn a_stored_result_opens_with_the_pictures_of_the_live_view_and_one_without_fram
     while reader(&place).recording(seq).unwrap().is_some() {
         assert!(last < seq + 20, "the quota removes nothing");
         last = long(&plc.measure(last as u16 + 1), 0);
-        // Not faster than they are written.
+        // Waits until each has been written.
         let started = Instant::now();
         while reader(&place).recording(seq).unwrap().is_some()
             && reader(&place).recording(last).unwrap().is_none()
@@ -338,7 +337,7 @@ fn a_list_by_time_says_how_many_results_it_leaves_out_because_their_time_is_not_
     );
 }
 
-/// Where TIME is in the registers from 200 on.
+/// Position of TIME in the registers from 200.
 const TIME: usize = 14;
 
 #[test]
@@ -363,12 +362,12 @@ fn the_time_of_a_browser_dates_history_and_log_and_never_the_register() {
     };
     let log = browser.get("/api/log")["lines"].clone();
     if said == "not needed" {
-        // The clock of this computer is synchronised.
+        // This computer's clock is synchronised.
         assert!(time != [0; 4] && results[0]["browser_utc_us"].is_null());
         return;
     }
     assert_eq!((said.as_str(), time), ("taken", &[0; 4][..]));
-    // Both of this start, also the one before the sign-in.
+    // Both results of this start, also the one before the sign-in.
     assert_eq!(results[1]["seq"], before);
     for result in [&results[0], &results[1], &log[0]] {
         let us = result["browser_utc_us"].as_u64().unwrap();

@@ -1,4 +1,4 @@
-//! Clients that mean no good, and many that do: neither takes the processor from the measurement, nor a place from the PLC.
+//! Hostile clients, and many ordinary ones: neither slows the measurement down, and the PLC can always connect.
 
 use crate::station_plc::{PATIENCE, READY, SMALL_HEAD, long, trigger};
 use appliance::config::Config;
@@ -19,15 +19,15 @@ use tokio_modbus::prelude::ExceptionCode;
 
 /// The PLC's address; the clients of the load come from 127.0.0.1, which may only read.
 const PLC: &str = "127.0.0.2";
-/// Room for the PLC, ten clients, and the place that is kept for a writer.
+/// Connections for the PLC, ten clients, and the one that is reserved for a writer.
 const CONNECTIONS: usize = 12;
-/// Clients that poll.
+/// Number of polling clients.
 const POLLING: usize = 10;
-/// What a load may add to the processing's processor time.
+/// Largest factor by which a load may increase the processor time of the processing.
 const ALLOWED: f64 = 1.05;
 const PASS: u16 = 1;
 
-/// A daemon with one computing thread: what it spends is work and never the looking for some.
+/// A daemon with one computing thread, so its processor time includes no search for work.
 struct Bed {
     daemon: Daemon,
     runtime: Runtime,
@@ -64,7 +64,7 @@ impl Bed {
         }
     }
 
-    /// One cycle of the PLC; the processor time of its processing in ms.
+    /// Runs one cycle; returns the processor time of its processing, ms.
     fn cycle(&mut self) -> f64 {
         self.token += 1;
         let Self { runtime, plc, .. } = self;
@@ -104,7 +104,7 @@ async fn connect(to: SocketAddr) -> std::io::Result<Context> {
     Ok(tcp::attach(socket.connect(to).await?))
 }
 
-/// Threads that do something again and again until it is over.
+/// Threads that repeat a task until the load ends.
 #[derive(Default)]
 struct Load {
     over: Arc<AtomicBool>,
@@ -129,10 +129,10 @@ impl Load {
     }
 }
 
-/// 20 Hz.
+/// Period of polling.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Ten clients that poll the registers at 20 Hz, and one page that is open: it follows the events and fetches the picture of
+/// Ten clients that poll the registers at 20 Hz, and one open page, which follows the events and fetches the picture of
 /// each new result.
 fn polite(daemon: &Daemon, polls: &Arc<AtomicU64>) -> Load {
     let mut load = Load::default();
@@ -157,7 +157,7 @@ fn polite(daemon: &Daemon, polls: &Arc<AtomicU64>) -> Load {
     let mut shown = String::new();
     load.spawn(move || {
         let mut events = [0; 16384];
-        // An event comes at least every second.
+        // There is an event at least every second.
         let count = page.read(&mut events).unwrap();
         assert!(count > 0, "the page was left alone");
         let text = String::from_utf8_lossy(&events[..count]);
@@ -171,7 +171,7 @@ fn polite(daemon: &Daemon, polls: &Arc<AtomicU64>) -> Load {
     load
 }
 
-/// Fetches the picture of the last result, if the station has the time to draw one.
+/// Fetches the picture of the last result, if the station has time to draw it.
 fn picture(http: SocketAddr) {
     let mut stream = patient(http).unwrap();
     let head = format!("Host: {http}\r\nConnection: close\r\n\r\n");
@@ -181,7 +181,7 @@ fn picture(http: SocketAddr) {
     assert!(answer.starts_with(b"HTTP/1.1 "));
 }
 
-/// A connection on which nothing takes for ever.
+/// A connection with timeouts.
 fn patient(to: SocketAddr) -> std::io::Result<TcpStream> {
     let stream = TcpStream::connect(to)?;
     stream.set_read_timeout(Some(PATIENCE))?;
@@ -191,11 +191,11 @@ fn patient(to: SocketAddr) -> std::io::Result<TcpStream> {
 
 /// How many connections a flood holds open at a time.
 const FLOOD: usize = 250;
-/// Room for the system between two waves.
+/// Pause between two waves.
 const BREATH: Duration = Duration::from_millis(20);
 
-/// Floods of connections, truncated and oversized frames, garbage, bytes that come one by one, and requests whose answers
-/// nobody fetches.
+/// Floods of connections, truncated and oversized frames, random bytes, bytes that arrive one by one, and requests whose
+/// answers are not read.
 fn hostile(modbus: SocketAddr, connections: &Arc<AtomicU64>) -> Load {
     let mut load = Load::default();
     let counted = Arc::clone(connections);
@@ -217,7 +217,7 @@ fn hostile(modbus: SocketAddr, connections: &Arc<AtomicU64>) -> Load {
     let counted = Arc::clone(connections);
     let mut turn = 0;
     load.spawn(move || {
-        // What the server closes while it is written to is what is wanted.
+        // The server should close the connection during a write.
         if let Ok(mut stream) = patient(modbus) {
             let _ = stream.set_write_timeout(Some(POLL));
             let _ = stream.write_all(&attacks[turn % attacks.len()]);
@@ -240,8 +240,8 @@ fn hostile(modbus: SocketAddr, connections: &Arc<AtomicU64>) -> Load {
     load
 }
 
-/// Medians of the processing's processor time in ms: alone, under polite load, under attack; interleaved. And the connections
-/// of the attack.
+/// Medians of the processor time of the processing, ms: without load, with ordinary load, under attack, measured in turn. Also
+/// the number of connections of the attack.
 fn figures(bed: &mut Bed, rounds: usize, cycles: usize) -> ([f64; 3], u64) {
     let (polls, connections) = (Arc::default(), Arc::default());
     let mut times: [Vec<f64>; 3] = Default::default();
@@ -282,7 +282,7 @@ fn a_plc_measures_during_and_after_an_attack_and_nobody_else_can_trigger() {
         "only the PLC triggers"
     );
     assert_eq!(snapshot.missed, 0);
-    // Who comes anew is served as well, and may read but not write from where the attack came.
+    // A new client is served too; from the address of the attack it may read but not write.
     let modbus = bed.daemon.modbus;
     bed.runtime.block_on(async {
         let mut late = connect(modbus).await.unwrap();
@@ -292,7 +292,7 @@ fn a_plc_measures_during_and_after_an_attack_and_nobody_else_can_trigger() {
             let mut reader = tcp::connect(modbus).await.unwrap();
             match reader.write_single_register(1, 999).await {
                 Ok(answer) => break answer,
-                // As long as the last of the attack are still there.
+                // While the last connections of the attack still exist.
                 Err(_) => assert!(began.elapsed() < PATIENCE, "no place for a reader"),
             }
         };
@@ -301,7 +301,7 @@ fn a_plc_measures_during_and_after_an_attack_and_nobody_else_can_trigger() {
     bed.daemon.stop();
 }
 
-/// Run by `.ci/run full`: on a machine that does much else at the same time the figure says nothing.
+/// Run by `.ci/run full`: on a busy machine the figure means nothing.
 #[test]
 #[ignore = "a measurement"]
 fn neither_load_nor_attack_adds_five_per_cent_to_the_processor_time_of_the_processing() {

@@ -1,11 +1,11 @@
-//! The house's plan: who may import whom. Each test fails with the sentence of the rule.
+//! The project's plan: which code may import which. Each test fails with the text of its rule.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use tests::files;
 
-/// Longest file, in lines that are no tests. House: 100–300 lines, one concept each; this is where a
-/// file has clearly become two.
+/// Longest file, in lines without tests. Files have 100–300 lines and one concept each; at this length
+/// a file clearly has two.
 const MAX_LINES: usize = 450;
 
 fn root() -> PathBuf {
@@ -21,11 +21,11 @@ struct Source {
     text: String,
 }
 
-/// All Rust files below a folder of the project; none if there is no such folder.
+/// All Rust files below a folder of the project; empty if there is no such folder.
 fn sources(folder: &str) -> Vec<Source> {
     let mut all = Vec::new();
     collect(&root().join(folder), &mut all);
-    // A module may be one file beside its folder.
+    // A module may be a file beside its folder.
     collect_file(&root().join(format!("{folder}.rs")), &mut all);
     all
 }
@@ -49,14 +49,14 @@ fn collect_file(path: &Path, all: &mut Vec<Source>) {
     }
 }
 
-/// The code of a text: without comments, and without the rest of a line behind one.
+/// The numbered lines of a text without comments.
 fn code(text: &str) -> impl Iterator<Item = (usize, &str)> {
     (1..)
         .zip(text.lines())
         .map(|(line, text)| (line, text.split("//").next().unwrap_or_default()))
 }
 
-/// Whether a line of code names a path that starts with `path`, as a word.
+/// Whether a line of code contains a path that starts with `path`, as a word.
 fn names(line: &str, path: &str) -> bool {
     line.match_indices(path).any(|(at, _)| {
         let before = line[..at].chars().next_back();
@@ -64,7 +64,7 @@ fn names(line: &str, path: &str) -> bool {
     })
 }
 
-/// Fails with `rule` where a file below `folder` names one of `paths` in its code.
+/// Fails with `rule` if the code of a file below `folder` contains one of `paths`.
 fn forbid(rule: &str, folder: &str, paths: &[&str]) {
     let mut broken = Vec::new();
     for source in sources(folder) {
@@ -77,7 +77,7 @@ fn forbid(rule: &str, folder: &str, paths: &[&str]) {
     assert!(broken.is_empty(), "{rule}\n{}", broken.join("\n"));
 }
 
-/// The names of the packages that a manifest depends on (not for its tests).
+/// The names of a package's dependencies, without those of its tests.
 fn dependencies(package: &str) -> Vec<String> {
     let text = fs::read_to_string(root().join(package).join("Cargo.toml")).unwrap();
     let mut inside = false;
@@ -92,7 +92,7 @@ fn dependencies(package: &str) -> Vec<String> {
     found
 }
 
-/// Fails with `rule` where a manifest names one of `packages`.
+/// Fails with `rule` if a package depends on one of `packages`.
 fn forbid_dependency(rule: &str, package: &str, packages: &[&str]) {
     let dependencies = dependencies(package);
     assert!(!dependencies.is_empty(), "{package} has no dependencies?");
@@ -196,7 +196,7 @@ fn the_stations_decisions_are_pure() {
         "hal::",
         "sim::",
     ];
-    // The handle is where the decisions meet the clock and the sockets.
+    // The handle connects the decisions to the clock and the sockets.
     let parts = files::names(&root().join("appliance/src/station"));
     for part in parts.iter().map(|name| name.trim_end_matches(".rs")) {
         if part != "handle" {
@@ -237,7 +237,7 @@ fn imports_inside_algo_only_go_backwards_along_the_flow() {
     }
 }
 
-/// Lines of code and comment that stand before the tests of a file.
+/// Number of lines before the tests of a file.
 fn untested_lines(source: &Source) -> usize {
     let test_file = source.name.ends_with("tests.rs") || source.name.contains("/tests/");
     if test_file {
@@ -287,7 +287,7 @@ fn files_hold_one_concept_each_and_say_which() {
 #[test]
 fn no_path_of_a_machine_stands_in_the_code() {
     let rule = "No machine paths in code: files are found from the workspace or from an option.";
-    // In two parts, so that this file does not break its own rule.
+    // In two parts, so this file does not break its own rule.
     let paths = [
         concat!("/wor", "k/"),
         concat!("/ho", "me/"),
@@ -356,7 +356,7 @@ fn every_file_that_the_architecture_names_is_there() {
     let named: Vec<_> = quoted.filter(file).collect();
     assert!(named.len() > 40, "{named:?}");
     for file in named {
-        // A file beside the one that was named before it needs only its name.
+        // A file in the folder of the previous one needs only its name.
         let by_name = || {
             let all = ["algo/src", "hal/src", "appliance/src"];
             all.iter().flat_map(|folder| sources(folder)).any(|source| {

@@ -1,4 +1,4 @@
-//! Files that arrive at the page go to the storage: they take no memory, and leave nothing behind.
+//! Files that are uploaded to the page go to the storage: they use no memory, and no temporary file remains.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, PATIENCE, Place};
@@ -7,15 +7,16 @@ use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Clients that send a file at a time.
+/// Clients that send a file at the same time.
 const CLIENTS: usize = 8;
-/// Memory that they may take together, KiB.
+/// Memory that they may use together, KiB.
 const ALLOWED: u64 = 64 << 10;
-/// The memory is given back within this time, but for what the program learned to need, KiB.
+/// Longest time until the memory is returned.
 const BACK: Duration = Duration::from_secs(10);
+/// Memory that may stay in use then, KiB.
 const LEFT: u64 = 16 << 10;
 
-/// A line of proc_pid_status(5), KiB.
+/// A value in KiB of proc_pid_status(5).
 fn memory(daemon: &Daemon, name: &str) -> u64 {
     let status = fs::read_to_string(format!("/proc/{}/status", daemon.pid())).unwrap();
     let line = status.lines().find_map(|line| line.strip_prefix(name));
@@ -23,7 +24,7 @@ fn memory(daemon: &Daemon, name: &str) -> u64 {
     words.map(|word| word.parse().unwrap()).next().unwrap()
 }
 
-/// Files on their way in the state folder: how many, and their bytes.
+/// Number and total size of the incomplete files in the state folder.
 fn arriving(place: &Place) -> (usize, u64) {
     let entries = fs::read_dir(place.path("state/recipes")).unwrap();
     let sizes: Vec<_> = entries
@@ -42,7 +43,7 @@ fn wait(what: &str, within: Duration, done: impl Fn() -> bool) {
     }
 }
 
-/// Sends a body but for its last byte, as far as it is taken.
+/// Sends a body without its last byte, as far as the server reads it.
 fn send(mut stream: TcpStream, mib: usize) -> TcpStream {
     let piece = vec![0x5A; 1 << 20];
     stream.set_write_timeout(Some(PATIENCE)).unwrap();
@@ -55,7 +56,7 @@ fn send(mut stream: TcpStream, mib: usize) -> TcpStream {
     stream
 }
 
-/// The answer, as far as it came before the connection ended.
+/// The part of the answer that arrived before the connection ended.
 fn answer(stream: &mut TcpStream) -> String {
     let mut answer = Vec::new();
     let _ = stream.read_to_end(&mut answer);
@@ -69,7 +70,7 @@ fn imports_take_no_memory(mib: usize) {
     browser.sign_in(&daemon);
     browser.wait_for_another("none");
     let idle = memory(&daemon, "VmRSS");
-    // The peak is counted from here on.
+    // From here on the peak counts.
     fs::write(format!("/proc/{}/clear_refs", daemon.pid()), "5").unwrap();
     let held: Vec<_> = (0..CLIENTS)
         .map(|_| browser.begin("POST", "/api/recipes", mib << 20))
@@ -81,7 +82,7 @@ fn imports_take_no_memory(mib: usize) {
         arriving(&place) == (2, 2 * all_but_one)
     });
     let peak = memory(&daemon, "VmHWM");
-    // Who is told to come later has an answer; two still wait for their last byte.
+    // A client that is told to come later has an answer; two still wait for their last byte.
     let mut open = Vec::new();
     for mut stream in held.drain(..) {
         stream
@@ -98,7 +99,7 @@ fn imports_take_no_memory(mib: usize) {
     }
     println!("{CLIENTS} files of {mib} MiB: {idle} KiB idle, {peak} KiB at most");
     assert!(peak <= idle + ALLOWED, "{peak} KiB after {idle} KiB");
-    // One of them is finished: no recipe. The others are given up.
+    // One of them is finished and is not a recipe. The others are dropped.
     let mut last = open.pop().unwrap();
     last.set_read_timeout(Some(PATIENCE)).unwrap();
     last.write_all(&[0x5A]).unwrap();
@@ -109,7 +110,7 @@ fn imports_take_no_memory(mib: usize) {
     wait("memory given back", BACK, || {
         memory(&daemon, "VmRSS") <= idle + LEFT
     });
-    // A recipe still comes in.
+    // A recipe can still be imported.
     let (_, recipe) = browser.ask("GET", "/api/recipes/1/file", &[]);
     assert_eq!(browser.ask("POST", "/api/recipes", &recipe).0, 201);
 }

@@ -1,4 +1,4 @@
-//! The simulator against an independent one: the study's recordings, rendered again.
+//! The simulator compared with an independent one: the recordings of the study are rendered again.
 
 use hal::frame::Samples;
 use hal::projector::Raster;
@@ -9,12 +9,12 @@ use sim::{Part, Scenario, head};
 use std::time::Duration;
 use tests::shared;
 
-/// Truth heights agree this well, RMS mm: a hundredth of a millimetre is far below the noise of any measurement.
+/// Largest difference of true heights, RMS mm; it is far below the noise of a measurement.
 const HEIGHT_RMS_MM: f64 = 0.01;
-/// Share of pixels whose class 2 agrees: the two programs find silhouettes and depth edges in their own ways.
+/// Smallest share of pixels with the same class 2: the two programs find silhouettes and depth edges differently.
 const CLASS_AGREEMENT: f64 = 0.995;
-/// Frames without noise differ from noisy recorded ones by the noise: σ of ±6.375 counts uniform and rounding, 3.69,
-/// twice rounded; the rest is room for the depth edges.
+/// Frames without noise differ from the recorded ones by the noise: uniform ±6.375 counts and rounding twice have
+/// σ 3.69; the rest is margin for the depth edges.
 const FRAME_RMS_COUNTS: std::ops::Range<f64> = 3.5..3.85;
 
 /// grey = 255/2 · (1 + sin 2π(ratio · Φ_P(ξ, η) + shift)), rounded: the format's definition.
@@ -102,7 +102,7 @@ fn compare(name: &str, part: Part) {
             panic!("not 8 bit");
         };
         for (at, (a, b)) in ours.iter().zip(theirs).enumerate() {
-            // Dark pixels clip their noise.
+            // In dark pixels the noise is clipped.
             if theirs_class[at] == 2 && *a > 8 && *a < 247 {
                 squares += (f64::from(*a) - f64::from(*b)).powi(2);
                 count += 1.0;

@@ -1,4 +1,4 @@
-//! Inputs of the fuzz targets: small examples, what once failed, and seeded damage to both.
+//! Inputs of the fuzz targets: small examples, inputs that once failed, and seeded damage to both.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -11,7 +11,7 @@ use tests::random::Random;
 const SEED: u64 = 20_261_122;
 /// Damaged copies of each input.
 const COPIES: usize = 4;
-/// Bytes of all examples together.
+/// Largest total size of the examples, bytes.
 const MOST: usize = 300_000;
 
 fn folder(name: &str) -> PathBuf {
@@ -20,7 +20,7 @@ fn folder(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// Name and bytes of the inputs of a target; none where the folder is not there.
+/// Names and contents of the inputs of a target; empty if the folder does not exist.
 fn inputs(kind: &str, target: &str) -> Vec<(String, Vec<u8>)> {
     let folder = folder(kind).join(target);
     let named = |name: &String| {
@@ -67,7 +67,7 @@ fn every_folder_of_inputs_has_its_target() {
     }
 }
 
-/// A copy with bits turned, bytes taken out, repeated or put in.
+/// A copy with bits changed, or bytes removed, repeated or inserted.
 fn damaged(random: &mut Random, whole: &[u8]) -> Vec<u8> {
     let mut bytes = whole.to_vec();
     for _ in 0..=random.below(3) {

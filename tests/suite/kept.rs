@@ -1,4 +1,4 @@
-//! A part that a station kept is judged again, and plays as a head.
+//! A recording that a station kept is judged again, and replayed as a head.
 
 use crate::history::{place_with_a_dent, program, reader, recording};
 use crate::page::Browser;
@@ -45,10 +45,10 @@ fn a_failed_part_is_kept_and_replays_bit_by_bit_and_a_difference_is_said() {
         "{}",
         run.stdout
     );
-    // With one thread as with many.
+    // One thread and many give the same result.
     replay(&folder, &["--threads", "1"]).succeeded();
 
-    // One frame of the finest level that is another's.
+    // One frame of the finest level is replaced by another.
     fs::copy(folder.join("frames/008.png"), folder.join("frames/011.png")).unwrap();
     let run = replay(&folder, &[]);
     assert_eq!(run.code, 70, "{}", run.stderr);
@@ -58,7 +58,7 @@ fn a_failed_part_is_kept_and_replays_bit_by_bit_and_a_difference_is_said() {
         run.stderr
     );
 
-    // Elsewhere nothing is known of it, but it can be judged.
+    // On another station the recording is unknown, but it can be judged.
     let elsewhere = place.path("elsewhere");
     fs::rename(&folder, &elsewhere).unwrap();
     let state = place.path("state");
@@ -75,7 +75,7 @@ fn a_failed_part_is_kept_and_replays_bit_by_bit_and_a_difference_is_said() {
 fn a_kept_part_is_judged_again_by_its_own_recipe_after_that_was_edited_or_deleted_also_from_the_pages_zip()
  {
     let place = place_with_a_dent();
-    // A new one is shown at the next start.
+    // A new recording is listed at the next start.
     fs::remove_file(place.path("state/access/secret")).unwrap();
     let daemon = Daemon::start(&place);
     let words = Plc::connect(&daemon).measure(9);
@@ -87,7 +87,7 @@ fn a_kept_part_is_judged_again_by_its_own_recipe_after_that_was_edited_or_delete
     assert_eq!(status, 200);
     let file = place.path("part.zip");
     fs::write(&file, zip).unwrap();
-    // No limits, so that the dent passes, and another name: no generation is left that judged the part.
+    // Without limits the dent passes. With the new name no generation of the recipe that judged the part remains.
     let taught = fs::read(place.recipe()).unwrap();
     assert_eq!(taught, fs::read(folder.join("recipe.recipe")).unwrap());
     browser.sign_in(&daemon);
@@ -136,7 +136,7 @@ fn a_kept_part_is_judged_again_by_its_own_recipe_after_that_was_edited_or_delete
     program().measure(&file, &out, &[]).succeeded();
     assert!(out.join("height.npy").exists());
     assert_eq!(replay(&folder, &["--recipe", "stored"]).code, 66);
-    // What an older program kept has no recipe of its own: the file that taught it is named.
+    // A recording of an older program has no recipe in it, so the recipe file is given.
     let named = place.path("named.recipe");
     fs::rename(folder.join("recipe.recipe"), &named).unwrap();
     assert_eq!(replay(&folder, &[]).code, 66);
@@ -144,7 +144,7 @@ fn a_kept_part_is_judged_again_by_its_own_recipe_after_that_was_edited_or_delete
     assert!(run.stdout.contains("bit by bit"), "{}", run.stdout);
 }
 
-/// The recipe in a file projects this of its sequences in production.
+/// Changes which of its sequences the recipe in a file projects in production.
 fn project(recipe: &Path, production: usize) {
     let (mut file, arrays) = files::recipe(&fs::read(recipe).unwrap());
     file.production = production;
@@ -156,7 +156,7 @@ fn a_kept_fail_plays_as_a_head_to_test_a_plc_with_by_the_documented_commands() {
     let documented =
         fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/modbus.md"))
             .unwrap();
-    // As taught all frames are projected; from the shortest on, the head that measured had the patterns of more.
+    // A taught recipe projects all frames. If it starts with the shortest sequence, the head that measured had the patterns of others too.
     for production in [None, Some(0)] {
         let place = place_with_a_dent();
         if let Some(production) = production {
@@ -186,7 +186,7 @@ fn a_kept_fail_plays_as_a_head_to_test_a_plc_with_by_the_documented_commands() {
             serve.starts_with("fringed serve --config test.toml"),
             "{serve}"
         );
-        // Where the commands are typed: beside the configuration.
+        // The commands run in the folder of the configuration.
         let elsewhere = Place::new();
         fs::write(elsewhere.path("test.toml"), block("toml")).unwrap();
         let typed = import.replace("fringed", env!("CARGO_BIN_EXE_fringed-under-test"));

@@ -1,4 +1,4 @@
-//! The limits that teaching sets by itself: good parts keep them, as predicted, and dents do not.
+//! The limits that teaching sets: good parts are within them, as predicted, and dents are not.
 
 use super::placement::{Bed, TIMEOUT, bed};
 use algo::geometry::Vector;
@@ -25,20 +25,20 @@ const STOCK: [&str; 8] = [
 ];
 const DEPTH_MM: f64 = 0.3;
 const DIAMETER_MM: f64 = 8.0;
-/// What the limits are asked to be.
+/// The tolerance for which the limits are set.
 const TOLERANCE_MM: f64 = 0.15;
 /// Half the height of the flowerpot's wall, and the cosine of its slope against the axis.
 const POT_MM: (f64, f64) = (74.5, 0.967);
-/// Neighbours that are further apart do not see the same surface.
+/// Neighbours that are further apart are not on the same surface.
 const STEP_MM: f64 = 6.0;
 
-/// The default head with a stock part in front of it, and its noise from a seed.
+/// The default head with a stock part, and noise from a seed.
 fn scenario(kind: &str, seed: u64) -> Scenario {
     let text = format!("[noise]\nseed = {seed}\n[part]\nkind = \"{kind}\"\n");
     Scenario::from_toml(&text, kind).unwrap()
 }
 
-/// A quarter of the pixels, and of the rays of each.
+/// The same with a quarter of the pixels, and a quarter of the rays of each.
 fn small(kind: &str, seed: u64) -> Scenario {
     let mut scenario = scenario(kind, seed);
     (scenario.rig.camera.width, scenario.rig.camera.height) = (256, 256);
@@ -46,7 +46,7 @@ fn small(kind: &str, seed: u64) -> Scenario {
     scenario
 }
 
-/// A taught part: what it is judged by, and the prediction.
+/// A taught part on its head, with its plan and the prediction.
 struct Line {
     bed: Bed,
     plan: Plan,
@@ -92,7 +92,7 @@ impl Line {
         }
     }
 
-    /// A cycle as production runs it: longer sequences while one asks for them.
+    /// Runs a cycle as in production: longer sequences follow if a shorter one is not enough.
     fn judge(&mut self) -> Inspection {
         let mut sequence = 0;
         loop {
@@ -108,7 +108,7 @@ impl Line {
         }
     }
 
-    /// |deviation| of so many good parts, all of which must pass.
+    /// |deviation| of `parts` good parts, all of which must pass.
     fn good(&mut self, name: &str, parts: usize) -> Vec<f64> {
         let judged = (0..parts).map(|at| {
             let found = self.judge();
@@ -121,7 +121,7 @@ impl Line {
         judged.collect()
     }
 
-    /// Puts the part with a dent in front of the head.
+    /// Replaces the part by one with a dent.
     fn dent(&self, pot: bool, place: Vector) {
         let defects = vec![Defect::Dent {
             x: place.x,
@@ -139,7 +139,7 @@ impl Line {
         self.bed.stage.place(&part, &Placement::default()).unwrap();
     }
 
-    /// The point that a pixel sees, where it sees one.
+    /// The point that a pixel sees, if any.
     fn point(&self, heights: &[f32], at: usize) -> Option<Vector> {
         let width = self.plan.conditions().camera.0 as usize;
         let z = f64::from(*heights.get(at)?);
@@ -148,8 +148,8 @@ impl Line {
         triangulator.point(at % width, at / width, height)
     }
 
-    /// Places uniform over the surface that is seen, by its area, that keep the dent's radius from the flowerpot's rim, from the
-    /// sheet metal's edges and from its openings, and are no pixels at a silhouette.
+    /// Places with a uniform distribution over the visible surface. They are at least the dent's radius away from the flowerpot's rim
+    /// and from the edges and openings of the sheet metal, and not at a silhouette.
     fn places(&self, pot: bool, count: usize, seed: u64) -> Vec<Vector> {
         let width = self.plan.conditions().camera.0 as usize;
         let heights = self.bed.stage.truth().height;
@@ -169,7 +169,7 @@ impl Line {
         let areas: Vec<f64> = (0..heights.len()).map(area).collect();
         let total: f64 = areas.iter().sum();
         let rim = POT_MM.0 - DIAMETER_MM / 2.0 * POT_MM.1;
-        // Two pixels at a silhouette are never compared; on the sheet metal a dent's radius is 12.
+        // The two pixels at a silhouette are never compared; on the sheet metal the radius of a dent is 12 pixels.
         let reach = if pot { 2 } else { 12 };
         let keeps_away = |at: usize, middle: Vector| {
             let (row, column) = (at / width, at % width);
@@ -196,7 +196,7 @@ impl Line {
     }
 }
 
-/// So many goldens, and good parts of each: all pass, and the largest deviations are as predicted within these shares.
+/// Teaches goldens and measures good parts of each: all pass, and the largest deviations are as predicted, within relative bounds.
 fn keep_their_limits(
     goldens: u64,
     parts: usize,
@@ -238,7 +238,7 @@ fn keep_their_limits(
     }
 }
 
-/// Dents at seeded places of both parts: all are found.
+/// Places dents at random on both parts: all are found.
 fn are_found(dents: usize, sub_rays: u32) {
     for kind in ["sheet_metal", "flowerpot"] {
         let mut scenario = scenario(kind, 3);
@@ -260,14 +260,14 @@ fn are_found(dents: usize, sub_rays: u32) {
 
 #[test]
 fn good_parts_of_every_stock_kind_keep_the_limits_that_teaching_sets() {
-    // One golden decides where the mean lies within its scatter, and how much of that is left.
+    // The noise of one golden shifts the mean of all its parts, and changes their scatter.
     keep_their_limits(1, 25, small, [0.35, 0.8]);
 }
 
 #[test]
 #[ignore = "takes minutes: `.ci/run full`"]
 fn two_hundred_good_parts_of_every_stock_kind_keep_the_limits_that_teaching_sets() {
-    // Measured: the mean is up to 18 % below its prediction (spline), the scatter up to 28 % (cone): on the safe side.
+    // Measured: the mean is up to 18 % below its prediction (spline), the scatter up to 28 % (cone), so the limits are safe.
     keep_their_limits(10, 20, scenario, [0.20, 0.35]);
 }
 

@@ -1,4 +1,4 @@
-//! Recordings measured in this process, each shared recording once for all tests.
+//! Recordings that are measured in this process; each shared recording once for all tests.
 
 use appliance::measure::{Measurement, measure};
 use hal::replay::Recording;
@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 use tests::shared;
 
-/// A recording and what the program's own code measures from it.
+/// A recording, and the results of the program's code for it.
 pub struct Measured {
     pub recording: Recording,
     pub result: Measurement,
@@ -33,7 +33,7 @@ pub const CONE: &str = "study-cone-adaptive";
 pub const SPLINE: &str = "study-spline-dense121";
 const ALL: [&str; 5] = [SKULL, BOARD, SPHERE, CONE, SPLINE];
 
-/// A shared recording, measured; none where it is absent: the test that asks counts as skipped.
+/// A shared recording, measured; `None` if it is not on this machine, and then the test counts as skipped.
 pub fn shared_recording(name: &str) -> Option<&'static Measured> {
     static MEASURED: [OnceLock<Option<Measured>>; ALL.len()] =
         [const { OnceLock::new() }; ALL.len()];

@@ -1,4 +1,4 @@
-//! What `fringed measure` writes and prints.
+//! The files and the text of `fringed measure`.
 
 use crate::written::{Written, geometric};
 use hal::replay::recording::PatternSpec;
@@ -20,7 +20,7 @@ const WITH_HEIGHT: [&str; 6] = [
 #[test]
 fn phase_and_height_are_nan_exactly_where_the_definition_rejects() {
     let mut recording = geometric().record();
-    // The top of the bump is out of range.
+    // The top of the bump is outside the working range.
     recording.range_mm = Some([-60.0, 5.0]);
     let written = Written::new(&recording);
     written.measure(&[]).succeeded();
@@ -48,7 +48,7 @@ fn phase_and_height_are_nan_exactly_where_the_definition_rejects() {
         resolved += usize::from(!missing);
         out_of_range += usize::from(found == Some(None));
     }
-    // The test is about something: every reason occurs.
+    // Every reason occurs, so the test is not trivial.
     assert!(seen.len() >= 4 && out_of_range > 100, "{seen:?}");
     let report = files::report(&written.out());
     assert_eq!(report["resolved"], resolved);
@@ -92,7 +92,7 @@ fn the_report_has_every_key_and_its_counts_add_up() {
         let expected = twin.reason.iter().filter(|r| **r == reason).count();
         assert_eq!(reasons[reason.word()], expected, "{}", reason.word());
     }
-    // A dark pixel is not lit, unless the truth says so; here the truth calls the dark patch unseen.
+    // Dark pixels count as not lit unless the truth says otherwise; here it calls the dark patch unseen.
     assert_eq!(reasons["dark"], 0);
     let unresolved: u64 = reasons.values().map(|n| n.as_u64().unwrap()).sum();
     assert_eq!(count("lit"), count("resolved") + unresolved);
@@ -144,7 +144,7 @@ fn the_cloud_has_one_vertex_per_resolved_pixel_on_that_pixels_ray() {
         assert!(off < 1e-4, "pixel {pixel} is off by {off}");
         levels.insert(vertex.intensity);
     }
-    // The part is lit from 97 counts on one side to 127 on the other.
+    // The part's brightness is 97 counts on one side and 127 on the other.
     assert!(levels.len() > 20, "{levels:?}");
 }
 
@@ -171,7 +171,7 @@ fn the_picture_shows_the_map_beside_its_scale() {
         .map(|(x, y)| colour(x, y))
         .collect();
     assert!(scale.len() > 30, "{} colours", scale.len());
-    // The dark patch has one colour, which is not the part's.
+    // The dark patch has one colour, different from the part's.
     assert_eq!(colour(8, 8), colour(12, 12));
     assert_ne!(colour(8, 8), colour(48, 48));
 }
@@ -225,13 +225,13 @@ fn of_two_patterns_the_vertical_one_is_the_phase_and_gives_the_height() {
     let twin = oracle::decode(&recording, 0);
     for (pixel, phase) in horizontal.iter().enumerate() {
         assert_eq!(phase.is_nan(), twin.phase[pixel].is_nan(), "{pixel}");
-        // The arctangent's bound; 36 turns as f32 are exact to 2e-6.
+        // The error bound of the arctangent; 36 turns as f32 are exact to 2e-6.
         let bound = 2.5e-5 + 2e-6;
         assert!(phase.is_nan() || (f64::from(*phase) - twin.phase[pixel]).abs() < bound);
     }
 }
 
-/// Checks what a measurement without geometry must and must not leave.
+/// Checks which files a measurement without geometry writes and which not.
 fn check_no_height(written: &Written, run: &Run) {
     assert_eq!(files::names(&written.out()), ["phase.npy", "report.json"]);
     let report = files::report(&written.out());
@@ -301,7 +301,7 @@ fn results_replace_older_ones_and_leave_no_temporary_files() {
 fn results_that_a_measurement_has_not_are_not_left_from_the_one_before() {
     let written = Written::new(&geometric().record());
     written.measure(&[]).succeeded();
-    // As a recording of two patterns leaves them.
+    // As after a recording of two patterns.
     for name in ["phase-0.npy", "phase-1.npy"] {
         fs::write(written.out().join(name), "old").unwrap();
     }

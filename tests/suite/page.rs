@@ -1,4 +1,4 @@
-//! The page's API on the real program: what a technician changes there, the PLC sees.
+//! The page's API on the real program: the PLC sees what a technician changes there.
 
 use super::written::program;
 use crate::station_plc::{Daemon, PATIENCE, Place, Plc, long};
@@ -12,7 +12,7 @@ use tests::files;
 const PASS: u16 = 1;
 const FAIL: u16 = 2;
 
-/// A browser without a page: one request per connection, and a cookie.
+/// A client like a browser: one request per connection, and a cookie.
 pub struct Browser {
     address: SocketAddr,
     cookie: String,
@@ -26,7 +26,7 @@ impl Browser {
         }
     }
 
-    /// The head of a request; its body is still to be sent.
+    /// Sends the head of a request; the caller sends the body.
     pub fn begin(&self, method: &str, path: &str, length: usize) -> TcpStream {
         let mut stream = TcpStream::connect(self.address).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -42,7 +42,7 @@ impl Browser {
     /// Status and body.
     pub fn ask(&mut self, method: &str, path: &str, body: &[u8]) -> (u16, Vec<u8>) {
         let mut stream = self.begin(method, path, body.len());
-        // A request that is refused may be answered before its body is read.
+        // A refused request may be answered before its body is read.
         let _ = stream.write_all(body);
         let mut answer = Vec::new();
         stream.read_to_end(&mut answer).unwrap();
@@ -79,7 +79,7 @@ impl Browser {
         self.sign_in_at(daemon, 0);
     }
 
-    /// Signs in where the clock says so many ms since 1970; answers with what came of that.
+    /// Signs in with the browser's clock at so many ms since 1970; returns the answer.
     pub fn sign_in_at(&mut self, daemon: &Daemon, time_ms: u64) -> String {
         let (_, rest) = daemon.log.split_once("shown this once: ").unwrap();
         let secret = rest.split(' ').next().unwrap();
@@ -89,7 +89,7 @@ impl Browser {
         answer["time"].as_str().unwrap().to_owned()
     }
 
-    /// Waits until the station is ready with a recipe whose fingerprint is not `before`.
+    /// Waits until the station is ready with a recipe whose fingerprint differs from `before`.
     pub fn wait_for_another(&mut self, before: &str) -> String {
         let started = Instant::now();
         loop {
@@ -103,7 +103,7 @@ impl Browser {
     }
 }
 
-/// The body of a chunked answer, which must be whole.
+/// The body of a chunked answer, which must be complete.
 fn unchunked(mut body: &[u8]) -> Vec<u8> {
     let mut whole = Vec::new();
     loop {
@@ -145,7 +145,7 @@ fn limits_that_are_edited_on_the_page_change_the_verdict_and_the_fingerprint() {
             .starts_with(&fingerprint)
     );
     assert_eq!(plc.measure(2)[8], FAIL);
-    // Who looked at the recipe before somebody else changed it does not undo that.
+    // A change that is based on an older version of the recipe does not undo somebody else's change.
     edit["name"] = json!("other");
     let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
     assert_eq!(status, 409, "{answer}");
@@ -211,7 +211,7 @@ fn a_recipe_with_inverted_limits_is_refused_by_the_gauges_name_wherever_it_comes
         let named = words.contains("deviation") && words.contains("passes no part");
         assert!(named, "{words}");
     };
-    // Through the page, and as a file.
+    // With the page's editor, and as a file.
     let (status, answer) = browser.ask("POST", "/api/recipes", &inverted);
     assert_eq!(status, 422);
     names(&String::from_utf8(answer).unwrap());
@@ -223,7 +223,7 @@ fn a_recipe_with_inverted_limits_is_refused_by_the_gauges_name_wherever_it_comes
     assert_eq!(run.code, 65, "{}", run.stderr);
     names(&run.stderr);
     assert_eq!(std::fs::read(place.recipe()).unwrap(), taught);
-    // In the store since before limits were checked: the generation before does not stand in for it, and it can be mended.
+    // Stored by a program that did not check limits: the earlier generation is not used instead, and the recipe can be repaired.
     let store = Store::at(&place.path("state/recipes"));
     store.save(1, &inverted).unwrap();
     names(&store.load(1).unwrap_err().to_string());
@@ -289,7 +289,7 @@ fn pictures_and_files_of_the_last_part_belong_to_its_result() {
     let names = String::from_utf8_lossy(&recording);
     assert!(names.contains("recording.json") && names.contains("frames/000.png"));
     let started = Instant::now();
-    // The history is written beside the cycle.
+    // The history is written in parallel to the cycle.
     while browser.get("/api/history")["results"]
         .as_array()
         .unwrap()

@@ -1,4 +1,4 @@
-//! Parts that lie elsewhere than where they were taught, and scenes that cannot be taught.
+//! Parts that are displaced from where they were taught, and scenes that cannot be taught.
 
 use algo::pattern::Shot;
 use algo::phase::Trust;
@@ -37,7 +37,7 @@ pub(crate) fn scenario(part: Part) -> Scenario {
         part,
         ..Scenario::default()
     };
-    // Half the study's resolution and a quarter of its rays: the geometry is the same.
+    // Half the study's resolution and a quarter of its rays, with the same geometry.
     scenario.rig.camera.width = 256;
     scenario.rig.camera.height = 256;
     scenario.sub_rays = 2;
@@ -106,7 +106,7 @@ fn moved_parts_have_no_wrong_fringe_order_inside_the_safe_masks() {
         ("spline", Part::Spline(Box::<Spline>::default())),
         ("sheet metal", Part::SheetMetal(SheetMetal::default())),
     ];
-    // Two corners of the tolerance and one inside: all of length ≤ 1 mm.
+    // Two at the limit of the tolerance and one inside, all of length ≤ 1 mm.
     let moves = [[0.57, -0.57, 0.57], [-0.99, 0.1, 0.0], [0.3, 0.4, -0.5]];
     for (name, part) in parts {
         let mut bed = bed(&scenario(part.clone()));
@@ -137,7 +137,7 @@ fn moved_parts_have_no_wrong_fringe_order_inside_the_safe_masks() {
                 sequence.frames.len(),
                 sequence.safe_share * 100.0
             );
-            // A mask that is empty keeps every promise.
+            // With an empty mask the test would always pass.
             assert!(sequence.safe_share > 0.5, "{name}: {}", sequence.safe_share);
         }
     }
@@ -163,7 +163,7 @@ fn a_scene_that_cannot_be_taught_says_which() {
     }
 }
 
-/// Heights of one cycle with the part in front of the head, and the first gauge's value.
+/// Heights of one cycle, and the value of the first gauge.
 fn cycle(bed: &mut Bed, file: &RecipeFile, arrays: &Arrays) -> (Vec<f32>, f64) {
     let (bytes, _) = pack(file, arrays).unwrap();
     let recipe = Recipe::from_bytes(&bytes).unwrap();
@@ -201,7 +201,7 @@ fn pixels_that_no_gauge_looks_at_are_not_computed_and_the_others_are_the_same() 
     let small = RecipeFile {
         regions: vec![region.clone()],
         gauges: vec![gauge.clone()],
-        // Alignment looks at the whole part.
+        // Alignment uses the whole part.
         alignment: AlignmentKind::None,
         ..file.clone()
     };
@@ -214,7 +214,7 @@ fn pixels_that_no_gauge_looks_at_are_not_computed_and_the_others_are_the_same() 
     let (mut inside, mut outside) = (0, 0);
     for (at, (seen, all)) in seen.iter().zip(&all).enumerate() {
         let (u, v) = (at % 256, at / 256);
-        // Nine pixels of smoothing reach four further.
+        // Smoothing over nine pixels affects four pixels on each side.
         if (96..154).contains(&u) && (106..144).contains(&v) {
             assert_eq!(seen.to_bits(), all.to_bits(), "at {u}, {v}");
             inside += 1;

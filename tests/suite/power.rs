@@ -1,4 +1,4 @@
-//! Losses of power: every prefix of what a run does to its files is opened, with what was not synced there, gone, or partly there.
+//! Losses of power: after every file operation of a run the files are opened as a power loss may leave them, with the unsynced data complete, missing, or partly there.
 
 use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, STOPPING, command, long};
 use appliance::history::{self, Bounds, Filter, Numbering, Reader};
@@ -20,25 +20,25 @@ use tests::random::Random;
 use tests::small_head::tiny_head;
 
 const SEED: u64 = 0x0FF_0FF;
-/// Numbers that a loss of power may skip.
+/// Largest count of result numbers that a loss of power may skip.
 const SKIPPED: u32 = 64;
 
-/// The part lies outside its tolerance: nothing passes, and every part's frames are kept.
+/// The part lies outside its tolerance: none passes, and the frames of every part are kept.
 const MOVED: &str = "[placement]\nshift_mm = [0.0, 0.0, 4.0]\n";
-/// Recordings that are made of them; those of the first go when those of the last come.
+/// Number of such parts; the first recordings are removed to make space for the last.
 const KEPT: usize = 20;
 
-/// What somebody was told, and when.
+/// What a client or a user was told.
 enum Told {
-    /// A result.
+    /// A result with this SEQ.
     Shown(u32),
-    /// A recipe is stored: its number and fingerprint.
+    /// A recipe with this number and fingerprint is stored.
     Stored(u16, String),
-    /// It is deleted.
+    /// The recipe with this number is deleted.
     Deleted(u16),
 }
 
-/// A run, as its files and its clients saw it.
+/// A recorded run: the operations on its files, and what its clients were told.
 struct Run {
     place: Place,
     operations: Vec<Operation>,
@@ -50,7 +50,7 @@ fn now() -> u64 {
     u64::try_from(since.as_micros()).unwrap()
 }
 
-/// Whether programs can be traced here; says so where they cannot.
+/// Whether programs can be traced here; prints a message if not.
 fn can_trace() -> bool {
     let tried = Command::new("strace")
         .args(["-o", "/dev/null", "true"])
@@ -106,7 +106,7 @@ impl Run {
         daemon
     }
 
-    /// Teaches, measures good parts, imports and deletes recipes, measures parts that are kept, and is killed.
+    /// Records a run that teaches, measures good parts, imports and deletes recipes, measures parts that are kept, and is killed.
     fn recorded() -> Self {
         let place = Place::new();
         // Few pixels: what counts here are files.
@@ -159,13 +159,13 @@ impl Run {
     }
 }
 
-/// A log to its end, which the tracer writes after the program's.
+/// Reads a log to its end, which the tracer writes after the end of the program.
 fn whole(path: &Path) -> String {
     let started = Instant::now();
     loop {
         let log = fs::read_to_string(path).unwrap_or_default();
         let mut lines = log.lines();
-        // The program's own thread, which is traced first, ends last.
+        // The program's main thread is traced first and ends last.
         let own = lines.next().and_then(|line| line.split_whitespace().next());
         let ended =
             lines.any(|line| line.contains(" +++ ") && line.split_whitespace().next() == own);
@@ -181,11 +181,11 @@ fn whole(path: &Path) -> String {
 struct Promise {
     /// The last result that was shown.
     shown: u32,
-    /// The first that was shown afterwards, or would have been.
+    /// The first result that was shown afterwards, or would have been.
     next: u32,
-    /// Fingerprints of the recipes that were there, and of what came next where it was on its way.
+    /// Fingerprints of the stored recipes, and of the next version if it was being stored.
     recipes: BTreeMap<u16, Vec<Option<String>>>,
-    /// Whether the device had been in use.
+    /// Whether the device was in use before.
     begun: bool,
 }
 
@@ -222,7 +222,7 @@ impl Promise {
         promise
     }
 
-    /// Opens what is left as the daemon does and compares.
+    /// Opens the remaining files as the daemon does, and compares.
     fn check(&self, state: &Path) -> Result<usize, String> {
         if !state.exists() {
             return if self.begun {
@@ -268,7 +268,7 @@ impl Promise {
         if next <= self.shown {
             return Err(format!("{next} comes next, {} was shown", self.shown));
         }
-        // The number of the result in flight was in use; those behind it are skipped.
+        // The number of the running cycle was used; the reserved ones after it are skipped.
         if next > self.next + 1 + SKIPPED {
             return Err(format!("{next} comes next, {} was the last", self.shown));
         }
@@ -307,7 +307,7 @@ impl Promise {
     }
 }
 
-/// Shared memory of a station, which a loss of power takes away.
+/// Removes the shared memory of a station, as a loss of power does.
 fn forget(serial: &str) {
     for name in files::names(Path::new("/dev/shm")) {
         if name.starts_with("fringed-") && name.contains(serial) {
@@ -328,7 +328,7 @@ fn results(state: &Path) -> Result<Vec<u32>, String> {
     Ok(found.iter().rev().map(|entry| entry.seq).collect())
 }
 
-/// Replays a run; every `step`-th operation is followed by three losses of power. Answers how many there were.
+/// Replays a run, with three losses of power after every `step`-th operation. Returns how many there were.
 fn losses(run: &Run, step: usize) -> usize {
     let folder = tempfile::tempdir().unwrap();
     let mut random = Random::new(SEED);

@@ -1,4 +1,4 @@
-//! How well gauges repeat against what they say of themselves, and defects against good parts that lie anywhere.
+//! Repeatability of gauges compared with their own prediction, and detection of defects among good parts at random placements.
 
 use super::gauges::{all_kinds, frames, gauge, plan, regions};
 use super::placement::{Bed, TIMEOUT, bed};
@@ -11,15 +11,15 @@ use sim::{Part, Placement, Scenario};
 use std::time::Instant;
 use tests::random::Random;
 
-/// Repeatability of what is linear in height against the prediction; that of 200 values is known to 5 %.
+/// Largest relative difference between repeatability and prediction for gauges that are linear in the height; with 200 values the repeatability is known to 5 %.
 const LINEAR: f64 = 0.20;
-/// The same of extremes and shares against their models.
+/// The same for extremes and shares.
 const OTHERS: f64 = 0.30;
 const REPEATS: usize = 200;
-/// Parts lie up to this much off in each direction, and are tilted about x and y.
+/// Largest displacement of parts in each direction, and largest tilt about x and y.
 const SHIFT_MM: f64 = 1.0;
 const TILT_DEG: f64 = 0.5;
-/// The farthest corner then goes √3 mm by the shift, and 70 mm from the middle 0.9 mm by the tilts.
+/// Then the shift moves the farthest corner by √3 mm, and the tilts move it by 0.9 mm, as it is 70 mm from the middle.
 const TOLERANCE_MM: f64 = 3.0;
 /// Deviations are averaged over 7 pixels of 0.66 mm, 4.6 mm: a dent of 0.3 mm and 8 mm is 0.16 mm deep on that mean.
 const SIDE: usize = 7;
@@ -27,7 +27,7 @@ const LIMIT_MM: f64 = 0.1;
 const DEPTH_MM: f64 = 0.3;
 const DIAMETER_MM: f64 = 8.0;
 
-/// 320 × 240 pixels: the study's field of view, and a second for each ten placements.
+/// 320 × 240 pixels with the study's field of view: ten placements take a second.
 fn small() -> (Bed, Taught) {
     let mut scenario = Scenario::default();
     let camera = &mut scenario.rig.camera;
@@ -65,7 +65,7 @@ fn inspect(bed: &mut Bed, plan: &Plan) -> Inspection {
 fn gauges_repeat_as_well_as_they_say() {
     let (mut bed, taught) = small();
     let mut gauges = all_kinds(5, 0.012);
-    // The dent beside the hole has the largest deviation of the frame.
+    // The dent beside the hole has the largest deviation in the picture.
     gauges[0] = gauge(
         "deviation",
         "frame",
@@ -116,7 +116,7 @@ fn gauges_repeat_as_well_as_they_say() {
     assert!(wrong.is_empty(), "{wrong:?}");
 }
 
-/// The scatter of a gauge's values as a multiple of what they say of themselves.
+/// The scatter of a gauge's values, as a multiple of their predicted σ.
 fn repeats(name: &str, found: &[Inspection], gauge: usize) -> f64 {
     let count = found.len() as f64;
     let values = || found.iter().map(|f| f.gauges[gauge].value.unwrap());
@@ -130,7 +130,7 @@ fn repeats(name: &str, found: &[Inspection], gauge: usize) -> f64 {
     ratio
 }
 
-/// Shares of the light by which a part was taught: many places are then modulated by about 16 counts, the least that is trusted.
+/// Light relative to that while teaching: in many places the modulation is then about 16 counts, the smallest that is trusted.
 const FAINT: [f64; 2] = [0.25, 0.3];
 
 #[test]
@@ -155,7 +155,7 @@ fn a_coverage_in_faint_light_repeats_as_well_as_it_says() {
     }
 }
 
-/// Good parts that were rejected, and dents that were missed, of so many of each; where the worst of them lay.
+/// Measures good parts, and parts with a dent; prints how many are rejected or missed and where the worst lay, and checks that there are none.
 fn rejects(good: usize, dented: usize) {
     let (mut bed, taught) = small();
     let mut file = taught.file.clone();

@@ -1,4 +1,4 @@
-//! Production by strips against exact triangulation and against the comparison of whole maps.
+//! Measurement in strips, as in production, compared with exact triangulation and with the comparison of whole maps.
 
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
 use algo::inspect::{Comparison, Findings, Golden, Measure, Production, Region, Weight};
@@ -17,16 +17,16 @@ use sim::parts::{Cone, Sawtooth, SheetMetal};
 use sim::{Part, Placement};
 use std::time::Instant;
 
-/// Heights by the production path are off the exact ones by at most this, mm: the noise of one level of four frames is
-/// a hundred times the RMS.
+/// Largest difference between production's heights and the exact ones, mm: the noise of one level of four frames is
+/// a hundred times this RMS.
 const MAX_RMS_MM: f64 = 0.5e-3;
 const MAX_ERROR_MM: f64 = 5e-3;
-/// A height is handed out as a single of mm: ± 150 mm have a step of 1.5e-5 mm.
+/// Heights are returned in mm as f32, whose resolution is 1.5e-5 mm at ± 150 mm.
 const SINGLE_MM: f64 = 1.6e-5;
-/// Of all pixels at all shifts tried, at least this share is reached by a cubic and not solved exactly: a bound on the time,
-/// not on the error. The sawtooth has the least, 0.83.
+/// At least this share of all pixels at all shifts gets its height from a cubic and not from the exact solution. This limits the
+/// time, not the error. The sawtooth has the smallest share, 0.83.
 const REACHED: f64 = 0.8;
-/// σ as taught is stored in steps of 32 nm; σ here is above 10 µm, and that of a mean is theirs.
+/// The taught σ is stored in units of 32 nm; σ here is above 10 µm, and the σ of a mean has the same relative error.
 const SIGMA_SHARE: f64 = 2e-3;
 
 pub(crate) fn parts() -> [(&'static str, Part); 3] {
@@ -37,7 +37,7 @@ pub(crate) fn parts() -> [(&'static str, Part); 3] {
     ]
 }
 
-/// The recipe's plan with one of its sequences and without alignment, and its whole recipe.
+/// A plan with one of the recipe's sequences and without alignment, and the recipe.
 pub(crate) fn plan(bed: &Bed, taught: &Taught, sequence: usize) -> (Plan, Recipe) {
     plan_with(bed, taught, sequence, AlignmentKind::None)
 }
@@ -269,7 +269,7 @@ pub(crate) fn expected(
     }
 }
 
-/// σ of golden's heights, mm, as the plan's sequence has it.
+/// σ of golden's heights with the plan's sequence, mm.
 fn golden_sigma(recipe: &Recipe, plan: &Plan) -> Vec<f32> {
     let arrays = &recipe.arrays;
     let decoder = plan.production().decoder();
@@ -305,10 +305,10 @@ fn golden(recipe: &Recipe) -> Golden {
     }
 }
 
-/// Variances are summed on every so many rows.
+/// Variances are summed on every `WEIGHED`-th row.
 const WEIGHED: usize = 4;
 
-/// RMS of sigma over the places that a map of heights knows, on the rows that production looks at for it.
+/// RMS of sigma over the pixels with a height, on the rows that production uses for it.
 fn rms(sigma: &[f32], heights: &[Height], width: usize) -> f64 {
     let weighed = |&(at, _): &(usize, _)| (at / width).is_multiple_of(WEIGHED);
     let pairs = sigma.iter().zip(heights).enumerate().filter(weighed);
@@ -345,7 +345,7 @@ fn findings_depend_neither_on_strips_nor_on_threads_nor_on_the_back_end() {
                     .unwrap()
             };
             let first = pool.install(&mut found);
-            // Buffers that were used before change nothing.
+            // Used buffers give the same result.
             assert_eq!(pool.install(&mut found), first);
             (first, heights.iter().map(|mm| mm.to_bits()).collect())
         };
@@ -394,7 +394,7 @@ fn levels_decoded_on_arrival_give_the_same_inspection() {
         };
         let expected = inspected(0).0;
         assert!(expected.valid_points > 5000);
-        // Rooms are used again, and whoever comes late decodes everything at the end.
+        // Buffers are reused, and a strip that starts late decodes all frames at the end.
         for wanted in [levels - 1, levels - 1, usize::from(levels > 2), levels - 1] {
             assert_eq!(
                 inspected(wanted),
@@ -405,7 +405,7 @@ fn levels_decoded_on_arrival_give_the_same_inspection() {
     }
 }
 
-/// Phases are moved, so that the map itself is.
+/// Moves the phases, and so the map.
 #[test]
 fn unknown_phases_have_no_height() {
     let mut bed = bed(&scenario(Part::Cone(Cone::default())));

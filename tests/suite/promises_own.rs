@@ -1,4 +1,4 @@
-//! What a measurement promises, on recordings of our own with exact truth.
+//! What a measurement promises, tested on rendered recordings with exact truth.
 
 use crate::cases;
 use crate::measured::Measured;
@@ -29,7 +29,7 @@ fn the_error_is_what_sigma_predicts_in_every_form_that_gives_heights() {
             .enumerate()
             .filter(|(pixel, z)| class[*pixel] == 2 && !z.is_nan())
             .map(|(pixel, z)| f64::from(z - truth[pixel]) / f64::from(surface.map.sigma[pixel]))
-            // Where the recording has no redundancy there is no σ.
+            // A recording without redundancy has no σ.
             .filter(|error| !error.is_nan())
             .collect();
         if measured.result.report.noise_counts.is_none() {
@@ -70,7 +70,7 @@ fn the_report_scores_as_the_definition_says() {
         assert!((ours - theirs).abs() < 2e-6, "{ours} {theirs}");
     }
     assert_eq!(ours.gross, 0);
-    // Every class-2 pixel is well lit, so none is lost.
+    // Every class-2 pixel is well lit, so all are resolved.
     let whole = class.iter().filter(|class| **class == 2).count();
     assert_eq!(ours.scored, whole);
 }

@@ -1,4 +1,4 @@
-//! What a measurement promises on the recordings that lie beside the project.
+//! What a measurement promises, tested on the shared recordings beside the project.
 
 use crate::measured::{BOARD, CONE, Measured, SKULL, SPHERE, SPLINE, shared_recording};
 use algo::phase::Trust;
@@ -54,7 +54,7 @@ fn the_board_is_flat_and_its_corners_are_ten_millimetres_apart() {
         rms(&off),
         area.len()
     );
-    // All of the outline but its edges between black and white.
+    // Everything inside the outline except the edges between black and white.
     assert!(area.len() > 400_000, "{}", area.len());
     assert!(rms(&off) <= 0.205, "{}", rms(&off));
 
@@ -118,7 +118,7 @@ impl<'a> Board<'a> {
         }
     }
 
-    /// The resolved points whose pixel `wanted` wants.
+    /// The resolved points whose pixel satisfies `wanted`.
     fn points(&self, wanted: impl Fn(f64, f64) -> bool) -> Vec<Point> {
         let width = self.measured.recording.width as usize;
         let mut points = Vec::new();
@@ -131,8 +131,8 @@ impl<'a> Board<'a> {
         points
     }
 
-    /// The surface under a corner between pixels: where its ray meets the plane through the resolved
-    /// points around it, a third of a square each way (the black squares give few).
+    /// The surface at a corner between pixels: where its ray meets the plane through the resolved
+    /// points around it, up to a third of a square away (the black squares have few).
     fn surface_at(&self, (u, v): (f64, f64)) -> Point {
         let width = self.measured.recording.width as usize;
         let mut near = Vec::new();
@@ -165,7 +165,7 @@ fn inside(outline: &[(f64, f64); 4], u: f64, v: f64) -> bool {
     sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0)
 }
 
-/// The score of an own f64 decode under the same rules, with the room that the issue gives.
+/// Compares with the score of an independent f64 decoder under the same rules, with a margin.
 fn check_score(name: &str, rms_mm: f64, gross: usize, scored: usize) {
     let Some(measured) = shared_recording(name) else {
         return;
@@ -212,7 +212,7 @@ fn the_studys_errors_are_what_sigma_predicts() {
             .map(|at| f64::from((heights[at] - truth[at]) / sigma[at]))
             .collect();
         println!("{name}: error / sigma {:.3}", rms(&errors));
-        // The study found 1.00–1.05 at 512 px; curvature inside a pixel of 256 adds a little.
+        // The study has 1.00–1.05 at 512 px; with 256 px curvature inside a pixel adds a little.
         assert!(
             (0.9..=1.2).contains(&rms(&errors)),
             "{name}: {}",

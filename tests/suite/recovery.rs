@@ -1,4 +1,4 @@
-//! What breaks and comes back while the daemon runs: cables, storage, a PLC that changes its mind.
+//! Faults that come and go while the daemon runs: cables, storage, a PLC that aborts.
 
 use crate::page::Browser;
 use crate::station_plc::{
@@ -19,7 +19,7 @@ use std::fs;
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// Words of VERDICT, STATE and REJECT_REASON.
+/// Values of VERDICT, STATE and REJECT_REASON.
 const PASS: u16 = 1;
 const INVALID: u16 = 3;
 const FAULT: u16 = 7;
@@ -72,7 +72,7 @@ fn a_device_that_is_unplugged_is_a_fault_that_names_it_and_ends_when_it_is_plugg
             (rejected.triggers(), rejected.0[20]),
             (triggers, REJECTED_BY_FAULT)
         );
-        // The measuring task lives, though its head is gone.
+        // The measuring task runs, although its head is gone.
         let beat = plc.status().0[1];
         plc.wait("the heartbeat", |status| status.0[1] != beat);
         stage.plug(device);
@@ -201,7 +201,7 @@ fn a_result_counter_that_cannot_be_stored_stops_the_station_until_it_can() {
     let mut plc = Plc::connect(&daemon);
     plc.measure(1);
     let counter = place.path("state/result-seq");
-    // A pipe in its place: writing waits until somebody reads, as on a disk that is busy for others.
+    // A pipe in place of the file: a write waits until somebody reads, as on a busy disk.
     fs::remove_file(&counter).unwrap();
     let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RWXU);
     rustix::fs::mknodat(rustix::fs::CWD, &counter, kind, mode, 0).unwrap();
@@ -224,14 +224,14 @@ fn a_result_counter_that_cannot_be_stored_stops_the_station_until_it_can() {
         text.split_whitespace().next()?.parse().ok()
     };
     let began = Instant::now();
-    // Until so many are reserved that no more are asked for.
+    // Until enough are reserved that no more are requested.
     while reserved() <= Some(u32::from(last) + AHEAD / 4 * 3) {
         assert!(began.elapsed() < PATIENCE, "{:?}", reserved());
     }
-    // A folder in the place of the counter's file: no write replaces it.
+    // A folder in place of the counter's file: no write can replace it.
     fs::remove_file(&counter).unwrap();
     fs::create_dir_all(counter.join("in the way")).unwrap();
-    // It goes on with the numbers that are reserved, and not one further.
+    // It uses exactly the reserved numbers.
     let broken = loop {
         let words = plc.measure(last + 1);
         last += 1;
@@ -288,7 +288,7 @@ fn starts_are_counted_and_a_kill_is_seen_at_the_next_one() {
     let place = Place::new();
     let boots = |program: &Program| {
         let mut plc = Plc::connect(program);
-        // The survey has a thread of its own.
+        // The survey runs in its own thread.
         loop {
             let words = plc.read(616, 4).unwrap();
             if long(&words, 0) > 0 {

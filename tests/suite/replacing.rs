@@ -1,4 +1,4 @@
-//! Replacing, undoing and deleting recipes on the real program: no work of a technician gets lost.
+//! Replacing, undoing and deleting recipes on the real program: no work of a technician is lost.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, ONLINE, PATIENCE, Place, Plc, READY};
@@ -12,7 +12,7 @@ const FAIL: u16 = 2;
 /// CONTROL: ONLINE and TEACH.
 const TEACH: u16 = ONLINE | 1 << 7;
 
-/// The command `recipe` or `teach` on this place.
+/// Runs the command `recipe` or `teach` in this place.
 fn run(place: &Place, arguments: &[&str]) -> Run {
     let config = place.path("fringed.toml");
     let mut all = arguments.to_vec();
@@ -20,7 +20,7 @@ fn run(place: &Place, arguments: &[&str]) -> Run {
     program().run(&all)
 }
 
-/// Recipe `number` as the list of recipes has it.
+/// The entry of recipe `number` in the list of recipes.
 fn listed(browser: &mut Browser, number: u16) -> Value {
     let all = browser.get("/api/recipes");
     let rows = all["recipes"].as_array().unwrap().iter();
@@ -32,7 +32,7 @@ fn fingerprint(recipe: &Value) -> String {
     recipe["fingerprint"].as_str().unwrap().to_owned()
 }
 
-/// Gives recipe 1 names, a region and a limit that a good part violates; answers with the recipe after that.
+/// Gives recipe 1 names, a region and a limit that a good part violates; returns the changed recipe.
 fn edit(browser: &mut Browser) -> Value {
     let before = browser.get("/api/recipes/1");
     let (mut regions, mut gauges) = (before["regions"].clone(), before["gauges"].clone());
@@ -128,7 +128,7 @@ fn undo_brings_back_the_generation_before_into_the_running_station_and_undo_agai
             (&answer["active"], &answer["loading"]),
             (&json!(true), &json!(true))
         );
-        // What lies on the disk, what is active, and what the PLC reads are the same again.
+        // The stored recipe, the active one, and what the PLC reads are the same again.
         browser.wait_for_another(&fingerprint(then));
         assert_eq!(browser.get("/api/recipes/1"), *now);
         assert_eq!(
@@ -172,7 +172,7 @@ fn a_recipe_is_deleted_on_the_page_unless_it_is_active_and_comes_back() {
         (&all["recipes"][0]["number"], &all["deleted"][0]["number"]),
         (&json!(2), &json!(1))
     );
-    // A number that something was deleted from is not proposed.
+    // A number whose recipe was deleted is not proposed.
     assert_eq!(all["free"], 3);
     assert_eq!(browser.ask("DELETE", "/api/recipes/1", &[]).0, 404);
     assert_eq!(browser.ask("POST", "/api/recipes/1/undo", &[]).0, 200);

@@ -1,7 +1,7 @@
-//! The rooms of the daemon: who may import whom.
+//! The rooms (groups of modules) of the daemon: which may import which.
 //!
-//! Every path of the code is looked at, as the compiler's lexer splits it, also those inside macros: `crate::a::B`,
-//! `crate::{a, b::C}`, `super::super::a`. The root of the crate re-exports nothing, so every such path names its room.
+//! Checks every path in the code, also inside macros: `crate::a::B`, `crate::{a, b::C}`, `super::super::a`.
+//! The root of the crate re-exports nothing, so every such path names its room.
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::collections::BTreeSet;
@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tests::files;
 
-/// The rooms from the top to the bottom. A room imports only those on lines below its own.
+/// The rooms from top to bottom. A room imports only rooms on lines below its own.
 const ORDER: [&[&str]; 13] = [
     &["cli"],
     &["service"],
@@ -26,7 +26,7 @@ const ORDER: [&[&str]; 13] = [
     &["station"],
 ];
 
-/// Rooms whose imports are named one by one: what the PLC, the wires and the page can see.
+/// Rooms whose imports are listed one by one: those that serve the PLC, the wires and the page.
 const SEEN: [(&str, &[&str]); 3] = [
     ("modbus", &["config", "system", "station"]),
     ("lines", &["production", "system", "error", "station"]),
@@ -45,7 +45,7 @@ const SEEN: [(&str, &[&str]); 3] = [
     ),
 ];
 
-/// A path in a file of the daemon, as the names of its modules from the root of the crate.
+/// An imported path in a file of the daemon: the names of its modules from the root of the crate.
 struct Import {
     file: PathBuf,
     from: Vec<String>,
@@ -59,7 +59,7 @@ fn source() -> PathBuf {
         .join("appliance/src")
 }
 
-/// All files of Rust in a folder, without those that only tests have.
+/// Collects all Rust files in a folder, without those for tests only.
 fn collect(folder: &Path, all: &mut Vec<PathBuf>) {
     for name in files::names(folder) {
         let path = folder.join(&name);
@@ -73,7 +73,7 @@ fn collect(folder: &Path, all: &mut Vec<PathBuf>) {
     }
 }
 
-/// The module that a file is.
+/// The module of a file.
 fn module(file: &Path) -> Vec<String> {
     let path = file.strip_prefix(source()).unwrap().with_extension("");
     let names = path.iter().map(|name| name.to_str().unwrap().to_owned());
@@ -87,7 +87,7 @@ fn module(file: &Path) -> Vec<String> {
     names
 }
 
-/// Takes modules that only tests have out of a file's tokens.
+/// Removes test-only modules from the tokens of a file.
 fn without_tests(tokens: TokenStream) -> Vec<TokenTree> {
     let mut kept = Vec::new();
     let mut tokens = tokens.into_iter().peekable();
@@ -100,7 +100,7 @@ fn without_tests(tokens: TokenStream) -> Vec<TokenTree> {
             kept.push(token);
             continue;
         }
-        // To the end of the item.
+        // Up to the end of the item.
         for token in tokens.by_ref() {
             match &token {
                 TokenTree::Group(group) if group.delimiter() == Delimiter::Brace => break,
@@ -119,14 +119,14 @@ fn name(token: &TokenTree) -> Option<String> {
     }
 }
 
-/// Whether `::` stands at a place.
+/// Whether `::` is at this position.
 fn joint(tokens: &[TokenTree], at: usize) -> bool {
     let colon =
         |at: usize| matches!(tokens.get(at), Some(TokenTree::Punct(mark)) if mark.as_char() == ':');
     colon(at) && colon(at + 1)
 }
 
-/// The paths that begin at a place behind `prefix`, each with all of its names; where the first of them ends.
+/// Collects the paths that begin at this position after `prefix`, each with all of its names; returns where the first of them ends.
 fn follow(
     tokens: &[TokenTree],
     mut at: usize,
@@ -223,7 +223,7 @@ fn a_room_of_the_daemon_imports_only_rooms_below_it() {
         let (Some(from), Some(to)) = (from.first(), to.first()) else {
             continue;
         };
-        // What only tests have may look at everything; an item of the root is no room.
+        // Code for tests may import everything; an item of the root is not a room.
         let item = to.starts_with(char::is_uppercase);
         if from == "boundaries" || from == to || item {
             continue;

@@ -1,4 +1,4 @@
-//! The sequences of a recipe: which of them a part is measured with, and which frames are whose.
+//! The sequences of a recipe: which ones a part is measured with, and which frames belong to which.
 
 use crate::gauges::{frames, inspect, plan};
 use crate::placement::{Bed, bed, scenario, taught};
@@ -45,7 +45,7 @@ fn the_shortest_sequence_will_do_for_a_part_in_place_and_not_for_one_out_of_it()
         assert_eq!(found.step_up, None);
         assert!((z(found) - 0.3).abs() < 0.02, "{}", z(found));
     }
-    // Beyond the tolerance short sequences may lie: the full one measures how far, and it is the last.
+    // Beyond the tolerance short sequences may be wrong. The full one measures the displacement, and is the last.
     place(&bed, 2.0);
     let short = inspect(&mut bed, &plan, 1);
     assert!(short.step_up.is_some());
@@ -64,7 +64,7 @@ fn sequences_of_the_same_length_and_of_different_kinds_are_all_run() {
         production: 0,
         ..taught.file.clone()
     };
-    // As many shifts of its one level as the two levels behind it have together.
+    // Its one level has as many shifts as the two levels of the next have together.
     file.sequences[0].frames = Shot::level(1.0, 6).collect();
     let plan = plan(&bed, &file, &taught.recipe.arrays);
     let counts: Vec<usize> = (0..plan.sequence_count())
@@ -83,7 +83,7 @@ fn sequences_of_the_same_length_and_of_different_kinds_are_all_run() {
         let resolved = layers.height_mm.iter().filter(|z| !z.is_nan()).count();
         assert!(resolved > 5000, "sequence {sequence}: {resolved}");
     }
-    // What is recorded names its frames, so a part that was judged by the second is judged by the second again.
+    // A recording names its frames, so a part that was judged with the second sequence is judged with it again.
     let other: Vec<_> = Shot::level(1.0, 1).collect();
     assert_eq!(plan.sequence_of(&other), None);
     let none = plan.inspect(3, &[], Instant::now());

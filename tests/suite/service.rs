@@ -1,4 +1,4 @@
-//! The daemon as a service manager sees it: what it tells over `sd_notify`, what it logs to a journal, how it ends.
+//! The daemon under a service manager: its `sd_notify` messages, its journal entries, and how it ends.
 
 use crate::station_plc::{
     Daemon, ONLINE, PATIENCE, Place, Plc, READY, SMALL_HEAD, STOPPING, command,
@@ -13,12 +13,12 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tests::program::Program;
 
-/// Silence that these managers take for a hang: a sign of life comes in a quarter of it.
+/// Silence that these managers treat as a hang; the daemon reports after a quarter of this time.
 const WATCHDOG: Duration = Duration::from_millis(800);
 /// RECIPE_LOAD of CONTROL.
 const RECIPE_LOAD: u16 = 1 << 3;
 
-/// A service manager that only listens.
+/// A service manager that only receives messages.
 struct Manager {
     socket: UnixDatagram,
     folder: TempDir,
@@ -31,7 +31,7 @@ impl Manager {
         Self { socket, folder }
     }
 
-    /// What starts the daemon of a place under this manager.
+    /// The command that starts the daemon of a place under this manager.
     fn command(&self, place: &Place) -> Command {
         let mut command = command(place);
         command
@@ -40,7 +40,7 @@ impl Manager {
         command
     }
 
-    /// The lines of the next message; none if there is none for so long.
+    /// The lines of the next message; `None` if none arrives in time.
     fn hear(&self, patience: Duration) -> Option<Vec<String>> {
         self.socket.set_read_timeout(Some(patience)).unwrap();
         let mut bytes = [0; 4096];
@@ -49,7 +49,7 @@ impl Manager {
         Some(text.lines().map(str::to_owned).collect())
     }
 
-    /// All lines up to the first that begins like this.
+    /// All lines up to the first with this beginning.
     fn hear_until(&self, beginning: &str) -> Vec<String> {
         let mut all = Vec::new();
         while !all.iter().any(|line: &String| line.starts_with(beginning)) {
@@ -60,7 +60,7 @@ impl Manager {
     }
 }
 
-/// A daemon that says nothing to the test itself. Dropped, it is killed.
+/// A daemon whose output the test does not read. It is killed on drop.
 struct Silent(Child);
 
 impl Drop for Silent {
@@ -98,7 +98,7 @@ fn ready_is_told_when_a_trigger_would_be_accepted_and_not_before() {
     let (place, manager) = (Place::new(), Manager::new());
     let daemon = Daemon::of(manager.command(&place));
     let start = manager.hear_until("READY=1");
-    // Its first start teaches, which takes a while: the manager hears that it goes on.
+    // Its first start teaches, which takes time: it reports progress to the manager.
     assert_eq!(start[0], "STATUS=starting");
     let more = format!("EXTEND_TIMEOUT_USEC={}", WATCHDOG.as_micros());
     assert!(start.contains(&more), "{start:?}");
@@ -128,7 +128,7 @@ fn only_the_measuring_task_feeds_the_watchdog_and_a_hung_one_still_ends_in_time(
         let beat = manager.hear(WATCHDOG);
         assert!(beat.is_some(), "a sign of life came too late");
     }
-    // Who reads this recipe waits for somebody who writes it: for ever, and the measuring task reads recipes.
+    // This recipe is a pipe without a writer: the measuring task, which reads recipes, waits for ever.
     let recipe = place.path("state/recipes/0002.recipe");
     assert!(
         Command::new("mkfifo")
@@ -140,11 +140,11 @@ fn only_the_measuring_task_feeds_the_watchdog_and_a_hung_one_still_ends_in_time(
     let mut plc = Plc::connect(&daemon);
     plc.write(0, &[ONLINE]);
     plc.write(0, &[ONLINE | RECIPE_LOAD, 0, 2, 0, 0, 0, 0, 0]);
-    // What was sent before it read.
+    // Messages that were sent before the read.
     while manager.hear(WATCHDOG / 2).is_some() {}
     let hung = Instant::now();
     while hung.elapsed() < 3 * WATCHDOG {
-        // Everything else lives.
+        // Everything else works.
         assert!(!plc.status().has(READY));
         if let Some(lines) = manager.hear(WATCHDOG / 8) {
             assert!(!lines.contains(&"WATCHDOG=1".to_owned()), "{lines:?}");
@@ -155,7 +155,7 @@ fn only_the_measuring_task_feeds_the_watchdog_and_a_hung_one_still_ends_in_time(
 
 #[test]
 fn a_start_that_is_told_to_end_ends_cleanly() {
-    // The default head: working out its light takes longer than telling it to end.
+    // The default head: computing its light takes longer than ending the daemon.
     let (place, manager) = (Place::new(), Manager::new());
     fs::write(place.path("fringed.toml"), "state = \"state\"\n").unwrap();
     let child = start(manager.command(&place));
@@ -163,12 +163,12 @@ fn a_start_that_is_told_to_end_ends_cleanly() {
     assert_eq!(end(child).code(), Some(0));
     let rest = manager.hear_until("STOPPING=1");
     assert!(!rest.contains(&"READY=1".to_owned()), "{rest:?}");
-    // Stopped and not killed, as the next start counts.
+    // It was stopped and not killed; the next start reports this.
     let boots = fs::read_to_string(place.path("state/boots")).unwrap();
     assert!(boots.contains("stopped"), "{boots}");
 }
 
-/// What the daemon of a place says when Ctrl-C ends it as soon as something is `reached`, by what it said so far and where its page is.
+/// Ends the daemon of a place by Ctrl-C as soon as `reached` is true of its output and the address of its page; returns its output.
 fn interrupted(place: &Place, reached: &dyn Fn(&str, SocketAddr) -> bool) -> String {
     let free = TcpListener::bind("127.0.0.1:0").unwrap();
     let page = free.local_addr().unwrap();
@@ -199,7 +199,7 @@ fn ctrl_c_during_the_opening_or_the_first_teaching_ends_it_in_time_and_without_a
         "state = \"state\"\n[head]\nscenario = \"many.toml\"\n",
     )
     .unwrap();
-    // Working out the light of so many rays takes longer than any stop waits.
+    // Computing the light of so many rays takes longer than any stop waits.
     fs::write(place.path("many.toml"), "sub_rays = 16\n").unwrap();
     let opening = interrupted(&place, &|said, _| said.contains("shown this once"));
     fs::write(place.path("many.toml"), "sub_rays = 1\n").unwrap();
@@ -243,10 +243,10 @@ fn a_head_that_is_not_there_at_the_start_is_a_fault_until_it_is() {
     let config =
         "state = \"state\"\n[head]\nbackend = \"replay\"\nrecordings = [\"one\", \"two\"]\n";
     fs::write(place.path("fringed.toml"), config).unwrap();
-    // Nobody watches: it ends and says why.
+    // Without a service manager it ends with the reason.
     let mut alone = command(&place);
     assert_eq!(alone.spawn().unwrap().wait().unwrap().code(), Some(69));
-    // A service waits; here until the recordings are those of one head.
+    // As a service it waits; here until the recordings are of one head.
     let child = start(manager.command(&place));
     let waiting = manager.hear_until("STATUS=fault");
     assert!(!waiting.contains(&"READY=1".to_owned()), "{waiting:?}");
@@ -306,7 +306,7 @@ fn a_secret_that_is_given_as_a_credential_is_not_shown_and_a_weak_one_is_refused
     let given = Daemon::of(with());
     assert!(!given.log.contains("shown this once"), "{}", given.log);
     drop(given);
-    // Without it the device makes one by itself, as ever.
+    // Without it the device generates one as before.
     fs::remove_file(&file).unwrap();
     let made = Daemon::of(with());
     assert!(made.log.contains("shown this once"), "{}", made.log);

@@ -1,4 +1,4 @@
-//! The recordings beside the project, where they are: they open, and hold what their README says.
+//! The shared recordings beside the project, if they are there: they can be opened and have the contents in their README.
 
 use hal::replay::recording::PatternSpec;
 use tests::shared;

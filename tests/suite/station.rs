@@ -1,4 +1,4 @@
-//! The daemon as a PLC sees it: the real binary, a socket, and a clock on the wall.
+//! The daemon as a PLC sees it: the real program, a real socket, and real time.
 
 use crate::station_plc::{
     BUSY, Daemon, EXPOSURE_DONE, ONLINE, Place, Plc, READY, RECIPE_OK, RESULT_ACK, RESULT_TOGGLE,
@@ -9,10 +9,11 @@ use std::path::Path;
 use tokio_modbus::ExceptionCode;
 use tokio_modbus::client::Writer as _;
 
-/// Words of VERDICT and RECIPE_RESULT.
+/// Values of VERDICT and RECIPE_RESULT.
 const PASS: u16 = 1;
 const CORRUPT: u16 = 2;
-/// Checks what holds for every result of a good part.
+
+/// Checks everything that is the same in every result of a good part.
 fn check_pass(words: &[u16], status: &Status) {
     assert_eq!(words.len(), 120);
     assert_eq!(long(words, 0), long(words, 118), "SEQ at both ends");
@@ -34,7 +35,7 @@ fn a_good_part_passes_by_the_edge_handshake() {
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     let before = plc.wait("READY", |status| status.has(READY | RECIPE_OK));
-    // The first write of a connection sets the level that edges are counted from.
+    // The first write of a connection sets the initial level for edges.
     plc.write(0, &[ONLINE]);
     let mut fields = vec![ONLINE | TRIGGER];
     fields.extend(trigger(0));
@@ -70,7 +71,7 @@ fn a_retried_token_measures_once_and_refused_requests_change_nothing() {
     plc.write(1, &trigger(77));
     let words = plc.measure(77);
     plc.write(1, &trigger(77));
-    // Another connection that retries the same write is answered the same way.
+    // Another connection that repeats the same write gets the same answer.
     Plc::connect(&daemon).write(1, &trigger(77));
     let done = plc.wait("READY", |status| status.has(READY));
     check_pass(&words, &done);
@@ -114,7 +115,7 @@ fn counters_go_on_and_the_recipe_stays_after_a_restart_and_after_kill_9() {
     assert_eq!(second.crc(), first.crc());
     // The same token as before the restart triggers again.
     assert_eq!(long(&plc.measure(5), 0), 2);
-    // Killed with a cycle in flight: at most its own SEQ is skipped.
+    // Killed during a cycle: at most the SEQ of this cycle is skipped.
     plc.write(1, &trigger(6));
     daemon.kill();
 
@@ -130,7 +131,7 @@ fn counters_go_on_and_the_recipe_stays_after_a_restart_and_after_kill_9() {
     assert_eq!(fs::read(place.recipe()).unwrap(), taught);
 }
 
-/// Damages a file in the middle.
+/// Changes a byte in the middle of a file.
 fn damage(path: &Path) {
     let mut bytes = fs::read(path).unwrap();
     let middle = bytes.len() / 2;

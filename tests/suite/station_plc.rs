@@ -1,4 +1,4 @@
-//! The daemon on a small simulated head, and the PLC in front of it.
+//! The daemon with a small simulated head, and a PLC as its client.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
@@ -24,15 +24,15 @@ pub const RECIPE_OK: u16 = 1 << 9;
 pub const ONLINE: u16 = 1;
 pub const TRIGGER: u16 = 1 << 1;
 pub const RESULT_ACK: u16 = 1 << 2;
-/// Longest wait for anything that must happen.
+/// Longest wait for any event.
 pub const PATIENCE: Duration = Duration::from_secs(30);
 /// SIGTERM ends the daemon within this time.
 pub const STOPPING: Duration = Duration::from_secs(5);
 
-/// A head with few pixels: where resolution does not matter, nothing waits for light.
+/// A head with few pixels, for tests in which resolution does not matter: its light takes little time to compute.
 pub const SMALL_HEAD: &str = "sub_rays = 2\n\n[rig.camera]\nwidth = 160\nheight = 160\n";
 
-/// A configuration with a small simulated head beside a state folder, in a folder of its own.
+/// A folder with the configuration of a small simulated head, and a state folder.
 pub struct Place {
     folder: TempDir,
 }
@@ -64,7 +64,7 @@ impl Drop for Place {
     }
 }
 
-/// What starts the daemon of a place.
+/// The command that starts the daemon of a place.
 pub fn command(place: &Place) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_fringed-under-test"));
     command
@@ -76,32 +76,32 @@ pub fn command(place: &Place) -> Command {
     command
 }
 
-/// A running daemon. Dropped, it is killed.
+/// A running daemon. It is killed on drop.
 pub struct Daemon {
     child: Child,
-    /// Where it serves Modbus TCP.
+    /// The address of its Modbus TCP server.
     pub modbus: SocketAddr,
-    /// Where it serves the page.
+    /// The address of the page.
     pub http: SocketAddr,
-    /// What it said until it served.
+    /// Its log up to the moment when it serves.
     pub log: String,
 }
 
 impl Daemon {
-    /// Starts the program and waits until it says where it serves.
+    /// Starts the program and waits until it prints its addresses.
     pub fn start(place: &Place) -> Self {
         Self::of(command(place))
     }
 
-    /// The same of a command that somebody has added to.
+    /// The same with a changed command.
     pub fn of(mut command: Command) -> Self {
         let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
-        // Read by a thread of its own, so that the daemon can go on logging and nothing waits for ever.
+        // A thread reads the log, so the daemon can continue to log and nothing waits for ever.
         let lines = BufReader::new(child.stderr.take().unwrap()).lines();
         let (said, hear) = mpsc::channel();
         std::thread::spawn(move || {
             for line in lines.map_while(Result::ok) {
-                // Nobody listens any more once it serves.
+                // Once it serves, nobody receives the lines.
                 let _ = said.send(line);
             }
         });
@@ -145,7 +145,7 @@ impl Daemon {
     }
 
     pub fn kill(mut self) {
-        // SIGKILL: nothing is written, closed or said.
+        // SIGKILL: the daemon can write, close and print nothing more.
         self.child.kill().unwrap();
         self.child.wait().unwrap();
     }
@@ -239,7 +239,7 @@ impl Plc {
         self.runtime.block_on(answer).unwrap().unwrap();
     }
 
-    /// FC23: writes, then reads STATUS as it is after the write.
+    /// FC23: writes, then reads STATUS after the write.
     pub fn write_and_read_status(&mut self, address: u16, words: &[u16]) -> Status {
         let answer = self
             .context

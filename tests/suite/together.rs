@@ -1,4 +1,4 @@
-//! Two clients at once: two PLCs that trigger, and a page that changes recipes under a PLC.
+//! Two clients at once: two PLCs that trigger, and a page that changes recipes while a PLC measures.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, ONLINE, PATIENCE, Place, Plc, READY, long, trigger};
@@ -11,14 +11,14 @@ use std::thread;
 use std::time::Instant;
 use tests::files;
 
-/// Tokens of each PLC.
+/// Number of tokens of each PLC.
 const TOKENS: u16 = 12;
-/// Parts that are measured while the page changes recipes.
+/// Number of parts that are measured while the page changes recipes.
 const PARTS: u16 = 12;
-/// CONTROL.
+/// RECIPE_LOAD of CONTROL.
 const RECIPE_LOAD: u16 = 1 << 3;
 
-/// Writes a token until it is accepted, which the same transaction answers.
+/// Writes a token until it is accepted, which the answer to the same transaction shows.
 fn accepted(plc: &mut Plc, words: &[u16; 7], refused: &mut dyn FnMut(&mut Plc)) {
     let started = Instant::now();
     while plc.write_and_read_status(1, words).last_token() != words[0] {
@@ -76,12 +76,12 @@ fn place_with_two_recipes() -> Place {
     let (bytes, _) = archive::pack(&file, &arrays).unwrap();
     let store = Store::open(&place.path("state/recipes")).unwrap();
     store.save(2, &bytes).unwrap();
-    // The secret is said once.
+    // The secret is shown once.
     fs::remove_dir_all(place.path("state/access")).unwrap();
     place
 }
 
-/// Asks for a recipe by an edge of RECIPE_LOAD.
+/// Selects a recipe by an edge of RECIPE_LOAD.
 fn select(plc: &mut Plc, number: u16) {
     plc.write(0, &[ONLINE, 0, number]);
     plc.write(0, &[ONLINE | RECIPE_LOAD, 0, number]);

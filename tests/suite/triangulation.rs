@@ -1,5 +1,5 @@
-//! Triangulation against the textbook where recordings seldom go: beyond the projector's raster, about
-//! the ends of the working range, and with patterns that give several heights.
+//! Triangulation compared with the textbook in rare cases: beyond the projector's raster, near the ends of
+//! the working range, and with patterns that give several heights.
 
 use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
 use appliance::head::seam;
@@ -20,7 +20,7 @@ const SLOPE: f64 = 5e-6;
 /// Both evaluate the same spline or line in f64; phases are up to 100 turns.
 const PHASE_TURNS: f64 = 1e-9;
 
-/// The rig with a projector of only the middle 40 % of its columns: the camera sees beyond them.
+/// The rig with only the middle 40 % of the projector's columns, so the camera sees beyond them.
 fn narrow(turns: impl Fn(f64, f64) -> f64) -> Recording {
     let (columns, rows) = (102_usize, 192_usize);
     let scene = Scene {
@@ -62,7 +62,7 @@ fn triangulator(recording: &Recording) -> Triangulator {
     .unwrap()
 }
 
-/// Solves seeded pixels and phases both ways; answers how many had a height and how many did not.
+/// Solves seeded pixels and phases both ways; returns how many had a height and how many had none.
 fn compare(recording: &Recording, spread: f64) -> (usize, usize) {
     let (solver, rig) = (triangulator(recording), Rig::of(recording).unwrap());
     let pattern = Pattern::of(recording, 0);
@@ -106,7 +106,7 @@ fn the_reference_phase_is_the_textbooks_also_beyond_the_frame() {
     let pattern = Pattern::of(&recording, 0);
     let mut random = Random::new(SEED);
     for _ in 0..CASES {
-        // A sixth of the frame beyond it, each way.
+        // Up to a sixth of the frame beyond each side.
         let mut place = || -5.0 + 42.0 * random.share();
         let (u, v) = (place(), place());
         let found = solver.reference_phase(u, v).unwrap();

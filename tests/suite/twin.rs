@@ -1,4 +1,4 @@
-//! The fixed-point path against its `f64` twin on the same frames.
+//! The fixed-point code compared with its `f64` twin on the same frames.
 
 use crate::cases;
 use crate::measured::{BOARD, CONE, Measured, SKULL, SPHERE, SPLINE, shared_recording};
@@ -10,19 +10,19 @@ use tests::score::rms;
 
 /// 1 % of the noise of one 4-frame level in the study, 7.4e-3 turn (docs/measurement.md, *Noise*).
 const PHASE_RMS_TURNS: f64 = 7.4e-5;
-/// Pixels whose mask may differ: a modulation or residual so near its threshold that the last bit of
-/// the fixed point decides. 0.01 % of the pixels, but one pixel of a small recording may be that near.
+/// Share of the pixels whose mask may differ, because a modulation or residual is so near its threshold that
+/// the last bit of the fixed point decides. In a small recording one such pixel is allowed.
 const MASK_SHARE: f64 = 1e-4;
-/// A quarter of the residual error of the reference method in the study's best case; both sides solve
-/// the same equation to 1e-7 mm, heights are stored in nm.
+/// A quarter of the residual error of the reference method in the study's best case. Both sides solve
+/// the same equation to 1e-7 mm; heights are stored in nm.
 const HEIGHT_RMS_MM: f64 = 5e-4;
-/// σ_z: the fixed point takes B at 12 bits and then a whole root of the mean power, rounding down
-/// both times, so at the least modulation of 16/255 (257 of 4095 units) it is off by up to two units.
+/// Relative error of σ_z: the fixed-point code rounds B to 12 bits and then takes an integer root of the mean power, rounding
+/// down both times. At the smallest modulation, 16/255 (257 of 4095 units), this is up to two units.
 const SIGMA_SHARE: f64 = 2.0 / 257.0;
 /// σ_z is written as f32.
 const NOISE_SHARE: f64 = 1e-6;
 
-/// How far the two differ on one pattern of a recording.
+/// The differences for one pattern of a recording.
 #[derive(Debug)]
 struct Difference {
     compared: usize,
@@ -35,8 +35,8 @@ fn same(trust: Trust, reason: Reason) -> bool {
     trust.word() == reason.word()
 }
 
-/// Compares phases over pixels that both resolve, and masks over all of them; `reason` has the twin's
-/// masks, with heights looked at or not as `trust` has.
+/// Compares the phases of pixels that both resolve, and the masks of all pixels. `reason` has the twin's
+/// masks; whether they include heights follows `trust`.
 fn compare(measured: &Measured, at: usize, twin: &PhaseTwin, reason: &[Reason]) -> Difference {
     let found = &measured.result.phases[at];
     let finest = levels_of(&measured.recording, at).last().unwrap().ratio;
@@ -48,7 +48,7 @@ fn compare(measured: &Measured, at: usize, twin: &PhaseTwin, reason: &[Reason]) 
         }
         if found.trust[pixel].has_phase() && reason.has_phase() {
             let error = found.phase[pixel].turns() - twin.phase[pixel];
-            // The order is that of the finest level's fringe; wraps of equal phases do not count.
+            // Compares the order of the finest level's fringe; wraps of equal phases do not count.
             if (error * finest).abs() > 0.5 {
                 orders += 1;
             } else {
@@ -64,8 +64,8 @@ fn compare(measured: &Measured, at: usize, twin: &PhaseTwin, reason: &[Reason]) 
     }
 }
 
-/// Heights and σ_z of the twin's geometry at the phases that the fixed point found, and the twin's
-/// own mask with heights looked at.
+/// Compares heights and σ_z with the twin's geometry at the fixed-point phases; returns the twin's
+/// own mask, which includes heights.
 fn check_heights(name: &str, measured: &Measured, twin: &PhaseTwin) -> Vec<Reason> {
     let recording = &measured.recording;
     let at = measured.result.primary;
@@ -114,7 +114,7 @@ fn check_heights(name: &str, measured: &Measured, twin: &PhaseTwin) -> Vec<Reaso
     assert!(worst <= SIGMA_SHARE, "{name}: sigma is off by {worst}");
     match (measured.result.report.noise_counts, noise) {
         (Some(found), Some(noise)) => {
-            // Not the same pixels where masks differ.
+            // Where masks differ, the pixels are not the same.
             assert!((found / noise - 1.0).abs() < 1e3 * NOISE_SHARE, "{name}");
             assert_eq!(sigmas.is_empty(), errors.is_empty(), "{name}");
         }
@@ -181,7 +181,7 @@ fn the_fixed_point_equals_its_twin_in_every_form_depth_and_number_of_shifts() {
     for (name, recording) in cases::all() {
         let measured = Measured::new(recording);
         let reasons = &measured.result.report.unresolved;
-        // Each case shows the reasons that it can show: nothing is equal because nothing is there.
+        // Each case has the reasons that it can have, so results are not equal only because they are empty.
         assert!(reasons["low_modulation"] + reasons["residual"] > 0 || name.starts_with("single"));
         check(name, &measured);
     }

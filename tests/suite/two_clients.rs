@@ -1,4 +1,4 @@
-//! Two clients that change the same recipe at the same moment: no change that was answered with success is lost.
+//! Two clients change the same recipe at the same time: no change is lost whose answer was success.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place};
@@ -9,7 +9,7 @@ const ROUNDS: usize = 60;
 const DONE: u16 = 200;
 const CONFLICT: u16 = 409;
 
-/// Two clients that signed in, and the fingerprint of recipe 1.
+/// Two signed-in clients.
 fn two(daemon: &Daemon) -> [Browser; 2] {
     [(); 2].map(|()| {
         let mut browser = Browser::new(daemon);
@@ -85,7 +85,7 @@ fn an_edit_does_not_undo_an_import_that_came_while_it_was_made() {
         });
         assert!([DONE, CONFLICT].contains(&edited), "{edited}");
         conflicts += usize::from(edited == CONFLICT);
-        // Whichever was first: an import replaces an edit, and an edit of another base does not replace an import.
+        // In either order: an import replaces an edit, and an edit with another base does not replace an import.
         assert_eq!(editor.get("/api/recipes/1")["name"], name, "round {round}");
     }
     println!("{conflicts} of {} edits came too late", ROUNDS / 2);

@@ -1,4 +1,4 @@
-//! Deviations that count with a weight: production by strips against the comparison of whole maps, still and displaced.
+//! Weighted deviations: measurement in strips compared with the comparison of whole maps, for parts in place and displaced parts.
 
 use super::placement::{bed, scenario, taught};
 use super::production::{compare, expected, frames, parts, plan, plan_with};
@@ -15,7 +15,7 @@ use sim::Placement;
 /// Where a pixel sees the taught part is interpolated between nodes.
 const BROUGHT_MM: f64 = 5e-5;
 
-/// Gives what is compared weights, in a pattern in which squares of a gauge hold several.
+/// Sets weights in a pattern, so that squares of a gauge have several different ones.
 fn weigh(taught: &mut Taught) {
     let width = taught.file.camera.width as usize;
     let valid = taught.recipe.arrays.valid.iter_mut().enumerate();
@@ -40,14 +40,14 @@ fn strips_weigh_deviations_as_the_comparison_of_whole_maps_does() {
         let taken = frames(&mut bed, &still);
         compare(&format!("{name}, weighed"), &still, &recipe, &taken);
         let (plan, recipe) = plan_with(&bed, &taught, full, AlignmentKind::Rigid);
-        // On the cone's steep wall a pixel more or less of a weight is micrometres.
+        // On the cone's steep wall, one pixel more or less with a weight changes micrometres.
         if name != "cone" {
             compare_displaced(name, &plan, &recipe, &taken);
         }
     }
 }
 
-/// The deviation of a part that was brought back, against maps in which golden is brought to where each pixel sees the part.
+/// Compares the deviation of an aligned part with maps in which golden is moved to where each pixel sees the part.
 fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]) {
     let production = plan.production();
     let views: Vec<_> = frames
@@ -60,7 +60,7 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
     let heights = plan.heights(0, frames).unwrap();
     let (width, triangulator) = (heights.width, production.triangulator());
     let arrays = &recipe.arrays;
-    // z less the deviation, and the weight.
+    // z minus the deviation, and the weight.
     let brought = |at: usize, z: f64| {
         let point = triangulator.point(at % width, at / width, Height::from_mm(z))?;
         let back = motion.undo(point);

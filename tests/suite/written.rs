@@ -1,4 +1,4 @@
-//! Recordings of our own on disk, and the program that measures them.
+//! Rendered recordings on disk, and the program that measures them.
 
 use hal::replay::{Recording, recorder};
 use serde_json::Value;
@@ -8,12 +8,12 @@ use tempfile::TempDir;
 use tests::program::{Program, Run};
 use tests::render::{Scene, levels};
 
-/// The program, built together with this suite.
+/// The program `fringed` of the same build as this suite.
 pub fn program() -> Program {
     Program::at(env!("CARGO_BIN_EXE_fringed-under-test"))
 }
 
-/// The program of benchmarks and experiments, built together with this suite.
+/// The program `fringed-lab` of the same build as this suite.
 pub fn laboratory() -> Program {
     Program::at(env!("CARGO_BIN_EXE_fringed-lab-under-test"))
 }
@@ -23,7 +23,7 @@ pub fn geometric() -> Scene {
     Scene::new(49.0, levels(&[0.0192, 0.138, 1.0], 4))
 }
 
-/// A folder with a recording in it and room for results.
+/// A folder with a recording, and a place for results.
 pub struct Written {
     folder: TempDir,
 }
