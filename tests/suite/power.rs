@@ -109,7 +109,7 @@ impl Run {
     /// Records a run that teaches, measures good parts, imports and deletes recipes, measures parts that are kept, and is killed.
     fn recorded() -> Self {
         let place = Place::new();
-        // Few pixels: what counts here are files.
+        // Few pixels, as this test is about files.
         let head = tiny_head(48, 36);
         fs::write(place.path("small.toml"), &head).unwrap();
         let config =

@@ -1,4 +1,4 @@
-//! The crates of the workspace with the devices of a real head, as cargo resolves them for its processors.
+//! The crates on which the workspace depends, with the features for a real head, as cargo resolves them for each platform.
 
 use serde_json::Value;
 use std::collections::{HashMap, HashSet};
@@ -9,16 +9,16 @@ use std::process::Command;
 /// The processors that the program is built for.
 const PLATFORMS: [&str; 2] = ["x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu"];
 
-/// A crate of somebody else.
+/// A crate from outside the workspace.
 pub struct Crate {
     pub name: String,
     pub version: String,
-    /// As its manifest has it.
+    /// The licence in its manifest.
     pub licence: Option<String>,
     pub authors: Vec<String>,
-    /// Where it lies on this machine.
+    /// Its folder on this machine.
     pub folder: PathBuf,
-    /// Whether its code is in the program: the others serve building and testing only.
+    /// Whether its code is in the program; the others are only for building and testing.
     pub shipped: bool,
 }
 
@@ -28,7 +28,7 @@ impl fmt::Display for Crate {
     }
 }
 
-/// The workspace.
+/// The root of the workspace.
 pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
@@ -36,7 +36,7 @@ pub fn root() -> PathBuf {
         .to_path_buf()
 }
 
-/// All of them in the order of their names, or why cargo cannot tell.
+/// All crates, sorted by name; an error if cargo cannot list them.
 pub fn all() -> Result<Vec<Crate>, String> {
     let platforms = PLATFORMS.map(|name| ["--filter-platform", name]).concat();
     let output = Command::new(env!("CARGO"))
@@ -69,7 +69,7 @@ pub fn all() -> Result<Vec<Crate>, String> {
     Ok(crates)
 }
 
-/// Everything that the programs reach without build scripts, derives and tests.
+/// The crates in the programs: those that they reach without build scripts, derives and tests.
 fn shipped(metadata: &Value) -> HashSet<String> {
     let of_compiler = |package: &Value| {
         let kinds = list(&package["targets"]).flat_map(|target| list(&target["kind"]));

@@ -1,5 +1,5 @@
-//! `docs/licences.txt` has the texts of everything that the programs are made of, without the network. Which licences
-//! are taken, and which crates may come twice, stands in `deny.toml`.
+//! `docs/licences.txt` has the licence texts of every crate in the programs; the test needs no network. `deny.toml` lists
+//! the accepted licences, and the crates that may occur in two versions.
 
 mod crates;
 mod texts;
@@ -8,7 +8,7 @@ use crates::Crate;
 use std::fs;
 use std::path::PathBuf;
 
-/// The crates; none, with a message, where their sources are not on this machine.
+/// The crates; `None` with a message if their sources are not on this machine.
 fn dependencies() -> Option<Vec<Crate>> {
     crates::all()
         .inspect_err(|reason| {
@@ -26,7 +26,7 @@ fn file() -> PathBuf {
 fn the_file_of_licences_has_the_texts_of_what_is_shipped() {
     let Some(crates) = dependencies() else { return };
     let written = fs::read_to_string(file()).unwrap();
-    // Not compared as a whole, which would print it as a whole.
+    // Compared line by line, as a failed comparison prints everything.
     let differs = texts::document(&crates)
         .lines()
         .zip(written.lines().chain(std::iter::repeat("")))

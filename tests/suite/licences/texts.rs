@@ -1,4 +1,4 @@
-//! The texts of the licences, from the crates' own sources, as one document.
+//! The licence texts from the sources of the crates, as one document.
 
 use super::crates::Crate;
 use spdx::{Expression, Licensee, ParseMode};
@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-/// How the names of files with terms begin.
+/// How the names of licence files begin.
 const TERMS: [&str; 6] = [
     "LICENSE",
     "LICENCE",
@@ -34,7 +34,7 @@ It loads from the system and does not contain the C library, and where it is bui
 and the C++ library.
 ";
 
-/// The document for what is shipped of `crates`.
+/// The document for those of `crates` that are in the programs.
 pub fn document(crates: &[Crate]) -> String {
     let shipped: Vec<&Crate> = crates.iter().filter(|one| one.shipped).collect();
     let mut texts: Vec<(String, Vec<String>)> = Vec::new();
@@ -76,7 +76,7 @@ pub fn document(crates: &[Crate]) -> String {
     document
 }
 
-/// The texts that a crate brings and that apply.
+/// The texts in a crate that apply.
 fn terms(one: &Crate) -> Vec<String> {
     let mut found = Vec::new();
     collect(&one.folder, &mut found);
@@ -94,7 +94,7 @@ fn terms(one: &Crate) -> Vec<String> {
     found.into_iter().map(|(_, text)| text).collect()
 }
 
-/// Names in capitals and texts of the files with terms in a folder, and in folders of that name.
+/// Collects the names, in capitals, and the texts of the licence files in a folder, and in folders with such a name.
 fn collect(folder: &Path, found: &mut Vec<(String, String)>) {
     for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let name = entry.file_name().to_string_lossy().to_uppercase();
@@ -111,7 +111,7 @@ fn collect(folder: &Path, found: &mut Vec<(String, String)>) {
     }
 }
 
-/// A text with this system's ends of lines and nothing behind them.
+/// Reads a text; changes its line ends to this system's and removes spaces before them.
 fn tidy(path: &Path) -> String {
     let bytes = fs::read(path).unwrap();
     let text = String::from_utf8_lossy(&bytes);

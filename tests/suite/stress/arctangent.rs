@@ -1,4 +1,4 @@
-//! All differences of 8-bit samples with four shifts, through the whole decoder.
+//! All differences of 8-bit samples with four shifts, decoded by the complete decoder.
 
 use super::bounds::ARCTANGENT;
 use super::stack::{Stack, shots};
@@ -7,14 +7,14 @@ use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use std::f64::consts::TAU;
 
-/// Of the error, turns: the prototype of such a kernel left 6.7e-6.
+/// Largest RMS of the error, turns; the prototype of such a kernel has 6.7e-6.
 const RMS: f64 = 1e-5;
-/// −255 … 255.
+/// Number of differences from −255 to 255.
 const DIFFERENCES: usize = 511;
-/// The square of N/2 · 16 counts: S² + C² of the least modulation that is trusted.
+/// The square of N/2 · 16 counts: S² + C² of the smallest trusted modulation.
 const LEAST_POWER: i32 = 32 * 32;
 
-/// What was left of all pairs.
+/// The errors over all pairs.
 struct Error {
     trusted: usize,
     worst: f64,
@@ -30,7 +30,7 @@ fn pair(pixel: usize) -> (i32, i32) {
     )
 }
 
-/// The four samples about `middle` that make up a pair, below full scale where they can be, in the order of
+/// Four samples around `middle` with these differences, below full scale if possible, in the order of
 /// the shifts k/4: S = I₀ − I₂, C = I₁ − I₃.
 fn samples((s, c): (i32, i32), middle: i32) -> [u16; 4] {
     let two = |difference: i32| {
@@ -103,7 +103,7 @@ fn exhaust(name: &str, mut stack: Stack, middle: i32) -> Error {
 
 fn check(name: &str, stack: Stack, middle: i32) {
     let error = exhaust(name, stack, middle);
-    // All but those below 16 counts and those that need a sample of 255.
+    // All except those below 16 counts and those that need a sample of 255.
     assert!(error.trusted > 250_000, "{name}: {}", error.trusted);
     assert!(error.worst <= ARCTANGENT, "{name}: {:e}", error.worst);
     assert!(error.rms <= RMS, "{name}: {:e}", error.rms);

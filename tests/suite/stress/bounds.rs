@@ -1,4 +1,4 @@
-//! How far a decoded pixel may be from the textbook, and which pixels are too near a threshold to say.
+//! The largest difference between a decoded pixel and the textbook, and which pixels are too near a threshold to compare.
 //!
 //! The bounds are those of a kernel in 16-bit lanes; they hold for every back-end.
 
@@ -10,34 +10,34 @@ use tests::oracle::demodulate::Demodulated;
 use tests::oracle::unwrap::Form;
 use tests::oracle::{Level, PixelTwin, Reason};
 
-/// The arctangent: a polynomial of degree 5 about a reciprocal of one Newton step (`algo/src/phase/angle.rs`).
+/// The arctangent: a polynomial of degree 5, with a reciprocal from one Newton iteration (`algo/src/phase/angle.rs`).
 pub const ARCTANGENT: f64 = 2.5e-5;
-/// The arctangent of geometric levels below the finest, which give orders only: a cubic about a cubic reciprocal. Every pair
-/// of 8-bit differences is within it (`every_rough_angle_is_within_the_bound` of `algo`).
+/// The arctangent of geometric levels below the finest, which give only orders: a cubic with a cubic reciprocal. Every pair
+/// of 8-bit differences is within this bound (`every_rough_angle_is_within_the_bound` of `algo`).
 const ROUGH_ARCTANGENT: f64 = 3.4e-4;
 /// Half a unit of 1/65536 turn.
 pub const ROUNDING: f64 = 1.0 / 131_072.0;
-/// S and C lie within ± N/2 of full scale; in 16 bits their rounding is 2⁻¹⁷ of N full scales each.
+/// S and C lie within ± N/2 of full scale; with 16 bits the rounding of each is 2⁻¹⁷ of N times full scale.
 const SUMS: f64 = 1.0 / 131_072.0;
 /// Half the last bit of a weight in Q15.
 const WEIGHTS: f64 = 1.0 / 65_536.0;
-/// Half the last bit of a factor (a ratio, its inverse, n) in Q20: what it moves a phase of one turn.
+/// Half the last bit of a factor (a ratio, its inverse, n) in Q20: its effect on a phase of one turn.
 const FACTORS: f64 = 1.0 / 2_097_152.0;
-/// Weights of 8 significant bits: the ratio of two is off by at most two parts in 256, which moves a mean
-/// by no more than this share of what it is taken over.
+/// Weights of 8 significant bits: the ratio of two is off by at most two parts in 256, so a mean changes
+/// by at most this share of the range of its values.
 const MEAN: f64 = 1.0 / 128.0;
 /// B is reported to 8 significant bits at the threshold (16/255: 257 of 4095 units), off by up to two
 /// units; σ_z has the same bound.
 const MODULATION: f64 = 2.0 / 257.0;
-/// Masks may differ on this share of the pixels, besides those on a threshold.
+/// Masks may differ on this share of the pixels, apart from those on a threshold.
 const MASK_SHARE: f64 = 1e-4;
-/// The thresholds' neighbourhood must stay small, or nothing would be asked.
+/// At most this share of the pixels may be on a threshold, or too little would be compared.
 const TIE_SHARE: f64 = 0.03;
 /// RMS of the error of the finest level of a geometric sequence, turns: 1e-5 for the arctangent, and
-/// the same again for sums and weights, whose worst case is 2.8e-5 at a quarter of full scale.
+/// as much for sums and weights, whose worst case is 2.8e-5 at a quarter of full scale.
 const RMS: f64 = 2e-5;
 
-/// What the samples of a level can move (S, C) by, in counts of B.
+/// How much the rounding of a level's samples can change (S, C), in counts of B.
 fn rounding_counts(level: &Level, seen: &Demodulated, stack: &Stack) -> f64 {
     if is_exact(level, stack) {
         return 0.0;
@@ -76,7 +76,7 @@ fn absolute(form: Form, levels: &[Level], twin: &PixelTwin, map: f64, stack: &St
         };
         worst(&mut each.skip(last)) + scaled
     } else {
-        // r Φ₀ is rounded as well, then the sum and each step of the mean.
+        // r Φ₀ is rounded too, and then the sum and each step of the mean.
         let relative = worst(&mut each.map(|(ratio, error)| (ratio, error + ROUNDING)));
         let spread = twin.doubt.map_or(0.0, |doubt| doubt.spread);
         let factor = (twin.phase - map).abs() * FACTORS;
@@ -84,7 +84,7 @@ fn absolute(form: Form, levels: &[Level], twin: &PixelTwin, map: f64, stack: &St
     }
 }
 
-/// Whether a pixel lies so near a threshold that rounding may decide.
+/// Whether a pixel is so near a threshold that rounding may decide.
 fn on_a_threshold(levels: &[Level], twin: &PixelTwin, stack: &Stack) -> bool {
     let full_scale = f64::from(stack.full_scale());
     let each = || levels.iter().zip(&twin.levels);
@@ -107,11 +107,11 @@ fn on_a_threshold(levels: &[Level], twin: &PixelTwin, stack: &Stack) -> bool {
     doubt.slack <= error + rough + ROUNDING + MEAN * doubt.spread + factors(levels, stack)
 }
 
-/// What the factors' rounding moves a decision by, as an error of the wrapped phases, turns.
+/// How much the rounding of the factors changes a decision, as an error of the wrapped phases, turns.
 fn factors(levels: &[Level], stack: &Stack) -> f64 {
     let turns = stack.range.max.abs().max(stack.range.min.abs());
     match stack.form() {
-        // n · Φ of the coarser level, of a decision that weighs wrapped phases by n + 1.
+        // n · Φ of the coarser level, in a decision that weights wrapped phases by n + 1.
         Form::Geometric { .. } => levels.windows(2).fold(0.0_f64, |worst, pair| {
             let n = pair[1].ratio / pair[0].ratio;
             worst.max(FACTORS * turns * pair[0].ratio / (n + 1.0))
@@ -123,15 +123,15 @@ fn factors(levels: &[Level], stack: &Stack) -> f64 {
     }
 }
 
-/// What comparing many stacks with the textbook has shown.
+/// The results of comparing many stacks with the textbook.
 #[derive(Clone, Debug, Default)]
 pub struct Tally {
     pub stacks: usize,
     pub pixels: usize,
     pub resolved: usize,
-    /// Pixels on a threshold, of which nothing is asked.
+    /// Pixels on a threshold, which are not compared.
     pub ties: usize,
-    /// Pixels of another mask.
+    /// Pixels whose masks differ.
     pub masks: usize,
     /// Squares of the errors of geometric levels of ratio 1.
     squares: f64,
@@ -143,8 +143,8 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Compares what was decoded with the textbook: phases within their bound and with it the fringe
-    /// orders, modulations, masks.
+    /// Compares a decoded stack with the textbook: phases within their bound, which includes the fringe
+    /// orders, modulations, and masks.
     pub fn add(&mut self, stack: &Stack, found: &PhaseMap) {
         let (levels, form, twins) = (stack.levels(), stack.form(), stack.twins());
         let full_scale = stack.full_scale();
@@ -190,7 +190,7 @@ impl Tally {
         (self.squares / self.squared.max(1) as f64).sqrt()
     }
 
-    /// Prints the figures and checks those that hold over all pixels together.
+    /// Prints the figures and checks those over all pixels.
     pub fn conclude(&self, name: &str) {
         println!(
             "{name}: {} stacks, {} pixels, {} resolved, {} on a threshold, {} other masks; worst error \

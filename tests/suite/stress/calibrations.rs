@@ -1,5 +1,5 @@
-//! Calibrations that are none are refused by the name of what is wrong; every one that is accepted is a
-//! camera.
+//! Invalid calibrations are refused, and the error names what is wrong; every accepted calibration is a
+//! valid camera.
 
 use super::random::between;
 use super::rig;
@@ -13,7 +13,7 @@ use tests::render::{Scene, levels};
 
 const SEED: u64 = 20_260_610;
 const SIZE: usize = 48;
-/// Pixels: Newton's method stops at 1e-12 of the focal length.
+/// Largest error in pixels: Newton's method stops at 1e-12 of the focal length.
 const ROUND_TRIP: f64 = 1e-8;
 
 fn good() -> PinholeModel {
@@ -24,7 +24,7 @@ fn refusal(model: PinholeModel) -> Option<ModelError> {
     Pinhole::new(model, SIZE, SIZE).err()
 }
 
-/// Every number of a model, with what it is called.
+/// Every number of a model, with its name.
 fn numbers(model: &mut PinholeModel) -> Vec<(&'static str, &mut f64)> {
     let PinholeModel {
         fx,
@@ -68,7 +68,7 @@ fn numbers_of_absurd_size_are_refused_by_name_wherever_they_stand() {
             let (name, number) = numbers(&mut model).swap_remove(at);
             *number = bad;
             let Some(error) = refusal(model) else {
-                // A large even radial distortion is one-to-one, and a camera.
+                // A large even radial distortion is one-to-one, so it is a valid camera.
                 assert!(
                     name == "the distortion" && is_camera(model),
                     "{name} = {bad}"
@@ -132,7 +132,7 @@ fn matrices_that_are_no_rotations_are_refused() {
         );
         assert!(error.unwrap().to_string().contains("rotation"));
     }
-    // Rounded to five digits it is still one.
+    // Rounded to five digits it is still a rotation.
     let rounded = r.map(|x| (x * 1e5).round() / 1e5);
     let model = PinholeModel {
         rotation: rounded,
@@ -141,11 +141,11 @@ fn matrices_that_are_no_rotations_are_refused() {
     assert_eq!(refusal(model), None);
 }
 
-/// Whether every pixel has one ray, and the ray leads back to it.
+/// Whether every pixel has one ray, and the ray projects to this pixel.
 fn is_camera(model: PinholeModel) -> bool {
     let pinhole = Pinhole::new(model, SIZE, SIZE).expect("accepted");
     (0..=SIZE * SIZE).all(|i| {
-        // Borders and corners included.
+        // Includes borders and corners.
         let (u, v) = ((i % SIZE) as f64 - 0.5, (i / SIZE) as f64 - 0.5);
         let Some(ray) = pinhole.ray(u, v) else {
             return false;
@@ -187,7 +187,7 @@ fn distortions_of_any_size_are_refused_or_are_cameras() {
 #[test]
 fn frames_of_no_size_have_no_camera_that_panics() {
     for (width, height) in [(0, 0), (0, 48), (48, 0), (1, 1), (1 << 40, 1)] {
-        // Any answer will do.
+        // Any result is fine, if there is no panic.
         let _ = Pinhole::new(good(), width, height);
     }
 }

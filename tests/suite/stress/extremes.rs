@@ -1,4 +1,4 @@
-//! Light that is no light: none, too much, none of the pattern, none of any structure.
+//! Unusable light: none, too much, light without the pattern, and light without any structure.
 
 use super::bounds::Tally;
 use super::random::{Draw, KINDS};
@@ -11,10 +11,10 @@ use std::f64::consts::TAU;
 use tests::random::Random;
 
 const SEED: u64 = 20_260_606;
-/// Of 8 bit; scales with full scale.
+/// Smallest trusted modulation at 8 bit; proportional to full scale.
 const LEAST_COUNTS: f64 = 16.0;
-/// RMS of what a tenth over full scale leaves with 8 shifts, turns: a clipped sine has harmonics, and N
-/// shifts let those of order N ± 1 through. At worst √2 times that for one of them, 2 with both.
+/// RMS of the error with 8 shifts if the light exceeds full scale by a tenth, turns: a clipped sine has harmonics, and with N
+/// shifts those of order N ± 1 have an effect. The maximum is √2 times this for one of them, and twice this for both.
 const SATURATED_RMS: f64 = 7e-4;
 
 /// Three geometric levels of `shifts`.
@@ -144,7 +144,7 @@ fn from_sixteen_counts_on_the_phase_is_known_and_below_it_never() {
             for pixel in 0..stack.pixels() {
                 let (turns, counts) = truth(pixel);
                 let counts = counts as f64;
-                // Rounded samples move (S, C) by at most half a count each, and so B by at most one.
+                // Rounded samples change S and C by at most half a count each, and so B by at most one.
                 let rounding = 1.0 / scale;
                 if counts + rounding < LEAST_COUNTS {
                     assert_eq!(map.trust[pixel], Trust::Dark, "B = {counts}");

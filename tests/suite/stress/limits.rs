@@ -1,4 +1,4 @@
-//! Sequences at their documented limits decode, and one beyond is refused when planned, by its name.
+//! Sequences at their documented limits are decoded; beyond a limit, planning refuses them with its name.
 
 use super::bounds::Tally;
 use super::random::between;
@@ -14,7 +14,7 @@ use tests::random::Random;
 
 const SEED: u64 = 20_260_608;
 
-/// Why a sequence of ratios, of `shifts` each, is refused for a phase function of this range.
+/// The reason for which a sequence of these ratios, with `shifts` each, is refused for a phase function of this range.
 fn refusal(ratios: &[f64], shifts: usize, (min, max): (f64, f64)) -> Option<String> {
     let frames = shots(ratios, shifts);
     let sequence = match Sequence::from_frames(&frames) {
@@ -25,7 +25,7 @@ fn refusal(ratios: &[f64], shifts: usize, (min, max): (f64, f64)) -> Option<Stri
     decoder.err().map(|error| error.to_string())
 }
 
-/// A refusal that names each of `words`.
+/// Checks that a refusal contains each of `words`.
 fn names(refusal: Option<String>, words: &[String]) {
     let refusal = refusal.expect("it is beyond a limit");
     for word in words {
@@ -43,7 +43,7 @@ fn climb(span: f64, finest: f64, step: f64) -> Vec<f64> {
     ratios
 }
 
-/// A stack of noise-free 12-bit pixels with phases all over the range.
+/// A stack of noise-free 12-bit pixels with phases over the whole range.
 fn lit(frames: Vec<Shot>, (min, max): (f64, f64), reach: f64) -> (Stack, Vec<f64>) {
     let mut random = Random::new(SEED);
     let mut stack = Stack::dark((4096, 1), 12, frames, (min, max));
@@ -67,7 +67,7 @@ fn lit(frames: Vec<Shot>, (min, max): (f64, f64), reach: f64) -> (Stack, Vec<f64
     (stack, phases)
 }
 
-/// Every pixel resolved, in its own fringe of the finest level, and as the textbook has it.
+/// Checks that every pixel is resolved, in its own fringe of the finest level, and agrees with the textbook.
 fn decodes(name: &str, (stack, phases): (Stack, Vec<f64>)) {
     let map = stack.decode();
     let finest = stack.levels().last().unwrap().ratio;
@@ -101,7 +101,7 @@ fn as_many_turns_as_documented_decode_in_every_fringe_and_more_are_refused() {
             );
         }
     }
-    // The limit is the level's: a finer ratio reaches it with fewer fringes.
+    // The limit is that of a level: a finer ratio reaches it with fewer fringes.
     names(
         refusal(&[2.0], 4, (0.0, MAX_TURNS * 0.51)),
         &[MAX_TURNS.to_string()],
@@ -132,8 +132,8 @@ fn as_many_fringes_as_documented_make_a_pattern_and_more_are_refused() {
 fn the_largest_step_between_levels_decodes_and_a_larger_one_is_refused() {
     let span = 0.9 * MAX_STEP;
     let ratios = [1.0 / MAX_STEP, 1.0];
-    // Half a count of 12 bit in a level of 16 shifts leaves at most 9e-5 turn: the step must not take more
-    // than the limit of the residual from it.
+    // Half a count of 12 bit in a level of 16 shifts is an error of at most 9e-5 turn. The step must not enlarge it
+    // to more than the limit of the residual.
     const { assert!(MAX_STEP * 9e-5 < 0.4, "a step that rounding alone slips") };
     decodes("two levels", lit(shots(&ratios, 16), (0.0, span), 0.0));
     // The finest ratio may be as small as the step is large.
@@ -163,7 +163,7 @@ fn dense_levels_have_an_n_of_at_most_the_documented_one() {
         );
         assert!(refusal(&[low, low.midpoint(1.0), 1.0], 4, range).is_some());
     }
-    // An n of 20 is beyond any use, and still decodes over all of its ± n²/2.
+    // An n of 20 is larger than any useful one, but decodes over its whole range of ± n²/2.
     let n = 20.0_f64;
     let three = [1.0 - 1.0 / n, 1.0 - 1.0 / (n * n), 1.0];
     let reach = n * n / 2.0 - n;

@@ -1,9 +1,9 @@
-//! Numerical stability: what the decoder, the patterns and the geometry do at their limits.
+//! Numerical stability of the decoder, the patterns and the geometry at their limits.
 //!
-//! - [`stack`]: frames of any samples, decoded in every way at once; [`bounds`]: how far a result may
-//!   be from the textbook's; [`random`]: seeded stacks of every form;
-//!   [`rig`]: rigs to triangulate with; [`twins`]: a rig judged by the textbook.
-//! - Each other module holds the promises of one threat; their bounds stand in `algo`'s README.
+//! - [`stack`]: frames of any samples, decoded in every way; [`bounds`]: the largest difference from
+//!   the textbook; [`random`]: seeded stacks of every form; [`rig`]: rigs for triangulation; [`twins`]:
+//!   a rig that is compared with the textbook.
+//! - Each other module tests one kind of limit; the bounds are in `algo`'s README.
 
 mod arctangent;
 mod bounds;

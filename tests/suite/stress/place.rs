@@ -1,5 +1,5 @@
-//! A pixel's result depends on its samples alone: not on its place, its row's width, the stride, or what
-//! is looked at beside it.
+//! A pixel's result depends only on its samples: not on its place, the width of its row, the stride, or
+//! its neighbours.
 
 use super::random::{Draw, KINDS, stack};
 use super::stack::{Stack, shots};
@@ -9,7 +9,7 @@ use std::ops::Range;
 use tests::random::Random;
 
 const SEED: u64 = 20_260_605;
-/// Depths and shifts that kernels are made for, and the general ones.
+/// Bit depths and shifts with special kernels, and others.
 const VARIANTS: [(u8, Option<usize>); 5] = [
     (8, Some(4)),
     (8, Some(3)),
@@ -27,7 +27,7 @@ fn bits(map: &PhaseMap, pixel: usize) -> (i32, u16, u8) {
     )
 }
 
-/// `inner` within a larger frame of which everything else is drawn.
+/// `inner` within a larger frame with random samples elsewhere.
 fn embedded(random: &mut Random, inner: &Stack, (left, top): (usize, usize)) -> Stack {
     let size = (
         left + inner.width + random.below(40),
@@ -37,7 +37,7 @@ fn embedded(random: &mut Random, inner: &Stack, (left, top): (usize, usize)) -> 
     let mut outer = Stack::dark(size, inner.bit_depth, inner.frames.clone(), range);
     let stride = outer.width + random.below(70);
     outer = outer.with_stride(stride);
-    // Wild light, or none, around it.
+    // Random light, or none, around it.
     let full = usize::from(inner.full_scale());
     let dark = random.below(2) == 0;
     outer.fill(|_, _| {

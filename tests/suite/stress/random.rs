@@ -22,23 +22,23 @@ pub const KINDS: [Kind; 4] = [
     Kind::Single,
 ];
 
-/// What a stack is to be; everything else is drawn.
+/// The fixed properties of a stack; all others are random.
 #[derive(Clone, Copy, Debug)]
 pub struct Draw {
     pub kind: Kind,
     pub size: (usize, usize),
     pub bit_depth: u8,
-    /// Shifts of every level; drawn for each, 3 to 16, if there is none.
+    /// Shifts of every level; if `None`, random for each, 3 to 16.
     pub shifts: Option<usize>,
 }
 
-/// Between two values.
+/// A random number between two values.
 pub fn between(random: &mut Random, low: f64, high: f64) -> f64 {
     low + (high - low) * random.share()
 }
 
-/// A stack of lit pixels with noise of up to 3 % of full scale, among them weak ones, saturated ones and
-/// random samples; a map for the forms that need one, unknown at some pixels and too far off at others.
+/// A stack of lit pixels with noise of up to 3 % of full scale, some weak, some saturated, and some with
+/// random samples; also a map for the forms that need one, unknown at some pixels and too far off at others.
 pub fn stack(random: &mut Random, draw: Draw) -> Stack {
     let min = between(random, -20.0, 20.0);
     let span = between(random, 5.0, 150.0);
@@ -76,9 +76,9 @@ pub fn stack(random: &mut Random, draw: Draw) -> Stack {
 fn light(random: &mut Random) -> (f64, f64, f64) {
     let noise = [0.0, 0.003, 0.03][random.below(3)];
     match random.below(8) {
-        // About the threshold of 16 of 255, and below it.
+        // Near the threshold of 16 of 255, and below it.
         0 => (0.3, between(random, 0.0, 0.08), noise),
-        // Over full scale by up to a tenth.
+        // Up to a tenth over full scale.
         1 => (0.55, between(random, 0.4, 0.55), noise),
         _ => {
             let modulation = between(random, 0.07, 0.48);
@@ -91,7 +91,7 @@ fn light(random: &mut Random) -> (f64, f64, f64) {
     }
 }
 
-/// Ratios of a form for a phase function of this span, and how far off its map may be, turns.
+/// Ratios of a form for a phase function of this span, and how far its map may be off, turns.
 fn ratios(random: &mut Random, kind: Kind, span: f64) -> (Vec<f64>, f64) {
     match kind {
         Kind::Geometric => {
@@ -137,7 +137,7 @@ fn order(random: &mut Random, least: usize) -> f64 {
     }
 }
 
-/// Frames of levels whose shifts start anywhere and run up or down, in any order.
+/// Frames of levels in random order; the shifts start at a random value and increase or decrease.
 fn frames(random: &mut Random, ratios: &[f64], shifts: Option<usize>) -> Vec<Shot> {
     let mut frames = Vec::new();
     for &ratio in ratios {

@@ -1,4 +1,4 @@
-//! Geometry that tells nothing of the height: no panic, no NaN, and never a height that is wrong.
+//! Geometry in which the phase does not depend on the height: no panic, no NaN, and no wrong height.
 
 use super::random::between;
 use super::rig::{self, PROJECTOR, looking_down};
@@ -13,7 +13,7 @@ const RANGE: HeightRange = HeightRange {
     high: 60.0,
 };
 
-/// Pixels at and about a place, down to where rounding blurs them.
+/// Pixels at a place and around it, at distances down to the rounding error.
 fn about((u, v): (f64, f64)) -> impl Iterator<Item = (f64, f64)> {
     let steps = [0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 5.0, 20.0];
     steps.into_iter().flat_map(move |step| {
@@ -33,7 +33,7 @@ fn lamp(centre: [f64; 3]) -> PinholeModel {
 #[test]
 fn a_pixel_on_the_baseline_has_no_height_and_its_neighbours_have_the_right_one() {
     let mut random = Random::new(SEED);
-    // The projector above and behind the camera, and in its view, right on the axis and beside it.
+    // The projector above and behind the camera, and within its view, on its axis and beside it.
     for (eye, light) in [
         ([0.0, 0.0, 600.0], [0.0, 0.0, 900.0]),
         ([0.0, 0.0, 600.0], [20.0, 0.0, 900.0]),
@@ -68,7 +68,7 @@ fn a_pixel_on_the_baseline_has_no_height_and_its_neighbours_have_the_right_one()
 
 #[test]
 fn fringes_along_the_baseline_tell_no_height() {
-    // Both at one height, one beyond the other along the fringes: every ray keeps its phase.
+    // Both at the same height, displaced along the fringes: the phase is constant along every ray.
     let twins = Twins::new(&down([0.0, 0.0, 600.0]), &lamp([0.0, 100.0, 600.0]), RANGE).unwrap();
     for u in 0..FRAME.0 {
         for v in (0..FRAME.1).step_by(8) {
@@ -162,7 +162,7 @@ fn rays_along_the_plane_or_upwards_have_no_height_and_no_reference() {
 #[test]
 fn rays_that_meet_no_light_of_their_phase_have_no_height() {
     let mut random = Random::new(SEED + 3);
-    // Both look the same way: a ray's phase tends to that of the parallel ray and never gets there.
+    // Both look in the same direction: a ray's phase approaches that of the parallel ray and never reaches it.
     let twins = Twins::new(&down([0.0, 0.0, 600.0]), &lamp([150.0, 0.0, 600.0]), RANGE).unwrap();
     for _ in 0..2000 {
         let (u, v) = (
@@ -239,7 +239,7 @@ fn a_guess_of_any_height_leads_to_the_right_one() {
         for guess in guesses.into_iter().chain([z, z + 1e-3, z - 0.5]) {
             let solution = twins.solver.solve_near(u, v, phase, guess);
             let solution = solution.unwrap_or_else(|| panic!("none from {guess}"));
-            // A last secant step of 1e-4 mm leaves less than 1e-6.
+            // A last secant step of 1e-4 mm means an error below 1e-6.
             assert!(
                 (solution.point.z - z).abs() <= 1e-6,
                 "{guess}: {solution:?}"
@@ -317,7 +317,7 @@ fn ranges_that_are_none_are_refused_and_heights_stay_where_they_can_be_stored() 
         );
         assert!(error.to_string().contains(&low.to_string()), "{error}");
     }
-    // Beyond ± 2.147 m no height can be written down: there is none, instead of one that is unknown.
+    // A height beyond ± 2.147 m cannot be stored, so there is no solution.
     for range in [
         Some(HeightRange {
             low: -9000.0,

@@ -1,4 +1,4 @@
-//! Rigs to triangulate with.
+//! Rigs for triangulation.
 
 use algo::geometry::{HeightRange, Pinhole, PinholeModel, Reference, RigError, Triangulator};
 use algo::pattern::PhaseFunction;
@@ -8,7 +8,7 @@ use hal::model::DeviceModel;
 /// Projector columns and rows.
 pub const PROJECTOR: (usize, usize) = (256, 192);
 
-/// A device model, checked.
+/// Checks a device model.
 pub fn pinhole(model: &DeviceModel, (width, height): (usize, usize)) -> Pinhole {
     Pinhole::new(seam::pinhole_model(model), width, height).expect("a camera")
 }
@@ -42,8 +42,8 @@ pub fn join(
     Triangulator::new(camera, projector, Reference::Models, function, range)
 }
 
-/// A device without distortion at `centre` that looks along −z, its image x along +x, tilted by `degrees`
-/// about the image's y towards +x, with half its frame of `size` as far as one focal length times `half`.
+/// A device without distortion at `centre` that looks along −z with its image x along +x, then tilted by `degrees`
+/// about the image's y towards +x; half the width of its frame of `size` is `half` times the focal length.
 pub fn looking_down(
     centre: [f64; 3],
     degrees: f64,

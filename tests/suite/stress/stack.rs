@@ -1,4 +1,4 @@
-//! Frames of any samples, decoded in every way that must give the same bits.
+//! Frames of any samples, decoded in all ways that must give the same bits.
 
 use algo::frame::{FrameView, Samples};
 use algo::pattern::{PhaseRange, Sequence, Shot};
@@ -11,31 +11,31 @@ use std::sync::OnceLock;
 use tests::oracle::unwrap::{Form, recognise};
 use tests::oracle::{Level, PixelTwin, levels_from};
 
-/// Frames of a sequence with what is needed to decode them.
+/// Frames of a sequence, and everything to decode them.
 #[derive(Clone, Debug)]
 pub struct Stack {
     pub width: usize,
     pub height: usize,
-    /// Samples from row to row; what lies between a row's end and the next row is no light.
+    /// Distance of rows in samples; those between the end of a row and the next row are not part of the picture.
     pub stride: usize,
     pub bit_depth: u8,
-    /// What each frame shows.
+    /// The ratio and shift of each frame.
     pub frames: Vec<Shot>,
-    /// Of the phase function.
+    /// Range of the phase function.
     pub range: PhaseRange,
     /// The known map, row-major, for the forms that need one.
     pub map: Option<Vec<AbsolutePhase>>,
     samples: Vec<Vec<u16>>,
 }
 
-/// The samples of a stack as a camera delivers them.
+/// Converts the samples of a stack to what a camera delivers.
 enum Delivered {
     Eight(Vec<Vec<u8>>),
     Sixteen(Vec<Vec<u16>>),
 }
 
 impl Stack {
-    /// Dark frames, rows packed.
+    /// Dark frames without gaps between rows.
     pub fn dark(
         (width, height): (usize, usize),
         bit_depth: u8,
@@ -55,8 +55,8 @@ impl Stack {
         }
     }
 
-    /// The same frames with another stride. The gaps hold the brightest sample that fits their type, so
-    /// that nothing that looks at them goes unnoticed.
+    /// The same frames with another stride. The gaps contain the brightest sample of the type, so reading
+    /// them is noticed.
     pub fn with_stride(mut self, stride: usize) -> Self {
         let gap = if self.bit_depth == 8 { 255 } else { u16::MAX };
         for frame in &mut self.samples {
@@ -99,7 +99,7 @@ impl Stack {
         }
     }
 
-    /// The levels as the textbook sees them, from coarse to fine.
+    /// The levels for the textbook, from coarse to fine.
     pub fn levels(&self) -> Vec<Level> {
         let frames = self.frames.iter().enumerate();
         levels_from(frames.map(|(place, shot)| (place, shot.ratio, shot.shift)))
@@ -111,7 +111,7 @@ impl Stack {
         recognise(&ratios, (self.range.min, self.range.max)).expect("ratios of a form")
     }
 
-    /// What the textbook says about every pixel.
+    /// The textbook's result for every pixel.
     pub fn twins(&self) -> Vec<PixelTwin> {
         let (levels, form) = (self.levels(), self.form());
         let full_scale = f64::from(self.full_scale());
@@ -132,13 +132,13 @@ impl Stack {
         (0..self.pixels()).map(twin).collect()
     }
 
-    /// Decodes with one and with two threads and on every back-end, and checks that all write the same
-    /// bits and every rejected pixel the one way.
+    /// Decodes with one and with two threads and on every back-end, and checks that all give the same
+    /// bits, and that rejected pixels have no phase.
     pub fn decode(&self) -> PhaseMap {
         self.decode_in(None)
     }
 
-    /// As [`Self::decode`], where only `window` is looked at.
+    /// As [`Self::decode`], but decodes only `window`.
     pub fn decode_in(&self, window: Option<Window<'_>>) -> PhaseMap {
         let delivered = self.deliver();
         let views = delivered.views(self);
@@ -160,14 +160,14 @@ impl Stack {
         first.expect("at least one back-end")
     }
 
-    /// The plan, as it is by default.
+    /// The plan with the default back-end.
     pub fn decoder(&self) -> Decoder {
         let sequence = Sequence::from_frames(&self.frames).expect("a sequence");
         Decoder::new(&sequence, self.range, self.bit_depth).expect("a sequence that can be decoded")
     }
 
-    /// The plan for every back-end that runs on this machine, with the back-end's name. The one place
-    /// where this suite knows of back-ends.
+    /// The plan for every back-end that runs on this machine, with the back-end's name. Only this function
+    /// of the suite uses back-ends.
     fn decoders(&self) -> Vec<(&'static str, Decoder)> {
         Backend::available()
             .map(|backend| (backend.name(), self.decoder().with_backend(backend)))
@@ -209,7 +209,7 @@ fn check_canonical(map: &PhaseMap) {
     }
 }
 
-/// A pool of one or two threads, made once.
+/// A pool of one or two threads, created once.
 pub fn pool(threads: usize) -> &'static ThreadPool {
     static POOLS: [OnceLock<ThreadPool>; 2] = [const { OnceLock::new() }; 2];
     POOLS[threads - 1].get_or_init(|| {

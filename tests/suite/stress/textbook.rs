@@ -1,11 +1,11 @@
-//! Any number of shifts, depth, ratios, form, size and stride decode as the textbook says.
+//! With any number of shifts, depth, ratios, form, size and stride, decoding agrees with the textbook.
 
 use super::bounds::Tally;
 use super::random::{Draw, KINDS, stack};
 use tests::random::Random;
 
 const SEED: u64 = 20_260_604;
-/// Stacks with everything drawn, of each form.
+/// Number of random stacks of each form.
 const CASES: usize = 450;
 
 #[test]

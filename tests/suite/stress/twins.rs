@@ -1,4 +1,4 @@
-//! A rig for the program and for the textbook: every height that the one gives is checked with the other.
+//! A rig for the program and for the textbook: every height of the program is checked with the textbook.
 
 use super::random::between;
 use super::rig::{self, PROJECTOR};
@@ -11,7 +11,7 @@ use tests::random::Random;
 
 pub const FRINGES: f64 = 60.0;
 pub const FRAME: (usize, usize) = (65, 65);
-/// Less than this over the default working range, ± 0.2 × the camera's height, is noise: one level of
+/// A smaller change over the default working range, ± 0.2 × the camera's height, is noise: one level of
 /// 4 frames has 7.4e-3 turn (docs/measurement.md, *Noise*).
 const LEAST_TURNS: f64 = 0.01;
 /// Half a unit of Q16.16.
@@ -71,7 +71,7 @@ impl Twins {
         self.pattern.at(xi, eta)
     }
 
-    /// The height of a pixel with this phase; where there is one, that it is one.
+    /// Solves for the height of a pixel with this phase, and checks it.
     pub fn solve(&self, u: f64, v: f64, phase: f64) -> Option<Solution> {
         let solution = self.solver.solve(u, v, phase)?;
         self.check(u, v, phase, &solution);
@@ -96,8 +96,8 @@ impl Twins {
         assert!(told >= LEAST_TURNS, "{place} is noise");
     }
 
-    /// Solves for surfaces at heights all over the range and answers how many had a height, which must
-    /// be the right one: as near as half a unit of the phase is worth.
+    /// Solves for surfaces at heights over the whole range and returns how many had a height, which must
+    /// be the right one within half a unit of the phase.
     pub fn recovered(&self, random: &mut Random, (u, v): (f64, f64)) -> usize {
         let HeightRange { low, high } = self.solver.range();
         let mut found = 0;
@@ -109,7 +109,7 @@ impl Twins {
             }
             for phase in [phase, AbsolutePhase::from_turns(phase).turns()] {
                 if let Some(solution) = self.solve(u, v, phase) {
-                    // The slope may change by half over the range that half a unit is worth.
+                    // The slope may change by half within half a unit of the phase.
                     let bound = 2.0 * UNIT / solution.slope.abs() + HEIGHT_MM;
                     let error = (solution.point.z - z).abs();
                     assert!(error <= bound, "({u}, {v}) at {z}: off by {error} mm");

@@ -1,4 +1,4 @@
-//! Phases at and about every wrap: no fringe order slips in frames without noise.
+//! Phases at and near every wrap: no fringe order is wrong in frames without noise.
 
 use super::bounds::ROUNDING;
 use super::random::between;
@@ -14,8 +14,8 @@ const FRINGES: f64 = 100.0;
 /// Offset and modulation, shares of full scale.
 const LIGHT: (f64, f64) = (0.5, 0.3);
 
-/// Every 65,536th of a turn once, in all 100 fringes in turn; every half turn of each fringe with what
-/// lies within a few units and a few hundredths of it; both ends.
+/// Every 65,536th of a turn once, spread over the 100 fringes; every half turn of each fringe and phases
+/// within a few units and a few hundredths of it; both ends.
 fn phases(min: f64) -> Vec<f64> {
     let unit = 1.0 / 65_536.0;
     let mut phases: Vec<f64> = (0..65_536)
@@ -52,7 +52,7 @@ fn stack(phases: &[f64], min: f64, bit_depth: u8, frames: Vec<Shot>, reach: f64)
         }
     }
     let mut near = |phase: &f64| {
-        // The ends of the reach as well as what lies between.
+        // The ends of the reach, and values between them.
         let off = [-reach, reach, between(&mut random, -reach, reach)][random.below(3)];
         AbsolutePhase::from_turns(phase + off)
     };
@@ -60,7 +60,7 @@ fn stack(phases: &[f64], min: f64, bit_depth: u8, frames: Vec<Shot>, reach: f64)
     stack
 }
 
-/// Every pixel resolved, within what the rounding of its samples leaves.
+/// Checks that every pixel is resolved, within the error from rounding its samples.
 fn check(name: &str, phases: &[f64], stack: &Stack) {
     let map = stack.decode();
     let counts = LIGHT.1 * f64::from(stack.full_scale());
@@ -70,7 +70,7 @@ fn check(name: &str, phases: &[f64], stack: &Stack) {
         .map(|l| l.ratio)
         .fold(f64::INFINITY, f64::min);
     let ratio = if stack.map.is_some() { ratio } else { 1.0 };
-    // Samples off by half a count move (S, C) by at most N/2: 1/B radians; then 1e-4 for the fixed point.
+    // Samples off by half a count change (S, C) by at most N/2: 1/B radians; plus 1e-4 for the fixed point.
     let bound = (1.0 / counts / TAU + 1e-4) / ratio;
     let mut worst = 0.0_f64;
     for (pixel, phase) in phases.iter().enumerate() {
@@ -99,7 +99,7 @@ fn no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes() {
             };
             for (count, shifts) in [(3, 4), (3, 3), (4, 5), (6, 3)] {
                 let frames = Sequence::geometric(range, count, shifts);
-                // Shifts from 0 are even about the ends; from anywhere else rounding tips them over.
+                // Shifts from 0 are symmetric at the ends; with any other start rounding moves them over the end.
                 for start in [0.0, 0.137] {
                     let moved = frames.iter().map(|&Shot { ratio, shift }| Shot {
                         ratio,
@@ -125,7 +125,7 @@ fn no_fringe_order_slips_at_any_wrap_about_a_map() {
                 vec![1.0, 1.0 - 1.0 / (n * n), 1.0 - 1.0 / n],
                 n * n / 2.0 - n,
             ),
-            // Two levels: the reach of the beat less what rounding may take of it.
+            // Two levels: the reach of the beat minus the effect of rounding.
             (vec![0.8, 1.0], 2.4),
             (vec![1.0], 0.49),
         ] {
