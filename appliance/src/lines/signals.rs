@@ -110,7 +110,7 @@ mod tests {
     /// What is said after each of these, from a station that has just become ready.
     fn said(snapshots: &[Snapshot]) -> Vec<Signals> {
         let (mut follower, first) = Follower::new(&snapshot(READY, 7, Verdict::Pass, 0));
-        assert_eq!(first, NOT_OK, "a result of before says nothing");
+        assert_eq!(first, NOT_OK, "an earlier result does not count");
         let said = snapshots
             .iter()
             .flat_map(|snapshot| follower.follow(snapshot).collect::<Vec<_>>());

@@ -188,7 +188,7 @@ fn a_start_by_wire_measures_one_part_and_the_lamps_follow() {
             job,
             inspection: good(),
         });
-        // Whoever waits for the end of busy finds ok.
+        // Ok is on before busy goes off.
         assert_eq!(panel.until("-busy"), "+busy +ok -busy");
         write(&finger, b"!").unwrap();
         orders.recv_timeout(PATIENCE).unwrap();

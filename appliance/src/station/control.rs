@@ -1,5 +1,7 @@
 //! The CONTROL block as the station sees it: stored registers, one write, and the edges of one connection.
 
+use std::ops::{BitAnd, BitOr, Not};
+
 use thiserror::Error;
 
 /// CONTROL bit 0: the PLC asks for the station to be online.
@@ -103,32 +105,20 @@ pub struct Masked<T> {
     pub value: T,
 }
 
-impl Masked<u16> {
-    /// All 16 bits.
-    pub const fn all(value: u16) -> Self {
+impl<T> Masked<T>
+where
+    T: Copy + Default + Not<Output = T> + BitAnd<Output = T> + BitOr<Output = T>,
+{
+    /// All bits.
+    pub fn all(value: T) -> Self {
         Self {
-            mask: u16::MAX,
+            mask: !T::default(),
             value,
         }
     }
 
     /// `old` with the written bits replaced.
-    pub const fn onto(self, old: u16) -> u16 {
-        (old & !self.mask) | (self.value & self.mask)
-    }
-}
-
-impl Masked<u32> {
-    /// All 32 bits.
-    pub const fn all(value: u32) -> Self {
-        Self {
-            mask: u32::MAX,
-            value,
-        }
-    }
-
-    /// `old` with the written bits replaced.
-    pub const fn onto(self, old: u32) -> u32 {
+    pub fn onto(self, old: T) -> T {
         (old & !self.mask) | (self.value & self.mask)
     }
 }

@@ -29,7 +29,7 @@ pub(super) async fn part(State(site): State<Site>) -> Json<Value> {
 pub(super) async fn put(State(site): State<Site>, body: Body) -> Result<Json<Value>, Problem> {
     let placed: Placed = json(body).await?;
     let simulation = site.simulation.clone();
-    let (done, told) = oneshot::channel();
+    let (done, answer) = oneshot::channel();
     let broken = || Problem::broken("putting the part in place failed; see the log");
     // A thread of its own: a stop would wait for one of the runtime's.
     std::thread::Builder::new()
@@ -39,6 +39,6 @@ pub(super) async fn put(State(site): State<Site>, body: Body) -> Result<Json<Val
             let _ = done.send(simulation.put(&placed));
         })
         .map_err(|_| broken())?;
-    told.await.map_err(|_| broken())??;
+    answer.await.map_err(|_| broken())??;
     Ok(Json(site.simulation.view()))
 }

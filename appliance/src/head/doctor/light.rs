@@ -24,14 +24,8 @@ pub(super) fn light(lit: &Lit) -> Finding {
         "{:.1} % of the picture is lit by the projector",
         share * 100.0
     );
-    if share < LEAST_LIT {
-        return Finding::fail(
-            found,
-            "switch the projector's lamp on, take off the lens caps, open the apertures, and put a part into view",
-            measured,
-        );
-    }
-    Finding::pass(found, measured)
+    let remedy = "switch the projector's lamp on, take off the lens caps, open the apertures, and put a part into view";
+    Finding::new(found, (share < LEAST_LIT).then_some(remedy), measured)
 }
 
 pub(super) fn exposure(lit: &Lit) -> Finding {
@@ -44,21 +38,14 @@ pub(super) fn exposure(lit: &Lit) -> Finding {
         bright * 100.0,
         saturated * 100.0
     );
-    if saturated > MOST_SATURATED {
-        return Finding::fail(
-            found,
-            "lower the gain, the lamp or the aperture, or expose fewer whole refreshes",
-            measured,
-        );
-    }
-    if bright < LEAST_BRIGHT {
-        return Finding::fail(
-            found,
-            "raise the lamp, open the aperture, or expose more whole refreshes",
-            measured,
-        );
-    }
-    Finding::pass(found, measured)
+    let remedy = if saturated > MOST_SATURATED {
+        Some("lower the gain, the lamp or the aperture, or expose fewer whole refreshes")
+    } else if bright < LEAST_BRIGHT {
+        Some("raise the lamp, open the aperture, or expose more whole refreshes")
+    } else {
+        None
+    };
+    Finding::new(found, remedy, measured)
 }
 
 pub(super) fn contrast(
@@ -86,17 +73,12 @@ pub(super) fn contrast(
         listed.join(", ")
     );
     let sharp = relative.iter().find(|(pitch, _)| *pitch == SHARP_PITCH);
-    if sharp.is_none_or(|(_, contrast)| *contrast < LEAST_CONTRAST) {
-        return Ok(Finding::fail(
-            found,
-            format!(
-                "focus projector and camera on the part until {SHARP_PITCH} px keep {:.0} %",
-                LEAST_CONTRAST * 100.0
-            ),
-            measured,
-        ));
-    }
-    Ok(Finding::pass(found, measured))
+    let blurred = sharp.is_none_or(|(_, contrast)| *contrast < LEAST_CONTRAST);
+    let remedy = format!(
+        "focus projector and camera on the part until {SHARP_PITCH} px keep {:.0} %",
+        LEAST_CONTRAST * 100.0
+    );
+    Ok(Finding::new(found, blurred.then_some(&*remedy), measured))
 }
 
 pub(super) fn response(
@@ -131,12 +113,7 @@ pub(super) fn response(
         "light follows grey with exponent {gamma:.2}, off proportion by {:.1} % of white at most",
         off * 100.0
     );
-    if off > MOST_NONLINEAR {
-        return Ok(Finding::fail(
-            found,
-            "set the projector's gamma to 1 (a mode without picture improvement), or calibrate its response",
-            measured,
-        ));
-    }
-    Ok(Finding::pass(found, measured))
+    let remedy = "set the projector's gamma to 1 (a mode without picture improvement), or calibrate its response";
+    let nonlinear = (off > MOST_NONLINEAR).then_some(remedy);
+    Ok(Finding::new(found, nonlinear, measured))
 }

@@ -57,18 +57,11 @@ struct Finding {
 }
 
 impl Finding {
-    fn pass(found: impl Into<String>, measured: Value) -> Self {
+    /// A check that passes if it needs no remedy.
+    fn new(found: impl Into<String>, remedy: Option<&str>, measured: Value) -> Self {
         Self {
             found: found.into(),
-            remedy: None,
-            measured,
-        }
-    }
-
-    fn fail(found: impl Into<String>, remedy: impl Into<String>, measured: Value) -> Self {
-        Self {
-            found: found.into(),
-            remedy: Some(remedy.into()),
+            remedy: remedy.map(str::to_owned),
             measured,
         }
     }
@@ -136,7 +129,7 @@ pub fn examine(
         let finding = finding.unwrap_or_else(|error| {
             let text = error.to_string();
             let (found, remedy) = text.rsplit_once(": ").unwrap_or((&text, ""));
-            Finding::fail(found, remedy, json!({}))
+            Finding::new(found, Some(remedy), json!({}))
         });
         checks.push(Check {
             name,

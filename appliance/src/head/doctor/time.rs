@@ -28,11 +28,12 @@ fn ms(time: Duration) -> f64 {
 pub(super) fn devices(head: &DynHead) -> Result<Finding, Error> {
     head.present()?;
     let ((columns, rows), camera) = (head.projector_size(), head.camera_format());
-    Ok(Finding::pass(
+    Ok(Finding::new(
         format!(
             "a camera of {} and a projector of {columns}×{rows}",
             camera.describe()
         ),
+        None,
         json!({
             "camera": [camera.width, camera.height], "bit_depth": camera.bit_depth,
             "projector": [columns, rows],
@@ -44,19 +45,16 @@ pub(super) fn format(head: &DynHead) -> Finding {
     let encoding = head.encoding();
     let measured = json!({ "encoding": encoding.name, "exact": encoding.exact });
     if encoding.exact {
-        return Finding::pass(
-            format!("{}: samples are what the sensor counted", encoding.name),
-            measured,
-        );
+        let found = format!("{}: samples are what the sensor counted", encoding.name);
+        return Finding::new(found, None, measured);
     }
-    Finding::fail(
-        format!(
-            "the camera grants {} only: its samples are not what the sensor counted, but compressed or processed",
-            encoding.name
-        ),
-        "ask for an uncompressed raw format (R16 on a Raspberry Pi 5, R10_CSI2P on a Pi 4)",
-        measured,
-    )
+    let found = format!(
+        "the camera grants {} only: its samples are not what the sensor counted, but compressed or processed",
+        encoding.name
+    );
+    let remedy =
+        "ask for an uncompressed raw format (R16 on a Raspberry Pi 5, R10_CSI2P on a Pi 4)";
+    Finding::new(found, Some(remedy), measured)
 }
 
 pub(super) fn mode(head: &DynHead) -> Finding {
@@ -75,14 +73,11 @@ pub(super) fn mode(head: &DynHead) -> Finding {
         ms(camera.exposure),
         ms(camera.period)
     );
-    if off > TOLERANCE {
-        let remedy = format!(
-            "set the exposure to {:.3} ms: a micromirror device makes grey levels over whole refreshes",
-            ms(whole)
-        );
-        return Finding::fail(found, remedy, measured);
-    }
-    Finding::pass(found, measured)
+    let remedy = format!(
+        "set the exposure to {:.3} ms: a micromirror device makes grey levels over whole refreshes",
+        ms(whole)
+    );
+    Finding::new(found, (off > TOLERANCE).then_some(&*remedy), measured)
 }
 
 /// Loads black and white.
@@ -105,9 +100,10 @@ pub(super) fn cadence(head: &mut DynHead) -> Result<Finding, Error> {
     let flips = head.watch(&showings, PATIENCE, &mut |_| ())?.flips;
     let nominal = head.refresh();
     let (Some(first), Some(last)) = (flips.first(), flips.last()) else {
-        return Ok(Finding::fail(
+        let remedy = "check the projector's connection and that no other program holds the display";
+        return Ok(Finding::new(
             "no flip came",
-            "check the projector's connection and that no other program holds the display",
+            Some(remedy),
             json!({ "flips": 0 }),
         ));
     };
@@ -129,17 +125,21 @@ pub(super) fn cadence(head: &mut DynHead) -> Result<Finding, Error> {
         jitter * 1e6
     );
     let remedy = if flips.len() < FLIPS as usize {
-        "the projector stopped flipping: check its cable and the display driver's log"
+        Some("the projector stopped flipping: check its cable and the display driver's log")
     } else if missed > 0 {
-        "flips come late: stop what else loads the computer, and give fringed a real-time priority"
+        Some(
+            "flips come late: stop what else loads the computer, and give fringed a real-time priority",
+        )
     } else if (period / nominal.as_secs_f64() - 1.0).abs() > PERIOD_TOLERANCE {
-        "the projector does not run in the mode that it says: set the mode anew"
+        Some("the projector does not run in the mode that it says: set the mode anew")
     } else if jitter > TOLERANCE.as_secs_f64() {
-        "the display driver does not stamp flips at the refresh: use a driver with precise vblank times"
+        Some(
+            "the display driver does not stamp flips at the refresh: use a driver with precise vblank times",
+        )
     } else {
-        return Ok(Finding::pass(found, measured));
+        None
     };
-    Ok(Finding::fail(found, remedy, measured))
+    Ok(Finding::new(found, remedy, measured))
 }
 
 pub(super) fn trigger(head: &mut DynHead, calibrated: bool) -> Result<Finding, Error> {
@@ -182,46 +182,41 @@ fn triggered(seen: &Watched<()>) -> Finding {
     let found =
         format!("{frames} frames for {pulses} triggers, exposed {off_us} µs from them at most");
     if frames == 0 {
-        return Finding::fail(
-            format!("no frame for {pulses} triggers"),
-            "check the wire from the trigger output to the camera's trigger input, and that the camera is in trigger mode",
-            measured,
-        );
+        let found = format!("no frame for {pulses} triggers");
+        let remedy = "check the wire from the trigger output to the camera's trigger input, and that the camera is in trigger mode";
+        return Finding::new(found, Some(remedy), measured);
     }
     if let Some(off) = pulse_off {
-        return Finding::fail(
+        return Finding::new(
             format!(
                 "{spoiled} of {pulses} pulses were too long or too short, by up to {:.2} ms, and so was the exposure",
                 ms(off)
             ),
-            "stop what else loads the computer, and give fringed a real-time priority",
+            Some("stop what else loads the computer, and give fringed a real-time priority"),
             measured,
         );
     }
-    if frames < pulses {
-        return Finding::fail(
-            found,
+    let remedy = if frames < pulses {
+        Some(
             "triggers are lost: check the wire's contact and level, and that the camera's period fits its exposure and readout",
-            measured,
-        );
-    }
-    if u128::from(off_us) > TOLERANCE.as_micros() {
-        return Finding::fail(
-            found,
+        )
+    } else if u128::from(off_us) > TOLERANCE.as_micros() {
+        Some(
             "the camera's stamps mark another moment of the exposure than the calibration says: calibrate anew",
-            measured,
-        );
-    }
-    Finding::pass(found, measured)
+        )
+    } else {
+        None
+    };
+    Finding::new(found, remedy, measured)
 }
 
 fn by_itself(seen: &Watched<()>, nominal: Duration) -> Finding {
     let frames = seen.frames.len();
     let (first, last) = (seen.frames.first(), seen.frames.last());
     let (Some(first), Some(last)) = (first, last.filter(|_| frames > 1)) else {
-        return Finding::fail(
+        return Finding::new(
             format!("{frames} frames of a camera that runs by itself"),
-            "check the camera's cable and that no other program holds it",
+            Some("check the camera's cable and that no other program holds it"),
             json!({ "frames": frames }),
         );
     };
@@ -233,21 +228,14 @@ fn by_itself(seen: &Watched<()>, nominal: Duration) -> Finding {
         "{frames} frames by itself, {lost} lost, one per {:.3} ms",
         period * 1e3
     );
-    if lost > 0 {
-        return Finding::fail(
-            found,
-            "frames are lost: check the camera's cable and the load of the computer",
-            measured,
-        );
-    }
-    if (period / nominal.as_secs_f64() - 1.0).abs() > PERIOD_TOLERANCE {
-        return Finding::fail(
-            found,
-            "the camera does not keep its frame length: set it before the start and not again",
-            measured,
-        );
-    }
-    Finding::pass(found, measured)
+    let remedy = if lost > 0 {
+        Some("frames are lost: check the camera's cable and the load of the computer")
+    } else if (period / nominal.as_secs_f64() - 1.0).abs() > PERIOD_TOLERANCE {
+        Some("the camera does not keep its frame length: set it before the start and not again")
+    } else {
+        None
+    };
+    Finding::new(found, remedy, measured)
 }
 
 /// The time from a flip to its light, from the brightness of the frames around many flips.
@@ -255,9 +243,9 @@ pub(super) fn delay(head: &mut DynHead, lit: &Lit) -> Result<Finding, Error> {
     let believed = head.timing().flip_to_light.as_secs_f64();
     let refresh = head.refresh().as_secs_f64();
     let Some(measured) = Delay::measure(head, lit, 1)? else {
-        return Ok(Finding::fail(
+        return Ok(Finding::new(
             "no light follows the flips from black to white",
-            "check the projector's input: it may show another source",
+            Some("check the projector's input: it may show another source"),
             json!({ "calibrated_ms": believed * 1e3 }),
         ));
     };
@@ -272,13 +260,11 @@ pub(super) fn delay(head: &mut DynHead, lit: &Lit) -> Result<Finding, Error> {
         delay * 1e3,
         believed * 1e3
     );
-    // The calibration measures it with more flips, so a difference below an eighth of a refresh is no error of its.
-    if (delay - believed).abs() > (off_ms * 1e-3).max(refresh / 8.0) {
-        let remedy = format!(
-            "the calibration is off by {:.1} refreshes: switch off the projector's picture processing, or calibrate anew",
-            (delay - believed) / refresh
-        );
-        return Ok(Finding::fail(found, remedy, numbers));
-    }
-    Ok(Finding::pass(found, numbers))
+    // The calibration measures the delay with more flips, so a difference below an eighth of a refresh does not show an error of it.
+    let wrong = (delay - believed).abs() > (off_ms * 1e-3).max(refresh / 8.0);
+    let remedy = format!(
+        "the calibration is off by {:.1} refreshes: switch off the projector's picture processing, or calibrate anew",
+        (delay - believed) / refresh
+    );
+    Ok(Finding::new(found, wrong.then_some(&*remedy), numbers))
 }

@@ -1,4 +1,4 @@
-//! Sessions: random tokens that a browser keeps in a cookie, and of which the device keeps only the hashes.
+//! Sessions: random tokens that a browser keeps in a cookie; the device keeps only their hashes.
 
 use sha2::{Digest, Sha256};
 use std::time::{Duration, Instant};

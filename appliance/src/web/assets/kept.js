@@ -39,7 +39,7 @@ function facts({ result, flags }, boot) {
     ["Token", result.token ? String(result.token) : "none"],
     ["Trigger to result", milliseconds(result.total_us)],
     ["Points", points],
-    ["Coverage of the regions", coverage],
+    ["Regions resolved", coverage],
     ["Height noise (1 σ)", noise],
     ["Pattern fitness", fitness],
     ["Stages", result.stages.map((stage) => `${nameOf(stage)} ${milliseconds(stage.us)}`).join(" · ") || "–"],

@@ -67,7 +67,7 @@ async fn a_boundary_value_in_an_edit_is_refused_by_its_key_or_the_recipe_judges_
                 }
                 400 | 409 | 413 | 422 => {
                     assert!(stored == bed.bytes, "{place} = {value} was stored");
-                    // That somebody else changed it is about its fingerprint.
+                    // A recipe that was changed meanwhile is refused for its fingerprint.
                     let about = if answer.status == 409 {
                         " (fingerprint)"
                     } else {
