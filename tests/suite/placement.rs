@@ -176,8 +176,8 @@ fn cycle(bed: &mut Bed, file: &RecipeFile, arrays: &Arrays) -> (Vec<f32>, f64) {
     let mut keep = |_, frame| frames.push(frame);
     bed.head.acquire(&indices, TIMEOUT, &mut keep).unwrap();
     let inspection = plan.inspect(0, &frames, Instant::now());
-    let maps = plan.heights(0, &frames).unwrap();
-    (maps.height_mm, inspection.gauges[0].value.unwrap())
+    let heights = plan.heights(0, &frames).unwrap();
+    (heights, inspection.gauges[0].value.unwrap())
 }
 
 #[test]

@@ -162,13 +162,13 @@ pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]
         .needs_map()
         .then(|| plan.golden_phase());
     let phases = decode(decoder, &views, map, window).unwrap();
-    let mut sigma = vec![f32::NAN; heights.height_mm.len()];
+    let mut sigma = vec![f32::NAN; heights.len()];
     let (mut gross, mut compared) = (0, 0);
-    for (at, &mm) in heights.height_mm.iter().enumerate() {
+    for (at, &mm) in heights.iter().enumerate() {
         if mm.is_nan() {
             continue;
         }
-        let (u, v) = ((at % heights.width) as f64, (at / heights.width) as f64);
+        let (u, v) = ((at % phases.width) as f64, (at / phases.width) as f64);
         let phase = phases.phase[at].turns();
         let exact = production
             .triangulator()
@@ -184,9 +184,8 @@ pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]
         "{name}: heights off the exact ones, of {compared}"
     );
     let measured = HeightMap {
-        width: heights.width,
+        width: phases.width,
         height: heights
-            .height_mm
             .iter()
             .map(|&mm| Height::from_mm(f64::from(mm)))
             .collect(),

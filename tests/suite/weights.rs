@@ -58,7 +58,8 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
     let found = production.inspect(&views, &mut strips, None).unwrap();
     let motion = found.placed.unwrap().motion;
     let heights = plan.heights(0, frames).unwrap();
-    let (width, triangulator) = (heights.width, production.triangulator());
+    let width = recipe.conditions.camera.0 as usize;
+    let triangulator = production.triangulator();
     let arrays = &recipe.arrays;
     // z minus the deviation, and the weight.
     let brought = |at: usize, z: f64| {
@@ -84,13 +85,12 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
     let measured = HeightMap {
         width,
         height: heights
-            .height_mm
             .iter()
             .map(|&mm| Height::from_mm(f64::from(mm)))
             .collect(),
-        sigma: vec![f32::NAN; heights.height_mm.len()],
+        sigma: vec![f32::NAN; heights.len()],
     };
-    let heights = heights.height_mm.iter().map(|&mm| f64::from(mm));
+    let heights = heights.iter().map(|&mm| f64::from(mm));
     let golden = heights.enumerate().map(|(at, z)| {
         let golden = z.is_finite().then(|| brought(at, z)).flatten();
         golden.unwrap_or((Height::UNKNOWN, Weight::NONE))

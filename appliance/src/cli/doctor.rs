@@ -39,13 +39,20 @@ impl Doctor {
             ));
         }
         let progress = options.output.progress();
-        let told = |share: f64| progress.tell(0.5 * share, "working out the light of the scene");
+        let on_progress =
+            |share: f64| progress.tell(0.5 * share, "working out the light of the scene");
         let pool = options.threads.pool(config.threads)?;
-        let mut opened = pool.install(|| backend::open_as_it_is(&config.head, &told))?;
+        let mut opened = pool.install(|| backend::open_as_it_is(&config.head, &on_progress))?;
         let calibrated = opened.problem.is_none();
-        let told = |share: f64, name: &str| progress.tell(0.5 + 0.5 * share, name);
-        let checks =
-            pool.install(|| examine(&mut opened.head, &opened.calibration, calibrated, &told));
+        let on_progress = |share: f64, name: &str| progress.tell(0.5 + 0.5 * share, name);
+        let checks = pool.install(|| {
+            examine(
+                &mut opened.head,
+                &opened.calibration,
+                calibrated,
+                &on_progress,
+            )
+        });
         progress.clear();
         let failed: Vec<&str> = failed(&checks).collect();
         let document = || format!("{:#}", as_json(&checks));

@@ -8,10 +8,9 @@ use super::numbers::number;
 use super::options::{Files, Json, Quiet};
 use crate::error::{Exit, Failure};
 use crate::production::backend;
-use crate::recipe::exchange::{ImportError, Listed};
-use crate::recipe::generations::GenerationError;
+use crate::recipe::exchange::Listed;
 use crate::recipe::plan::Plan;
-use crate::recipe::{LoadError, Store};
+use crate::recipe::{ChangeError, LoadError, Store};
 use crate::station::control::MAX_RECIPE;
 use crate::storage::state::StateFolder;
 use std::path::PathBuf;
@@ -77,7 +76,7 @@ impl RecipeCommand {
             Self::Export { recipe, file } => {
                 let number = recipe.number;
                 let exported = store(&recipe.files)?.export(number, file);
-                exported.map_err(refused)?;
+                exported.map_err(failed)?;
                 let words = || format!("recipe {number} is in {}", file.display());
                 recipe.quiet.say(words);
                 Ok(())
@@ -90,7 +89,7 @@ impl RecipeCommand {
                     let tried = Plan::try_out(recipe, &calibration);
                     tried.map_err(|error| error.to_string())
                 };
-                let imported = store.import(file, fits).map_err(refused)?;
+                let imported = store.import(file, fits).map_err(failed)?;
                 let digits = imported.fingerprint.get(..8).unwrap_or_default();
                 quiet.say(|| {
                     format!(
@@ -104,7 +103,7 @@ impl RecipeCommand {
                 let number = recipe.number;
                 let state = at_rest(&recipe.files, "Delete")?;
                 let deleted = Store::of_state(&state)?.delete(number);
-                deleted.map_err(unchanged)?;
+                deleted.map_err(failed)?;
                 let undo = format!("`fringed recipe undo {number}` brings it back");
                 let words = || format!("recipe {number} is deleted; {undo}");
                 recipe.quiet.say(words);
@@ -113,7 +112,7 @@ impl RecipeCommand {
             Self::Undo(recipe) => {
                 let number = recipe.number;
                 let state = at_rest(&recipe.files, "Undo")?;
-                let file = Store::of_state(&state)?.undo(number).map_err(unchanged)?;
+                let file = Store::of_state(&state)?.undo(number).map_err(failed)?;
                 let digits = file.fingerprint.get(..8).unwrap_or_default();
                 recipe.quiet.say(|| {
                     format!(
@@ -142,23 +141,13 @@ fn at_rest(files: &Files, button: &str) -> Result<StateFolder, Failure> {
     StateFolder::open_unless_used(&files.state_folder()?, Exit::Unavailable, &instead)
 }
 
-fn unchanged(error: GenerationError) -> Failure {
+fn failed(error: ChangeError) -> Failure {
     let exit = match &error {
-        GenerationError::Load(LoadError::Unknown(_)) | GenerationError::Nothing(_) => Exit::Missing,
-        GenerationError::Load(LoadError::Corrupt { .. }) | GenerationError::Unfit { .. } => {
-            Exit::Content
-        }
-        GenerationError::Write { .. } => Exit::CannotCreate,
-    };
-    Failure::new(exit, error.to_string())
-}
-
-fn refused(error: ImportError) -> Failure {
-    let exit = match &error {
-        ImportError::Load(LoadError::Unknown(_)) => Exit::Missing,
-        ImportError::Load(LoadError::Corrupt { .. }) | ImportError::Refused { .. } => Exit::Content,
-        ImportError::Missing { .. } => Exit::Missing,
-        ImportError::Write { .. } => Exit::CannotCreate,
+        ChangeError::Load(LoadError::Unknown(_))
+        | ChangeError::Nothing(_)
+        | ChangeError::Missing { .. } => Exit::Missing,
+        ChangeError::Load(LoadError::Corrupt { .. }) | ChangeError::Unfit(_) => Exit::Content,
+        ChangeError::Write { .. } => Exit::CannotCreate,
     };
     Failure::new(exit, error.to_string())
 }

@@ -49,9 +49,10 @@ impl Record {
     pub fn run(&self) -> Result<(), Failure> {
         let config = self.files.configuration()?;
         let progress = self.quiet.progress();
-        let told = |share: f64| progress.tell(0.8 * share, "working out the light of the scene");
+        let on_progress =
+            |share: f64| progress.tell(0.8 * share, "working out the light of the scene");
         let pool = self.threads.pool(config.threads)?;
-        let mut opened = pool.install(|| backend::open(&self.files.head(&config), &told))?;
+        let mut opened = pool.install(|| backend::open(&self.files.head(&config), &on_progress))?;
         opened.calibrated()?;
         let taken = self.take(&mut opened, &|share| {
             progress.tell(0.8 + 0.2 * share, "recording")
@@ -66,7 +67,7 @@ impl Record {
         Ok(())
     }
 
-    fn take(&self, opened: &mut Opened, told: &dyn Fn(f64)) -> Result<Recording, Failure> {
+    fn take(&self, opened: &mut Opened, on_progress: &dyn Fn(f64)) -> Result<Recording, Failure> {
         let Opened {
             head,
             calibration,
@@ -80,7 +81,8 @@ impl Record {
         let (levels, steps) = (usize::from(self.levels), usize::from(self.steps));
         let shots = Sequence::geometric(function.range(), levels, steps);
         let device = |error: hal::error::Error| Failure::new(Exit::Unavailable, error.to_string());
-        let taken = take(head, calibration, &function, &shots, TIMEOUT, told).map_err(device)?;
+        let taken =
+            take(head, calibration, &function, &shots, TIMEOUT, on_progress).map_err(device)?;
         let recorded = shots.into_iter().zip(taken);
         let truth = stage.as_ref().map(sim::Stage::truth);
         Ok(Recording {

@@ -90,12 +90,12 @@ async fn serve(daemon: &Daemon, notify: &Notify, progress: &Progress) {
     ));
     notify.ready();
     let mut snapshots = daemon.station.subscribe();
-    let mut said = String::new();
+    let mut reported = String::new();
     loop {
         let words = status_line(&snapshots.borrow_and_update());
-        if words != said {
+        if words != reported {
             notify.status(&words);
-            said = words;
+            reported = words;
         }
         // Fails only after the daemon, which holds the sender, is gone.
         if snapshots.changed().await.is_err() {

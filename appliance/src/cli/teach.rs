@@ -210,16 +210,16 @@ impl Teach {
     ) -> Result<Taught, Failure> {
         let options = &self.measuring;
         let progress = options.output.progress();
-        let told = |share: f64| progress.tell(share, "working out the light of the scene");
-        let opened = pool.install(|| backend::open(&options.files.head(config), &told))?;
+        let on_progress = |share: f64| progress.tell(share, "working out the light of the scene");
+        let opened = pool.install(|| backend::open(&options.files.head(config), &on_progress))?;
         opened.calibrated()?;
         let Opened {
             mut head,
             calibration,
             ..
         } = opened;
-        let told = |share: f64, words: &str| progress.tell(share, words);
-        let taught = pool.install(|| teach(&mut head, &calibration, naming, TIMEOUT, &told));
+        let on_progress = |share: f64, words: &str| progress.tell(share, words);
+        let taught = pool.install(|| teach(&mut head, &calibration, naming, TIMEOUT, &on_progress));
         progress.clear();
         taught.map_err(|error| {
             let exit = match error {

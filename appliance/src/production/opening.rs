@@ -31,24 +31,27 @@ pub struct Opening<'a> {
 }
 
 impl Opening<'_> {
-    /// Opens the head; returns it with the event that tells the station that it can work. `heard` gets the outcome of the first
+    /// Opens the head; returns it with the event that tells the station that it can work. `outcome` gets the outcome of the first
     /// attempt for the caller of the start: where parts are placed in front of a simulated head, or `None` as long as the head is
     /// waited for. Returns `None` if the head cannot be opened or the daemon ends.
     pub fn run(
         &self,
         orders: &Receiver<Order>,
-        heard: &Sender<Result<Option<Stage>, Failure>>,
+        outcome: &Sender<Result<Option<Stage>, Failure>>,
     ) -> Option<(Opened, Event)> {
-        let told = |share: f64| {
+        let on_progress = |share: f64| {
             self.pulse.beat();
             self.progress
                 .tell(share, "working out the light of the scene");
         };
         let mut pause = Pause::default();
-        let mut said = String::new();
+        let mut reported = String::new();
         loop {
             self.pulse.beat();
-            let open = || self.pool.install(|| backend::open(self.config, &told));
+            let open = || {
+                self.pool
+                    .install(|| backend::open(self.config, &on_progress))
+            };
             let opened = match self.config.backend {
                 Backend::Sim => self.computing.on(open),
                 Backend::Replay | Backend::Rpi => open(),
@@ -56,8 +59,8 @@ impl Opening<'_> {
             match opened {
                 Ok(head) => {
                     // The receiver is gone if the start was given up.
-                    drop(heard.send(Ok(head.stage.clone())));
-                    let event = match said.is_empty() {
+                    drop(outcome.send(Ok(head.stage.clone())));
+                    let event = match reported.is_empty() {
                         true => Event::Started,
                         false => Event::Recovered { recipe: None },
                     };
@@ -65,16 +68,17 @@ impl Opening<'_> {
                 }
                 // Once it is waited for, errors of its files are waited out as well.
                 Err(failure)
-                    if self.patient && (failure.exit == Exit::Unavailable || !said.is_empty()) =>
+                    if self.patient
+                        && (failure.exit == Exit::Unavailable || !reported.is_empty()) =>
                 {
-                    if failure.message != said {
+                    if failure.message != reported {
                         self.lost(&failure);
-                        said = failure.message;
+                        reported = failure.message;
                     }
-                    drop(heard.send(Ok(None)));
+                    drop(outcome.send(Ok(None)));
                 }
                 Err(failure) => {
-                    drop(heard.send(Err(failure)));
+                    drop(outcome.send(Err(failure)));
                     return None;
                 }
             }

@@ -45,7 +45,7 @@ impl Worker {
         });
         let before = self.opened.calibration.fingerprint();
         let mut pause = Pause::default();
-        let mut said = String::new();
+        let mut reported = String::new();
         loop {
             pause.wait(orders, &self.station, &self.pulse)?;
             let problem = match self.opened.reopen(&self.config) {
@@ -62,10 +62,10 @@ impl Worker {
                     }
                 }
             };
-            if problem != said {
+            if problem != reported {
                 self.progress
                     .warn(&format!("the head cannot be opened yet: {problem}"));
-                said = problem;
+                reported = problem;
             }
         }
         let recipe = plan.as_deref().map(active);

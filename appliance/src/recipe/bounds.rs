@@ -55,11 +55,12 @@ impl RecipeFile {
             within("pattern.fringes", fringes, 1e-3, MAX_FRINGES)?;
         }
         length("sequences", self.sequences.len(), 1, MAX_SEQUENCES)?;
-        for (at, sequence) in self.sequences.iter().enumerate() {
-            sequence
-                .check_bounds()
-                .map_err(|error| format!("sequences[{at}].{error}"))?;
-        }
+        each(
+            "sequences",
+            ".",
+            &self.sequences,
+            SequenceFile::check_bounds,
+        )?;
         within("production", self.production, 0, self.sequences.len() - 1)?;
         let tolerance = self.placement_tolerance_mm;
         within("placement_tolerance_mm", tolerance, 0.0, MAX_TOLERANCE_MM)?;
@@ -75,18 +76,12 @@ impl RecipeFile {
         within("expansion_range_turns", range, 1e-3, MAX_FRINGES)?;
         within("min_coverage", self.min_coverage, 0.0, 1.0)?;
         length("regions", self.regions.len(), 0, MAX_REGIONS)?;
-        for (at, region) in self.regions.iter().enumerate() {
-            region
-                .check_bounds()
-                .map_err(|error| format!("regions[{at}].{error}"))?;
-        }
+        each("regions", ".", &self.regions, RegionFile::check_bounds)?;
         length("gauges", self.gauges.len(), 1, MAX_GAUGES)?;
         let largest = camera.width.max(camera.height) as usize;
-        for (at, gauge) in self.gauges.iter().enumerate() {
-            gauge
-                .check_bounds(largest)
-                .map_err(|error| format!("gauges[{at}]: {error}"))?;
-        }
+        each("gauges", ": ", &self.gauges, |gauge| {
+            gauge.check_bounds(largest)
+        })?;
         let comparison = self.comparison.iter();
         for (which, quality) in
             comparison.flat_map(|both| [("fixed", &both.fixed), ("adaptive", &both.adaptive)])
@@ -112,15 +107,27 @@ impl RecipeFile {
     }
 }
 
+/// Checks each element of the list `name`; an error begins with the element's place and `separator`.
+fn each<T>(
+    name: &str,
+    separator: &str,
+    list: &[T],
+    check: impl Fn(&T) -> Result<(), String>,
+) -> Result<(), String> {
+    let mut places = list.iter().enumerate();
+    places.try_for_each(|(at, element)| {
+        check(element).map_err(|error| format!("{name}[{at}]{separator}{error}"))
+    })
+}
+
 impl SequenceFile {
     fn check_bounds(&self) -> Result<(), String> {
         length("frames", self.frames.len(), 3, MAX_FRAMES)?;
         let [low, high] = RATIOS;
-        for (at, &Shot { ratio, shift }) in self.frames.iter().enumerate() {
-            within("ratio", ratio, low, high)
-                .and_then(|()| within("shift", shift, -MAX_SHIFT_TURNS, MAX_SHIFT_TURNS))
-                .map_err(|error| format!("frames[{at}]: {error}"))?;
-        }
+        each("frames", ": ", &self.frames, |&Shot { ratio, shift }| {
+            within("ratio", ratio, low, high)?;
+            within("shift", shift, -MAX_SHIFT_TURNS, MAX_SHIFT_TURNS)
+        })?;
         within("sigma_mm", self.sigma_mm, 0.0, MAX_SIGMA_MM)?;
         within("safe_share", self.safe_share, 0.0, 1.0)?;
         Sequence::from_frames(&self.frames)

@@ -1,7 +1,7 @@
 //! Lists, exports and imports stored recipes. A file is imported only if it is whole and can be used on this head.
 
 use super::archive::{self, ArchiveError};
-use super::store::{LoadError, Store, is_sound};
+use super::store::{ChangeError, LoadError, Store, is_sound, write};
 use super::{Recipe, RecipeFile, RecipeId, SequenceKind};
 use crate::storage::folder::copy_whole;
 use serde::Serialize;
@@ -40,38 +40,6 @@ pub struct Listed {
     pub problem: Option<String>,
 }
 
-/// An import or export that failed.
-#[derive(Debug, thiserror::Error)]
-pub enum ImportError {
-    /// It is not in the store, or damaged there.
-    #[error(transparent)]
-    Load(#[from] LoadError),
-    /// The file is not a usable recipe.
-    #[error("import {path}: {reason}", path = path.display())]
-    Refused {
-        /// The file.
-        path: PathBuf,
-        /// Why, with the remedy.
-        reason: String,
-    },
-    /// The file cannot be read.
-    #[error("import {path}: {source}: name a recipe file", path = path.display())]
-    Missing {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// The target cannot be written.
-    #[error("write {path}: {source}: free space or name another place", path = path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-}
-
 impl Store {
     /// All stored recipes by their manifests. Fingerprints are not checked here but when a recipe is loaded.
     pub fn list(&self) -> Vec<Listed> {
@@ -107,12 +75,8 @@ impl Store {
     ///
     /// # Errors
     /// If there is no such recipe, no generation is sound, or the file cannot be written.
-    pub fn export(&self, number: u16, target: &Path) -> Result<(), ImportError> {
-        let failed = |source| ImportError::Write {
-            path: target.to_path_buf(),
-            source,
-        };
-        copy_whole(&self.whole(number)?, target).map_err(failed)
+    pub fn export(&self, number: u16, target: &Path) -> Result<(), ChangeError> {
+        copy_whole(&self.whole(number)?, target).map_err(write(target))
     }
 
     /// The file of the newest sound generation: its content agrees with its fingerprint.
@@ -142,20 +106,13 @@ impl Store {
         &self,
         source: &Path,
         fits: impl FnOnce(Recipe) -> Result<(), String>,
-    ) -> Result<RecipeId, ImportError> {
-        let refused = |reason: String| ImportError::Refused {
-            path: source.to_path_buf(),
-            reason,
-        };
-        let missing = |error| ImportError::Missing {
+    ) -> Result<RecipeId, ChangeError> {
+        let refused = |reason| ChangeError::Unfit(format!("import {}: {reason}", source.display()));
+        let missing = |error| ChangeError::Missing {
             path: source.to_path_buf(),
             source: error,
         };
         // Copied first, so that what is stored is what was checked, even if the source changes meanwhile.
-        let write = |path: &Path| {
-            let path = path.to_path_buf();
-            move |source| ImportError::Write { path, source }
-        };
         let _alone = self.lock().map_err(write(&self.folder))?;
         let opened = File::open(source).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (size, mut opened) = opened.map_err(missing)?;

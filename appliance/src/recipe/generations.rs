@@ -5,40 +5,11 @@
 
 use super::RecipeFile;
 use super::gauge::check_limits;
-use super::store::{LoadError, Store, is_sound, manifest_at};
+use super::store::{ChangeError, LoadError, Store, is_sound, manifest_at, write};
 use crate::storage::folder::{name_also, rename_whole, sync_folder_of};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-
-/// An undo or a deletion that failed; the recipes are unchanged.
-#[derive(Debug, thiserror::Error)]
-pub enum GenerationError {
-    /// There is no such recipe.
-    #[error(transparent)]
-    Load(#[from] LoadError),
-    /// There is no generation to restore.
-    #[error(
-        "undo recipe {0}: no generation before it is stored, and it was not deleted: teach or import it"
-    )]
-    Nothing(u16),
-    /// The generation before cannot be used.
-    #[error("undo recipe {number}: the generation before it {reason}")]
-    Unfit {
-        /// The recipe.
-        number: u16,
-        /// Why, with the remedy.
-        reason: String,
-    },
-    /// A file cannot be renamed or removed.
-    #[error("write {path}: {source}: free space", path = path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-}
 
 impl Store {
     pub(super) fn previous(&self, number: u16) -> PathBuf {
@@ -99,20 +70,20 @@ impl Store {
     /// # Errors
     /// If there is nothing to restore, it is damaged or made for another calibration than the newest generation, or the files
     /// cannot be renamed.
-    pub fn undo(&self, number: u16) -> Result<RecipeFile, GenerationError> {
+    pub fn undo(&self, number: u16) -> Result<RecipeFile, ChangeError> {
         let _alone = self.lock().map_err(write(&self.folder))?;
-        let before = self
-            .before(number)
-            .ok_or(GenerationError::Nothing(number))?;
-        let unfit = |reason| GenerationError::Unfit { number, reason };
+        let before = self.before(number).ok_or(ChangeError::Nothing(number))?;
+        let unfit = |reason| {
+            let words = format!("undo recipe {number}: the generation before it {reason}");
+            ChangeError::Unfit(words)
+        };
         let restored = read(&before, number).map_err(unfit)?;
         let (path, previous, kept) = (self.path(number), self.previous(number), self.kept(number));
         if let Some(newest) = manifest_at(&path)
             && newest.calibration != restored.calibration
         {
-            return Err(unfit(
-                "was made for another calibration: teach it again".into(),
-            ));
+            let reason = "was made for another calibration: teach it again";
+            return Err(unfit(reason.into()));
         }
         let rename = |from: &Path, to: &Path| rename_whole(from, to).map_err(write(to));
         if !path.exists() {
@@ -133,7 +104,7 @@ impl Store {
     ///
     /// # Errors
     /// If there is no such recipe or its files cannot be renamed or removed.
-    pub fn delete(&self, number: u16) -> Result<(), GenerationError> {
+    pub fn delete(&self, number: u16) -> Result<(), ChangeError> {
         let _alone = self.lock().map_err(write(&self.folder))?;
         let (path, previous, kept) = (self.path(number), self.previous(number), self.kept(number));
         let whole = self.whole(number);
@@ -157,14 +128,6 @@ impl Store {
             }
         }
         sync_folder_of(&path).map_err(write(&path))
-    }
-}
-
-fn write(path: &Path) -> impl Fn(io::Error) -> GenerationError {
-    let path = path.to_path_buf();
-    move |source| GenerationError::Write {
-        path: path.clone(),
-        source,
     }
 }
 
@@ -298,7 +261,7 @@ mod tests {
         assert_eq!(place.before().unwrap(), "second");
         assert!(matches!(
             place.store.delete(7),
-            Err(GenerationError::Load(LoadError::Unknown(_)))
+            Err(ChangeError::Load(LoadError::Unknown(_)))
         ));
         assert_eq!(place.store.undo(7).unwrap().name, "second");
         assert_eq!(place.newest(), "second");
@@ -341,7 +304,7 @@ mod tests {
     fn without_a_generation_before_or_for_another_calibration_nothing_is_undone() {
         let place = Place::with(&["first"]);
         let refused = place.store.undo(7).unwrap_err();
-        assert!(matches!(refused, GenerationError::Nothing(7)), "{refused}");
+        assert!(matches!(refused, ChangeError::Nothing(7)), "{refused}");
         place
             .store
             .save(7, &packed(7, "second", "another"))

@@ -33,4 +33,4 @@ pub use file::{
     AlignmentKind, AxisFile, ComponentFile, GaugeFile, GaugeKind, PatternFile, RecipeFile,
     RegionFile, SequenceFile, SequenceKind, safe,
 };
-pub use store::{LoadError, Store};
+pub use store::{ChangeError, LoadError, Store};

@@ -31,6 +31,47 @@ pub enum LoadError {
     },
 }
 
+/// A change to the stored recipes, an import or an export that failed; the recipes are unchanged.
+#[derive(Debug, thiserror::Error)]
+pub enum ChangeError {
+    /// There is no such recipe, or it is damaged.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// There is no generation to restore.
+    #[error(
+        "undo recipe {0}: no generation before it is stored, and it was not deleted: teach or import it"
+    )]
+    Nothing(u16),
+    /// The recipe that is imported or restored cannot be used: why, with the remedy.
+    #[error("{0}")]
+    Unfit(String),
+    /// The file that is imported cannot be read.
+    #[error("import {path}: {source}: name a recipe file", path = path.display())]
+    Missing {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A file cannot be written, renamed or removed.
+    #[error("write {path}: {source}: free space or name another place", path = path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+/// The failure to write a file.
+pub(super) fn write(path: &Path) -> impl Fn(io::Error) -> ChangeError {
+    let path = path.to_path_buf();
+    move |source| ChangeError::Write {
+        path: path.clone(),
+        source,
+    }
+}
+
 /// Identifies the content of a stored recipe's file without reading all of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stamp {

@@ -13,10 +13,9 @@ use super::orders::{self, Reload};
 use super::problem::Problem;
 use super::site::Site;
 use crate::recipe::edit::{self, Edit, EditError};
-use crate::recipe::generations::GenerationError;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::store::Loaded;
-use crate::recipe::{LoadError, Recipe, RecipeFile, RecipeId, Store};
+use crate::recipe::{ChangeError, LoadError, Recipe, RecipeFile, RecipeId, Store};
 
 impl From<LoadError> for Problem {
     fn from(error: LoadError) -> Self {
@@ -39,14 +38,14 @@ impl From<EditError> for Problem {
     }
 }
 
-impl From<GenerationError> for Problem {
-    fn from(error: GenerationError) -> Self {
+impl From<ChangeError> for Problem {
+    fn from(error: ChangeError) -> Self {
         let words = error.to_string();
         match error {
-            GenerationError::Load(error) => error.into(),
-            GenerationError::Nothing(_) => Self::missing(words),
-            GenerationError::Unfit { .. } => Self::unfit(words),
-            GenerationError::Write { .. } => Self::broken(words),
+            ChangeError::Load(error) => error.into(),
+            ChangeError::Nothing(_) | ChangeError::Missing { .. } => Self::missing(words),
+            ChangeError::Unfit(_) => Self::unfit(words),
+            ChangeError::Write { .. } => Self::broken(words),
         }
     }
 }

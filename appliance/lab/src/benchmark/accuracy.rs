@@ -123,11 +123,11 @@ impl Study {
                 };
                 let mut runner = Runner::new(&scene, OpticsKind::Ideal).map_err(words)?;
                 for compared in &SEQUENCES {
-                    let told = format!(
+                    let words = format!(
                         "{part}, {bit_depth} bit, {} {}x{}",
                         compared.name, compared.levels, compared.shifts
                     );
-                    progress(done / total, &told);
+                    progress(done / total, &words);
                     points.extend(self.compare(
                         &mut runner,
                         compared,

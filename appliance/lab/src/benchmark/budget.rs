@@ -73,8 +73,9 @@ pub fn budgets(
         taught_at_unix_s: 0,
         placement_tolerance_mm: PLACEMENT_MM,
     };
-    let told = |share: f64, words: &str| progress(0.3 + 0.4 * share, &format!("{about}: {words}"));
-    let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &told).map_err(words)?;
+    let on_progress =
+        |share: f64, words: &str| progress(0.3 + 0.4 * share, &format!("{about}: {words}"));
+    let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &on_progress).map_err(words)?;
     let sequences = &taught.file.sequences;
     let full = sequences.len().saturating_sub(1);
     let four = sequences

@@ -16,11 +16,11 @@ pub struct Machine {
 impl Machine {
     /// This one.
     pub fn this() -> Self {
-        let told = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let cpuinfo = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let board = fs::read_to_string("/proc/device-tree/model").unwrap_or_default();
         let board = board.trim_end_matches('\0').trim();
         let processor = if board.is_empty() {
-            model(&told).unwrap_or(std::env::consts::ARCH)
+            model(&cpuinfo).unwrap_or(std::env::consts::ARCH)
         } else {
             board
         };
@@ -33,8 +33,10 @@ impl Machine {
 }
 
 /// The processor's name in `/proc/cpuinfo`; on ARM only the board has one.
-fn model(told: &str) -> Option<&str> {
-    let line = told.lines().find(|line| line.starts_with("model name"))?;
+fn model(cpuinfo: &str) -> Option<&str> {
+    let line = cpuinfo
+        .lines()
+        .find(|line| line.starts_with("model name"))?;
     line.split(':').nth(1).map(str::trim)
 }
 
@@ -44,8 +46,8 @@ mod tests {
 
     #[test]
     fn the_processors_name_is_found() {
-        let told = "processor\t: 0\nmodel name\t: Some CPU @ 2 GHz\nflags\t: a b\n";
-        assert_eq!(model(told), Some("Some CPU @ 2 GHz"));
+        let cpuinfo = "processor\t: 0\nmodel name\t: Some CPU @ 2 GHz\nflags\t: a b\n";
+        assert_eq!(model(cpuinfo), Some("Some CPU @ 2 GHz"));
         assert_eq!(model("processor : 0\nBogoMIPS : 108"), None);
         assert!(Machine::this().cores > 0);
     }

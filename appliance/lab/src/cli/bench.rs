@@ -56,8 +56,8 @@ impl Bench {
         let folder = self.out.as_deref().map(OutputFolder::create);
         let folder = folder.transpose()?;
         let progress = self.output.progress();
-        let told = |share: f64, words: &str| progress.tell(share, words);
-        let report = self.measure(&told);
+        let on_progress = |share: f64, words: &str| progress.tell(share, words);
+        let report = self.measure(&on_progress);
         progress.clear();
         let report = report?;
         let json = format!("{:#}\n", report.json());
@@ -76,7 +76,7 @@ impl Bench {
         Ok(())
     }
 
-    fn measure(&self, told: &(dyn Fn(f64, &str) + Sync)) -> Result<Report, Failure> {
+    fn measure(&self, on_progress: &(dyn Fn(f64, &str) + Sync)) -> Result<Report, Failure> {
         let software =
             |what: &'static str| move |error: String| Failure::because(Exit::Software, what, error);
         let wanted = |what| self.what.is_none_or(|asked| asked == what);
@@ -88,7 +88,7 @@ impl Bench {
             budget: None,
         };
         if wanted(What::Kernel) {
-            let table = benchmark::kernel_table(&self.effort(), told);
+            let table = benchmark::kernel_table(&self.effort(), on_progress);
             report.kernel = Some(table.map_err(software("time the kernels"))?);
         }
         if wanted(What::Accuracy) {
@@ -97,7 +97,7 @@ impl Bench {
             } else {
                 Study::full()
             };
-            let points = pool.install(|| study.run(told));
+            let points = pool.install(|| study.run(on_progress));
             report.accuracy = Some(points.map_err(software("measure run time against error"))?);
         }
         if wanted(What::Budget) {
@@ -108,7 +108,7 @@ impl Bench {
             };
             let effort = self.effort();
             let budgets = pool.install(|| {
-                let each = |&camera| benchmark::budgets(camera, &effort, told);
+                let each = |&camera| benchmark::budgets(camera, &effort, on_progress);
                 cameras.iter().map(each).collect::<Result<Vec<_>, _>>()
             });
             let budgets = budgets.map_err(software("measure from trigger to verdict"))?;

@@ -41,8 +41,8 @@ impl Experiment {
         let folder = OutputFolder::create(&self.out)?;
         let pool = self.threads.pool(0)?;
         let progress = self.output.progress();
-        let told = |share: f64, words: &str| progress.tell(share, words);
-        let results = pool.install(|| campaign.run(&told));
+        let on_progress = |share: f64, words: &str| progress.tell(share, words);
+        let results = pool.install(|| campaign.run(&on_progress));
         progress.clear();
         let results = results
             .map_err(|error| Failure::because(Exit::Software, "run the experiments", error))?;

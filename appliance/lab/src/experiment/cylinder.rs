@@ -3,6 +3,8 @@
 //! Gauss–Newton over the five parameters of a cylinder along y: its axis (x₀ + a y, y, z₀ + c y) and its radius. Outliers are left
 //! out round by round, so that wrong fringe orders do not bias the fit.
 
+use algo::math::solve::solve_symmetric;
+
 /// A fitted cylinder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cylinder {
@@ -65,50 +67,26 @@ fn distance(point: &[f64; 3], shape: &[f64; UNKNOWNS]) -> (f64, [f64; UNKNOWNS])
 
 /// One Gauss–Newton iteration over the points within `cut` of the surface.
 fn iterate(points: &[[f64; 3]], shape: [f64; UNKNOWNS], cut: f64) -> Option<[f64; UNKNOWNS]> {
-    let mut normal = [[0.0; UNKNOWNS + 1]; UNKNOWNS];
+    let mut normal = [0.0; UNKNOWNS * UNKNOWNS];
+    let mut right = [0.0; UNKNOWNS];
     for point in points {
         let (error, slopes) = distance(point, &shape);
         if error.abs() > cut {
             continue;
         }
-        for (row, slope) in normal.iter_mut().zip(slopes) {
-            for (sum, other) in row.iter_mut().zip(slopes) {
-                *sum += slope * other;
-            }
-            row[UNKNOWNS] -= slope * error;
+        for (at, sum) in normal.iter_mut().enumerate() {
+            *sum += slopes[at / UNKNOWNS] * slopes[at % UNKNOWNS];
+        }
+        for (sum, slope) in right.iter_mut().zip(slopes) {
+            *sum -= slope * error;
         }
     }
-    let change = solve(normal)?;
+    let change = solve_symmetric(&mut normal, &mut right)?;
     let mut next = shape;
     for (value, change) in next.iter_mut().zip(change) {
         *value += change;
     }
     next.iter().all(|value| value.is_finite()).then_some(next)
-}
-
-/// Solves a small system (rows with the right side last) by elimination with pivoting.
-fn solve(mut rows: [[f64; UNKNOWNS + 1]; UNKNOWNS]) -> Option<[f64; UNKNOWNS]> {
-    for at in 0..UNKNOWNS {
-        let pivot =
-            (at..UNKNOWNS).max_by(|&i, &j| rows[i][at].abs().total_cmp(&rows[j][at].abs()))?;
-        rows.swap(at, pivot);
-        let lead = rows[at];
-        if lead[at].abs() < 1e-9 {
-            return None;
-        }
-        for row in rows.iter_mut().skip(at + 1) {
-            let factor = row[at] / lead[at];
-            for (value, lead) in row.iter_mut().zip(lead) {
-                *value -= factor * lead;
-            }
-        }
-    }
-    let mut found = [0.0; UNKNOWNS];
-    for at in (0..UNKNOWNS).rev() {
-        let known: f64 = (at + 1..UNKNOWNS).map(|i| rows[at][i] * found[i]).sum();
-        found[at] = (rows[at][UNKNOWNS] - known) / rows[at][at];
-    }
-    Some(found)
 }
 
 #[cfg(test)]

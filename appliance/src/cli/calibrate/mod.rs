@@ -83,21 +83,22 @@ impl Calibrate {
         });
         let before = before.map(|loaded| loaded.file);
         let progress = options.output.progress();
-        let told = |share: f64| progress.tell(0.3 * share, "working out the light of the scene");
+        let on_progress =
+            |share: f64| progress.tell(0.3 * share, "working out the light of the scene");
         let pool = options.threads.pool(config.threads)?;
         // Without the stored calibration, which is being replaced.
         let bare = HeadConfig {
             calibration: None,
             ..head
         };
-        let mut opened = pool.install(|| backend::open(&bare, &told))?;
+        let mut opened = pool.install(|| backend::open(&bare, &on_progress))?;
         let basis = self.basis(&opened, before.as_ref())?;
         if basis.plate {
             let stage = opened.stage.clone();
             pool.install(|| lay_plate(stage.as_ref(), &mut notes))?;
         }
-        let told = |share: f64, words: &str| progress.tell(0.3 + 0.7 * share, words);
-        let made = pool.install(|| make(&mut opened.head, basis, &told));
+        let on_progress = |share: f64, words: &str| progress.tell(0.3 + 0.7 * share, words);
+        let made = pool.install(|| make(&mut opened.head, basis, &on_progress));
         progress.clear();
         let mut made = made.map_err(refused)?;
         place.save(&made.bytes, &made.maps).map_err(|error| {

@@ -75,7 +75,7 @@ impl Report<'_> {
             .collect();
         line("contrast", pitches.join(", "));
         if let Some(maps) = &file.reference {
-            let told = |name: &str, map: &MapFile| {
+            let residual = |name: &str, map: &MapFile| {
                 format!(
                     "{name} {:.5} turn (noise {:.4})",
                     map.residual_turns, map.noise_turns
@@ -85,8 +85,8 @@ impl Report<'_> {
                 "plane",
                 format!(
                     "residual {}, {}; the models are off it by {:.3} px",
-                    told("vertical", &maps.vertical),
-                    told("horizontal", &maps.horizontal),
+                    residual("vertical", &maps.vertical),
+                    residual("horizontal", &maps.horizontal),
                     maps.models_off_px
                 ),
             );

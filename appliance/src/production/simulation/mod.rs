@@ -80,7 +80,7 @@ impl Simulation {
         let staged = stage
             .work_out(&placed.part, &placed.placement, &|_| ())
             .map_err(|error| PutError::Unfit(error.to_string()))?;
-        let (done, told) = mpsc::sync_channel(1);
+        let (done, in_place) = mpsc::sync_channel(1);
         let waiting = Arc::new(Mutex::new(Some(staged)));
         let placing = Placing {
             stage: stage.clone(),
@@ -93,13 +93,13 @@ impl Simulation {
             let words = "put the part in place: the measuring task is busy or its head is lost; try again when it is ready";
             Err(PutError::Busy(words.into()))
         };
-        match told.recv_timeout(PATIENCE) {
+        match in_place.recv_timeout(PATIENCE) {
             Ok(()) => Ok(()),
             Err(RecvTimeoutError::Disconnected) => busy(),
             // The part is taken back, unless it is being put in place at this moment.
             Err(RecvTimeoutError::Timeout) => match taken(&waiting) {
                 Some(_) => busy(),
-                None => told.recv().or_else(|_| busy()),
+                None => in_place.recv().or_else(|_| busy()),
             },
         }
     }

@@ -23,10 +23,10 @@ pub struct Layers {
 impl Plan {
     /// The maps of a part from the frames of a sequence; `None` if the frames do not fit.
     pub fn layers(&self, sequence: usize, frames: &[Frame]) -> Option<Layers> {
-        let maps = self.heights(sequence, frames)?;
+        let height_mm = self.heights(sequence, frames)?;
         let production = &self.runs.get(sequence)?.production;
         let golden = &production.cubics().surface().height;
-        let deviation = maps.height_mm.iter().zip(golden).map(|(&here, golden)| {
+        let deviation = height_mm.iter().zip(golden).map(|(&here, golden)| {
             if golden.is_known() {
                 here - golden.mm() as f32
             } else {
@@ -40,8 +40,8 @@ impl Plan {
         let full_scale = decoder.full_scale();
         let counts = phases.modulation.iter();
         Some(Layers {
-            width: maps.width,
-            height_mm: maps.height_mm,
+            width: phases.width,
+            height_mm,
             deviation_mm,
             modulation: counts.map(|b| b.counts(full_scale) as f32).collect(),
         })

@@ -75,15 +75,6 @@ pub enum PlanError {
     },
 }
 
-/// The heights of a part, for the page.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Maps {
-    /// Pixels per row.
-    pub width: usize,
-    /// z in mm, NaN where not resolved.
-    pub height_mm: Vec<f32>,
-}
-
 /// A frame is inspected in this many strips: enough for four threads, with few rows that two strips both need.
 pub const STRIPS: usize = 4;
 /// Heights are planned this many pixels around the taught part at least: a part that is not aligned may be displaced by that.
@@ -350,15 +341,14 @@ impl Plan {
         inspection
     }
 
-    /// The heights of the part from the frames of a sequence, for the page; `None` if the frames do not fit.
-    pub fn heights(&self, sequence: usize, frames: &[Frame]) -> Option<Maps> {
+    /// z in mm of each pixel from the frames of a sequence, for the page, NaN where not resolved; `None` if the frames do not fit.
+    pub fn heights(&self, sequence: usize, frames: &[Frame]) -> Option<Vec<f32>> {
         let (columns, rows, _) = self.conditions.camera;
-        let width = columns as usize;
-        let mut height_mm = vec![f32::NAN; width * rows as usize];
+        let mut height_mm = vec![f32::NAN; columns as usize * rows as usize];
         let mut laps = Laps::since(Instant::now());
         let heights = Some(&mut height_mm[..]);
         self.run(sequence, frames, None, heights, &mut laps).ok()?;
-        Some(Maps { width, height_mm })
+        Some(height_mm)
     }
 
     fn run(
