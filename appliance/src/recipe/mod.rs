@@ -8,7 +8,6 @@
 //!   the deviation; [`replace`] keeps names and gauges of a recipe that is taught again.
 
 pub mod archive;
-pub mod arriving;
 pub mod bounds;
 pub mod check;
 pub mod comparison;
@@ -20,6 +19,7 @@ mod gauge;
 pub mod generations;
 pub mod golden;
 pub mod good_parts;
+pub mod incoming;
 pub mod plan;
 pub mod planner;
 pub mod replace;

@@ -12,7 +12,7 @@ use tokio_stream::StreamExt as _;
 use super::problem::Problem;
 use super::site::Site;
 use crate::error::shortened;
-use crate::recipe::arriving::Arriving;
+use crate::recipe::incoming::Arriving;
 
 /// Largest body in JSON, bytes: 32 regions of 100 corners take a tenth of it.
 const MAX_JSON: usize = 64 << 10;
