@@ -116,13 +116,13 @@ impl Store {
         let _alone = self.lock().map_err(write(&self.folder))?;
         let opened = File::open(source).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (size, mut opened) = opened.map_err(missing)?;
-        let mut arriving = self.arriving(size).map_err(write(&self.folder))?;
-        io::copy(&mut opened, &mut arriving).map_err(write(arriving.path()))?;
-        let recipe = arriving.recipe().map_err(&refused)?;
+        let mut incoming = self.receive(size).map_err(write(&self.folder))?;
+        io::copy(&mut opened, &mut incoming).map_err(write(incoming.path()))?;
+        let recipe = incoming.recipe().map_err(&refused)?;
         let id = recipe.id.clone();
         fits(recipe).map_err(&refused)?;
         let target = self.path(id.number);
-        let taken = self.take_locked(arriving, id.number);
+        let taken = self.take_locked(incoming, id.number);
         taken.map_err(write(&target))?;
         Ok(id)
     }

@@ -18,7 +18,7 @@ const STRETCH: u64 = 1 << 20;
 
 /// A file that is being received.
 #[derive(Debug)]
-pub struct Arriving {
+pub struct Incoming {
     path: PathBuf,
     file: File,
     bytes: u64,
@@ -29,7 +29,7 @@ impl Store {
     ///
     /// # Errors
     /// Errors of the file system, or that the file would leave less free storage than the station needs.
-    pub fn arriving(&self, expected: u64) -> io::Result<Arriving> {
+    pub fn receive(&self, expected: u64) -> io::Result<Incoming> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         loop {
             let count = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -41,9 +41,9 @@ impl Store {
                 opened => {
                     let file = opened?;
                     let bytes = 0;
-                    let arriving = Arriving { path, file, bytes };
-                    arriving.check_room(expected)?;
-                    return Ok(arriving);
+                    let incoming = Incoming { path, file, bytes };
+                    incoming.check_room(expected)?;
+                    return Ok(incoming);
                 }
             }
         }
@@ -53,15 +53,15 @@ impl Store {
     ///
     /// # Errors
     /// Errors of the file system; the stored recipe is then unchanged.
-    pub fn take(&self, arriving: Arriving, number: u16) -> io::Result<()> {
+    pub fn take(&self, incoming: Incoming, number: u16) -> io::Result<()> {
         let _alone = self.lock()?;
-        self.take_locked(arriving, number)
+        self.take_locked(incoming, number)
     }
 
-    pub(super) fn take_locked(&self, arriving: Arriving, number: u16) -> io::Result<()> {
-        arriving.file.sync_all()?;
+    pub(super) fn take_locked(&self, incoming: Incoming, number: u16) -> io::Result<()> {
+        incoming.file.sync_all()?;
         self.keep_previous(number)?;
-        rename_whole(&arriving.path, &self.path(number))
+        rename_whole(&incoming.path, &self.path(number))
     }
 
     /// Removes the temporary files that a kill left behind.
@@ -81,7 +81,7 @@ impl Store {
     }
 }
 
-impl Arriving {
+impl Incoming {
     /// Its temporary path.
     pub fn path(&self) -> &Path {
         &self.path
@@ -111,7 +111,7 @@ impl Arriving {
     }
 }
 
-impl Write for Arriving {
+impl Write for Incoming {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.file.write(bytes)?;
         let before = self.bytes;
@@ -127,7 +127,7 @@ impl Write for Arriving {
     }
 }
 
-impl Drop for Arriving {
+impl Drop for Incoming {
     fn drop(&mut self) {
         // After `take` there is nothing to remove; what cannot be removed now is removed at the next start.
         let _ = fs::remove_file(&self.path);
@@ -143,19 +143,19 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(folder.path()).unwrap();
         let files = || fs::read_dir(folder.path()).unwrap().count();
-        let mut arriving = store.arriving(4).unwrap();
-        arriving.write_all(b"none").unwrap();
-        assert!(arriving.recipe().is_err());
+        let mut incoming = store.receive(4).unwrap();
+        incoming.write_all(b"none").unwrap();
+        assert!(incoming.recipe().is_err());
         assert_eq!((store.numbers(), files()), (Vec::new(), 1));
-        drop(arriving);
+        drop(incoming);
         assert_eq!(files(), 0);
         // A kill leaves it behind.
-        std::mem::forget(store.arriving(0).unwrap());
+        std::mem::forget(store.receive(0).unwrap());
         assert_eq!(files(), 1);
         store.remove_left_behind().unwrap();
-        let mut arriving = store.arriving(4).unwrap();
-        arriving.write_all(b"some").unwrap();
-        store.take(arriving, 7).unwrap();
+        let mut incoming = store.receive(4).unwrap();
+        incoming.write_all(b"some").unwrap();
+        store.take(incoming, 7).unwrap();
         assert_eq!(store.numbers(), [7]);
         // The lock's file beside it.
         assert_eq!(fs::read(store.path(7)).unwrap(), b"some");
@@ -166,7 +166,7 @@ mod tests {
     fn a_file_that_would_fill_the_storage_is_refused_before_it_comes() {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(folder.path()).unwrap();
-        let refused = store.arriving(u64::MAX / 2).unwrap_err();
+        let refused = store.receive(u64::MAX / 2).unwrap_err();
         assert_eq!(refused.kind(), ErrorKind::StorageFull);
         assert!(refused.to_string().contains("MiB are free"), "{refused}");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);

@@ -12,7 +12,7 @@ use tokio_stream::StreamExt as _;
 use super::problem::Problem;
 use super::site::Site;
 use crate::error::shortened;
-use crate::recipe::incoming::Arriving;
+use crate::recipe::incoming::Incoming;
 
 /// Largest body in JSON, bytes: 32 regions of 100 corners take a tenth of it.
 const MAX_JSON: usize = 64 << 10;
@@ -54,7 +54,7 @@ fn parsed<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
 /// A received file, and its place among those that are received at the same time.
 pub struct Upload {
     /// The file.
-    pub file: Arriving,
+    pub file: Incoming,
     _place: OwnedSemaphorePermit,
 }
 
@@ -73,7 +73,7 @@ pub async fn file(site: &Site, body: Body) -> Result<Upload, Problem> {
     let (chunks, mut received) = mpsc::channel::<Bytes>(1);
     let store = site.recipes.clone();
     let storing = tokio::task::spawn_blocking(move || {
-        let mut file = store.arriving(expected)?;
+        let mut file = store.receive(expected)?;
         while let Some(chunk) = received.blocking_recv() {
             file.write_all(&chunk)?;
         }
