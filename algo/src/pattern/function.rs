@@ -208,6 +208,14 @@ impl PhaseFunction {
         }
     }
 
+    /// Φ_P of every pixel in turns, row-major.
+    pub fn turns(&self) -> Vec<f64> {
+        let places = 0..self.columns * self.rows;
+        places
+            .map(|at| self.at_pixel(at % self.columns, at / self.columns))
+            .collect()
+    }
+
     /// Φ_P(ξ, η) in turns, anywhere.
     #[inline]
     pub fn at(&self, xi: f64, eta: f64) -> f64 {

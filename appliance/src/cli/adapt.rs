@@ -7,7 +7,6 @@ use crate::error::{Exit, Failure};
 use crate::measure::adapt::{Choice, Method, adapt};
 use crate::storage::folder::OutputFolder;
 use algo::adaptive::{noise, paper};
-use algo::pattern::PhaseFunction;
 use hal::npy;
 use hal::replay::Recording;
 use std::path::{Path, PathBuf};
@@ -57,7 +56,9 @@ impl Adapt {
         let pool = self.threads.pool(0)?;
         let adapted = pool.install(|| adapt(&recording, &self.recording, &choice))?;
         let folder = OutputFolder::create(self.out.parent().unwrap_or(Path::new("")))?;
-        folder.write(name, &array(&adapted.function))?;
+        let function = &adapted.function;
+        let array = npy::write(function.columns(), &function.turns());
+        folder.write(name, &array)?;
         let json = serde_json::to_string_pretty(&adapted.report)
             .map_err(|error| Failure::because(Exit::Software, "write the report", error))?;
         let text = || {
@@ -92,13 +93,4 @@ impl Adapt {
             },
         })
     }
-}
-
-/// The phase function as a file of rows × columns.
-fn array(function: &PhaseFunction) -> Vec<u8> {
-    let (columns, rows) = (function.columns(), function.rows());
-    let turns: Vec<f64> = (0..columns * rows)
-        .map(|at| function.at_pixel(at % columns, at / columns))
-        .collect();
-    npy::write(columns, &turns)
 }

@@ -247,14 +247,10 @@ fn pattern(plan: &Plan) -> PatternSpec {
         PatternFile::Horizontal { fringes } => PatternSpec::Horizontal { fringes },
         PatternFile::File => {
             let function = plan.production().triangulator().function();
-            let (rows, columns) = (function.rows(), function.columns());
-            let pixels = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
             PatternSpec::File {
-                rows,
-                columns,
-                turns: pixels
-                    .map(|(column, row)| function.at_pixel(column, row))
-                    .collect(),
+                rows: function.rows(),
+                columns: function.columns(),
+                turns: function.turns(),
             }
         }
     }

@@ -114,9 +114,9 @@ impl Known {
 
 /// The largest difference of two phase functions over the pixels of the raster, in turns; `None` if their rasters differ.
 fn difference(a: &PhaseFunction, b: &PhaseFunction) -> Option<f64> {
-    let (columns, rows) = (a.columns(), a.rows());
-    let differences = (0..rows).flat_map(|row| {
-        (0..columns).map(move |column| (a.at_pixel(column, row) - b.at_pixel(column, row)).abs())
-    });
-    ((columns, rows) == (b.columns(), b.rows())).then(|| differences.fold(0.0, f64::max))
+    if (a.columns(), a.rows()) != (b.columns(), b.rows()) {
+        return None;
+    }
+    let pairs = a.turns().into_iter().zip(b.turns());
+    Some(pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
 }

@@ -105,8 +105,8 @@ impl Worker {
         failed
     }
 
-    /// Stores a recipe. `kept` is the one whose gauges it has taken over: if somebody edited that meanwhile, the edit was
-    /// reported as stored, and it must not be lost.
+    /// Stores a recipe. `kept` is the one whose gauges it has taken over. It must still be the stored one: an edit that was stored
+    /// meanwhile must not be lost.
     fn store(&self, taught: &Taught, kept: Option<RecipeFile>) -> Result<(), (u16, String)> {
         for reason in &taught.choice.reasons {
             self.progress.log(reason);

@@ -102,25 +102,17 @@ impl Recipe {
     /// As [`Self::from_bytes`], from a file of `size` bytes that is not read into memory as a whole.
     ///
     /// # Errors
-    /// As there.
+    /// As above.
     pub fn read(source: impl Read + Seek, size: u64) -> Result<Self, RecipeError> {
         let (file, recipe) = Self::read_to_edit(source, size)?;
         check_limits(&file.gauges).map_err(RecipeError::Limits)?;
         Ok(recipe)
     }
 
-    /// As [`Self::from_bytes`], with the manifest.
-    pub(super) fn from_bytes_with_manifest(bytes: &[u8]) -> Result<(RecipeFile, Self), String> {
-        let read = Self::read_to_edit(Cursor::new(bytes), bytes.len() as u64);
-        let (file, recipe) = read.map_err(|error| error.to_string())?;
-        check_limits(&file.gauges)?;
-        Ok((file, recipe))
-    }
-
     /// As [`Self::read`], with the manifest and without checking the limits of gauges: an edit may be about to correct them.
     ///
     /// # Errors
-    /// As there.
+    /// As above.
     pub(super) fn read_to_edit(
         source: impl Read + Seek,
         size: u64,

@@ -16,6 +16,7 @@ use algo::inspect::{eroded, openings};
 use algo::pattern::Shot;
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
+use std::io::Cursor;
 
 /// The golden map is eroded by this many pixels: those at silhouettes mix two surfaces.
 const EROSION_PX: usize = 2;
@@ -155,7 +156,9 @@ impl GoldenPart<'_> {
         let (bytes, _) = archive::pack(&file, &arrays).map_err(|error| error.to_string())?;
         drop(arrays);
         // Read back as after a restart, so that what was taught is known to load.
-        let (file, recipe) = Recipe::from_bytes_with_manifest(&bytes)?;
+        let unpacked = archive::unpack(Cursor::new(&bytes), bytes.len() as u64);
+        let (file, arrays) = unpacked.map_err(|error| error.to_string())?;
+        let recipe = Recipe::check(&file, arrays)?;
         Ok(Taught {
             bytes,
             file,
@@ -199,10 +202,7 @@ impl GoldenPart<'_> {
         };
         Arrays {
             phase_function: match self.pattern {
-                PatternFile::File => (0..function.rows())
-                    .flat_map(|row| (0..function.columns()).map(move |column| (column, row)))
-                    .map(|(column, row)| function.at_pixel(column, row))
-                    .collect(),
+                PatternFile::File => function.turns(),
                 PatternFile::Vertical { .. } | PatternFile::Horizontal { .. } => Vec::new(),
             },
             golden_phase: (0..phases.phase.len()).map(turns).collect(),

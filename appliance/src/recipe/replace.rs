@@ -58,7 +58,7 @@ pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<
 }
 
 /// Gives a recipe that was just taught the regions, gauges, limits and least coverage of the one that it replaces; the
-/// production sequence is chosen anew for those limits.
+/// production sequence is chosen again for those limits.
 ///
 /// # Errors
 /// In words, if they do not fit what was taught.

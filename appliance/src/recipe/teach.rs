@@ -26,7 +26,7 @@ const LEVELS: usize = 3;
 const SHIFTS: usize = 4;
 /// n of the dense levels about the expected map: they unwrap ± (n²/2 − n) = ± 4 turns.
 const DENSE_N: f64 = 4.0;
-/// A scene of which less than this share of the frame is resolved cannot be taught.
+/// A scene cannot be taught if less than this share of the frame is resolved.
 const LEAST_RESOLVED: f64 = 0.005;
 
 /// A part that could not be taught.

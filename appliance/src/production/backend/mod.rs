@@ -134,7 +134,7 @@ impl Opened {
     }
 }
 
-/// Opens the configured head. `progress` is told the share done, from any thread.
+/// Opens the configured head. `progress` is called with the share done, from any thread.
 ///
 /// # Errors
 /// If a file of the head is missing or wrong, or a device is not there.
@@ -154,7 +154,7 @@ pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Open
     Ok(opened)
 }
 
-/// Opens the configured head even if nothing can be measured with it. `progress` is told the share done, from any thread.
+/// Opens the configured head even if nothing can be measured with it. `progress` is called with the share done, from any thread.
 ///
 /// # Errors
 /// If a file of the head is missing or wrong, or a device is not there.
