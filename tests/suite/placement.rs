@@ -7,7 +7,7 @@ use appliance::head::calibration::Calibration;
 use appliance::head::rig::Rig;
 use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::plan::Plan;
-use appliance::recipe::teach::{Naming, Taught, teach};
+use appliance::recipe::teach::{Naming, TaughtRecipe, teach};
 use appliance::recipe::{AlignmentKind, GaugeFile, Recipe, RecipeFile, RegionFile, safe};
 use hal::head::DynHead;
 use sim::parts::{Cone, Plane, Sawtooth, SheetMetal, Sphere, Spline};
@@ -44,7 +44,7 @@ pub(crate) fn scenario(part: Part) -> Scenario {
     scenario
 }
 
-pub(crate) fn taught(bed: &mut Bed) -> Result<Taught, String> {
+pub(crate) fn taught(bed: &mut Bed) -> Result<TaughtRecipe, String> {
     let naming = Naming {
         number: 1,
         part_number: "P".into(),
@@ -64,7 +64,12 @@ pub(crate) fn taught(bed: &mut Bed) -> Result<Taught, String> {
 
 /// Pixels whose phase is more than half a turn off the true one, and all that were compared, for a
 /// sequence about the golden map inside its safe mask.
-fn wrong_orders(bed: &mut Bed, taught: &Taught, shots: &[Shot], reach: f32) -> (usize, usize) {
+fn wrong_orders(
+    bed: &mut Bed,
+    taught: &TaughtRecipe,
+    shots: &[Shot],
+    reach: f32,
+) -> (usize, usize) {
     let arrays = &taught.recipe.arrays;
     let golden = arrays.golden_phase.iter();
     let golden: Vec<_> = golden

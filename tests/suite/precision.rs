@@ -3,7 +3,7 @@
 use super::gauges::{all_kinds, frames, gauge, plan, regions};
 use super::placement::{Bed, TIMEOUT, bed};
 use appliance::recipe::plan::Plan;
-use appliance::recipe::teach::{Naming, Taught, teach};
+use appliance::recipe::teach::{Naming, TaughtRecipe, teach};
 use appliance::recipe::{GaugeKind, RecipeFile, SequenceKind};
 use appliance::station::{Inspection, Verdict};
 use sim::parts::{Defect, SheetMetal};
@@ -28,7 +28,7 @@ const DEPTH_MM: f64 = 0.3;
 const DIAMETER_MM: f64 = 8.0;
 
 /// 320 × 240 pixels with the study's field of view: ten placements take a second.
-fn small() -> (Bed, Taught) {
+fn small() -> (Bed, TaughtRecipe) {
     let mut scenario = Scenario::default();
     let camera = &mut scenario.rig.camera;
     (camera.width, camera.height, camera.fov_deg) = (320, 240, [20.0, 15.0]);

@@ -9,7 +9,7 @@ use algo::units::{AbsolutePhase, Height, PhaseDelta};
 use appliance::head::seam;
 use appliance::recipe::archive::pack;
 use appliance::recipe::plan::Plan;
-use appliance::recipe::teach::Taught;
+use appliance::recipe::teach::TaughtRecipe;
 use appliance::recipe::{AlignmentKind, Recipe};
 use appliance::station::{Inspection, Stages};
 use hal::frame::Frame;
@@ -38,13 +38,13 @@ pub(crate) fn parts() -> [(&'static str, Part); 3] {
 }
 
 /// A plan with one of the recipe's sequences and without alignment, and the recipe.
-pub(crate) fn plan(bed: &Bed, taught: &Taught, sequence: usize) -> (Plan, Recipe) {
+pub(crate) fn plan(bed: &Bed, taught: &TaughtRecipe, sequence: usize) -> (Plan, Recipe) {
     plan_with(bed, taught, sequence, AlignmentKind::None)
 }
 
 pub(crate) fn plan_with(
     bed: &Bed,
-    taught: &Taught,
+    taught: &TaughtRecipe,
     sequence: usize,
     alignment: AlignmentKind,
 ) -> (Plan, Recipe) {

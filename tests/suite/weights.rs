@@ -7,7 +7,7 @@ use algo::pipeline::HeightMap;
 use algo::units::Height;
 use appliance::head::seam;
 use appliance::recipe::plan::Plan;
-use appliance::recipe::teach::Taught;
+use appliance::recipe::teach::TaughtRecipe;
 use appliance::recipe::{AlignmentKind, Recipe};
 use hal::frame::Frame;
 use sim::Placement;
@@ -16,7 +16,7 @@ use sim::Placement;
 const BROUGHT_MM: f64 = 5e-5;
 
 /// Sets weights in a pattern, so that squares of a gauge have several different ones.
-fn weigh(taught: &mut Taught) {
+fn weigh(taught: &mut TaughtRecipe) {
     let width = taught.file.camera.width as usize;
     let valid = taught.recipe.arrays.valid.iter_mut().enumerate();
     for (place, valid) in valid.filter(|(_, valid)| **valid != 0) {

@@ -4,7 +4,7 @@ use super::names;
 use super::numbers::number;
 use super::options::{Output, Threads};
 use crate::error::{Exit, Failure};
-use crate::measure::adapt::{Choice, Method, adapt};
+use crate::measure::adapt::{AdaptOptions, Method, adapt};
 use crate::storage::folder::OutputFolder;
 use algo::adaptive::{noise, paper};
 use hal::npy;
@@ -47,14 +47,14 @@ impl Adapt {
     /// # Errors
     /// If the recording cannot be opened or lacks what the method needs, or the file cannot be written.
     pub fn run(&self) -> Result<(), Failure> {
-        let choice = self.choice()?;
+        let options = self.options()?;
         let Some(name) = self.out.file_name().and_then(|name| name.to_str()) else {
             let message = format!("--out {}: name a file", self.out.display());
             return Err(Failure::new(Exit::Usage, message));
         };
         let recording = Recording::open(&self.recording)?;
         let pool = self.threads.pool(0)?;
-        let adapted = pool.install(|| adapt(&recording, &self.recording, &choice))?;
+        let adapted = pool.install(|| adapt(&recording, &self.recording, &options))?;
         let folder = OutputFolder::create(self.out.parent().unwrap_or(Path::new("")))?;
         let function = &adapted.function;
         let array = npy::write(function.columns(), &function.turns());
@@ -69,7 +69,7 @@ impl Adapt {
         Ok(())
     }
 
-    fn choice(&self) -> Result<Choice, Failure> {
+    fn options(&self) -> Result<AdaptOptions, Failure> {
         let (projector_pitch, image_pitch) = match self.method {
             Method::Fringed => (noise::PROJECTOR_PITCH, noise::IMAGE_PITCH),
             Method::Paper => (paper::PROJECTOR_PITCH, paper::IMAGE_PITCH),
@@ -83,7 +83,7 @@ impl Adapt {
                 ),
             ));
         }
-        Ok(Choice {
+        Ok(AdaptOptions {
             method: self.method,
             optics: noise::Optics {
                 projector_blur: self.projector_blur,

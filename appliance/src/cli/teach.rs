@@ -10,7 +10,7 @@ use crate::head::seam;
 use crate::measure::{measure, measure_after, primary_of};
 use crate::production::backend::{self, Opened};
 use crate::recipe::bounds::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_TOLERANCE_MM};
-use crate::recipe::golden::{GoldenPart, Naming, Taught};
+use crate::recipe::golden::{GoldenPart, Naming, TaughtRecipe};
 use crate::recipe::replace;
 use crate::recipe::teach::{TeachError, teach};
 use crate::recipe::{PatternFile, RecipeFile, Store};
@@ -70,7 +70,7 @@ enum Target<'a> {
 
 impl Target<'_> {
     /// Writes the recipe; returns where, in words.
-    fn store(&self, taught: &Taught) -> Result<String, Failure> {
+    fn store(&self, taught: &TaughtRecipe) -> Result<String, Failure> {
         let (written, what, place) = match self {
             Self::File(out) => (
                 write_whole(out, &taught.bytes),
@@ -207,7 +207,7 @@ impl Teach {
         config: &Config,
         pool: &rayon::ThreadPool,
         naming: &Naming,
-    ) -> Result<Taught, Failure> {
+    ) -> Result<TaughtRecipe, Failure> {
         let options = &self.measuring;
         let progress = options.output.progress();
         let on_progress = |share: f64| progress.tell(share, "working out the light of the scene");
@@ -232,7 +232,7 @@ impl Teach {
         })
     }
 
-    fn teach_recordings(&self, folder: &Path, naming: &Naming) -> Result<Taught, Failure> {
+    fn teach_recordings(&self, folder: &Path, naming: &Naming) -> Result<TaughtRecipe, Failure> {
         let recording = Recording::open(folder)?;
         let manifest = folder.join("recording.json");
         let wrong = |error: &dyn std::fmt::Display| {

@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// The method and its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Choice {
+pub struct AdaptOptions {
     /// The method.
     pub method: Method,
     /// Blur and smallest pitches. The paper's method uses only the image pitch: its projector pitch is
@@ -64,9 +64,13 @@ pub struct Report {
 ///
 /// # Errors
 /// If it cannot be measured, lacks a pattern or a model that the method needs, or has no resolved pixels.
-pub fn adapt(recording: &Recording, folder: &Path, choice: &Choice) -> Result<Adapted, Failure> {
+pub fn adapt(
+    recording: &Recording,
+    folder: &Path,
+    options: &AdaptOptions,
+) -> Result<Adapted, Failure> {
     let wrong = |error: &dyn std::fmt::Display| wrong(folder, error);
-    let channels = Channels::of(recording, choice.method).map_err(|error| wrong(&error))?;
+    let channels = Channels::of(recording, options.method).map_err(|error| wrong(&error))?;
     let measurement = measure(recording, folder)?;
     let surface = measurement.heights.as_ref().map_err(|missing| {
         wrong(&format!(
@@ -82,20 +86,26 @@ pub fn adapt(recording: &Recording, folder: &Path, choice: &Choice) -> Result<Ad
             ProjectorMap::from_phases(phases, pitch, surface.map.width)
         }
     };
-    let made = match choice.method {
-        Method::Fringed => noise::adapt(&map, columns, rows, &choice.optics),
-        Method::Paper => paper::adapt(&map, columns, rows, choice.optics.image_pitch),
+    let made = match options.method {
+        Method::Fringed => noise::adapt(&map, columns, rows, &options.optics),
+        Method::Paper => paper::adapt(&map, columns, rows, options.optics.image_pitch),
     };
     let function = made.map_err(|error| wrong(&error))?;
     let spec = &recording.patterns[measurement.primary];
     let before = seam::phase_function(spec, columns, rows).map_err(|error| wrong(&error))?;
-    let sigmas = noise::predict(&surface.map.sigma, &map, &before, &function, &choice.optics);
+    let sigmas = noise::predict(
+        &surface.map.sigma,
+        &map,
+        &before,
+        &function,
+        &options.optics,
+    );
     let on_raster = |point: &&[f64; 2]| {
         let inside = |x: f64, count: usize| x > -0.5 && x < count as f64 - 0.5;
         inside(point[0], columns) && inside(point[1], rows)
     };
     let report = Report {
-        method: choice.method,
+        method: options.method,
         shape: [rows, columns],
         pixels_used: map.points.iter().filter(on_raster).count(),
         pitch_px: function.pitches(),

@@ -2,7 +2,7 @@
 
 use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, recovery};
 use crate::recipe::plan::Plan;
-use crate::recipe::teach::{Taught, TeachError, teach_while};
+use crate::recipe::teach::{TaughtRecipe, TeachError, teach_while};
 use crate::recipe::{RecipeFile, replace};
 use crate::station::{Event, JobId, RecipeKey, StationHandle, error_code};
 use std::sync::Arc;
@@ -57,7 +57,7 @@ impl Worker {
         number: u16,
         replaced: Option<&RecipeFile>,
         keep_gauges: bool,
-    ) -> Result<Taught, TeachError> {
+    ) -> Result<TaughtRecipe, TeachError> {
         if let Some(problem) = &self.opened.problem {
             return Err(TeachError::NotCalibrated(problem.clone()));
         }
@@ -107,7 +107,7 @@ impl Worker {
 
     /// Stores a recipe. `kept` is the one whose gauges it has taken over. It must still be the stored one: an edit that was stored
     /// meanwhile must not be lost.
-    fn store(&self, taught: &Taught, kept: Option<RecipeFile>) -> Result<(), (u16, String)> {
+    fn store(&self, taught: &TaughtRecipe, kept: Option<RecipeFile>) -> Result<(), (u16, String)> {
         for reason in &taught.choice.reasons {
             self.progress.log(reason);
         }

@@ -3,7 +3,7 @@
 use super::archive;
 use super::bounds::LONGEST_NAME;
 use super::planner;
-use super::store::Loaded;
+use super::store::LoadedRecipe;
 use super::{GaugeFile, LoadError, Recipe, RegionFile, Store};
 use hal::bounds::clipped;
 use serde::Deserialize;
@@ -57,7 +57,7 @@ pub fn edit(
     edit: Edit,
     fits: impl FnOnce(Recipe) -> Result<(), String>,
 ) -> Result<String, EditError> {
-    let Loaded {
+    let LoadedRecipe {
         mut file, recipe, ..
     } = store.load_to_edit(number)?;
     if file.fingerprint != edit.fingerprint {

@@ -80,7 +80,7 @@ pub struct GoldenPart<'a> {
 
 /// A finished recipe.
 #[derive(Debug)]
-pub struct Taught {
+pub struct TaughtRecipe {
     /// The file.
     pub bytes: Vec<u8>,
     /// Its manifest.
@@ -97,7 +97,7 @@ impl GoldenPart<'_> {
     ///
     /// # Errors
     /// In words, if the recipe could not be loaded again.
-    pub fn recipe(&self, naming: &Naming) -> Result<Taught, String> {
+    pub fn recipe(&self, naming: &Naming) -> Result<TaughtRecipe, String> {
         let resolved: Vec<bool> = self
             .phases
             .trust
@@ -159,7 +159,7 @@ impl GoldenPart<'_> {
         let unpacked = archive::unpack(Cursor::new(&bytes), bytes.len() as u64);
         let (file, arrays) = unpacked.map_err(|error| error.to_string())?;
         let recipe = Recipe::check(&file, arrays)?;
-        Ok(Taught {
+        Ok(TaughtRecipe {
             bytes,
             file,
             recipe,

@@ -2,7 +2,7 @@
 
 use super::archive;
 use super::gauge::check_limits;
-use super::golden::{Naming, Taught};
+use super::golden::{Naming, TaughtRecipe};
 use super::planner;
 use super::{Recipe, RecipeFile};
 
@@ -62,8 +62,8 @@ pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<
 ///
 /// # Errors
 /// In words, if they do not fit what was taught.
-pub fn keep_gauges(taught: Taught, replaced: &RecipeFile) -> Result<Taught, String> {
-    let Taught {
+pub fn keep_gauges(taught: TaughtRecipe, replaced: &RecipeFile) -> Result<TaughtRecipe, String> {
+    let TaughtRecipe {
         mut file, recipe, ..
     } = taught;
     check_kept(replaced, (file.camera.width, file.camera.height))?;
@@ -79,7 +79,7 @@ pub fn keep_gauges(taught: Taught, replaced: &RecipeFile) -> Result<Taught, Stri
         archive::pack(&file, &recipe.arrays).map_err(|error| error.to_string())?;
     recipe.id.fingerprint.clone_from(&fingerprint);
     file.fingerprint = fingerprint;
-    Ok(Taught {
+    Ok(TaughtRecipe {
         bytes,
         file,
         recipe,

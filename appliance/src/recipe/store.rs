@@ -90,7 +90,7 @@ impl Stamp {
 
 /// A loaded recipe.
 #[derive(Clone, Debug)]
-pub struct Loaded {
+pub struct LoadedRecipe {
     /// Its manifest.
     pub file: RecipeFile,
     /// Its checked form.
@@ -186,13 +186,13 @@ impl Store {
         Ok(lock)
     }
 
-    /// Loads a recipe by number. If the newest generation is damaged, the one before is loaded, and [`Loaded::fallback`] says
+    /// Loads a recipe by number. If the newest generation is damaged, the one before is loaded, and [`LoadedRecipe::fallback`] says
     /// why.
     ///
     /// # Errors
     /// If there is none, no generation can be used, or a gauge has limits that it cannot have. The generation before is not used
     /// in the last case: it may judge by other limits.
-    pub fn load(&self, number: u16) -> Result<Loaded, LoadError> {
+    pub fn load(&self, number: u16) -> Result<LoadedRecipe, LoadError> {
         let loaded = self.load_to_edit(number)?;
         refuse_limits(&self.path(number), &loaded.file)?;
         Ok(loaded)
@@ -202,11 +202,11 @@ impl Store {
     ///
     /// # Errors
     /// If there is none, or no generation can be used.
-    pub fn load_to_edit(&self, number: u16) -> Result<Loaded, LoadError> {
+    pub fn load_to_edit(&self, number: u16) -> Result<LoadedRecipe, LoadError> {
         let path = self.path(number);
         let newest = Self::read(&path, number);
         if let Some(Ok((file, recipe))) = newest {
-            return Ok(Loaded {
+            return Ok(LoadedRecipe {
                 file,
                 recipe,
                 fallback: None,
@@ -214,7 +214,7 @@ impl Store {
         }
         let reason = newest.and_then(Result::err);
         match Self::read(&self.previous(number), number) {
-            Some(Ok((file, recipe))) => Ok(Loaded {
+            Some(Ok((file, recipe))) => Ok(LoadedRecipe {
                 file,
                 recipe,
                 fallback: Some(format!(

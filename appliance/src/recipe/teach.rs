@@ -1,6 +1,6 @@
 //! Teaching: from a good part in front of the head to a recipe.
 
-pub use super::golden::{Naming, Taught};
+pub use super::golden::{Naming, TaughtRecipe};
 
 use super::PatternFile;
 use super::comparison::ComparisonFile;
@@ -88,7 +88,7 @@ pub fn teach(
     naming: &Naming,
     timeout: Duration,
     progress: &dyn Fn(f64, &str),
-) -> Result<Taught, TeachError> {
+) -> Result<TaughtRecipe, TeachError> {
     let all = |share: f64, words: &str| {
         progress(share, words);
         true
@@ -109,7 +109,7 @@ pub fn teach_while(
     timeout: Duration,
     computing: &Computing,
     progress: &dyn Fn(f64, &str) -> bool,
-) -> Result<Taught, TeachError> {
+) -> Result<TaughtRecipe, TeachError> {
     let stage = |share: f64, words: &str| match progress(share, words) {
         true => Ok(()),
         false => Err(TeachError::Ended),

@@ -14,7 +14,7 @@ use super::problem::Problem;
 use super::site::Site;
 use crate::recipe::edit::{self, Edit, EditError};
 use crate::recipe::plan::{Plan, PlanError};
-use crate::recipe::store::Loaded;
+use crate::recipe::store::LoadedRecipe;
 use crate::recipe::{ChangeError, LoadError, Recipe, RecipeFile, RecipeId, Store};
 
 impl From<LoadError> for Problem {
@@ -108,7 +108,7 @@ pub(super) async fn picture(
     Path((number, layer)): Path<(u16, String)>,
 ) -> Result<Map, Problem> {
     site.aside(move |site| {
-        let Loaded { recipe, .. } = site.recipes.load_to_edit(number)?;
+        let LoadedRecipe { recipe, .. } = site.recipes.load_to_edit(number)?;
         let width = recipe.conditions.camera.0 as usize;
         match layer.as_str() {
             "height" => Ok(map(&recipe.arrays.golden_height, width, "mm", false, None)),
