@@ -1,9 +1,9 @@
 //! A measured height map against the golden one: deviation and coverage of regions.
 
+use super::table::IntegralTable;
 use super::{Region, Weight};
 use crate::pipeline::{HeightMap, Window};
 use crate::units::Height;
-use alloc::vec;
 use alloc::vec::Vec;
 
 /// The part as taught, row-major over the camera's frame.
@@ -35,10 +35,8 @@ pub struct Reading {
 pub struct Comparison<'a> {
     golden: &'a Golden,
     measured: &'a HeightMap,
-    /// Integral tables of (width + 1) × (rows + 1): deviation in nm, variance in nm², count.
-    deviation: Vec<i64>,
-    variance: Vec<f64>,
-    count: Vec<u32>,
+    /// Deviation in nm, variance in nm², and 1 of each pixel that both maps know.
+    sums: IntegralTable<3>,
 }
 
 /// A mean over a square needs at least this share of its pixels.
@@ -47,76 +45,24 @@ pub(super) const MIN_SUPPORT: f64 = 0.5;
 impl<'a> Comparison<'a> {
     /// Compares two maps of the same size; places that only one of them knows do not count.
     pub fn new(golden: &'a Golden, measured: &'a HeightMap) -> Self {
-        let width = golden.width;
-        let rows = golden.height.len() / width.max(1);
-        let stride = width + 1;
-        let mut comparison = Self {
+        let sums = IntegralTable::new(golden.width, golden.height.len(), |place| {
+            let (deviation, variance) = at(golden, measured, place)?;
+            Some([deviation as f64, variance, 1.0])
+        });
+        Self {
             golden,
             measured,
-            deviation: vec![0; stride * (rows + 1)],
-            variance: vec![0.0; stride * (rows + 1)],
-            count: vec![0; stride * (rows + 1)],
-        };
-        for row in 0..rows {
-            let (mut sum, mut squares, mut count) = (0_i64, 0.0, 0_u32);
-            for column in 0..width {
-                if let Some((deviation, variance)) = comparison.at(row * width + column) {
-                    sum += deviation;
-                    squares += variance;
-                    count += 1;
-                }
-                let (here, above) = ((row + 1) * stride + column + 1, row * stride + column + 1);
-                comparison.deviation[here] = comparison.deviation[above] + sum;
-                comparison.variance[here] = comparison.variance[above] + squares;
-                comparison.count[here] = comparison.count[above] + count;
-            }
+            sums,
         }
-        comparison
-    }
-
-    /// Weighted deviation in nm and its variance in nm² (0 where the noise is not known).
-    fn at(&self, place: usize) -> Option<(i64, f64)> {
-        let (golden, measured) = (self.golden.height[place], self.measured.height[place]);
-        if !(golden.is_known() && measured.is_known()) {
-            return None;
-        }
-        let weight = self.golden.weight[place];
-        let sigma = f64::from(self.measured.sigma[place]) * 1e6 * weight.share();
-        let variance = if sigma.is_finite() {
-            sigma * sigma
-        } else {
-            0.0
-        };
-        let deviation = i64::from(measured.nm()) - i64::from(golden.nm());
-        Some((weight.apply(deviation), variance))
     }
 
     /// The mean weighted deviation over a square of `side` pixels around a place, in mm, and its σ.
     fn smoothed(&self, row: usize, column: usize, side: usize) -> Option<Reading> {
-        let stride = self.golden.width + 1;
-        let rows = self.count.len() / stride - 1;
-        let half = side / 2;
-        let (top, bottom) = (row.saturating_sub(half), (row + half + 1).min(rows));
-        let (left, right) = (
-            column.saturating_sub(half),
-            (column + half + 1).min(self.golden.width),
-        );
-        let corners = [
-            bottom * stride + right,
-            bottom * stride + left,
-            top * stride + right,
-            top * stride + left,
-        ];
-        let [a, b, c, d] = corners.map(|at| i64::from(self.count[at]));
-        let count = (a - b - c + d) as f64;
+        let [sum, variance, count] = self.sums.square(row, column, side);
         if count < MIN_SUPPORT * (side * side) as f64 {
             return None;
         }
-        let [a, b, c, d] = corners.map(|at| self.deviation[at]);
-        let sum = (a - b - c + d) as f64;
-        let [a, b, c, d] = corners.map(|at| self.variance[at]);
-        let variance = (a - b - c + d).max(0.0);
-        let sigma = libm::sqrt(variance) / count / 1e6;
+        let sigma = libm::sqrt(variance.max(0.0)) / count / 1e6;
         Some(Reading {
             value: sum / count / 1e6,
             sigma: (sigma > 0.0).then_some(sigma),
@@ -132,7 +78,10 @@ impl<'a> Comparison<'a> {
             .iter()
             .flat_map(|(row, columns)| columns.clone().map(move |column| (*row, column)));
         places
-            .filter(|(row, column)| self.at(row * self.golden.width + column).is_some())
+            .filter(|(row, column)| {
+                let place = row * self.golden.width + column;
+                at(self.golden, self.measured, place).is_some()
+            })
             .filter_map(|(row, column)| self.smoothed(row, column, side))
             .max_by(|a, b| libm::fabs(a.value).total_cmp(&libm::fabs(b.value)))
     }
@@ -167,9 +116,27 @@ impl<'a> Comparison<'a> {
     }
 }
 
+/// Weighted deviation in nm and its variance in nm² (0 where the noise is not known).
+fn at(golden: &Golden, measured: &HeightMap, place: usize) -> Option<(i64, f64)> {
+    let (taught, height) = (golden.height[place], measured.height[place]);
+    if !(taught.is_known() && height.is_known()) {
+        return None;
+    }
+    let weight = golden.weight[place];
+    let sigma = f64::from(measured.sigma[place]) * 1e6 * weight.share();
+    let variance = if sigma.is_finite() {
+        sigma * sigma
+    } else {
+        0.0
+    };
+    let deviation = i64::from(height.nm()) - i64::from(taught.nm());
+    Some((weight.apply(deviation), variance))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use alloc::vec;
 
     const WIDTH: usize = 40;
 

@@ -44,11 +44,11 @@
 use super::Weight;
 use super::align::{Alignment, Facet, GoldenSurface};
 use super::deviation::MIN_SUPPORT;
+use super::table::IntegralTable;
 use crate::geometry::Vector;
 use crate::pipeline::for_each_row;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::array::from_fn;
 use core::f64::consts::{PI, SQRT_2};
 
 /// The variances of each pixel's deviation on a good part, mm².
@@ -106,15 +106,20 @@ impl DeviationNoise<'_> {
     pub fn of_squares(&self, weights: &[Weight], side: usize) -> Vec<f32> {
         let width = self.width.max(1);
         let least = MIN_SUPPORT * (side * side) as f64;
-        let squares = Squares::new(self, weights, side);
+        // The number of compared pixels, Σ w and Σ w² σ_p².
+        let sums = IntegralTable::new(width, weights.len(), |place| {
+            let weight = weights[place].share();
+            let variance = weight * weight * f64::from(self.pixel[place]);
+            weights[place].compared().then_some([1.0, weight, variance])
+        });
         let mut sigma = vec![f32::NAN; weights.len()];
         for_each_row(&mut sigma, width, |row, sigma| {
             for (column, sigma) in sigma.iter_mut().enumerate() {
                 let place = row * width + column;
-                let [pixels, weight, own] = squares.at(row, column);
+                let [pixels, weight, own] = sums.square(row, column, side);
                 if weights[place].compared() && pixels >= least {
                     let motion = weight * weight * f64::from(self.motion[place]);
-                    *sigma = (libm::sqrt(own + motion) / pixels) as f32;
+                    *sigma = (libm::sqrt(own.max(0.0) + motion) / pixels) as f32;
                 }
             }
         });
@@ -122,67 +127,11 @@ impl DeviationNoise<'_> {
     }
 }
 
-/// Sums over squares from an integral table of (width + 1) × (rows + 1): the number of compared pixels, Σ w and Σ w² σ_p².
-struct Squares {
-    width: usize,
-    rows: usize,
-    side: usize,
-    table: Vec<[f64; 3]>,
-}
-
-impl Squares {
-    fn new(noise: &DeviationNoise<'_>, weights: &[Weight], side: usize) -> Self {
-        let width = noise.width.max(1);
-        let rows = weights.len() / width;
-        let stride = width + 1;
-        let mut table = vec![[0.0; 3]; stride * (rows + 1)];
-        for row in 0..rows {
-            let mut sums = [0.0; 3];
-            for column in 0..width {
-                let place = row * width + column;
-                if weights[place].compared() {
-                    let weight = weights[place].share();
-                    let variance = weight * weight * f64::from(noise.pixel[place]);
-                    for (sum, value) in sums.iter_mut().zip([1.0, weight, variance]) {
-                        *sum += value;
-                    }
-                }
-                let above = table[row * stride + column + 1];
-                table[(row + 1) * stride + column + 1] = from_fn(|i| above[i] + sums[i]);
-            }
-        }
-        Self {
-            width,
-            rows,
-            side,
-            table,
-        }
-    }
-
-    /// Of the square about a pixel.
-    fn at(&self, row: usize, column: usize) -> [f64; 3] {
-        let (stride, half) = (self.width + 1, self.side / 2);
-        let (top, bottom) = (row.saturating_sub(half), (row + half + 1).min(self.rows));
-        let (left, right) = (
-            column.saturating_sub(half),
-            (column + half + 1).min(self.width),
-        );
-        let corners = [
-            bottom * stride + right,
-            top * stride + left,
-            bottom * stride + left,
-            top * stride + right,
-        ];
-        let [a, b, c, d] = corners.map(|at| self.table[at]);
-        from_fn(|i| (a[i] + b[i] - c[i] - d[i]).max(0.0))
-    }
-}
-
 /// Variance of each pixel's deviation by the errors of the motion of golden and of a part, as far as both are found from
 /// heights with the noise of golden; 0 where no motion is found. The motion is found inside `window` from the pixels that count in
 /// full in `golden`; the variance is that of the pixels that are compared in `whole`.
 ///
-/// An error δ of the motion lifts a pixel by j·δ ([`Fitting::jacobian`](super::align::Fitting::jacobian)), so the variance is 2 jᵀ C j, C the
+/// An error δ of the motion lifts a pixel by j·δ ([`Facet::jacobian`]), so the variance is 2 jᵀ C j, C the
 /// covariance of the motion of a part that lies as taught.
 pub fn motion_variance(
     golden: GoldenSurface<'_>,
@@ -198,7 +147,7 @@ pub fn motion_variance(
     };
     let fitting = alignment.fitting(golden);
     of_facets(whole, |facet, point| {
-        2.0 * fitting.lift_variance(&placed, facet.lift, point)
+        2.0 * fitting.lift_variance(&placed, facet, point)
     })
 }
 

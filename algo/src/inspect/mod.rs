@@ -8,6 +8,7 @@ mod mask;
 mod openings;
 mod region;
 mod strips;
+mod table;
 mod weight;
 
 pub use deviation::{Comparison, Golden, Reading};

@@ -91,7 +91,7 @@ const MEDIAN_TO_SIGMA: f64 = 1.4826;
 pub(super) struct Equation {
     /// At the motion about which the problem is linear, mm.
     pub residual: f64,
-    /// What a further motion takes off it, see [`Fitting::jacobian`].
+    /// What a further motion takes off it, see [`Facet::jacobian`].
     pub jacobian: [f64; 6],
     /// Error of the lift.
     pub lift_noise: f64,
@@ -227,15 +227,9 @@ impl Fitting<'_> {
         }
     }
 
-    /// −∂r/∂x of a facet at a point: what a shift and a turn (as the way at the radius) take off its residual.
-    pub fn jacobian(&self, lift: Vector, point: Vector) -> [f64; 6] {
-        let turning = (point - self.centre).cross(lift) * (1.0 / self.radius);
-        [lift.x, lift.y, lift.z, turning.x, turning.y, turning.z]
-    }
-
     /// Variance, mm², of how far the error of a motion lifts a facet at a point.
-    pub fn lift_variance(&self, placed: &Placed, lift: Vector, point: Vector) -> f64 {
-        let jacobian = self.jacobian(lift, point);
+    pub fn lift_variance(&self, placed: &Placed, facet: &Facet, point: Vector) -> f64 {
+        let jacobian = facet.jacobian(point, (self.centre, self.radius));
         form(&jacobian, &placed.covariance, &jacobian).max(0.0)
     }
 
@@ -265,7 +259,7 @@ impl Fitting<'_> {
         let variance = sample.sigma * sample.sigma;
         Equation {
             residual: above,
-            jacobian: self.jacobian(facet.lift, point),
+            jacobian: facet.jacobian(point, (self.centre, self.radius)),
             lift_noise: facet.lift_noise,
             lever: (point - self.centre) * (1.0 / self.radius),
             variance,

@@ -62,7 +62,7 @@ impl Alignment {
         loop {
             let (alignment, placed) = Self::of_points(points, golden, window)?;
             let fitting = alignment.fitting(golden);
-            let lift = |spot: &Spot| fitting.lift_variance(&placed, spot.facet.lift, spot.point);
+            let lift = |spot: &Spot| fitting.lift_variance(&placed, &spot.facet, spot.point);
             let most = alignment.spots.iter().map(lift).fold(0.0, f64::max);
             points *= 2;
             if most <= MOST_LIFT_MM * MOST_LIFT_MM || points > MORE_POINTS * POINTS {

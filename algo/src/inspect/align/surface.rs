@@ -29,6 +29,16 @@ pub struct Facet {
     pub sigma: f64,
 }
 
+impl Facet {
+    /// −∂r/∂x at a point, r its height above the surface: what a shift in mm and a turn about `centre`, as the way in mm of a
+    /// point at `radius`, take off it where they are taken back.
+    pub fn jacobian(&self, point: Vector, (centre, radius): (Vector, f64)) -> [f64; 6] {
+        let turning = (point - centre).cross(self.lift) * (1.0 / radius);
+        let lift = self.lift;
+        [lift.x, lift.y, lift.z, turning.x, turning.y, turning.z]
+    }
+}
+
 /// The plane is fitted to the heights of a square of this many pixels to each side.
 const REACH: usize = 2;
 /// Distance over which the camera's derivatives are taken, mm: small against the working distance, large against rounding.

@@ -206,7 +206,7 @@ fn what_is_not_there_has_no_place() {
 fn worst_lift(alignment: &Alignment, golden: GoldenSurface<'_>) -> f64 {
     let placed = alignment.still(golden).unwrap();
     let fitting = alignment.fitting(golden);
-    let lift = |spot: &Spot| fitting.lift_variance(&placed, spot.facet.lift, spot.point);
+    let lift = |spot: &Spot| fitting.lift_variance(&placed, &spot.facet, spot.point);
     libm::sqrt(alignment.spots.iter().map(lift).fold(0.0, f64::max))
 }
 

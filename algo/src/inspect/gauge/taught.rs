@@ -21,7 +21,7 @@ pub struct TaughtCell {
     /// Their area in x and y, mm².
     pub area: f64,
     /// −∂z/∂x of its height over the components x of the motion that is taken back: shifts in mm, turns as the way of a point at
-    /// the radius in mm ([`Fitting::jacobian`](crate::inspect::align::Fitting::jacobian)).
+    /// the radius in mm ([`Facet::jacobian`](crate::inspect::align::Facet::jacobian)).
     pub jacobian: [f64; 6],
     /// Σ of the variances of its pixels' heights, mm².
     pub variance: f64,
@@ -30,12 +30,12 @@ pub struct TaughtCell {
 /// Facets of a cell that are averaged, in each direction.
 const FACETS: usize = 4;
 
-/// The cells of a region. Turns are about `centre`, as ways at `radius`.
+/// The cells of a region; turns are `about` this centre, as ways at this radius.
 pub(in crate::inspect) fn taught_cells(
     grid: &Grid,
     region: &Region,
     golden: GoldenSurface<'_>,
-    (centre, radius): (Vector, f64),
+    about: (Vector, f64),
 ) -> Vec<TaughtCell> {
     let width = golden.surface.width;
     let mut cells = vec![TaughtCell::default(); grid.len()];
@@ -63,11 +63,7 @@ pub(in crate::inspect) fn taught_cells(
                 continue;
             }
             if let Some(facet) = golden.facet(point, (u as f64, *v as f64)) {
-                let (lift, turning) = (
-                    facet.lift,
-                    (point - centre).cross(facet.lift) * (1.0 / radius),
-                );
-                let jacobian = [lift.x, lift.y, lift.z, turning.x, turning.y, turning.z];
+                let jacobian = facet.jacobian(point, about);
                 for (sum, value) in cell.jacobian.iter_mut().zip(jacobian) {
                     *sum += value;
                 }

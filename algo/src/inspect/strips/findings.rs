@@ -40,7 +40,7 @@ pub struct Findings {
 pub struct Skipped {
     /// Pixels outside of every gauge's region and smoothing.
     pub outside: u64,
-    /// Pixels where nothing is known to unwrap about.
+    /// Pixels without a known phase to unwrap about.
     pub unexpected: u64,
     /// Pixels that the pattern's light does not reach, without finer levels.
     pub dark: u64,

@@ -1,0 +1,47 @@
+//! An integral table: sums over any square of a map in constant time (F. C. Crow, 1984).
+
+use alloc::vec;
+use alloc::vec::Vec;
+use core::array::from_fn;
+
+/// Sums of N values over the pixels above and left of each corner of a map's pixels.
+#[derive(Clone, Debug)]
+pub(super) struct IntegralTable<const N: usize> {
+    width: usize,
+    rows: usize,
+    /// Row-major, (width + 1) × (rows + 1).
+    sums: Vec<[f64; N]>,
+}
+
+impl<const N: usize> IntegralTable<N> {
+    /// Of a row-major map of `pixels` pixels in rows of `width`; pixels without values add nothing.
+    pub fn new(width: usize, pixels: usize, values: impl Fn(usize) -> Option<[f64; N]>) -> Self {
+        let rows = pixels / width.max(1);
+        let stride = width + 1;
+        let mut sums = vec![[0.0; N]; stride * (rows + 1)];
+        for row in 0..rows {
+            let mut sum = [0.0; N];
+            for column in 0..width {
+                if let Some(values) = values(row * width + column) {
+                    sum = from_fn(|i| sum[i] + values[i]);
+                }
+                let above = sums[row * stride + column + 1];
+                sums[(row + 1) * stride + column + 1] = from_fn(|i| above[i] + sum[i]);
+            }
+        }
+        Self { width, rows, sums }
+    }
+
+    /// Sums over the square of `side` pixels about a pixel, as far as it lies inside the map.
+    pub fn square(&self, row: usize, column: usize, side: usize) -> [f64; N] {
+        let (stride, half) = (self.width + 1, side / 2);
+        let (top, bottom) = (row.saturating_sub(half), (row + half + 1).min(self.rows));
+        let (left, right) = (
+            column.saturating_sub(half),
+            (column + half + 1).min(self.width),
+        );
+        let corners = [(bottom, right), (top, left), (bottom, left), (top, right)];
+        let [a, b, c, d] = corners.map(|(row, column)| self.sums[row * stride + column]);
+        from_fn(|i| a[i] + b[i] - c[i] - d[i])
+    }
+}
