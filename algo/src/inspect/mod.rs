@@ -1,8 +1,8 @@
 //! What a height map says about a part: regions, gauges and the comparison with the golden map.
 
-pub mod align;
+mod align;
 mod deviation;
-pub mod gauge;
+mod gauge;
 pub mod good;
 mod mask;
 mod openings;
@@ -11,8 +11,9 @@ mod strips;
 mod table;
 mod weight;
 
+pub use align::{Facet, GoldenSurface, Motion, Placed};
 pub use deviation::{Comparison, Golden, Reading};
-pub use gauge::{Axis, Measure};
+pub use gauge::{Axis, Measure, TooFine};
 pub use mask::eroded;
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};

@@ -11,9 +11,8 @@
 use super::golden::SMOOTHING_PX;
 use crate::station::Unit;
 use algo::geometry::Triangulator;
-use algo::inspect::align::GoldenSurface;
 use algo::inspect::good::{DeviationNoise, LargestDeviation, areas, motion_variance};
-use algo::inspect::{Taught, Weight};
+use algo::inspect::{GoldenSurface, Taught, Weight};
 use algo::pipeline::KnownSurface;
 use hal::bounds::within;
 use serde::{Deserialize, Serialize};

@@ -93,11 +93,6 @@ impl Directions {
         Self { kept, left_out }
     }
 
-    /// How many directions are determined.
-    pub fn count(&self) -> usize {
-        self.kept.len()
-    }
-
     /// The x with A x = b along the directions that are determined, 0 along the others.
     pub fn solve(&self, b: &[f64; 6]) -> [f64; 6] {
         let mut x = [0.0; 6];
@@ -156,13 +151,13 @@ mod tests {
         let normal = diagonal([30.0, 30.0, 1000.0, 1000.0, 1000.0, 30.0]);
         let noise = diagonal([25.0, 25.0, 0.0, 0.0, 0.0, 25.0]);
         let directions = Directions::of(&normal, &noise, 0.05);
-        assert_eq!(directions.count(), 3);
+        assert_eq!(directions.kept.len(), 3);
         assert_eq!(directions.left_out, [true, true, false, false, false, true]);
         let step = directions.solve(&[5.0, 5.0, 10.0, 0.0, 0.0, 5.0]);
         assert_eq!(step, [0.0, 0.0, 0.01, 0.0, 0.0, 0.0]);
         let exact = Directions::of(&normal, &[[0.0; 6]; 6], 0.05);
-        assert_eq!(exact.count(), 6);
+        assert_eq!(exact.kept.len(), 6);
         // 0.05 mm / √30 = 9 µm is known well enough, 0.5 mm / √30 = 91 µm is not.
-        assert_eq!(Directions::of(&normal, &[[0.0; 6]; 6], 0.5).count(), 3);
+        assert_eq!(Directions::of(&normal, &[[0.0; 6]; 6], 0.5).kept.len(), 3);
     }
 }

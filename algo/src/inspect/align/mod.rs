@@ -6,7 +6,7 @@ mod motion;
 mod normal;
 mod surface;
 
-pub use directions::{Directions, Six, form};
+pub use directions::form;
 pub use fit::{Fitting, Placed, Room, Sample};
 pub use motion::Motion;
 pub use surface::{Facet, GoldenSurface};

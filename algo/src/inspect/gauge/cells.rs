@@ -86,11 +86,6 @@ impl Grid {
         self.columns * self.rows
     }
 
-    /// Whether there are none; never for a grid that could be made.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// Side of a cell in pixels.
     pub fn side(&self) -> usize {
         self.side

@@ -2,8 +2,7 @@
 
 use crate::recipe::Demands;
 use crate::station::{GaugeValue, Inspection, Placement, Skipped, Verdict};
-use algo::inspect::Findings;
-use algo::inspect::align::Placed;
+use algo::inspect::{Findings, Placed};
 use std::sync::Arc;
 
 /// Largest share of lit pixels whose levels contradict each other; silhouettes cause about 1 %.
