@@ -11,8 +11,8 @@
 //! pixel, a fifth of the time.
 
 use super::level::Demodulated;
-use super::step::{Step, StepLanes, Turns, q15, word};
 use super::unwrap::farness;
+use super::unwrap_step::{Step, StepLanes, Turns, q15, word};
 use crate::pattern::{Level, Unwrapping};
 use crate::simd::Lanes;
 

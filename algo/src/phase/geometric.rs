@@ -1,6 +1,6 @@
 //! Unwrapping from coarse to fine.
 
-use super::step::Step;
+use super::unwrap_step::Step;
 use crate::pattern::{Level, PhaseRange, SequenceError};
 use crate::units::AbsolutePhase;
 use alloc::vec::Vec;

@@ -11,8 +11,8 @@ mod level;
 mod narrow;
 mod rows;
 mod source;
-mod step;
 mod unwrap;
+mod unwrap_step;
 
 pub use crate::trust::{MIN_MODULATION_8_BIT, Trust};
 pub use arrived::Arrived;

@@ -1,7 +1,7 @@
 //! Decoding row by row: all levels at once, or each when it arrives.
 
 use super::arrived::{Arrived, ArrivingRow, ClimbedRow, WrappedRow};
-use super::kernel::{around, arrive, fused};
+use super::kernel::{about, geometric, on_arrival};
 use super::narrow::{FewClimbed, FewResults, FewWrapped, MAX_PIXELS, RowSample, padded};
 use super::unwrap::Unwrapper;
 use super::{Decoder, PhaseRow};
@@ -114,10 +114,10 @@ impl Decoder {
         let out = results(out, &columns);
         match &self.unwrapper {
             Unwrapper::Geometric(plan) => {
-                fused::climb_row(self.backend, plan, &self.levels, &levels, columns, out);
+                geometric::climb_row(self.backend, plan, &self.levels, &levels, columns, out);
             }
             Unwrapper::About(plan) => {
-                around::around_row(self.backend, plan, &self.levels, &levels, map, columns, out);
+                about::around_row(self.backend, plan, &self.levels, &levels, map, columns, out);
             }
         }
     }
@@ -170,10 +170,10 @@ impl Decoder {
         let level = &self.levels[at];
         match (&self.unwrapper, row) {
             (Unwrapper::Geometric(plan), ArrivingRow::Climbing(row)) => {
-                arrive::arrive_row(self.backend, plan, at, level, rows, 0..width, row);
+                on_arrival::arrive_row(self.backend, plan, at, level, rows, 0..width, row);
             }
             (_, ArrivingRow::Wrapping { coarsest, row }) => {
-                around::wrap_row(self.backend, level, rows, coarsest, 0..width, row);
+                about::wrap_row(self.backend, level, rows, coarsest, 0..width, row);
             }
             // `Decoder::arrived` gives geometric levels the one, and others the other.
             (Unwrapper::About(_), ArrivingRow::Climbing(_)) => {}
@@ -224,13 +224,13 @@ impl Decoder {
         let backend = self.backend;
         match (&self.unwrapper, climbed, &self.levels[..]) {
             (Unwrapper::Geometric(plan), _, [_]) => {
-                fused::climb_row(backend, plan, &self.levels, &[rows], columns, out);
+                geometric::climb_row(backend, plan, &self.levels, &[rows], columns, out);
             }
             (Unwrapper::Geometric(plan), Some(before), [.., level]) => {
-                arrive::last_row(backend, plan, level, rows, before, columns, out);
+                on_arrival::last_row(backend, plan, level, rows, before, columns, out);
             }
             (Unwrapper::About(plan), _, levels) => {
-                around::last_row(backend, plan, levels, wrapped, rows, map, columns, out);
+                about::last_row(backend, plan, levels, wrapped, rows, map, columns, out);
             }
             // A decoder has levels, and gives geometric ones such room.
             (Unwrapper::Geometric(_), ..) => {}

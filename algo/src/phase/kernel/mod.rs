@@ -1,10 +1,10 @@
 //! Rows, block by block: the levels of a block → its absolute phase, modulation and trust.
 
-pub(super) mod around;
-pub(super) mod arrive;
-mod climb;
-mod doubt;
-pub(super) mod fused;
+pub(super) mod about;
+pub(super) mod geometric;
+pub(super) mod on_arrival;
+mod quality;
+mod temporal;
 
 use super::narrow::MAX_PIXELS;
 use crate::pattern::MAX_SHIFTS;

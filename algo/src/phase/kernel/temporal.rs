@@ -1,12 +1,12 @@
 //! Where a block stands on its way from the coarsest of geometric levels to the finest.
 
-use super::doubt::{Doubts, none, trust};
+use super::quality::{Doubts, none, trust};
 use crate::phase::angle::AngleLanes;
 use crate::phase::fold::Folded;
 use crate::phase::geometric::Geometric;
 use crate::phase::level::{Level, LevelLanes, Samples};
 use crate::phase::source::Frames;
-use crate::phase::step::{Ahead, Step, StepLanes, Turns};
+use crate::phase::unwrap_step::{Ahead, Step, StepLanes, Turns};
 use crate::simd::{Four, Lanes, Results};
 use crate::trust::Trust;
 use crate::units::AbsolutePhase;

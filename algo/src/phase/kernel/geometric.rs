@@ -1,8 +1,8 @@
 //! Geometric levels in one pass over the frames of all of them.
 
-use super::arrive::{arrive_row, top_row};
-use super::climb::{Ground, Rung, four};
-use super::doubt::unless_dark;
+use super::on_arrival::{arrive_row, top_row};
+use super::quality::unless_dark;
+use super::temporal::{Ground, Rung, four};
 use super::{STRETCH, next_block, of_stretch, stretches};
 use crate::phase::fold::BlockSample;
 use crate::phase::geometric::Geometric;

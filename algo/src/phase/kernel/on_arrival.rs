@@ -1,14 +1,14 @@
 //! Geometric levels one by one, as they arrive.
 
-use super::climb::{Below, Ground, Rung, four};
-use super::doubt::{Doubts, unless_dark};
 use super::next_block;
+use super::quality::{Doubts, unless_dark};
+use super::temporal::{Below, Ground, Rung, four};
 use crate::phase::arrived::{ClimbedRow, ClimbedRowMut};
 use crate::phase::fold::BlockSample;
 use crate::phase::geometric::Geometric;
 use crate::phase::level::{Level, LevelLanes};
 use crate::phase::source::Frames;
-use crate::phase::step::{Ahead, Step, StepLanes};
+use crate::phase::unwrap_step::{Ahead, Step, StepLanes};
 use crate::simd::{Backend, Lanes, Results, back_end_entry};
 use crate::trust::Trust;
 use core::ops::Range;

@@ -1,7 +1,7 @@
 //! Levels about a known map: one, two or three of them, from frames or from what has arrived.
 
-use super::climb::{doubled_where, four};
-use super::doubt::{Doubts, none, trust};
+use super::quality::{Doubts, none, trust};
+use super::temporal::{doubled_where, four};
 use super::{STRETCH, next_block, of_stretch, stretches};
 use crate::phase::about::{About, AboutLanes, Around};
 use crate::phase::angle::AngleLanes;
@@ -10,7 +10,7 @@ use crate::phase::fold::BlockSample;
 use crate::phase::level::{Demodulated, Level, LevelLanes};
 use crate::phase::narrow::FewWrapped;
 use crate::phase::source::{Frames, Source};
-use crate::phase::step::Turns;
+use crate::phase::unwrap_step::Turns;
 use crate::simd::{Backend, Four, Lanes, Results, back_end_entry, plain};
 use crate::trust::Trust;
 use crate::units::AbsolutePhase;
