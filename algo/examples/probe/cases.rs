@@ -1,4 +1,4 @@
-//! The sequences that are probed.
+//! The sequences that the probe decodes.
 
 use super::Outcome;
 use algo::pattern::{PhaseRange, Sequence, Shot};
@@ -8,10 +8,10 @@ use algo::phase::Decoder;
 pub struct Case {
     /// Form, levels × shifts, bits.
     pub name: &'static str,
-    /// Of each level, from coarse to fine.
+    /// Ratio of each level, from coarse to fine.
     pub ratios: &'static [f64],
     /// Shifts of each level.
-    pub steps: usize,
+    pub shifts: usize,
     /// Bits of a sample.
     pub bits: u8,
 }
@@ -27,7 +27,7 @@ const DENSE: &[f64] = &[1.0 - 1.0 / 6.0, 1.0 - 1.0 / 36.0, 1.0];
 const DENSE_TWO: &[f64] = &[1.0 - 1.0 / 5.0, 1.0];
 const SINGLE: &[f64] = &[1.0];
 
-/// Every form, the specialised and the generic numbers of shifts, every width of a sample.
+/// Every form, numbers of shifts with and without a path of their own, every sample type.
 pub const CASES: &[Case] = &[
     case("geometric-3x4-8", GEOMETRIC, 4, 8),
     case("geometric-3x3-8", GEOMETRIC, 3, 8),
@@ -47,11 +47,11 @@ pub const CASES: &[Case] = &[
     case("single-4-12", SINGLE, 4, 12),
 ];
 
-const fn case(name: &'static str, ratios: &'static [f64], steps: usize, bits: u8) -> Case {
+const fn case(name: &'static str, ratios: &'static [f64], shifts: usize, bits: u8) -> Case {
     Case {
         name,
         ratios,
-        steps,
+        shifts,
         bits,
     }
 }
@@ -59,20 +59,20 @@ const fn case(name: &'static str, ratios: &'static [f64], steps: usize, bits: u8
 impl Case {
     /// Ratio and place k of the shift k/N of each frame, in the order in which they are taken.
     pub fn frames(&self) -> impl Iterator<Item = (f64, usize)> {
-        let shifts = |&ratio| (0..self.steps).map(move |k| (ratio, k));
+        let shifts = |&ratio| (0..self.shifts).map(move |k| (ratio, k));
         self.ratios.iter().flat_map(shifts)
     }
 
-    /// Whether it is unwrapped about a map.
+    /// Whether the levels are unwrapped about a map.
     pub fn needs_map(&self) -> bool {
         self.ratios[0] > 1.0 / FRINGES as f64
     }
 
-    /// With the machine's best back-end.
+    /// The decoder, on the machine's best back-end.
     pub fn decoder(&self) -> Outcome<Decoder> {
         let levels = self.ratios.iter();
         let frames: Vec<Shot> = levels
-            .flat_map(|&ratio| Shot::level(ratio, self.steps))
+            .flat_map(|&ratio| Shot::level(ratio, self.shifts))
             .collect();
         let range = PhaseRange {
             min: 0.0,

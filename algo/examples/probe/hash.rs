@@ -1,4 +1,4 @@
-//! FNV-1a with 64 bits (Fowler, Noll & Vo), so that maps can be compared by one line.
+//! FNV-1a with 64 bits (Fowler, Noll & Vo), so that maps can be compared by one line of text.
 
 use std::fmt;
 
@@ -13,7 +13,7 @@ impl Default for Hash {
 }
 
 impl Hash {
-    /// Takes in more bytes.
+    /// Adds bytes.
     pub fn add(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);

@@ -1,17 +1,17 @@
-//! Shows what the kernels give and lets others count what they cost, on any machine.
+//! Prints hashes of the kernels' results, and decodes single cases for counting instructions, on any machine.
 //!
 //! ```text
 //! cargo run -p algo --example probe                 one line per back-end and case: hashes of the maps
 //! cargo run -p algo --example probe decode CASE R W decodes the first R rows of one case, W pixels wide
-//!                                                   (1456 if not said), once, and says how many pixels
-//!                                                   that are
+//!                                                   (default 1456), once, and prints the number of
+//!                                                   pixels
 //! ```
 //!
-//! CASE is a case's name, with `/background` behind it if three quarters of the frames shall be dark, or `/arrival` if the
-//! coarser levels shall be demodulated first.
+//! CASE is a case's name; with `/background` appended three quarters of the frames are dark, with `/arrival` the
+//! coarser levels are decoded on arrival.
 //!
-//! The hashes must be those of `frozen.txt` on every machine, with every back-end: the test here says so. After a
-//! change that is meant to move bits, `probe | sed 's/[^ ]* //' | awk '!seen[$0]++'` writes that file anew.
+//! The hashes must be those of `frozen.txt` on every machine and with every back-end; a test here checks it. After a
+//! change that is meant to change bits, `probe | sed 's/[^ ]* //' | awk '!seen[$0]++'` writes that file anew.
 
 mod cases;
 mod hash;
@@ -25,7 +25,7 @@ use algo::simd::Backend;
 use algo::units::AbsolutePhase;
 use cases::{CASES, Case};
 use hash::Hash;
-use scene::{Image, Light};
+use scene::{Image, Lighting};
 use std::env;
 use std::error::Error;
 use std::hint::black_box;
@@ -33,9 +33,9 @@ use std::io::{Write, stdout};
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
-/// Sizes that leave a rest with every lane width, and one that is below all of them.
+/// A size that is a multiple of no block, and one that is smaller than every block.
 const SIZES: [(usize, usize); 2] = [(67, 48), (13, 9)];
-/// The frames for counting: as wide as the camera's.
+/// Size of the frames for counting: as wide as the camera's.
 const COUNTED: (usize, usize) = (1456, 48);
 
 /// The decoder with each back-end of this machine.
@@ -45,7 +45,7 @@ fn backends(decoder: &Decoder) -> Vec<(&'static str, Decoder)> {
         .collect()
 }
 
-/// Decodes level by level, as the frames of each are there.
+/// Decodes level by level, on arrival.
 fn arrival(
     decoder: &Decoder,
     frames: &[FrameView<'_>],
@@ -66,7 +66,7 @@ fn arrival(
 fn line(case: &Case, decoder: &Decoder) -> Outcome<String> {
     let [mut phase, mut modulation, mut trust, mut height] = [Hash::default(); 4];
     for (columns, rows) in SIZES {
-        let image = Image::new(case, Light::Everything, columns, rows);
+        let image = Image::new(case, Lighting::Everything, columns, rows);
         let mut map = decode(decoder, &image.frames(rows)?, image.map(case), None)?;
         for at in 0..columns * rows {
             phase.add(&map.phase[at].to_bits().to_le_bytes());
@@ -96,8 +96,8 @@ fn main() -> Outcome<()> {
         ["decode", counted, rows, ref rest @ ..] if rest.len() <= 1 => {
             let (name, way) = counted.split_once('/').unwrap_or((counted, ""));
             let light = match way {
-                "background" => Light::Background,
-                _ => Light::Even,
+                "background" => Lighting::Background,
+                _ => Lighting::Even,
             };
             let case = CASES.iter().find(|case| case.name == name);
             let case = case.ok_or("no such case")?;
@@ -140,19 +140,18 @@ mod tests {
     fn the_frames_show_every_reason_and_most_of_the_surface() {
         for case in CASES {
             let (width, height) = SIZES[0];
-            let image = Image::new(case, Light::Everything, width, height);
+            let image = Image::new(case, Lighting::Everything, width, height);
             let decoder = case.decoder().unwrap();
             let frames = image.frames(height).unwrap();
             let mut map = decode(&decoder, &frames, image.map(case), None).unwrap();
             let rig = rig::triangulator(width, height).unwrap();
             triangulate(&rig, &decoder, None, None, None, &mut map);
             for reason in Trust::REASONS {
-                // The only level is the coarsest, and has no step that leaves something over; only maps have places of which
-                // nothing is known; 8 shifts tolerate saturation; a phase within a few turns of the
-                // map is within the working range.
+                // A single level is the coarsest and has no unwrapping step, so no residual; only maps have unknown pixels; 8
+                // shifts tolerate saturation; a phase within a few turns of the map is within the working range.
                 let expected = match reason {
                     Trust::LowModulation => case.ratios.len() > 1,
-                    Trust::Saturated => case.steps < 8,
+                    Trust::Saturated => case.shifts < 8,
                     Trust::Unexpected => case.needs_map(),
                     Trust::Residual => case.ratios.len() > 1,
                     Trust::OutOfRange => !case.needs_map() || case.ratios.len() > 2,
@@ -169,7 +168,7 @@ mod tests {
     fn what_is_counted_is_resolved_everywhere() {
         for case in CASES {
             let (width, height) = (COUNTED.0, 4);
-            let image = Image::new(case, Light::Even, width, height);
+            let image = Image::new(case, Lighting::Even, width, height);
             let frames = image.frames(height).unwrap();
             let map = decode(&case.decoder().unwrap(), &frames, image.map(case), None).unwrap();
             assert_eq!(map.count(Trust::Resolved), width * height, "{}", case.name);

@@ -1,11 +1,11 @@
-//! A rig that sees the scene's phase as heights near the plane.
+//! A rig for which the scene's phase is that of heights near the plane.
 
 use super::Outcome;
 use super::cases::FRINGES;
 use algo::geometry::{Pinhole, PinholeModel, Reference, Triangulator};
 use algo::pattern::PhaseFunction;
 
-/// Both devices stand this far above the plane and from each other, mm.
+/// Height of both devices above the plane, and their distance from each other, mm.
 const DISTANCE: f64 = 600.0;
 const BASELINE: f64 = 120.0;
 /// Width of the plane that both see, mm.
@@ -14,8 +14,8 @@ const PROJECTOR: (usize, usize) = (1024, 768);
 
 /// For a camera of `width` × `height` pixels.
 ///
-/// Side by side they look straight down, each principal point moved so that both see the same piece: on the plane the
-/// phase then runs evenly along the camera's rows, but for the distortion of the lenses.
+/// Both look straight down, with principal points shifted so that they see the same area: but for the lenses' distortion the
+/// phase on the plane is then linear along the camera's rows.
 pub fn triangulator(width: usize, height: usize) -> Outcome<Triangulator> {
     let camera = device(
         (width, height),

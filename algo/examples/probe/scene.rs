@@ -1,4 +1,4 @@
-//! Frames of an uneven part, made with whole numbers only: the same on every machine.
+//! Frames of an uneven part, computed with integers only, so that they are the same on every machine.
 
 use super::Outcome;
 use super::cases::{Case, FRINGES};
@@ -9,24 +9,24 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 /// Samples between the end of a row and the next.
 const PADDING: usize = 3;
-/// Half of the noise's width on an uneven and on an even scene, as a share 1/n of full scale.
+/// Half width of the noise as full scale / n: n of [`Lighting::Everything`], and of the others.
 const NOISE: (i64, i64) = (60, 250);
-/// The part rises by this share of a turn, in 1/65536: less than half, so that one level about a map is enough.
+/// Phase rise of the part, 1/65536 turn: less than half a turn, so that one level about a map is enough.
 const RISE: i64 = 20_000;
 
-/// What the light does.
+/// How the scene is lit.
 #[derive(Clone, Copy, PartialEq)]
-pub enum Light {
-    /// Every pixel can be decoded.
+pub enum Lighting {
+    /// Every pixel is resolved.
     Even,
-    /// The same in the first quarter of the columns, and no light in the others.
+    /// The same in the first quarter of the columns; the others are dark.
     Background,
-    /// Of six parts of the rows four are a part with dark, dazzling, faint and doubtful patches, one is noise alone,
-    /// and one jumps between the ends of the scale and about the threshold of modulation.
+    /// Every reason to reject a pixel: four sixths of the rows have dark, saturated and weak patches, one sixth is noise alone,
+    /// and one has samples at the ends of the scale and modulations about the threshold.
     Everything,
 }
 
-/// The frames of one case and the map about which they are unwrapped.
+/// The frames of one case, and the map for cases that are unwrapped about one.
 pub struct Image {
     eight: Vec<Vec<u8>>,
     sixteen: Vec<Vec<u16>>,
@@ -36,20 +36,20 @@ pub struct Image {
 
 impl Image {
     /// Exposes `width` × `height` pixels.
-    pub fn new(case: &Case, light: Light, width: usize, height: usize) -> Self {
+    pub fn new(case: &Case, light: Lighting, width: usize, height: usize) -> Self {
         let scene = Scene {
             full: (1 << case.bits) - 1,
             light,
             width,
             height,
         };
-        // The hashes of the probe are frozen, and with them this generator.
-        let mut random = SplitMix64::seed_from_u64(u64::from(case.bits) << 8 | case.steps as u64);
+        // The frozen hashes depend on this generator and its seed.
+        let mut random = SplitMix64::seed_from_u64(u64::from(case.bits) << 8 | case.shifts as u64);
         let frames = case.frames().map(|(ratio, k)| {
             let mut samples = vec![0; (width + PADDING) * height];
             for (v, row) in samples.chunks_mut(width + PADDING).enumerate() {
                 for (u, sample) in row.iter_mut().enumerate() {
-                    let turn = scene.turn(u, v, ratio) + (65_536 * k / case.steps) as i64;
+                    let turn = scene.turn(u, v, ratio) + (65_536 * k / case.shifts) as i64;
                     *sample = scene.sample(u, v, turn as u16, ratio == 1.0, &mut random);
                 }
             }
@@ -93,20 +93,20 @@ impl Image {
 
 struct Scene {
     full: i64,
-    light: Light,
+    light: Lighting,
     width: usize,
     height: usize,
 }
 
 impl Scene {
-    /// Φ of the plane, 1/65536 turn: from one fringe to the last but one.
+    /// Φ of the plane, 1/65536 turn: from the first fringe to the last but one.
     fn plane(&self, u: usize) -> i64 {
         65_536 + (FRINGES - 2) * 65_536 * u as i64 / self.width as i64
     }
 
-    /// Φ that is known beforehand; not everywhere.
+    /// Φ₀ of the map; with [`Lighting::Everything`] some columns are unknown.
     fn known(&self, u: usize) -> AbsolutePhase {
-        if self.light == Light::Everything && u % 16 == 7 {
+        if self.light == Lighting::Everything && u % 16 == 7 {
             return AbsolutePhase::UNKNOWN;
         }
         AbsolutePhase::from_bits((self.plane(u) + RISE / 2) as i32)
@@ -116,13 +116,13 @@ impl Scene {
     fn turn(&self, u: usize, v: usize, ratio: f64) -> i64 {
         let (v, height) = (v as i64, self.height as i64);
         let phase = self.plane(u) + 4 * RISE * v * (height - v) / (height * height);
-        // A power of two times a number is exact.
+        // Multiplying by a power of two is exact.
         (phase * (ratio * f64::from(1 << 30)) as i64) >> 30
     }
 
     fn sample(&self, u: usize, v: usize, turn: u16, finest: bool, random: &mut SplitMix64) -> u16 {
         let draw = random.next_u64();
-        let band = if self.light == Light::Everything {
+        let band = if self.light == Lighting::Everything {
             6 * v / self.height
         } else {
             0
@@ -132,25 +132,25 @@ impl Scene {
         let sample = match band {
             4 => below(full + 1),
             5 if u % 8 < 4 => [0, 1, full / 2, full - 1, full][below(5) as usize],
-            // Two such steps apart a level of 4 shifts is exactly at the threshold.
+            // With samples two of these increments apart, a level of 4 shifts is exactly at the threshold.
             5 => full / 2 + 16 * full / 255 * below(3),
             _ => {
                 // Offset and modulation, 1/256 of full scale.
                 let patch = (u / 8 * 5 + v / 8 * 3) % 16;
                 let (offset, modulation) = match (self.light, patch) {
-                    (Light::Background, _) if 4 * u >= self.width => (12, 4),
-                    (Light::Even | Light::Background, _) => (120, 90),
+                    (Lighting::Background, _) if 4 * u >= self.width => (12, 4),
+                    (Lighting::Even | Lighting::Background, _) => (120, 90),
                     (_, 0) => (12, 4),
                     (_, 1) => (170, 95),
                     (_, 2) if finest => (90, 3),
-                    // Through the threshold of 16 of 255 counts.
+                    // Modulations about the threshold of 16 of 255 counts.
                     (_, 3) => (60, 14 + (u % 8) as i64 / 2),
                     (_, patch) => (110, 30 + 5 * patch as i64),
                 };
                 let light = (offset << 15) + modulation * sine(turn);
                 let noise = match self.light {
-                    Light::Everything => full / NOISE.0,
-                    Light::Even | Light::Background => full / NOISE.1,
+                    Lighting::Everything => full / NOISE.0,
+                    Lighting::Even | Lighting::Background => full / NOISE.1,
                 };
                 let noise = below(2 * noise + 1) - noise;
                 ((full * light) >> 23) + noise
@@ -160,7 +160,7 @@ impl Scene {
     }
 }
 
-/// sin of 1/65536 turns in Q15, within 0.2 %: a parabola, mended by its own square.
+/// Sine of 1/65536 turns in Q15, within 0.2 %: a parabola, corrected by its own square.
 fn sine(turn: u16) -> i64 {
     let x = i64::from(turn as i16);
     let y = (4 * x * (32_768 - x.abs())) >> 15;

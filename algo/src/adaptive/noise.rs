@@ -1,8 +1,8 @@
-//! The better pattern: least noise for the contrast that there is.
+//! The pattern of least noise for the contrast of projector and camera.
 //!
-//! The noise of the height falls with g·M(g), frequency times contrast; so on each part of the
-//! surface the frequency is the one that maximises it, instead of a fixed image pitch. From one
-//! preliminary vertical measurement.
+//! The height's noise is proportional to 1 / (g · M(g)), frequency times contrast. So each part of the
+//! surface gets the frequency that maximises g · M(g), instead of a fixed image pitch. Needs one
+//! preliminary measurement with vertical fringes.
 
 use super::field::Field;
 use super::integrate::balanced_rows;
@@ -17,7 +17,7 @@ use core::f64::consts::PI;
 pub struct Optics {
     /// σ of the projector's Gaussian blur, projector pixels.
     pub projector_blur: f64,
-    /// σ of the camera's Gaussian blur, camera pixels; the pixel's own box comes on top.
+    /// σ of the camera's Gaussian blur, camera pixels, beside the box of the pixel itself.
     pub camera_blur: f64,
     /// Smallest pitch in projector pixels.
     pub projector_pitch: f64,
@@ -25,12 +25,11 @@ pub struct Optics {
     pub image_pitch: f64,
 }
 
-/// The smallest pitch in projector pixels unless one is asked for. Below 6 px the projector's own
-/// pixels bend the fringes (a bilinear raster at 5 px: error / σ_z rises from 1.09 to 1.21 on the
+/// Default of the smallest pitch in projector pixels. Below 6 px the projector's own
+/// pixels distort the fringes (a bilinear raster at 5 px: error / σ_z rises from 1.09 to 1.21 on the
 /// cone).
 pub const PROJECTOR_PITCH: f64 = 6.0;
-/// The smallest pitch in camera pixels unless one is asked for: where g·M(g) has its maximum under
-/// the box of the pixel alone.
+/// Default of the smallest pitch in camera pixels: the maximum of g · M(g) with the box of the pixel alone.
 pub const IMAGE_PITCH: f64 = 2.2;
 /// No blur but the pixels' own.
 const SHARP: Optics = Optics {
@@ -39,24 +38,24 @@ const SHARP: Optics = Optics {
     projector_pitch: PROJECTOR_PITCH,
     image_pitch: IMAGE_PITCH,
 };
-/// Coarsest pitch of a pattern, projector pixels: where the part is so steep that even this is not
-/// resolved, nothing is.
+/// Largest pitch of a pattern, projector pixels. Where the part is so steep that this is not resolved, no pitch is.
 const MAX_PITCH: f64 = 128.0;
-/// Neighbours further apart than this per camera pixel lie on different surfaces, projector pixels.
-pub const MAX_STEP: f64 = 6.0;
-/// Cells that no camera pixel hit take their neighbours' frequency up to this far.
+/// Neighbours that differ by more than this many projector pixels per camera pixel lie on different surfaces.
+pub const MAX_SLOPE: f64 = 6.0;
+/// Cells without a camera pixel take the frequency of a neighbour up to this far away, projector pixels.
 const FILL: usize = 8;
-/// Half of the minimum filter's side, and the σ of the smoothing after it.
+/// Reach of the minimum filter to each side, projector pixels.
 const MINIMUM_REACH: usize = 1;
+/// σ of the smoothing after it, projector pixels.
 const SMOOTHING: f64 = 3.0;
-/// Share of the best g·M(g) that is good enough.
+/// Share of the largest g · M(g) that is enough.
 const ENOUGH: f64 = 0.985;
-/// Steps from the coarsest frequency to the finest, of equal ratio.
+/// Frequencies that are tried between the coarsest and the finest, in geometric progression.
 const STEPS: usize = 160;
 
 /// The contrast M of a sine of frequency `g` (turns per projector pixel) that the camera sees with
-/// gradient `[a, b]` (turns per camera pixel along u and v): the projector's bilinear pixels and
-/// blur, the camera's blur and the box of its pixel.
+/// gradient `[a, b]` (turns per camera pixel along u and v): that of the projector's bilinear pixels and
+/// blur, of the camera's blur and of the box of its pixel.
 pub fn contrast(optics: &Optics, g: f64, [a, b]: [f64; 2]) -> f64 {
     let gauss = |sigma: f64, f: f64| libm::exp(-2.0 * (PI * sigma * f) * (PI * sigma * f));
     let projector = sinc(g) * sinc(g) * gauss(optics.projector_blur, g);
@@ -76,10 +75,10 @@ fn sinc(x: f64) -> f64 {
 
 /// σ of the blur of projector and camera together, in projector pixels, from the contrast that a
 /// preliminary measurement has at two frequencies: each sample is a pixel's slope J and its
-/// modulation at `fine` as a share of that at `coarse` (turns per projector pixel). The median
-/// decides, so that edges and noise do not.
+/// modulation at `fine` as a share of that at `coarse` (turns per projector pixel). Uses the median, which is robust
+/// against edges and noise.
 ///
-/// `None` without samples. Contrast that is better than the pixels' own is no blur.
+/// `None` without samples; 0 if the contrast is better than that of the pixels alone.
 pub fn measured_blur(
     samples: impl Iterator<Item = ([f64; 2], f64)>,
     fine: f64,
@@ -100,9 +99,9 @@ pub fn measured_blur(
     Some(libm::sqrt(variance.max(0.0)))
 }
 
-/// The frequency for a surface that the camera sees with slope J: the coarsest one whose g·M(g)
-/// reaches 98.5 % of the maximum, under both limits of pitch. The maximum is flat: the last
-/// share of precision costs a tenth of the contrast, and with it resolved pixels.
+/// The frequency for a surface that the camera sees with slope J: the lowest whose g · M(g)
+/// reaches 98.5 % of the maximum within both limits of pitch. The maximum is flat: the last 1.5 %
+/// would cost a tenth of the contrast, and with it resolved pixels.
 pub fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2]) -> f64 {
     let slope = libm::sqrt(ju * ju + jv * jv);
     let coarsest = 1.0 / MAX_PITCH;
@@ -115,13 +114,13 @@ pub fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2]) -> f64 {
         let g = frequency(i);
         g * contrast(optics, g, [g * ju, g * jv])
     };
-    // The logarithms of g, of each sinc and of each Gaussian are concave, so g·M(g) rises to one peak and falls.
+    // The logarithms of g, of each sinc and of each Gaussian are concave, so g · M(g) has a single peak.
     let peak = first(STEPS, |i| worth(i) >= worth(i + 1));
     let enough = ENOUGH * worth(peak);
     frequency(first(peak, |i| worth(i) >= enough))
 }
 
-/// The first of 0…`last` that `holds`, where all behind it do as well; `last` if none before it does.
+/// The first of 0…`last` for which `holds` is true, given that it is true for all after it; `last` if it is for none before.
 fn first(last: usize, holds: impl Fn(usize) -> bool) -> usize {
     let (mut low, mut high) = (0, last);
     while low < high {
@@ -135,8 +134,8 @@ fn first(last: usize, holds: impl Fn(usize) -> bool) -> usize {
     low
 }
 
-/// RMS of σ_z in mm under one phase function, and predicted for the same levels and shifts of another one: σ_z falls with
-/// g·M(g) on every pixel. `sigma` is that of each camera pixel of `map` under the first; none if no pixel has one.
+/// RMS of σ_z in mm under the phase function `before`, and predicted for the same levels and shifts of `after`: σ_z of each pixel
+/// is proportional to 1 / (g · M(g)). `sigma` is σ_z of each camera pixel of `map` under `before`; `None` if no pixel has one.
 pub fn predict(
     sigma: &[f32],
     map: &ProjectorMap,
@@ -144,7 +143,7 @@ pub fn predict(
     after: &PhaseFunction,
     optics: &Optics,
 ) -> Option<[f64; 2]> {
-    let slopes = map.slopes(MAX_STEP);
+    let slopes = map.slopes(MAX_SLOPE);
     let (mut squares, mut count) = ([0.0; 2], 0.0);
     for ((sigma, [xi, eta]), [ju, jv]) in sigma.iter().zip(&map.points).zip(slopes) {
         let worth = |function: &PhaseFunction| {
@@ -171,7 +170,7 @@ pub fn adapt(
     rows: usize,
     optics: &Optics,
 ) -> Result<PhaseFunction, AdaptError> {
-    let slopes = map.slopes(MAX_STEP);
+    let slopes = map.slopes(MAX_SLOPE);
     let frequencies = frequencies(&slopes, map.width, optics);
     let mut field = Field::uniform(columns, rows, f64::NAN);
     let mut seen = vec![false; columns * rows];
@@ -181,7 +180,7 @@ pub fn adapt(
         }
         if let Some(cell) = field.cell(*point) {
             seen[cell] = true;
-            // Several pixels see a cell: the steepest one decides. A NaN loses against any number.
+            // Of several pixels that see a cell the lowest frequency counts; `min` ignores a NaN.
             field.values[cell] = g.min(field.values[cell]);
         }
     }

@@ -1,4 +1,4 @@
-//! The paper's adaptive pattern, as it is (Peng & Gupta 2008, eqs. 2–9): the baseline.
+//! The paper's adaptive pattern, unchanged (Peng & Gupta 2008, eqs. 2–9): the baseline.
 //!
 //! In turns: preliminary patterns Φ^V = ξ/(c p_P), Φ^H = η/p_H give each camera pixel its projector
 //! point. Where the fringes of the camera's image would be finer than p_I, |∂Φ^V/∂u| > 1/(c p_I), the
@@ -14,21 +14,20 @@ use alloc::vec::Vec;
 
 /// p_P, the smallest projector pitch, in projector pixels.
 pub const PROJECTOR_PITCH: f64 = 8.0;
-/// c_p0: the preliminary patterns are this much coarser.
+/// c: the preliminary patterns' pitch is this many times p_P.
 pub const PRELIMINARY: f64 = 2.5;
-/// p_I, the smallest image pitch, in camera pixels: the paper gives none, the baseline has this.
+/// p_I, the smallest image pitch, in camera pixels. The paper does not state it; the baseline uses this.
 pub const IMAGE_PITCH: f64 = 5.0;
 /// Largest local pitch, projector pixels.
 const MAX_PITCH: f64 = 128.0;
-/// Neighbours further apart are depth edges and not slopes, projector pixels.
-const MAX_STEP: f64 = 24.0;
+/// Neighbours that differ by more than this many projector pixels per camera pixel are depth edges, not slopes.
+const MAX_SLOPE: f64 = 24.0;
 /// Smaller components of the mask are dropped, camera pixels.
 const MIN_COMPONENT: usize = 40;
 /// σ of the smoothing of G, projector pixels.
 const SMOOTHING: f64 = 4.0;
 
-/// Makes the paper's phase function for a part, over a projector of `columns` × `rows` pixels.
-/// `image_pitch` is p_I, which the paper does not give; the baseline has 5 px.
+/// Makes the paper's phase function for a part, over a projector of `columns` × `rows` pixels. `image_pitch` is p_I.
 ///
 /// # Errors
 /// If no pixel of the part is known.
@@ -63,7 +62,7 @@ fn slopes(map: &ProjectorMap) -> Vec<f64> {
         let [left, _] = map.at(u - 1, v)?;
         let [right, _] = map.at(u + 1, v)?;
         let step = libm::fabs(right - left) / 2.0;
-        (map.at(u, v).is_some() && step <= MAX_STEP).then_some(step)
+        (map.at(u, v).is_some() && step <= MAX_SLOPE).then_some(step)
     };
     (0..map.points.len())
         .map(|place| slope(place).unwrap_or(f64::NAN))
@@ -103,7 +102,7 @@ fn components(mask: &[bool], width: usize) -> Vec<Vec<usize>> {
 }
 
 /// Eq. 7 over the component's image in the pattern: its boundary is mapped by eq. 4 and filled; each
-/// cell takes the mean of the pixels that hit it, missed cells are interpolated along their row.
+/// cell takes the mean of the pixels that map to it, other cells are interpolated along their row.
 fn stretch(
     field: &mut Field,
     map: &ProjectorMap,

@@ -1,56 +1,56 @@
-//! The phase along one pixel's line of sight.
+//! The line of sight of one camera pixel, and the phase that a surface has along it.
 
 use super::{Reference, Triangulator, Vector};
 
-/// The line of sight of one pixel, worked out once for any number of heights: its point at height z is start + z · rise.
+/// The line of sight of one pixel, prepared once for any number of heights: its point at height z is start + z · rise.
 #[derive(Clone, Copy, Debug)]
 pub struct Sight<'a> {
     triangulator: &'a Triangulator,
     start: Vector,
     rise: Vector,
-    frame: Frame,
+    coordinates: Coordinates,
 }
 
-/// Whose directions a line of sight is given in.
+/// The coordinates in which a line of sight is given.
 #[derive(Clone, Copy, Debug)]
-enum Frame {
-    /// The projector's, from its centre: light needs no more than the lens.
+enum Coordinates {
+    /// The projector's, from its centre: a point's projector pixel then needs the lens model only.
     Projector,
     /// The world's.
     World,
 }
 
 impl Triangulator {
-    /// The line of sight of pixel (u, v), if it meets every height once.
+    /// The line of sight of pixel (u, v), or `None` if it does not meet every height once.
     pub fn sight(&self, u: f64, v: f64) -> Option<Sight<'_>> {
         let ray = self.falling_ray(u, v)?;
         let (rise, on_plane) = (ray * (1.0 / ray.z), self.on_ray(ray, 0.0));
-        let (start, rise, frame) = match &self.reference {
+        let (start, rise, coordinates) = match &self.reference {
             Reference::Models => {
                 let lamp = &self.projector;
                 let start = lamp.turned(on_plane - lamp.centre());
-                (start, lamp.turned(rise), Frame::Projector)
+                (start, lamp.turned(rise), Coordinates::Projector)
             }
-            Reference::Measured { .. } => (on_plane, rise, Frame::World),
+            Reference::Measured { .. } => (on_plane, rise, Coordinates::World),
         };
         Some(Sight {
             triangulator: self,
             start,
             rise,
-            frame,
+            coordinates,
         })
     }
 }
 
 impl Sight<'_> {
-    /// Φ in turns of a surface at height `z` mm, where it has one.
+    /// Φ in turns of a surface at height `z` mm; `None` if the projector does not light it.
     #[inline]
     pub fn phase(&self, z: f64) -> Option<f64> {
         let point = self.start + self.rise * z;
         let triangulator = self.triangulator;
-        let (xi, eta) = match self.frame {
-            Frame::Projector => triangulator.projector.pixel(point),
-            Frame::World => triangulator.projector_point(point),
+        let (xi, eta) = match self.coordinates {
+            Coordinates::Projector => triangulator.projector.pixel(point),
+            Coordinates::World => triangulator.projector_point(point),
         }?;
         Some(triangulator.function.at(xi, eta))
     }

@@ -1,4 +1,4 @@
-//! What is projected: phase functions, their grey rasters, and the sequence of levels and shifts.
+//! What is projected: phase functions, their grey rasters, and sequences of levels and shifts.
 
 mod encode;
 mod function;
@@ -9,7 +9,7 @@ mod shot;
 pub use encode::{Encoder, GreyRaster, GreyResponse, ResponseError};
 pub use function::{MAX_TURNS, PhaseFunction, PhaseFunctionError, PhaseRange};
 pub use sequence::{
-    Level, MAX_DENSE_N, MAX_FRAMES, MAX_LEVELS, MAX_SHIFTS, MAX_STEP, Sequence, SequenceError,
-    Unwrapping,
+    Level, MAX_DENSE_N, MAX_FRAMES, MAX_LEVEL_FACTOR, MAX_LEVELS, MAX_SHIFTS, Sequence,
+    SequenceError, Unwrapping,
 };
 pub use shot::Shot;

@@ -1,4 +1,4 @@
-//! Levels and shifts of a sequence, and how its levels are unwrapped.
+//! Sequences: which level and shift each frame is, and how the levels are unwrapped.
 
 use super::function::MAX_TURNS;
 use super::{PhaseRange, Shot};
@@ -7,7 +7,7 @@ use core::fmt;
 
 /// Levels that a sequence may have.
 pub const MAX_LEVELS: usize = 8;
-/// Shifts that a level may have; sums of 64 samples of 16 bits stay inside the kernels' bounds.
+/// Shifts that a level may have: the kernels' sums hold 64 samples of 16 bits.
 pub const MAX_SHIFTS: usize = 64;
 /// Frames that a sequence may have.
 pub const MAX_FRAMES: usize = MAX_LEVELS * MAX_SHIFTS;
@@ -17,10 +17,10 @@ const SHIFT_TOLERANCE: f64 = 1e-6;
 const RATIO_TOLERANCE: f64 = 1e-6;
 /// Largest span of the coarsest level, in turns, that is still absolute by itself.
 const GEOMETRIC_SPAN: f64 = 1.001;
-/// Largest step from one geometric level to the next: what a level's error of up to 1.4e-4 turn becomes in the step must
+/// Largest factor from the ratio of one geometric level to the next: a level's error of up to 1.4e-4 turn, times the factor, must
 /// stay far below the 0.40 turn that a residual may have.
-pub const MAX_STEP: f64 = 64.0;
-/// Largest n of dense levels: their D stays within ± 450 turns, which words hold with 5 fractional bits.
+pub const MAX_LEVEL_FACTOR: f64 = 64.0;
+/// Largest n of dense levels: Φ − Φ₀ then stays within ± 450 turns, which 16-bit words hold with 5 fractional bits.
 pub const MAX_DENSE_N: f64 = 30.0;
 
 /// All shifts at one ratio of the full phase function: s_k = start + k/N.
@@ -36,7 +36,7 @@ pub struct Level {
 
 impl Level {
     /// N, the number of shifts.
-    pub fn steps(&self) -> usize {
+    pub fn shifts(&self) -> usize {
         self.frames.len()
     }
 }
@@ -48,7 +48,7 @@ pub struct Sequence {
     frame_count: usize,
 }
 
-/// Frames that do not make up a sequence, or one that cannot be unwrapped.
+/// Frames that do not form a sequence, or a sequence that cannot be unwrapped.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum SequenceError {
@@ -59,31 +59,31 @@ pub enum SequenceError {
     /// More levels than [`MAX_LEVELS`].
     TooManyLevels(usize),
     /// A level has fewer than 3 shifts or more than [`MAX_SHIFTS`].
-    Steps {
+    Shifts {
         /// The level's ratio.
         ratio: f64,
         /// Its number of shifts.
-        steps: usize,
+        shifts: usize,
     },
     /// The shifts of a level are not equally spaced over one turn.
     Spacing {
         /// The level's ratio.
         ratio: f64,
         /// Its number of shifts.
-        steps: usize,
-        /// The shift that is off its place, in turns.
+        shifts: usize,
+        /// The shift that is not on the grid, in turns.
         shift: f64,
     },
-    /// The ratios are of no form that can be unwrapped.
+    /// The ratios have no form that can be unwrapped.
     Ratios(Vec<f64>),
-    /// The finest level's ratio is out of the range of fixed point.
+    /// The finest level's ratio or phase is too small or large for fixed point.
     Finest {
         /// Its ratio.
         ratio: f64,
         /// Its largest phase in turns.
         turns: f64,
     },
-    /// The step between two geometric levels is too large.
+    /// The factor between two geometric levels is too large.
     Step {
         /// Ratio of the coarser level.
         from: f64,
@@ -106,18 +106,18 @@ impl fmt::Display for SequenceError {
                     "{levels} levels where at most {MAX_LEVELS} can be decoded"
                 )
             }
-            Self::Steps { ratio, steps } => write!(
+            Self::Shifts { ratio, shifts } => write!(
                 f,
-                "the level of ratio {ratio} has {steps} shifts: it needs 3 to {MAX_SHIFTS}"
+                "the level of ratio {ratio} has {shifts} shifts: it needs 3 to {MAX_SHIFTS}"
             ),
             Self::Spacing {
                 ratio,
-                steps,
+                shifts,
                 shift,
             } => write!(
                 f,
-                "the {steps} shifts of the level of ratio {ratio} are not equally spaced over one turn: \
-                 {shift} is off its place; shifts of a level are start + k/{steps}"
+                "the {shifts} shifts of the level of ratio {ratio} are not equally spaced over one turn: \
+                 {shift} is off its place; shifts of a level are start + k/{shifts}"
             ),
             Self::Ratios(ratios) => write!(
                 f,
@@ -127,12 +127,12 @@ impl fmt::Display for SequenceError {
             ),
             Self::Finest { ratio, turns } => write!(
                 f,
-                "the finest level has ratio {ratio} and {turns} turns: the ratio must be at least 1/{MAX_STEP} \
+                "the finest level has ratio {ratio} and {turns} turns: the ratio must be at least 1/{MAX_LEVEL_FACTOR} \
                  and the phase at most {MAX_TURNS} turns"
             ),
             Self::Step { from, to } => write!(
                 f,
-                "the step from ratio {from} to {to} is over {MAX_STEP}, or too long beside the other levels: put a level \
+                "the step from ratio {from} to {to} is over {MAX_LEVEL_FACTOR}, or too long beside the other levels: put a level \
                  between them"
             ),
         }
@@ -175,30 +175,30 @@ impl Sequence {
     }
 
     fn level(ratio: f64, frames: &[Shot]) -> Result<Level, SequenceError> {
-        let shifts: Vec<(u16, f64)> = (0..)
+        let frames: Vec<(u16, f64)> = (0..)
             .zip(frames)
             .filter(|(_, shot)| shot.ratio == ratio)
             .map(|(at, shot)| (at, shot.shift))
             .collect();
-        let steps = shifts.len();
-        if !(3..=MAX_SHIFTS).contains(&steps) {
-            return Err(SequenceError::Steps { ratio, steps });
+        let shifts = frames.len();
+        if !(3..=MAX_SHIFTS).contains(&shifts) {
+            return Err(SequenceError::Shifts { ratio, shifts });
         }
-        let start = shifts[0].1 - libm::floor(shifts[0].1);
+        let start = frames[0].1 - libm::floor(frames[0].1);
         let mut places = [None; MAX_SHIFTS];
-        for (at, shift) in shifts {
-            let place = (shift - start) * steps as f64;
+        for (at, shift) in frames {
+            let place = (shift - start) * shifts as f64;
             let nearest = libm::rint(place);
-            let slot = nearest - steps as f64 * libm::floor(nearest / steps as f64);
-            // A shift of so many turns that its fraction is lost lies on no place.
+            let slot = nearest - shifts as f64 * libm::floor(nearest / shifts as f64);
+            // A shift of so many turns that its fraction is lost is not on the grid.
             let on_grid =
-                slot >= 0.0 && libm::fabs(place - nearest) <= SHIFT_TOLERANCE * steps as f64;
-            match places[..steps].get_mut(slot as usize) {
+                slot >= 0.0 && libm::fabs(place - nearest) <= SHIFT_TOLERANCE * shifts as f64;
+            match places[..shifts].get_mut(slot as usize) {
                 Some(free @ None) if on_grid => *free = Some(at),
                 _ => {
                     return Err(SequenceError::Spacing {
                         ratio,
-                        steps,
+                        shifts,
                         shift,
                     });
                 }
@@ -211,12 +211,12 @@ impl Sequence {
         })
     }
 
-    /// Our own geometric sequence for a phase function: `levels` levels of `steps` shifts, the frames
-    /// from coarse to fine, shifts k/N.
+    /// The standard geometric sequence for a phase function: `levels` levels of `shifts` shifts k/N, frames
+    /// from coarse to fine.
     ///
     /// The coarsest level spans 0.94 turn (one turn less a margin for noise on both sides), the
-    /// finest has ratio 1, the steps between are equal.
-    pub fn geometric(range: PhaseRange, levels: usize, steps: usize) -> Vec<Shot> {
+    /// finest has ratio 1, the factors between them are equal.
+    pub fn geometric(range: PhaseRange, levels: usize, shifts: usize) -> Vec<Shot> {
         let step = libm::pow(
             (range.span() / 0.94).max(1.0),
             1.0 / (levels.max(2) - 1) as f64,
@@ -224,16 +224,16 @@ impl Sequence {
         (0..levels)
             .flat_map(|level| {
                 let ratio = libm::pow(step, -((levels - 1 - level) as f64));
-                Shot::level(ratio, steps)
+                Shot::level(ratio, shifts)
             })
             .collect()
     }
 
-    /// Three dense levels of `steps` shifts: ratios 1, 1 − 1/n², 1 − 1/n, in this order.
-    pub fn dense(n: f64, steps: usize) -> Vec<Shot> {
+    /// Three dense levels of `shifts` shifts: ratios 1, 1 − 1/n², 1 − 1/n, in this order.
+    pub fn dense(n: f64, shifts: usize) -> Vec<Shot> {
         [1.0, 1.0 - 1.0 / (n * n), 1.0 - 1.0 / n]
             .into_iter()
-            .flat_map(|ratio| Shot::level(ratio, steps))
+            .flat_map(|ratio| Shot::level(ratio, shifts))
             .collect()
     }
 
@@ -271,13 +271,13 @@ impl Unwrapping {
     /// Recognises the form of a sequence for a phase function with this range.
     ///
     /// # Errors
-    /// If the ratios are of no known form.
+    /// If the ratios have no known form.
     pub fn recognise(sequence: &Sequence, range: PhaseRange) -> Result<Self, SequenceError> {
         let ratios: heapless::Vec<f64, MAX_LEVELS> =
             sequence.levels().iter().map(|level| level.ratio).collect();
         let finest = ratios[ratios.len() - 1];
         let turns = finest * libm::fabs(range.max).max(libm::fabs(range.min));
-        if !(finest >= 1.0 / MAX_STEP && turns <= MAX_TURNS) {
+        if !(finest >= 1.0 / MAX_LEVEL_FACTOR && turns <= MAX_TURNS) {
             return Err(SequenceError::Finest {
                 ratio: finest,
                 turns,
@@ -285,7 +285,10 @@ impl Unwrapping {
         }
         let near = |a: f64, b: f64| libm::fabs(a - b) <= RATIO_TOLERANCE;
         if ratios[0] * range.span() <= GEOMETRIC_SPAN {
-            if let Some(pair) = ratios.windows(2).find(|pair| pair[1] / pair[0] > MAX_STEP) {
+            if let Some(pair) = ratios
+                .windows(2)
+                .find(|pair| pair[1] / pair[0] > MAX_LEVEL_FACTOR)
+            {
                 return Err(SequenceError::Step {
                     from: pair[0],
                     to: pair[1],
@@ -293,7 +296,7 @@ impl Unwrapping {
             }
             return Ok(Self::Geometric);
         }
-        // For ratios that are not dense, or of 1 and more, n is ≤ 0 or infinite.
+        // For a ratio of 1 or more n is ≤ 0 or infinite.
         let n = 1.0 / (1.0 - ratios[0]);
         let reachable = n > 0.0 && n <= MAX_DENSE_N * (1.0 + RATIO_TOLERANCE);
         match ratios[..] {
@@ -313,7 +316,7 @@ impl Unwrapping {
         }
     }
 
-    /// Whether the phase is unwrapped relative to a map that must be known beforehand.
+    /// Whether the levels are unwrapped about a known map.
     pub fn needs_map(self) -> bool {
         self != Self::Geometric
     }
@@ -375,16 +378,16 @@ mod tests {
         let unequal = shifted(&[0.0, 0.3, 0.6]);
         assert!(matches!(
             Sequence::from_frames(&unequal),
-            Err(SequenceError::Spacing { steps: 3, .. })
+            Err(SequenceError::Spacing { shifts: 3, .. })
         ));
         let repeated = shifted(&[0.0, 0.25, 0.5, 0.5]);
         assert!(matches!(
             Sequence::from_frames(&repeated),
-            Err(SequenceError::Spacing { steps: 4, .. })
+            Err(SequenceError::Spacing { shifts: 4, .. })
         ));
         assert!(matches!(
             Sequence::from_frames(&repeated[..2]),
-            Err(SequenceError::Steps { steps: 2, .. })
+            Err(SequenceError::Shifts { shifts: 2, .. })
         ));
         assert_eq!(Sequence::from_frames(&[]), Err(SequenceError::Empty));
         let unknown = Shot {

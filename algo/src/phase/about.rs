@@ -1,100 +1,123 @@
 //! Unwrapping about a known map Φ₀: dense levels by their beats, or a single level within half a turn.
 //!
-//! q_i = φ_i − frac(r_i Φ₀). With D = Φ − Φ₀ the slow beat a = q₁ − q₂ = D/n² unwraps the fast one b = q₁ − q₃ = D/n, and
-//! that gives the order of level 1 (ratio 1): D₁ = k + q₁. The other levels are then a residual away from it,
-//! e_i = wrap(r_i D₁ − q_i), D_i = D₁ − e_i/r_i, and D is the mean of the D_i with weights N_i r_i²: D = D₁ − Σ p_i e_i,
-//! p_i = N_i r_i / Σ N r². It is the weighted mean that takes one level after the other, because the orders are the same.
+//! **Idea.** Levels whose ratios are all close to 1 carry the full accuracy each, but none is unambiguous. Relative to a map of
+//! about the expected phase, the differences between levels (beats) vary slowly and are unambiguous over n²/2 turns either way.
+//! They unwrap each other up to the finest level, and then all levels are averaged.
 //!
-//! The best weights are N_i r_i² B_i², B_i the modulations. Dense levels have nearly the same: at a pitch of 8 pixels a blur of
-//! 1 pixel (σ) leaves 0.81 at r = 5/6 where it leaves 0.73 at r = 1, and σ_Φ is then 0.3 % above its least
-//! (`weights_without_modulations_lose_next_to_nothing`). Weights that are the same everywhere save a quotient and a root per
-//! pixel, a fifth of the time.
+//! **Equation.** Ratios of Towers, Towers & Jones 2003 (their optimum series): coarse r_c = 1 − 1/n, middle r_m = 1 − 1/n²,
+//! finest r_f = 1; the middle one may be missing. Each beat is unwrapped by the one before it as by a coarser level
+//! ([`UnwrapStep`]); D = Φ − Φ₀:
+//!
+//! ```text
+//! q_i = φ_i − frac(r_i Φ₀)                        i = c, m, f
+//! slow beat  q_f − q_m = D / n²                   unambiguous within ± n²/2 turns
+//! fast beat  q_f − q_c = D / n                    unwrapped by n · slow
+//! D_f = k + q_f                                   unwrapped by n · fast
+//! e_i = wrap(r_i D_f − q_i)                       residual of level i = c, m about the finest
+//! D   = D_f − Σ p_i e_i,    p_i = N_i r_i / Σ N r²
+//! ```
+//!
+//! The last line is the mean of D_i = D_f − e_i / r_i with weights N_i r_i². It gives the orders that adding one level after the
+//! other to the mean gives, because they are the same. A **single** level has D = wrap(q_f) / r_f: it is right only within half
+//! a turn of the map.
+//!
+//! **Shapes and units.** Half a block of pixels; wrapped phases and residuals in words of 1/65536 turn, Φ₀ and Φ in double words
+//! of 1/65536 turn.
+//!
+//! **Departures.** The best weights are N_i r_i² B_i²; the modulations B_i are left out, which saves a quotient and a root per
+//! pixel, a fifth of the time. Dense levels have nearly the same modulation: at a pitch of 8 pixels a blur of 1 pixel (σ) leaves
+//! 0.81 at r = 5/6 and 0.73 at r = 1, so σ_Φ is 0.3 % above its least
+//! (`weights_without_modulations_lose_next_to_nothing`).
+//!
+//! **Accuracy.** Every form against the textbook in f64, and no wrong fringe order:
+//! `any_shifts_depth_ratios_size_and_stride_decode_as_the_textbook_says`, `no_fringe_order_slips_at_any_wrap_about_a_map`.
 
 use super::level::Demodulated;
-use super::unwrap::farness;
-use super::unwrap_step::{Step, StepLanes, Turns, q15, word};
+use super::unwrap_step::{Turns, UnwrapStep, UnwrapStepLanes, q15, word};
 use crate::pattern::{Level, Unwrapping};
 use crate::simd::Lanes;
 
-/// Levels about a map, prepared for unwrapping.
+/// The plan of unwrapping about a map.
 #[derive(Clone, Debug)]
 pub(super) struct About {
-    /// The level whose ratio is the largest: of ratio 1 where there are several.
-    finest: Rated,
+    /// The level of the largest ratio; of dense levels it is 1.
+    finest: FixedRatio,
     /// 1/r of the finest level, where that is not 1.
     scale: Option<f32>,
-    /// What the other levels add.
+    /// The other levels, where there are any.
     dense: Option<Dense>,
 }
 
-/// Levels beside the finest.
+/// The levels beside the finest.
 #[derive(Clone, Debug)]
 struct Dense {
-    /// Of ratio 1 − 1/n.
-    first: Rated,
+    /// r_c = 1 − 1/n.
+    coarse: FixedRatio,
     /// From the fast beat to the order of the finest level.
-    fast: Step,
-    /// Of ratio 1 − 1/n², with the step from the slow beat to the fast one.
-    second: Option<(Rated, Step)>,
-    /// p of the first and of the second (0 if there is none); that of the first with what the second's residual is less by.
-    pull: [f64; 2],
-    /// By how much the first moves the mean of the two before the second, per unit of its residual and in units of the second.
-    moved: f64,
+    fast: UnwrapStep,
+    /// r_m = 1 − 1/n², and the step from the slow beat to the fast one.
+    middle: Option<(FixedRatio, UnwrapStep)>,
+    /// p_c and p_m (0 without a middle level). With a middle level p_c includes p_m · `mean_gain`, because the kernel takes e_m
+    /// about the mean of finest and coarse level.
+    weights: [f64; 2],
+    /// By how much e_m is smaller about that mean than about the finest level, as a share of e_c.
+    mean_gain: f64,
 }
 
-/// A level's ratio in the forms that words need.
+/// A level's ratio r in fixed point.
 #[derive(Clone, Copy, Debug)]
-struct Rated {
-    /// Whether the ratio is 1.
+struct FixedRatio {
+    /// Whether r is 1.
     one: bool,
     /// Whole part of r.
     whole: i16,
-    /// frac(r) in Q15; in Q16; and what the latter leaves over in Q31.
+    /// frac(r) in Q15, for phases.
     part: i16,
+    /// frac(r) in Q16 and the remainder in Q31, for fringe orders.
     high: i16,
     low: i16,
 }
 
 impl About {
-    /// `None` for levels whose beats words cannot hold.
+    /// `None` for levels whose beats do not fit words.
     pub fn new(unwrapping: Unwrapping, levels: &[Level]) -> Option<Self> {
         let finest = levels.len() - 1;
-        let rated = |at: usize| Rated::new(levels[at].ratio);
-        let part = |at: usize| levels[at].steps() as f64 * levels[at].ratio;
+        let ratio_of = |at: usize| FixedRatio::new(levels[at].ratio);
+        let part = |at: usize| levels[at].shifts() as f64 * levels[at].ratio;
         let weight = |at: usize| part(at) * levels[at].ratio;
         let total = |levels: core::ops::Range<usize>| levels.map(weight).sum::<f64>();
-        // Of three levels.
-        let moved = part(0) * levels[1.min(finest)].ratio / (weight(0) + weight(finest));
+        // Used with three levels only.
+        let mean_gain = part(0) * levels[1.min(finest)].ratio / (weight(0) + weight(finest));
         let dense = match unwrapping {
             Unwrapping::DenseThree { n } => Some(Dense {
-                first: rated(0),
-                fast: Step::new(n, n / 2.0 + 1.0, 0.0)?,
-                second: Some((rated(1), Step::new(n, 0.5, 0.0)?)),
-                pull: [
-                    (part(0) + part(1) * moved) / total(0..3),
+                coarse: ratio_of(0),
+                fast: UnwrapStep::new(n, n / 2.0 + 1.0, 0.0)?,
+                middle: Some((ratio_of(1), UnwrapStep::new(n, 0.5, 0.0)?)),
+                weights: [
+                    (part(0) + part(1) * mean_gain) / total(0..3),
                     part(1) / total(0..3),
                 ],
-                moved,
+                mean_gain,
             }),
             Unwrapping::DenseTwo { n } => Some(Dense {
-                first: rated(0),
-                fast: Step::new(n, 0.5, 0.0)?,
-                second: None,
-                pull: [part(0) / total(0..2), 0.0],
-                moved: 0.0,
+                coarse: ratio_of(0),
+                fast: UnwrapStep::new(n, 0.5, 0.0)?,
+                middle: None,
+                weights: [part(0) / total(0..2), 0.0],
+                mean_gain: 0.0,
             }),
             Unwrapping::Single | Unwrapping::Geometric => None,
         };
         let ratio = levels[finest].ratio;
         Some(Self {
-            finest: rated(finest),
+            finest: ratio_of(finest),
             scale: (libm::fabs(ratio - 1.0) > 1e-12).then_some((1.0 / ratio) as f32),
             dense,
         })
     }
 }
 
-impl Rated {
+impl FixedRatio {
     fn new(ratio: f64) -> Self {
         let fraction = ratio - libm::floor(ratio);
         let high = libm::rint(fraction * 65_536.0);
@@ -108,18 +131,18 @@ impl Rated {
     }
 }
 
-/// A ratio with every constant in all lanes.
-struct RatedLanes<V: Lanes> {
-    plan: Rated,
+/// [`FixedRatio`] with every constant in all lanes.
+struct FixedRatioLanes<V: Lanes> {
+    plan: FixedRatio,
     whole: V::W,
     part: V::W,
     high: V::W,
     low: V::W,
 }
 
-impl<V: Lanes> RatedLanes<V> {
+impl<V: Lanes> FixedRatioLanes<V> {
     #[inline(always)]
-    fn new(v: V, plan: Rated) -> Self {
+    fn new(v: V, plan: FixedRatio) -> Self {
         Self {
             plan,
             whole: v.splat16(plan.whole),
@@ -129,23 +152,23 @@ impl<V: Lanes> RatedLanes<V> {
         }
     }
 
-    /// frac(r·x) in 1/65536 turn.
+    /// frac(r · x) in 1/65536 turn.
     #[inline(always)]
-    fn times(&self, v: V, x: Turns<V>) -> V::W {
+    fn fraction_of(&self, v: V, x: Turns<V>) -> V::W {
         if self.plan.one {
             return x.phase;
         }
-        let product = self.part_times(v, x);
+        let product = self.fraction_below_one(v, x);
         if self.plan.whole == 0 {
             return product;
         }
         v.add(product, v.mul_low(x.phase, self.whole))
     }
 
-    /// frac(r·x) of a ratio below 1.
+    /// The same for a ratio below 1.
     #[inline(always)]
-    fn part_times(&self, v: V, x: Turns<V>) -> V::W {
-        let order = x.nearest(v);
+    fn fraction_below_one(&self, v: V, x: Turns<V>) -> V::W {
+        let order = x.nearest_order(v);
         let orders = v.add(v.mul_low(order, self.high), v.mul_q15(order, self.low));
         v.add(orders, v.mul_q15(x.phase, self.part))
     }
@@ -153,28 +176,29 @@ impl<V: Lanes> RatedLanes<V> {
 
 /// [`About`] with every constant in all lanes.
 pub(super) struct AboutLanes<V: Lanes> {
-    finest: RatedLanes<V>,
+    finest: FixedRatioLanes<V>,
     scale: Option<V::F>,
     dense: Option<DenseLanes<V>>,
 }
 
 struct DenseLanes<V: Lanes> {
-    first: RatedLanes<V>,
-    fast: StepLanes<V>,
-    second: Option<(RatedLanes<V>, StepLanes<V>)>,
-    /// −p in Q14: that of the first may be above 1.
-    pull: [V::W; 2],
-    moved: V::W,
+    coarse: FixedRatioLanes<V>,
+    fast: UnwrapStepLanes<V>,
+    middle: Option<(FixedRatioLanes<V>, UnwrapStepLanes<V>)>,
+    /// −p in Q14, because p_c may be above 1.
+    weights: [V::W; 2],
+    /// Q15.
+    mean_gain: V::W,
 }
 
-/// The levels of a block; of those that a sequence has not, nothing is looked at.
+/// The demodulated levels of a block. Levels that the sequence does not have are not read.
 #[derive(Clone, Copy)]
-pub(super) struct Around<V: Lanes> {
-    /// Of ratio 1 − 1/n.
-    pub first: Demodulated<V>,
-    /// Of ratio 1 − 1/n².
-    pub second: Demodulated<V>,
-    /// Whose ratio is the largest.
+pub(super) struct BlockLevels<V: Lanes> {
+    /// r_c = 1 − 1/n.
+    pub coarse: Demodulated<V>,
+    /// r_m = 1 − 1/n².
+    pub middle: Demodulated<V>,
+    /// The largest ratio.
     pub finest: Demodulated<V>,
 }
 
@@ -182,12 +206,12 @@ pub(super) struct Around<V: Lanes> {
 pub(super) struct Unwrapped<V: Lanes> {
     /// Φ, 1/65536 turn.
     pub phase: [V::D; 2],
-    /// The most that a step left over.
-    pub left: V::W,
+    /// The largest residual of the unwrapping steps and of the levels, unsigned.
+    pub residual: V::W,
 }
 
 impl<V: Lanes> AboutLanes<V> {
-    /// `None` where the plan is not for this number of levels.
+    /// `None` if the plan is for another number of levels.
     #[inline(always)]
     pub fn new<const LEVELS: usize>(v: V, plan: &About) -> Option<Self> {
         let mut scale = None;
@@ -197,54 +221,58 @@ impl<V: Lanes> AboutLanes<V> {
         let mut dense = None;
         if LEVELS > 1 {
             let Some(plan) = &plan.dense else { return None };
-            let mut second = None;
+            let mut middle = None;
             if LEVELS > 2 {
-                let Some((rated, slow)) = &plan.second else {
+                let Some((ratio, slow)) = &plan.middle else {
                     return None;
                 };
-                second = Some((RatedLanes::new(v, *rated), StepLanes::new(v, slow)));
+                middle = Some((
+                    FixedRatioLanes::new(v, *ratio),
+                    UnwrapStepLanes::new(v, slow),
+                ));
             }
             dense = Some(DenseLanes {
-                first: RatedLanes::new(v, plan.first),
-                fast: StepLanes::new(v, &plan.fast),
-                second,
-                pull: [
-                    v.splat16(q15(-plan.pull[0] / 2.0)),
-                    v.splat16(q15(-plan.pull[1] / 2.0)),
+                coarse: FixedRatioLanes::new(v, plan.coarse),
+                fast: UnwrapStepLanes::new(v, &plan.fast),
+                middle,
+                weights: [
+                    v.splat16(q15(-plan.weights[0] / 2.0)),
+                    v.splat16(q15(-plan.weights[1] / 2.0)),
                 ],
-                moved: v.splat16(q15(plan.moved)),
+                mean_gain: v.splat16(q15(plan.mean_gain)),
             });
         }
         Some(Self {
-            finest: RatedLanes::new(v, plan.finest),
+            finest: FixedRatioLanes::new(v, plan.finest),
             scale,
             dense,
         })
     }
 
-    /// Unwraps half a block (`half` 0 or 1) about `known`, Φ₀ in 1/65536 turn, and the same in turns.
+    /// Unwraps half a block (`half` 0 or 1) about Φ₀, given as double words (`known`) and as orders and fractions (`map`).
     #[inline(always)]
     pub fn unwrap(
         &self,
         v: V,
         known: [V::D; 2],
         map: Turns<V>,
-        levels: &Around<V>,
+        levels: &BlockLevels<V>,
         half: usize,
     ) -> Unwrapped<V> {
         let finest = &levels.finest;
         match &self.dense {
             Some(dense) => dense.unwrap(v, known, map, levels, half),
             None => {
-                let q1 = v.sub(finest.phase[half], self.finest.times(v, map));
-                self.single(v, known, q1)
+                let q_f = v.sub(finest.phase[half], self.finest.fraction_of(v, map));
+                self.single(v, known, q_f)
             }
         }
     }
 
+    /// Φ = Φ₀ + wrap(q_f) / r_f.
     #[inline(always)]
-    fn single(&self, v: V, known: [V::D; 2], q1: V::W) -> Unwrapped<V> {
-        let mut delta = v.join(q1, v.sar::<15>(q1));
+    fn single(&self, v: V, known: [V::D; 2], q_f: V::W) -> Unwrapped<V> {
+        let mut delta = v.join(q_f, v.sar::<15>(q_f));
         if let Some(scale) = self.scale {
             delta = [
                 v.to_whole(v.mul_single(v.to_single(delta[0]), scale)),
@@ -253,8 +281,8 @@ impl<V: Lanes> AboutLanes<V> {
         }
         Unwrapped {
             phase: [v.add32(known[0], delta[0]), v.add32(known[1], delta[1])],
-            // No step, so nothing is left over: whether the map is near enough is known to who made it.
-            left: v.splat16(0),
+            // A single level has no residual: that the map is near enough is ensured where the map is made.
+            residual: v.splat16(0),
         }
     }
 }
@@ -266,49 +294,50 @@ impl<V: Lanes> DenseLanes<V> {
         v: V,
         known: [V::D; 2],
         map: Turns<V>,
-        levels: &Around<V>,
+        levels: &BlockLevels<V>,
         half: usize,
     ) -> Unwrapped<V> {
         let zero = v.splat16(0);
-        // Of several levels the finest has ratio 1, the others less.
-        let q1 = v.sub(levels.finest.phase[half], map.phase);
-        let q3 = v.sub(levels.first.phase[half], self.first.part_times(v, map));
-        let beat = v.sub(q1, q3);
-        let (mut left, mut q2) = (zero, zero);
-        let ahead = if let Some((rated, slow)) = &self.second {
-            q2 = v.sub(levels.second.phase[half], rated.part_times(v, map));
-            let slow_beat = v.sub(q1, q2);
-            let [above, _] = slow.ahead_of_start(v, [slow_beat; 2]);
-            let climbed;
-            (climbed, left) = slow.land(v, above, beat);
-            self.fast.ahead(v, [climbed; 2])[0]
+        // With several levels r_f is 1 and the others are below 1.
+        let q_f = v.sub(levels.finest.phase[half], map.phase);
+        let coarse_expected = self.coarse.fraction_below_one(v, map);
+        let q_c = v.sub(levels.coarse.phase[half], coarse_expected);
+        let fast_beat = v.sub(q_f, q_c);
+        let (mut residual, mut q_m) = (zero, zero);
+        let expected = if let Some((ratio, slow)) = &self.middle {
+            q_m = v.sub(levels.middle.phase[half], ratio.fraction_below_one(v, map));
+            let slow_beat = v.sub(q_f, q_m);
+            let [fast_expected, _] = slow.expected_from_wrapped(v, [slow_beat; 2]);
+            let fast;
+            (fast, residual) = slow.unwrap(v, fast_expected, fast_beat);
+            self.fast.expected(v, [fast; 2])[0]
         } else {
-            self.fast.ahead_of_start(v, [beat; 2])[0]
+            self.fast.expected_from_wrapped(v, [fast_beat; 2])[0]
         };
-        let (d1, left_fast) = self.fast.land(v, ahead, q1);
-        let e3 = v.sub(self.first.part_times(v, d1), q3);
-        left = v.max_unsigned(left, v.max_unsigned(left_fast, farness(v, e3)));
-        let mut e2 = zero;
-        if let Some((rated, _)) = &self.second {
-            // About the mean so far, as far as it matters for trust.
-            let moved = v.mul_q15(e3, self.moved);
-            e2 = v.sub(v.sub(rated.part_times(v, d1), q2), moved);
-            left = v.max_unsigned(left, farness(v, e2));
+        let (d_f, residual_fast) = self.fast.unwrap(v, expected, q_f);
+        let e_c = v.sub(self.coarse.fraction_below_one(v, d_f), q_c);
+        residual = v.max_unsigned(residual, v.max_unsigned(residual_fast, v.abs(e_c)));
+        let mut e_m = zero;
+        if let Some((ratio, _)) = &self.middle {
+            // About the mean of finest and coarse level, as the residual's limit asks for.
+            let moved = v.mul_q15(e_c, self.mean_gain);
+            e_m = v.sub(v.sub(ratio.fraction_below_one(v, d_f), q_m), moved);
+            residual = v.max_unsigned(residual, v.abs(e_m));
         }
-        let delta = v.join(d1.phase, d1.order);
-        let correction = v.dot(e3, self.pull[0], e2, self.pull[1]);
+        let delta = v.join(d_f.phase, d_f.order);
+        let correction = v.dot(e_c, self.weights[0], e_m, self.weights[1]);
         let known = [v.add32(known[0], delta[0]), v.add32(known[1], delta[1])];
         Unwrapped {
             phase: [
                 v.add32(known[0], rounded(v, correction[0])),
                 v.add32(known[1], rounded(v, correction[1])),
             ],
-            left,
+            residual,
         }
     }
 }
 
-/// A double word in Q14 as a whole number, rounded to nearest.
+/// A double word in Q14, rounded to the nearest whole number.
 #[inline(always)]
 fn rounded<V: Lanes>(v: V, x: V::D) -> V::D {
     v.sar32_by(v.add32(x, v.splat32(1 << 13)), 14)

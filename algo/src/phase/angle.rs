@@ -1,11 +1,27 @@
-//! The angle and the length of a folded pointer, in words.
+//! Wrapped phase and length of a folded pointer, by multiplications of words.
 //!
-//! Half of t = short/long by a polynomial for 1/(2 long) about the middle of its range, in two qualities. Fine: a quadratic and
-//! one residual step, then the arctangent by a polynomial of degree 5 at 1/131072 turn, so that its roundings stay below the
-//! last bit. Rough, for levels that only give the fringe order of the next: a cubic and an arctangent of degree 3. No table,
-//! no division, no estimate that differs from machine to machine.
+//! **Idea.** After folding ([`super::fold`]) the pointer (C, S) lies in the first octant, so its angle is the arctangent of
+//! t = short / long, 0 ≤ t ≤ 1. Both the quotient and the arctangent are polynomials.
 //!
-//! Over all pairs of 8-bit differences of a trusted pixel the fine angle is off by at most 2.24e-5 turn, RMS 6.2e-6
+//! **Equation**, fine quality:
+//!
+//! ```text
+//! t₀ = 2 short · R(long)                          R(x) ≈ 1/(2x), a quadratic about the middle of the range of long
+//! t  = t₀ + 2 (short − t₀ · long) · R(long)       one Newton step on the remainder of the division
+//! a  = t · P(t)                                   ≈ atan(t)/2π, a polynomial of degree 5 in t
+//! φ  = axis ± a                                   unfolded
+//! √(S² + C²) = long · √(1 + t²)                   a polynomial of degree 2 in t²
+//! ```
+//!
+//! Rough quality, for levels that only give the fringe order of the next: R is a cubic, there is no Newton step, a is of degree 3.
+//!
+//! **Shapes and units.** Half a block. `long` is Q15 in ½…1, `short` the same scale; t in Q15; angles in 1/65536 turn, inside
+//! the fine arctangent in 1/131072 turn so that its roundings stay below the last bit.
+//!
+//! **Departures** from `atan2`: no table, no division and no hardware estimate of a reciprocal, which would differ from machine
+//! to machine. The coefficients are minimax; their last digits come from a search over all pairs of 8-bit differences.
+//!
+//! **Accuracy.** Over all pairs of 8-bit differences of a trusted pixel the fine angle is off by at most 2.24e-5 turn, RMS 6.2e-6
 //! (`every_pair_of_8_bit_differences_is_within_the_bound`), the rough one by at most 3.2e-4
 //! (`every_rough_angle_is_within_the_bound`).
 
@@ -13,16 +29,15 @@ use super::fold::Folded;
 use crate::simd::Lanes;
 use core::hint::black_box;
 
-/// 1/(2x) in Q15 for x = (3 + d)/4, −1 ≤ d < 1, from the constant to the square: relative error 1 %. Minimax; the last digits
-/// of all constants here by search over all pairs of 8-bit differences.
+/// 1/(2x) in Q15 for x = (3 + d)/4, −1 ≤ d < 1, coefficients of d⁰ to d²: relative error 1 %.
 const RECIPROCAL: [i16; 3] = [21_826, -7_914, 2_710];
-/// The same to the cube: relative error 0.2 %.
+/// The same with d³: relative error 0.2 %.
 const ROUGH_RECIPROCAL: [i16; 4] = [21_817, -7_271, 2_724, -914];
-/// atan(t)/2π on 0 ≤ t ≤ 1 in 1/131072 turn, from the first power of t to the fifth: error 4e-6 turn.
+/// atan(t)/2π on 0 ≤ t ≤ 1 in 1/131072 turn, coefficients of t to t⁵: error 4e-6 turn.
 const ARCTANGENT: [i16; 5] = [20_831, 439, -9_260, 5_342, -967];
-/// atan(2h)/2π on 0 ≤ h ≤ ½ in 1/65536 turn, from the first power of h to the third: error 1.9e-4 turn.
+/// atan(2h)/2π on 0 ≤ h ≤ ½ in 1/65536 turn, coefficients of h to h³: error 1.9e-4 turn.
 const ROUGH_ARCTANGENT: [i16; 3] = [21_455, -7_158, -6_092];
-/// √(1 + t²) on 0 ≤ t ≤ 1 in powers of t²: relative error 6.5e-4.
+/// √(1 + t²) on 0 ≤ t ≤ 1, coefficients of 1, t² and t⁴: relative error 6.5e-4.
 pub(super) const LENGTH: [f64; 3] = [1.000_644, 0.484_927, -0.072_269];
 
 /// The constants in all lanes.
@@ -44,21 +59,21 @@ impl<V: Lanes> AngleLanes<V> {
         }
     }
 
-    /// φ of half a block in 1/65536 turn, and t in Q15.
+    /// φ of half a block in fine quality, 1/65536 turn, and t in Q15.
     #[inline(always)]
     pub fn fine(&self, v: V, folded: &Folded<V>, half: usize) -> (V::W, V::W) {
         let (short, long) = (folded.short[half], folded.long[half]);
         let reciprocal = polynomial(v, self.reciprocal, folded.centred[half]);
-        let first = v.mul_q15(short, reciprocal);
-        let first = v.add_sat(first, first);
-        let missing = v.sub(short, v.mul_q15(first, long));
-        let second = v.mul_q15(v.add(missing, missing), reciprocal);
-        let t = v.add_sat(first, second);
+        let quotient = v.mul_q15(short, reciprocal);
+        let quotient = v.add_sat(quotient, quotient);
+        let remainder = v.sub(short, v.mul_q15(quotient, long));
+        let correction = v.mul_q15(v.add(remainder, remainder), reciprocal);
+        let t = v.add_sat(quotient, correction);
         let angle = v.halve(v.mul_q15(t, polynomial(v, self.arctangent, t)));
         (folded.unfold(v, half, angle), t)
     }
 
-    /// φ of half a block in 1/65536 turn, roughly.
+    /// φ of half a block in rough quality, 1/65536 turn.
     #[inline(always)]
     pub fn rough(&self, v: V, folded: &Folded<V>, half: usize) -> V::W {
         let reciprocal = polynomial(v, self.rough_reciprocal, folded.centred[half]);
@@ -70,7 +85,7 @@ impl<V: Lanes> AngleLanes<V> {
 
 #[inline(always)]
 fn splat<V: Lanes, const N: usize>(v: V, constants: [i16; N]) -> [V::W; N] {
-    // Hidden from the compiler, or it makes them anew at every use instead of reading them from memory.
+    // Hidden from the compiler, which otherwise builds each constant anew at every use instead of loading it.
     let constants = black_box(constants);
     let mut lanes = [v.splat16(0); N];
     let mut at = 0;

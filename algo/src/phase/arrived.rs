@@ -1,88 +1,116 @@
-//! What the levels of a measurement say that were decoded when they arrived, while the next was being exposed.
+//! What is kept of levels that were decoded on arrival, while the next level was being exposed.
 //!
-//! Geometric levels climb: of each pixel only what the finest level so far says of the next is kept, in place. Levels about a known map
-//! need one another at the end: wrapped phase and doubts of each are kept.
+//! Geometric levels update one set of maps in place: the phase that the levels so far predict for the next one. Levels about a
+//! known map are combined after the last one, so wrapped phase and flags of each are kept. Rows are at least one block wide, so
+//! that frames narrower than a block need no copies of them.
 
 use super::level::Demodulated;
-use crate::pattern::MAX_LEVELS;
+use super::narrow::MAX_PIXELS;
 use crate::simd::Lanes;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 /// The levels that have arrived, coarse to fine, of a whole frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Arrived {
-    /// Pixels per row.
-    width: usize,
-    /// Rows.
-    height: usize,
+    /// Width and height of the frames.
+    size: (usize, usize),
     /// How many levels.
     levels: usize,
-    planes: Planes,
+    layout: Layout,
+    /// The words of all rows, one row after the other, and the bytes.
+    words: Vec<u16>,
+    bytes: Vec<u8>,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum Planes {
-    Climbed(Climbed),
-    Wrapped(Vec<Wrapped>),
+/// What a row of the maps consists of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Layout {
+    /// Pixels per row, at least a block.
+    pixels: usize,
+    /// Words and bytes per pixel.
+    each: (usize, usize),
+    /// Whether rows are of geometric levels.
+    geometric: bool,
 }
 
-/// What the finest level so far says of the next, row-major.
-#[derive(Clone, Debug, PartialEq, Eq)]
-struct Climbed {
-    /// Of the phase expected at the next level, 1/65536 turn.
-    pub fraction: Vec<u16>,
-    /// The same in turns, in the fixed point of the step to it.
-    pub turns: Vec<u16>,
-    /// The number of the first [`crate::trust::Trust`] that speaks against it, or [`NO_DOUBT`].
-    pub doubt: Vec<u8>,
+/// A row of what has arrived, borrowed as words `W` and bytes `B`.
+#[derive(Debug)]
+pub(crate) enum ArrivedRow<W, B> {
+    /// Of geometric levels: what they predict for the next.
+    Expected(Expected<W, B>),
+    /// Of levels about a known map.
+    Wrapped {
+        /// All levels but the finest, coarse to fine, one after the other.
+        levels: Wrapped<W, B>,
+        /// Pixels of each.
+        pixels: usize,
+    },
 }
 
-/// Nothing speaks against a pixel so far. Above every reason, so that of two the smaller is the first.
-pub(super) const NO_DOUBT: u8 = u8::MAX;
+/// The phase expected at the next level ([`super::unwrap_step::ExpectedPhase`]) along a row, with maps of words `W` and of
+/// bytes `B`: owned or borrowed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Expected<W, B> {
+    /// Modulo one turn, 1/65536 turn.
+    pub fraction: W,
+    /// Its turns, in the fixed point of the step to the next level.
+    pub turns: W,
+    /// The first [`crate::trust::Trust`] that rejects the pixel, or [`NO_REASON`].
+    pub reason: B,
+}
 
-/// One demodulated level, row-major.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Wrapped {
+/// A row of [`Expected`], borrowed.
+pub(crate) type ExpectedRow<'a> = Expected<&'a [u16], &'a [u8]>;
+/// A row of [`Expected`], to be written.
+pub(crate) type ExpectedRowMut<'a> = Expected<&'a mut [u16], &'a mut [u8]>;
+
+/// No reason so far to reject a pixel. Larger than every reason, so that the smaller of two numbers is the first reason.
+pub(super) const NO_REASON: u8 = u8::MAX;
+
+/// A demodulated level along a row, with maps of words `W` and of bytes `B`: owned or borrowed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Wrapped<W, B> {
     /// φ in 1/65536 turn.
-    pub phase: Vec<u16>,
+    pub phase: W,
     /// [`WEAK`] and [`SATURATED`].
-    pub doubts: Vec<u8>,
+    pub flags: B,
 }
+
+/// A row of [`Wrapped`], borrowed.
+pub(crate) type WrappedRow<'a> = Wrapped<&'a [u16], &'a [u8]>;
+/// A row of [`Wrapped`], to be written.
+pub(crate) type WrappedRowMut<'a> = Wrapped<&'a mut [u16], &'a mut [u8]>;
 
 /// The modulation is below the trusted minimum.
 const WEAK: u8 = 1;
-/// A sample is at full scale, where that matters.
+/// A sample is at full scale and the level does not tolerate that.
 const SATURATED: u8 = 2;
 
 impl Arrived {
-    pub(super) fn climbing(width: usize, height: usize) -> Self {
-        let pixels = width * height;
-        let planes = Planes::Climbed(Climbed {
-            fraction: vec![0; pixels],
-            turns: vec![0; pixels],
-            doubt: vec![NO_DOUBT; pixels],
-        });
-        Self {
-            width,
-            height,
-            levels: 0,
-            planes,
-        }
+    /// Room for geometric levels.
+    pub(super) fn geometric(width: usize, height: usize) -> Self {
+        Self::new((width, height), (2, 1), true)
     }
 
-    /// With room for this many levels.
-    pub(super) fn wrapping(width: usize, height: usize, levels: usize) -> Self {
-        let pixels = width * height;
-        let level = Wrapped {
-            phase: vec![0; pixels],
-            doubts: vec![0; pixels],
+    /// Room for this many levels about a known map.
+    pub(super) fn about_map(width: usize, height: usize, levels: usize) -> Self {
+        Self::new((width, height), (levels, levels), false)
+    }
+
+    fn new(size: (usize, usize), each: (usize, usize), geometric: bool) -> Self {
+        let layout = Layout {
+            pixels: size.0.max(MAX_PIXELS),
+            each,
+            geometric,
         };
         Self {
-            width,
-            height,
+            size,
             levels: 0,
-            planes: Planes::Wrapped(vec![level; levels]),
+            layout,
+            words: vec![0; layout.words() * size.1],
+            bytes: vec![NO_REASON; layout.bytes() * size.1],
         }
     }
 
@@ -93,215 +121,207 @@ impl Arrived {
 
     /// Width and height of the frames.
     pub fn size(&self) -> (usize, usize) {
-        (self.width, self.height)
+        self.size
     }
 
-    /// Forgets all levels: those of another measurement may arrive.
+    /// Forgets all levels, so that those of another measurement may arrive.
     pub fn restart(&mut self) {
         self.levels = 0;
     }
 
-    /// One more has been written.
+    /// Counts the level that has been written to [`Self::maps_mut`].
     pub(crate) fn add_level(&mut self) {
         self.levels += 1;
     }
 
-    /// Row `v` of geometric levels.
-    pub(super) fn climbed_row(&self, v: usize) -> Option<ClimbedRow<'_>> {
-        let Planes::Climbed(planes) = &self.planes else {
-            return None;
-        };
-        let row = v * self.width..(v + 1) * self.width;
-        Some(ClimbedRow {
-            fraction: &planes.fraction[row.clone()],
-            turns: &planes.turns[row.clone()],
-            doubt: &planes.doubt[row],
-        })
-    }
-
-    /// Row `v` of each level about a known map, coarse to fine.
-    pub(super) fn wrapped_rows(&self, v: usize) -> heapless::Vec<WrappedRow<'_>, MAX_LEVELS> {
-        match &self.planes {
-            Planes::Climbed(_) => heapless::Vec::new(),
-            Planes::Wrapped(levels) => levels
-                .iter()
-                .map(|level| level.row(self.width, v))
-                .collect(),
-        }
-    }
-
-    /// Where the next level is to be written to: what it is, and its maps; empty if there is no room for another.
-    pub(crate) fn arriving(&mut self) -> (ArrivingLevel<'_>, PlanesMut<'_>) {
-        match &mut self.planes {
-            Planes::Climbed(planes) => (
-                ArrivingLevel::Climbing,
-                (&mut planes.fraction, &mut planes.turns, &mut planes.doubt),
-            ),
-            Planes::Wrapped(levels) => {
-                let there = self.levels.min(levels.len());
-                let (before, rest) = levels.split_at_mut(there);
-                let level = ArrivingLevel::Wrapping {
-                    coarsest: before.first(),
-                    width: self.width,
-                };
-                let planes: PlanesMut<'_> = match rest.first_mut() {
-                    Some(next) => (&mut next.phase, &mut [], &mut next.doubts),
-                    None => (&mut [], &mut [], &mut []),
-                };
-                (level, planes)
+    /// Row `v`.
+    pub(super) fn row(&self, v: usize) -> ArrivedRow<&[u16], &[u8]> {
+        let (words, bytes) = (self.layout.words(), self.layout.bytes());
+        let words = &self.words[v * words..(v + 1) * words];
+        let bytes = &self.bytes[v * bytes..(v + 1) * bytes];
+        if self.layout.geometric {
+            let (fraction, turns) = words.split_at(self.layout.pixels);
+            ArrivedRow::Expected(Expected {
+                fraction,
+                turns,
+                reason: bytes,
+            })
+        } else {
+            ArrivedRow::Wrapped {
+                levels: Wrapped {
+                    phase: words,
+                    flags: bytes,
+                },
+                pixels: self.layout.pixels,
             }
         }
     }
 
-    /// Every row, for the next level to be written to.
-    #[cfg(test)]
-    pub(crate) fn rows(&mut self) -> impl Iterator<Item = ArrivingRow<'_>> {
-        let width = self.width.max(1);
-        let (level, (first, second, third)) = self.arriving();
-        let mut seconds = second.chunks_mut(width);
-        let rows = first.chunks_mut(width).zip(third.chunks_mut(width));
-        rows.enumerate().map(move |(v, (first, third))| {
-            level.row(v, (first, seconds.next().unwrap_or_default(), third))
-        })
+    /// Words and bytes of all rows, for the next level to be written to, and the layout of a row.
+    pub(crate) fn maps_mut(&mut self) -> (Layout, &mut [u16], &mut [u8]) {
+        (self.layout, &mut self.words, &mut self.bytes)
     }
 }
 
-impl Wrapped {
-    fn row(&self, width: usize, v: usize) -> WrappedRow<'_> {
-        let row = v * width..(v + 1) * width;
-        WrappedRow {
-            phase: &self.phase[row.clone()],
-            doubts: &self.doubts[row],
-        }
+impl Layout {
+    /// Words of a row.
+    pub fn words(&self) -> usize {
+        self.pixels * self.each.0
     }
-}
 
-/// Three maps, or a row of each: fraction, turns, doubt, or phase, nothing, doubts.
-pub(crate) type PlanesMut<'a> = (&'a mut [u16], &'a mut [u16], &'a mut [u8]);
+    /// Bytes of a row.
+    pub fn bytes(&self) -> usize {
+        self.pixels * self.each.1
+    }
 
-/// The level that is to be written next.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum ArrivingLevel<'a> {
-    /// A geometric one.
-    Climbing,
-    /// One about a known map.
-    Wrapping {
-        /// The first of them, if it is there already.
-        coarsest: Option<&'a Wrapped>,
-        width: usize,
-    },
-}
-
-impl<'a> ArrivingLevel<'a> {
-    /// Row `v` of its maps.
-    pub fn row<'b>(&self, v: usize, (first, second, third): PlanesMut<'b>) -> ArrivingRow<'b>
-    where
-        'a: 'b,
-    {
-        match *self {
-            Self::Climbing => ArrivingRow::Climbing(ClimbedRowMut {
-                fraction: first,
-                turns: second,
-                doubt: third,
-            }),
-            Self::Wrapping { coarsest, width } => ArrivingRow::Wrapping {
-                coarsest: coarsest.map(|level| level.row(width, v)),
-                row: WrappedRowMut {
-                    phase: first,
-                    doubts: third,
+    /// The row that these words and bytes are.
+    pub fn row_mut<'a>(
+        &self,
+        words: &'a mut [u16],
+        bytes: &'a mut [u8],
+    ) -> ArrivedRow<&'a mut [u16], &'a mut [u8]> {
+        if self.geometric {
+            let (fraction, turns) = words.split_at_mut(self.pixels);
+            ArrivedRow::Expected(Expected {
+                fraction,
+                turns,
+                reason: bytes,
+            })
+        } else {
+            ArrivedRow::Wrapped {
+                levels: Wrapped {
+                    phase: words,
+                    flags: bytes,
                 },
-            },
+                pixels: self.pixels,
+            }
         }
     }
 }
 
-/// A row of what has arrived, for the next level to be written to.
-#[derive(Debug)]
-pub(crate) enum ArrivingRow<'a> {
-    /// Of geometric levels.
-    Climbing(ClimbedRowMut<'a>),
-    /// Of levels about a known map.
-    Wrapping {
-        /// The first of them, if it is there already.
-        coarsest: Option<WrappedRow<'a>>,
-        row: WrappedRowMut<'a>,
-    },
-}
-
-/// A row of [`Climbed`].
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ClimbedRow<'a> {
-    pub fraction: &'a [u16],
-    pub turns: &'a [u16],
-    pub doubt: &'a [u8],
-}
-
-/// A row of [`Climbed`], to be written.
-#[derive(Debug)]
-pub(crate) struct ClimbedRowMut<'a> {
-    pub fraction: &'a mut [u16],
-    pub turns: &'a mut [u16],
-    pub doubt: &'a mut [u8],
-}
-
-impl ClimbedRowMut<'_> {
-    pub fn as_row(&self) -> ClimbedRow<'_> {
-        ClimbedRow {
-            fraction: self.fraction,
-            turns: self.turns,
-            doubt: self.doubt,
+impl<W: AsRef<[u16]>, B: AsRef<[u8]>> Expected<W, B> {
+    /// Borrowed.
+    #[inline(always)]
+    pub fn row(&self) -> ExpectedRow<'_> {
+        Expected {
+            fraction: self.fraction.as_ref(),
+            turns: self.turns.as_ref(),
+            reason: self.reason.as_ref(),
         }
     }
 }
 
-/// A row of a demodulated level.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct WrappedRow<'a> {
-    pub phase: &'a [u16],
-    pub doubts: &'a [u8],
+impl<W: AsMut<[u16]>, B: AsMut<[u8]>> Expected<W, B> {
+    /// Borrowed to be written.
+    #[inline(always)]
+    pub fn row_mut(&mut self) -> ExpectedRowMut<'_> {
+        Expected {
+            fraction: self.fraction.as_mut(),
+            turns: self.turns.as_mut(),
+            reason: self.reason.as_mut(),
+        }
+    }
 }
 
-/// A row of a demodulated level, to be written.
-#[derive(Debug)]
-pub(crate) struct WrappedRowMut<'a> {
-    pub phase: &'a mut [u16],
-    pub doubts: &'a mut [u8],
+impl<W: AsRef<[u16]>, B: AsRef<[u8]>> Wrapped<W, B> {
+    /// Borrowed.
+    #[inline(always)]
+    pub fn row(&self) -> WrappedRow<'_> {
+        Wrapped {
+            phase: self.phase.as_ref(),
+            flags: self.flags.as_ref(),
+        }
+    }
+}
+
+impl<W: AsMut<[u16]>, B: AsMut<[u8]>> Wrapped<W, B> {
+    /// Borrowed to be written.
+    #[inline(always)]
+    pub fn row_mut(&mut self) -> WrappedRowMut<'_> {
+        Wrapped {
+            phase: self.phase.as_mut(),
+            flags: self.flags.as_mut(),
+        }
+    }
+}
+
+impl ExpectedRow<'_> {
+    /// These columns.
+    #[inline(always)]
+    pub fn part(self, columns: Range<usize>) -> Self {
+        Self {
+            fraction: &self.fraction[columns.clone()],
+            turns: &self.turns[columns.clone()],
+            reason: &self.reason[columns],
+        }
+    }
 }
 
 impl WrappedRow<'_> {
-    /// Mask: the block's pixels that are not weak.
+    /// These columns.
+    #[inline(always)]
+    pub fn part(self, columns: Range<usize>) -> Self {
+        Self {
+            phase: &self.phase[columns.clone()],
+            flags: &self.flags[columns],
+        }
+    }
+
+    /// Mask: the block's pixels that are not [`WEAK`].
     #[inline(always)]
     pub fn strong<V: Lanes>(&self, v: V, at: usize) -> V::B {
         let weak = v.splat8(WEAK);
-        v.eq8(v.and8(v.load8(self.doubts, at), weak), v.splat8(0))
+        v.eq8(v.and8(v.load8(self.flags, at), weak), v.splat8(0))
     }
 
+    /// The block at `at`.
     #[inline(always)]
     pub fn block<V: Lanes>(&self, v: V, at: usize) -> Demodulated<V> {
         let saturated = v.splat8(SATURATED);
-        let doubts = v.load8(self.doubts, at);
+        let flags = v.load8(self.flags, at);
         Demodulated {
             phase: v.load16(self.phase, at),
             strong: self.strong(v, at),
-            brightest: v.eq8(v.and8(doubts, saturated), saturated),
+            brightest: v.eq8(v.and8(flags, saturated), saturated),
         }
     }
 }
 
 impl WrappedRowMut<'_> {
+    /// Of several levels of `pixels` each: the coarsest, if it has arrived before, and level `at` to be written. `None` if there
+    /// is no room for it, which there is not for the finest.
+    pub fn level(
+        &mut self,
+        at: usize,
+        pixels: usize,
+    ) -> Option<(Option<WrappedRow<'_>>, WrappedRowMut<'_>)> {
+        let (words, phase) = self.phase.split_at_mut_checked(at * pixels)?;
+        let (bytes, flags) = self.flags.split_at_mut_checked(at * pixels)?;
+        let coarsest = (at > 0).then(|| Wrapped {
+            phase: &words[..pixels],
+            flags: &bytes[..pixels],
+        });
+        let level = Wrapped {
+            phase: phase.get_mut(..pixels)?,
+            flags: flags.get_mut(..pixels)?,
+        };
+        Some((coarsest, level))
+    }
+
+    /// Writes the block at `at`.
     #[inline(always)]
     pub fn store<V: Lanes>(&mut self, v: V, at: usize, block: &Demodulated<V>) {
         v.store16(self.phase, at, block.phase);
         let weak = v.pick8(block.strong, v.splat8(0), v.splat8(WEAK));
         let saturated = v.eq8(block.brightest, v.splat8(u8::MAX));
-        let doubts = v.or8(weak, v.and8(saturated, v.splat8(SATURATED)));
-        v.store8(self.doubts, at, doubts);
+        let flags = v.or8(weak, v.and8(saturated, v.splat8(SATURATED)));
+        v.store8(self.flags, at, flags);
     }
 
-    /// A block of which nothing is known but that it is weak.
+    /// Writes a block that was not decoded: all of it weak.
     #[inline(always)]
     pub fn store_weak<V: Lanes>(&mut self, v: V, at: usize) {
         v.store16(self.phase, at, [v.splat16(0); 2]);
-        v.store8(self.doubts, at, v.splat8(WEAK));
+        v.store8(self.flags, at, v.splat8(WEAK));
     }
 }

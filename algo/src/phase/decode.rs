@@ -1,4 +1,4 @@
-//! What decoding a sequence needs, worked out once, and which frames fit it.
+//! The decoder of a sequence: its plan, the predicted noise, and the check that frames fit it. `rows.rs` decodes.
 
 use super::arrived::Arrived;
 use super::level::Level;
@@ -11,7 +11,7 @@ use crate::units::{AbsolutePhase, Modulation};
 use alloc::vec::Vec;
 use core::fmt;
 
-/// Everything that decoding a sequence needs, worked out once.
+/// The plan of decoding a sequence from samples of one bit depth, prepared once.
 #[derive(Clone, Debug)]
 pub struct Decoder {
     /// From coarse to fine.
@@ -30,8 +30,7 @@ pub struct Decoder {
 pub struct PhaseRow<'a> {
     /// Φ in turns of the phase function, [`AbsolutePhase::UNKNOWN`] where not resolved.
     pub phase: &'a mut [AbsolutePhase],
-    /// The modulation that decides the phase's accuracy: of the finest level, or the mean of dense levels with weights
-    /// N r². 0 where the pixel is not resolved.
+    /// The finest level's modulation; 0 where the pixel is not resolved.
     pub modulation: &'a mut [Modulation],
     /// Resolved, or the first reason why not.
     pub trust: &'a mut [Trust],
@@ -61,7 +60,7 @@ pub enum DecodeError {
         /// Width and height of this one.
         given: (usize, usize),
     },
-    /// Levels have arrived in another number than this needs.
+    /// The number of levels that have arrived does not fit the call.
     Level {
         /// How many have arrived.
         arrived: usize,
@@ -99,7 +98,7 @@ impl fmt::Display for DecodeError {
             ),
             Self::Level { arrived, levels } => write!(
                 f,
-                "{arrived} of {levels} levels have arrived: all but the finest are decoded one after the other, it is last"
+                "{arrived} of {levels} levels have arrived: decode all but the finest on arrival, from coarse to fine, then the finest"
             ),
             Self::SampleWidth { frame, bit_depth } => write!(
                 f,
@@ -143,12 +142,12 @@ impl Decoder {
         })
     }
 
-    /// The same on another back-end of this machine, with the same bits.
+    /// The same decoder on another back-end of this machine; the bits are the same.
     pub fn with_backend(self, backend: Backend) -> Self {
         Self { backend, ..self }
     }
 
-    /// The back-end that it runs on.
+    /// The back-end in use.
     pub fn backend(&self) -> Backend {
         self.backend
     }
@@ -163,7 +162,8 @@ impl Decoder {
         ((1_u32 << self.bit_depth) - 1) as u16
     }
 
-    /// σ_Φ in turns of a resolved pixel: σ_I / 2π · √(2 / Σ N_i r_i² B²), B of the finest level, whose modulation is the least.
+    /// σ_Φ of a resolved pixel in turns: σ_I / 2π · √(2 / Σ N_i r_i² B²). B is the finest level's, the smallest of all, so that σ
+    /// is not too small.
     ///
     /// `noise` is σ_I, the noise of one sample in counts.
     pub fn phase_noise(&self, modulation: Modulation, noise: f64) -> f64 {
@@ -177,13 +177,13 @@ impl Decoder {
         MIN_MODULATION_8_BIT * f64::from(self.full_scale()) / 255.0
     }
 
-    /// σ_B in counts, where samples have a noise of `noise` counts: σ_I · √(2 / N) of the finest level's N.
+    /// σ_B in counts: σ_I · √(2 / N) with σ_I = `noise` counts and the finest level's N.
     pub fn modulation_noise(&self, noise: f64) -> f64 {
         let shifts = self.levels.last().map_or(1, |level| level.frames.len());
         noise * libm::sqrt(2.0 / shifts as f64)
     }
 
-    /// Checks that `frames` are what this decoder was made for: count, equal size, sample type.
+    /// Checks that `frames` fit this decoder: count, equal size, sample type.
     ///
     /// # Errors
     /// Naming the frame that does not fit.
@@ -219,10 +219,10 @@ impl Decoder {
         Ok(())
     }
 
-    /// Checks that `frames` are those of the level after those that have arrived: count, size, sample type.
+    /// Checks that `frames` fit the next level after those that have arrived: count, size, sample type.
     ///
     /// # Errors
-    /// What does not fit.
+    /// Naming what does not fit.
     pub fn check_arrival(
         &self,
         frames: &[FrameView<'_>],
@@ -246,10 +246,10 @@ impl Decoder {
         Ok(())
     }
 
-    /// Checks that `frames` are those of the finest level and that all others have arrived.
+    /// Checks that `frames` fit the finest level and that all others have arrived.
     ///
     /// # Errors
-    /// What does not fit.
+    /// Naming what does not fit.
     pub fn check_last(
         &self,
         frames: &[FrameView<'_>],
@@ -264,7 +264,7 @@ impl Decoder {
         self.check_arrival(frames, arrived)
     }
 
-    /// Places in the sequence of the frames of a level, in the order of their shifts; levels from coarse to fine.
+    /// For each level, coarse to fine: the places of its frames in the sequence, in the order of their shifts.
     pub fn levels(&self) -> impl ExactSizeIterator<Item = &[usize]> {
         self.levels.iter().map(|level| &level.frames[..])
     }

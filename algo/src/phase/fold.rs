@@ -1,47 +1,67 @@
 //! The samples of a level at a block of pixels → the pointer (C, S) of its fringes, folded into the first octant.
 //!
-//! S = Σ I_k cos 2πs_k, C = Σ I_k sin 2πs_k for I_k = A + B sin 2π(φ + s_k) (Peng & Gupta 2008, eq. 1 with a phase step;
-//! the generalised N-step method); φ = atan2(S, C)/2π, B = (2/N) √(S² + C²). With k/N for s_k:
+//! **Idea.** N shifted samples of a fringe are projected on cosine and sine of their shifts. Offset A drops out; what remains is
+//! a pointer whose angle is the phase and whose length is proportional to the modulation. Signs and swap of its components are
+//! taken out ("folded"), so that [`super::angle`] needs an arctangent of 0…1 only.
 //!
-//! - N = 4: S = I₀ − I₂, C = I₁ − I₃. At 8 bits all of it, the folding too, is done in bytes, exactly.
-//! - N = 3: S = (2I₀ − I₁ − I₂)/2, C = (√3/2)(I₁ − I₂).
-//! - any other N, and 3 or 4 of more than 12 bits: sums of products in 32 bits with weights in Q14.
+//! **Equation.** I_k = A + B sin 2π(φ + s_k) (Peng & Gupta 2008, eq. 1 with a shift); N equally spaced shifts (Bruning et al.
+//! 1974):
+//!
+//! ```text
+//! S = Σ I_k cos 2πs_k      C = Σ I_k sin 2πs_k      φ = atan2(S, C) / 2π      B = (2/N) √(S² + C²)
+//! ```
+//!
+//! With s_k = k/N this becomes, by the number of shifts and bits:
+//!
+//! | N | S | C | arithmetic |
+//! |---|---|---|---|
+//! | 4, 8 bits | I₀ − I₂ | I₁ − I₃ | bytes, exact, folding included |
+//! | 4, up to 12 bits | I₀ − I₂ | I₁ − I₃ | words, exact |
+//! | 3, up to 12 bits | (2I₀ − I₁ − I₂)/2 | (√3/2)(I₁ − I₂) | words; one rounding in C |
+//! | any other | Σ w I | Σ w I | weights in Q14, sums in 32 bits, rounded to words |
+//!
+//! **Shapes and units.** Samples in counts of the bit depth, one block of each of the N rows; components in words, scaled by a
+//! power of two so that the longer one uses 15 bits.
+//!
+//! **Accuracy.** Every N from 3 to 64 at every depth against the definition in f64
+//! (`any_number_of_steps_at_any_depth_agrees_with_the_definition`). The threshold of modulation is decided exactly, from S² + C²
+//! (`the_modulation_threshold_is_sixteen_counts_exactly`).
 
 use super::level::{LevelLanes, Samples};
 use crate::frame::Sample;
 use crate::simd::{Four, Lanes};
 
-/// Where the pointer lies: in the first octant after folding, and how to unfold.
+/// The pointers of a block, folded into the first octant, and how to unfold their angles.
 pub(super) struct Folded<V: Lanes> {
-    /// The longer component, scaled by a power of two to 2¹⁴…2¹⁵ (less only where the pixel is weak).
+    /// The longer component, scaled by a power of two to 2¹⁴…2¹⁵ (below that only where the modulation is too small).
     pub long: [V::W; 2],
-    /// The shorter, with the same factor.
+    /// The shorter component, with the same factor.
     pub short: [V::W; 2],
     /// 4 · long − 3 · 2¹⁵.
     pub centred: [V::W; 2],
-    /// The longer before scaling, in the level's unit.
+    /// The longer component before scaling, in the level's unit.
     pub length: [V::W; 2],
-    /// −1 where the angle in the octant counts backwards, else 1.
+    /// −1 where the octant's angle is subtracted from the axis, 1 where it is added.
     pub sign: [V::W; 2],
-    /// The axis from which it counts in 1/65536 turn.
+    /// The axis that the octant's angle is measured from, 1/65536 turn.
     pub axis: [V::W; 2],
     /// Mask: the modulation is at least the trusted minimum.
     pub strong: V::B,
-    /// 255 where a sample is at full scale and that matters.
+    /// 255 where a sample is at full scale and the level does not tolerate that.
     pub brightest: V::B,
 }
 
 impl<V: Lanes> Folded<V> {
-    /// The phase of half a block that has this angle in its octant.
+    /// The phases of half a block from the angles in its octants.
     #[inline(always)]
     pub fn unfold(&self, v: V, half: usize, angle: V::W) -> V::W {
         v.add_signed(self.axis[half], angle, self.sign[half])
     }
 }
 
-/// A sample that blocks of pixels can be made of.
+/// A sample type that the kernels can read blocks of.
 pub(crate) trait BlockSample: Sample {
-    /// Demodulation of four equally spaced shifts, the quickest that there is for this width.
+    /// Folds a level of four shifts a quarter of a turn apart, in the fastest way for this type.
     fn four<V: Lanes>(
         v: V,
         level: &LevelLanes<'_, V>,
@@ -54,7 +74,7 @@ pub(crate) trait BlockSample: Sample {
     fn saturated<V: Lanes>(v: V, level: &LevelLanes<'_, V>, row: &[Self], at: usize) -> V::B;
 }
 
-/// Folds the block at `at` of a level's rows, of which there are as many as it has shifts.
+/// Folds the block at `at` of a level's rows, one row per shift.
 #[inline(always)]
 pub(super) fn fold<V: Lanes, T: BlockSample>(
     v: V,
@@ -71,8 +91,8 @@ pub(super) fn fold<V: Lanes, T: BlockSample>(
     folded
 }
 
-/// At 8 bits and N = 4, B = √(S² + C²)/2 is trusted from 16 counts, so from S² + C² = 32²: the least of the shorter component
-/// for each longer one from 16 to 31; 255 where none is enough.
+/// At 8 bits and N = 4, B = √(S² + C²)/2 reaches 16 counts where S² + C² ≥ 32²: for each longer component from 16 to 31 the
+/// least shorter one that is enough; 255 where none is.
 const LEAST_SHORT: [u8; 16] = [
     255, 255, 255, 255, 255, 255, 255, 23, 22, 20, 19, 18, 16, 14, 12, 8,
 ];
@@ -89,7 +109,7 @@ impl BlockSample for u8 {
         let (even, odd) = (v.max8(i0, i2), v.max8(i1, i3));
         let s = v.sub8(even, v.min8(i0, i2));
         let c = v.sub8(odd, v.min8(i1, i3));
-        // Also where S or C is 0: the angle is the same from either side.
+        // The signs of S and C. Where one is 0 its sign is of no consequence: the angle is the same from either side.
         let (s_down, c_down) = (v.eq8(even, i2), v.eq8(odd, i3));
         let (long, short) = (v.max8(s, c), v.min8(s, c));
         let steep = v.eq8(long, s);
@@ -168,7 +188,7 @@ impl BlockSample for u16 {
 /// Mask: one of the samples is at full scale or above.
 #[inline(always)]
 fn any_full<V: Lanes>(v: V, level: &LevelLanes<'_, V>, a: V::W, b: V::W, c: V::W, d: V::W) -> V::W {
-    // With the sign bit turned the order of unsigned words is that of signed ones.
+    // With the sign bit inverted, signed comparison orders unsigned words.
     let turn = v.splat16(i16::MIN);
     let (a, b) = (v.xor(a, turn), v.xor(b, turn));
     let (c, d) = (v.xor(c, turn), v.xor(d, turn));
@@ -187,6 +207,7 @@ fn dot_enough<V: Lanes>(v: V, level: &LevelLanes<'_, V>, [a, b, c, d]: [V::W; 4]
 /// √3/2 in Q15.
 const ROOT_3_HALVES: i16 = 28_378;
 
+/// N = 3.
 #[inline(always)]
 fn three<V: Lanes, T: BlockSample>(
     v: V,
@@ -211,7 +232,7 @@ fn three<V: Lanes, T: BlockSample>(
     )
 }
 
-/// S, C and whether they are enough: 4 (S² + C²) = (2I₀ − I₁ − I₂)² + 3 (I₁ − I₂)², exactly.
+/// S, C and the mask of enough modulation: 4 (S² + C²) = (2I₀ − I₁ − I₂)² + 3 (I₁ − I₂)², exactly.
 #[inline(always)]
 fn three_words<V: Lanes>(
     v: V,
@@ -229,6 +250,7 @@ fn three_words<V: Lanes>(
     (s, c_, strong)
 }
 
+/// Any N, by weights.
 #[inline(always)]
 fn weighted<V: Lanes, T: BlockSample>(
     v: V,
@@ -243,7 +265,7 @@ fn weighted<V: Lanes, T: BlockSample>(
     let mut saturated = v.splat8(0);
     let centre = level.centre;
     let none = v.splat16(0);
-    // In pairs, as the instructions take them.
+    // Two rows at a time: one instruction multiplies and adds two pairs of words.
     for (rows, weights) in rows.chunks(2).zip(weights.chunks(2)) {
         let ([s_first, c_first], [s_second, c_second]) = match *weights {
             [first, second] => (first, second),
@@ -287,7 +309,7 @@ fn weighted<V: Lanes, T: BlockSample>(
     octant(v, s, c, v.narrow_mask(strong), saturated)
 }
 
-/// A sum, and products brought down so far that all of them fit.
+/// Adds products to a sum, shifted right by the level's `drop` so that all of them fit 32 bits.
 #[inline(always)]
 fn add_part<V: Lanes>(
     v: V,
@@ -304,7 +326,7 @@ fn add_part<V: Lanes>(
     ]
 }
 
-/// Mask: S² + C² of the sums is at least the level's least power, in singles (1e-7).
+/// Mask: S² + C² of the sums is at least the level's least power, in single precision (1e-7).
 #[inline(always)]
 fn enough_sums<V: Lanes>(v: V, level: &LevelLanes<'_, V>, s: [V::D; 2], c: [V::D; 2]) -> V::W {
     let below = level.below_least_sum_power;
@@ -315,7 +337,7 @@ fn enough_sums<V: Lanes>(v: V, level: &LevelLanes<'_, V>, s: [V::D; 2], c: [V::D
     v.narrow_mask32([v.lt_single(below, power0), v.lt_single(below, power1)])
 }
 
-/// Folds words.
+/// Folds the pointers of a block that is in words.
 #[inline(always)]
 fn octant<V: Lanes>(v: V, s: [V::W; 2], c: [V::W; 2], strong: V::B, brightest: V::B) -> Folded<V> {
     let (low, high) = (octant_words(v, s[0], c[0]), octant_words(v, s[1], c[1]));
@@ -331,6 +353,7 @@ fn octant<V: Lanes>(v: V, s: [V::W; 2], c: [V::W; 2], strong: V::B, brightest: V
     }
 }
 
+/// [`Folded`] of half a block.
 struct OctantWords<W> {
     long: W,
     short: W,
@@ -350,7 +373,7 @@ fn octant_words<V: Lanes>(v: V, s: V::W, c: V::W) -> OctantWords<V::W> {
     let backwards = v.xor(v.xor(s_down, c_down), steep);
     let half = v.and(v.pick(steep, s_down, c_down), v.splat16(i16::MIN));
     let quarter = v.and(steep, v.splat16(0x4000));
-    // The weakest trusted pixel needs 2⁴ (see `level`): twice 2² and once 2.
+    // The least trusted modulation needs a factor of 2⁴; these three give up to 2⁵.
     let (long, short) = lift::<V, 2>(v, length, short, 1 << 13);
     let (long, short) = lift::<V, 2>(v, long, short, 1 << 13);
     let (long, short) = lift::<V, 1>(v, long, short, 1 << 14);

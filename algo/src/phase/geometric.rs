@@ -1,6 +1,10 @@
-//! Unwrapping from coarse to fine.
+//! The plan of coarse-to-fine unwrapping: the turn of the coarsest level, the steps between levels, the scale of the result.
+//!
+//! The coarsest level spans at most one turn of the pattern, so its wrapped phase is absolute once it is known where that turn
+//! begins. Each further level is one [`UnwrapStep`] (Huntley & Saldner 1993). Phases are counted from an origin per level near
+//! the middle of its range, so that orders take as few bits as possible.
 
-use super::unwrap_step::Step;
+use super::unwrap_step::UnwrapStep;
 use crate::pattern::{Level, PhaseRange, SequenceError};
 use crate::units::AbsolutePhase;
 use alloc::vec::Vec;
@@ -8,11 +12,11 @@ use alloc::vec::Vec;
 /// Coarse-to-fine levels prepared for unwrapping.
 #[derive(Clone, Debug)]
 pub(super) struct Geometric {
-    /// The middle of the turn that the coarsest level can have, 1/65536 turn of that level.
+    /// Middle of the coarsest level's turn, 1/65536 turn of that level.
     pub middle: i32,
     /// From each level to the next finer one.
-    pub steps: Vec<Step>,
-    /// What the finest level's phase counts from, 1/65536 turn.
+    pub steps: Vec<UnwrapStep>,
+    /// Origin of the finest level's phase, 1/65536 turn.
     pub origin: i32,
     /// 1 / ratio of the finest level, Q20, where that is not 1.
     pub scale: Option<i64>,
@@ -21,17 +25,17 @@ pub(super) struct Geometric {
 impl Geometric {
     pub fn new(levels: &[Level], range: PhaseRange) -> Result<Self, SequenceError> {
         let coarsest = levels[0].ratio;
-        // What the coarsest level leaves free of its turn is noise margin on both sides.
+        // The part of a turn that the coarsest level does not use is margin for noise, half on each side.
         let margin = (1.0 - coarsest * range.span()).max(0.0) / 2.0;
         let middle = libm::rint((coarsest * range.min - margin + 0.5) * 65_536.0);
-        // Φ of a level = origin + what is found, which is at most `reach` turns either way.
+        // A level's phase lies within ± `reach` turns of its origin.
         let mut origin = middle / 65_536.0;
         let mut reach = 0.5;
         let mut steps = Vec::new();
         for pair in levels.windows(2) {
             let n = pair[1].ratio / pair[0].ratio;
             let next = libm::rint(n * origin);
-            let step = Step::new(n, reach, n * origin - next).ok_or(SequenceError::Step {
+            let step = UnwrapStep::new(n, reach, n * origin - next).ok_or(SequenceError::Step {
                 from: pair[0].ratio,
                 to: pair[1].ratio,
             })?;
@@ -49,7 +53,8 @@ impl Geometric {
         })
     }
 
-    /// What few sequences need: an origin between two orders (of a single level), a finest ratio that is not 1.
+    /// Adds the origin's fraction and divides by the finest level's ratio, for the few sequences that need it: a single level
+    /// (its origin lies between two orders), or a finest ratio other than 1.
     pub fn finish(&self, phases: &mut [i32]) {
         let part = self.origin & 0xFFFF;
         if part == 0 && self.scale.is_none() {

@@ -1,4 +1,8 @@
-//! Wrapped phase and modulation, which pixels to trust, and the absolute phase.
+//! From the samples of a pixel to its absolute phase, its modulation and whether to trust it.
+//!
+//! `fold`, `angle` and `level` demodulate a level: samples → wrapped phase and modulation. `unwrap_step` is one step of temporal
+//! unwrapping; `geometric` and `about` plan its two forms. `kernel` joins them for rows of pixels; `decode` and `rows` are the
+//! entry. `arrived` keeps what levels that are decoded on arrival leave for the next.
 
 mod about;
 mod angle;
@@ -16,9 +20,8 @@ mod unwrap_step;
 
 pub use crate::trust::{MIN_MODULATION_8_BIT, Trust};
 pub use arrived::Arrived;
-pub(crate) use arrived::PlanesMut;
 pub use decode::{DecodeError, Decoder, PhaseRow};
-pub use level::FULL_TRUST_STEPS;
+pub use level::FULL_TRUST_SHIFTS;
 
 #[cfg(test)]
 mod tests;

@@ -1,19 +1,19 @@
-//! Fewer columns than a block: a block around them, of rows that are narrower a copy that is wide enough.
+//! Decoding fewer columns than a block: a block of the row around them, or a padded copy of rows that are narrower than a block.
 
 use super::PhaseRow;
-use super::arrived::{ClimbedRow, ClimbedRowMut, NO_DOUBT, WrappedRow, WrappedRowMut};
 use super::fold::BlockSample;
 use crate::frame::{FrameView, Samples};
 use crate::trust::Trust;
 use crate::units::{AbsolutePhase, Modulation};
+use alloc::vec::Vec;
 use core::ops::Range;
 
-/// At least the pixels of any back-end's block.
+/// Pixels of the widest block of any back-end, or more.
 pub(super) const MAX_PIXELS: usize = 64;
 
-/// A sample by which a frame's rows can be asked for.
+/// A sample type whose rows can be taken out of a frame.
 pub(super) trait RowSample: BlockSample + Default {
-    /// Row `v` of a frame; empty if it is of the other kind of samples.
+    /// Row `v` of a frame; empty if its samples are of the other type.
     fn row(frame: FrameView<'_>, v: usize) -> &[Self];
 }
 
@@ -35,21 +35,60 @@ impl RowSample for u16 {
     }
 }
 
-/// Columns of a row, followed by what is dark, up to a block.
-pub(super) fn padded<T: Copy + Default>(row: &[T], columns: &Range<usize>) -> [T; MAX_PIXELS] {
-    let mut padded = [T::default(); MAX_PIXELS];
-    padded[..columns.len()].copy_from_slice(&row[columns.clone()]);
-    padded
+/// A block of columns around fewer; the whole row if it is narrower than a block.
+pub(super) fn near(columns: &Range<usize>, width: usize) -> Range<usize> {
+    let start = columns.start.min(width.saturating_sub(MAX_PIXELS));
+    start..(start + MAX_PIXELS).min(width)
 }
 
-/// A padded row of results, and the place that they belong to.
-pub(super) struct FewResults {
+/// Padded copies of rows that are narrower than a block, none of others.
+pub(super) fn padded_rows<T: RowSample>(
+    rows: &[&[T]],
+    near: &Range<usize>,
+) -> Vec<[T; MAX_PIXELS]> {
+    let narrow = rows.iter().filter(|_| near.len() < MAX_PIXELS);
+    let padded = |row: &&[T]| {
+        let mut padded = [T::default(); MAX_PIXELS];
+        padded[..near.len()].copy_from_slice(&row[near.clone()]);
+        padded
+    };
+    narrow.map(padded).collect()
+}
+
+/// The columns `near` of the rows, or their padded copies.
+pub(super) fn near_rows<'a, T>(
+    rows: &[&'a [T]],
+    padded: &'a [[T; MAX_PIXELS]],
+    near: &Range<usize>,
+) -> impl Iterator<Item = &'a [T]> {
+    rows.iter()
+        .enumerate()
+        .map(|(at, row)| match padded.get(at) {
+            Some(padded) => &padded[..],
+            None => &row[near.clone()],
+        })
+}
+
+/// The known map at the columns `near`, padded to a block.
+pub(super) fn near_known(
+    map: &[AbsolutePhase],
+    columns: &Range<usize>,
+) -> [AbsolutePhase; MAX_PIXELS] {
+    let mut known = [AbsolutePhase::UNKNOWN; MAX_PIXELS];
+    if let Some(map) = map.get(columns.clone()) {
+        known[..map.len()].copy_from_slice(map);
+    }
+    known
+}
+
+/// Results of a block, to be copied to the columns that were asked for.
+pub(super) struct ResultColumns {
     phase: [AbsolutePhase; MAX_PIXELS],
     modulation: [Modulation; MAX_PIXELS],
     trust: [Trust; MAX_PIXELS],
 }
 
-impl FewResults {
+impl ResultColumns {
     pub fn new() -> Self {
         Self {
             phase: [AbsolutePhase::UNKNOWN; MAX_PIXELS],
@@ -67,95 +106,11 @@ impl FewResults {
         }
     }
 
-    /// To the columns that they were computed for; the first pixel is that of column `start`.
+    /// Copies `columns` to a row; the first pixel of the block is column `start`.
     pub fn copy_to(&self, out: PhaseRow<'_>, columns: Range<usize>, start: usize) {
         let few = columns.start - start..columns.end - start;
         out.phase[columns.clone()].copy_from_slice(&self.phase[few.clone()]);
         out.modulation[columns.clone()].copy_from_slice(&self.modulation[few.clone()]);
         out.trust[columns].copy_from_slice(&self.trust[few]);
-    }
-}
-
-/// `N` columns of what geometric levels have come to.
-pub(super) struct FewClimbed<const N: usize> {
-    pub fraction: [u16; N],
-    pub turns: [u16; N],
-    pub doubt: [u8; N],
-}
-
-impl<const N: usize> FewClimbed<N> {
-    pub fn new() -> Self {
-        Self {
-            fraction: [0; N],
-            turns: [0; N],
-            doubt: [NO_DOUBT; N],
-        }
-    }
-
-    pub fn row(&self) -> ClimbedRow<'_> {
-        ClimbedRow {
-            fraction: &self.fraction,
-            turns: &self.turns,
-            doubt: &self.doubt,
-        }
-    }
-
-    pub fn row_mut(&mut self) -> ClimbedRowMut<'_> {
-        ClimbedRowMut {
-            fraction: &mut self.fraction,
-            turns: &mut self.turns,
-            doubt: &mut self.doubt,
-        }
-    }
-}
-
-impl FewClimbed<MAX_PIXELS> {
-    /// Padded columns of a row.
-    pub fn padded(row: ClimbedRow<'_>, columns: &Range<usize>) -> Self {
-        Self {
-            fraction: padded(row.fraction, columns),
-            turns: padded(row.turns, columns),
-            doubt: padded(row.doubt, columns),
-        }
-    }
-}
-
-/// `N` columns of a level about a known map.
-#[derive(Clone, Copy)]
-pub(super) struct FewWrapped<const N: usize> {
-    pub phase: [u16; N],
-    pub doubts: [u8; N],
-}
-
-impl<const N: usize> FewWrapped<N> {
-    pub fn new() -> Self {
-        Self {
-            phase: [0; N],
-            doubts: [0; N],
-        }
-    }
-
-    pub fn row(&self) -> WrappedRow<'_> {
-        WrappedRow {
-            phase: &self.phase,
-            doubts: &self.doubts,
-        }
-    }
-
-    pub fn row_mut(&mut self) -> WrappedRowMut<'_> {
-        WrappedRowMut {
-            phase: &mut self.phase,
-            doubts: &mut self.doubts,
-        }
-    }
-}
-
-impl FewWrapped<MAX_PIXELS> {
-    /// Padded columns of a row.
-    pub fn padded(row: WrappedRow<'_>, columns: &Range<usize>) -> Self {
-        Self {
-            phase: padded(row.phase, columns),
-            doubts: padded(row.doubts, columns),
-        }
     }
 }

@@ -1,29 +1,33 @@
-//! Decoding row by row: all levels at once, or each when it arrives.
+//! Decoding row by row: all levels at once, or each on arrival.
+//!
+//! Chooses the sample type, gathers the rows of the frames, widens columns that are fewer than a block, and calls the kernel of
+//! the sequence's form.
 
-use super::arrived::{Arrived, ArrivingRow, ClimbedRow, WrappedRow};
+use super::arrived::{Arrived, ArrivedRow, WrappedRow};
 use super::kernel::{about, geometric, on_arrival};
-use super::narrow::{FewClimbed, FewResults, FewWrapped, MAX_PIXELS, RowSample, padded};
+use super::narrow::{
+    MAX_PIXELS, ResultColumns, RowSample, near, near_known, near_rows, padded_rows,
+};
 use super::unwrap::Unwrapper;
 use super::{Decoder, PhaseRow};
 use crate::frame::FrameView;
 use crate::pattern::{MAX_FRAMES, MAX_LEVELS, MAX_SHIFTS};
 use crate::simd::Results;
 use crate::units::AbsolutePhase;
-use alloc::vec::Vec;
 use core::ops::Range;
 
 impl Decoder {
-    /// Room for what the levels say that are decoded on arrival, of frames of this size.
+    /// Room for levels that are decoded on arrival, of frames of this size.
     pub fn arrived(&self, width: usize, height: usize) -> Arrived {
         match &self.unwrapper {
-            Unwrapper::Geometric(_) => Arrived::climbing(width, height),
-            Unwrapper::About(_) => Arrived::wrapping(width, height, self.levels.len() - 1),
+            Unwrapper::Geometric(_) => Arrived::geometric(width, height),
+            Unwrapper::About(_) => Arrived::about_map(width, height, self.levels.len() - 1),
         }
     }
 
     /// Decodes `columns` of row `v` of frames that [`Self::check`] has passed, into the same columns of `out`.
     ///
-    /// `map` is the row of the known map for dense and single-level sequences and is not looked at otherwise.
+    /// `map` is the row of the known map for dense and single-level sequences; other sequences do not read it.
     pub fn row(
         &self,
         frames: &[FrameView<'_>],
@@ -39,14 +43,14 @@ impl Decoder {
         }
     }
 
-    /// Decodes row `v` of level `level`, whose frames [`Self::check_level`] has passed; not where the levels before found a
-    /// whole block dark.
+    /// Decodes row `v` of level `level`, whose frames [`Self::check_arrival`] has passed. Blocks that the coarsest level found
+    /// dark are skipped.
     pub(crate) fn arrive_row(
         &self,
         level: usize,
         frames: &[FrameView<'_>],
         v: usize,
-        row: ArrivingRow<'_>,
+        row: ArrivedRow<&mut [u16], &mut [u8]>,
     ) {
         if self.bit_depth == 8 {
             self.typed_arrival::<u8>(level, frames, v, row);
@@ -55,7 +59,7 @@ impl Decoder {
         }
     }
 
-    /// As [`Self::row`], from all levels but the finest, which have arrived, and the frames of the finest.
+    /// As [`Self::row`], from the levels that have arrived, which are all but the finest, and the frames of the finest.
     pub fn last_row(
         &self,
         arrived: &Arrived,
@@ -66,9 +70,9 @@ impl Decoder {
         out: PhaseRow<'_>,
     ) {
         if self.bit_depth == 8 {
-            self.typed_last::<u8>(arrived, last, v, map, columns, out);
+            self.typed_last::<u8>(arrived.row(v), last, v, map, columns, out);
         } else {
-            self.typed_last::<u16>(arrived, last, v, map, columns, out);
+            self.typed_last::<u16>(arrived.row(v), last, v, map, columns, out);
         }
     }
 
@@ -81,7 +85,7 @@ impl Decoder {
         out: PhaseRow<'_>,
     ) {
         let places = self.levels.iter().flat_map(|level| &level.frames);
-        // A sequence has no more frames than fit. Filled in place: `collect` moves all 8 KiB of it, for every row.
+        // Filled in place: `collect` would move all 8 KiB of it, for every row.
         let mut rows: heapless::Vec<&[T], MAX_FRAMES> = heapless::Vec::new();
         rows.extend(places.map(|&at| T::row(frames[at], v)));
         if columns.len() >= MAX_PIXELS {
@@ -91,13 +95,13 @@ impl Decoder {
         let padded = padded_rows(&rows, &near);
         let mut around: heapless::Vec<&[T], MAX_FRAMES> = heapless::Vec::new();
         around.extend(near_rows(&rows, &padded, &near));
-        let mut few = FewResults::new();
-        let map = few_known(map, &near);
+        let mut few = ResultColumns::new();
+        let map = near_known(map, &near);
         self.columns(&around, &map, 0..MAX_PIXELS, few.row());
         few.copy_to(out, columns, near.start);
     }
 
-    /// From the rows of all frames, level by level.
+    /// Decodes from the rows of all frames, level after level.
     fn columns<T: RowSample>(
         &self,
         mut rows: &[&[T]],
@@ -114,126 +118,115 @@ impl Decoder {
         let out = results(out, &columns);
         match &self.unwrapper {
             Unwrapper::Geometric(plan) => {
-                geometric::climb_row(self.backend, plan, &self.levels, &levels, columns, out);
+                geometric::decode_row(self.backend, plan, &self.levels, &levels, columns, out);
             }
             Unwrapper::About(plan) => {
-                about::around_row(self.backend, plan, &self.levels, &levels, map, columns, out);
+                about::decode_row(self.backend, plan, &self.levels, &levels, map, columns, out);
             }
         }
     }
 
     fn typed_arrival<T: RowSample>(
         &self,
-        level: usize,
+        at: usize,
         frames: &[FrameView<'_>],
         v: usize,
-        row: ArrivingRow<'_>,
+        row: ArrivedRow<&mut [u16], &mut [u8]>,
     ) {
         let mut rows = LevelRows::new();
         rows.extend(frames.iter().map(|&frame| T::row(frame, v)));
-        let width = width(&rows);
-        if width >= MAX_PIXELS {
-            return self.arrive(level, &rows, width, row);
+        let columns = 0..width(&rows);
+        if columns.len() >= MAX_PIXELS {
+            return self.arrive(at, &rows, row, columns);
         }
-        let columns = 0..width;
         let padded = padded_rows(&rows, &columns);
         let mut around = LevelRows::new();
         around.extend(near_rows(&rows, &padded, &columns));
-        let rows = around;
-        match row {
-            ArrivingRow::Climbing(out) => {
-                let mut few = FewClimbed::padded(out.as_row(), &columns);
-                self.arrive(
-                    level,
-                    &rows,
-                    MAX_PIXELS,
-                    ArrivingRow::Climbing(few.row_mut()),
-                );
-                out.fraction.copy_from_slice(&few.fraction[..width]);
-                out.turns.copy_from_slice(&few.turns[..width]);
-                out.doubt.copy_from_slice(&few.doubt[..width]);
-            }
-            ArrivingRow::Wrapping { row: out, .. } => {
-                let mut few = FewWrapped::<MAX_PIXELS>::new();
-                let row = ArrivingRow::Wrapping {
-                    coarsest: None,
-                    row: few.row_mut(),
-                };
-                self.arrive(level, &rows, MAX_PIXELS, row);
-                out.phase.copy_from_slice(&few.phase[..width]);
-                out.doubts.copy_from_slice(&few.doubts[..width]);
-            }
-        }
+        self.arrive(at, &around, row, 0..MAX_PIXELS);
     }
 
-    fn arrive<T: RowSample>(&self, at: usize, rows: &[&[T]], width: usize, row: ArrivingRow<'_>) {
-        let level = &self.levels[at];
-        match (&self.unwrapper, row) {
-            (Unwrapper::Geometric(plan), ArrivingRow::Climbing(row)) => {
-                on_arrival::arrive_row(self.backend, plan, at, level, rows, 0..width, row);
+    fn arrive<T: RowSample>(
+        &self,
+        at: usize,
+        rows: &[&[T]],
+        out: ArrivedRow<&mut [u16], &mut [u8]>,
+        columns: Range<usize>,
+    ) {
+        let (backend, level) = (self.backend, &self.levels[at]);
+        match (&self.unwrapper, out) {
+            (Unwrapper::Geometric(plan), ArrivedRow::Expected(out)) => {
+                on_arrival::level_row(backend, plan, at, level, rows, columns, out);
             }
-            (_, ArrivingRow::Wrapping { coarsest, row }) => {
-                about::wrap_row(self.backend, level, rows, coarsest, 0..width, row);
+            (_, ArrivedRow::Wrapped { mut levels, pixels }) => {
+                if let Some((coarsest, out)) = levels.level(at, pixels) {
+                    about::demodulate_row(backend, level, rows, coarsest, columns, out);
+                }
             }
-            // `Decoder::arrived` gives geometric levels the one, and others the other.
-            (Unwrapper::About(_), ArrivingRow::Climbing(_)) => {}
+            // `Decoder::arrived` makes the layout that fits the unwrapper.
+            (Unwrapper::About(_), ArrivedRow::Expected(_)) => {}
         }
     }
 
     fn typed_last<T: RowSample>(
         &self,
-        arrived: &Arrived,
-        last: &[FrameView<'_>],
+        arrived: ArrivedRow<&[u16], &[u8]>,
+        frames: &[FrameView<'_>],
         v: usize,
         map: &[AbsolutePhase],
         columns: Range<usize>,
         out: PhaseRow<'_>,
     ) {
         let mut rows = LevelRows::new();
-        rows.extend(last.iter().map(|&frame| T::row(frame, v)));
-        let (climbed, wrapped) = (arrived.climbed_row(v), arrived.wrapped_rows(v));
+        rows.extend(frames.iter().map(|&frame| T::row(frame, v)));
         if columns.len() >= MAX_PIXELS {
-            return self.last(&rows, climbed, &wrapped, map, columns, out);
+            return self.last(&rows, (arrived, 0), map, columns, out);
         }
         let near = near(&columns, width(&rows));
         let padded = padded_rows(&rows, &near);
         let mut around = LevelRows::new();
         around.extend(near_rows(&rows, &padded, &near));
-        let rows = around;
-        let climbed = climbed.map(|row| FewClimbed::padded(row, &near));
-        let wrapped = wrapped.iter().map(|row| FewWrapped::padded(*row, &near));
-        let wrapped: heapless::Vec<_, MAX_LEVELS> = wrapped.collect();
-        let wrapped: heapless::Vec<_, MAX_LEVELS> = wrapped.iter().map(FewWrapped::row).collect();
-        let climbed = climbed.as_ref().map(FewClimbed::row);
-        let mut few = FewResults::new();
-        let map = few_known(map, &near);
-        self.last(&rows, climbed, &wrapped, &map, 0..MAX_PIXELS, few.row());
+        let mut few = ResultColumns::new();
+        let map = near_known(map, &near);
+        let before = (arrived, near.start);
+        self.last(&around, before, &map, 0..MAX_PIXELS, few.row());
         few.copy_to(out, columns, near.start);
     }
 
+    /// Decodes from the rows of the finest level's frames and what has arrived from column `start` on.
     fn last<T: RowSample>(
         &self,
         rows: &[&[T]],
-        climbed: Option<ClimbedRow<'_>>,
-        wrapped: &[WrappedRow<'_>],
+        (arrived, start): (ArrivedRow<&[u16], &[u8]>, usize),
         map: &[AbsolutePhase],
         columns: Range<usize>,
         out: PhaseRow<'_>,
     ) {
+        let (backend, levels) = (self.backend, &self.levels[..]);
         let out = results(out, &columns);
-        let backend = self.backend;
-        match (&self.unwrapper, climbed, &self.levels[..]) {
+        let there = start..start + columns.end;
+        match (&self.unwrapper, arrived, levels) {
             (Unwrapper::Geometric(plan), _, [_]) => {
-                geometric::climb_row(backend, plan, &self.levels, &[rows], columns, out);
+                geometric::decode_row(backend, plan, levels, &[rows], columns, out);
             }
-            (Unwrapper::Geometric(plan), Some(before), [.., level]) => {
-                on_arrival::last_row(backend, plan, level, rows, before, columns, out);
+            (Unwrapper::Geometric(plan), ArrivedRow::Expected(before), [.., level]) => {
+                let before = before.part(there);
+                on_arrival::finest_row(backend, plan, level, rows, before, columns, out);
             }
-            (Unwrapper::About(plan), _, levels) => {
-                about::last_row(backend, plan, levels, wrapped, rows, map, columns, out);
+            (
+                Unwrapper::About(plan),
+                ArrivedRow::Wrapped {
+                    levels: row,
+                    pixels,
+                },
+                _,
+            ) => {
+                let level = |at: usize| row.part(at * pixels..(at + 1) * pixels);
+                let before = (0..levels.len() - 1).map(|at| level(at).part(there.clone()));
+                let before: heapless::Vec<WrappedRow<'_>, MAX_LEVELS> = before.collect();
+                about::finest_row(backend, plan, levels, &before, rows, map, columns, out);
             }
-            // A decoder has levels, and gives geometric ones such room.
-            (Unwrapper::Geometric(_), ..) => {}
+            // A decoder has levels, and `Decoder::arrived` makes the layout that fits the unwrapper.
+            _ => {}
         }
     }
 }
@@ -243,44 +236,10 @@ fn results<'a>(out: PhaseRow<'a>, columns: &Range<usize>) -> Results<'a> {
     Results::new(out.phase, out.modulation, out.trust, columns.end)
 }
 
-/// The rows of a level's frames, filled in place as those of all frames are.
+/// The rows of a level's frames.
 type LevelRows<'a, T> = heapless::Vec<&'a [T], MAX_SHIFTS>;
 
 /// Pixels of a row.
 fn width<T>(rows: &[&[T]]) -> usize {
     rows.first().map_or(0, |row| row.len())
-}
-
-/// A block of columns around a few; the whole row if it is narrower.
-fn near(columns: &Range<usize>, width: usize) -> Range<usize> {
-    let start = columns.start.min(width.saturating_sub(MAX_PIXELS));
-    start..(start + MAX_PIXELS).min(width)
-}
-
-/// Copies of rows that are narrower than a block, none of others.
-fn padded_rows<T: RowSample>(rows: &[&[T]], near: &Range<usize>) -> Vec<[T; MAX_PIXELS]> {
-    let narrow = rows.iter().filter(|_| near.len() < MAX_PIXELS);
-    narrow.map(|row| padded(row, near)).collect()
-}
-
-/// The rows' columns, or the copies that are wide enough.
-fn near_rows<'a, T>(
-    rows: &[&'a [T]],
-    padded: &'a [[T; MAX_PIXELS]],
-    near: &Range<usize>,
-) -> impl Iterator<Item = &'a [T]> {
-    rows.iter()
-        .enumerate()
-        .map(|(at, row)| match padded.get(at) {
-            Some(padded) => &padded[..],
-            None => &row[near.clone()],
-        })
-}
-
-fn few_known(map: &[AbsolutePhase], columns: &Range<usize>) -> [AbsolutePhase; MAX_PIXELS] {
-    let mut known = [AbsolutePhase::UNKNOWN; MAX_PIXELS];
-    if let Some(map) = map.get(columns.clone()) {
-        known[..map.len()].copy_from_slice(map);
-    }
-    known
 }

@@ -1,4 +1,7 @@
-//! Where a level's blocks come from: frames, or memory if it was demodulated when it arrived.
+//! Where a level's blocks come from: the rows of its frames, or maps if it was demodulated on arrival.
+//!
+//! Kernels are generic over this, so that decoding all levels at once and decoding on arrival share one body. [`Four`] is the
+//! form of four rows that are checked once per row and whose number the compiler knows; `&[&[T]]` takes any number of shifts.
 
 use super::angle::AngleLanes;
 use super::arrived::WrappedRow;
@@ -8,12 +11,13 @@ use crate::simd::{Four, Lanes};
 
 /// The rows of a level's frames, in the order of their shifts.
 pub(crate) trait Frames: Copy {
-    /// Whether modulations may have to be doubled: never those of four shifts, whose length is twice the modulation.
+    /// Whether the modulation may come out halved ([`LevelLanes::fine`]): never with four shifts, where the pointer is twice as
+    /// long as the modulation.
     const DOUBLED: bool;
 
-    /// The first columns: rows of one length are checked together.
+    /// The first columns, so that one check of the length serves all blocks.
     fn first(self, columns: usize) -> Self;
-    /// The block at `at`, folded; what lies `after` samples behind it is fetched.
+    /// The block at `at`, folded; samples `after` behind it are prefetched.
     fn fold<V: Lanes>(&self, v: V, level: &LevelLanes<'_, V>, at: usize, after: usize)
     -> Folded<V>;
 }
@@ -64,22 +68,22 @@ impl<T: BlockSample> Frames for &[&[T]] {
     }
 }
 
-/// A level of a row, read block by block.
+/// A row of a level, read block by block.
 pub(crate) trait Source: Copy {
     /// As [`Frames::DOUBLED`].
     const DOUBLED: bool;
 
     /// The first columns.
     fn first(self, columns: usize) -> Self;
-    /// The block at `at` as far as whether it is strong.
+    /// The block at `at`, at least as far as its modulation mask is known.
     fn block<V: Lanes>(&self, v: V, level: &LevelLanes<'_, V>, at: usize) -> Block<V>;
 }
 
-/// A block of pixels of a level.
+/// A block of a level.
 pub(crate) enum Block<V: Lanes> {
-    /// Its angles are not known yet.
+    /// Folded; its angles are not computed yet.
     Folded(Folded<V>),
-    /// It has been demodulated before.
+    /// Read from maps.
     Demodulated(Demodulated<V>),
 }
 
@@ -93,7 +97,7 @@ impl<V: Lanes> Block<V> {
         }
     }
 
-    /// Its phases.
+    /// The demodulated block.
     #[inline(always)]
     pub fn fine(
         &self,
@@ -128,10 +132,7 @@ impl Source for WrappedRow<'_> {
 
     #[inline(always)]
     fn first(self, columns: usize) -> Self {
-        Self {
-            phase: &self.phase[..columns],
-            doubts: &self.doubts[..columns],
-        }
+        self.part(0..columns)
     }
 
     #[inline(always)]

@@ -1,4 +1,4 @@
-//! What both ways of unwrapping share: when a step is trusted, and what a plan says of its accuracy.
+//! What both ways of unwrapping share: the choice between them, the limit of residuals, and the information in a sequence.
 
 use super::about::About;
 use super::geometric::Geometric;
@@ -10,7 +10,7 @@ pub(super) const MAX_RESIDUAL: f64 = 0.40;
 /// The same in 1/65536 turn.
 pub(super) const MAX_RESIDUAL_BITS: i16 = (MAX_RESIDUAL * 65_536.0) as i16;
 
-/// How to combine the levels of a pixel; prepared once per plan.
+/// How the levels of a pixel become one absolute phase; prepared once per plan.
 #[derive(Clone, Debug)]
 pub(super) enum Unwrapper {
     /// From coarse to fine.
@@ -35,8 +35,8 @@ impl Unwrapper {
     }
 }
 
-/// Σ N_i r_i² over the levels whose noise is the result's noise: coarser geometric levels only give the fringe order,
-/// dense ones are averaged.
+/// Σ N_i r_i² over the levels that carry the result's accuracy: of geometric levels only the finest, because the coarser ones
+/// only give fringe orders; of dense levels all, because they are averaged.
 pub(super) fn information(unwrapping: Unwrapping, sequence: &Sequence) -> f64 {
     let levels = sequence.levels();
     let accurate = match unwrapping {
@@ -45,23 +45,17 @@ pub(super) fn information(unwrapping: Unwrapping, sequence: &Sequence) -> f64 {
     };
     accurate
         .iter()
-        .map(|level| level.steps() as f64 * level.ratio * level.ratio)
+        .map(|level| level.shifts() as f64 * level.ratio * level.ratio)
         .sum()
 }
 
-/// |x| of a residual in 1/65536 turn, unsigned.
+/// Mask: a residual's magnitude (unsigned, 1/65536 turn) is above the limit.
 #[inline(always)]
-pub(super) fn farness<V: Lanes>(v: V, x: V::W) -> V::W {
-    v.abs(x)
-}
-
-/// Mask: a residual of this farness is too large.
-#[inline(always)]
-pub(super) fn too_far<V: Lanes>(v: V, farness: V::W) -> V::W {
-    // With the sign bit turned the order of unsigned words is that of signed ones.
+pub(super) fn too_large<V: Lanes>(v: V, residual: V::W) -> V::W {
+    // With the sign bit inverted, signed comparison orders unsigned words.
     let turn = v.splat16(i16::MIN);
     v.gt(
-        v.xor(farness, turn),
+        v.xor(residual, turn),
         v.splat16(MAX_RESIDUAL_BITS ^ i16::MIN),
     )
 }

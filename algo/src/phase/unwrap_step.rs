@@ -1,44 +1,62 @@
-//! A step from a coarse phase to a fine one: k = round(n·Φ − φ), Φ_fine = k + φ, in words.
+//! One step of temporal unwrapping: the absolute phase of a coarse level gives the fringe order of a finer one.
 //!
-//! A phase is a number of turns and −½…½ of one. The fraction of n·Φ is exact to 2/65536 turn and decides whether the step is
-//! trusted; its whole part is needed only to within ± 0.1 turn, because a residual above 0.40 turn is rejected anyhow,
-//! and is taken from a fixed-point product with as many fractional bits as fit beside the largest number of turns.
+//! **Idea.** The coarse phase times the quotient of the two ratios predicts the fine phase. The fine level's wrapped phase is
+//! more accurate but lacks its whole turns; the prediction supplies them.
+//!
+//! **Equation** (Huntley & Saldner 1993; Zuo et al. 2016), with n = r_fine / r_coarse:
+//!
+//! ```text
+//! expected = n · Φ_coarse
+//! k        = round(expected − φ_fine)
+//! Φ_fine   = k + φ_fine
+//! residual = |expected − Φ_fine|          a pixel with more than 0.40 turn is rejected
+//! ```
+//!
+//! **Shapes and units.** Half a block of pixels in 16-bit words; phases in 1/65536 turn, so that the wrap of the word is the
+//! wrap of the phase. An absolute phase takes two words, its fringe order and its fraction ([`Turns`]).
+//!
+//! **Departure.** n · Φ does not fit a word, so it is computed twice ([`ExpectedPhase`]). Modulo one turn it is within 2/65536
+//! turn; that gives the residual. Its whole turns are needed only within ± 0.1 turn, because a residual above 0.40 is rejected
+//! anyway; they come from a fixed-point product with as many fractional bits as fit beside the largest number of turns.
+//!
+//! **Accuracy.** No fringe order differs from the exact one: `no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes`,
+//! `as_many_turns_as_documented_decode_in_every_fringe_and_more_are_refused`,
+//! `the_largest_step_between_levels_decodes_and_a_larger_one_is_refused`.
 
-use super::unwrap::farness;
 use crate::simd::Lanes;
 
-/// A step prepared for any back-end.
+/// An unwrapping step, prepared for any back-end.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Step {
+pub(super) struct UnwrapStep {
     /// Whole part of n.
     whole: i16,
     /// Fraction of n in Q15, for phases, and in Q16, for turns.
     part_q15: i16,
     part_q16: i16,
-    /// Fraction of n · (what the coarse phase counts from), Q16.
+    /// What the origins of both levels add to the fraction of n·Φ, Q16.
     origin: i16,
-    /// The coarse number of turns takes this many bits, with its sign.
+    /// Bits of the coarse fringe order, with its sign.
     order_bits: u8,
     /// n in the fixed point of the product with the coarse phase.
     gain: i16,
-    /// Fractional bits of the product.
+    /// Fractional bits of that product.
     bits: u8,
-    /// The product's origin, and half a turn for rounding.
+    /// What the origins add to the product, and half a turn for rounding.
     offset: i16,
 }
 
-/// Fewest fractional bits of the product: with 4 the order is off by at most 1/16 turn for the product and 1/16 for the
-/// fine phase.
+/// Fewest fractional bits of the product: with 4, truncation of the product and of the fine phase moves what is rounded to the
+/// fringe order by at most 1/16 turn each.
 const LEAST_BITS: f64 = 4.0;
 
-/// An n this near to a whole number is that number: over 1000 turns 1e-6 turn.
+/// An n this near to a whole number is taken as that number: over 1000 turns that is 1e-6 turn.
 const WHOLE: f64 = 1e-9;
 
-impl Step {
-    /// From phases of at most `reach` turns either way of an origin to n times as many; `behind` is n · that origin less the
-    /// origin of the fine phase, in turns. `None` if a word cannot hold the fine ones with enough precision.
+impl UnwrapStep {
+    /// A step from coarse phases within ± `reach` turns of their origin to n times as many; `behind` is n · that origin less
+    /// the origin of the fine phase, in turns. `None` if a word cannot hold the fine phases with enough precision.
     pub fn new(n: f64, reach: f64, behind: f64) -> Option<Self> {
-        // A whole n that comes out of ratios is off in its last digits.
+        // The quotient of two ratios has rounding errors even where n is whole.
         let next = libm::rint(n);
         let n = if libm::fabs(n - next) < WHOLE {
             next
@@ -72,61 +90,61 @@ impl Step {
     }
 }
 
-/// In Q15, at most 32767.
+/// x in Q15, saturated to ± 32767.
 pub(super) fn q15(x: f64) -> i16 {
     libm::rint(x * 32_768.0).clamp(-32_767.0, 32_767.0) as i16
 }
 
-/// The low 16 bits of the number next to x.
+/// The low 16 bits of x rounded to nearest.
 pub(super) fn word(x: f64) -> i16 {
     libm::rint(x) as i64 as i16
 }
 
-/// Half a block of phases: whole turns, and what is beyond them in 1/65536.
+/// The absolute phases of half a block.
 #[derive(Clone, Copy)]
 pub(super) struct Turns<V: Lanes> {
-    /// Rounded down.
+    /// Fringe order: the phase rounded down.
     pub order: V::W,
-    /// 0…1 turn, as an unsigned word.
+    /// The fraction, 0…1 turn as an unsigned word in 1/65536 turn.
     pub phase: V::W,
 }
 
 impl<V: Lanes> Turns<V> {
-    /// Of a phase of −½…½ turn.
+    /// From wrapped phases, taken as −½…½ turn.
     #[inline(always)]
-    pub fn within_half(v: V, phase: V::W) -> Self {
+    pub fn from_wrapped(v: V, phase: V::W) -> Self {
         Self {
             order: v.sar::<15>(phase),
             phase,
         }
     }
 
-    /// The turns of half a block of phases in 1/65536 turn.
+    /// From double words in 1/65536 turn.
     #[inline(always)]
-    pub fn of(v: V, x: [V::D; 2]) -> Self {
+    pub fn split(v: V, x: [V::D; 2]) -> Self {
         let (phase, order) = v.split(x);
         Self { order, phase }
     }
 
-    /// Whole turns next to the phase, of which it is −½…½ away.
+    /// The nearest whole number of turns.
     #[inline(always)]
-    pub fn nearest(self, v: V) -> V::W {
+    pub fn nearest_order(self, v: V) -> V::W {
         v.sub(self.order, v.sar::<15>(self.phase))
     }
 }
 
-/// What half a block's coarse phases say of the fine ones: n·Φ.
+/// The phases that half a block's coarse level predicts for the finer one: n·Φ.
 #[derive(Clone, Copy)]
-pub(super) struct Ahead<V: Lanes> {
-    /// Its fraction, 1/65536 turn.
+pub(super) struct ExpectedPhase<V: Lanes> {
+    /// n·Φ modulo one turn, 1/65536 turn.
     pub fraction: V::W,
-    /// n·Φ + ½ in the step's fixed point.
+    /// n·Φ + ½ in the step's fixed point, for its whole turns.
     pub turns: V::W,
 }
 
-/// A step with every constant in all lanes.
+/// [`UnwrapStep`] with every constant in all lanes.
 #[derive(Clone, Copy)]
-pub(super) struct StepLanes<V: Lanes> {
+pub(super) struct UnwrapStepLanes<V: Lanes> {
     whole: V::W,
     part_q15: V::W,
     part_q16: V::W,
@@ -135,16 +153,16 @@ pub(super) struct StepLanes<V: Lanes> {
     offset: V::W,
     /// Whether n is whole.
     integral: bool,
-    /// How turns of the coarse phase and what is beyond them make one word.
+    /// Shifts that put fringe order and fraction of the coarse phase into one word.
     order_left: V::Count,
     phase_right: V::Count,
     fine_right: V::Count,
     bits_right: V::Count,
 }
 
-impl<V: Lanes> StepLanes<V> {
+impl<V: Lanes> UnwrapStepLanes<V> {
     #[inline(always)]
-    pub fn new(v: V, step: &Step) -> Self {
+    pub fn new(v: V, step: &UnwrapStep) -> Self {
         Self {
             whole: v.splat16(step.whole),
             part_q15: v.splat16(step.part_q15),
@@ -160,34 +178,34 @@ impl<V: Lanes> StepLanes<V> {
         }
     }
 
-    /// What is expected at the fine level above coarse phases of −½…½ turn, for a step made for no more than that.
+    /// The expected phase from wrapped coarse phases of −½…½ turn, for a step with a `reach` of ½.
     #[inline(always)]
-    pub fn ahead_of_start(&self, v: V, coarse: [V::W; 2]) -> [Ahead<V>; 2] {
+    pub fn expected_from_wrapped(&self, v: V, coarse: [V::W; 2]) -> [ExpectedPhase<V>; 2] {
         let mut fraction = self.fraction(v, coarse);
         if !self.integral {
             fraction = self.add_part(v, fraction, coarse);
         }
-        self.ahead_of(v, fraction, coarse)
+        self.expected_of(v, fraction, coarse)
     }
 
-    /// What is expected at the fine level above coarse phases of any number of turns.
+    /// The expected phase from coarse phases of any number of turns.
     #[inline(always)]
-    pub fn ahead(&self, v: V, coarse: [Turns<V>; 2]) -> [Ahead<V>; 2] {
+    pub fn expected(&self, v: V, coarse: [Turns<V>; 2]) -> [ExpectedPhase<V>; 2] {
         let [low, high] = coarse;
         let phase = [low.phase, high.phase];
         let mut fraction = self.fraction(v, phase);
         if !self.integral {
             fraction = self.add_part(v, fraction, phase);
             fraction = [
-                v.add(fraction[0], v.mul_low(low.nearest(v), self.part_q16)),
-                v.add(fraction[1], v.mul_low(high.nearest(v), self.part_q16)),
+                v.add(fraction[0], v.mul_low(low.nearest_order(v), self.part_q16)),
+                v.add(fraction[1], v.mul_low(high.nearest_order(v), self.part_q16)),
             ];
         }
         let product = [self.word(v, low), self.word(v, high)];
-        self.ahead_of(v, fraction, product)
+        self.expected_of(v, fraction, product)
     }
 
-    /// The fraction of the origin's and of the whole part of n's share of n·Φ.
+    /// Fraction of (whole part of n) · Φ and of the origin.
     #[inline(always)]
     fn fraction(&self, v: V, phase: [V::W; 2]) -> [V::W; 2] {
         [
@@ -196,6 +214,7 @@ impl<V: Lanes> StepLanes<V> {
         ]
     }
 
+    /// Adds (fraction of n) · φ.
     #[inline(always)]
     fn add_part(&self, v: V, fraction: [V::W; 2], phase: [V::W; 2]) -> [V::W; 2] {
         [
@@ -204,40 +223,41 @@ impl<V: Lanes> StepLanes<V> {
         ]
     }
 
-    /// As much of a phase as a word holds.
+    /// The absolute phase in one word, with as many fractional bits as fit.
     #[inline(always)]
     fn word(&self, v: V, Turns { order, phase }: Turns<V>) -> V::W {
         let high = v.shl_by(order, self.order_left);
         v.add(high, v.shr_by(phase, self.phase_right))
     }
 
+    /// The expected phase from its fraction and the coarse phase in one word.
     #[inline(always)]
-    fn ahead_of(&self, v: V, fraction: [V::W; 2], product: [V::W; 2]) -> [Ahead<V>; 2] {
+    fn expected_of(&self, v: V, fraction: [V::W; 2], product: [V::W; 2]) -> [ExpectedPhase<V>; 2] {
         let turns = [
             v.add(v.mul_q15(product[0], self.gain), self.offset),
             v.add(v.mul_q15(product[1], self.gain), self.offset),
         ];
         [
-            Ahead {
+            ExpectedPhase {
                 fraction: fraction[0],
                 turns: turns[0],
             },
-            Ahead {
+            ExpectedPhase {
                 fraction: fraction[1],
                 turns: turns[1],
             },
         ]
     }
 
-    /// The fine phase of which `fine` is the wrapped one, and what was left over ([`farness`]).
+    /// Unwraps `wrapped`, the fine level's phase: its absolute phase, and the residual's magnitude (unsigned, 1/65536 turn).
     #[inline(always)]
-    pub fn land(&self, v: V, ahead: Ahead<V>, fine: V::W) -> (Turns<V>, V::W) {
-        let left = farness(v, v.sub(ahead.fraction, fine));
-        let turns = v.sub(ahead.turns, v.shr_by(fine, self.fine_right));
-        let climbed = Turns {
+    pub fn unwrap(&self, v: V, expected: ExpectedPhase<V>, wrapped: V::W) -> (Turns<V>, V::W) {
+        let residual = v.abs(v.sub(expected.fraction, wrapped));
+        let turns = v.sub(expected.turns, v.shr_by(wrapped, self.fine_right));
+        let phase = Turns {
             order: v.sar_by(turns, self.bits_right),
-            phase: fine,
+            phase: wrapped,
         };
-        (climbed, left)
+        (phase, residual)
     }
 }

@@ -1,6 +1,6 @@
 //! Whole frames: frames → phase map → height map.
 
-use super::{for_each, for_each_row_of};
+use super::{for_each, for_each_row_of_two};
 use crate::frame::FrameView;
 use crate::geometry::Triangulator;
 use crate::phase::{Arrived, DecodeError, Decoder, PhaseRow, Trust};
@@ -16,14 +16,14 @@ pub struct PhaseMap {
     pub width: usize,
     /// Φ, [`AbsolutePhase::UNKNOWN`] where the phase is rejected.
     pub phase: Vec<AbsolutePhase>,
-    /// The modulation that decides the phase's accuracy.
+    /// The finest level's modulation, 0 where the phase is rejected.
     pub modulation: Vec<Modulation>,
     /// Resolved, or the first reason why not.
     pub trust: Vec<Trust>,
 }
 
 impl PhaseMap {
-    /// A map of which nothing is known yet.
+    /// A map without any phase: every pixel is dark.
     pub fn new(width: usize, height: usize) -> Self {
         let pixels = width * height;
         Self {
@@ -65,14 +65,14 @@ pub struct HeightMap {
     pub sigma: Vec<f32>,
 }
 
-/// The columns of each row that somebody looks at; the rest need not be computed.
+/// The columns of each row that are needed; the others are not computed.
 pub type Window<'a> = &'a [Range<usize>];
 
-/// Decodes frames to absolute phase; `map` is the known map (row-major) for sequences that are
-/// unwrapped about one. Pixels outside `window` are left out: they stay dark.
+/// Decodes frames to absolute phase. `map` is the known map (row-major) for sequences that are
+/// unwrapped about one. Pixels outside `window` are not decoded and stay dark.
 ///
 /// # Errors
-/// If the frames are not what the decoder was made for. Nothing else can fail.
+/// If the frames do not fit the decoder. Nothing else can fail.
 pub fn decode(
     decoder: &Decoder,
     frames: &[FrameView<'_>],
@@ -90,11 +90,11 @@ pub fn decode(
     ))
 }
 
-/// Decodes the frames of the next level (in the order of their shifts, levels from coarse to fine) while those of finer
-/// ones are still being exposed.
+/// Decodes the frames of the next level on arrival, while those of finer levels are being exposed. Levels arrive from coarse to
+/// fine, frames are in the order of their shifts.
 ///
 /// # Errors
-/// If the frames are not those of the level, or the room is for frames of another size.
+/// If the frames do not fit the level, or `arrived` was made for frames of another size.
 pub fn arrive(
     decoder: &Decoder,
     frames: &[FrameView<'_>],
@@ -102,10 +102,10 @@ pub fn arrive(
 ) -> Result<(), DecodeError> {
     let level = arrived.levels();
     decoder.check_arrival(frames, arrived)?;
-    let width = arrived.size().0;
-    let (arriving, planes) = arrived.arriving();
-    for_each_row_of(planes, width, |v, row| {
-        decoder.arrive_row(level, frames, v, arriving.row(v, row));
+    let (layout, words, bytes) = arrived.maps_mut();
+    let (words, bytes) = ((words, layout.words()), (bytes, layout.bytes()));
+    for_each_row_of_two(words, bytes, |v, words, bytes| {
+        decoder.arrive_row(level, frames, v, layout.row_mut(words, bytes));
     });
     arrived.add_level();
     Ok(())
@@ -114,7 +114,7 @@ pub fn arrive(
 /// As [`decode`], from the coarser levels that have gone through [`arrive`] and the frames of the finest.
 ///
 /// # Errors
-/// If the frames are not those of the finest level, another level is missing, or they are of another size.
+/// If the frames do not fit the finest level, another level has not arrived, or the frames have another size.
 pub fn decode_last(
     decoder: &Decoder,
     arrived: &Arrived,
@@ -128,7 +128,7 @@ pub fn decode_last(
     }))
 }
 
-/// A phase map of frames like `frame`, each row decoded with the known map's row and the columns that are looked at.
+/// A phase map of the size of `frame`: calls `decode` with each row, the known map's row and the columns inside the window.
 fn each_row(
     frame: &FrameView<'_>,
     map: Option<&[AbsolutePhase]>,
@@ -149,18 +149,16 @@ fn each_row(
     phases
 }
 
-/// The columns of row `v` that a window lets through.
+/// The columns of row `v` inside the window.
 fn columns(window: Option<Window<'_>>, v: usize, width: usize) -> Range<usize> {
     window.map_or(0..width, |window| window[v].clone())
 }
 
-/// What is known of the heights beforehand: for a place (row-major) and its phase, a height in mm that
-/// is nearly right.
+/// A height in mm near the solution, if there is one, for a pixel (row-major index) and its phase.
 pub type Guess<'a> = &'a (dyn Fn(usize, AbsolutePhase) -> Option<f64> + Sync);
 
-/// Triangulates every resolved pixel, and marks those without a height in the working range as
-/// [`Trust::OutOfRange`]. `noise` is σ of one sample in counts, for σ_z; `guess` makes it faster. Pixels outside
-/// `window` get no height.
+/// Triangulates every resolved pixel inside `window`, and marks those without a height in the working range as
+/// [`Trust::OutOfRange`]. `noise` is σ of one sample in counts, for σ_z; `guess` makes it faster.
 pub fn triangulate(
     triangulator: &Triangulator,
     decoder: &Decoder,

@@ -1,4 +1,4 @@
-//! Who computes which row: in turn or on a rayon pool, with the same bits.
+//! Whole frames: decoding, triangulation, heights about a known surface. Rows run serially or on a rayon pool, with the same bits.
 
 mod cubic;
 mod measure;
@@ -15,4 +15,4 @@ pub use measure::{Guess, HeightMap, PhaseMap, Window, arrive, decode, decode_las
 pub use noise::sample_noise;
 pub use plate::{Plate, PlateError};
 pub use rows::for_each_row;
-pub(crate) use rows::{for_each, for_each_item, for_each_row_of, map_rows};
+pub(crate) use rows::{for_each, for_each_item, for_each_row_of_two, map_rows};

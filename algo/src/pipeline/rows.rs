@@ -1,6 +1,5 @@
-//! The walk over rows, serial or parallel.
+//! Loops over rows, serial or on the rayon pool.
 
-use crate::phase::PlanesMut;
 use alloc::vec::Vec;
 #[cfg(feature = "parallel")]
 use rayon::prelude::*;
@@ -30,38 +29,30 @@ pub(crate) fn for_each_item<T: Send>(items: &mut [T], each: impl Fn(usize, &mut 
     });
 }
 
-/// Calls `each` with every row of three maps (row-major, rows of `width`), of which the second may be empty.
-pub(crate) fn for_each_row_of(
-    (first, second, third): PlanesMut<'_>,
-    width: usize,
-    each: impl Fn(usize, PlanesMut<'_>) + Sync + Send,
+/// Calls `each` with every row of two maps (row-major), each given with the length of its rows.
+pub(crate) fn for_each_row_of_two<T: Send, U: Send>(
+    (first, first_length): (&mut [T], usize),
+    (second, second_length): (&mut [U], usize),
+    each: impl Fn(usize, &mut [T], &mut [U]) + Sync + Send,
 ) {
-    let width = width.max(1);
+    let (first_length, second_length) = (first_length.max(1), second_length.max(1));
     #[cfg(feature = "parallel")]
-    {
-        let rows = first
-            .par_chunks_mut(width)
-            .zip(third.par_chunks_mut(width))
-            .enumerate();
-        if second.is_empty() {
-            rows.for_each(|(v, (first, third))| each(v, (first, &mut [], third)));
-        } else {
-            rows.zip(second.par_chunks_mut(width))
-                .for_each(|((v, (first, third)), second)| each(v, (first, second, third)));
-        }
-    }
+    first
+        .par_chunks_mut(first_length)
+        .zip(second.par_chunks_mut(second_length))
+        .enumerate()
+        .for_each(|(v, (first, second))| each(v, first, second));
     #[cfg(not(feature = "parallel"))]
+    for (v, (first, second)) in first
+        .chunks_mut(first_length)
+        .zip(second.chunks_mut(second_length))
+        .enumerate()
     {
-        let mut seconds = second.chunks_mut(width);
-        let rows = first.chunks_mut(width).zip(third.chunks_mut(width));
-        for (v, (first, third)) in rows.enumerate() {
-            each(v, (first, seconds.next().unwrap_or_default(), third));
-        }
+        each(v, first, second);
     }
 }
 
-/// Calls `each` with every row (and its place), and with a scratch buffer that is reused from row to
-/// row.
+/// Calls `each` with the index of every row, the row, and a scratch buffer that is reused from row to row.
 pub(crate) fn for_each<T: Send, S>(
     rows: Vec<T>,
     scratch: impl Fn() -> S + Sync + Send,

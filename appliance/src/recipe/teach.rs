@@ -190,7 +190,7 @@ fn blur(
     let coarse = Scan::new(function.range(), &shots[..SHIFTS], &first.frames[..SHIFTS])
         .and_then(|coarse| coarse.phases(None))
         .map_err(TeachError::Rig)?;
-    let slopes = map.slopes(noise::MAX_STEP);
+    let slopes = map.slopes(noise::MAX_SLOPE);
     let resolved = (0..slopes.len())
         .filter(|&at| first.phases.trust[at] == Trust::Resolved && !slopes[at][0].is_nan());
     let samples = resolved.map(|at| {

@@ -4,7 +4,7 @@ use super::bounds::Tally;
 use super::random::{Draw, KINDS};
 use super::rig;
 use super::stack::{Stack, pool, shots};
-use algo::phase::{FULL_TRUST_STEPS, Trust};
+use algo::phase::{FULL_TRUST_SHIFTS, Trust};
 use algo::pipeline::triangulate;
 use algo::units::AbsolutePhase;
 use std::f64::consts::TAU;
@@ -115,7 +115,7 @@ fn samples_beyond_the_bit_depth_are_survived_and_rejected_below_eight_shifts() {
             let full = usize::from(stack.full_scale());
             stack.fill(|_, _| (full + random.below(65_536 - full)) as u16);
             let map = stack.decode();
-            if shifts < FULL_TRUST_STEPS {
+            if shifts < FULL_TRUST_SHIFTS {
                 assert_eq!(map.count(Trust::Resolved), 0, "{shifts}, {bit_depth} bit");
             }
         }
@@ -178,7 +178,7 @@ fn a_tenth_over_full_scale_is_rejected_below_eight_shifts_and_a_small_periodic_e
         let (mut worst, mut squares) = (0.0_f64, 0.0);
         for pixel in 0..stack.pixels() {
             let clipped = (0..shifts).any(|f| stack.sample(f, pixel) == stack.full_scale());
-            let rejected = clipped && shifts < FULL_TRUST_STEPS;
+            let rejected = clipped && shifts < FULL_TRUST_SHIFTS;
             assert_eq!(map.trust[pixel] == Trust::Saturated, rejected, "{shifts}");
             if !rejected {
                 let error = (map.phase[pixel].turns() - truth(pixel)).abs();
@@ -188,7 +188,7 @@ fn a_tenth_over_full_scale_is_rejected_below_eight_shifts_and_a_small_periodic_e
         }
         let rms = (squares / stack.pixels() as f64).sqrt();
         println!("{shifts} shifts: worst {worst:.2e} turn, RMS {rms:.2e}");
-        if shifts >= FULL_TRUST_STEPS {
+        if shifts >= FULL_TRUST_SHIFTS {
             assert!(rms <= SATURATED_RMS, "{shifts}: {rms:e}");
             assert!(worst <= 2.0 * SATURATED_RMS, "{shifts}: {worst:e}");
         }

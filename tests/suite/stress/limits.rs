@@ -4,8 +4,8 @@ use super::bounds::Tally;
 use super::random::between;
 use super::stack::{Stack, shots};
 use algo::pattern::{
-    MAX_DENSE_N, MAX_LEVELS, MAX_SHIFTS, MAX_STEP, MAX_TURNS, PhaseFunction, PhaseFunctionError,
-    PhaseRange, Sequence, Shot,
+    MAX_DENSE_N, MAX_LEVEL_FACTOR, MAX_LEVELS, MAX_SHIFTS, MAX_TURNS, PhaseFunction,
+    PhaseFunctionError, PhaseRange, Sequence, Shot,
 };
 use algo::phase::{DecodeError, Decoder, Trust};
 use algo::units::AbsolutePhase;
@@ -130,23 +130,28 @@ fn as_many_fringes_as_documented_make_a_pattern_and_more_are_refused() {
 
 #[test]
 fn the_largest_step_between_levels_decodes_and_a_larger_one_is_refused() {
-    let span = 0.9 * MAX_STEP;
-    let ratios = [1.0 / MAX_STEP, 1.0];
+    let span = 0.9 * MAX_LEVEL_FACTOR;
+    let ratios = [1.0 / MAX_LEVEL_FACTOR, 1.0];
     // Half a count of 12 bit in a level of 16 shifts is an error of at most 9e-5 turn. The step must not enlarge it
     // to more than the limit of the residual.
-    const { assert!(MAX_STEP * 9e-5 < 0.4, "a step that rounding alone slips") };
+    const {
+        assert!(
+            MAX_LEVEL_FACTOR * 9e-5 < 0.4,
+            "a step that rounding alone slips"
+        )
+    };
     decodes("two levels", lit(shots(&ratios, 16), (0.0, span), 0.0));
     // The finest ratio may be as small as the step is large.
-    let small = [1.0 / MAX_STEP];
+    let small = [1.0 / MAX_LEVEL_FACTOR];
     decodes("a small ratio", lit(shots(&small, 16), (0.0, span), 0.0));
-    let over = 1.0 / (MAX_STEP + 1.0);
+    let over = 1.0 / (MAX_LEVEL_FACTOR + 1.0);
     names(
         refusal(&[over, 1.0], 4, (0.0, span)),
-        &[over.to_string(), MAX_STEP.to_string()],
+        &[over.to_string(), MAX_LEVEL_FACTOR.to_string()],
     );
     names(
         refusal(&[over], 4, (0.0, span)),
-        &[over.to_string(), MAX_STEP.to_string()],
+        &[over.to_string(), MAX_LEVEL_FACTOR.to_string()],
     );
 }
 

@@ -1,7 +1,7 @@
 //! Seeded stacks of every form: any number of shifts, depth, ratios, size and stride.
 
 use super::stack::Stack;
-use algo::pattern::{MAX_STEP, Shot};
+use algo::pattern::{MAX_LEVEL_FACTOR, Shot};
 use algo::units::AbsolutePhase;
 use std::f64::consts::TAU;
 use tests::random::Random;
@@ -102,7 +102,7 @@ fn ratios(random: &mut Random, kind: Kind, span: f64) -> (Vec<f64>, f64) {
                 between(random, 0.4, 1.8)
             };
             let rise: f64 = finest / coarsest;
-            let fewest = (rise.ln() / MAX_STEP.ln()).ceil() as usize;
+            let fewest = (rise.ln() / MAX_LEVEL_FACTOR.ln()).ceil() as usize;
             let steps = fewest + random.below(4);
             let step = rise.powf(1.0 / steps as f64);
             let mut ratios: Vec<f64> = (0..steps)

@@ -1,240 +1,249 @@
-//! Geometric levels one by one, as they arrive.
+//! Geometric levels, one at a time: each is decoded on arrival, while the frames of the next are being exposed.
+//!
+//! **Idea.** After each level only the phase that it predicts for the next one is kept: expected fraction and turns, and the first
+//! reason against the pixel, 5 bytes. When the last frame arrives only the finest level is left to decode.
+//!
+//! **Equation and pseudo-code**: those of [`super::geometric`], with the loops exchanged:
+//!
+//! ```text
+//! level 1, when it has arrived:         store n_2 Φ_1 and the reasons
+//! level i = 2 … K − 1, when it has:     Φ_i = φ_i + round(stored − φ_i); store n_{i+1} Φ_i and the reasons
+//! level K:                              Φ_K = φ_K + round(stored − φ_K); store Φ, B and trust
+//! ```
+//!
+//! **Shapes and units.** [`ExpectedRow`], a row of the frame; else as in [`super::geometric`].
+//!
+//! **Departures from the plain form.** Blocks that are dark at the coarsest level are skipped later; their stored prediction is
+//! never read. The last block of a row may overlap the one before, whose prediction is for the next level by then, so what it
+//! needs is read before the row begins.
+//!
+//! **Accuracy.** The bits of [`super::geometric`]: `every_back_end_and_levels_on_arrival_give_the_same_bits`.
 
 use super::next_block;
-use super::quality::{Doubts, unless_dark};
-use super::temporal::{Below, Ground, Rung, four};
-use crate::phase::arrived::{ClimbedRow, ClimbedRowMut};
+use super::quality::{Quality, dark_unless};
+use super::temporal::{ExpectedBlock, FinerLevel, GeometricLanes, four};
+use crate::phase::arrived::{ExpectedRow, ExpectedRowMut};
 use crate::phase::fold::BlockSample;
 use crate::phase::geometric::Geometric;
 use crate::phase::level::{Level, LevelLanes};
 use crate::phase::source::Frames;
-use crate::phase::unwrap_step::{Ahead, Step, StepLanes};
+use crate::phase::unwrap_step::{ExpectedPhase, UnwrapStep, UnwrapStepLanes};
 use crate::simd::{Backend, Lanes, Results, back_end_entry};
 use crate::trust::Trust;
 use core::ops::Range;
 
-/// Climbs columns of a row to level `at`, which has arrived.
-pub(crate) fn arrive_row<T: BlockSample>(
+/// Decodes columns of a row of level `at`, which has arrived and is not the finest.
+pub(crate) fn level_row<T: BlockSample>(
     backend: Backend,
     plan: &Geometric,
     at: usize,
     level: &Level,
     rows: &[&[T]],
     columns: Range<usize>,
-    out: ClimbedRowMut<'_>,
+    out: ExpectedRowMut<'_>,
 ) {
     match (&plan.steps[..at], &plan.steps[at..]) {
-        ([], [next, ..]) => start(backend, plan, next, level, rows, columns, out),
-        ([.., step], [next, ..]) => up(backend, plan, [step, next], level, rows, columns, out),
-        // Nobody has room for the finest level.
+        ([], [next, ..]) => coarsest(backend, plan, next, level, rows, columns, out),
+        ([.., step], [next, ..]) => between(backend, plan, [step, next], level, rows, columns, out),
+        // The finest level is decoded by `finest_row`.
         _ => {}
     }
 }
 
-/// Decodes columns of a row of the finest level, of which all others have arrived.
-pub(crate) fn last_row<T: BlockSample>(
+/// Decodes columns of a row of the finest level, after all others have arrived.
+pub(crate) fn finest_row<T: BlockSample>(
     backend: Backend,
     plan: &Geometric,
     level: &Level,
     rows: &[&[T]],
-    before: ClimbedRow<'_>,
+    before: ExpectedRow<'_>,
     columns: Range<usize>,
     mut out: Results<'_>,
 ) {
     let part = columns.clone();
-    top_row(backend, plan, level, rows, before, columns, &mut out);
+    finest_row_unscaled(backend, plan, level, rows, before, columns, &mut out);
     plan.finish(&mut out.phase[part]);
 }
 
-/// Decodes columns of a row of the finest level as far as [`Geometric::finish`].
-pub(super) fn top_row<T: BlockSample>(
+/// As [`finest_row`], without [`Geometric::finish`].
+pub(super) fn finest_row_unscaled<T: BlockSample>(
     backend: Backend,
     plan: &Geometric,
     level: &Level,
     rows: &[&[T]],
-    before: ClimbedRow<'_>,
+    before: ExpectedRow<'_>,
     columns: Range<usize>,
     out: &mut Results<'_>,
 ) {
     match four(level, rows, &columns) {
-        Some(frames) => top(backend, plan, level, frames, before, columns, out),
-        None => top(backend, plan, level, rows, before, columns, out),
+        Some(frames) => finest(backend, plan, level, frames, before, columns, out),
+        None => finest(backend, plan, level, rows, before, columns, out),
     }
 }
 
 back_end_entry! {
-    fn start [S: Frames] = start_columns(
+    /// The coarsest level.
+    fn coarsest [S: Frames] = coarsest_columns(
         plan: &Geometric,
-        next: &Step,
+        next: &UnwrapStep,
         level: &Level,
         frames: S,
         columns: Range<usize>,
-        out: ClimbedRowMut<'_>,
+        out: ExpectedRowMut<'_>,
     )
 }
 
 back_end_entry! {
-    fn up [S: Frames] = up_columns(
+    /// A level between coarsest and finest.
+    fn between [S: Frames] = between_columns(
         plan: &Geometric,
-        steps: [&Step; 2],
+        steps: [&UnwrapStep; 2],
         level: &Level,
         frames: S,
         columns: Range<usize>,
-        out: ClimbedRowMut<'_>,
+        out: ExpectedRowMut<'_>,
     )
 }
 
 back_end_entry! {
-    fn top [S: Frames] = top_columns(
+    /// The finest level.
+    fn finest [S: Frames] = finest_columns(
         plan: &Geometric,
         level: &Level,
         frames: S,
-        before: ClimbedRow<'_>,
+        before: ExpectedRow<'_>,
         columns: Range<usize>,
         out: &mut Results<'_>,
     )
 }
 
-/// The coarsest level.
 #[inline(always)]
-fn start_columns<V: Lanes, S: Frames>(
+fn coarsest_columns<V: Lanes, S: Frames>(
     v: V,
     plan: &Geometric,
-    next: &Step,
+    next: &UnwrapStep,
     level: &Level,
     frames: S,
     columns: Range<usize>,
-    mut out: ClimbedRowMut<'_>,
+    mut out: ExpectedRowMut<'_>,
 ) {
-    let ground = Ground::new(v, plan);
-    let next = StepLanes::new(v, next);
+    let lanes = GeometricLanes::new(v, plan);
+    let next = UnwrapStepLanes::new(v, next);
     let level = LevelLanes::new(v, level);
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
         let folded = frames.fold(v, &level, at, V::AHEAD);
         if v.none8(folded.strong) {
-            // Where it stands nobody asks any more.
-            v.store8(out.doubt, at, v.splat8(Trust::Dark as u8));
+            // Later levels skip this block and do not read its prediction.
+            v.store8(out.reason, at, v.splat8(Trust::Dark as u8));
             continue;
         }
-        let climb = ground.start(v, ground.rough(v, &folded), &folded);
-        let doubt = v.min8(unless_dark(v, folded.strong), climb.doubts.first(v));
-        out.store(v, at, &climb.ahead(v, &next), doubt);
+        let unwrapped = lanes.coarsest(v, lanes.rough(v, &folded), &folded);
+        let reason = v.min8(
+            dark_unless(v, folded.strong),
+            unwrapped.quality.first_reason(v),
+        );
+        out.store(v, at, &unwrapped.expected(v, &next), reason);
     }
 }
 
-/// A level between.
 #[inline(always)]
-fn up_columns<V: Lanes, S: Frames>(
+fn between_columns<V: Lanes, S: Frames>(
     v: V,
     plan: &Geometric,
-    [step, next]: [&Step; 2],
+    [step, next]: [&UnwrapStep; 2],
     level: &Level,
     frames: S,
     columns: Range<usize>,
-    mut out: ClimbedRowMut<'_>,
+    mut out: ExpectedRowMut<'_>,
 ) {
-    let ground = Ground::new(v, plan);
-    let rung = Rung::new(v, step, level, frames);
-    let next = StepLanes::new(v, next);
-    // The last block may overlap the one before, which by then stands a level higher.
+    let lanes = GeometricLanes::new(v, plan);
+    let finer = FinerLevel::new(v, step, level, frames);
+    let next = UnwrapStepLanes::new(v, next);
+    // The last block may overlap the one before, whose prediction is for the next level by then.
     let last = columns.end - V::PIXELS;
-    let before = out.as_row();
-    let end = (v.load8(before.doubt, last), before.below(v, last));
+    let before = out.row();
+    let end = (v.load8(before.reason, last), before.expected(v, last));
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
-        let before = out.as_row();
-        let (mut doubt, mut below) = (v.load8(before.doubt, at), before.below(v, at));
+        let before = out.row();
+        let (mut reason, mut expected) = (v.load8(before.reason, at), before.expected(v, at));
         if at == last {
-            (doubt, below) = end;
+            (reason, expected) = end;
         }
-        if all_dark(v, doubt) {
+        if all_dark(v, reason) {
             continue;
         }
-        let climb = rung.rough(v, &ground, &below, at, V::AHEAD);
-        let doubt = v.min8(doubt, climb.doubts.first(v));
-        out.store(v, at, &climb.ahead(v, &next), doubt);
+        let unwrapped = finer.rough(v, &lanes, &expected, at, V::AHEAD);
+        let reason = v.min8(reason, unwrapped.quality.first_reason(v));
+        out.store(v, at, &unwrapped.expected(v, &next), reason);
     }
 }
 
-/// The finest level.
 #[inline(always)]
-fn top_columns<V: Lanes, S: Frames>(
+fn finest_columns<V: Lanes, S: Frames>(
     v: V,
     plan: &Geometric,
     level: &Level,
     frames: S,
-    before: ClimbedRow<'_>,
+    before: ExpectedRow<'_>,
     columns: Range<usize>,
     out: &mut Results<'_>,
 ) {
     let Some(step) = plan.steps.last() else {
         return;
     };
-    let finest = Rung::new(v, step, level, frames.first(columns.end));
-    let ground = Ground::new(v, plan);
-    let (before, mut out) = (before.first(columns.end), out.first(columns.end));
+    let finest = FinerLevel::new(v, step, level, frames.first(columns.end));
+    let lanes = GeometricLanes::new(v, plan);
+    let (before, mut out) = (before.part(0..columns.end), out.first(columns.end));
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
-        let doubt = v.load8(before.doubt, at);
-        if all_dark(v, doubt) {
-            out.store_unknown(v, at, doubt);
+        let reason = v.load8(before.reason, at);
+        if all_dark(v, reason) {
+            out.store_unknown(v, at, reason);
             continue;
         }
-        let (climb, modulation) = finest.fine(v, &ground, &before.below(v, at), at, V::AHEAD);
-        ground.store(v, &climb, doubt, modulation, at, &mut out);
+        let (unwrapped, modulation) = finest.fine(v, &lanes, &before.expected(v, at), at, V::AHEAD);
+        lanes.store(v, &unwrapped, reason, modulation, at, &mut out);
     }
 }
 
 #[inline(always)]
-fn all_dark<V: Lanes>(v: V, doubt: V::B) -> bool {
-    v.none8(v.xor8(doubt, v.splat8(Trust::Dark as u8)))
+fn all_dark<V: Lanes>(v: V, reason: V::B) -> bool {
+    v.none8(v.xor8(reason, v.splat8(Trust::Dark as u8)))
 }
 
-impl<'a> ClimbedRow<'a> {
-    /// The first columns.
+impl ExpectedRow<'_> {
+    /// The block at `at`, without its reasons.
     #[inline(always)]
-    fn first(self, length: usize) -> Self {
-        Self {
-            fraction: &self.fraction[..length],
-            turns: &self.turns[..length],
-            doubt: &self.doubt[..length],
-        }
-    }
-
-    /// What the block says of the next level, without its doubts.
-    #[inline(always)]
-    fn below<V: Lanes>(&self, v: V, at: usize) -> Below<V> {
+    fn expected<V: Lanes>(&self, v: V, at: usize) -> ExpectedBlock<V> {
         let (fraction, turns) = (v.load16(self.fraction, at), v.load16(self.turns, at));
-        Below {
-            ahead: [
-                Ahead {
+        ExpectedBlock {
+            phase: [
+                ExpectedPhase {
                     fraction: fraction[0],
                     turns: turns[0],
                 },
-                Ahead {
+                ExpectedPhase {
                     fraction: fraction[1],
                     turns: turns[1],
                 },
             ],
-            doubts: Doubts {
-                strong: v.splat8(u8::MAX),
-                brightest: v.splat8(0),
-                left: [v.splat16(0); 2],
-            },
+            quality: Quality::new(v, v.splat8(u8::MAX)),
         }
     }
 }
 
-impl ClimbedRowMut<'_> {
+impl ExpectedRowMut<'_> {
+    /// Writes the block at `at`.
     #[inline(always)]
-    fn store<V: Lanes>(&mut self, v: V, at: usize, below: &Below<V>, doubt: V::B) {
-        let [low, high] = below.ahead;
+    fn store<V: Lanes>(&mut self, v: V, at: usize, expected: &ExpectedBlock<V>, reason: V::B) {
+        let [low, high] = expected.phase;
         v.store16(self.fraction, at, [low.fraction, high.fraction]);
         v.store16(self.turns, at, [low.turns, high.turns]);
-        v.store8(self.doubt, at, doubt);
+        v.store8(self.reason, at, reason);
     }
 }

@@ -1,41 +1,65 @@
-//! What speaks against the pixels of a block.
+//! Which pixels of a block are resolved, and the first reason why not.
+//!
+//! Reasons are bytes: the numbers of [`Trust`], or [`NO_REASON`], which is larger than all of them. So the smaller of two bytes
+//! is the reason that comes first, and levels are combined by a minimum.
 
-use crate::phase::arrived::NO_DOUBT;
-use crate::phase::unwrap::too_far;
+use crate::phase::arrived::NO_REASON;
+use crate::phase::unwrap::too_large;
 use crate::simd::Lanes;
 use crate::trust::Trust;
 
-/// Doubts about the pixels of a block.
+/// What decides about the pixels of a block, over all levels so far.
 #[derive(Clone, Copy)]
-pub(crate) struct Doubts<V: Lanes> {
-    /// Mask: every level is strong.
+pub(crate) struct Quality<V: Lanes> {
+    /// Mask: every level has at least the trusted modulation.
     pub strong: V::B,
-    /// 255 where a sample is at full scale.
+    /// 255 where a sample is at full scale and its level does not tolerate that.
     pub brightest: V::B,
-    /// The most that a step left over.
-    pub left: [V::W; 2],
+    /// The largest residual, unsigned, 1/65536 turn.
+    pub residual: [V::W; 2],
 }
 
-impl<V: Lanes> Doubts<V> {
-    /// The number of the first [`Trust`] that speaks against each pixel, or [`NO_DOUBT`]. Whether a pixel is dark is not asked.
+impl<V: Lanes> Quality<V> {
+    /// Before any level, of pixels where this mask is set.
     #[inline(always)]
-    pub fn first(&self, v: V) -> V::B {
+    pub fn new(v: V, strong: V::B) -> Self {
+        Self {
+            strong,
+            brightest: v.splat8(0),
+            residual: [v.splat16(0); 2],
+        }
+    }
+
+    /// Adds modulation and saturation of a level.
+    #[inline(always)]
+    pub fn add(&mut self, v: V, strong: V::B, brightest: V::B) {
+        self.strong = v.and8(self.strong, strong);
+        self.brightest = v.max8(self.brightest, brightest);
+    }
+
+    /// The first reason against each pixel. Does not tell [`Trust::Dark`] from [`Trust::LowModulation`].
+    #[inline(always)]
+    pub fn first_reason(&self, v: V) -> V::B {
         let residual = v.splat8(Trust::Residual as u8);
-        let first = v.pick8(self.doubtful(v), residual, v.splat8(NO_DOUBT));
+        let first = v.pick8(self.ambiguous(v), residual, v.splat8(NO_REASON));
         let first = v.pick8(self.saturated(v), v.splat8(Trust::Saturated as u8), first);
         v.pick8(self.strong, first, v.splat8(Trust::LowModulation as u8))
     }
 
-    /// Whether nothing speaks against any pixel of the block, nor has `before`: the first doubts of levels below.
+    /// Whether all pixels of the block are resolved: no reason here, nor in `before`, the reasons of coarser levels.
     #[inline(always)]
-    pub fn none(&self, v: V, before: V::B) -> bool {
-        let against = v.or8(self.doubtful(v), self.saturated(v));
+    pub fn all_resolved(&self, v: V, before: V::B) -> bool {
+        let against = v.or8(self.ambiguous(v), self.saturated(v));
         v.all8(v.pick8(against, v.splat8(0), v.min8(self.strong, before)))
     }
 
+    /// Mask: the residual is too large for the fringe order to be trusted.
     #[inline(always)]
-    fn doubtful(&self, v: V) -> V::B {
-        v.narrow_mask([too_far(v, self.left[0]), too_far(v, self.left[1])])
+    fn ambiguous(&self, v: V) -> V::B {
+        v.narrow_mask([
+            too_large(v, self.residual[0]),
+            too_large(v, self.residual[1]),
+        ])
     }
 
     #[inline(always)]
@@ -44,22 +68,22 @@ impl<V: Lanes> Doubts<V> {
     }
 }
 
-/// The first doubts where all that is known is which pixels are lit.
+/// Reasons of a block of which only the mask of lit pixels is known: [`NO_REASON`] or [`Trust::Dark`].
 #[inline(always)]
-pub(crate) fn unless_dark<V: Lanes>(v: V, lit: V::B) -> V::B {
+pub(crate) fn dark_unless<V: Lanes>(v: V, lit: V::B) -> V::B {
     v.max8(lit, v.splat8(Trust::Dark as u8))
 }
 
-/// Masks of words: nothing speaks against the pixel.
+/// Masks of words: there is no reason against the pixel.
 #[inline(always)]
-pub(crate) fn none<V: Lanes>(v: V, first: V::B) -> [V::W; 2] {
-    let none = v.eq8(first, v.splat8(NO_DOUBT));
+pub(crate) fn resolved_mask<V: Lanes>(v: V, reason: V::B) -> [V::W; 2] {
+    let none = v.eq8(reason, v.splat8(NO_REASON));
     v.widen(none, none)
 }
 
-/// The first doubts as numbers of [`Trust`].
+/// Reasons as numbers of [`Trust`].
 #[inline(always)]
-pub(crate) fn trust<V: Lanes>(v: V, first: V::B) -> V::B {
-    // `NO_DOUBT` becomes 0, which is `Resolved`; every other number stays.
-    v.xor8(first, v.eq8(first, v.splat8(NO_DOUBT)))
+pub(crate) fn trust<V: Lanes>(v: V, reason: V::B) -> V::B {
+    // `NO_REASON` becomes 0, which is `Resolved`; every other number stays.
+    v.xor8(reason, v.eq8(reason, v.splat8(NO_REASON)))
 }

@@ -1,27 +1,32 @@
-//! Where a block stands on its way from the coarsest of geometric levels to the finest.
+//! Temporal unwrapping of one block, from the coarsest geometric level to the finest.
+//!
+//! A block goes back and forth between two states: [`UnwrappedBlock`], absolute up to a level, and [`ExpectedBlock`], what that
+//! predicts for the next one. [`crate::phase::unwrap_step`] has the equations; the reasons to reject pixels are collected on the
+//! way ([`Quality`]). [`super::geometric`] runs through all levels of a block, [`super::on_arrival`] stores the prediction between
+//! two levels.
 
-use super::quality::{Doubts, none, trust};
+use super::quality::{Quality, resolved_mask, trust};
 use crate::phase::angle::AngleLanes;
 use crate::phase::fold::Folded;
 use crate::phase::geometric::Geometric;
 use crate::phase::level::{Level, LevelLanes, Samples};
 use crate::phase::source::Frames;
-use crate::phase::unwrap_step::{Ahead, Step, StepLanes, Turns};
+use crate::phase::unwrap_step::{ExpectedPhase, Turns, UnwrapStep, UnwrapStepLanes};
 use crate::simd::{Four, Lanes, Results};
 use crate::trust::Trust;
 use crate::units::AbsolutePhase;
 use core::ops::Range;
 
-/// What all blocks of a row need.
-pub(super) struct Ground<V: Lanes> {
+/// [`Geometric`] with every constant in all lanes, for all blocks of a row.
+pub(super) struct GeometricLanes<V: Lanes> {
     pub angle: AngleLanes<V>,
-    /// The middle of the turn that the coarsest level can have.
+    /// Middle of the coarsest level's turn.
     middle: V::W,
-    /// Whole turns that the finest level's phase counts from.
+    /// Whole turns of the finest level's origin.
     origin: V::W,
 }
 
-impl<V: Lanes> Ground<V> {
+impl<V: Lanes> GeometricLanes<V> {
     #[inline(always)]
     pub fn new(v: V, plan: &Geometric) -> Self {
         Self {
@@ -31,24 +36,23 @@ impl<V: Lanes> Ground<V> {
         }
     }
 
-    /// At the coarsest level, of which these are the phases.
+    /// The coarsest level, whose wrapped phases are absolute about the middle of its turn.
     #[inline(always)]
-    pub fn start(&self, v: V, phase: [V::W; 2], folded: &Folded<V>) -> Climb<V> {
-        let zero = v.splat16(0);
-        Climb {
-            here: [
-                Turns::within_half(v, v.sub(phase[0], self.middle)),
-                Turns::within_half(v, v.sub(phase[1], self.middle)),
+    pub fn coarsest(&self, v: V, phase: [V::W; 2], folded: &Folded<V>) -> UnwrappedBlock<V> {
+        UnwrappedBlock {
+            phase: [
+                Turns::from_wrapped(v, v.sub(phase[0], self.middle)),
+                Turns::from_wrapped(v, v.sub(phase[1], self.middle)),
             ],
-            doubts: Doubts {
+            quality: Quality {
                 strong: folded.strong,
                 brightest: folded.brightest,
-                left: [zero; 2],
+                residual: [v.splat16(0); 2],
             },
         }
     }
 
-    /// The phases of a level that only gives the order of the next.
+    /// Wrapped phases of a level that only gives the fringe order of the next, in rough quality.
     #[inline(always)]
     pub fn rough(&self, v: V, folded: &Folded<V>) -> [V::W; 2] {
         [
@@ -57,21 +61,21 @@ impl<V: Lanes> Ground<V> {
         ]
     }
 
-    /// Stores a block: phases from their origin on and modulations of the pixels that nothing speaks against. `before` are the
-    /// first doubts of the levels below.
+    /// Stores a block at the finest level: absolute phase and modulation of resolved pixels, the reason of others. `before` are
+    /// the reasons of coarser levels.
     #[inline(always)]
     pub fn store(
         &self,
         v: V,
-        climb: &Climb<V>,
+        unwrapped: &UnwrappedBlock<V>,
         before: V::B,
         modulation: [V::W; 2],
         at: usize,
         out: &mut Results<'_>,
     ) {
-        let [low, high] = climb.here;
-        if climb.doubts.none(v, before) {
-            // Nearly always: nothing speaks against any of them.
+        let [low, high] = unwrapped.phase;
+        if unwrapped.quality.all_resolved(v, before) {
+            // Nearly every block of the part.
             let phases = [
                 v.join(low.phase, v.add(low.order, self.origin)),
                 v.join(high.phase, v.add(high.order, self.origin)),
@@ -83,127 +87,132 @@ impl<V: Lanes> Ground<V> {
             out.store(v, at, phases, modulation, v.splat8(Trust::Resolved as u8));
             return;
         }
-        let first_doubt = v.min8(before, climb.doubts.first(v));
-        let trusted = none(v, first_doubt);
+        let reason = v.min8(before, unwrapped.quality.first_reason(v));
+        let resolved = resolved_mask(v, reason);
         let phases = [
-            self.known(v, low, trusted[0]),
-            self.known(v, high, trusted[1]),
+            self.known(v, low, resolved[0]),
+            self.known(v, high, resolved[1]),
         ];
-        let modulation = doubled_where(v, trusted, modulation);
-        out.store(v, at, phases, modulation, trust(v, first_doubt));
+        let modulation = doubled_where(v, resolved, modulation);
+        out.store(v, at, phases, modulation, trust(v, reason));
     }
 
-    /// The phase where it is trusted, [`AbsolutePhase::UNKNOWN`] elsewhere.
+    /// The phase where the mask is set, [`AbsolutePhase::UNKNOWN`] elsewhere.
     #[inline(always)]
-    fn known(&self, v: V, here: Turns<V>, trusted: V::W) -> [V::D; 2] {
+    fn known(&self, v: V, phase: Turns<V>, resolved: V::W) -> [V::D; 2] {
         let unknown = v.splat16((AbsolutePhase::UNKNOWN.to_bits() >> 16) as i16);
-        let order = v.pick(trusted, v.add(here.order, self.origin), unknown);
-        v.join(v.and(here.phase, trusted), order)
+        let order = v.pick(resolved, v.add(phase.order, self.origin), unknown);
+        v.join(v.and(phase.phase, resolved), order)
     }
 }
 
-/// Where a block stands at a level.
+/// A block, unwrapped up to a level.
 #[derive(Clone, Copy)]
-pub(super) struct Climb<V: Lanes> {
-    pub here: [Turns<V>; 2],
-    pub doubts: Doubts<V>,
+pub(super) struct UnwrappedBlock<V: Lanes> {
+    pub phase: [Turns<V>; 2],
+    pub quality: Quality<V>,
 }
 
-impl<V: Lanes> Climb<V> {
-    /// What it says of the next level.
+impl<V: Lanes> UnwrappedBlock<V> {
+    /// What it predicts for the next level.
     #[inline(always)]
-    pub fn ahead(&self, v: V, step: &StepLanes<V>) -> Below<V> {
-        Below {
-            ahead: step.ahead(v, self.here),
-            doubts: self.doubts,
+    pub fn expected(&self, v: V, step: &UnwrapStepLanes<V>) -> ExpectedBlock<V> {
+        ExpectedBlock {
+            phase: step.expected(v, self.phase),
+            quality: self.quality,
         }
     }
 
-    /// The same at the coarsest level.
+    /// The same from the coarsest level.
     #[inline(always)]
-    pub fn ahead_of_start(&self, v: V, step: &StepLanes<V>) -> Below<V> {
-        let [low, high] = self.here;
-        Below {
-            ahead: step.ahead_of_start(v, [low.phase, high.phase]),
-            doubts: self.doubts,
+    pub fn expected_from_coarsest(&self, v: V, step: &UnwrapStepLanes<V>) -> ExpectedBlock<V> {
+        let [low, high] = self.phase;
+        ExpectedBlock {
+            phase: step.expected_from_wrapped(v, [low.phase, high.phase]),
+            quality: self.quality,
         }
     }
 }
 
-/// What a block says of the level above.
+/// What a block predicts for the next level.
 #[derive(Clone, Copy)]
-pub(super) struct Below<V: Lanes> {
-    pub ahead: [Ahead<V>; 2],
-    pub doubts: Doubts<V>,
+pub(super) struct ExpectedBlock<V: Lanes> {
+    pub phase: [ExpectedPhase<V>; 2],
+    pub quality: Quality<V>,
 }
 
-/// A level and the step that leads to it.
+/// A level, its frames and the unwrapping step to it.
 #[derive(Clone, Copy)]
-pub(super) struct Rung<'a, V: Lanes, S> {
+pub(super) struct FinerLevel<'a, V: Lanes, S> {
     level: LevelLanes<'a, V>,
     frames: S,
-    pub step: StepLanes<V>,
+    pub step: UnwrapStepLanes<V>,
 }
 
-impl<'a, V: Lanes, S: Frames> Rung<'a, V, S> {
+impl<'a, V: Lanes, S: Frames> FinerLevel<'a, V, S> {
     #[inline(always)]
-    pub fn new(v: V, step: &Step, level: &'a Level, frames: S) -> Self {
+    pub fn new(v: V, step: &UnwrapStep, level: &'a Level, frames: S) -> Self {
         Self {
             level: LevelLanes::new(v, level),
             frames,
-            step: StepLanes::new(v, step),
+            step: UnwrapStepLanes::new(v, step),
         }
     }
 
-    /// Up to this level, roughly; `after` as in [`Frames::fold`].
+    /// Unwraps a block at this level in rough quality; `after` as in [`Frames::fold`].
     #[inline(always)]
     pub fn rough(
         &self,
         v: V,
-        ground: &Ground<V>,
-        below: &Below<V>,
+        lanes: &GeometricLanes<V>,
+        expected: &ExpectedBlock<V>,
         at: usize,
         after: usize,
-    ) -> Climb<V> {
+    ) -> UnwrappedBlock<V> {
         let folded = self.frames.fold(v, &self.level, at, after);
-        self.land(v, below, ground.rough(v, &folded), &folded)
+        self.unwrap(v, expected, lanes.rough(v, &folded), &folded)
     }
 
-    /// Up to this level, and the modulation there.
+    /// Unwraps a block at this level in fine quality, with its modulation.
     #[inline(always)]
     pub fn fine(
         &self,
         v: V,
-        ground: &Ground<V>,
-        below: &Below<V>,
+        lanes: &GeometricLanes<V>,
+        expected: &ExpectedBlock<V>,
         at: usize,
         after: usize,
-    ) -> (Climb<V>, [V::W; 2]) {
+    ) -> (UnwrappedBlock<V>, [V::W; 2]) {
         let folded = self.frames.fold(v, &self.level, at, after);
-        let (block, modulation) = (self.level).fine(v, &ground.angle, &folded, S::DOUBLED);
-        (self.land(v, below, block.phase, &folded), modulation)
+        let (block, modulation) = (self.level).fine(v, &lanes.angle, &folded, S::DOUBLED);
+        (self.unwrap(v, expected, block.phase, &folded), modulation)
     }
 
     #[inline(always)]
-    fn land(&self, v: V, below: &Below<V>, phase: [V::W; 2], folded: &Folded<V>) -> Climb<V> {
-        let (low, left_low) = self.step.land(v, below.ahead[0], phase[0]);
-        let (high, left_high) = self.step.land(v, below.ahead[1], phase[1]);
-        let before = &below.doubts;
-        Climb {
-            here: [low, high],
-            doubts: Doubts {
-                strong: v.and8(before.strong, folded.strong),
-                brightest: v.max8(before.brightest, folded.brightest),
-                left: [
-                    v.max_unsigned(before.left[0], left_low),
-                    v.max_unsigned(before.left[1], left_high),
-                ],
-            },
+    fn unwrap(
+        &self,
+        v: V,
+        expected: &ExpectedBlock<V>,
+        phase: [V::W; 2],
+        folded: &Folded<V>,
+    ) -> UnwrappedBlock<V> {
+        let (low, residual_low) = self.step.unwrap(v, expected.phase[0], phase[0]);
+        let (high, residual_high) = self.step.unwrap(v, expected.phase[1], phase[1]);
+        let before = &expected.quality;
+        let mut quality = *before;
+        quality.add(v, folded.strong, folded.brightest);
+        quality.residual = [
+            v.max_unsigned(before.residual[0], residual_low),
+            v.max_unsigned(before.residual[1], residual_high),
+        ];
+        UnwrappedBlock {
+            phase: [low, high],
+            quality,
         }
     }
 }
 
-/// Four rows up to the end of the columns, of a level whose samples are subtracted in pairs.
+/// The four rows of a level that is demodulated by differences, checked up to the end of the columns.
 pub(super) fn four<'a, T>(
     level: &Level,
     rows: &[&'a [T]],
@@ -215,7 +224,7 @@ pub(super) fn four<'a, T>(
     }
 }
 
-/// Twice the words where a mask is set, 0 elsewhere.
+/// Twice the words where the mask is set, 0 elsewhere.
 #[inline(always)]
 pub(super) fn doubled_where<V: Lanes>(v: V, mask: [V::W; 2], x: [V::W; 2]) -> [V::W; 2] {
     [

@@ -3,13 +3,14 @@
 use super::super::{Decoder, PhaseRow, Trust};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence, Shot};
+use crate::pipeline::arrive;
 use crate::simd::Backend;
 use crate::units::{AbsolutePhase, Modulation};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::vec::Vec;
 
-/// What is decoded.
+/// A decoded frame.
 #[derive(Clone, PartialEq)]
 struct Map {
     phase: Vec<AbsolutePhase>,
@@ -44,7 +45,7 @@ impl Map {
 const WIDTH: usize = 75;
 const HEIGHT: usize = 4;
 
-/// Frames without any sense, with dark and bright stretches.
+/// Frames of random samples, with dark and bright stretches.
 fn frames(count: usize, depth: u8, random: &mut SplitMix64) -> Vec<Vec<u16>> {
     (0..count)
         .map(|_| {
@@ -86,11 +87,8 @@ fn decode(decoder: &Decoder, samples: &[Vec<u16>], depth: u8, map: &[AbsolutePha
         .collect();
     let (last, coarser) = levels.split_last().unwrap();
     let mut arrived = decoder.arrived(WIDTH, HEIGHT);
-    for (at, level) in coarser.iter().enumerate() {
-        for (v, row) in arrived.rows().enumerate() {
-            decoder.arrive_row(at, level, v, row);
-        }
-        arrived.add_level();
+    for level in coarser {
+        arrive(decoder, level, &mut arrived).unwrap();
     }
     let mut late = Map::new();
     for (v, row) in late.rows() {

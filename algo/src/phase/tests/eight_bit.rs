@@ -1,13 +1,15 @@
-//! Four shifts of 8 bits: every pair of differences.
+//! Accuracy of four shifts at 8 bits, over every pair of differences.
 
 use super::super::Decoder;
+use super::super::arrived::ArrivedRow;
 use super::{by_definition, bytes_of, level, off, wrap};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence, Shot};
+use crate::pipeline::arrive;
 use std::vec::Vec;
 
 const SHIFTS: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
-/// Quotient, polynomial and two roundings; the bound.
+/// Quotient, polynomial and two roundings.
 const WORST_TURNS: f64 = 2.5e-5;
 const RMS_TURNS: f64 = 1e-5;
 /// Reciprocal 0.2 % of t (1.4e-4 turn at t = 1), arctangent 1.9e-4, roundings.
@@ -37,8 +39,8 @@ fn every_pair_of_8_bit_differences_is_within_the_bound() {
         for (u, c) in (-255..=255_i32).enumerate() {
             let weak = s * s + c * c < 32 * 32;
             let full = s.abs() == 255 || c.abs() == 255;
-            let doubts = u8::from(weak) + 2 * u8::from(full);
-            assert_eq!(found.row().doubts[u], doubts, "S {s} C {c}");
+            let flags = u8::from(weak) + 2 * u8::from(full);
+            assert_eq!(found.row().flags[u], flags, "S {s} C {c}");
             if weak {
                 continue;
             }
@@ -75,16 +77,16 @@ fn every_rough_angle_is_within_the_bound() {
             .each_ref()
             .map(|row| FrameView::new(Samples::Eight(row), row.len(), 1, row.len()).unwrap());
         let mut arrived = decoder.arrived(511, 1);
-        for row in arrived.rows() {
-            decoder.arrive_row(0, &frames, 0, row);
-        }
-        let row = arrived.climbed_row(0).unwrap();
+        arrive(&decoder, &frames, &mut arrived).unwrap();
+        let ArrivedRow::Expected(row) = arrived.row(0) else {
+            panic!("not geometric")
+        };
         for (u, c) in (-255..=255_i32).enumerate() {
             if s * s + c * c < 32 * 32 {
                 continue;
             }
             let samples: Vec<u16> = rows.iter().map(|row| row[u]).collect();
-            // What it says of the next level, counted from the middle of the turn.
+            // The prediction for the next level, counted from the middle of the turn.
             let (turns, _) = by_definition(&samples, &SHIFTS);
             let expected = 8.0 * (turns - 0.5);
             worst = worst.max(off(row.fraction[u], expected).abs() / 8.0);

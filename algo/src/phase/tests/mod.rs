@@ -1,14 +1,15 @@
-//! The promises of the phase kernels that can be checked on a row of pixels.
+//! Tests of the phase kernels on single rows.
 
 mod backends;
 mod eight_bit;
 mod textbook;
 mod weights;
 
-use super::arrived::{Arrived, ArrivingRow, WrappedRow};
+use super::arrived::{Arrived, ArrivedRow, WrappedRow};
 use super::{Decoder, PhaseRow};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence, Shot};
+use crate::pipeline::arrive;
 use crate::trust::Trust;
 use crate::units::{AbsolutePhase, Modulation};
 use core::f64::consts::TAU;
@@ -24,11 +25,14 @@ fn level(shifts: &[f64], depth: u8) -> Decoder {
 }
 
 /// One demodulated row, and the modulations of its pixels that are trusted.
-struct Wrapped(Arrived, Vec<Modulation>);
+struct Demodulated(Arrived, Vec<Modulation>);
 
-impl Wrapped {
+impl Demodulated {
     fn row(&self) -> WrappedRow<'_> {
-        self.0.wrapped_rows(0)[0]
+        let ArrivedRow::Wrapped { levels, .. } = self.0.row(0) else {
+            panic!("not about a map")
+        };
+        levels.part(0..self.1.len())
     }
 
     /// In counts; 0 where not trusted.
@@ -38,7 +42,7 @@ impl Wrapped {
 }
 
 /// Demodulates one row; `rows` holds the samples of each frame.
-fn wrap(decoder: &Decoder, depth: u8, rows: &[Vec<u16>]) -> Wrapped {
+fn wrap(decoder: &Decoder, depth: u8, rows: &[Vec<u16>]) -> Demodulated {
     let width = rows[0].len();
     let bytes: Vec<Vec<u8>> = rows.iter().map(|row| bytes_of(row)).collect();
     let places = decoder.levels().next().unwrap();
@@ -52,11 +56,8 @@ fn wrap(decoder: &Decoder, depth: u8, rows: &[Vec<u16>]) -> Wrapped {
             FrameView::new(samples, width, 1, width).unwrap()
         })
         .collect();
-    let mut arrived = Arrived::wrapping(width, 1, 1);
-    for (v, row) in arrived.rows().enumerate() {
-        assert!(matches!(row, ArrivingRow::Wrapping { .. }));
-        decoder.arrive_row(0, &frames, v, row);
-    }
+    let mut arrived = Arrived::about_map(width, 1, 1);
+    arrive(decoder, &frames, &mut arrived).unwrap();
     let mut phase = std::vec![AbsolutePhase::from_bits(0); width];
     let mut modulation = std::vec![Modulation::default(); width];
     let mut trust = std::vec![Trust::default(); width];
@@ -67,7 +68,7 @@ fn wrap(decoder: &Decoder, depth: u8, rows: &[Vec<u16>]) -> Wrapped {
         trust: &mut trust,
     };
     decoder.row(&frames, 0, &map, 0..width, out);
-    Wrapped(arrived, modulation)
+    Demodulated(arrived, modulation)
 }
 
 /// Samples of at most 8 bits as bytes.
@@ -86,7 +87,7 @@ fn by_definition(samples: &[u16], shifts: &[f64]) -> (f64, f64) {
     (libm::atan2(s, c) / TAU, modulation)
 }
 
-/// The short way round, in turns.
+/// The error of a phase in turns, the short way round.
 fn off(found: u16, turns: f64) -> f64 {
     let error = f64::from(found) / 65_536.0 - turns;
     error - libm::rint(error)

@@ -1,12 +1,12 @@
-//! Any number of shifts at any depth against the definition.
+//! Any number of shifts at any bit depth, against the definition in `f64`.
 
 use super::{by_definition, level, off, wrap};
 use core::f64::consts::TAU;
 use std::vec::Vec;
 
-/// The arctangent's bound, and the roundings of S and C to words at the modulation used here.
+/// The arctangent's bound, and the rounding of S and C to words at the modulation used here.
 const PHASE_BOUND: f64 = 2.5e-5 + 0.5 / 8_000.0 / TAU;
-/// The polynomial for √(1 + t²), and roundings.
+/// The polynomial for √(1 + t²), and rounding.
 const MODULATION_SHARE: f64 = 6.5e-4 + 3e-4;
 
 #[test]
@@ -46,7 +46,7 @@ fn any_number_of_steps_at_any_depth_agrees_with_the_definition() {
                         (modulation - counts).abs() <= counts * MODULATION_SHARE,
                         "{depth} bit, N = {steps}: {modulation} for {counts}"
                     );
-                    assert_eq!(found.row().doubts[u], 0);
+                    assert_eq!(found.row().flags[u], 0);
                 }
             }
         }
@@ -63,14 +63,14 @@ fn the_modulation_threshold_is_sixteen_counts_exactly() {
         let [b, c, d] = others.clone();
         wrap(&decoder, 8, &[row(first), b, c, d])
     };
-    assert_eq!(with(132).row().doubts, [0; 33]);
-    assert_eq!(with(131).row().doubts, [1; 33]);
+    assert_eq!(with(132).row().flags, [0; 33]);
+    assert_eq!(with(131).row().flags, [1; 33]);
     let thirds = level(&[0.0, 1.0 / 3.0, 2.0 / 3.0], 8);
     // B = (2/3) · 24 = 16.
     let found = |first| {
         wrap(&thirds, 8, &[row(first), row(100), row(100)])
             .row()
-            .doubts[32]
+            .flags[32]
     };
     assert_eq!((found(124), found(123)), (0, 1));
 }
@@ -86,7 +86,7 @@ fn constant_frames_are_weak_and_full_scale_is_saturated_below_eight_steps() {
             let decoder = level(&shifts, depth);
             let constant = |x: u16| {
                 let rows = std::vec![std::vec![x; 40]; usize::from(steps)];
-                wrap(&decoder, depth, &rows).row().doubts[5]
+                wrap(&decoder, depth, &rows).row().flags[5]
             };
             let saturated = if steps < 8 { 2 } else { 0 };
             assert_eq!(constant(full), 1 + saturated, "N = {steps}, {depth} bit");

@@ -8,7 +8,7 @@ use super::frames::{Buffer, FrameSet};
 use super::kernel::Kernel;
 use super::real::Real;
 use algo::pattern::{Level, PhaseRange, Sequence, Unwrapping};
-use algo::phase::{DecodeError, FULL_TRUST_STEPS, MIN_MODULATION_8_BIT};
+use algo::phase::{DecodeError, FULL_TRUST_SHIFTS, MIN_MODULATION_8_BIT};
 use algo::units::AbsolutePhase;
 use appliance::production::stopwatch::timed;
 use std::time::Duration;
@@ -42,7 +42,7 @@ struct LevelWeights<T> {
 
 impl<T: Real> LevelWeights<T> {
     fn new(level: &Level) -> Self {
-        let shifts = level.steps();
+        let shifts = level.shifts();
         let angles = (0..shifts).map(|k| {
             let turns = level.start + k as f64 / shifts as f64;
             std::f64::consts::TAU * turns
@@ -116,7 +116,7 @@ impl<T: Real> Textbook<T> {
             for (trusted, &modulation) in self.trusted.iter_mut().zip(&self.modulation[at]) {
                 *trusted &= modulation >= self.least_modulation;
             }
-            if level.frames.len() < FULL_TRUST_STEPS {
+            if level.frames.len() < FULL_TRUST_SHIFTS {
                 for &frame in &level.frames {
                     for (trusted, &sample) in self.trusted.iter_mut().zip(frames[frame]) {
                         *trusted &= T::count(sample.into()) < self.full_scale;
