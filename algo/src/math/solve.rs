@@ -1,11 +1,11 @@
-//! Least squares for a handful of unknowns.
+//! Symmetric linear systems of a few unknowns, as least squares give them.
 
 use alloc::vec::Vec;
 
 /// Solves the symmetric positive definite system `a · x = b` in place by Cholesky's method.
 ///
 /// `a` is row-major n × n with n = `b.len()`. Returns `None` where the matrix is not positive
-/// definite to working precision, i.e. where the observations do not determine the unknowns.
+/// definite to working precision, that is, where the observations do not determine the unknowns.
 pub fn solve_symmetric(a: &mut [f64], b: &mut [f64]) -> Option<Vec<f64>> {
     let n = b.len();
     for j in 0..n {

@@ -1,17 +1,17 @@
-//! What the phase kernels ask of a processor: a block of pixels as lanes of 8, 16 and 32 bits.
+//! The operations that a back-end provides: a block of pixels as lanes of 8, 16 and 32 bits.
 //!
 //! A block is [`Lanes::PIXELS`] neighbouring pixels of a row: one vector of bytes, two of words (`[W; 2]`), four of
-//! double words. How the pixels of a block are spread over the two halves is the back-end's own affair: every way in
-//! (loading, widening) and out (storing, narrowing) agrees about it, so kernels never see it.
+//! double words. Each back-end may distribute the pixels over these halves in its own way: its loads and widening operations agree
+//! with its stores and narrowing operations, so kernels do not depend on it.
 //!
-//! Each operation is a whole number, or an IEEE 754 single with + − ×, with one result on every machine. Words are
-//! signed or not as the operation says; what does not fit wraps around unless the name says otherwise. Loads and stores
+//! Every operation has one result on every machine: it is integer, or IEEE 754 single precision with + − ×. Words are
+//! signed or unsigned as the operation says; overflow wraps around unless the name says otherwise. Loads and stores
 //! panic outside of their slice.
 
 use super::rows::Four;
 use core::fmt::Debug;
 
-/// The components of the pointers of a block, scaled by a power of two.
+/// The components of the pointers of a block, scaled by a power of two (see [`Lanes::scaled`]).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scaled<W> {
     /// The longer, 2¹⁴…2¹⁵.
@@ -22,11 +22,11 @@ pub(crate) struct Scaled<W> {
     pub centred: [W; 2],
 }
 
-/// A back-end: a proof that its instructions may be used on this machine. See the module's text.
+/// A back-end. A value of it proves that its instructions are available on this machine.
 pub(crate) trait Lanes: Copy + Debug {
     /// Pixels of a block.
     const PIXELS: usize;
-    /// Samples that a block is fetched before it is needed.
+    /// How many samples ahead of their use rows are prefetched.
     const AHEAD: usize;
     /// A byte per pixel of a block.
     type B: Copy;
@@ -47,13 +47,13 @@ pub(crate) trait Lanes: Copy + Debug {
     fn load8(self, from: &[u8], at: usize) -> Self::B;
     /// The blocks of four rows that start at `at`.
     fn load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [Self::B; 4];
-    /// Has what lies `after` samples behind the block at `at` fetched, where waiting for it would cost: [`Self::AHEAD`] where all
-    /// of a row is looked at, as rows follow one another in memory; else the length of a row, which is the same place in the
-    /// next one: between the end of one row's columns and the start of the next one's lies what nobody needs.
+    /// Prefetches what lies `after` samples behind the block at `at`. That is [`Self::AHEAD`] where whole rows are read, because
+    /// rows follow one another in memory; where only some columns of each row are read it is the length of a row, so that the
+    /// same columns of the next row are prefetched.
     fn fetch<T>(self, row: &[T], at: usize, after: usize);
-    /// The same, ahead, for what is going to be written.
+    /// Prefetches for writing, [`Self::AHEAD`] samples behind the block at `at`.
     fn claim_ahead<T>(self, row: &[T], at: usize);
-    /// Into the block of `to` that starts at `at`.
+    /// Writes the block of `to` that starts at `at`.
     fn store8(self, to: &mut [u8], at: usize, x: Self::B);
     /// The smaller.
     fn min8(self, a: Self::B, b: Self::B) -> Self::B;
@@ -90,8 +90,7 @@ pub(crate) trait Lanes: Copy + Debug {
     fn widen_256(self, x: Self::B) -> [Self::W; 2];
     /// Words 128 · x.
     fn widen_128(self, x: Self::B) -> [Self::W; 2];
-    /// Both as words times 128 · 2ⁿ, with n so that 2¹⁴ ≤ long < 2¹⁵; of pixels where long < 16 or short > long nothing is
-    /// promised.
+    /// Both as words times 128 · 2ⁿ, with n so that 2¹⁴ ≤ long < 2¹⁵. Unspecified where long < 16 or short > long.
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W>;
     /// Masks of words as masks of bytes.
     fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B;
@@ -102,7 +101,7 @@ pub(crate) trait Lanes: Copy + Debug {
     fn splat16(self, x: i16) -> Self::W;
     /// The block of `from` that starts at `at`.
     fn load16(self, from: &[u16], at: usize) -> [Self::W; 2];
-    /// Into the block of `to` that starts at `at`.
+    /// Writes the block of `to` that starts at `at`.
     fn store16(self, to: &mut [u16], at: usize, x: [Self::W; 2]);
     /// a + b.
     fn add(self, a: Self::W, b: Self::W) -> Self::W;
@@ -172,7 +171,7 @@ pub(crate) trait Lanes: Copy + Debug {
     fn splat32(self, x: i32) -> Self::D;
     /// The block of `from` that starts at `at`.
     fn load32(self, from: &[i32], at: usize) -> [[Self::D; 2]; 2];
-    /// Into the block of `to` that starts at `at`.
+    /// Writes the block of `to` that starts at `at`.
     fn store32(self, to: &mut [i32], at: usize, x: [[Self::D; 2]; 2]);
     /// a + b.
     fn add32(self, a: Self::D, b: Self::D) -> Self::D;
@@ -182,9 +181,9 @@ pub(crate) trait Lanes: Copy + Debug {
     fn gt32(self, a: Self::D, b: Self::D) -> Self::D;
     /// a where the mask is set, else b.
     fn pick32(self, mask: Self::D, a: Self::D, b: Self::D) -> Self::D;
-    /// The single next to x.
+    /// x rounded to the nearest single.
     fn to_single(self, x: Self::D) -> Self::F;
-    /// The whole number next to x, ties to even; |x| below 2²².
+    /// x rounded to the nearest whole number, ties to even; |x| below 2²².
     fn to_whole(self, x: Self::F) -> Self::D;
     /// Every pixel `x`.
     fn splat_single(self, x: f32) -> Self::F;
@@ -195,3 +194,19 @@ pub(crate) trait Lanes: Copy + Debug {
     /// Mask: a < b.
     fn lt_single(self, a: Self::F, b: Self::F) -> Self::D;
 }
+
+/// Defines the operations of a back-end that are one expression each, as `name(self, arguments) -> result = expression;`.
+///
+/// `$within` is the macro that the expression is wrapped in, `$inline` the argument of `#[inline]`.
+macro_rules! operations {
+    ($within:ident, $inline:ident;
+        $($name:ident($self:ident $(, $arg:ident: $type:ty)*) -> $out:ty = $body:expr;)*) => {
+        $(
+            #[inline($inline)]
+            fn $name($self $(, $arg: $type)*) -> $out {
+                $within!($body)
+            }
+        )*
+    };
+}
+pub(super) use operations;

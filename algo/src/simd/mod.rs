@@ -1,12 +1,12 @@
-//! The instructions of a processor behind one small trait, and which of them this machine has.
+//! Vector instructions behind one small trait, and the choice of the back-end that this machine has.
 //!
-//! `Lanes` is what the phase kernels are written in; `Portable` is its definition as code, `Avx2` and `Neon` are
-//! the same results by vector instructions. A back-end's value proves that its instructions may be used, so the
-//! operations are safe to call. This is the only module with `unsafe`: calls of intrinsics that the proof covers, and
-//! loads and stores inside slices whose length has been asserted.
+//! The phase kernels are written in the operations of `Lanes`. `Portable` defines them as plain code; `Avx2` and `Neon`
+//! give the same results by vector instructions. A value of a back-end proves that its instructions are available, so its
+//! operations are safe to call. This is the only module with `unsafe`: intrinsics that the proof covers, and loads and
+//! stores inside slices whose length has been asserted.
 //!
-//! Kernels are generic functions, inlined into entry points that are compiled for the back-end's instructions: see
-//! `back_end_entry!`. They hold no closures: those would be compiled without the instructions.
+//! Kernels are generic functions that are inlined into entry points compiled for the back-end's instructions (`back_end_entry!`).
+//! They contain no closures, because those would be compiled without these instructions.
 #![allow(unsafe_code)]
 
 #[cfg(target_arch = "x86_64")]
@@ -28,14 +28,14 @@ pub(crate) use portable::Portable;
 pub(crate) use results::Results;
 pub(crate) use rows::Four;
 
-/// The instructions that the phase kernels are compiled for. All give the same bits.
+/// A back-end of the phase kernels: the instructions that they are compiled for. All give the same bits.
 #[derive(Clone, Copy, Debug)]
 pub struct Backend(pub(crate) Proof);
 
-/// A back-end that may be used on this machine.
+/// A back-end and the proof that this machine has it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Proof {
-    /// No particular instructions.
+    /// Plain code.
     Portable(Portable),
     /// x86-64 with AVX2.
     #[cfg(target_arch = "x86_64")]
@@ -46,7 +46,7 @@ pub(crate) enum Proof {
 }
 
 impl Backend {
-    /// Arrays instead of vectors: slow, and the oracle of the others.
+    /// Plain code on arrays: slow, and the oracle of the others.
     pub const PORTABLE: Self = Self(Proof::Portable(Portable));
 
     /// The back-ends that this machine has, the fastest last.

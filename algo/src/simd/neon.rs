@@ -1,10 +1,10 @@
-//! Lanes of aarch64, where NEON is always there.
+//! The back-end of aarch64, where NEON is always available.
 
-use super::lanes::{Lanes, Scaled};
+use super::lanes::{Lanes, Scaled, operations};
 use super::rows::{Four, block, block_mut};
 use core::arch::aarch64::*;
 
-/// NEON belongs to aarch64.
+/// Needs no proof: NEON is part of aarch64.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Neon;
 
@@ -13,26 +13,76 @@ const BYTES: usize = 16;
 /// Calls intrinsics of NEON.
 macro_rules! neon {
     ($e:expr) => {{
-        // SAFETY: every aarch64 processor that this is compiled for has NEON, which is all that these intrinsics on
-        // values ask for.
+        // SAFETY: every aarch64 processor that this is compiled for has NEON, the only condition of intrinsics on values.
         unsafe { $e }
     }};
 }
 
+type B = uint8x16_t;
+type W = int16x8_t;
+type D = int32x4_t;
+type F = float32x4_t;
+type Count = int16x8_t;
+
 impl Lanes for Neon {
     const PIXELS: usize = BYTES;
-    /// Nothing is fetched.
+    /// Nothing is prefetched.
     const AHEAD: usize = 0;
-    type B = uint8x16_t;
-    type W = int16x8_t;
-    type D = int32x4_t;
-    type F = float32x4_t;
-    type Count = int16x8_t;
+    type B = B;
+    type W = W;
+    type D = D;
+    type F = F;
+    type Count = Count;
 
-    #[inline(always)]
-    fn splat8(self, x: u8) -> Self::B {
-        neon!(vdupq_n_u8(x))
+    operations! { neon, always;
+        splat8(self, x: u8) -> B = vdupq_n_u8(x);
+        min8(self, a: B, b: B) -> B = vminq_u8(a, b);
+        max8(self, a: B, b: B) -> B = vmaxq_u8(a, b);
+        sub8(self, a: B, b: B) -> B = vsubq_u8(a, b);
+        eq8(self, a: B, b: B) -> B = vceqq_u8(a, b);
+        and8(self, a: B, b: B) -> B = vandq_u8(a, b);
+        or8(self, a: B, b: B) -> B = vorrq_u8(a, b);
+        xor8(self, a: B, b: B) -> B = veorq_u8(a, b);
+        pick8(self, mask: B, a: B, b: B) -> B = vbslq_u8(mask, a, b);
+        quarters8(self, half: B, quarter: B) -> B = vandq_u8(vsriq_n_u8::<1>(half, quarter), vdupq_n_u8(192));
+        narrow_mask(self, mask: [W; 2]) -> B = vuzp1q_u8(vreinterpretq_u8_s16(mask[0]), vreinterpretq_u8_s16(mask[1]));
+        splat16(self, x: i16) -> W = vdupq_n_s16(x);
+        add(self, a: W, b: W) -> W = vaddq_s16(a, b);
+        sub(self, a: W, b: W) -> W = vsubq_s16(a, b);
+        add_signed(self, a: W, b: W, sign: W) -> W = vmlaq_s16(a, b, sign);
+        add_sat(self, a: W, b: W) -> W = vqaddq_s16(a, b);
+        mul_q15(self, a: W, b: W) -> W = vqrdmulhq_s16(a, b);
+        mul_low(self, a: W, b: W) -> W = vmulq_s16(a, b);
+        left(self, n: u8) -> Count = vdupq_n_s16(i16::from(n));
+        right(self, n: u8) -> Count = vdupq_n_s16(-i16::from(n));
+        shl_by(self, x: W, n: Count) -> W = vshlq_s16(x, n);
+        sar_by(self, x: W, n: Count) -> W = vshlq_s16(x, n);
+        shr_by(self, x: W, n: Count) -> W = vreinterpretq_s16_u16(vshlq_u16(vreinterpretq_u16_s16(x), n));
+        halve(self, x: W) -> W = vreinterpretq_s16_u16(vrshrq_n_u16::<1>(vreinterpretq_u16_s16(x)));
+        abs(self, x: W) -> W = vabsq_s16(x);
+        min(self, a: W, b: W) -> W = vminq_s16(a, b);
+        max(self, a: W, b: W) -> W = vmaxq_s16(a, b);
+        max_unsigned(self, a: W, b: W) -> W = vreinterpretq_s16_u16(vmaxq_u16(vreinterpretq_u16_s16(a), vreinterpretq_u16_s16(b)));
+        gt(self, a: W, b: W) -> W = vreinterpretq_s16_u16(vcgtq_s16(a, b));
+        eq(self, a: W, b: W) -> W = vreinterpretq_s16_u16(vceqq_s16(a, b));
+        and(self, a: W, b: W) -> W = vandq_s16(a, b);
+        or(self, a: W, b: W) -> W = vorrq_s16(a, b);
+        xor(self, a: W, b: W) -> W = veorq_s16(a, b);
+        pick(self, mask: W, a: W, b: W) -> W = vbslq_s16(vreinterpretq_u16_s16(mask), a, b);
+        narrow_mask32(self, mask: [D; 2]) -> W = vuzp1q_s16(vreinterpretq_s16_s32(mask[0]), vreinterpretq_s16_s32(mask[1]));
+        splat32(self, x: i32) -> D = vdupq_n_s32(x);
+        add32(self, a: D, b: D) -> D = vaddq_s32(a, b);
+        sar32_by(self, x: D, n: u8) -> D = vshlq_s32(x, vdupq_n_s32(-i32::from(n)));
+        gt32(self, a: D, b: D) -> D = vreinterpretq_s32_u32(vcgtq_s32(a, b));
+        pick32(self, mask: D, a: D, b: D) -> D = vbslq_s32(vreinterpretq_u32_s32(mask), a, b);
+        to_single(self, x: D) -> F = vcvtq_f32_s32(x);
+        to_whole(self, x: F) -> D = vcvtnq_s32_f32(x);
+        splat_single(self, x: f32) -> F = vdupq_n_f32(x);
+        add_single(self, a: F, b: F) -> F = vaddq_f32(a, b);
+        mul_single(self, a: F, b: F) -> F = vmulq_f32(a, b);
+        lt_single(self, a: F, b: F) -> D = vreinterpretq_s32_u32(vcltq_f32(a, b));
     }
+
     #[inline(always)]
     fn load8(self, from: &[u8], at: usize) -> Self::B {
         let block = block(from, at, BYTES);
@@ -54,42 +104,6 @@ impl Lanes for Neon {
         let block = block_mut(to, at, BYTES);
         // SAFETY: the slice holds the 16 bytes that are written.
         unsafe { vst1q_u8(block.as_mut_ptr(), x) }
-    }
-    #[inline(always)]
-    fn min8(self, a: Self::B, b: Self::B) -> Self::B {
-        neon!(vminq_u8(a, b))
-    }
-    #[inline(always)]
-    fn max8(self, a: Self::B, b: Self::B) -> Self::B {
-        neon!(vmaxq_u8(a, b))
-    }
-    #[inline(always)]
-    fn sub8(self, a: Self::B, b: Self::B) -> Self::B {
-        neon!(vsubq_u8(a, b))
-    }
-    #[inline(always)]
-    fn eq8(self, a: Self::B, b: Self::B) -> Self::B {
-        neon!(vceqq_u8(a, b))
-    }
-    #[inline(always)]
-    fn and8(self, a: Self::B, b: Self::B) -> Self::B {
-        neon!(vandq_u8(a, b))
-    }
-    #[inline(always)]
-    fn or8(self, a: Self::B, b: Self::B) -> Self::B {
-        neon!(vorrq_u8(a, b))
-    }
-    #[inline(always)]
-    fn xor8(self, a: Self::B, b: Self::B) -> Self::B {
-        neon!(veorq_u8(a, b))
-    }
-    #[inline(always)]
-    fn pick8(self, mask: Self::B, a: Self::B, b: Self::B) -> Self::B {
-        neon!(vbslq_u8(mask, a, b))
-    }
-    #[inline(always)]
-    fn quarters8(self, half: Self::B, quarter: Self::B) -> Self::B {
-        neon!(vandq_u8(vsriq_n_u8::<1>(half, quarter), vdupq_n_u8(192)))
     }
     #[inline(always)]
     fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
@@ -136,25 +150,13 @@ impl Lanes for Neon {
             let n = vreinterpretq_s8_u8(vclzq_u8(long));
             (vshlq_u8(long, n), vshlq_u8(short, n))
         });
-        // Twice the longer without its first bit, from −128 on, in the upper byte.
+        // The upper byte of 4 · long − 3 · 2¹⁵: the longer without its leading bit, doubled, with its sign bit inverted.
         let centred = neon!(veorq_u8(vshlq_n_u8::<1>(long), vdupq_n_u8(128)));
         Scaled {
             long: self.widen_128(long),
             short: self.widen_128(short),
             centred: self.widen(self.splat8(0), centred),
         }
-    }
-    #[inline(always)]
-    fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B {
-        neon!(vuzp1q_u8(
-            vreinterpretq_u8_s16(mask[0]),
-            vreinterpretq_u8_s16(mask[1])
-        ))
-    }
-
-    #[inline(always)]
-    fn splat16(self, x: i16) -> Self::W {
-        neon!(vdupq_n_s16(x))
     }
     #[inline(always)]
     fn load16(self, from: &[u16], at: usize) -> [Self::W; 2] {
@@ -173,30 +175,6 @@ impl Lanes for Neon {
         }
     }
     #[inline(always)]
-    fn add(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!(vaddq_s16(a, b))
-    }
-    #[inline(always)]
-    fn sub(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!(vsubq_s16(a, b))
-    }
-    #[inline(always)]
-    fn add_signed(self, a: Self::W, b: Self::W, sign: Self::W) -> Self::W {
-        neon!(vmlaq_s16(a, b, sign))
-    }
-    #[inline(always)]
-    fn add_sat(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!(vqaddq_s16(a, b))
-    }
-    #[inline(always)]
-    fn mul_q15(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!(vqrdmulhq_s16(a, b))
-    }
-    #[inline(always)]
-    fn mul_low(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!(vmulq_s16(a, b))
-    }
-    #[inline(always)]
     fn shl<const N: i32>(self, x: Self::W) -> Self::W {
         neon!(vshlq_n_s16::<N>(x))
     }
@@ -204,79 +182,6 @@ impl Lanes for Neon {
     fn sar<const N: i32>(self, x: Self::W) -> Self::W {
         neon!(vshrq_n_s16::<N>(x))
     }
-    #[inline(always)]
-    fn left(self, n: u8) -> Self::Count {
-        neon!(vdupq_n_s16(i16::from(n)))
-    }
-    #[inline(always)]
-    fn right(self, n: u8) -> Self::Count {
-        neon!(vdupq_n_s16(-i16::from(n)))
-    }
-    #[inline(always)]
-    fn shl_by(self, x: Self::W, n: Self::Count) -> Self::W {
-        neon!(vshlq_s16(x, n))
-    }
-    #[inline(always)]
-    fn sar_by(self, x: Self::W, n: Self::Count) -> Self::W {
-        neon!(vshlq_s16(x, n))
-    }
-    #[inline(always)]
-    fn shr_by(self, x: Self::W, n: Self::Count) -> Self::W {
-        neon!(vreinterpretq_s16_u16(vshlq_u16(
-            vreinterpretq_u16_s16(x),
-            n
-        )))
-    }
-    #[inline(always)]
-    fn halve(self, x: Self::W) -> Self::W {
-        neon!(vreinterpretq_s16_u16(vrshrq_n_u16::<1>(
-            vreinterpretq_u16_s16(x)
-        )))
-    }
-    #[inline(always)]
-    fn abs(self, x: Self::W) -> Self::W {
-        neon!(vabsq_s16(x))
-    }
-    #[inline(always)]
-    fn min(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!(vminq_s16(a, b))
-    }
-    #[inline(always)]
-    fn max(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!(vmaxq_s16(a, b))
-    }
-    #[inline(always)]
-    fn max_unsigned(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!(vreinterpretq_s16_u16(vmaxq_u16(
-            vreinterpretq_u16_s16(a),
-            vreinterpretq_u16_s16(b)
-        )))
-    }
-    #[inline(always)]
-    fn gt(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!(vreinterpretq_s16_u16(vcgtq_s16(a, b)))
-    }
-    #[inline(always)]
-    fn eq(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!(vreinterpretq_s16_u16(vceqq_s16(a, b)))
-    }
-    #[inline(always)]
-    fn and(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!(vandq_s16(a, b))
-    }
-    #[inline(always)]
-    fn or(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!(vorrq_s16(a, b))
-    }
-    #[inline(always)]
-    fn xor(self, a: Self::W, b: Self::W) -> Self::W {
-        neon!(veorq_s16(a, b))
-    }
-    #[inline(always)]
-    fn pick(self, mask: Self::W, a: Self::W, b: Self::W) -> Self::W {
-        neon!(vbslq_s16(vreinterpretq_u16_s16(mask), a, b))
-    }
-
     #[inline(always)]
     fn join(self, low: Self::W, high: Self::W) -> [Self::D; 2] {
         neon!([
@@ -312,18 +217,6 @@ impl Lanes for Neon {
         })
     }
     #[inline(always)]
-    fn narrow_mask32(self, mask: [Self::D; 2]) -> Self::W {
-        neon!(vuzp1q_s16(
-            vreinterpretq_s16_s32(mask[0]),
-            vreinterpretq_s16_s32(mask[1])
-        ))
-    }
-
-    #[inline(always)]
-    fn splat32(self, x: i32) -> Self::D {
-        neon!(vdupq_n_s32(x))
-    }
-    #[inline(always)]
     fn load32(self, from: &[i32], at: usize) -> [[Self::D; 2]; 2] {
         let block = block(from, at, BYTES);
         // SAFETY: the slice holds the 16 double words that are read, 4 at a time.
@@ -345,45 +238,5 @@ impl Lanes for Neon {
             vst1q_s32(block.as_mut_ptr().add(8), x[1][0]);
             vst1q_s32(block.as_mut_ptr().add(12), x[1][1]);
         }
-    }
-    #[inline(always)]
-    fn add32(self, a: Self::D, b: Self::D) -> Self::D {
-        neon!(vaddq_s32(a, b))
-    }
-    #[inline(always)]
-    fn sar32_by(self, x: Self::D, n: u8) -> Self::D {
-        neon!(vshlq_s32(x, vdupq_n_s32(-i32::from(n))))
-    }
-    #[inline(always)]
-    fn gt32(self, a: Self::D, b: Self::D) -> Self::D {
-        neon!(vreinterpretq_s32_u32(vcgtq_s32(a, b)))
-    }
-    #[inline(always)]
-    fn pick32(self, mask: Self::D, a: Self::D, b: Self::D) -> Self::D {
-        neon!(vbslq_s32(vreinterpretq_u32_s32(mask), a, b))
-    }
-    #[inline(always)]
-    fn to_single(self, x: Self::D) -> Self::F {
-        neon!(vcvtq_f32_s32(x))
-    }
-    #[inline(always)]
-    fn to_whole(self, x: Self::F) -> Self::D {
-        neon!(vcvtnq_s32_f32(x))
-    }
-    #[inline(always)]
-    fn splat_single(self, x: f32) -> Self::F {
-        neon!(vdupq_n_f32(x))
-    }
-    #[inline(always)]
-    fn add_single(self, a: Self::F, b: Self::F) -> Self::F {
-        neon!(vaddq_f32(a, b))
-    }
-    #[inline(always)]
-    fn mul_single(self, a: Self::F, b: Self::F) -> Self::F {
-        neon!(vmulq_f32(a, b))
-    }
-    #[inline(always)]
-    fn lt_single(self, a: Self::F, b: Self::F) -> Self::D {
-        neon!(vreinterpretq_s32_u32(vcltq_f32(a, b)))
     }
 }

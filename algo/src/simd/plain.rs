@@ -1,4 +1,4 @@
-//! Units as the plain numbers that lanes are stored to.
+//! Slices of units as slices of the plain numbers that they wrap, for loads and stores.
 
 use crate::units::{AbsolutePhase, Modulation};
 

@@ -1,11 +1,13 @@
-//! Lanes without instructions of any particular machine: arrays, written so that each line can be checked against the
-//! definition. The oracle of the other back-ends, and the fallback. Its operations are not inlined: kernels made of
-//! hundreds of them, lane by lane, take the compiler minutes.
+//! The back-end without any particular instructions: arrays, written so that each line can be checked against [`Lanes`].
+//!
+//! It is the oracle of the other back-ends, and the fallback of machines without them. Its operations are not inlined, because
+//! kernels of hundreds of inlined loops take minutes to compile.
 
-use super::lanes::{Lanes, Scaled};
+use super::lanes::{Lanes, Scaled, operations};
 use super::rows::Four;
+use crate::math::nearest;
 
-/// May always be used.
+/// Always available.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Portable;
 
@@ -64,28 +66,82 @@ fn mask32(set: bool) -> i32 {
     -i32::from(set)
 }
 
+type B = [u8; BYTES];
+type W = [i16; WORDS];
+type D = [i32; DOUBLES];
+type F = [f32; DOUBLES];
+type Count = u8;
+
+/// The expression itself: nothing here is unsafe.
+macro_rules! plain {
+    ($e:expr) => {
+        $e
+    };
+}
+
 impl Lanes for Portable {
     const PIXELS: usize = BYTES;
-    /// Nothing is fetched.
+    /// Nothing is prefetched.
     const AHEAD: usize = 0;
-    type B = [u8; BYTES];
-    type W = [i16; WORDS];
-    type D = [i32; DOUBLES];
-    type F = [f32; DOUBLES];
-    type Count = u8;
+    type B = B;
+    type W = W;
+    type D = D;
+    type F = F;
+    type Count = Count;
 
-    #[inline(never)]
-    fn splat8(self, x: u8) -> Self::B {
-        [x; BYTES]
+    operations! { plain, never;
+        splat8(self, x: u8) -> B = [x; BYTES];
+        load8(self, from: &[u8], at: usize) -> B = core::array::from_fn(|lane| from[at + lane]);
+        load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [B; 4] = from.rows().map(|row| self.load8(row, at));
+        min8(self, a: B, b: B) -> B = pairs(a, b, u8::min);
+        max8(self, a: B, b: B) -> B = pairs(a, b, u8::max);
+        sub8(self, a: B, b: B) -> B = pairs(a, b, u8::wrapping_sub);
+        eq8(self, a: B, b: B) -> B = pairs(a, b, |a, b| mask8(a == b));
+        and8(self, a: B, b: B) -> B = pairs(a, b, |a, b| a & b);
+        or8(self, a: B, b: B) -> B = pairs(a, b, |a, b| a | b);
+        xor8(self, a: B, b: B) -> B = pairs(a, b, |a, b| a ^ b);
+        all8(self, mask: B) -> bool = mask == [u8::MAX; BYTES];
+        none8(self, mask: B) -> bool = mask == [0; BYTES];
+        quarters8(self, half: B, quarter: B) -> B = pairs(half, quarter, |half, quarter| half & 128 | quarter & 64);
+        signs(self, mask: B) -> [W; 2] = halves(mask, |mask| lanes(mask, |mask| if mask == 0 { 1 } else { -1 }));
+        widen_256(self, x: B) -> [W; 2] = self.widen([0; BYTES], x);
+        widen_128(self, x: B) -> [W; 2] = halves(x, |x| lanes(x, |x| i16::from(x) << 7));
+        narrow_mask(self, mask: [W; 2]) -> B = lanes(whole::<_, WORDS, BYTES>(mask), |mask: i16| mask as u8);
+        splat16(self, x: i16) -> W = [x; WORDS];
+        add(self, a: W, b: W) -> W = pairs(a, b, i16::wrapping_add);
+        sub(self, a: W, b: W) -> W = pairs(a, b, i16::wrapping_sub);
+        add_signed(self, a: W, b: W, sign: W) -> W = self.add(a, pairs(b, sign, i16::wrapping_mul));
+        add_sat(self, a: W, b: W) -> W = pairs(a, b, i16::saturating_add);
+        mul_q15(self, a: W, b: W) -> W = pairs(a, b, |a, b| ((i32::from(a) * i32::from(b) + (1 << 14)) >> 15) as i16);
+        mul_low(self, a: W, b: W) -> W = pairs(a, b, i16::wrapping_mul);
+        left(self, n: u8) -> Count = n;
+        right(self, n: u8) -> Count = n;
+        shl_by(self, x: W, n: u8) -> W = lanes(x, |x| x.checked_shl(u32::from(n)).unwrap_or(0));
+        sar_by(self, x: W, n: u8) -> W = lanes(x, |x| x >> n);
+        shr_by(self, x: W, n: u8) -> W = lanes(x, |x| (x.cast_unsigned() >> n).cast_signed());
+        halve(self, x: W) -> W = lanes(x, |x| x.cast_unsigned().div_ceil(2).cast_signed());
+        abs(self, x: W) -> W = lanes(x, i16::wrapping_abs);
+        min(self, a: W, b: W) -> W = pairs(a, b, i16::min);
+        max(self, a: W, b: W) -> W = pairs(a, b, i16::max);
+        max_unsigned(self, a: W, b: W) -> W = pairs(a, b, |a, b| a.cast_unsigned().max(b.cast_unsigned()).cast_signed());
+        gt(self, a: W, b: W) -> W = pairs(a, b, |a, b| mask16(a > b));
+        eq(self, a: W, b: W) -> W = pairs(a, b, |a, b| mask16(a == b));
+        and(self, a: W, b: W) -> W = pairs(a, b, |a, b| a & b);
+        or(self, a: W, b: W) -> W = pairs(a, b, |a, b| a | b);
+        xor(self, a: W, b: W) -> W = pairs(a, b, |a, b| a ^ b);
+        narrow_mask32(self, mask: [D; 2]) -> W = lanes(whole::<_, DOUBLES, WORDS>(mask), |mask: i32| mask as i16);
+        splat32(self, x: i32) -> D = [x; DOUBLES];
+        add32(self, a: D, b: D) -> D = pairs(a, b, i32::wrapping_add);
+        sar32_by(self, x: D, n: u8) -> D = lanes(x, |x| x >> n);
+        gt32(self, a: D, b: D) -> D = pairs(a, b, |a, b| mask32(a > b));
+        to_single(self, x: D) -> F = lanes(x, |x| x as f32);
+        to_whole(self, x: F) -> D = lanes(x, nearest::whole);
+        splat_single(self, x: f32) -> F = [x; DOUBLES];
+        add_single(self, a: F, b: F) -> F = pairs(a, b, |a, b| a + b);
+        mul_single(self, a: F, b: F) -> F = pairs(a, b, |a, b| a * b);
+        lt_single(self, a: F, b: F) -> D = pairs(a, b, |a, b| mask32(a < b));
     }
-    #[inline(never)]
-    fn load8(self, from: &[u8], at: usize) -> Self::B {
-        core::array::from_fn(|lane| from[at + lane])
-    }
-    #[inline(never)]
-    fn load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [Self::B; 4] {
-        from.rows().map(|row| self.load8(row, at))
-    }
+
     #[inline(always)]
     fn fetch<T>(self, _row: &[T], _at: usize, _after: usize) {}
     #[inline(always)]
@@ -95,41 +151,9 @@ impl Lanes for Portable {
         to[at..at + BYTES].copy_from_slice(&x);
     }
     #[inline(never)]
-    fn min8(self, a: Self::B, b: Self::B) -> Self::B {
-        pairs(a, b, u8::min)
-    }
-    #[inline(never)]
-    fn max8(self, a: Self::B, b: Self::B) -> Self::B {
-        pairs(a, b, u8::max)
-    }
-    #[inline(never)]
-    fn sub8(self, a: Self::B, b: Self::B) -> Self::B {
-        pairs(a, b, u8::wrapping_sub)
-    }
-    #[inline(never)]
-    fn eq8(self, a: Self::B, b: Self::B) -> Self::B {
-        pairs(a, b, |a, b| mask8(a == b))
-    }
-    #[inline(never)]
-    fn and8(self, a: Self::B, b: Self::B) -> Self::B {
-        pairs(a, b, |a, b| a & b)
-    }
-    #[inline(never)]
-    fn or8(self, a: Self::B, b: Self::B) -> Self::B {
-        pairs(a, b, |a, b| a | b)
-    }
-    #[inline(never)]
-    fn xor8(self, a: Self::B, b: Self::B) -> Self::B {
-        pairs(a, b, |a, b| a ^ b)
-    }
-    #[inline(never)]
     fn pick8(self, mask: Self::B, a: Self::B, b: Self::B) -> Self::B {
         let b = pairs(mask, b, |mask, b| !mask & b);
         self.or8(self.and8(mask, a), b)
-    }
-    #[inline(never)]
-    fn quarters8(self, half: Self::B, quarter: Self::B) -> Self::B {
-        pairs(half, quarter, |half, quarter| half & 128 | quarter & 64)
     }
     #[inline(never)]
     fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
@@ -140,33 +164,9 @@ impl Lanes for Portable {
         })
     }
     #[inline(never)]
-    fn all8(self, mask: Self::B) -> bool {
-        mask == [u8::MAX; BYTES]
-    }
-
-    #[inline(never)]
-    fn none8(self, mask: Self::B) -> bool {
-        mask == [0; BYTES]
-    }
-
-    #[inline(never)]
     fn widen(self, low: Self::B, high: Self::B) -> [Self::W; 2] {
         let words: [i16; BYTES] = pairs(low, high, |low, high| i16::from_le_bytes([low, high]));
         halves(words, |half| half)
-    }
-    #[inline(never)]
-    fn signs(self, mask: Self::B) -> [Self::W; 2] {
-        halves(mask, |mask| {
-            lanes(mask, |mask| if mask == 0 { 1 } else { -1 })
-        })
-    }
-    #[inline(never)]
-    fn widen_256(self, x: Self::B) -> [Self::W; 2] {
-        self.widen([0; BYTES], x)
-    }
-    #[inline(never)]
-    fn widen_128(self, x: Self::B) -> [Self::W; 2] {
-        halves(x, |x| lanes(x, |x| i16::from(x) << 7))
     }
     #[inline(never)]
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W> {
@@ -186,15 +186,6 @@ impl Lanes for Portable {
         }
     }
     #[inline(never)]
-    fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B {
-        lanes(whole::<_, WORDS, BYTES>(mask), |mask: i16| mask as u8)
-    }
-
-    #[inline(never)]
-    fn splat16(self, x: i16) -> Self::W {
-        [x; WORDS]
-    }
-    #[inline(never)]
     fn load16(self, from: &[u16], at: usize) -> [Self::W; 2] {
         let block: [u16; BYTES] = core::array::from_fn(|lane| from[at + lane]);
         halves(block, |half| lanes(half, u16::cast_signed))
@@ -204,100 +195,12 @@ impl Lanes for Portable {
         to[at..at + BYTES].copy_from_slice(&lanes(whole::<_, WORDS, BYTES>(x), i16::cast_unsigned));
     }
     #[inline(never)]
-    fn add(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, i16::wrapping_add)
-    }
-    #[inline(never)]
-    fn sub(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, i16::wrapping_sub)
-    }
-    #[inline(never)]
-    fn add_signed(self, a: Self::W, b: Self::W, sign: Self::W) -> Self::W {
-        self.add(a, pairs(b, sign, i16::wrapping_mul))
-    }
-    #[inline(never)]
-    fn add_sat(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, i16::saturating_add)
-    }
-    #[inline(never)]
-    fn mul_q15(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, |a, b| {
-            ((i32::from(a) * i32::from(b) + (1 << 14)) >> 15) as i16
-        })
-    }
-    #[inline(never)]
-    fn mul_low(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, i16::wrapping_mul)
-    }
-    #[inline(never)]
     fn shl<const N: i32>(self, x: Self::W) -> Self::W {
         lanes(x, |x| x << N)
     }
     #[inline(never)]
     fn sar<const N: i32>(self, x: Self::W) -> Self::W {
         lanes(x, |x| x >> N)
-    }
-    #[inline(never)]
-    fn left(self, n: u8) -> Self::Count {
-        n
-    }
-    #[inline(never)]
-    fn right(self, n: u8) -> Self::Count {
-        n
-    }
-    #[inline(never)]
-    fn shl_by(self, x: Self::W, n: u8) -> Self::W {
-        lanes(x, |x| x.checked_shl(u32::from(n)).unwrap_or(0))
-    }
-    #[inline(never)]
-    fn sar_by(self, x: Self::W, n: u8) -> Self::W {
-        lanes(x, |x| x >> n)
-    }
-    #[inline(never)]
-    fn shr_by(self, x: Self::W, n: u8) -> Self::W {
-        lanes(x, |x| (x.cast_unsigned() >> n).cast_signed())
-    }
-    #[inline(never)]
-    fn halve(self, x: Self::W) -> Self::W {
-        lanes(x, |x| x.cast_unsigned().div_ceil(2).cast_signed())
-    }
-    #[inline(never)]
-    fn abs(self, x: Self::W) -> Self::W {
-        lanes(x, i16::wrapping_abs)
-    }
-    #[inline(never)]
-    fn min(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, i16::min)
-    }
-    #[inline(never)]
-    fn max(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, i16::max)
-    }
-    #[inline(never)]
-    fn max_unsigned(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, |a, b| {
-            a.cast_unsigned().max(b.cast_unsigned()).cast_signed()
-        })
-    }
-    #[inline(never)]
-    fn gt(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, |a, b| mask16(a > b))
-    }
-    #[inline(never)]
-    fn eq(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, |a, b| mask16(a == b))
-    }
-    #[inline(never)]
-    fn and(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, |a, b| a & b)
-    }
-    #[inline(never)]
-    fn or(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, |a, b| a | b)
-    }
-    #[inline(never)]
-    fn xor(self, a: Self::W, b: Self::W) -> Self::W {
-        pairs(a, b, |a, b| a ^ b)
     }
     #[inline(never)]
     fn pick(self, mask: Self::W, a: Self::W, b: Self::W) -> Self::W {
@@ -332,15 +235,6 @@ impl Lanes for Portable {
         })
     }
     #[inline(never)]
-    fn narrow_mask32(self, mask: [Self::D; 2]) -> Self::W {
-        lanes(whole::<_, DOUBLES, WORDS>(mask), |mask: i32| mask as i16)
-    }
-
-    #[inline(never)]
-    fn splat32(self, x: i32) -> Self::D {
-        [x; DOUBLES]
-    }
-    #[inline(never)]
     fn load32(self, from: &[i32], at: usize) -> [[Self::D; 2]; 2] {
         let block: [i32; BYTES] = core::array::from_fn(|lane| from[at + lane]);
         halves(block, quarters)
@@ -353,50 +247,9 @@ impl Lanes for Portable {
         }
     }
     #[inline(never)]
-    fn add32(self, a: Self::D, b: Self::D) -> Self::D {
-        pairs(a, b, i32::wrapping_add)
-    }
-    #[inline(never)]
-    fn sar32_by(self, x: Self::D, n: u8) -> Self::D {
-        lanes(x, |x| x >> n)
-    }
-    #[inline(never)]
-    fn gt32(self, a: Self::D, b: Self::D) -> Self::D {
-        pairs(a, b, |a, b| mask32(a > b))
-    }
-    #[inline(never)]
     fn pick32(self, mask: Self::D, a: Self::D, b: Self::D) -> Self::D {
         let a = pairs(mask, a, |mask, a| mask & a);
         let b = pairs(mask, b, |mask, b| !mask & b);
         pairs(a, b, |a, b| a | b)
-    }
-    #[inline(never)]
-    fn to_single(self, x: Self::D) -> Self::F {
-        lanes(x, |x| x as f32)
-    }
-    #[inline(never)]
-    fn to_whole(self, x: Self::F) -> Self::D {
-        // Above 2²³ the singles are the whole numbers.
-        const WHOLE: f32 = 12_582_912.0;
-        lanes(x, |x| {
-            let shifted = (x + WHOLE).to_bits().cast_signed();
-            shifted.wrapping_sub(WHOLE.to_bits().cast_signed())
-        })
-    }
-    #[inline(never)]
-    fn splat_single(self, x: f32) -> Self::F {
-        [x; DOUBLES]
-    }
-    #[inline(never)]
-    fn add_single(self, a: Self::F, b: Self::F) -> Self::F {
-        pairs(a, b, |a, b| a + b)
-    }
-    #[inline(never)]
-    fn mul_single(self, a: Self::F, b: Self::F) -> Self::F {
-        pairs(a, b, |a, b| a * b)
-    }
-    #[inline(never)]
-    fn lt_single(self, a: Self::F, b: Self::F) -> Self::D {
-        pairs(a, b, |a, b| mask32(a < b))
     }
 }

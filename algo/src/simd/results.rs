@@ -1,4 +1,4 @@
-//! A row of results that blocks are stored to, with one check of the place for all of them.
+//! A row of results that blocks are stored to: phase, modulation and trust.
 
 use super::Lanes;
 use super::plain;
@@ -51,7 +51,7 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// Stores a block. A number that is no [`Trust`]'s is stored as the largest that is.
+    /// Stores a block. A byte above the largest number of [`Trust`] is stored as that number.
     #[inline(always)]
     pub fn store<V: Lanes>(
         &mut self,
@@ -66,14 +66,14 @@ impl<'a> Results<'a> {
         v.claim_ahead(self.trust, at);
         v.store32(self.phase, at, phase);
         v.store16(self.modulation, at, modulation);
-        // SAFETY: `Trust` is one byte, and its numbers are 0 to `LAST`: no byte above is stored.
+        // SAFETY: `Trust` is one byte with the numbers 0 to `LAST`, and no byte above `LAST` is stored.
         let bytes = unsafe {
             core::slice::from_raw_parts_mut(self.trust.as_mut_ptr().cast(), self.trust.len())
         };
         v.store8(bytes, at, v.min8(trust, v.splat8(Trust::LAST)));
     }
 
-    /// Stores a block of which nothing is known but why.
+    /// Stores a block without any phase; `reason` says why.
     #[inline(always)]
     pub fn store_unknown<V: Lanes>(&mut self, v: V, at: usize, reason: V::B) {
         let unknown = v.splat32(AbsolutePhase::UNKNOWN.to_bits());

@@ -1,4 +1,4 @@
-//! Rows of samples that are read block by block, with one check for all of them.
+//! Rows of samples that are read block by block, with one bounds check for several rows.
 
 /// Four rows of equal length.
 #[derive(Clone, Copy, Debug)]
@@ -25,10 +25,10 @@ impl<'a, T> Four<'a, T> {
         self.rows
     }
 
-    /// Where the blocks of `pixels` samples at `at` start; all of them may be read.
+    /// The starts of the blocks of `pixels` samples at `at`, all of which may be read.
     ///
     /// # Panics
-    /// If a row ends before.
+    /// If a block does not end within the rows.
     #[inline(always)]
     pub(super) fn blocks(&self, at: usize, pixels: usize) -> [*const T; 4] {
         assert_fits(at, pixels, self.length);
@@ -64,8 +64,8 @@ pub(super) fn block_mut<T>(row: &mut [T], at: usize, pixels: usize) -> &mut [T] 
     unsafe { row.get_unchecked_mut(at..at + pixels) }
 }
 
-/// Asserts that a block of `pixels` at `at` ends within `length`, in the one form that the compiler finds again for all rows
-/// of that length.
+/// Asserts that a block of `pixels` at `at` ends within `length`. Always in this form, so that the compiler merges the checks of
+/// all rows of one length.
 #[inline(always)]
 fn assert_fits(at: usize, pixels: usize, length: usize) {
     assert!(length >= pixels && at <= length - pixels);

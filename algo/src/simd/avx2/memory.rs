@@ -1,16 +1,15 @@
-//! Memory: vectors whose halves AVX2 keeps apart, and what will be wanted soon.
+//! Loads and stores of vectors from two places of 16 bytes each, and prefetching.
 
 use super::BYTES;
 use crate::simd::rows::{block, block_mut};
 use core::arch::x86_64::*;
 
-/// Rows are fetched this many samples ahead: some 500 ns of work.
+/// Rows are prefetched this many samples ahead, about 500 ns of work.
 pub(super) const AHEAD: usize = 512;
-/// A line of the cache, bytes.
+/// Bytes of a cache line.
 const LINE: usize = 64;
 
-/// The four sixteenths (or eighths) of a block, by where AVX2 puts them: for each `W` or pair of `D`s the pieces of
-/// 128 bits for its lower and upper half.
+/// The vector whose lower and upper 128 bits are the elements from `low` and from `high` of the block at `at`.
 #[inline(always)]
 pub(super) fn load_halves<T>(from: &[T], at: usize, low: usize, high: usize) -> __m256i {
     let block = block(from, at, BYTES);
@@ -21,6 +20,7 @@ pub(super) fn load_halves<T>(from: &[T], at: usize, low: usize, high: usize) -> 
     unsafe { _mm256_loadu2_m128i(high.as_ptr().cast(), low.as_ptr().cast()) }
 }
 
+/// Stores the lower and upper 128 bits of a vector as [`load_halves`] loads them.
 #[inline(always)]
 pub(super) fn store_halves<T>(to: &mut [T], at: usize, low: usize, high: usize, x: __m256i) {
     let block = block_mut(to, at, BYTES);
@@ -33,8 +33,8 @@ pub(super) fn store_halves<T>(to: &mut [T], at: usize, low: usize, high: usize, 
     }
 }
 
-/// Hints at the lines of the block `after` samples behind the one at `at`: there are more rows than the processor follows by
-/// itself.
+/// Prefetches the cache lines of the block `after` samples behind the one at `at`: there are more rows than the processor's own
+/// prefetcher follows.
 #[inline(always)]
 pub(super) fn hint<T, const HINT: i32>(row: &[T], at: usize, after: usize) {
     let lines = BYTES * size_of::<T>() / LINE;

@@ -1,16 +1,16 @@
-//! Lanes of x86-64 with AVX2.
+//! The back-end of x86-64 with AVX2.
 //!
-//! AVX2 widens within each half of a vector, so the first `W` of a block holds its pixels 0–7 and 16–23, the second
-//! 8–15 and 24–31; narrowing undoes it.
+//! AVX2 widens within each 128-bit half of a vector: the first `W` of a block holds its pixels 0–7 and 16–23, the second 8–15 and
+//! 24–31. Narrowing restores the order.
 
 mod memory;
 
-use super::lanes::{Lanes, Scaled};
+use super::lanes::{Lanes, Scaled, operations};
 use super::rows::{Four, block, block_mut};
 use core::arch::x86_64::*;
 use memory::{AHEAD, hint, load_halves, store_halves};
 
-/// AVX2 is there: only [`Avx2::detect`] makes one.
+/// The proof that this machine has AVX2: only [`Avx2::detect`] makes one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Avx2(());
 
@@ -30,25 +30,75 @@ const BYTES: usize = 32;
 /// Calls intrinsics of AVX2. Sound because `self` proves that the processor has it.
 macro_rules! avx2 {
     ($e:expr) => {{
-        // SAFETY: an `Avx2` exists only where the processor has AVX2 (`Avx2::detect`), which is all that these
-        // intrinsics on values ask for.
+        // SAFETY: an `Avx2` exists only where the processor has AVX2 (`Avx2::detect`), the only condition of intrinsics on
+        // values.
         unsafe { $e }
     }};
 }
 
+type B = __m256i;
+type W = __m256i;
+type D = __m256i;
+type F = __m256;
+type Count = __m128i;
+
 impl Lanes for Avx2 {
     const PIXELS: usize = BYTES;
     const AHEAD: usize = AHEAD;
-    type B = __m256i;
-    type W = __m256i;
-    type D = __m256i;
-    type F = __m256;
-    type Count = __m128i;
+    type B = B;
+    type W = W;
+    type D = D;
+    type F = F;
+    type Count = Count;
 
-    #[inline(always)]
-    fn splat8(self, x: u8) -> Self::B {
-        avx2!(_mm256_set1_epi8(x.cast_signed()))
+    operations! { avx2, always;
+        splat8(self, x: u8) -> B = _mm256_set1_epi8(x.cast_signed());
+        min8(self, a: B, b: B) -> B = _mm256_min_epu8(a, b);
+        max8(self, a: B, b: B) -> B = _mm256_max_epu8(a, b);
+        sub8(self, a: B, b: B) -> B = _mm256_sub_epi8(a, b);
+        eq8(self, a: B, b: B) -> B = _mm256_cmpeq_epi8(a, b);
+        and8(self, a: B, b: B) -> B = _mm256_and_si256(a, b);
+        or8(self, a: B, b: B) -> B = _mm256_or_si256(a, b);
+        xor8(self, a: B, b: B) -> B = _mm256_xor_si256(a, b);
+        pick8(self, mask: B, a: B, b: B) -> B = _mm256_blendv_epi8(b, a, mask);
+        widen(self, low: B, high: B) -> [W; 2] = [_mm256_unpacklo_epi8(low, high), _mm256_unpackhi_epi8(low, high)];
+        narrow_mask(self, mask: [W; 2]) -> B = _mm256_packs_epi16(mask[0], mask[1]);
+        splat16(self, x: i16) -> W = _mm256_set1_epi16(x);
+        add(self, a: W, b: W) -> W = _mm256_add_epi16(a, b);
+        sub(self, a: W, b: W) -> W = _mm256_sub_epi16(a, b);
+        add_sat(self, a: W, b: W) -> W = _mm256_adds_epi16(a, b);
+        mul_q15(self, a: W, b: W) -> W = _mm256_mulhrs_epi16(a, b);
+        mul_low(self, a: W, b: W) -> W = _mm256_mullo_epi16(a, b);
+        left(self, n: u8) -> Count = _mm_cvtsi32_si128(i32::from(n));
+        shl_by(self, x: W, n: Count) -> W = _mm256_sll_epi16(x, n);
+        sar_by(self, x: W, n: Count) -> W = _mm256_sra_epi16(x, n);
+        shr_by(self, x: W, n: Count) -> W = _mm256_srl_epi16(x, n);
+        halve(self, x: W) -> W = _mm256_avg_epu16(x, _mm256_setzero_si256());
+        abs(self, x: W) -> W = _mm256_abs_epi16(x);
+        min(self, a: W, b: W) -> W = _mm256_min_epi16(a, b);
+        max(self, a: W, b: W) -> W = _mm256_max_epi16(a, b);
+        max_unsigned(self, a: W, b: W) -> W = _mm256_max_epu16(a, b);
+        gt(self, a: W, b: W) -> W = _mm256_cmpgt_epi16(a, b);
+        eq(self, a: W, b: W) -> W = _mm256_cmpeq_epi16(a, b);
+        and(self, a: W, b: W) -> W = _mm256_and_si256(a, b);
+        or(self, a: W, b: W) -> W = _mm256_or_si256(a, b);
+        xor(self, a: W, b: W) -> W = _mm256_xor_si256(a, b);
+        pick(self, mask: W, a: W, b: W) -> W = _mm256_blendv_epi8(b, a, mask);
+        join(self, low: W, high: W) -> [D; 2] = [_mm256_unpacklo_epi16(low, high), _mm256_unpackhi_epi16(low, high)];
+        narrow_mask32(self, mask: [D; 2]) -> W = _mm256_packs_epi32(mask[0], mask[1]);
+        splat32(self, x: i32) -> D = _mm256_set1_epi32(x);
+        add32(self, a: D, b: D) -> D = _mm256_add_epi32(a, b);
+        sar32_by(self, x: D, n: u8) -> D = _mm256_sra_epi32(x, _mm_cvtsi32_si128(i32::from(n)));
+        gt32(self, a: D, b: D) -> D = _mm256_cmpgt_epi32(a, b);
+        pick32(self, mask: D, a: D, b: D) -> D = _mm256_blendv_epi8(b, a, mask);
+        to_single(self, x: D) -> F = _mm256_cvtepi32_ps(x);
+        to_whole(self, x: F) -> D = _mm256_cvtps_epi32(x);
+        splat_single(self, x: f32) -> F = _mm256_set1_ps(x);
+        add_single(self, a: F, b: F) -> F = _mm256_add_ps(a, b);
+        mul_single(self, a: F, b: F) -> F = _mm256_mul_ps(a, b);
+        lt_single(self, a: F, b: F) -> D = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b));
     }
+
     #[inline(always)]
     fn load8(self, from: &[u8], at: usize) -> Self::B {
         let block = block(from, at, BYTES);
@@ -83,38 +133,6 @@ impl Lanes for Avx2 {
         unsafe { _mm256_storeu_si256(block.as_mut_ptr().cast(), x) }
     }
     #[inline(always)]
-    fn min8(self, a: Self::B, b: Self::B) -> Self::B {
-        avx2!(_mm256_min_epu8(a, b))
-    }
-    #[inline(always)]
-    fn max8(self, a: Self::B, b: Self::B) -> Self::B {
-        avx2!(_mm256_max_epu8(a, b))
-    }
-    #[inline(always)]
-    fn sub8(self, a: Self::B, b: Self::B) -> Self::B {
-        avx2!(_mm256_sub_epi8(a, b))
-    }
-    #[inline(always)]
-    fn eq8(self, a: Self::B, b: Self::B) -> Self::B {
-        avx2!(_mm256_cmpeq_epi8(a, b))
-    }
-    #[inline(always)]
-    fn and8(self, a: Self::B, b: Self::B) -> Self::B {
-        avx2!(_mm256_and_si256(a, b))
-    }
-    #[inline(always)]
-    fn or8(self, a: Self::B, b: Self::B) -> Self::B {
-        avx2!(_mm256_or_si256(a, b))
-    }
-    #[inline(always)]
-    fn xor8(self, a: Self::B, b: Self::B) -> Self::B {
-        avx2!(_mm256_xor_si256(a, b))
-    }
-    #[inline(always)]
-    fn pick8(self, mask: Self::B, a: Self::B, b: Self::B) -> Self::B {
-        avx2!(_mm256_blendv_epi8(b, a, mask))
-    }
-    #[inline(always)]
     fn quarters8(self, half: Self::B, quarter: Self::B) -> Self::B {
         self.or8(
             self.and8(half, self.splat8(128)),
@@ -142,13 +160,6 @@ impl Lanes for Avx2 {
         avx2!(_mm256_testz_si256(mask, mask)) == 1
     }
 
-    #[inline(always)]
-    fn widen(self, low: Self::B, high: Self::B) -> [Self::W; 2] {
-        avx2!([
-            _mm256_unpacklo_epi8(low, high),
-            _mm256_unpackhi_epi8(low, high)
-        ])
-    }
     #[inline(always)]
     fn signs(self, mask: Self::B) -> [Self::W; 2] {
         self.widen(self.or8(mask, self.splat8(1)), mask)
@@ -196,15 +207,6 @@ impl Lanes for Avx2 {
         }
     }
     #[inline(always)]
-    fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B {
-        avx2!(_mm256_packs_epi16(mask[0], mask[1]))
-    }
-
-    #[inline(always)]
-    fn splat16(self, x: i16) -> Self::W {
-        avx2!(_mm256_set1_epi16(x))
-    }
-    #[inline(always)]
     fn load16(self, from: &[u16], at: usize) -> [Self::W; 2] {
         [load_halves(from, at, 0, 16), load_halves(from, at, 8, 24)]
     }
@@ -214,28 +216,8 @@ impl Lanes for Avx2 {
         store_halves(to, at, 8, 24, x[1]);
     }
     #[inline(always)]
-    fn add(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_add_epi16(a, b))
-    }
-    #[inline(always)]
-    fn sub(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_sub_epi16(a, b))
-    }
-    #[inline(always)]
     fn add_signed(self, a: Self::W, b: Self::W, sign: Self::W) -> Self::W {
         self.add(a, avx2!(_mm256_sign_epi16(b, sign)))
-    }
-    #[inline(always)]
-    fn add_sat(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_adds_epi16(a, b))
-    }
-    #[inline(always)]
-    fn mul_q15(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_mulhrs_epi16(a, b))
-    }
-    #[inline(always)]
-    fn mul_low(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_mullo_epi16(a, b))
     }
     #[inline(always)]
     fn shl<const N: i32>(self, x: Self::W) -> Self::W {
@@ -246,76 +228,8 @@ impl Lanes for Avx2 {
         avx2!(_mm256_srai_epi16::<N>(x))
     }
     #[inline(always)]
-    fn left(self, n: u8) -> Self::Count {
-        avx2!(_mm_cvtsi32_si128(i32::from(n)))
-    }
-    #[inline(always)]
     fn right(self, n: u8) -> Self::Count {
         self.left(n)
-    }
-    #[inline(always)]
-    fn shl_by(self, x: Self::W, n: Self::Count) -> Self::W {
-        avx2!(_mm256_sll_epi16(x, n))
-    }
-    #[inline(always)]
-    fn sar_by(self, x: Self::W, n: Self::Count) -> Self::W {
-        avx2!(_mm256_sra_epi16(x, n))
-    }
-    #[inline(always)]
-    fn shr_by(self, x: Self::W, n: Self::Count) -> Self::W {
-        avx2!(_mm256_srl_epi16(x, n))
-    }
-    #[inline(always)]
-    fn halve(self, x: Self::W) -> Self::W {
-        avx2!(_mm256_avg_epu16(x, _mm256_setzero_si256()))
-    }
-    #[inline(always)]
-    fn abs(self, x: Self::W) -> Self::W {
-        avx2!(_mm256_abs_epi16(x))
-    }
-    #[inline(always)]
-    fn min(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_min_epi16(a, b))
-    }
-    #[inline(always)]
-    fn max(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_max_epi16(a, b))
-    }
-    #[inline(always)]
-    fn max_unsigned(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_max_epu16(a, b))
-    }
-    #[inline(always)]
-    fn gt(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_cmpgt_epi16(a, b))
-    }
-    #[inline(always)]
-    fn eq(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_cmpeq_epi16(a, b))
-    }
-    #[inline(always)]
-    fn and(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_and_si256(a, b))
-    }
-    #[inline(always)]
-    fn or(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_or_si256(a, b))
-    }
-    #[inline(always)]
-    fn xor(self, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_xor_si256(a, b))
-    }
-    #[inline(always)]
-    fn pick(self, mask: Self::W, a: Self::W, b: Self::W) -> Self::W {
-        avx2!(_mm256_blendv_epi8(b, a, mask))
-    }
-
-    #[inline(always)]
-    fn join(self, low: Self::W, high: Self::W) -> [Self::D; 2] {
-        avx2!([
-            _mm256_unpacklo_epi16(low, high),
-            _mm256_unpackhi_epi16(low, high)
-        ])
     }
     #[inline(always)]
     fn split(self, x: [Self::D; 2]) -> (Self::W, Self::W) {
@@ -350,15 +264,6 @@ impl Lanes for Avx2 {
         })
     }
     #[inline(always)]
-    fn narrow_mask32(self, mask: [Self::D; 2]) -> Self::W {
-        avx2!(_mm256_packs_epi32(mask[0], mask[1]))
-    }
-
-    #[inline(always)]
-    fn splat32(self, x: i32) -> Self::D {
-        avx2!(_mm256_set1_epi32(x))
-    }
-    #[inline(always)]
     fn load32(self, from: &[i32], at: usize) -> [[Self::D; 2]; 2] {
         [
             [load_halves(from, at, 0, 16), load_halves(from, at, 4, 20)],
@@ -371,45 +276,5 @@ impl Lanes for Avx2 {
         store_halves(to, at, 4, 20, x[0][1]);
         store_halves(to, at, 8, 24, x[1][0]);
         store_halves(to, at, 12, 28, x[1][1]);
-    }
-    #[inline(always)]
-    fn add32(self, a: Self::D, b: Self::D) -> Self::D {
-        avx2!(_mm256_add_epi32(a, b))
-    }
-    #[inline(always)]
-    fn sar32_by(self, x: Self::D, n: u8) -> Self::D {
-        avx2!(_mm256_sra_epi32(x, _mm_cvtsi32_si128(i32::from(n))))
-    }
-    #[inline(always)]
-    fn gt32(self, a: Self::D, b: Self::D) -> Self::D {
-        avx2!(_mm256_cmpgt_epi32(a, b))
-    }
-    #[inline(always)]
-    fn pick32(self, mask: Self::D, a: Self::D, b: Self::D) -> Self::D {
-        avx2!(_mm256_blendv_epi8(b, a, mask))
-    }
-    #[inline(always)]
-    fn to_single(self, x: Self::D) -> Self::F {
-        avx2!(_mm256_cvtepi32_ps(x))
-    }
-    #[inline(always)]
-    fn to_whole(self, x: Self::F) -> Self::D {
-        avx2!(_mm256_cvtps_epi32(x))
-    }
-    #[inline(always)]
-    fn splat_single(self, x: f32) -> Self::F {
-        avx2!(_mm256_set1_ps(x))
-    }
-    #[inline(always)]
-    fn add_single(self, a: Self::F, b: Self::F) -> Self::F {
-        avx2!(_mm256_add_ps(a, b))
-    }
-    #[inline(always)]
-    fn mul_single(self, a: Self::F, b: Self::F) -> Self::F {
-        avx2!(_mm256_mul_ps(a, b))
-    }
-    #[inline(always)]
-    fn lt_single(self, a: Self::F, b: Self::F) -> Self::D {
-        avx2!(_mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)))
     }
 }
