@@ -1,6 +1,6 @@
 //! Single stages, each on 512 × 512 pixels of the study's rig: `cargo bench -p algo [NAME]`.
 //!
-//! For work on one stage; what is quoted comes from `fringed-lab bench`, which keeps caches and other programs out.
+//! For work on one stage. Published figures come from `fringed-lab bench`, which keeps the frames out of the caches.
 
 #![expect(clippy::unwrap_used, reason = "a benchmark may fail loudly")]
 

@@ -1,4 +1,4 @@
-//! Units that live in types: a point and a difference are different types.
+//! Quantities as types with their units: phases, modulations, heights. A position and a difference are different types.
 //!
 //! ```compile_fail
 //! use algo::units::AbsolutePhase;
@@ -52,8 +52,7 @@ impl WrappedPhase {
 pub struct AbsolutePhase(i32);
 
 impl AbsolutePhase {
-    /// Stands in a map for "no phase is known here". It is the one value that no measurement gives:
-    /// arithmetic saturates one above it.
+    /// "No phase is known here". No arithmetic gives this value: it saturates one above it.
     pub const UNKNOWN: Self = Self(i32::MIN);
 
     /// From units of 1/65536 turn.
@@ -177,7 +176,7 @@ impl Modulation {
 pub struct Height(i32);
 
 impl Height {
-    /// Stands in a map for "no height is known here".
+    /// "No height is known here".
     pub const UNKNOWN: Self = Self(i32::MIN);
 
     /// From nanometres.

@@ -1,16 +1,15 @@
-//! A field of values over a raster, fringe frequencies over the projector's as a rule, and the
-//! filters that shape it.
+//! A field of values over a raster, usually fringe frequencies over the projector's, and its filters.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Values over a raster, row-major; as a rule G(s, t), the frequency along ξ in turns per projector
+/// Values over a raster, row-major; usually G(s, t), the frequency along ξ in turns per projector
 /// pixel at row s, column t.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
     /// Columns.
     pub columns: usize,
-    /// Values; NaN where none is known yet.
+    /// Values; NaN where not known.
     pub values: Vec<f64>,
 }
 
@@ -37,7 +36,7 @@ impl Field {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
-    /// Gaussian smoothing with σ in pixels; the edge values go on beyond the raster.
+    /// Gaussian smoothing with σ in pixels; edge values are repeated beyond the raster.
     pub fn smoothed(&self, sigma: f64) -> Self {
         let reach = libm::ceil(4.0 * sigma) as isize;
         let weights: Vec<f64> = (-reach..=reach)
@@ -147,8 +146,8 @@ impl Field {
         }
     }
 
-    /// Gives unknown cells of a row the value between their known neighbours, in proportion; beyond
-    /// the outermost ones theirs. A row without any takes `otherwise`.
+    /// Fills unknown cells of each row by linear interpolation between known ones; beyond the outermost known cell its value is
+    /// repeated. A row without known cells becomes `otherwise`.
     pub fn fill_rows(&mut self, otherwise: f64) {
         crate::pipeline::for_each_row(&mut self.values, self.columns, |_, line| {
             let mut before: Option<usize> = None;

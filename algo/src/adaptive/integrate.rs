@@ -1,4 +1,4 @@
-//! From frequencies to a phase function.
+//! Integrates a field of frequencies to a phase function.
 
 use super::Field;
 use crate::pipeline::map_rows;
@@ -20,10 +20,9 @@ pub(super) fn rows_from_zero(field: &Field) -> Vec<f64> {
     turns
 }
 
-/// As [`rows_from_zero`], with each row shifted so that its phase differs from the row above by
-/// nothing on average over the cells that are `seen` in both rows: a zero first column shears rows
-/// against each other, and the sheared fringes are as fine across as the shear is steep. The lowest
-/// phase is 0.
+/// As [`rows_from_zero`], with each row shifted so that its mean difference to the row above is 0 over the cells that are `seen`
+/// in both. With a zero first column rows shear against each other, which makes fringes across the rows as fine as the shear is
+/// steep. The lowest phase is 0.
 pub(super) fn balanced_rows(field: &Field, seen: &[bool]) -> Vec<f64> {
     let columns = field.columns.max(1);
     let mut turns = rows_from_zero(field);

@@ -1,4 +1,4 @@
-//! Where the light of each camera pixel comes from.
+//! The projector point that lights each camera pixel's point of the surface.
 
 use crate::geometry::Triangulator;
 use crate::pattern::PhaseFunction;
@@ -21,8 +21,8 @@ pub struct ProjectorMap {
 const UNKNOWN: [f64; 2] = [f64::NAN; 2];
 
 impl ProjectorMap {
-    /// From the heights of a preliminary measurement: η comes from projecting the point, which is
-    /// thirty times more exact than a measured horizontal map, and half the frames.
+    /// From the heights of a preliminary measurement with vertical fringes: η follows from projecting the point, which is
+    /// thirty times more accurate than measuring it with horizontal fringes, and takes half the frames.
     pub fn from_heights(triangulator: &Triangulator, heights: &HeightMap) -> Self {
         let width = heights.width;
         let mut points = vec![UNKNOWN; heights.height.len()];
@@ -39,7 +39,7 @@ impl ProjectorMap {
         Self { width, points }
     }
 
-    /// From a preliminary measurement with straight fringes of these pitches, vertical and horizontal ones: ξ and η are pitch ×
+    /// From preliminary measurements with vertical and horizontal fringes of these pitches: ξ and η are pitch ×
     /// phase (Peng & Gupta 2008, eqs. 3 and 4).
     pub fn from_phases(
         [vertical, horizontal]: [&[AbsolutePhase]; 2],
@@ -59,8 +59,8 @@ impl ProjectorMap {
         }
     }
 
-    /// The phase that each pixel has under a phase function if the surface is where it was measured,
-    /// unknown where it was not.
+    /// The phase of each pixel under a phase function, if the surface has not moved since it was measured; unknown where
+    /// it was not resolved.
     pub fn expected_phase(&self, function: &PhaseFunction) -> Vec<AbsolutePhase> {
         let phase = |[xi, eta]: &[f64; 2]| AbsolutePhase::from_turns(function.at(*xi, *eta));
         self.points.iter().map(phase).collect()
@@ -79,8 +79,7 @@ impl ProjectorMap {
         (!point[0].is_nan()).then_some(point)
     }
 
-    /// Takes the outermost pixels off every silhouette: a pixel stays if its 3 × 3 neighbours inside
-    /// the frame are all known.
+    /// Erodes the silhouettes by one pixel: a pixel stays known if all 3 × 3 pixels around it, inside the frame, are known.
     pub fn eroded(&self) -> Self {
         let (width, height) = (self.width as isize, self.height() as isize);
         let keep = |u: isize, v: isize| {
@@ -106,14 +105,14 @@ impl ProjectorMap {
         }
     }
 
-    /// J = (∂ξ/∂u, ∂ξ/∂v) of each pixel by a plane fit over its known 5 × 5 neighbours that lie within
-    /// `max_step` projector pixels per camera pixel (edges do not mix surfaces); NaN where the
+    /// J = (∂ξ/∂u, ∂ξ/∂v) of each pixel, by a plane fit over its known 5 × 5 neighbours whose ξ differs by at most
+    /// `max_slope` projector pixels per camera pixel (so that surfaces do not mix at edges); NaN where the
     /// neighbours do not determine it.
-    pub fn slopes(&self, max_step: f64) -> Vec<[f64; 2]> {
+    pub fn slopes(&self, max_slope: f64) -> Vec<[f64; 2]> {
         let mut slopes = vec![[f64::NAN; 2]; self.points.len()];
         for_each_row(&mut slopes, self.width, |v, row| {
             for (u, slope) in row.iter_mut().enumerate() {
-                if let Some(found) = self.slope(u as isize, v as isize, max_step) {
+                if let Some(found) = self.slope(u as isize, v as isize, max_slope) {
                     *slope = found;
                 }
             }
@@ -121,7 +120,7 @@ impl ProjectorMap {
         slopes
     }
 
-    fn slope(&self, u: isize, v: isize, max_step: f64) -> Option<[f64; 2]> {
+    fn slope(&self, u: isize, v: isize, max_slope: f64) -> Option<[f64; 2]> {
         let [centre, _] = self.at(u, v)?;
         // Sums of x = du, y = dv and z = Δξ about their means.
         let (mut n, mut x, mut y, mut z) = (0.0, 0.0, 0.0, 0.0);
@@ -133,7 +132,7 @@ impl ProjectorMap {
                 };
                 let (a, b, step) = (du as f64, dv as f64, xi - centre);
                 let distance = libm::fabs(a).max(libm::fabs(b));
-                if libm::fabs(step) > max_step * distance {
+                if libm::fabs(step) > max_slope * distance {
                     continue;
                 }
                 n += 1.0;

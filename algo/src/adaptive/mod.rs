@@ -1,9 +1,9 @@
 //! Patterns made for a part: curved fringes of varying pitch.
 //!
-//! [`paper`] is the method of Peng & Gupta (2008), eqs. 2–9, as it stands: the baseline. [`noise`] is
-//! the better one: the local frequency that gives the least noise for the contrast that projector
-//! and camera have, on every part of the surface. Both work out a field of frequencies over the
-//! projector's raster ([`Field`]) from where each camera pixel's light comes from ([`ProjectorMap`])
+//! [`paper`] is the method of Peng & Gupta (2008), eqs. 2–9, unchanged: the baseline. [`noise`] is
+//! the better one: on every part of the surface the local frequency that gives the least noise for the contrast that projector
+//! and camera have. Both compute a field of frequencies over the
+//! projector's raster ([`Field`]) from the projector point of each camera pixel ([`ProjectorMap`])
 //! and integrate it to a phase function.
 
 mod field;
@@ -20,13 +20,13 @@ pub use placement::{Surface, phase_reach};
 use crate::pattern::PhaseFunctionError;
 use core::fmt;
 
-/// A part that no pattern can be made for.
+/// A part for which no pattern can be made.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum AdaptError {
     /// No pixel of the part is known.
     Empty,
-    /// The pattern that came out cannot be shown.
+    /// The computed pattern cannot be shown.
     Pattern(PhaseFunctionError),
 }
 

@@ -1,8 +1,8 @@
-//! How far a part's placement can move the phase of each pixel.
+//! How far a part's placement can change the phase of each pixel.
 //!
 //! A single level cannot prove its fringe order: it is right only where the phase stays within half
-//! a turn of the golden map. Two dense levels reach further. Which pixels are safe follows from the
-//! golden surface and the declared tolerance of placement.
+//! a turn of the golden map. Two dense levels reach further. The golden
+//! surface and the declared tolerance of placement decide which pixels are safe.
 
 use crate::geometry::{Triangulator, Vector};
 use crate::pipeline::{for_each_row, map_rows};
@@ -21,22 +21,20 @@ pub struct Surface<'a> {
     pub phase: &'a [AbsolutePhase],
 }
 
-/// Moves that are tried: the 26 neighbours of a cube's centre, as directions.
+/// Directions of the moves that are tried: the 26 neighbours of a cube's centre.
 const DIRECTIONS: usize = 26;
-/// Shares of the tolerance that are tried along each direction: what passes through the frame on the
-/// way to the full move counts as well.
+/// Shares of the tolerance that are tried along each direction, because smaller moves count as well.
 const SHARES: [f64; 2] = [1.0, 0.5];
 
-/// Rows whose moved points are kept at a time: work for all threads, and little memory.
+/// Rows whose moved points are kept at a time: enough for all threads, in little memory.
 const BAND: usize = 64;
 
-/// The largest |ΔΦ| in turns that each pixel can see when the part is moved by up to `tolerance` mm
-/// in any direction; infinite where golden knows nothing within reach of the move.
+/// The largest |ΔΦ| in turns of each pixel when the part is moved by up to `tolerance` mm
+/// in any direction; infinite where golden is unknown within reach of the move.
 ///
-/// Every golden point is moved along 26 directions and projected; each of the four pixels around it
-/// then sees about its phase, carried there by the golden gradient, and that is compared with the
-/// golden phase of the pixel. That another part of the surface may stand in front is left out: it
-/// only makes the answer more careful.
+/// Every golden point is moved along 26 directions and projected. Its phase there, extrapolated by the golden gradient to each
+/// of the four pixels around it, is compared with the golden phase of that pixel. Occlusion is neglected, which can only make the
+/// result larger.
 pub fn phase_reach(triangulator: &Triangulator, golden: Surface<'_>, tolerance: f64) -> Vec<f32> {
     let width = golden.width.max(1);
     let rows = golden.height.len() / width;
@@ -72,18 +70,18 @@ pub fn phase_reach(triangulator: &Triangulator, golden: Surface<'_>, tolerance: 
 
 /// A golden point after a move.
 struct Moved {
-    /// The pixel that saw it.
+    /// The pixel that saw it before.
     from: (usize, usize),
     /// Where it is seen now.
     to: (f64, f64),
-    /// The phase that it has there, turns.
+    /// Its phase after the move, turns.
     phase: f64,
     /// The golden gradient where it was, turns per pixel.
     gradient: (f64, f64),
 }
 
 impl Moved {
-    /// How far it went, in whole pixels.
+    /// How far it moved in the image, whole pixels.
     fn distance(&self) -> usize {
         let (u, v) = (self.from.0 as f64, self.from.1 as f64);
         libm::ceil(libm::fabs(self.to.0 - u).max(libm::fabs(self.to.1 - v))) as usize
@@ -115,7 +113,7 @@ impl Moved {
 }
 
 /// The golden gradient at a pixel in turns per pixel: the smaller of the differences to both sides,
-/// so that it stays on the pixel's own surface.
+/// so that it does not cross an edge of the surface.
 fn gradient(golden: Surface<'_>, u: usize, v: usize) -> (f64, f64) {
     let (width, rows) = (golden.width, golden.height.len() / golden.width);
     let at = |u: usize, v: usize| {
@@ -131,7 +129,7 @@ fn gradient(golden: Surface<'_>, u: usize, v: usize) -> (f64, f64) {
             (back, forth) => forth.or(back).unwrap_or(0.0),
         }
     };
-    // Beyond the first column and row the index wraps to a value outside the frame.
+    // At the first column and row the index wraps to a value outside the frame.
     (
         smaller(at(u.wrapping_sub(1), v), at(u, v), at(u + 1, v)),
         smaller(at(u, v.wrapping_sub(1)), at(u, v), at(u, v + 1)),
@@ -160,7 +158,7 @@ fn moves(tolerance: f64) -> impl Iterator<Item = Vector> {
         })
 }
 
-/// What golden does not know may move into view: pixels within `away` of it are not safe.
+/// Makes the reach of pixels within `away` of unknown golden pixels infinite: something unknown may move into view there.
 fn forbid_near_unknown(reach: &mut [f32], known: &[bool], width: usize, away: usize) {
     let rows = known.len() / width;
     // Rows first, then columns: a separable square.

@@ -1,4 +1,4 @@
-//! The mean of frames, as a picture of the scene without its fringes.
+//! The mean of frames: a picture of the scene without fringes.
 
 use super::{FrameView, Samples};
 use alloc::vec;

@@ -1,4 +1,4 @@
-//! Borrowed camera pixels, and what they tell of the camera.
+//! Borrowed camera frames, their mean, and a camera's noise from pairs of them.
 
 mod mean;
 mod transfer;

@@ -1,47 +1,47 @@
-//! A camera's noise against its level: read noise and shot noise.
+//! A camera's noise as a function of its signal: read noise and shot noise.
 //!
-//! Two pictures of the same light differ by noise alone: half the mean square of their difference is the variance of a sample.
-//! Over the level it is read² + gain · level (photon transfer: Janesick 1987): what is the same in the dark, and what light adds.
+//! Two pictures of the same scene differ by noise alone: half the mean square of their difference is the variance of a sample.
+//! As a function of the signal it is read² + gain · signal (photon transfer: Janesick 1987), read noise and shot noise.
 
 use alloc::vec::Vec;
 use libm::sqrt;
 
-/// Bins of levels between black and full scale.
+/// Bins of signal levels between black and full scale.
 const BINS: usize = 16;
-/// Least number of pixels of a bin that is used: its σ is then known to 3 %.
+/// Least number of pixels of a bin that is used: σ is then known to 3 %.
 const LEAST_PIXELS: u64 = 500;
 /// Bins at least this many σ from black and full scale are not clipped.
 const CLEAR: f64 = 4.0;
-/// Variance of the rounding to counts. A camera without other noise has this, though its two pictures are equal.
+/// Variance of rounding to counts: the least variance, also where both pictures are equal.
 const ROUNDING: f64 = 1.0 / 12.0;
-/// Shot noise that differs from 0 by fewer σ than this is taken as 0.
+/// Shot noise below this many of its own σ is taken as 0.
 const SIGNIFICANT: f64 = 3.0;
 
-/// Noise at one level.
+/// Noise at one signal level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoisePoint {
     /// Mean sample, counts.
     pub level: f64,
     /// σ of one sample, counts.
     pub counts: f64,
-    /// Pixels that have this level.
+    /// Number of pixels at this level.
     pub pixels: u64,
 }
 
 /// A camera's noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Noise {
-    /// σ of one sample at the level that was asked for, counts.
+    /// σ of one sample at the requested level, counts.
     pub counts: f64,
     /// σ in the dark, counts.
     pub read_counts: f64,
-    /// What light adds to the variance, counts² per count.
+    /// Shot noise: variance per signal, counts² per count.
     pub shot: f64,
-    /// The levels that it was fitted to.
+    /// The levels that were fitted.
     pub points: Vec<NoisePoint>,
 }
 
-/// Sums over the pixels of each level, from pairs of pictures of the same light.
+/// Sums over the pixels of each level, from pairs of pictures of the same scene.
 #[derive(Clone, Debug)]
 pub struct PhotonTransfer {
     full_scale: f64,
@@ -50,7 +50,7 @@ pub struct PhotonTransfer {
 }
 
 impl PhotonTransfer {
-    /// Nothing yet, for samples of 0 to `full_scale` counts.
+    /// Empty sums for samples of 0 to `full_scale` counts.
     pub fn new(full_scale: f64) -> Self {
         Self {
             full_scale,
@@ -58,8 +58,8 @@ impl PhotonTransfer {
         }
     }
 
-    /// Adds two pictures of the same light in counts; `levels` are the expected levels of their pixels, from other pictures:
-    /// a pixel that its own noise assigns to a level would seem quiet.
+    /// Adds two pictures of the same scene in counts. `levels` are the expected levels of their pixels, from other pictures,
+    /// because bins chosen by the pictures' own noise would bias the variance.
     pub fn add(&mut self, first: &[f32], second: &[f32], levels: impl Iterator<Item = f64>) {
         let per_count = BINS as f64 / (self.full_scale + 1.0);
         for ((a, b), level) in first.iter().zip(second).zip(levels) {
@@ -71,7 +71,7 @@ impl PhotonTransfer {
         }
     }
 
-    /// The noise, with its σ at `level`; none if too little is clear of black and full scale.
+    /// The noise, with σ at `level`; `None` if too few pixels are clear of black and full scale.
     pub fn noise(&self, level: f64) -> Option<Noise> {
         let point = |(levels, squares, pixels): &(f64, f64, u64)| NoisePoint {
             level: levels / *pixels as f64,
@@ -97,8 +97,8 @@ impl PhotonTransfer {
     }
 }
 
-/// Variance in the dark and what light adds to it, by least squares weighted with what is known of each variance: of n pairs it
-/// has itself the variance 2σ⁴/n. Without significant shot noise, or where it would make the read noise imaginary, the mean.
+/// Read noise (variance) and shot noise (per count), by least squares with weights 1/(2σ⁴/n), the variance of a variance from n
+/// pairs. Without significant shot noise, or where the read noise's variance would be negative: the mean variance and 0.
 fn fit(points: &[NoisePoint]) -> Option<(f64, f64)> {
     let (mut w, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for point in points {

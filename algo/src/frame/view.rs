@@ -40,7 +40,7 @@ impl Samples<'_> {
     }
 }
 
-/// A frame of `width` × `height` samples, borrowed from the device that took it.
+/// A frame of `width` × `height` samples, borrowed from its owner.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameView<'a> {
     samples: Samples<'a>,
@@ -49,7 +49,7 @@ pub struct FrameView<'a> {
     stride: usize,
 }
 
-/// Samples that do not make up the frame they claim to be.
+/// Samples that are too few for the frame's size and stride.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameError {
     /// Samples needed for the size and stride.

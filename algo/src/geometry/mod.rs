@@ -1,4 +1,4 @@
-//! From absolute phase to height: devices, the reference phase map, triangulation.
+//! From absolute phase to height: models of camera and projector, the reference phase map, triangulation.
 
 mod pinhole;
 mod reference;

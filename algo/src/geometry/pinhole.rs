@@ -1,4 +1,4 @@
-//! A pinhole with Brown distortion, OpenCV's convention: cameras, and projectors run backwards.
+//! The model of camera and projector: a pinhole with Brown's distortion, in OpenCV's convention. A projector is an inverse camera.
 //!
 //! X_device = R · X_world + t; x = X/Z, y = Y/Z; with r² = x² + y²
 //! x_d = x(1 + k₁r² + k₂r⁴ + k₃r⁶) + 2p₁xy + p₂(r² + 2x²),
@@ -9,7 +9,7 @@
 use super::Vector;
 use core::fmt;
 
-/// The numbers of a device model as a calibration gives them.
+/// The parameters of a device model as a calibration gives them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PinholeModel {
     /// Focal length along x, in pixels.
@@ -28,7 +28,7 @@ pub struct PinholeModel {
     pub translation: [f64; 3],
 }
 
-/// A device model, checked: every pixel of its frame has one ray, found by a converging iteration.
+/// A checked device model: every pixel of its frame has exactly one ray, and the iteration that finds it converges.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pinhole {
     model: PinholeModel,
@@ -37,12 +37,11 @@ pub struct Pinhole {
     centre: Vector,
     /// R as rows; its transpose turns rays into the world.
     rows: [Vector; 3],
-    /// Square of the normalised radius up to which the distortion was shown to be one-to-one;
-    /// beyond it the distortion goes on linearly.
+    /// Square of the normalised radius up to which the distortion is one-to-one; beyond it the distortion is continued linearly.
     radius_square: f64,
 }
 
-/// A device model that is no camera.
+/// A device model that cannot be used.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ModelError {
@@ -63,7 +62,7 @@ pub enum ModelError {
         /// c_y.
         cy: f64,
     },
-    /// R · Rᵀ is not the unit matrix or R mirrors.
+    /// R · Rᵀ is not the unit matrix, or R is a reflection.
     Rotation {
         /// Largest deviation of R · Rᵀ from the unit matrix.
         deviation: f64,
@@ -119,21 +118,21 @@ impl fmt::Display for ModelError {
 
 impl core::error::Error for ModelError {}
 
-/// Rounded calibrations are off by less than this.
+/// Largest deviation of R · Rᵀ from the unit matrix; rounded calibrations stay below it.
 const ROTATION_TOLERANCE: f64 = 1e-4;
-/// A kilometre in mm: beyond it the translation is in another unit, and f64 is no longer exact to 1e-9 mm.
+/// A kilometre in mm: a larger translation is in another unit, and f64 no longer resolves 1e-9 mm.
 const MAX_DISTANCE: f64 = 1e6;
-/// Newton steps until the undistortion must have converged; 4 suffice for lenses on sale.
+/// Newton iterations after which the undistortion must have converged; real lenses take 4.
 const NEWTON_STEPS: usize = 25;
-/// How far beyond the frame's border the distortion is followed, as shares of the radius there: the
-/// reference phase map is asked for up to 15 % outside. Every model must reach the last one.
+/// Radii up to which the distortion is checked, as multiples of the radius at the frame's border: the reference phase map is
+/// evaluated up to 15 % outside. The largest that is one-to-one is used; a model must reach the last.
 const REACHES: [f64; 4] = [1.3, 1.2, 1.1, 1.02];
 
 impl Pinhole {
     /// Checks a model for a frame of `width` × `height` pixels.
     ///
     /// # Errors
-    /// If a number is not finite or absurd, R is no rotation, or the distortion is not one-to-one
+    /// If a number is not finite or absurd, R is not a rotation, or the distortion is not one-to-one
     /// over the frame.
     pub fn new(model: PinholeModel, width: usize, height: usize) -> Result<Self, ModelError> {
         let finite = |what, numbers: &[f64]| {
@@ -176,8 +175,8 @@ impl Pinhole {
         pinhole.with_checked_distortion()
     }
 
-    /// Follows the distortion from the axis to each border pixel: it must stay one-to-one, i.e. its
-    /// Jacobian's determinant positive, all the way. Sets the radius up to which it is used.
+    /// Checks that the distortion is one-to-one, that is, its Jacobian's determinant is positive, from the axis to each border
+    /// pixel. Sets the radius up to which it is used.
     fn with_checked_distortion(mut self) -> Result<Self, ModelError> {
         let mut reach_left = 0;
         let mut radius_square = 0.0_f64;
@@ -208,7 +207,7 @@ impl Pinhole {
         Ok(self)
     }
 
-    /// The model as it was given.
+    /// The parameters as given.
     pub fn model(&self) -> &PinholeModel {
         &self.model
     }
@@ -233,7 +232,7 @@ impl Pinhole {
         self.rows[2]
     }
 
-    /// The direction in the world in which pixel (u, v) looks, with a component of 1 along the
+    /// The direction of pixel (u, v)'s ray in the world, with a component of 1 along the
     /// optical axis; `None` where the iteration does not converge (never inside the frame).
     pub fn ray(&self, u: f64, v: f64) -> Option<Vector> {
         let (x, y) = self.undistorted(u, v)?;
@@ -246,14 +245,14 @@ impl Pinhole {
         self.pixel(self.turned(point - self.centre))
     }
 
-    /// A direction of the world as the device has it: z along its optical axis.
+    /// A direction of the world in the device's coordinates: z along its optical axis.
     #[inline]
     pub(super) fn turned(&self, direction: Vector) -> Vector {
         let [x, y, z] = self.rows.map(|row| row.dot(direction));
         Vector::new(x, y, z)
     }
 
-    /// The pixel that sees a point given as the device has it, from its centre; `None` behind it.
+    /// The pixel that sees a point given in the device's coordinates; `None` behind the device.
     #[inline]
     pub(super) fn pixel(&self, from: Vector) -> Option<(f64, f64)> {
         let depth = from.z;
@@ -318,7 +317,7 @@ impl Pinhole {
             x -= (yy * ex - xy * ey) / determinant;
             y -= (xx * ey - xy * ex) / determinant;
         }
-        // Rounding keeps it from 1e-14 where |x| is large; 1e-12 (1e-9 px) is as good as converged.
+        // Where |x| is large rounding prevents 1e-14; 1e-12 (1e-9 px) is enough.
         let (found_x, found_y) = self.distorted(x, y);
         let left = libm::fabs(found_x - xd) + libm::fabs(found_y - yd);
         (left <= 1e-12).then_some((x, y))

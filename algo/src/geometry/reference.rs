@@ -16,7 +16,7 @@ const DEGREE: usize = 6;
 /// Coefficients of a polynomial of total degree [`DEGREE`] in two variables.
 const TERMS: usize = (DEGREE + 1) * (DEGREE + 2) / 2;
 
-/// Where the projector point of a camera pixel on the reference plane comes from.
+/// How the projector point of a camera pixel on the reference plane is found.
 #[derive(Clone, Debug, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "there is one per rig")]
 pub enum Reference {
@@ -41,7 +41,7 @@ pub struct FittedMap {
     residual: f64,
 }
 
-/// Samples that do not determine a smooth map.
+/// The samples do not determine a smooth map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReferenceError {
     /// Samples that were given.

@@ -1,11 +1,11 @@
-//! A safe root finder for a bracketed sign change.
+//! A root finder that keeps the root bracketed.
 
 /// A root of `f` between `a` and `b`, where f(a) = `fa` and f(b) = `fb` have opposite signs (or one is
-/// zero), to `tolerance` in the argument.
+/// zero), to `tolerance` in the argument; `None` if `f` is undefined at a point that is tried.
 ///
 /// Regula falsi with Anderson and Björck's weights (1973), falling back to bisection whenever three
-/// steps have not halved the bracket: at most 3 log₂(|b − a| / tolerance) evaluations, typically 6. Never leaves the bracket. Where `f` answers `None` there is no
-/// root to be had.
+/// iterations have not halved the bracket: at most 3 log₂(|b − a| / tolerance) evaluations, typically 6. Never leaves the
+/// bracket.
 pub(super) fn bracketed(
     f: impl Fn(f64) -> Option<f64>,
     (mut a, mut fa): (f64, f64),
@@ -29,7 +29,7 @@ pub(super) fn bracketed(
         } else {
             b - fb * (b - a) / (fb - fa)
         };
-        // Closer than the tolerance to an end gains nothing: step over the root instead.
+        // A point closer to an end than the tolerance gains nothing: go that far, which most likely crosses the root.
         let least = 0.5 * tolerance * if b > a { 1.0 } else { -1.0 };
         if libm::fabs(c - b) < libm::fabs(least) {
             c = b - least;
@@ -40,7 +40,7 @@ pub(super) fn bracketed(
         if fc * fb < 0.0 {
             (a, fa) = (b, fb);
         } else {
-            // The end `a` stays: weigh it down so that it moves next time.
+            // The end `a` stays: its value is weighted down, so that the next point lies nearer to it.
             let weight = 1.0 - fc / fb;
             fa *= if weight > 0.0 { weight } else { 0.5 };
         }

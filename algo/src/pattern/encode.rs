@@ -1,4 +1,4 @@
-//! Grey rasters of a phase function (eq. 1 of Peng & Gupta 2008, with a phase step).
+//! Grey rasters of a phase function (Peng & Gupta 2008, eq. 1 with a shift).
 
 use super::{PhaseFunction, Shot};
 use alloc::vec::Vec;
@@ -16,10 +16,10 @@ pub struct GreyRaster {
     pub pixels: Vec<u8>,
 }
 
-/// The projector's grey response and its inverse.
+/// The inverse of a projector's grey response.
 ///
-/// A projector that is asked for level g gives light `measured[g]`. The inverse asks for the level
-/// whose light comes nearest to linear between its darkest and brightest.
+/// The projector shows grey level g with the light `measured[g]`. The inverse maps each level to the one whose light is nearest
+/// to linear between darkest and brightest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GreyResponse {
     inverse: [u8; 256],
@@ -73,20 +73,20 @@ impl GreyResponse {
         Ok(Self { inverse })
     }
 
-    /// The level to ask for so that the light is linear in `wanted`.
+    /// The level to show so that the light is linear in `wanted`.
     pub fn level_for(&self, wanted: u8) -> u8 {
         self.inverse[usize::from(wanted)]
     }
 }
 
-/// Steps of a turn in which the projected sine is kept.
+/// Entries of the projected sine's table per turn.
 const STEPS: f64 = 65_536.0;
 /// 1.5 · 2⁵²: added to a number below 2⁵⁰, it leaves the nearest whole number in the low bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// Encodes I(ξ, η) = I_max/2 · (1 + sin 2π(r·Φ_P(ξ, η) + s)), I_max = 255, rounded to grey levels.
 ///
-/// The argument is taken at 1/65536 turn, which moves a level by at most 0.006 before rounding.
+/// The argument is rounded to 1/65536 turn, which changes a grey level by at most 0.006 before its own rounding.
 #[derive(Clone, Debug)]
 pub struct Encoder {
     /// One turn of the projected sine.
@@ -94,7 +94,7 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// With a `response` the levels are passed through its inverse.
+    /// With a `response` grey levels pass through its inverse.
     pub fn new(response: Option<&GreyResponse>) -> Self {
         let level = |bits: u32| {
             let light = 127.5 * (1.0 + libm::sin(TAU * f64::from(bits) / STEPS));
@@ -106,7 +106,7 @@ impl Encoder {
         }
     }
 
-    /// The raster that a shot of the phase function shows.
+    /// The raster that shows `shot` of the phase function.
     pub fn raster(&self, function: &PhaseFunction, shot: Shot) -> GreyRaster {
         let Shot { ratio, shift } = shot;
         let (width, height) = (function.columns(), function.rows());

@@ -5,11 +5,11 @@ use alloc::vec::Vec;
 use core::fmt;
 
 /// Largest |Φ_P| and largest phase of a level, in turns: a projector of 4,096 columns at 4 pixels per turn. The kernels
-/// find the fringe order of a step as a word with at least 4 fractional bits.
+/// compute fringe orders in 16-bit words with at least 4 fractional bits.
 pub const MAX_TURNS: f64 = 1000.0;
 
 /// The phase function Φ_P(ξ, η) of a pattern in turns, over projector pixels (ξ = column, η = row,
-/// centres at integers). Defined for every real ξ and η: outside its raster it goes on linearly, so
+/// centres at integers). Defined for every real ξ and η: it continues linearly outside its raster, so
 /// that a reference phase map can extend beyond the frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhaseFunction {
@@ -41,7 +41,7 @@ pub struct PhaseRange {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum PhaseFunctionError {
-    /// The raster has no pixels, or one row or column only where a sampled function needs two.
+    /// The raster has no pixels, or fewer than two rows or columns of a sampled function.
     Size {
         /// Projector columns.
         columns: usize,
@@ -180,12 +180,12 @@ impl PhaseFunction {
         self.rows
     }
 
-    /// Whether the function is given by samples, so that nothing is known of its course.
+    /// Whether the function is given by samples, so that it need not be monotone.
     pub fn is_sampled(&self) -> bool {
         matches!(self.shape, Shape::Sampled(_))
     }
 
-    /// The samples, row-major, of a function that is given by them.
+    /// The samples of a sampled function, row-major.
     pub(super) fn samples(&self) -> Option<&[f64]> {
         match &self.shape {
             Shape::Sampled(turns) => Some(turns),
@@ -193,7 +193,7 @@ impl PhaseFunction {
         }
     }
 
-    /// Whether all rows are alike, so that one encoded row serves for all.
+    /// Whether all rows are equal, so that one encoded row serves for all.
     pub(super) fn is_vertical(&self) -> bool {
         matches!(self.shape, Shape::Vertical { .. })
     }
@@ -263,7 +263,7 @@ impl PhaseFunction {
     }
 }
 
-/// In words, for messages: what kind, how many fringes, on which raster.
+/// In words, for messages: kind, number of fringes, raster.
 impl fmt::Display for PhaseFunction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (columns, rows) = (self.columns, self.rows);

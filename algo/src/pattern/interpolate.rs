@@ -1,4 +1,4 @@
-//! Values between the samples of a raster: Catmull–Rom along both axes, going on linearly beyond the raster.
+//! Interpolation of a raster: Catmull–Rom along both axes, continued linearly beyond the raster.
 
 /// The value at a point (ξ, η) of `turns`, a raster of `(columns, rows)`, at least two of each.
 #[inline]
@@ -25,14 +25,14 @@ fn anywhere(turns: &[f64], (columns, rows): (usize, usize), (xi, eta): (f64, f64
     down.interpolate(lines)
 }
 
-/// The same where all 16 samples around a point lie on the raster, as they do nearly everywhere: by weights, in less time.
+/// The same where all 16 samples around a point lie on the raster, as they do nearly everywhere; by weights, which is faster.
 #[inline]
 fn inside(turns: &[f64], (columns, rows): (usize, usize), (xi, eta): (f64, f64)) -> Option<f64> {
     let fits = |x: f64, count: usize| x >= 1.0 && x < (count - 2) as f64;
     if !(fits(xi, columns) && fits(eta, rows)) {
         return None;
     }
-    // Both are positive, so that the whole part is the floor; no raster has 2³¹ columns or rows.
+    // Both are positive, so truncation is the floor; no raster has 2³¹ columns or rows.
     let (column, row) = (xi as i32, eta as i32);
     let across = weights(xi - f64::from(column));
     let down = weights(eta - f64::from(row));
@@ -46,7 +46,7 @@ fn inside(turns: &[f64], (columns, rows): (usize, usize), (xi, eta): (f64, f64))
     Some((across[0] * a + across[1] * b) + (across[2] * c + across[3] * d))
 }
 
-/// Sample `i` of a line of `count`, going on linearly beyond both ends.
+/// Sample `i` of a line of `count`, continued linearly beyond both ends.
 #[inline]
 fn extended(i: isize, count: usize, sample: impl Fn(usize) -> f64) -> f64 {
     let last = count as isize - 1;
@@ -70,16 +70,16 @@ fn weights(t: f64) -> [f64; 4] {
     [first, 1.0 - first - third - last, third, last]
 }
 
-/// Where a point lies between two samples of a line.
+/// The position of a point between two samples of a line.
 enum Cell {
-    /// Inside or next to the raster: fraction of the cell, Catmull–Rom.
+    /// In or next to the raster: the fraction of the cell, for Catmull–Rom.
     Within(f64),
-    /// Far outside: the distance from the cell's start, linear.
+    /// Far outside: the distance from the cell's start, for linear continuation.
     Beyond(f64),
 }
 
 impl Cell {
-    /// The sample before `x` on a line of `count` samples, and the place behind it.
+    /// The sample before `x` on a line of `count` samples, and the position after it.
     #[inline]
     fn new(x: f64, count: usize) -> (isize, Self) {
         let floor = libm::floor(x);
@@ -93,7 +93,7 @@ impl Cell {
         }
     }
 
-    /// The value behind taps at −1, 0, 1, 2.
+    /// The value from taps at −1, 0, 1, 2.
     #[inline]
     fn interpolate(&self, [a, b, c, d]: [f64; 4]) -> f64 {
         match *self {

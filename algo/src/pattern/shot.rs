@@ -1,11 +1,11 @@
-//! What one frame shows of a phase function.
+//! The ratio and shift that one frame shows.
 
-/// What one frame shows of a phase function Φ_P: I = I_max/2 · (1 + sin 2π(ratio · Φ_P + shift)).
+/// The ratio and shift at which one frame shows a phase function Φ_P: I = I_max/2 · (1 + sin 2π(ratio · Φ_P + shift)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shot {
     /// Share of the full phase function. Frames of equal ratio form a level.
     pub ratio: f64,
-    /// Phase step in turns.
+    /// Shift in turns.
     pub shift: f64,
 }
 

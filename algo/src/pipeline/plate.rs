@@ -1,7 +1,7 @@
-//! A reference phase map from the phases of a flat plate in the plane z = 0, fitted smoothly.
+//! A reference phase map, fitted to the measured phases of a flat plate in the plane z = 0.
 //!
-//! Φ_R^V and Φ_R^H (Peng & Gupta 2008, eqs. 10–11) tell which projector point lights each camera pixel's point of the plane: ξ =
-//! pitch · Φ_R^V, η = pitch · Φ_R^H. Raw they have the noise of a measurement; a polynomial of degree 6 has a hundredth of it.
+//! Φ_R^V and Φ_R^H (Peng & Gupta 2008, eqs. 10–11) give the projector point that lights each camera pixel's point of the plane:
+//! ξ = pitch · Φ_R^V, η = pitch · Φ_R^H. The measured maps are noisy; a polynomial of degree 6 has a hundredth of their noise.
 
 use super::PhaseMap;
 use crate::geometry::{FittedMap, ReferenceError, fit_map};
@@ -10,27 +10,26 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
 
-/// Pixels that are off the first fit by more than this many times its scatter (dust, scratches) are left out of the second.
+/// Pixels whose residual to the first fit is more than this many times its RMS (dust, scratches) are left out of the second.
 const OUTLIER: f64 = 4.0;
-/// Least share of the frame that the plate must fill: where it does not, the fit extrapolates.
+/// Least share of the frame that the plate must fill: beyond the plate the fit extrapolates.
 const LEAST_FILLED: f64 = 0.6;
-/// Side of the squares over which noise is averaged, so that what is left tells how well the polynomial follows the plate.
+/// Side of the squares over which residuals are averaged, so that noise averages out and the lack of fit remains, pixels.
 const SQUARE: usize = 16;
 
 /// One reference phase map.
 #[derive(Clone, Debug)]
 pub struct Plate {
     fit: FittedMap,
-    /// Scatter of the pixels about the fit, turns: noise.
+    /// RMS of the pixels about the fit, turns: noise.
     pub noise_turns: f64,
-    /// Estimated RMS error of the fit, turns: its lack of fit, from the means of squares of pixels, and the noise that is left in
-    /// its coefficients.
+    /// Estimated RMS error of the fit, turns: its lack of fit, and the noise of its coefficients.
     pub residual_turns: f64,
-    /// Share of the frame that it was fitted to.
+    /// Share of the frame with samples.
     pub filled: f64,
 }
 
-/// Phases that are not those of a plate.
+/// Phases that cannot be those of a plate.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum PlateError {
@@ -39,7 +38,7 @@ pub enum PlateError {
         /// The share that is.
         filled: f64,
     },
-    /// What is resolved does not determine the fit.
+    /// The resolved pixels do not determine the fit.
     Fit(ReferenceError),
 }
 
@@ -62,7 +61,7 @@ impl Plate {
     /// Fits the phases of a plate.
     ///
     /// # Errors
-    /// If too little of the frame is resolved, or what is does not determine the fit.
+    /// If too little of the frame is resolved, or the resolved pixels do not determine the fit.
     pub fn fit(phases: &PhaseMap) -> Result<Self, PlateError> {
         let width = phases.width.max(1);
         let height = phases.phase.len() / width;
@@ -85,7 +84,7 @@ impl Plate {
         let fit = fit_map(width, height, kept.iter().copied()).map_err(PlateError::Fit)?;
         let noise_turns = fit.residual();
         let lack = lack_of_fit(&fit, &kept, width, height);
-        // Of 28 coefficients, each takes one part in N of the noise.
+        // 28 coefficients, each with 1/N of the noise's variance.
         let left = noise_turns * libm::sqrt(28.0 / kept.len() as f64);
         Ok(Self {
             fit,
@@ -107,13 +106,13 @@ impl Plate {
     }
 }
 
-/// Lack of fit, RMS: the mean square deviation of the means of squares of pixels, less what noise contributes to it.
+/// Lack of fit, RMS: the mean square of the squares' mean residuals, less the contribution of noise.
 fn lack_of_fit(fit: &FittedMap, samples: &[(f64, f64, f64)], width: usize, height: usize) -> f64 {
     let across = width.div_ceil(SQUARE);
     let mut squares = vec![(0.0, 0.0, 0.0); across * height.div_ceil(SQUARE)];
     for &(u, v, turns) in samples {
         let off = turns - fit.at(u, v);
-        // Pixels of the frame: whole numbers inside it.
+        // u and v are whole numbers inside the frame.
         let square = &mut squares[v as usize / SQUARE * across + u as usize / SQUARE];
         *square = (square.0 + 1.0, square.1 + off, square.2 + off * off);
     }
@@ -149,7 +148,7 @@ mod tests {
         3.0 + 0.1 * u + 0.02 * v + 1e-4 * u * v
     }
 
-    /// A plate whose first rows are not resolved and whose pixels are off by noise.
+    /// A noisy plate whose first rows are not resolved.
     fn plate(unresolved_rows: usize) -> PhaseMap {
         let mut random = SplitMix64::seed_from_u64(3);
         let mut phases = PhaseMap::new(SIDE, SIDE);

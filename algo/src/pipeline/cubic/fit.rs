@@ -1,24 +1,24 @@
-//! The cubic of one pixel: least squares over exact phases at heights around the known one.
+//! Fits the cubic of one pixel, by least squares to exact phases at heights around the known one.
 
 use super::REACH_UNIT;
 use crate::geometry::{Sight, Triangulator};
 use crate::units::{AbsolutePhase, Height};
 use core::ops::Range;
 
-/// Coefficients of y² and y³ are stored in units of this many nm: their rounding is below 0.05 µm each.
+/// Unit of the stored coefficients of y² and y³, nm: rounding is below 0.05 µm each.
 pub(super) const UNIT_NM: f64 = 100.0;
 /// The farthest a cubic is used from the known height, mm: offsets in nm are rounded in single precision below 2²².
 const MAX_RISE_MM: f64 = 4.1;
-/// A cubic is off an exact height by at most this many mm. A fifth of the largest error that is allowed, as between the
-/// nodes it may be larger; its RMS is far smaller.
+/// Largest error of a cubic at its nodes, mm: a fifth of the largest error that is allowed anywhere, because between the
+/// nodes it may be larger. Its RMS is far smaller.
 const MAX_MISS_MM: f64 = 1e-3;
-/// Heights whose phases the cubic is fitted to, as shares of the step that the slope at the known height predicts for the
-/// whole range. The pattern's samples lie closer than the nodes at no pitch above 4 px per turn.
+/// Offsets to which the cubic is fitted, as shares of the offset that the slope at the known height predicts for the
+/// range. At no pitch above 4 px per turn do the pattern's samples lie closer together than these nodes.
 const NODES: [f64; 6] = [-1.06, -0.76, -0.34, 0.34, 0.76, 1.06];
 const LAST: usize = NODES.len() - 1;
-/// Step of the first slope, mm.
+/// Step of the difference quotient of the slope at the known height, mm.
 const SLOPE_STEP: f64 = 0.05;
-/// How often the range is halved until a cubic fits.
+/// How many times the range is halved at most until a cubic fits.
 const HALVINGS: usize = 4;
 
 /// A pixel's cubic as it is stored.
@@ -43,7 +43,7 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Works out an unknown phase of pixel (u, v) from its height.
+    /// Computes the phase of pixel (u, v) from its height, if it is not known.
     pub fn complete(&self, (u, v): (usize, usize), phase: &mut AbsolutePhase, height: Height) {
         if !phase.is_known() {
             let found = self
@@ -53,7 +53,8 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// The phases of some columns of row `v`, none of which is known, in proportion between those of the outermost two.
+    /// Computes the phases of columns of row `v`, none of which is known: the outermost two from their heights, the others by linear
+    /// interpolation.
     pub fn between(
         &self,
         v: usize,
@@ -81,8 +82,8 @@ impl<'a> Fitting<'a> {
         known.then(|| self.triangulator.sight(u as f64, v as f64))?
     }
 
-    /// The cubic about phase and height of pixel (u, v); `None` where neither the range nor a sixteenth of it has one. An
-    /// unknown phase becomes that of the height.
+    /// The cubic about phase and height of pixel (u, v); `None` if none fits, not even over a sixteenth of the range. An
+    /// unknown phase is computed from the height.
     pub fn cubic(
         &self,
         (u, v): (usize, usize),
@@ -114,7 +115,7 @@ impl<'a> Fitting<'a> {
         None
     }
 
-    /// The cubic through the known point that fits heights up to `step` mm away, if it fits them well enough.
+    /// The cubic through the known point that is fitted to offsets up to `step` mm, if its error is small enough.
     fn fit(&self, sight: &Sight<'_>, (phase, height): (f64, f64), step: f64) -> Option<Cubic> {
         let share = 1.0 / self.range;
         let mut nodes = [(0.0, 0.0); NODES.len()];
@@ -128,7 +129,7 @@ impl<'a> Fitting<'a> {
             .windows(2)
             .all(|pair| (pair[1].0 > pair[0].0) == rising && pair[1].0 != pair[0].0);
         let reach = libm::fabs(ends[0]).min(libm::fabs(ends[1])).min(1.0) * self.range;
-        // Positive and below 128: its whole part is what a byte holds.
+        // Positive and below 128, so a byte holds its whole part.
         let reach = (reach / REACH_UNIT + 1e-9) as u8;
         if !(monotone && ends[0] * ends[1] < 0.0 && reach >= 1) {
             return None;
@@ -141,14 +142,14 @@ impl<'a> Fitting<'a> {
             reach,
         };
         let fits = nodes.iter().all(|&(y, offset)| {
-            // Also catches what is not finite.
+            // False for NaN as well.
             libm::fabs(cubic.offset(y) - offset) <= MAX_MISS_MM
         });
         fits.then_some(cubic)
     }
 }
 
-/// A coefficient in its units, if they hold it.
+/// A coefficient in units of [`UNIT_NM`], if it fits.
 fn stored(mm: f64) -> Option<i16> {
     let units = mm * (1e6 / UNIT_NM);
     let inside = libm::fabs(units) <= f64::from(i16::MAX);

@@ -1,8 +1,9 @@
 //! Height offsets from a known surface: z − z₀ as a cubic of Φ − Φ₀, planned for every pixel.
 //!
-//! The cubic is fitted to exact evaluations of Φ(z) on the pixel's line of sight, and holds within the pixel's own
-//! reach: the largest |Φ − Φ₀| up to the declared range for which it stays next to the exact height. Further away, and
-//! where there is no such cubic, the height is found by the exact solution. A pixel takes 9 bytes beside Φ₀ and z₀.
+//! With y = (Φ − Φ₀) / range: z − z₀ = a y + b y² + c y³, a least-squares fit to exact evaluations of Φ(z) on the pixel's line of
+//! sight (`fit.rs`). Each cubic is used within the pixel's own reach, the largest |Φ − Φ₀| up to the declared range for which it
+//! is within 1 µm of the exact height at the fitted points. Further away, and where no cubic fits, the exact triangulation is
+//! used. A pixel takes 9 bytes beside Φ₀ and z₀.
 
 mod fit;
 mod near;
@@ -23,7 +24,7 @@ use alloc::vec::Vec;
 use fit::Fitting;
 use near::Near;
 
-/// A surface that is known beforehand, row-major.
+/// A known surface, row-major: its phases and heights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownSurface {
     /// Pixels per row.
@@ -38,14 +39,14 @@ pub struct KnownSurface {
 #[derive(Clone, Debug)]
 pub struct HeightCubics {
     surface: KnownSurface,
-    /// The declared range in turns, of which y = 1 is the end.
+    /// The declared range in turns: |Φ − Φ₀| at y = 1.
     range: f64,
     /// Coefficient of y, nm.
     first: Vec<f32>,
     /// Coefficients of y² and y³, units of [`fit::UNIT_NM`].
     second: Vec<i16>,
     third: Vec<i16>,
-    /// |Φ − Φ₀| below which the cubic holds, units of [`REACH_UNIT`] turns.
+    /// |Φ − Φ₀| below which the cubic is used, units of [`REACH_UNIT`] turns; 0 without a cubic.
     reach: Vec<u8>,
 }
 
@@ -57,8 +58,8 @@ const MAX_RANGE: f64 = 127.0 * REACH_UNIT;
 impl HeightCubics {
     /// Plans the pixels inside `window` for |Φ − Φ₀| up to `range` turns (or a little less than a turn).
     ///
-    /// Where z₀ is known and Φ₀ is not, Φ₀ is worked out: exactly up to `around` pixels from the next place where it is
-    /// known, further away, where nothing is expected and there is no cubic, for every few pixels.
+    /// Where z₀ is known and Φ₀ is not, Φ₀ is computed from z₀: exactly within `around` pixels of a pixel where it is known;
+    /// further away, where nothing is expected and there are no cubics, interpolated between exact values.
     pub fn new(
         triangulator: &Triangulator,
         surface: KnownSurface,
@@ -116,7 +117,7 @@ impl HeightCubics {
         cubics
     }
 
-    /// Bytes that it takes.
+    /// Its size in memory, bytes.
     pub fn bytes(&self) -> usize {
         let surface = size_of_val(&*self.surface.phase) + size_of_val(&*self.surface.height);
         let cubics = size_of_val(&*self.first) + size_of_val(&*self.second);
@@ -133,7 +134,7 @@ impl HeightCubics {
         self.range
     }
 
-    /// The largest |Φ − Φ₀| in turns that the cubic of a place (row-major) is used for, 0 where it has none.
+    /// The largest |Φ − Φ₀| in turns for which the cubic of a pixel (row-major index) is used, 0 where there is none.
     pub fn reach(&self, place: usize) -> f64 {
         f64::from(self.reach[place]) * REACH_UNIT
     }
@@ -166,21 +167,21 @@ impl HeightCubics {
         }
     }
 
-    /// y of a phase at a place, if the cubic reaches it.
+    /// y of a pixel's phase, if it is within the cubic's reach.
     fn share(&self, place: usize, phase: AbsolutePhase) -> Option<f64> {
         let base = self.surface.phase[place];
         let delta = (phase - base).turns();
         (base.is_known() && libm::fabs(delta) < self.reach(place)).then(|| delta / self.range)
     }
 
-    /// ∂z/∂Φ in mm per turn, where the cubic of a place reaches the phase.
+    /// ∂z/∂Φ in mm per turn at a pixel's phase, if it is within the cubic's reach.
     pub fn slope(&self, place: usize, phase: AbsolutePhase) -> Option<f64> {
         let y = self.share(place, phase)?;
         let [first, second, third] = self.coefficients(place);
         Some((first + y * (2.0 * second + y * 3.0 * third)) / self.range)
     }
 
-    /// A height in mm that is near that of a phase, as far as the cubic's slope at the known height tells.
+    /// A height in mm near that of a pixel's phase, by the cubic's slope at the known height; `None` beyond twice the range.
     pub fn near(&self, place: usize, phase: AbsolutePhase) -> Option<f64> {
         let (base, height) = (self.surface.phase[place], self.surface.height[place]);
         let known = base.is_known() && height.is_known() && self.reach[place] > 0;
@@ -189,7 +190,7 @@ impl HeightCubics {
             .then(|| height.mm() + delta / self.range * self.coefficients(place)[0])
     }
 
-    /// Of y, y² and y³ in mm.
+    /// Coefficients of y, y² and y³ in mm.
     fn coefficients(&self, place: usize) -> [f64; 3] {
         [
             f64::from(self.first[place]),

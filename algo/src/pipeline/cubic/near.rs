@@ -1,4 +1,4 @@
-//! Which parts of a frame lie near a known surface: the others need no cubics of their own.
+//! Which blocks of a frame lie near pixels of a known surface. The other blocks need no cubics.
 
 use super::KnownSurface;
 use alloc::vec;
@@ -8,7 +8,7 @@ use core::ops::Range;
 /// Side of a block in pixels.
 const SIDE: usize = 16;
 
-/// Square blocks of pixels, and whether something is known of one or of those around it.
+/// Square blocks of pixels, each with whether it or a block near it contains a known pixel.
 pub(super) struct Near {
     width: usize,
     columns: usize,
@@ -16,7 +16,7 @@ pub(super) struct Near {
 }
 
 impl Near {
-    /// Of a surface, with at least `around` pixels around what is known of it.
+    /// For a surface: every pixel within `around` pixels of a known one is in a near block.
     pub fn new(surface: &KnownSurface, around: usize) -> Self {
         let width = surface.width.max(1);
         let columns = width.div_ceil(SIDE);
@@ -43,7 +43,7 @@ impl Near {
         }
     }
 
-    /// The columns of each block that row `v` runs through, and whether it is near.
+    /// The columns of each block along row `v`, and whether the block is near.
     pub fn row(&self, v: usize) -> impl Iterator<Item = (Range<usize>, bool)> {
         let blocks = &self.blocks[v / SIDE * self.columns..][..self.columns];
         let starts = (0..self.width).step_by(SIDE);

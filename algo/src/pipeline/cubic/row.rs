@@ -14,7 +14,7 @@ use core::ops::Range;
 pub(crate) const COMPARED: u16 = 1 << 15;
 /// The bit that says that it is compared at the pixels to the right, below and right below as well.
 pub(crate) const SQUARE: u16 = 1 << 14;
-/// The bits of σ.
+/// Bits of [`CubicInput::taught`]: σ of golden's height.
 pub(crate) const SIGMA: u16 = SQUARE - 1;
 /// Variances are summed in units of the square of this many nm, each rounded to nearest.
 pub(crate) const VARIANCE_UNIT_NM: f64 = 512.0;
@@ -22,9 +22,9 @@ pub(crate) const VARIANCE_UNIT_NM: f64 = 512.0;
 const SIGMAS_PER_UNIT_BITS: u32 = 4;
 /// Half of the square of [`VARIANCE_UNIT_NM`], in squares of these.
 const HALF: u32 = 1 << (2 * SIGMAS_PER_UNIT_BITS - 1);
-/// The largest variance that is summed, (1 mm)²: no sum over a block exceeds 32 bits.
+/// Larger variances count as this, about (1 mm)², so that no sum over a block exceeds 32 bits.
 const MAX_VARIANCE: f32 = 4_000_000.0;
-/// Pixels that are skipped together where none is resolved; sums over so many fit into 32 bits.
+/// Pixels per block: skipped together where none is resolved; sums over a block fit 32 bits.
 const BLOCK: usize = 128;
 /// Pixels that one prefetch hint covers.
 const FETCHED: usize = 32;
@@ -40,13 +40,13 @@ pub(crate) struct CubicRow<'a> {
     pub second: &'a [i16],
     /// Coefficient of y³.
     pub third: &'a [i16],
-    /// How far the cubic holds.
+    /// Reach of the cubic, 1/128 turn.
     pub reach: &'a [u8],
     /// The phase of y = 1, turns.
     pub range: f64,
 }
 
-/// A decoded row and what else is known of its pixels.
+/// A decoded row, with what is taught of its pixels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CubicInput<'a> {
     /// Φ.
@@ -55,7 +55,7 @@ pub(crate) struct CubicInput<'a> {
     pub modulation: &'a [Modulation],
     /// Which pixels are resolved.
     pub trust: &'a [Trust],
-    /// σ of golden's heights in 32 nm ([`SIGMA`]), 0 where not known; [`COMPARED`] where the part is compared with golden.
+    /// σ of golden's height in 32 nm ([`SIGMA`]), 0 where not known; [`COMPARED`] and [`SQUARE`].
     pub taught: &'a [u16],
     /// σ_z² = `noise` · (∂z/∂y)² / B², in units of [`VARIANCE_UNIT_NM`]².
     pub noise: f32,
@@ -70,7 +70,7 @@ pub(crate) struct CubicOutput<'a> {
     pub deviation: &'a mut [i32],
     /// Sums.
     pub tally: &'a mut HeightTally,
-    /// Columns outside of which no pixel is resolved.
+    /// Columns that contain all resolved pixels, in whole blocks.
     pub extent: &'a mut Range<usize>,
 }
 
@@ -251,7 +251,7 @@ fn sum_columns<V: Lanes>(
     }
 }
 
-/// y of one unit of a phase's bits.
+/// y per unit of a phase difference's bits.
 #[inline(always)]
 fn scale(range: f64) -> f32 {
     (1.0 / (range * 65_536.0)) as f32
