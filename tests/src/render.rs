@@ -242,3 +242,26 @@ pub fn levels(ratios: &[f64], shifts: usize) -> Vec<(f64, f64)> {
         .flat_map(|&ratio| (0..shifts).map(move |k| (ratio, k as f64 / shifts as f64)))
         .collect()
 }
+
+/// A recording of few pixels, with every optional part.
+pub fn small_recording(bit_depth: u8, ratios: &[f64]) -> Recording {
+    let (columns, rows) = (32, 24);
+    let turns = (0..rows * columns).map(|at| f64::from(at % columns) + f64::from(at) / 999.0);
+    let sampled = PatternSpec::File {
+        rows: rows as usize,
+        columns: columns as usize,
+        turns: turns.collect(),
+    };
+    let scene = Scene {
+        size: 12,
+        bit_depth,
+        projector: (columns, rows),
+        patterns: vec![PatternSpec::Vertical { fringes: 30.0 }, sampled],
+        patches: false,
+        ..Scene::new(0.0, levels(ratios, 3))
+    };
+    let mut recording = scene.record();
+    recording.noise_counts = Some(3.7);
+    recording.exposure_us = Some(1e4);
+    recording
+}

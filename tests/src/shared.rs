@@ -1,12 +1,20 @@
-//! The shared recordings beside the project, and the marks of tests that were skipped for want of them.
+//! The shared recordings beside the project, and a mark for each test that is skipped because they are absent.
 
 use hal::replay::Recording;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::{env, fs, thread};
+
+/// The root of the workspace.
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("this package lies in the workspace")
+        .to_path_buf()
+}
 
 /// The folder of the shared recordings.
 pub fn recordings() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/recordings")
+    root().join("../shared/recordings")
 }
 
 /// The folder of a shared recording. If it is absent, returns none and marks the calling test as skipped.

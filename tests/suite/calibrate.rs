@@ -1,11 +1,12 @@
 //! `fringed calibrate` on simulated heads: it measures the values of the scenario, and its files survive a kill.
 
+use crate::written::{FRINGED, program};
 use appliance::head::calibration::place::Place;
 use serde_json::Value;
 use sim::Scenario;
 use std::fs;
 use std::path::Path;
-use tests::program::{Program, Run};
+use tests::program::Run;
 use tests::small_head::SMALL_HEAD as HEAD;
 
 /// Largest error of the response, levels of 255.
@@ -14,10 +15,6 @@ const RESPONSE_TOLERANCE: f64 = 1.0;
 const NOISE_TOLERANCE: f64 = 0.05;
 /// Largest error of the reference plane, turns.
 const RESIDUAL_TOLERANCE: f64 = 5e-4;
-
-fn program() -> Program {
-    Program::at(env!("CARGO_BIN_EXE_fringed-under-test"))
-}
 
 /// Calibrates a head of this scenario into the state folder in `folder`.
 fn calibrate(folder: &Path, scenario: &str, more: &[&str]) -> Run {
@@ -294,7 +291,7 @@ fn kill_9_while_it_is_written_leaves_the_old_calibration_or_the_new_one() {
         // The noise differs each time, so every file changes.
         let scenario = format!("{HEAD}[noise]\nseed = {changes}\n");
         fs::write(folder.path().join("scenario.toml"), scenario).unwrap();
-        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_fringed-under-test"))
+        let mut child = std::process::Command::new(FRINGED)
             .args(["calibrate", "--quiet", "--state"])
             .arg(folder.path().join("state"))
             .arg("--scenario")

@@ -1,8 +1,8 @@
 //! The station uses the stored calibration: CALIBRATION_VALID, recipes of another calibration, no guessed values.
 
 use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, trigger};
+use crate::written::program;
 use std::fs;
-use tests::program::Program;
 
 /// Bit 15 of STATUS, and the RECIPE_RESULT "made for another calibration".
 const CALIBRATION_VALID: u16 = 1 << 15;
@@ -13,7 +13,7 @@ const FAIL: u16 = 2;
 #[test]
 fn the_station_measures_by_the_stored_calibration_and_by_no_other() {
     let place = Place::new();
-    let program = Program::at(env!("CARGO_BIN_EXE_fringed-under-test"));
+    let program = program();
     let config = place.path("fringed.toml");
     let scenario = place.path("small.toml");
     let head = fs::read_to_string(&scenario).unwrap();

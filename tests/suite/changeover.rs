@@ -1,6 +1,7 @@
 //! A production line that changes its part between triggers: the verdict always comes from the selected recipe.
 
 use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, TRIGGER, long, trigger};
+use crate::written::program;
 use appliance::head::calibration::Calibration;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::{Store, archive};
@@ -226,9 +227,8 @@ const MANY: u16 = 5;
 fn recipes_at_full_resolution_are_switched_within_a_second() {
     let place = Place::new();
     fs::write(place.path("small.toml"), FULL_HEAD).unwrap();
-    let taught = tests::program::Program::at(env!("CARGO_BIN_EXE_fringed-under-test"));
     let config = place.path("fringed.toml");
-    taught
+    program()
         .run(&[
             "teach",
             "--number",

@@ -1,18 +1,19 @@
 //! `fringed doctor` on the simulated head: a head without faults passes, and of each single fault only that fault is reported.
 
+use crate::written::program;
 use appliance::head::calibration::Calibration;
 use appliance::head::doctor::{Verdict, examine};
 use hal::head::Timing;
 use serde_json::Value;
 use sim::Scenario;
 use std::path::Path;
-use tests::program::{Program, Run};
+use tests::program::Run;
 use tests::small_head::SMALL_HEAD as HEAD;
 
 fn doctor(folder: &Path, scenario: &str) -> Run {
     let path = folder.join("scenario.toml");
     std::fs::write(&path, scenario).unwrap();
-    Program::at(env!("CARGO_BIN_EXE_fringed-under-test")).run(&[
+    program().run(&[
         "doctor",
         "--quiet",
         "--json",
@@ -152,7 +153,7 @@ fn a_compressed_format_is_examined_and_not_measured_with() {
         format!("[head]\nbackend = \"sim\"\nscenario = {scenario:?}\n"),
     )
     .unwrap();
-    let run = Program::at(env!("CARGO_BIN_EXE_fringed-under-test")).run(&[
+    let run = program().run(&[
         "record",
         folder.path().join("out").to_str().unwrap(),
         "--config",
@@ -171,11 +172,7 @@ fn a_recording_cannot_be_examined() {
         "[head]\nbackend = \"replay\"\nrecordings = [\"somewhere\"]\n",
     )
     .unwrap();
-    let run = Program::at(env!("CARGO_BIN_EXE_fringed-under-test")).run(&[
-        "doctor",
-        "--config",
-        config.to_str().unwrap(),
-    ]);
+    let run = program().run(&["doctor", "--config", config.to_str().unwrap()]);
     assert_eq!(run.code, 64, "{}", run.stderr);
     assert!(run.stderr.contains("--scenario"), "{}", run.stderr);
 }

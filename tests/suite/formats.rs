@@ -1,14 +1,14 @@
 //! The files that the program reads and writes are as documented.
 
 use crate::station_plc::{Daemon, Place};
+use crate::written::program;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
-use tests::program::Program;
+use tests::shared::root;
 
 fn document(name: &str) -> String {
-    let path = format!("{}/../docs/{name}", env!("CARGO_MANIFEST_DIR"));
-    fs::read_to_string(path).unwrap()
+    fs::read_to_string(root().join("docs").join(name)).unwrap()
 }
 
 /// Members of a recipe, version 1. If this fails, do not change the test: old files must stay readable.
@@ -176,8 +176,7 @@ fn every_documented_gauge_is_read_and_written_as_it_stands_there() {
 
 #[test]
 fn the_documentation_holds_the_register_map() {
-    let program = Program::at(env!("CARGO_BIN_EXE_fringed-under-test"));
-    let json = program.run(&["registers", "--json"]).succeeded().stdout;
+    let json = program().run(&["registers", "--json"]).succeeded().stdout;
     let json: Value = serde_json::from_str(&json).unwrap();
     let documented = document("modbus.md");
     let mut block = String::new();
@@ -290,7 +289,7 @@ const CALIBRATION: [&str; 63] = [
 fn a_calibration_has_exactly_the_documented_keys() {
     let place = Place::new();
     let config = place.path("fringed.toml");
-    Program::at(env!("CARGO_BIN_EXE_fringed-under-test"))
+    program()
         .run(&["calibrate", "--quiet", "--config", config.to_str().unwrap()])
         .succeeded();
     let text = fs::read_to_string(place.path("state/calibration/calibration.json")).unwrap();

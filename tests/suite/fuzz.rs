@@ -5,13 +5,12 @@
 use crate::written::{Written, geometric};
 use appliance::measure::measure;
 use hal::replay::Recording;
-use hal::replay::recording::PatternSpec;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use tests::files;
 use tests::random::Random;
-use tests::render::{Scene, levels};
+use tests::render::{Scene, levels, small_recording};
 
 const SEED: u64 = 20_260_401;
 /// Cases of each kind of damage.
@@ -53,28 +52,6 @@ const NUMBERS: [&str; 28] = [
 /// Ratios of a geometric, a dense and a single sequence.
 const FORMS: [&[f64]; 3] = [&[0.03, 0.2, 1.0], &[1.0, 35.0 / 36.0, 5.0 / 6.0], &[1.0]];
 
-/// A recording of few pixels, with every optional part.
-fn small(ratios: &[f64]) -> Recording {
-    let (columns, rows) = (32, 24);
-    let turns = (0..rows * columns).map(|at| f64::from(at % columns) + f64::from(at) / 999.0);
-    let sampled = PatternSpec::File {
-        rows: rows as usize,
-        columns: columns as usize,
-        turns: turns.collect(),
-    };
-    let scene = Scene {
-        size: 12,
-        projector: (columns, rows),
-        patterns: vec![PatternSpec::Vertical { fringes: 30.0 }, sampled],
-        patches: false,
-        ..Scene::new(0.0, levels(ratios, 3))
-    };
-    let mut recording = scene.record();
-    recording.noise_counts = Some(3.7);
-    recording.exposure_us = Some(1e4);
-    recording
-}
-
 /// Whether a folder can be opened and measured without a panic; the result does not matter.
 fn survives(case: u64, folder: &Path, damage: &str) -> bool {
     outcome(folder).unwrap_or_else(|| panic!("case {case} panicked: {damage}"))
@@ -106,7 +83,7 @@ fn damaged_bytes_never_panic() {
     let mut random = Random::new(SEED);
     let mut measured = 0;
     for ratios in FORMS {
-        let written = Written::new(&small(ratios));
+        let written = Written::new(&small_recording(8, ratios));
         let all = every_file(&written.recording());
         assert!(all.len() > 9, "{all:?}");
         for case in 0..BYTE_CASES / 3 {
@@ -170,7 +147,7 @@ fn is_ratio(text: &str, place: &std::ops::Range<usize>) -> bool {
 fn ratios_of_any_size_never_panic() {
     let mut panicked = Vec::new();
     for ratios in FORMS {
-        let written = Written::new(&small(ratios));
+        let written = Written::new(&small_recording(8, ratios));
         let whole = fs::read_to_string(written.manifest()).unwrap();
         let places = numbers(&whole);
         for number in NUMBERS {
@@ -198,7 +175,7 @@ fn extreme_numbers_never_panic() {
     let mut random = Random::new(SEED + 1);
     let mut measured = 0;
     for ratios in FORMS {
-        let written = Written::new(&small(ratios));
+        let written = Written::new(&small_recording(8, ratios));
         let whole = fs::read_to_string(written.manifest()).unwrap();
         // Another test is for ratios.
         let mut places = numbers(&whole);

@@ -3,15 +3,9 @@
 use crate::written::{laboratory, program};
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tests::files;
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .unwrap()
-        .to_path_buf()
-}
+use tests::shared::root;
 
 /// The first cell of each table row below a heading of the operations guide.
 fn first_cells(heading: &str) -> Vec<String> {

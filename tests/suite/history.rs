@@ -2,20 +2,16 @@
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, READY, long, trigger};
+use crate::written::program;
 use appliance::history::{Entry, Filter, Reader, Writer};
 use appliance::station::Verdict;
 use std::fs;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use tests::program::Program;
 use tests::random::Random;
 
 /// Longest wait for the history's own threads.
 const WRITTEN: Duration = Duration::from_secs(30);
-
-pub(crate) fn program() -> Program {
-    Program::at(env!("CARGO_BIN_EXE_fringed-under-test"))
-}
 
 pub(crate) fn reader(place: &Place) -> Reader {
     Reader::of(&place.path("state"))

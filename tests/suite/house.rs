@@ -1,19 +1,13 @@
 //! The project's plan: which code may import which. Each test fails with the text of its rule.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tests::files;
+use tests::shared::root;
 
 /// Longest file, in lines without tests. Files have 100–300 lines and one concept each; at this length
 /// a file clearly has two.
 const MAX_LINES: usize = 450;
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .unwrap()
-        .to_path_buf()
-}
 
 /// A source file: its path from the root, and its text.
 struct Source {

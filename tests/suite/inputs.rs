@@ -3,10 +3,11 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tests::files;
 use tests::fuzz::{TARGETS, Target};
 use tests::random::Random;
+use tests::shared::root;
 
 const SEED: u64 = 20_261_122;
 /// Damaged copies of each input.
@@ -15,9 +16,7 @@ const COPIES: usize = 4;
 const MOST: usize = 300_000;
 
 fn folder(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("fuzz")
-        .join(name)
+    root().join("tests/fuzz").join(name)
 }
 
 /// Names and contents of the inputs of a target; empty if the folder does not exist.

@@ -1,8 +1,9 @@
 //! A recording that a station kept is judged again, and replayed as a head.
 
-use crate::history::{place_with_a_dent, program, reader, recording};
+use crate::history::{place_with_a_dent, reader, recording};
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, long};
+use crate::written::{FRINGED, program};
 use appliance::recipe::archive;
 use appliance::station::Verdict;
 use std::fs;
@@ -10,6 +11,7 @@ use std::path::Path;
 use std::process::Command;
 use tests::files;
 use tests::program::Run;
+use tests::shared::root;
 
 /// Word of VERDICT.
 const FAIL: u16 = 2;
@@ -153,9 +155,7 @@ fn project(recipe: &Path, production: usize) {
 
 #[test]
 fn a_kept_fail_plays_as_a_head_to_test_a_plc_with_by_the_documented_commands() {
-    let documented =
-        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/modbus.md"))
-            .unwrap();
+    let documented = fs::read_to_string(root().join("docs/modbus.md")).unwrap();
     // A taught recipe projects all frames. If it starts with the shortest sequence, the head that measured had the patterns of others too.
     for production in [None, Some(0)] {
         let place = place_with_a_dent();
@@ -189,7 +189,7 @@ fn a_kept_fail_plays_as_a_head_to_test_a_plc_with_by_the_documented_commands() {
         // The commands run in the folder of the configuration.
         let elsewhere = Place::new();
         fs::write(elsewhere.path("test.toml"), block("toml")).unwrap();
-        let typed = import.replace("fringed", env!("CARGO_BIN_EXE_fringed-under-test"));
+        let typed = import.replace("fringed", FRINGED);
         let mut words = typed.split_whitespace();
         let imported = Command::new(words.next().unwrap())
             .args(words)

@@ -1,12 +1,11 @@
 //! The limits that teaching sets: good parts are within them, as predicted, and dents are not.
 
-use super::placement::{Bed, TIMEOUT, bed};
+use super::placement::{Bed, TIMEOUT, bed, taught_within};
 use algo::geometry::Vector;
 use algo::units::Height;
 use appliance::recipe::Recipe;
 use appliance::recipe::good_parts::GoodPartsFile;
 use appliance::recipe::plan::Plan;
-use appliance::recipe::teach::{Naming, teach};
 use appliance::station::{Inspection, Verdict};
 use sim::parts::{Defect, Flowerpot, SheetMetal};
 use sim::{Part, Placement, Scenario};
@@ -61,15 +60,7 @@ fn line(scenario: &Scenario) -> Line {
 /// A head, and what it was taught of the part in front of it.
 fn taught(scenario: &Scenario) -> (Bed, Recipe, GoodPartsFile) {
     let mut bed = bed(scenario);
-    let naming = Naming {
-        number: 1,
-        part_number: "P".into(),
-        name: "part".into(),
-        taught_at_unix_s: 0,
-        placement_tolerance_mm: 3.0,
-    };
-    let (head, calibration) = (&mut bed.head, &bed.calibration);
-    let taught = teach(head, calibration, &naming, TIMEOUT, &|_, _| ()).unwrap();
+    let taught = taught_within(&mut bed, 3.0).unwrap();
     let predicted = taught.file.good_parts.unwrap();
     let words = predicted.words();
     assert!(

@@ -45,12 +45,20 @@ pub(crate) fn scenario(part: Part) -> Scenario {
 }
 
 pub(crate) fn taught(bed: &mut Bed) -> Result<TaughtRecipe, String> {
+    taught_within(bed, TOLERANCE_MM)
+}
+
+/// Teaches the part with this placement tolerance.
+pub(crate) fn taught_within(
+    bed: &mut Bed,
+    placement_tolerance_mm: f64,
+) -> Result<TaughtRecipe, String> {
     let naming = Naming {
         number: 1,
         part_number: "P".into(),
         name: "part".into(),
         taught_at_unix_s: 0,
-        placement_tolerance_mm: TOLERANCE_MM,
+        placement_tolerance_mm,
     };
     teach(
         &mut bed.head,

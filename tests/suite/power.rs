@@ -1,6 +1,7 @@
 //! Losses of power: after every file operation of a run the files are opened as a power loss may leave them, with the unsynced data complete, missing, or partly there.
 
 use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, STOPPING, command, long};
+use crate::written::FRINGED;
 use appliance::history::{self, Bounds, Filter, Numbering, Reader};
 use appliance::recipe::Store;
 use appliance::recipe::archive;
@@ -79,7 +80,7 @@ impl Run {
 
     /// Runs a command that changes recipes.
     fn recipe(&mut self, number: usize, arguments: &[&str], told: Told) {
-        let mut plain = Command::new(env!("CARGO_BIN_EXE_fringed-under-test"));
+        let mut plain = Command::new(FRINGED);
         plain
             .arg("recipe")
             .args(arguments)

@@ -1,9 +1,9 @@
 //! Repeatability of gauges compared with their own prediction, and detection of defects among good parts at random placements.
 
 use super::gauges::{all_kinds, frames, gauge, plan, regions};
-use super::placement::{Bed, TIMEOUT, bed};
+use super::placement::{Bed, bed, taught_within};
 use appliance::recipe::plan::Plan;
-use appliance::recipe::teach::{Naming, TaughtRecipe, teach};
+use appliance::recipe::teach::TaughtRecipe;
 use appliance::recipe::{GaugeKind, RecipeFile, SequenceKind};
 use appliance::station::{Inspection, Verdict};
 use sim::parts::{Defect, SheetMetal};
@@ -34,21 +34,7 @@ fn small() -> (Bed, TaughtRecipe) {
     (camera.width, camera.height, camera.fov_deg) = (320, 240, [20.0, 15.0]);
     scenario.sub_rays = 2;
     let mut bed = bed(&scenario);
-    let naming = Naming {
-        number: 1,
-        part_number: "P".into(),
-        name: "part".into(),
-        taught_at_unix_s: 0,
-        placement_tolerance_mm: TOLERANCE_MM,
-    };
-    let taught = teach(
-        &mut bed.head,
-        &bed.calibration,
-        &naming,
-        TIMEOUT,
-        &|_, _| (),
-    )
-    .unwrap();
+    let taught = taught_within(&mut bed, TOLERANCE_MM).unwrap();
     (bed, taught)
 }
 

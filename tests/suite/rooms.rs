@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tests::files;
+use tests::shared::root;
 
 /// The rooms from top to bottom. A room imports only rooms on lines below its own.
 const ORDER: [&[&str]; 13] = [
@@ -53,10 +54,7 @@ struct Import {
 }
 
 fn source() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .unwrap()
-        .join("appliance/src")
+    root().join("appliance/src")
 }
 
 /// Collects all Rust files in a folder, without those for tests only.

@@ -3,6 +3,7 @@
 use crate::station_plc::{
     Daemon, ONLINE, PATIENCE, Place, Plc, READY, SMALL_HEAD, STOPPING, command,
 };
+use crate::written::{FRINGED, program};
 use std::fs::{self, File};
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -11,7 +12,6 @@ use std::os::unix::net::UnixDatagram;
 use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use tests::program::Program;
 
 /// Silence that these managers treat as a hang; the daemon reports after a quarter of this time.
 const WATCHDOG: Duration = Duration::from_millis(800);
@@ -174,7 +174,7 @@ fn interrupted(place: &Place, reached: &dyn Fn(&str, SocketAddr) -> bool) -> Str
     let page = free.local_addr().unwrap();
     drop(free);
     let said = place.path("stderr");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_fringed-under-test"));
+    let mut command = Command::new(FRINGED);
     command
         .args(["serve", "--modbus", "127.0.0.1:0", "--http"])
         .arg(page.to_string())
@@ -226,7 +226,7 @@ fn ctrl_c_during_the_opening_or_the_first_teaching_ends_it_in_time_and_without_a
 #[test]
 fn a_head_that_is_not_there_at_the_start_is_a_fault_until_it_is() {
     let (place, manager) = (Place::new(), Manager::new());
-    let program = Program::at(env!("CARGO_BIN_EXE_fringed-under-test"));
+    let program = program();
     fs::write(place.path("other.toml"), SMALL_HEAD.replace("160", "128")).unwrap();
     fs::write(
         place.path("other-head.toml"),
@@ -276,7 +276,7 @@ fn a_journal_gets_priorities_and_a_terminal_does_not() {
         let stderr = File::create(folder.path().join("stderr")).unwrap();
         let about = stderr.metadata().unwrap();
         let other = u64::from(!journal);
-        let mut command = Command::new(env!("CARGO_BIN_EXE_fringed-under-test"));
+        let mut command = Command::new(FRINGED);
         command
             .args(["--config", "no-such-file"])
             .env(

@@ -2,8 +2,8 @@
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, command};
+use crate::written::program;
 use serde_json::{Value, json};
-use tests::program::Program;
 
 const PASS: u16 = 1;
 const FAIL: u16 = 2;
@@ -119,7 +119,7 @@ fn a_part_that_cannot_be_simulated_is_a_usage_error_with_the_remedy() {
     let config = place.path("fringed.toml").display().to_string();
     let refused = |arguments: &[&str], word: &str| {
         let all = [&["serve", "--config", &config], arguments].concat();
-        let run = Program::at(env!("CARGO_BIN_EXE_fringed-under-test")).run(&all);
+        let run = program().run(&all);
         assert_eq!(run.code, 64, "{arguments:?}: {}", run.stderr);
         assert!(run.stderr.contains(word), "{}", run.stderr);
     };

@@ -1,5 +1,6 @@
 //! The daemon with a small simulated head, and a PLC as its client.
 
+use crate::written::FRINGED;
 use std::fs;
 use std::io::{BufRead as _, BufReader};
 use std::net::SocketAddr;
@@ -66,7 +67,7 @@ impl Drop for Place {
 
 /// The command that starts the daemon of a place.
 pub fn command(place: &Place) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_fringed-under-test"));
+    let mut command = Command::new(FRINGED);
     command
         .args(["serve", "--modbus", "127.0.0.1:0", "--http", "127.0.0.1:0"])
         .arg("--config")

@@ -8,9 +8,12 @@ use tempfile::TempDir;
 use tests::program::{Program, Run};
 use tests::render::{Scene, levels};
 
-/// The program `fringed` of the same build as this suite.
+/// The path of the program `fringed` of the same build as this suite.
+pub const FRINGED: &str = env!("CARGO_BIN_EXE_fringed-under-test");
+
+/// This program.
 pub fn program() -> Program {
-    Program::at(env!("CARGO_BIN_EXE_fringed-under-test"))
+    Program::at(FRINGED)
 }
 
 /// The program `fringed-lab` of the same build as this suite.

@@ -23,7 +23,7 @@ pub struct Exposing {
     pub period: Duration,
 }
 
-/// The metadata of a request, in libcamera's units; none where a value is missing.
+/// The metadata of a request, in libcamera's units; `None` where a value is missing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Reported {
     /// µs.

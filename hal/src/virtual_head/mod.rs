@@ -101,7 +101,7 @@ impl<S: Scene + 'static> Control<S> {
         act(&mut lock(&self.bench).scene)
     }
 
-    /// Opens the devices anew: a stopped camera and a blank projector.
+    /// Opens the devices again: a stopped camera and a blank projector.
     ///
     /// # Errors
     /// `Disconnected` if one of them is unplugged.

@@ -1,10 +1,9 @@
 //! Targets for files with pixels: arrays, frames, recordings.
 
 use super::bounded;
-use crate::render::{Scene, levels};
+use crate::render::small_recording;
 use appliance::measure::measure;
 use hal::npy;
-use hal::replay::recording::PatternSpec;
 use hal::replay::{Recording, recorder};
 use std::fs;
 use std::path::PathBuf;
@@ -43,24 +42,7 @@ struct Kept {
 
 impl Kept {
     fn new(bit_depth: u8) -> Self {
-        let (columns, rows) = (32, 24);
-        let turns = (0..rows * columns).map(|at| f64::from(at % columns) + f64::from(at) / 999.0);
-        let sampled = PatternSpec::File {
-            rows: rows as usize,
-            columns: columns as usize,
-            turns: turns.collect(),
-        };
-        let scene = Scene {
-            size: 12,
-            bit_depth,
-            projector: (columns, rows),
-            patterns: vec![PatternSpec::Vertical { fringes: 30.0 }, sampled],
-            patches: false,
-            ..Scene::new(0.0, levels(&[0.03, 0.2, 1.0], 3))
-        };
-        let mut recording = scene.record();
-        recording.noise_counts = Some(3.7);
-        recording.exposure_us = Some(1e4);
+        let recording = small_recording(bit_depth, &[0.03, 0.2, 1.0]);
         let folder = tempfile::tempdir().expect("a folder");
         recorder::write(&recording, &folder.path().join("recording")).expect("written");
         Self { folder }

@@ -7,6 +7,7 @@ mod texts;
 use crates::Crate;
 use std::fs;
 use std::path::PathBuf;
+use tests::shared::root;
 
 /// The crates; `None` with a message if their sources are not on this machine.
 fn dependencies() -> Option<Vec<Crate>> {
@@ -19,7 +20,7 @@ fn dependencies() -> Option<Vec<Crate>> {
 
 /// The committed file.
 fn file() -> PathBuf {
-    crates::root().join("docs/licences.txt")
+    root().join("docs/licences.txt")
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Promises of the head: each frame that is handed over shows the pattern that it is said to show, whatever the devices do.
+//! Promises of the head: each frame that it returns shows the pattern that the frame names, whatever the devices do.
 
 mod schedules;
 mod sequences;
