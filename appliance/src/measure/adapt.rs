@@ -70,7 +70,7 @@ pub fn adapt(
     options: &AdaptOptions,
 ) -> Result<Adapted, Failure> {
     let wrong = |error: &dyn std::fmt::Display| wrong(folder, error);
-    let channels = Channels::of(recording, options.method).map_err(|error| wrong(&error))?;
+    let crossed = crossed(recording, options.method).map_err(|error| wrong(&error))?;
     let measurement = measure(recording, folder)?;
     let surface = measurement.heights.as_ref().map_err(|missing| {
         wrong(&format!(
@@ -79,9 +79,9 @@ pub fn adapt(
     })?;
     let projector = &recording.projector;
     let (columns, rows) = (projector.width as usize, projector.height as usize);
-    let map = match channels.across {
+    let map = match crossed {
         None => ProjectorMap::from_heights(&surface.triangulator, &surface.map),
-        Some(Across { at, pitch }) => {
+        Some(Crossed { at, pitch }) => {
             let phases = at.map(|at| &measurement.phases[at].phase[..]);
             ProjectorMap::from_phases(phases, pitch, surface.map.width)
         }
@@ -116,60 +116,48 @@ pub fn adapt(
     Ok(Adapted { function, report })
 }
 
-/// The patterns of a recording that a method uses; the vertical one is the measurement's primary pattern.
-struct Channels {
-    /// For the paper's method only.
-    across: Option<Across>,
-}
-
 /// Vertical and horizontal fringes of a recording.
-#[derive(Clone, Copy)]
-struct Across {
+struct Crossed {
     /// Indices of the vertical and the horizontal pattern.
     at: [usize; 2],
     /// Pitch of each, projector pixels.
     pitch: [f64; 2],
 }
 
-impl Channels {
-    fn of(recording: &Recording, method: Method) -> Result<Self, String> {
-        let projector = &recording.projector;
-        let found = |wanted: &dyn Fn(&PatternSpec) -> Option<f64>| {
-            let mut patterns = recording.patterns.iter().enumerate();
-            patterns.find_map(|(at, spec)| wanted(spec).map(|pitch| (at, pitch)))
-        };
-        let vertical = found(&|spec| match spec {
-            PatternSpec::Vertical { fringes } => Some(f64::from(projector.width) / fringes),
-            _ => None,
-        });
-        let horizontal = found(&|spec| match spec {
-            PatternSpec::Horizontal { fringes } => Some(f64::from(projector.height) / fringes),
-            _ => None,
-        });
-        match (method, vertical, horizontal) {
-            (Method::Fringed, Some(_), _) => Ok(Self { across: None }),
-            (Method::Paper, Some(v), Some(h)) => Ok(Self {
-                across: Some(Across {
-                    at: [v.0, h.0],
-                    pitch: [v.1, h.1],
-                }),
-            }),
-            (Method::Paper, Some(_), None) => Err(
-                "the paper's method needs vertical and horizontal fringes, and the recording has no \
-                 horizontal pattern: record both, or use --method fringed"
-                    .into(),
-            ),
-            (Method::Paper, None, _) => Err(
-                "the paper's method needs vertical and horizontal fringes, and the recording has no \
-                 vertical pattern: record both"
-                    .into(),
-            ),
-            (Method::Fringed, None, _) => Err(
-                "the recording has no vertical pattern, which the heights come from: record one with \
-                 fringed record"
-                    .into(),
-            ),
-        }
+/// Checks that a recording has the patterns that a method needs; those of the paper's method are returned. The vertical pattern is
+/// the measurement's primary one.
+fn crossed(recording: &Recording, method: Method) -> Result<Option<Crossed>, &'static str> {
+    let projector = &recording.projector;
+    let find = |pitch: &dyn Fn(&PatternSpec) -> Option<f64>| {
+        let mut patterns = recording.patterns.iter().enumerate();
+        patterns.find_map(|(at, spec)| pitch(spec).map(|pitch| (at, pitch)))
+    };
+    let vertical = find(&|spec| match spec {
+        PatternSpec::Vertical { fringes } => Some(f64::from(projector.width) / fringes),
+        _ => None,
+    });
+    let horizontal = find(&|spec| match spec {
+        PatternSpec::Horizontal { fringes } => Some(f64::from(projector.height) / fringes),
+        _ => None,
+    });
+    match (method, vertical, horizontal) {
+        (Method::Fringed, Some(_), _) => Ok(None),
+        (Method::Paper, Some((vertical, across)), Some((horizontal, down))) => Ok(Some(Crossed {
+            at: [vertical, horizontal],
+            pitch: [across, down],
+        })),
+        (Method::Paper, Some(_), None) => Err(
+            "the paper's method needs vertical and horizontal fringes, and the recording has no \
+             horizontal pattern: record both, or use --method fringed",
+        ),
+        (Method::Paper, None, _) => Err(
+            "the paper's method needs vertical and horizontal fringes, and the recording has no \
+             vertical pattern: record both",
+        ),
+        (Method::Fringed, None, _) => Err(
+            "the recording has no vertical pattern, which the heights come from: record one with \
+             fringed record",
+        ),
     }
 }
 

@@ -22,8 +22,7 @@ impl Daemon {
     /// As [`Daemon::wait_until_ready`].
     pub async fn settled(&self) -> Result<Arc<Snapshot>, Failure> {
         if !self.awaited {
-            let message =
-                "there is no recipe yet: load or teach one, or import it with `fringed teach`";
+            let message = "there is no recipe yet: load or teach one, or import one with `fringed recipe import`";
             return Err(Failure::new(Exit::Unavailable, message));
         }
         let mut snapshots = self.station.subscribe();

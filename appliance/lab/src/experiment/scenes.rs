@@ -57,34 +57,27 @@ const TILT: f64 = 7.0;
 impl Scene {
     /// The part of a name.
     pub fn named(name: &str) -> Option<Self> {
-        let at = PARTS.iter().position(|known| *known == name)?;
-        let (figure, judged, part) = match PARTS[at] {
-            "cone" => ("Fig. 12", Judged::Error, Part::Cone(Cone::default())),
-            "sawtooth" => {
-                let part = Part::Sawtooth(Sawtooth::default());
-                ("Fig. 13", Judged::Error, part)
-            }
-            "sphere" => ("Fig. 14", Judged::Error, Part::Sphere(Sphere::default())),
-            "spline" => {
-                let part = Part::Spline(Box::<Spline>::default());
-                ("Fig. 15", Judged::Error, part)
-            }
-            "cone-tilted" => {
-                let part = Part::Cone(Cone::default());
-                ("Fig. 12, tilted by 7°", Judged::Error, part)
-            }
-            "flowerpot" => {
-                let part = Part::Flowerpot(Flowerpot::default());
-                ("Fig. 16", Judged::Coverage, part)
-            }
-            _ => ("Fig. 17", Judged::CylinderFit, Part::Tube(Tube::default())),
+        let name = *PARTS.iter().find(|known| **known == name)?;
+        let (figure, part) = match name {
+            "cone" => ("Fig. 12", Part::Cone(Cone::default())),
+            "sawtooth" => ("Fig. 13", Part::Sawtooth(Sawtooth::default())),
+            "sphere" => ("Fig. 14", Part::Sphere(Sphere::default())),
+            "spline" => ("Fig. 15", Part::Spline(Box::<Spline>::default())),
+            "cone-tilted" => ("Fig. 12, tilted by 7°", Part::Cone(Cone::default())),
+            "flowerpot" => ("Fig. 16", Part::Flowerpot(Flowerpot::default())),
+            _ => ("Fig. 17", Part::Tube(Tube::default())),
+        };
+        let judged = match name {
+            "flowerpot" => Judged::Coverage,
+            "tube" => Judged::CylinderFit,
+            _ => Judged::Error,
         };
         let mut placement = Placement::default();
-        if PARTS[at] == "cone-tilted" {
+        if name == "cone-tilted" {
             placement.tilt_deg = [0.0, TILT];
         }
         Some(Self {
-            name: PARTS[at],
+            name,
             figure,
             judged,
             part,
