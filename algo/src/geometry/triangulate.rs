@@ -11,8 +11,6 @@
 use super::{Pinhole, Reference, Vector, root};
 use crate::pattern::PhaseFunction;
 use crate::units::{AbsolutePhase, Height};
-use alloc::vec;
-use alloc::vec::Vec;
 use core::fmt;
 
 /// The working range of z in mm.
@@ -321,13 +319,5 @@ impl Triangulator {
         self.point(u, v, Height::from_mm(height))
             .and_then(|point| self.phase_at(point))
             .map_or(AbsolutePhase::UNKNOWN, AbsolutePhase::from_turns)
-    }
-
-    /// The whole reference phase map, row-major, for unwrapping dense sequences about it.
-    pub fn reference_map(&self) -> Vec<AbsolutePhase> {
-        let (width, height) = (self.camera.width(), self.camera.height());
-        let mut map = vec![AbsolutePhase::UNKNOWN; width * height];
-        crate::pipeline::for_each_row(&mut map, width, |v, row| self.reference_row(v, row));
-        map
     }
 }

@@ -139,22 +139,7 @@ impl Arrived {
         let (words, bytes) = (self.layout.words(), self.layout.bytes());
         let words = &self.words[v * words..(v + 1) * words];
         let bytes = &self.bytes[v * bytes..(v + 1) * bytes];
-        if self.layout.geometric {
-            let (fraction, turns) = words.split_at(self.layout.pixels);
-            ArrivedRow::Expected(Expected {
-                fraction,
-                turns,
-                reason: bytes,
-            })
-        } else {
-            ArrivedRow::Wrapped {
-                levels: Wrapped {
-                    phase: words,
-                    flags: bytes,
-                },
-                pixels: self.layout.pixels,
-            }
-        }
+        self.layout.row(words, bytes, <[u16]>::split_at)
     }
 
     /// Words and bytes of all rows, for the next level to be written to, and the layout of a row.
@@ -174,27 +159,35 @@ impl Layout {
         self.pixels * self.each.1
     }
 
-    /// The row that these words and bytes are.
+    /// The row that these words and bytes are, to be written.
     pub fn row_mut<'a>(
         &self,
         words: &'a mut [u16],
         bytes: &'a mut [u8],
     ) -> ArrivedRow<&'a mut [u16], &'a mut [u8]> {
+        self.row(words, bytes, <[u16]>::split_at_mut)
+    }
+
+    fn row<W, B>(
+        &self,
+        words: W,
+        bytes: B,
+        split: impl FnOnce(W, usize) -> (W, W),
+    ) -> ArrivedRow<W, B> {
+        let pixels = self.pixels;
         if self.geometric {
-            let (fraction, turns) = words.split_at_mut(self.pixels);
+            let (fraction, turns) = split(words, pixels);
             ArrivedRow::Expected(Expected {
                 fraction,
                 turns,
                 reason: bytes,
             })
         } else {
-            ArrivedRow::Wrapped {
-                levels: Wrapped {
-                    phase: words,
-                    flags: bytes,
-                },
-                pixels: self.pixels,
-            }
+            let levels = Wrapped {
+                phase: words,
+                flags: bytes,
+            };
+            ArrivedRow::Wrapped { levels, pixels }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Whole frames: frames → phase map → height map.
 
-use super::{for_each, for_each_row_of_two};
+use super::{for_each, for_each_row, for_each_row_of_two};
 use crate::frame::FrameView;
 use crate::geometry::Triangulator;
 use crate::phase::{Arrived, DecodeError, Decoder, PhaseRow, Trust};
@@ -207,4 +207,14 @@ pub fn triangulate(
         },
     );
     map
+}
+
+impl Triangulator {
+    /// The whole reference phase map, row-major, for unwrapping dense sequences about it.
+    pub fn reference_map(&self) -> Vec<AbsolutePhase> {
+        let (width, height) = (self.camera().width(), self.camera().height());
+        let mut map = vec![AbsolutePhase::UNKNOWN; width * height];
+        for_each_row(&mut map, width, |v, row| self.reference_row(v, row));
+        map
+    }
 }

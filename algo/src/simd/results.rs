@@ -35,14 +35,11 @@ impl<'a> Results<'a> {
     /// The first `length` of a row.
     #[inline(always)]
     pub fn first(&mut self, length: usize) -> Results<'_> {
-        Results {
-            phase: &mut self.phase[..length],
-            modulation: &mut self.modulation[..length],
-            trust: &mut self.trust[..length],
-        }
+        self.part(&(0..length))
     }
 
     /// Columns of the row.
+    #[inline(always)]
     pub fn part(&mut self, columns: &Range<usize>) -> Results<'_> {
         Results {
             phase: &mut self.phase[columns.clone()],

@@ -234,7 +234,7 @@ fn dense_columns<V: Lanes, S: Source, F: Frames, const OTHERS: usize>(
     let ([first, .., last], Some(about)) = (levels, about) else {
         return;
     };
-    // With two levels there is no middle one, and what stands for it here is not used.
+    // With two levels there is no middle one; `middle` is then a copy that is not used.
     let (Some(&source), Some(&other), Some(second)) =
         (others.first(), others.last(), levels.get(1))
     else {
