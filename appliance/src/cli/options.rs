@@ -172,7 +172,7 @@ impl Quiet {
 }
 
 impl Output {
-    /// As [`Quiet::progress`].
+    /// What shows the progress, as the options of output say.
     pub fn progress(self) -> Progress {
         self.quiet.progress()
     }

@@ -3,7 +3,7 @@
 //! The counter's file says which SEQs may be in use. As soon as a quarter of the reserved numbers are used, a thread of its own
 //! (`reserving`) reserves [`AHEAD`] again; nothing else that waits for the card runs on it. After a loss of power numbers go on
 //! behind the reservation, so that at most [`AHEAD`] are skipped; after kill -9 behind the last result in shared memory
-//! ([`super::spool`]). A stop writes the SEQ of the last result, so that none is skipped.
+//! (`history/spool.rs`). A stop writes the SEQ of the last result, so that none is skipped.
 
 use super::spool::Spool;
 use crate::station::Unstored;

@@ -1,6 +1,6 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
-//! - On disk: [`file`] is the manifest, [`bounds`] the bounds of its values, [`archive`] the ZIP with its fingerprint.
+//! - On disk: [`mod@file`] is the manifest, [`bounds`] the bounds of its values, [`archive`] the ZIP with its fingerprint.
 //! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], [`plan`] joins that with the head's calibration.
 //! - Stored: [`store`] keeps the files of a station, [`generations`] the one before the newest and deleted ones, [`incoming`]
 //!   files that are being uploaded; [`exchange`] lists, exports and imports, [`edit`] changes.
