@@ -350,17 +350,16 @@ fn every_file_that_the_architecture_names_is_there() {
     let named: Vec<_> = quoted.filter(file).collect();
     assert!(named.len() > 40, "{named:?}");
     for file in named {
-        // A file or folder beside the previous one needs only the end of its path.
-        let by_end = || {
+        // A file in the folder of the previous one needs only its name.
+        let by_name = || {
             let all = ["algo/src", "hal/src", "appliance/src"];
-            let end = format!("/{file}");
-            let mut sources = all.iter().flat_map(|folder| sources(folder));
-            sources.any(|source| match end.ends_with('/') {
-                true => source.name.contains(&end),
-                false => source.name.ends_with(&end),
+            all.iter().flat_map(|folder| sources(folder)).any(|source| {
+                Path::new(&source.name)
+                    .file_name()
+                    .is_some_and(|name| name == file)
             })
         };
-        let found = bases.iter().any(|base| base.join(file).exists()) || by_end();
+        let found = bases.iter().any(|base| base.join(file).exists()) || by_name();
         assert!(found, "ARCHITECTURE.md names {file}, which is not there");
     }
 }
