@@ -5,14 +5,14 @@
 #     tests/package/start.sh BINARY [RUNS]
 #
 # Three starts: with a replay head and a stored recipe, with a simulated head and a stored recipe, and with the simulated head of a new
-# device, which teaches its first recipe and for which no time is promised. The station is ready when the log says so. The program's
-# processor time is printed as well, because wall time means little on a machine with other work.
+# device, which teaches its first recipe and for which no time is promised. A start ends with the line of the log that says ready with
+# recipe 1. The program's processor time until then is printed as well, because wall time means little on a machine with other work.
 set -euo pipefail
 shopt -s inherit_errexit
 usage='usage: start.sh BINARY [RUNS]'
 fringed=$(realpath -- "${1:?$usage}")
 runs=${2:-5}
-# The longest median, in ms.
+# The largest allowed median of the times, in ms, by the head's name.
 declare -A promised=([replay]=2000 [simulated]=5000)
 
 work=$(mktemp -d)
@@ -45,7 +45,7 @@ start() {
     while IFS= read -r -u "$log" line; do
         case $line in
         *': ready, recipe 1 '*) ended=${EPOCHREALTIME/./} ;;&
-        # A station that is not ready serves as well; the line about being ready comes before this one.
+        # Logged after the line about being ready, and also by a station that is not ready: the first start of these two lines ends the wait.
         *': ready'* | *': Modbus TCP on '*) break ;;
         esac
     done

@@ -8,6 +8,9 @@ use std::fs;
 use std::time::Instant;
 use tests::program::Run;
 
+/// VERDICT of [`Plc::measure`], which returns the registers from 200 on: register 208.
+const VERDICT: usize = 8;
+const PASS: u16 = 1;
 const FAIL: u16 = 2;
 /// CONTROL: ONLINE and TEACH.
 const TEACH: u16 = ONLINE | 1 << 7;
@@ -51,7 +54,7 @@ fn edit(browser: &mut Browser) -> Value {
 }
 
 #[test]
-fn a_number_that_is_taken_is_taught_only_if_that_is_said_and_what_was_edited_stays_on_request() {
+fn a_number_that_is_taken_is_taught_only_with_replace_and_what_was_edited_stays_on_request() {
     let place = Place::new();
     let daemon = Daemon::start(&place);
     let mut browser = Browser::new(&daemon);
@@ -89,7 +92,7 @@ fn a_number_that_is_taken_is_taught_only_if_that_is_said_and_what_was_edited_sta
         edited["fingerprint"]
     );
     let mut plc = Plc::connect(&daemon);
-    assert_eq!(plc.measure(1)[8], FAIL, "the limit that was edited");
+    assert_eq!(plc.measure(1)[VERDICT], FAIL, "the limit that was edited");
 
     assert_eq!(teach(&mut browser, json!({ "replace": true })).0, 202);
     browser.wait_for_another(&kept);
@@ -99,11 +102,11 @@ fn a_number_that_is_taken_is_taught_only_if_that_is_said_and_what_was_edited_sta
         (&json!("bracket"), &json!("BR-1"))
     );
     assert_ne!(recipe["gauges"], edited["gauges"]);
-    assert_eq!(teach(&mut browser, json!({ "replace": true })).0, 202);
 }
 
 #[test]
-fn undo_brings_back_the_generation_before_into_the_running_station_and_undo_again_takes_it_back() {
+fn undo_brings_back_the_previous_generation_into_the_running_station_and_undo_again_takes_it_back()
+{
     let place = Place::new();
     let daemon = Daemon::start(&place);
     let mut browser = Browser::new(&daemon);
@@ -114,7 +117,7 @@ fn undo_brings_back_the_generation_before_into_the_running_station_and_undo_agai
             && answer["error"]
                 .as_str()
                 .unwrap()
-                .contains("no generation before"),
+                .contains("no previous generation"),
         "{answer}"
     );
     let first = browser.get("/api/recipes/1");
@@ -141,7 +144,8 @@ fn undo_brings_back_the_generation_before_into_the_running_station_and_undo_agai
         );
         assert!(fingerprint(now).starts_with(&crc), "{crc}");
     }
-    assert_eq!(plc.measure(1)[8], FAIL);
+    // After the second undo the edited limit holds again.
+    assert_eq!(plc.measure(1)[VERDICT], FAIL);
     let changes = browser.get("/api/changes");
     assert_eq!(changes["changes"][0]["action"], "undo recipe");
 }
@@ -172,7 +176,7 @@ fn a_recipe_is_deleted_on_the_page_unless_it_is_active_and_comes_back() {
         (&all["recipes"][0]["number"], &all["deleted"][0]["number"]),
         (&json!(2), &json!(1))
     );
-    // A number whose recipe was deleted is not proposed.
+    // The number of a deleted recipe is not proposed for teaching, so that undo can bring the recipe back.
     assert_eq!(all["free"], 3);
     assert_eq!(browser.ask("DELETE", "/api/recipes/1", &[]).0, 404);
     assert_eq!(browser.ask("POST", "/api/recipes/1/undo", &[]).0, 200);
@@ -186,7 +190,7 @@ fn a_recipe_is_deleted_on_the_page_unless_it_is_active_and_comes_back() {
 }
 
 #[test]
-fn the_plc_teaches_by_number_and_neither_names_nor_the_recipe_before_are_lost() {
+fn the_plc_teaches_by_number_and_neither_names_nor_the_previous_generation_are_lost() {
     let place = Place::new();
     let config = place.path("fringed.toml");
     let text = fs::read_to_string(&config).unwrap();
@@ -230,7 +234,7 @@ fn no_command_takes_a_recipe_from_under_a_station_and_each_says_how_it_is_done()
         assert!(began.elapsed() < PATIENCE);
     }
     assert_eq!(fs::read(place.recipe()).unwrap(), taught);
-    assert_eq!(Plc::connect(&daemon).measure(1)[8], 1);
+    assert_eq!(Plc::connect(&daemon).measure(1)[VERDICT], PASS);
 
     assert_eq!(daemon.terminate().code(), Some(0));
     let said = run(&place, &["recipe", "delete", "1"]).succeeded().stdout;
@@ -242,7 +246,7 @@ fn no_command_takes_a_recipe_from_under_a_station_and_each_says_how_it_is_done()
 }
 
 #[test]
-fn the_command_teach_replaces_a_recipe_only_if_that_is_said() {
+fn the_command_teach_replaces_a_recipe_only_with_replace() {
     let place = Place::new();
     run(
         &place,

@@ -30,7 +30,7 @@ pub enum RigError {
     NotAbove(&'static str),
     /// Camera and projector stand in the same place.
     NoBaseline,
-    /// The working range is empty, not finite, or reaches up to a device.
+    /// The working range is empty or not finite, reaches up to a device, or lies wholly beyond ± 2147 mm.
     Range(HeightRange),
 }
 
@@ -48,7 +48,7 @@ impl fmt::Display for RigError {
             ),
             Self::Range(range) => write!(
                 f,
-                "the working range {} to {} mm is empty or reaches up to a device",
+                "the working range {} to {} mm is empty or not finite, reaches up to a device, or lies beyond ±2147 mm",
                 range.low, range.high
             ),
         }
@@ -65,7 +65,7 @@ pub struct Triangulator {
     pub(super) reference: Reference,
     pub(super) function: PhaseFunction,
     range: HeightRange,
-    /// The least |∂Φ/∂z| at which a phase determines a height, turns per mm.
+    /// The least |∂Φ/∂z| from which a height is computed, turns per mm.
     slope_min: f64,
 }
 
@@ -91,29 +91,32 @@ pub struct Expansion {
 
 /// Tolerance of z, mm.
 const HEIGHT_TOLERANCE: f64 = 1e-7;
-/// The secant iteration ends with a step of at most this many mm: the remaining error is then below 1e-6 mm.
+/// After a secant step of at most this many mm, the height is less than 1e-6 mm off.
 const NEAR_TOLERANCE: f64 = 1e-4;
-/// A secant step longer than this many mm means that the guess was not near.
+/// A secant step longer than this many mm has left the neighbourhood of the guess.
 const MAX_SECANT_STEP: f64 = 2.0;
-/// Half the step of the numeric slope, mm: small against any fringe, large against rounding.
+/// The numeric slope is taken over ± this many mm: small against any fringe, large against rounding. The
+/// first secant starts this far below the guess.
 const SLOPE_STEP: f64 = 0.01;
-/// Pieces of the working range that are searched for a change of sign where the phase need not be monotone
-/// along the ray: with a sampled phase function, whose rows may be shifted against each other.
+/// Pieces of the working range, each of which is searched for a change of sign, for a sampled phase
+/// function: it need not be monotone along the line of projector pixels that a camera ray crosses.
 const PIECES: usize = 16;
-/// Largest z component of a ray (whose component along the optical axis is 1): flatter rays meet the plane at a thousand
-/// kilometres or nowhere.
+/// Largest z component of a usable ray whose component along the optical axis is 1: from a height of
+/// 1 m, other rays meet the plane a thousand kilometres away or nowhere.
 const FALL: f64 = -1e-6;
-/// Where the phase changes by less than this over the default working range it does not determine a height: the noise of one
-/// level of 4 frames is 7.4e-3 turn. That is the case on rays along the baseline, and for fringes parallel to it.
+/// Where the phase changes by less than this over ± 0.2 × the camera's height, the height is only noise: the
+/// phase of one level of 4 frames has σ = 7.4e-3 turn. That happens on rays along the baseline, and
+/// everywhere if the fringes run along the baseline.
 const LEAST_TURNS: f64 = 0.01;
 /// Heights are stored within ± this many mm.
 const HEIGHT_REACH: f64 = i32::MAX as f64 / 1e6;
-/// The default working range, as a share of the camera's distance from the plane along its axis.
+/// Half the default working range, as a share of the camera's distance from the plane along its axis.
 const RANGE_SHARE: f64 = 0.2;
 
 impl Triangulator {
-    /// For a rig, a reference and a phase function. The default range is ± 0.2 × the camera's distance from the reference plane
-    /// along its axis; every range is cut to the heights that can be stored, ± 2.147 m.
+    /// Joins the rig, the reference and the phase function. The default range is ± 0.2 × the camera's
+    /// distance from the reference plane along its axis, its upper end at most 0.9 × the lower device's z.
+    /// Any range is cut to the heights that can be stored, ± 2147 mm, without an error.
     ///
     /// # Errors
     /// If the devices do not look down at the plane from two different places, or the range is unusable.
@@ -187,7 +190,7 @@ impl Triangulator {
         eye + ray * ((z - eye.z) / ray.z)
     }
 
-    /// The projector point (ξ, η) that lights a point of space.
+    /// The projector point (ξ, η), in pixels of its raster, that lights a point of space.
     #[inline]
     pub fn projector_point(&self, point: Vector) -> Option<(f64, f64)> {
         match &self.reference {
@@ -202,7 +205,7 @@ impl Triangulator {
         }
     }
 
-    /// The phase of the projector's light at `point`.
+    /// Φ_P in turns at the projector point that lights `point`.
     #[inline]
     pub(super) fn phase_at(&self, point: Vector) -> Option<f64> {
         let (xi, eta) = self.projector_point(point)?;
@@ -226,8 +229,9 @@ impl Triangulator {
         }
     }
 
-    /// The surface point that pixel (u, v) sees with phase `phase` (turns), or `None` where no
-    /// height in the working range has that phase, more than one has, or the phase hardly depends on the height.
+    /// The surface point that pixel (u, v) sees if its phase is `phase` (turns), or `None` where no
+    /// height in the working range has that phase, several have, or the phase hardly depends on the
+    /// height. Several are noticed only where they lie in different [`PIECES`] of the range.
     pub fn solve(&self, u: f64, v: f64, phase: f64) -> Option<Solution> {
         let ray = self.falling_ray(u, v)?;
         let off = |z: f64| Some(self.phase_at(self.on_ray(ray, z))? - phase);
@@ -254,12 +258,14 @@ impl Triangulator {
         self.solution(ray, z)
     }
 
-    /// As [`Self::solve`], starting from a height near the solution: two or three evaluations
-    /// instead of twenty, and where several heights have the phase, the one near the guess.
+    /// As [`Self::solve`], starting from a height that is nearly right: about 5 evaluations of the phase
+    /// instead of 10, or 25 for a sampled function. Where several heights have the phase, the one near the
+    /// guess, unless the secant method does not converge: then the answer is that of [`Self::solve`].
     pub fn solve_near(&self, u: f64, v: f64, phase: f64, guess: f64) -> Option<Solution> {
         let ray = self.falling_ray(u, v)?;
         let off = |z: f64| Some(self.phase_at(self.on_ray(ray, z))? - phase);
-        // From a guess that is micrometres off the secant converges in one or two steps; otherwise `solve` searches the range.
+        // The secant from a guess that is off by micrometres converges at the first or second step;
+        // where it does not converge, `solve` decides.
         let (mut before, mut z) = (guess - SLOPE_STEP, guess);
         let mut missed = off(before).unwrap_or(f64::NAN);
         for _ in 0..4 {
@@ -290,8 +296,8 @@ impl Triangulator {
     }
 
     /// The expansion z(Φ + δ) ≈ z + z′δ + z″δ²/2 of the height about a phase at pixel (u, v), in mm per
-    /// turn and turn². The second derivative is a central difference over ± ¼ turn, 0 where the working
-    /// range ends within that.
+    /// turn and turn²; the second derivative by central differences of ± ¼ turn, 0 where there is no
+    /// height for one of these two phases.
     pub fn expand(&self, u: f64, v: f64, phase: f64) -> Option<Expansion> {
         const STEP: f64 = 0.25;
         let solution = self.solve(u, v, phase)?;
@@ -314,7 +320,8 @@ impl Triangulator {
         height.is_known().then(|| self.on_ray(ray, height.mm()))
     }
 
-    /// The phase of pixel (u, v) with a surface at `height` mm, [`AbsolutePhase::UNKNOWN`] where it has none.
+    /// The phase that pixel (u, v) has if its surface is at `height` (mm), [`AbsolutePhase::UNKNOWN`] where it
+    /// has none.
     pub fn phase_of(&self, u: usize, v: usize, height: f64) -> AbsolutePhase {
         self.point(u, v, Height::from_mm(height))
             .and_then(|point| self.phase_at(point))

@@ -55,7 +55,7 @@ pub enum Order {
 
 /// Period of the signs of life while the task is idle.
 const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
-/// Longest wait for one flip, one pulse or one frame.
+/// How long a sequence may take beyond its planned duration.
 const DEVICE_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Why an aborted job ended.

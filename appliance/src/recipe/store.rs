@@ -39,7 +39,7 @@ pub enum ChangeError {
     Load(#[from] LoadError),
     /// There is no generation to restore.
     #[error(
-        "undo recipe {0}: no generation before it is stored, and it was not deleted: teach or import it"
+        "undo recipe {0}: no previous generation of it is stored, and it was not deleted: teach or import it"
     )]
     Nothing(u16),
     /// The recipe that is imported or restored cannot be used: why, with the remedy.

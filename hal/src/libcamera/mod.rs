@@ -42,7 +42,7 @@ pub struct Settings {
     pub size: Option<(u32, u32)>,
     /// Who starts an exposure. The sensor's trigger mode is set in its driver, not here.
     pub starts: Starts,
-    /// Exposure, gain and frame length.
+    /// Exposure, gain and frame period.
     pub exposing: Exposing,
     /// Whether `exposing` is set, and verified in each frame's metadata. False only for trials with a camera that has no such
     /// controls.

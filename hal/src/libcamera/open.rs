@@ -191,7 +191,7 @@ fn must_be_settable(camera: &Camera<'_>, id: &str) -> Result<(), Error> {
     let missing: Vec<&str> = [
         ("exposure", controls::ExposureTime::ID),
         ("gain", controls::AnalogueGain::ID),
-        ("frame length", controls::FrameDurationLimits::ID),
+        ("frame period", controls::FrameDurationLimits::ID),
     ]
     .into_iter()
     .filter_map(|(name, control)| all.find(control).is_err().then_some(name))

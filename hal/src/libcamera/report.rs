@@ -1,4 +1,4 @@
-//! Checking a request's metadata: exposure, gain and frame length must be as set, and the stamp is converted to the head's clock.
+//! Checking a request's metadata: exposure, gain and frame period must be as set, and the stamp is converted to the head's clock.
 
 use std::time::Duration;
 
@@ -36,18 +36,18 @@ pub(crate) struct Reported {
 impl Exposing {
     /// Checks that a frame of `rows` rows was taken as set.
     ///
-    /// A sensor exposes for a whole number of lines, and a line lasts at most the frame length divided by the number of rows, so times
-    /// may differ by one line.
+    /// A sensor's exposure and period are whole numbers of lines, and a line lasts at most the period divided by the number of rows (a
+    /// frame also has blank lines), so each may differ from its setting by that time.
     ///
     /// # Errors
     /// `Protocol` if a value in the metadata differs or is missing.
     pub(crate) fn verify(&self, rows: u32, reported: &Reported) -> Result<(), Error> {
-        let line = self.period / rows.max(1) + MICROSECOND;
+        let tolerance = self.period / rows.max(1) + MICROSECOND;
         let time = |us: i64| Duration::from_micros(u64::try_from(us).unwrap_or(0));
         let exposure = reported.exposure.map(|us| time(us.into()));
         let period = reported.period.map(time);
         let near = |set: Duration, found: Option<Duration>| {
-            found.is_some_and(|found| set.abs_diff(found) <= line)
+            found.is_some_and(|found| set.abs_diff(found) <= tolerance)
         };
         let gain_off = reported.gain.map(|gain| (gain / self.gain - 1.0).abs());
         let wrong = |what: &str, set: String, found: Option<String>| {
@@ -63,7 +63,7 @@ impl Exposing {
         }
         if !near(self.period, period) {
             let found = period.map(|found| format!("{found:?}"));
-            return wrong("frame length", format!("{:?}", self.period), found);
+            return wrong("frame period", format!("{:?}", self.period), found);
         }
         // NaN is refused, too.
         if !gain_off.is_some_and(|off| off <= GAIN_INCREMENT) {
@@ -83,7 +83,8 @@ pub(crate) struct Clocks {
 
 impl Clocks {
     /// From readings of the monotonic clock, the boot-time clock, and the monotonic clock again. The reading thread may be interrupted
-    /// in between, so the reading with the shortest time between its two monotonic times is used.
+    /// in between, so `suspended` is from the reading with the shortest time between its two monotonic times, and too long by at most
+    /// that time. `monotonic` is the very last time that was read.
     pub fn of(readings: &[(Timestamp, Timestamp, Timestamp)]) -> Self {
         let spread = |(before, _, after): &&(Timestamp, Timestamp, Timestamp)| after.since(*before);
         let closest = readings.iter().min_by_key(spread);
@@ -96,10 +97,11 @@ impl Clocks {
     }
 }
 
-/// Converts a stamp to the head's clock. Libcamera documents `CLOCK_BOOTTIME`; most drivers stamp with `CLOCK_MONOTONIC`.
+/// Converts a frame's stamp in ns to the head's clock. Libcamera documents `CLOCK_BOOTTIME`; most drivers stamp with `CLOCK_MONOTONIC`.
 ///
-/// A frame is stamped before it is fetched, so a stamp later than the monotonic clock must be from the boot-time clock: the
-/// difference of the clocks then exceeds the age of the frame. `clocks` is read when the frame is fetched.
+/// A frame is stamped before it is fetched, so a stamp later than the monotonic clock must be from the boot-time clock. The
+/// other way round this holds if the computer was suspended for longer than the frame is old: after a shorter time, if that happened,
+/// the stamp would be taken as monotonic, and be late by the time of suspension. `clocks` is read when the frame is fetched.
 ///
 /// # Errors
 /// `Protocol` if the stamp fits neither.
@@ -146,7 +148,7 @@ mod tests {
     use super::*;
     use crate::error::ErrorKind;
 
-    /// The reference head: one whole refresh of 60 Hz in a frame of two.
+    /// The reference head: exposed for one refresh of the projector at 60 Hz, one frame in two refreshes.
     const SET: Exposing = Exposing {
         exposure: Duration::from_micros(16_667),
         gain: 2.0,
@@ -163,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_taken_as_set_is_one_within_a_line_and_a_step_of_gain() {
+    fn a_frame_counts_as_taken_as_set_within_a_line_and_an_increment_of_gain() {
         for (exposure, gain, period) in [
             (16_667, 2.0, 33_333),
             (16_652, 1.98, 33_318), // A line of the IMX296 less: 14.8 µs; 0.1 dB.
@@ -180,7 +182,7 @@ mod tests {
             ("exposure", "5ms", reported(5_000, 2.0, 33_333)),
             ("gain", "2.1", reported(16_667, 2.1, 33_333)),
             ("gain", "NaN", reported(16_667, f32::NAN, 33_333)),
-            ("frame length", "16.667ms", reported(16_667, 2.0, 16_667)),
+            ("frame period", "16.667ms", reported(16_667, 2.0, 16_667)),
             ("exposure", "0ns", reported(-5, 2.0, 33_333)),
         ] {
             let error = SET.verify(ROWS, &reported).unwrap_err();
@@ -232,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_is_interrupted_between_two_clocks_still_tells_their_difference() {
+    fn the_difference_of_two_clocks_is_found_although_readings_are_interrupted() {
         let at = Timestamp;
         // Suspended for 5000; interrupted for 900 before and after the other clock was read, and not at all.
         let readings = [

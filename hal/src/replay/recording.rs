@@ -61,7 +61,7 @@ pub enum PatternSpec {
 }
 
 /// One frame of a recording, and the ratio and shift of the pattern that the projector showed:
-/// I_max/2 · (1 + sin 2π(ratio · Φ_P + shift)).
+/// I_max/2 · (1 + sin 2π(ratio · Φ_P + shift)), with the projector's brightest grey I_max.
 #[derive(Clone, Debug)]
 pub struct RecordedFrame {
     /// The level's share of the full phase function, above 0.
@@ -72,7 +72,7 @@ pub struct RecordedFrame {
     pub pattern: usize,
     /// Start of the exposure, if it was recorded, in ns of the recording head's clock.
     pub timestamp_ns: Option<u64>,
-    /// The image; its count is the frame's place in the recording.
+    /// The image; its sequence number (`count`) is the frame's place in the manifest, from 0.
     pub frame: Frame,
 }
 
@@ -103,7 +103,7 @@ pub struct Recording {
     pub range_mm: Option<[f64; 2]>,
     /// Exposure of one frame in µs.
     pub exposure_us: Option<f64>,
-    /// The part that was measured.
+    /// PART_ID of the part that was measured.
     pub part_id: Option<String>,
     /// The recipe that it was measured with.
     pub recipe: Option<RecipeReference>,

@@ -23,10 +23,10 @@ use std::time::Duration;
 
 use crate::units::Timestamp;
 
-/// A pulse may be off by 1/SHARE of its width: 0.5 %.
-const SHARE: u32 = 200;
+/// The width of a pulse divided by this is how much the pulse may be off: 0.5 %.
+const WIDTH_DIVISOR: u32 = 200;
 /// It may be off by this in any case: even on an idle computer two edges are not known better (a system call for each takes some
-/// µs). It exceeds the share for pulses below 4 ms, which is shorter than any refresh that makes grey levels.
+/// µs). This is more than 0.5 % of pulses below 4 ms, but a pulse that lasts a refresh of a projector that shows grey levels is longer.
 const LEAST: Duration = Duration::from_micros(20);
 
 /// Readings of the head's clock around the two edges of a pulse.
@@ -63,7 +63,7 @@ impl Spoiled {
             shorter: width.saturating_sub(shortest),
             longer: longest.saturating_sub(width),
         };
-        (pulse.off() > (width / SHARE).max(LEAST)).then_some(pulse)
+        (pulse.off() > (width / WIDTH_DIVISOR).max(LEAST)).then_some(pulse)
     }
 
     /// Whether it determined the length of an exposure. A pulse shorter than half the exposure only starts it.
@@ -78,7 +78,7 @@ impl Spoiled {
         self.shorter.max(self.longer)
     }
 
-    /// The latest time at which it may have ended.
+    /// An upper bound of the time at which it ended: not before the reading after its fall, and not before its planned end.
     #[must_use]
     pub fn ended(&self) -> Timestamp {
         self.fired + (self.width + self.longer)
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interruption_at_any_place_spoils_a_pulse_by_as_much_as_it_lasted() {
+    fn an_interruption_at_any_place_or_an_early_end_spoils_a_pulse_by_at_least_its_length() {
         let (stall, edge) = (us(100), us(2));
         let fired = Timestamp(1_000_000_000);
         for (what, edges, began, shorter, longer) in [
@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn what_a_pulse_may_be_off_costs_the_phase_that_the_doc_says() {
         // The formulas of the module's doc, tried over all phases: N, A/B, and the bound in turns.
-        let e = 1.0 / f64::from(SHARE);
+        let e = 1.0 / f64::from(WIDTH_DIVISOR);
         for (steps, ambient, bound) in [(4, 1.0, 0.0006), (3, 2.0, 0.00135)] {
             let mut worst = 0.0_f64;
             for tried in 0..1000 {

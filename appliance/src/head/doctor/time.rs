@@ -231,7 +231,7 @@ fn by_itself(seen: &Watched<()>, nominal: Duration) -> Finding {
     let remedy = if lost > 0 {
         Some("frames are lost: check the camera's cable and the load of the computer")
     } else if (period / nominal.as_secs_f64() - 1.0).abs() > PERIOD_TOLERANCE {
-        Some("the camera does not keep its frame length: set it before the start and not again")
+        Some("the camera does not keep its frame period: set it before the start and not again")
     } else {
         None
     };
