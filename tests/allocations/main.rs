@@ -48,7 +48,7 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
     let (mut head, stage) = sim::head(&scenario).unwrap();
     let calibration = Calibration::of_stage(&stage).unwrap();
     let taught = teach(&mut head, &calibration, &naming(), TIMEOUT, &|_, _| ()).unwrap();
-    let mut file = taught.file.clone();
+    let mut file = taught.manifest.clone();
     file.gauges = gauges(&file.regions[0].name);
     let (bytes, _) = archive::pack(&file, &taught.recipe.arrays).unwrap();
     let plan = Plan::new(Recipe::from_bytes(&bytes).unwrap(), &calibration, true).unwrap();

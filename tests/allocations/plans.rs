@@ -37,9 +37,9 @@ fn a_plan_keeps_nothing_twice_and_making_it_takes_little_more_than_its_file() {
         .num_threads(1)
         .build()
         .unwrap();
-    let last = taught.file.sequences.len() - 1;
+    let last = taught.manifest.sequences.len() - 1;
     for (production, each) in [(last, PLAN), (0, LONG_PLAN)] {
-        let mut file = taught.file.clone();
+        let mut file = taught.manifest.clone();
         file.production = production;
         let (bytes, _) = archive::pack(&file, &taught.recipe.arrays).unwrap();
         let (plan, taken) = pool.install(|| {

@@ -147,7 +147,7 @@ fn gauges_give_what_is_true_of_the_part_wherever_it_lies_within_its_tolerance() 
         regions: regions(PLATE, BEAD),
         gauges: all_kinds(5, 0.1),
         placement_tolerance_mm: 3.0,
-        ..taught.file.clone()
+        ..taught.manifest.clone()
     };
     let plan = plan(&bed, &file, &taught.recipe.arrays);
     let places = [
@@ -225,7 +225,7 @@ fn findings_of_a_moved_part_depend_neither_on_strips_nor_on_threads_nor_on_the_b
     let file = RecipeFile {
         regions: regions(PLATE, BEAD),
         gauges,
-        ..taught.file.clone()
+        ..taught.manifest.clone()
     };
     let plan = plan(&bed, &file, &taught.recipe.arrays);
     let place = Placement {
@@ -281,7 +281,7 @@ fn a_part_outside_its_tolerance_is_invalid_and_says_how_far() {
     let part = Part::SheetMetal(SheetMetal::default());
     let mut bed = bed(&scenario(part.clone()));
     let taught = taught(&mut bed).unwrap();
-    let plan = plan(&bed, &taught.file, &taught.recipe.arrays);
+    let plan = plan(&bed, &taught.manifest, &taught.recipe.arrays);
     for (x, verdict) in [(0.8, Verdict::Pass), (1.6, Verdict::Invalid)] {
         let place = Placement {
             shift_mm: [x, 0.0, 0.0],
@@ -329,7 +329,7 @@ fn a_component_that_the_shape_does_not_determine_is_invalid_and_is_named() {
                 },
             ),
         ],
-        ..taught.file.clone()
+        ..taught.manifest.clone()
     };
     let plan = plan(&bed, &file, &taught.recipe.arrays);
     let found = inspect(&mut bed, &plan, 0);
@@ -347,7 +347,7 @@ fn a_component_that_the_shape_does_not_determine_is_invalid_and_is_named() {
 fn a_recipe_without_the_key_is_not_aligned() {
     let mut bed = bed(&scenario(Part::SheetMetal(SheetMetal::default())));
     let taught = taught(&mut bed).unwrap();
-    let mut manifest = serde_json::to_value(&taught.file).unwrap();
+    let mut manifest = serde_json::to_value(&taught.manifest).unwrap();
     assert_eq!(manifest["alignment"], "rigid");
     manifest.as_object_mut().unwrap().remove("alignment");
     let file: RecipeFile = serde_json::from_value(manifest).unwrap();
@@ -365,7 +365,7 @@ fn a_part_that_the_short_sequence_cannot_vouch_for_is_measured_again_within_the_
     let taught = taught(&mut bed(&scenario)).unwrap();
     let file = RecipeFile {
         production: 2,
-        ..taught.file.clone()
+        ..taught.manifest.clone()
     };
     let place = Place::new();
     fs::create_dir_all(place.recipe().parent().unwrap()).unwrap();

@@ -61,7 +61,7 @@ fn line(scenario: &Scenario) -> Line {
 fn taught(scenario: &Scenario) -> (Bed, Recipe, GoodPartsFile) {
     let mut bed = bed(scenario);
     let taught = taught_within(&mut bed, 3.0).unwrap();
-    let predicted = taught.file.good_parts.unwrap();
+    let predicted = taught.manifest.good_parts.unwrap();
     let words = predicted.words();
     assert!(
         words

@@ -124,7 +124,7 @@ fn moved_parts_have_no_wrong_fringe_order_inside_the_safe_masks() {
     for (name, part) in parts {
         let mut bed = bed(&scenario(part.clone()));
         let taught = taught(&mut bed).unwrap();
-        for sequence in &taught.file.sequences {
+        for sequence in &taught.manifest.sequences {
             let Some(reach) = sequence.kind.reach() else {
                 continue;
             };
@@ -197,7 +197,7 @@ fn cycle(bed: &mut Bed, file: &RecipeFile, arrays: &Arrays) -> (Vec<f32>, f64) {
 fn pixels_that_no_gauge_looks_at_are_not_computed_and_the_others_are_the_same() {
     let mut bed = bed(&scenario(Part::Sphere(Sphere::default())));
     let taught = taught(&mut bed).unwrap();
-    let (file, arrays) = (taught.file, taught.recipe.arrays);
+    let (file, arrays) = (taught.manifest, taught.recipe.arrays);
     let region = RegionFile {
         name: "middle".into(),
         polygon: vec![

@@ -66,7 +66,7 @@ fn gauges_repeat_as_well_as_they_say() {
     ];
     let mut file = RecipeFile {
         gauges,
-        ..taught.file.clone()
+        ..taught.manifest.clone()
     };
     file.regions.extend(regions(plate, bead));
     let plan = plan(&bed, &file, &taught.recipe.arrays);
@@ -122,7 +122,7 @@ const FAINT: [f64; 2] = [0.25, 0.3];
 #[test]
 fn a_coverage_in_faint_light_repeats_as_well_as_it_says() {
     let (bed, taught) = small();
-    let mut file = taught.file.clone();
+    let mut file = taught.manifest.clone();
     file.gauges = vec![gauge("coverage", "frame", GaugeKind::Coverage)];
     for share in FAINT {
         let mut scenario = bed.stage.scenario().clone();
@@ -144,7 +144,7 @@ fn a_coverage_in_faint_light_repeats_as_well_as_it_says() {
 /// Measures good parts, and parts with a dent; prints how many are rejected or missed and where the worst lay, and checks that there are none.
 fn rejects(good: usize, dented: usize) {
     let (mut bed, taught) = small();
-    let mut file = taught.file.clone();
+    let mut file = taught.manifest.clone();
     let deviation = &mut file.gauges[0];
     deviation.measures = GaugeKind::Deviation { smoothing_px: SIDE };
     (deviation.low, deviation.high) = (Some(-LIMIT_MM), Some(LIMIT_MM));

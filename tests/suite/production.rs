@@ -48,7 +48,7 @@ pub(crate) fn plan_with(
     sequence: usize,
     alignment: AlignmentKind,
 ) -> (Plan, Recipe) {
-    let mut file = taught.file.clone();
+    let mut file = taught.manifest.clone();
     file.production = sequence;
     file.alignment = alignment;
     let (bytes, _) = pack(&file, &taught.recipe.arrays).unwrap();
@@ -73,7 +73,7 @@ fn heights_about_golden_are_exact_to_micrometres_within_the_declared_range() {
     for (name, part) in parts() {
         let mut bed = bed(&scenario(part));
         let taught = taught(&mut bed).unwrap();
-        let full = taught.file.sequences.len() - 1;
+        let full = taught.manifest.sequences.len() - 1;
         let (plan, _) = plan(&bed, &taught, full);
         let (cubics, exact) = (plan.production().cubics(), plan.production().triangulator());
         let surface = cubics.surface();
@@ -134,7 +134,7 @@ fn strips_find_what_the_comparison_of_whole_maps_finds() {
             ..Placement::default()
         };
         bed.stage.place(&part, &placement).unwrap();
-        for sequence in 0..taught.file.sequences.len() {
+        for sequence in 0..taught.manifest.sequences.len() {
             let (plan, recipe) = plan(&bed, &taught, sequence);
             let frames = frames(&mut bed, &plan);
             compare(
@@ -323,7 +323,7 @@ fn rms(sigma: &[f32], heights: &[Height], width: usize) -> f64 {
 fn findings_depend_neither_on_strips_nor_on_threads_nor_on_the_back_end() {
     let mut bed = bed(&scenario(Part::SheetMetal(SheetMetal::default())));
     let taught = taught(&mut bed).unwrap();
-    for sequence in [1, taught.file.sequences.len() - 1] {
+    for sequence in [1, taught.manifest.sequences.len() - 1] {
         let (plan, _) = plan(&bed, &taught, sequence);
         let frames = frames(&mut bed, &plan);
         let views: Vec<_> = frames
@@ -369,7 +369,7 @@ fn findings_depend_neither_on_strips_nor_on_threads_nor_on_the_back_end() {
 fn levels_decoded_on_arrival_give_the_same_inspection() {
     let mut bed = bed(&scenario(Part::SheetMetal(SheetMetal::default())));
     let taught = taught(&mut bed).unwrap();
-    for sequence in 0..taught.file.sequences.len() {
+    for sequence in 0..taught.manifest.sequences.len() {
         let (plan, _) = plan_with(&bed, &taught, sequence, AlignmentKind::Rigid);
         let frames = frames(&mut bed, &plan);
         let levels = plan.sequence().levels().len();

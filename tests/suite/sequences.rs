@@ -16,7 +16,7 @@ fn the_shortest_sequence_will_do_for_a_part_in_place_and_not_for_one_out_of_it()
     let taught = taught(&mut bed).unwrap();
     let file = RecipeFile {
         production: 0,
-        ..taught.file.clone()
+        ..taught.manifest.clone()
     };
     let plan = plan(&bed, &file, &taught.recipe.arrays);
     assert_eq!(plan.sequence_count(), 3);
@@ -62,7 +62,7 @@ fn sequences_of_the_same_length_and_of_different_kinds_are_all_run() {
     let taught = taught(&mut bed).unwrap();
     let mut file = RecipeFile {
         production: 0,
-        ..taught.file.clone()
+        ..taught.manifest.clone()
     };
     // Its one level has as many shifts as the two levels of the next have together.
     file.sequences[0].frames = Shot::level(1.0, 6).collect();

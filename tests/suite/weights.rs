@@ -17,7 +17,7 @@ const BROUGHT_MM: f64 = 5e-5;
 
 /// Sets weights in a pattern, so that squares of a gauge have several different ones.
 fn weigh(taught: &mut TaughtRecipe) {
-    let width = taught.file.camera.width as usize;
+    let width = taught.manifest.camera.width as usize;
     let valid = taught.recipe.arrays.valid.iter_mut().enumerate();
     for (place, valid) in valid.filter(|(_, valid)| **valid != 0) {
         *valid = [1, 60, 190][(place % width / 23 + place / width / 17) % 3];
@@ -35,7 +35,7 @@ fn strips_weigh_deviations_as_the_comparison_of_whole_maps_does() {
             ..Placement::default()
         };
         bed.stage.place(&part, &placement).unwrap();
-        let full = taught.file.sequences.len() - 1;
+        let full = taught.manifest.sequences.len() - 1;
         let (still, recipe) = plan(&bed, &taught, full);
         let taken = frames(&mut bed, &still);
         compare(&format!("{name}, weighed"), &still, &recipe, &taken);

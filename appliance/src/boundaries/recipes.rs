@@ -57,7 +57,7 @@ impl Bed {
         .unwrap();
         Self {
             calibration,
-            file: taught.file,
+            file: taught.manifest,
             recipe: taught.recipe,
             bytes: taught.bytes,
             frames,

@@ -5,7 +5,7 @@ use clap_complete::{Shell, generate};
 /// Print what makes a shell complete the command line.
 #[derive(Debug, clap::Args)]
 pub struct Completions {
-    /// The shell.
+    /// The shell that the script is for.
     #[arg(value_enum)]
     shell: Shell,
 }

@@ -73,7 +73,7 @@ enum Command {
     Teach(teach::Teach),
     /// Show or export stored results.
     History(history::History),
-    /// Judge a kept part again and compare with the history.
+    /// Judge a part that did not pass again and compare with the history.
     Replay(replay::Replay),
     /// List, export, import or delete recipes, or undo that.
     #[command(subcommand)]

@@ -1,4 +1,5 @@
-//! `fringed replay RECORDING`: judges a kept part again and compares the result with the stored one, bit by bit.
+//! `fringed replay RECORDING`: judges a part that did not pass again, from its recorded frames, and compares the result with the one in
+//! the history, bit by bit.
 
 use super::history::failure;
 use super::options::Measuring;
@@ -14,12 +15,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Judge a kept part again, from its frames.
+/// Judge a part that did not pass again, from its recorded frames.
 #[derive(Debug, clap::Args)]
 pub struct Replay {
-    /// Its folder, which `fringed history` names, or the ZIP that the page gives.
+    /// The folder of its frames, which `fringed history` names, or their ZIP from the page.
     recording: PathBuf,
-    /// Another recipe than the one that judged it then: a file, or `stored` for the station's of that number.
+    /// Another recipe than the one that it was judged by: a file, or `stored` for the station's recipe of the same number.
     #[arg(long, value_name = "FILE|stored")]
     recipe: Option<PathBuf>,
     #[command(flatten)]
@@ -31,25 +32,29 @@ struct Chosen {
     recipe: Recipe,
     /// Where it comes from, in words.
     from: String,
-    /// Whether it is the one that judged the part before.
-    same: bool,
+    /// Whether the part was judged by it before.
+    original: bool,
 }
 
 impl Replay {
     /// Judges and compares.
     ///
     /// # Errors
-    /// If recording, recipe or stored result cannot be read (65, 66), or the results differ (70).
+    /// If the recording, the recipe or the history's result is missing (66) or damaged (65), the frames do not fit the recipe (65), the
+    /// results differ (70), or as for every command with a configuration and a state folder.
     pub fn run(&self) -> Result<(), Failure> {
         let options = &self.measuring;
         let unpacked = Unpacked::of(&self.recording)?;
         let state = self.state()?;
         let kept = Kept::open(unpacked.folder())?;
-        let Chosen { recipe, from, same } =
-            self.choose(&kept, &Store::at(&state.join("recipes")))?;
+        let Chosen {
+            recipe,
+            from,
+            original,
+        } = self.choose(&kept, &Store::at(&state.join("recipes")))?;
         let (number, fingerprint) = (recipe.id.number, recipe.id.fingerprint.clone());
-        let stored = stored(&state, unpacked.name(), &kept)?;
-        let flags = stored.as_ref().map_or(0, |entry| entry.flags);
+        let before = result_of(&state, unpacked.name(), &kept)?;
+        let flags = before.as_ref().map_or(0, |entry| entry.flags);
         let (frames, shots) = (kept.frames(), kept.shots());
         let configured = options.files.configuration()?.threads;
         let judged = options.threads.pool(configured)?.install(|| {
@@ -68,39 +73,39 @@ impl Replay {
         let replayed = entry(inspection, number, &fingerprint);
         let document = || {
             let recipe = serde_json::json!({
-                "from": from, "number": number, "fingerprint": fingerprint, "same": same,
+                "from": from, "number": number, "fingerprint": fingerprint, "same": original,
             });
             let all =
-                serde_json::json!({ "replayed": replayed, "stored": stored, "recipe": recipe });
+                serde_json::json!({ "replayed": replayed, "stored": before, "recipe": recipe });
             format!("{all:#}")
         };
         options.output.answer(document, || table(&replayed, &from));
-        if !same {
-            if let Some(stored) = stored {
+        if !original {
+            if let Some(before) = before {
                 options.output.remark(|| {
                     format!(
                         "result {} in the history is {}{}, judged by another recipe: the two are not compared",
-                        stored.seq,
-                        stored.verdict.word(),
-                        because(&stored)
+                        before.seq,
+                        before.verdict.word(),
+                        because(&before)
                     )
                 });
             }
             return Ok(());
         }
-        let Some(stored) = stored else {
+        let Some(before) = before else {
             let message = format!(
-                "compare with the history: no stored result names {}: the result above was compared with nothing",
+                "compare with the history: it has no result of {} with the recording's recipe and PART_ID: the result above was compared with nothing",
                 self.recording.display()
             );
             return Err(Failure::new(Exit::Missing, message));
         };
-        match difference(&stored, &replayed) {
+        match difference(&before, &replayed) {
             None => {
                 options.output.remark(|| {
                     format!(
                         "the same as result {} in the history, bit by bit",
-                        stored.seq
+                        before.seq
                     )
                 });
                 Ok(())
@@ -108,14 +113,14 @@ impl Replay {
             Some(difference) => {
                 let message = format!(
                     "the replay differs from result {}: {difference}",
-                    stored.seq
+                    before.seq
                 );
                 Err(Failure::new(Exit::Software, message))
             }
         }
     }
 
-    /// The state folder that the recording lies in, else the configured one.
+    /// The state folder: that of `--state` if it is given, else the one that the recording lies in, else the configured one.
     fn state(&self) -> Result<PathBuf, Failure> {
         let files = &self.measuring.files;
         let own = self.recording.canonicalize().ok();
@@ -126,10 +131,10 @@ impl Replay {
         }
     }
 
-    fn choose(&self, kept: &Kept, stored: &Store) -> Result<Chosen, Failure> {
+    fn choose(&self, kept: &Kept, store: &Store) -> Result<Chosen, Failure> {
         let (recipe, from) = match &self.recipe {
             None => {
-                let (recipe, own) = kept.recipe(stored)?;
+                let (recipe, own) = kept.recipe(store)?;
                 let from = match own {
                     true => "the recording's own recipe",
                     false => "the station's recipe: the recording has none of its own",
@@ -138,19 +143,23 @@ impl Replay {
             }
             Some(named) if named == Path::new("stored") => {
                 let number = u16::try_from(kept.reference().number).unwrap_or(0);
-                let loaded = stored.load(number).map_err(|error| missing(&error))?;
+                let loaded = store.load(number).map_err(|error| missing(&error))?;
                 (loaded.recipe, "the station's recipe as it is now".into())
             }
             Some(path) => (kept::read(path)?, path.display().to_string()),
         };
-        let same = recipe.id.fingerprint == kept.reference().fingerprint;
-        Ok(Chosen { recipe, from, same })
+        let original = recipe.id.fingerprint == kept.reference().fingerprint;
+        Ok(Chosen {
+            recipe,
+            from,
+            original,
+        })
     }
 }
 
-/// The stored result of a recording: the one that names the recording, else the one with the SEQ in the recording's name. A result
-/// with another recipe or PART_ID belongs to another device and is ignored.
-fn stored(state: &Path, name: Option<&str>, kept: &Kept) -> Result<Option<Entry>, Failure> {
+/// The result of a recording in the history: the one that names the recording, else the one with the SEQ in the recording's name. It is
+/// ignored if its recipe or PART_ID is not the recording's: the history may be another station's, or have begun again at SEQ 1.
+fn result_of(state: &Path, name: Option<&str>, kept: &Kept) -> Result<Option<Entry>, Failure> {
     let reader = Reader::of(state);
     let Some(name) = name.filter(|_| reader.path().exists()) else {
         return Ok(None);
@@ -160,11 +169,11 @@ fn stored(state: &Path, name: Option<&str>, kept: &Kept) -> Result<Option<Entry>
         found = reader.result(seq).map_err(failure)?;
     }
     let part = kept.part_id();
-    let same = |entry: &Entry| {
+    let of_this_part = |entry: &Entry| {
         kept.reference().fingerprint.starts_with(&entry.fingerprint)
             && part.is_none_or(|part| part == entry.part_id.to_string())
     };
-    Ok(found.filter(same))
+    Ok(found.filter(of_this_part))
 }
 
 fn entry(inspection: Inspection, recipe: u16, fingerprint: &str) -> Entry {

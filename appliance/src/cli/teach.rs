@@ -78,7 +78,7 @@ impl Target<'_> {
                 out.display().to_string(),
             ),
             Self::State(state) => {
-                let (number, path) = (taught.file.number, state.path().display());
+                let (number, path) = (taught.manifest.number, state.path().display());
                 (
                     Store::of_state(state)?.save(number, &taught.bytes),
                     format!("store recipe {number} in {path}"),
@@ -139,7 +139,7 @@ impl Teach {
             None => taught,
         };
         let place = target.store(&taught)?;
-        let file = &taught.file;
+        let file = &taught.manifest;
         let summary = || {
             let summary = serde_json::json!({
                 "number": file.number,

@@ -21,7 +21,7 @@ const MOST_WAITING: usize = 8;
 pub struct LastCycle<'a> {
     /// Its result.
     pub record: &'a Arc<ResultRecord>,
-    /// The recipe that it was judged by.
+    /// The plan that it was judged by: recipe and calibration.
     pub plan: &'a Arc<Plan>,
     /// Which of the recipe's sequences it was judged by.
     pub sequence: usize,
@@ -39,32 +39,32 @@ impl LastCycle<'_> {
 }
 
 /// A request, which sends its own answer.
-type Question = Box<dyn FnOnce(Option<LastCycle<'_>>) + Send>;
+type Request = Box<dyn FnOnce(Option<LastCycle<'_>>) + Send>;
 
 /// Requests about the last cycle. Cheap to clone.
 #[derive(Clone, Default)]
-pub struct LastMaps(Arc<Mutex<Inside>>);
+pub struct LastCycleRequests(Arc<Mutex<Inside>>);
 
 #[derive(Default)]
 struct Inside {
-    waiting: Vec<Question>,
-    /// The maps that were computed last, with the SEQ of their result.
+    waiting: Vec<Request>,
+    /// The layers (height, deviation and modulation maps) that were computed last, with the SEQ of their result.
     layers: Option<(u32, Arc<Layers>)>,
 }
 
-impl LastMaps {
+impl LastCycleRequests {
     fn inside(&self) -> MutexGuard<'_, Inside> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Has the measuring task compute `answer`, and waits for it, 3 s at most. `None` if there are no frames, too many requests
-    /// wait, or the task is busy.
+    /// wait, or the task is busy for longer: then the request stays in the queue, and its answer is computed and dropped.
     pub fn ask<T: Send + 'static>(
         &self,
         answer: impl FnOnce(LastCycle<'_>) -> T + Send + 'static,
     ) -> Option<T> {
         let (sender, receiver): (SyncSender<Option<T>>, _) = sync_channel(1);
-        let question: Question = Box::new(move |cycle| {
+        let request: Request = Box::new(move |cycle| {
             // The requester may have given up.
             let _ = sender.send(cycle.map(answer));
         });
@@ -72,12 +72,13 @@ impl LastMaps {
         if inside.waiting.len() >= MOST_WAITING {
             return None;
         }
-        inside.waiting.push(question);
+        inside.waiting.push(request);
         drop(inside);
         receiver.recv_timeout(PATIENCE).ok().flatten()
     }
 
-    /// The maps of the last cycle and the SEQ of its result. If the frames are gone: the maps that were computed last.
+    /// The layers of the last cycle and the SEQ of its result. Those that were computed last are returned again if they are of result
+    /// `seq`, the caller's latest, or if no others can be computed.
     pub fn layers(&self, seq: u32) -> Option<(u32, Arc<Layers>)> {
         let made = self.inside().layers.clone();
         if let Some((of, _)) = &made
@@ -98,8 +99,8 @@ impl LastMaps {
 
     /// Answers all waiting requests.
     pub fn answer(&self, cycle: Option<LastCycle<'_>>) {
-        for question in std::mem::take(&mut self.inside().waiting) {
-            question(cycle);
+        for request in std::mem::take(&mut self.inside().waiting) {
+            request(cycle);
         }
     }
 
@@ -114,8 +115,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_asks_before_there_are_frames_is_told_so_at_once() {
-        let last = LastMaps::default();
+    fn a_request_before_there_are_frames_gets_none_at_once() {
+        let last = LastCycleRequests::default();
         assert!(!last.wanted());
         let asking = last.clone();
         let asked = std::thread::spawn(move || asking.ask(|cycle| cycle.seq()));
@@ -127,8 +128,8 @@ mod tests {
     }
 
     #[test]
-    fn more_than_can_wait_are_refused_instead_of_piling_up() {
-        let last = LastMaps::default();
+    fn more_requests_than_can_wait_are_refused_instead_of_piling_up() {
+        let last = LastCycleRequests::default();
         for _ in 0..MOST_WAITING {
             last.inside().waiting.push(Box::new(|_| ()));
         }

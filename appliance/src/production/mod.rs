@@ -18,7 +18,7 @@ use crate::head::calibration::Current;
 use crate::head::placed::Placed;
 use crate::history::History;
 use crate::production::backend::Opened;
-use crate::production::latest::{LastCycle, LastMaps};
+use crate::production::latest::{LastCycle, LastCycleRequests};
 use crate::production::shelf::Shelf;
 use crate::production::simulation::Placing;
 use crate::recipe::plan::{Plan, PlanError};
@@ -74,7 +74,7 @@ pub struct Worker {
     /// The station.
     pub station: StationHandle,
     /// Requests about the last cycle.
-    pub maps: LastMaps,
+    pub last_cycle: LastCycleRequests,
     /// Where the frames of failed parts go.
     pub history: History,
     /// Progress and log.
@@ -112,7 +112,7 @@ impl Worker {
             // Pictures are computed only while no order waits.
             let order = match orders.try_recv() {
                 Err(TryRecvError::Empty) => {
-                    if self.maps.wanted() {
+                    if self.last_cycle.wanted() {
                         self.tell(plan.as_ref(), &last);
                     }
                     orders.recv_timeout(SIGN_OF_LIFE)
@@ -171,7 +171,7 @@ impl Worker {
 
     /// Answers the requests about the last cycle.
     fn tell(&self, plan: Option<&Arc<Plan>>, last: &JudgedBy) {
-        let (maps, calibration) = (&self.maps, &self.opened.calibration);
+        let (requests, calibration) = (&self.last_cycle, &self.opened.calibration);
         let result = self.station.snapshot().result.clone();
         let measured = plan
             .filter(|_| !last.frames.is_empty())
@@ -183,7 +183,7 @@ impl Worker {
             frames: &last.frames,
             calibration,
         });
-        self.pool.install(|| maps.answer(cycle));
+        self.pool.install(|| requests.answer(cycle));
     }
 
     /// Loads a recipe; if that fails, the one before stays active.

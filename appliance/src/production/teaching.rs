@@ -111,7 +111,7 @@ impl Worker {
         for reason in &taught.choice.reasons {
             self.progress.log(reason);
         }
-        let (number, bytes) = (taught.file.number, &taught.bytes);
+        let (number, bytes) = (taught.manifest.number, &taught.bytes);
         let stored = match kept {
             None => self.recipes.save(number, bytes).map(|()| true),
             Some(file) => self.recipes.replace(number, &file.fingerprint, bytes),

@@ -18,25 +18,28 @@ use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
 use std::io::Cursor;
 
-/// The golden map is eroded by this many pixels: those at silhouettes mix two surfaces.
+/// The area where deviations are compared is eroded by this many pixels on each side: pixels at silhouettes mix two surfaces.
 const EROSION_PX: usize = 2;
 /// Pixels whose taught height is less certain than this are not compared, mm (1 σ).
 const MAX_SIGMA_MM: f64 = 0.25;
-/// Deviations are averaged over squares of this many camera pixels.
+/// Deviations are averaged over squares with sides of this many camera pixels.
 pub(super) const SMOOTHING_PX: usize = 9;
-/// Limit of the deviation where the part can be measured that well, mm: see [`super::good_parts`].
+/// Requested tolerance of the deviation, ± mm. It becomes the gauge's limit if the part can be measured that well, else the limit is
+/// wider: see [`super::good_parts`].
 const DEVIATION_MM: f64 = 0.15;
 /// The coverage of a good part may be lower than golden's by this share of the frame. Noise alone causes less: of 200,000 pixels
 /// that are all just at the least trusted modulation, the number of resolved ones has σ = √200,000 / 2, and 6 σ of the difference
-/// of two such numbers is 1,900.
+/// of two such numbers is 1,900, or 0.7 % of a frame of only 512 × 512 pixels.
 const COVERAGE_CHANGE: f64 = 0.01;
 /// Least share of the golden surface that must be resolved.
 const MIN_COVERAGE: f64 = 0.80;
-/// An opening has at least this many pixels, and at most this share of its region may be resolved.
+/// An opening has at least this many pixels.
 const OPENING_PIXELS: usize = 60;
+/// At most this share of an opening's region may be resolved on a good part.
 const OPENING_COVERAGE: f64 = 0.25;
-/// At most this many openings get a gauge, each with a region of at least this reach in pixels.
+/// At most this many openings get a gauge, the largest ones.
 const MAX_OPENINGS: usize = 8;
+/// Half the diagonals of an opening's region, an upright diamond, are at least this many pixels long.
 const OPENING_REACH: usize = 4;
 /// |ΔΦ| up to which the expansion of the height is used, turns.
 const EXPANSION_TURNS: f64 = 0.5;
@@ -52,7 +55,7 @@ pub struct Naming {
     pub name: String,
     /// When, in seconds since 1970 UTC; 0 if not known.
     pub taught_at_unix_s: u64,
-    /// How far a part may lie from where it was taught, in any direction, mm.
+    /// How far any corner of a part may lie from where it was taught, mm.
     pub placement_tolerance_mm: f64,
 }
 
@@ -64,13 +67,13 @@ pub struct GoldenPart<'a> {
     pub pattern: PatternFile,
     /// What each frame of the full sequence shows.
     pub full: &'a [Shot],
-    /// How it was decoded.
+    /// How these frames were decoded.
     pub decoder: &'a Decoder,
     /// The geometry with its phase function.
     pub triangulator: &'a Triangulator,
-    /// Golden phase.
+    /// Golden phase of each camera pixel, with its modulation and trust.
     pub phases: &'a PhaseMap,
-    /// Golden height.
+    /// Golden height of each camera pixel, with its σ.
     pub heights: &'a HeightMap,
     /// σ of one sample in counts.
     pub noise: f64,
@@ -84,7 +87,7 @@ pub struct TaughtRecipe {
     /// The file.
     pub bytes: Vec<u8>,
     /// Its manifest.
-    pub file: RecipeFile,
+    pub manifest: RecipeFile,
     /// Its checked form.
     pub recipe: Recipe,
     /// The production sequence, with the reasons.
@@ -92,11 +95,12 @@ pub struct TaughtRecipe {
 }
 
 impl GoldenPart<'_> {
-    /// Makes the recipe: expansion of the height, safe mask, sequences, regions and gauges. The gauges are the deviation from
-    /// golden and the coverage of the whole frame, and for each opening of the part that it stays open.
+    /// Makes the recipe: expansion of the height, phase reach (from which follows where a short sequence is safe), sequences, regions
+    /// and gauges. The gauges are the deviation from golden and the coverage of the whole frame, and, for each of up to
+    /// [`MAX_OPENINGS`] openings of the part that are large enough, the coverage of the opening.
     ///
     /// # Errors
-    /// In words, if the recipe could not be loaded again.
+    /// In words, if the recipe could not be packed, or not be loaded again.
     pub fn recipe(&self, naming: &Naming) -> Result<TaughtRecipe, String> {
         let resolved: Vec<bool> = self
             .phases
@@ -108,7 +112,7 @@ impl GoldenPart<'_> {
         let mut arrays = self.arrays(naming.placement_tolerance_mm);
         let sequences = self.sequences(&arrays);
         let mut choice = planner::choose(&sequences, &gauges);
-        let good_parts = self.hold(&mut arrays, &sequences, choice.production);
+        let good_parts = self.weigh(&mut arrays, &sequences, choice.production);
         choice.reasons.extend(good_parts.words());
         for gauge in &mut gauges {
             if matches!(gauge.measures, GaugeKind::Deviation { .. }) {
@@ -119,7 +123,7 @@ impl GoldenPart<'_> {
         let calibration = self.calibration;
         let (width, height, bit_depth) = calibration.frames();
         let (columns, rows) = calibration.raster();
-        let file = RecipeFile {
+        let manifest = RecipeFile {
             format: FORMAT.into(),
             version: VERSION,
             fingerprint: String::new(),
@@ -144,6 +148,7 @@ impl GoldenPart<'_> {
             placement_tolerance_mm: naming.placement_tolerance_mm,
             alignment: AlignmentKind::Rigid,
             range_mm: [range.low, range.high],
+            // Heads take their exposure from the configuration.
             exposure_us: None,
             noise_counts: self.noise,
             expansion_range_turns: EXPANSION_TURNS,
@@ -153,21 +158,21 @@ impl GoldenPart<'_> {
             comparison: self.comparison.clone(),
             good_parts: Some(good_parts),
         };
-        let (bytes, _) = archive::pack(&file, &arrays).map_err(|error| error.to_string())?;
+        let (bytes, _) = archive::pack(&manifest, &arrays).map_err(|error| error.to_string())?;
         drop(arrays);
         // Read back as after a restart, so that what was taught is known to load.
         let unpacked = archive::unpack(Cursor::new(&bytes), bytes.len() as u64);
-        let (file, arrays) = unpacked.map_err(|error| error.to_string())?;
-        let recipe = Recipe::check(&file, arrays)?;
+        let (manifest, arrays) = unpacked.map_err(|error| error.to_string())?;
+        let recipe = Recipe::check(&manifest, arrays)?;
         Ok(TaughtRecipe {
             bytes,
-            file,
+            manifest,
             recipe,
             choice,
         })
     }
 
-    fn arrays(&self, tolerance: f64) -> Arrays {
+    fn arrays(&self, placement_tolerance_mm: f64) -> Arrays {
         let (phases, heights) = (self.phases, self.heights);
         let width = phases.width;
         let resolved = |at: usize| phases.trust[at] == Trust::Resolved;
@@ -222,15 +227,18 @@ impl GoldenPart<'_> {
                 .iter()
                 .map(|modulation| modulation.counts(full_scale) as f32)
                 .collect(),
-            phase_reach: phase_reach(self.triangulator, surface, tolerance),
+            phase_reach: phase_reach(self.triangulator, surface, placement_tolerance_mm),
         }
     }
 
-    /// The sequences that the part can be measured with, each with its predicted noise and safe share.
+    /// The sequences that the part can be measured with, each with its predicted noise and the share of the surface where it is safe:
+    /// where no placement within the tolerance makes its phase ambiguous.
     fn sequences(&self, arrays: &Arrays) -> Vec<SequenceFile> {
         let mut full = self.full.to_vec();
         // The finest level last: the coarser ones are decoded while it is being exposed.
         full.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
+        // Levels of ratios 0.8 and 1 repeat together only after 5 turns: unambiguous within ± 2.5 turns of golden, less a margin for
+        // noise ([`SequenceKind::reach`]).
         let candidates = [
             (SequenceKind::SingleLevel, Shot::level(1.0, 3).collect()),
             (SequenceKind::SingleLevel, Shot::level(1.0, 4).collect()),
@@ -241,7 +249,7 @@ impl GoldenPart<'_> {
             (SequenceKind::Full, full),
         ];
         candidates
-            .map(|(kind, frames)| self.worth(kind, frames, arrays))
+            .map(|(kind, frames)| self.rated(kind, frames, arrays))
             .into()
     }
 
@@ -268,8 +276,9 @@ impl GoldenPart<'_> {
         }
     }
 
-    /// The limit of the deviation; pixels that are too noisy for it get weights.
-    fn hold(
+    /// Sets the limit of the deviation, and overwrites `arrays.valid` (0 or 1) with the weights of the pixels: those that are too noisy
+    /// for the limit get less weight.
+    fn weigh(
         &self,
         arrays: &mut Arrays,
         sequences: &[SequenceFile],
@@ -296,10 +305,11 @@ impl GoldenPart<'_> {
             golden: variances(sequences.last()),
             production: variances(sequences.get(production)),
         };
-        noise.hold(&mut arrays.valid, DEVIATION_MM)
+        noise.weigh(&mut arrays.valid, DEVIATION_MM)
     }
 
-    fn worth(&self, kind: SequenceKind, frames: Vec<Shot>, arrays: &Arrays) -> SequenceFile {
+    /// A sequence with its predicted noise (RMS over the compared pixels) and safe share.
+    fn rated(&self, kind: SequenceKind, frames: Vec<Shot>, arrays: &Arrays) -> SequenceFile {
         let safe = |at: &usize| {
             kind.reach()
                 .is_none_or(|reach| arrays.phase_reach[*at] < reach)
@@ -317,7 +327,7 @@ impl GoldenPart<'_> {
     }
 }
 
-/// The regions and gauges that every taught part gets.
+/// The regions and gauges of a part with these resolved pixels: those of the whole frame, and those of its openings.
 fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) {
     let rows = resolved.len() / width.max(1);
     let (right, bottom) = (width as f64 - 0.5, rows as f64 - 0.5);

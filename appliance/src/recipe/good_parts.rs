@@ -70,9 +70,9 @@ pub(super) struct Noise<'a> {
 }
 
 impl Noise<'_> {
-    /// The limit of the deviation for a tolerance. `mask` is where the part can be compared, not 0, and gets the weights of
-    /// the pixels ([`Weight::bits`]) that hold it.
-    pub fn hold(&self, mask: &mut [u8], tolerance_mm: f64) -> GoodPartsFile {
+    /// The limit of the deviation for a tolerance. `mask` is not 0 where the part can be compared; it is overwritten with the
+    /// weights of the pixels ([`Weight::bits`]) for this limit.
+    pub fn weigh(&self, mask: &mut [u8], tolerance_mm: f64) -> GoodPartsFile {
         let width = self.surface.width;
         let valid: Vec<bool> = mask.iter().map(|&valid| valid != 0).collect();
         let both = self.golden.iter().zip(&self.production);

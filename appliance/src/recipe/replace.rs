@@ -64,24 +64,26 @@ pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<
 /// In words, if they do not fit what was taught.
 pub fn keep_gauges(taught: TaughtRecipe, replaced: &RecipeFile) -> Result<TaughtRecipe, String> {
     let TaughtRecipe {
-        mut file, recipe, ..
+        mut manifest,
+        recipe,
+        ..
     } = taught;
-    check_kept(replaced, (file.camera.width, file.camera.height))?;
-    file.regions.clone_from(&replaced.regions);
-    file.gauges.clone_from(&replaced.gauges);
-    file.min_coverage = replaced.min_coverage;
+    check_kept(replaced, (manifest.camera.width, manifest.camera.height))?;
+    manifest.regions.clone_from(&replaced.regions);
+    manifest.gauges.clone_from(&replaced.gauges);
+    manifest.min_coverage = replaced.min_coverage;
     // The prediction is for the limits that teaching sets.
-    file.good_parts = None;
-    let choice = planner::choose(&file.sequences, &file.gauges);
-    file.production = choice.production;
-    let mut recipe = Recipe::check(&file, recipe.arrays)?;
+    manifest.good_parts = None;
+    let choice = planner::choose(&manifest.sequences, &manifest.gauges);
+    manifest.production = choice.production;
+    let mut recipe = Recipe::check(&manifest, recipe.arrays)?;
     let (bytes, fingerprint) =
-        archive::pack(&file, &recipe.arrays).map_err(|error| error.to_string())?;
+        archive::pack(&manifest, &recipe.arrays).map_err(|error| error.to_string())?;
     recipe.id.fingerprint.clone_from(&fingerprint);
-    file.fingerprint = fingerprint;
+    manifest.fingerprint = fingerprint;
     Ok(TaughtRecipe {
         bytes,
-        file,
+        manifest,
         recipe,
         choice,
     })

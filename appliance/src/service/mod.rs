@@ -20,7 +20,7 @@ use crate::head::calibration::Current;
 use crate::head::placed::Placed;
 use crate::history::{self, Bounds, History, Numbering, Reader};
 use crate::production::backend;
-use crate::production::latest::LastMaps;
+use crate::production::latest::LastCycleRequests;
 use crate::production::opening::Opening;
 use crate::production::shelf::Shelf;
 use crate::production::simulation::Simulation;
@@ -124,7 +124,7 @@ impl Daemon {
             let station = station.clone();
             spawn("history", move || task.run(&station))?
         };
-        let maps = LastMaps::default();
+        let last_cycle = LastCycleRequests::default();
         let calibration = Current::default();
         let simulation = Simulation::new(orders.clone());
         let computing = Computing::default();
@@ -147,7 +147,7 @@ impl Daemon {
                 access,
                 recipes: recipes.clone(),
                 calibration: calibration.clone(),
-                maps: maps.clone(),
+                last_cycle: last_cycle.clone(),
                 simulation: simulation.clone(),
                 history: Reader::of(&path),
                 date: Box::new(move |utc_us| dating.date(boot_id, utc_us)),
@@ -210,7 +210,7 @@ impl Daemon {
                     pool,
                     recipes,
                     station,
-                    maps,
+                    last_cycle,
                     history,
                     progress,
                     config,

@@ -204,7 +204,7 @@ impl Station {
     ) {
         if self.ends(self.is_teaching(), job, "a failed teach", effects) {
             log(effects, words.clone());
-            let code = error_code::named(code);
+            let code = error_code::or_unnamed(code);
             self.failure = Some(Failure { code, words });
         }
     }

@@ -78,7 +78,7 @@ impl Station {
     ) {
         if let Some(cycle) = self.take_cycle(job, "a failed measurement", effects) {
             log(effects, words.clone());
-            self.fail_cycle(cycle, error_code::named(code), words, effects);
+            self.fail_cycle(cycle, error_code::or_unnamed(code), words, effects);
         }
     }
 

@@ -2,7 +2,7 @@
 
 /// The camera is lost.
 pub const CAMERA_LOST: u16 = 101;
-/// A device cannot do what it is asked for.
+/// A device cannot do what is asked of it: any device, although the code is in the camera's family.
 pub const UNSUPPORTED: u16 = 102;
 /// The frames of a cycle are not those that the recipe was made for.
 pub const WRONG_FRAMES: u16 = 103;
@@ -12,13 +12,14 @@ pub const PROJECTOR_LOST: u16 = 201;
 pub const TIMEOUT: u16 = 301;
 /// A device broke the rules of its interface.
 pub const PROTOCOL: u16 = 302;
-/// The chip of the lines (trigger, start, results) is lost.
+/// The GPIO chip of the camera's trigger is lost.
 pub const LINES_LOST: u16 = 303;
-/// The scene does not make a recipe.
+/// What is in front of the head cannot be taught; the message says why.
 pub const NOTHING_TO_TEACH: u16 = 401;
 /// A stored recipe is damaged or cannot be used on this head; it stays stored.
 pub const RECIPE_UNUSABLE: u16 = 402;
-/// The geometry or the pattern is impossible.
+/// The geometry, the pattern and a recipe do not fit each other: teaching cannot triangulate with them, the recipe that was
+/// taught cannot be made ready to measure, or a trigger came without a recipe.
 pub const RIG: u16 = 501;
 /// The head has no calibration that can be used.
 pub const NOT_CALIBRATED: u16 = 502;
@@ -28,15 +29,15 @@ pub const NOT_STORED: u16 = 601;
 pub const STORAGE_FULL: u16 = 602;
 /// The number of a result could not be stored.
 pub const SEQ_NOT_STORED: u16 = 603;
-/// The station's measuring task did not answer before the deadline of a wait.
+/// The measuring task did not answer before the deadline of a job, or gave no sign of life while it had none.
 pub const DEADLINE: u16 = 801;
 /// The PLC or a stop ended the cycle before it had a result.
 pub const ABORTED: u16 = 802;
 /// The measuring task failed without naming a code of its own.
 pub const UNNAMED: u16 = 899;
 
-/// The code of a failure, which always has one.
-pub(super) fn named(code: u16) -> u16 {
+/// The code of a failure: [`UNNAMED`] in place of 0, which means no error.
+pub(super) fn or_unnamed(code: u16) -> u16 {
     if code == 0 { UNNAMED } else { code }
 }
 
@@ -50,6 +51,7 @@ pub fn family(code: u16) -> &'static str {
         4 => "recipe",
         5 => "calibration",
         6 => "storage",
+        // Reserved: no code is in this family yet.
         7 => "thermal",
         _ => "internal",
     }

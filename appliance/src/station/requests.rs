@@ -1,4 +1,5 @@
-//! What became of the PLC's requests: triggers counted as accepted or missed, the last token, why the last one was rejected.
+//! What became of requests: triggers of any source (PLC, page, start line) counted as accepted or missed, the last token of the PLC,
+//! why the last request was rejected.
 
 /// The counters and latches of requests.
 #[derive(Debug, Clone, Default)]
@@ -7,17 +8,17 @@ pub(super) struct Requests {
     pub(super) triggers: u32,
     /// Rejected triggers.
     pub(super) missed: u32,
-    /// MISSED_TRIGGER.
+    /// Whether a trigger was rejected since the last ERROR_RESET.
     pub(super) missed_latch: bool,
     /// The last accepted token.
     pub(super) last_token: u16,
-    /// REJECT_REASON.
+    /// Why the last rejected request was rejected ([`super::reject`]); 0 before the first.
     pub(super) reject_reason: u16,
 }
 
 impl Requests {
-    /// The token of a write if it is a trigger. It is compared with the last accepted one, whatever connection that came from, so
-    /// that a write sent twice never measures twice.
+    /// The token of a write if it is a trigger: neither 0 nor the last accepted one, whatever connection that came from. So a write
+    /// that is sent again does not measure again, until another token is accepted or the daemon is started again.
     pub(super) fn new_token(&self, written: Option<u16>) -> Option<u16> {
         written.filter(|&token| token != 0 && token != self.last_token)
     }
@@ -42,7 +43,7 @@ impl Requests {
         self.reject_reason = reason;
     }
 
-    /// ERROR_RESET.
+    /// ERROR_RESET clears the latch; counters and token stay.
     pub(super) fn reset(&mut self) {
         self.missed_latch = false;
     }

@@ -73,7 +73,7 @@ impl Station {
                 remedy,
             } => {
                 let fault = Fault {
-                    code: error_code::named(error_code),
+                    code: error_code::or_unnamed(error_code),
                     cause,
                     remedy,
                     since: self.clock.now(),

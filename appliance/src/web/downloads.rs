@@ -175,7 +175,7 @@ fn streamed(
 
 pub(super) async fn cloud(State(site): State<Site>) -> Result<Response, Problem> {
     file(&site, "application/octet-stream", |site| {
-        let asked = site.maps.ask(|cycle| {
+        let asked = site.last_cycle.ask(|cycle| {
             let cloud = cycle.plan.cloud(cycle.sequence, cycle.frames)?;
             Some((format!("{}.ply", cycle.seq()), cloud))
         });
@@ -190,7 +190,7 @@ const GONE: &str =
 
 pub(super) async fn recording(State(site): State<Site>) -> Result<Response, Problem> {
     folder(&site, |site| {
-        let asked = site.maps.ask(|cycle| FailedPart {
+        let asked = site.last_cycle.ask(|cycle| FailedPart {
             record: cycle.record.clone(),
             sequence: cycle.sequence,
             frames: cycle.frames.to_vec(),

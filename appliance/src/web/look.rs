@@ -56,7 +56,7 @@ pub(super) async fn picture(
             return Err(Problem::missing(words));
         }
         // Not an error: the page asks for a picture of every result.
-        let Some((seq, layers)) = site.maps.layers(site.last_seq()) else {
+        let Some((seq, layers)) = site.last_cycle.layers(site.last_seq()) else {
             let words = "the frames are gone, or nothing was measured yet: trigger a measurement";
             return Ok((StatusCode::NO_CONTENT, [("x-none", words)]).into_response());
         };

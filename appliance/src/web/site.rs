@@ -12,7 +12,7 @@ use super::problem::Problem;
 use super::slots::Slots;
 use crate::head::calibration::Current;
 use crate::history::Reader;
-use crate::production::latest::LastMaps;
+use crate::production::latest::LastCycleRequests;
 use crate::production::simulation::Simulation;
 use crate::recipe::Store;
 use crate::station::tally::Tally;
@@ -44,8 +44,8 @@ pub struct Parts {
     pub recipes: Store,
     /// The calibration of the open head.
     pub calibration: Current,
-    /// Frames and plan of the last cycle, for its maps.
-    pub maps: LastMaps,
+    /// Requests about the last cycle: its maps and downloads.
+    pub last_cycle: LastCycleRequests,
     /// The part in front of a simulated head.
     pub simulation: Simulation,
     /// The stored results.

@@ -45,7 +45,7 @@ impl Part {
         };
         let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &|_, _| ());
         let taught = taught.expect("a plane can be taught");
-        let (file, recipe, bytes) = (taught.file, taught.recipe, taught.bytes);
+        let (file, recipe, bytes) = (taught.manifest, taught.recipe, taught.bytes);
         let plan = Plan::new(recipe.clone(), &calibration, true).expect("a plan");
         let rasters = plan.rasters(&calibration).expect("rasters");
         let all: Vec<usize> = (0..rasters.len()).collect();

@@ -76,7 +76,7 @@ pub fn budgets(
     let on_progress =
         |share: f64, words: &str| progress(0.3 + 0.4 * share, &format!("{about}: {words}"));
     let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &on_progress).map_err(words)?;
-    let sequences = &taught.file.sequences;
+    let sequences = &taught.manifest.sequences;
     let full = sequences.len().saturating_sub(1);
     let four = sequences
         .iter()
@@ -89,7 +89,7 @@ pub fn budgets(
             0.8,
             &format!("{about}: {} frames", sequences[production].frames.len()),
         );
-        let mut file = taught.file.clone();
+        let mut file = taught.manifest.clone();
         file.production = production;
         file.alignment = alignment;
         let (bytes, _) = archive::pack(&file, &taught.recipe.arrays).map_err(words)?;

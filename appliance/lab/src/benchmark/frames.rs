@@ -1,11 +1,12 @@
-//! Sets of frames that kernels are timed on, and a rotation through more copies than fit into any cache.
+//! Sets of frames that kernels are timed on, and a rotation through copies of a set: with `Effort::FULL` more than fit into any cache,
+//! with `Effort::QUICK` one.
 
 use algo::frame::{FrameView, Samples};
 use algo::phase::Trust;
 use algo::units::{AbsolutePhase, Modulation};
 use hal::frame::Frame;
 
-/// The frames of one measurement, the map that they are unwrapped about, and memory for the result.
+/// The frames of one sequence, the phase map that they are unwrapped about if the sequence needs one, and memory for the result.
 #[derive(Clone)]
 pub struct FrameSet {
     width: usize,
@@ -16,7 +17,7 @@ pub struct FrameSet {
     pub out: Output,
 }
 
-/// All frames of a set, one behind the other.
+/// All frames of a set, one after the other, each row-major without padding.
 #[derive(Clone)]
 pub enum Buffer {
     /// 8 bits.
@@ -37,7 +38,8 @@ pub struct Output {
 }
 
 impl FrameSet {
-    /// Frames of `width` × `height` samples, one behind the other, and the map for sequences that need one.
+    /// Frames of `width` × `height` samples, one after the other, and the map for sequences that need one. Samples beyond the last
+    /// whole frame are not used.
     pub fn new(
         (width, height): (usize, usize),
         samples: Buffer,
@@ -110,7 +112,7 @@ impl FrameSet {
         };
         let views = frames
             .into_iter()
-            // A chunk is exactly a frame, so none is left out.
+            // A chunk has exactly the samples of a frame, so this cannot fail.
             .filter_map(|frame| FrameView::new(frame, self.width, self.height, self.width).ok())
             .collect();
         (views, self.map.as_deref(), &mut self.out)
@@ -133,7 +135,7 @@ pub struct Rotation {
 }
 
 impl Rotation {
-    /// As many copies as read `bytes` in all, at least one.
+    /// As many copies as a kernel must decode to read at least `bytes` bytes of frames and maps; at least one.
     pub fn of(set: FrameSet, bytes: usize) -> Self {
         let copies = bytes.div_ceil(set.bytes().max(1)).max(1);
         Self {

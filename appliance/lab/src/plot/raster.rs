@@ -1,9 +1,10 @@
-//! A plot as a picture of pixels: lines and dots with soft edges, words in the font of all pictures.
+//! A plot as a picture of pixels: lines and dots with soft edges, words in the one font of all pictures, whose size is fixed (the `size`
+//! of [`Mark::Words`] is for SVG). Pixel (x, y) has its centre at the point (x, y), in SVG at (x + ½, y + ½).
 
 use super::marks::{Anchor, DASH, Mark};
 use appliance::output::canvas::{Canvas, LETTER, LINE};
 
-/// Marks on white.
+/// The marks on white, in a picture of `width` × `height` pixels.
 pub fn render((width, height): (f64, f64), marks: &[Mark]) -> Canvas<3> {
     let mut canvas = Canvas::new(width as usize, height as usize);
     canvas.pixels.fill([255; 3]);
@@ -41,13 +42,13 @@ pub fn render((width, height): (f64, f64), marks: &[Mark]) -> Canvas<3> {
     canvas
 }
 
-/// The colour of a CSS code of six digits; black for anything else.
+/// The colour of a CSS code with six hexadecimal digits, as all marks have; black for a code that is not hexadecimal.
 fn rgb(code: &str) -> [u8; 3] {
     let bits = u32::from_str_radix(code.trim_start_matches('#'), 16).unwrap_or(0);
     [16, 8, 0].map(|shift| (bits >> shift) as u8)
 }
 
-/// Paints `colour` over the pixels of a box, each as much as `cover` says of its middle, 0…1.
+/// Mixes `colour` into the pixels of a box, each by the share `cover` of its centre (x, y), which is clamped to 0…1.
 fn paint(
     canvas: &mut Canvas<3>,
     [left, top, right, bottom]: [f64; 4],
@@ -69,7 +70,8 @@ fn paint(
     }
 }
 
-/// A straight line; `walked` is where in the dashes it starts, if it has any.
+/// A straight line of `width` pixels; if it is dashed, `walked` is the length in pixels of the whole line before it, so that dashes go on
+/// over its points.
 fn line(
     canvas: &mut Canvas<3>,
     ((x0, y0), (x1, y1)): ((f64, f64), (f64, f64)),
@@ -105,24 +107,14 @@ fn dot(canvas: &mut Canvas<3>, (x, y): (f64, f64), radius: f64, colour: [u8; 3])
     });
 }
 
+/// Words at the point (x, y) of their base line.
 fn words(canvas: &mut Canvas<3>, (x, y): (f64, f64), anchor: Anchor, colour: [u8; 3], text: &str) {
     let length = LETTER * text.chars().count();
-    if anchor == Anchor::Upright {
-        let mut lying = Canvas::<3>::new(length.max(1), LINE);
-        lying.pixels.fill([255; 3]);
-        lying.text_in(text, 0, 0, colour);
-        let left = (x as usize).saturating_sub(LINE);
-        let bottom = (y + length as f64 / 2.0) as usize;
-        for (at, &pixel) in lying.pixels.iter().enumerate() {
-            let (across, down) = (at % lying.width, at / lying.width);
-            canvas.set(left + down, bottom.saturating_sub(across), pixel);
-        }
-        return;
-    }
     let before = match anchor {
+        Anchor::Start => 0.0,
         Anchor::Middle => length as f64 / 2.0,
         Anchor::End => length as f64,
-        Anchor::Start | Anchor::Upright => 0.0,
+        Anchor::Upright => return upright(canvas, (x, y), colour, text),
     };
     // The base line is 3 pixels above the lower edge of a line.
     let top = y - (LINE as f64 - 3.0);
@@ -132,6 +124,21 @@ fn words(canvas: &mut Canvas<3>, (x, y): (f64, f64), anchor: Anchor, colour: [u8
         top.max(0.0) as usize,
         colour,
     );
+}
+
+/// Words that are read from below, with their middle at height y. They are drawn on a white canvas and copied turned by a quarter,
+/// including its background, which hides what is below. The lower edge of the line, not its base line, is at x.
+fn upright(canvas: &mut Canvas<3>, (x, y): (f64, f64), colour: [u8; 3], text: &str) {
+    let length = LETTER * text.chars().count();
+    let mut lying = Canvas::<3>::new(length.max(1), LINE);
+    lying.pixels.fill([255; 3]);
+    lying.text_in(text, 0, 0, colour);
+    let left = (x as usize).saturating_sub(LINE);
+    let bottom = (y + length as f64 / 2.0) as usize;
+    for (at, &pixel) in lying.pixels.iter().enumerate() {
+        let (across, down) = (at % lying.width, at / lying.width);
+        canvas.set(left + down, bottom.saturating_sub(across), pixel);
+    }
 }
 
 #[cfg(test)]

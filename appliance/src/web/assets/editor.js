@@ -220,7 +220,7 @@ function save(event) {
     const stored = await ask("PUT", `/api/recipes/${recipe.number}`, body);
     recipe.fingerprint = stored.fingerprint;
     show("editor", false);
-    if (stored.active && !stored.loading) notice(`recipe ${recipe.number} is stored, but the station still uses the version before: load it`, true);
+    if (stored.active && !stored.loading) notice(`recipe ${recipe.number} is stored, but the station still uses the previous version: load recipe ${recipe.number}`, true);
     else notice(`recipe ${recipe.number} is stored${stored.loading ? " and is being loaded" : ""}`);
     if (!stored.loading) window.dispatchEvent(new Event("recipes"));
   });

@@ -2,12 +2,12 @@
 import { $, button, fill, make, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { change, notice } from "./session.js";
-import { signed } from "./number.js";
 import { choose } from "./question.js";
 import { edit } from "./editor.js";
 
 let active = null;
-let taught = "";
+// Number and fingerprint of the active recipe when the list was read last.
+let listedFor = "";
 // The listed recipes, and the number that the page proposed to teach.
 let stored = [];
 let proposed = "";
@@ -61,12 +61,13 @@ function remover(recipe) {
   return remove;
 }
 
-// A line below a recipe, or in place of a deleted one, that restores the version before.
+// A line below a recipe, or in place of a deleted one, that restores the previous version.
 function undoer(number, before, words) {
   const undo = button(words, "plain", () => change(async () => {
     const now = await ask("POST", `/api/recipes/${number}/undo`);
+    // The PLC reads the first 32 bits of the fingerprint.
     const crc = `RECIPE_CRC32 is 0x${now.fingerprint.slice(0, 8).toUpperCase()}`;
-    if (now.active && !now.loading) notice(`recipe ${number} is undone, but the station still uses the version before: load it`, true);
+    if (now.active && !now.loading) notice(`recipe ${number} is undone, but the station still uses the version that was undone: load recipe ${number}`, true);
     else notice(`recipe ${number} · ${now.name} is back${now.loading ? " and is being loaded" : ""}: its ${crc}`);
     list();
   }));
@@ -114,20 +115,20 @@ async function consent(number) {
   return choose(`Replace recipe ${number}?`, words, keep.concat([["Replace, with new gauges", { replace: true }]]));
 }
 
-// How the limit of the deviation was set when the part was taught.
+// How the limit of the deviation was set when the part was taught. The requested limit is the default of teaching.
 function held(good) {
   if (!good) return "";
   const limit = `±${good.limit_mm.toFixed(2)} mm`;
   const expected = `Good parts deviate by up to ${good.largest_mm.toFixed(3)} ± ${good.scatter_mm.toFixed(3)} mm`;
   const words = [good.limit_mm > good.tolerance_mm
-    ? `The requested limit of ±${good.tolerance_mm.toFixed(2)} mm would reject good parts: it was set to ${limit}. ${expected}. More light, less noise or another pose narrows it.`
+    ? `The default limit of ±${good.tolerance_mm.toFixed(2)} mm would reject good parts: the limit was set to ${limit}. ${expected}. More light, less noise or another pose narrows it.`
     : `${expected}; the limit was set to ${limit}.`];
   if (good.weighed > 0) words.push(`${(100 * good.weighed).toFixed(2)} % of the surface is so dark or so steep that a deviation there must be larger to be found, by a factor of ${(1 / good.least_weight).toFixed(1)} at its worst place: another pose or more light lowers it.`);
   if (good.left_out > 0) words.push(`${(100 * good.left_out).toFixed(2)} % of the surface's pixels are too dark or too steep to be compared: another pose brings them back.`);
   return words.join(" ");
 }
 
-// Compares straight fringes with the part's adaptive pattern, at the same number of frames.
+// Shows the comparison that teaching stored: straight fringes with the part's adaptive pattern, at the same number of frames.
 export async function compare(number) {
   const recipe = await ask("GET", `/api/recipes/${number}`);
   const { comparison } = recipe;
@@ -143,13 +144,14 @@ export async function compare(number) {
   fill($("comparison-rows"), line(`fixed: straight fringes, ${comparison.fixed.frames} frames`, comparison.fixed), line(`adaptive: the part's own, ${comparison.adaptive.frames} frames`, comparison.adaptive));
   const less = 100 * (1 - comparison.adaptive.sigma_mm / comparison.fixed.sigma_mm);
   const production = recipe.sequences[recipe.production];
-  text("comparison-words", `${signed(less, 0)} % less noise where both see the part. In production ${production.frames.length} frames are projected: predicted height noise ${(1000 * production.sigma_mm).toFixed(1)} µm.`);
+  text("comparison-words", `${less < 0 ? `${(-less).toFixed(0)} % more` : `${less.toFixed(0)} % less`} noise where both see the part. In production ${production.frames.length} frames are projected: predicted height noise ${(1000 * production.sigma_mm).toFixed(1)} µm.`);
 }
 
-// Follows the snapshot: the active recipe, the progress of teaching, and the comparison when it has ended.
+// Follows the snapshot: reads the list again when another recipe is active and the list is visible, shows the progress of teaching,
+// and the comparison when teaching has ended.
 export function showRecipes(now, visible) {
   const number = now.recipe ? now.recipe.number : null;
-  const changed = number !== active || `${number}/${now.recipe ? now.recipe.fingerprint : ""}` !== taught;
+  const changed = number !== active || `${number}/${now.recipe ? now.recipe.fingerprint : ""}` !== listedFor;
   active = number;
   show("teaching", Boolean(now.teach));
   if (now.teach) {
@@ -165,7 +167,7 @@ export function showRecipes(now, visible) {
     else notice(`recipe ${done} was not taught: ${now.error ? now.error.words : "see the event log"}`, true);
   }
   if (visible && changed) {
-    taught = `${number}/${now.recipe ? now.recipe.fingerprint : ""}`;
+    listedFor = `${number}/${now.recipe ? now.recipe.fingerprint : ""}`;
     list();
   }
 }

@@ -56,7 +56,7 @@ async fn served() -> Served {
         access,
         recipes: Store::open(&folder.path().join("recipes")).unwrap(),
         calibration: Default::default(),
-        maps: Default::default(),
+        last_cycle: Default::default(),
         simulation: Simulation::new(mpsc::channel().0),
         history: Reader::of(folder.path()),
         date: Box::new(move |utc_us| dates.send(utc_us).is_ok()),

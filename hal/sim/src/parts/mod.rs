@@ -1,6 +1,7 @@
 //! The parts that can be measured: thin surfaces z(x, y) of bounded slope, with nothing behind them.
 //!
-//! The sizes of the study's parts (docs/measurement.md, *The study's head and parts*) are defaults; a scenario may change them.
+//! Default sizes are those of the parts of the accuracy study (docs/measurement.md, *The study's head and parts*, and docs/experiments.md);
+//! a scenario may change them.
 
 mod dented;
 mod shapes;
@@ -81,28 +82,29 @@ impl Part {
         ]
     }
 
-    /// Checks the measures; the error names the key and its range.
+    /// Checks the measures of the part and of its defects; the error names the first key that is out of its range, and the range.
     pub(crate) fn check(&self) -> Result<(), String> {
         let positive = |key: &str, value: f64| within(&format!("part.{key}"), value, 1e-3, 1000.0);
-        let finite = |key: &str, value: f64| within(&format!("part.{key}"), value, -1000.0, 1000.0);
+        let coordinate =
+            |key: &str, value: f64| within(&format!("part.{key}"), value, -1000.0, 1000.0);
         match self {
             Self::Cone(part) => {
                 positive("half_size", part.half_size)?;
                 positive("radius", part.radius)?;
-                finite("depth", part.depth)?;
-                finite("top", part.top)
+                coordinate("depth", part.depth)?;
+                coordinate("top", part.top)
             }
             Self::Sawtooth(part) => {
                 positive("half_size", part.half_size)?;
                 positive("period", part.period)?;
                 within("part.rise", part.rise, 0.01, 0.99)?;
-                finite("x0", part.x0)?;
-                finite("lo", part.lo)?;
-                finite("hi", part.hi)
+                coordinate("x0", part.x0)?;
+                coordinate("lo", part.lo)?;
+                coordinate("hi", part.hi)
             }
             Self::Sphere(part) => {
                 positive("radius", part.radius)?;
-                finite("centre_z", part.centre_z)?;
+                coordinate("centre_z", part.centre_z)?;
                 // Lower than a tenth of the radius above the centre, the surface is too steep for a height field.
                 let low = part.centre_z + 0.1 * part.radius;
                 within("part.cut", part.cut, low, part.centre_z + part.radius)
@@ -110,11 +112,12 @@ impl Part {
             Self::Tube(part) => {
                 positive("diameter", part.diameter)?;
                 positive("half_length", part.half_length)?;
-                finite("centre_z", part.centre_z)
+                coordinate("centre_z", part.centre_z)
             }
             Self::Flowerpot(part) => {
                 positive("bottom_diameter", part.bottom_diameter)?;
                 positive("depth", part.depth)?;
+                // The wall leans outwards by at least 0.025 mm per mm of depth: a height field has no upright walls.
                 let least = part.bottom_diameter + 0.05 * part.depth;
                 within("part.rim_diameter", part.rim_diameter, least, 1000.0)?;
                 part.defects.iter().try_for_each(|defect| {
@@ -135,7 +138,7 @@ impl Part {
         }
     }
 
-    /// The surface to trace; none for an empty stage.
+    /// The surface to trace; `None` for [`Part::Empty`].
     pub(crate) fn surface(&self) -> Option<Box<dyn Surface>> {
         Some(match self {
             Self::Cone(part) => Box::new(part.clone()),

@@ -1,4 +1,4 @@
-//! Surfaces and rays: slopes stay within their bounds, and traced rays meet the surface where a march in small steps does.
+//! Surfaces and rays: slopes and material stay within their bounds, and traced rays meet the surface where a march in small steps does.
 
 use super::{all_parts, wall_dent};
 use crate::optics::{Lens, Vector, along};
@@ -7,7 +7,7 @@ use crate::trace::Traced;
 use crate::{Part, Scenario};
 
 #[test]
-fn no_height_has_a_slope_above_its_bound() {
+fn no_slope_is_above_its_bound_and_no_material_outside_of_its_box() {
     for part in all_parts() {
         let Some(surface) = part.surface() else {
             continue;
@@ -53,10 +53,12 @@ fn a_dent_of_a_wall_is_as_deep_along_its_normal_and_as_wide_across_it_as_it_says
         Part::Flowerpot(pot).surface().unwrap()
     });
     let centre = [-60.0_f64, 52.0];
+    // The wall of a pot has the same slope everywhere, its bound; n_z of its normal follows.
     let normal_z = 1.0 / good.slope_bound().hypot(1.0);
     let depth = |x: f64, y: f64| (good.height(x, y) - dented.height(x, y)) * normal_z;
     assert!((depth(centre[0], centre[1]) - 0.3).abs() < 1e-6);
-    // Up the wall and around it: half as deep at a quarter of the diameter from the centre, not deep beyond half the diameter.
+    // Across the surface, up the wall and around it: half the depth at a quarter of the diameter (2 mm) from the centre, none beyond half
+    // the diameter (4 mm).
     let radius = centre[0].hypot(centre[1]);
     let [outwards, around] = [
         [centre[0] / radius, centre[1] / radius],
@@ -65,7 +67,8 @@ fn a_dent_of_a_wall_is_as_deep_along_its_normal_and_as_wide_across_it_as_it_says
     for ([x, y], per_mm) in [(outwards, normal_z), (around, 1.0)] {
         let at = |mm: f64| depth(centre[0] + x * mm * per_mm, centre[1] + y * mm * per_mm);
         for side in [-1.0, 1.0] {
-            // The wall is curved: 2 mm away it is 0.02 mm off its tangent, and 0.1 mm lower in z.
+            // Around the pot the place 2 mm along the tangent is farther from the axis by 2²/2r = 0.025 mm, where the wall is higher in z, so
+            // that its distance in space from the centre is a little more than 2 mm: hence the tolerance.
             assert!((at(2.0 * side) - 0.15).abs() < 0.005, "{}", at(2.0 * side));
             assert_eq!(at(4.01 * side), 0.0);
         }

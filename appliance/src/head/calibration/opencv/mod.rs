@@ -124,8 +124,8 @@ pub fn from_two(
                 distortion: ALONE[1],
             };
             right_size(tree, size)?;
-            let mm = millimetres(tree, declared)?;
-            let pose = Pose::read(tree, (ROTATION, TRANSLATION), mm)?;
+            let mm_per_unit = millimetres(tree, declared)?;
+            let pose = Pose::read(tree, (ROTATION, TRANSLATION), mm_per_unit)?;
             model(tree, &names, turned(pose, declared))
         })
     };
@@ -142,9 +142,9 @@ pub fn from_two(
 pub fn from_one(path: &Path, sizes: Sizes, declared: Declared) -> Result<Models, String> {
     read(path, |tree| {
         right_size(tree, sizes.camera)?;
-        let mm = millimetres(tree, declared)?;
-        let between = Pose::read(tree, (ROTATION, TRANSLATION), mm)?;
-        let plate = Pose::read(tree, (PLATE_ROTATION, PLATE_TRANSLATION), mm).map_err(|error| {
+        let mm_per_unit = millimetres(tree, declared)?;
+        let between = Pose::read(tree, (ROTATION, TRANSLATION), mm_per_unit)?;
+        let plate = Pose::read(tree, (PLATE_ROTATION, PLATE_TRANSLATION), mm_per_unit).map_err(|error| {
             format!(
                 "{error} (the pose of the plate that lies in the reference plane, as cv2.solvePnP gives it)"
             )

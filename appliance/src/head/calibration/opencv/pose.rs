@@ -17,16 +17,17 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Reads one by any of the names of its rotation and its translation; a unit of length is `mm` millimetres.
+    /// Reads a pose; `names` are the accepted names of the node of the rotation and of that of the translation. A unit of length in the
+    /// file is `mm_per_unit` millimetres.
     ///
     /// # Errors
     /// In words: a node is missing or has another shape, R is not a rotation, or it mirrors.
     pub fn read(
         tree: &Node,
-        (rotation, translation): (&[&'static str], &[&'static str]),
-        mm: f64,
+        names: (&[&'static str], &[&'static str]),
+        mm_per_unit: f64,
     ) -> Result<Self, String> {
-        let (name, found) = node(tree, rotation)
+        let (name, found) = node(tree, names.0)
             .map_err(|error| format!("{error}: a rotation, 3×3 or a vector of 3"))?;
         let matrix = Matrix::read(name, found)?;
         let rotation = if matrix.is_vector() && matrix.numbers.len() == 3 {
@@ -36,15 +37,15 @@ impl Pose {
         };
         is_rotation(name, &rotation)?;
         let (name, found) =
-            node(tree, translation).map_err(|error| format!("{error}: a translation, 3×1"))?;
+            node(tree, names.1).map_err(|error| format!("{error}: a translation, 3×1"))?;
         let translation: [f64; 3] = Matrix::read(name, found)?.expect(name, (3, 1))?;
         Ok(Self {
             rotation,
-            translation_mm: translation.map(|length| length * mm),
+            translation_mm: translation.map(|length| length * mm_per_unit),
         })
     }
 
-    /// This pose after another: X = R₂(R₁X + t₁) + t₂.
+    /// This pose (R₂, t₂) applied after `first` (R₁, t₁): X_to = R₂(R₁X_from + t₁) + t₂.
     pub fn after(&self, first: &Self) -> Self {
         let moved = apply(&self.rotation, first.translation_mm);
         let mut translation_mm = self.translation_mm;
@@ -58,7 +59,7 @@ impl Pose {
         }
     }
 
-    /// The same pose with respect to a world turned by 180° about its x axis: y and z point the other way.
+    /// The same pose with respect to a world turned by half a turn about its x axis: y and z point the other way.
     pub fn about_x(&self) -> Self {
         let half_turn = [1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0];
         Self {
