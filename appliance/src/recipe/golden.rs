@@ -96,8 +96,8 @@ pub struct TaughtRecipe {
 
 impl GoldenPart<'_> {
     /// Makes the recipe: expansion of the height, phase reach (from which follows where a short sequence is safe), sequences, regions
-    /// and gauges. The gauges are the deviation from golden and the coverage of the whole frame, and, for each of up to
-    /// [`MAX_OPENINGS`] openings of the part that are large enough, the coverage of the opening.
+    /// and gauges. The gauges are the deviation from golden and the coverage of the whole frame, and, for each of the up to
+    /// 8 largest openings of the part that have 60 pixels and room for a region, the coverage of the opening.
     ///
     /// # Errors
     /// In words, if the recipe could not be packed, or not be loaded again.

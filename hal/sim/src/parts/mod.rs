@@ -1,7 +1,7 @@
 //! The parts that can be measured: thin surfaces z(x, y) of bounded slope, with nothing behind them.
 //!
-//! Default sizes are those of the parts of the accuracy study (docs/measurement.md, *The study's head and parts*, and docs/experiments.md);
-//! a scenario may change them.
+//! Default sizes are those of the parts in Peng & Gupta's study (2008; docs/measurement.md, *The study's head and parts*); a scenario may
+//! change them.
 
 mod dented;
 mod shapes;
