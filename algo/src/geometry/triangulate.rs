@@ -232,7 +232,7 @@ impl Triangulator {
     /// The surface point that pixel (u, v) sees if its phase is `phase` (turns), or `None` where no
     /// height in the working range has that phase, several have, or the phase hardly depends on the
     /// height. Several are noticed only where they lie in different sixteenths of the range, and only for a
-    /// sampled phase function: others are monotone along a ray.
+    /// sampled phase function.
     pub fn solve(&self, u: f64, v: f64, phase: f64) -> Option<Solution> {
         let ray = self.falling_ray(u, v)?;
         let off = |z: f64| Some(self.phase_at(self.on_ray(ray, z))? - phase);

@@ -95,7 +95,7 @@ pub struct Recording {
     pub noise_counts: Option<f64>,
     /// The projector.
     pub projector: RecordedProjector,
-    /// One or two patterns.
+    /// One or two patterns, for example vertical and horizontal fringes. Heights are from the first vertical one, else from the first.
     pub patterns: Vec<PatternSpec>,
     /// The frames in the order of the manifest.
     pub frames: Vec<RecordedFrame>,

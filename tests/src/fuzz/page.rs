@@ -3,7 +3,7 @@
 use super::part::PART;
 use super::plant::{runtime, settings};
 use appliance::history::Reader;
-use appliance::production::latest::LastMaps;
+use appliance::production::latest::LastCycleRequests;
 use appliance::production::simulation::Simulation;
 use appliance::recipe::Store;
 use appliance::station::{Micros, Station, StationHandle};
@@ -61,7 +61,7 @@ impl Page {
             access: access.clone(),
             recipes: Store::open(&recipes).expect("a store"),
             calibration: Default::default(),
-            maps: maps_of_no_cycle(),
+            last_cycle: no_cycle(),
             simulation: Simulation::new(mpsc::channel().0),
             history: Reader::of(folder.path()),
             date: Box::new(|_| false),
@@ -146,8 +146,8 @@ impl Page {
 
 /// The maps of the last cycle, with a thread that answers in place of the measuring task that there was no cycle: without it each
 /// request for a picture would wait for seconds.
-fn maps_of_no_cycle() -> LastMaps {
-    let maps = LastMaps::default();
+fn no_cycle() -> LastCycleRequests {
+    let maps = LastCycleRequests::default();
     let asked = maps.clone();
     std::thread::spawn(move || {
         loop {
