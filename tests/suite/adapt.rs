@@ -342,7 +342,7 @@ fn record(
 #[test]
 fn with_a_recipe_a_few_frames_give_the_heights_of_the_full_sequence() {
     let taught = Taught::get();
-    let (_folder, recipe) = taught.manifest();
+    let (_folder, recipe) = taught.file();
     let measured = |recording: &Recording| {
         let written = Written::new(recording);
         written.measure(&["--recipe", &recipe]).succeeded();
@@ -392,7 +392,7 @@ fn without_the_recipe_the_report_names_the_reference_map() {
 #[test]
 fn a_recipe_that_does_not_fit_the_recording_is_refused_naming_both() {
     let taught = Taught::get();
-    let (folder, recipe) = taught.manifest();
+    let (folder, recipe) = taught.file();
     let refused = |recording: &Recording, recipe: &str, code: i32, words: &[&str]| {
         let written = Written::new(recording);
         let run = written.measure(&["--recipe", recipe]);
