@@ -1,9 +1,9 @@
 //! All back-ends of this machine give the same bits.
 
 use super::super::{Decoder, PhaseRow, Trust};
+use super::arrive;
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence, Shot};
-use crate::pipeline::arrive;
 use crate::simd::Backend;
 use crate::units::{AbsolutePhase, Modulation};
 use rand_xoshiro::SplitMix64;
@@ -88,7 +88,7 @@ fn decode(decoder: &Decoder, samples: &[Vec<u16>], depth: u8, map: &[AbsolutePha
     let (last, coarser) = levels.split_last().unwrap();
     let mut arrived = decoder.arrived(WIDTH, HEIGHT);
     for level in coarser {
-        arrive(decoder, level, &mut arrived).unwrap();
+        arrive(decoder, level, &mut arrived);
     }
     let mut late = Map::new();
     for (v, row) in late.rows() {

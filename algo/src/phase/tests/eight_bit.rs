@@ -2,10 +2,9 @@
 
 use super::super::Decoder;
 use super::super::arrived::ArrivedRow;
-use super::{by_definition, bytes_of, level, off, wrap};
+use super::{arrive, by_definition, bytes_of, level, off, wrap};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence, Shot};
-use crate::pipeline::arrive;
 use std::vec::Vec;
 
 const SHIFTS: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
@@ -77,7 +76,7 @@ fn every_rough_angle_is_within_the_bound() {
             .each_ref()
             .map(|row| FrameView::new(Samples::Eight(row), row.len(), 1, row.len()).unwrap());
         let mut arrived = decoder.arrived(511, 1);
-        arrive(&decoder, &frames, &mut arrived).unwrap();
+        arrive(&decoder, &frames, &mut arrived);
         let ArrivedRow::Expected(row) = arrived.row(0) else {
             panic!("not geometric")
         };

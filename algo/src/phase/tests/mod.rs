@@ -9,7 +9,6 @@ use super::arrived::{Arrived, ArrivedRow, WrappedRow};
 use super::{Decoder, PhaseRow};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence, Shot};
-use crate::pipeline::arrive;
 use crate::trust::Trust;
 use crate::units::{AbsolutePhase, Modulation};
 use core::f64::consts::TAU;
@@ -22,6 +21,18 @@ fn level(shifts: &[f64], depth: u8) -> Decoder {
     let shot = |&shift| Shot { ratio: 1.0, shift };
     let frames: Vec<_> = shifts.iter().map(shot).collect();
     Decoder::new(&Sequence::from_frames(&frames).unwrap(), ONE_TURN, depth).unwrap()
+}
+
+/// Decodes the next level on arrival.
+fn arrive(decoder: &Decoder, frames: &[FrameView<'_>], arrived: &mut Arrived) {
+    let level = arrived.levels();
+    let (layout, words, bytes) = arrived.maps_mut();
+    let bytes = bytes.chunks_mut(layout.bytes());
+    let rows = words.chunks_mut(layout.words()).zip(bytes);
+    for (v, (words, bytes)) in rows.enumerate() {
+        decoder.arrive_row(level, frames, v, layout.row_mut(words, bytes));
+    }
+    arrived.add_level();
 }
 
 /// One demodulated row, and the modulations of its pixels that are trusted.
@@ -57,7 +68,7 @@ fn wrap(decoder: &Decoder, depth: u8, rows: &[Vec<u16>]) -> Demodulated {
         })
         .collect();
     let mut arrived = Arrived::about_map(width, 1, 1);
-    arrive(decoder, &frames, &mut arrived).unwrap();
+    arrive(decoder, &frames, &mut arrived);
     let mut phase = std::vec![AbsolutePhase::from_bits(0); width];
     let mut modulation = std::vec![Modulation::default(); width];
     let mut trust = std::vec![Trust::default(); width];
