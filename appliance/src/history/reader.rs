@@ -85,7 +85,7 @@ impl Reader {
         if !self.path.exists() {
             return Err(HistoryError {
                 path: self.path.clone(),
-                reason: "there is none: the station begins it at its first start".into(),
+                reason: "it does not exist: the station begins it at its first start".into(),
                 damaged: false,
             });
         }

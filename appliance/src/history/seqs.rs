@@ -94,7 +94,7 @@ struct Numbers {
     asked: Option<Instant>,
     /// What the card answered last, if it refused.
     refused: Option<Arc<str>>,
-    /// Whether the station was told that no number is left.
+    /// Whether the station waits, because no number was left.
     exhausted: bool,
     stopping: bool,
 }
@@ -139,8 +139,8 @@ impl Seqs {
         Some(format!("reserve result numbers: {words}: free space"))
     }
 
-    /// Reserves numbers whenever more are asked for, until [`Self::stop`]. `again` gets the last SEQ in use when the station was
-    /// told that no number is left and now there are some.
+    /// Reserves numbers whenever more are asked for, until [`Self::stop`]. `again` gets the last SEQ in use when the station waited
+    /// for numbers and there are some.
     pub(super) fn run(&self, again: impl Fn(u32)) {
         loop {
             let idle = |numbers: &mut Numbers| numbers.asked.is_none() && !numbers.stopping;
@@ -154,8 +154,8 @@ impl Seqs {
         }
     }
 
-    /// Reserves more where they are asked for: it waits for the card. Answers with the last SEQ in use if the station was told
-    /// that no number is left and now there are some.
+    /// Reserves more where they are asked for: it waits for the card. Answers with the last SEQ in use if the station waited for
+    /// numbers and there are some.
     fn refill(&self) -> Option<u32> {
         let last = {
             let numbers = self.numbers();
@@ -291,7 +291,7 @@ mod tests {
         assert!(seqs.take(101).is_ok());
     }
 
-    /// The counter's file of a storage that hangs until somebody reads from it.
+    /// Puts a pipe in place of the counter's file: writing hangs until it is read.
     fn hang(file: &Path) {
         std::fs::remove_file(file).unwrap();
         let kind = rustix::fs::FileType::Fifo;

@@ -13,7 +13,7 @@ use crate::station::{Event, StationHandle};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
+use std::sync::mpsc::{Receiver, SyncSender};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -65,9 +65,9 @@ pub struct Task {
     waiting: VecDeque<Entry>,
     /// From which length on the log is brought into the database.
     due: u64,
-    /// Results lost that the station was told of.
+    /// Lost results that were reported to the station.
     lost_before: u32,
-    /// What the station was told last.
+    /// The problem that was reported to the station last.
     problem: Option<Arc<str>>,
 }
 
@@ -91,27 +91,22 @@ impl Task {
         }
     }
 
-    /// Works until told to stop. Problems are told to the station, which warns of them.
+    /// Works until [`History::stop`]. Problems go to the station, which warns of them.
     pub fn run(mut self, station: &StationHandle) {
         self.reconcile();
         let keeping = self.keeping.take();
-        // A system without threads has not come this far; without this one no frames are kept.
+        // Where the system has no more threads, no frames are kept.
         let keeping = keeping.and_then(|keeping| start("recordings", move || keeping.run()));
-        let (seqs, told) = (self.history.seqs.clone(), station.clone());
-        let again = move |seq| drop(told.event(Event::Stored { seq, failed: None }));
+        let (seqs, waiting) = (self.history.seqs.clone(), station.clone());
+        let again = move |seq| drop(waiting.event(Event::Stored { seq, failed: None }));
         let reserving = start("reserving", move || seqs.run(again));
         let mut settled = false;
         loop {
-            let first = if settled {
-                self.inbox
-                    .recv()
-                    .map_err(|_| RecvTimeoutError::Disconnected)
-            } else {
-                self.inbox.recv_timeout(PAUSE)
+            // The queue never closes: `self.history` is one of its senders.
+            let first = match settled {
+                true => self.inbox.recv().ok(),
+                false => self.inbox.recv_timeout(PAUSE).ok(),
             };
-            if matches!(first, Err(RecvTimeoutError::Disconnected)) {
-                return;
-            }
             let messages: Vec<_> = first.into_iter().chain(self.inbox.try_iter()).collect();
             let paused = messages.is_empty();
             let (mut problem, mut stop) = (None, None);
@@ -126,7 +121,7 @@ impl Task {
                 return self.end(last_seq, reserving, keeping);
             }
             settled = paused && problem.is_none();
-            self.tell(problem, station);
+            self.report(problem, station);
         }
     }
 
@@ -260,7 +255,7 @@ impl Task {
             let left = until.saturating_duration_since(Instant::now());
             match self.inbox.recv_timeout(left) {
                 Ok(Message::RecordingsEnded) | Err(_) => return,
-                // There is nobody left to tell of a problem.
+                // The station ends as well: a problem is not reported any more.
                 Ok(message) => drop(self.take(message)),
             }
         }
@@ -286,8 +281,8 @@ impl Task {
         }
     }
 
-    /// Tells the station when the history begins to fail and when it works again.
-    fn tell(&mut self, problem: Option<String>, station: &StationHandle) {
+    /// Reports to the station when the history begins to fail and when it works again.
+    fn report(&mut self, problem: Option<String>, station: &StationHandle) {
         let problem = problem.map(Arc::from);
         if problem != self.problem {
             self.problem.clone_from(&problem);

@@ -349,7 +349,7 @@ fn without_a_history_reading_says_so() {
     let error = Reader::of(state.path())
         .results(&Filter::default())
         .unwrap_err();
-    assert!(error.to_string().contains("there is none"), "{error}");
+    assert!(error.to_string().contains("does not exist"), "{error}");
     assert!(!state.path().join(DATABASE).exists());
 }
 

@@ -37,7 +37,8 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    fn filter(self, most: usize) -> Result<Filter, Problem> {
+    /// The filter, of the `usual` number of results unless asked for another one, and at `most` that many.
+    fn filter(self, usual: usize, most: usize) -> Result<Filter, Problem> {
         let verdict = match self.verdict.as_deref() {
             None => None,
             Some("PASS") => Some(Verdict::Pass),
@@ -55,7 +56,7 @@ impl Wanted {
             since_us: self.since_us,
             until_us: self.until_us,
             before_seq: self.before_seq,
-            limit: self.limit.unwrap_or(most).min(most),
+            limit: self.limit.unwrap_or(usual).min(most),
         })
     }
 }
@@ -64,9 +65,7 @@ pub(super) async fn list(
     State(site): State<Site>,
     Query(wanted): Query<Wanted>,
 ) -> Result<Json<Value>, Problem> {
-    let limit = wanted.limit.unwrap_or(PAGE);
-    let mut filter = wanted.filter(MAX_PAGE)?;
-    filter.limit = filter.limit.min(limit);
+    let filter = wanted.filter(PAGE, MAX_PAGE)?;
     let found = site.aside(move |site| {
         let results = site.history.results(&filter)?;
         // Counts are of the whole list, also where the request is for its next page.
@@ -87,7 +86,7 @@ pub(super) async fn csv(
     State(site): State<Site>,
     Query(wanted): Query<Wanted>,
 ) -> Result<Response, Problem> {
-    let filter = wanted.filter(MAX_CSV)?;
+    let filter = wanted.filter(MAX_CSV, MAX_CSV)?;
     file(&site, "text/csv; charset=utf-8", move |site| {
         let mut bytes = Vec::new();
         site.history.csv(&filter, &mut bytes)?;
