@@ -6,7 +6,7 @@ const VIEWS = ["live", "history", "recipes", "registers", "device"];
 // Side of the smallest target that a finger hits (WCAG 2.5.8), in pixels of the screen.
 const FINGER = 24;
 // The longest text for the station's state in the header.
-const LONGEST = "offline: the PLC does not ask for it";
+const LONGEST = "offline: the PLC has not set ONLINE";
 
 async function everywhere(browser, url, cookies, touch, check) {
   for (const [width, height] of SIZES) {

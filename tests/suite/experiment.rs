@@ -3,7 +3,8 @@
 use crate::written::laboratory;
 use fringed_lab::experiment::{BetterSequence, HEADER, Method, OpticsKind, Runner, Scene};
 
-/// Columns and rows of the camera: the study's picture, or the middle quarter of it with pixels of the same size.
+/// Columns and rows of the camera: the picture of the study (docs/measurement.md), or the middle quarter of it with pixels of the same
+/// size.
 const WHOLE: u32 = 512;
 const MIDDLE: u32 = 256;
 /// RMS of error / σ_z; with about ten thousand pixels the noise of this value is below 0.01.
@@ -30,7 +31,7 @@ const SAWTOOTH: Limits = limits("sawtooth", [0.54, 0.61, 0.75, 0.83]);
 const SPHERE: Limits = limits("sphere", [0.62, 0.71, 0.89, 1.0]);
 const SPLINE: Limits = limits("spline", [0.62, 0.71, 0.89, 1.0]);
 
-fn check(limits: &Limits, camera: u32, shots: &[BetterSequence]) {
+fn check(limits: &Limits, camera: u32, sequences: &[BetterSequence]) {
     let part = limits.part;
     let scene = Scene {
         camera,
@@ -39,15 +40,15 @@ fn check(limits: &Limits, camera: u32, shots: &[BetterSequence]) {
     let mut runner = Runner::new(&scene, OpticsKind::Ideal).unwrap();
     let paper = runner.run(Method::Paper { image_pitch: 5 }, 1).unwrap();
     let paper = paper.outcome.score.unwrap().rms_mm;
-    for (shot, limit) in limits
+    for (sequence, limit) in limits
         .ratios
         .iter()
-        .filter(|(shot, _)| shots.contains(shot))
+        .filter(|(sequence, _)| sequences.contains(sequence))
     {
-        let outcome = runner.run(Method::Better(*shot), 1).unwrap().outcome;
+        let outcome = runner.run(Method::Better(*sequence), 1).unwrap().outcome;
         let score = outcome.score.unwrap();
         let ratio = score.rms_mm / paper;
-        let words = format!("{part}, {} frames: {ratio:.3}", shot.count());
+        let words = format!("{part}, {} frames: {ratio:.3}", sequence.count());
         assert!(ratio <= *limit, "{words} of the paper's");
         assert_eq!(score.gross, 0, "{words}");
         assert!(outcome.unresolved <= 50, "{words}: {}", outcome.unresolved);
@@ -56,7 +57,7 @@ fn check(limits: &Limits, camera: u32, shots: &[BetterSequence]) {
     }
 }
 
-/// Not for the sawtooth: the paper's pattern is worst at the part's ends, which its middle does not include.
+/// Not for the sawtooth: the paper's pattern is worst at the part's ends, which are outside of the middle of the picture.
 #[test]
 fn the_better_pattern_beats_the_papers_own_in_the_middle_of_cone_and_spline() {
     check(

@@ -1,4 +1,4 @@
-//! Inputs of the fuzz targets: small examples, inputs that once failed, and seeded damage to both.
+//! Inputs of the fuzz targets: small examples, inputs that once failed, and seeded damage to the examples.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -22,12 +22,16 @@ const STOCK: [&str; 8] = [
     "plane",
     "sheet_metal",
 ];
+/// Of the dents.
 const DEPTH_MM: f64 = 0.3;
+/// Of the dents.
 const DIAMETER_MM: f64 = 8.0;
-/// The tolerance for which the limits are set.
+/// The tolerance for which the limits are set, ± mm.
 const TOLERANCE_MM: f64 = 0.15;
-/// Half the height of the flowerpot's wall, and the cosine of its slope against the axis.
-const POT_MM: (f64, f64) = (74.5, 0.967);
+/// Half the height of the flowerpot's wall; z = 0 is its middle.
+const POT_HALF_HEIGHT_MM: f64 = 74.5;
+/// The cosine of the angle between the flowerpot's wall and its axis.
+const POT_COSINE: f64 = 0.967;
 /// Neighbours that are further apart are not on the same surface.
 const STEP_MM: f64 = 6.0;
 
@@ -45,7 +49,7 @@ fn small(kind: &str, seed: u64) -> Scenario {
     scenario
 }
 
-/// A taught part on its head, with its plan and the prediction.
+/// A production line: a taught part in front of its head, with its plan and the prediction.
 struct Line {
     bed: Bed,
     plan: Plan,
@@ -57,7 +61,7 @@ fn line(scenario: &Scenario) -> Line {
     Line::new(bed, recipe, predicted)
 }
 
-/// A head, and what it was taught of the part in front of it.
+/// A head, and the recipe and prediction that were taught from the part in front of it.
 fn taught(scenario: &Scenario) -> (Bed, Recipe, GoodPartsFile) {
     let mut bed = bed(scenario);
     let taught = taught_within(&mut bed, 3.0).unwrap();
@@ -66,7 +70,7 @@ fn taught(scenario: &Scenario) -> (Bed, Recipe, GoodPartsFile) {
     assert!(
         words
             .iter()
-            .all(|line| taught.choice.reasons.contains(line))
+            .all(|reason| taught.choice.reasons.contains(reason))
     );
     (bed, taught.recipe, predicted)
 }
@@ -99,7 +103,7 @@ impl Line {
         }
     }
 
-    /// |deviation| of `parts` good parts, all of which must pass.
+    /// |deviation| of `parts` good parts, mm; all must pass.
     fn good(&mut self, name: &str, parts: usize) -> Vec<f64> {
         let judged = (0..parts).map(|at| {
             let found = self.judge();
@@ -159,7 +163,7 @@ impl Line {
         };
         let areas: Vec<f64> = (0..heights.len()).map(area).collect();
         let total: f64 = areas.iter().sum();
-        let rim = POT_MM.0 - DIAMETER_MM / 2.0 * POT_MM.1;
+        let rim = POT_HALF_HEIGHT_MM - DIAMETER_MM / 2.0 * POT_COSINE;
         // The two pixels at a silhouette are never compared; on the sheet metal the radius of a dent is 12 pixels.
         let reach = if pot { 2 } else { 12 };
         let keeps_away = |at: usize, middle: Vector| {
@@ -280,6 +284,7 @@ fn dents_where_pixels_have_weights_are_found_and_would_be_missed_without_these_p
     let mut scenario = scenario("flowerpot", 3);
     scenario.sub_rays = 2;
     let (bed, recipe, predicted) = taught(&scenario);
+    // 1 is full weight, a larger number is a part of it (docs/formats.md).
     let valid = recipe.arrays.valid.iter().enumerate();
     let weighed: Vec<usize> = valid.filter(|(_, v)| **v > 1).map(|(at, _)| at).collect();
     let mut rest = recipe.clone();

@@ -12,10 +12,12 @@ use appliance::recipe::{AlignmentKind, Recipe};
 use hal::frame::Frame;
 use sim::Placement;
 
-/// Where a pixel sees the taught part is interpolated between nodes.
+/// Largest difference between the two, mm: strips interpolate between nodes where on the taught part a pixel looks, this file computes
+/// it for each pixel.
 const BROUGHT_MM: f64 = 5e-5;
 
-/// Sets weights in a pattern, so that squares of a gauge have several different ones.
+/// Sets weights in a pattern, so that squares of a gauge have several different ones. `valid` holds them as [`Weight::bits`]: 1 is full
+/// weight, 60 and 190 are 60/256 and 190/256.
 fn weigh(taught: &mut TaughtRecipe) {
     let width = taught.manifest.camera.width as usize;
     let valid = taught.recipe.arrays.valid.iter_mut().enumerate();
@@ -61,8 +63,8 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
     let width = recipe.conditions.camera.0 as usize;
     let triangulator = production.triangulator();
     let arrays = &recipe.arrays;
-    // z minus the deviation, and the weight.
-    let brought = |at: usize, z: f64| {
+    // Golden as the pixel `at` sees it after the part's motion: the measured z minus its deviation, and the weight there.
+    let moved_golden = |at: usize, z: f64| {
         let point = triangulator.point(at % width, at / width, Height::from_mm(z))?;
         let back = motion.undo(point);
         let (u, v) = triangulator.camera().project(back)?;
@@ -92,7 +94,7 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
     };
     let heights = heights.iter().map(|&mm| f64::from(mm));
     let golden = heights.enumerate().map(|(at, z)| {
-        let golden = z.is_finite().then(|| brought(at, z)).flatten();
+        let golden = z.is_finite().then(|| moved_golden(at, z)).flatten();
         golden.unwrap_or((Height::UNKNOWN, Weight::NONE))
     });
     let (height, weight) = golden.unzip();

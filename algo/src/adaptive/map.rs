@@ -21,8 +21,8 @@ pub struct ProjectorMap {
 const UNKNOWN: [f64; 2] = [f64::NAN; 2];
 
 impl ProjectorMap {
-    /// From the heights of a preliminary measurement with vertical fringes: η follows from projecting the point, which is
-    /// thirty times more accurate than measuring it with horizontal fringes, and takes half the frames.
+    /// From the heights of a preliminary measurement with vertical fringes: η follows from projecting the point. As camera and
+    /// projector lie beside each other, an error of the height hardly changes η, and horizontal fringes are not needed.
     pub fn from_heights(triangulator: &Triangulator, heights: &HeightMap) -> Self {
         let width = heights.width;
         let mut points = vec![UNKNOWN; heights.height.len()];
@@ -39,8 +39,8 @@ impl ProjectorMap {
         Self { width, points }
     }
 
-    /// From preliminary measurements with vertical and horizontal fringes of these pitches: ξ and η are pitch ×
-    /// phase (Peng & Gupta 2008, eqs. 3 and 4).
+    /// From preliminary measurements with vertical and horizontal fringes: ξ = `across` × vertical phase, η = `down` × horizontal
+    /// phase, where `across` and `down` are their pitches in projector pixels (Peng & Gupta 2008, eqs. 3 and 4).
     pub fn from_phases(
         [vertical, horizontal]: [&[AbsolutePhase]; 2],
         [across, down]: [f64; 2],
@@ -79,7 +79,7 @@ impl ProjectorMap {
         (!point[0].is_nan()).then_some(point)
     }
 
-    /// Erodes the silhouettes by one pixel: a pixel stays known if all 3 × 3 pixels around it, inside the frame, are known.
+    /// Erodes the known region by one pixel, because silhouettes mix surfaces: a pixel stays known if all 3 × 3 pixels around it, inside the frame, are known.
     pub fn eroded(&self) -> Self {
         let (width, height) = (self.width as isize, self.height() as isize);
         let keep = |u: isize, v: isize| {
@@ -122,7 +122,7 @@ impl ProjectorMap {
 
     fn slope(&self, u: isize, v: isize, max_slope: f64) -> Option<[f64; 2]> {
         let [centre, _] = self.at(u, v)?;
-        // Sums of x = du, y = dv and z = Δξ about their means.
+        // Sums of x = du, y = dv and z = Δξ and of their products; below, the products are taken about the means.
         let (mut n, mut x, mut y, mut z) = (0.0, 0.0, 0.0, 0.0);
         let (mut xx, mut xy, mut yy, mut xz, mut yz) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for dv in -2..=2_isize {
@@ -130,20 +130,20 @@ impl ProjectorMap {
                 let Some([xi, _]) = self.at(u + du, v + dv) else {
                     continue;
                 };
-                let (a, b, step) = (du as f64, dv as f64, xi - centre);
+                let (a, b, difference) = (du as f64, dv as f64, xi - centre);
                 let distance = libm::fabs(a).max(libm::fabs(b));
-                if libm::fabs(step) > max_slope * distance {
+                if libm::fabs(difference) > max_slope * distance {
                     continue;
                 }
                 n += 1.0;
                 x += a;
                 y += b;
-                z += step;
+                z += difference;
                 xx += a * a;
                 xy += a * b;
                 yy += b * b;
-                xz += a * step;
-                yz += b * step;
+                xz += a * difference;
+                yz += b * difference;
             }
         }
         let (xx, xy, yy) = (xx - x * x / n, xy - x * y / n, yy - y * y / n);

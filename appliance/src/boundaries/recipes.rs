@@ -64,7 +64,7 @@ impl Bed {
         }
     }
 
-    /// Plans a recipe and judges a part with it, as the station would.
+    /// Plans a recipe and judges a part with it, as the station would; any verdict will do.
     pub fn use_recipe(&self, recipe: Recipe) -> Result<(), String> {
         let plan = Plan::new(recipe, &self.calibration, true).map_err(|error| error.to_string())?;
         for sequence in 0..plan.sequence_count() {
@@ -106,7 +106,7 @@ fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_par
     let write = |tree: &Value| serde_json::to_string_pretty(tree).unwrap();
     let members = members(file, arrays);
     let read = |text: &str| {
-        // What parsing refuses is refused before any array is read.
+        // Parsed alone first: most cases are refused by the manifest, and need no archive with arrays.
         parse(text).map_err(|error| error.to_string())?;
         let (bytes, _) = seal(text, members.clone()).unwrap();
         Recipe::from_bytes(&bytes).map_err(|error| error.to_string())
@@ -138,7 +138,7 @@ fn arrays_of_any_numbers_never_panic() {
         128.0,
         1e9,
     ] {
-        // One array at a time, one place of it, every third, or all.
+        // One array at a time: all of its values, every third, or every 1500th.
         for (array, every) in (0..8).flat_map(|array| [1, 3, 1500].map(|every| (array, every))) {
             let mut arrays = bed.recipe.arrays.clone();
             let single = [
@@ -170,7 +170,7 @@ fn arrays_of_any_numbers_never_panic() {
 }
 
 #[test]
-fn a_recipe_for_a_projector_of_a_whole_turn_of_pixels_is_refused_and_does_not_replace_a_good_one() {
+fn a_recipe_for_a_projector_of_four_billion_columns_is_refused_and_does_not_replace_a_good_one() {
     let bed = Bed::new();
     let mut file = bed.file.clone();
     file.fingerprint = "0".repeat(64);
@@ -185,7 +185,8 @@ fn a_recipe_for_a_projector_of_a_whole_turn_of_pixels_is_refused_and_does_not_re
         words.contains("projector.width is 4294967295: write 1 to 8192"),
         "{words}"
     );
-    // Stored by an older program: it is listed with its problem, the generation before is used, and stays when another is stored.
+    // As if an older program had stored it: it is listed with its problem, and the generation before is used. Storing it again over a
+    // good recipe does not displace the last good generation either.
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).unwrap();
     store.save(1, &bed.bytes).unwrap();

@@ -11,7 +11,7 @@ use hal::frame::Frame;
 use hal::head::DynHead;
 use std::time::Duration;
 
-/// A head with its calibration, in front of a part.
+/// A head with its calibration, in front of a part. (The rig of a scenario is the simulated camera and projector alone.)
 pub struct Rig<'a> {
     /// The devices.
     pub head: &'a mut DynHead,
@@ -52,11 +52,12 @@ fn impossible(error: impl std::fmt::Display) -> MeasureError {
 }
 
 impl Rig<'_> {
-    /// Projects the shots of a phase function and measures the part in the default working range. Levels that are unwrapped about a
+    /// Projects the shots of a phase function and measures the part in the default working range of [`Triangulator::new`]. Levels that are unwrapped about a
     /// known map take `map` (row-major), or without one the reference phase map. `progress` gets the share of the frames taken.
     ///
     /// # Errors
-    /// If a device fails, the sequence cannot be decoded, or the devices do not look down at the plane from two places.
+    /// If a device fails, the sequence cannot be decoded, or camera and projector do not look down at the reference plane from two
+    /// different points.
     pub fn measure(
         &mut self,
         function: &PhaseFunction,

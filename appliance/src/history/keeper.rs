@@ -124,7 +124,7 @@ impl Keeping {
 
     /// Removes what is over the quota.
     fn bound(&mut self) {
-        while let Some(name) = self.recordings.over_quota() {
+        while let Some(name) = self.recordings.remove_over_quota() {
             let why = Unkept::Quota;
             self.send(Message::Removed { name, why });
         }

@@ -1,4 +1,4 @@
-//! The recordings of failed parts: a folder with a quota, from which the oldest are removed.
+//! The recordings of parts that did not pass (FAIL or INVALID): a folder with a quota, from which the oldest are removed.
 //!
 //! Each recording holds the recipe that judged the part, so that the part can be judged again after the recipe was edited or
 //! deleted. The recipe is a hard link to the store's file, which the store replaces and never changes: it takes no room while
@@ -32,7 +32,7 @@ pub struct FailedPart {
     pub sequence: usize,
     /// The frames of that sequence.
     pub frames: Vec<Frame>,
-    /// What judged it.
+    /// The plan that judged it.
     pub plan: Arc<Plan>,
     /// The head's calibration.
     pub calibration: Calibration,
@@ -88,7 +88,7 @@ struct OnDisk {
     name: String,
     /// Without its recipe.
     bytes: u64,
-    /// The recipe's file, as the file system numbers it, and its bytes.
+    /// The inode number and size in bytes of the recipe's file, by which links to the same file are counted once.
     recipe: Option<(u64, u64)>,
 }
 
@@ -106,7 +106,7 @@ impl OnDisk {
 }
 
 impl Recordings {
-    /// Opens the folder and removes what a kill left half written. `recipes` are those of the station, `quota` is in bytes.
+    /// Opens the folder and removes recordings that were being written or removed when the program was killed. `recipes` are those of the station, `quota` is in bytes.
     ///
     /// # Errors
     /// Whatever the file system answers.
@@ -143,7 +143,8 @@ impl Recordings {
     pub(super) fn keep(&mut self, part: &FailedPart) -> Result<String, RecorderError> {
         let name = name_of(&part.record);
         let folder = self.folder.join(&name);
-        // First the one of the recording before, so that a recipe that was imported twice is kept once.
+        // The recipe of the newest recording is tried first: a recipe that was imported again is a new file in the store with the same
+        // fingerprint, and a link to that file would take room for a second copy.
         let before = self.kept.back().filter(|kept| kept.recipe.is_some());
         let before = before.map(|kept| self.folder.join(&kept.name).join(RECIPE));
         let stored = self.recipes.generations(part.plan.id().number);
@@ -153,8 +154,8 @@ impl Recordings {
         Ok(name)
     }
 
-    /// Removes the oldest recording while all together are over the quota; answers with its name.
-    pub(super) fn over_quota(&mut self) -> Option<String> {
+    /// Removes the oldest recording if all together are over the quota, and answers with its name; to be repeated until there is none.
+    pub(super) fn remove_over_quota(&mut self) -> Option<String> {
         let recipes: BTreeMap<u64, u64> = self.kept.iter().filter_map(|kept| kept.recipe).collect();
         let frames: u64 = self.kept.iter().map(|kept| kept.bytes).sum();
         if frames + recipes.values().sum::<u64>() > self.quota {
@@ -169,7 +170,7 @@ impl Recordings {
     pub(super) fn remove_oldest(&mut self) -> Option<String> {
         let OnDisk { name, .. } = self.kept.pop_front()?;
         let nameless = self.folder.join(format!(".{name}.partial-removed"));
-        // What stays of it is removed at the next start, or counted again where it has kept its name.
+        // What cannot be removed now is removed at the next start. If it could not be renamed either, it is counted again from then on.
         let _ = rename_whole(&self.folder.join(&name), &nameless)
             .and_then(|()| fs::remove_dir_all(nameless));
         Some(name)
@@ -281,7 +282,7 @@ mod tests {
         put(&recordings, 3, None);
         let open = |quota| {
             let mut recordings = Recordings::open(&recordings, Store::at(folder.path()), quota);
-            std::iter::from_fn(|| recordings.as_mut().unwrap().over_quota()).count()
+            std::iter::from_fn(|| recordings.as_mut().unwrap().remove_over_quota()).count()
         };
         // Three sets of frames and two recipes.
         assert_eq!(open(2300), 0);

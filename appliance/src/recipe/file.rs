@@ -41,7 +41,7 @@ pub struct RecipeFile {
     pub pattern: PatternFile,
     /// The sequences that the part can be measured with, from the cheapest to the full one.
     pub sequences: Vec<SequenceFile>,
-    /// Which of them is projected in production, counted from 0.
+    /// Which of them is projected first in production, counted from 0; longer ones may follow in the same cycle.
     pub production: usize,
     /// How far a part may lie from where it was taught, in any direction, mm.
     pub placement_tolerance_mm: f64,
@@ -55,7 +55,7 @@ pub struct RecipeFile {
     pub exposure_us: Option<f64>,
     /// σ of one sample in counts.
     pub noise_counts: f64,
-    /// |ΔΦ| in turns up to which the expansion of the height holds.
+    /// |ΔΦ| about the golden phase, in turns, up to which `height_slope.npy` and `height_curvature.npy` give the height accurately.
     pub expansion_range_turns: f64,
     /// Least share of the golden pixels that must be resolved, else the verdict is INVALID.
     pub min_coverage: f64,
@@ -111,7 +111,7 @@ pub enum PatternFile {
     File,
 }
 
-/// A sequence and its predicted noise and safe mask on this part.
+/// A sequence, its predicted noise on this part, and the share of the part that it can unwrap.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SequenceFile {
@@ -143,21 +143,22 @@ mod shots {
     }
 }
 
-/// The kinds of sequence, ordered by how far from the golden map they can unwrap.
+/// The kinds of sequence, ordered by how far from the golden map they can unwrap. Dense levels have the ratios 1, 1 − 1/n and perhaps
+/// 1 − 1/n² (`docs/measurement.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SequenceKind {
-    /// One level: |ΔΦ| < 0.4 turn.
+    /// One level: |ΔΦ| < 0.4 turn, of 0.5 that are unambiguous.
     SingleLevel,
-    /// Two dense levels 1, 4/5: |ΔΦ| < 2.3 turns.
+    /// Two dense levels of ratios 1 and 4/5: |ΔΦ| < 2.3 turns, of 2.5 that are unambiguous.
     TwoLevels,
-    /// Absolute, or three dense levels: |ΔΦ| < n²/2 − n turns.
+    /// Geometric levels, without a limit, or three dense levels: |ΔΦ| < n²/2 − n turns.
     Full,
 }
 
 impl SequenceKind {
-    /// Largest |ΔΦ| about the golden map that is unwrapped correctly, in turns; `None` for the full sequence, whose residuals
-    /// show wrong fringe orders.
+    /// Largest |ΔΦ| about the golden map that is unwrapped correctly, in turns; `None` for the full sequence, in which a
+    /// wrong fringe order leaves a large residual, so that the pixel is rejected.
     pub fn reach(self) -> Option<f32> {
         match self {
             Self::SingleLevel => Some(0.4),
@@ -167,13 +168,14 @@ impl SequenceKind {
     }
 }
 
-/// A phase map within the safe mask of a sequence that unwraps less than `limit` turns about it: unknown where a placement
-/// within the tolerance may move the phase (`reach`) further.
-pub fn safe(phase: &[AbsolutePhase], reach: &[f32], limit: f32) -> Vec<AbsolutePhase> {
-    let pairs = phase.iter().zip(reach);
+/// The part of a phase map about which a sequence can unwrap any part within the placement tolerance. `changes` are the largest |ΔΦ| that
+/// such a placement can cause, in turns (`phase_reach.npy`); where they are not below `limit`, the sequence's [`SequenceKind::reach`],
+/// the phase becomes unknown.
+pub fn safe(phase: &[AbsolutePhase], changes: &[f32], limit: f32) -> Vec<AbsolutePhase> {
+    let pairs = phase.iter().zip(changes);
     pairs
-        .map(|(&phase, &moved)| {
-            if moved < limit {
+        .map(|(&phase, &change)| {
+            if change < limit {
                 phase
             } else {
                 AbsolutePhase::UNKNOWN
@@ -203,7 +205,7 @@ pub struct GaugeFile {
     pub region: String,
     /// What it measures.
     pub measures: GaugeKind,
-    /// Lower limit, inclusive, in mm, degrees, mm³ or as a share.
+    /// Lower limit, inclusive, in mm, degrees, mm³ or as a share from 0 to 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub low: Option<f64>,
     /// Upper limit, inclusive.
@@ -243,38 +245,38 @@ pub enum AxisFile {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ComponentFile {
-    /// Shift along x, mm.
+    /// Translation along x, mm.
     X,
-    /// Shift along y, mm.
+    /// Translation along y, mm.
     Y,
-    /// Shift along z, mm.
+    /// Translation along z, mm.
     Z,
-    /// Turn about x, degrees.
+    /// Rotation about x, degrees.
     AboutX,
-    /// Turn about y, degrees.
+    /// Rotation about y, degrees.
     AboutY,
-    /// Turn about z, degrees.
+    /// Rotation about z, degrees.
     AboutZ,
 }
 
-/// What a gauge measures; `docs/formats.md` has the definitions. `smoothing_px` is the side of the square that is averaged
-/// over, in camera pixels.
+/// What a gauge measures; `docs/formats.md` has the definitions. `smoothing_px` is the side of the squares that are
+/// averaged over, in camera pixels: for a deviation about each pixel, else the cells into which the region is divided.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum GaugeKind {
     /// The deviation from golden of largest magnitude, in mm.
     Deviation {
-        /// Odd.
+        /// Odd, so that the square has a middle pixel.
         smoothing_px: usize,
     },
     /// The root mean square of the deviation from golden, in mm.
     RmsDeviation {
-        /// See above.
+        /// Odd or even.
         smoothing_px: usize,
     },
     /// The share of the region that deviates from golden by more than a tolerance.
     OutOfTolerance {
-        /// See above.
+        /// Odd or even.
         smoothing_px: usize,
         /// In mm.
         tolerance_mm: f64,
@@ -290,12 +292,12 @@ pub enum GaugeKind {
     },
     /// The peak-to-valley flatness about the least-squares plane, in mm.
     Flatness {
-        /// See above.
+        /// Odd or even.
         smoothing_px: usize,
     },
     /// The highest less the lowest place, in mm.
     PeakToValley {
-        /// See above.
+        /// Odd or even.
         smoothing_px: usize,
     },
     /// The angle of the least-squares plane about an axis, in degrees.

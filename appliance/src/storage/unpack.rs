@@ -8,7 +8,8 @@ use std::io;
 use std::os::unix::fs::DirBuilderExt as _;
 use std::path::{Component, Path, PathBuf};
 
-/// The most members: a recording has at most 1024 frames, two patterns, two truths, a manifest and a recipe.
+/// The most members that are unpacked. A recording has at most 1030 files: 1024 frames, two patterns, two truths, a manifest and a
+/// recipe.
 const MOST_MEMBERS: usize = 2048;
 /// What a recording's folder must hold.
 const MANIFEST: &str = "recording.json";
@@ -55,7 +56,9 @@ impl Unpacked {
             copied.map_err(|error| match error.kind() {
                 io::ErrorKind::StorageFull | io::ErrorKind::PermissionDenied => {
                     let what = format!("unpack {} into {}", path.display(), target.display());
-                    let words = format!("{error}: free space there, or name its folder");
+                    let words = format!(
+                        "{error}: make room and allow writing there, or unpack it elsewhere and name that folder"
+                    );
                     Failure::because(Exit::CannotCreate, what, words)
                 }
                 _ => wrong(&format!("member {name}: {error}")),

@@ -159,7 +159,7 @@ impl Properties {
     }
 }
 
-/// All cards, in the order of their numbers.
+/// All cards, sorted as text (card10 before card2).
 pub(super) fn paths() -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(CARDS) else {
         return Vec::new();
@@ -200,7 +200,10 @@ pub(super) fn refused(attempt: impl Into<String>, why: &io::Error) -> Error {
             attempt,
             "let the user belong to the group \"video\", and stop other programs that show something there",
         ),
-        Some(Errno::BUSY) => Error::protocol(attempt, "another flip still waits: fetch it first"),
+        Some(Errno::BUSY) => Error::protocol(
+            attempt,
+            "the flip before it has not happened yet: wait for it first",
+        ),
         Some(Errno::NOMEM | Errno::NOSPC) => Error::unsupported(
             attempt,
             "there is not enough memory for display buffers: give more (on a Raspberry Pi \"dtoverlay=vc4-kms-v3d,cma-512\")",

@@ -28,9 +28,10 @@ pub(super) struct Output {
     name: String,
     mode: Mode,
     connector: Properties,
-    driver: Properties,
+    crtc_properties: Properties,
     plane: Properties,
-    picture: property::Handle,
+    /// The plane's property `FB_ID`: the framebuffer that it shows.
+    framebuffer: property::Handle,
     /// The kernel's status file of the connector, which does not probe the display; none if there is no such file.
     status: Option<File>,
 }
@@ -43,7 +44,7 @@ impl Output {
         let name = connector.to_string();
         let timings: Vec<Timings> = connector.modes().iter().map(Timings::of).collect();
         let chosen = choose(&timings, setup).ok_or_else(|| no_mode(&name, &timings, setup))?;
-        let failed = |error| refused(format!("looking for a way to {name}"), &error);
+        let failed = |error| refused(format!("looking for a CRTC for {name}"), &error);
         let all = card.resource_handles().map_err(failed)?;
         let crtc = crtc_for(&card, &all, &connector)
             .map_err(failed)?
@@ -59,8 +60,8 @@ impl Output {
                 "use a driver that has it",
             )
         })?;
-        let status = card.path.file_name().and_then(|number| {
-            let folder = format!("{}-{name}", number.to_string_lossy());
+        let status = card.path.file_name().and_then(|card| {
+            let folder = format!("{}-{name}", card.to_string_lossy());
             File::open(PathBuf::from(CONNECTORS).join(folder).join("status")).ok()
         });
         let plane = card.properties(plane)?;
@@ -69,8 +70,8 @@ impl Output {
             timings: timings[chosen],
             mode: connector.modes()[chosen],
             connector: card.properties(connector.handle())?,
-            driver: card.properties(crtc)?,
-            picture: plane.named("FB_ID")?,
+            crtc_properties: card.properties(crtc)?,
+            framebuffer: plane.named("FB_ID")?,
             plane,
             status,
             name,
@@ -112,7 +113,7 @@ impl Output {
         let mut request = AtomicModeReq::new();
         request.add_raw_property(
             self.plane.object,
-            self.picture,
+            self.framebuffer,
             u32::from(canvas.shown_as).into(),
         );
         self.commit(
@@ -128,8 +129,8 @@ impl Output {
             (&self.plane, "FB_ID"),
             (&self.plane, "CRTC_ID"),
             (&self.connector, "CRTC_ID"),
-            (&self.driver, "MODE_ID"),
-            (&self.driver, "ACTIVE"),
+            (&self.crtc_properties, "MODE_ID"),
+            (&self.crtc_properties, "ACTIVE"),
         ] {
             request.add_raw_property(object.object, object.named(name)?, 0);
         }
@@ -141,7 +142,8 @@ impl Output {
         self.card.atomic_commit(flags, request)
     }
 
-    /// The commit that sets the mode, with the settings that leave grey levels unchanged and nothing else on the CRTC.
+    /// The commit that sets the mode. It also sets every property that would change grey levels to a neutral value, and removes
+    /// everything else from the CRTC.
     fn mode_request(&self, mode: u64, canvas: &canvas::Canvas) -> Result<AtomicModeReq, Error> {
         let mut request = AtomicModeReq::new();
         let (width, height) = (
@@ -169,20 +171,29 @@ impl Output {
             self.connector.named("CRTC_ID")?,
             crtc,
         );
-        request.add_raw_property(self.driver.object, self.driver.named("MODE_ID")?, mode);
-        request.add_raw_property(self.driver.object, self.driver.named("ACTIVE")?, 1);
+        request.add_raw_property(
+            self.crtc_properties.object,
+            self.crtc_properties.named("MODE_ID")?,
+            mode,
+        );
+        request.add_raw_property(
+            self.crtc_properties.object,
+            self.crtc_properties.named("ACTIVE")?,
+            1,
+        );
         self.be_faithful(&mut request);
         self.be_alone(&mut request)?;
         Ok(request)
     }
 
+    /// Sets the properties that would change grey levels, such as gamma or scaling, to neutral values ([`faithful`]).
     fn be_faithful(&self, request: &mut AtomicModeReq) {
         for (object, wanted) in [
             (
                 &self.connector,
                 faithful::of_connector as fn(&str, &property::ValueType) -> Option<u64>,
             ),
-            (&self.driver, faithful::of_crtc),
+            (&self.crtc_properties, faithful::of_crtc),
             (&self.plane, faithful::of_plane),
         ] {
             for property in object.all.iter().filter(|property| property.info.mutable()) {

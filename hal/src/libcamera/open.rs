@@ -77,8 +77,8 @@ pub(super) fn refused(id: &str, attempt: &str, cause: &io::Error) -> Error {
 /// Opens the camera with these settings.
 ///
 /// # Errors
-/// `Disconnected` if there is no camera of that id; `Unsupported` if it does not support the settings; `Protocol` if it is in use or
-/// the library fails.
+/// `Disconnected` if there is no camera, or none of that id; `Unsupported` if there are several and no id is given, if the camera does not
+/// support the settings, or if there is no memory for buffers; `Protocol` if it is in use or the library fails.
 pub(super) fn open(manager: &CameraManager, settings: &Settings) -> Result<Opened, Error> {
     let found = find(manager, settings.id.as_deref())?;
     let id = found.id();
@@ -186,6 +186,7 @@ fn no_stream(id: &str) -> Error {
     )
 }
 
+/// Checks that exposure, gain and frame length can be set.
 fn must_be_settable(camera: &Camera<'_>, id: &str) -> Result<(), Error> {
     let all = camera.controls();
     let missing: Vec<&str> = [
@@ -205,7 +206,7 @@ fn must_be_settable(camera: &Camera<'_>, id: &str) -> Result<(), Error> {
     ))
 }
 
-/// Asks for every format that this reading can use, and returns the configuration of the best one that was granted.
+/// Asks for every format that has the wanted samples ([`Reading`]), and returns the configuration of the best one that was granted.
 fn agree(
     camera: &Camera<'_>,
     id: &str,

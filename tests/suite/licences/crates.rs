@@ -19,7 +19,7 @@ pub struct Crate {
     pub authors: Vec<String>,
     /// Its folder on this machine.
     pub folder: PathBuf,
-    /// Whether its code is in the program; the others are only for building and testing.
+    /// Whether its code is in `fringed` or `fringed-lab`; the others are only for building and testing.
     pub shipped: bool,
 }
 
@@ -62,14 +62,14 @@ pub fn all() -> Result<Vec<Crate>, String> {
     Ok(crates)
 }
 
-/// The crates in the programs: those that they reach without build scripts, derives and tests.
+/// The crates in the programs: those that they reach by normal dependencies, not through build scripts, procedural macros or tests.
 fn shipped(metadata: &Value) -> HashSet<String> {
-    let of_compiler = |package: &Value| {
+    let is_proc_macro = |package: &Value| {
         let kinds = list(&package["targets"]).flat_map(|target| list(&target["kind"]));
         kinds.into_iter().any(|kind| kind == "proc-macro")
     };
-    let compilers: HashSet<String> = list(&metadata["packages"])
-        .filter(|package| of_compiler(package))
+    let proc_macros: HashSet<String> = list(&metadata["packages"])
+        .filter(|package| is_proc_macro(package))
         .map(|package| text(&package["id"]))
         .collect();
     let nodes: HashMap<String, &Value> = list(&metadata["resolve"]["nodes"])
@@ -86,7 +86,7 @@ fn shipped(metadata: &Value) -> HashSet<String> {
         .collect();
     let mut reached = HashSet::new();
     while let Some(id) = open.pop() {
-        if compilers.contains(&id) || !reached.insert(id.clone()) {
+        if proc_macros.contains(&id) || !reached.insert(id.clone()) {
             continue;
         }
         let linked = |dep: &&Value| list(&dep["dep_kinds"]).any(|kind| kind["kind"].is_null());

@@ -1,14 +1,14 @@
 //! The directions of a motion, and which of them a part's shape determines.
 
 /// A symmetric matrix of the six unknowns: shifts along x, y, z, turns about x, y, z.
-pub type Six = [[f64; 6]; 6];
+pub type Matrix6 = [[f64; 6]; 6];
 
 /// Sweeps of Jacobi's method; six unknowns need five at most to reach the precision of `f64`.
 const SWEEPS: usize = 12;
 
 /// Eigenvalues and eigenvectors (as rows) of a symmetric matrix, by cyclic Jacobi rotations
 /// (Golub, Van Loan, *Matrix Computations*, 8.5).
-pub fn eigen(matrix: &Six) -> ([f64; 6], Six) {
+pub fn eigen(matrix: &Matrix6) -> ([f64; 6], Matrix6) {
     let mut a = *matrix;
     let mut vectors = [[0.0; 6]; 6];
     for (i, row) in vectors.iter_mut().enumerate() {
@@ -43,7 +43,7 @@ pub fn eigen(matrix: &Six) -> ([f64; 6], Six) {
 }
 
 /// uᵀ M v.
-pub fn form(u: &[f64; 6], matrix: &Six, v: &[f64; 6]) -> f64 {
+pub fn form(u: &[f64; 6], matrix: &Matrix6, v: &[f64; 6]) -> f64 {
     let row = |i: usize| (0..6).map(|j| matrix[i][j] * v[j]).sum::<f64>();
     (0..6).map(|i| u[i] * row(i)).sum()
 }
@@ -68,7 +68,7 @@ const SHARE: f64 = 0.5;
 impl Directions {
     /// Of a normal matrix Σ j jᵀ of rows in mm per mm. `noise` is what errors of the normals add to it, `sigma_mm` the
     /// error of a residual, 1 σ.
-    pub fn of(normal: &Six, noise: &Six, sigma_mm: f64) -> Self {
+    pub fn of(normal: &Matrix6, noise: &Matrix6, sigma_mm: f64) -> Self {
         let (values, vectors) = eigen(normal);
         let mut kept = heapless::Vec::new();
         let mut lost = [0.0; 6];
@@ -106,7 +106,7 @@ impl Directions {
     }
 
     /// A⁺ C A⁺, A⁺ the inverse along the directions that are determined: the covariance of x where b has covariance C.
-    pub fn covariance(&self, of_right: &Six) -> Six {
+    pub fn covariance(&self, of_right: &Matrix6) -> Matrix6 {
         let mut covariance = [[0.0; 6]; 6];
         for (p, u) in &self.kept {
             for (q, v) in &self.kept {
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn eigenvectors_put_the_matrix_together_again() {
         let entry = |i: usize, j: usize| 1.0 / (1.0 + i as f64 + j as f64);
-        let matrix: Six = core::array::from_fn(|i| core::array::from_fn(|j| entry(i, j)));
+        let matrix: Matrix6 = core::array::from_fn(|i| core::array::from_fn(|j| entry(i, j)));
         let (values, vectors) = eigen(&matrix);
         for i in 0..6 {
             for j in 0..6 {
@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn a_plate_determines_height_and_tilt_only_whatever_the_noise_of_its_normals_says() {
-        let diagonal = |values: [f64; 6]| -> Six {
+        let diagonal = |values: [f64; 6]| -> Matrix6 {
             core::array::from_fn(|i| core::array::from_fn(|j| if i == j { values[i] } else { 0.0 }))
         };
         let normal = diagonal([30.0, 30.0, 1000.0, 1000.0, 1000.0, 30.0]);

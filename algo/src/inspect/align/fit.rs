@@ -20,9 +20,9 @@
 //! `a_motion_of_a_shape_that_determines_it_is_found_in_all_six_components`, `a_dent_over_a_tenth_of_the_part_does_not_pull_it`.
 
 use super::Spot;
-use super::directions::{Directions, Six, form};
+use super::directions::{Directions, Matrix6, form};
 use super::motion::Motion;
-use super::normal::{Normal, TUKEY, Weights};
+use super::normal::{Normal, TUKEY, WeightFunction};
 use super::surface::{Facet, GoldenSurface};
 use crate::geometry::Vector;
 use alloc::vec::Vec;
@@ -44,7 +44,7 @@ pub struct Placed {
     /// The motion from where it was taught.
     pub motion: Motion,
     /// Covariance of the motion over repeated measurements, mm²; turns as the way of a point at the radius.
-    pub covariance: Six,
+    pub covariance: Matrix6,
     /// The part's radius, mm.
     pub radius: f64,
     /// Components that the shape does not determine: they are taken as 0.
@@ -93,7 +93,7 @@ pub(super) struct Equation {
     pub residual: f64,
     /// What a further motion takes off it, see [`Facet::jacobian`].
     pub jacobian: [f64; 6],
-    /// Error of the lift.
+    /// Error of the x and y of the facet's lift (1 σ).
     pub lift_noise: f64,
     /// From the centre to the point, in radii.
     pub lever: Vector,
@@ -104,8 +104,8 @@ pub(super) struct Equation {
 }
 
 impl Equation {
-    /// The residual after a further motion.
-    pub fn left(&self, further: &[f64; 6]) -> f64 {
+    /// The residual after a further motion, mm.
+    pub fn residual_after(&self, further: &[f64; 6]) -> f64 {
         let taken: f64 = self.jacobian.iter().zip(further).map(|(r, x)| r * x).sum();
         self.residual - taken
     }
@@ -113,7 +113,7 @@ impl Equation {
 
 /// Buffers of a fit, which the next one uses again.
 #[derive(Debug, Default)]
-pub struct Room {
+pub struct FitBuffers {
     equations: Vec<Equation>,
     sizes: Vec<f64>,
 }
@@ -153,19 +153,19 @@ impl Fitting<'_> {
     ///
     /// Where many points disagree, a bent part may have been taken for a moved one: a second descent with Tukey's weights alone stays near
     /// the part as taught, and the motion with which more points agree is taken.
-    pub fn fit(&self, samples: &[Sample], room: &mut Room) -> Option<Placed> {
-        let moved = self.descend(Weights::Huber, samples, room)?;
+    pub fn fit(&self, samples: &[Sample], buffers: &mut FitBuffers) -> Option<Placed> {
+        let moved = self.descend(WeightFunction::Huber, samples, buffers)?;
         if moved.placed.outliers <= SUSPICIOUS {
             return Some(moved.placed);
         }
-        let Some(bent) = self.descend(Weights::Tukey, samples, room) else {
+        let Some(bent) = self.descend(WeightFunction::Tukey, samples, buffers) else {
             return Some(moved.placed);
         };
         let limit = moved.limit.min(bent.limit);
         let mut agreeing = |motion: &Motion| {
-            self.linearise(samples, motion, false, &mut room.equations);
+            self.linearise(samples, motion, false, &mut buffers.equations);
             let agrees = |equation: &&Equation| libm::fabs(equation.residual) < limit;
-            room.equations.iter().filter(agrees).count()
+            buffers.equations.iter().filter(agrees).count()
         };
         let found = match agreeing(&bent.placed.motion) > agreeing(&moved.placed.motion) {
             true => bent,
@@ -177,26 +177,27 @@ impl Fitting<'_> {
     /// The motion that is found from none at all, beginning with these weights.
     fn descend(
         &self,
-        mut weights: Weights,
+        mut weights: WeightFunction,
         samples: &[Sample],
-        room: &mut Room,
+        buffers: &mut FitBuffers,
     ) -> Option<Descended> {
         let mut motion = Motion::none(self.centre);
         for round in 1..=ROUNDS {
-            self.linearise(samples, &motion, round == 1, &mut room.equations);
-            if room.equations.len() < LEAST_POINTS {
+            self.linearise(samples, &motion, round == 1, &mut buffers.equations);
+            if buffers.equations.len() < LEAST_POINTS {
                 return None;
             }
-            let mut solved = solve(weights, [0.0; 6], room);
-            if weights == Weights::Huber && (is_near(&solved.further) || 2 * round >= ROUNDS) {
-                weights = Weights::Tukey;
-                solved = solve(weights, solved.further, room);
+            let mut solved = solve(weights, [0.0; 6], buffers);
+            if weights == WeightFunction::Huber && (is_near(&solved.further) || 2 * round >= ROUNDS)
+            {
+                weights = WeightFunction::Tukey;
+                solved = solve(weights, solved.further, buffers);
             }
             motion = self.then(&motion, &solved.further);
-            let found = weights == Weights::Tukey && is_near(&solved.further);
+            let found = weights == WeightFunction::Tukey && is_near(&solved.further);
             if found || round == ROUNDS {
                 return Some(Descended {
-                    placed: self.placed(motion, &solved, &room.equations),
+                    placed: self.placed(motion, &solved, &buffers.equations),
                     limit: TUKEY * solved.scale,
                 });
             }
@@ -269,8 +270,8 @@ impl Fitting<'_> {
 }
 
 /// Solves the linear problem by reweighting, from a first guess.
-fn solve(weights: Weights, guess: [f64; 6], room: &mut Room) -> Solved {
-    let Room { equations, sizes } = room;
+fn solve(weights: WeightFunction, guess: [f64; 6], buffers: &mut FitBuffers) -> Solved {
+    let FitBuffers { equations, sizes } = buffers;
     let predicted = equations.iter().map(|e| e.both).sum::<f64>() / equations.len() as f64;
     let predicted = libm::sqrt(predicted);
     let mut further = guess;
@@ -279,7 +280,7 @@ fn solve(weights: Weights, guess: [f64; 6], room: &mut Room) -> Solved {
         let scale = scale(equations, &further, sizes).max(predicted);
         let normal = Normal::of(equations, weights, &further, scale);
         let directions = Directions::of(&normal.matrix, &normal.noise, predicted);
-        let next = directions.solve(&normal.right);
+        let next = directions.solve(&normal.right_side);
         let change: f64 = next
             .iter()
             .zip(further)
@@ -306,7 +307,11 @@ fn is_near(further: &[f64; 6]) -> bool {
 /// σ of the residuals by their median.
 fn scale(equations: &[Equation], further: &[f64; 6], sizes: &mut Vec<f64>) -> f64 {
     sizes.clear();
-    sizes.extend(equations.iter().map(|e| libm::fabs(e.left(further))));
+    sizes.extend(
+        equations
+            .iter()
+            .map(|e| libm::fabs(e.residual_after(further))),
+    );
     let middle = sizes.len() / 2;
     let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
     MEDIAN_TO_SIGMA * *median

@@ -7,7 +7,7 @@ mod normal;
 mod surface;
 
 pub use directions::form;
-pub use fit::{Fitting, Placed, Room, Sample};
+pub use fit::{FitBuffers, Fitting, Placed, Sample};
 pub use motion::Motion;
 pub use surface::{Facet, GoldenSurface};
 
@@ -122,7 +122,8 @@ impl Alignment {
             over: Some((at, 0.0)),
         };
         let samples: Vec<_> = self.spots.iter().enumerate().map(still).collect();
-        self.fitting(golden).fit(&samples, &mut Room::default())
+        self.fitting(golden)
+            .fit(&samples, &mut FitBuffers::default())
     }
 
     /// The index of the first spot in some rows, and the spots in them.

@@ -128,7 +128,7 @@ fn a_motion_of_a_shape_that_determines_it_is_found_in_all_six_components() {
     let motion = motion(&alignment);
     let found = alignment
         .fitting(made.golden())
-        .fit(&made.moved(&motion), &mut Room::default())
+        .fit(&made.moved(&motion), &mut FitBuffers::default())
         .unwrap();
     assert_found(&found, &motion);
     assert!(found.outliers < 0.01, "{found:?}");
@@ -148,7 +148,7 @@ fn a_dent_over_a_tenth_of_the_part_does_not_pull_it() {
     }
     let found = alignment
         .fitting(made.golden())
-        .fit(&samples, &mut Room::default())
+        .fit(&samples, &mut FitBuffers::default())
         .unwrap();
     assert_found(&found, &motion);
     assert!((found.outliers - 0.1).abs() < 0.02, "{}", found.outliers);
@@ -161,7 +161,10 @@ fn directions_that_a_shape_does_not_determine_are_left_out_and_stay_nought() {
     assert_eq!(alignment.left_out, [true, true, false, false, false, true]);
     let found = alignment
         .fitting(plate.golden())
-        .fit(&plate.moved(&motion(&alignment)), &mut Room::default())
+        .fit(
+            &plate.moved(&motion(&alignment)),
+            &mut FitBuffers::default(),
+        )
         .unwrap();
     let values = found.motion.values();
     assert!(
@@ -185,7 +188,7 @@ fn what_is_not_there_has_no_place() {
     assert!(
         alignment
             .fitting(made.golden())
-            .fit(&[], &mut Room::default())
+            .fit(&[], &mut FitBuffers::default())
             .is_none()
     );
     let away = Motion::new(
@@ -197,7 +200,7 @@ fn what_is_not_there_has_no_place() {
     assert!(
         alignment
             .fitting(made.golden())
-            .fit(&samples, &mut Room::default())
+            .fit(&samples, &mut FitBuffers::default())
             .is_none()
     );
 }

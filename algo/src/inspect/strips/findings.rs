@@ -4,7 +4,7 @@ use super::counts::TRUSTS;
 use super::coverage;
 use super::pose::PoseField;
 use super::squares::extreme::Extreme;
-use super::{CellRoom, Input, MAX_GAUGES, Measure, Production, Strip, Strips};
+use super::{CellBuffers, Input, MAX_GAUGES, Measure, Production, Strip, Strips};
 use crate::inspect::Reading;
 use crate::inspect::align::Placed;
 use crate::inspect::gauge::{
@@ -150,21 +150,21 @@ impl Production {
         noisier: f64,
         pose: &PoseField,
         strips: &[Strip],
-        room: &mut CellRoom,
+        buffers: &mut CellBuffers,
     ) -> Option<Reading> {
         let measure = self.gauges.list[gauge].measure;
         let patches = self.gauges.patches_of[gauge].clone();
         let side = measure.cell_side()?;
-        room.cells.clear();
-        room.weights.clear();
+        buffers.cells.clear();
+        buffers.weights.clear();
         let taught = &self.gauges.patches[patches.start].taught;
-        self.gather(patches.start, side, strips, room);
-        let count = room.cells.len();
+        self.gather(patches.start, side, strips, buffers);
+        let count = buffers.cells.len();
         if measure == Measure::Step {
             // Both regions' cells behind each other: the motion moves them together.
-            self.gather(patches.end - 1, side, strips, room);
+            self.gather(patches.end - 1, side, strips, buffers);
         }
-        let CellRoom { cells, weights, .. } = room;
+        let CellBuffers { cells, weights, .. } = buffers;
         let variance = |taught: &[TaughtCell]| {
             let pixels: u32 = taught.iter().map(|cell| cell.pixels).sum();
             let sum: f64 = taught.iter().map(|cell| cell.variance).sum();
@@ -199,11 +199,11 @@ impl Production {
     }
 
     /// Appends the cells of a patch.
-    fn gather(&self, at: usize, side: usize, strips: &[Strip], room: &mut CellRoom) {
+    fn gather(&self, at: usize, side: usize, strips: &[Strip], buffers: &mut CellBuffers) {
         let patch = &self.gauges.patches[at];
-        let CellRoom {
+        let CellBuffers {
             sums, cells: out, ..
-        } = room;
+        } = buffers;
         sums.clear();
         sums.resize(patch.grid.len(), Sum::default());
         for strip in strips {

@@ -7,8 +7,8 @@
 //! 2. **height** (`height`): Φ → height offset z − z₀ above the golden surface, on the pixel's own ray;
 //! 3. **align** (`coordinates`, `displaced`): takes the part's motion back by the pose field (`pose`): the pixel's taught coordinates,
 //!    and its deviation from golden there;
-//! 4. **accumulate** (`counts`, `coverage`, `weighted`, `squares`): counts, cells of gauges, and the square of largest mean weighted
-//!    deviation, from the last rows (`recent`);
+//! 4. **accumulate** (`counts`, `coverage`, `weighted`, `squares`): counts, the sums of the gauges' cells ([`gauge`](super::gauge)), and
+//!    the square with the largest mean weighted deviation; for the squares, the rows before this one are kept (`recent`);
 //! 5. **gauge** (`findings`): after all strips, readings and their errors from these sums.
 //!
 //! Before that, where the part's motion is wanted, some rows go through stages 1 and 2 and a few points of each are kept: the
@@ -46,7 +46,7 @@ pub use input::Input;
 pub use plan::{Parts, Production};
 pub use taught::Taught;
 
-use super::align::{Placed, Room, Sample};
+use super::align::{FitBuffers, Placed, Sample};
 use super::gauge::{Cell, Measure, Sum, Weights};
 use crate::frame::FrameView;
 use crate::phase::DecodeError;
@@ -60,18 +60,18 @@ use strip::Strip;
 #[derive(Debug)]
 pub struct Strips {
     strips: Vec<Strip>,
-    /// Of each but the last.
+    /// Rows of each strip; the last may have fewer.
     rows: usize,
     pose: PoseField,
     /// Points of all strips that the part's motion is found from.
     samples: Vec<Sample>,
-    fitting: Room,
-    cells: CellRoom,
+    fitting: FitBuffers,
+    cells: CellBuffers,
 }
 
 /// Buffers for the cells of one gauge after the other.
 #[derive(Debug, Default)]
-struct CellRoom {
+struct CellBuffers {
     sums: Vec<Sum>,
     cells: Vec<Cell>,
     weights: Weights,
@@ -89,13 +89,13 @@ impl Production {
             rows,
             pose: PoseField::new(self),
             samples: Vec::new(),
-            fitting: Room::default(),
-            cells: CellRoom::default(),
+            fitting: FitBuffers::default(),
+            cells: CellBuffers::default(),
         }
     }
 
-    /// Inspects a part, in strips from [`Self::strips`]. Where `heights` is given (as long as a frame, row-major) it gets
-    /// z in mm, NaN where not resolved or not looked at. The same as [`Self::place`] and [`Self::inspect_placed`].
+    /// Inspects a part, in strips from [`Self::strips`]. If `heights` is given (as long as a frame, row-major), it gets
+    /// z in mm, NaN where not resolved and outside of [`Self::window`]. The same as [`Self::place`] and [`Self::inspect_placed`].
     ///
     /// # Errors
     /// If the frames are not what the decoder was made for. Nothing else can fail.
@@ -110,8 +110,8 @@ impl Production {
         self.inspect_placed(input, strips, placed, heights)
     }
 
-    /// The first half: how the part lies, from a few rows of each strip. None if that is not asked for, or too little of the part
-    /// is seen.
+    /// The first half: how the part lies, from a few rows of each strip. None if parts are not aligned ([`Parts::aligned`]), or if
+    /// too few points are resolved.
     ///
     /// # Errors
     /// As [`Self::inspect`].
@@ -167,7 +167,7 @@ impl Production {
     }
 }
 
-/// The columns of both, possibly none.
+/// The intersection of two ranges of columns; it may be empty.
 fn common(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     let start = a.start.max(b.start);
     start..a.end.min(b.end).max(start)

@@ -20,10 +20,10 @@ import { count, duration, measures } from "./number.js";
 const VIEWS = ["live", "history", "recipes", "registers", "device"];
 const STATES = {
   boot: ["starting", "wait"], ready: ["ready", "ready"], acquiring: ["exposing", "busy"], processing: ["computing", "busy"],
-  loading: ["loading a recipe", "busy"], teaching: ["teaching", "busy"], offline: ["offline: the PLC does not ask for it", "wait"],
+  loading: ["loading a recipe", "busy"], teaching: ["teaching", "busy"], offline: ["offline: the PLC has not set ONLINE", "wait"],
   fault: ["fault", "fault"], stopping: ["stopping", "wait"],
 };
-// Why a station that waits accepts no trigger, by REJECT_REASON.
+// Why a station in state ready accepts no trigger (its READY bit is 0), by REJECT_REASON.
 const WAITING = { 3: "no recipe is active", 6: "another recipe is asked for" };
 let view = "live";
 let last = null;
@@ -62,7 +62,8 @@ function showSnapshot(now) {
   showRecipes(now, view === "recipes");
   showDevice(now, view === "device");
   showSimulation(now);
-  // Times without a clock count from the start, so lists are read again when BOOT_ID is known.
+  // Times that were recorded without a synchronised clock are relative to the start of the program, so the lists are read again when
+  // BOOT_ID is known or has changed.
   if (restarted) { openHistory(view === "history", now); openDevice(view === "device", now); }
   const key = `${now.boot_id}/${now.result ? now.result.seq : "none"}`;
   if (key !== shown) {
