@@ -1,13 +1,13 @@
 //! Tells the program which commit it was built from.
 //!
-//! In this order: what `FRINGED_COMMIT` says, for whoever packages; the name that `git archive` wrote into the file
-//! `commit` of a tarball; git itself; nothing. Only optimised builds ask git, so that a commit costs development and
+//! The first of these that is there: the environment variable `FRINGED_COMMIT`, for packagers; the name that `git archive` wrote
+//! into the file `commit` of a tarball; the answer of git. Only optimised builds ask git, so that a commit costs development and
 //! tests no new compilation.
 
 use std::path::Path;
 use std::process::Command;
 
-/// What goes into the program; elsewhere a change is none of its own.
+/// What the program is made of. Uncommitted changes elsewhere do not count.
 const SOURCES: [&str; 5] = ["algo", "hal", "appliance", "Cargo.toml", "Cargo.lock"];
 /// Digits of a commit's name: enough for one of many.
 const DIGITS: usize = 12;
@@ -25,28 +25,28 @@ fn main() {
 }
 
 fn commit() -> Option<String> {
-    told().or_else(archived).or_else(asked)
+    from_environment().or_else(from_archive).or_else(from_git)
 }
 
-fn told() -> Option<String> {
-    let told = std::env::var("FRINGED_COMMIT").ok()?;
-    Some(told.trim().to_owned()).filter(|told| !told.is_empty())
+fn from_environment() -> Option<String> {
+    let commit = std::env::var("FRINGED_COMMIT").ok()?;
+    Some(commit.trim().to_owned()).filter(|commit| !commit.is_empty())
 }
 
-fn archived() -> Option<String> {
+fn from_archive() -> Option<String> {
     let name = std::fs::read_to_string("commit").ok()?;
-    // In a working copy it still is the placeholder.
+    // In a working copy the file still holds the placeholder.
     let name = name.trim().get(..DIGITS)?;
     let is_one = name.chars().all(|c| c.is_ascii_hexdigit());
     is_one.then(|| name.to_owned())
 }
 
-fn asked() -> Option<String> {
+fn from_git() -> Option<String> {
     if std::env::var("PROFILE").as_deref() != Ok("release") {
         return None;
     }
     let root = Path::new("..").canonicalize().ok()?;
-    // A tarball that was unpacked inside another project's repository is none of its commits.
+    // A tarball that was unpacked inside another project's repository does not belong to its commits.
     let top = git(&root, &["rev-parse", "--show-toplevel"])?;
     if Path::new(&top).canonicalize().ok()? != root {
         return None;
