@@ -4,11 +4,17 @@ import { strict as assert } from "node:assert";
 export async function recipes({ page, step, verdict, trigger }) {
   const rows = page.locator("#recipe-rows tr:not(.before)");
   const notice = (words) => page.waitForFunction((wanted) => !document.querySelector("#notice").hidden && document.querySelector("#notice").textContent.includes(wanted), words);
-  // The station is ready with this recipe; the banner still names the one that measured the last part.
-  const active = (wanted) => page.waitForFunction(async (of) => {
-    const { recipe, state } = await (await fetch("/api/snapshot")).json();
-    return state === "ready" && Object.keys(of).every((key) => recipe[key] === of[key]);
-  }, wanted);
+  // The station is ready with this recipe; the banner still names the one that measured the last part. Asked from here, because
+  // waitForFunction takes the promise of an async function for an answer.
+  const active = async (wanted) => {
+    const until = Date.now() + 30000;
+    for (;;) {
+      const { recipe, state } = await page.evaluate(async () => (await fetch("/api/snapshot")).json());
+      if (state === "ready" && Object.keys(wanted).every((key) => recipe[key] === wanted[key])) return;
+      assert.ok(Date.now() < until, `${JSON.stringify(wanted)} is not active: ${state}, ${JSON.stringify(recipe)}`);
+      await page.waitForTimeout(20);
+    }
+  };
   const ready = () => page.waitForSelector("#state[data-state=ready]");
   const recipe = (number) => page.evaluate(async (at) => (await fetch(`/api/recipes/${at}`)).json(), number);
   const open = async () => { await page.click("nav a[href='#recipes']"); await rows.first().waitFor(); };
