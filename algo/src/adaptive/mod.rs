@@ -18,28 +18,17 @@ pub use map::ProjectorMap;
 pub use placement::{Surface, phase_reach};
 
 use crate::pattern::PhaseFunctionError;
-use core::fmt;
 
 /// A part for which no pattern can be made.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AdaptError {
     /// No pixel of the part is known.
+    #[error(
+        "the preliminary measurement resolved no pixel: is the part in place and the light on?"
+    )]
     Empty,
     /// The computed pattern cannot be shown.
+    #[error("{0}")]
     Pattern(PhaseFunctionError),
 }
-
-impl fmt::Display for AdaptError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Empty => write!(
-                f,
-                "the preliminary measurement resolved no pixel: is the part in place and the light on?"
-            ),
-            Self::Pattern(error) => error.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for AdaptError {}

@@ -1,7 +1,5 @@
 //! One camera frame as borrowed samples.
 
-use core::fmt;
-
 /// A sample that a camera delivers: `u8` for 8 bits, `u16` for 9 to 16.
 pub trait Sample: Copy + Send + Sync {
     /// The sample in counts.
@@ -50,25 +48,14 @@ pub struct FrameView<'a> {
 }
 
 /// Samples that are too few for the frame's size and stride.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("a frame of {given} samples was given where size and stride need {needed}")]
 pub struct FrameError {
     /// Samples needed for the size and stride.
     pub needed: usize,
     /// Samples given.
     pub given: usize,
 }
-
-impl fmt::Display for FrameError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "a frame of {} samples was given where size and stride need {}",
-            self.given, self.needed
-        )
-    }
-}
-
-impl core::error::Error for FrameError {}
 
 impl<'a> FrameView<'a> {
     /// A view of `height` rows of `width` samples that start `stride` samples apart.

@@ -7,7 +7,6 @@
 //! Source: D. C. Brown, "Decentering distortion of lenses", 1966, as in OpenCV's calib3d.
 
 use super::Vector;
-use core::fmt;
 
 /// The parameters of a device model as a calibration gives them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,13 +41,18 @@ pub struct Pinhole {
 }
 
 /// A device model that cannot be used.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModelError {
     /// A number is not finite.
+    #[error("{0} is not a finite number")]
     NotFinite(&'static str),
     /// A focal length is not positive, or absurd for the frame: less than a hundredth of it (an angle of
     /// view of 179°) or more than 1e6 pixels.
+    #[error(
+        "focal lengths {fx} and {fy}: both must be positive, at least a hundredth of the frame and \
+         at most 1e6 pixels"
+    )]
     Focal {
         /// f_x.
         fx: f64,
@@ -56,6 +60,7 @@ pub enum ModelError {
         fy: f64,
     },
     /// The principal point lies more than ten frames away.
+    #[error("the principal point ({cx}, {cy}) lies more than ten frames away: it is in pixels")]
     PrincipalPoint {
         /// c_x.
         cx: f64,
@@ -63,6 +68,10 @@ pub enum ModelError {
         cy: f64,
     },
     /// R · Rᵀ is not the unit matrix, or R is a reflection.
+    #[error(
+        "the rotation is not a rotation matrix: R·Rᵀ is off the unit matrix by {deviation:.2e}, det R = \
+         {determinant:.6}; write its 9 numbers row by row"
+    )]
     Rotation {
         /// Largest deviation of R · Rᵀ from the unit matrix.
         deviation: f64,
@@ -70,11 +79,13 @@ pub enum ModelError {
         determinant: f64,
     },
     /// The device stands more than a kilometre from the origin.
+    #[error("the translation of {distance:e} mm is over a kilometre: it is in mm")]
     Translation {
         /// Its distance from the origin, mm.
         distance: f64,
     },
     /// The distortion folds over: two rays meet in one pixel of the frame.
+    #[error("the distortion folds over at pixel ({u:.1}, {v:.1}): the order is k1, k2, p1, p2, k3")]
     Distortion {
         /// Column of the pixel.
         u: f64,
@@ -82,41 +93,6 @@ pub enum ModelError {
         v: f64,
     },
 }
-
-impl fmt::Display for ModelError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotFinite(what) => write!(f, "{what} is not a finite number"),
-            Self::Focal { fx, fy } => write!(
-                f,
-                "focal lengths {fx} and {fy}: both must be positive, at least a hundredth of the frame and \
-                 at most 1e6 pixels"
-            ),
-            Self::PrincipalPoint { cx, cy } => write!(
-                f,
-                "the principal point ({cx}, {cy}) lies more than ten frames away: it is in pixels"
-            ),
-            Self::Rotation {
-                deviation,
-                determinant,
-            } => write!(
-                f,
-                "the rotation is not a rotation matrix: R·Rᵀ is off the unit matrix by {deviation:.2e}, det R = \
-                 {determinant:.6}; write its 9 numbers row by row"
-            ),
-            Self::Translation { distance } => write!(
-                f,
-                "the translation of {distance:e} mm is over a kilometre: it is in mm"
-            ),
-            Self::Distortion { u, v } => write!(
-                f,
-                "the distortion folds over at pixel ({u:.1}, {v:.1}): the order is k1, k2, p1, p2, k3"
-            ),
-        }
-    }
-}
-
-impl core::error::Error for ModelError {}
 
 /// Largest deviation of R · Rᵀ from the unit matrix; rounded calibrations stay below it.
 const ROTATION_TOLERANCE: f64 = 1e-4;

@@ -9,7 +9,6 @@
 use crate::math::solve::solve_symmetric;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::fmt;
 
 /// Degree of the fit.
 const DEGREE: usize = 6;
@@ -42,24 +41,15 @@ pub struct FittedMap {
 }
 
 /// The samples do not determine a smooth map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{samples} samples do not determine the reference phase map: the plate must fill most of the \
+     frame in both directions"
+)]
 pub struct ReferenceError {
     /// Samples that were given.
     pub samples: usize,
 }
-
-impl fmt::Display for ReferenceError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{} samples do not determine the reference phase map: the plate must fill most of the \
-             frame in both directions",
-            self.samples
-        )
-    }
-}
-
-impl core::error::Error for ReferenceError {}
 
 impl FittedMap {
     /// The value at pixel (u, v), also outside the frame.

@@ -11,7 +11,6 @@
 use super::{Pinhole, Reference, Vector, root};
 use crate::pattern::PhaseFunction;
 use crate::units::{AbsolutePhase, Height};
-use core::fmt;
 
 /// The working range of z in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,39 +22,25 @@ pub struct HeightRange {
 }
 
 /// A rig (camera, projector and working range) that cannot triangulate.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RigError {
     /// A device is not above the reference plane or does not look down at it.
+    #[error(
+        "the {0} is not above the plane z = 0 looking down at it: +z points towards the \
+         head and X_device = R·X_world + t"
+    )]
     NotAbove(&'static str),
     /// Camera and projector stand in the same place.
+    #[error("camera and projector have the same centre: without a baseline there is no height")]
     NoBaseline,
     /// The working range is empty or not finite, reaches up to a device, or lies wholly beyond ± 2147 mm.
+    #[error(
+        "the working range {} to {} mm is empty or not finite, reaches up to a device, or lies beyond ±2147 mm",
+        .0.low, .0.high
+    )]
     Range(HeightRange),
 }
-
-impl fmt::Display for RigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotAbove(device) => write!(
-                f,
-                "the {device} is not above the plane z = 0 looking down at it: +z points towards the \
-                 head and X_device = R·X_world + t"
-            ),
-            Self::NoBaseline => write!(
-                f,
-                "camera and projector have the same centre: without a baseline there is no height"
-            ),
-            Self::Range(range) => write!(
-                f,
-                "the working range {} to {} mm is empty or not finite, reaches up to a device, or lies beyond ±2147 mm",
-                range.low, range.high
-            ),
-        }
-    }
-}
-
-impl core::error::Error for RigError {}
 
 /// Turns phase into height for one rig and one phase function.
 #[derive(Clone, Debug)]

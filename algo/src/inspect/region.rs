@@ -1,7 +1,6 @@
 //! A polygon in camera pixels, as the pixels inside it.
 
 use alloc::vec::Vec;
-use core::fmt;
 use core::ops::Range;
 
 /// The pixels whose centres lie inside a polygon (even-odd rule), as spans of rows.
@@ -22,41 +21,22 @@ struct Spans {
 }
 
 /// A polygon that encloses nothing.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RegionError {
     /// Fewer than three corners.
+    #[error("a region of {0} corners: a polygon needs at least 3")]
     Corners(usize),
     /// A corner is not finite.
+    #[error("corner {corner} of the region is not finite")]
     NotFinite {
         /// Which corner.
         corner: usize,
     },
     /// No pixel centre of the frame lies inside.
+    #[error("the region holds no pixel of the frame: corners are (column, row) in camera pixels")]
     Empty,
 }
-
-impl fmt::Display for RegionError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Corners(corners) => {
-                write!(
-                    f,
-                    "a region of {corners} corners: a polygon needs at least 3"
-                )
-            }
-            Self::NotFinite { corner } => {
-                write!(f, "corner {corner} of the region is not finite")
-            }
-            Self::Empty => write!(
-                f,
-                "the region holds no pixel of the frame: corners are (column, row) in camera pixels"
-            ),
-        }
-    }
-}
-
-impl core::error::Error for RegionError {}
 
 impl Region {
     /// The pixels of a frame of `width` × `height` inside a polygon of (u, v) corners. What lies

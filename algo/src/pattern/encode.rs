@@ -3,7 +3,6 @@
 use super::{PhaseFunction, Shot};
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
-use core::fmt;
 
 /// A raster of 8-bit grey levels, `height` rows of `width`, for a projector to show.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -26,24 +25,15 @@ pub struct GreyResponse {
 }
 
 /// A response that cannot be inverted.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "the grey response does not rise at level {level}: measure it again with more light or longer \
+     exposure"
+)]
 pub struct ResponseError {
     /// The grey level at which the light is not finite or falls.
     pub level: usize,
 }
-
-impl fmt::Display for ResponseError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "the grey response does not rise at level {}: measure it again with more light or longer \
-             exposure",
-            self.level
-        )
-    }
-}
-
-impl core::error::Error for ResponseError {}
 
 impl GreyResponse {
     /// From the light measured at each of the 256 grey levels, in any linear unit.

@@ -38,10 +38,11 @@ pub struct PhaseRange {
 }
 
 /// A phase function that no projector can show.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PhaseFunctionError {
     /// The raster has no pixels, or fewer than two rows or columns of a sampled function.
+    #[error("a phase function of {columns} x {rows} pixels is empty or too small")]
     Size {
         /// Projector columns.
         columns: usize,
@@ -49,8 +50,10 @@ pub enum PhaseFunctionError {
         rows: usize,
     },
     /// The number of fringes is not a positive number of at most [`MAX_TURNS`].
+    #[error("{0} fringes: give a positive number of at most {MAX_TURNS}")]
     Fringes(f64),
     /// The number of samples is not rows × columns.
+    #[error("the phase function has {given} samples where the projector has {expected} pixels")]
     Length {
         /// rows × columns.
         expected: usize,
@@ -58,6 +61,10 @@ pub enum PhaseFunctionError {
         given: usize,
     },
     /// A sample is not finite or beyond ± [`MAX_TURNS`].
+    #[error(
+        "the phase function is {value} at column {column}, row {row}: every sample must be \
+         finite and within ± {MAX_TURNS} turns"
+    )]
     Sample {
         /// Projector column.
         column: usize,
@@ -67,34 +74,6 @@ pub enum PhaseFunctionError {
         value: f64,
     },
 }
-
-impl fmt::Display for PhaseFunctionError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Size { columns, rows } => {
-                write!(
-                    f,
-                    "a phase function of {columns} x {rows} pixels is empty or too small"
-                )
-            }
-            Self::Fringes(fringes) => write!(
-                f,
-                "{fringes} fringes: give a positive number of at most {MAX_TURNS}"
-            ),
-            Self::Length { expected, given } => write!(
-                f,
-                "the phase function has {given} samples where the projector has {expected} pixels"
-            ),
-            Self::Sample { column, row, value } => write!(
-                f,
-                "the phase function is {value} at column {column}, row {row}: every sample must be \
-                 finite and within ± {MAX_TURNS} turns"
-            ),
-        }
-    }
-}
-
-impl core::error::Error for PhaseFunctionError {}
 
 impl PhaseFunction {
     /// Fringes parallel to the projector's columns: Φ_P = fringes · ξ / columns.

@@ -3,7 +3,6 @@
 use super::function::MAX_TURNS;
 use super::{PhaseRange, Shot};
 use alloc::vec::Vec;
-use core::fmt;
 
 /// Levels that a sequence may have.
 pub const MAX_LEVELS: usize = 8;
@@ -49,16 +48,23 @@ pub struct Sequence {
 }
 
 /// Frames that do not form a sequence, or a sequence that cannot be unwrapped.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SequenceError {
     /// There are no frames.
+    #[error("there are no frames: a level needs at least 3")]
     Empty,
     /// A ratio is not a positive finite number, or a shift not finite.
+    #[error(
+        "a frame with ratio {} and shift {}: both must be finite and the ratio positive",
+        .0.ratio, .0.shift
+    )]
     NotFinite(Shot),
     /// More levels than [`MAX_LEVELS`].
+    #[error("{0} levels where at most {MAX_LEVELS} can be decoded")]
     TooManyLevels(usize),
     /// A level has fewer than 3 shifts or more than [`MAX_SHIFTS`].
+    #[error("the level of ratio {ratio} has {shifts} shifts: it needs 3 to {MAX_SHIFTS}")]
     Shifts {
         /// The level's ratio.
         ratio: f64,
@@ -66,6 +72,10 @@ pub enum SequenceError {
         shifts: usize,
     },
     /// The shifts of a level are not equally spaced over one turn.
+    #[error(
+        "the {shifts} shifts of the level of ratio {ratio} are not equally spaced over one turn: \
+         {shift} is off its place; shifts of a level are start + k/{shifts}"
+    )]
     Spacing {
         /// The level's ratio.
         ratio: f64,
@@ -75,8 +85,17 @@ pub enum SequenceError {
         shift: f64,
     },
     /// The ratios have no form that can be unwrapped.
+    #[error(
+        "levels of ratios {0:?} cannot be unwrapped: the smallest must span at most one turn \
+         of the pattern (geometric), or they are 1, 1 - 1/n^2, 1 - 1/n with n >= 3 or 1, 1 - 1/n \
+         with n >= 2 (dense, n up to {MAX_DENSE_N}), or a single one"
+    )]
     Ratios(Vec<f64>),
     /// The finest level's ratio or phase is too small or large for fixed point.
+    #[error(
+        "the finest level has ratio {ratio} and {turns} turns: the ratio must be at least 1/{MAX_LEVEL_FACTOR} \
+         and the phase at most {MAX_TURNS} turns"
+    )]
     Finest {
         /// Its ratio.
         ratio: f64,
@@ -84,6 +103,10 @@ pub enum SequenceError {
         turns: f64,
     },
     /// The factor between two geometric levels is too large.
+    #[error(
+        "the step from ratio {from} to {to} is over {MAX_LEVEL_FACTOR}, or too long beside the other levels: put a level \
+         between them"
+    )]
     Step {
         /// Ratio of the coarser level.
         from: f64,
@@ -91,55 +114,6 @@ pub enum SequenceError {
         to: f64,
     },
 }
-
-impl fmt::Display for SequenceError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Empty => write!(f, "there are no frames: a level needs at least 3"),
-            Self::NotFinite(Shot { ratio, shift }) => write!(
-                f,
-                "a frame with ratio {ratio} and shift {shift}: both must be finite and the ratio positive"
-            ),
-            Self::TooManyLevels(levels) => {
-                write!(
-                    f,
-                    "{levels} levels where at most {MAX_LEVELS} can be decoded"
-                )
-            }
-            Self::Shifts { ratio, shifts } => write!(
-                f,
-                "the level of ratio {ratio} has {shifts} shifts: it needs 3 to {MAX_SHIFTS}"
-            ),
-            Self::Spacing {
-                ratio,
-                shifts,
-                shift,
-            } => write!(
-                f,
-                "the {shifts} shifts of the level of ratio {ratio} are not equally spaced over one turn: \
-                 {shift} is off its place; shifts of a level are start + k/{shifts}"
-            ),
-            Self::Ratios(ratios) => write!(
-                f,
-                "levels of ratios {ratios:?} cannot be unwrapped: the smallest must span at most one turn \
-                 of the pattern (geometric), or they are 1, 1 - 1/n^2, 1 - 1/n with n >= 3 or 1, 1 - 1/n \
-                 with n >= 2 (dense, n up to {MAX_DENSE_N}), or a single one"
-            ),
-            Self::Finest { ratio, turns } => write!(
-                f,
-                "the finest level has ratio {ratio} and {turns} turns: the ratio must be at least 1/{MAX_LEVEL_FACTOR} \
-                 and the phase at most {MAX_TURNS} turns"
-            ),
-            Self::Step { from, to } => write!(
-                f,
-                "the step from ratio {from} to {to} is over {MAX_LEVEL_FACTOR}, or too long beside the other levels: put a level \
-                 between them"
-            ),
-        }
-    }
-}
-
-impl core::error::Error for SequenceError {}
 
 impl Sequence {
     /// From what each frame shows, in the order of the frames.

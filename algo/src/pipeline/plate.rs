@@ -8,7 +8,6 @@ use crate::geometry::{FittedMap, ReferenceError, fit_map};
 use crate::trust::Trust;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::fmt;
 
 /// Pixels whose residual to the first fit is more than this many times its RMS (dust, scratches) are left out of the second.
 const OUTLIER: f64 = 4.0;
@@ -30,32 +29,22 @@ pub struct Plate {
 }
 
 /// Phases that cannot be those of a plate.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlateError {
     /// Too little of the frame is resolved.
+    #[error(
+        "{:.0} % of the frame shows fringes: put a flat, bright, matt plate into the plane z = 0 that fills it",
+        filled * 100.0
+    )]
     Small {
         /// The share that is.
         filled: f64,
     },
     /// The resolved pixels do not determine the fit.
+    #[error("{0}")]
     Fit(ReferenceError),
 }
-
-impl fmt::Display for PlateError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Small { filled } => write!(
-                f,
-                "{:.0} % of the frame shows fringes: put a flat, bright, matt plate into the plane z = 0 that fills it",
-                filled * 100.0
-            ),
-            Self::Fit(error) => error.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for PlateError {}
 
 impl Plate {
     /// Fits the phases of a plate.

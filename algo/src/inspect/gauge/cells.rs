@@ -3,7 +3,6 @@
 use super::TaughtCell;
 use crate::inspect::Region;
 use alloc::vec::Vec;
-use core::fmt;
 
 /// The cells of a region, over the box around it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,26 +15,17 @@ pub struct Grid {
 }
 
 /// A region with more cells than there are buffers for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{cells} squares of {side}x{side} pixels where at most {MAX_CELLS} are kept: smooth over more pixels or make the \
+     region smaller"
+)]
 pub struct TooFine {
     /// Side of a cell in pixels.
     pub side: usize,
     /// How many there would be.
     pub cells: usize,
 }
-
-impl fmt::Display for TooFine {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{} squares of {1}x{1} pixels where at most {MAX_CELLS} are kept: smooth over more pixels or make the \
-             region smaller",
-            self.cells, self.side
-        )
-    }
-}
-
-impl core::error::Error for TooFine {}
 
 /// Cells of a region: 3 MB.
 const MAX_CELLS: usize = 1 << 16;

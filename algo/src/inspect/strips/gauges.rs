@@ -25,38 +25,24 @@ pub struct Gauge {
 pub const MAX_GAUGES: usize = 16;
 
 /// Gauges that cannot be measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unmeasurable {
     /// More than [`MAX_GAUGES`].
+    #[error("{gauges} gauges where at most {MAX_GAUGES} are measured")]
     TooMany {
         /// How many.
         gauges: usize,
     },
     /// A smoothing over so many pixels that sums of heights over them could overflow.
+    #[error("a smoothing over {side}x{side} pixels is too wide for the working range")]
     TooSmooth {
         /// Side of the square in pixels.
         side: usize,
     },
     /// More cells than are kept.
+    #[error("{0}")]
     TooFine(TooFine),
 }
-
-impl core::fmt::Display for Unmeasurable {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::TooMany { gauges } => {
-                write!(f, "{gauges} gauges where at most {MAX_GAUGES} are measured")
-            }
-            Self::TooSmooth { side } => write!(
-                f,
-                "a smoothing over {side}x{side} pixels is too wide for the working range"
-            ),
-            Self::TooFine(error) => error.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for Unmeasurable {}
 
 /// The cells of a gauge's region.
 #[derive(Debug)]
