@@ -18,10 +18,10 @@ struct Limits {
 
 const fn limits(part: &'static str, [twelve, nine, six, four]: [f64; 4]) -> Limits {
     let ratios = [
-        (BetterSequence::Twelve, twelve),
-        (BetterSequence::Nine, nine),
-        (BetterSequence::Six, six),
-        (BetterSequence::Four, four),
+        (BetterSequence::TWELVE, twelve),
+        (BetterSequence::NINE, nine),
+        (BetterSequence::SIX, six),
+        (BetterSequence::FOUR, four),
     ];
     Limits { part, ratios }
 }
@@ -63,9 +63,9 @@ fn the_better_pattern_beats_the_papers_own_in_the_middle_of_cone_and_spline() {
     check(
         &CONE,
         MIDDLE,
-        &[BetterSequence::Twelve, BetterSequence::Four],
+        &[BetterSequence::TWELVE, BetterSequence::FOUR],
     );
-    check(&SPLINE, MIDDLE, &[BetterSequence::Twelve]);
+    check(&SPLINE, MIDDLE, &[BetterSequence::TWELVE]);
 }
 
 #[test]
@@ -73,10 +73,10 @@ fn the_better_pattern_beats_the_papers_own_in_the_middle_of_cone_and_spline() {
 fn the_better_pattern_beats_the_papers_own_on_every_part() {
     for limits in [&CONE, &SAWTOOTH, &SPHERE, &SPLINE] {
         let all = [
-            BetterSequence::Twelve,
-            BetterSequence::Nine,
-            BetterSequence::Six,
-            BetterSequence::Four,
+            BetterSequence::TWELVE,
+            BetterSequence::NINE,
+            BetterSequence::SIX,
+            BetterSequence::FOUR,
         ];
         check(limits, WHOLE, &all);
     }

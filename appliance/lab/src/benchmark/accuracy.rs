@@ -7,7 +7,7 @@ use super::median::median;
 use super::point::Point;
 use super::variants::{Variant, decoders, references};
 use super::words;
-use crate::experiment::{OpticsKind, Pattern, Runner, Scene};
+use crate::experiment::{BetterSequence, Method, OpticsKind, Runner, Scene};
 use algo::pattern::{PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
@@ -30,51 +30,49 @@ pub struct Study {
     pub effort: Effort,
 }
 
-/// A sequence that is compared.
+/// A sequence that is compared: of the fixed pattern, or of the better one.
 struct Compared {
     name: &'static str,
-    pattern: Pattern,
-    levels: usize,
-    shifts: usize,
+    sequence: BetterSequence,
 }
 
-/// Fringes of the fixed pattern.
-const FIXED: Pattern = Pattern::Fixed { fringes: 100 };
-/// n of the dense levels: reaches ± 4 turns, as recipes have it.
-const DENSE_N: f64 = 4.0;
+/// The name of the fixed pattern, and the pattern.
+const FIXED: &str = "fixed";
+const FIXED_METHOD: Method = Method::Fixed { fringes: 100 };
 /// The noise of all measurements.
 const SEED: u64 = 1;
 
-const fn compared(name: &'static str, pattern: Pattern, levels: usize, shifts: usize) -> Compared {
-    Compared {
-        name,
-        pattern,
-        levels,
-        shifts,
-    }
+const fn compared(name: &'static str, levels: usize, shifts: usize) -> Compared {
+    let sequence = BetterSequence::new(levels, shifts);
+    Compared { name, sequence }
 }
 
 const SEQUENCES: [Compared; 10] = [
-    compared("fixed", FIXED, 3, 3),
-    compared("fixed", FIXED, 3, 4),
-    compared("fixed", FIXED, 3, 8),
-    compared("better", Pattern::Better, 3, 3),
-    compared("better", Pattern::Better, 3, 4),
-    compared("better", Pattern::Better, 3, 8),
-    compared("better", Pattern::Golden, 2, 3),
-    compared("better", Pattern::Golden, 1, 3),
-    compared("better", Pattern::Golden, 1, 4),
-    compared("better", Pattern::Golden, 1, 8),
+    compared(FIXED, 3, 3),
+    compared(FIXED, 3, 4),
+    compared(FIXED, 3, 8),
+    compared("better", 3, 3),
+    compared("better", 3, 4),
+    compared("better", 3, 8),
+    compared("better", 2, 3),
+    compared("better", 1, 3),
+    compared("better", 1, 4),
+    compared("better", 1, 8),
 ];
 
 impl Compared {
+    fn method(&self) -> Method {
+        match self.name {
+            FIXED => FIXED_METHOD,
+            _ => Method::Better(self.sequence),
+        }
+    }
+
     fn frames(&self, range: PhaseRange) -> Vec<Shot> {
-        let level = |ratio| Shot::level(ratio, self.shifts);
-        match (self.pattern, self.levels) {
-            (Pattern::Fixed { .. }, levels) => Sequence::geometric(range, levels, self.shifts),
-            (_, 3) => Sequence::dense(DENSE_N, self.shifts),
-            (_, 2) => level(1.0).chain(level(0.8)).collect(),
-            _ => level(1.0).collect(),
+        let BetterSequence { levels, shifts } = self.sequence;
+        match self.name {
+            FIXED => Sequence::geometric(range, levels, shifts),
+            _ => self.sequence.shots(),
         }
     }
 }
@@ -125,7 +123,7 @@ impl Study {
                 for compared in &SEQUENCES {
                     let words = format!(
                         "{part}, {bit_depth} bit, {} {}x{}",
-                        compared.name, compared.levels, compared.shifts
+                        compared.name, compared.sequence.levels, compared.sequence.shifts
                     );
                     progress(done / total, &words);
                     points.extend(self.compare(
@@ -152,7 +150,7 @@ impl Study {
     ) -> Result<Vec<Point>, String> {
         let frames = |range| compared.frames(range);
         let (measured, map) = runner
-            .measure_with(compared.pattern, frames, SEED)
+            .measure_with(compared.method(), frames, SEED)
             .map_err(words)?;
         let range = measured.triangulator.function().range();
         let sequence = Sequence::from_frames(&compared.frames(range)).map_err(words)?;
@@ -190,8 +188,8 @@ impl Study {
                 part,
                 implementation,
                 sequence: compared.name,
-                frames: compared.levels * compared.shifts,
-                shifts: compared.shifts,
+                frames: compared.sequence.count(),
+                shifts: compared.sequence.shifts,
                 bits,
                 skipping,
                 ns_per_px,

@@ -19,25 +19,22 @@ pub enum Method {
     Better(BetterSequence),
 }
 
-/// The sequences of the better method.
+/// A sequence of the better method: three dense levels, two of them, or a single one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BetterSequence {
-    /// Three dense levels of four shifts about the map of the preliminary measurement.
-    Twelve,
-    /// Three dense levels of three shifts.
-    Nine,
-    /// Two dense levels of three shifts about the golden map.
-    Six,
-    /// One level of four shifts about the golden map.
-    Four,
-    /// One level of three shifts about the golden map.
-    Three,
+pub struct BetterSequence {
+    /// Three are unwrapped about the map of the preliminary measurement, fewer about the golden map.
+    pub levels: usize,
+    /// Shifts of each level.
+    pub shifts: usize,
 }
+
+/// n of the dense levels: reaches ± 4 turns, as recipes have it.
+const DENSE_N: f64 = 4.0;
 
 /// The fixed pattern that pictures show.
 pub const SHOWN_FIXED: Method = Method::Fixed { fringes: 100 };
 /// The adaptive pattern that pictures show.
-pub const SHOWN_ADAPTIVE: Method = Method::Better(BetterSequence::Twelve);
+pub const SHOWN_ADAPTIVE: Method = Method::Better(BetterSequence::TWELVE);
 /// The run that ratios refer to: the paper's adaptive pattern with its own image pitch.
 pub const PAPER: Method = Method::Paper { image_pitch: 5 };
 
@@ -60,51 +57,66 @@ impl Method {
     }
 
     /// Frames of its measurement, without the preliminary ones that are measured once per part.
-    pub fn frame_count(self) -> u32 {
+    pub fn frame_count(self) -> usize {
         match self {
             Self::Fixed { .. } | Self::Paper { .. } => 12,
             Self::Better(frames) => frames.count(),
         }
     }
+
+    /// What each frame of its measurement shows. Geometric levels are the paper's: 1, n, n² with n = √(max Φ_P), N = 4.
+    pub fn shots(self, function: &PhaseFunction) -> Vec<Shot> {
+        if let Self::Better(sequence) = self {
+            return sequence.shots();
+        }
+        let max = function.range().max;
+        let ratios = [1.0 / max, 1.0 / max.sqrt(), 1.0].into_iter();
+        ratios.flat_map(|ratio| Shot::level(ratio, 4)).collect()
+    }
 }
 
 impl BetterSequence {
-    /// All of them.
-    pub const ALL: [Self; 5] = [Self::Twelve, Self::Nine, Self::Six, Self::Four, Self::Three];
+    /// Three levels of four shifts.
+    pub const TWELVE: Self = Self::new(3, 4);
+    /// Three levels of three shifts.
+    pub const NINE: Self = Self::new(3, 3);
+    /// Two levels of three shifts.
+    pub const SIX: Self = Self::new(2, 3);
+    /// One level of four shifts.
+    pub const FOUR: Self = Self::new(1, 4);
+    /// All that are compared with the paper's pattern.
+    const ALL: [Self; 5] = [
+        Self::TWELVE,
+        Self::NINE,
+        Self::SIX,
+        Self::FOUR,
+        Self::new(1, 3),
+    ];
+
+    /// So many levels of so many shifts.
+    pub const fn new(levels: usize, shifts: usize) -> Self {
+        Self { levels, shifts }
+    }
 
     /// Number of frames.
-    pub fn count(self) -> u32 {
-        match self {
-            Self::Twelve => 12,
-            Self::Nine => 9,
-            Self::Six => 6,
-            Self::Four => 4,
-            Self::Three => 3,
-        }
+    pub fn count(self) -> usize {
+        self.levels * self.shifts
     }
 
     /// Whether it is unwrapped about the golden map, not about the preliminary one.
     pub fn needs_golden(self) -> bool {
-        !matches!(self, Self::Twelve | Self::Nine)
+        self.levels < 3
     }
 
     /// What each frame shows.
     pub fn shots(self) -> Vec<Shot> {
-        match self {
-            Self::Twelve => Sequence::dense(4.0, 4),
-            Self::Nine => Sequence::dense(4.0, 3),
-            Self::Six => Shot::level(1.0, 3).chain(Shot::level(0.8, 3)).collect(),
-            Self::Four => Shot::level(1.0, 4).collect(),
-            Self::Three => Shot::level(1.0, 3).collect(),
+        let level = |ratio| Shot::level(ratio, self.shifts);
+        match self.levels {
+            3 => Sequence::dense(DENSE_N, self.shifts),
+            2 => level(1.0).chain(level(0.8)).collect(),
+            _ => level(1.0).collect(),
         }
     }
-}
-
-/// A geometric sequence as the paper has it: levels 1, n, n² with n = √(max Φ_P), N = 4.
-pub fn geometric(function: &PhaseFunction) -> Vec<Shot> {
-    let max = function.range().max;
-    let ratios = [1.0 / max, 1.0 / max.sqrt(), 1.0].into_iter();
-    ratios.flat_map(|ratio| Shot::level(ratio, 4)).collect()
 }
 
 /// The first frame of the finest level.

@@ -17,6 +17,6 @@ pub use cylinder::Cylinder;
 pub use figures::figures;
 pub use judge::Outcome;
 pub use methods::{BetterSequence, Method};
-pub use runner::{Pattern, Run, Runner};
+pub use runner::{Run, Runner};
 pub use scenes::{Judged, OpticsKind, PARTS, Scene};
 pub use table::{HEADER, RunRow, Values, csv, means, table};

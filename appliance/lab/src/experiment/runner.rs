@@ -9,6 +9,7 @@ use super::scenes::{Judged, OpticsKind, Scene};
 use algo::adaptive::{ProjectorMap, noise, paper};
 use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
+use algo::pipeline::PhaseMap;
 use algo::units::AbsolutePhase;
 use appliance::head::calibration::Calibration;
 use appliance::head::rig::{MeasureError, Measured, Rig};
@@ -50,20 +51,6 @@ struct Better {
     expected: Vec<AbsolutePhase>,
 }
 
-/// The pattern of a sequence that the caller chooses, and what it is unwrapped about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pattern {
-    /// Fixed pitch, absolute by itself.
-    Fixed {
-        /// Fringes over the projector's width.
-        fringes: u32,
-    },
-    /// The better pattern about the map of the preliminary measurement.
-    Better,
-    /// The better pattern about the golden map.
-    Golden,
-}
-
 /// A run: its measurement and how good it is.
 pub struct Run {
     /// Against truth.
@@ -90,7 +77,7 @@ const CHOSEN_STREAM: u64 = 3;
 fn stream(method: Method) -> u64 {
     match method {
         Method::Paper { image_pitch } => 10 + u64::from(image_pitch),
-        Method::Better(shot) => 30 + u64::from(shot.count()),
+        Method::Better(sequence) => 30 + sequence.count() as u64,
         Method::Fixed { fringes } => 100 + u64::from(fringes),
     }
 }
@@ -121,46 +108,59 @@ impl Runner {
     /// If the head or the pattern fails.
     pub fn run(&mut self, method: Method, seed: u64) -> Result<Run, MeasureError> {
         self.learn_with(seed);
-        let (columns, rows) = self.size();
-        match method {
-            Method::Fixed { fringes } => {
-                self.paper_chain(method, self.vertical(f64::from(fringes))?)
-            }
-            Method::Paper { image_pitch } => {
-                let map = self.paper_map()?;
-                let function = paper::adapt(&map, columns, rows, f64::from(image_pitch));
-                self.paper_chain(method, function.map_err(rig)?)
-            }
-            Method::Better(frames) => self.better_frames(method, frames),
+        let (function, map) = self.pattern(method)?;
+        let shots = method.shots(&function);
+        let mut measured = self.measure(stream(method), &function, &shots, map.as_deref())?;
+        if map.is_none() {
+            reject_too_fine(&mut measured.phases);
         }
+        Ok(Run {
+            outcome: judge(&self.truth, &measured, self.judged),
+            measured,
+            function,
+            finest: methods::finest(&shots),
+        })
     }
 
-    /// Measures with a sequence of the caller's choice and the noise of `seed`. `shots` returns what each frame
-    /// shows, for the range of the phase function. The second result is the map that the phase was unwrapped about.
+    /// Measures the pattern of a method with a sequence of the caller's choice and the noise of `seed`. `shots` returns what each
+    /// frame shows, for the range of the phase function. The second result is the map that the phase was unwrapped about.
     ///
     /// # Errors
     /// If the head or the pattern fails.
     pub fn measure_with(
         &mut self,
-        pattern: Pattern,
+        method: Method,
         shots: impl Fn(PhaseRange) -> Vec<Shot>,
         seed: u64,
     ) -> Result<(Measured, Option<Vec<AbsolutePhase>>), MeasureError> {
         self.learn_with(seed);
-        let (function, map) = match pattern {
-            Pattern::Fixed { fringes } => (self.vertical(f64::from(fringes))?, None),
-            Pattern::Better => {
-                let better = self.better()?;
-                (better.function.clone(), Some(better.expected.clone()))
-            }
-            Pattern::Golden => {
-                let golden = self.golden()?;
-                (self.better()?.function.clone(), Some(golden.to_vec()))
-            }
-        };
+        let (function, map) = self.pattern(method)?;
         let shots = shots(function.range());
         let measured = self.measure(CHOSEN_STREAM, &function, &shots, map.as_deref())?;
         Ok((measured, map))
+    }
+
+    /// The pattern of a method, and the map that its phase is unwrapped about if it is not absolute by itself.
+    fn pattern(
+        &mut self,
+        method: Method,
+    ) -> Result<(PhaseFunction, Option<Vec<AbsolutePhase>>), MeasureError> {
+        Ok(match method {
+            Method::Fixed { fringes } => (self.vertical(f64::from(fringes))?, None),
+            Method::Paper { image_pitch } => {
+                let ((columns, rows), map) = (self.size(), self.paper_map()?);
+                let function = paper::adapt(&map, columns, rows, f64::from(image_pitch));
+                (function.map_err(rig)?, None)
+            }
+            Method::Better(sequence) => {
+                let better = self.better()?;
+                let map = match sequence.needs_golden() {
+                    true => self.golden()?.to_vec(),
+                    false => better.expected.clone(),
+                };
+                (better.function.clone(), Some(map))
+            }
+        })
     }
 
     /// The true heights and classes of the pixels.
@@ -262,53 +262,10 @@ impl Runner {
         }
         let better = self.better()?;
         let map = Some(&better.expected[..]);
-        let shots = BetterSequence::Twelve.shots();
+        let shots = BetterSequence::TWELVE.shots();
         let measured = self.measure(GOLDEN_STREAM, &better.function, &shots, map)?;
         let found = Arc::new(measured.phases.phase);
         Ok(Arc::clone(self.learnt.golden.insert(found)))
-    }
-
-    fn better_frames(
-        &mut self,
-        method: Method,
-        frames: BetterSequence,
-    ) -> Result<Run, MeasureError> {
-        let better = self.better()?;
-        let golden = if frames.needs_golden() {
-            Some(self.golden()?)
-        } else {
-            None
-        };
-        let map = golden.as_deref().unwrap_or(&better.expected);
-        let shots = frames.shots();
-        let measured = self.measure(stream(method), &better.function, &shots, Some(map))?;
-        Ok(self.judged(better.function.clone(), &shots, measured))
-    }
-
-    /// The paper's chain with its own criterion of image pitch.
-    fn paper_chain(
-        &mut self,
-        method: Method,
-        function: PhaseFunction,
-    ) -> Result<Run, MeasureError> {
-        let shots = methods::geometric(&function);
-        let mut measured = self.measure(stream(method), &function, &shots, None)?;
-        let fine = too_fine(&measured.phases.phase, measured.phases.width);
-        for (trust, fine) in measured.phases.trust.iter_mut().zip(fine) {
-            if fine && *trust == Trust::Resolved {
-                *trust = Trust::LowModulation;
-            }
-        }
-        Ok(self.judged(function, &shots, measured))
-    }
-
-    fn judged(&self, function: PhaseFunction, shots: &[Shot], measured: Measured) -> Run {
-        Run {
-            outcome: judge(&self.truth, &measured, self.judged),
-            measured,
-            function,
-            finest: methods::finest(shots),
-        }
     }
 }
 
@@ -319,16 +276,19 @@ fn rig(error: impl std::fmt::Display) -> MeasureError {
 /// Smallest image pitch along u that the paper's chain resolves, camera pixels.
 const RESOLVED_PITCH: f64 = 2.5;
 
-/// Where the image pitch along u is below [`RESOLVED_PITCH`], by central differences of Φ.
-fn too_fine(phase: &[AbsolutePhase], width: usize) -> Vec<bool> {
-    (0..phase.len())
-        .map(|at| {
-            let u = at % width;
-            let inside = u > 0 && u + 1 < width;
-            inside && phase[at - 1].is_known() && phase[at + 1].is_known() && {
-                let rise = (phase[at + 1] - phase[at - 1]).turns();
-                rise.abs() / 2.0 > 1.0 / RESOLVED_PITCH
-            }
-        })
-        .collect()
+/// The criterion of the paper's chain: rejects the pixels whose image pitch along u, by central differences of Φ, is below
+/// [`RESOLVED_PITCH`].
+fn reject_too_fine(phases: &mut PhaseMap) {
+    let (phase, width) = (&phases.phase, phases.width);
+    for (at, trust) in phases.trust.iter_mut().enumerate() {
+        let inside = at % width > 0 && at % width + 1 < width;
+        if *trust == Trust::Resolved
+            && inside
+            && phase[at - 1].is_known()
+            && phase[at + 1].is_known()
+            && (phase[at + 1] - phase[at - 1]).turns().abs() / 2.0 > 1.0 / RESOLVED_PITCH
+        {
+            *trust = Trust::LowModulation;
+        }
+    }
 }

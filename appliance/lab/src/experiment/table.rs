@@ -21,7 +21,7 @@ pub struct RunRow {
     /// Name of the method.
     pub method: String,
     /// Frames of its measurement.
-    pub frames: u32,
+    pub frames: usize,
     /// Noise seed; 0 = the mean over all.
     pub seed: u64,
     /// The measured quantities.
