@@ -3,21 +3,14 @@
 use super::{Reference, Triangulator, Vector};
 
 /// The line of sight of one pixel, prepared once for any number of heights: its point at height z is start + z · rise.
+///
+/// With a reference from the device models both are in the projector's coordinates, from its centre: a point's projector pixel then
+/// needs the lens model only. Else they are in the world's.
 #[derive(Clone, Copy, Debug)]
 pub struct Sight<'a> {
     triangulator: &'a Triangulator,
     start: Vector,
     rise: Vector,
-    coordinates: Coordinates,
-}
-
-/// The coordinates in which a line of sight is given.
-#[derive(Clone, Copy, Debug)]
-enum Coordinates {
-    /// The projector's, from its centre: a point's projector pixel then needs the lens model only.
-    Projector,
-    /// The world's.
-    World,
 }
 
 impl Triangulator {
@@ -25,19 +18,18 @@ impl Triangulator {
     pub fn sight(&self, u: f64, v: f64) -> Option<Sight<'_>> {
         let ray = self.falling_ray(u, v)?;
         let (rise, on_plane) = (ray * (1.0 / ray.z), self.on_ray(ray, 0.0));
-        let (start, rise, coordinates) = match &self.reference {
+        let (start, rise) = match &self.reference {
             Reference::Models => {
                 let lamp = &self.projector;
                 let start = lamp.turned(on_plane - lamp.centre());
-                (start, lamp.turned(rise), Coordinates::Projector)
+                (start, lamp.turned(rise))
             }
-            Reference::Measured { .. } => (on_plane, rise, Coordinates::World),
+            Reference::Measured { .. } => (on_plane, rise),
         };
         Some(Sight {
             triangulator: self,
             start,
             rise,
-            coordinates,
         })
     }
 }
@@ -48,9 +40,9 @@ impl Sight<'_> {
     pub fn phase(&self, z: f64) -> Option<f64> {
         let point = self.start + self.rise * z;
         let triangulator = self.triangulator;
-        let (xi, eta) = match self.coordinates {
-            Coordinates::Projector => triangulator.projector.pixel(point),
-            Coordinates::World => triangulator.projector_point(point),
+        let (xi, eta) = match triangulator.reference {
+            Reference::Models => triangulator.projector.pixel(point),
+            Reference::Measured { .. } => triangulator.projector_point(point),
         }?;
         Some(triangulator.function.at(xi, eta))
     }

@@ -138,14 +138,10 @@ fn each_row(
     let width = frame.width();
     let mut phases = PhaseMap::new(width, frame.height());
     let map = map.unwrap_or(&[]);
-    for_each(
-        phases.rows(),
-        || (),
-        |v, row, ()| {
-            let known = map.get(v * width..(v + 1) * width).unwrap_or(&[]);
-            decode(v, known, columns(window, v, width), row);
-        },
-    );
+    for_each(phases.rows(), |v, row| {
+        let known = map.get(v * width..(v + 1) * width).unwrap_or(&[]);
+        decode(v, known, columns(window, v, width), row);
+    });
     phases
 }
 
@@ -178,34 +174,30 @@ pub fn triangulate(
         .zip(map.sigma.chunks_mut(width.max(1)))
         .zip(phases.rows())
         .collect();
-    for_each(
-        rows,
-        || (),
-        |v, ((heights, sigmas), phases), ()| {
-            for u in window.map_or(0..heights.len(), |window| window[v].clone()) {
-                if phases.trust[u] != Trust::Resolved {
-                    continue;
-                }
-                let phase = phases.phase[u];
-                let near = guess.and_then(|guess| guess(v * width + u, phase));
-                let (column, row) = (u as f64, v as f64);
-                let solved = match near {
-                    Some(near) => triangulator.solve_near(column, row, phase.turns(), near),
-                    None => triangulator.solve(column, row, phase.turns()),
-                };
-                match solved {
-                    None => phases.trust[u] = Trust::OutOfRange,
-                    Some(solution) => {
-                        heights[u] = Height::from_mm(solution.point.z);
-                        if let Some(noise) = noise {
-                            let turns = decoder.phase_noise(phases.modulation[u], noise);
-                            sigmas[u] = (turns / libm::fabs(solution.slope)) as f32;
-                        }
+    for_each(rows, |v, ((heights, sigmas), phases)| {
+        for u in window.map_or(0..heights.len(), |window| window[v].clone()) {
+            if phases.trust[u] != Trust::Resolved {
+                continue;
+            }
+            let phase = phases.phase[u];
+            let near = guess.and_then(|guess| guess(v * width + u, phase));
+            let (column, row) = (u as f64, v as f64);
+            let solved = match near {
+                Some(near) => triangulator.solve_near(column, row, phase.turns(), near),
+                None => triangulator.solve(column, row, phase.turns()),
+            };
+            match solved {
+                None => phases.trust[u] = Trust::OutOfRange,
+                Some(solution) => {
+                    heights[u] = Height::from_mm(solution.point.z);
+                    if let Some(noise) = noise {
+                        let turns = decoder.phase_noise(phases.modulation[u], noise);
+                        sigmas[u] = (turns / libm::fabs(solution.slope)) as f32;
                     }
                 }
             }
-        },
-    );
+        }
+    });
     map
 }
 

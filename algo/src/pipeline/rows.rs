@@ -21,12 +21,8 @@ pub fn for_each_row<T: Send>(
 }
 
 /// Calls `each` with every item.
-pub(crate) fn for_each_item<T: Send>(items: &mut [T], each: impl Fn(usize, &mut T) + Sync + Send) {
-    for_each_row(items, 1, |at, items| {
-        for item in items {
-            each(at, item);
-        }
-    });
+pub(crate) fn for_each_item<T: Send>(items: &mut [T], each: impl Fn(&mut T) + Sync + Send) {
+    for_each_row(items, 1, |_, item| item.iter_mut().for_each(&each));
 }
 
 /// Calls `each` with every row of two maps (row-major), each given with the length of its rows.
@@ -52,22 +48,15 @@ pub(crate) fn for_each_row_of_two<T: Send, U: Send>(
     }
 }
 
-/// Calls `each` with the index of every row, the row, and a scratch buffer that is reused from row to row.
-pub(crate) fn for_each<T: Send, S>(
-    rows: Vec<T>,
-    scratch: impl Fn() -> S + Sync + Send,
-    each: impl Fn(usize, T, &mut S) + Sync + Send,
-) {
+/// Calls `each` with the index of every row and the row.
+pub(crate) fn for_each<T: Send>(rows: Vec<T>, each: impl Fn(usize, T) + Sync + Send) {
     #[cfg(feature = "parallel")]
     rows.into_par_iter()
         .enumerate()
-        .for_each_init(scratch, |scratch, (v, row)| each(v, row, scratch));
+        .for_each(|(v, row)| each(v, row));
     #[cfg(not(feature = "parallel"))]
-    {
-        let mut scratch = scratch();
-        for (v, row) in rows.into_iter().enumerate() {
-            each(v, row, &mut scratch);
-        }
+    for (v, row) in rows.into_iter().enumerate() {
+        each(v, row);
     }
 }
 

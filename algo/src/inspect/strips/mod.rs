@@ -124,7 +124,7 @@ impl Production {
         let Some(alignment) = &self.alignment else {
             return Ok(None);
         };
-        for_each_item(&mut strips.strips, |_, strip| {
+        for_each_item(&mut strips.strips, |strip| {
             strip.sample(self, alignment, input);
         });
         strips.samples.clear();
@@ -150,17 +150,15 @@ impl Production {
         strips.pose.set(self, placed);
         let (pose, width) = (&strips.pose, self.size().0);
         match heights {
-            None => for_each_item(&mut strips.strips, |_, strip| {
+            None => for_each_item(&mut strips.strips, |strip| {
                 strip.inspect(self, pose, input, None);
             }),
             Some(map) => {
                 let maps = map.chunks_mut((strips.rows * width).max(1));
                 let work = strips.strips.iter_mut().zip(maps).collect();
-                for_each(
-                    work,
-                    || (),
-                    |_, (strip, map), ()| strip.inspect(self, pose, input, Some(map)),
-                );
+                for_each(work, |_, (strip, map)| {
+                    strip.inspect(self, pose, input, Some(map));
+                });
             }
         }
         Ok(self.findings(input, strips))

@@ -90,30 +90,24 @@ impl HeightCubics {
             .zip(cubics.third.chunks_mut(width))
             .zip(cubics.reach.chunks_mut(width))
             .collect();
-        for_each(
-            rows,
-            || (),
-            |v, ((((phases, first), second), third), reach), ()| {
-                let heights = &heights[v * width..(v + 1) * width];
-                for (columns, near) in near.row(v) {
-                    if !near {
-                        fitting.between(v, columns, phases, heights);
-                        continue;
-                    }
-                    for u in columns {
-                        if !window[v].contains(&u) {
-                            fitting.complete((u, v), &mut phases[u], heights[u]);
-                        } else if let Some(cubic) =
-                            fitting.cubic((u, v), &mut phases[u], heights[u])
-                        {
-                            first[u] = cubic.first;
-                            (second[u], third[u]) = (cubic.second, cubic.third);
-                            reach[u] = cubic.reach;
-                        }
+        for_each(rows, |v, ((((phases, first), second), third), reach)| {
+            let heights = &heights[v * width..(v + 1) * width];
+            for (columns, near) in near.row(v) {
+                if !near {
+                    fitting.between(v, columns, phases, heights);
+                    continue;
+                }
+                for u in columns {
+                    if !window[v].contains(&u) {
+                        fitting.complete((u, v), &mut phases[u], heights[u]);
+                    } else if let Some(cubic) = fitting.cubic((u, v), &mut phases[u], heights[u]) {
+                        first[u] = cubic.first;
+                        (second[u], third[u]) = (cubic.second, cubic.third);
+                        reach[u] = cubic.reach;
                     }
                 }
-            },
-        );
+            }
+        });
         cubics
     }
 
