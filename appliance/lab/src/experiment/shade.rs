@@ -1,5 +1,6 @@
 //! A shaded view of a measured surface: neighbouring points as small facets, seen obliquely.
 
+use algo::geometry::Vector;
 use algo::phase::Trust;
 use appliance::head::rig::Measured;
 use appliance::output::canvas::Canvas;
@@ -10,7 +11,7 @@ const TURN: f64 = 0.35;
 /// Facets whose corners differ more in z span a depth edge and are not drawn, mm.
 const DEPTH_EDGE_MM: f64 = 10.0;
 /// Direction to the lamp (x, y, z), low enough that noise is visible.
-const LAMP: [f64; 3] = [-0.70, -0.30, 0.65];
+const LAMP: Vector = Vector::new(-0.70, -0.30, 0.65);
 /// Grey of a facet that faces away from the lamp, and what is added to it if it faces the lamp.
 const DARK: f64 = 50.0;
 const BRIGHT: f64 = 200.0;
@@ -37,8 +38,8 @@ pub fn render(measured: &Measured, size: usize) -> Canvas<1> {
             let [Some(a), Some(b), Some(c)] = corners.map(|corner| points[corner]) else {
                 continue;
             };
-            let low = a[2].min(b[2]).min(c[2]);
-            if a[2].max(b[2]).max(c[2]) - low <= DEPTH_EDGE_MM {
+            let low = a.z.min(b.z).min(c.z);
+            if a.z.max(b.z).max(c.z) - low <= DEPTH_EDGE_MM {
                 let seen = [a, b, c].map(|point| viewport.seen(point));
                 facet(&mut canvas, &mut nearest, seen, grey(a, b, c));
             }
@@ -47,8 +48,8 @@ pub fn render(measured: &Measured, size: usize) -> Canvas<1> {
     canvas
 }
 
-/// The resolved points (x, y, z) of each camera pixel, mm.
-fn points(measured: &Measured) -> Vec<Option<[f64; 3]>> {
+/// The resolved points of each camera pixel, mm.
+fn points(measured: &Measured) -> Vec<Option<Vector>> {
     let heights = &measured.heights;
     let pixels = heights.height.iter().zip(&measured.phases.trust);
     pixels
@@ -56,23 +57,17 @@ fn points(measured: &Measured) -> Vec<Option<[f64; 3]>> {
         .map(|(at, (height, trust))| {
             let (u, v) = (at % heights.width, at / heights.width);
             let resolved = *trust == Trust::Resolved;
-            let point = resolved.then(|| measured.triangulator.point(u, v, *height));
-            point.flatten().map(|point| [point.x, point.y, point.z])
+            resolved.then(|| measured.triangulator.point(u, v, *height))?
         })
         .collect()
 }
 
 /// Lambert's law on the facet's normal.
-fn grey(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> u8 {
-    let (p, q) = (minus(b, a), minus(c, a));
-    let normal = [
-        p[1] * q[2] - p[2] * q[1],
-        p[2] * q[0] - p[0] * q[2],
-        p[0] * q[1] - p[1] * q[0],
-    ];
+fn grey(a: Vector, b: Vector, c: Vector) -> u8 {
+    let normal = (b - a).cross(c - a);
     // The camera is above: the side that it sees looks up.
-    let length = dot(normal, normal).sqrt() * if normal[2] < 0.0 { -1.0 } else { 1.0 };
-    let facing = dot(normal, LAMP) / (length * dot(LAMP, LAMP).sqrt());
+    let length = normal.length() * if normal.z < 0.0 { -1.0 } else { 1.0 };
+    let facing = normal.dot(LAMP) / (length * LAMP.length());
     // A facet without an area has no normal; a NaN becomes 0.
     (DARK + BRIGHT * facing.max(0.0)) as u8
 }
@@ -85,7 +80,7 @@ struct Viewport {
 }
 
 impl Viewport {
-    fn around(points: &[Option<[f64; 3]>], size: usize) -> Option<Self> {
+    fn around(points: &[Option<Vector>], size: usize) -> Option<Self> {
         let seen: Vec<_> = points
             .iter()
             .flatten()
@@ -107,7 +102,7 @@ impl Viewport {
         })
     }
 
-    fn seen(&self, point: [f64; 3]) -> [f64; 3] {
+    fn seen(&self, point: Vector) -> [f64; 3] {
         let [x, y, near] = turned(point);
         [
             self.half + self.scale * (x - self.centre[0]),
@@ -118,7 +113,7 @@ impl Viewport {
 }
 
 /// A world point in the coordinates of the view: right, up, towards the eye.
-fn turned([x, y, z]: [f64; 3]) -> [f64; 3] {
+fn turned(Vector { x, y, z }: Vector) -> [f64; 3] {
     let (sin, cos) = TURN.sin_cos();
     let (x, y) = (cos * x - sin * y, sin * x + cos * y);
     let (sin, cos) = ELEVATION.sin_cos();
@@ -157,12 +152,4 @@ fn facet(canvas: &mut Canvas<1>, nearest: &mut [f64], corners: [[f64; 3]; 3], gr
             }
         }
     }
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
