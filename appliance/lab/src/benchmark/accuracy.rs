@@ -5,7 +5,7 @@ use super::frames::{FrameSet, Rotation};
 use super::kernel::{Effort, FloorSets, Kernel, interleaved};
 use super::median::median;
 use super::point::Point;
-use super::variants::{Variant, decoders, references};
+use super::variants::{decoders, references};
 use super::words;
 use crate::experiment::{BetterSequence, Method, OpticsKind, Runner, Scene};
 use algo::pattern::{PhaseRange, Sequence, Shot};
@@ -158,31 +158,28 @@ impl Study {
         let truth = runner.truth();
         let lit = Truth::from(truth).whole_pixels().count();
         let pixels = set.pixels();
-        let mut variants = Vec::new();
+        let mut kernels: Vec<Box<dyn Kernel>> = Vec::new();
         let mut named = Vec::new();
         for (name, kernel) in references(&sequence, range, bits, pixels)? {
-            variants.push(variant(name, kernel));
+            kernels.push(kernel);
             named.push((name, false));
         }
         for (name, decoder) in decoders(&sequence, range, bits)? {
             let window = rows_seen(truth, set.width());
             let whole = Decoding::new(decoder.clone(), None);
-            variants.push(variant(name, Box::new(whole)));
-            variants.push(variant(
-                name,
-                Box::new(Decoding::new(decoder, Some(window))),
-            ));
+            kernels.push(Box::new(whole));
+            kernels.push(Box::new(Decoding::new(decoder, Some(window))));
             named.extend([(name, false), (name, true)]);
         }
         let mut sets = Rotation::of(set, self.effort.bytes);
-        let rounds = interleaved(&mut variants, &mut sets, base, &self.effort);
+        let rounds = interleaved(&mut kernels, &mut sets, base, &self.effort);
         let mut points = Vec::new();
-        for (((implementation, skipping), variant), rounds) in
-            named.into_iter().zip(&mut variants).zip(rounds)
+        for (((implementation, skipping), kernel), rounds) in
+            named.into_iter().zip(&mut kernels).zip(rounds)
         {
             let set = sets.next();
-            variant.kernel.run(set);
-            let score = score(&measured, truth, &variant.kernel.turns(set));
+            kernel.run(set);
+            let score = score(&measured, truth, &kernel.turns(set));
             let ns_per_px = median(rounds.iter().map(|round| round.of).collect());
             points.push(Point {
                 part,
@@ -203,13 +200,6 @@ impl Study {
             });
         }
         Ok(points)
-    }
-}
-
-fn variant(name: &str, kernel: Box<dyn Kernel>) -> Variant {
-    Variant {
-        name: name.to_owned(),
-        kernel,
     }
 }
 

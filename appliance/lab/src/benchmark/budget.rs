@@ -11,7 +11,7 @@ use appliance::recipe::teach::{Naming, teach};
 use appliance::recipe::{AlignmentKind, Recipe, archive};
 use hal::frame::Frame;
 use hal::head::DynHead;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use sim::Scenario;
 use std::time::{Duration, Instant};
 
@@ -26,16 +26,21 @@ const PLACEMENT_MM: f64 = 0.5;
 #[derive(Clone, Debug, Serialize)]
 pub struct Budget {
     /// Columns of the camera.
+    #[serde(skip)]
     pub width: u32,
     /// Rows of it.
+    #[serde(skip)]
     pub height: u32,
     /// Frames of the production sequence.
+    #[serde(skip)]
     pub frames: usize,
     /// Whether the part's motion is measured and compensated.
+    #[serde(skip)]
     pub aligned: bool,
     /// From the trigger to the end of the last exposure at the projector's refresh rate, ms.
     pub exposure_ms: f64,
     /// Stage and wall time on all threads, ms, medians; without what is decoded on arrival.
+    #[serde(serialize_with = "by_stage")]
     pub stages: Vec<(String, f64)>,
     /// From the last frame to the verdict, ms: all stages.
     pub verdict_ms: f64,
@@ -185,6 +190,11 @@ fn on_one_thread(plan: &Plan, frames: &[Frame], effort: &Effort) -> Result<[f64;
         ratios.push(inspection / phase.max(f64::MIN_POSITIVE));
     }
     Ok([inspected, decoded, ratios].map(median))
+}
+
+/// An object with a key `<stage>_ms` for each stage.
+fn by_stage<S: Serializer>(stages: &[(String, f64)], out: S) -> Result<S::Ok, S::Error> {
+    out.collect_map(stages.iter().map(|(name, ms)| (format!("{name}_ms"), ms)))
 }
 
 fn ms(time: Duration) -> f64 {

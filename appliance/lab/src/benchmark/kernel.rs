@@ -3,9 +3,10 @@
 use super::floor::{self, floor};
 use super::frames::{FrameSet, Rotation};
 use super::median::median;
-use super::variants::{self, Variant};
+use super::variants;
 use super::workload::Workload;
 use appliance::production::stopwatch::timed;
+use serde::Serialize;
 use std::hint::black_box;
 use std::time::Duration;
 
@@ -49,9 +50,10 @@ impl Effort {
 }
 
 /// One row of the table.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Timing {
     /// Implementation and workload, `f32_geometric_12`.
+    #[serde(skip)]
     pub name: String,
     /// Frames of a set.
     pub frames: usize,
@@ -90,23 +92,19 @@ pub fn kernel_table(effort: &Effort, progress: &dyn Fn(f64, &str)) -> Result<Ker
     for (at, workload) in workloads.iter().enumerate() {
         progress(at as f64 / workloads.len() as f64, workload.name);
         let mut sets = Rotation::of(workload.render(effort.size), effort.bytes);
-        let mut variants = variants::of(workload, effort.size)?;
-        let right: Vec<f64> = variants
+        let variants = variants::of(workload, effort.size)?;
+        let (names, mut kernels): (Vec<_>, Vec<_>) = variants.into_iter().unzip();
+        let right: Vec<f64> = kernels
             .iter_mut()
-            .map(|variant| share_right(variant, workload, effort.size, sets.next()))
+            .map(|kernel| share_right(&mut **kernel, workload, effort.size, sets.next()))
             .collect();
-        let times = interleaved(&mut variants, &mut sets, &mut base, effort);
-        for (((variant, right), times), frames) in variants
-            .iter()
-            .zip(right)
-            .zip(&times)
-            .zip(std::iter::repeat(workload.frames.len()))
-        {
+        let times = interleaved(&mut kernels, &mut sets, &mut base, effort);
+        for ((name, right), times) in names.into_iter().zip(right).zip(&times) {
             let mut ratios: Vec<f64> = times.iter().map(|time| time.of / time.floor).collect();
             ratios.sort_by(f64::total_cmp);
             rows.push(Timing {
-                name: variant.name.clone(),
-                frames,
+                name,
+                frames: workload.frames.len(),
                 ns_per_px: median(times.iter().map(|time| time.of).collect()),
                 x_floor: median(ratios.clone()),
                 x_floor_range: ends(&ratios),
@@ -129,26 +127,26 @@ fn ends(sorted: &[f64]) -> [f64; 2] {
 
 /// Times of one round, ns per pixel.
 pub(super) struct Round {
-    /// Of the variant.
+    /// Of the kernel.
     pub of: f64,
     /// Of the floor.
     pub floor: f64,
 }
 
-/// The rounds of each variant. In every round the floor is timed first and then each variant in turn, so that other work
+/// The rounds of each kernel. In every round the floor is timed first and then each kernel in turn, so that other work
 /// on the machine affects all of them alike.
 pub(super) fn interleaved(
-    variants: &mut [Variant],
+    kernels: &mut [Box<dyn Kernel>],
     sets: &mut Rotation,
     base: &mut FloorSets,
     effort: &Effort,
 ) -> Vec<Vec<Round>> {
-    let mut rounds: Vec<Vec<Round>> = variants.iter().map(|_| Vec::new()).collect();
+    let mut rounds: Vec<Vec<Round>> = kernels.iter().map(|_| Vec::new()).collect();
     base.time();
     for _ in 0..effort.rounds {
         let floor = base.time();
-        for (variant, rounds) in variants.iter_mut().zip(&mut rounds) {
-            let of = rotate(&mut *variant.kernel, sets, effort.patience);
+        for (kernel, rounds) in kernels.iter_mut().zip(&mut rounds) {
+            let of = rotate(&mut **kernel, sets, effort.patience);
             rounds.push(Round { of, floor });
         }
     }
@@ -170,15 +168,15 @@ pub fn rotate(kernel: &mut dyn Kernel, sets: &mut Rotation, patience: Duration) 
     taken.as_secs_f64() * 1e9 / pixels.max(1) as f64
 }
 
-/// Share of the pixels that a variant gets right.
+/// Share of the pixels that a kernel gets right.
 fn share_right(
-    variant: &mut Variant,
+    kernel: &mut dyn Kernel,
     workload: &Workload,
     size: (usize, usize),
     set: &mut FrameSet,
 ) -> f64 {
-    variant.kernel.run(set);
-    let found = variant.kernel.turns(set);
+    kernel.run(set);
+    let found = kernel.turns(set);
     let right = found.iter().enumerate().filter(|&(at, found)| {
         let phase = workload.phase(at, size);
         (phase.is_nan() && found.is_nan()) || (found - phase).abs() <= RIGHT

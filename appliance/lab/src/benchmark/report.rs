@@ -101,14 +101,7 @@ fn kernel(table: &KernelTable) -> Value {
     all.insert("floor_ns_per_px".into(), json!(table.floor_ns_per_px));
     all.insert("floor_range".into(), json!(table.floor_range));
     for row in &table.rows {
-        let values = json!({
-            "frames": row.frames,
-            "ns_per_px": row.ns_per_px,
-            "x_floor": row.x_floor,
-            "x_floor_range": row.x_floor_range,
-            "right": row.right,
-        });
-        all.insert(row.name.clone(), values);
+        all.insert(row.name.clone(), json!(row));
     }
     Value::Object(all)
 }
@@ -117,24 +110,10 @@ fn kernel(table: &KernelTable) -> Value {
 fn budget(budgets: &[Budget]) -> Value {
     let mut all = Map::new();
     for budget in budgets {
-        let stages: Map<String, Value> = budget
-            .stages
-            .iter()
-            .map(|(name, ms)| (format!("{name}_ms"), json!(ms)))
-            .collect();
-        let values = json!({
-            "exposure_ms": budget.exposure_ms,
-            "stages": stages,
-            "verdict_ms": budget.verdict_ms,
-            "total_ms": budget.total_ms,
-            "one_thread_ms": budget.one_thread_ms,
-            "kernel_ms": budget.kernel_ms,
-            "x_kernel": budget.x_kernel,
-        });
         let size = format!("{}x{}", budget.width, budget.height);
         let sizes = all.entry(size).or_insert_with(|| json!({}));
         if budget.aligned {
-            sizes[budget.frames.to_string()] = values;
+            sizes[budget.frames.to_string()] = json!(budget);
         }
         let per_px =
             |ms: f64| json!(ms * 1e6 / (f64::from(budget.width) * f64::from(budget.height)));

@@ -10,15 +10,7 @@ use algo::phase::Decoder;
 use algo::simd::Backend;
 
 /// An implementation by its name.
-pub type Named = (&'static str, Box<dyn Kernel>);
-
-/// An implementation on a workload.
-pub struct Variant {
-    /// `f32_geometric_12`: a key in JSON.
-    pub name: String,
-    /// The implementation.
-    pub kernel: Box<dyn Kernel>,
-}
+pub type Named<N> = (N, Box<dyn Kernel>);
 
 /// The decoder on each back-end of this machine, with the back-end's name.
 ///
@@ -44,23 +36,22 @@ pub fn references(
     range: PhaseRange,
     bit_depth: u8,
     pixels: usize,
-) -> Result<[Named; 2], String> {
+) -> Result<[Named<&'static str>; 2], String> {
     let double = Textbook::<f64>::new(sequence, range, bit_depth, pixels).map_err(words)?;
     let single = Textbook::<f32>::new(sequence, range, bit_depth, pixels).map_err(words)?;
     Ok([("f64", Box::new(double)), ("f32", Box::new(single))])
 }
 
-/// The variants of a workload.
+/// The variants of a workload, by implementation and workload: `f32_geometric_12`, a key in JSON.
 ///
 /// # Errors
 /// If its sequence cannot be decoded.
-pub fn of(workload: &Workload, size: (usize, usize)) -> Result<Vec<Variant>, String> {
+pub fn of(workload: &Workload, size: (usize, usize)) -> Result<Vec<Named<String>>, String> {
     let sequence = Sequence::from_frames(&workload.frames).map_err(words)?;
     let depth = workload.bit_depth;
     let mut variants = Vec::new();
-    let mut push = |implementation: &str, kernel| {
-        let name = format!("{implementation}_{}", workload.name);
-        variants.push(Variant { name, kernel });
+    let mut push = |implementation: &str, kernel: Box<dyn Kernel>| {
+        variants.push((format!("{implementation}_{}", workload.name), kernel));
     };
     for (name, decoder) in decoders(&sequence, RANGE, depth)? {
         if decoder.levels().len() > 1 && workload.has_references {
