@@ -181,9 +181,8 @@ impl PhaseFunction {
     #[inline]
     pub fn at_pixel(&self, column: usize, row: usize) -> f64 {
         match &self.shape {
-            Shape::Vertical { fringes } => fringes * column as f64 / self.columns as f64,
-            Shape::Horizontal { fringes } => fringes * row as f64 / self.rows as f64,
             Shape::Sampled(turns) => turns[row * self.columns + column],
+            _ => self.at(column as f64, row as f64),
         }
     }
 
@@ -220,13 +219,9 @@ impl PhaseFunction {
     /// The values over the pixel centres of the raster.
     pub fn range(&self) -> PhaseRange {
         match &self.shape {
-            Shape::Vertical { .. } => PhaseRange {
+            Shape::Vertical { .. } | Shape::Horizontal { .. } => PhaseRange {
                 min: 0.0,
-                max: self.at_pixel(self.columns - 1, 0),
-            },
-            Shape::Horizontal { .. } => PhaseRange {
-                min: 0.0,
-                max: self.at_pixel(0, self.rows - 1),
+                max: self.at_pixel(self.columns - 1, self.rows - 1),
             },
             Shape::Sampled(turns) => turns.iter().fold(
                 PhaseRange {
