@@ -2,7 +2,7 @@
 
 use super::entry::Entry;
 use super::keeper::{self, Keeper};
-use super::recordings::FailedPart;
+use super::recordings::JudgedPart;
 use super::seqs::{Numbering, Seqs};
 use super::spool::{Spool, is_after};
 use super::task::{MAX_WAITING, Message, Task};
@@ -111,7 +111,7 @@ impl History {
 
     /// Hands over the frames of a part, made by `part`, if it did not pass; after its result. Where those of another are
     /// still being written these are not kept, and the history says so: the line goes on.
-    pub fn keep(&self, record: &ResultRecord, part: impl FnOnce() -> FailedPart) {
+    pub fn keep(&self, record: &ResultRecord, part: impl FnOnce() -> JudgedPart) {
         let failed = matches!(record.verdict, Verdict::Fail | Verdict::Invalid);
         if failed && let Err(why) = self.keeper.keep(part) {
             let (seq, kept) = (record.seq, Err(why));

@@ -1,7 +1,7 @@
 //! The thread `recordings`: writes the frames of failed parts. It is not the history's thread, because a recording takes as long
 //! as many results.
 
-use super::recordings::{FailedPart, Recordings};
+use super::recordings::{JudgedPart, Recordings};
 use super::task::Message;
 use super::unkept::Unkept;
 use crate::recipe::Store;
@@ -12,7 +12,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 /// What the thread is asked to do.
 enum Order {
-    Keep(Box<FailedPart>),
+    Keep(Box<JudgedPart>),
     MakeRoom,
     Stop,
 }
@@ -63,7 +63,7 @@ pub(super) fn open(
 
 impl Keeper {
     /// Hands over a part that did not pass, made by `part`; the error says why its frames are not kept.
-    pub(super) fn keep(&self, part: impl FnOnce() -> FailedPart) -> Result<(), Unkept> {
+    pub(super) fn keep(&self, part: impl FnOnce() -> JudgedPart) -> Result<(), Unkept> {
         if self.quota == 0 {
             return Err(Unkept::Off);
         }

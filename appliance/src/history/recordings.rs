@@ -23,9 +23,9 @@ use std::{fs, io};
 /// The recipe's name in a recording's folder.
 pub const RECIPE: &str = "recipe.recipe";
 
-/// A part that did not pass, and what it was judged by.
-#[derive(Debug)]
-pub struct FailedPart {
+/// A part with its result and what it was judged by; the history keeps those that did not pass.
+#[derive(Clone, Debug)]
+pub struct JudgedPart {
     /// The result.
     pub record: Arc<ResultRecord>,
     /// Which of the recipe's sequences it was judged by.
@@ -38,7 +38,7 @@ pub struct FailedPart {
     pub calibration: Calibration,
 }
 
-impl FailedPart {
+impl JudgedPart {
     /// Writes the frames as the new folder `folder`, with the recipe that judged the part, if it is among the files `recipes`.
     /// The recipe is left out where it is not among them, or where it and the frames would take more than `most` bytes.
     ///
@@ -140,7 +140,7 @@ impl Recordings {
     ///
     /// # Errors
     /// [`RecorderError`]; nothing of it is left then.
-    pub(super) fn keep(&mut self, part: &FailedPart) -> Result<String, RecorderError> {
+    pub(super) fn keep(&mut self, part: &JudgedPart) -> Result<String, RecorderError> {
         let name = name_of(&part.record);
         let folder = self.folder.join(&name);
         // The recipe of the newest recording is tried first: a recipe that was imported again is a new file in the store with the same
@@ -209,8 +209,8 @@ fn bytes_in(folder: &Path) -> u64 {
         .sum()
 }
 
-fn recording(part: &FailedPart) -> Recording {
-    let FailedPart {
+fn recording(part: &JudgedPart) -> Recording {
+    let JudgedPart {
         record,
         sequence,
         frames,

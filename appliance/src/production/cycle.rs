@@ -3,7 +3,7 @@
 use super::stopwatch::timed_on;
 use super::{ABORTED, DEVICE_TIMEOUT, Worker};
 use crate::error::code_of;
-use crate::history::FailedPart;
+use crate::history::JudgedPart;
 use crate::recipe::plan::{Arriving, Plan};
 use crate::station::result::flag::{RETRIED, STEPPED_UP};
 use crate::station::{
@@ -146,7 +146,7 @@ impl Worker {
         // The station ignores an inspection that it no longer waits for.
         let published = |record: &Arc<ResultRecord>| Arc::ptr_eq(&record.inspection, &inspection);
         if let Some(record) = after.result.clone().filter(published) {
-            self.history.keep(&record, || FailedPart {
+            self.history.keep(&record, || JudgedPart {
                 record: record.clone(),
                 sequence: judged_by.sequence,
                 frames: judged_by.frames.clone(),

@@ -3,10 +3,8 @@
 //! The measuring task keeps the plan and the frames of the last cycle. A request for something computed from them is queued, and
 //! its thread waits; the measuring task answers when it has nothing more urgent to do.
 
-use crate::head::calibration::Calibration;
-use crate::recipe::plan::{Layers, Plan};
-use crate::station::ResultRecord;
-use hal::frame::Frame;
+use crate::history::JudgedPart;
+use crate::recipe::plan::Layers;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -16,30 +14,8 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// Most requests that wait at a time.
 const MOST_WAITING: usize = 8;
 
-/// The last cycle as the measuring task holds it.
-#[derive(Clone, Copy, Debug)]
-pub struct LastCycle<'a> {
-    /// Its result.
-    pub record: &'a Arc<ResultRecord>,
-    /// The plan that it was judged by: recipe and calibration.
-    pub plan: &'a Arc<Plan>,
-    /// Which of the recipe's sequences it was judged by.
-    pub sequence: usize,
-    /// The frames of that sequence, in its order.
-    pub frames: &'a [Frame],
-    /// The head's calibration.
-    pub calibration: &'a Calibration,
-}
-
-impl LastCycle<'_> {
-    /// SEQ of its result.
-    pub fn seq(&self) -> u32 {
-        self.record.seq
-    }
-}
-
 /// A request, which sends its own answer.
-type Request = Box<dyn FnOnce(Option<LastCycle<'_>>) + Send>;
+type Request = Box<dyn FnOnce(Option<&JudgedPart>) + Send>;
 
 /// Requests about the last cycle. Cheap to clone.
 #[derive(Clone, Default)]
@@ -61,7 +37,7 @@ impl LastCycleRequests {
     /// wait, or the task is busy for longer: then the request stays in the queue, and its answer is computed and dropped.
     pub fn ask<T: Send + 'static>(
         &self,
-        answer: impl FnOnce(LastCycle<'_>) -> T + Send + 'static,
+        answer: impl FnOnce(&JudgedPart) -> T + Send + 'static,
     ) -> Option<T> {
         let (sender, receiver): (SyncSender<Option<T>>, _) = sync_channel(1);
         let request: Request = Box::new(move |cycle| {
@@ -88,8 +64,8 @@ impl LastCycleRequests {
         }
         let asked = self.ask(|cycle| {
             Some((
-                cycle.seq(),
-                Arc::new(cycle.plan.layers(cycle.sequence, cycle.frames)?),
+                cycle.record.seq,
+                Arc::new(cycle.plan.layers(cycle.sequence, &cycle.frames)?),
             ))
         });
         let newest = asked.flatten().or(made);
@@ -98,7 +74,7 @@ impl LastCycleRequests {
     }
 
     /// Answers all waiting requests.
-    pub fn answer(&self, cycle: Option<LastCycle<'_>>) {
+    pub fn answer(&self, cycle: Option<&JudgedPart>) {
         for request in std::mem::take(&mut self.inside().waiting) {
             request(cycle);
         }
@@ -119,7 +95,7 @@ mod tests {
         let last = LastCycleRequests::default();
         assert!(!last.wanted());
         let asking = last.clone();
-        let asked = std::thread::spawn(move || asking.ask(|cycle| cycle.seq()));
+        let asked = std::thread::spawn(move || asking.ask(|cycle| cycle.record.seq));
         while !last.wanted() {
             std::thread::yield_now();
         }
@@ -133,7 +109,7 @@ mod tests {
         for _ in 0..MOST_WAITING {
             last.inside().waiting.push(Box::new(|_| ()));
         }
-        assert_eq!(last.ask(|cycle| cycle.seq()), None);
+        assert_eq!(last.ask(|cycle| cycle.record.seq), None);
         assert_eq!(last.inside().waiting.len(), MOST_WAITING);
     }
 }

@@ -16,9 +16,9 @@ pub use aborts::Aborts;
 use crate::config::HeadConfig;
 use crate::head::calibration::Current;
 use crate::head::placed::Placed;
-use crate::history::History;
+use crate::history::{History, JudgedPart};
 use crate::production::backend::Opened;
-use crate::production::latest::{LastCycle, LastCycleRequests};
+use crate::production::latest::LastCycleRequests;
 use crate::production::shelf::Shelf;
 use crate::production::simulation::Placing;
 use crate::recipe::plan::{Plan, PlanError};
@@ -171,19 +171,17 @@ impl Worker {
 
     /// Answers the requests about the last cycle.
     fn tell(&self, plan: Option<&Arc<Plan>>, last: &JudgedBy) {
-        let (requests, calibration) = (&self.last_cycle, &self.opened.calibration);
         let result = self.station.snapshot().result.clone();
-        let measured = plan
-            .filter(|_| !last.frames.is_empty())
-            .zip(result.as_ref());
-        let cycle = measured.map(|(plan, record)| LastCycle {
+        let measured = plan.filter(|_| !last.frames.is_empty()).zip(result);
+        let cycle = measured.map(|(plan, record)| JudgedPart {
             record,
-            plan,
+            plan: plan.clone(),
             sequence: last.sequence,
-            frames: &last.frames,
-            calibration,
+            frames: last.frames.clone(),
+            calibration: self.opened.calibration.clone(),
         });
-        self.pool.install(|| requests.answer(cycle));
+        let requests = &self.last_cycle;
+        self.pool.install(|| requests.answer(cycle.as_ref()));
     }
 
     /// Loads a recipe; if that fails, the one before stays active.

@@ -306,12 +306,8 @@ fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> Result<JoinHandle<(
 }
 
 async fn listen(config: &Config) -> Result<(TcpListener, TcpListener), Failure> {
-    let bind = async |what, address| {
-        let bound = socket::bind(what, address).await;
-        bound.map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))
-    };
-    let plc = bind("Modbus TCP", config.modbus.listen).await?;
-    let page = bind("the page", config.http.listen).await?;
+    let plc = socket::bind("Modbus TCP", config.modbus.listen).await?;
+    let page = socket::bind("the page", config.http.listen).await?;
     Ok((plc, page))
 }
 

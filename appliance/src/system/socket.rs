@@ -1,62 +1,33 @@
 //! Listening on a TCP port, and comparing addresses with networks.
 
+use crate::error::{Exit, Failure};
 use ipnet::IpNet;
 use std::io;
 use std::net::{IpAddr, Ipv6Addr, SocketAddr};
-use thiserror::Error;
 use tokio::net::TcpListener;
-
-/// Why a port cannot be listened on.
-#[derive(Debug, Error)]
-pub enum BindError {
-    /// Another program listens there.
-    #[error(
-        "serve {what} on {address}: the port is in use; end the other program or choose another port"
-    )]
-    InUse {
-        /// What is served.
-        what: &'static str,
-        /// What was attempted.
-        address: SocketAddr,
-    },
-    /// Ports below 1024 need a permission.
-    #[error(
-        "serve {what} on {address}: not permitted; choose a port from 1024 on or grant CAP_NET_BIND_SERVICE"
-    )]
-    NotPermitted {
-        /// What is served.
-        what: &'static str,
-        /// What was attempted.
-        address: SocketAddr,
-    },
-    /// Anything else.
-    #[error("serve {what} on {address}: {source}; check that the address belongs to this machine")]
-    Other {
-        /// What is served.
-        what: &'static str,
-        /// What was attempted.
-        address: SocketAddr,
-        /// What the system said.
-        source: io::Error,
-    },
-}
 
 /// Opens the socket on which `what` is served. With port 0 the system chooses one: the listener's own address has it.
 ///
 /// # Errors
-/// The address is in use, not permitted, or not of this machine.
-pub async fn bind(what: &'static str, address: SocketAddr) -> Result<TcpListener, BindError> {
-    TcpListener::bind(address)
-        .await
-        .map_err(|source| match source.kind() {
-            io::ErrorKind::AddrInUse => BindError::InUse { what, address },
-            io::ErrorKind::PermissionDenied => BindError::NotPermitted { what, address },
-            _ => BindError::Other {
-                what,
-                address,
-                source,
-            },
-        })
+/// The address is in use, not permitted, or not of this machine (exit code 69).
+pub async fn bind(what: &str, address: SocketAddr) -> Result<TcpListener, Failure> {
+    TcpListener::bind(address).await.map_err(|error| {
+        let words = match error.kind() {
+            io::ErrorKind::AddrInUse => {
+                "the port is in use; end the other program or choose another port".into()
+            }
+            // Ports below 1024 need a permission.
+            io::ErrorKind::PermissionDenied => {
+                "not permitted; choose a port from 1024 on or grant CAP_NET_BIND_SERVICE".into()
+            }
+            _ => format!("{error}; check that the address belongs to this machine"),
+        };
+        Failure::because(
+            Exit::Unavailable,
+            format!("serve {what} on {address}"),
+            words,
+        )
+    })
 }
 
 /// Whether one of the networks contains an address. An IPv4-mapped IPv6 address counts as its IPv4 address.

@@ -18,7 +18,7 @@ use zip::{CompressionMethod, ZipWriter};
 use super::problem::Problem;
 use super::site::Site;
 use super::{metrics, view};
-use crate::history::{FailedPart, Filter, name_of};
+use crate::history::{Filter, JudgedPart, name_of};
 
 /// Bytes of a file that are sent to its client at a time.
 const CHUNK: usize = 64 << 10;
@@ -176,8 +176,8 @@ fn streamed(
 pub(super) async fn cloud(State(site): State<Site>) -> Result<Response, Problem> {
     file(&site, "application/octet-stream", |site| {
         let asked = site.last_cycle.ask(|cycle| {
-            let cloud = cycle.plan.cloud(cycle.sequence, cycle.frames)?;
-            Some((format!("{}.ply", cycle.seq()), cloud))
+            let cloud = cycle.plan.cloud(cycle.sequence, &cycle.frames)?;
+            Some((format!("{}.ply", cycle.record.seq), cloud))
         });
         asked.flatten().ok_or_else(|| Problem::missing(GONE))
     })
@@ -190,13 +190,7 @@ const GONE: &str =
 
 pub(super) async fn recording(State(site): State<Site>) -> Result<Response, Problem> {
     folder(&site, |site| {
-        let asked = site.last_cycle.ask(|cycle| FailedPart {
-            record: cycle.record.clone(),
-            sequence: cycle.sequence,
-            frames: cycle.frames.to_vec(),
-            plan: cycle.plan.clone(),
-            calibration: cycle.calibration.clone(),
-        });
+        let asked = site.last_cycle.ask(JudgedPart::clone);
         let part = asked.ok_or_else(|| Problem::missing(GONE))?;
         let scratch = site.history.scratch();
         let recipes = site.recipes.generations(part.plan.id().number);
