@@ -146,8 +146,10 @@ fn failed(error: ChangeError) -> Failure {
         ChangeError::Load(LoadError::Unknown(_))
         | ChangeError::Nothing(_)
         | ChangeError::Missing { .. } => Exit::Missing,
-        ChangeError::Load(LoadError::Corrupt { .. }) | ChangeError::Unfit(_) => Exit::Content,
-        ChangeError::Write { .. } => Exit::CannotCreate,
+        ChangeError::Load(LoadError::Corrupt { .. })
+        | ChangeError::Outdated(_)
+        | ChangeError::Unfit(_) => Exit::Content,
+        ChangeError::Store(_) | ChangeError::Write { .. } => Exit::CannotCreate,
     };
     Failure::new(exit, error.to_string())
 }

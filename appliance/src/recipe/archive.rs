@@ -20,30 +20,63 @@ const MAX_MANIFEST: u64 = 1 << 20;
 /// The fingerprint in the manifest while the fingerprint is computed.
 const NO_FINGERPRINT: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
-/// The arrays of a recipe, row-major over the camera's frame except the phase function.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Arrays {
-    /// Φ_P over the projector's raster in turns; empty where the pattern is given by a formula.
-    pub phase_function: Vec<f64>,
-    /// Φ as taught in turns, NaN where not resolved.
-    pub golden_phase: Vec<f64>,
-    /// z as taught in mm, NaN where not resolved.
-    pub golden_height: Vec<f32>,
-    /// ∂z/∂Φ in mm per turn.
-    pub height_slope: Vec<f32>,
-    /// ∂²z/∂Φ² in mm per turn².
-    pub height_curvature: Vec<f32>,
-    /// Weight of a pixel's deviation from golden ([`algo::inspect::Weight::bits`]); 0 where it is not compared.
-    pub valid: Vec<u8>,
-    /// Modulation as taught, in counts.
-    pub modulation: Vec<f32>,
-    /// Largest |ΔΦ| in turns that a placement within the tolerance can cause; infinite where golden is not resolved.
-    pub phase_reach: Vec<f32>,
+/// Defines [`Arrays`] with what is done to each of them by its name, which is also that of its member.
+macro_rules! arrays {
+    ($($(#[$doc:meta])* $name:ident: $element:ty,)*) => {
+        /// The arrays of a recipe, row-major over the camera's frame except the phase function.
+        #[derive(Clone, Debug, Default, PartialEq)]
+        pub struct Arrays {
+            $($(#[$doc])* pub $name: Vec<$element>,)*
+        }
+
+        impl Arrays {
+            /// The name and the number of values of each array.
+            pub(super) fn lengths(&self) -> Vec<(&'static str, usize)> {
+                vec![$((stringify!($name), self.$name.len())),*]
+            }
+
+            /// The arrays by their members' names, in rows of as many `columns` as an array of this name has.
+            fn members(&self, columns: impl Fn(&str) -> u32) -> Vec<(&'static str, Vec<u8>)> {
+                vec![$((
+                    concat!(stringify!($name), ".npy"),
+                    npy::write(columns(stringify!($name)) as usize, &self.$name),
+                )),*]
+            }
+
+            /// Sets an array to the content of its member.
+            fn read(&mut self, member: &str, bytes: &[u8]) -> Result<(), RecipeError> {
+                match member {
+                    $(concat!(stringify!($name), ".npy") => self.$name = read(member, bytes)?,)*
+                    unknown => return Err(broken(format!("it holds an unknown member {unknown:?}"))),
+                }
+                Ok(())
+            }
+        }
+    };
 }
 
-/// An archive that is not a recipe of this version.
+arrays! {
+    /// Φ_P over the projector's raster in turns; empty where the pattern is given by a formula.
+    phase_function: f64,
+    /// Φ as taught in turns, NaN where not resolved.
+    golden_phase: f64,
+    /// z as taught in mm, NaN where not resolved.
+    golden_height: f32,
+    /// ∂z/∂Φ in mm per turn.
+    height_slope: f32,
+    /// ∂²z/∂Φ² in mm per turn².
+    height_curvature: f32,
+    /// Weight of a pixel's deviation from golden ([`algo::inspect::Weight::bits`]); 0 where it is not compared.
+    valid: u8,
+    /// Modulation as taught, in counts.
+    modulation: f32,
+    /// Largest |ΔΦ| in turns that a placement within the tolerance can cause; infinite where golden is not resolved.
+    phase_reach: f32,
+}
+
+/// A recipe that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ArchiveError {
+pub enum RecipeError {
     /// It is not a ZIP, a member is missing or broken, or the manifest cannot be read.
     #[error("{0}: export the recipe again or teach it")]
     Broken(String),
@@ -61,17 +94,23 @@ pub enum ArchiveError {
         /// Over the content.
         computed: String,
     },
+    /// Manifest and arrays do not fit each other.
+    #[error("{0}: teach it again")]
+    Inconsistent(String),
+    /// A gauge has limits that it cannot have.
+    #[error("{0}: change the limits")]
+    Limits(String),
 }
 
-fn broken(what: impl std::fmt::Display) -> ArchiveError {
-    ArchiveError::Broken(shortened(&what.to_string()))
+fn broken(what: impl std::fmt::Display) -> RecipeError {
+    RecipeError::Broken(shortened(&what.to_string()))
 }
 
 /// Packs a recipe; its fingerprint is filled in. Returns the bytes and the fingerprint.
 ///
 /// # Errors
 /// If the archive cannot be made.
-pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), ArchiveError> {
+pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), RecipeError> {
     let zeroed = RecipeFile {
         fingerprint: NO_FINGERPRINT.into(),
         ..file.clone()
@@ -80,34 +119,14 @@ pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), Arc
     seal(&manifest, members(file, arrays))
 }
 
-/// The arrays by their members' names.
+/// The arrays by their members' names; a phase function that is given by a formula has no member.
 pub(crate) fn members(file: &RecipeFile, arrays: &Arrays) -> Vec<(&'static str, Vec<u8>)> {
-    let columns = file.camera.width as usize;
-    let mut members = vec![
-        (
-            "golden_phase.npy",
-            npy::write(columns, &arrays.golden_phase),
-        ),
-        (
-            "golden_height.npy",
-            npy::write(columns, &arrays.golden_height),
-        ),
-        (
-            "height_slope.npy",
-            npy::write(columns, &arrays.height_slope),
-        ),
-        (
-            "height_curvature.npy",
-            npy::write(columns, &arrays.height_curvature),
-        ),
-        ("valid.npy", npy::write(columns, &arrays.valid)),
-        ("modulation.npy", npy::write(columns, &arrays.modulation)),
-        ("phase_reach.npy", npy::write(columns, &arrays.phase_reach)),
-    ];
-    if !arrays.phase_function.is_empty() {
-        let columns = file.projector.width as usize;
-        let function = npy::write(columns, &arrays.phase_function);
-        members.insert(0, ("phase_function.npy", function));
+    let mut members = arrays.members(|name| match name {
+        "phase_function" => file.projector.width,
+        _ => file.camera.width,
+    });
+    if arrays.phase_function.is_empty() {
+        members.remove(0);
     }
     members
 }
@@ -116,7 +135,7 @@ pub(crate) fn members(file: &RecipeFile, arrays: &Arrays) -> Vec<(&'static str, 
 pub(crate) fn seal(
     manifest: &str,
     mut members: Vec<(&str, Vec<u8>)>,
-) -> Result<(Vec<u8>, String), ArchiveError> {
+) -> Result<(Vec<u8>, String), RecipeError> {
     let fingerprint = fingerprint(manifest.as_bytes(), &members);
     let manifest = manifest.replacen(NO_FINGERPRINT, &fingerprint, 1);
     members.insert(0, (MANIFEST, manifest.into_bytes()));
@@ -135,7 +154,7 @@ pub(crate) fn seal(
 ///
 /// # Errors
 /// If it is not a recipe, of a newer version, or changed.
-pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays), ArchiveError> {
+pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays), RecipeError> {
     let mut zip = Members::open(source, MAX_MEMBERS).map_err(broken)?;
     let (file, zeroed) = read_manifest(&mut zip)?;
     let mut hash = Fingerprint::new(zeroed.as_bytes());
@@ -147,11 +166,11 @@ pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays
             .map_err(|error| broken(format!("member {name}: {error}")))?;
         hash.add(&name, &content);
         // A wrong fingerprint, checked below, is the better message: the file as a whole was damaged.
-        problem = problem.or(read_array(&mut arrays, &name, &content).err());
+        problem = problem.or(arrays.read(&name, &content).err());
     }
     let computed = hash.finish();
     if computed != file.fingerprint {
-        return Err(ArchiveError::Fingerprint {
+        return Err(RecipeError::Fingerprint {
             found: file.fingerprint,
             computed,
         });
@@ -177,9 +196,7 @@ pub fn is_sound(source: impl Read + Seek) -> bool {
 }
 
 /// The manifest, and its text with the fingerprint replaced by zeros.
-fn read_manifest(
-    zip: &mut Members<impl Read + Seek>,
-) -> Result<(RecipeFile, String), ArchiveError> {
+fn read_manifest(zip: &mut Members<impl Read + Seek>) -> Result<(RecipeFile, String), RecipeError> {
     let text = zip.content(MANIFEST, MAX_MANIFEST);
     let text = text.map_err(|error| broken(format!("{MANIFEST}: {error}")))?;
     let text = String::from_utf8(text).map_err(broken)?;
@@ -198,7 +215,7 @@ fn arrays_of<R: Read + Seek>(zip: &Members<R>) -> Vec<String> {
 ///
 /// # Errors
 /// If it is not a recipe or of a newer version.
-pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, ArchiveError> {
+pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, RecipeError> {
     let mut zip = Members::open(file, MAX_MEMBERS).map_err(broken)?;
     Ok(read_manifest(&mut zip)?.0)
 }
@@ -207,7 +224,7 @@ pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, ArchiveError> {
 ///
 /// # Errors
 /// If it is not a manifest, of a newer version, or a value is out of its bounds.
-pub fn parse(text: &str) -> Result<RecipeFile, ArchiveError> {
+pub fn parse(text: &str) -> Result<RecipeFile, RecipeError> {
     /// What every version has, read first: a newer version is reported as such, whatever else it contains.
     #[derive(serde::Deserialize)]
     struct Header {
@@ -224,7 +241,7 @@ pub fn parse(text: &str) -> Result<RecipeFile, ArchiveError> {
         )));
     }
     match version.as_u64() {
-        Some(version) if version > u64::from(VERSION) => return Err(ArchiveError::Newer(version)),
+        Some(version) if version > u64::from(VERSION) => return Err(RecipeError::Newer(version)),
         Some(1) => {}
         _ => return Err(broken(format!("recipe.json: version is {version}"))),
     }
@@ -236,22 +253,7 @@ pub fn parse(text: &str) -> Result<RecipeFile, ArchiveError> {
     Ok(file)
 }
 
-fn read_array(arrays: &mut Arrays, name: &str, bytes: &[u8]) -> Result<(), ArchiveError> {
-    match name {
-        "phase_function.npy" => arrays.phase_function = read(name, bytes)?,
-        "golden_phase.npy" => arrays.golden_phase = read(name, bytes)?,
-        "golden_height.npy" => arrays.golden_height = read(name, bytes)?,
-        "height_slope.npy" => arrays.height_slope = read(name, bytes)?,
-        "height_curvature.npy" => arrays.height_curvature = read(name, bytes)?,
-        "valid.npy" => arrays.valid = read(name, bytes)?,
-        "modulation.npy" => arrays.modulation = read(name, bytes)?,
-        "phase_reach.npy" => arrays.phase_reach = read(name, bytes)?,
-        unknown => return Err(broken(format!("it holds an unknown member {unknown:?}"))),
-    }
-    Ok(())
-}
-
-fn read<T: npy::Element>(name: &str, bytes: &[u8]) -> Result<Vec<T>, ArchiveError> {
+fn read<T: npy::Element>(name: &str, bytes: &[u8]) -> Result<Vec<T>, RecipeError> {
     npy::read(bytes)
         .map(|array| array.elements)
         .map_err(|error| broken(format!("member {name}: {error}")))

@@ -1,6 +1,6 @@
 //! From the file form of a recipe to a checked one.
 
-use super::archive::{ArchiveError, Arrays, short, unpack};
+use super::archive::{Arrays, RecipeError, short, unpack};
 use super::demands::Demands;
 use super::file::{PatternFile, RecipeFile, SequenceKind};
 use super::gauge::{check_limits, gauges};
@@ -73,20 +73,6 @@ pub struct RecipeSequence {
     pub levels: Sequence,
 }
 
-/// A recipe that cannot be used.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum RecipeError {
-    /// It cannot be read.
-    #[error(transparent)]
-    Archive(#[from] ArchiveError),
-    /// Its parts do not fit each other.
-    #[error("{0}: teach it again")]
-    Inconsistent(String),
-    /// A gauge has limits that it cannot have.
-    #[error("{0}: change the limits")]
-    Limits(String),
-}
-
 /// Regions of a recipe.
 pub const MAX_REGIONS: usize = 32;
 
@@ -135,15 +121,8 @@ impl Recipe {
         file.check_bounds()?;
         let (width, height) = (file.camera.width as usize, file.camera.height as usize);
         let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
-        for (name, length) in [
-            ("golden_phase", arrays.golden_phase.len()),
-            ("golden_height", arrays.golden_height.len()),
-            ("height_slope", arrays.height_slope.len()),
-            ("height_curvature", arrays.height_curvature.len()),
-            ("valid", arrays.valid.len()),
-            ("modulation", arrays.modulation.len()),
-            ("phase_reach", arrays.phase_reach.len()),
-        ] {
+        // A phase function has the size of the projector, which is checked below.
+        for (name, length) in arrays.lengths().into_iter().skip(1) {
             if Some(length) != pixels {
                 return Err(format!(
                     "{name} has {length} values for a camera of {width}x{height}"

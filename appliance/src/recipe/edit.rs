@@ -1,10 +1,9 @@
 //! Edits a taught recipe: names, regions, gauges and least coverage.
 
-use super::archive;
 use super::bounds::LONGEST_NAME;
-use super::planner;
+use super::golden::TaughtRecipe;
 use super::store::LoadedRecipe;
-use super::{GaugeFile, LoadError, Recipe, RegionFile, Store};
+use super::{ChangeError, GaugeFile, Recipe, RegionFile, Store};
 use hal::bounds::clipped;
 use serde::Deserialize;
 use std::collections::HashSet;
@@ -27,25 +26,6 @@ pub struct Edit {
     pub gauges: Option<Vec<GaugeFile>>,
 }
 
-/// An edit that was not made; the recipe is as before.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum EditError {
-    /// There is no such recipe, or it is damaged.
-    #[error(transparent)]
-    Load(#[from] LoadError),
-    /// Another change was stored since the recipe was read.
-    #[error(
-        "recipe {0} was changed or deleted by somebody else: load it again and repeat the change"
-    )]
-    Outdated(u16),
-    /// The changed recipe could not be used.
-    #[error("{0}")]
-    Unfit(String),
-    /// It could not be stored.
-    #[error("store recipe: {0}: free space")]
-    Store(String),
-}
-
 /// Changes a stored recipe; what was stored before stays as the previous generation. `fits` tries the changed recipe on the
 /// head and says in words why it cannot be used there. Returns the new fingerprint.
 ///
@@ -56,12 +36,12 @@ pub fn edit(
     number: u16,
     edit: Edit,
     fits: impl FnOnce(Recipe) -> Result<(), String>,
-) -> Result<String, EditError> {
+) -> Result<String, ChangeError> {
     let LoadedRecipe {
         mut file, recipe, ..
     } = store.load_to_edit(number)?;
     if file.fingerprint != edit.fingerprint {
-        return Err(EditError::Outdated(number));
+        return Err(ChangeError::Outdated(number));
     }
     file.name = edit.name.map_or(file.name, |name| name.trim().to_owned());
     file.part_number = edit.part_number.unwrap_or(file.part_number);
@@ -74,20 +54,17 @@ pub fn edit(
     check_names("gauge", gauges)?;
     check_names("recipe", std::iter::once(&file.name))?;
     // Tighter limits may need a longer sequence, wider ones a shorter one.
-    file.production = planner::choose(&file.sequences, &file.gauges).production;
-    let checked = Recipe::check(&file, recipe.arrays).map_err(EditError::Unfit)?;
-    let (bytes, fingerprint) = archive::pack(&file, &checked.arrays)
-        .map_err(|error| EditError::Unfit(error.to_string()))?;
-    fits(checked).map_err(EditError::Unfit)?;
+    let changed = TaughtRecipe::of(file, recipe.arrays).map_err(ChangeError::Unfit)?;
+    fits(changed.recipe).map_err(ChangeError::Unfit)?;
     // The recipe was read without the lock: another change may have been stored meanwhile.
-    match store.replace(number, &edit.fingerprint, &bytes) {
-        Ok(true) => Ok(fingerprint),
-        Ok(false) => Err(EditError::Outdated(number)),
-        Err(error) => Err(EditError::Store(error.to_string())),
+    match store.replace(number, &edit.fingerprint, &changed.bytes) {
+        Ok(true) => Ok(changed.manifest.fingerprint),
+        Ok(false) => Err(ChangeError::Outdated(number)),
+        Err(error) => Err(ChangeError::Store(error)),
     }
 }
 
-fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a String>) -> Result<(), EditError> {
+fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a String>) -> Result<(), ChangeError> {
     let mut seen = HashSet::new();
     for name in names {
         let length = name.chars().count();
@@ -96,11 +73,11 @@ fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a String>) -> Resul
                 "{what} name {:?} has {length} characters: write 1 to {LONGEST_NAME}",
                 clipped(name)
             );
-            return Err(EditError::Unfit(words));
+            return Err(ChangeError::Unfit(words));
         }
         if !seen.insert(name) {
             let words = format!("two of them are called {name:?}: give each {what} its own name");
-            return Err(EditError::Unfit(words));
+            return Err(ChangeError::Unfit(words));
         }
     }
     Ok(())

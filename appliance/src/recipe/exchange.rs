@@ -1,6 +1,6 @@
 //! Lists, exports and imports stored recipes. A file is imported only if it is whole and can be used on this head.
 
-use super::archive::{self, ArchiveError};
+use super::archive::{self, RecipeError};
 use super::store::{ChangeError, LoadError, Store, is_sound, write};
 use super::{Recipe, RecipeFile, RecipeId, SequenceKind};
 use crate::storage::folder::copy_whole;
@@ -50,24 +50,19 @@ impl Store {
     fn listed(&self, number: u16) -> Listed {
         let path = self.path(number);
         let manifest = File::open(&path)
-            .map_err(|error| ArchiveError::Broken(error.to_string()))
+            .map_err(|error| RecipeError::Broken(error.to_string()))
             .and_then(archive::manifest);
         let previous = self.previous(number).exists();
         let bytes = fs::metadata(&path).map_or(0, |found| found.len());
-        match manifest {
-            Ok(file) => Listed {
-                number,
-                bytes,
-                previous,
-                ..of_manifest(file)
-            },
-            Err(error) => Listed {
-                number,
-                bytes,
-                previous,
-                problem: Some(error.to_string()),
-                ..Listed::default()
-            },
+        let unreadable = |error: RecipeError| Listed {
+            problem: Some(error.to_string()),
+            ..Listed::default()
+        };
+        Listed {
+            number,
+            bytes,
+            previous,
+            ..manifest.map_or_else(unreadable, of_manifest)
         }
     }
 

@@ -145,14 +145,9 @@ fn remove(file: &Path) -> io::Result<bool> {
 /// # Errors
 /// In words: why it cannot be used.
 fn read(path: &Path, number: u16) -> Result<RecipeFile, String> {
-    match Store::read(path, number) {
-        Some(Ok((file, _))) => match check_limits(&file.gauges) {
-            Ok(()) => Ok(file),
-            Err(reason) => Err(format!("cannot be used: {reason}")),
-        },
-        Some(Err(reason)) => Err(format!("cannot be used: {reason}")),
-        None => Err("is gone: teach the recipe again".into()),
-    }
+    let read = Store::read(path, number).ok_or("is gone: teach the recipe again")?;
+    read.and_then(|(file, _)| check_limits(&file.gauges).map(|()| file))
+        .map_err(|reason| format!("cannot be used: {reason}"))
 }
 
 #[cfg(test)]

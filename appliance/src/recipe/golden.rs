@@ -94,6 +94,28 @@ pub struct TaughtRecipe {
     pub choice: Choice,
 }
 
+impl TaughtRecipe {
+    /// Chooses the production sequence for the gauges of a manifest, and packs it with its arrays.
+    ///
+    /// # Errors
+    /// In words, if they do not fit each other.
+    pub(super) fn of(mut manifest: RecipeFile, arrays: Arrays) -> Result<Self, String> {
+        let choice = planner::choose(&manifest.sequences, &manifest.gauges);
+        manifest.production = choice.production;
+        let mut recipe = Recipe::check(&manifest, arrays)?;
+        let (bytes, fingerprint) =
+            archive::pack(&manifest, &recipe.arrays).map_err(|error| error.to_string())?;
+        recipe.id.fingerprint.clone_from(&fingerprint);
+        manifest.fingerprint = fingerprint;
+        Ok(Self {
+            bytes,
+            manifest,
+            recipe,
+            choice,
+        })
+    }
+}
+
 impl GoldenPart<'_> {
     /// Makes the recipe: expansion of the height, phase reach (from which follows where a short sequence is safe), sequences, regions
     /// and gauges. The gauges are the deviation from golden and the coverage of the whole frame, and, for each of the up to

@@ -1,10 +1,8 @@
 //! Teaching under a number that is taken: what the new recipe keeps of the one that it replaces.
 
-use super::archive;
+use super::RecipeFile;
 use super::gauge::check_limits;
 use super::golden::{Naming, TaughtRecipe};
-use super::planner;
-use super::{Recipe, RecipeFile};
 
 /// Placement tolerance of a recipe that replaces none, mm.
 pub const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
@@ -74,17 +72,5 @@ pub fn keep_gauges(taught: TaughtRecipe, replaced: &RecipeFile) -> Result<Taught
     manifest.min_coverage = replaced.min_coverage;
     // The prediction is for the limits that teaching sets.
     manifest.good_parts = None;
-    let choice = planner::choose(&manifest.sequences, &manifest.gauges);
-    manifest.production = choice.production;
-    let mut recipe = Recipe::check(&manifest, recipe.arrays)?;
-    let (bytes, fingerprint) =
-        archive::pack(&manifest, &recipe.arrays).map_err(|error| error.to_string())?;
-    recipe.id.fingerprint.clone_from(&fingerprint);
-    manifest.fingerprint = fingerprint;
-    Ok(TaughtRecipe {
-        bytes,
-        manifest,
-        recipe,
-        choice,
-    })
+    TaughtRecipe::of(manifest, recipe.arrays)
 }

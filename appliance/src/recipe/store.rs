@@ -31,7 +31,7 @@ pub enum LoadError {
     },
 }
 
-/// A change to the stored recipes, an import or an export that failed; the recipes are unchanged.
+/// A change to the stored recipes, an edit, an import or an export that failed; the recipes are unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum ChangeError {
     /// There is no such recipe, or it is damaged.
@@ -42,9 +42,17 @@ pub enum ChangeError {
         "undo recipe {0}: no previous generation of it is stored, and it was not deleted: teach or import it"
     )]
     Nothing(u16),
-    /// The recipe that is imported or restored cannot be used: why, with the remedy.
+    /// Another change was stored since the recipe that is edited was read.
+    #[error(
+        "recipe {0} was changed or deleted by somebody else: load it again and repeat the change"
+    )]
+    Outdated(u16),
+    /// The recipe that is edited, imported or restored cannot be used: why, with the remedy.
     #[error("{0}")]
     Unfit(String),
+    /// The edited recipe cannot be stored.
+    #[error("store recipe: {0}: free space")]
+    Store(io::Error),
     /// The file that is imported cannot be read.
     #[error("import {path}: {source}: name a recipe file", path = path.display())]
     Missing {

@@ -12,7 +12,7 @@ use super::map::{Map, map};
 use super::orders::{self, Reload};
 use super::problem::Problem;
 use super::site::Site;
-use crate::recipe::edit::{self, Edit, EditError};
+use crate::recipe::edit::{self, Edit};
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::store::LoadedRecipe;
 use crate::recipe::{ChangeError, LoadError, Recipe, RecipeFile, RecipeId, Store};
@@ -26,26 +26,15 @@ impl From<LoadError> for Problem {
     }
 }
 
-impl From<EditError> for Problem {
-    fn from(error: EditError) -> Self {
-        let words = error.to_string();
-        match error {
-            EditError::Load(error) => error.into(),
-            EditError::Outdated(_) => Self::busy(words),
-            EditError::Unfit(_) => Self::unfit(words),
-            EditError::Store(_) => Self::broken(words),
-        }
-    }
-}
-
 impl From<ChangeError> for Problem {
     fn from(error: ChangeError) -> Self {
         let words = error.to_string();
         match error {
             ChangeError::Load(error) => error.into(),
             ChangeError::Nothing(_) | ChangeError::Missing { .. } => Self::missing(words),
+            ChangeError::Outdated(_) => Self::busy(words),
             ChangeError::Unfit(_) => Self::unfit(words),
-            ChangeError::Write { .. } => Self::broken(words),
+            ChangeError::Store(_) | ChangeError::Write { .. } => Self::broken(words),
         }
     }
 }
