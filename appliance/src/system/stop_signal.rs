@@ -3,6 +3,7 @@
 use super::runtime;
 use crate::error::{Exit, Failure};
 use std::future::pending;
+use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 
 /// Whether the signal has arrived; the default value never gets one. Cheap to clone.
@@ -17,26 +18,19 @@ impl StopSignal {
     pub fn listen() -> Result<Self, Failure> {
         let failed = |error| Failure::because(Exit::Software, "wait for a signal", error);
         let runtime = runtime()?;
-        #[cfg(unix)]
-        let (mut interrupt, mut terminate) = {
-            use tokio::signal::unix::{SignalKind, signal};
+        let listen = |kind| {
             let _inside = runtime.enter();
-            let listen = |kind| signal(kind).map_err(failed);
-            (
-                listen(SignalKind::interrupt())?,
-                listen(SignalKind::terminate())?,
-            )
+            signal(kind).map_err(failed)
         };
+        let mut interrupt = listen(SignalKind::interrupt())?;
+        let mut terminate = listen(SignalKind::terminate())?;
         let (arrive, arrived) = watch::channel(false);
         let wait = move || {
             runtime.block_on(async {
-                #[cfg(unix)]
                 tokio::select! {
                     _ = interrupt.recv() => {}
                     _ = terminate.recv() => {}
                 }
-                #[cfg(not(unix))]
-                drop(tokio::signal::ctrl_c().await);
             });
             // All receivers are gone only where the program ends anyway.
             let _ = arrive.send(true);
