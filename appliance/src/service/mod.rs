@@ -12,7 +12,6 @@ pub mod survey;
 use crate::recipe::Store;
 pub use caller::Caller;
 use serving::{PlcSide, serve};
-use stopping::Stopping;
 
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
@@ -61,7 +60,20 @@ pub struct Daemon {
     pub stage: Option<Stage>,
     /// Whether a recipe is loaded or taught at the start.
     awaited: bool,
-    stopping: Stopping,
+    /// The way to the measuring task.
+    orders: mpsc::Sender<Order>,
+    /// Ends the threads of the sockets and of the lines.
+    sockets: watch::Sender<bool>,
+    /// Ends the survey's thread once it is dropped.
+    survey: mpsc::Sender<()>,
+    /// Those that measure, serve sockets, survey and serve lines.
+    threads: [JoinHandle<()>; 4],
+    /// The thread of the history.
+    writing: JoinHandle<()>,
+    history: History,
+    progress: Progress,
+    /// Whether the measuring task only computes.
+    computing: Computing,
     /// Locked as long as the daemon runs.
     _state: StateFolder,
 }
@@ -224,16 +236,21 @@ impl Daemon {
                 worker.run(&inbox, begin, first);
             })?
         };
-        let stopping = Stopping {
+        let daemon = Self {
+            station,
+            modbus,
+            http,
+            stage: None,
+            awaited,
             orders,
             sockets,
             survey,
             threads: [measuring, serving, surveying, wiring],
-            progress,
-            station: station.clone(),
-            history,
             writing,
+            history,
+            progress,
             computing,
+            _state: state,
         };
         let gone = || {
             Failure::new(
@@ -252,26 +269,12 @@ impl Daemon {
             }
         };
         match outcome {
-            Ok(stage) => Ok(Self {
-                station,
-                modbus,
-                http,
-                stage,
-                awaited,
-                stopping,
-                _state: state,
-            }),
+            Ok(stage) => Ok(Self { stage, ..daemon }),
             Err(failure) => {
-                stopping.stop();
+                daemon.end();
                 Err(failure)
             }
         }
-    }
-
-    /// Stops everything: the cycle in flight ends with its result, INVALID if it was still exposing; then the sockets close.
-    pub fn stop(self) {
-        self.station.event(Event::Stop);
-        self.stopping.stop();
     }
 }
 

@@ -1,27 +1,11 @@
 //! Stops the daemon: asks every thread to end, and waits for each with a limit.
 
-use crate::history::History;
+use super::Daemon;
 use crate::production::Order;
-use crate::station::StationHandle;
-use crate::system::computing::Computing;
+use crate::station::Event;
 use crate::system::progress::Progress;
-use std::sync::mpsc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use tokio::sync::watch;
-
-/// The daemon's threads, and the senders that end them.
-pub(super) struct Stopping {
-    pub(super) orders: mpsc::Sender<Order>,
-    pub(super) sockets: watch::Sender<bool>,
-    pub(super) survey: mpsc::Sender<()>,
-    pub(super) threads: [JoinHandle<()>; 4],
-    pub(super) progress: Progress,
-    pub(super) station: StationHandle,
-    pub(super) history: History,
-    pub(super) writing: JoinHandle<()>,
-    pub(super) computing: Computing,
-}
 
 /// Time between two checks whether a thread has ended.
 const POLLING: Duration = Duration::from_millis(2);
@@ -30,9 +14,15 @@ const MEASURING: Duration = Duration::from_secs(3);
 /// A thread that has not ended after this time is abandoned: a stop takes at most 5 s, whatever hangs.
 const STOPPING: Duration = Duration::from_millis(4500);
 
-impl Stopping {
+impl Daemon {
+    /// Stops everything: the cycle in flight ends with its result, INVALID if it was still exposing; then the sockets close.
+    pub fn stop(self) {
+        self.station.event(Event::Stop);
+        self.end();
+    }
+
     /// Ends measuring, then the sockets, the survey and the history.
-    pub(super) fn stop(self) {
+    pub(super) fn end(self) {
         let began = Instant::now();
         let until = began + STOPPING;
         // Fails only if the measuring task has ended already.
