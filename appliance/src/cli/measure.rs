@@ -5,7 +5,7 @@ use super::options::{Output, Threads};
 use crate::error::{Exit, Failure};
 use crate::history::kept;
 use crate::measure::{Measurement, measure_with};
-use crate::output::{cloud, picture};
+use crate::output::picture;
 use crate::storage::folder::OutputFolder;
 use crate::storage::unpack::Unpacked;
 use algo::pipeline::PhaseMap;
@@ -92,7 +92,7 @@ fn write(folder: &OutputFolder, measurement: &Measurement) -> Result<(), Failure
         let rows = mm.len() / map.width.max(1);
         let png = picture::height_png(map.width as u32, rows as u32, &mm);
         folder.write(picture_of, &png)?;
-        folder.write(points, &cloud::ply(surface, &measurement.intensity))?;
+        folder.write(points, &surface.ply(&measurement.intensity))?;
     }
     Ok(())
 }

@@ -13,46 +13,21 @@ pub struct Surface {
     pub triangulator: Triangulator,
 }
 
-/// One point of a cloud.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Vertex {
-    /// x, y, z in mm.
-    pub point: [f32; 3],
-    /// How bright it is.
-    pub intensity: u8,
-    /// σ_z in mm, NaN where not known.
-    pub sigma: f32,
-}
-
-/// A binary little-endian PLY: one vertex per resolved pixel with float x, y, z in mm, uchar
-/// intensity and float sigma (σ_z in mm, NaN where not known).
+/// A binary little-endian PLY: one vertex per known height with float x, y, z in mm, uchar intensity and float sigma (σ_z in mm, NaN
+/// where not known).
 ///
-/// `intensity` is one value per pixel, row-major like the heights.
-pub fn ply(surface: &Surface, intensity: &[u8]) -> Vec<u8> {
-    let Surface { map, triangulator } = surface;
-    let known = |(_, height): &(usize, &Height)| height.is_known();
-    let vertices: Vec<Vertex> = map
-        .height
-        .iter()
+/// `heights` are row-major in rows of `width` pixels; `shade` gives intensity and σ_z of the pixel of an index.
+pub fn ply(
+    triangulator: &Triangulator,
+    width: usize,
+    heights: impl Iterator<Item = Height>,
+    shade: impl Fn(usize) -> (u8, f32),
+) -> Vec<u8> {
+    let points: Vec<_> = heights
         .enumerate()
-        .filter(known)
-        .map(|(at, height)| {
-            let point = triangulator
-                .point(at % map.width, at / map.width, *height)
-                .unwrap_or_default();
-            Vertex {
-                point: [point.x as f32, point.y as f32, point.z as f32],
-                intensity: intensity.get(at).copied().unwrap_or(0),
-                sigma: map.sigma[at],
-            }
-        })
+        .filter_map(|(at, height)| Some((at, triangulator.point(at % width, at / width, height)?)))
         .collect();
-    binary_ply(&vertices)
-}
-
-/// The same format for any points.
-pub fn binary_ply(vertices: &[Vertex]) -> Vec<u8> {
-    let count = vertices.len();
+    let count = points.len();
     let mut ply = format!(
         "ply\nformat binary_little_endian 1.0\ncomment heights above the plane z = 0, units mm\n\
          element vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
@@ -60,14 +35,26 @@ pub fn binary_ply(vertices: &[Vertex]) -> Vec<u8> {
     )
     .into_bytes();
     ply.reserve(count * VERTEX_BYTES);
-    for vertex in vertices {
-        for coordinate in vertex.point {
-            ply.extend_from_slice(&coordinate.to_le_bytes());
+    for (at, point) in points {
+        for coordinate in [point.x, point.y, point.z] {
+            ply.extend_from_slice(&(coordinate as f32).to_le_bytes());
         }
-        ply.push(vertex.intensity);
-        ply.extend_from_slice(&vertex.sigma.to_le_bytes());
+        let (intensity, sigma) = shade(at);
+        ply.push(intensity);
+        ply.extend_from_slice(&sigma.to_le_bytes());
     }
     ply
+}
+
+impl Surface {
+    /// The heights as a [`ply`]; `intensity` is one value per pixel, row-major like the heights.
+    pub fn ply(&self, intensity: &[u8]) -> Vec<u8> {
+        let Self { map, triangulator } = self;
+        let heights = map.height.iter().copied();
+        ply(triangulator, map.width, heights, |at| {
+            (intensity.get(at).copied().unwrap_or(0), map.sigma[at])
+        })
+    }
 }
 
 /// Bytes of one vertex.

@@ -2,7 +2,7 @@
 
 use super::Plan;
 use crate::head::seam;
-use crate::output::cloud::{Vertex, binary_ply};
+use crate::output::cloud::ply;
 use algo::pipeline;
 use algo::units::Height;
 use hal::frame::Frame;
@@ -52,23 +52,14 @@ impl Plan {
         let layers = self.layers(sequence, frames)?;
         let production = &self.runs.get(sequence)?.production;
         let full_scale = f32::from(production.decoder().full_scale());
+        // NaN becomes an unknown height.
+        let heights = layers.height_mm.iter();
+        let heights = heights.map(|&mm| Height::from_mm(f64::from(mm)));
+        let shade = |at: usize| {
+            let intensity = layers.modulation[at] * 2.0 / full_scale * 255.0;
+            (intensity as u8, f32::NAN)
+        };
         let triangulator = production.triangulator();
-        let known = layers
-            .height_mm
-            .iter()
-            .enumerate()
-            .filter(|(_, z)| !z.is_nan());
-        let vertices: Vec<Vertex> = known
-            .filter_map(|(at, &z)| {
-                let (u, v) = (at % layers.width, at / layers.width);
-                let point = triangulator.point(u, v, Height::from_mm(f64::from(z)))?;
-                Some(Vertex {
-                    point: [point.x as f32, point.y as f32, point.z as f32],
-                    intensity: (layers.modulation[at] * 2.0 / full_scale * 255.0) as u8,
-                    sigma: f32::NAN,
-                })
-            })
-            .collect();
-        Some(binary_ply(&vertices))
+        Some(ply(triangulator, layers.width, heights, shade))
     }
 }
