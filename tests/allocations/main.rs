@@ -58,7 +58,7 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
         .num_threads(1)
         .build()
         .unwrap();
-    let count = plan.sequence().frame_count();
+    let count = plan.indices(0).len();
     let indices: Vec<usize> = (0..count).collect();
     let mut frames: Vec<Frame> = Vec::new();
     let (mut taking, mut judging) = (Default::default(), Default::default());

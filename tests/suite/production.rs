@@ -59,7 +59,7 @@ pub(crate) fn plan_with(
 
 pub(crate) fn frames(bed: &mut Bed, plan: &Plan) -> Vec<Frame> {
     let rasters = plan.rasters(&bed.calibration).unwrap();
-    let indices: Vec<usize> = (0..plan.sequence().frame_count()).collect();
+    let indices: Vec<usize> = plan.indices(0).to_vec();
     bed.head.load(rasters).unwrap();
     bed.stage.reseed(11);
     let mut frames = Vec::new();
@@ -157,10 +157,7 @@ pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]
     let found = production.inspect(&views, &mut strips, None).unwrap();
     let heights = plan.heights(0, frames).unwrap();
     let (decoder, window) = (production.decoder(), Some(production.window()));
-    let map = decoder
-        .unwrapping()
-        .needs_map()
-        .then(|| plan.golden_phase());
+    let map = decoder.unwrapping().needs_map().then(|| production.map());
     let phases = decode(decoder, &views, map, window).unwrap();
     let mut sigma = vec![f32::NAN; heights.len()];
     let (mut gross, mut compared) = (0, 0);
@@ -372,7 +369,7 @@ fn levels_decoded_on_arrival_give_the_same_inspection() {
     for sequence in 0..taught.manifest.sequences.len() {
         let (plan, _) = plan_with(&bed, &taught, sequence, AlignmentKind::Rigid);
         let frames = frames(&mut bed, &plan);
-        let levels = plan.sequence().levels().len();
+        let levels = plan.production().decoder().levels().len();
         let inspected = |wanted: usize| {
             let (mut arriving, mut arrived) = (plan.arriving(0), 0);
             for count in 1..=frames.len() {

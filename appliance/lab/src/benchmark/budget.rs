@@ -117,10 +117,10 @@ fn budget(
 ) -> Result<Budget, String> {
     head.load(plan.rasters(calibration).map_err(words)?)
         .map_err(words)?;
-    let indices: Vec<usize> = (0..plan.sequence().frame_count()).collect();
+    let indices = plan.indices(0);
     let mut frames = Vec::new();
     let exposure = head
-        .acquire(&indices, TIMEOUT, &mut |_, frame| frames.push(frame))
+        .acquire(indices, TIMEOUT, &mut |_, frame| frames.push(frame))
         .map_err(words)?;
     // The last exposure lasts a refresh, and the trigger waits for up to one before the first.
     let shown = Duration::from_nanos(exposure.done.0.saturating_sub(exposure.started.0));
@@ -169,11 +169,11 @@ fn budget(
 /// Processor time of frames → verdict and of the phase kernel alone, ms, and their ratio. The two are timed in turn, each on more
 /// frame sets than fit into any cache.
 fn on_one_thread(plan: &Plan, frames: &[Frame], effort: &Effort) -> Result<[f64; 3], String> {
-    let map = plan.golden_phase().to_vec();
+    let map = plan.production().map().to_vec();
     let mut sets = Rotation::of(FrameSet::of(frames, Some(map)), effort.bytes);
     let pixels = sets.next().pixels() as f64;
     let decoder = plan.production().decoder().clone();
-    let mut kernel = Decoding::new(decoder, Some(plan.window().to_vec()));
+    let mut kernel = Decoding::new(decoder, Some(plan.production().window().to_vec()));
     let mut whole = Inspecting::new(plan.production());
     let alone = rayon::ThreadPoolBuilder::new()
         .num_threads(1)

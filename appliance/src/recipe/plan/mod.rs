@@ -21,14 +21,13 @@ use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Reference, Triangulator};
 use algo::inspect::{Findings, Input, Production, Strips};
-use algo::pattern::{MAX_FRAMES, Sequence, Shot};
+use algo::pattern::{MAX_FRAMES, Shot};
 use algo::phase::Arrived;
 use algo::pipeline::HeightCubics;
-use algo::units::{AbsolutePhase, Height};
+use algo::units::Height;
 use hal::frame::Frame;
 use hal::projector::Raster;
-use run::{Run, Shared, Unjoined};
-use std::ops::Range;
+use run::{Run, Shared, prepare};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -181,14 +180,14 @@ impl Plan {
         }
         let range = triangulator.function().range();
         let mut shots = Vec::new();
-        let sequences = || {
-            let unjoined =
-                |sequence| Unjoined::new(sequence, &conditions, &arrays, range, &mut shots);
-            let runs = sequences.into_iter().map(unjoined);
-            runs.collect::<Result<Vec<_>, _>>()
+        let prepared = || {
+            let (noise, range) = (conditions.noise_counts, (range, camera.2));
+            let runs = sequences.into_iter();
+            runs.map(|sequence| prepare(sequence, noise, &arrays, range, &mut shots))
+                .collect::<Result<Vec<_>, _>>()
         };
-        let (sequences, surface) = rayon::join(sequences, || golden::surface(size.0, &arrays));
-        let sequences = sequences?;
+        let (prepared, surface) = rayon::join(prepared, || golden::surface(size.0, &arrays));
+        let prepared = prepared?;
         let patterns = shots.len() * raster.0 as usize * raster.1 as usize;
         if patterns > MAX_PATTERN_BYTES {
             return Err(format!(
@@ -203,14 +202,13 @@ impl Plan {
         let range = conditions.expansion_range_turns;
         let cubics = HeightCubics::new(&triangulator, surface, range, &window, away.max(AROUND));
         let shared = Shared {
-            conditions: &conditions,
             aligned,
             triangulator: Arc::new(triangulator),
             cubics: Arc::new(cubics),
             gauges,
             window,
         };
-        let runs = sequences.into_iter().map(|sequence| sequence.join(&shared));
+        let runs = prepared.into_iter().map(|join| join(&shared));
         let runs = runs.collect::<Result<Vec<_>, _>>()?;
         let first = runs.first().ok_or("it has no sequence")?;
         let strips = first.production.strips(size.1.div_ceil(STRIPS));
@@ -247,11 +245,6 @@ impl Plan {
         production.cubics().bytes() + samples * size_of::<f64>() + runs
     }
 
-    /// Levels of the sequence that is tried first.
-    pub fn sequence(&self) -> &Sequence {
-        &self.runs[0].levels
-    }
-
     /// Number of sequences; they are tried one after the other until one is good enough.
     pub fn sequence_count(&self) -> usize {
         self.runs.len()
@@ -271,16 +264,6 @@ impl Plan {
     /// The sequence that consists of these shots, if there is one.
     pub fn sequence_of(&self, shots: &[Shot]) -> Option<usize> {
         (0..self.sequence_count()).find(|&sequence| self.shots(sequence).eq(shots.iter().copied()))
-    }
-
-    /// The columns of each row that some gauge needs.
-    pub fn window(&self) -> &[Range<usize>] {
-        self.production().window()
-    }
-
-    /// The phase that the first sequence is unwrapped about, row-major: golden's, where it is safe.
-    pub fn golden_phase(&self) -> &[AbsolutePhase] {
-        self.production().map()
     }
 
     /// What computes findings from frames of the first sequence.
