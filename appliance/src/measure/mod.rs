@@ -5,7 +5,7 @@ mod known;
 mod report;
 mod score;
 
-pub use report::{RecipeName, Report, StageTimes};
+pub use report::{Manner, RecipeName, Report};
 pub use score::{GROSS_MM, Score, Truth};
 
 use crate::error::{Exit, Failure};
@@ -22,7 +22,7 @@ use algo::units::AbsolutePhase;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
 use known::Known;
-use report::Manner;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
@@ -97,7 +97,11 @@ fn measure_about(
     let primary = known
         .as_ref()
         .map_or_else(|| primary_of(recording), |known| known.pattern);
-    let mut stages = StageTimes::default();
+    let mut stage_us = BTreeMap::new();
+    let mut stage_ended = |stage, started: Instant| {
+        let us = u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX);
+        *stage_us.entry(stage).or_default() += us;
+    };
     let mut phases = Vec::new();
     let mut chosen = None;
     for at in 0..recording.patterns.len() {
@@ -124,11 +128,11 @@ fn measure_about(
             made = about.reference_map();
             Some(("reference", &made))
         };
-        stages.map += started.elapsed();
+        stage_ended("map", started);
         let started = Instant::now();
         let decoded = channel.scan.phases(map.map(|(_, map)| map));
         let decoded = decoded.map_err(|error| wrong(&error))?;
-        stages.phase += started.elapsed();
+        stage_ended("phase", started);
         phases.push(decoded);
         if at == primary {
             chosen = Some((channel, geometry, map.map(|(name, _)| name)));
@@ -146,7 +150,7 @@ fn measure_about(
         } = &channel.scan;
         pipeline::sample_noise(sequence, frames, &phases[primary].trust)
     });
-    stages.noise = started.elapsed();
+    stage_ended("noise", started);
     let started = Instant::now();
     let heights = geometry.map(|triangulator| Surface {
         map: channel
@@ -154,7 +158,7 @@ fn measure_about(
             .heights(&triangulator, noise, &mut phases[primary]),
         triangulator,
     });
-    stages.height = started.elapsed();
+    stage_ended("height", started);
     let report = Report::new(
         &phases[primary],
         &heights,
@@ -169,7 +173,7 @@ fn measure_about(
         },
         noise,
         &Truth::of(recording),
-        &stages,
+        stage_us,
     );
     Ok(Measurement {
         intensity: channel.intensity(),

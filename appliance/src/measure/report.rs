@@ -7,31 +7,18 @@ use algo::pipeline::PhaseMap;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::time::Duration;
-
-/// Wall time of each stage.
-#[derive(Clone, Debug, Default)]
-pub struct StageTimes {
-    /// The map that dense levels are unwrapped about.
-    pub map: Duration,
-    /// Frames to absolute phase.
-    pub phase: Duration,
-    /// The noise of a sample.
-    pub noise: Duration,
-    /// Phase to height.
-    pub height: Duration,
-}
 
 /// How the levels were unwrapped.
-#[derive(Clone, Debug)]
-pub(super) struct Manner {
-    /// See [`Report::kind`].
+#[derive(Clone, Debug, Serialize)]
+pub struct Manner {
+    /// Geometric, dense or single.
     pub kind: &'static str,
-    /// See [`Report::ratios`].
+    /// The levels' ratios from coarse to fine.
     pub ratios: Vec<f64>,
-    /// See [`Report::map`].
+    /// The map that they were unwrapped about: reference, golden or preliminary; `None` if they are absolute by themselves.
     pub map: Option<&'static str>,
-    /// See [`Report::recipe`].
+    /// The recipe that was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub recipe: Option<RecipeName>,
 }
 
@@ -55,15 +42,9 @@ pub struct Report {
     pub unresolved: BTreeMap<&'static str, usize>,
     /// Pixels that were not decoded, because the expected map is unknown there.
     pub skipped: usize,
-    /// How the levels were unwrapped: geometric, dense or single.
-    pub kind: &'static str,
-    /// The levels' ratios from coarse to fine.
-    pub ratios: Vec<f64>,
-    /// The map that they were unwrapped about: reference, golden or preliminary; `None` if they are absolute by themselves.
-    pub map: Option<&'static str>,
-    /// The recipe that was given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub recipe: Option<RecipeName>,
+    /// How the levels were unwrapped.
+    #[serde(flatten)]
+    pub manner: Manner,
     /// Wall time per stage in µs.
     pub stage_us: BTreeMap<&'static str, u64>,
     /// σ of one sample in counts: the recording's, else the recipe's, else from the frames' redundancy (N ≥ 4).
@@ -92,7 +73,7 @@ impl Report {
         manner: Manner,
         noise_counts: Option<f64>,
         truth: &Truth<'_>,
-        stages: &StageTimes,
+        stage_us: BTreeMap<&'static str, u64>,
     ) -> Self {
         // A dark pixel that truth calls wholly lit counts as lit and unresolved.
         let dark_but_lit = (0..phases.trust.len())
@@ -117,22 +98,13 @@ impl Report {
             let known = || map.height.iter().filter(|height| height.is_known());
             Some([known().min()?.mm(), known().max()?.mm()])
         });
-        let micros = |time: Duration| u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
         Self {
             lit: resolved + unresolved.values().sum::<usize>(),
             resolved,
             unresolved,
             skipped: phases.count(Trust::Unexpected),
-            kind: manner.kind,
-            ratios: manner.ratios,
-            map: manner.map,
-            recipe: manner.recipe,
-            stage_us: BTreeMap::from([
-                ("map", micros(stages.map)),
-                ("phase", micros(stages.phase)),
-                ("noise", micros(stages.noise)),
-                ("height", micros(stages.height)),
-            ]),
+            manner,
+            stage_us,
             noise_counts,
             no_height: heights.as_ref().err().cloned(),
             no_sigma: noise_counts.is_none().then_some(
@@ -151,22 +123,21 @@ impl Report {
         let mut line = |name: &str, value: String| {
             let _ = writeln!(table, "{name:<30}{value}");
         };
-        let ratios: Vec<String> = self
-            .ratios
-            .iter()
-            .map(|ratio| format!("{ratio:.6}"))
-            .collect();
-        line(
-            "levels",
-            format!("{}, ratios {}", self.kind, ratios.join(" ")),
-        );
-        if let Some(map) = self.map {
+        let Manner {
+            kind,
+            ratios,
+            map,
+            recipe,
+        } = &self.manner;
+        let ratios: Vec<String> = ratios.iter().map(|ratio| format!("{ratio:.6}")).collect();
+        line("levels", format!("{kind}, ratios {}", ratios.join(" ")));
+        if let Some(map) = map {
             line("unwrapped about", format!("the {map} map"));
         }
         if let Some(RecipeName {
             number,
             fingerprint,
-        }) = &self.recipe
+        }) = recipe
         {
             line("recipe", format!("{number}, fingerprint {fingerprint}"));
         }
