@@ -8,21 +8,11 @@ use std::time::Instant;
 /// Lines that are kept.
 const LINES: usize = 200;
 
-/// One line.
-#[derive(Clone, Debug, PartialEq)]
-struct Line {
-    /// Time in µs since 1970 UTC, if the clock is synchronised.
-    utc_us: Option<u64>,
-    /// Since the start.
-    uptime_s: u64,
-    words: String,
-}
-
 /// The lines. Cheap to clone; clones share them.
 #[derive(Clone, Debug)]
 pub struct Logbook {
     begun: Instant,
-    lines: Arc<Mutex<VecDeque<Line>>>,
+    lines: Arc<Mutex<VecDeque<Value>>>,
 }
 
 impl Default for Logbook {
@@ -37,11 +27,11 @@ impl Default for Logbook {
 impl Logbook {
     /// Adds a line; beyond 200 lines the oldest is dropped.
     pub fn add(&self, words: &str) {
-        let line = Line {
-            utc_us: crate::system::clock::utc_us(),
-            uptime_s: self.begun.elapsed().as_secs(),
-            words: words.to_owned(),
-        };
+        let line = json!({
+            "utc_us": crate::system::clock::utc_us(),
+            "uptime_s": self.begun.elapsed().as_secs(),
+            "words": words,
+        });
         let mut lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
         if lines.len() >= LINES {
             lines.pop_front();
@@ -52,10 +42,7 @@ impl Logbook {
     /// All lines, newest first: `utc_us` (null if the clock was not synchronised), `uptime_s`, `words`.
     pub fn latest(&self) -> Vec<Value> {
         let lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
-        let newest = lines.iter().rev();
-        newest
-            .map(|line| json!({ "utc_us": line.utc_us, "uptime_s": line.uptime_s, "words": line.words }))
-            .collect()
+        lines.iter().rev().cloned().collect()
     }
 }
 
