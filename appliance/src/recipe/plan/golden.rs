@@ -8,7 +8,6 @@ use algo::phase::Decoder;
 use algo::pipeline::{self, KnownSurface};
 use algo::units::{AbsolutePhase, Height, Modulation};
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// The weight of each pixel's deviation, and the uncertainty of its taught height.
 pub(super) fn taught(noise_counts: f64, arrays: &Arrays, decoder: &Decoder) -> Taught {
@@ -60,19 +59,5 @@ pub(super) fn surface(width: usize, arrays: &Arrays) -> KnownSurface {
         width,
         phase: turns.map(AbsolutePhase::from_turns).collect(),
         height,
-    }
-}
-
-/// Widens the window of a plan to all pixels that are compared: the part's motion is estimated from all of them.
-pub(super) fn widen(window: &mut [Range<usize>], arrays: &Arrays, width: usize) {
-    for (seen, valid) in window.iter_mut().zip(arrays.valid.chunks(width.max(1))) {
-        let first = valid.iter().position(|&valid| valid != 0);
-        let last = valid.iter().rposition(|&valid| valid != 0);
-        if let Some((first, last)) = first.zip(last) {
-            *seen = match seen.start == seen.end {
-                true => first..last + 1,
-                false => seen.start.min(first)..seen.end.max(last + 1),
-            };
-        }
     }
 }

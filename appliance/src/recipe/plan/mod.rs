@@ -176,7 +176,7 @@ impl Plan {
         };
         let mut window = window::of(&gauges, size, away);
         if aligned {
-            golden::widen(&mut window, &arrays, size.0);
+            window::add_compared(&mut window, &arrays.valid, size.0);
         }
         let range = triangulator.function().range();
         let mut shots = Vec::new();

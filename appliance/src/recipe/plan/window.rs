@@ -25,14 +25,28 @@ pub(super) fn of(
             let left = columns.start.saturating_sub(margin);
             let right = (columns.end + margin).min(width);
             let near = row.saturating_sub(margin)..(row + margin + 1).min(height);
-            for seen in &mut window[near] {
-                *seen = if seen.start == seen.end {
-                    left..right
-                } else {
-                    seen.start.min(left)..seen.end.max(right)
-                };
+            for columns in &mut window[near] {
+                widen(columns, left..right);
             }
         }
     }
     window
+}
+
+/// Widens the window to all pixels that are compared, those that are `valid`: the part's motion is estimated from all of them.
+pub(super) fn add_compared(window: &mut [Range<usize>], valid: &[u8], width: usize) {
+    for (columns, valid) in window.iter_mut().zip(valid.chunks(width.max(1))) {
+        let first = valid.iter().position(|&valid| valid != 0);
+        let last = valid.iter().rposition(|&valid| valid != 0);
+        if let Some((first, last)) = first.zip(last) {
+            widen(columns, first..last + 1);
+        }
+    }
+}
+
+fn widen(columns: &mut Range<usize>, by: Range<usize>) {
+    *columns = match columns.start == columns.end {
+        true => by,
+        false => columns.start.min(by.start)..columns.end.max(by.end),
+    };
 }
