@@ -280,7 +280,6 @@ impl Teach {
             triangulator: &surface.triangulator,
             phases,
             heights: &surface.map,
-            noise,
             comparison: None,
         };
         part.recipe(naming).map_err(|error| wrong(&error))

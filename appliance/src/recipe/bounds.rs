@@ -9,7 +9,7 @@ use crate::station::MAX_GAUGES;
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use hal::bounds::{
     FINGERPRINT_DIGITS, MAX_EXPOSURE_US, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_RANGE_MM,
-    MAX_SHIFT_TURNS, MAX_SIDE, MIN_NOISE_COUNTS, RATIOS, fingerprint, length, text, within,
+    MAX_SHIFT_TURNS, MAX_SIDE, MIN_NOISE_COUNTS, RATIOS, length, text, within,
 };
 
 /// The longest name of a recipe, region or gauge, in characters.
@@ -96,14 +96,6 @@ impl RecipeFile {
                 .map_err(|error| format!("good_parts.{error}"))?;
         }
         Ok(())
-    }
-
-    /// Checks the form of the fingerprint; a recipe that is being made has none yet.
-    ///
-    /// # Errors
-    /// If it is not 64 hexadecimal digits.
-    pub fn check_fingerprint(&self) -> Result<(), String> {
-        fingerprint("fingerprint", &self.fingerprint)
     }
 }
 

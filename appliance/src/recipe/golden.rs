@@ -75,8 +75,6 @@ pub struct GoldenPart<'a> {
     pub phases: &'a PhaseMap,
     /// Golden height of each camera pixel, with its σ.
     pub heights: &'a HeightMap,
-    /// σ of one sample in counts.
-    pub noise: f64,
     /// Fixed against adaptive pattern, if a fixed one was measured as well.
     pub comparison: Option<ComparisonFile>,
 }
@@ -172,7 +170,7 @@ impl GoldenPart<'_> {
             range_mm: [range.low, range.high],
             // Heads take their exposure from the configuration.
             exposure_us: None,
-            noise_counts: self.noise,
+            noise_counts: calibration.noise_counts,
             expansion_range_turns: EXPANSION_TURNS,
             min_coverage: MIN_COVERAGE,
             regions,
@@ -290,10 +288,11 @@ impl GoldenPart<'_> {
             .filter(|shot| carries(shot.ratio))
             .map(|shot| shot.ratio * shot.ratio);
         let information: f64 = squares.sum();
+        let noise = self.calibration.noise_counts;
         move |at| {
             let counts = f64::from(arrays.modulation[at]);
             let turns =
-                self.noise / std::f64::consts::TAU * (2.0 / (information * counts * counts)).sqrt();
+                noise / std::f64::consts::TAU * (2.0 / (information * counts * counts)).sqrt();
             (turns * f64::from(arrays.height_slope[at])).powi(2)
         }
     }

@@ -121,9 +121,7 @@ impl Store {
     /// Errors of the file system.
     pub fn open(folder: &Path) -> io::Result<Self> {
         fs::create_dir_all(folder)?;
-        Ok(Self {
-            folder: folder.to_path_buf(),
-        })
+        Ok(Self::at(folder))
     }
 
     /// Opens the recipes of a state folder and removes what an interrupted import left behind.

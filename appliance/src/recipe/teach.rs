@@ -169,7 +169,6 @@ pub fn teach_while(
         triangulator,
         phases,
         heights,
-        noise: calibration.noise_counts,
         comparison: Some(comparison),
     };
     let taught = computing.on(|| part.recipe(naming));
