@@ -23,14 +23,6 @@ pub(super) struct JudgedBy {
     pub frames: Vec<Frame>,
 }
 
-/// The frames of a sequence.
-struct Taken {
-    frames: Vec<Frame>,
-    exposure: Exposure,
-    /// Processor time of the decoding on arrival.
-    spent: Duration,
-}
-
 impl Worker {
     /// Runs a cycle; returns the frames that the part was judged by.
     pub(super) fn measure(&mut self, plan: Option<&Arc<Plan>>, job: &Job) -> JudgedBy {
@@ -48,14 +40,10 @@ impl Worker {
         loop {
             let began = Instant::now();
             let mut arriving = plan.arriving(sequence);
-            let Some(taken) = self.take(plan, sequence, &mut arriving, id) else {
+            let taken = self.take(plan, sequence, &mut arriving, id);
+            let Some((frames, exposure, spent)) = taken else {
                 return JudgedBy::default();
             };
-            let Taken {
-                frames,
-                exposure,
-                spent,
-            } = taken;
             cpu += spent;
             stages.add(Stage::Exposure, us(began.elapsed()));
             if exposure.retaken > 0 {
@@ -89,15 +77,15 @@ impl Worker {
         }
     }
 
-    /// Takes the frames of a sequence and decodes each level on arrival. `None` if some are missing; the station has then been
-    /// told why.
+    /// Takes the frames of a sequence and decodes each level on arrival; the time is the processor's for decoding. `None` if frames
+    /// are missing; the station has then got the reason.
     fn take(
         &mut self,
         plan: &Plan,
         sequence: usize,
         arriving: &mut Arriving,
         job: JobId,
-    ) -> Option<Taken> {
+    ) -> Option<(Vec<Frame>, Exposure, Duration)> {
         let indices = plan.indices(sequence);
         let mut frames: Vec<Frame> = Vec::with_capacity(indices.len());
         let mut spent = Duration::ZERO;
@@ -122,11 +110,7 @@ impl Worker {
             }
             Ok(exposure) => {
                 self.paced(indices.len(), &exposure);
-                Some(Taken {
-                    frames,
-                    exposure,
-                    spent,
-                })
+                Some((frames, exposure, spent))
             }
             Err(error) => {
                 let failed = failed(job, code_of(&error), error.to_string());

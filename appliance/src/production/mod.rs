@@ -39,7 +39,6 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::time::Duration;
 
 /// What the measuring task is to do.
-#[derive(Debug)]
 pub enum Order {
     /// Measure a part.
     Measure(Job),

@@ -75,14 +75,10 @@ impl Worker {
 }
 
 /// The pause between two attempts to open a head: from one sign of life to [`LONGEST_WAIT`], doubled after each attempt.
+#[derive(Default)]
 pub(super) struct Pause {
+    /// Of the last pause.
     signs: u32,
-}
-
-impl Default for Pause {
-    fn default() -> Self {
-        Self { signs: 1 }
-    }
 }
 
 impl Pause {
@@ -94,6 +90,7 @@ impl Pause {
         station: &StationHandle,
         pulse: &Pulse,
     ) -> ControlFlow<()> {
+        self.signs = (2 * self.signs).clamp(1, LONGEST_WAIT);
         for _ in 0..self.signs {
             match orders.recv_timeout(SIGN_OF_LIFE) {
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => {
@@ -105,7 +102,6 @@ impl Pause {
                 }
             }
         }
-        self.signs = (2 * self.signs).min(LONGEST_WAIT);
         ControlFlow::Continue(())
     }
 }

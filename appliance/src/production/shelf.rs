@@ -22,12 +22,6 @@ struct Ready {
     plan: Arc<Plan>,
 }
 
-impl Ready {
-    fn bytes(&self) -> u64 {
-        self.plan.bytes() as u64
-    }
-}
-
 impl Shelf {
     /// The plan of this recipe file, joined with this calibration, if it is kept.
     pub fn take(&mut self, stamp: &Stamp, calibration: &str) -> Option<Arc<Plan>> {
@@ -41,7 +35,8 @@ impl Shelf {
 
     /// Drops the least recently used plans until there is room for `bytes` more.
     pub fn make_room(&mut self, bytes: u64) {
-        let taken = |ready: &[Ready]| ready.iter().map(Ready::bytes).sum::<u64>();
+        let bytes_of = |ready: &Ready| ready.plan.bytes() as u64;
+        let taken = |ready: &[Ready]| ready.iter().map(bytes_of).sum::<u64>();
         while !self.ready.is_empty() && taken(&self.ready).saturating_add(bytes) > ROOM {
             self.ready.remove(0);
         }

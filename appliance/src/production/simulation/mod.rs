@@ -122,12 +122,6 @@ impl Placing {
     }
 }
 
-impl std::fmt::Debug for Placing {
-    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        out.write_str("Placing")
-    }
-}
-
 fn taken(waiting: &Mutex<Option<Staged>>) -> Option<Staged> {
     let mut waiting = waiting.lock().unwrap_or_else(PoisonError::into_inner);
     waiting.take()
