@@ -1,8 +1,8 @@
-//! From a snapshot to the 16-bit words of each block.
+//! From a snapshot to the 16-bit words of each block. Which value a register has is in the table of [`map`].
 
-use super::map::{self, Block, at};
+use super::map::{self, Block};
 use crate::config::WordOrder;
-use crate::station::{GaugeValue, Health, ResultRecord, Snapshot};
+use crate::station::{Decision, GaugeValue, MAX_GAUGES, ResultRecord, Snapshot};
 use std::sync::Arc;
 
 /// `i32` of a missing value.
@@ -17,252 +17,154 @@ pub const UNKNOWN_U16: u16 = 0xFFFF;
 pub const MAGIC: u32 = 0x4652_4E47;
 
 /// The words of one block, addressed as in the map.
-struct Words {
+pub(super) struct Words {
     first: u16,
     words: Vec<u16>,
     order: WordOrder,
 }
 
 impl Words {
-    fn of(block: &Block, order: WordOrder) -> Self {
-        let count = usize::from(block.last - block.first) + 1;
-        Self {
-            first: block.first,
-            words: vec![0; count],
-            order,
-        }
+    /// Puts the value of a row at its address.
+    pub(super) fn put(&mut self, address: u16, value: impl Item) {
+        value.put(self, address);
     }
+}
 
-    fn u16(&mut self, address: u16, word: u16) {
+/// A value of one or more registers.
+pub(super) trait Item {
+    fn put(self, words: &mut Words, address: u16);
+}
+
+impl Item for u16 {
+    fn put(self, words: &mut Words, address: u16) {
         // Every address comes from the table, whose rows lie inside their block (tested there).
         if let Some(place) = address
-            .checked_sub(self.first)
-            .and_then(|k| self.words.get_mut(usize::from(k)))
+            .checked_sub(words.first)
+            .and_then(|k| words.words.get_mut(usize::from(k)))
         {
-            *place = word;
+            *place = self;
         }
     }
+}
 
-    fn many<const N: usize>(&mut self, address: u16, mut words: [u16; N]) {
-        if self.order == WordOrder::Swapped {
-            words.reverse();
-        }
-        for (address, word) in (address..).zip(words) {
-            self.u16(address, word);
-        }
-    }
-
-    fn u32(&mut self, address: u16, value: u32) {
-        let [a, b, c, d] = value.to_be_bytes();
-        self.many(
+impl Item for u32 {
+    fn put(self, words: &mut Words, address: u16) {
+        let (high, low) = ((self >> 16) as u16, self as u16);
+        words.put(
             address,
-            [u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d])],
+            match words.order {
+                WordOrder::Normal => [high, low],
+                WordOrder::Swapped => [low, high],
+            },
         );
     }
+}
 
-    fn u64(&mut self, address: u16, value: u64) {
-        let [a, b, c, d, e, f, g, h] = value.to_be_bytes();
-        self.many(
+impl Item for u64 {
+    fn put(self, words: &mut Words, address: u16) {
+        let (high, low) = ((self >> 32) as u32, self as u32);
+        words.put(
             address,
-            [[a, b], [c, d], [e, f], [g, h]].map(u16::from_be_bytes),
+            match words.order {
+                WordOrder::Normal => [high, low],
+                WordOrder::Swapped => [low, high],
+            },
         );
     }
+}
 
-    fn bytes(&mut self, address: u16, bytes: &[u8]) {
-        for (address, pair) in (address..).zip(bytes.chunks(2)) {
-            let low = pair.get(1).copied().unwrap_or(0);
-            self.u16(
-                address,
-                u16::from_be_bytes([pair.first().copied().unwrap_or(0), low]),
-            );
+impl<T: Item, const N: usize> Item for [T; N] {
+    fn put(self, words: &mut Words, address: u16) {
+        for (address, item) in (address..).step_by(size_of::<T>() / 2).zip(self) {
+            words.put(address, item);
         }
     }
+}
 
+impl Item for &[u8] {
+    fn put(self, words: &mut Words, address: u16) {
+        let pairs = self.chunks(2);
+        for (address, pair) in (address..).zip(pairs) {
+            let byte = |k| u16::from(pair.get(k).copied().unwrap_or(0));
+            words.put(address, byte(0) << 8 | byte(1));
+        }
+    }
+}
+
+impl Item for &str {
     /// At most 32 characters, NUL padded; characters that are not ASCII become `?`.
-    fn ascii32(&mut self, address: u16, text: &str) {
-        let ascii: Vec<u8> = text
+    fn put(self, words: &mut Words, address: u16) {
+        let ascii: Vec<u8> = self
             .chars()
             .take(32)
             .map(|c| u8::try_from(c).ok().filter(u8::is_ascii).unwrap_or(b'?'))
             .collect();
-        self.bytes(address, &ascii);
+        words.put(address, &*ascii);
     }
 }
 
 /// The words of a block, `block.last - block.first + 1` of them; zeros for a block that is not served.
 pub fn block_words(snapshot: &Snapshot, block: &Block, order: WordOrder) -> Vec<u16> {
-    let mut words = Words::of(block, order);
+    let mut words = Words {
+        first: block.first,
+        words: vec![0; usize::from(block.last - block.first) + 1],
+        order,
+    };
     // Without a result the block shows an empty one, all of whose gauges are invalid.
     let shown = |record: &Option<Arc<ResultRecord>>| record.clone().unwrap_or_default();
     match *block {
-        map::CONTROL => control(&mut words, snapshot),
-        map::STATUS => status(&mut words, snapshot),
-        map::RESULT => result(&mut words, &shown(&snapshot.result)),
+        map::CONTROL => map::control(&mut words, snapshot),
+        map::STATUS => map::status(&mut words, snapshot),
+        map::RESULT => map::result(&mut words, &shown(&snapshot.result)),
         map::OLDEST => {
             // The same layout: written at RESULT's addresses, read at its own.
             words.first = map::RESULT.first;
-            result(&mut words, &shown(&snapshot.oldest));
+            map::result(&mut words, &shown(&snapshot.oldest));
         }
-        map::GAUGE_DETAIL => gauge_detail(&mut words, &shown(&snapshot.result)),
-        map::HEALTH => health(&mut words, &snapshot.health),
-        map::RECIPE_DIRECTORY => recipe_directory(&mut words, &snapshot.health.system.recipes),
-        map::IDENTITY => {
-            words.u32(at::identity::MAGIC, MAGIC);
-            words.ascii32(at::identity::SERIAL, &snapshot.identity.serial);
-            words.ascii32(at::identity::VERSION, &snapshot.identity.version);
-            words.u32(at::identity::TEST_U32, 0x1234_5678);
-            words.u32(at::identity::TEST_F32, 123.456_f32.to_bits());
-        }
+        map::GAUGE_DETAIL => map::gauge_detail(&mut words, &shown(&snapshot.result)),
+        map::HEALTH => map::health(&mut words, snapshot),
+        map::RECIPE_DIRECTORY => map::recipe_directory(&mut words, snapshot),
+        map::IDENTITY => map::identity(&mut words, snapshot),
         _ => {}
     }
     words.words
 }
 
-fn control(words: &mut Words, snapshot: &Snapshot) {
-    let control = &snapshot.control;
-    words.u16(at::control::CONTROL, control.control);
-    words.u16(at::control::TRIGGER_TOKEN, control.token);
-    words.u16(at::control::RECIPE_SELECT, control.recipe_select);
-    words.u16(at::control::PLC_HEARTBEAT, control.plc_heartbeat);
-    words.u32(at::control::PART_ID, control.part_id);
-    words.u32(at::control::PRESS_STROKE, control.press_stroke);
-    words.bytes(at::control::PART_NUMBER, &control.part_number);
+/// The item of each gauge of a result, and `missing` where there is no gauge.
+pub(super) fn gauges<T: Copy>(
+    record: &ResultRecord,
+    missing: T,
+    item: impl Fn(&GaugeValue) -> T,
+) -> [T; MAX_GAUGES] {
+    let gauges = &record.inspection.gauges;
+    std::array::from_fn(|k| gauges.get(k).map_or(missing, &item))
 }
 
-fn status(words: &mut Words, snapshot: &Snapshot) {
-    use at::status as a;
-    words.u16(a::STATUS, snapshot.status);
-    words.u16(a::HEARTBEAT, snapshot.heartbeat);
-    words.u16(a::ERROR_CODE, snapshot.error_code);
-    words.u16(a::WARNING, snapshot.warnings);
-    words.u16(a::STATE, snapshot.state);
-    words.u16(a::ACTIVE_RECIPE, snapshot.active().unwrap_or(0));
-    words.u32(
-        a::RECIPE_CRC32,
-        snapshot.recipe.as_ref().map_or(0, |recipe| recipe.crc),
-    );
-    words.u16(a::REQUESTED_RECIPE, snapshot.requested_recipe);
-    words.u16(a::RECIPE_RESULT, snapshot.recipe_result.number());
-    words.u32(a::TRIGGERS, snapshot.triggers);
-    words.u32(a::RESULT_SEQ, snapshot.result_seq);
-    words.u32(a::MISSED, snapshot.missed);
-    words.u16(a::LAST_TOKEN, snapshot.last_token);
-    words.u16(a::BUFFERED, snapshot.buffered);
-    words.u32(a::UPTIME, snapshot.uptime_s);
-    words.u16(a::REJECT_REASON, snapshot.reject_reason);
-    words.u16(a::MAP_VERSION, map::VERSION);
-    words.u32(a::BOOT_ID, snapshot.boot_id);
+/// The bits of the gauges for which `set` is true: gauge k is bit k.
+pub(super) fn mask(record: &ResultRecord, set: impl Fn(&Decision) -> bool) -> u32 {
+    let bits = gauges(record, 0, |gauge| u32::from(set(&gauge.decision)));
+    bits.iter().rev().fold(0, |mask, bit| mask << 1 | bit)
 }
 
-fn result(words: &mut Words, record: &ResultRecord) {
-    use at::result as a;
-    let found = &record.inspection;
-    let mask = |set: fn(&GaugeValue) -> bool| {
-        found
-            .gauges
-            .iter()
-            .enumerate()
-            .fold(0, |mask, (k, gauge)| mask | (u32::from(set(gauge)) << k))
-    };
-    words.u32(a::SEQ, record.seq);
-    words.u16(a::TOKEN, record.token);
-    words.u16(a::RECIPE, record.recipe);
-    words.u32(a::RECIPE_CRC32, record.recipe_crc);
-    words.u32(a::PART_ID, record.part_id);
-    words.u16(a::VERDICT, record.verdict.number());
-    words.u16(a::ERROR_CODE, record.error_code);
-    words.u32(
-        a::PASS,
-        mask(|gauge| gauge.decision.pass && gauge.decision.valid),
-    );
-    words.u32(a::VALID, mask(|gauge| gauge.decision.valid));
-    words.u64(a::TIME, record.time_utc_us);
-    words.u32(a::EXPOSURE_TIME, record.exposure_us);
-    words.u32(a::TOTAL_TIME, record.total_us);
-    words.u32(a::VALID_POINTS, found.valid_points);
-    words.u16(a::COVERAGE, found.coverage_permille);
-    words.u16(a::TEMPERATURE, tenths(found.temperature_c));
-    words.u16(
-        a::HEIGHT_NOISE,
-        saturated_u16(found.height_noise_mm * 10_000.0),
-    );
-    words.u16(
-        a::GAUGE_COUNT,
-        u16::try_from(found.gauges.len()).unwrap_or(u16::MAX),
-    );
-    words.u32(a::PRESS_STROKE, record.press_stroke);
-    words.u16(a::FITNESS, found.fitness_permille);
-    words.u16(a::FLAGS, record.flags());
-    for k in 0..map::GAUGES {
-        let gauge = found.gauges.get(usize::from(k));
-        // Shown only if it is valid: a number beside VALID = 0 would be taken for a measurement.
-        let value = gauge
-            .filter(|gauge| gauge.decision.valid)
-            .and_then(|gauge| gauge.value);
-        let steps = gauge.map_or(1.0, |gauge| gauge.unit.steps());
-        words.u32(a::GAUGE_STEPS + 2 * k, i32_steps(value, steps));
-        words.u32(a::GAUGE_VALUE + 2 * k, f32_bits(value));
-        words.u16(
-            a::GAUGE_DECISION + k,
-            gauge.map_or(0, |gauge| gauge.decision.bits()),
-        );
+/// A number of a gauge, only if the gauge is valid: a number beside VALID = 0 would be taken for a measurement.
+pub(super) fn measured(gauge: &GaugeValue, number: Option<f64>) -> Option<f64> {
+    number.filter(|_| gauge.decision.valid)
+}
+
+/// The bits of the stored recipes that the directory has room for.
+pub(super) fn stored(recipes: &[u16]) -> [u16; 64] {
+    let mut words = [0; 64];
+    for recipe in recipes {
+        let bit = recipe.wrapping_sub(1);
+        if let Some(word) = words.get_mut(usize::from(bit / 16)) {
+            *word |= 1 << (bit % 16);
+        }
     }
-    words.u32(a::SEQ_AGAIN, record.seq);
-}
-
-fn gauge_detail(words: &mut Words, record: &ResultRecord) {
-    use at::gauge_detail as a;
-    words.u32(a::SEQ, record.seq);
-    for k in 0..map::GAUGES {
-        let gauge = record.inspection.gauges.get(usize::from(k));
-        let sigma = gauge
-            .filter(|gauge| gauge.decision.valid)
-            .and_then(|gauge| gauge.sigma);
-        words.u32(a::GAUGE_SIGMA + 2 * k, f32_bits(sigma));
-        words.u16(
-            a::GAUGE_UNIT + k,
-            gauge.map_or(0, |gauge| gauge.unit.number()),
-        );
-    }
-    words.u32(a::SEQ_AGAIN, record.seq);
-}
-
-fn health(words: &mut Words, health: &Health) {
-    use at::health as a;
-    let (pace, system) = (&health.pace, &health.system);
-    let lag = i32::try_from(pace.lag_us).unwrap_or(i32::MAX);
-    words.u32(a::CAMERA_FPS, pace.camera_centihertz);
-    words.u32(a::PROJECTOR_REFRESH, pace.refresh_millihertz);
-    words.u32(a::SYNC_ERROR, lag.cast_unsigned());
-    words.u32(a::DROPPED_FRAMES, pace.dropped);
-    words.u32(a::MISSED_FLIPS, pace.missed_flips);
-    words.u32(a::PROCESSING_TIME, health.processing_us);
-    words.u32(a::PROCESSING_TIME_MAX, health.processing_max_us);
-    words.u32(a::STORAGE_ERRORS, health.storage_errors);
-    words.u32(a::BOOTS, system.boots);
-    words.u32(a::UNCLEAN_BOOTS, system.unclean_boots);
-    words.u32(a::WATCHDOG_RESTARTS, system.watchdog_restarts);
-    words.u16(a::CPU_LOAD, known(system.cpu_percent.map(u64::from)));
-    words.u16(a::FREE_MEMORY, known(system.free_memory_mib));
-    words.u16(a::FREE_STORAGE, known(system.free_storage_mib));
-    words.u16(a::CPU_TEMPERATURE, tenths(system.cpu_temperature_c));
-    // No head of this version has a thermometer.
-    words.u16(a::CAMERA_TEMPERATURE, UNKNOWN_I16);
-    words.u16(a::PROJECTOR_TEMPERATURE, UNKNOWN_I16);
-    words.u16(a::MODBUS_CLIENTS, system.clients);
-    words.u16(a::WRITER_CONNECTED, u16::from(system.writer_connected));
-}
-
-fn recipe_directory(words: &mut Words, stored: &[u16]) {
-    let first = at::recipe_directory::STORED_RECIPES;
-    for register in 0..=map::RECIPE_DIRECTORY.last - map::RECIPE_DIRECTORY.first {
-        let bits = (0..16).filter(|bit| stored.binary_search(&(16 * register + bit + 1)).is_ok());
-        words.u16(first + register, bits.fold(0, |word, bit| word | 1 << bit));
-    }
+    words
 }
 
 /// A number, saturated below the value that means "not known".
-fn known(value: Option<u64>) -> u16 {
+pub(super) fn known(value: Option<u64>) -> u16 {
     let most = UNKNOWN_U16 - 1;
     value.map_or(UNKNOWN_U16, |value| {
         u16::try_from(value).unwrap_or(most).min(most)
@@ -287,7 +189,7 @@ pub fn f32_bits(value: Option<f64>) -> u32 {
         .map_or(INVALID_F32, |value| (value as f32).to_bits())
 }
 
-fn tenths(celsius: Option<f64>) -> u16 {
+pub(super) fn tenths(celsius: Option<f64>) -> u16 {
     celsius
         .filter(|value| value.is_finite())
         .map_or(UNKNOWN_I16, |value| {
@@ -296,7 +198,7 @@ fn tenths(celsius: Option<f64>) -> u16 {
         })
 }
 
-fn saturated_u16(value: f64) -> u16 {
+pub(super) fn saturated_u16(value: f64) -> u16 {
     // The cast turns NaN into 0 and saturates everything else.
     value.round() as u16
 }

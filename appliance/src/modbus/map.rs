@@ -1,9 +1,13 @@
 //! The register map, version 1.1: one table, append-only, from which everything else is derived.
 
+use super::encode::{
+    INVALID_F32, INVALID_I32, MAGIC, UNKNOWN_I16, Words, f32_bits, gauges, i32_steps, known, mask,
+    measured, saturated_u16, stored, tenths,
+};
+use crate::station::{ResultRecord, Snapshot};
+
 /// MAP_VERSION, register 121.
 pub const VERSION: u16 = 0x0101;
-/// The most gauges of one result.
-pub const GAUGES: u16 = 16;
 
 /// How a register's words are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,165 +92,156 @@ impl Register {
     }
 }
 
-/// Declares each row once, as the constant with its address and as the line of the table.
+/// Declares each block once, with its addresses and whether it can be written, and each row once: address, name, type, number of
+/// items, value, meaning. The values come from the snapshot or from the result that the block shows.
 macro_rules! registers {
-    ($($module:ident $table:ident { $($address:literal $name:ident $kind:ident x $items:literal, $meaning:literal;)* })*) => {
-        /// The addresses by block and name.
+    ($($module:ident $block:ident $first:literal..=$last:literal, $writable:literal, $shown:ident: $from:ty {
+        $($address:literal $name:ident $kind:ident x $items:literal = $value:expr, $meaning:literal;)*
+    })*) => {
+        /// The addresses by block and name, and the rows of each block.
         pub mod at {
             $(
-                /// Addresses of one block.
+                /// One block.
                 pub mod $module {
+                    use super::super::{Kind, Register};
                     $(#[doc = $meaning] pub const $name: u16 = $address;)*
+                    /// The rows by address.
+                    pub const ROWS: &[Register] = &[
+                        $(Register { address: $address, name: stringify!($name), kind: Kind::$kind, items: $items, meaning: $meaning },)*
+                    ];
                 }
             )*
         }
         $(
-            #[doc = concat!("The rows of block `", stringify!($module), "`.")]
-            pub const $table: &[Register] = &[
-                $(Register { address: $address, name: stringify!($name), kind: Kind::$kind, items: $items, meaning: $meaning },)*
-            ];
+            #[doc = concat!("Block ", stringify!($block), ".")]
+            pub const $block: Block = Block {
+                name: stringify!($block),
+                first: $first,
+                last: $last,
+                writable: $writable,
+                served: true,
+            };
+            pub(super) fn $module(words: &mut Words, $shown: &$from) {
+                $(words.put($address, $value);)*
+            }
         )*
     };
 }
 
 registers! {
-    control CONTROL_ROWS {
-        0 CONTROL Bits x 1, "0 ONLINE request, 1 TRIGGER edge, 2 RESULT_ACK edge, 3 RECIPE_LOAD edge, 4 ERROR_RESET edge, 5 ABORT edge, 6 BUFFERED mode, 7 TEACH edge, 8-15 must be 0";
-        1 TRIGGER_TOKEN U16 x 1, "a write that changes it to a non-zero value triggers; echoed at 116 and 202";
-        2 RECIPE_SELECT U16 x 1, "1-9999; 0 leave the recipe; 65535 select by PART_NUMBER; a trigger is accepted only if it is the active recipe, or 0";
-        3 PLC_HEARTBEAT U16 x 1, "any changing value; stale for longer than plc_timeout sets a warning bit";
-        4 PART_ID U32 x 1, "the piece's serial, latched at the trigger, returned with the result";
-        6 PRESS_STROKE U32 x 1, "stroke or pallet counter, latched at the trigger, returned with the result";
-        8 PART_NUMBER Ascii x 16, "recipe key, 32 characters";
+    control CONTROL 0..=31, true, now: Snapshot {
+        0 CONTROL Bits x 1 = now.control.control, "0 ONLINE request, 1 TRIGGER edge, 2 RESULT_ACK edge, 3 RECIPE_LOAD edge, 4 ERROR_RESET edge, 5 ABORT edge, 6 BUFFERED mode, 7 TEACH edge, 8-15 must be 0";
+        1 TRIGGER_TOKEN U16 x 1 = now.control.token, "a write that changes it to a non-zero value triggers; echoed at 116 and 202";
+        2 RECIPE_SELECT U16 x 1 = now.control.recipe_select, "1-9999; 0 leave the recipe; 65535 select by PART_NUMBER; a trigger is accepted only if it is the active recipe, or 0";
+        3 PLC_HEARTBEAT U16 x 1 = now.control.plc_heartbeat, "any changing value; stale for longer than plc_timeout sets a warning bit";
+        4 PART_ID U32 x 1 = now.control.part_id, "the piece's serial, latched at the trigger, returned with the result";
+        6 PRESS_STROKE U32 x 1 = now.control.press_stroke, "stroke or pallet counter, latched at the trigger, returned with the result";
+        8 PART_NUMBER Ascii x 16 = &now.control.part_number[..], "recipe key, 32 characters";
     }
-    status STATUS_ROWS {
-        100 STATUS Bits x 1, "0 ONLINE, 1 READY, 2 BUSY, 3 PROCESSING, 4 EXPOSURE_DONE, 5 RESULT_VALID, 6 RESULT_TOGGLE, 7 TRIGGER_ACK, 8 RECIPE_LOADING, 9 RECIPE_OK, 10 WARNING, 11 ERROR, 12 MISSED_TRIGGER, 13 BUFFER_OVERFLOW, 14 WARMING_UP, 15 CALIBRATION_VALID";
-        101 HEARTBEAT U16 x 1, "+1 every 100 ms as long as the measuring task meets its deadlines";
-        102 ERROR_CODE U16 x 1, "0 none, 1xx camera, 2xx projector, 3xx sync, 4xx recipe, 5xx calibration, 6xx storage, 7xx thermal, 8xx internal";
-        103 WARNING Bits x 1, "0 temperature, 1 storage, 2 plc_lost, 3 clock_unsynced, 4 low_light, 5 saturation, 6 pattern_unfit, 7 frame_slip";
-        104 STATE U16 x 1, "0 boot, 1 ready, 2 acquiring, 3 processing, 4 loading, 5 teaching, 6 offline, 7 fault, 8 stopping";
-        105 ACTIVE_RECIPE U16 x 1, "number of the active recipe, 0 none";
-        106 RECIPE_CRC32 U32 x 1, "first 32 bits of the active recipe's fingerprint";
-        108 REQUESTED_RECIPE U16 x 1, "number of the last requested recipe";
-        109 RECIPE_RESULT U16 x 1, "0 ok, 1 unknown, 2 corrupt, 3 made for another calibration, 4 busy";
-        110 TRIGGERS U32 x 1, "accepted triggers since the start";
-        112 RESULT_SEQ U32 x 1, "last completed result; continues across restarts";
-        114 MISSED U32 x 1, "rejected triggers since the start";
-        116 LAST_TOKEN U16 x 1, "last accepted token";
-        117 BUFFERED U16 x 1, "results waiting for RESULT_ACK";
-        118 UPTIME U32 x 1, "s";
-        120 REJECT_REASON U16 x 1, "of the last rejected request: 1 not ready, 2 offline, 3 no recipe, 4 teach not allowed, 5 fault, 6 another recipe is active";
-        121 MAP_VERSION U16 x 1, "0x0101";
-        122 BOOT_ID U32 x 1, "random per start: tokens and counters restarted";
+    status STATUS 100..=131, false, now: Snapshot {
+        100 STATUS Bits x 1 = now.status, "0 ONLINE, 1 READY, 2 BUSY, 3 PROCESSING, 4 EXPOSURE_DONE, 5 RESULT_VALID, 6 RESULT_TOGGLE, 7 TRIGGER_ACK, 8 RECIPE_LOADING, 9 RECIPE_OK, 10 WARNING, 11 ERROR, 12 MISSED_TRIGGER, 13 BUFFER_OVERFLOW, 14 WARMING_UP, 15 CALIBRATION_VALID";
+        101 HEARTBEAT U16 x 1 = now.heartbeat, "+1 every 100 ms as long as the measuring task meets its deadlines";
+        102 ERROR_CODE U16 x 1 = now.error_code, "0 none, 1xx camera, 2xx projector, 3xx sync, 4xx recipe, 5xx calibration, 6xx storage, 7xx thermal, 8xx internal";
+        103 WARNING Bits x 1 = now.warnings, "0 temperature, 1 storage, 2 plc_lost, 3 clock_unsynced, 4 low_light, 5 saturation, 6 pattern_unfit, 7 frame_slip";
+        104 STATE U16 x 1 = now.state, "0 boot, 1 ready, 2 acquiring, 3 processing, 4 loading, 5 teaching, 6 offline, 7 fault, 8 stopping";
+        105 ACTIVE_RECIPE U16 x 1 = now.active().unwrap_or(0), "number of the active recipe, 0 none";
+        106 RECIPE_CRC32 U32 x 1 = now.recipe.as_ref().map_or(0, |recipe| recipe.crc), "first 32 bits of the active recipe's fingerprint";
+        108 REQUESTED_RECIPE U16 x 1 = now.requested_recipe, "number of the last requested recipe";
+        109 RECIPE_RESULT U16 x 1 = now.recipe_result.number(), "0 ok, 1 unknown, 2 corrupt, 3 made for another calibration, 4 busy";
+        110 TRIGGERS U32 x 1 = now.triggers, "accepted triggers since the start";
+        112 RESULT_SEQ U32 x 1 = now.result_seq, "last completed result; continues across restarts";
+        114 MISSED U32 x 1 = now.missed, "rejected triggers since the start";
+        116 LAST_TOKEN U16 x 1 = now.last_token, "last accepted token";
+        117 BUFFERED U16 x 1 = now.buffered, "results waiting for RESULT_ACK";
+        118 UPTIME U32 x 1 = now.uptime_s, "s";
+        120 REJECT_REASON U16 x 1 = now.reject_reason, "of the last rejected request: 1 not ready, 2 offline, 3 no recipe, 4 teach not allowed, 5 fault, 6 another recipe is active";
+        121 MAP_VERSION U16 x 1 = VERSION, "0x0101";
+        122 BOOT_ID U32 x 1 = now.boot_id, "random per start: tokens and counters restarted";
     }
-    result RESULT_ROWS {
-        200 SEQ U32 x 1, "number of this result";
-        202 TOKEN U16 x 1, "token that triggered, 0 for an edge";
-        203 RECIPE U16 x 1, "recipe number";
-        204 RECIPE_CRC32 U32 x 1, "first 32 bits of the recipe's fingerprint";
-        206 PART_ID U32 x 1, "as latched at the trigger";
-        208 VERDICT U16 x 1, "0 none, 1 PASS, 2 FAIL, 3 INVALID";
-        209 ERROR_CODE U16 x 1, "of this result, 0 none";
-        210 PASS U32 x 1, "bits, gauge k = bit k";
-        212 VALID U32 x 1, "bits, gauge k = bit k";
-        214 TIME U64 x 1, "us since 1970 UTC of the trigger, 0 if the clock is not synchronised";
-        218 EXPOSURE_TIME U32 x 1, "us, trigger to exposure done";
-        220 TOTAL_TIME U32 x 1, "us, trigger to result";
-        222 VALID_POINTS U32 x 1, "resolved pixels";
-        224 COVERAGE U16 x 1, "per mille of the regions";
-        225 TEMPERATURE I16 x 1, "head, 0.1 degC, 0x8000 not known";
-        226 HEIGHT_NOISE U16 x 1, "0.1 um, 1 sigma, from the measured modulation";
-        227 GAUGE_COUNT U16 x 1, "0-16";
-        228 PRESS_STROKE U32 x 1, "as latched at the trigger";
-        230 FITNESS U16 x 1, "per mille, 1000 = pattern as taught";
-        231 FLAGS Bits x 1, "0 a pattern was retried, 1 single level used, 2 two levels used, 3 full sequence used, 4 stepped up from a shorter one, 5 simulated head, 6 warm-up, 7 at least one doubtful decision";
-        232 GAUGE_STEPS I32 x 16, "value in the unit's step: length 0.1 um, angle 0.0001 deg, volume 0.01 mm3, share 0.1 per mille; saturates at +-(2^31-1), 0x80000000 invalid";
-        264 GAUGE_VALUE F32 x 16, "the same in mm, deg, mm3, share 0-1; NaN (0x7FC00000) invalid";
-        296 GAUGE_DECISION Bits x 16, "0 pass, 1 valid, 2 low, 3 high, 4 doubtful (a limit lies within 2 sigma)";
-        318 SEQ_AGAIN U32 x 1, "equals SEQ unless two reads were mixed";
+    result RESULT 200..=319, false, record: ResultRecord {
+        200 SEQ U32 x 1 = record.seq, "number of this result";
+        202 TOKEN U16 x 1 = record.token, "token that triggered, 0 for an edge";
+        203 RECIPE U16 x 1 = record.recipe, "recipe number";
+        204 RECIPE_CRC32 U32 x 1 = record.recipe_crc, "first 32 bits of the recipe's fingerprint";
+        206 PART_ID U32 x 1 = record.part_id, "as latched at the trigger";
+        208 VERDICT U16 x 1 = record.verdict.number(), "0 none, 1 PASS, 2 FAIL, 3 INVALID";
+        209 ERROR_CODE U16 x 1 = record.error_code, "of this result, 0 none";
+        210 PASS U32 x 1 = mask(record, |decision| decision.pass && decision.valid), "bits, gauge k = bit k";
+        212 VALID U32 x 1 = mask(record, |decision| decision.valid), "bits, gauge k = bit k";
+        214 TIME U64 x 1 = record.time_utc_us, "us since 1970 UTC of the trigger, 0 if the clock is not synchronised";
+        218 EXPOSURE_TIME U32 x 1 = record.exposure_us, "us, trigger to exposure done";
+        220 TOTAL_TIME U32 x 1 = record.total_us, "us, trigger to result";
+        222 VALID_POINTS U32 x 1 = record.inspection.valid_points, "resolved pixels";
+        224 COVERAGE U16 x 1 = record.inspection.coverage_permille, "per mille of the regions";
+        225 TEMPERATURE I16 x 1 = tenths(record.inspection.temperature_c), "head, 0.1 degC, 0x8000 not known";
+        226 HEIGHT_NOISE U16 x 1 = saturated_u16(record.inspection.height_noise_mm * 10_000.0), "0.1 um, 1 sigma, from the measured modulation";
+        227 GAUGE_COUNT U16 x 1 = record.inspection.gauges.len() as u16, "0-16";
+        228 PRESS_STROKE U32 x 1 = record.press_stroke, "as latched at the trigger";
+        230 FITNESS U16 x 1 = record.inspection.fitness_permille, "per mille, 1000 = pattern as taught";
+        231 FLAGS Bits x 1 = record.flags(), "0 a pattern was retried, 1 single level used, 2 two levels used, 3 full sequence used, 4 stepped up from a shorter one, 5 simulated head, 6 warm-up, 7 at least one doubtful decision";
+        232 GAUGE_STEPS I32 x 16 = gauges(record, INVALID_I32, |gauge| i32_steps(measured(gauge, gauge.value), gauge.unit.steps())), "value in the unit's step: length 0.1 um, angle 0.0001 deg, volume 0.01 mm3, share 0.1 per mille; saturates at +-(2^31-1), 0x80000000 invalid";
+        264 GAUGE_VALUE F32 x 16 = gauges(record, INVALID_F32, |gauge| f32_bits(measured(gauge, gauge.value))), "the same in mm, deg, mm3, share 0-1; NaN (0x7FC00000) invalid";
+        296 GAUGE_DECISION Bits x 16 = gauges(record, 0, |gauge| gauge.decision.bits()), "0 pass, 1 valid, 2 low, 3 high, 4 doubtful (a limit lies within 2 sigma)";
+        318 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
     }
-    gauge_detail GAUGE_DETAIL_ROWS {
-        520 SEQ U32 x 1, "number of the result";
-        522 GAUGE_SIGMA F32 x 16, "1 sigma of each gauge, in mm, deg, mm3, share 0-1; NaN (0x7FC00000) not known";
-        554 GAUGE_UNIT U16 x 16, "0 none, 1 length, 2 angle, 3 volume, 4 share";
-        582 SEQ_AGAIN U32 x 1, "equals SEQ unless two reads were mixed";
+    gauge_detail GAUGE_DETAIL 520..=583, false, record: ResultRecord {
+        520 SEQ U32 x 1 = record.seq, "number of the result";
+        522 GAUGE_SIGMA F32 x 16 = gauges(record, INVALID_F32, |gauge| f32_bits(measured(gauge, gauge.sigma))), "1 sigma of each gauge, in mm, deg, mm3, share 0-1; NaN (0x7FC00000) not known";
+        554 GAUGE_UNIT U16 x 16 = gauges(record, 0, |gauge| gauge.unit.number()), "0 none, 1 length, 2 angle, 3 volume, 4 share";
+        582 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
     }
-    health HEALTH_ROWS {
-        600 CAMERA_FPS U32 x 1, "frames per second x 100, last sequence";
-        602 PROJECTOR_REFRESH U32 x 1, "mHz";
-        604 SYNC_ERROR I32 x 1, "us, longest time in the last sequence from a pattern in view to its exposure";
-        606 DROPPED_FRAMES U32 x 1, "since the start";
-        608 MISSED_FLIPS U32 x 1, "since the start";
-        610 PROCESSING_TIME U32 x 1, "us, last cycle";
-        612 PROCESSING_TIME_MAX U32 x 1, "us, since the start";
-        614 STORAGE_ERRORS U32 x 1, "write errors";
-        616 BOOTS U32 x 1, "starts";
-        618 UNCLEAN_BOOTS U32 x 1, "starts after a crash or power loss";
-        620 WATCHDOG_RESTARTS U32 x 1, "unclean boots after the measuring task had missed its deadlines for 10 s: what a watchdog or a person then ended";
-        622 CPU_LOAD U16 x 1, "%, 65535 not known";
-        623 FREE_MEMORY U16 x 1, "MiB, saturating at 65534, 65535 not known";
-        624 FREE_STORAGE U16 x 1, "MiB, saturating at 65534, 65535 not known";
-        625 CPU_TEMPERATURE I16 x 1, "0.1 degC, 0x8000 not known";
-        626 CAMERA_TEMPERATURE I16 x 1, "0.1 degC, 0x8000 not known";
-        627 PROJECTOR_TEMPERATURE I16 x 1, "0.1 degC, 0x8000 not known";
-        628 MODBUS_CLIENTS U16 x 1, "open connections";
-        629 WRITER_CONNECTED U16 x 1, "1 if a client that may write is connected";
+    health HEALTH 600..=639, false, now: Snapshot {
+        600 CAMERA_FPS U32 x 1 = now.health.pace.camera_centihertz, "frames per second x 100, last sequence";
+        602 PROJECTOR_REFRESH U32 x 1 = now.health.pace.refresh_millihertz, "mHz";
+        604 SYNC_ERROR I32 x 1 = now.health.pace.lag_us.min(i32::MAX.cast_unsigned()), "us, longest time in the last sequence from a pattern in view to its exposure";
+        606 DROPPED_FRAMES U32 x 1 = now.health.pace.dropped, "since the start";
+        608 MISSED_FLIPS U32 x 1 = now.health.pace.missed_flips, "since the start";
+        610 PROCESSING_TIME U32 x 1 = now.health.processing_us, "us, last cycle";
+        612 PROCESSING_TIME_MAX U32 x 1 = now.health.processing_max_us, "us, since the start";
+        614 STORAGE_ERRORS U32 x 1 = now.health.storage_errors, "write errors";
+        616 BOOTS U32 x 1 = now.health.system.boots, "starts";
+        618 UNCLEAN_BOOTS U32 x 1 = now.health.system.unclean_boots, "starts after a crash or power loss";
+        620 WATCHDOG_RESTARTS U32 x 1 = now.health.system.watchdog_restarts, "unclean boots after the measuring task had missed its deadlines for 10 s: what a watchdog or a person then ended";
+        622 CPU_LOAD U16 x 1 = known(now.health.system.cpu_percent.map(u64::from)), "%, 65535 not known";
+        623 FREE_MEMORY U16 x 1 = known(now.health.system.free_memory_mib), "MiB, saturating at 65534, 65535 not known";
+        624 FREE_STORAGE U16 x 1 = known(now.health.system.free_storage_mib), "MiB, saturating at 65534, 65535 not known";
+        625 CPU_TEMPERATURE I16 x 1 = tenths(now.health.system.cpu_temperature_c), "0.1 degC, 0x8000 not known";
+        // No head of this version has a thermometer.
+        626 CAMERA_TEMPERATURE I16 x 1 = UNKNOWN_I16, "0.1 degC, 0x8000 not known";
+        627 PROJECTOR_TEMPERATURE I16 x 1 = UNKNOWN_I16, "0.1 degC, 0x8000 not known";
+        628 MODBUS_CLIENTS U16 x 1 = now.health.system.clients, "open connections";
+        629 WRITER_CONNECTED U16 x 1 = u16::from(now.health.system.writer_connected), "1 if a client that may write is connected";
     }
-    recipe_directory RECIPE_DIRECTORY_ROWS {
-        700 STORED_RECIPES Bits x 64, "recipe r in register 700 + (r - 1) / 16, bit (r - 1) mod 16, r = 1-1024";
+    recipe_directory RECIPE_DIRECTORY 700..=763, false, now: Snapshot {
+        700 STORED_RECIPES Bits x 64 = stored(&now.health.system.recipes), "recipe r in register 700 + (r - 1) / 16, bit (r - 1) mod 16, r = 1-1024";
     }
-    identity IDENTITY_ROWS {
-        900 MAGIC U32 x 1, "0x46524E47 (FRNG)";
-        902 SERIAL Ascii x 16, "32 characters";
-        918 VERSION Ascii x 16, "32 characters";
-        936 TEST_U32 U32 x 1, "0x12345678, word order test";
-        938 TEST_F32 F32 x 1, "123.456, word order test";
-    }
-}
-
-const fn read_only(name: &'static str, first: u16, last: u16, served: bool) -> Block {
-    Block {
-        name,
-        first,
-        last,
-        writable: false,
-        served,
+    identity IDENTITY 900..=939, false, now: Snapshot {
+        900 MAGIC U32 x 1 = MAGIC, "0x46524E47 (FRNG)";
+        902 SERIAL Ascii x 16 = &*now.identity.serial, "32 characters";
+        918 VERSION Ascii x 16 = &*now.identity.version, "32 characters";
+        936 TEST_U32 U32 x 1 = 0x1234_5678_u32, "0x12345678, word order test";
+        938 TEST_F32 F32 x 1 = 123.456_f32.to_bits(), "123.456, word order test";
     }
 }
 
-/// CONTROL, the only block that can be written.
-pub const CONTROL: Block = Block {
-    name: "CONTROL",
-    first: 0,
-    last: 31,
-    writable: true,
-    served: true,
+/// Block OLDEST: the layout of RESULT, with the oldest unacknowledged result.
+pub const OLDEST: Block = Block {
+    name: "OLDEST",
+    first: 400,
+    last: 519,
+    ..RESULT
 };
-/// STATUS.
-pub const STATUS: Block = read_only("STATUS", 100, 131, true);
-/// RESULT: the last result.
-pub const RESULT: Block = read_only("RESULT", 200, 319, true);
-/// OLDEST: the layout of RESULT, with the oldest unacknowledged result.
-pub const OLDEST: Block = read_only("OLDEST", 400, 519, true);
-/// Gauge detail.
-pub const GAUGE_DETAIL: Block = read_only("GAUGE_DETAIL", 520, 583, true);
-/// Health.
-pub const HEALTH: Block = read_only("HEALTH", 600, 639, true);
-/// Recipe directory.
-pub const RECIPE_DIRECTORY: Block = read_only("RECIPE_DIRECTORY", 700, 763, true);
-/// Identity.
-pub const IDENTITY: Block = read_only("IDENTITY", 900, 939, true);
 
 /// Every block with its rows, by address. OLDEST repeats the rows of RESULT, moved by [`Block::first`].
 pub const BLOCKS: [(Block, &[Register]); 8] = [
-    (CONTROL, CONTROL_ROWS),
-    (STATUS, STATUS_ROWS),
-    (RESULT, RESULT_ROWS),
-    (OLDEST, RESULT_ROWS),
-    (GAUGE_DETAIL, GAUGE_DETAIL_ROWS),
-    (HEALTH, HEALTH_ROWS),
-    (RECIPE_DIRECTORY, RECIPE_DIRECTORY_ROWS),
-    (IDENTITY, IDENTITY_ROWS),
+    (CONTROL, at::control::ROWS),
+    (STATUS, at::status::ROWS),
+    (RESULT, at::result::ROWS),
+    (OLDEST, at::result::ROWS),
+    (GAUGE_DETAIL, at::gauge_detail::ROWS),
+    (HEALTH, at::health::ROWS),
+    (RECIPE_DIRECTORY, at::recipe_directory::ROWS),
+    (IDENTITY, at::identity::ROWS),
 ];
 
 /// Every row of the map with its address and block.
