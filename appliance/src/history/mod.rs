@@ -38,7 +38,7 @@ mod tests;
 
 pub use entry::{Entry, Filter, GaugeEntry, PlacementEntry, StageEntry, difference};
 pub use handle::{History, open};
-pub use reader::{Counts, Reader, Trend, TrendPoint};
+pub use reader::{Reader, Trend, TrendPoint};
 pub use recordings::{JudgedPart, RECIPE, name_of, seq_of};
 pub use seqs::Numbering;
 pub use task::Task;

@@ -2,7 +2,7 @@
 
 use super::entry::{Entry, Filter, GaugeEntry, verdict_of};
 use super::{HistoryError, schema};
-use crate::station::Verdict;
+use crate::station::Counts;
 use rusqlite::types::Value;
 use rusqlite::{Connection, OptionalExtension as _, Params, Row, params_from_iter};
 use serde::Serialize;
@@ -19,17 +19,6 @@ const BATCH: usize = 256;
 pub struct Reader {
     path: PathBuf,
     recordings: PathBuf,
-}
-
-/// How many results there are of each verdict.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Counts {
-    /// PASS.
-    pub pass: u64,
-    /// FAIL.
-    pub fail: u64,
-    /// INVALID.
-    pub invalid: u64,
 }
 
 /// The last values of one gauge.
@@ -196,17 +185,11 @@ impl Reader {
                 Ok((row.get(0)?, row.get(1)?))
             })
         })?;
-        let of = |verdict: Verdict| {
-            let found = counted
-                .iter()
-                .find(|(number, _)| *number == verdict.number());
-            found.map_or(0, |(_, count)| *count)
-        };
-        Ok(Counts {
-            pass: of(Verdict::Pass),
-            fail: of(Verdict::Fail),
-            invalid: of(Verdict::Invalid),
-        })
+        let mut counts = Counts::default();
+        for (number, count) in counted {
+            counts.add(verdict_of(number), count);
+        }
+        Ok(counts)
     }
 
     /// How many results a filter by time leaves out because it is not known when they were; 0 for one that asks for no time.

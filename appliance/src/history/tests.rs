@@ -3,8 +3,8 @@
 use super::*;
 use crate::station::snapshot::warning;
 use crate::station::{
-    Effect, Identity, Inspection, Limits, Micros, ResultRecord, Settings, Station, StationHandle,
-    Verdict,
+    Counts, Effect, Identity, Inspection, Limits, Micros, ResultRecord, Settings, Station,
+    StationHandle, Verdict,
 };
 use crate::storage::state::StateFolder;
 use std::path::Path;

@@ -25,7 +25,6 @@ use crate::production::shelf::Shelf;
 use crate::production::simulation::Simulation;
 use crate::production::{Aborts, Order, Worker};
 use crate::service::survey::Survey;
-use crate::station::tally::Tally;
 use crate::station::{
     Effect, Event, Identity, Limits, Micros, RecipeKey, Request, Settings, Station, StationHandle,
 };
@@ -121,14 +120,12 @@ impl Daemon {
         if let Some(complaint) = complaint {
             progress.warn(&complaint);
         }
-        let tally = Tally::default();
         let aborts = Aborts::default();
         let sink = effects(
             orders.clone(),
             aborts.clone(),
             history.clone(),
             progress.clone(),
-            tally.clone(),
         );
         let settings = station(config, &state, next_seq)?;
         let station = StationHandle::new(settings, Instant::now(), sink);
@@ -163,7 +160,6 @@ impl Daemon {
                 simulation: simulation.clone(),
                 history: Reader::of(&path),
                 date: Box::new(move |utc_us| dating.date(boot_id, utc_us)),
-                tally,
                 log: progress.logbook().clone(),
                 registers: modbus::live,
                 configuration: toml::to_string(config).unwrap_or_default(),
@@ -364,7 +360,6 @@ fn effects(
     aborts: Aborts,
     history: History,
     progress: Progress,
-    tally: Tally,
 ) -> impl FnMut(Effect) -> Option<Event> {
     // If the measuring task is gone, the order is lost, and the station's deadline for the job passes.
     let order = move |order| drop(orders.send(order));
@@ -384,10 +379,7 @@ fn effects(
             Effect::Log(line) => progress.log(&line),
             Effect::Alarm(line) => progress.report(Severity::Error, &line),
             Effect::Abort { job } => aborts.abort(job),
-            Effect::Publish(result) => {
-                tally.add(result.verdict);
-                history.record(&result);
-            }
+            Effect::Publish(result) => history.record(&result),
         }
         None
     }

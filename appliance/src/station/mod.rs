@@ -55,7 +55,6 @@ pub mod snapshot;
 pub mod stages;
 pub mod state;
 pub mod step;
-pub mod tally;
 
 mod change;
 mod cycle;
@@ -81,6 +80,7 @@ pub use health::{FULL_STORAGE_MIB, Health, Pace, System};
 pub use machine::{Limits, Settings, Station};
 pub use recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 pub use result::{Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, Verdict};
+pub use results::Counts;
 pub use snapshot::{Identity, Snapshot, TeachProgress};
 pub use stages::{Stage, StageTime, Stages};
 pub use state::{Cycle, State};

@@ -2,10 +2,35 @@
 
 use std::sync::Arc;
 
-use super::result::ResultRecord;
+use serde::Serialize;
+
+use super::result::{ResultRecord, Verdict};
 
 /// The most unacknowledged results in BUFFERED mode.
 pub const MAX_BUFFERED: usize = 32;
+
+/// How many results there are of each verdict.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// PASS.
+    pub pass: u64,
+    /// FAIL.
+    pub fail: u64,
+    /// INVALID.
+    pub invalid: u64,
+}
+
+impl Counts {
+    /// Counts results of a verdict.
+    pub fn add(&mut self, verdict: Verdict, count: u64) {
+        match verdict {
+            Verdict::Pass => self.pass += count,
+            Verdict::Fail => self.fail += count,
+            Verdict::Invalid => self.invalid += count,
+            Verdict::None => {}
+        }
+    }
+}
 
 /// The results since the start.
 #[derive(Debug, Clone)]
@@ -14,6 +39,8 @@ pub(super) struct Results {
     pub(super) last_seq: u32,
     /// Whether `last_seq` still has to be stored. Until then no trigger is accepted.
     pub(super) unstored: bool,
+    /// How many there were.
+    pub(super) counts: Counts,
     /// The last result.
     pub(super) latest: Option<Arc<ResultRecord>>,
     /// RESULT_VALID.
@@ -34,6 +61,7 @@ impl Results {
         Self {
             last_seq: next_seq.wrapping_sub(1),
             unstored: false,
+            counts: Counts::default(),
             latest: None,
             valid: false,
             toggle: false,
@@ -64,6 +92,7 @@ impl Results {
     pub(super) fn publish(&mut self, record: Arc<ResultRecord>, buffered: bool) -> bool {
         let queued = !buffered || self.queue.push_back(record.clone()).is_ok();
         self.overflow_latch |= !queued;
+        self.counts.add(record.verdict, 1);
         self.latest = Some(record);
         self.valid = true;
         self.toggle = !self.toggle;

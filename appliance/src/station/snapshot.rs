@@ -9,6 +9,7 @@ use super::health::Health;
 use super::machine::Station;
 use super::recipes::{ActiveRecipe, RecipeResult};
 use super::result::ResultRecord;
+use super::results::Counts;
 use super::state::State;
 
 /// STATUS bits, register 100.
@@ -153,6 +154,8 @@ pub struct Snapshot {
     pub boot_id: u32,
     /// Names of this device.
     pub identity: Arc<Identity>,
+    /// Results since the start, by verdict.
+    pub counts: Counts,
     /// The last result of this run.
     pub result: Option<Arc<ResultRecord>>,
     /// The oldest unacknowledged result.
@@ -232,6 +235,7 @@ impl Station {
             uptime_s: now.seconds(),
             boot_id: self.settings.boot_id,
             identity: self.settings.identity.clone(),
+            counts: self.results.counts,
             result: self.results.latest.clone(),
             oldest: self.results.queue.front().cloned(),
             teach,

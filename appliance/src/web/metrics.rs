@@ -54,7 +54,7 @@ pub(super) fn text(site: &Site) -> String {
         now.uptime_s,
         "Time since the start.",
     );
-    let counts = site.tally.counts();
+    let counts = now.counts;
     out.family(
         "fringed_results",
         "counter",

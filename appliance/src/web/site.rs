@@ -15,7 +15,6 @@ use crate::history::Reader;
 use crate::production::latest::LastCycleRequests;
 use crate::production::simulation::Simulation;
 use crate::recipe::Store;
-use crate::station::tally::Tally;
 use crate::station::{Snapshot, StationHandle};
 use crate::system::logbook::Logbook;
 use crate::system::socket;
@@ -53,8 +52,6 @@ pub struct Parts {
     /// Stores the time of this start of the daemon, µs since 1970 UTC, by the clock of a signed-in user's browser; answers whether
     /// it is stored.
     pub date: Box<dyn Fn(u64) -> bool + Send + Sync>,
-    /// Results since the start.
-    pub tally: Tally,
     /// The log.
     pub log: Logbook,
     /// The registers with their values, as the PLC reads them.

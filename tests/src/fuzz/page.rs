@@ -65,7 +65,6 @@ impl Page {
             simulation: Simulation::new(mpsc::channel().0),
             history: Reader::of(folder.path()),
             date: Box::new(|_| false),
-            tally: Default::default(),
             log: Default::default(),
             registers: |_| serde_json::json!({ "registers": [] }),
             configuration: "threads = 0\n".into(),

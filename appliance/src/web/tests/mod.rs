@@ -60,7 +60,6 @@ async fn served() -> Served {
         simulation: Simulation::new(mpsc::channel().0),
         history: Reader::of(folder.path()),
         date: Box::new(move |utc_us| dates.send(utc_us).is_ok()),
-        tally: Default::default(),
         log: Default::default(),
         registers: |_| serde_json::json!({ "registers": [] }),
         configuration: "threads = 0\n".into(),
