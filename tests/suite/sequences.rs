@@ -40,7 +40,7 @@ fn the_shortest_sequence_will_do_for_a_part_in_place_and_not_for_one_out_of_it()
         [0, 1, 2].map(|sequence| flags(&found[sequence])),
         [0b10, 0b100, 0b1000]
     );
-    let z = |found: &Inspection| found.placement.unwrap().shift_mm[2];
+    let z = |found: &Inspection| found.placement.unwrap().values[2].unwrap();
     for found in &found[1..] {
         assert_eq!(found.step_up, None);
         assert!((z(found) - 0.3).abs() < 0.02, "{}", z(found));

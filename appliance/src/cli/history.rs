@@ -43,12 +43,7 @@ pub struct History {
 const SCREEN: u32 = 20;
 
 fn verdict(word: &str) -> Result<Verdict, String> {
-    match word.to_ascii_lowercase().as_str() {
-        "pass" => Ok(Verdict::Pass),
-        "fail" => Ok(Verdict::Fail),
-        "invalid" => Ok(Verdict::Invalid),
-        _ => Err("write pass, fail or invalid".into()),
-    }
+    Verdict::of_word(&word.to_ascii_uppercase()).ok_or_else(|| "write pass, fail or invalid".into())
 }
 
 impl History {

@@ -2,7 +2,7 @@
 
 use crate::station::result::flag;
 use crate::station::{Placement, ResultRecord, Verdict};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
 /// One stored result. Lengths in mm, times in µs; as JSON the keys are the fields' names.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -29,7 +29,6 @@ pub struct Entry {
     /// The token that triggered, 0 for an edge.
     pub token: u16,
     /// PASS, FAIL or INVALID.
-    #[serde(serialize_with = "word", deserialize_with = "of_word")]
     pub verdict: Verdict,
     /// 0, or why there is no measurement.
     pub error_code: u16,
@@ -56,40 +55,11 @@ pub struct Entry {
     /// The gauges, in the recipe's order.
     pub gauges: Vec<GaugeEntry>,
     /// How the part lay; `None` where it was not aligned, and in results of older programs.
-    pub placement: Option<PlacementEntry>,
+    pub placement: Option<Placement>,
     /// The folder in `recordings/` that holds the frames, if they were kept.
     pub recording: Option<String>,
     /// Why the frames of a part that did not pass were not kept, as far as known; see [`super::Unkept`].
     pub unkept: Option<String>,
-}
-
-/// How a part lay against how it was taught.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PlacementEntry {
-    /// Translation along x, y, z in mm and rotation vector about x, y, z in degrees; `None` where the part's shape does not
-    /// determine it.
-    pub values: [Option<f64>; 6],
-    /// How far its farthest corner moved, mm.
-    pub reach_mm: f64,
-    /// Share of the sampled points that do not fit.
-    pub outliers: f64,
-}
-
-impl PlacementEntry {
-    /// `None` where reach or outliers are not finite, which JSON cannot hold.
-    fn of(placement: &Placement) -> Option<Self> {
-        let values = [placement.shift_mm, placement.turn_deg];
-        let mut values = values.as_flattened().iter().zip(placement.left_out);
-        let finite = placement.reach_mm.is_finite() && placement.outliers.is_finite();
-        finite.then(|| Self {
-            values: std::array::from_fn(|_| {
-                let (value, left_out) = values.next()?;
-                (value.is_finite() && !left_out).then_some(*value)
-            }),
-            reach_mm: placement.reach_mm,
-            outliers: placement.outliers,
-        })
-    }
 }
 
 /// The time of one stage.
@@ -181,11 +151,16 @@ impl Entry {
             total_us: record.total_us,
             stages: stages(record),
             gauges: gauges(record),
-            placement: found.placement.as_ref().and_then(PlacementEntry::of),
+            placement: found.placement.filter(is_finite),
             recording: None,
             unkept: None,
         }
     }
+}
+
+/// Whether JSON can hold it; components that are not finite become null.
+fn is_finite(placement: &Placement) -> bool {
+    placement.reach_mm.is_finite() && placement.outliers.is_finite()
 }
 
 fn stages(record: &ResultRecord) -> Vec<StageEntry> {
@@ -236,7 +211,7 @@ pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
         total_us: stored.total_us,
         stages: stored.stages.clone(),
         // Older programs have not stored it.
-        placement: stored.placement.as_ref().and(replayed.placement.clone()),
+        placement: stored.placement.as_ref().and(replayed.placement),
         recording: stored.recording.clone(),
         unkept: stored.unkept.clone(),
         ..replayed.clone()
@@ -249,33 +224,4 @@ pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
         Some((stored, replayed)) => format!("a gauge was {stored:?}, is {replayed:?}"),
         None => format!("it was {stored:?}, is {same:?}"),
     })
-}
-
-/// All verdicts.
-const VERDICTS: [Verdict; 4] = [
-    Verdict::None,
-    Verdict::Pass,
-    Verdict::Fail,
-    Verdict::Invalid,
-];
-
-/// The verdict of a number of register 208; anything unknown counts as not judged.
-pub(super) fn verdict_of(number: u16) -> Verdict {
-    let mut known = VERDICTS.into_iter();
-    known
-        .find(|verdict| verdict.number() == number)
-        .unwrap_or_default()
-}
-
-fn word<S: Serializer>(verdict: &Verdict, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(verdict.word())
-}
-
-fn of_word<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Verdict, D::Error> {
-    let word = String::deserialize(deserializer)?;
-    let mut known = VERDICTS.into_iter();
-    let unknown = || serde::de::Error::custom(format!("{word:?} is not a verdict"));
-    known
-        .find(|verdict| verdict.word() == word)
-        .ok_or_else(unknown)
 }

@@ -16,6 +16,7 @@
 //! before it is shown, and the next start stores what the database lacks: kill -9 costs at most the result in flight, however
 //! busy the card was. A loss of power costs what was not synced yet: what came in the time that the card takes for one sync.
 
+mod columns;
 pub mod csv;
 pub mod entry;
 mod handle;
@@ -36,7 +37,7 @@ mod log_tests;
 #[cfg(test)]
 mod tests;
 
-pub use entry::{Entry, Filter, GaugeEntry, PlacementEntry, StageEntry, difference};
+pub use entry::{Entry, Filter, GaugeEntry, StageEntry, difference};
 pub use handle::{History, open};
 pub use reader::{Reader, Trend, TrendPoint};
 pub use recordings::{JudgedPart, RECIPE, name_of, seq_of};

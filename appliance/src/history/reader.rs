@@ -1,8 +1,8 @@
 //! Reads the history for the page and the command line. Nothing here can change it.
 
-use super::entry::{Entry, Filter, GaugeEntry, verdict_of};
-use super::{HistoryError, schema};
-use crate::station::Counts;
+use super::entry::{Entry, Filter};
+use super::{HistoryError, columns, schema};
+use crate::station::{Counts, Verdict};
 use rusqlite::types::Value;
 use rusqlite::{Connection, OptionalExtension as _, Params, Row, params_from_iter};
 use serde::Serialize;
@@ -126,7 +126,7 @@ impl Reader {
 
     fn first(&self, query: &str, key: impl rusqlite::ToSql) -> Result<Option<Entry>, HistoryError> {
         self.read(|connection| {
-            let found = connection.query_row(query, [key], |row| with_gauges(connection, row));
+            let found = connection.query_row(query, [key], |row| columns::read(connection, row));
             found.optional()
         })
     }
@@ -158,7 +158,7 @@ impl Reader {
             let bounds = [Value::from(below), Value::from(most as i64)];
             let values = params_from_iter(values.iter().cloned().chain(bounds));
             let batch = rows(&connection, &query, values, |row| {
-                Ok((row.get("id")?, with_gauges(&connection, row)?))
+                Ok((row.get("id")?, columns::read(&connection, row)?))
             });
             let batch: Vec<(i64, Entry)> =
                 batch.map_err(|error| HistoryError::of(&self.path, &error))?;
@@ -179,15 +179,15 @@ impl Reader {
         let (condition, values) = condition(filter);
         let query =
             format!("SELECT verdict, count(*) FROM dated WHERE {condition} GROUP BY verdict");
-        let counted: Vec<(u16, u64)> = self.read(|connection| {
+        let counted: Vec<(Verdict, u64)> = self.read(|connection| {
             let values = params_from_iter(values);
             rows(connection, &query, values, |row| {
                 Ok((row.get(0)?, row.get(1)?))
             })
         })?;
         let mut counts = Counts::default();
-        for (number, count) in counted {
-            counts.add(verdict_of(number), count);
+        for (verdict, count) in counted {
+            counts.add(verdict, count);
         }
         Ok(counts)
     }
@@ -315,53 +315,4 @@ pub(super) fn condition(filter: &Filter) -> (String, Vec<Value>) {
     let before = "id < (SELECT min(id) FROM result WHERE seq = ?)";
     add(before, filter.before_seq.map(i64::from));
     (conditions.join(" AND "), values)
-}
-
-fn with_gauges(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry> {
-    let id: i64 = row.get("id")?;
-    let stages: String = row.get("stages")?;
-    let placement: Option<String> = row.get("placement").unwrap_or_default();
-    let of_result = "SELECT name, unit, value, sigma, low, high, decision FROM gauge
-        WHERE result = ?1 ORDER BY place";
-    let gauges = rows(connection, of_result, [id], |row| {
-        Ok(GaugeEntry {
-            name: row.get(0)?,
-            unit: row.get(1)?,
-            value: row.get(2)?,
-            sigma: row.get(3)?,
-            low: row.get(4)?,
-            high: row.get(5)?,
-            decision: row.get(6)?,
-        })
-    });
-    Ok(Entry {
-        seq: row.get("seq")?,
-        time_utc_us: row.get("time_utc_us")?,
-        // Columns that a database of an older program lacks.
-        uptime_s: row.get("uptime_s").unwrap_or_default(),
-        boot_id: row.get("boot_id").unwrap_or_default(),
-        browser_utc_us: row.get("browser_utc_us")?,
-        recipe: row.get("recipe")?,
-        fingerprint: row.get("fingerprint")?,
-        part_id: row.get("part_id")?,
-        press_stroke: row.get("press_stroke")?,
-        token: row.get("token")?,
-        verdict: verdict_of(row.get("verdict")?),
-        error_code: row.get("error_code")?,
-        reason: row.get("reason")?,
-        flags: row.get("flags")?,
-        valid_points: row.get("valid_points")?,
-        coverage_permille: row.get("coverage_permille")?,
-        temperature_c: row.get("temperature_c")?,
-        height_noise_mm: row.get("height_noise_mm")?,
-        fitness_permille: row.get("fitness_permille")?,
-        exposure_us: row.get("exposure_us")?,
-        total_us: row.get("total_us")?,
-        // Times are only shown: what cannot be read is left out.
-        stages: serde_json::from_str(&stages).unwrap_or_default(),
-        gauges: gauges?,
-        placement: placement.and_then(|text| serde_json::from_str(&text).ok()),
-        recording: row.get("recording")?,
-        unkept: row.get("unkept").unwrap_or_default(),
-    })
 }

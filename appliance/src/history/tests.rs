@@ -3,8 +3,8 @@
 use super::*;
 use crate::station::snapshot::warning;
 use crate::station::{
-    Counts, Effect, Identity, Inspection, Limits, Micros, ResultRecord, Settings, Station,
-    StationHandle, Verdict,
+    Counts, Effect, Identity, Inspection, Limits, Micros, Placement, ResultRecord, Settings,
+    Station, StationHandle, Verdict,
 };
 use crate::storage::state::StateFolder;
 use std::path::Path;
@@ -496,7 +496,7 @@ fn a_database_of_an_older_program_is_read_as_it_is_and_completed_when_it_is_writ
     let new = Entry {
         uptime_s: Some(61),
         boot_id: Some("0000b007".into()),
-        placement: Some(PlacementEntry {
+        placement: Some(Placement {
             values: [Some(0.1), None, Some(-1.0 / 3.0), None, None, Some(1e-9)],
             reach_mm: 0.1 + 0.2,
             outliers: 0.01,

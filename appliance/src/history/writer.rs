@@ -1,10 +1,11 @@
 //! Writes results into the database, bounds their number, and links recordings to them.
 
-use super::entry::{Entry, GaugeEntry};
+use super::columns::insert;
+use super::entry::Entry;
 use super::reader::rows;
 use super::unkept::Unkept;
 use super::{HistoryError, schema};
-use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
+use rusqlite::{Connection, OptionalExtension as _, params};
 use std::path::{Path, PathBuf};
 
 /// Starts of the daemon whose time is kept: more than there are in a year.
@@ -228,74 +229,4 @@ fn set_aside(path: &Path, reason: &str) -> Result<PathBuf, HistoryError> {
 fn said(error: &HistoryError, aside: &Path) -> String {
     let aside = aside.display();
     format!("{error}; it is kept as {aside} and a new history begins")
-}
-
-fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
-    let stages = serde_json::to_string(&entry.stages).unwrap_or_default();
-    let placement = entry.placement.as_ref().map(serde_json::to_string);
-    // Numbers that are finite are always JSON.
-    let placement = placement.and_then(Result::ok);
-    transaction
-        .prepare_cached(
-            "INSERT INTO result (seq, time_utc_us, recipe, fingerprint, part_id, press_stroke, token,
-                verdict, error_code, reason, flags, valid_points, coverage_permille, temperature_c,
-                height_noise_mm, fitness_permille, exposure_us, total_us, stages, recording, uptime_s, boot_id,
-                unkept, placement)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18,
-                ?19, ?20, ?21, ?22, ?23, ?24)",
-        )?
-        .execute(params![
-            entry.seq,
-            entry.time_utc_us,
-            entry.recipe,
-            entry.fingerprint,
-            entry.part_id,
-            entry.press_stroke,
-            entry.token,
-            entry.verdict.number(),
-            entry.error_code,
-            entry.reason,
-            entry.flags,
-            entry.valid_points,
-            entry.coverage_permille,
-            entry.temperature_c,
-            entry.height_noise_mm,
-            entry.fitness_permille,
-            entry.exposure_us,
-            entry.total_us,
-            stages,
-            entry.recording,
-            entry.uptime_s,
-            entry.boot_id,
-            entry.unkept,
-            placement,
-        ])?;
-    let result = transaction.last_insert_rowid();
-    for (place, gauge) in entry.gauges.iter().enumerate() {
-        insert_gauge(transaction, result, place, gauge)?;
-    }
-    Ok(())
-}
-
-fn insert_gauge(
-    transaction: &Transaction<'_>,
-    result: i64,
-    place: usize,
-    gauge: &GaugeEntry,
-) -> rusqlite::Result<()> {
-    let values = params![
-        result,
-        place,
-        gauge.name,
-        gauge.unit,
-        gauge.value,
-        gauge.sigma,
-        gauge.low,
-        gauge.high,
-        gauge.decision,
-    ];
-    transaction
-        .prepare_cached("INSERT INTO gauge VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)")?
-        .execute(values)?;
-    Ok(())
 }

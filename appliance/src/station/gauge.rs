@@ -2,8 +2,11 @@
 
 use std::sync::Arc;
 
+use serde::Serialize;
+
 /// What a gauge's value is: registers 554–569.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Unit {
     /// 0: a bare number; register step 0.0001.
     #[default]
@@ -21,13 +24,7 @@ pub enum Unit {
 impl Unit {
     /// The number of registers 554–569.
     pub fn number(self) -> u16 {
-        match self {
-            Self::None => 0,
-            Self::Length => 1,
-            Self::Angle => 2,
-            Self::Volume => 3,
-            Self::Share => 4,
-        }
+        self as u16
     }
 
     /// Register steps per mm, °, mm³ or 1.

@@ -32,13 +32,7 @@ pub enum RecipeResult {
 impl RecipeResult {
     /// The number of register 109.
     pub fn number(self) -> u16 {
-        match self {
-            Self::Ok => 0,
-            Self::Unknown => 1,
-            Self::Corrupt => 2,
-            Self::OtherCalibration => 3,
-            Self::Busy => 4,
-        }
+        self as u16
     }
 
     /// In words.

@@ -2,14 +2,19 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::gauge::GaugeValue;
 use super::stages::Stages;
 
 /// The most gauges that a recipe can have: bits and registers of the map.
 pub use algo::inspect::MAX_GAUGES;
+/// Pixels of a cycle that were not computed, and those that needed the slower exact solution.
+pub use algo::inspect::Skipped;
 
 /// The judgement of one cycle: register 208.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
 pub enum Verdict {
     /// 0: nothing was judged.
     #[default]
@@ -25,12 +30,19 @@ pub enum Verdict {
 impl Verdict {
     /// The number of register 208.
     pub fn number(self) -> u16 {
-        match self {
-            Self::None => 0,
-            Self::Pass => 1,
-            Self::Fail => 2,
-            Self::Invalid => 3,
-        }
+        self as u16
+    }
+
+    /// The verdict of this number.
+    pub fn of_number(number: u16) -> Option<Self> {
+        let mut all = [Self::None, Self::Pass, Self::Fail, Self::Invalid].into_iter();
+        all.find(|verdict| verdict.number() == number)
+    }
+
+    /// The judgement of this word: PASS, FAIL or INVALID.
+    pub fn of_word(word: &str) -> Option<Self> {
+        let mut all = [Self::Pass, Self::Fail, Self::Invalid].into_iter();
+        all.find(|verdict| verdict.word() == word)
     }
 
     /// The word.
@@ -75,28 +87,12 @@ pub mod flag {
     ];
 }
 
-/// Pixels of a cycle that were skipped because no gauge needs them, and pixels that needed the slower exact solution.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Skipped {
-    /// Outside of every gauge's region.
-    pub outside: u32,
-    /// Golden has no expected phase there.
-    pub unexpected: u32,
-    /// Not lit by the pattern.
-    pub dark: u32,
-    /// Too far from golden for its expansion: their heights were solved exactly.
-    pub exact: u32,
-}
-
 /// The pose of a part relative to its pose at teaching.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Placement {
-    /// How far the middle of its surface was shifted, x, y, z.
-    pub shift_mm: [f64; 3],
-    /// The rotation vector about it: about x, y, z.
-    pub turn_deg: [f64; 3],
-    /// Which of the six components the part's shape does not determine: they are taken as 0.
-    pub left_out: [bool; 6],
+    /// Translation of the middle of its surface along x, y, z in mm, and rotation vector about it in degrees; `None` where the
+    /// part's shape does not determine the component.
+    pub values: [Option<f64>; 6],
     /// Displacement of the corner of the part's bounding box that moved farthest.
     pub reach_mm: f64,
     /// Share of the sampled points that do not fit: they lie on defects, or their fringe order is wrong.
@@ -109,9 +105,9 @@ impl Placement {
 
     /// The names of the components that the part's shape does not determine.
     pub fn undetermined(&self) -> Vec<&'static str> {
-        let pairs = Self::COMPONENTS.into_iter().zip(self.left_out);
+        let pairs = Self::COMPONENTS.into_iter().zip(self.values);
         pairs
-            .filter(|(_, out)| *out)
+            .filter(|(_, value)| value.is_none())
             .map(|(name, _)| name)
             .collect()
     }

@@ -39,16 +39,11 @@ pub(super) struct Wanted {
 impl Wanted {
     /// The filter, of the `usual` number of results unless asked for another one, and at `most` that many.
     fn filter(self, usual: usize, most: usize) -> Result<Filter, Problem> {
-        let verdict = match self.verdict.as_deref() {
-            None => None,
-            Some("PASS") => Some(Verdict::Pass),
-            Some("FAIL") => Some(Verdict::Fail),
-            Some("INVALID") => Some(Verdict::Invalid),
-            Some(other) => {
-                let words = format!("verdict={other}: write PASS, FAIL or INVALID");
-                return Err(Problem::unclear(words));
-            }
+        let judged = |word: String| {
+            let words = format!("verdict={word}: write PASS, FAIL or INVALID");
+            Verdict::of_word(&word).ok_or_else(|| Problem::unclear(words))
         };
+        let verdict = self.verdict.map(judged).transpose()?;
         Ok(Filter {
             recipe: self.recipe,
             verdict,

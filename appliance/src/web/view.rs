@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::station::result::flag;
 use crate::station::snapshot::{status, warning};
-use crate::station::{GaugeValue, Placement, ResultRecord, Snapshot, Unit, error_code};
+use crate::station::{GaugeValue, Placement, ResultRecord, Snapshot, error_code};
 
 /// The whole snapshot.
 pub fn snapshot(snapshot: &Snapshot) -> Value {
@@ -127,30 +127,19 @@ fn result(record: &ResultRecord) -> Value {
 
 /// Shifts in mm, turns in degrees; null where the part's shape does not determine them.
 fn placement(placement: &Placement) -> Value {
-    let values = placement.shift_mm.iter().chain(&placement.turn_deg);
-    let determined = values
-        .zip(placement.left_out)
-        .map(|(value, out)| (!out).then_some(*value));
     json!({
         "components": Placement::COMPONENTS,
-        "values": determined.collect::<Vec<_>>(),
+        "values": placement.values,
         "reach_mm": placement.reach_mm,
         "outliers": placement.outliers,
     })
 }
 
 fn gauge(gauge: &GaugeValue) -> Value {
-    let kind = match gauge.unit {
-        Unit::None => "none",
-        Unit::Length => "length",
-        Unit::Angle => "angle",
-        Unit::Volume => "volume",
-        Unit::Share => "share",
-    };
     let decision = gauge.decision;
     json!({
         "name": &*gauge.name,
-        "kind": kind,
+        "kind": gauge.unit,
         "unit": gauge.unit.symbol(),
         "value": gauge.value.filter(|_| decision.valid),
         "sigma": gauge.sigma,

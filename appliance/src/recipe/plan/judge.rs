@@ -1,7 +1,7 @@
 //! From findings to a verdict, or to the reason why a longer sequence should be tried.
 
 use crate::recipe::Demands;
-use crate::station::{GaugeValue, Inspection, Placement, Skipped, Verdict};
+use crate::station::{GaugeValue, Inspection, Placement, Verdict};
 use algo::inspect::{Findings, Placed};
 use std::sync::Arc;
 
@@ -32,13 +32,7 @@ impl Demands {
         inspection.height_noise_mm = findings.height_noise_mm;
         let fitness = findings.taught_noise_mm / findings.height_noise_mm.max(f64::MIN_POSITIVE);
         inspection.fitness_permille = (fitness.min(1.0) * 1000.0).round() as u16;
-        let skipped = &findings.skipped;
-        inspection.skipped = Skipped {
-            outside: skipped.outside as u32,
-            unexpected: skipped.unexpected as u32,
-            dark: skipped.dark as u32,
-            exact: skipped.exact as u32,
-        };
+        inspection.skipped = findings.skipped;
         inspection.placement = findings.placed.as_ref().map(placement);
         inspection.reason = self.not_judged(inspection, coverage).map(Arc::from);
         inspection.judged = match &inspection.reason {
@@ -60,7 +54,7 @@ impl Demands {
         }
         let lies = inspection.placement.as_ref();
         if let Some(placement) = lies.filter(|lies| lies.reach_mm > self.tolerance_mm) {
-            let [x, y, z] = placement.shift_mm;
+            let [x, y, z, ..] = placement.values.map(Option::unwrap_or_default);
             return Some(format!(
                 "the part lies up to {:.2} mm off its place ({x:+.2}, {y:+.2}, {z:+.2} mm and turned), {:.2} mm are \
                  allowed: put it in place",
@@ -112,11 +106,14 @@ impl Demands {
 
 /// The placement that is shown with the result.
 fn placement(placed: &Placed) -> Placement {
-    let values = placed.motion.values();
+    let [x, y, z, turns @ ..] = placed.motion.values();
+    let [a, b, c] = turns.map(f64::to_degrees);
+    let mut values = [x, y, z, a, b, c].map(Some);
+    for (value, left_out) in values.iter_mut().zip(placed.left_out) {
+        value.take_if(|_| left_out);
+    }
     Placement {
-        shift_mm: [values[0], values[1], values[2]],
-        turn_deg: [values[3], values[4], values[5]].map(f64::to_degrees),
-        left_out: placed.left_out,
+        values,
         reach_mm: placed.reach,
         outliers: placed.outliers,
     }
