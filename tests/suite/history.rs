@@ -297,7 +297,7 @@ fn a_stored_result_opens_with_the_pictures_of_the_live_view_and_one_without_fram
 fn a_list_by_time_says_how_many_results_it_leaves_out_because_their_time_is_not_known() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("history.db");
-    let mut writer = Writer::open(&database, 1000).unwrap().writer;
+    let mut writer = Writer::open(&database, 1000).unwrap().0;
     let entries: Vec<_> = (1..=3)
         .map(|seq| Entry {
             seq,

@@ -5,7 +5,8 @@ use super::entry::{Entry, Filter};
 use super::reader::{Reader, condition, rows};
 use super::time::utc;
 use rusqlite::params_from_iter;
-use std::fmt::{Display, Write as _};
+use std::borrow::Cow;
+use std::fmt::Write as _;
 use std::io::Write;
 
 /// The columns before the gauges'.
@@ -29,7 +30,7 @@ impl Reader {
             };
             for column in [&unit, " sigma", " low", " high", " decision"] {
                 head.push(',');
-                text(&mut head, &format!("{name}{column}"));
+                head.push_str(&quoted(&format!("{name}{column}")));
             }
         }
         let write = |out: &mut dyn Write, line: &str| {
@@ -74,41 +75,34 @@ fn one(line: &mut String, entry: &Entry, gauges: &[(String, String)]) {
         (None, Some(us)) => (utc(us), "browser"),
         (None, None) => (String::new(), ""),
     };
-    let _ = write!(line, "{},{time}", entry.seq);
-    let _ = write!(
-        line,
-        ",{},{},{},{}",
-        entry.recipe, entry.fingerprint, entry.part_id, entry.press_stroke
-    );
-    let _ = write!(
-        line,
-        ",{},{},{},",
-        entry.token,
-        entry.verdict.word(),
-        entry.error_code
-    );
-    text(line, entry.reason.as_deref().unwrap_or_default());
-    let _ = write!(
-        line,
-        ",{},{},{}",
-        entry.flags, entry.valid_points, entry.coverage_permille
-    );
-    number(line, entry.temperature_c);
-    number(line, entry.height_noise_mm);
-    let _ = write!(
-        line,
-        ",{},{},{},",
-        entry.fitness_permille, entry.exposure_us, entry.total_us
-    );
     let stages: Vec<_> = entry
         .stages
         .iter()
         .map(|stage| format!("{} {}", stage.name, stage.us))
         .collect();
-    text(line, &stages.join("; "));
-    line.push(',');
-    text(line, entry.recording.as_deref().unwrap_or_default());
-    let _ = write!(line, ",{source}");
+    let words = [&entry.reason, &entry.recording];
+    let [reason, recording] = words.map(|text| quoted(text.as_deref().unwrap_or_default()));
+    let _ = write!(
+        line,
+        "{},{time},{},{},{},{},{},{},{},{reason},{},{},{},{},{},{},{},{},{},{recording},{source}",
+        entry.seq,
+        entry.recipe,
+        entry.fingerprint,
+        entry.part_id,
+        entry.press_stroke,
+        entry.token,
+        entry.verdict.word(),
+        entry.error_code,
+        entry.flags,
+        entry.valid_points,
+        entry.coverage_permille,
+        number(entry.temperature_c),
+        number(entry.height_noise_mm),
+        entry.fitness_permille,
+        entry.exposure_us,
+        entry.total_us,
+        quoted(&stages.join("; ")),
+    );
     for (name, unit) in gauges {
         match entry
             .gauges
@@ -117,30 +111,27 @@ fn one(line: &mut String, entry: &Entry, gauges: &[(String, String)]) {
         {
             Some(gauge) => {
                 for value in [gauge.value, gauge.sigma, gauge.low, gauge.high] {
-                    number(line, value);
+                    let _ = write!(line, ",{}", number(value));
                 }
-                number(line, Some(gauge.decision));
+                let _ = write!(line, ",{}", gauge.decision);
             }
             None => line.push_str(",,,,,"),
         }
     }
 }
 
-fn number(line: &mut String, number: Option<impl Display>) {
-    line.push(',');
-    if let Some(number) = number {
-        let _ = write!(line, "{number}");
-    }
+fn number(number: Option<f64>) -> String {
+    number.map_or_else(String::new, |number| number.to_string())
 }
 
-/// Adds a text, quoted where it must be; what a spreadsheet would take for a formula gets an apostrophe in front.
-fn text(line: &mut String, text: &str) {
+/// A text, quoted where it must be; what a spreadsheet would take for a formula gets an apostrophe in front.
+fn quoted(text: &str) -> Cow<'_, str> {
     let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
     let guard = if formula { "'" } else { "" };
     if formula || text.contains([',', '"', '\r', '\n']) {
-        let _ = write!(line, "\"{guard}{}\"", text.replace('"', "\"\""));
+        format!("\"{guard}{}\"", text.replace('"', "\"\"")).into()
     } else {
-        line.push_str(text);
+        text.into()
     }
 }
 
@@ -150,11 +141,6 @@ mod tests {
 
     #[test]
     fn a_text_is_quoted_where_it_must_be_and_is_no_formula() {
-        let quoted = |given| {
-            let mut line = String::new();
-            text(&mut line, given);
-            line
-        };
         assert_eq!(quoted("plain"), "plain");
         assert_eq!(quoted("a,\"b\""), "\"a,\"\"b\"\"\"");
         assert_eq!(quoted("=1+1"), "\"'=1+1\"");

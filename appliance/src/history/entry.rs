@@ -197,24 +197,20 @@ const COURSE: u16 = flag::RETRIED | flag::STEPPED_UP | flag::WARM_UP;
 /// and not to its frames is not compared: numbers, times, temperature, the flags of its course.
 pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
     let same = Entry {
-        seq: stored.seq,
-        time_utc_us: stored.time_utc_us,
-        uptime_s: stored.uptime_s,
-        boot_id: stored.boot_id.clone(),
-        browser_utc_us: stored.browser_utc_us,
-        part_id: stored.part_id,
-        press_stroke: stored.press_stroke,
-        token: stored.token,
+        recipe: replayed.recipe,
+        fingerprint: replayed.fingerprint.clone(),
+        verdict: replayed.verdict,
+        error_code: replayed.error_code,
+        reason: replayed.reason.clone(),
         flags: (stored.flags & COURSE) | (replayed.flags & !COURSE),
-        temperature_c: stored.temperature_c,
-        exposure_us: stored.exposure_us,
-        total_us: stored.total_us,
-        stages: stored.stages.clone(),
+        valid_points: replayed.valid_points,
+        coverage_permille: replayed.coverage_permille,
+        height_noise_mm: replayed.height_noise_mm,
+        fitness_permille: replayed.fitness_permille,
+        gauges: replayed.gauges.clone(),
         // Older programs have not stored it.
-        placement: stored.placement.as_ref().and(replayed.placement),
-        recording: stored.recording.clone(),
-        unkept: stored.unkept.clone(),
-        ..replayed.clone()
+        placement: stored.placement.and(replayed.placement),
+        ..stored.clone()
     };
     if same == *stored {
         return None;

@@ -6,7 +6,7 @@ use super::recordings::JudgedPart;
 use super::seqs::{Numbering, Seqs};
 use super::spool::{Spool, is_after};
 use super::task::{MAX_WAITING, Message, Task};
-use super::writer::{Opening, Writer};
+use super::writer::Writer;
 use super::{Bounds, DATABASE, HistoryError, RECORDINGS};
 use crate::recipe::Store;
 use crate::station::{ResultRecord, Unstored, Verdict};
@@ -46,10 +46,7 @@ pub fn open(
         reason: format!("{error}: free space"),
         damaged: false,
     };
-    let Opening {
-        mut writer,
-        complaint,
-    } = Writer::open(&state.join(DATABASE), bounds.results)?;
+    let (mut writer, complaint) = Writer::open(&state.join(DATABASE), bounds.results)?;
     let owner = std::fs::metadata(state).map_err(|error| failed("", error))?;
     // Where the system has no shared memory, or another process has it, a kill skips numbers and loses results that wait.
     let spool = Spool::open(&numbering.serial, owner.uid()).ok();

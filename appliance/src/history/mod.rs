@@ -44,7 +44,7 @@ pub use recordings::{JudgedPart, RECIPE, name_of, seq_of};
 pub use seqs::Numbering;
 pub use task::Task;
 pub use unkept::{Unkept, why_no_frames};
-pub use writer::{Opening, Writer};
+pub use writer::Writer;
 
 /// The database's name in the state folder.
 pub const DATABASE: &str = "history.db";

@@ -56,9 +56,9 @@ fn open_writer(state: &Path) -> Writer {
 }
 
 fn bounded(state: &Path, limit: u64) -> Writer {
-    let opening = Writer::open(&state.join(DATABASE), limit).unwrap();
-    assert_eq!(opening.complaint, None);
-    opening.writer
+    let (writer, complaint) = Writer::open(&state.join(DATABASE), limit).unwrap();
+    assert_eq!(complaint, None);
+    writer
 }
 
 fn seqs(reader: &Reader, filter: &Filter) -> Vec<u32> {
@@ -304,10 +304,7 @@ fn a_damaged_database_is_set_aside_with_a_message_and_a_new_one_begun() {
         b"no database at all, but long enough to be read".to_vec(),
     ] {
         std::fs::write(&path, &damaged).unwrap();
-        let Opening {
-            mut writer,
-            complaint,
-        } = Writer::open(&path, ENOUGH).unwrap();
+        let (mut writer, complaint) = Writer::open(&path, ENOUGH).unwrap();
         let complaint = complaint.unwrap();
         assert!(complaint.contains("history.damaged.db"), "{complaint}");
         assert_eq!(

@@ -21,33 +21,19 @@ pub struct Writer {
     limit: u64,
 }
 
-/// What opening a database brought.
-pub struct Opening {
-    /// The writer.
-    pub writer: Writer,
-    /// Why the database that was there was set aside, and its new name.
-    pub complaint: Option<String>,
-}
-
 impl Writer {
-    /// Opens the database; a damaged one is set aside and a new one begun. `limit` is the most results that are kept.
+    /// Opens the database; a damaged one is set aside and a new one begun: then the answer says so. `limit` is the most results
+    /// that are kept.
     ///
     /// # Errors
     /// If it can be neither opened nor set aside.
-    pub fn open(path: &Path, limit: u64) -> Result<Opening, HistoryError> {
+    pub fn open(path: &Path, limit: u64) -> Result<(Self, Option<String>), HistoryError> {
         match Self::open_sound(path, limit) {
-            Ok(writer) => Ok(Opening {
-                writer,
-                complaint: None,
-            }),
             Err(error) if error.damaged => {
                 let aside = set_aside(path, &error.reason)?;
-                Ok(Opening {
-                    writer: Self::open_sound(path, limit)?,
-                    complaint: Some(said(&error, &aside)),
-                })
+                Ok((Self::open_sound(path, limit)?, Some(said(&error, &aside))))
             }
-            Err(error) => Err(error),
+            opened => Ok((opened?, None)),
         }
     }
 

@@ -7,6 +7,7 @@ use super::fault::Failure;
 use super::machine::{Station, log, push};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 use super::refusal::reject;
+use super::snapshot::TeachProgress;
 use super::state::State;
 use std::sync::Arc;
 
@@ -89,9 +90,11 @@ impl Station {
         );
         self.state = State::Teaching {
             job,
-            number,
-            fraction: 0.0,
-            words: "starting".into(),
+            progress: TeachProgress {
+                number,
+                fraction: 0.0,
+                words: "starting".into(),
+            },
             deadline: self.within(self.settings.limits.teaching),
         };
         None
@@ -164,15 +167,13 @@ impl Station {
         match &mut self.state {
             State::Teaching {
                 job: awaited,
-                fraction,
-                words,
+                progress,
                 deadline,
-                ..
             } if *awaited == job => {
                 if reached.is_finite() {
-                    *fraction = reached.clamp(0.0, 1.0);
+                    progress.fraction = reached.clamp(0.0, 1.0);
                 }
-                *words = doing;
+                progress.words = doing;
                 *deadline = until;
             }
             _ => self.late("progress", job, effects),

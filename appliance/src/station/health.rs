@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use serde::Serialize;
+
 /// Less free storage than this is a warning, MiB: a day of results and some recordings.
 pub const LOW_STORAGE_MIB: u64 = 256;
 /// Less free storage than this is a fault, MiB: a recipe is written whole beside its two generations, each up to 8 MiB.
@@ -10,7 +12,7 @@ pub const FULL_STORAGE_MIB: u64 = 24;
 pub const HOT_PROCESSOR_C: f64 = 80.0;
 
 /// One survey of the system; about one a second.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct System {
     /// Load of all processors since the last survey, %.
     pub cpu_percent: Option<u8>,
@@ -27,55 +29,46 @@ pub struct System {
     /// Of the unclean starts, those that followed a daemon whose measuring task hung.
     pub watchdog_restarts: u32,
     /// Open Modbus connections.
+    #[serde(rename = "modbus_clients")]
     pub clients: u16,
     /// Whether one of them may write.
     pub writer_connected: bool,
     /// Numbers of the stored recipes, ascending.
+    #[serde(skip)]
     pub recipes: Arc<[u16]>,
 }
 
-impl Default for System {
-    fn default() -> Self {
-        Self {
-            cpu_percent: None,
-            free_memory_mib: None,
-            free_storage_mib: None,
-            cpu_temperature_c: None,
-            boots: 0,
-            unclean_boots: 0,
-            watchdog_restarts: 0,
-            clients: 0,
-            writer_connected: false,
-            recipes: Arc::new([]),
-        }
-    }
-}
-
 /// Timing of camera and projector in one sequence.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Pace {
     /// Frames per second × 100.
+    #[serde(skip)]
     pub camera_centihertz: u32,
     /// Refreshes of the projector, mHz.
+    #[serde(skip)]
     pub refresh_millihertz: u32,
     /// Longest time from a pattern in view to its exposure, µs.
     pub lag_us: u32,
     /// Frames that the camera did not deliver.
+    #[serde(rename = "dropped_frames")]
     pub dropped: u32,
     /// Refreshes that the projector missed.
     pub missed_flips: u32,
     /// Patterns that were shown again because no frame was exposed to them alone, or their frame was spoiled.
+    #[serde(rename = "retaken_patterns")]
     pub retaken: u32,
     /// Largest deviation of a flip from its expected time and of an exposure from its trigger, µs.
     pub sync_error_us: u32,
 }
 
-/// Everything that the HEALTH registers show.
-#[derive(Debug, Clone, Default, PartialEq)]
+/// Everything that the HEALTH registers show. The page shows it as JSON; null is what is not known.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Health {
     /// The last survey.
+    #[serde(flatten)]
     pub system: System,
     /// The last sequence; its counts are sums since the start.
+    #[serde(flatten)]
     pub pace: Pace,
     /// Processing of the last cycle that was measured, µs: all stages but waiting and exposure.
     pub processing_us: u32,

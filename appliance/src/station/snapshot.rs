@@ -197,23 +197,15 @@ impl Station {
             (None, None) => (0, None),
         };
         let teach = match &self.state {
-            State::Teaching {
-                number,
-                fraction,
-                words,
-                ..
-            } => Some(TeachProgress {
-                number: *number,
-                fraction: *fraction,
-                words: words.clone(),
-            }),
+            State::Teaching { progress, .. } => Some(progress.clone()),
             _ => None,
         };
         let warnings = self.warnings();
+        let (state, state_word) = self.state.named();
         Snapshot {
             at: now,
-            state: self.state.number(),
-            state_word: self.state.word(),
+            state,
+            state_word,
             status: self.status(warnings, error_code),
             warnings,
             heartbeat: self.worker.heartbeat,

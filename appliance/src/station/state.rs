@@ -1,11 +1,10 @@
 //! The states of the station, each with the data that it needs.
 
-use std::sync::Arc;
-
 use super::clock::Micros;
 use super::event::{Job, JobId};
 use super::fault::Fault;
 use super::recipes::RecipeKey;
+use super::snapshot::TeachProgress;
 
 /// One accepted trigger on its way to a verdict.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -16,7 +15,7 @@ pub struct Cycle {
     pub exposed: Option<Micros>,
 }
 
-/// What the station is doing. The numbers of register 104 are [`State::number`].
+/// What the station is doing. The numbers of register 104 are in [`State::named`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum State {
     /// The worker has not reported its head yet.
@@ -53,12 +52,8 @@ pub enum State {
     Teaching {
         /// What the worker quotes in its answers.
         job: JobId,
-        /// The recipe being taught.
-        number: u16,
-        /// 0…1.
-        fraction: f32,
-        /// The present stage of teaching, for people.
-        words: Arc<str>,
+        /// How far it has come.
+        progress: TeachProgress,
         /// The next sign of progress must come by then.
         deadline: Micros,
     },
@@ -74,34 +69,24 @@ pub enum State {
 }
 
 impl State {
-    /// The number of register 104.
-    pub fn number(&self) -> u16 {
+    /// Number and word of register 104, as the map and the page use them.
+    pub fn named(&self) -> (u16, &'static str) {
         match self {
-            Self::Boot { .. } => 0,
-            Self::Ready => 1,
-            Self::Acquiring { .. } => 2,
-            Self::Processing { .. } => 3,
-            Self::Loading { .. } => 4,
-            Self::Teaching { .. } => 5,
-            Self::Offline => 6,
-            Self::Fault(_) => 7,
-            Self::Stopping { .. } => 8,
+            Self::Boot { .. } => (0, "boot"),
+            Self::Ready => (1, "ready"),
+            Self::Acquiring { .. } => (2, "acquiring"),
+            Self::Processing { .. } => (3, "processing"),
+            Self::Loading { .. } => (4, "loading"),
+            Self::Teaching { .. } => (5, "teaching"),
+            Self::Offline => (6, "offline"),
+            Self::Fault(_) => (7, "fault"),
+            Self::Stopping { .. } => (8, "stopping"),
         }
     }
 
-    /// The word for register 104's number, as the map and the page use it.
+    /// The word of register 104.
     pub fn word(&self) -> &'static str {
-        match self {
-            Self::Boot { .. } => "boot",
-            Self::Ready => "ready",
-            Self::Acquiring { .. } => "acquiring",
-            Self::Processing { .. } => "processing",
-            Self::Loading { .. } => "loading",
-            Self::Teaching { .. } => "teaching",
-            Self::Offline => "offline",
-            Self::Fault(_) => "fault",
-            Self::Stopping { .. } => "stopping",
-        }
+        self.named().1
     }
 
     /// The deadline, where the state waits for the worker.

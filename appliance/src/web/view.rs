@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::station::result::flag;
 use crate::station::snapshot::{status, warning};
-use crate::station::{GaugeValue, Placement, ResultRecord, Snapshot, error_code};
+use crate::station::{GaugeValue, Health, Placement, ResultRecord, Snapshot, error_code};
 
 /// The whole snapshot.
 pub fn snapshot(snapshot: &Snapshot) -> Value {
@@ -48,35 +48,18 @@ pub fn snapshot(snapshot: &Snapshot) -> Value {
         "identity": {
             "product": snapshot.identity.product, "serial": snapshot.identity.serial, "version": snapshot.identity.version,
         },
-        "health": health(snapshot),
+        "health": health(&snapshot.health),
         "result": snapshot.result.as_deref().map(result),
     })
 }
 
 /// Measured values of system, head and clients; null where not known.
-fn health(snapshot: &Snapshot) -> Value {
-    let (system, pace) = (&snapshot.health.system, &snapshot.health.pace);
-    json!({
-        "cpu_percent": system.cpu_percent,
-        "free_memory_mib": system.free_memory_mib,
-        "free_storage_mib": system.free_storage_mib,
-        "cpu_temperature_c": system.cpu_temperature_c,
-        "boots": system.boots,
-        "unclean_boots": system.unclean_boots,
-        "watchdog_restarts": system.watchdog_restarts,
-        "modbus_clients": system.clients,
-        "writer_connected": system.writer_connected,
-        "camera_hz": f64::from(pace.camera_centihertz) / 100.0,
-        "projector_hz": f64::from(pace.refresh_millihertz) / 1000.0,
-        "lag_us": pace.lag_us,
-        "dropped_frames": pace.dropped,
-        "missed_flips": pace.missed_flips,
-        "retaken_patterns": pace.retaken,
-        "sync_error_us": pace.sync_error_us,
-        "processing_us": snapshot.health.processing_us,
-        "processing_max_us": snapshot.health.processing_max_us,
-        "storage_errors": snapshot.health.storage_errors,
-    })
+fn health(health: &Health) -> Value {
+    let pace = &health.pace;
+    let mut shown = json!(health);
+    shown["camera_hz"] = json!(f64::from(pace.camera_centihertz) / 100.0);
+    shown["projector_hz"] = json!(f64::from(pace.refresh_millihertz) / 1000.0);
+    shown
 }
 
 fn warnings(bits: u16) -> Vec<&'static str> {
