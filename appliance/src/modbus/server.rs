@@ -5,7 +5,6 @@ use std::net::{IpAddr, SocketAddr};
 use std::sync::Mutex;
 use std::time::Duration;
 
-use ipnet::IpNet;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_modbus::server::tcp::Server;
 
@@ -13,21 +12,15 @@ use super::guard::Guard;
 use super::places::Clients;
 use super::refusals::{Refusals, Refused};
 use super::service::{FrameFlaw, PlcService};
-use crate::config::{ModbusConfig, WordOrder};
+use crate::config::ModbusConfig;
 use crate::station::{ConnectionEdges, StationHandle};
 use crate::system::socket::holds;
 
 /// The server's settings.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Options {
-    /// Word order of 32- and 64-bit values.
-    pub word_order: WordOrder,
-    /// Answer only to this unit id, exception 0x0B to others.
-    pub strict_unit_id: Option<u8>,
-    /// Networks from which connections are accepted.
-    pub readers: Vec<IpNet>,
-    /// Networks from which writes are accepted.
-    pub writers: Vec<IpNet>,
+    /// Word order, unit id, and who may read and write.
+    pub config: ModbusConfig,
     /// A connection without a request for this long is closed.
     pub idle: Duration,
     /// Time to finish a started frame, and for the client to read an answer.
@@ -36,18 +29,8 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        let ModbusConfig {
-            word_order,
-            strict_unit_id,
-            readers,
-            writers,
-            ..
-        } = ModbusConfig::default();
         Self {
-            word_order,
-            strict_unit_id,
-            readers,
-            writers,
+            config: ModbusConfig::default(),
             idle: Duration::from_secs(300),
             frame: Duration::from_secs(10),
         }
@@ -65,11 +48,11 @@ pub async fn serve(
 ) {
     let server = Server::new(listener);
     let admit = |peer: IpAddr| {
-        if !holds(&options.readers, peer) {
+        if !holds(&options.config.readers, peer) {
             refusals.note(Refused::Connection, peer);
             return None;
         }
-        let may_write = holds(&options.writers, peer);
+        let may_write = holds(&options.config.writers, peer);
         let place = clients.admit(may_write);
         if place.is_none() {
             refusals.note(Refused::Full, peer);
@@ -83,8 +66,8 @@ pub async fn serve(
             let flaw = FrameFlaw::default();
             let service = PlcService {
                 handle: handle.clone(),
-                word_order: options.word_order,
-                strict_unit_id: options.strict_unit_id,
+                word_order: options.config.word_order,
+                strict_unit_id: options.config.strict_unit_id,
                 flaw: flaw.clone(),
                 edges: Mutex::new(ConnectionEdges::default()),
                 peer: peer.ip(),

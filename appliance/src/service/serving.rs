@@ -30,10 +30,7 @@ pub(super) async fn serve(
         }
     };
     let options = modbus::Options {
-        word_order: config.modbus.word_order,
-        strict_unit_id: config.modbus.strict_unit_id,
-        readers: config.modbus.readers.clone(),
-        writers: config.modbus.writers.clone(),
+        config: config.modbus.clone(),
         ..modbus::Options::default()
     };
     tokio::join!(

@@ -74,11 +74,9 @@ impl Plant {
             frame: FRAME,
             ..Options::default()
         };
-        let strict = Options {
-            word_order: WordOrder::Swapped,
-            strict_unit_id: Some(1),
-            ..lenient.clone()
-        };
+        let mut strict = lenient.clone();
+        strict.config.word_order = WordOrder::Swapped;
+        strict.config.strict_unit_id = Some(1);
         let addresses = [lenient, strict].map(|options| {
             runtime.block_on(async {
                 let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");

@@ -32,10 +32,8 @@ async fn the_oldest_buffered_result_is_at_400_until_it_is_acknowledged() {
 
 #[tokio::test]
 async fn word_order_swapped_swaps_reads_and_writes() {
-    let options = Options {
-        word_order: WordOrder::Swapped,
-        ..Default::default()
-    };
+    let mut options = Options::default();
+    options.config.word_order = WordOrder::Swapped;
     let plant = Plant::with(options, false).await;
     let mut plc = plant.client().await;
     assert_eq!(

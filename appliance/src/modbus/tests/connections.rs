@@ -21,14 +21,9 @@ async fn pipelined_requests_are_answered_one_by_one_each_with_its_own_flaw() {
 
 #[tokio::test]
 async fn unit_ids_are_all_accepted_unless_one_is_configured() {
-    let plant = Plant::with(
-        Options {
-            strict_unit_id: Some(3),
-            ..Default::default()
-        },
-        false,
-    )
-    .await;
+    let mut options = Options::default();
+    options.config.strict_unit_id = Some(3);
+    let plant = Plant::with(options, false).await;
     let mut right = tcp::connect_slave(plant.address, Slave(3)).await.unwrap();
     assert!(right.read_input_registers(100, 1).await.unwrap().is_ok());
     let mut wrong = tcp::connect_slave(plant.address, Slave(4)).await.unwrap();
@@ -102,10 +97,8 @@ async fn the_connection_over_the_limit_is_closed_and_a_freed_place_is_taken_agai
 #[tokio::test]
 async fn who_may_not_write_reads_everything_and_is_refused_with_exception_1_and_a_line_in_the_log()
 {
-    let options = Options {
-        writers: vec!["127.0.0.2/32".parse().unwrap()],
-        ..Default::default()
-    };
+    let mut options = Options::default();
+    options.config.writers = vec!["127.0.0.2/32".parse().unwrap()];
     let plant = Plant::with(options, false).await;
     let mut reader = plant.client().await;
     assert!(reader.read_input_registers(200, 120).await.unwrap().is_ok());
@@ -137,10 +130,8 @@ async fn who_may_not_write_reads_everything_and_is_refused_with_exception_1_and_
 
 #[tokio::test]
 async fn who_may_not_read_gets_no_connection() {
-    let options = Options {
-        readers: vec!["10.0.0.0/8".parse().unwrap()],
-        ..Default::default()
-    };
+    let mut options = Options::default();
+    options.config.readers = vec!["10.0.0.0/8".parse().unwrap()];
     let plant = Plant::with(options, false).await;
     let mut stranger = plant.client().await;
     assert!(stranger.read_input_registers(100, 1).await.is_err());
