@@ -1,12 +1,12 @@
 //! `fringed config check [FILE]` and `fringed config keys`.
 
 use super::options::{Json, Output};
-use crate::config::{Backend, Config, keys, table};
+use crate::config::{Backend, Config, TABLE, keys};
 use crate::error::{Exit, Failure};
 use crate::head::calibration::place::Place;
 use crate::production::backend;
 use hal::replay::Recording;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Check a configuration, or list its keys.
 #[derive(Debug, clap::Subcommand)]
@@ -33,23 +33,16 @@ impl ConfigCommand {
     pub fn run(&self) -> Result<(), Failure> {
         match self {
             Self::Keys { json } if json.json => {
-                let keys: Vec<_> = keys()
-                    .map(|key| {
-                        serde_json::json!({
-                            "name": key.name, "unit": key.unit, "range": key.range,
-                            "default": key.default, "meaning": key.meaning,
-                        })
-                    })
-                    .collect();
-                say!("{:#}", serde_json::Value::from(keys));
+                let keys: Vec<_> = keys().collect();
+                say!("{:#}", serde_json::json!(keys));
                 Ok(())
             }
             Self::Keys { .. } => {
-                say!("{}", table().trim_end());
+                say!("{}", TABLE.trim_end());
                 Ok(())
             }
             Self::Check { file, output } => {
-                let checked = check(file);
+                let checked = Config::read(file).and_then(|config| check_named_files(&config));
                 let problem = checked.as_ref().err();
                 let document = || {
                     let problem = problem.map(|failure| failure.message.as_str());
@@ -65,10 +58,6 @@ impl ConfigCommand {
             }
         }
     }
-}
-
-fn check(file: &Path) -> Result<(), Failure> {
-    check_named_files(&Config::read(file)?)
 }
 
 fn check_named_files(config: &Config) -> Result<(), Failure> {

@@ -3,7 +3,7 @@
 mod devices;
 mod keys;
 
-pub use keys::{Key, keys, table};
+pub use keys::{Key, TABLE, keys};
 
 use crate::error::{Exit, Failure};
 use crate::head::calibration::place::IN_STATE;
@@ -119,7 +119,7 @@ pub struct HttpConfig {
 }
 
 /// The devices.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct HeadConfig {
     /// Which kind of head.
@@ -142,10 +142,11 @@ pub struct HeadConfig {
 }
 
 /// The kinds of head.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Backend {
     /// Simulated light.
+    #[default]
     Sim,
     /// Recordings.
     Replay,
@@ -203,21 +204,6 @@ impl Default for HistoryConfig {
     }
 }
 
-impl Default for HeadConfig {
-    fn default() -> Self {
-        Self {
-            backend: Backend::Sim,
-            scenario: None,
-            recordings: Vec::new(),
-            camera: CameraSetup::default(),
-            projector: ProjectorSetup::default(),
-            trigger: TriggerSetup::default(),
-            calibration: None,
-            part: None,
-        }
-    }
-}
-
 impl Config {
     /// Reads and checks a file. Paths in it are relative to its folder.
     ///
@@ -236,12 +222,10 @@ impl Config {
         })?;
         let wrong = |error: String| {
             let error = shortened(&error);
-            let remedy = format!("{error}; `fringed config keys` lists every key");
-            Failure::because(
-                Exit::Configuration,
-                format!("read configuration {place}"),
-                remedy,
-            )
+            let words = format!(
+                "read configuration {place}: {error}; `fringed config keys` lists every key"
+            );
+            Failure::new(Exit::Configuration, words)
         };
         let mut config: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
         config.check().map_err(wrong)?;

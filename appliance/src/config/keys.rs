@@ -1,0 +1,133 @@
+//! Every configuration key with its unit, range, default and meaning.
+
+use serde::Serialize;
+
+/// All keys as a table in Markdown, as `docs/configuration.md` has it; tests compare them with the structs.
+pub const TABLE: &str = include_str!("keys.md");
+
+/// One key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Key {
+    /// `section.key`.
+    pub name: &'static str,
+    /// Its unit, or its type.
+    pub unit: &'static str,
+    /// What may be written.
+    pub range: &'static str,
+    /// What holds if it is not written.
+    pub default: &'static str,
+    /// What it does.
+    pub meaning: &'static str,
+}
+
+/// Every key: the rows of [`TABLE`].
+pub fn keys() -> impl Iterator<Item = Key> {
+    TABLE.lines().filter_map(|row| {
+        let row = row.strip_prefix("| `")?.strip_suffix(" |")?;
+        let (name, row) = row.split_once("` | ")?;
+        let mut cells = row.split(" | ");
+        Some(Key {
+            name,
+            unit: cells.next()?,
+            range: cells.next()?,
+            default: cells.next()?,
+            meaning: cells.next()?,
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{Config, HeadConfig, ModbusConfig};
+    use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
+    use std::collections::BTreeMap;
+
+    /// A configuration in which nothing is left out.
+    fn full() -> Config {
+        let word = || Some("word".to_owned());
+        Config {
+            state: Some("state".into()),
+            modbus: ModbusConfig {
+                strict_unit_id: Some(1),
+                ..ModbusConfig::default()
+            },
+            head: HeadConfig {
+                scenario: Some("scenario".into()),
+                camera: CameraSetup {
+                    id: word(),
+                    width: Some(1),
+                    height: Some(1),
+                    ..CameraSetup::default()
+                },
+                projector: ProjectorSetup {
+                    card: Some("card".into()),
+                    connector: word(),
+                    width: Some(1),
+                    height: Some(1),
+                    refresh_hz: Some(1.0),
+                },
+                trigger: TriggerSetup {
+                    line: word(),
+                    ..TriggerSetup::default()
+                },
+                calibration: Some("calibration.json".into()),
+                ..HeadConfig::default()
+            },
+            lines: LinesSetup {
+                start: word(),
+                busy: word(),
+                ok: word(),
+                fault: word(),
+                ..LinesSetup::default()
+            },
+            ..Config::default()
+        }
+    }
+
+    fn flat(config: &Config) -> BTreeMap<String, String> {
+        let mut keys = BTreeMap::new();
+        gather("", &toml::Value::try_from(config).unwrap(), &mut keys);
+        keys
+    }
+
+    /// Every value below `value` under its whole name.
+    fn gather(name: &str, value: &toml::Value, keys: &mut BTreeMap<String, String>) {
+        let toml::Value::Table(values) = value else {
+            keys.insert(name.to_owned(), value.to_string().replace('"', ""));
+            return;
+        };
+        for (key, value) in values {
+            let name = [name, key].join(".");
+            gather(name.trim_start_matches('.'), value, keys);
+        }
+    }
+
+    #[test]
+    fn the_table_has_every_key_of_the_code_and_no_other() {
+        let mut documented: Vec<_> = keys().map(|key| key.name.to_owned()).collect();
+        documented.sort();
+        assert_eq!(documented, flat(&full()).into_keys().collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn the_documented_defaults_are_the_code_s() {
+        let defaults = flat(&Config::default());
+        for key in keys() {
+            // What has no default value in the code is described in words.
+            if let Some(value) = defaults.get(key.name) {
+                assert_eq!(key.default, value, "{}", key.name);
+            }
+        }
+    }
+
+    #[test]
+    fn the_documentation_holds_the_table() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/configuration.md");
+        let text = std::fs::read_to_string(path).unwrap();
+        assert!(
+            text.contains(TABLE),
+            "copy appliance/src/config/keys.md into docs/configuration.md"
+        );
+    }
+}
