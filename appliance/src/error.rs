@@ -47,14 +47,6 @@ impl Failure {
         }
     }
 
-    /// A device that cannot be opened.
-    pub fn of_device(error: &Error) -> Self {
-        Self {
-            code: Some(code_of(error)),
-            ..Self::new(Exit::Unavailable, error.to_string())
-        }
-    }
-
     /// `error` while doing `what`, which names the file.
     pub fn because(exit: Exit, what: impl fmt::Display, error: impl fmt::Display) -> Self {
         Self::new(exit, format!("{what}: {error}"))
@@ -86,6 +78,15 @@ impl std::error::Error for Failure {}
 impl From<Exit> for ExitCode {
     fn from(exit: Exit) -> Self {
         Self::from(exit as u8)
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self {
+            code: Some(code_of(&error)),
+            ..Self::new(Exit::Unavailable, error.to_string())
+        }
     }
 }
 

@@ -64,7 +64,7 @@ impl History {
             before_seq: None,
             limit: self.limit.unwrap_or(usual) as usize,
         };
-        let undated = reader.undated(&filter).map_err(failure)?;
+        let undated = reader.undated(&filter)?;
         if undated > 0 {
             let words = format!(
                 "{undated} results are left out, of which it is not known when they were: the clock was not synchronised; \
@@ -75,7 +75,7 @@ impl History {
         if self.csv {
             return self.csv(&reader, &filter);
         }
-        let results = reader.results(&filter).map_err(failure)?;
+        let results = reader.results(&filter)?;
         if self.json.json {
             say!(
                 "{:#}",
@@ -94,7 +94,7 @@ impl History {
                 "≈ the time is from the browser of a signed-in user: the clock was not synchronised"
             );
         }
-        let counts = reader.counts(&filter).map_err(failure)?;
+        let counts = reader.counts(&filter)?;
         say!(
             "{} PASS, {} FAIL, {} INVALID in all",
             counts.pass,
@@ -108,20 +108,21 @@ impl History {
         let mut out = std::io::BufWriter::new(std::io::stdout().lock());
         match reader.csv(filter, &mut out) {
             // A pipe that the reader has closed is not an error.
-            Err(error) if !error.reason.starts_with("write as CSV") => Err(failure(error)),
+            Err(error) if !error.reason.starts_with("write as CSV") => Err(error.into()),
             _ => Ok(()),
         }
     }
 }
 
-/// The failure of a history that cannot be read.
-pub fn failure(error: HistoryError) -> Failure {
-    let exit = match (error.path.exists(), error.damaged) {
-        (false, _) => Exit::Missing,
-        (true, true) => Exit::Content,
-        (true, false) => Exit::Unavailable,
-    };
-    Failure::new(exit, error.to_string())
+impl From<HistoryError> for Failure {
+    fn from(error: HistoryError) -> Self {
+        let exit = match (error.path.exists(), error.damaged) {
+            (false, _) => Exit::Missing,
+            (true, true) => Exit::Content,
+            (true, false) => Exit::Unavailable,
+        };
+        Self::new(exit, error.to_string())
+    }
 }
 
 /// The time of a result, to the second: by the clock, else by a browser's clock, else since the start of the daemon.

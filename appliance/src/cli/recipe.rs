@@ -75,8 +75,7 @@ impl RecipeCommand {
             }
             Self::Export { recipe, file } => {
                 let number = recipe.number;
-                let exported = store(&recipe.files)?.export(number, file);
-                exported.map_err(failed)?;
+                store(&recipe.files)?.export(number, file)?;
                 let words = || format!("recipe {number} is in {}", file.display());
                 recipe.quiet.say(words);
                 Ok(())
@@ -89,7 +88,7 @@ impl RecipeCommand {
                     let tried = Plan::try_out(recipe, &calibration);
                     tried.map_err(|error| error.to_string())
                 };
-                let imported = store.import(file, fits).map_err(failed)?;
+                let imported = store.import(file, fits)?;
                 let digits = imported.fingerprint.get(..8).unwrap_or_default();
                 quiet.say(|| {
                     format!(
@@ -102,8 +101,7 @@ impl RecipeCommand {
             Self::Delete(recipe) => {
                 let number = recipe.number;
                 let state = at_rest(&recipe.files, "Delete")?;
-                let deleted = Store::of_state(&state)?.delete(number);
-                deleted.map_err(failed)?;
+                Store::of_state(&state)?.delete(number)?;
                 let undo = format!("`fringed recipe undo {number}` brings it back");
                 let words = || format!("recipe {number} is deleted; {undo}");
                 recipe.quiet.say(words);
@@ -112,7 +110,7 @@ impl RecipeCommand {
             Self::Undo(recipe) => {
                 let number = recipe.number;
                 let state = at_rest(&recipe.files, "Undo")?;
-                let file = Store::of_state(&state)?.undo(number).map_err(failed)?;
+                let file = Store::of_state(&state)?.undo(number)?;
                 let digits = file.fingerprint.get(..8).unwrap_or_default();
                 recipe.quiet.say(|| {
                     format!(
@@ -141,17 +139,19 @@ fn at_rest(files: &Files, button: &str) -> Result<StateFolder, Failure> {
     StateFolder::open_unless_used(&files.state_folder()?, Exit::Unavailable, &instead)
 }
 
-fn failed(error: ChangeError) -> Failure {
-    let exit = match &error {
-        ChangeError::Load(LoadError::Unknown(_))
-        | ChangeError::Nothing(_)
-        | ChangeError::Missing { .. } => Exit::Missing,
-        ChangeError::Load(LoadError::Corrupt { .. })
-        | ChangeError::Outdated(_)
-        | ChangeError::Unfit(_) => Exit::Content,
-        ChangeError::Store(_) | ChangeError::Write { .. } => Exit::CannotCreate,
-    };
-    Failure::new(exit, error.to_string())
+impl From<ChangeError> for Failure {
+    fn from(error: ChangeError) -> Self {
+        let exit = match &error {
+            ChangeError::Load(LoadError::Unknown(_))
+            | ChangeError::Nothing(_)
+            | ChangeError::Missing { .. } => Exit::Missing,
+            ChangeError::Load(LoadError::Corrupt { .. })
+            | ChangeError::Outdated(_)
+            | ChangeError::Unfit(_) => Exit::Content,
+            ChangeError::Store(_) | ChangeError::Write { .. } => Exit::CannotCreate,
+        };
+        Self::new(exit, error.to_string())
+    }
 }
 
 fn list(recipes: &[Listed], json: bool) {

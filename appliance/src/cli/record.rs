@@ -80,9 +80,7 @@ impl Record {
             .map_err(|error| Failure::because(Exit::Usage, "--fringes", error))?;
         let (levels, steps) = (usize::from(self.levels), usize::from(self.steps));
         let shots = Sequence::geometric(function.range(), levels, steps);
-        let device = |error: hal::error::Error| Failure::new(Exit::Unavailable, error.to_string());
-        let taken =
-            take(head, calibration, &function, &shots, TIMEOUT, on_progress).map_err(device)?;
+        let taken = take(head, calibration, &function, &shots, TIMEOUT, on_progress)?;
         let recorded = shots.into_iter().zip(taken);
         let truth = stage.as_ref().map(sim::Stage::truth);
         Ok(Recording {

@@ -1,7 +1,6 @@
 //! `fringed replay RECORDING`: judges a part that did not pass again, from its recorded frames, and compares the result with the one in
 //! the history, bit by bit.
 
-use super::history::failure;
 use super::options::Measuring;
 use crate::error::{Exit, Failure};
 use crate::history::kept::{self, Kept, missing};
@@ -164,9 +163,9 @@ fn result_of(state: &Path, name: Option<&str>, kept: &Kept) -> Result<Option<Ent
     let Some(name) = name.filter(|_| reader.path().exists()) else {
         return Ok(None);
     };
-    let mut found = reader.recorded_as(name).map_err(failure)?;
+    let mut found = reader.recorded_as(name)?;
     if let (None, Some(seq)) = (&found, seq_of(name)) {
-        found = reader.result(seq).map_err(failure)?;
+        found = reader.result(seq)?;
     }
     let part = kept.part_id();
     let of_this_part = |entry: &Entry| {

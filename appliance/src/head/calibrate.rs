@@ -8,13 +8,13 @@ use super::calibration::file::{
 };
 use super::calibration::place::Place;
 use super::examine::{
-    Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, PLATE_PITCH, PlateError, SETTLE, Stamps,
+    Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, PLATE_PITCH, SETTLE, Stamps,
     contrast, noise, plate, response,
 };
 use super::seam;
+use crate::error::{Exit, Failure};
 use algo::geometry::Vector;
 use algo::pipeline::Plate;
-use hal::error::Error;
 use hal::head::{DynHead, Timing};
 use std::time::Duration;
 
@@ -60,38 +60,25 @@ pub struct Made {
     pub notes: Vec<String>,
 }
 
-/// A head that cannot be calibrated.
-#[derive(Debug, thiserror::Error)]
-pub enum MakeError {
-    /// A device failed.
-    #[error("{0}")]
-    Device(#[from] Error),
-    /// The scene in front of the head or the head's settings do not allow it.
-    #[error("{0}")]
-    Scene(String),
-    /// The models are those of another head.
-    #[error("{0}")]
-    Models(String),
+/// A scene in front of the head, or settings of the head, that do not allow a calibration.
+fn scene(words: impl Into<String>) -> Failure {
+    Failure::new(Exit::Unavailable, words)
 }
 
-impl From<PlateError> for MakeError {
-    fn from(error: PlateError) -> Self {
-        match error {
-            PlateError::Device(error) => Self::Device(error),
-            PlateError::Unfit(words) => Self::Scene(words),
-        }
-    }
+/// Models that are those of another head.
+fn models(words: impl Into<String>) -> Failure {
+    Failure::new(Exit::Content, words)
 }
 
 /// Measures a calibration. `progress` gets the share done and what is measured next. Afterwards the head's timing is the calibrated one.
 ///
 /// # Errors
-/// Of a device; if too little light comes back, or too much; if there is no flat plate or the models do not fit it.
+/// Of a device; if too little light comes back, or too much, or there is no flat plate (69); if the models do not fit it (65).
 pub fn make(
     head: &mut DynHead,
     basis: Basis,
     progress: &dyn Fn(f64, &str),
-) -> Result<Made, MakeError> {
+) -> Result<Made, Failure> {
     let mut calibration = basis.calibration;
     let mut notes = Vec::new();
     progress(0.0, "camera stamps");
@@ -109,8 +96,7 @@ pub fn make(
     let delay = Delay::measure(head, &lit, ROUNDS)?
         .filter(|delay| delay.seconds >= LEAST_DELAY_S)
         .ok_or_else(|| {
-            let words = "measure the flip-to-light delay: light does not follow the flips: `fringed doctor` says more";
-            MakeError::Scene(words.into())
+            scene("measure the flip-to-light delay: light does not follow the flips: `fringed doctor` says more")
         })?;
     head.set_timing(Timing {
         flip_to_light: delay.duration(),
@@ -130,7 +116,7 @@ pub fn make(
         );
         greys = before;
     }
-    calibration.response = inverted(&greys).map_err(MakeError::Scene)?;
+    calibration.response = inverted(&greys).map_err(scene)?;
     progress(0.6, "noise");
     let noise = noise(head, settle, &lit)?;
     calibration.noise_counts = noise.counts;
@@ -203,7 +189,7 @@ pub fn make(
         },
         reference,
     };
-    let (file, bytes) = file.sealed().map_err(MakeError::Scene)?;
+    let (file, bytes) = file.sealed().map_err(scene)?;
     Ok(Made {
         file,
         bytes,
@@ -221,7 +207,7 @@ fn same(before: &[f64], now: &[f64]) -> bool {
     before.len() == now.len() && before.iter().zip(now).all(near)
 }
 
-fn bright_enough(lit: &Lit) -> Result<(), MakeError> {
+fn bright_enough(lit: &Lit) -> Result<(), Failure> {
     let (share, bright) = (lit.share(), lit.bright() / lit.full_scale());
     let words = if share < LEAST_LIT {
         format!(
@@ -241,7 +227,7 @@ fn bright_enough(lit: &Lit) -> Result<(), MakeError> {
     } else {
         return Ok(());
     };
-    Err(MakeError::Scene(format!(
+    Err(scene(format!(
         "calibrate: {words}; `fringed doctor` says more"
     )))
 }
@@ -252,10 +238,10 @@ fn reference(
     vertical: &Plate,
     horizontal: &Plate,
     maps: &mut Vec<(String, Vec<u8>)>,
-) -> Result<ReferenceFile, MakeError> {
-    let models_off_px = models_off(calibration, vertical, horizontal).map_err(MakeError::Models)?;
+) -> Result<ReferenceFile, Failure> {
+    let models_off_px = models_off(calibration, vertical, horizontal).map_err(models)?;
     if !(models_off_px <= MOST_OFF_PX) {
-        return Err(MakeError::Models(format!(
+        return Err(models(format!(
             "the models are off the measured plate by {models_off_px:.1} projector pixels, more than {MOST_OFF_PX}: put the \
              plate into the plane z = 0 of the models, or import the models of this head"
         )));

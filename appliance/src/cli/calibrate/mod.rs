@@ -6,7 +6,7 @@ use super::numbers::number;
 use super::options::Measuring;
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
-use crate::head::calibrate::{Basis, MakeError, make};
+use crate::head::calibrate::{Basis, make};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::bounds::{COLDEST_C, HOTTEST_C};
 use crate::head::calibration::file::CalibrationFile;
@@ -100,7 +100,7 @@ impl Calibrate {
         let on_progress = |share: f64, words: &str| progress.tell(0.3 + 0.7 * share, words);
         let made = pool.install(|| make(&mut opened.head, basis, &on_progress));
         progress.clear();
-        let mut made = made.map_err(refused)?;
+        let mut made = made?;
         place.save(&made.bytes, &made.maps).map_err(|error| {
             let what = format!("write {}", place.path().display());
             Failure::because(
@@ -231,12 +231,4 @@ fn lay_plate(stage: Option<&Stage>, notes: &mut Vec<String>) -> Result<(), Failu
     stage
         .place(&plate, &sim::Placement::default())
         .map_err(|error| Failure::new(Exit::Software, error.to_string()))
-}
-
-fn refused(error: MakeError) -> Failure {
-    let exit = match error {
-        MakeError::Device(_) | MakeError::Scene(_) => Exit::Unavailable,
-        MakeError::Models(_) => Exit::Content,
-    };
-    Failure::new(exit, error.to_string())
 }

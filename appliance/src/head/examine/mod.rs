@@ -15,7 +15,7 @@ pub use contrast::{PITCHES, contrast};
 pub use delay::Delay;
 pub use noise::noise;
 pub use pictures::{LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, SETTLE, counts, pictures};
-pub use plate::{PITCH as PLATE_PITCH, PlateError, plate};
+pub use plate::{PITCH as PLATE_PITCH, plate};
 pub use response::{lights, response};
 pub use stamps::Stamps;
 

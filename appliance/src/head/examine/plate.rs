@@ -1,5 +1,6 @@
 //! Measures the reference phase maps: a flat plate in the plane z = 0 under vertical and horizontal fringes.
 
+use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
 use crate::head::scan::{self, Scan};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
@@ -16,19 +17,8 @@ const FINEST_SHIFTS: usize = 16;
 /// Pitch of both patterns, projector pixels.
 pub const PITCH: f64 = 20.0;
 
-/// A plate that cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum PlateError {
-    /// A device failed.
-    #[error(transparent)]
-    Device(#[from] hal::error::Error),
-    /// There is no flat plate, or the projector cannot show the patterns.
-    #[error("measure the reference plane: {0}")]
-    Unfit(String),
-}
-
-fn unfit(error: impl std::fmt::Display) -> PlateError {
-    PlateError::Unfit(error.to_string())
+fn unfit(error: impl std::fmt::Display) -> Failure {
+    Failure::because(Exit::Unavailable, "measure the reference plane", error)
 }
 
 /// Measures the reference phase map under vertical or under horizontal fringes. The head's timing must be calibrated.
@@ -40,7 +30,7 @@ pub fn plate(
     calibration: &Calibration,
     vertical: bool,
     timeout: Duration,
-) -> Result<Plate, PlateError> {
+) -> Result<Plate, Failure> {
     let (columns, rows) = head.projector_size();
     let (columns, rows) = (columns as usize, rows as usize);
     let function = if vertical {

@@ -85,7 +85,7 @@ pub(super) fn rpi(config: &HeadConfig) -> Result<Opened, Failure> {
 
 #[cfg(all(feature = "kms", feature = "libcamera"))]
 fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<DynHead, Failure> {
-    rpi::head(config, trigger).map_err(|error| Failure::of_device(&error))
+    Ok(rpi::head(config, trigger)?)
 }
 
 /// Not reached: [`built_for_head`] refuses the head in this build.
