@@ -59,14 +59,11 @@ impl Adapt {
         let function = &adapted.function;
         let array = npy::write(function.columns(), &function.turns());
         folder.write(name, &array)?;
-        let json = serde_json::to_string_pretty(&adapted.report)
-            .map_err(|error| Failure::because(Exit::Software, "write the report", error))?;
         let text = || {
             let table = adapted.report.table();
             format!("{}\nwritten to {}", table.trim_end(), self.out.display())
         };
-        self.output.answer(|| json, text);
-        Ok(())
+        self.output.answer(&adapted.report, text)
     }
 
     fn options(&self) -> Result<AdaptOptions, Failure> {

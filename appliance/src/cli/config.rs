@@ -44,15 +44,12 @@ impl ConfigCommand {
             Self::Check { file, output } => {
                 let checked = Config::read(file).and_then(|config| check_named_files(&config));
                 let problem = checked.as_ref().err();
-                let document = || {
-                    let problem = problem.map(|failure| failure.message.as_str());
-                    let document = serde_json::json!({
-                        "file": file.display().to_string(), "valid": problem.is_none(), "problem": problem,
-                    });
-                    format!("{document:#}")
-                };
+                let problem = problem.map(|failure| failure.message.as_str());
+                let document = serde_json::json!({
+                    "file": file.display().to_string(), "valid": problem.is_none(), "problem": problem,
+                });
                 if output.is_json() || checked.is_ok() {
-                    output.answer(document, || format!("{} is right", file.display()));
+                    output.answer(&document, || format!("{} is right", file.display()))?;
                 }
                 checked
             }

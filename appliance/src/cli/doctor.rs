@@ -5,7 +5,7 @@ use crate::config::Backend;
 use crate::error::{Exit, Failure};
 use crate::head::doctor::{Check, Verdict, examine};
 use crate::production::backend;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::PathBuf;
 
 /// Examine the head: devices, format, mode, flips, trigger, light, exposure, delay, contrast, grey response.
@@ -54,9 +54,10 @@ impl Doctor {
             )
         });
         progress.clear();
-        let failed: Vec<&str> = failed(&checks).collect();
-        let document = || format!("{:#}", as_json(&checks));
-        options.output.answer(document, || table(&checks));
+        let failed = checks.iter().filter(|check| check.verdict == Verdict::Fail);
+        let failed: Vec<&str> = failed.map(|check| check.name).collect();
+        let document = json!({ "healthy": failed.is_empty(), "steps": checks });
+        options.output.answer(&document, || table(&checks))?;
         if failed.is_empty() {
             return Ok(());
         }
@@ -65,25 +66,6 @@ impl Doctor {
             format!("doctor: the head is not well: {}", failed.join(", ")),
         ))
     }
-}
-
-fn failed(checks: &[Check]) -> impl Iterator<Item = &str> {
-    let failed = checks.iter().filter(|check| check.verdict == Verdict::Fail);
-    failed.map(|check| check.name)
-}
-
-fn as_json(checks: &[Check]) -> Value {
-    let rows: Vec<Value> = checks
-        .iter()
-        .map(|check| {
-            // The names of JSON are a format: docs/doctor.md.
-            json!({
-                "step": check.name, "verdict": check.verdict.word(), "found": check.found,
-                "remedy": check.remedy, "measured": check.measured,
-            })
-        })
-        .collect();
-    json!({ "healthy": failed(checks).next().is_none(), "steps": rows })
 }
 
 fn table(checks: &[Check]) -> String {

@@ -51,8 +51,7 @@ impl Measure {
             let table = measurement.report.table();
             format!("{}\nwritten to {}", table.trim_end(), self.out.display())
         };
-        self.output.answer(|| json, text);
-        Ok(())
+        self.output.answer(&measurement.report, text)
     }
 }
 

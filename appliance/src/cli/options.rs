@@ -6,6 +6,7 @@ use crate::error::{Exit, Failure};
 use crate::storage::state::StateFolder;
 use crate::system::progress::Progress;
 use clap::{Arg, Args, Command};
+use serde::Serialize;
 use std::ffi::OsString;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -178,12 +179,22 @@ impl Output {
     }
 
     /// Prints the result: as JSON for programs, else as text for people, unless `--quiet` is given.
-    pub fn answer(self, document: impl FnOnce() -> String, text: impl FnOnce() -> String) {
+    ///
+    /// # Errors
+    /// If it cannot be written as JSON (70).
+    pub fn answer(
+        self,
+        result: &impl Serialize,
+        text: impl FnOnce() -> String,
+    ) -> Result<(), Failure> {
         if self.is_json() {
-            say!("{}", document().trim_end());
+            let json = serde_json::to_string_pretty(result);
+            let failed = |error| Failure::because(Exit::Software, "write the result", error);
+            say!("{}", json.map_err(failed)?);
         } else {
             self.quiet.say(text);
         }
+        Ok(())
     }
 
     /// Prints a remark for people: neither beside JSON nor with `--quiet`.

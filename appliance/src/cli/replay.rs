@@ -70,15 +70,12 @@ impl Replay {
             Failure::new(Exit::Content, words)
         })?;
         let replayed = entry(inspection, number, &fingerprint);
-        let document = || {
-            let recipe = serde_json::json!({
-                "from": from, "number": number, "fingerprint": fingerprint, "same": original,
-            });
-            let all =
-                serde_json::json!({ "replayed": replayed, "stored": before, "recipe": recipe });
-            format!("{all:#}")
-        };
-        options.output.answer(document, || table(&replayed, &from));
+        let document = serde_json::json!({
+            "replayed": replayed, "stored": before,
+            "recipe": { "from": from, "number": number, "fingerprint": fingerprint, "same": original },
+        });
+        let text = || table(&replayed, &from);
+        options.output.answer(&document, text)?;
         if !original {
             if let Some(before) = before {
                 options.output.remark(|| {

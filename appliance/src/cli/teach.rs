@@ -140,17 +140,14 @@ impl Teach {
         };
         let place = target.store(&taught)?;
         let file = &taught.manifest;
-        let summary = || {
-            let summary = serde_json::json!({
-                "number": file.number,
-                "fingerprint": file.fingerprint,
-                "sequences": file.sequences,
-                "production": file.production,
-                "reasons": taught.choice.reasons,
-                "file": place,
-            });
-            format!("{summary:#}")
-        };
+        let summary = serde_json::json!({
+            "number": file.number,
+            "fingerprint": file.fingerprint,
+            "sequences": file.sequences,
+            "production": file.production,
+            "reasons": taught.choice.reasons,
+            "file": place,
+        });
         let text = || {
             let mut lines = taught.choice.reasons.clone();
             let fingerprint = &file.fingerprint[..8];
@@ -160,8 +157,7 @@ impl Teach {
             ));
             lines.join("\n")
         };
-        options.output.answer(summary, text);
-        Ok(())
+        options.output.answer(&summary, text)
     }
 
     /// The recipe that is replaced, if any.

@@ -8,8 +8,8 @@ use super::calibration::file::{
 };
 use super::calibration::place::Place;
 use super::examine::{
-    Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, PLATE_PITCH, SETTLE, Stamps,
-    contrast, noise, plate, response,
+    Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, PLATE_PITCH, SETTLE, Stamps, contrast,
+    noise, plate, response,
 };
 use super::seam;
 use crate::error::{Exit, Failure};

@@ -60,10 +60,10 @@ impl Bench {
         let report = self.measure(&on_progress);
         progress.clear();
         let report = report?;
-        let json = format!("{:#}\n", report.json());
+        let json = report.json();
         let tables = report.markdown();
         if let Some(folder) = &folder {
-            folder.write("benchmarks.json", json.as_bytes())?;
+            folder.write("benchmarks.json", format!("{json:#}\n").as_bytes())?;
             folder.write("benchmarks.md", tables.as_bytes())?;
             if let Some(csv) = report.csv() {
                 folder.write("accuracy.csv", csv.as_bytes())?;
@@ -72,8 +72,7 @@ impl Bench {
                 folder.write(&name, &bytes)?;
             }
         }
-        self.output.answer(|| json, || tables);
-        Ok(())
+        self.output.answer(&json, || tables)
     }
 
     fn measure(&self, on_progress: &(dyn Fn(f64, &str) + Sync)) -> Result<Report, Failure> {

@@ -48,14 +48,11 @@ impl Experiment {
             .map_err(|error| Failure::because(Exit::Software, "run the experiments", error))?;
         let means = means(&results.rows);
         write(&folder, &campaign, &results, &means)?;
-        let json = serde_json::to_string_pretty(&means)
-            .map_err(|error| Failure::because(Exit::Software, "write the means", error))?;
         let text = || {
             let tables = tables(&campaign, &means);
             format!("{}\nwritten to {}", tables.trim_end(), self.out.display())
         };
-        self.output.answer(|| json, text);
-        Ok(())
+        self.output.answer(&means, text)
     }
 
     fn scenes(&self) -> Result<Vec<Scene>, Failure> {

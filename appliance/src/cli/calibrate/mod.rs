@@ -116,9 +116,7 @@ impl Calibrate {
             place: place.path(),
             notes: &notes,
         };
-        let document = || format!("{:#}", report.json());
-        options.output.answer(document, || report.table());
-        Ok(())
+        options.output.answer(&report.json(), || report.table())
     }
 
     /// What the calibration starts from.

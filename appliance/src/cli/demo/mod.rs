@@ -67,8 +67,8 @@ impl Demo {
         let rows = runtime()?.block_on(play(&daemon, recipe, &progress));
         progress.clear();
         let rows = rows?;
-        let document = || format!("{:#}", table::json(&rows));
-        self.output.answer(document, || table::text(&rows));
+        self.output
+            .answer(&table::json(&rows), || table::text(&rows))?;
         if !self.exit && std::io::stdout().is_terminal() {
             if !self.output.is_json() {
                 say!("\nThe page stays on http://{} until Ctrl-C.", daemon.http);

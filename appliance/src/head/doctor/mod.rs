@@ -10,10 +10,12 @@ use crate::head::calibration::Calibration;
 use crate::head::examine::{Lit, SETTLE};
 use hal::error::Error;
 use hal::head::DynHead;
+use serde::Serialize;
 use serde_json::{Value, json};
 
 /// The verdict of a check.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// What was checked is as it must be.
     Pass,
@@ -34,10 +36,11 @@ impl Verdict {
     }
 }
 
-/// One check with its verdict.
-#[derive(Clone, Debug)]
+/// One check with its verdict. The names of its JSON are a format: docs/doctor.md.
+#[derive(Clone, Debug, Serialize)]
 pub struct Check {
     /// Its name.
+    #[serde(rename = "step")]
     pub name: &'static str,
     /// Its verdict.
     pub verdict: Verdict,
