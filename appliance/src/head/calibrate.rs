@@ -3,8 +3,8 @@
 
 use super::calibration::Calibration;
 use super::calibration::file::{
-    CalibrationFile, CameraFile, ContrastFile, FORMAT, LevelFile, MapFile, NoiseFile, PitchFile,
-    ProjectorFile, ReferenceFile, TimingFile, VERSION, inverted,
+    CalibrationFile, CameraFile, FORMAT, LevelFile, MapFile, NoiseFile, ProjectorFile,
+    ReferenceFile, TimingFile, VERSION, inverted,
 };
 use super::calibration::place::Place;
 use super::examine::{
@@ -134,7 +134,6 @@ pub fn make(
         None
     };
     progress(1.0, "calibrated");
-    let coarsest = contrast.first().map_or(0.0, |first| first.1);
     let (width, height, bit_depth) = calibration.frames();
     let (columns, rows) = calibration.raster();
     let file = CalibrationFile {
@@ -177,16 +176,7 @@ pub fn make(
                 .collect(),
         },
         response: greys,
-        contrast: ContrastFile {
-            modulation_counts: coarsest,
-            pitches: contrast
-                .iter()
-                .map(|(pitch_px, modulation)| PitchFile {
-                    pitch_px: *pitch_px,
-                    contrast: modulation / coarsest.max(1e-9),
-                })
-                .collect(),
-        },
+        contrast,
         reference,
     };
     let (file, bytes) = file.sealed().map_err(scene)?;

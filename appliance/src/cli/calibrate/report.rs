@@ -69,11 +69,7 @@ impl Report<'_> {
                 noise.counts, noise.read_counts, noise.shot
             ),
         );
-        let pitches = file.contrast.pitches.iter();
-        let pitches: Vec<String> = pitches
-            .map(|one| format!("{:.0} % at {} px", one.contrast * 100.0, one.pitch_px))
-            .collect();
-        line("contrast", pitches.join(", "));
+        line("contrast", file.contrast.words());
         if let Some(maps) = &file.reference {
             let residual = |name: &str, map: &MapFile| {
                 format!(

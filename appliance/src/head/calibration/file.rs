@@ -129,6 +129,17 @@ pub struct ContrastFile {
     pub pitches: Vec<PitchFile>,
 }
 
+impl ContrastFile {
+    /// The contrasts for people.
+    pub fn words(&self) -> String {
+        let pitches = self.pitches.iter();
+        let pitches: Vec<String> = pitches
+            .map(|of| format!("{:.0} % at {} px", of.contrast * 100.0, of.pitch_px))
+            .collect();
+        pitches.join(", ")
+    }
+}
+
 /// Contrast of one pitch.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

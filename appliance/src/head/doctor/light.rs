@@ -53,27 +53,20 @@ pub(super) fn contrast(
     calibration: &Calibration,
     lit: &Lit,
 ) -> Result<Finding, Error> {
-    let modulations = examine::contrast(head, calibration, SETTLE, lit)?;
-    let coarsest = modulations.first().map_or(0.0, |first| first.1);
-    let relative: Vec<(u32, f64)> = modulations
-        .iter()
-        .map(|(pitch, modulation)| (*pitch, modulation / coarsest.max(1e-9)))
+    let found = examine::contrast(head, calibration, SETTLE, lit)?;
+    let pitches = found.pitches.iter();
+    let by_pitch: serde_json::Map<String, Value> = pitches
+        .map(|of| (of.pitch_px.to_string(), json!(of.contrast)))
         .collect();
-    let by_pitch: serde_json::Map<String, Value> = relative
-        .iter()
-        .map(|(pitch, contrast)| (pitch.to_string(), json!(contrast)))
-        .collect();
-    let measured = json!({ "modulation_counts": coarsest, "contrast_by_pitch": by_pitch });
-    let listed: Vec<String> = relative
-        .iter()
-        .map(|(pitch, contrast)| format!("{:.0} % at {pitch} px", contrast * 100.0))
-        .collect();
+    let measured =
+        json!({ "modulation_counts": found.modulation_counts, "contrast_by_pitch": by_pitch });
+    let mut pitches = found.pitches.iter();
+    let sharp = pitches.find(|of| of.pitch_px == SHARP_PITCH);
+    let blurred = sharp.is_none_or(|of| of.contrast < LEAST_CONTRAST);
     let found = format!(
         "contrast of the coarsest pitch is kept to {}",
-        listed.join(", ")
+        found.words()
     );
-    let sharp = relative.iter().find(|(pitch, _)| *pitch == SHARP_PITCH);
-    let blurred = sharp.is_none_or(|(_, contrast)| *contrast < LEAST_CONTRAST);
     let remedy = format!(
         "focus projector and camera on the part until {SHARP_PITCH} px keep {:.0} %",
         LEAST_CONTRAST * 100.0

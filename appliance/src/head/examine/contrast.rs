@@ -5,6 +5,7 @@
 
 use super::pictures::{Lit, median, pictures};
 use crate::head::calibration::Calibration;
+use crate::head::calibration::file::{ContrastFile, PitchFile};
 use crate::head::rasters::rasters;
 use algo::pattern::{PhaseFunction, Shot};
 use hal::error::Error;
@@ -16,7 +17,7 @@ pub const PITCHES: [u32; 6] = [64, 32, 24, 16, 12, 8];
 /// Shifts of each pitch, a quarter of a turn each.
 const SHIFTS: usize = 4;
 
-/// The median modulation over the lit pixels for each of [`PITCHES`], counts.
+/// The contrast of each of [`PITCHES`] by the median modulation over the lit pixels.
 ///
 /// # Errors
 /// Of a device, or if the projector is too small for a pitch.
@@ -25,7 +26,7 @@ pub fn contrast(
     calibration: &Calibration,
     settle: u32,
     lit: &Lit,
-) -> Result<Vec<(u32, f64)>, Error> {
+) -> Result<ContrastFile, Error> {
     let mut measured = Vec::with_capacity(PITCHES.len());
     for pitch in PITCHES {
         let patterns = shifts(head.projector_size(), pitch, calibration)?;
@@ -38,7 +39,15 @@ pub fn contrast(
             |at: &usize| (shot(0, *at) - shot(2, *at)).hypot(shot(1, *at) - shot(3, *at)) / 2.0;
         measured.push((pitch, median(lit.places().iter().map(one).collect())));
     }
-    Ok(measured)
+    let modulation_counts = measured.first().map_or(0.0, |(_, coarsest)| *coarsest);
+    let relative = |(pitch_px, modulation)| PitchFile {
+        pitch_px,
+        contrast: modulation / f64::max(modulation_counts, 1e-9),
+    };
+    Ok(ContrastFile {
+        modulation_counts,
+        pitches: measured.into_iter().map(relative).collect(),
+    })
 }
 
 fn shifts(
