@@ -1,11 +1,11 @@
 //! The doctor's checks of devices and time: devices answer, format and mode, flips, triggers, flip-to-light delay.
 
 use super::Finding;
-use crate::head::examine::{Delay, Lit, PATIENCE, Stamps};
+use crate::head::examine::{Delay, Lit, PATIENCE, Stamps, load_black_and_white};
 use hal::camera::Starts;
 use hal::error::Error;
 use hal::head::{DynHead, Showing, TOLERANCE, Timing, Watched};
-use hal::projector::{Flip, Raster};
+use hal::projector::Flip;
 use hal::trigger::Spoiled;
 use serde_json::json;
 use std::time::Duration;
@@ -16,7 +16,7 @@ const FLIPS: u32 = 60;
 const PERIOD_TOLERANCE: f64 = 2e-3;
 /// Refreshes over which the trigger is judged.
 const TRIGGERED: u32 = 24;
-/// The index of white among the patterns of [`load`].
+/// The index of white among the patterns of [`load_black_and_white`].
 const WHITE: usize = 1;
 /// Least uncertainty of the measured delay, ms: that of one round with a camera of few pixels.
 const LEAST_OFF_MS: f64 = 0.05;
@@ -80,17 +80,8 @@ pub(super) fn mode(head: &DynHead) -> Finding {
     Finding::new(found, (off > TOLERANCE).then_some(&*remedy), measured)
 }
 
-/// Loads black and white.
-fn load(head: &mut DynHead) -> Result<(), Error> {
-    let (columns, rows) = head.projector_size();
-    head.load(vec![
-        Raster::uniform(columns, rows, 0)?,
-        Raster::uniform(columns, rows, u8::MAX)?,
-    ])
-}
-
 pub(super) fn cadence(head: &mut DynHead) -> Result<Finding, Error> {
-    load(head)?;
+    load_black_and_white(head)?;
     let showing = |index: u32| Showing {
         index: index as usize % 2,
         refreshes: 1,
@@ -143,7 +134,7 @@ pub(super) fn cadence(head: &mut DynHead) -> Result<Finding, Error> {
 }
 
 pub(super) fn trigger(head: &mut DynHead, calibrated: bool) -> Result<Finding, Error> {
-    load(head)?;
+    load_black_and_white(head)?;
     let showing = Showing {
         index: WHITE,
         refreshes: TRIGGERED,
@@ -158,7 +149,7 @@ pub(super) fn trigger(head: &mut DynHead, calibrated: bool) -> Result<Finding, E
             readout,
             ..head.timing()
         });
-        load(head)?;
+        load_black_and_white(head)?;
         seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
     }
     Ok(match head.camera_timing().starts {

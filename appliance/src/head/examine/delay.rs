@@ -7,10 +7,9 @@
 //! root of the number of such changes.
 
 use super::PATIENCE;
-use super::pictures::{Lit, counts};
+use super::pictures::{Lit, counts, load_black_and_white};
 use hal::error::Error;
 use hal::head::{DynHead, Showing};
-use hal::projector::Raster;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::time::Duration;
@@ -56,11 +55,7 @@ impl Delay {
     /// # Errors
     /// Of a device.
     pub fn measure(head: &mut DynHead, lit: &Lit, rounds: u32) -> Result<Option<Self>, Error> {
-        let (columns, rows) = head.projector_size();
-        head.load(vec![
-            Raster::uniform(columns, rows, 0)?,
-            Raster::uniform(columns, rows, u8::MAX)?,
-        ])?;
+        load_black_and_white(head)?;
         let exposure = head.camera_timing().exposure.as_secs_f64();
         let refresh = head.refresh().as_secs_f64();
         let mut taken = Vec::new();

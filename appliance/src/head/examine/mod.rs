@@ -14,7 +14,9 @@ mod stamps;
 pub use contrast::{PITCHES, contrast};
 pub use delay::Delay;
 pub use noise::noise;
-pub use pictures::{LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, SETTLE, counts, pictures};
+pub use pictures::{
+    LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, SETTLE, counts, load_black_and_white, pictures,
+};
 pub use plate::{PITCH as PLATE_PITCH, plate};
 pub use response::{lights, response};
 pub use stamps::Stamps;

@@ -203,6 +203,15 @@ impl Lit {
     }
 }
 
+/// Loads black and white, in this order.
+///
+/// # Errors
+/// Of the projector.
+pub fn load_black_and_white(head: &mut DynHead) -> Result<(), Error> {
+    let patterns = greys(head.projector_size(), [0, u8::MAX]);
+    head.load(patterns.collect::<Result<_, _>>()?)
+}
+
 /// Rasters of one grey level each.
 pub(super) fn greys(
     (columns, rows): (u32, u32),
