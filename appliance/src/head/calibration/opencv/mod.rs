@@ -8,6 +8,7 @@ mod matrix;
 mod pose;
 mod tree;
 
+use clap::ValueEnum as _;
 use hal::bounds::shortened;
 use hal::model::DeviceModel;
 use matrix::Matrix;
@@ -80,16 +81,6 @@ impl Unit {
             Self::Cm => 10.0,
             Self::M => 1000.0,
             Self::Inch => 25.4,
-        }
-    }
-
-    fn named(word: &str) -> Option<Self> {
-        match word {
-            "mm" => Some(Self::Mm),
-            "cm" => Some(Self::Cm),
-            "m" => Some(Self::M),
-            "inch" => Some(Self::Inch),
-            _ => None,
         }
     }
 }
@@ -185,8 +176,8 @@ fn millimetres(tree: &Node, declared: Declared) -> Result<f64, String> {
     let written = match tree.get("unit") {
         None => None,
         Some(Node::Value(word)) => Some(
-            Unit::named(word)
-                .ok_or_else(|| format!("unit is {word:?}: write mm, cm, m or inch"))?,
+            Unit::from_str(word, false)
+                .map_err(|_| format!("unit is {word:?}: write mm, cm, m or inch"))?,
         ),
         Some(_) => return Err("unit is not a word: write mm, cm, m or inch".into()),
     };
