@@ -7,7 +7,7 @@ use axum::extract::{Path, State};
 use axum::response::Json;
 use serde_json::{Value, json};
 
-use super::look::map_of;
+use super::look::{map_of, place_of};
 use super::map::Map;
 use super::problem::Problem;
 use super::site::Site;
@@ -19,9 +19,6 @@ use crate::system::priority;
 
 /// The pictures that were computed last, height, deviation, modulation, and the SEQ of their result.
 pub(super) type LastKept = Option<(u32, [Map; 3])>;
-
-/// The names of the pictures, in the order of [`LastKept`].
-const LAYERS: [&str; 3] = ["height", "deviation", "modulation"];
 
 pub(super) async fn one(
     State(site): State<Site>,
@@ -48,8 +45,7 @@ pub(super) async fn picture(
     State(site): State<Site>,
     Path((seq, layer)): Path<(u32, String)>,
 ) -> Result<Map, Problem> {
-    let at = LAYERS.iter().position(|known| *known == layer);
-    let at = at.ok_or_else(|| Problem::missing("there are height, deviation and modulation"))?;
+    let at = place_of(&layer)?;
     // Waiting here takes no thread from other requests.
     let mut last = site.kept.clone().lock_owned().await;
     if let Some((_, maps)) = last.as_ref().filter(|(of, _)| *of == seq) {
@@ -89,8 +85,7 @@ fn maps(site: &Site, seq: u32) -> Result<[Map; 3], Problem> {
         let layers = sequence.and_then(|sequence| plan.layers(sequence, &kept.frames()));
         let words = "the recording's frames are not those of its recipe";
         let layers = layers.ok_or_else(|| Problem::broken(words))?;
-        let [height, deviation, modulation] = LAYERS.map(|name| map_of(&layers, name, seq));
-        Ok([height?, deviation?, modulation?])
+        Ok([0, 1, 2].map(|at| map_of(&layers, at, seq)))
     })
 }
 

@@ -43,7 +43,7 @@ pub(super) async fn readiness(State(site): State<Site>) -> Response {
     (StatusCode::SERVICE_UNAVAILABLE, words).into_response()
 }
 
-/// The pictures of the last measured part.
+/// The pictures of a measured part.
 const LAYERS: [&str; 3] = ["height", "deviation", "modulation"];
 
 pub(super) async fn picture(
@@ -51,33 +51,34 @@ pub(super) async fn picture(
     Path(layer): Path<String>,
 ) -> Result<Response, Problem> {
     site.aside(move |site| {
-        if !LAYERS.contains(&&*layer) {
-            let words = format!("there are {}", LAYERS.join(", "));
-            return Err(Problem::missing(words));
-        }
+        let at = place_of(&layer)?;
         // Not an error: the page asks for a picture of every result.
         let Some((seq, layers)) = site.last_cycle.layers(site.last_seq()) else {
             let words = "the frames are gone, or nothing was measured yet: trigger a measurement";
             return Ok((StatusCode::NO_CONTENT, [("x-none", words)]).into_response());
         };
-        Ok(map_of(&layers, &layer, seq)?.into_response())
+        Ok(map_of(&layers, at, seq).into_response())
     })
     .await
 }
 
-/// One of the maps of a part, by its name.
-pub(super) fn map_of(layers: &Layers, name: &str, seq: u32) -> Result<Map, Problem> {
-    let (values, unit, symmetric) = match name {
-        "height" => (&layers.height_mm, "mm", false),
-        "deviation" => (&layers.deviation_mm, "mm", true),
-        "modulation" => (&layers.modulation, "counts", false),
-        _ => {
-            return Err(Problem::missing(
-                "there are height, deviation and modulation",
-            ));
-        }
-    };
-    Ok(map(values, layers.width, unit, symmetric, Some(seq)))
+/// The place of a picture in [`LAYERS`].
+///
+/// # Errors
+/// If there is no such picture.
+pub(super) fn place_of(layer: &str) -> Result<usize, Problem> {
+    let at = LAYERS.iter().position(|known| *known == layer);
+    at.ok_or_else(|| Problem::missing("there are height, deviation and modulation"))
+}
+
+/// One of the maps of a part, by its place in [`LAYERS`].
+pub(super) fn map_of(layers: &Layers, at: usize, seq: u32) -> Map {
+    let (values, unit, symmetric) = [
+        (&layers.height_mm, "mm", false),
+        (&layers.deviation_mm, "mm", true),
+        (&layers.modulation, "counts", false),
+    ][at];
+    map(values, layers.width, unit, symmetric, Some(seq))
 }
 
 pub(super) async fn registers(State(site): State<Site>) -> Json<Value> {
