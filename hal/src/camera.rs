@@ -77,33 +77,3 @@ pub trait Camera: Send {
     /// The device's error.
     fn stop(&mut self) -> Result<(), Error>;
 }
-
-impl<C: Camera + ?Sized> Camera for Box<C> {
-    fn format(&self) -> FrameFormat {
-        (**self).format()
-    }
-
-    fn encoding(&self) -> Encoding {
-        (**self).encoding()
-    }
-
-    fn timing(&self) -> CameraTiming {
-        (**self).timing()
-    }
-
-    fn present(&self) -> Result<(), Error> {
-        (**self).present()
-    }
-
-    fn start(&mut self) -> Result<(), Error> {
-        (**self).start()
-    }
-
-    fn poll_frame(&mut self) -> Result<Option<Frame>, Error> {
-        (**self).poll_frame()
-    }
-
-    fn stop(&mut self) -> Result<(), Error> {
-        (**self).stop()
-    }
-}

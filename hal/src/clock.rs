@@ -22,20 +22,6 @@ pub trait Clock: Send {
     }
 }
 
-impl<K: Clock + ?Sized> Clock for Box<K> {
-    fn now(&self) -> Timestamp {
-        (**self).now()
-    }
-
-    fn wait(&mut self, until: Timestamp) {
-        (**self).wait(until);
-    }
-
-    fn stands_still(&self) -> bool {
-        (**self).stands_still()
-    }
-}
-
 /// The clock of real devices: `CLOCK_MONOTONIC`, waiting for any of their descriptors.
 ///
 /// A descriptor must be readable as long as its device has a flip, a frame or an error that was not fetched. It may be a

@@ -75,7 +75,7 @@ fn must_fail<T>(
 ///
 /// # Errors
 /// The first promise that is not kept.
-pub fn check_camera(camera: &mut impl Camera, clock: &mut impl Clock) -> Result<(), Violation> {
+pub fn check_camera(camera: &mut dyn Camera, clock: &mut dyn Clock) -> Result<(), Violation> {
     let timing = camera.timing();
     if timing.exposure.is_zero() || timing.period < timing.exposure {
         return Err(violated(
@@ -131,8 +131,8 @@ pub fn check_camera(camera: &mut impl Camera, clock: &mut impl Clock) -> Result<
 /// # Errors
 /// The first promise that is not kept.
 pub fn check_projector(
-    projector: &mut impl Projector,
-    clock: &mut impl Clock,
+    projector: &mut dyn Projector,
+    clock: &mut dyn Clock,
     patterns: usize,
 ) -> Result<(), Violation> {
     let (width, height) = projector.size();
@@ -218,7 +218,7 @@ pub fn check_projector(
     Ok(())
 }
 
-fn next_flip(projector: &mut impl Projector, clock: &mut impl Clock) -> Result<Flip, Violation> {
+fn next_flip(projector: &mut dyn Projector, clock: &mut dyn Clock) -> Result<Flip, Violation> {
     let end = clock.now() + PATIENT;
     loop {
         if let Some(flip) = must("a flip comes", prompt(|| projector.poll_flip())?)? {
@@ -238,7 +238,7 @@ fn next_flip(projector: &mut impl Projector, clock: &mut impl Clock) -> Result<F
 ///
 /// # Errors
 /// The first promise that is not kept.
-pub fn check_trigger(trigger: &mut impl Trigger, clock: &mut impl Clock) -> Result<(), Violation> {
+pub fn check_trigger(trigger: &mut dyn Trigger, clock: &mut dyn Clock) -> Result<(), Violation> {
     while trigger.poll_spoiled().is_some() {}
     let (begun, mut last) = (clock.now(), Timestamp(0));
     for _ in 0..3 {
@@ -270,7 +270,7 @@ pub fn check_trigger(trigger: &mut impl Trigger, clock: &mut impl Clock) -> Resu
 ///
 /// # Errors
 /// The first promise that is not kept.
-pub fn check_clock(clock: &mut impl Clock) -> Result<(), Violation> {
+pub fn check_clock(clock: &mut dyn Clock) -> Result<(), Violation> {
     for ms in [0, 1, 20] {
         let (begun, until) = (clock.now(), clock.now() + Duration::from_millis(ms));
         // A wait may return early without a reason, but not for ever.
@@ -291,15 +291,13 @@ pub fn check_clock(clock: &mut impl Clock) -> Result<(), Violation> {
 ///
 /// # Errors
 /// The first promise that is not kept.
-pub fn check_head<C: Camera, P: Projector, T: Trigger, K: Clock>(
-    head: &mut Head<C, P, T, K>,
-    patterns: usize,
-) -> Result<(), Violation> {
+pub fn check_head(head: &mut Head, patterns: usize) -> Result<(), Violation> {
     let devices = head.devices();
-    check_clock(&mut devices.clock)?;
-    check_camera(&mut devices.camera, &mut devices.clock)?;
-    check_projector(&mut devices.projector, &mut devices.clock, patterns)?;
-    check_trigger(&mut devices.trigger, &mut devices.clock)?;
+    let clock = &mut *devices.clock;
+    check_clock(clock)?;
+    check_camera(&mut *devices.camera, clock)?;
+    check_projector(&mut *devices.projector, clock, patterns)?;
+    check_trigger(&mut *devices.trigger, clock)?;
 
     let format = head.camera_format();
     let indices: Vec<usize> = (0..patterns).collect();

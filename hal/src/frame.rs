@@ -331,6 +331,6 @@ mod tests {
         fn shared<T: Send + Sync + Clone>() {}
         fn moved<T: Send>() {}
         shared::<Frame>();
-        moved::<crate::head::DynHead>();
+        moved::<crate::head::Head>();
     }
 }

@@ -116,36 +116,6 @@ pub trait Projector: Send {
     fn blank(&mut self) -> Result<(), Error>;
 }
 
-impl<P: Projector + ?Sized> Projector for Box<P> {
-    fn size(&self) -> (u32, u32) {
-        (**self).size()
-    }
-
-    fn refresh(&self) -> Duration {
-        (**self).refresh()
-    }
-
-    fn present(&self) -> Result<(), Error> {
-        (**self).present()
-    }
-
-    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
-        (**self).load(rasters)
-    }
-
-    fn queue(&mut self, index: usize) -> Result<(), Error> {
-        (**self).queue(index)
-    }
-
-    fn poll_flip(&mut self) -> Result<Option<Flip>, Error> {
-        (**self).poll_flip()
-    }
-
-    fn blank(&mut self) -> Result<(), Error> {
-        (**self).blank()
-    }
-}
-
 /// Checks that all rasters have the projector's size (width, height).
 ///
 /// # Errors

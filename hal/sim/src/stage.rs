@@ -8,7 +8,7 @@ use super::scenario::{Placement, Scenario};
 use super::scene::SimScene;
 use super::transport::{Transport, Truth};
 use hal::error::{DeviceKind, Error};
-use hal::head::DynHead;
+use hal::head::Head;
 use hal::model::DeviceModel;
 use hal::virtual_head::{self, Control, Scene as _};
 
@@ -37,7 +37,7 @@ pub struct Staged {
 ///
 /// # Errors
 /// `Unsupported` if a value of the scenario is out of its range.
-pub fn head(scenario: &Scenario) -> Result<(DynHead, Stage), Error> {
+pub fn head(scenario: &Scenario) -> Result<(Head, Stage), Error> {
     head_with_progress(scenario, &|_| ())
 }
 
@@ -48,7 +48,7 @@ pub fn head(scenario: &Scenario) -> Result<(DynHead, Stage), Error> {
 pub fn head_with_progress(
     scenario: &Scenario,
     progress: &(dyn Fn(f64) + Sync),
-) -> Result<(DynHead, Stage), Error> {
+) -> Result<(Head, Stage), Error> {
     scenario
         .check()
         .map_err(|problem| Error::unsupported("simulating this scenario", problem))?;
@@ -180,7 +180,7 @@ impl Stage {
     ///
     /// # Errors
     /// `Disconnected` if camera or projector is unplugged.
-    pub fn reopen(&self) -> Result<DynHead, Error> {
+    pub fn reopen(&self) -> Result<Head, Error> {
         self.control.reopen()
     }
 

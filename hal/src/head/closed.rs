@@ -4,13 +4,13 @@
 
 use std::time::Duration;
 
-use super::{DynHead, Head};
+use super::Head;
 use crate::camera::{Camera, CameraTiming, Encoding};
-use crate::clock::{Clock, Monotonic};
+use crate::clock::Monotonic;
 use crate::error::{DeviceKind, Error};
 use crate::frame::{Frame, FrameFormat};
 use crate::projector::{Flip, Projector, Raster};
-use crate::trigger::{NoTrigger, Trigger};
+use crate::trigger::NoTrigger;
 
 /// The properties of the devices that were closed.
 #[derive(Clone, Debug)]
@@ -22,9 +22,9 @@ struct Closed {
     refresh: Duration,
 }
 
-impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
+impl Head {
     /// A closed head with the properties of this one.
-    pub fn closed(&self) -> DynHead {
+    pub fn closed(&self) -> Self {
         let like = Closed {
             format: self.camera_format(),
             encoding: self.encoding(),
@@ -32,7 +32,7 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
             size: self.projector_size(),
             refresh: self.refresh(),
         };
-        Head::new(
+        Self::new(
             Box::new(like.clone()),
             Box::new(like),
             Box::new(NoTrigger),

@@ -29,23 +29,21 @@ pub use watch::{Showing, Watched, WatchedFrame};
 /// A device may disappear without ending a wait; on a real clock the devices are polled at least this often.
 const UNNOTICED: Duration = Duration::from_millis(100);
 
-/// A head of any back-end.
-pub type DynHead = Head<Box<dyn Camera>, Box<dyn Projector>, Box<dyn Trigger>, Box<dyn Clock>>;
+/// A head.
+pub type DynHead = Head;
 
 /// Camera, projector and trigger in front of the same part, and the clock that they share.
-#[derive(Debug)]
-pub struct Head<C, P, T, K> {
-    devices: Devices<C, P, T, K>,
+pub struct Head {
+    devices: Devices,
     timing: Timing,
     sequencer: Sequencer<Frame>,
 }
 
-#[derive(Debug)]
-pub(crate) struct Devices<C, P, T, K> {
-    pub camera: C,
-    pub projector: P,
-    pub trigger: T,
-    pub clock: K,
+pub(crate) struct Devices {
+    pub camera: Box<dyn Camera>,
+    pub projector: Box<dyn Projector>,
+    pub trigger: Box<dyn Trigger>,
+    pub clock: Box<dyn Clock>,
 }
 
 /// How a sequence was taken.
@@ -90,9 +88,15 @@ impl Exposure {
     }
 }
 
-impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
+impl Head {
     /// A head of these devices with these measured times.
-    pub fn new(camera: C, projector: P, trigger: T, clock: K, timing: Timing) -> Self {
+    pub fn new(
+        camera: Box<dyn Camera>,
+        projector: Box<dyn Projector>,
+        trigger: Box<dyn Trigger>,
+        clock: Box<dyn Clock>,
+        timing: Timing,
+    ) -> Self {
         Self {
             devices: Devices {
                 camera,
@@ -232,12 +236,12 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
     }
 
     /// The devices, for the contract checks and for [`Head::watch`].
-    pub(crate) fn devices(&mut self) -> &mut Devices<C, P, T, K> {
+    pub(crate) fn devices(&mut self) -> &mut Devices {
         &mut self.devices
     }
 }
 
-impl<C: Camera, P: Projector, T: Trigger, K: Clock> Devices<C, P, T, K> {
+impl Devices {
     /// Calls `work` with a running camera. However it ends, the camera is stopped and the projector blank afterwards.
     pub fn exposing<R>(
         &mut self,
@@ -258,8 +262,8 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Devices<C, P, T, K> {
 }
 
 /// Passes events to the sequencer and does what it decides, until the sequence ends or `hand` returns `false`.
-fn carry_out<C: Camera, P: Projector, T: Trigger, K: Clock>(
-    devices: &mut Devices<C, P, T, K>,
+fn carry_out(
+    devices: &mut Devices,
     sequencer: &mut Sequencer<Frame>,
     timeout: Duration,
     start_of: &(dyn Fn(&Frame) -> Timestamp + Sync),
@@ -291,7 +295,7 @@ fn carry_out<C: Camera, P: Projector, T: Trigger, K: Clock>(
                     return Ok(sequencer.so_far());
                 }
             }
-            Act::Wait(until) => wait(clock, until),
+            Act::Wait(until) => wait(&mut **clock, until),
             Act::Done => return Ok(sequencer.so_far()),
             Act::Fail(failure) => return Err(failure.error(timeout)),
         }
@@ -299,7 +303,7 @@ fn carry_out<C: Camera, P: Projector, T: Trigger, K: Clock>(
 }
 
 /// Waits for a flip or a frame, but not longer than the absence of a device may stay unnoticed.
-fn wait(clock: &mut impl Clock, until: Timestamp) {
+fn wait(clock: &mut dyn Clock, until: Timestamp) {
     let soon = clock.now() + UNNOTICED;
     clock.wait(if clock.stands_still() {
         until

@@ -7,12 +7,11 @@
 use std::time::Duration;
 
 use super::{Head, wait};
-use crate::camera::{Camera, Starts};
-use crate::clock::Clock;
+use crate::camera::Starts;
 use crate::error::Error;
 use crate::frame::Frame;
-use crate::projector::{Flip, Projector};
-use crate::trigger::{Spoiled, Trigger};
+use crate::projector::Flip;
+use crate::trigger::Spoiled;
 use crate::units::Timestamp;
 
 /// A pattern and how long it is shown.
@@ -64,7 +63,7 @@ impl<M> Watched<M> {
     }
 }
 
-impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
+impl Head {
     /// Shows `showings` one after the other while the camera exposes as often as it can, and measures every frame. Flips and
     /// frames that do not arrive are missing in the result, without an error. Ends at the latest `timeout` after its planned end.
     ///
@@ -144,7 +143,7 @@ impl<C: Camera, P: Projector, T: Trigger, K: Clock> Head<C, P, T, K> {
                     }
                     next = next.min(due);
                 }
-                wait(&mut devices.clock, next.min(deadline));
+                wait(&mut *devices.clock, next.min(deadline));
             }
         })?;
         Ok(seen)

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::recording::Recording;
 use crate::error::Error;
 use crate::frame::{Frame, FrameFormat};
-use crate::head::DynHead;
+use crate::head::Head;
 use crate::projector::Raster;
 use crate::units::Timestamp;
 use crate::virtual_head::{self, Mechanics, Scene};
@@ -23,7 +23,7 @@ const EXPOSURE_REFRESHES: u32 = 2;
 /// # Errors
 /// `Unsupported` if there is no recording, or if they differ in camera format, projector size, number of frames, or ratio and
 /// shift of a frame.
-pub fn head(recordings: Vec<Recording>) -> Result<DynHead, Error> {
+pub fn head(recordings: Vec<Recording>) -> Result<Head, Error> {
     let Some(first) = recordings.first() else {
         return Err(Error::unsupported(
             "replaying 0 recordings",

@@ -32,16 +32,6 @@ pub trait Trigger: Send {
     }
 }
 
-impl<T: Trigger + ?Sized> Trigger for Box<T> {
-    fn fire(&mut self) -> Result<Timestamp, Error> {
-        (**self).fire()
-    }
-
-    fn poll_spoiled(&mut self) -> Option<Spoiled> {
-        (**self).poll_spoiled()
-    }
-}
-
 /// No trigger, for a camera that runs by itself.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoTrigger;

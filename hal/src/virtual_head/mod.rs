@@ -20,7 +20,7 @@ use std::time::Duration;
 use crate::clock::Clock;
 use crate::error::Error;
 use crate::frame::{Frame, FrameFormat};
-use crate::head::{DynHead, Head};
+use crate::head::Head;
 use crate::projector::Raster;
 use crate::trigger::{Spoiled, Trigger};
 use crate::units::Timestamp;
@@ -105,14 +105,14 @@ impl<S: Scene + 'static> Control<S> {
     ///
     /// # Errors
     /// `Disconnected` if one of them is unplugged.
-    pub fn reopen(&self) -> Result<DynHead, Error> {
+    pub fn reopen(&self) -> Result<Head, Error> {
         lock(&self.bench).reset()?;
         Ok(devices(&self.bench))
     }
 }
 
 /// A head in front of `scene` with these times and faults, and the control of it.
-pub fn head<S: Scene + 'static>(scene: S, mechanics: Mechanics) -> (DynHead, Control<S>) {
+pub fn head<S: Scene + 'static>(scene: S, mechanics: Mechanics) -> (Head, Control<S>) {
     let bench = Arc::new(Mutex::new(Bench {
         scene,
         dice: Dice::new(mechanics.faults.seed),
@@ -131,7 +131,7 @@ pub fn head<S: Scene + 'static>(scene: S, mechanics: Mechanics) -> (DynHead, Con
 }
 
 /// A head of the devices, opened with the cables in their present state.
-fn devices<S: Scene + 'static>(bench: &Shared<S>) -> DynHead {
+fn devices<S: Scene + 'static>(bench: &Shared<S>) -> Head {
     let (camera, projector, timing) = {
         let bench = lock(bench);
         (

@@ -27,8 +27,6 @@ use machine::in_the_machine;
 const PATTERNS: usize = 8;
 const PATIENT: Duration = Duration::from_secs(5);
 
-type Rig = Head<Eye, Late, Pulse, Monotonic>;
-
 /// A display whose flips are sometimes queued late, as on a busy computer.
 struct Late {
     display: Display,
@@ -81,7 +79,7 @@ struct Kind {
     late_every: u32,
 }
 
-fn rig(_: &Chip, kind: Kind, knows_patterns: bool) -> Rig {
+fn rig(_: &Chip, kind: Kind, knows_patterns: bool) -> Head {
     let setup = ProjectorSetup {
         width: Some(64),
         height: Some(48),
@@ -126,16 +124,16 @@ fn rig(_: &Chip, kind: Kind, knows_patterns: bool) -> Rig {
         queued: 0,
     };
     Head::new(
-        camera,
-        projector,
-        Pulse::open(&trigger, chip::LINE).unwrap(),
-        clock,
+        Box::new(camera),
+        Box::new(projector),
+        Box::new(Pulse::open(&trigger, chip::LINE).unwrap()),
+        Box::new(clock),
         timing,
     )
 }
 
 /// Takes sequences of all patterns, each in another order, checks that every frame shows its pattern, and sums the counts up.
-fn take(rig: &mut Rig, sequences: usize) -> Exposure {
+fn take(rig: &mut Head, sequences: usize) -> Exposure {
     let mut sum = Exposure::default();
     for start in 0..sequences {
         // 3 and 8 have no common divisor, so each pattern is shown once.

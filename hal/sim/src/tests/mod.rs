@@ -11,7 +11,7 @@ use super::parts::{Cone, Defect, Flowerpot, Plane, Sawtooth, SheetMetal, Sphere,
 use super::{Part, Scenario, head};
 use hal::contract::check_head;
 use hal::frame::{Frame, Samples};
-use hal::head::DynHead;
+use hal::head::Head;
 use hal::projector::Raster;
 
 const PATIENT: Duration = Duration::from_secs(1);
@@ -68,7 +68,7 @@ fn wall_dent(depth_mm: f64) -> Defect {
 }
 
 /// One frame for each grey, shown uniformly.
-fn frames(head: &mut DynHead, greys: &[u8]) -> Vec<Frame> {
+fn frames(head: &mut Head, greys: &[u8]) -> Vec<Frame> {
     let (width, height) = head.projector_size();
     let rasters = greys
         .iter()

@@ -93,11 +93,11 @@ fn label(frame: &Frame) -> Label {
 }
 
 /// A head in front of a `Labels` scene, with so many patterns loaded.
-pub(super) fn labelled(mechanics: Mechanics, patterns: usize) -> DynHead {
+pub(super) fn labelled(mechanics: Mechanics, patterns: usize) -> Head {
     in_front_of(Labels::default(), mechanics, patterns)
 }
 
-fn in_front_of(labels: Labels, mechanics: Mechanics, patterns: usize) -> DynHead {
+fn in_front_of(labels: Labels, mechanics: Mechanics, patterns: usize) -> Head {
     let (mut head, _) = virtual_head::head(labels, mechanics);
     head.load(vec![Raster::uniform(1, 1, 0).unwrap(); patterns])
         .unwrap();
@@ -111,7 +111,7 @@ pub(super) fn plain() -> Mechanics {
 /// The index and label of each frame of a sequence, and the result of the sequence.
 type Taken = (Vec<(usize, Label)>, Result<Exposure, Error>);
 
-fn take(head: &mut DynHead, indices: &[usize]) -> Taken {
+fn take(head: &mut Head, indices: &[usize]) -> Taken {
     let mut frames = Vec::new();
     let result = head.acquire(indices, TIMEOUT, &mut |index, frame| {
         frames.push((index, label(&frame)));

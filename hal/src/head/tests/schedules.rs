@@ -4,7 +4,6 @@ use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 use super::*;
-use crate::clock::Clock as _;
 
 /// Seeds of an ordinary test run, and of the long one.
 const QUICK: u64 = 400;

@@ -1,13 +1,12 @@
 //! Sequences with faults of one kind each, and the speed of a sequence without faults.
 
 use super::*;
-use crate::clock::Clock as _;
 use crate::error::ErrorKind;
 
 const COUNT: usize = 12;
 
 /// Takes a sequence and checks that each pattern gives a frame, in order, that shows only this pattern.
-fn all_right(head: &mut DynHead) -> Exposure {
+fn all_right(head: &mut Head) -> Exposure {
     let indices: Vec<usize> = (0..COUNT).collect();
     let (frames, result) = take(head, &indices);
     let wholly = |index: &usize| Label {
@@ -24,7 +23,7 @@ fn all_right(head: &mut DynHead) -> Exposure {
 }
 
 /// As [`all_right`], but tolerates pulses of the trigger that are off by less than what spoils a frame.
-fn all_but_half_a_percent(head: &mut DynHead) -> Exposure {
+fn all_but_half_a_percent(head: &mut Head) -> Exposure {
     let indices: Vec<usize> = (0..COUNT).collect();
     let (frames, result) = take(head, &indices);
     assert_eq!(frames.len(), COUNT, "{result:?}");
@@ -348,7 +347,7 @@ fn devices_are_served_while_the_sink_works() {
         devices.camera,
         devices.projector,
         devices.trigger,
-        Running(devices.clock),
+        Box::new(Running(devices.clock)),
         timing,
     );
     let indices: Vec<usize> = (0..COUNT).collect();
