@@ -42,16 +42,26 @@ fn must<T>(promise: &'static str, result: Result<T, Error>) -> Result<T, Violati
     result.map_err(|error| violated(promise, error))
 }
 
+/// Checks that a promise holds; `found` says what was found instead.
+fn ensure(
+    promise: &'static str,
+    holds: bool,
+    found: impl FnOnce() -> String,
+) -> Result<(), Violation> {
+    match holds {
+        true => Ok(()),
+        false => Err(violated(promise, found())),
+    }
+}
+
 /// The result of `call`, which must return without waiting.
 fn prompt<T>(call: impl FnOnce() -> T) -> Result<T, Violation> {
     let begun = Instant::now();
     let answer = call();
-    if begun.elapsed() > SLACK {
-        return Err(violated(
-            "devices are asked without waiting",
-            format!("the call took {:?}", begun.elapsed()),
-        ));
-    }
+    let took = begun.elapsed();
+    ensure("devices are asked without waiting", took <= SLACK, || {
+        format!("the call took {took:?}")
+    })?;
     Ok(answer)
 }
 
@@ -63,11 +73,9 @@ fn must_fail<T>(
 ) -> Result<(), Violation> {
     match prompt(call)? {
         Ok(_) => Err(violated(promise, "the call succeeded")),
-        Err(error) if error.kind() != kind => Err(violated(
-            promise,
-            format!("{:?} error: {error}", error.kind()),
-        )),
-        Err(_) => Ok(()),
+        Err(error) => ensure(promise, error.kind() == kind, || {
+            format!("{:?} error: {error}", error.kind())
+        }),
     }
 }
 
@@ -77,12 +85,11 @@ fn must_fail<T>(
 /// The first promise that is not kept.
 pub fn check_camera(camera: &mut dyn Camera, clock: &mut dyn Clock) -> Result<(), Violation> {
     let timing = camera.timing();
-    if timing.exposure.is_zero() || timing.period < timing.exposure {
-        return Err(violated(
-            "a camera exposes for some time, and never twice at a time",
-            format!("{timing:?}"),
-        ));
-    }
+    ensure(
+        "a camera exposes for some time, and never twice at a time",
+        !timing.exposure.is_zero() && timing.period >= timing.exposure,
+        || format!("{timing:?}"),
+    )?;
     must_fail(
         "a stopped camera gives no frame",
         ErrorKind::Protocol,
@@ -113,17 +120,14 @@ pub fn check_camera(camera: &mut dyn Camera, clock: &mut dyn Clock) -> Result<()
             frames += 1;
         }
     }
-    match (timing.starts, frames) {
-        (Starts::OnTrigger, 1..) => Err(violated(
-            "a camera without a trigger gives no frame",
-            format!("{frames} frames within {patience:?}"),
-        )),
-        (Starts::ByItself, 0) => Err(violated(
-            "a camera that runs by itself gives frames",
-            format!("none within {patience:?}"),
-        )),
-        _ => must("a camera stops", camera.stop()),
-    }
+    let (promise, holds) = match timing.starts {
+        Starts::OnTrigger => ("a camera without a trigger gives no frame", frames == 0),
+        Starts::ByItself => ("a camera that runs by itself gives frames", frames > 0),
+    };
+    ensure(promise, holds, || {
+        format!("{frames} frames within {patience:?}")
+    })?;
+    must("a camera stops", camera.stop())
 }
 
 /// The promises of a projector by itself, with `patterns` rasters loaded.
@@ -148,17 +152,14 @@ pub fn check_projector(
         ErrorKind::Unsupported,
         || projector.load(vec![wrong; patterns]),
     )?;
-    let mut rasters = Vec::new();
-    for index in 0..patterns {
-        rasters.push(raster(
-            width,
-            height,
-            u8::try_from(index % 256).unwrap_or(0),
-        )?);
-    }
+    let rasters: Result<_, _> = (0..=u8::MAX)
+        .cycle()
+        .take(patterns)
+        .map(|grey| raster(width, height, grey))
+        .collect();
     must(
         "rasters of the projector's size are loaded",
-        projector.load(rasters),
+        projector.load(rasters?),
     )?;
     must_fail(
         "a pattern that is not loaded is not shown",
@@ -166,12 +167,11 @@ pub fn check_projector(
         || projector.queue(patterns),
     )?;
     let nothing = must("a projector can be asked for flips", projector.poll_flip())?;
-    if nothing.is_some() {
-        return Err(violated(
-            "no flip comes that was not queued",
-            format!("{nothing:?}"),
-        ));
-    }
+    ensure(
+        "no flip comes that was not queued",
+        nothing.is_none(),
+        || format!("{nothing:?}"),
+    )?;
     let refresh = projector.refresh();
     let mut last: Option<Flip> = None;
     for index in (0..patterns).rev() {
@@ -181,27 +181,24 @@ pub fn check_projector(
             projector.queue(index)
         })?;
         let flip = next_flip(projector, clock)?;
-        if flip.timestamp + TOLERANCE < asked {
-            return Err(violated(
-                "no flip comes before it is queued",
-                format!("queued at {asked}, {flip:?}"),
-            ));
-        }
+        ensure(
+            "no flip comes before it is queued",
+            flip.timestamp + TOLERANCE >= asked,
+            || format!("queued at {asked}, {flip:?}"),
+        )?;
         if let Some(last) = last {
-            if flip.timestamp <= last.timestamp || flip.count <= last.count {
-                return Err(violated(
-                    "flips have increasing times and counts",
-                    format!("{last:?}, then {flip:?}"),
-                ));
-            }
+            ensure(
+                "flips have increasing times and counts",
+                flip.timestamp > last.timestamp && flip.count > last.count,
+                || format!("{last:?}, then {flip:?}"),
+            )?;
             let counts = u32::try_from(flip.count - last.count).unwrap_or(u32::MAX);
             let (by_time, by_count) = (flip.timestamp.since(last.timestamp), refresh * counts);
-            if by_time.abs_diff(by_count) > refresh / 4 {
-                return Err(violated(
-                    "a flip's count is the count of refreshes",
-                    format!("{counts} counts in {by_time:?} at a period of {refresh:?}"),
-                ));
-            }
+            ensure(
+                "a flip's count is the count of refreshes",
+                by_time.abs_diff(by_count) <= refresh / 4,
+                || format!("{counts} counts in {by_time:?} at a period of {refresh:?}"),
+            )?;
         }
         last = Some(flip);
     }
@@ -209,13 +206,11 @@ pub fn check_projector(
     must("a projector goes blank", projector.blank())?;
     clock.wait(clock.now() + refresh * 3);
     let forgotten = must("a blank projector can be asked", projector.poll_flip())?;
-    if forgotten.is_some() {
-        return Err(violated(
-            "blanking forgets the flip that waits",
-            format!("{forgotten:?}"),
-        ));
-    }
-    Ok(())
+    ensure(
+        "blanking forgets the flip that waits",
+        forgotten.is_none(),
+        || format!("{forgotten:?}"),
+    )
 }
 
 fn next_flip(projector: &mut dyn Projector, clock: &mut dyn Clock) -> Result<Flip, Violation> {
@@ -224,12 +219,9 @@ fn next_flip(projector: &mut dyn Projector, clock: &mut dyn Clock) -> Result<Fli
         if let Some(flip) = must("a flip comes", prompt(|| projector.poll_flip())?)? {
             return Ok(flip);
         }
-        if clock.now() >= end {
-            return Err(violated(
-                "each queued pattern flips",
-                format!("none within {PATIENT:?}"),
-            ));
-        }
+        ensure("each queued pattern flips", clock.now() < end, || {
+            format!("none within {PATIENT:?}")
+        })?;
         clock.wait(end);
     }
 }
@@ -244,23 +236,21 @@ pub fn check_trigger(trigger: &mut dyn Trigger, clock: &mut dyn Clock) -> Result
     for _ in 0..3 {
         let asked = clock.now();
         let fired = must("a trigger fires", prompt(|| trigger.fire())?)?;
-        if fired < last || fired < asked || fired > clock.now() {
-            return Err(violated(
-                "a trigger's times are those of the head's clock and do not go back",
-                format!("{last}, then {fired}, asked at {asked}"),
-            ));
-        }
+        ensure(
+            "a trigger's times are those of the head's clock and do not go back",
+            fired >= last && (asked..=clock.now()).contains(&fired),
+            || format!("{last}, then {fired}, asked at {asked}"),
+        )?;
         last = fired;
         clock.wait(clock.now() + Duration::from_millis(1));
     }
     let mut earliest = begun;
     while let Some(spoiled) = prompt(|| trigger.poll_spoiled())? {
-        if spoiled.fired < earliest || spoiled.fired > last {
-            return Err(violated(
-                "a trigger reports spoiled pulses that it fired, in order and once",
-                format!("{spoiled:?} after {earliest}, the last one fired at {last}"),
-            ));
-        }
+        ensure(
+            "a trigger reports spoiled pulses that it fired, in order and once",
+            (earliest..=last).contains(&spoiled.fired),
+            || format!("{spoiled:?} after {earliest}, the last one fired at {last}"),
+        )?;
         earliest = spoiled.fired + Duration::from_nanos(1);
     }
     Ok(())
@@ -277,12 +267,12 @@ pub fn check_clock(clock: &mut dyn Clock) -> Result<(), Violation> {
         for _ in 0..1000 {
             clock.wait(until);
         }
-        if clock.now() < until || clock.now() < begun {
-            return Err(violated(
-                "a wait ends when its time has come",
-                format!("{} after waiting from {begun} until {until}", clock.now()),
-            ));
-        }
+        let now = clock.now();
+        ensure(
+            "a wait ends when its time has come",
+            now >= until && now >= begun,
+            || format!("{now} after waiting from {begun} until {until}"),
+        )?;
     }
     Ok(())
 }
@@ -301,8 +291,8 @@ pub fn check_head(head: &mut Head, patterns: usize) -> Result<(), Violation> {
 
     let format = head.camera_format();
     let indices: Vec<usize> = (0..patterns).collect();
-    let mut last: Option<Frame> = None;
-    let mut kept: Vec<(Frame, u64)> = Vec::new();
+    let mut last: Option<(Timestamp, u64)> = None;
+    let mut kept: Vec<(u64, Frame)> = Vec::new();
     for _ in 0..RESTARTS {
         let mut frames: Vec<(usize, Frame)> = Vec::new();
         let exposure = must(
@@ -312,50 +302,38 @@ pub fn check_head(head: &mut Head, patterns: usize) -> Result<(), Violation> {
             }),
         )?;
         let order: Vec<usize> = frames.iter().map(|(index, _)| *index).collect();
-        if order != indices {
-            return Err(violated(
-                "each pattern gives one frame, in order",
-                format!("{order:?}"),
-            ));
-        }
+        ensure(
+            "each pattern gives one frame, in order",
+            order == indices,
+            || format!("{order:?}"),
+        )?;
         for (_, frame) in frames {
-            if frame.format() != format {
-                return Err(violated(
-                    "every frame has the camera's format",
-                    format!("{:?} instead of {format:?}", frame.format()),
-                ));
-            }
-            if frame.timestamp() < exposure.started || frame.timestamp() > exposure.done {
-                return Err(violated(
-                    "frames are exposed while their sequence lasts",
-                    format!("{} outside {exposure:?}", frame.timestamp()),
-                ));
-            }
-            if let Some(last) = &last
-                && (frame.timestamp() <= last.timestamp() || frame.count() <= last.count())
-            {
-                return Err(violated(
-                    "timestamps and counts of frames increase",
-                    format!(
-                        "frame {} at {}, then {} at {}",
-                        last.count(),
-                        last.timestamp(),
-                        frame.count(),
-                        frame.timestamp()
-                    ),
-                ));
-            }
+            ensure(
+                "every frame has the camera's format",
+                frame.format() == format,
+                || format!("{:?} instead of {format:?}", frame.format()),
+            )?;
+            let (at, count) = (frame.timestamp(), frame.count());
+            ensure(
+                "frames are exposed while their sequence lasts",
+                (exposure.started..=exposure.done).contains(&at),
+                || format!("{at} outside {exposure:?}"),
+            )?;
+            ensure(
+                "timestamps and counts of frames increase",
+                last.is_none_or(|(before, fewer)| at > before && count > fewer),
+                || format!("{last:?}, then frame {count} at {at}"),
+            )?;
+            last = Some((at, count));
             if kept.len() < 3 {
-                kept.push((frame.clone(), digest(&frame)));
+                kept.push((digest(&frame), frame));
             }
-            last = Some(frame);
         }
-        if kept.iter().any(|(frame, before)| digest(frame) != *before) {
-            return Err(violated(
-                "a kept frame survives later ones unchanged",
-                "its samples changed",
-            ));
-        }
+        ensure(
+            "a kept frame survives later ones unchanged",
+            kept.iter().all(|(before, frame)| digest(frame) == *before),
+            || "its samples changed".into(),
+        )?;
     }
 
     must_fail(

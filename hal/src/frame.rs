@@ -80,32 +80,28 @@ impl Pixels {
             Self::Sixteen(vec![0; format.samples()])
         }
     }
-
-    fn fits(&self, format: &FrameFormat) -> bool {
-        match self {
-            Self::Eight(samples) => format.bit_depth == 8 && samples.len() == format.samples(),
-            Self::Sixteen(samples) => format.bit_depth != 8 && samples.len() == format.samples(),
-        }
-    }
 }
 
-/// Samples in memory that belongs to a camera; it is lent until the last clone of the frame is dropped.
-pub trait Lent: std::fmt::Debug + Send + Sync {
+/// The memory of a frame's samples: [`Pixels`], or a buffer that a camera lends until the last clone of the frame is dropped.
+pub trait Memory: std::fmt::Debug + Send + Sync {
     /// The samples; the same at every call.
     fn samples(&self) -> Samples<'_>;
 }
 
-#[derive(Clone, Debug)]
-enum Memory {
-    Own(Arc<Pixels>),
-    Lent(Arc<dyn Lent>),
+impl Memory for Pixels {
+    fn samples(&self) -> Samples<'_> {
+        match self {
+            Self::Eight(samples) => Samples::Eight(samples),
+            Self::Sixteen(samples) => Samples::Sixteen(samples),
+        }
+    }
 }
 
 /// One camera image. Clones share the samples; a frame may be kept while others arrive.
 #[derive(Clone, Debug)]
 pub struct Frame {
     format: FrameFormat,
-    memory: Memory,
+    memory: Arc<dyn Memory>,
     timestamp: Timestamp,
     count: u64,
 }
@@ -115,41 +111,17 @@ impl Frame {
     ///
     /// # Errors
     /// `Unsupported` if the format has no pixels, a stride below its width or a depth outside 8…16, or if
-    /// the buffer does not have the format's number and kind of samples.
+    /// the memory does not have the format's number and kind of samples.
     pub fn new(
         format: FrameFormat,
-        pixels: Arc<Pixels>,
+        memory: Arc<dyn Memory>,
         timestamp: Timestamp,
         count: u64,
     ) -> Result<Self, Error> {
-        let fits = pixels.fits(&format);
-        Self::of(format, fits, Memory::Own(pixels), timestamp, count)
-    }
-
-    /// As [`Frame::new`], in memory that a camera lends and gets back when the last clone of this frame is dropped.
-    ///
-    /// # Errors
-    /// As [`Frame::new`].
-    pub fn lent(
-        format: FrameFormat,
-        lent: Arc<dyn Lent>,
-        timestamp: Timestamp,
-        count: u64,
-    ) -> Result<Self, Error> {
-        let fits = match lent.samples() {
+        let fits = match memory.samples() {
             Samples::Eight(samples) => format.bit_depth == 8 && samples.len() == format.samples(),
             Samples::Sixteen(samples) => format.bit_depth != 8 && samples.len() == format.samples(),
         };
-        Self::of(format, fits, Memory::Lent(lent), timestamp, count)
-    }
-
-    fn of(
-        format: FrameFormat,
-        fits: bool,
-        memory: Memory,
-        timestamp: Timestamp,
-        count: u64,
-    ) -> Result<Self, Error> {
         let sane = format.width > 0
             && format.height > 0
             && format.stride >= format.width as usize
@@ -181,13 +153,7 @@ impl Frame {
     /// The samples, without a copy.
     #[must_use]
     pub fn samples(&self) -> Samples<'_> {
-        match &self.memory {
-            Memory::Own(pixels) => match &**pixels {
-                Pixels::Eight(samples) => Samples::Eight(samples),
-                Pixels::Sixteen(samples) => Samples::Sixteen(samples),
-            },
-            Memory::Lent(lent) => lent.samples(),
-        }
+        self.memory.samples()
     }
 
     /// Start of the exposure.
@@ -206,10 +172,9 @@ impl Frame {
     #[must_use]
     pub fn restamped(&self, timestamp: Timestamp, count: u64) -> Self {
         Self {
-            format: self.format,
-            memory: self.memory.clone(),
             timestamp,
             count,
+            ..self.clone()
         }
     }
 }
@@ -253,7 +218,7 @@ impl Pool {
             && let Some(pixels) = Arc::get_mut(buffer)
         {
             write(pixels);
-            return Frame::new(self.format, Arc::clone(buffer), timestamp, count);
+            return Frame::new(self.format, buffer.clone(), timestamp, count);
         }
         let mut pixels = Pixels::zeroed(&self.format);
         write(&mut pixels);
@@ -262,18 +227,6 @@ impl Pool {
             self.buffers.push(Arc::clone(&buffer));
         }
         Frame::new(self.format, buffer, timestamp, count)
-    }
-
-    /// Buffers the pool remembers, free or in use.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.buffers.len()
-    }
-
-    /// Whether the pool remembers no buffer yet.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.buffers.is_empty()
     }
 }
 
@@ -298,7 +251,7 @@ mod tests {
             filled(&mut pool, value);
         }
         assert_eq!(
-            pool.len(),
+            pool.buffers.len(),
             2,
             "one kept frame and one in flight need two buffers"
         );

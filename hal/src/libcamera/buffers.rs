@@ -12,7 +12,7 @@ use filedescriptor::FileDescriptor;
 
 use super::owner::Order;
 use crate::error::Error;
-use crate::frame::{Lent, Samples};
+use crate::frame::{Memory, Samples};
 
 /// Maps the first `length` bytes of the first plane of a buffer; the mapping lasts as long as the result or a clone of it.
 ///
@@ -98,12 +98,12 @@ impl Lease {
     }
 }
 
-impl Lent for Lease {
+impl Memory for Lease {
     fn samples(&self) -> Samples<'_> {
         if !self.wide {
             return Samples::Eight(&self.bytes);
         }
-        // A mapping starts at a page and a plane at an even offset; otherwise the cast fails, and `Frame::lent` refuses the empty frame.
+        // A mapping starts at a page and a plane at an even offset; otherwise the cast fails, and `Frame::new` refuses the empty frame.
         Samples::Sixteen(bytemuck::try_cast_slice(&self.bytes).unwrap_or_default())
     }
 }

@@ -201,7 +201,7 @@ impl LibCamera {
         } = self.configured;
         let count = self.count.of(arrived.count);
         if readable.is_plain() && self.out.load(Ordering::Relaxed) + IN_FLIGHT <= buffers {
-            return Frame::lent(format, Arc::new(arrived.lease), arrived.stamp, count);
+            return Frame::new(format, Arc::new(arrived.lease), arrived.stamp, count);
         }
         self.copies.frame(arrived.stamp, count, |pixels| {
             readable.copy(arrived.lease.bytes(), stride, &format, pixels);
