@@ -18,6 +18,12 @@ impl Timestamp {
     pub fn since(self, earlier: Self) -> Duration {
         Duration::from_nanos(self.0.saturating_sub(earlier.0))
     }
+
+    /// Time between `self` and `other`, whichever is earlier.
+    #[must_use]
+    pub fn off(self, other: Self) -> Duration {
+        Duration::from_nanos(self.0.abs_diff(other.0))
+    }
 }
 
 /// Saturates at the end of the clock (584 years).

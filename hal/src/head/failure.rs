@@ -46,15 +46,11 @@ pub(super) struct Failure {
 impl Failure {
     /// The error; `timeout` is the time that the caller allowed beyond the plan.
     pub fn error(self, timeout: Duration) -> Error {
-        let Self {
-            index,
-            attempts,
-            taken,
-            of,
-            so_far,
-            ..
-        } = self;
-        let acquiring = format!("acquiring pattern {index} ({taken} of {of} taken)");
+        let (attempts, so_far) = (self.attempts, self.so_far);
+        let acquiring = format!(
+            "acquiring pattern {} ({} of {} taken)",
+            self.index, self.taken, self.of
+        );
         let counts = format!(
             "{} frames straddled two patterns, {} were older, {} began at no trigger, {} were spoiled by their pulses, {} were lost, \
              {} refreshes were missed",

@@ -7,6 +7,7 @@
 
 use std::time::Duration;
 
+use super::pacing::Pacing;
 use crate::latest;
 use crate::projector::Flip;
 use crate::units::Timestamp;
@@ -39,7 +40,7 @@ struct View {
 }
 
 /// The latest patterns in view, oldest first.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Views {
     views: heapless::Deque<View, MAX_VIEWS>,
     /// When the flip that was not yet reported was queued.
@@ -50,21 +51,14 @@ pub(super) struct Views {
 }
 
 impl Views {
-    pub fn new() -> Self {
+    /// No views yet, of a head with these times.
+    pub fn new(pacing: &Pacing) -> Self {
         Self {
-            views: heapless::Deque::new(),
-            queued: None,
-            flip_to_light: Duration::ZERO,
-            tolerance: Duration::ZERO,
-            refresh: Duration::ZERO,
+            flip_to_light: pacing.flip_to_light,
+            tolerance: pacing.tolerance,
+            refresh: pacing.refresh,
+            ..Self::default()
         }
-    }
-
-    /// Forgets all views and takes new times: from a flip to its light, tolerance, and refresh period.
-    pub fn restart(&mut self, flip_to_light: Duration, tolerance: Duration, refresh: Duration) {
-        self.views.clear();
-        self.queued = None;
-        (self.flip_to_light, self.tolerance, self.refresh) = (flip_to_light, tolerance, refresh);
     }
 
     /// A flip is queued now.
@@ -77,10 +71,7 @@ impl Views {
         let queued = self.queued.take().unwrap_or(flip.timestamp);
         let known = self.counted(flip);
         let counted = known.unwrap_or(flip.timestamp);
-        let off = flip
-            .timestamp
-            .since(counted)
-            .max(counted.since(flip.timestamp));
+        let off = flip.timestamp.off(counted);
         let (mut earliest, mut latest) = (flip.timestamp, flip.timestamp);
         if known.is_none() {
             // Nothing confirms the stamp, but no flip happens before it is queued.

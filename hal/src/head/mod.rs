@@ -36,7 +36,7 @@ pub type DynHead = Head;
 pub struct Head {
     devices: Devices,
     timing: Timing,
-    sequencer: Sequencer<Frame>,
+    sequencer: Sequencer,
 }
 
 pub(crate) struct Devices {
@@ -105,7 +105,7 @@ impl Head {
                 clock,
             },
             timing,
-            sequencer: Sequencer::new(),
+            sequencer: Sequencer::default(),
         }
     }
 
@@ -264,7 +264,7 @@ impl Devices {
 /// Passes events to the sequencer and does what it decides, until the sequence ends or `hand` returns `false`.
 fn carry_out(
     devices: &mut Devices,
-    sequencer: &mut Sequencer<Frame>,
+    sequencer: &mut Sequencer,
     timeout: Duration,
     start_of: &(dyn Fn(&Frame) -> Timestamp + Sync),
     hand: &mut dyn FnMut(usize, Frame) -> bool,
@@ -281,7 +281,7 @@ fn carry_out(
         }
         while let Some(frame) = camera.poll_frame()? {
             let (start, count) = (start_of(&frame), frame.count());
-            sequencer.frame(start, count, frame.restamped(start, count));
+            sequencer.frame(frame.restamped(start, count));
         }
         // After the frames and before any decision: the pulse of a frame that has arrived has ended and is known.
         while let Some(pulse) = trigger.poll_spoiled() {

@@ -68,12 +68,8 @@ impl Pacing {
             period: camera.period.max(Duration::from_nanos(1)),
             delivery: camera.delivery,
             triggered: camera.starts == Starts::OnTrigger,
-            free: Timestamp(0),
-            triggers: heapless::Deque::new(),
-            count: 0,
-            spoiled: SpoiledPulses::new(),
             promptness: timing.tolerance,
-            phase: None,
+            ..Self::default()
         }
     }
 
@@ -115,7 +111,7 @@ impl Pacing {
     /// camera starts an exposure at a trigger, and each exposure needs a trigger of its own. Otherwise its stamp is wrong.
     pub fn explains(&self, start: Timestamp, before: u64) -> bool {
         let oldest = self.count - self.triggers.len();
-        let prompt = |at: Timestamp| start.0.abs_diff(at.0) <= self.promptness.as_nanos() as u64;
+        let prompt = |at: Timestamp| start.off(at) <= self.promptness;
         !self.triggered
             || (oldest as u64..)
                 .zip(&self.triggers)

@@ -12,6 +12,7 @@ use super::count::FrameCount;
 use super::failure::{Blocked, Failure};
 use super::identity::{Identity, Views};
 use super::pacing::{Attempt, Pacing};
+use crate::frame::Frame;
 use crate::latest;
 use crate::projector::Flip;
 use crate::trigger::Spoiled;
@@ -21,18 +22,16 @@ use crate::units::Timestamp;
 const MAX_ATTEMPTS: u32 = 12;
 /// Frames that may wait for the flip that decides them.
 const MAX_UNDECIDED: usize = 8;
-/// Capacity for attempts; more than are ever pending, as each is given up after some time.
-const ATTEMPTS: usize = 16;
 
 /// What to do next.
 #[derive(Debug)]
-pub(super) enum Act<F> {
+pub(super) enum Act {
     /// Queue the pattern of this index.
     Queue(usize),
     /// Fire the trigger and report when the pulse began.
     Fire,
     /// Hand over the frame of the pattern of this index.
-    Hand(usize, F),
+    Hand(usize, Frame),
     /// Wait until this time, or until a flip or a frame arrives.
     Wait(Timestamp),
     /// All frames were handed over.
@@ -43,16 +42,16 @@ pub(super) enum Act<F> {
 
 /// A place of the sequence.
 #[derive(Debug)]
-struct Position<F> {
+struct Position {
     index: usize,
     attempts: u32,
-    frame: Taken<F>,
+    frame: Taken,
 }
 
 #[derive(Debug)]
-enum Taken<F> {
+enum Taken {
     Not,
-    Waits(F),
+    Waits(Frame),
     Handed,
 }
 
@@ -64,19 +63,11 @@ struct Queued {
     wanted: Option<u64>,
 }
 
-/// A frame that is not decided yet.
-#[derive(Debug)]
-struct Exposed<F> {
-    start: Timestamp,
-    count: u64,
-    frame: F,
-}
-
 /// The state of one sequence. It is reused for the next one, so that repeated sequences allocate nothing.
-#[derive(Debug)]
-pub(super) struct Sequencer<F> {
+#[derive(Debug, Default)]
+pub(super) struct Sequencer {
     pacing: Pacing,
-    positions: Vec<Position<F>>,
+    positions: Vec<Position>,
     /// Positions to be shown, the next one first.
     todo: VecDeque<usize>,
     queued: Option<Queued>,
@@ -85,7 +76,8 @@ pub(super) struct Sequencer<F> {
     /// Attempts whose frames are expected; the last one is the pattern in view, done or not.
     attempts: VecDeque<Attempt>,
     views: Views,
-    undecided: heapless::Deque<Exposed<F>, MAX_UNDECIDED>,
+    /// Frames that are not decided yet.
+    undecided: heapless::Deque<Frame, MAX_UNDECIDED>,
     count: FrameCount,
     handed: usize,
     exhausted: Option<usize>,
@@ -95,47 +87,33 @@ pub(super) struct Sequencer<F> {
     so_far: Exposure,
 }
 
-impl<F> Sequencer<F> {
-    pub fn new() -> Self {
-        Self {
-            pacing: Pacing::default(),
-            positions: Vec::new(),
-            todo: VecDeque::new(),
-            queued: None,
-            planned: None,
-            attempts: VecDeque::with_capacity(ATTEMPTS),
-            views: Views::new(),
-            undecided: heapless::Deque::new(),
-            count: FrameCount::default(),
-            handed: 0,
-            exhausted: None,
-            deadline: Timestamp(0),
-            started: None,
-            so_far: Exposure::default(),
-        }
-    }
-
+impl Sequencer {
     /// Begins a sequence of the patterns `indices`, to be done by `deadline`.
     pub fn begin(&mut self, pacing: Pacing, indices: &[usize], deadline: Timestamp) {
-        self.pacing = pacing;
-        self.positions.clear();
-        self.positions.extend(indices.iter().map(|index| Position {
+        let Self {
+            mut positions,
+            mut todo,
+            mut attempts,
+            ..
+        } = std::mem::take(self);
+        positions.clear();
+        positions.extend(indices.iter().map(|index| Position {
             index: *index,
             attempts: 0,
             frame: Taken::Not,
         }));
-        self.todo.clear();
-        self.todo.extend(0..indices.len());
-        (self.queued, self.planned, self.exhausted) = (None, None, None);
-        self.attempts.clear();
-        let p = &self.pacing;
-        self.views.restart(p.flip_to_light, p.tolerance, p.refresh);
-        self.undecided.clear();
-        self.count = FrameCount::default();
-        self.handed = 0;
-        self.deadline = deadline;
-        self.started = None;
-        self.so_far = Exposure::default();
+        todo.clear();
+        todo.extend(0..indices.len());
+        attempts.clear();
+        *self = Self {
+            views: Views::new(&pacing),
+            pacing,
+            positions,
+            todo,
+            attempts,
+            deadline,
+            ..Self::default()
+        };
     }
 
     /// The counts and times of the sequence so far.
@@ -192,25 +170,20 @@ impl<F> Sequencer<F> {
         self.pacing.spoiled(pulse);
     }
 
-    /// A frame has arrived whose exposure started at `start`, with this count of the camera.
-    pub fn frame(&mut self, start: Timestamp, count: u64, frame: F) {
-        if !self.count.see(count) {
+    /// A frame has arrived, stamped with the start of its exposure.
+    pub fn frame(&mut self, frame: Frame) {
+        if !self.count.see(frame.count()) {
             self.so_far.duplicated = self.so_far.duplicated.saturating_add(1);
             return;
         }
-        self.pacing.exposed(start);
-        let exposed = Exposed {
-            start,
-            count,
-            frame,
-        };
-        if latest::keep(&mut self.undecided, exposed).is_some() {
+        self.pacing.exposed(frame.timestamp());
+        if latest::keep(&mut self.undecided, frame).is_some() {
             self.so_far.stale = self.so_far.stale.saturating_add(1);
         }
     }
 
     /// What to do now. Flips and triggers come before frames, so that handing over delays none of them.
-    pub fn act(&mut self, now: Timestamp) -> Act<F> {
+    pub fn act(&mut self, now: Timestamp) -> Act {
         self.decide(now);
         self.give_up_overdue(now);
         let fire = self.trigger_due(now);
@@ -250,7 +223,7 @@ impl<F> Sequencer<F> {
         let decided = self
             .undecided
             .iter()
-            .map(|exposed| self.pacing.end(exposed.start));
+            .map(|frame| self.pacing.end(frame.timestamp()));
         let next = [flip, fire].into_iter().flatten().chain(overdue);
         // A frame whose exposure ends in the future is decided at that time, unless the next flip decides it earlier.
         let next = next.chain(decided.filter(|end| *end > now));
@@ -263,10 +236,10 @@ impl<F> Sequencer<F> {
     /// Assigns frames to their positions, as far as they can be decided.
     fn decide(&mut self, now: Timestamp) {
         for _ in 0..self.undecided.len() {
-            let Some(exposed) = self.undecided.pop_front() else {
+            let Some(frame) = self.undecided.pop_front() else {
                 return;
             };
-            let start = exposed.start;
+            let start = frame.timestamp();
             let end = self.pacing.end(start);
             if let Some(pulse) = self.pacing.spoiled_by(start) {
                 self.so_far.spoiled = self.so_far.spoiled.saturating_add(1);
@@ -276,15 +249,15 @@ impl<F> Sequencer<F> {
             }
             if !self
                 .pacing
-                .explains(start, self.count.before(exposed.count))
+                .explains(start, self.count.before(frame.count()))
             {
                 self.so_far.unexplained = self.so_far.unexplained.saturating_add(1);
                 continue;
             }
             match self.views.identify(start, end, now) {
-                Identity::Of(position, light) => self.take(position, light, exposed),
+                Identity::Of(position, light) => self.take(position, light, frame),
                 Identity::Undecided => {
-                    latest::keep(&mut self.undecided, exposed);
+                    latest::keep(&mut self.undecided, frame);
                 }
                 Identity::Stale => self.so_far.stale = self.so_far.stale.saturating_add(1),
                 Identity::Straddles => {
@@ -296,17 +269,15 @@ impl<F> Sequencer<F> {
     }
 
     /// Assigns a frame to this position.
-    fn take(&mut self, position: usize, light: Timestamp, exposed: Exposed<F>) {
+    fn take(&mut self, position: usize, light: Timestamp, frame: Frame) {
+        let start = frame.timestamp();
         for attempt in self
             .attempts
             .iter_mut()
             .filter(|attempt| attempt.position == position)
         {
             if let Some(expected) = attempt.fired {
-                let off = exposed
-                    .start
-                    .since(expected)
-                    .max(expected.since(exposed.start));
+                let off = start.off(expected);
                 self.so_far.sync_error = self.so_far.sync_error.max(off);
             }
             attempt.done = true;
@@ -316,14 +287,14 @@ impl<F> Sequencer<F> {
             self.so_far.surplus = self.so_far.surplus.saturating_add(1);
             return;
         }
-        *slot = Taken::Waits(exposed.frame);
+        *slot = Taken::Waits(frame);
         self.todo.retain(|waiting| *waiting != position);
         // Within the tolerance an exposure may begin before its pattern's light.
-        let began = light.min(exposed.start);
+        let began = light.min(start);
         self.started = Some(self.started.map_or(began, |first| first.min(began)));
         let so_far = &mut self.so_far;
-        so_far.done = so_far.done.max(exposed.start);
-        so_far.lag = so_far.lag.max(exposed.start.since(light));
+        so_far.done = so_far.done.max(start);
+        so_far.lag = so_far.lag.max(start.since(light));
     }
 
     /// A frame exposed from `start` showed no pattern alone: the position of its attempt is shown again at once.
@@ -335,7 +306,7 @@ impl<F> Sequencer<F> {
             } else {
                 self.pacing.expected(attempt)
             };
-            expected.is_some_and(|at| at.since(start).max(start.since(at)) < near)
+            expected.is_some_and(|at| at.off(start) < near)
         });
         if let Some(at) = meant {
             self.retake(at);

@@ -55,10 +55,7 @@ impl<M> Watched<M> {
     /// Whether a spoiled pulse may have affected an exposure that started at `start` by its stamp: its own or a neighbouring one, as
     /// stamps of the end are off by as much as the pulse.
     pub fn spoiled_near(&self, start: Timestamp) -> bool {
-        let near = |pulse: &Spoiled| {
-            let reach = u128::from(start.0.abs_diff(pulse.fired.0));
-            reach <= (pulse.width + pulse.off()).as_nanos()
-        };
+        let near = |pulse: &Spoiled| start.off(pulse.fired) <= pulse.width + pulse.off();
         self.spoiled.iter().any(near)
     }
 }

@@ -9,15 +9,17 @@ use super::faults::{Dice, Kind};
 use super::timing::Mechanics;
 use super::{Bench, Scene, VirtualDevice, lock};
 use crate::camera::{Camera, CameraTiming, Encoding};
-use crate::error::Error;
+use crate::error::{DeviceKind, Error};
 use crate::frame::{Frame, FrameFormat};
 use crate::head::Stamp;
 use crate::units::Timestamp;
 
 /// Most frames that wait to be fetched; when one more arrives, the oldest is lost, as in a real driver.
 const MAX_WAITING: usize = 4;
+const DEVICE: DeviceKind = DeviceKind::Camera;
 
 /// The exposures of a camera.
+#[derive(Default)]
 pub(super) struct Sensor {
     armed: bool,
     /// A triggered camera ignores triggers before this.
@@ -42,18 +44,6 @@ struct PendingExposure {
 }
 
 impl Sensor {
-    pub fn new() -> Self {
-        Self {
-            armed: false,
-            busy_until: Timestamp(0),
-            started: Timestamp(0),
-            since: 0,
-            count: 0,
-            exposures: VecDeque::with_capacity(2 * MAX_WAITING),
-            again: None,
-        }
-    }
-
     pub fn stop(&mut self) {
         self.armed = false;
         self.exposures.clear();
@@ -157,23 +147,16 @@ impl<S: Scene> Bench<S> {
         if let Some(frame) = self.sensor.again.take() {
             return Ok(Some(frame));
         }
-        let now = self.now;
-        let Some(exposure) = self
-            .sensor
-            .exposures
-            .front()
-            .copied()
-            .filter(|e| e.ready <= now)
-        else {
+        let ready = |exposure: &mut PendingExposure| exposure.ready <= self.now;
+        let Some(exposure) = self.sensor.exposures.pop_front_if(ready) else {
             return Ok(None);
         };
-        self.sensor.exposures.pop_front();
         let mechanics = &self.mechanics;
-        let end = exposure.start + exposure.length;
         let (start, length) = (exposure.start, exposure.length);
+        let end = start + length;
         let seen = self.light.seen(start, length, mechanics.exposure);
         let marked = match mechanics.stamp {
-            Stamp::ExposureStart => exposure.start,
+            Stamp::ExposureStart => start,
             Stamp::ExposureEnd => end,
             Stamp::ReadoutEnd => end + mechanics.readout,
         };
@@ -205,11 +188,11 @@ impl<S: Scene> Camera for VirtualDevice<S> {
     }
 
     fn present(&self) -> Result<(), Error> {
-        self.as_camera("looking for the camera").map(|_| ())
+        self.plugged(DEVICE, "looking for the camera").map(|_| ())
     }
 
     fn start(&mut self) -> Result<(), Error> {
-        let mut bench = self.as_camera("starting the camera")?;
+        let mut bench = self.plugged(DEVICE, "starting the camera")?;
         if bench.sensor.armed {
             return Err(Error::protocol(
                 "starting a camera that is running",
@@ -222,7 +205,7 @@ impl<S: Scene> Camera for VirtualDevice<S> {
     }
 
     fn poll_frame(&mut self) -> Result<Option<Frame>, Error> {
-        let mut bench = self.as_camera("waiting for a frame")?;
+        let mut bench = self.plugged(DEVICE, "waiting for a frame")?;
         if !bench.sensor.armed {
             return Err(Error::protocol(
                 "waiting for a frame of a stopped camera",
@@ -233,7 +216,7 @@ impl<S: Scene> Camera for VirtualDevice<S> {
     }
 
     fn stop(&mut self) -> Result<(), Error> {
-        self.as_camera("stopping the camera")?.sensor.stop();
+        self.plugged(DEVICE, "stopping the camera")?.sensor.stop();
         Ok(())
     }
 }

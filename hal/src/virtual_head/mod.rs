@@ -24,7 +24,7 @@ use crate::head::Head;
 use crate::projector::Raster;
 use crate::trigger::{Spoiled, Trigger};
 use crate::units::Timestamp;
-use cables::Cable;
+use cables::Cables;
 use camera::Sensor;
 use faults::Dice;
 pub use faults::Faults;
@@ -75,8 +75,7 @@ struct Bench<S> {
     sensor: Sensor,
     pulses: Pulses,
     waits: u64,
-    camera: Cable,
-    projector: Cable,
+    cables: Cables,
 }
 
 /// One bench, shared by the devices and the [`Control`].
@@ -119,11 +118,10 @@ pub fn head<S: Scene + 'static>(scene: S, mechanics: Mechanics) -> (Head, Contro
         now: Timestamp(0),
         screen: Screen::default(),
         light: LightHistory::new(),
-        sensor: Sensor::new(),
-        pulses: Pulses::new(),
+        sensor: Sensor::default(),
+        pulses: Pulses::default(),
         waits: 0,
-        camera: Cable::default(),
-        projector: Cable::default(),
+        cables: Cables::default(),
         mechanics,
     }));
     let head = devices(&bench);
@@ -132,19 +130,14 @@ pub fn head<S: Scene + 'static>(scene: S, mechanics: Mechanics) -> (Head, Contro
 
 /// A head of the devices, opened with the cables in their present state.
 fn devices<S: Scene + 'static>(bench: &Shared<S>) -> Head {
-    let (camera, projector, timing) = {
+    let (opened, timing) = {
         let bench = lock(bench);
-        (
-            bench.camera.pulled,
-            bench.projector.pulled,
-            bench.mechanics.calibrated(),
-        )
+        (bench.cables, bench.mechanics.calibrated())
     };
     let device = || {
         Box::new(VirtualDevice {
             bench: Arc::clone(bench),
-            camera,
-            projector,
+            opened,
         })
     };
     Head::new(device(), device(), device(), device(), timing)
@@ -158,8 +151,7 @@ fn lock<S>(bench: &Shared<S>) -> MutexGuard<'_, Bench<S>> {
 /// Any of the devices of the bench, with the state of the cables when it was opened.
 struct VirtualDevice<S> {
     bench: Shared<S>,
-    camera: u64,
-    projector: u64,
+    opened: Cables,
 }
 
 impl<S: Scene> Clock for VirtualDevice<S> {

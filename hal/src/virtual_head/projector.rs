@@ -4,9 +4,11 @@ use std::time::Duration;
 
 use super::faults::Kind;
 use super::{Bench, Scene, VirtualDevice, lock};
-use crate::error::Error;
+use crate::error::{DeviceKind, Error};
 use crate::projector::{Flip, Projector, Raster, all_of_size};
 use crate::units::Timestamp;
+
+const DEVICE: DeviceKind = DeviceKind::Projector;
 
 /// The state of the projector's flips.
 #[derive(Default)]
@@ -96,18 +98,19 @@ impl<S: Scene> Projector for VirtualDevice<S> {
     }
 
     fn present(&self) -> Result<(), Error> {
-        self.as_projector("looking for the projector").map(|_| ())
+        self.plugged(DEVICE, "looking for the projector")
+            .map(|_| ())
     }
 
     fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
-        let mut bench = self.as_projector("loading patterns")?;
+        let mut bench = self.plugged(DEVICE, "loading patterns")?;
         all_of_size(&rasters, bench.scene.projector_size())?;
         bench.blank();
         bench.scene.load(rasters)
     }
 
     fn queue(&mut self, index: usize) -> Result<(), Error> {
-        let mut bench = self.as_projector("showing a pattern")?;
+        let mut bench = self.plugged(DEVICE, "showing a pattern")?;
         let loaded = bench.scene.loaded();
         if index >= loaded {
             return Err(Error::protocol(
@@ -126,7 +129,7 @@ impl<S: Scene> Projector for VirtualDevice<S> {
     }
 
     fn poll_flip(&mut self) -> Result<Option<Flip>, Error> {
-        let mut bench = self.as_projector("waiting for a flip")?;
+        let mut bench = self.plugged(DEVICE, "waiting for a flip")?;
         let now = bench.now;
         let came = bench.screen.next().is_some_and(|news| news <= now);
         Ok(if came {
@@ -137,7 +140,7 @@ impl<S: Scene> Projector for VirtualDevice<S> {
     }
 
     fn blank(&mut self) -> Result<(), Error> {
-        self.as_projector("blanking the projector")?.blank();
+        self.plugged(DEVICE, "blanking the projector")?.blank();
         Ok(())
     }
 }

@@ -9,6 +9,7 @@ use crate::trigger::{Edges, Spoiled, SpoiledPulses};
 use crate::units::Timestamp;
 
 /// The line of the trigger. The exposure lasts as long as the pulse.
+#[derive(Default)]
 pub(super) struct Pulses {
     begun: u64,
     /// The end of the latest pulse that lasts too long. All other pulses end before the camera can take the next one.
@@ -18,14 +19,6 @@ pub(super) struct Pulses {
 }
 
 impl Pulses {
-    pub fn new() -> Self {
-        Self {
-            begun: 0,
-            on_until: Timestamp(0),
-            spoiled: SpoiledPulses::new(),
-        }
-    }
-
     /// Begins a pulse and returns how long it will last; none if one is still on.
     pub fn begin(&mut self, now: Timestamp, mechanics: &Mechanics, dice: Dice) -> Option<Duration> {
         if now < self.on_until {
