@@ -52,11 +52,11 @@ fn compare(name: &str, part: Part) {
 
     for (ours, theirs) in [
         (
-            stage.camera_model(),
+            stage.scenario().rig.camera.model(),
             recording.camera_model.clone().unwrap(),
         ),
         (
-            stage.projector_model(),
+            stage.scenario().rig.projector.model(),
             recording.projector.model.clone().unwrap(),
         ),
     ] {

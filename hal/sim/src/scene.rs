@@ -10,7 +10,7 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 use super::blur;
 use super::scenario::Scenario;
-use super::transport::Transport;
+use super::stage::Staged;
 use hal::error::Error;
 use hal::frame::{Frame, FrameFormat, Pixels, Pool};
 use hal::projector::Raster;
@@ -23,7 +23,7 @@ const MAX_KEPT_FRAMES: usize = 64;
 /// Part, rasters and sensor of a simulated head.
 pub(crate) struct SimScene {
     scenario: Arc<Scenario>,
-    transport: Arc<Transport>,
+    placed: Staged,
     /// The light of each loaded raster, 1 = white, row by row.
     rasters: Vec<Vec<f32>>,
     /// The light on the camera; the memory is reused for each frame.
@@ -36,11 +36,11 @@ pub(crate) struct SimScene {
 }
 
 impl SimScene {
-    pub(super) fn new(scenario: Arc<Scenario>, transport: Arc<Transport>) -> Self {
+    pub(super) fn new(scenario: Arc<Scenario>, placed: Staged) -> Self {
         let camera = &scenario.rig.camera;
         let format = FrameFormat::packed(camera.width, camera.height, scenario.bit_depth);
         Self {
-            transport,
+            placed,
             rasters: Vec::new(),
             picture: vec![0.0; format.samples()],
             part: vec![0.0; format.samples()],
@@ -52,13 +52,13 @@ impl SimScene {
     }
 
     /// Puts another part in place.
-    pub(super) fn place(&mut self, transport: Arc<Transport>) {
-        self.transport = transport;
+    pub(super) fn place(&mut self, placed: Staged) {
+        self.placed = placed;
     }
 
-    /// The light transport of the part in place.
-    pub(super) fn transport(&self) -> Arc<Transport> {
-        Arc::clone(&self.transport)
+    /// The part in place.
+    pub(super) fn placed(&self) -> Staged {
+        self.placed.clone()
     }
 
     /// Restarts the noise with another seed.
@@ -117,15 +117,16 @@ impl Scene for SimScene {
             let raster = shown.and_then(|index| self.rasters.get(index));
             raster.map(Vec::as_slice)
         };
+        let transport = &self.placed.transport;
         match seen {
             [(shown, share)] => {
-                self.transport.light(raster(*shown), &mut self.picture);
+                transport.light(raster(*shown), &mut self.picture);
                 self.picture.iter_mut().for_each(|light| *light *= share);
             }
             several => {
                 self.picture.fill(0.0);
                 for (shown, share) in several {
-                    self.transport.light(raster(*shown), &mut self.part);
+                    transport.light(raster(*shown), &mut self.part);
                     let parts = self.picture.iter_mut().zip(&self.part);
                     parts.for_each(|(sum, light)| *sum += share * light);
                 }

@@ -1,7 +1,6 @@
 //! The simulated head and its stage, on which parts are placed and which knows their true heights.
 
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::parts::Part;
 use super::scenario::{Placement, Scenario};
@@ -9,7 +8,6 @@ use super::scene::SimScene;
 use super::transport::{Transport, Truth};
 use hal::error::{DeviceKind, Error};
 use hal::head::Head;
-use hal::model::DeviceModel;
 use hal::virtual_head::{self, Control, Scene as _};
 
 /// Placed parts whose light transport is kept; one of 512 × 512 pixels takes about 20 MB.
@@ -20,7 +18,6 @@ const MAX_REMEMBERED: usize = 8;
 pub struct Stage {
     control: Control<SimScene>,
     scenario: Arc<Scenario>,
-    placed: Arc<Mutex<(Part, Placement)>>,
     /// Light transports of the last placed parts; the most recent is the last.
     remembered: Arc<Mutex<Vec<Staged>>>,
 }
@@ -30,7 +27,22 @@ pub struct Stage {
 pub struct Staged {
     part: Part,
     placement: Placement,
-    transport: Arc<Transport>,
+    pub(super) transport: Arc<Transport>,
+}
+
+impl Staged {
+    fn new(
+        scenario: &Scenario,
+        part: &Part,
+        placement: &Placement,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Self {
+        Self {
+            part: part.clone(),
+            placement: *placement,
+            transport: Arc::new(Transport::build(scenario, part, placement, progress)),
+        }
+    }
 }
 
 /// A simulated head in front of the scenario's part, and the stage to place others on.
@@ -53,24 +65,13 @@ pub fn head_with_progress(
         .check()
         .map_err(|problem| Error::unsupported("simulating this scenario", problem))?;
     let scenario = Arc::new(scenario.clone());
-    let transport = Arc::new(Transport::build(
-        &scenario,
-        &scenario.part,
-        &scenario.placement,
-        progress,
-    ));
-    let remembered = Staged {
-        part: scenario.part.clone(),
-        placement: scenario.placement,
-        transport: Arc::clone(&transport),
-    };
-    let scene = SimScene::new(Arc::clone(&scenario), transport);
+    let staged = Staged::new(&scenario, &scenario.part, &scenario.placement, progress);
+    let scene = SimScene::new(Arc::clone(&scenario), staged.clone());
     let (head, control) = virtual_head::head(scene, scenario.mechanics());
     let stage = Stage {
         control,
-        placed: Arc::new(Mutex::new((scenario.part.clone(), scenario.placement))),
         scenario,
-        remembered: Arc::new(Mutex::new(vec![remembered])),
+        remembered: Arc::new(Mutex::new(vec![staged])),
     };
     Ok((head, stage))
 }
@@ -95,11 +96,21 @@ impl Stage {
         placement: &Placement,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<(), Error> {
-        let staged = match self.recall(part, placement) {
+        let known = |staged: &Staged| staged.part == *part && staged.placement == *placement;
+        let recalled = {
+            let mut remembered = self.remembered();
+            let at = remembered.iter().position(known);
+            at.map(|at| remembered.remove(at))
+        };
+        let staged = match recalled {
             Some(known) => known,
             None => self.work_out(part, placement, progress)?,
         };
-        self.remember(&staged);
+        let mut remembered = self.remembered();
+        if remembered.len() == MAX_REMEMBERED {
+            remembered.remove(0);
+        }
+        remembered.push(staged.clone());
         self.show(staged);
         Ok(())
     }
@@ -118,48 +129,25 @@ impl Stage {
         part.check()
             .and_then(|()| placement.check())
             .map_err(|problem| Error::unsupported("placing this part", problem))?;
-        let transport = Transport::build(&self.scenario, part, placement, progress);
-        Ok(Staged {
-            part: part.clone(),
-            placement: *placement,
-            transport: Arc::new(transport),
-        })
+        Ok(Staged::new(&self.scenario, part, placement, progress))
     }
 
     /// Puts a part in place whose light transport is computed; the next exposure sees it.
     pub fn show(&self, staged: Staged) {
-        let mut placed = self.placed.lock().unwrap_or_else(PoisonError::into_inner);
-        self.control.scene(|scene| scene.place(staged.transport));
-        *placed = (staged.part, staged.placement);
+        self.control.scene(|scene| scene.place(staged));
     }
 
     /// The part that is in place, and how it lies.
     #[must_use]
     pub fn placed(&self) -> (Part, Placement) {
-        let placed = self.placed.lock().unwrap_or_else(PoisonError::into_inner);
-        placed.clone()
+        let staged = self.control.scene(|scene| scene.placed());
+        (staged.part, staged.placement)
     }
 
-    fn recall(&self, part: &Part, placement: &Placement) -> Option<Staged> {
-        let mut remembered = self
-            .remembered
+    fn remembered(&self) -> MutexGuard<'_, Vec<Staged>> {
+        self.remembered
             .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        let at = remembered
-            .iter()
-            .position(|r| r.part == *part && r.placement == *placement)?;
-        Some(remembered.remove(at))
-    }
-
-    fn remember(&self, staged: &Staged) {
-        let mut remembered = self
-            .remembered
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        if remembered.len() == MAX_REMEMBERED {
-            remembered.remove(0);
-        }
-        remembered.push(staged.clone());
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Unplugs a device: each of its calls fails until it is plugged in and the head opened again.
@@ -187,8 +175,8 @@ impl Stage {
     /// The true heights and classes of the part that is in place.
     #[must_use]
     pub fn truth(&self) -> Truth {
-        let transport = self.control.scene(|scene| scene.transport());
-        transport.truth.clone()
+        let staged = self.control.scene(|scene| scene.placed());
+        staged.transport.truth.clone()
     }
 
     /// Restarts the noise with `seed`: the next frame has the noise of frame 0.
@@ -200,23 +188,5 @@ impl Stage {
     #[must_use]
     pub fn scenario(&self) -> &Scenario {
         &self.scenario
-    }
-
-    /// The exact geometry of the camera.
-    #[must_use]
-    pub fn camera_model(&self) -> DeviceModel {
-        self.scenario.rig.camera.model()
-    }
-
-    /// The exact geometry of the projector.
-    #[must_use]
-    pub fn projector_model(&self) -> DeviceModel {
-        self.scenario.rig.projector.model()
-    }
-
-    /// Refresh period of the projector.
-    #[must_use]
-    pub fn refresh(&self) -> Duration {
-        self.scenario.refresh()
     }
 }

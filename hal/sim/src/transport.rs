@@ -29,25 +29,16 @@ pub struct Truth {
     pub class: Vec<u8>,
 }
 
-/// The sparse matrix from rasters to frames, and the ground truth. Light is in units of full scale.
+/// The sparse matrix from rasters to frames, and the ground truth: of one camera row, or of all. Light is in units of full scale.
 #[derive(Debug)]
 pub(super) struct Transport {
     /// Ambient light of each camera pixel.
     ambient: Vec<f32>,
-    /// Where each pixel's taps start, and where the last pixel's end.
-    starts: Vec<u32>,
+    /// Where each pixel's taps end; they start where those of the pixel before end.
+    ends: Vec<u32>,
     /// Projector pixel and weight.
     taps: Vec<(u32, f32)>,
     pub truth: Truth,
-}
-
-/// One camera row of a transport.
-struct CameraRow {
-    ambient: Vec<f32>,
-    ends: Vec<u32>,
-    taps: Vec<(u32, f32)>,
-    height: Vec<f32>,
-    class: Vec<u8>,
 }
 
 /// The devices in the coordinates of a placed part.
@@ -117,7 +108,7 @@ impl Transport {
         };
         let height = scenario.rig.camera.height;
         let done = std::sync::atomic::AtomicU32::new(0);
-        let rows: Vec<CameraRow> = (0..height)
+        let rows: Vec<Self> = (0..height)
             .into_par_iter()
             .map(|v| {
                 let row = tracer.row(v);
@@ -129,28 +120,31 @@ impl Transport {
         Self::join(rows)
     }
 
-    fn join(rows: Vec<CameraRow>) -> Self {
+    fn join(rows: Vec<Self>) -> Self {
         let pixels = rows.iter().map(|row| row.ambient.len()).sum();
         let taps = rows.iter().map(|row| row.taps.len()).sum();
-        let mut whole = Self {
+        let mut whole = Self::with_capacity(pixels, taps);
+        for row in rows {
+            let before = whole.taps.len() as u32;
+            whole.ends.extend(row.ends.iter().map(|end| before + end));
+            whole.ambient.extend(row.ambient);
+            whole.taps.extend(row.taps);
+            whole.truth.height.extend(row.truth.height);
+            whole.truth.class.extend(row.truth.class);
+        }
+        whole
+    }
+
+    fn with_capacity(pixels: usize, taps: usize) -> Self {
+        Self {
             ambient: Vec::with_capacity(pixels),
-            starts: Vec::with_capacity(pixels + 1),
+            ends: Vec::with_capacity(pixels),
             taps: Vec::with_capacity(taps),
             truth: Truth {
                 height: Vec::with_capacity(pixels),
                 class: Vec::with_capacity(pixels),
             },
-        };
-        whole.starts.push(0);
-        for row in rows {
-            let before = whole.taps.len() as u32;
-            whole.starts.extend(row.ends.iter().map(|end| before + end));
-            whole.ambient.extend(row.ambient);
-            whole.taps.extend(row.taps);
-            whole.truth.height.extend(row.height);
-            whole.truth.class.extend(row.class);
         }
-        whole
     }
 
     /// The light of each camera pixel while the projector shows `raster` (light per projector pixel, 1 = white), or
@@ -160,12 +154,10 @@ impl Transport {
             picture.copy_from_slice(&self.ambient);
             return;
         };
-        for ((pixel, ambient), ends) in picture
-            .iter_mut()
-            .zip(&self.ambient)
-            .zip(self.starts.windows(2))
-        {
-            let taps = &self.taps[ends[0] as usize..ends[1] as usize];
+        let mut start = 0;
+        for ((pixel, ambient), end) in picture.iter_mut().zip(&self.ambient).zip(&self.ends) {
+            let taps = &self.taps[start..*end as usize];
+            start = *end as usize;
             let lit: f32 = taps
                 .iter()
                 .map(|(index, weight)| weight * raster[*index as usize])
@@ -191,18 +183,12 @@ struct Lit {
 }
 
 impl Tracer<'_> {
-    fn row(&self, v: u32) -> CameraRow {
+    fn row(&self, v: u32) -> Transport {
         let device = &self.scenario.rig.camera;
         let n = self.scenario.sub_rays;
         let share = 1.0 / f64::from(n * n);
         let width = device.width as usize;
-        let mut row = CameraRow {
-            ambient: Vec::with_capacity(width),
-            ends: Vec::with_capacity(width),
-            taps: Vec::with_capacity(width * 8),
-            height: Vec::with_capacity(width),
-            class: Vec::with_capacity(width),
-        };
+        let mut row = Transport::with_capacity(width, width * 8);
         let mut pixel: Vec<(u32, f64)> = Vec::with_capacity((4 * n * n) as usize);
         for u in 0..device.width {
             pixel.clear();
@@ -234,8 +220,9 @@ impl Tracer<'_> {
                 Some(_) if whole => 2,
                 Some(_) => 1,
             };
-            row.class.push(class);
-            row.height
+            row.truth.class.push(class);
+            row.truth
+                .height
                 .push(seen.map_or(f32::NAN, |point| self.placed.to_world(point)[2] as f32));
             row.ambient
                 .push((self.scenario.light.ambient * f64::from(met) * share) as f32);

@@ -6,6 +6,7 @@ use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
+use drm::control::atomic::AtomicModeReq;
 use drm::control::{
     Device as ControlDevice, PlaneType, RawResourceHandle, ResourceHandle, property,
 };
@@ -150,6 +151,12 @@ impl Properties {
                 "use a driver that has it",
             )
         })
+    }
+
+    /// Adds the property of this name with this value to a request.
+    pub fn set(&self, request: &mut AtomicModeReq, name: &str, value: u64) -> Result<(), Error> {
+        request.add_raw_property(self.object, self.named(name)?, value);
+        Ok(())
     }
 
     /// Whether this is a plane of this type.

@@ -7,13 +7,13 @@ use drm::control::property::ValueType;
 
 /// A value by its name in a list of names, or a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Wanted {
+pub(super) enum Wanted {
     Named(&'static str),
     Number(u64),
 }
 
 /// Properties of a connector by the kernel's names, grouped by driver.
-const CONNECTOR: [(&str, Wanted); 11] = [
+pub(super) const CONNECTOR: &[(&str, Wanted)] = &[
     // Black is 0 and white is 255, also on television modes.
     ("Broadcast RGB", Wanted::Named("Full")),
     ("output_csc", Wanted::Named("bypass")),
@@ -31,7 +31,7 @@ const CONNECTOR: [(&str, Wanted); 11] = [
 ];
 
 /// Properties of a CRTC: no look-up tables and colour matrices between buffer and connector, and a constant refresh rate.
-const CRTC: [(&str, Wanted); 4] = [
+pub(super) const CRTC: &[(&str, Wanted)] = &[
     ("DEGAMMA_LUT", Wanted::Number(0)),
     ("CTM", Wanted::Number(0)),
     ("GAMMA_LUT", Wanted::Number(0)),
@@ -39,28 +39,14 @@ const CRTC: [(&str, Wanted); 4] = [
 ];
 
 /// Properties of a plane: not rotated and opaque, whatever another program has set before.
-const PLANE: [(&str, Wanted); 2] = [
+pub(super) const PLANE: &[(&str, Wanted)] = &[
     // The bit for 0°.
     ("rotation", Wanted::Number(1)),
     ("alpha", Wanted::Number(0xffff)),
 ];
 
-/// The value that a connector's property should have; none if it does not matter or the driver has no such value.
-pub(super) fn of_connector(name: &str, kind: &ValueType) -> Option<u64> {
-    find(&CONNECTOR, name, kind)
-}
-
-/// The value that a CRTC's property should have; none if it does not matter.
-pub(super) fn of_crtc(name: &str, kind: &ValueType) -> Option<u64> {
-    find(&CRTC, name, kind)
-}
-
-/// The value that a plane's property should have; none if it does not matter.
-pub(super) fn of_plane(name: &str, kind: &ValueType) -> Option<u64> {
-    find(&PLANE, name, kind)
-}
-
-fn find(known: &[(&str, Wanted)], name: &str, kind: &ValueType) -> Option<u64> {
+/// The value that a property should have, by one of the lists above; none if it does not matter or the driver has no such value.
+pub(super) fn find(known: &[(&str, Wanted)], name: &str, kind: &ValueType) -> Option<u64> {
     let (_, wanted) = known.iter().find(|(known, _)| *known == name)?;
     match (wanted, kind) {
         (Wanted::Number(number), _) => Some(*number),

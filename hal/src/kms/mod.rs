@@ -119,6 +119,11 @@ impl Display {
         Ok(())
     }
 
+    fn waits_for_black(&self) -> bool {
+        self.waiting
+            .is_some_and(|commit| commit.picture == Picture::Black)
+    }
+
     /// Reads the events that have arrived.
     fn take_events(&mut self) -> Result<(), Error> {
         loop {
@@ -235,13 +240,7 @@ impl Projector for Display {
             ));
         }
         self.take_events()?;
-        let black = matches!(
-            self.waiting,
-            Some(Commit {
-                picture: Picture::Black,
-                ..
-            })
-        );
+        let black = self.waits_for_black();
         if self.came.is_some() || self.next.is_some() || self.waiting.is_some() && !black {
             return Err(Error::protocol(
                 format!("showing pattern {index} while another one waits for its refresh"),
@@ -268,13 +267,7 @@ impl Projector for Display {
     /// Waits for a pattern that is queued, at most a few refreshes: a commit cannot be cancelled.
     fn blank(&mut self) -> Result<(), Error> {
         self.next = None;
-        if !matches!(
-            self.waiting,
-            Some(Commit {
-                picture: Picture::Black,
-                ..
-            })
-        ) {
+        if !self.waits_for_black() {
             self.settle()?;
             if self.shown != Picture::Black {
                 self.commit(Picture::Black)?;

@@ -132,7 +132,7 @@ impl Output {
             (&self.crtc_properties, "MODE_ID"),
             (&self.crtc_properties, "ACTIVE"),
         ] {
-            request.add_raw_property(object.object, object.named(name)?, 0);
+            object.set(&mut request, name, 0)?;
         }
         let off = self.commit(AtomicCommitFlags::ALLOW_MODESET, request);
         off.map_err(|error| refused(format!("switching {} off", self.name), &error))
@@ -164,23 +164,11 @@ impl Output {
             ("CRTC_W", width),
             ("CRTC_H", height),
         ] {
-            request.add_raw_property(self.plane.object, self.plane.named(name)?, value);
+            self.plane.set(&mut request, name, value)?;
         }
-        request.add_raw_property(
-            self.connector.object,
-            self.connector.named("CRTC_ID")?,
-            crtc,
-        );
-        request.add_raw_property(
-            self.crtc_properties.object,
-            self.crtc_properties.named("MODE_ID")?,
-            mode,
-        );
-        request.add_raw_property(
-            self.crtc_properties.object,
-            self.crtc_properties.named("ACTIVE")?,
-            1,
-        );
+        self.connector.set(&mut request, "CRTC_ID", crtc)?;
+        self.crtc_properties.set(&mut request, "MODE_ID", mode)?;
+        self.crtc_properties.set(&mut request, "ACTIVE", 1)?;
         self.be_faithful(&mut request);
         self.be_alone(&mut request)?;
         Ok(request)
@@ -189,15 +177,12 @@ impl Output {
     /// Sets the properties that would change grey levels, such as gamma or scaling, to neutral values ([`faithful`]).
     fn be_faithful(&self, request: &mut AtomicModeReq) {
         for (object, wanted) in [
-            (
-                &self.connector,
-                faithful::of_connector as fn(&str, &property::ValueType) -> Option<u64>,
-            ),
-            (&self.crtc_properties, faithful::of_crtc),
-            (&self.plane, faithful::of_plane),
+            (&self.connector, faithful::CONNECTOR),
+            (&self.crtc_properties, faithful::CRTC),
+            (&self.plane, faithful::PLANE),
         ] {
             for property in object.all.iter().filter(|property| property.info.mutable()) {
-                let value = wanted(&property.name, property.info.value_type());
+                let value = faithful::find(wanted, &property.name, property.info.value_type());
                 if let Some(value) = value.filter(|value| *value != property.value) {
                     request.add_raw_property(object.object, property.info.handle(), value);
                 }
@@ -231,7 +216,7 @@ impl Output {
                 .any(|property| property.name == "CRTC_ID" && property.value == crtc);
             if here && !ours {
                 for name in names {
-                    request.add_raw_property(other.object, other.named(name)?, 0);
+                    other.set(request, name, 0)?;
                 }
             }
         }

@@ -25,7 +25,7 @@ pub(crate) struct Manifest {
     #[serde(default)]
     pub source: String,
     pub camera: CameraEntry,
-    pub projector: ProjectorEntry,
+    pub projector: RecordedProjector,
     pub pattern: PatternEntries,
     pub frames: Vec<FrameEntry>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -50,11 +50,15 @@ pub(crate) struct CameraEntry {
     pub noise_counts: Option<f64>,
 }
 
+/// The projector of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct ProjectorEntry {
+pub struct RecordedProjector {
+    /// Columns.
     pub width: u32,
+    /// Rows.
     pub height: u32,
+    /// Its geometry, if it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<DeviceModel>,
 }

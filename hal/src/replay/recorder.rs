@@ -7,8 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::failure::RecordingError;
 use super::manifest::{
-    CameraEntry, FORMAT, FrameEntry, Manifest, PatternEntries, PatternEntry, ProjectorEntry,
-    VERSION,
+    CameraEntry, FORMAT, FrameEntry, Manifest, PatternEntries, PatternEntry, VERSION,
 };
 use super::recording::{MANIFEST, PatternSpec, Recording, TRUTH_CLASS, TRUTH_HEIGHT};
 use super::{check, grey};
@@ -191,11 +190,7 @@ fn manifest_of(recording: &Recording) -> Manifest {
             model: recording.camera_model.clone(),
             noise_counts: recording.noise_counts,
         },
-        projector: ProjectorEntry {
-            width: recording.projector.width,
-            height: recording.projector.height,
-            model: recording.projector.model.clone(),
-        },
+        projector: recording.projector.clone(),
         pattern: PatternEntries(recording.patterns.iter().enumerate().map(pattern).collect()),
         frames: frames.collect(),
         range_mm: recording.range_mm,
@@ -270,20 +265,6 @@ fn check_samples(recording: &Recording, folder: &Path) -> Result<(), RecorderErr
 }
 
 fn fill(recording: &Recording, manifest: &Manifest, partial: &Path) -> Result<(), RecorderError> {
-    for folder in ["frames", "pattern", "truth"] {
-        let needed = match folder {
-            "pattern" => recording
-                .patterns
-                .iter()
-                .any(|p| matches!(p, PatternSpec::File { .. })),
-            "truth" => recording.truth_height.is_some() || recording.truth_class.is_some(),
-            _ => true,
-        };
-        if needed {
-            let path = partial.join(folder);
-            fs::create_dir(&path).map_err(|source| create(&path, source))?;
-        }
-    }
     for (index, frame) in recording.frames.iter().enumerate() {
         let path = partial.join(frame_file(index));
         let file = grey::encode(&frame.frame.format(), frame.frame.samples())
@@ -310,8 +291,10 @@ fn fill(recording: &Recording, manifest: &Manifest, partial: &Path) -> Result<()
     put(&path, text.as_bytes())
 }
 
+/// Writes and syncs a new file, and makes its folder if there is none yet.
 fn put(path: &Path, bytes: &[u8]) -> Result<(), RecorderError> {
-    fs::File::create_new(path)
+    fs::create_dir_all(path.parent().unwrap_or(path))
+        .and_then(|()| fs::File::create_new(path))
         .and_then(|mut file| {
             file.write_all(bytes)?;
             file.sync_all()

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use super::failure::RecordingError;
@@ -13,7 +13,7 @@ use crate::model::DeviceModel;
 use crate::npy::{self, Array, Element, NpyError};
 use crate::units::Timestamp;
 
-pub use super::manifest::RecipeReference;
+pub use super::manifest::{RecipeReference, RecordedProjector};
 
 /// Name of the manifest in a recording's folder.
 pub(crate) const MANIFEST: &str = "recording.json";
@@ -24,17 +24,6 @@ const MAX_FILE_BYTES: u64 = 4 << 30;
 /// Names of the ground truth's files in a recording's folder.
 pub(crate) const TRUTH_HEIGHT: &str = "truth/height.npy";
 pub(crate) const TRUTH_CLASS: &str = "truth/class.npy";
-
-/// The projector of a recording.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RecordedProjector {
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Its geometry, if it is known.
-    pub model: Option<DeviceModel>,
-}
 
 /// The phase function Φ_P(ξ, η) of a pattern, in turns.
 #[derive(Clone, Debug, PartialEq)]
@@ -149,30 +138,19 @@ impl Recording {
         let truth_height = truth(folder, TRUTH_HEIGHT, shape)?;
         let truth_class = truth(folder, TRUTH_CLASS, shape)?;
 
-        let Manifest {
-            description,
-            source,
-            camera,
-            projector,
-            range_mm,
-            ..
-        } = manifest;
+        let camera = manifest.camera;
         Ok(Self {
             width: camera.width,
             height: camera.height,
             bit_depth: camera.bit_depth,
-            description,
-            source,
+            description: manifest.description,
+            source: manifest.source,
             camera_model: camera.model,
             noise_counts: camera.noise_counts,
-            projector: RecordedProjector {
-                width: projector.width,
-                height: projector.height,
-                model: projector.model,
-            },
+            projector: manifest.projector,
             patterns,
             frames,
-            range_mm,
+            range_mm: manifest.range_mm,
             exposure_us: manifest.exposure_us,
             part_id: manifest.part_id,
             recipe: manifest.recipe,
@@ -297,11 +275,8 @@ fn read(folder: &Path, name: &str, limit: u64) -> Result<Vec<u8>, RecordingError
             "check the file and its permissions",
         ),
     };
-    let real = |path: &Path| -> Result<PathBuf, std::io::Error> { fs::canonicalize(path) };
-    if !real(&path)
-        .map_err(failed)?
-        .starts_with(real(folder).map_err(failed)?)
-    {
+    let real = |path: &Path| fs::canonicalize(path).map_err(failed);
+    if !real(&path)?.starts_with(real(folder)?) {
         return Err(wrong(
             "the file is a link out of the folder".to_owned(),
             "copy the file itself",

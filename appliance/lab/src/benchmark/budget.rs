@@ -102,7 +102,13 @@ pub fn budgets(
         let plan = Plan::new(recipe, &calibration, true).map_err(words)?;
         found.push(Budget {
             aligned: alignment == AlignmentKind::Rigid,
-            ..budget(&plan, &mut head, &calibration, stage.refresh(), effort)?
+            ..budget(
+                &plan,
+                &mut head,
+                &calibration,
+                stage.scenario().refresh(),
+                effort,
+            )?
         });
     }
     Ok(found)

@@ -250,16 +250,9 @@ impl Surface for Stamping {
     }
 
     fn bounds(&self) -> [Vector; 2] {
-        let down: f64 = self
-            .dents
-            .iter()
-            .map(|[_, _, depth, _]| depth.max(0.0))
-            .sum();
-        let up: f64 = self
-            .dents
-            .iter()
-            .map(|[_, _, depth, _]| (-depth).max(0.0))
-            .sum();
+        let depths = || self.dents.iter().map(|[_, _, depth, _]| depth);
+        let down: f64 = depths().map(|depth| depth.max(0.0)).sum();
+        let up: f64 = depths().map(|depth| (-depth).max(0.0)).sum();
         let low = PLATE_Z - self.flange_drop(self.right) - EDGE_DROP - down;
         [
             [LEFT, -HALF_HEIGHT, low],

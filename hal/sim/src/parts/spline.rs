@@ -82,22 +82,16 @@ impl Surface for Spline {
     /// difference bounds it.
     fn slope_bound(&self) -> f64 {
         let spacing = 2.0 * self.half_size / PATCHES;
-        let largest = |differences: &mut dyn Iterator<Item = f64>| {
-            differences.fold(0.0_f64, |largest, difference| largest.max(difference.abs()))
-        };
-        let columns = 0..CONTROL;
-        let x = largest(
-            &mut self
-                .control
-                .iter()
-                .flat_map(|row| row.windows(2).map(|w| w[1] - w[0])),
-        );
-        let y = largest(
-            &mut self
-                .control
-                .windows(2)
-                .flat_map(|w| columns.clone().map(|i| w[1][i] - w[0][i])),
-        );
+        let along_x = self
+            .control
+            .iter()
+            .flat_map(|row| row.windows(2).map(|pair| (pair[1] - pair[0]).abs()));
+        let along_y = self
+            .control
+            .windows(2)
+            .flat_map(|rows| rows[0].iter().zip(&rows[1]))
+            .map(|(before, after)| (after - before).abs());
+        let (x, y) = (along_x.fold(0.0, f64::max), along_y.fold(0.0, f64::max));
         x.hypot(y) / spacing
     }
 
