@@ -3,12 +3,13 @@
 //! The checks use only the traits, so a new back-end is tested by one call.
 
 use std::fmt::Display;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::time::{Duration, Instant};
 
 use crate::camera::{Camera, Starts};
 use crate::clock::Clock;
 use crate::error::{Error, ErrorKind};
-use crate::frame::{Frame, Samples};
+use crate::frame::Frame;
 use crate::head::{Head, TOLERANCE};
 use crate::projector::{Flip, Projector, Raster};
 use crate::trigger::Trigger;
@@ -347,12 +348,9 @@ pub fn check_head(head: &mut Head, patterns: usize) -> Result<(), Violation> {
     )
 }
 
-/// A checksum of a frame's samples (FNV-1a).
+/// A checksum of a frame's samples.
 fn digest(frame: &Frame) -> u64 {
-    let mix = |hash: u64, sample: u64| (hash ^ sample).wrapping_mul(0x0100_0000_01b3);
-    let start = 0xcbf2_9ce4_8422_2325;
-    match frame.samples() {
-        Samples::Eight(samples) => samples.iter().fold(start, |h, s| mix(h, u64::from(*s))),
-        Samples::Sixteen(samples) => samples.iter().fold(start, |h, s| mix(h, u64::from(*s))),
-    }
+    let mut hasher = DefaultHasher::new();
+    frame.samples().hash(&mut hasher);
+    hasher.finish()
 }

@@ -53,7 +53,7 @@ impl FrameFormat {
 }
 
 /// The samples of a frame, row by row, `stride` samples per row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Samples<'a> {
     /// Samples of a camera of 8 bits.
     Eight(&'a [u8]),

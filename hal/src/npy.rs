@@ -81,24 +81,12 @@ const ALIGNMENT: usize = 64;
 /// Longest header that is read. NumPy's headers of plain arrays are shorter than 128 bytes.
 const MAX_HEADER: usize = 4096;
 
-struct Header<'a> {
-    kind: &'a str,
-    rows: usize,
-    columns: usize,
-    elements: &'a [u8],
-}
-
 /// Reads an array.
 ///
 /// # Errors
 /// If the bytes are not a two-dimensional row-major array of this type of element, or are cut off.
 pub fn read<T: Element>(bytes: &[u8]) -> Result<Array<T>, NpyError> {
-    let Header {
-        kind,
-        rows,
-        columns,
-        elements,
-    } = header(bytes)?;
+    let (kind, [rows, columns], elements) = header(bytes)?;
     // The last character of a kind is its size in bytes: "<f4".
     let size = kind
         .strip_prefix(['<', '|', '>', '='])
@@ -158,7 +146,8 @@ fn broken(problem: impl Into<String>) -> NpyError {
     }
 }
 
-fn header(bytes: &[u8]) -> Result<Header<'_>, NpyError> {
+/// The kind of the elements, rows and columns, and the bytes of the elements.
+fn header(bytes: &[u8]) -> Result<(&str, [usize; 2], &[u8]), NpyError> {
     let rest = bytes
         .strip_prefix(MAGIC)
         .ok_or_else(|| broken("not a NumPy array"))?;
@@ -186,14 +175,12 @@ fn header(bytes: &[u8]) -> Result<Header<'_>, NpyError> {
         order if order.starts_with("False") => {}
         _ => return Err(broken("the array is stored column by column")),
     }
-    let kind = value_of(text, "'descr':")
-        .and_then(|rest| rest.strip_prefix('\'')?.split_once('\''))
-        .map(|(kind, _)| kind)
-        .ok_or_else(unreadable)?;
-    let shape = value_of(text, "'shape':")
-        .and_then(|rest| rest.strip_prefix('(')?.split_once(')'))
-        .map(|(shape, _)| shape)
-        .ok_or_else(unreadable)?;
+    let between = |key, open: char, close: char| {
+        let rest = value_of(text, key)?.strip_prefix(open)?;
+        rest.split_once(close).map(|(inner, _)| inner)
+    };
+    let kind = between("'descr':", '\'', '\'').ok_or_else(unreadable)?;
+    let shape = between("'shape':", '(', ')').ok_or_else(unreadable)?;
     let sizes: Option<Vec<usize>> = shape
         .split(',')
         .map(str::trim)
@@ -201,12 +188,7 @@ fn header(bytes: &[u8]) -> Result<Header<'_>, NpyError> {
         .map(|size| size.parse().ok())
         .collect();
     match sizes.as_deref() {
-        Some(&[rows, columns]) => Ok(Header {
-            kind,
-            rows,
-            columns,
-            elements,
-        }),
+        Some(&[rows, columns]) => Ok((kind, [rows, columns], elements)),
         _ => Err(broken(format!(
             "the array has shape ({shape}), expected rows and columns"
         ))),

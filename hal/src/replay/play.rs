@@ -30,59 +30,41 @@ pub fn head(recordings: Vec<Recording>) -> Result<Head, Error> {
             "name at least one",
         ));
     };
-    let shape = |r: &Recording| {
-        (
-            r.format(),
-            r.projector.width,
-            r.projector.height,
+    let describe = |r: &Recording| {
+        format!(
+            "{} frames of {} under a {}×{} projector",
             r.frames.len(),
+            r.format().describe(),
+            r.projector.width,
+            r.projector.height
         )
     };
-    let wanted = shape(first);
-    if let Some((index, other)) = recordings
-        .iter()
-        .enumerate()
-        .find(|(_, r)| shape(r) != wanted)
-    {
-        let describe = |r: &Recording| {
-            format!(
-                "{} frames of {} under a {}×{} projector",
-                r.frames.len(),
-                r.format().describe(),
-                r.projector.width,
-                r.projector.height
-            )
-        };
-        return Err(Error::unsupported(
-            format!(
-                "replaying recording {index} with {} after recording 0 with {}",
-                describe(other),
-                describe(first)
-            ),
-            "replay recordings of one head and one kind of sequence together",
-        ));
+    for (index, other) in recordings.iter().enumerate() {
+        if describe(other) != describe(first) {
+            return Err(Error::unsupported(
+                format!(
+                    "replaying recording {index} with {} after recording 0 with {}",
+                    describe(other),
+                    describe(first)
+                ),
+                "replay recordings of one head and one kind of sequence together",
+            ));
+        }
+        let mut pairs = other.frames.iter().zip(&first.frames);
+        let differs = pairs.position(|(a, b)| (a.ratio, a.shift_turns) != (b.ratio, b.shift_turns));
+        if let Some(frame) = differs {
+            return Err(Error::unsupported(
+                format!(
+                    "replaying recording {index}, whose frame {frame} shows another ratio or shift than that of recording 0"
+                ),
+                "replay recordings of one sequence together",
+            ));
+        }
     }
-    let differs = |r: &Recording| {
-        let mut pairs = r.frames.iter().zip(&first.frames);
-        pairs.position(|(a, b)| (a.ratio, a.shift_turns) != (b.ratio, b.shift_turns))
-    };
-    let other = recordings.iter().enumerate();
-    if let Some((index, frame)) = other
-        .filter_map(|(index, r)| Some((index, differs(r)?)))
-        .next()
-    {
-        return Err(Error::unsupported(
-            format!(
-                "replaying recording {index}, whose frame {frame} shows another ratio or shift than that of recording 0"
-            ),
-            "replay recordings of one sequence together",
-        ));
-    }
-    let played = vec![false; wanted.3];
     let scene = Played {
+        played: vec![false; first.frames.len()],
         recordings,
         current: 0,
-        played,
         loaded: 0,
     };
     Ok(virtual_head::head(scene, Mechanics::plain(REFRESH, EXPOSURE_REFRESHES)).0)

@@ -10,7 +10,7 @@ use super::manifest::{self, Manifest, PatternEntry};
 use super::{check, grey};
 use crate::frame::{Frame, FrameFormat};
 use crate::model::DeviceModel;
-use crate::npy::{self, Array, Element, NpyError};
+use crate::npy::{self, Element};
 use crate::units::Timestamp;
 
 pub use super::manifest::{RecipeReference, RecordedProjector};
@@ -198,13 +198,10 @@ fn patterns(folder: &Path, manifest: &Manifest) -> Result<Vec<PatternSpec>, Reco
         PatternEntry::Vertical { fringes } => Ok(PatternSpec::Vertical { fringes: *fringes }),
         PatternEntry::Horizontal { fringes } => Ok(PatternSpec::Horizontal { fringes: *fringes }),
         PatternEntry::File { file } => {
-            let path = folder.join(file);
-            let array: Array<f64> =
-                npy::read(&read(folder, file, MAX_FILE_BYTES)?).map_err(unusable(&path))?;
-            shaped(&array, (rows, columns), "projector", &path)?;
-            if let Some(at) = array.elements.iter().position(|turns| !turns.is_finite()) {
+            let turns: Vec<f64> = array(folder, file, (rows, columns), "projector")?;
+            if let Some(at) = turns.iter().position(|turns| !turns.is_finite()) {
                 return Err(RecordingError::content(
-                    &path,
+                    &folder.join(file),
                     format!(
                         "the phase at row {}, column {} is not finite",
                         at / columns,
@@ -216,15 +213,11 @@ fn patterns(folder: &Path, manifest: &Manifest) -> Result<Vec<PatternSpec>, Reco
             Ok(PatternSpec::File {
                 rows,
                 columns,
-                turns: array.elements,
+                turns,
             })
         }
     };
     manifest.pattern.0.iter().map(load).collect()
-}
-
-fn unusable(path: &Path) -> impl Fn(NpyError) -> RecordingError {
-    |error| RecordingError::content(path, error.problem, error.remedy)
 }
 
 fn truth<T: Element>(
@@ -232,26 +225,27 @@ fn truth<T: Element>(
     name: &str,
     shape: (usize, usize),
 ) -> Result<Option<Vec<T>>, RecordingError> {
-    let path = folder.join(name);
-    if !path.exists() {
-        return Ok(None);
-    }
-    let array = npy::read(&read(folder, name, MAX_FILE_BYTES)?).map_err(unusable(&path))?;
-    shaped(&array, shape, "camera", &path)?;
-    Ok(Some(array.elements))
+    let there = folder.join(name).exists();
+    there
+        .then(|| array(folder, name, shape, "camera"))
+        .transpose()
 }
 
-fn shaped<T>(
-    array: &Array<T>,
+/// The elements of an array of the folder, which must have the shape of the device's pixels.
+fn array<T: Element>(
+    folder: &Path,
+    name: &str,
     (rows, columns): (usize, usize),
     device: &str,
-    path: &Path,
-) -> Result<(), RecordingError> {
+) -> Result<Vec<T>, RecordingError> {
+    let path = folder.join(name);
+    let array = npy::read(&read(folder, name, MAX_FILE_BYTES)?)
+        .map_err(|error| RecordingError::content(&path, error.problem, error.remedy))?;
     if (array.rows, array.columns) == (rows, columns) {
-        return Ok(());
+        return Ok(array.elements);
     }
     Err(RecordingError::content(
-        path,
+        &path,
         format!(
             "expected the {device}'s {rows} rows × {columns} columns, got {}×{}",
             array.rows, array.columns

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::Faults;
 use crate::camera::{CameraTiming, Encoding, Starts};
-use crate::head::{Stamp, TOLERANCE, Timing};
+use crate::head::{Stamp, Timing};
 
 /// The true times of a virtual head, and its faults.
 #[derive(Clone, Debug)]
@@ -48,8 +48,7 @@ impl Mechanics {
             flip_to_light: self.calibrated_flip_to_light,
             stamp: self.stamp,
             readout: self.readout,
-            tolerance: TOLERANCE,
-            hold: 1,
+            ..Timing::default()
         }
     }
 
