@@ -55,7 +55,7 @@ impl Clock for Monotonic {
             .map(|device| PollFd::new(device, PollFlags::IN))
             .collect();
         // A signal ends the wait early, which the trait allows; nothing else can fail with descriptors that we own.
-        let _ = poll(&mut waiting, Some(&timespec(left)));
+        let _ = poll(&mut waiting, Timespec::try_from(left).ok().as_ref());
         let hung_up: Vec<bool> = waiting
             .iter()
             .map(|device| {
@@ -72,23 +72,12 @@ impl Clock for Monotonic {
 /// Now, on `CLOCK_MONOTONIC`.
 #[must_use]
 pub fn monotonic() -> Timestamp {
-    let now = clock_gettime(ClockId::Monotonic);
-    // The clock starts at 0 when the system boots and never goes back, so neither conversion fails.
-    let seconds = u64::try_from(now.tv_sec).unwrap_or(0);
-    let nanoseconds = u64::try_from(now.tv_nsec).unwrap_or(0);
-    Timestamp(
-        seconds
-            .saturating_mul(1_000_000_000)
-            .saturating_add(nanoseconds),
-    )
+    read(ClockId::Monotonic)
 }
 
-/// A duration in the kernel's form.
-pub(crate) fn timespec(span: Duration) -> Timespec {
-    Timespec {
-        tv_sec: i64::try_from(span.as_secs()).unwrap_or(i64::MAX),
-        tv_nsec: span.subsec_nanos().into(),
-    }
+/// Now, on a clock that starts at 0 when the system boots and never goes back, so the conversion does not fail.
+pub(crate) fn read(clock: ClockId) -> Timestamp {
+    Timestamp(0) + Duration::try_from(clock_gettime(clock)).unwrap_or_default()
 }
 
 #[cfg(test)]

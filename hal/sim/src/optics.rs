@@ -42,12 +42,7 @@ impl Lens {
     #[must_use]
     pub fn project(&self, point: Vector) -> Option<[f64; 2]> {
         let turned = turned(&self.model.rotation, point);
-        let shift = self.model.translation_mm;
-        let [x, y, z] = [
-            turned[0] + shift[0],
-            turned[1] + shift[1],
-            turned[2] + shift[2],
-        ];
+        let [x, y, z] = plus(turned, self.model.translation_mm);
         if z <= 0.0 {
             return None;
         }
@@ -127,6 +122,10 @@ pub(crate) fn turned_back(r: &[f64; 9], v: Vector) -> Vector {
 
 pub(crate) fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn plus(a: Vector, b: Vector) -> Vector {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 pub(crate) fn minus(a: Vector, b: Vector) -> Vector {

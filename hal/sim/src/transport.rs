@@ -11,7 +11,7 @@
 
 use rayon::prelude::*;
 
-use super::optics::{Lens, Vector, dot, minus, normalised, turned, turned_back};
+use super::optics::{Lens, Vector, dot, minus, normalised, plus, turned, turned_back};
 use super::parts::Part;
 use super::scenario::{Placement, Scenario};
 use super::trace::{Hit, Traced, facing};
@@ -63,8 +63,7 @@ impl Placed {
     }
 
     fn to_world(&self, point: Vector) -> Vector {
-        let [x, y, z] = turned(&self.rotation, point);
-        [x + self.shift[0], y + self.shift[1], z + self.shift[2]]
+        plus(turned(&self.rotation, point), self.shift)
     }
 }
 

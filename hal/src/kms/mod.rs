@@ -19,9 +19,9 @@ use std::time::Duration;
 
 use drm::Device as _;
 use drm::control::{Device as _, Event, PageFlipEvent};
-use rustix::event::{PollFd, PollFlags, poll};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-use crate::clock::{monotonic, timespec};
+use crate::clock::monotonic;
 use crate::error::Error;
 use crate::projector::{Flip, Projector, Raster, all_of_size};
 use crate::setup::ProjectorSetup;
@@ -186,7 +186,7 @@ impl Display {
             }
             let mut news = [PollFd::new(&self.output.card, PollFlags::IN)];
             // A signal ends the wait early; nothing else can fail with a descriptor that we own.
-            let _ = poll(&mut news, Some(&timespec(left)));
+            let _ = poll(&mut news, Timespec::try_from(left).ok().as_ref());
         }
     }
 }

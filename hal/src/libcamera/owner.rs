@@ -12,14 +12,14 @@ use ::libcamera::framebuffer::{AsFrameBuffer, FrameMetadataStatus};
 use ::libcamera::framebuffer_allocator::FrameBuffer;
 use ::libcamera::request::{Request, RequestStatus, ReuseFlag};
 use rustix::fd::OwnedFd;
-use rustix::time::{ClockId, clock_gettime};
+use rustix::time::ClockId;
 
 use super::Settings;
 use super::buffers::Lease;
 use super::layout::Layout;
 use super::open::{Configured, Opened, open, refused};
 use super::report::{Clocks, Reported, on_the_heads_clock};
-use crate::clock::monotonic;
+use crate::clock::{monotonic, read};
 use crate::error::{DeviceKind, Error};
 use crate::units::Timestamp;
 
@@ -304,7 +304,8 @@ impl Owner<'_> {
 
     /// The event of a completed request; none if its frame is erroneous.
     fn read(&self, index: usize) -> Option<Event> {
-        let clocks = Clocks::of(&[(); 3].map(|()| (monotonic(), boot(), monotonic())));
+        let clocks =
+            Clocks::of(&[(); 3].map(|()| (monotonic(), read(ClockId::Boottime), monotonic())));
         let slot = &self.opened.slots[index];
         let request = slot.request.as_ref()?;
         let buffer: &FrameBuffer = request.buffer(&self.opened.stream)?;
@@ -349,11 +350,4 @@ impl Owner<'_> {
         ring(&self.wires.ready);
         let _ = self.wires.events.send(event);
     }
-}
-
-/// Now, on `CLOCK_BOOTTIME`.
-fn boot() -> Timestamp {
-    let now = clock_gettime(ClockId::Boottime);
-    let seconds = Duration::from_secs(u64::try_from(now.tv_sec).unwrap_or(0));
-    Timestamp(0) + seconds + Duration::from_nanos(u64::try_from(now.tv_nsec).unwrap_or(0))
 }
