@@ -10,7 +10,7 @@ use crate::error::Error;
 pub(super) enum Blocked {
     /// The projector never flipped.
     NoFlip,
-    /// The camera gave no frame at all.
+    /// The camera gave no frame at all, or none during more than half of the allowed attempts, up to the last.
     NoFrame,
     /// A pattern was shown as often as allowed, and no frame was exposed while only it was in view.
     Retakes,

@@ -172,7 +172,7 @@ impl Head {
     ///
     /// # Errors
     /// The first error of a device; `Protocol` if `indices` is empty or frames never fit their patterns; `Timeout` if
-    /// the time is over, or no flips or no frames arrive at all. `sink` has then received the frames before the failure.
+    /// the time is over, or flips or frames no longer arrive. `sink` has then received the frames before the failure.
     pub fn acquire(
         &mut self,
         indices: &[usize],

@@ -79,6 +79,8 @@ pub(super) struct Sequencer {
     /// Frames that are not decided yet.
     undecided: heapless::Deque<Frame, MAX_UNDECIDED>,
     count: FrameCount,
+    /// Attempts that were given up since the last frame arrived.
+    unanswered: u32,
     handed: usize,
     exhausted: Option<usize>,
     deadline: Timestamp,
@@ -172,6 +174,7 @@ impl Sequencer {
 
     /// A frame has arrived, stamped with the start of its exposure.
     pub fn frame(&mut self, frame: Frame) {
+        self.unanswered = 0;
         if !self.count.see(frame.count()) {
             self.so_far.duplicated = self.so_far.duplicated.saturating_add(1);
             return;
@@ -331,6 +334,7 @@ impl Sequencer {
 
     /// Shows the position of an attempt once more, unless it is planned or done already.
     fn retake(&mut self, at: usize) {
+        self.unanswered += 1;
         let attempt = &mut self.attempts[at];
         attempt.done = true;
         let place = attempt.position;
@@ -391,6 +395,7 @@ impl Sequencer {
         let blocked = match (self.exhausted, self.queued, self.count.any()) {
             (_, Some(_), _) if self.attempts.is_empty() => Blocked::NoFlip,
             (_, _, false) => Blocked::NoFrame,
+            _ if self.unanswered > MAX_ATTEMPTS / 2 => Blocked::NoFrame,
             // Also when frames arrive and none fits: more time would not help.
             (Some(_), ..) => Blocked::misfit(&self.so_far),
             _ if self.started.is_none() && self.so_far.unfit() > 0 => Blocked::misfit(&self.so_far),

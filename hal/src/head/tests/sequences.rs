@@ -199,12 +199,13 @@ fn a_stuck_device_ends_in_a_timeout_that_names_it() {
                 frames_until_stuck: 3,
                 ..Faults::default()
             },
-            "wholly",
+            "(3 of 5 taken): shown 12 times, no frame came",
         ),
     ] {
         let mut head = labelled(Mechanics { faults, ..plain() }, COUNT);
         let (_, result) = take(&mut head, &[0, 1, 2, 3, 4]);
         let error = result.unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Timeout, "{error}");
         assert!(error.to_string().contains(word), "{error}");
     }
 }
