@@ -36,6 +36,8 @@ impl Daemon {
             began + MEASURING,
             &self.progress,
         );
+        // A cycle that has no result by now gets none from the measuring task.
+        self.station.event(Event::Stop);
         let _ = self.sockets.send(true);
         join("sockets", serving, until, &self.progress);
         join("lines", wiring, until, &self.progress);

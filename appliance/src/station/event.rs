@@ -152,7 +152,7 @@ pub enum Event {
         /// The time in µs since 1970 UTC, if the clock is synchronised.
         utc_us: Option<u64>,
     },
-    /// The daemon is asked to end.
+    /// The daemon is asked to end; sent again once the measuring task no longer answers, which ends the cycle in flight.
     Stop,
 }
 

@@ -96,7 +96,11 @@ impl Station {
         self.abort(effects);
         let cycle = match std::mem::replace(&mut self.state, State::Offline) {
             State::Acquiring { cycle, .. } | State::Processing { cycle, .. } => Some(cycle),
-            State::Stopping { cycle } => cycle,
+            State::Stopping { cycle: Some(cycle) } => {
+                let words = "measure: the stop ended it before the measuring task answered";
+                self.fail_cycle(cycle, error_code::ABORTED, words.into(), effects);
+                None
+            }
             _ => None,
         };
         self.state = State::Stopping { cycle };

@@ -323,3 +323,49 @@ fn time_that_runs_backwards_or_to_its_end_is_survived() {
         }
     }
 }
+
+/// Takes every order of `left` events from `station` on. Each trigger has one result, or its cycle is in flight; none is after the
+/// worker's last word, a missed deadline or a second stop.
+fn follow(station: &Station, now: Micros, left: u32) {
+    let stopping = matches!(station.state, State::Stopping { .. });
+    for (event, _) in events(station.worker.last_job) {
+        let (ends, pause) = match event {
+            Event::Finished { .. } | Event::MeasureFailed { .. } | Event::Faulted { .. } => {
+                (true, 1)
+            }
+            // After every deadline; a stop has its own.
+            Event::Tick { .. } => (!stopping, 31_000),
+            Event::Stop => (stopping, 1),
+            _ => (false, 1),
+        };
+        let now = now.after(Micros::from_millis(pause));
+        let (next, _) = step(station.clone(), event.clone(), now);
+        let in_flight = matches!(
+            next.state,
+            State::Acquiring { .. } | State::Processing { .. } | State::Stopping { cycle: Some(_) }
+        );
+        let Counts {
+            pass,
+            fail,
+            invalid,
+        } = next.results.counts;
+        let accounted = pass + fail + invalid + u64::from(in_flight);
+        assert!(
+            accounted == u64::from(next.requests.triggers) && !(ends && in_flight),
+            "{event:?} in {:?} led to {accounted} results in {:?}",
+            station.state,
+            next.state
+        );
+        if left > 1 {
+            follow(&next, now, left - 1);
+        }
+    }
+}
+
+#[test]
+fn every_trigger_has_one_result_in_every_state_and_order_of_three_events() {
+    for column in 0..STATES.len() {
+        let bench = in_state(column);
+        follow(&bench.station, bench.now, 3);
+    }
+}

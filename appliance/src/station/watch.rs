@@ -10,7 +10,7 @@ use super::recipes::ActiveRecipe;
 use super::state::State;
 
 impl Station {
-    /// Enters a fault; what was under way ends here.
+    /// Enters a fault; what was under way ends here. A station that stops only ends its cycle.
     pub(super) fn fault(&mut self, fault: Fault, effects: &mut Effects) {
         let words = format!("fault {}: {}; {}", fault.code, fault.cause, fault.remedy);
         push(effects, Effect::Alarm(words.into()));
@@ -20,7 +20,10 @@ impl Station {
             }
             State::Loading { .. } | State::Teaching { .. } => self.recipes.interrupt(),
             State::Stopping { cycle } => {
-                self.state = State::Stopping { cycle };
+                self.state = State::Stopping { cycle: None };
+                if let Some(cycle) = cycle {
+                    self.fail_cycle(cycle, fault.code, fault.cause, effects);
+                }
                 return;
             }
             State::Boot { .. } | State::Ready | State::Offline | State::Fault(_) => {}
