@@ -41,7 +41,7 @@ pub(super) fn information(unwrapping: Unwrapping, sequence: &Sequence) -> f64 {
     let levels = sequence.levels();
     let accurate = match unwrapping {
         Unwrapping::Geometric => &levels[levels.len() - 1..],
-        _ => levels,
+        Unwrapping::DenseThree { .. } | Unwrapping::DenseTwo { .. } | Unwrapping::Single => levels,
     };
     accurate
         .iter()

@@ -129,7 +129,8 @@ impl GaugeKind {
             | Self::OutOfTolerance { smoothing_px, .. }
             | Self::Flatness { smoothing_px }
             | Self::PeakToValley { smoothing_px } => Some(smoothing_px),
-            _ => None,
+            Self::Coverage | Self::MeanHeight | Self::Step { .. } | Self::Tilt { .. } => None,
+            Self::Volume { .. } | Self::Placement { .. } => None,
         }
     }
 

@@ -50,16 +50,10 @@ pub struct Skipped {
 
 impl Production {
     pub(super) fn findings(&self, input: Input<'_>, strips: &mut Strips) -> Findings {
-        let Strips {
-            strips,
-            pose,
-            cells,
-            ..
-        } = strips;
         let mut trusts = [0; TRUSTS];
         let mut tally = crate::pipeline::HeightTally::default();
         let mut exact = 0;
-        for strip in strips.iter() {
+        for strip in &strips.strips {
             tally.add(&strip.counts.tally);
             exact += strip.counts.exact;
             for (all, here) in trusts.iter_mut().zip(&strip.counts.trusts) {
@@ -78,10 +72,7 @@ impl Production {
         // The ratio of σ_z to that as taught.
         let noisier = height_noise_mm / taught_noise_mm.max(f64::MIN_POSITIVE);
         let readings = (0..self.gauges.list.len())
-            .map(|gauge| match self.gauges.patches_of[gauge].is_empty() {
-                true => self.reading(gauge, input, pose, strips),
-                false => self.of_cells(gauge, noisier, pose, strips, cells),
-            })
+            .map(|gauge| self.reading(gauge, input, noisier, strips))
             .collect();
         let count = |trust: Trust| trusts[trust as usize];
         let contradicting = count(Trust::Residual);
@@ -93,7 +84,7 @@ impl Production {
             taught_noise_mm,
             contradicting: contradicting as f64
                 / (contradicting + count(Trust::Resolved)).max(1) as f64,
-            placed: pose.placed.clone(),
+            placed: strips.pose.placed.clone(),
             skipped: Skipped {
                 outside: pixels - seen,
                 unexpected: trusts[Trust::Unexpected as usize],
@@ -103,13 +94,20 @@ impl Production {
         }
     }
 
+    /// The reading of a gauge; `noisier` is the ratio of σ_z to that as taught.
     fn reading(
         &self,
         gauge: usize,
         input: Input<'_>,
-        pose: &PoseField,
-        strips: &mut [Strip],
+        noisier: f64,
+        strips: &mut Strips,
     ) -> Option<Reading> {
+        let Strips {
+            strips,
+            pose,
+            cells,
+            ..
+        } = strips;
         match self.gauges.list[gauge].measure {
             Measure::Coverage => {
                 let pixels = pose.region(self, gauge).len();
@@ -139,11 +137,11 @@ impl Production {
                     sigma: Some(sigma),
                 })
             }
-            _ => None,
+            _ => self.of_cells(gauge, noisier, pose, strips, cells),
         }
     }
 
-    /// The reading of a gauge of cells; `noisier` is the ratio of σ_z to that as taught.
+    /// The reading of a gauge of cells.
     fn of_cells(
         &self,
         gauge: usize,
@@ -185,7 +183,7 @@ impl Production {
             Measure::Tilt(about) => tilt(cells, about, weights)?,
             Measure::Volume { above } => volume(cells, above, weights)?,
             Measure::Step => step(&cells[..count], &cells[count..], weights)?,
-            _ => return None,
+            Measure::Deviation { .. } | Measure::Coverage | Measure::Placement(_) => return None,
         };
         let noises = [
             pixel,
