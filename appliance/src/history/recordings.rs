@@ -136,7 +136,7 @@ impl Recordings {
         self.kept.iter().map(|kept| kept.name.as_str())
     }
 
-    /// Writes the frames of a failed part; answers with the recording's name.
+    /// Writes the frames of a part that did not pass; answers with the recording's name.
     ///
     /// # Errors
     /// [`RecorderError`]; nothing of it is left then.

@@ -80,15 +80,16 @@ impl Card {
         Ok(Some(card))
     }
 
-    /// Makes this program the one that sets modes (DRM master); the console is then not shown.
+    /// Makes this program the one that sets modes (DRM master); the console is then not shown. The remedy names
+    /// the usual causes of a refusal.
     pub fn own(&self) -> Result<(), Error> {
         self.acquire_master_lock().map_err(|_| {
             Error::unsupported(
                 format!(
-                    "setting a mode on {} while another program does",
+                    "becoming the program that sets modes on {}",
                     self.path.display()
                 ),
-                "stop the desktop, display manager or other program that shows something there",
+                "stop the desktop, display manager or other program that shows something there; another user than root must belong to the group \"video\"",
             )
         })
     }

@@ -76,8 +76,9 @@ impl LibCamera {
     /// Opens a camera: finds it by its id, negotiates a format, and maps its buffers.
     ///
     /// # Errors
-    /// `Disconnected` if there is no camera of that id; `Unsupported` if it does not support the settings, listing what it supports;
-    /// `Protocol` if another program uses it, one is open in this program, or the library fails; `Timeout` if its driver hangs.
+    /// `Disconnected` if there is no camera, or none of that id; `Unsupported` if there are several and no id is given, if the camera does
+    /// not support the settings, listing what it supports, or if there is no memory for buffers; `Protocol` if another program uses it, one
+    /// is open in this program, or the library fails; `Timeout` if its driver hangs.
     pub fn open(settings: Settings) -> Result<Self, Error> {
         let system = |cause: &dyn std::fmt::Display| {
             Error::protocol(
