@@ -86,7 +86,7 @@ fn the_station_measures_by_the_stored_calibration_and_by_no_other() {
         }
     };
     refused(true, &["made for calibration", &first[..8], &second[..8]]);
-    // Damaged, and there is no earlier generation.
+    // Damaged, and there is no previous generation.
     let json = place.path("state/calibration/calibration.json");
     fs::remove_file(json.with_extension("json.previous")).unwrap();
     let text = fs::read_to_string(&json).unwrap();

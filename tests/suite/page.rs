@@ -223,7 +223,7 @@ fn a_recipe_with_inverted_limits_is_refused_by_the_gauges_name_wherever_it_comes
     assert_eq!(run.code, 65, "{}", run.stderr);
     names(&run.stderr);
     assert_eq!(std::fs::read(place.recipe()).unwrap(), taught);
-    // Stored by a program that did not check limits: the earlier generation is not used instead, and the recipe can be repaired.
+    // Stored by a program that did not check limits: the previous generation is not used instead, and the recipe can be repaired.
     let store = Store::at(&place.path("state/recipes"));
     store.save(1, &inverted).unwrap();
     names(&store.load(1).unwrap_err().to_string());

@@ -151,7 +151,7 @@ fn a_damaged_recipe_gives_way_to_the_generation_before_it_and_the_daemon_says_so
     let daemon = Daemon::start(&place);
     assert!(daemon.log.contains("0001.recipe"), "{}", daemon.log);
     assert!(
-        daemon.log.contains("generation before it is used"),
+        daemon.log.contains("the previous generation is used"),
         "{}",
         daemon.log
     );

@@ -185,7 +185,7 @@ fn a_recipe_for_a_projector_of_four_billion_columns_is_refused_and_does_not_repl
         words.contains("projector.width is 4294967295: write 1 to 8192"),
         "{words}"
     );
-    // As if an older program had stored it: it is listed with its problem, and the generation before is used. Storing it again over a
+    // As if an older program had stored it: it is listed with its problem, and the previous generation is used. Storing it again over a
     // good recipe does not displace the last good generation either.
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).unwrap();

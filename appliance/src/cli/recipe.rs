@@ -44,7 +44,7 @@ pub enum RecipeCommand {
     },
     /// Delete a recipe; `undo` brings it back. Not while a station runs: its page deletes recipes as well.
     Delete(Numbered),
-    /// Bring back a deleted recipe, or the generation before the newest; the same again takes it back. Not while a station
+    /// Bring back a deleted recipe, or the previous generation; the same again takes it back. Not while a station
     /// runs: its page undoes as well.
     Undo(Numbered),
 }

@@ -30,7 +30,7 @@ pub struct Teach {
     /// Recipe number.
     #[arg(long, value_parser = number(1, MAX_RECIPE))]
     number: u16,
-    /// Replace the recipe that has this number; it stays as the generation before, `fringed recipe undo` brings it back.
+    /// Replace the recipe that has this number; it stays as the previous generation, `fringed recipe undo` brings it back.
     #[arg(long, conflicts_with = "out")]
     replace: bool,
     /// Keep regions, gauges and limits of the recipe that is replaced.

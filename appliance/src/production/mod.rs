@@ -228,7 +228,7 @@ impl Worker {
     }
 
     /// Makes a recipe ready to measure: plans it and loads its patterns. `shown` is the plan whose patterns the head holds; if it is
-    /// the one that is asked for, there is nothing to do. The second result warns that an older generation of the recipe is used.
+    /// the one that is asked for, there is nothing to do. The second result warns that the previous generation of the recipe is used.
     fn prepare(
         &mut self,
         key: &RecipeKey,
@@ -266,7 +266,7 @@ impl Worker {
                     None => Plan::new(loaded.recipe, calibration, simulated),
                 });
                 let plan = Arc::new(planned.map_err(refuse_plan)?);
-                // The plan of an older generation does not belong to the stamp of the newest file.
+                // The plan of the previous generation does not belong to the stamp of the newest file.
                 if let Some(stamp) = stamp.filter(|_| loaded.fallback.is_none()) {
                     self.shelf.put(stamp, fingerprint, plan.clone());
                 }

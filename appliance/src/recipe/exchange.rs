@@ -34,7 +34,7 @@ pub struct Listed {
     pub gauges: usize,
     /// Bytes of the newest generation.
     pub bytes: u64,
-    /// Whether a generation before it is stored.
+    /// Whether a previous generation of it is stored.
     pub previous: bool,
     /// Why the newest generation cannot be read.
     pub problem: Option<String>,

@@ -1,6 +1,6 @@
-//! Generations of a recipe: keeping the one before the newest, deleting, and undoing both.
+//! Generations of a recipe: keeping the previous one, deleting, and undoing both.
 //!
-//! Beside `NNNN.recipe` lies `NNNN.recipe.previous`, the generation before it. `NNNN.recipe.kept` is a deleted recipe or, while
+//! Beside `NNNN.recipe` lies `NNNN.recipe.previous`, its previous generation. `NNNN.recipe.kept` is a deleted recipe or, while
 //! two generations are being exchanged, a second link to the newest one. A kill between any two renames loses no generation.
 
 use super::RecipeFile;
@@ -20,8 +20,8 @@ impl Store {
         self.folder.join(format!("{number:04}.recipe.kept"))
     }
 
-    /// Makes the current generation the previous one, unless it is damaged: a damaged file must not replace the sound
-    /// generation before it.
+    /// Makes the current generation the previous one, unless it is damaged: a damaged file must not replace a sound
+    /// previous generation.
     pub(super) fn keep_previous(&self, number: u16) -> io::Result<()> {
         let (path, previous) = (self.path(number), self.previous(number));
         if !is_sound(&path) {
@@ -39,7 +39,7 @@ impl Store {
         files.into_iter().find(|file| file.exists())
     }
 
-    /// The manifest of what [`Store::undo`] restores: the generation before the newest, or the deleted recipe.
+    /// The manifest of what [`Store::undo`] restores: the previous generation, or the deleted recipe.
     pub fn manifest_before(&self, number: u16) -> Option<RecipeFile> {
         manifest_at(&self.before(number)?)
     }
@@ -64,7 +64,7 @@ impl Store {
         (1..=9999).find(|number| taken.binary_search(number).is_err())
     }
 
-    /// Exchanges the newest generation and the one before it, or restores a deleted recipe. A second undo reverses the first.
+    /// Exchanges the newest and the previous generation, or restores a deleted recipe. A second undo reverses the first.
     /// Returns the manifest of what is now the newest generation.
     ///
     /// # Errors
@@ -74,7 +74,7 @@ impl Store {
         let _alone = self.lock().map_err(write(&self.folder))?;
         let before = self.before(number).ok_or(ChangeError::Nothing(number))?;
         let unfit = |reason| {
-            let words = format!("undo recipe {number}: the generation before it {reason}");
+            let words = format!("undo recipe {number}: its previous generation {reason}");
             ChangeError::Unfit(words)
         };
         let restored = read(&before, number).map_err(unfit)?;

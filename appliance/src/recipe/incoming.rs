@@ -49,7 +49,7 @@ impl Store {
         }
     }
 
-    /// Stores a received file under a number; the recipe before stays as the previous generation.
+    /// Stores a received file under a number; the old recipe stays as the previous generation.
     ///
     /// # Errors
     /// Errors of the file system; the stored recipe is then unchanged.

@@ -2,7 +2,7 @@
 //!
 //! - On disk: [`mod@file`] is the manifest, [`bounds`] the bounds of its values, [`archive`] the ZIP with its fingerprint.
 //! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], [`plan`] joins that with the head's calibration.
-//! - Stored: [`store`] keeps the files of a station, [`generations`] the one before the newest and deleted ones, [`incoming`]
+//! - Stored: [`store`] keeps the files of a station, [`generations`] previous generations and deleted recipes, [`incoming`]
 //!   files that are being uploaded; [`exchange`] lists, exports and imports, [`edit`] changes.
 //! - Made: [`teach`] measures the part, [`golden`] makes the recipe, [`planner`] chooses the sequence, [`good_parts`] the limit of
 //!   the deviation; [`replace`] keeps names and gauges of a recipe that is taught again.

@@ -1,4 +1,4 @@
-//! The stored recipes of a station: a folder with a file `NNNN.recipe` for each and the generation before it.
+//! The stored recipes of a station: a folder with a file `NNNN.recipe` for each, and its previous generation.
 
 use super::gauge::check_limits;
 use super::{Recipe, RecipeFile, archive};
@@ -103,7 +103,7 @@ pub struct LoadedRecipe {
     pub file: RecipeFile,
     /// Its checked form.
     pub recipe: Recipe,
-    /// If this is the generation before: why the newest could not be used.
+    /// If this is the previous generation: why the newest could not be used.
     pub fallback: Option<String>,
 }
 
@@ -148,7 +148,7 @@ impl Store {
         [self.path(number), self.previous(number), self.kept(number)]
     }
 
-    /// Stores a packed recipe under its number; the one before stays as the previous generation.
+    /// Stores a packed recipe under its number; the recipe that had it stays as the previous generation.
     ///
     /// # Errors
     /// Errors of the file system; the stored recipe is then unchanged.
@@ -192,11 +192,11 @@ impl Store {
         Ok(lock)
     }
 
-    /// Loads a recipe by number. If the newest generation is damaged, the one before is loaded, and [`LoadedRecipe::fallback`] says
+    /// Loads a recipe by number. If the newest generation is damaged, the previous one is loaded, and [`LoadedRecipe::fallback`] says
     /// why.
     ///
     /// # Errors
-    /// If there is none, no generation can be used, or a gauge has limits that it cannot have. The generation before is not used
+    /// If there is none, no generation can be used, or a gauge has limits that it cannot have. The previous generation is not used
     /// in the last case: it may judge by other limits.
     pub fn load(&self, number: u16) -> Result<LoadedRecipe, LoadError> {
         let loaded = self.load_to_edit(number)?;
@@ -224,7 +224,7 @@ impl Store {
                 file,
                 recipe,
                 fallback: Some(format!(
-                    "recipe file {} {}; the generation before it is used",
+                    "recipe file {} {}; the previous generation is used",
                     path.display(),
                     reason.as_deref().unwrap_or("is missing")
                 )),

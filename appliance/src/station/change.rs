@@ -38,7 +38,7 @@ impl Station {
             {
                 Some(reject::OTHER_RECIPE)
             }
-            // The PLC chose the number; the recipe that had it is kept as the generation before.
+            // The PLC chose the number; the recipe that had it stays as the previous generation.
             (0 | BY_PART_NUMBER, Some(number)) | (number, _) => self.teach(number, false, effects),
         };
         if let Some(reason) = reason {

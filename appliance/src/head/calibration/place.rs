@@ -63,7 +63,7 @@ impl Place {
             (Some(Ok(file)), reason) => Ok(Some(Loaded {
                 file,
                 fallback: Some(format!(
-                    "calibration {place}: {}; the one before it is used",
+                    "calibration {place}: {}; the previous generation is used",
                     reason.as_deref().unwrap_or("it is missing")
                 )),
             })),
@@ -78,11 +78,11 @@ impl Place {
         (format!("{name}-{}.npy", &sum[..DIGITS]), sum)
     }
 
-    /// Writes a calibration with its maps (name, bytes) and keeps the one before as the previous generation. After a loss of power at any
+    /// Writes a calibration with its maps (name, bytes) and keeps the present one as the previous generation. After a loss of power at any
     /// moment either the old one or the new one is whole: maps have names of their own, and count only once `calibration.json` names them.
     ///
     /// # Errors
-    /// Whatever the file system answers; then the calibration is the one before.
+    /// Whatever the file system answers; then the calibration is unchanged.
     pub fn save(&self, bytes: &[u8], maps: &[(String, Vec<u8>)]) -> io::Result<()> {
         let folder = self.folder();
         fs::create_dir_all(folder)?;

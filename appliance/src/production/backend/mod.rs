@@ -29,7 +29,7 @@ pub struct Opened {
     pub stage: Option<Stage>,
     /// Why the calibration cannot be trusted: it is nominal only, or the stored one cannot be used. Nothing may be measured then.
     pub problem: Option<String>,
-    /// If the calibration is the one before the newest: why the newest could not be used.
+    /// If the calibration is the previous generation: why the newest could not be used.
     pub fallback: Option<String>,
     /// The recordings of a replay head.
     pub played: Option<Played>,
