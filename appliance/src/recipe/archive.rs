@@ -44,7 +44,7 @@ macro_rules! arrays {
             }
 
             /// Sets an array to the content of its member.
-            fn read(&mut self, member: &str, bytes: &[u8]) -> Result<(), RecipeError> {
+            fn read(&mut self, member: &str, bytes: &[u8]) -> Result<(), String> {
                 match member {
                     $(concat!(stringify!($name), ".npy") => self.$name = read(member, bytes)?,)*
                     unknown => return Err(broken(format!("it holds an unknown member {unknown:?}"))),
@@ -74,43 +74,17 @@ arrays! {
     phase_reach: f32,
 }
 
-/// A recipe that cannot be used.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum RecipeError {
-    /// It is not a ZIP, a member is missing or broken, or the manifest cannot be read.
-    #[error("{0}: export the recipe again or teach it")]
-    Broken(String),
-    /// It was written by a newer program.
-    #[error("version {0} is newer than this program reads ({VERSION}): update fringed")]
-    Newer(u64),
-    /// Its content was changed or damaged since it was written.
-    #[error(
-        "its fingerprint is {found}, its content has {computed}: the file was changed or damaged; export \
-         it again or teach it"
-    )]
-    Fingerprint {
-        /// In the manifest.
-        found: String,
-        /// Over the content.
-        computed: String,
-    },
-    /// Manifest and arrays do not fit each other.
-    #[error("{0}: teach it again")]
-    Inconsistent(String),
-    /// A gauge has limits that it cannot have.
-    #[error("{0}: change the limits")]
-    Limits(String),
-}
-
-fn broken(what: impl std::fmt::Display) -> RecipeError {
-    RecipeError::Broken(shortened(&what.to_string()))
+/// What is wrong with a file that is not a ZIP, lacks a member, or has one that cannot be read; with the remedy.
+pub(super) fn broken(what: impl std::fmt::Display) -> String {
+    let what = shortened(&what.to_string());
+    format!("{what}: export the recipe again or teach it")
 }
 
 /// Packs a recipe; its fingerprint is filled in. Returns the bytes and the fingerprint.
 ///
 /// # Errors
-/// If the archive cannot be made.
-pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), RecipeError> {
+/// In words: the archive cannot be made.
+pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), String> {
     let zeroed = RecipeFile {
         fingerprint: NO_FINGERPRINT.into(),
         ..file.clone()
@@ -135,7 +109,7 @@ pub(crate) fn members(file: &RecipeFile, arrays: &Arrays) -> Vec<(&'static str, 
 pub(crate) fn seal(
     manifest: &str,
     mut members: Vec<(&str, Vec<u8>)>,
-) -> Result<(Vec<u8>, String), RecipeError> {
+) -> Result<(Vec<u8>, String), String> {
     let fingerprint = fingerprint(manifest.as_bytes(), &members);
     let manifest = manifest.replacen(NO_FINGERPRINT, &fingerprint, 1);
     members.insert(0, (MANIFEST, manifest.into_bytes()));
@@ -153,8 +127,8 @@ pub(crate) fn seal(
 /// arrays read so far.
 ///
 /// # Errors
-/// If it is not a recipe, of a newer version, or changed.
-pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays), RecipeError> {
+/// In words, with the remedy: it is not a recipe, of a newer version, or changed.
+pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays), String> {
     let mut zip = Members::open(source, MAX_MEMBERS).map_err(broken)?;
     let (file, zeroed) = read_manifest(&mut zip)?;
     let mut hash = Fingerprint::new(zeroed.as_bytes());
@@ -170,10 +144,11 @@ pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays
     }
     let computed = hash.finish();
     if computed != file.fingerprint {
-        return Err(RecipeError::Fingerprint {
-            found: file.fingerprint,
-            computed,
-        });
+        return Err(format!(
+            "its fingerprint is {}, its content has {computed}: the file was changed or damaged; export \
+             it again or teach it",
+            file.fingerprint
+        ));
     }
     match problem {
         Some(problem) => Err(problem),
@@ -196,7 +171,7 @@ pub fn is_sound(source: impl Read + Seek) -> bool {
 }
 
 /// The manifest, and its text with the fingerprint replaced by zeros.
-fn read_manifest(zip: &mut Members<impl Read + Seek>) -> Result<(RecipeFile, String), RecipeError> {
+fn read_manifest(zip: &mut Members<impl Read + Seek>) -> Result<(RecipeFile, String), String> {
     let text = zip.content(MANIFEST, MAX_MANIFEST);
     let text = text.map_err(|error| broken(format!("{MANIFEST}: {error}")))?;
     let text = String::from_utf8(text).map_err(broken)?;
@@ -214,8 +189,8 @@ fn arrays_of<R: Read + Seek>(zip: &Members<R>) -> Vec<String> {
 /// Reads only the manifest of a recipe, without checking the fingerprint: for lists.
 ///
 /// # Errors
-/// If it is not a recipe or of a newer version.
-pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, RecipeError> {
+/// In words, with the remedy: it is not a recipe, or of a newer version.
+pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, String> {
     let mut zip = Members::open(file, MAX_MEMBERS).map_err(broken)?;
     Ok(read_manifest(&mut zip)?.0)
 }
@@ -223,8 +198,8 @@ pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, RecipeError> {
 /// Reads the text of a manifest and checks the bounds of its values.
 ///
 /// # Errors
-/// If it is not a manifest, of a newer version, or a value is out of its bounds.
-pub fn parse(text: &str) -> Result<RecipeFile, RecipeError> {
+/// In words, with the remedy: it is not a manifest, of a newer version, or a value is out of its bounds.
+pub fn parse(text: &str) -> Result<RecipeFile, String> {
     /// What every version has, read first: a newer version is reported as such, whatever else it contains.
     #[derive(serde::Deserialize)]
     struct Header {
@@ -241,7 +216,11 @@ pub fn parse(text: &str) -> Result<RecipeFile, RecipeError> {
         )));
     }
     match version.as_u64() {
-        Some(version) if version > u64::from(VERSION) => return Err(RecipeError::Newer(version)),
+        Some(version) if version > u64::from(VERSION) => {
+            return Err(format!(
+                "version {version} is newer than this program reads ({VERSION}): update fringed"
+            ));
+        }
         Some(1) => {}
         _ => return Err(broken(format!("recipe.json: version is {version}"))),
     }
@@ -254,7 +233,7 @@ pub fn parse(text: &str) -> Result<RecipeFile, RecipeError> {
     Ok(file)
 }
 
-fn read<T: npy::Element>(name: &str, bytes: &[u8]) -> Result<Vec<T>, RecipeError> {
+fn read<T: npy::Element>(name: &str, bytes: &[u8]) -> Result<Vec<T>, String> {
     npy::read(bytes)
         .map(|array| array.elements)
         .map_err(|error| broken(format!("member {name}: {error}")))

@@ -1,6 +1,6 @@
 //! From the file form of a recipe to a checked one.
 
-use super::archive::{Arrays, RecipeError, short, unpack};
+use super::archive::{Arrays, short, unpack};
 use super::demands::Demands;
 use super::file::{PatternFile, RecipeFile, SequenceKind};
 use super::gauge::{check_limits, gauges};
@@ -80,8 +80,8 @@ impl Recipe {
     /// Reads and checks a recipe file's bytes.
     ///
     /// # Errors
-    /// If it is broken, of a newer version, changed, or inconsistent.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, RecipeError> {
+    /// In words, with the remedy: it is broken, of a newer version, changed, or inconsistent.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
         Self::read(Cursor::new(bytes), bytes.len() as u64)
     }
 
@@ -89,9 +89,9 @@ impl Recipe {
     ///
     /// # Errors
     /// As above.
-    pub fn read(source: impl Read + Seek, size: u64) -> Result<Self, RecipeError> {
+    pub fn read(source: impl Read + Seek, size: u64) -> Result<Self, String> {
         let (file, recipe) = Self::read_to_edit(source, size)?;
-        check_limits(&file.gauges).map_err(RecipeError::Limits)?;
+        check_limits(&file.gauges).map_err(|error| format!("{error}: change the limits"))?;
         Ok(recipe)
     }
 
@@ -102,9 +102,10 @@ impl Recipe {
     pub(super) fn read_to_edit(
         source: impl Read + Seek,
         size: u64,
-    ) -> Result<(RecipeFile, Self), RecipeError> {
+    ) -> Result<(RecipeFile, Self), String> {
         let (file, arrays) = unpack(source, size)?;
-        let recipe = Self::fit(&file, arrays).map_err(RecipeError::Inconsistent)?;
+        let recipe =
+            Self::fit(&file, arrays).map_err(|error| format!("{error}: teach it again"))?;
         Ok((file, recipe))
     }
 

@@ -1,6 +1,6 @@
 //! Lists, exports and imports stored recipes. A file is imported only if it is whole and can be used on this head.
 
-use super::archive::{self, RecipeError};
+use super::archive::{self, broken};
 use super::store::{ChangeError, LoadError, Store, is_sound, write};
 use super::{Recipe, RecipeFile, RecipeId, SequenceKind};
 use crate::storage::folder::copy_whole;
@@ -50,12 +50,12 @@ impl Store {
     fn listed(&self, number: u16) -> Listed {
         let path = self.path(number);
         let manifest = File::open(&path)
-            .map_err(|error| RecipeError::Broken(error.to_string()))
+            .map_err(broken)
             .and_then(archive::manifest);
         let previous = self.previous(number).exists();
         let bytes = fs::metadata(&path).map_or(0, |found| found.len());
-        let unreadable = |error: RecipeError| Listed {
-            problem: Some(error.to_string()),
+        let unreadable = |problem| Listed {
+            problem: Some(problem),
             ..Listed::default()
         };
         Listed {

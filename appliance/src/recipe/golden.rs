@@ -101,8 +101,7 @@ impl TaughtRecipe {
         let choice = planner::choose(&manifest.sequences, &manifest.gauges);
         manifest.production = choice.production;
         let mut recipe = Recipe::check(&manifest, arrays)?;
-        let (bytes, fingerprint) =
-            archive::pack(&manifest, &recipe.arrays).map_err(|error| error.to_string())?;
+        let (bytes, fingerprint) = archive::pack(&manifest, &recipe.arrays)?;
         recipe.id.fingerprint.clone_from(&fingerprint);
         manifest.fingerprint = fingerprint;
         Ok(Self {
@@ -178,11 +177,10 @@ impl GoldenPart<'_> {
             comparison: self.comparison.clone(),
             good_parts: Some(good_parts),
         };
-        let (bytes, _) = archive::pack(&manifest, &arrays).map_err(|error| error.to_string())?;
+        let (bytes, _) = archive::pack(&manifest, &arrays)?;
         drop(arrays);
         // Read back as after a restart, so that what was taught is known to load.
-        let unpacked = archive::unpack(Cursor::new(&bytes), bytes.len() as u64);
-        let (manifest, arrays) = unpacked.map_err(|error| error.to_string())?;
+        let (manifest, arrays) = archive::unpack(Cursor::new(&bytes), bytes.len() as u64)?;
         let recipe = Recipe::check(&manifest, arrays)?;
         Ok(TaughtRecipe {
             bytes,

@@ -93,8 +93,7 @@ impl Incoming {
     /// In words: why it is not a usable recipe.
     pub fn recipe(&self) -> Result<Recipe, String> {
         let file = File::open(&self.path).map_err(|error| error.to_string())?;
-        let read = Recipe::read(BufReader::new(file), self.bytes);
-        read.map_err(|error| error.to_string())
+        Recipe::read(BufReader::new(file), self.bytes)
     }
 
     /// Checks that `more` bytes leave as much free storage as the station needs.

@@ -275,12 +275,11 @@ impl Store {
             Ok(opened) => opened,
         };
         Some(match Recipe::read_to_edit(io::BufReader::new(file), size) {
-            Err(error) => Err(error.to_string()),
             Ok((file, _)) if file.number != number => Err(format!(
                 "holds recipe {}: rename it to {:04}.recipe",
                 file.number, file.number
             )),
-            Ok(read) => Ok(read),
+            read => read,
         })
     }
 
@@ -291,7 +290,7 @@ impl Store {
     pub fn manifest(&self, number: u16) -> Result<RecipeFile, String> {
         let file = fs::File::open(self.path(number))
             .map_err(|error| format!("recipe {number}: {error}: teach or import it"))?;
-        archive::manifest(file).map_err(|error| error.to_string())
+        archive::manifest(file)
     }
 
     /// Opens the newest file of a recipe as it is, to be exported.

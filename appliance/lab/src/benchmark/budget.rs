@@ -97,8 +97,8 @@ pub fn budgets(
         let mut file = taught.manifest.clone();
         file.production = production;
         file.alignment = alignment;
-        let (bytes, _) = archive::pack(&file, &taught.recipe.arrays).map_err(words)?;
-        let recipe = Recipe::from_bytes(&bytes).map_err(words)?;
+        let (bytes, _) = archive::pack(&file, &taught.recipe.arrays)?;
+        let recipe = Recipe::from_bytes(&bytes)?;
         let plan = Plan::new(recipe, &calibration, true).map_err(words)?;
         found.push(Budget {
             aligned: alignment == AlignmentKind::Rigid,
