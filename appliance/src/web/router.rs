@@ -31,43 +31,41 @@ pub struct Route {
     answer: MethodRouter<Site>,
 }
 
-fn look<H, T>(path: &'static str, handler: H) -> Route
-where
-    H: Handler<T, Site>,
-    T: 'static,
-{
-    Route {
-        method: Method::GET,
-        path,
-        changes: None,
-        answer: get(handler),
-    }
-}
+const GET: (Method, MethodFilter) = (Method::GET, MethodFilter::GET);
+const POST: (Method, MethodFilter) = (Method::POST, MethodFilter::POST);
+const PUT: (Method, MethodFilter) = (Method::PUT, MethodFilter::PUT);
+const DELETE: (Method, MethodFilter) = (Method::DELETE, MethodFilter::DELETE);
 
-/// A change: needs a session, and is recorded as `action`.
-fn change<H, T>(
+fn route<T: 'static>(
     (method, filter): (Method, MethodFilter),
     path: &'static str,
-    action: &'static str,
-    handler: H,
-) -> Route
-where
-    H: Handler<T, Site>,
-    T: 'static,
-{
+    changes: Option<&'static str>,
+    handler: impl Handler<T, Site>,
+) -> Route {
     Route {
         method,
         path,
-        changes: Some(action),
+        changes,
         answer: on(filter, handler),
     }
 }
 
+fn look<T: 'static>(path: &'static str, handler: impl Handler<T, Site>) -> Route {
+    route(GET, path, None, handler)
+}
+
+/// A change: needs a session, and is recorded as `action`.
+fn change<T: 'static>(
+    method: (Method, MethodFilter),
+    path: &'static str,
+    action: &'static str,
+    handler: impl Handler<T, Site>,
+) -> Route {
+    route(method, path, Some(action), handler)
+}
+
 /// Every path that is answered, but for the page's own files.
 pub fn routes() -> Vec<Route> {
-    let post = || (Method::POST, MethodFilter::POST);
-    let delete = || (Method::DELETE, MethodFilter::DELETE);
-    let put = || (Method::PUT, MethodFilter::PUT);
     vec![
         look("/events", events::follow),
         look("/healthz", look::health),
@@ -93,54 +91,44 @@ pub fn routes() -> Vec<Route> {
         look("/api/recipes/{number}", recipes::one),
         look("/api/recipes/{number}/file", recipes::export),
         look("/api/recipes/{number}/picture/{layer}", recipes::picture),
-        change(post(), "/api/recipes", "import recipe", recipes::import),
-        change(put(), "/api/recipes/{number}", "edit recipe", recipes::edit),
+        change(POST, "/api/recipes", "import recipe", recipes::import),
+        change(PUT, "/api/recipes/{number}", "edit recipe", recipes::edit),
         change(
-            delete(),
+            DELETE,
             "/api/recipes/{number}",
             "delete recipe",
             recipes::delete,
         ),
         change(
-            post(),
+            POST,
             "/api/recipes/{number}/undo",
             "undo recipe",
             recipes::undo,
         ),
         change(
-            post(),
+            POST,
             "/api/recipes/{number}/load",
             "load recipe",
             orders::load,
         ),
         change(
-            post(),
+            POST,
             "/api/recipes/{number}/teach",
             "teach recipe",
             orders::teach,
         ),
-        change(post(), "/api/trigger", "trigger", orders::trigger),
-        change(post(), "/api/reset", "reset errors", orders::reset),
+        change(POST, "/api/trigger", "trigger", orders::trigger),
+        change(POST, "/api/reset", "reset errors", orders::reset),
         look("/api/simulation/part", simulation::part),
         change(
-            put(),
+            PUT,
             "/api/simulation/part",
             "place simulated part",
             simulation::put,
         ),
         look("/api/session", sessions::state),
-        Route {
-            method: Method::POST,
-            path: "/api/session",
-            changes: None,
-            answer: on(MethodFilter::POST, sessions::begin).route_layer(from_fn(own_page_only)),
-        },
-        Route {
-            method: Method::DELETE,
-            path: "/api/session",
-            changes: None,
-            answer: on(MethodFilter::DELETE, sessions::end).route_layer(from_fn(own_page_only)),
-        },
+        route(POST, "/api/session", None, sessions::begin),
+        route(DELETE, "/api/session", None, sessions::end),
     ]
 }
 
@@ -148,15 +136,16 @@ pub fn routes() -> Vec<Route> {
 pub fn router(site: Site) -> Router {
     let mut router = Router::new();
     for route in routes() {
-        let answer = match route.changes {
-            None => route.answer,
-            // The layer that is added last runs first: origin, then session.
-            Some(action) => route
-                .answer
+        let mut answer = route.answer;
+        // The layer that is added last runs first: origin, then session.
+        if let Some(action) = route.changes {
+            answer = answer
                 .route_layer(from_fn_with_state(site.clone(), signed_in_only))
-                .route_layer(Extension(Action(action)))
-                .route_layer(from_fn(own_page_only)),
-        };
+                .route_layer(Extension(Action(action)));
+        }
+        if route.method != Method::GET {
+            answer = answer.route_layer(from_fn(own_page_only));
+        }
         router = router.route(route.path, answer);
     }
     for asset in assets::ALL {
