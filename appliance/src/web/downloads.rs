@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use axum::body::{Body, Bytes};
 use axum::extract::State;
-use axum::http::{HeaderName, header};
+use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use serde_json::{Value, json};
-use tokio::sync::{OwnedSemaphorePermit, mpsc};
+use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
@@ -23,39 +23,74 @@ use crate::history::{Filter, JudgedPart, name_of};
 /// Bytes of a file that are sent to its client at a time.
 const CHUNK: usize = 64 << 10;
 
-/// Sends a file whose name and bytes `work` makes; a few at a time.
+/// What is sent.
+pub(super) enum Content {
+    /// A file in memory.
+    Bytes(Vec<u8>),
+    /// A stored file.
+    Stored(File),
+    /// A folder, as a ZIP.
+    Folder(Packed),
+}
+
+impl Content {
+    /// Its bytes, where they are known beforehand.
+    fn length(&self) -> io::Result<Option<u64>> {
+        Ok(match self {
+            Self::Bytes(bytes) => Some(bytes.len() as u64),
+            Self::Stored(file) => Some(file.metadata()?.len()),
+            Self::Folder(_) => None,
+        })
+    }
+
+    fn write(self, to: &mut ToClient) -> io::Result<()> {
+        match self {
+            Self::Bytes(bytes) => bytes
+                .chunks(CHUNK)
+                .try_for_each(|chunk| to.write_all(chunk)),
+            Self::Stored(mut file) => io::copy(&mut file, to).map(drop),
+            Self::Folder(packed) => packed.write(to).map_err(io::Error::other),
+        }
+    }
+}
+
+/// Sends a file whose name and content `work` finds or makes; a few at a time, and each no faster than its client receives it.
 ///
 /// # Errors
 /// Too many files are being sent, or what `work` answers.
-pub(super) async fn file(
+pub(super) async fn send(
     site: &Site,
     kind: &'static str,
-    work: impl FnOnce(&Site) -> Result<(String, Vec<u8>), Problem> + Send + 'static,
+    work: impl FnOnce(&Site) -> Result<(String, Content), Problem> + Send + 'static,
 ) -> Result<Response, Problem> {
-    let permit = permit(site)?;
-    let (name, bytes) = site.aside(work).await?;
-    let length = [(header::CONTENT_LENGTH, bytes.len().to_string())];
-    let body = streamed(permit, move |to| {
-        bytes
-            .chunks(CHUNK)
-            .try_for_each(|chunk| to.write_all(chunk))
+    let permit =
+        site.files.clone().try_acquire_owned().map_err(|_| {
+            Problem::crowded("too many files are being sent: wait until one is done")
+        })?;
+    let (name, content) = site.aside(work).await?;
+    let length = content.length();
+    let length = length.map_err(|error| Problem::broken(format!("read {name}: {error}")))?;
+    let (sender, receiver) = mpsc::channel(1);
+    tokio::task::spawn_blocking(move || {
+        // Held until the client has received the file or is gone.
+        let _permit = permit;
+        let chunk = Vec::with_capacity(CHUNK);
+        let mut to = ToClient { sender, chunk };
+        if let Err(error) = content.write(&mut to).and_then(|()| to.flush()) {
+            // The answer breaks off, so the client knows that it is not whole.
+            let _ = to.sender.blocking_send(Err(error));
+        }
     });
-    Ok((attached(kind, &name), length, body).into_response())
-}
-
-fn permit(site: &Site) -> Result<OwnedSemaphorePermit, Problem> {
-    let permit = site.files.clone().try_acquire_owned();
-    permit.map_err(|_| Problem::crowded("too many files are being sent: wait until one is done"))
-}
-
-fn attached(kind: &str, name: &str) -> [(HeaderName, String); 2] {
-    [
+    let headers = [
         (header::CONTENT_TYPE, kind.to_owned()),
         (
             header::CONTENT_DISPOSITION,
             format!("attachment; filename=\"{name}\""),
         ),
-    ]
+    ];
+    let length = length.map(|bytes| [(header::CONTENT_LENGTH, bytes.to_string())]);
+    let body = Body::from_stream(ReceiverStream::new(receiver));
+    Ok((headers, length, body).into_response())
 }
 
 /// The files of a folder, to be sent as a ZIP piece by piece: a recording with its recipe is too large to be in memory for each client.
@@ -122,62 +157,11 @@ impl io::Write for ToClient {
     }
 }
 
-/// Sends a folder that `work` finds as a ZIP; a few at a time.
-///
-/// # Errors
-/// Too many files are being sent, or what `work` answers.
-pub(super) async fn folder(
-    site: &Site,
-    work: impl FnOnce(&Site) -> Result<(String, Packed), Problem> + Send + 'static,
-) -> Result<Response, Problem> {
-    let permit = permit(site)?;
-    let (name, packed) = site.aside(work).await?;
-    let body = streamed(permit, |to| packed.write(to).map_err(io::Error::other));
-    Ok((attached("application/zip", &name), body).into_response())
-}
-
-/// Sends a stored file that `work` opens; a few at a time.
-///
-/// # Errors
-/// Too many files are being sent, or what `work` answers.
-pub(super) async fn stored(
-    site: &Site,
-    kind: &'static str,
-    work: impl FnOnce(&Site) -> Result<(String, File), Problem> + Send + 'static,
-) -> Result<Response, Problem> {
-    let permit = permit(site)?;
-    let (name, mut file) = site.aside(work).await?;
-    let failed = |error: io::Error| Problem::broken(format!("read {name}: {error}"));
-    let length = file.metadata().map_err(failed)?.len().to_string();
-    let body = streamed(permit, move |to| io::copy(&mut file, to).map(drop));
-    let length = [(header::CONTENT_LENGTH, length)];
-    Ok((attached(kind, &name), length, body).into_response())
-}
-
-/// A body that `write` sends piece by piece, no faster than its client receives it.
-fn streamed(
-    permit: OwnedSemaphorePermit,
-    write: impl FnOnce(&mut ToClient) -> io::Result<()> + Send + 'static,
-) -> Body {
-    let (sender, receiver) = mpsc::channel(1);
-    tokio::task::spawn_blocking(move || {
-        // Held until the client has received the file or is gone.
-        let _permit = permit;
-        let chunk = Vec::with_capacity(CHUNK);
-        let mut to = ToClient { sender, chunk };
-        if let Err(error) = write(&mut to).and_then(|()| to.flush()) {
-            // The answer breaks off, so the client knows that it is not whole.
-            let _ = to.sender.blocking_send(Err(error));
-        }
-    });
-    Body::from_stream(ReceiverStream::new(receiver))
-}
-
 pub(super) async fn cloud(State(site): State<Site>) -> Result<Response, Problem> {
-    file(&site, "application/octet-stream", |site| {
+    send(&site, "application/octet-stream", |site| {
         let asked = site.last_cycle.ask(|cycle| {
             let cloud = cycle.plan.cloud(cycle.sequence, &cycle.frames)?;
-            Some((format!("{}.ply", cycle.record.seq), cloud))
+            Some((format!("{}.ply", cycle.record.seq), Content::Bytes(cloud)))
         });
         asked.flatten().ok_or_else(|| Problem::missing(GONE))
     })
@@ -189,7 +173,7 @@ const GONE: &str =
     "the frames of the last result are gone, or the station is busy; trigger a measurement";
 
 pub(super) async fn recording(State(site): State<Site>) -> Result<Response, Problem> {
-    folder(&site, |site| {
+    send(&site, "application/zip", |site| {
         let asked = site.last_cycle.ask(JudgedPart::clone);
         let part = asked.ok_or_else(|| Problem::missing(GONE))?;
         let scratch = site.history.scratch();
@@ -201,7 +185,7 @@ pub(super) async fn recording(State(site): State<Site>) -> Result<Response, Prob
         // Its files are open. What cannot be removed now is removed at the next start.
         let _ = std::fs::remove_dir_all(&scratch);
         let name = format!("{}-recording.zip", part.record.seq);
-        Ok((name, packed.map_err(Problem::broken)?))
+        Ok((name, Content::Folder(packed.map_err(Problem::broken)?)))
     })
     .await
 }
@@ -212,10 +196,10 @@ pub(super) fn unpacked(error: io::Error) -> String {
 }
 
 pub(super) async fn gauges(State(site): State<Site>) -> Result<Response, Problem> {
-    file(&site, "text/csv; charset=utf-8", gauges_csv).await
+    send(&site, "text/csv; charset=utf-8", gauges_csv).await
 }
 
-fn gauges_csv(site: &Site) -> Result<(String, Vec<u8>), Problem> {
+fn gauges_csv(site: &Site) -> Result<(String, Content), Problem> {
     let snapshot = site.station.snapshot();
     let words = "nothing was measured yet; trigger a measurement";
     let result = snapshot
@@ -241,16 +225,19 @@ fn gauges_csv(site: &Site) -> Result<(String, Vec<u8>), Problem> {
             u8::from(decision.doubtful),
         );
     }
-    Ok((format!("{}.csv", result.seq), csv.into_bytes()))
+    Ok((
+        format!("{}.csv", result.seq),
+        Content::Bytes(csv.into_bytes()),
+    ))
 }
 
 /// A ZIP of everything that explains a device's behaviour; no secrets.
 pub(super) async fn diagnostics(State(site): State<Site>) -> Result<Response, Problem> {
-    file(&site, "application/zip", |site| {
+    send(&site, "application/zip", |site| {
         let packed = pack(site).map_err(|error| Problem::broken(error.to_string()));
         let serial = &site.station.snapshot().identity.serial;
         let safe: String = serial.chars().filter(char::is_ascii_alphanumeric).collect();
-        Ok((format!("fringed-{safe}.zip"), packed?))
+        Ok((format!("fringed-{safe}.zip"), Content::Bytes(packed?)))
     })
     .await
 }

@@ -5,7 +5,7 @@ use axum::response::{Json, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::downloads::{Packed, file, folder, unpacked};
+use super::downloads::{Content, Packed, send, unpacked};
 use super::problem::Problem;
 use super::site::Site;
 use crate::history::{Filter, HistoryError};
@@ -82,10 +82,10 @@ pub(super) async fn csv(
     Query(wanted): Query<Wanted>,
 ) -> Result<Response, Problem> {
     let filter = wanted.filter(MAX_CSV, MAX_CSV)?;
-    file(&site, "text/csv; charset=utf-8", move |site| {
+    send(&site, "text/csv; charset=utf-8", move |site| {
         let mut bytes = Vec::new();
         site.history.csv(&filter, &mut bytes)?;
-        Ok(("history.csv".into(), bytes))
+        Ok(("history.csv".into(), Content::Bytes(bytes)))
     })
     .await
 }
@@ -94,7 +94,7 @@ pub(super) async fn recording(
     State(site): State<Site>,
     Path(seq): Path<u32>,
 ) -> Result<Response, Problem> {
-    folder(&site, move |site| {
+    send(&site, "application/zip", move |site| {
         let words = format!("the frames of result {seq} were not kept");
         let kept = site.history.recording(seq)?;
         let kept = kept.filter(|folder| folder.is_dir());
@@ -102,7 +102,7 @@ pub(super) async fn recording(
         let name = kept.file_name().unwrap_or_default().to_string_lossy();
         let packed = Packed::of(&kept, name.into_owned());
         let packed = packed.map_err(|error| Problem::broken(unpacked(error)))?;
-        Ok((format!("{seq}-recording.zip"), packed))
+        Ok((format!("{seq}-recording.zip"), Content::Folder(packed)))
     })
     .await
 }

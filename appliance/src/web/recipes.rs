@@ -7,7 +7,7 @@ use axum::response::{Json, Response};
 use serde_json::{Value, json};
 
 use super::body;
-use super::downloads::stored;
+use super::downloads::{Content, send};
 use super::map::{Map, map};
 use super::orders::{self, Reload};
 use super::problem::Problem;
@@ -84,10 +84,11 @@ pub(super) async fn export(
     State(site): State<Site>,
     Path(number): Path<u16>,
 ) -> Result<Response, Problem> {
-    stored(&site, "application/zip", move |site| {
+    send(&site, "application/zip", move |site| {
         let opened = site.recipes.file(number);
         let failed = |error| Problem::missing(format!("read recipe {number}: {error}"));
-        Ok((format!("{number:04}.recipe"), opened.map_err(failed)?))
+        let file = Content::Stored(opened.map_err(failed)?);
+        Ok((format!("{number:04}.recipe"), file))
     })
     .await
 }
