@@ -1,6 +1,6 @@
 //! Bounds of every value of `calibration.json`. Whether the models are usable cameras is checked by the geometry.
 
-use super::file::{CalibrationFile, ContrastFile, MapFile, NoiseFile, ReferenceFile, TimingFile};
+use super::file::{CalibrationFile, MapFile};
 use hal::bounds::{
     MAX_FRINGES, MAX_NOISE_COUNTS, MAX_SIDE, MIN_NOISE_COUNTS, fingerprint, length, text, within,
 };
@@ -39,69 +39,40 @@ impl CalibrationFile {
         within("camera.bit_depth", camera.bit_depth, 8, 16)?;
         within("projector.width", projector.width, 1, MAX_SIDE)?;
         within("projector.height", projector.height, 1, MAX_SIDE)?;
-        self.timing.check_bounds()?;
-        self.noise.check_bounds()?;
-        length("response", self.response.len(), 256, 256)?;
-        self.contrast.check_bounds()?;
-        self.reference
-            .as_ref()
-            .map_or(Ok(()), ReferenceFile::check_bounds)
-    }
-}
-
-impl TimingFile {
-    fn check_bounds(&self) -> Result<(), String> {
-        within(
-            "timing.flip_to_light_ns",
-            self.flip_to_light_ns,
-            0,
-            MAX_TIME_NS,
-        )?;
-        within("timing.sigma_ns", self.sigma_ns, 0, MAX_TIME_NS)?;
-        within("timing.readout_ns", self.readout_ns, 0, MAX_TIME_NS)
-    }
-}
-
-impl NoiseFile {
-    fn check_bounds(&self) -> Result<(), String> {
-        let most = MAX_NOISE_COUNTS;
-        within("noise.counts", self.counts, MIN_NOISE_COUNTS, most)?;
-        within("noise.read_counts", self.read_counts, 0.0, most)?;
-        within("noise.shot", self.shot, 0.0, most)?;
-        length("noise.levels", self.levels.len(), 0, MAX_LEVELS)?;
-        for level in &self.levels {
+        let timing = &self.timing;
+        for (key, ns) in [
+            ("timing.flip_to_light_ns", timing.flip_to_light_ns),
+            ("timing.sigma_ns", timing.sigma_ns),
+            ("timing.readout_ns", timing.readout_ns),
+        ] {
+            within(key, ns, 0, MAX_TIME_NS)?;
+        }
+        let (noise, most) = (&self.noise, MAX_NOISE_COUNTS);
+        within("noise.counts", noise.counts, MIN_NOISE_COUNTS, most)?;
+        within("noise.read_counts", noise.read_counts, 0.0, most)?;
+        within("noise.shot", noise.shot, 0.0, most)?;
+        length("noise.levels", noise.levels.len(), 0, MAX_LEVELS)?;
+        for level in &noise.levels {
             within("noise.levels.level", level.level, 0.0, most)?;
             within("noise.levels.counts", level.counts, 0.0, most)?;
         }
-        Ok(())
-    }
-}
-
-impl ContrastFile {
-    fn check_bounds(&self) -> Result<(), String> {
-        let modulation = self.modulation_counts;
-        within(
-            "contrast.modulation_counts",
-            modulation,
-            0.0,
-            MAX_NOISE_COUNTS,
-        )?;
-        length("contrast.pitches", self.pitches.len(), 0, MAX_LEVELS)?;
-        for pitch in &self.pitches {
+        length("response", self.response.len(), 256, 256)?;
+        let contrast = &self.contrast;
+        let modulation = contrast.modulation_counts;
+        within("contrast.modulation_counts", modulation, 0.0, most)?;
+        length("contrast.pitches", contrast.pitches.len(), 0, MAX_LEVELS)?;
+        for pitch in &contrast.pitches {
             within("contrast.pitches.pitch_px", pitch.pitch_px, 1, MAX_SIDE)?;
             within("contrast.pitches.contrast", pitch.contrast, 0.0, 100.0)?;
         }
-        Ok(())
-    }
-}
-
-impl ReferenceFile {
-    fn check_bounds(&self) -> Result<(), String> {
-        let widest = f64::from(MAX_SIDE);
-        within("reference.pitch_px", self.pitch_px, 1.0, widest)?;
-        within("reference.models_off_px", self.models_off_px, 0.0, widest)?;
-        self.vertical.check_bounds("reference.vertical")?;
-        self.horizontal.check_bounds("reference.horizontal")
+        let Some(reference) = &self.reference else {
+            return Ok(());
+        };
+        let (pitch, off) = (reference.pitch_px, reference.models_off_px);
+        within("reference.pitch_px", pitch, 1.0, f64::from(MAX_SIDE))?;
+        within("reference.models_off_px", off, 0.0, f64::from(MAX_SIDE))?;
+        reference.vertical.check_bounds("reference.vertical")?;
+        reference.horizontal.check_bounds("reference.horizontal")
     }
 }
 
@@ -116,13 +87,9 @@ impl MapFile {
             ));
         }
         fingerprint(&inner("sha256"), &self.sha256)?;
-        within(
-            &inner("residual_turns"),
-            self.residual_turns,
-            0.0,
-            MAX_FRINGES,
-        )?;
-        within(&inner("noise_turns"), self.noise_turns, 0.0, MAX_FRINGES)?;
+        let (residual, noise) = (self.residual_turns, self.noise_turns);
+        within(&inner("residual_turns"), residual, 0.0, MAX_FRINGES)?;
+        within(&inner("noise_turns"), noise, 0.0, MAX_FRINGES)?;
         within(&inner("filled"), self.filled, 0.0, 1.0)
     }
 }
