@@ -1,6 +1,6 @@
 //! The doctor's checks of light: there is some, it is exposed well, fringes are sharp, and light is proportional to grey.
 
-use super::Finding;
+use super::Check;
 use crate::head::calibration::Calibration;
 use crate::head::examine::{self, Lit, SETTLE};
 use crate::head::examine::{LEAST_BRIGHT, LEAST_LIT, MOST_SATURATED};
@@ -17,7 +17,7 @@ const LEAST_CONTRAST: f64 = 0.5;
 /// Largest deviation of light from proportionality to grey, share of white. A gamma of 1.1 deviates by 0.035.
 const MOST_NONLINEAR: f64 = 0.03;
 
-pub(super) fn light(lit: &Lit) -> Finding {
+pub(super) fn light(lit: &Lit) -> Check {
     let share = lit.share();
     let measured = json!({ "lit_percent": share * 100.0 });
     let found = format!(
@@ -25,10 +25,10 @@ pub(super) fn light(lit: &Lit) -> Finding {
         share * 100.0
     );
     let remedy = "switch the projector's lamp on, take off the lens caps, open the apertures, and put a part into view";
-    Finding::new(found, (share < LEAST_LIT).then_some(remedy), measured)
+    Check::new(found, (share < LEAST_LIT).then_some(remedy), measured)
 }
 
-pub(super) fn exposure(lit: &Lit) -> Finding {
+pub(super) fn exposure(lit: &Lit) -> Check {
     let saturated = lit.saturated();
     let bright = lit.bright() / lit.full_scale();
     let measured =
@@ -45,14 +45,14 @@ pub(super) fn exposure(lit: &Lit) -> Finding {
     } else {
         None
     };
-    Finding::new(found, remedy, measured)
+    Check::new(found, remedy, measured)
 }
 
 pub(super) fn contrast(
     head: &mut DynHead,
     calibration: &Calibration,
     lit: &Lit,
-) -> Result<Finding, Error> {
+) -> Result<Check, Error> {
     let found = examine::contrast(head, calibration, SETTLE, lit)?;
     let pitches = found.pitches.iter();
     let by_pitch: serde_json::Map<String, Value> = pitches
@@ -71,14 +71,14 @@ pub(super) fn contrast(
         "focus projector and camera on the part until {SHARP_PITCH} px keep {:.0} %",
         LEAST_CONTRAST * 100.0
     );
-    Ok(Finding::new(found, blurred.then_some(&*remedy), measured))
+    Ok(Check::new(found, blurred.then_some(&*remedy), measured))
 }
 
 pub(super) fn response(
     head: &mut DynHead,
     calibration: &Calibration,
     lit: &Lit,
-) -> Result<Finding, Error> {
+) -> Result<Check, Error> {
     // Projected as patterns are: through the inverse of the calibrated response.
     let asked = GREYS.map(|grey| {
         let response = calibration.response.as_ref();
@@ -108,5 +108,5 @@ pub(super) fn response(
     );
     let remedy = "set the projector's gamma to 1 (a mode without picture improvement), or calibrate its response";
     let nonlinear = (off > MOST_NONLINEAR).then_some(remedy);
-    Ok(Finding::new(found, nonlinear, measured))
+    Ok(Check::new(found, nonlinear, measured))
 }

@@ -52,19 +52,17 @@ pub struct Check {
     pub measured: Value,
 }
 
-/// What a check found; [`Check`] adds its name.
-struct Finding {
-    found: String,
-    remedy: Option<String>,
-    measured: Value,
-}
-
-impl Finding {
-    /// A check that passes if it needs no remedy.
+impl Check {
+    /// A check that passes if it needs no remedy; [`examine`] gives it its name.
     fn new(found: impl Into<String>, remedy: Option<&str>, measured: Value) -> Self {
         Self {
+            name: "",
+            verdict: match remedy {
+                Some(_) => Verdict::Fail,
+                None => Verdict::Pass,
+            },
             found: found.into(),
-            remedy: remedy.map(str::to_owned),
+            remedy: remedy.unwrap_or_default().to_owned(),
             measured,
         }
     }
@@ -102,16 +100,15 @@ pub fn examine(
                 .any(|check| check.name == **need && check.verdict != Verdict::Pass)
         });
         if let Some(missing) = missing {
+            let words = format!("cannot be judged before the check {missing} passes");
             checks.push(Check {
                 name,
                 verdict: Verdict::Skipped,
-                found: format!("cannot be judged before the check {missing} passes"),
-                remedy: String::new(),
-                measured: json!({}),
+                ..Check::new(words, None, json!({}))
             });
             continue;
         }
-        let finding = match name {
+        let checked = match name {
             "devices" => time::devices(head),
             "format" => Ok(time::format(head)),
             "mode" => Ok(time::mode(head)),
@@ -129,21 +126,12 @@ pub fn examine(
                 }
             }
         };
-        let finding = finding.unwrap_or_else(|error| {
+        let checked = checked.unwrap_or_else(|error| {
             let text = error.to_string();
             let (found, remedy) = text.rsplit_once(": ").unwrap_or((&text, ""));
-            Finding::new(found, Some(remedy), json!({}))
+            Check::new(found, Some(remedy), json!({}))
         });
-        checks.push(Check {
-            name,
-            verdict: match finding.remedy {
-                Some(_) => Verdict::Fail,
-                None => Verdict::Pass,
-            },
-            found: finding.found,
-            remedy: finding.remedy.unwrap_or_default(),
-            measured: finding.measured,
-        });
+        checks.push(Check { name, ..checked });
     }
     progress(1.0, "examined");
     checks

@@ -1,6 +1,6 @@
 //! The doctor's checks of devices and time: devices answer, format and mode, flips, triggers, flip-to-light delay.
 
-use super::Finding;
+use super::Check;
 use crate::head::examine::{Delay, Lit, PATIENCE, Stamps, load_black_and_white};
 use hal::camera::Starts;
 use hal::error::Error;
@@ -25,10 +25,10 @@ fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
-pub(super) fn devices(head: &DynHead) -> Result<Finding, Error> {
+pub(super) fn devices(head: &DynHead) -> Result<Check, Error> {
     head.present()?;
     let ((columns, rows), camera) = (head.projector_size(), head.camera_format());
-    Ok(Finding::new(
+    Ok(Check::new(
         format!(
             "a camera of {} and a projector of {columns}×{rows}",
             camera.describe()
@@ -41,12 +41,12 @@ pub(super) fn devices(head: &DynHead) -> Result<Finding, Error> {
     ))
 }
 
-pub(super) fn format(head: &DynHead) -> Finding {
+pub(super) fn format(head: &DynHead) -> Check {
     let encoding = head.encoding();
     let measured = json!({ "encoding": encoding.name, "exact": encoding.exact });
     if encoding.exact {
         let found = format!("{}: samples are what the sensor counted", encoding.name);
-        return Finding::new(found, None, measured);
+        return Check::new(found, None, measured);
     }
     let found = format!(
         "the camera grants {} only: its samples are not what the sensor counted, but compressed or processed",
@@ -54,10 +54,10 @@ pub(super) fn format(head: &DynHead) -> Finding {
     );
     let remedy =
         "ask for an uncompressed raw format (R16 on a Raspberry Pi 5, R10_CSI2P on a Pi 4)";
-    Finding::new(found, Some(remedy), measured)
+    Check::new(found, Some(remedy), measured)
 }
 
-pub(super) fn mode(head: &DynHead) -> Finding {
+pub(super) fn mode(head: &DynHead) -> Check {
     let (camera, refresh) = (head.camera_timing(), head.refresh());
     let refreshes = camera.exposure.as_secs_f64() / refresh.as_secs_f64();
     let whole = refresh.mul_f64(refreshes.round().max(1.0));
@@ -77,10 +77,10 @@ pub(super) fn mode(head: &DynHead) -> Finding {
         "set the exposure to {:.3} ms: a micromirror device makes grey levels over whole refreshes",
         ms(whole)
     );
-    Finding::new(found, (off > TOLERANCE).then_some(&*remedy), measured)
+    Check::new(found, (off > TOLERANCE).then_some(&*remedy), measured)
 }
 
-pub(super) fn cadence(head: &mut DynHead) -> Result<Finding, Error> {
+pub(super) fn cadence(head: &mut DynHead) -> Result<Check, Error> {
     load_black_and_white(head)?;
     let showing = |index: u32| Showing {
         index: index as usize % 2,
@@ -92,7 +92,7 @@ pub(super) fn cadence(head: &mut DynHead) -> Result<Finding, Error> {
     let nominal = head.refresh();
     let (Some(first), Some(last)) = (flips.first(), flips.last()) else {
         let remedy = "check the projector's connection and that no other program holds the display";
-        return Ok(Finding::new(
+        return Ok(Check::new(
             "no flip came",
             Some(remedy),
             json!({ "flips": 0 }),
@@ -130,10 +130,10 @@ pub(super) fn cadence(head: &mut DynHead) -> Result<Finding, Error> {
     } else {
         None
     };
-    Ok(Finding::new(found, remedy, measured))
+    Ok(Check::new(found, remedy, measured))
 }
 
-pub(super) fn trigger(head: &mut DynHead, calibrated: bool) -> Result<Finding, Error> {
+pub(super) fn trigger(head: &mut DynHead, calibrated: bool) -> Result<Check, Error> {
     load_black_and_white(head)?;
     let showing = Showing {
         index: WHITE,
@@ -158,7 +158,7 @@ pub(super) fn trigger(head: &mut DynHead, calibrated: bool) -> Result<Finding, E
     })
 }
 
-fn triggered(seen: &Watched<()>) -> Finding {
+fn triggered(seen: &Watched<()>) -> Check {
     let (pulses, frames) = (seen.triggers.len(), seen.frames.len());
     let latest = |frame: &hal::head::WatchedFrame<()>| {
         let off = seen.triggers.iter().map(|at| at.0.abs_diff(frame.start.0));
@@ -175,10 +175,10 @@ fn triggered(seen: &Watched<()>) -> Finding {
     if frames == 0 {
         let found = format!("no frame for {pulses} triggers");
         let remedy = "check the wire from the trigger output to the camera's trigger input, and that the camera is in trigger mode";
-        return Finding::new(found, Some(remedy), measured);
+        return Check::new(found, Some(remedy), measured);
     }
     if let Some(off) = pulse_off {
-        return Finding::new(
+        return Check::new(
             format!(
                 "{spoiled} of {pulses} pulses were too long or too short, by up to {:.2} ms, and so was the exposure",
                 ms(off)
@@ -198,14 +198,14 @@ fn triggered(seen: &Watched<()>) -> Finding {
     } else {
         None
     };
-    Finding::new(found, remedy, measured)
+    Check::new(found, remedy, measured)
 }
 
-fn by_itself(seen: &Watched<()>, nominal: Duration) -> Finding {
+fn by_itself(seen: &Watched<()>, nominal: Duration) -> Check {
     let frames = seen.frames.len();
     let (first, last) = (seen.frames.first(), seen.frames.last());
     let (Some(first), Some(last)) = (first, last.filter(|_| frames > 1)) else {
-        return Finding::new(
+        return Check::new(
             format!("{frames} frames of a camera that runs by itself"),
             Some("check the camera's cable and that no other program holds it"),
             json!({ "frames": frames }),
@@ -226,15 +226,15 @@ fn by_itself(seen: &Watched<()>, nominal: Duration) -> Finding {
     } else {
         None
     };
-    Finding::new(found, remedy, measured)
+    Check::new(found, remedy, measured)
 }
 
 /// The time from a flip to its light, from the brightness of the frames around many flips.
-pub(super) fn delay(head: &mut DynHead, lit: &Lit) -> Result<Finding, Error> {
+pub(super) fn delay(head: &mut DynHead, lit: &Lit) -> Result<Check, Error> {
     let believed = head.timing().flip_to_light.as_secs_f64();
     let refresh = head.refresh().as_secs_f64();
     let Some(measured) = Delay::measure(head, lit, 1)? else {
-        return Ok(Finding::new(
+        return Ok(Check::new(
             "no light follows the flips from black to white",
             Some("check the projector's input: it may show another source"),
             json!({ "calibrated_ms": believed * 1e3 }),
@@ -257,5 +257,5 @@ pub(super) fn delay(head: &mut DynHead, lit: &Lit) -> Result<Finding, Error> {
         "the calibration is off by {:.1} refreshes: switch off the projector's picture processing, or calibrate anew",
         (delay - believed) / refresh
     );
-    Ok(Finding::new(found, wrong.then_some(&*remedy), numbers))
+    Ok(Check::new(found, wrong.then_some(&*remedy), numbers))
 }
