@@ -2,7 +2,7 @@
 
 use crate::station_plc::{PATIENCE, READY, SMALL_HEAD, long, trigger};
 use appliance::config::Config;
-use appliance::service::Daemon;
+use appliance::service::{Caller, Daemon};
 use appliance::system::progress::Progress;
 use fringed_lab::benchmark::median;
 use std::fs;
@@ -48,7 +48,13 @@ impl Bed {
         fs::write(&path, text).unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         let config = Config::read(&path).unwrap();
-        let daemon = Daemon::start(&config, pool.unwrap(), Progress::new(true)).unwrap();
+        let daemon = Daemon::start(
+            &config,
+            pool.unwrap(),
+            Progress::new(true),
+            &Caller::default(),
+        )
+        .unwrap();
         daemon.wait_until_ready().unwrap();
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()

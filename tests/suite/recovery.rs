@@ -9,7 +9,7 @@ use appliance::config::Config;
 use appliance::head::calibration::Calibration;
 use appliance::history::seqs::AHEAD;
 use appliance::recipe::teach::{Naming, TeachError, teach_while};
-use appliance::service::Daemon;
+use appliance::service::{Caller, Daemon};
 use appliance::station::{ConnectionEdges, ControlWrite, Event, Masked, Request};
 use appliance::system::computing::Computing;
 use appliance::system::progress::Progress;
@@ -38,7 +38,13 @@ fn starting(place: &Place) -> Daemon {
     config.modbus.listen = "127.0.0.1:0".parse().unwrap();
     config.http.listen = config.modbus.listen;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    Daemon::start(&config, pool.unwrap(), Progress::new(true)).unwrap()
+    Daemon::start(
+        &config,
+        pool.unwrap(),
+        Progress::new(true),
+        &Caller::default(),
+    )
+    .unwrap()
 }
 
 fn state(status: &Status) -> u16 {
@@ -167,7 +173,7 @@ fn an_abort_ends_a_teach_and_the_recipe_before_it_goes_on() {
 fn a_teach_that_is_ended_does_no_further_step() {
     let scenario = Scenario::from_toml(SMALL_HEAD, "small head").unwrap();
     let (mut head, stage) = sim::head(&scenario).unwrap();
-    let calibration = Calibration::of_stage(&stage).unwrap();
+    let calibration = Calibration::of_scenario(stage.scenario()).unwrap();
     let naming = Naming {
         number: 1,
         part_number: "PART".into(),

@@ -6,7 +6,7 @@ use crate::config::Config;
 use crate::production::caught;
 use crate::recipe::Store;
 use crate::recipe::archive::pack;
-use crate::service::Daemon;
+use crate::service::{Caller, Daemon};
 use crate::station::snapshot::status;
 use crate::station::{
     ActiveRecipe, ControlWrite, Effect, Event, Identity, Limits, Masked, Micros, RecipeKey,
@@ -38,7 +38,13 @@ fn a_station_whose_recipe_cannot_be_used_stays_reachable_and_loads_another() {
 
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let config = Config::read(&path).unwrap();
-    let daemon = Daemon::start(&config, pool.unwrap(), Progress::new(true)).unwrap();
+    let daemon = Daemon::start(
+        &config,
+        pool.unwrap(),
+        Progress::new(true),
+        &Caller::default(),
+    )
+    .unwrap();
     let refused = daemon.wait_until_ready().unwrap_err();
     assert!(refused.message.contains("range"), "{}", refused.message);
     let after = daemon.station.snapshot();

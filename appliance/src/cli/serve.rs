@@ -44,7 +44,7 @@ impl Serve {
         };
         caller.notify.status("starting");
         let pool = self.serving.threads.pool(config.threads)?;
-        let daemon = Daemon::start_for(&config, pool, progress.clone(), &caller)?;
+        let daemon = Daemon::start(&config, pool, progress.clone(), &caller)?;
         runtime()?.block_on(async {
             tokio::select! {
                 () = caller.stop.wait() => {}

@@ -79,25 +79,13 @@ pub struct Daemon {
 
 impl Daemon {
     /// Starts everything and returns when the head is open. The station then loads its recipe; on a simulated head without one, it
-    /// teaches one.
+    /// teaches one. For a service manager as `caller` it also returns if the head is missing; the measuring task then waits for the
+    /// head as for a lost one. On the caller's stop signal it returns at once; the daemon can then only be stopped.
     ///
     /// # Errors
     /// If the state folder cannot be used (73), a port is in use or the head missing (69), or the
     /// configuration is wrong (78). Nothing keeps running then.
     pub fn start(
-        config: &Config,
-        pool: rayon::ThreadPool,
-        progress: Progress,
-    ) -> Result<Self, Failure> {
-        Self::start_for(config, pool, progress, &Caller::default())
-    }
-
-    /// As [`Daemon::start`], for a caller. With a service manager it also returns if the head is missing; the measuring task then
-    /// waits for the head as for a lost one. On the stop signal it returns at once; the daemon can then only be stopped.
-    ///
-    /// # Errors
-    /// As [`Daemon::start`].
-    pub fn start_for(
         config: &Config,
         pool: rayon::ThreadPool,
         progress: Progress,

@@ -7,7 +7,7 @@ mod table;
 use super::options::{Output, Serving};
 use crate::config::Backend;
 use crate::error::{Exit, Failure};
-use crate::service::Daemon;
+use crate::service::{Caller, Daemon};
 use crate::storage::state::StateFolder;
 use crate::system::runtime;
 use crate::system::stop_signal::StopSignal;
@@ -57,7 +57,7 @@ impl Demo {
         }
         let progress = self.output.progress();
         let pool = self.serving.threads.pool(config.threads)?;
-        let daemon = Daemon::start(&config, pool, progress.clone())?;
+        let daemon = Daemon::start(&config, pool, progress.clone(), &Caller::default())?;
         daemon.wait_until_ready()?;
         progress.log(&format!(
             "page on http://{}, Modbus TCP on {}",
