@@ -46,7 +46,7 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
     )
     .unwrap();
     let (mut head, stage) = sim::head(&scenario).unwrap();
-    let calibration = Calibration::of_stage(&stage).unwrap();
+    let calibration = Calibration::of_scenario(stage.scenario()).unwrap();
     let taught = teach(&mut head, &calibration, &naming(), TIMEOUT, &|_, _| ()).unwrap();
     let mut file = taught.manifest.clone();
     file.gauges = gauges(&file.regions[0].name);

@@ -31,7 +31,7 @@ fn a_plan_keeps_nothing_twice_and_making_it_takes_little_more_than_its_file() {
     )
     .unwrap();
     let (mut head, stage) = sim::head(&scenario).unwrap();
-    let calibration = Calibration::of_stage(&stage).unwrap();
+    let calibration = Calibration::of_scenario(stage.scenario()).unwrap();
     let taught = teach(&mut head, &calibration, &naming(), TIMEOUT, &|_, _| ()).unwrap();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)

@@ -270,7 +270,7 @@ impl Taught {
         (scenario.rig.camera.width, scenario.rig.camera.height) = (128, 128);
         (scenario.rig.projector.width, scenario.rig.projector.height) = (512, 384);
         let (mut head, stage) = sim::head(&scenario).expect("a head");
-        let calibration = Calibration::of_stage(&stage).unwrap();
+        let calibration = Calibration::of_scenario(stage.scenario()).unwrap();
         let (bytes, recipe) = taught_recipe(&mut head, &calibration);
         let mut record = |ratios: &[f64], steps| {
             let levels = ratios.iter().flat_map(|&ratio| Shot::level(ratio, steps));

@@ -281,7 +281,7 @@ fn recipes_at_full_resolution_are_switched_within_a_second() {
 fn stages(store: &Store, bytes: usize) {
     let scenario = Scenario::from_toml(FULL_HEAD, "full").unwrap();
     let (mut head, stage) = sim::head(&scenario).unwrap();
-    let calibration = Calibration::of_stage(&stage).unwrap();
+    let calibration = Calibration::of_scenario(stage.scenario()).unwrap();
     let mut works = Vec::new();
     for number in 1..=3 {
         let (began, worked) = (Instant::now(), processor_time());

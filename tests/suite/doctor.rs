@@ -112,7 +112,7 @@ fn a_head_that_nobody_has_calibrated_fails_in_nothing_but_what_calibration_measu
     for calibrated in [false, true] {
         let (mut head, stage) = sim::head_with_progress(&scenario, &|_| ()).unwrap();
         head.set_timing(Timing::default());
-        let known = Calibration::of_stage(&stage).unwrap();
+        let known = Calibration::of_scenario(stage.scenario()).unwrap();
         let steps = examine(&mut head, &known, calibrated, &|_, _| ());
         let failed = steps.iter().filter(|step| step.verdict == Verdict::Fail);
         let failed: Vec<&str> = failed.map(|step| step.name).collect();

@@ -27,7 +27,7 @@ pub(crate) fn bed(scenario: &Scenario) -> Bed {
     let (head, stage) = sim::head(scenario).unwrap();
     Bed {
         head,
-        calibration: Calibration::of_stage(&stage).unwrap(),
+        calibration: Calibration::of_scenario(stage.scenario()).unwrap(),
         stage,
     }
 }

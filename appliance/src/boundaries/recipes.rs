@@ -38,7 +38,7 @@ impl Bed {
     pub fn new() -> Self {
         let scenario = Scenario::from_toml(HEAD, "head").unwrap();
         let (mut head, stage) = sim::head(&scenario).unwrap();
-        let calibration = Calibration::of_stage(&stage).unwrap();
+        let calibration = Calibration::of_scenario(stage.scenario()).unwrap();
         let naming = Naming {
             number: 1,
             part_number: "P".into(),

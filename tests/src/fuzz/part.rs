@@ -35,7 +35,8 @@ impl Part {
         let scenario =
             Scenario::from_toml(&tiny_head(24, 18), "the fuzz targets' head").expect("a scenario");
         let (mut head, stage) = sim::head(&scenario).expect("a head");
-        let calibration = Calibration::of_stage(&stage).expect("models that can be used");
+        let calibration =
+            Calibration::of_scenario(stage.scenario()).expect("models that can be used");
         let naming = Naming {
             number: 1,
             part_number: "P-1".into(),

@@ -70,7 +70,7 @@ pub fn budgets(
     let about = format!("{width}x{height}");
     progress(0.0, &format!("{about}: light of the scene"));
     let (mut head, stage) = sim::head(&scenario).map_err(words)?;
-    let calibration = Calibration::of_stage(&stage)?;
+    let calibration = Calibration::of_scenario(stage.scenario())?;
     let naming = Naming {
         number: 1,
         part_number: "BENCH".into(),

@@ -90,7 +90,7 @@ impl Runner {
     pub fn new(scene: &Scene, optics: OpticsKind) -> Result<Self, MeasureError> {
         let scenario = scene.scenario(optics, 1);
         let (head, stage) = sim::head(&scenario)?;
-        let calibration = Calibration::of_stage(&stage).map_err(rig)?;
+        let calibration = Calibration::of_scenario(stage.scenario()).map_err(rig)?;
         Ok(Self {
             head,
             truth: stage.truth(),

@@ -16,7 +16,7 @@ use hal::model::DeviceModel;
 use hal::replay::Recording;
 use hal::replay::recording::RecordedProjector;
 use sha2::{Digest, Sha256};
-use sim::{Scenario, Stage};
+use sim::Scenario;
 
 /// The calibration of a head. Its models are checked: each pixel has one ray.
 #[derive(Clone, Debug)]
@@ -52,14 +52,6 @@ impl Calibration {
             noise_counts,
             response: None,
         })
-    }
-
-    /// The exact calibration of a simulated head.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn of_stage(stage: &Stage) -> Result<Self, String> {
-        Self::of_scenario(stage.scenario())
     }
 
     /// The exact calibration of the head of a scenario, which need not be simulated.
