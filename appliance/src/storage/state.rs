@@ -60,11 +60,9 @@ impl StateFolder {
             let what = format!("open the state folder {}", path.display());
             Failure::because(exit, what, error)
         };
-        let failed = |error| refused(Exit::CannotCreate, error);
         let cannot = |error: std::io::Error| {
-            failed(format!(
-                "{error}: name one that can be written with --state"
-            ))
+            let words = format!("{error}: name one that can be written with --state");
+            refused(Exit::CannotCreate, words)
         };
         fs::create_dir_all(path).map_err(cannot)?;
         let lock = File::create(path.join("lock")).map_err(cannot)?;

@@ -11,6 +11,7 @@ use super::look::{map_of, place_of};
 use super::map::Map;
 use super::problem::Problem;
 use super::site::Site;
+use super::view;
 use crate::error::{Exit, Failure};
 use crate::history::kept::Kept;
 use crate::history::why_no_frames;
@@ -27,12 +28,8 @@ pub(super) async fn one(
     let found = site.aside(move |site| {
         let entry = site.history.result(seq)?;
         let entry = entry.ok_or_else(|| unknown(seq))?;
-        let flags = flag::WORDS.iter().enumerate();
-        let set: Vec<_> = flags
-            .filter(|(bit, _)| entry.flags >> bit & 1 == 1)
-            .map(|(_, words)| words)
-            .collect();
-        Ok(json!({ "result": entry, "flags": set, "no_frames": why_no_frames(&entry) }))
+        let flags = view::set(entry.flags, &flag::WORDS);
+        Ok(json!({ "result": entry, "flags": flags, "no_frames": why_no_frames(&entry) }))
     });
     found.await.map(Json)
 }

@@ -21,7 +21,7 @@ pub fn snapshot(snapshot: &Snapshot) -> Value {
         "calibration_valid": snapshot.is(status::CALIBRATION_VALID),
         "missed_trigger": snapshot.is(status::MISSED_TRIGGER),
         "buffer_overflow": snapshot.is(status::BUFFER_OVERFLOW),
-        "warnings": warnings(snapshot.warnings),
+        "warnings": set(snapshot.warnings, &warning::WORDS),
         "error": snapshot.error.as_ref().map(|words| json!({
             "code": snapshot.error_code, "family": error_code::family(snapshot.error_code), "words": &**words,
         })),
@@ -62,13 +62,11 @@ fn health(health: &Health) -> Value {
     shown
 }
 
-fn warnings(bits: u16) -> Vec<&'static str> {
-    warning::WORDS
-        .iter()
-        .enumerate()
-        .filter(|(bit, _)| bits >> bit & 1 == 1)
-        .map(|(_, word)| *word)
-        .collect()
+/// The words of the bits that are set.
+pub(super) fn set(bits: u16, words: &[&'static str]) -> Vec<&'static str> {
+    let words = words.iter().enumerate();
+    let set = words.filter(|(bit, _)| bits >> bit & 1 == 1);
+    set.map(|(_, word)| *word).collect()
 }
 
 fn result(record: &ResultRecord) -> Value {

@@ -16,12 +16,6 @@ pub(super) struct Report<'a> {
 }
 
 impl Report<'_> {
-    /// Whether recipes that were made before stay valid.
-    fn recipes_stay(&self) -> bool {
-        self.before
-            .is_none_or(|before| before == self.file.fingerprint)
-    }
-
     pub fn json(&self) -> Value {
         json!({
             "calibration": self.file, "file": self.place.display().to_string(), "notes": self.notes,
@@ -92,7 +86,7 @@ impl Report<'_> {
         }
         let digits = |fingerprint: &str| fingerprint.get(..8).unwrap_or_default().to_owned();
         let recipes = match self.before {
-            Some(before) if !self.recipes_stay() => format!(
+            Some(before) if before != file.fingerprint => format!(
                 "was {}: recipes made for that one are refused, teach them again",
                 digits(before)
             ),

@@ -34,10 +34,6 @@ pub struct Delay {
     pub seconds: f64,
     /// 1 σ of it, s.
     pub error: f64,
-    /// Scatter of the frames' means about the fit, share of white.
-    pub scatter: f64,
-    /// Frames in the fit.
-    pub frames: usize,
 }
 
 /// The flips and frames of one round.
@@ -177,17 +173,12 @@ fn fit(rounds: &[Round], exposure: f64, refresh: f64) -> Option<Delay> {
         let inverse = last_of_inverse(&normal)?;
         delay += (inverse * right[2]).clamp(-step, step);
         let scatter = (squares / f64::from((frames - 3).max(1))).sqrt();
-        known = Some((black, white, scatter, scatter * inverse.sqrt(), frames));
+        known = Some((white, scatter, scatter * inverse.sqrt()));
     }
-    let (_, white, scatter, error, frames) = known?;
+    let (white, scatter, error) = known?;
     // Adding 0 turns a negative zero into 0.
     let seconds = (delay * 1e6).round() * 1e-6 + 0.0;
-    (white > LEAST_SIGNAL * scatter).then_some(Delay {
-        seconds,
-        error,
-        scatter: scatter / white,
-        frames: frames as usize,
-    })
+    (white > LEAST_SIGNAL * scatter).then_some(Delay { seconds, error })
 }
 
 /// The straight line of means over shares: black, white above black, and the sum of squared residuals.

@@ -142,12 +142,10 @@ fn kind(part: &Part) -> String {
 fn defect<'a>(kind: &str, numbers: impl Iterator<Item = (&'a str, f64)>) -> Value {
     let mut defect = Map::from_iter([("kind".to_owned(), json!(kind))]);
     for (name, number) in numbers {
-        // Indices are whole numbers.
-        let whole = name == "index" && number.fract() == 0.0 && number >= 0.0;
-        let number = if whole {
-            json!(number as u64)
-        } else {
-            json!(number)
+        let number = match name {
+            // Checked to be a whole number.
+            "index" => json!(number as u64),
+            _ => json!(number),
         };
         defect.insert(name.to_owned(), number);
     }
