@@ -166,24 +166,13 @@ impl Teach {
     /// If the number is taken and `--replace` is not given, or there are no gauges to keep.
     fn replaced(&self, recipes: &Store) -> Result<Option<RecipeFile>, Failure> {
         let number = self.number;
-        let replaced = recipes.present(number);
-        if recipes.numbers().contains(&number) && !self.replace {
-            let what = match &replaced {
-                Some(file) => format!("has {:?} with {}", file.name, replace::gauges_of(file)),
-                None => "has a file that cannot be read".into(),
-            };
-            let free = recipes
-                .free()
-                .map(|free| format!(", or teach number {free}, which is free"));
-            let words = format!(
-                "teach: recipe {number} {what}: add --replace (and --keep-gauges){}",
-                free.unwrap_or_default()
-            );
-            return Err(Failure::new(Exit::CannotCreate, words));
+        if !self.replace {
+            replace::refuse_taken(recipes, number, "add --replace (and --keep-gauges)")
+                .map_err(|words| Failure::new(Exit::CannotCreate, words))?;
         }
+        let replaced = recipes.present(number);
         if self.keep_gauges && replaced.is_none() {
-            let words = format!("teach: there is no recipe {number} whose gauges could be kept");
-            return Err(Failure::new(Exit::Missing, words));
+            return Err(Failure::new(Exit::Missing, replace::no_gauges(number)));
         }
         Ok(replaced)
     }

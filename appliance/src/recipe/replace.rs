@@ -1,8 +1,8 @@
 //! Teaching under a number that is taken: what the new recipe keeps of the one that it replaces.
 
-use super::RecipeFile;
 use super::gauge::check_limits;
 use super::golden::{Naming, TaughtRecipe};
+use super::{RecipeFile, Store};
 
 /// Placement tolerance of a recipe that replaces none, mm.
 pub const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
@@ -27,17 +27,38 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
     }
 }
 
-/// How many regions and gauges a recipe has, in words.
-pub fn gauges_of(file: &RecipeFile) -> String {
+/// Refuses a number that is taken, naming the recipe, how to `replace` it, and a number that is free.
+///
+/// # Errors
+/// In words: the number is taken.
+pub fn refuse_taken(recipes: &Store, number: u16, replace: &str) -> Result<(), String> {
+    if !recipes.numbers().contains(&number) {
+        return Ok(());
+    }
     let count = |number: usize, what: &str| match number {
         1 => format!("1 {what}"),
         _ => format!("{number} {what}s"),
     };
-    format!(
-        "{} and {}",
-        count(file.regions.len(), "region"),
-        count(file.gauges.len(), "gauge")
-    )
+    let has = match recipes.present(number) {
+        Some(file) => format!(
+            "{:?} with {} and {}",
+            file.name,
+            count(file.regions.len(), "region"),
+            count(file.gauges.len(), "gauge")
+        ),
+        None => "a file that cannot be read".into(),
+    };
+    let free = recipes.free();
+    let free = free.map(|free| format!(", or teach number {free}, which is free"));
+    Err(format!(
+        "teach: recipe {number} has {has}: {replace}{}",
+        free.unwrap_or_default()
+    ))
+}
+
+/// The refusal to keep the gauges of a recipe that is not there.
+pub fn no_gauges(number: u16) -> String {
+    format!("teach: there is no recipe {number} whose gauges could be kept")
 }
 
 /// Checks that the gauges of a recipe can be kept on a head with frames of (width, height).

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use super::body;
 use super::problem::Problem;
 use super::site::Site;
-use crate::recipe::{Store, replace};
+use crate::recipe::replace;
 use crate::station::control::{ERROR_RESET, TRIGGER};
 use crate::station::{ControlWrite, Event, RecipeKey, RecipeResult, Request, Snapshot};
 
@@ -152,18 +152,19 @@ pub(super) async fn teach(
         )));
     }
     let Teaching {
-        replace,
+        replace: may_replace,
         keep_gauges,
     } = body::json_if_any(request.into_body()).await?;
-    site.change(move |site| match (replace, keep_gauges) {
+    site.change(move |site| match (may_replace, keep_gauges) {
         (false, true) => Err(Problem::unfit(
             "teach: keep_gauges needs replace: the gauges of the recipe that is replaced stay",
         )),
-        (false, false) => refuse_taken(&site.recipes, number),
+        (false, false) => {
+            let instead = "send {\"replace\": true} to replace it";
+            replace::refuse_taken(&site.recipes, number, instead).map_err(Problem::busy)
+        }
         (true, _) if keep_gauges && site.recipes.present(number).is_none() => {
-            Err(Problem::missing(format!(
-                "teach: there is no recipe {number} whose gauges could be kept"
-            )))
+            Err(Problem::missing(replace::no_gauges(number)))
         }
         (true, _) => Ok(()),
     })
@@ -178,21 +179,4 @@ pub(super) async fn teach(
     } else {
         Err(not_now("teach", &after))
     }
-}
-
-/// Refuses a number that is taken, naming the recipe and a number that is free.
-fn refuse_taken(recipes: &Store, number: u16) -> Result<(), Problem> {
-    if !recipes.numbers().contains(&number) {
-        return Ok(());
-    }
-    let has = match recipes.present(number) {
-        Some(file) => format!("{:?} with {}", file.name, replace::gauges_of(&file)),
-        None => "a file that cannot be read".into(),
-    };
-    let free = recipes.free();
-    let free = free.map(|free| format!(", or teach number {free}, which is free"));
-    Err(Problem::busy(format!(
-        "teach: recipe {number} has {has}: send {{\"replace\": true}} to replace it{}",
-        free.unwrap_or_default()
-    )))
 }
