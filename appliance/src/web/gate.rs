@@ -3,6 +3,7 @@
 use std::net::IpAddr;
 use std::time::Instant;
 
+use axum::Extension;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::Next;
@@ -66,9 +67,13 @@ fn is_own(headers: &HeaderMap) -> bool {
 }
 
 /// Lets a request through only with an open session, and records its outcome.
-pub async fn signed_in_only(State(site): State<Site>, request: Request, next: Next) -> Response {
-    let peer = request.extensions().get::<Peer>().copied();
-    let action = request.extensions().get::<Action>().copied();
+pub async fn signed_in_only(
+    State(site): State<Site>,
+    Extension(Peer(from)): Extension<Peer>,
+    Extension(Action(action)): Extension<Action>,
+    request: Request,
+    next: Next,
+) -> Response {
     let subject = request.uri().path().trim_start_matches("/api/").to_owned();
     let response = if is_signed_in(&site, request.headers()) {
         next.run(request).await
@@ -76,22 +81,19 @@ pub async fn signed_in_only(State(site): State<Site>, request: Request, next: Ne
         let words = "sign in first: POST the device's secret to /api/session";
         Problem::new(StatusCode::UNAUTHORIZED, words).into_response()
     };
-    let outcome = match response.extensions().get::<Outcome>() {
-        Some(Outcome(words)) => words.clone(),
-        None => "done".to_owned(),
-    };
-    let action = action.map_or("change", |Action(name)| name);
-    record(&site, peer, action, subject, outcome).await;
+    let outcome = response.extensions().get::<Outcome>();
+    let outcome = outcome.map(|Outcome(words)| words.clone());
+    record(&site, from, action, subject, outcome).await;
     response
 }
 
-/// Adds a line to the record of changes; if that fails, the log says so.
+/// Adds a line to the record of changes, with why the change was refused, or that it was done; if that fails, the log says so.
 pub async fn record(
     site: &Site,
-    peer: Option<Peer>,
+    from: IpAddr,
     action: &'static str,
     subject: String,
-    outcome: String,
+    refused: Option<String>,
 ) {
     let written = site
         .change(move |site| {
@@ -100,10 +102,10 @@ pub async fn record(
                 utc_us: clock::utc_us(),
                 uptime_s: snapshot.uptime_s,
                 boot_id: snapshot.boot_id,
-                from: peer.map_or(IpAddr::from([0, 0, 0, 0]), |Peer(address)| address),
+                from,
                 action,
                 subject: &subject,
-                outcome: &outcome,
+                outcome: refused.as_deref().unwrap_or("done"),
             };
             let stored = site.access.changes().add(&change);
             stored.map_err(|error| Problem::broken(error.to_string()))

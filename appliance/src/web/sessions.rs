@@ -1,6 +1,5 @@
 //! Signing in and out.
 
-use std::net::IpAddr;
 use std::time::Instant;
 
 use axum::body::Body;
@@ -34,24 +33,17 @@ pub(super) async fn state(State(site): State<Site>, headers: HeaderMap) -> Json<
 
 pub(super) async fn begin(
     State(site): State<Site>,
-    peer: Option<Extension<Peer>>,
+    Extension(Peer(from)): Extension<Peer>,
     request: extract::Request<Body>,
 ) -> Result<Response, Problem> {
-    let peer = peer.map(|Extension(peer)| peer);
     let SignIn { secret, time_ms } = body::json(request.into_body()).await?;
     let received = site.station.now();
-    let from = peer.map_or(IpAddr::from([0, 0, 0, 0]), |Peer(address)| address);
     let guess = site.change(move |site| Ok(site.access.sign_in(from, &secret, Instant::now())));
-    let (token, outcome) = match guess.await? {
-        Ok(token) => (Ok(token), "done".to_owned()),
-        Err(refused) => {
-            let words = refused.to_string();
-            (Err(refused), words)
-        }
-    };
+    let token = guess.await?;
     // A guess that has to wait is not recorded, so that guessing cannot fill the record.
     if !matches!(token, Err(Refused::Wait(_))) {
-        gate::record(&site, peer, "sign in", "session".into(), outcome).await;
+        let outcome = token.as_ref().err().map(ToString::to_string);
+        gate::record(&site, from, "sign in", "session".into(), outcome).await;
     }
     match token {
         Ok(token) => {
