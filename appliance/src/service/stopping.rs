@@ -28,45 +28,38 @@ impl Daemon {
         // Fails only if the measuring task has ended already.
         drop(self.orders.send(Order::Stop));
         let [measuring, serving, surveying, wiring] = self.threads;
-        let needed = || !self.computing.is_under_way();
-        join_while(
-            &needed,
-            "measuring",
-            measuring,
-            began + MEASURING,
-            &self.progress,
-        );
+        let join = |thread| join_while(thread, until, &self.progress, &|| true);
+        // A thread that only computes may end with the program.
+        join_while(measuring, began + MEASURING, &self.progress, &|| {
+            !self.computing.is_under_way()
+        });
         // A cycle that has no result by now gets none from the measuring task.
         self.station.event(Event::Stop);
         let _ = self.sockets.send(true);
-        join("sockets", serving, until, &self.progress);
-        join("lines", wiring, until, &self.progress);
+        join(serving);
+        join(wiring);
         drop(self.survey);
-        join("survey", surveying, until, &self.progress);
+        join(surveying);
         // Last, so that the results of the others are stored.
         self.history.stop(self.station.snapshot().result_seq);
-        join("history", self.writing, until, &self.progress);
+        join(self.writing);
     }
 }
 
-/// Waits for a thread to end, until `until` at most: a thread that hangs in a device or the storage must not keep the program alive.
-fn join(name: &str, thread: JoinHandle<()>, until: Instant, progress: &Progress) {
-    join_while(&|| true, name, thread, until, progress);
-}
-
-/// The same as long as the thread is `needed`: one that only computes may end with the program.
+/// Waits for a thread to end as long as it is `needed`, until `until` at most: a thread that hangs in a device or the storage must
+/// not keep the program alive.
 fn join_while(
-    needed: &dyn Fn() -> bool,
-    name: &str,
     thread: JoinHandle<()>,
     until: Instant,
     progress: &Progress,
+    needed: &dyn Fn() -> bool,
 ) {
     while !thread.is_finished() {
         if !needed() {
             return;
         }
         if Instant::now() > until {
+            let name = thread.thread().name().unwrap_or_default();
             progress.warn(&format!(
                 "the thread {name} does not end and is left behind"
             ));
