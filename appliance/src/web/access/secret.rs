@@ -5,6 +5,7 @@ use argon2::Argon2;
 use argon2::password_hash::phc::PasswordHash;
 use argon2::password_hash::{PasswordHasher, PasswordVerifier};
 use std::io::ErrorKind;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 
 /// Digits of the secret: Crockford's base 32, without I, L, O and U, so that nothing is misread.
@@ -113,15 +114,8 @@ fn plain(typed: &str) -> String {
     .collect()
 }
 
-#[cfg(unix)]
 fn close_to_others(file: &Path) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt as _;
     std::fs::set_permissions(file, std::fs::Permissions::from_mode(0o600))
-}
-
-#[cfg(not(unix))]
-fn close_to_others(_: &Path) -> std::io::Result<()> {
-    Ok(())
 }
 
 #[cfg(test)]

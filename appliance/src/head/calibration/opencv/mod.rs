@@ -24,17 +24,18 @@ struct Names {
     distortion: &'static [&'static str],
 }
 
-/// Names of matrix and distortion in a file of one device.
-const ALONE: [&[&str]; 2] = [
-    &["camera_matrix", "cameraMatrix", "K", "projector_matrix"],
-    &[
+/// The nodes in a file of one device.
+const ALONE: Names = Names {
+    device: "device",
+    matrix: &["camera_matrix", "cameraMatrix", "K", "projector_matrix"],
+    distortion: &[
         "distortion_coefficients",
         "dist_coeffs",
         "distCoeffs",
         "D",
         "projector_distortion",
     ],
-];
+};
 /// The camera's nodes in a file of both devices.
 const CAMERA: Names = Names {
     device: "camera",
@@ -109,11 +110,7 @@ pub fn from_two(
 ) -> Result<Models, String> {
     let one = |path: &Path, device: &'static str, size| {
         read(path, |tree| {
-            let names = Names {
-                device,
-                matrix: ALONE[0],
-                distortion: ALONE[1],
-            };
+            let names = Names { device, ..ALONE };
             right_size(tree, size)?;
             let mm_per_unit = millimetres(tree, declared)?;
             let pose = Pose::read(tree, (ROTATION, TRANSLATION), mm_per_unit)?;
