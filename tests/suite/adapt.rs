@@ -3,8 +3,8 @@
 use crate::measured::SPHERE;
 use crate::written::{Written, geometric, program};
 use algo::pattern::Shot;
+use appliance::head::calibrated;
 use appliance::head::calibration::Calibration;
-use appliance::head::rig;
 use appliance::head::seam;
 use appliance::recipe::Recipe;
 use appliance::recipe::teach::{Naming, teach};
@@ -304,7 +304,7 @@ fn record(
     recipe: &Recipe,
     shots: &[Shot],
 ) -> Recording {
-    let mut rig = rig::Rig {
+    let mut rig = calibrated::Rig {
         head,
         calibration,
         timeout: TIMEOUT,

@@ -3,8 +3,8 @@
 use algo::pattern::Shot;
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
+use appliance::head::calibrated::Rig;
 use appliance::head::calibration::Calibration;
-use appliance::head::rig::Rig;
 use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, TaughtRecipe, teach};

@@ -1,11 +1,11 @@
 //! The head as a measuring instrument: its calibration, what can be measured on it, and the doctor that checks it.
 
 pub mod calibrate;
+pub mod calibrated;
 pub mod calibration;
 pub mod doctor;
 pub mod examine;
 pub mod placed;
 pub mod rasters;
-pub mod rig;
 pub mod scan;
 pub mod seam;

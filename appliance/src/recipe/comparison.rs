@@ -1,6 +1,6 @@
 //! The fixed pattern against the adaptive one on the taught part, as measured while teaching with equally many frames.
 
-use crate::head::rig::Measured;
+use crate::head::calibrated::Measured;
 use algo::phase::Trust;
 use serde::{Deserialize, Serialize};
 

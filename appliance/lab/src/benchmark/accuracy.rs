@@ -12,7 +12,7 @@ use algo::pattern::{PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::{AbsolutePhase, Modulation};
-use appliance::head::rig::Measured;
+use appliance::head::calibrated::Measured;
 use appliance::measure::{Score, Truth};
 use std::ops::Range;
 use std::time::Duration;

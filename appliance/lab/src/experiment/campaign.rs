@@ -5,7 +5,7 @@ use super::methods::{SHOWN_ADAPTIVE, SHOWN_FIXED};
 use super::runner::Runner;
 use super::scenes::{OpticsKind, Scene};
 use super::table::{self, RunRow};
-use appliance::head::rig::MeasureError;
+use appliance::head::calibrated::MeasureError;
 
 /// What is to be run.
 #[derive(Clone, Debug)]

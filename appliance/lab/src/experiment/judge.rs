@@ -3,7 +3,7 @@
 use super::cylinder::{self, Cylinder};
 use super::scenes::Judged;
 use algo::phase::Trust;
-use appliance::head::rig::Measured;
+use appliance::head::calibrated::Measured;
 use appliance::measure::{GROSS_MM, Score, Truth};
 
 /// The quality of one measurement of a part.

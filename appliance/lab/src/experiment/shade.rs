@@ -2,7 +2,7 @@
 
 use algo::geometry::Vector;
 use algo::phase::Trust;
-use appliance::head::rig::Measured;
+use appliance::head::calibrated::Measured;
 use appliance::output::canvas::Canvas;
 
 /// Elevation of the view above the plane z = 0, after a turn about z, radians.
