@@ -3,7 +3,7 @@
 use crate::measured::SPHERE;
 use crate::written::{Written, geometric, program};
 use algo::pattern::Shot;
-use appliance::head::calibrated;
+use appliance::head::calibrated::CalibratedHead;
 use appliance::head::calibration::Calibration;
 use appliance::head::seam;
 use appliance::recipe::Recipe;
@@ -304,13 +304,13 @@ fn record(
     recipe: &Recipe,
     shots: &[Shot],
 ) -> Recording {
-    let mut rig = calibrated::Rig {
+    let mut head = CalibratedHead {
         head,
         calibration,
         timeout: TIMEOUT,
     };
     let function = &recipe.function;
-    let measured = rig
+    let measured = head
         .measure(function, shots, None, &|_| ())
         .expect("a measurement");
     let (columns, rows) = (function.columns(), function.rows());

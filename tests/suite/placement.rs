@@ -3,7 +3,7 @@
 use algo::pattern::Shot;
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
-use appliance::head::calibrated::Rig;
+use appliance::head::calibrated::CalibratedHead;
 use appliance::head::calibration::Calibration;
 use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::plan::Plan;
@@ -84,13 +84,13 @@ fn wrong_orders(
         .map(|&turns| AbsolutePhase::from_turns(turns))
         .collect();
     let map = safe(&golden, &arrays.phase_reach, reach);
-    let mut rig = Rig {
+    let mut head = CalibratedHead {
         head: &mut bed.head,
         calibration: &bed.calibration,
         timeout: TIMEOUT,
     };
     let function = &taught.recipe.function;
-    let measured = rig.measure(function, shots, Some(&map), &|_| ()).unwrap();
+    let measured = head.measure(function, shots, Some(&map), &|_| ()).unwrap();
     let truth = bed.stage.truth();
     let width = measured.phases.width;
     let (mut wrong, mut compared) = (0, 0);

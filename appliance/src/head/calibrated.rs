@@ -11,8 +11,8 @@ use hal::frame::Frame;
 use hal::head::DynHead;
 use std::time::Duration;
 
-/// A head with its calibration, in front of a part. (The rig of a scenario is the simulated camera and projector alone.)
-pub struct Rig<'a> {
+/// A head with its calibration, in front of a part.
+pub struct CalibratedHead<'a> {
     /// The devices.
     pub head: &'a mut DynHead,
     /// The calibration of the head.
@@ -51,7 +51,7 @@ fn impossible(error: impl std::fmt::Display) -> MeasureError {
     MeasureError::Impossible(error.to_string())
 }
 
-impl Rig<'_> {
+impl CalibratedHead<'_> {
     /// Projects the shots of a phase function and measures the part in the default working range of [`Triangulator::new`]. Levels that are unwrapped about a
     /// known map take `map` (row-major), or without one the reference phase map. `progress` gets the share of the frames taken.
     ///

@@ -6,7 +6,7 @@ use super::PatternFile;
 use super::comparison::ComparisonFile;
 use super::golden::GoldenPart;
 use crate::error::code_of;
-use crate::head::calibrated::{MeasureError, Measured, Rig};
+use crate::head::calibrated::{CalibratedHead, MeasureError, Measured};
 use crate::head::calibration::Calibration;
 use crate::head::scan::Scan;
 use crate::station::error_code;
@@ -115,7 +115,7 @@ pub fn teach_while(
         false => Err(TeachError::Ended),
     };
     stage(0.0, "measuring the part")?;
-    let mut rig = Rig {
+    let mut head = CalibratedHead {
         head,
         calibration,
         timeout,
@@ -127,7 +127,7 @@ pub fn teach_while(
     let preliminary = PhaseFunction::vertical(columns, rows, columns as f64 / PRELIMINARY_PITCH_PX)
         .map_err(|error| TeachError::Rig(error.to_string()))?;
     let shots = Sequence::geometric(preliminary.range(), LEVELS, SHIFTS);
-    let first = rig.measure(&preliminary, &shots, None, &|share| {
+    let first = head.measure(&preliminary, &shots, None, &|share| {
         // Checked before the next stage: a sequence is not interrupted.
         progress(0.3 * share, "measuring the part");
     })?;
@@ -146,7 +146,7 @@ pub fn teach_while(
     stage(0.4, "measuring the part with its own pattern")?;
     let expected = map.expected_phase(&function);
     let full = Sequence::dense(DENSE_N, SHIFTS);
-    let golden = rig.measure(&function, &full, Some(&expected), &|share| {
+    let golden = head.measure(&function, &full, Some(&expected), &|share| {
         progress(0.4 + 0.3 * share, "measuring the part with its own pattern");
     })?;
     refuse_empty(&golden.phases)?;

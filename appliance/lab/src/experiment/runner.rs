@@ -11,7 +11,7 @@ use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use algo::units::AbsolutePhase;
-use appliance::head::calibrated::{MeasureError, Measured, Rig};
+use appliance::head::calibrated::{CalibratedHead, MeasureError, Measured};
 use appliance::head::calibration::Calibration;
 use hal::head::DynHead;
 use sim::{Stage, Truth};
@@ -190,12 +190,12 @@ impl Runner {
         map: Option<&[AbsolutePhase]>,
     ) -> Result<Measured, MeasureError> {
         self.stage.reseed(self.learnt.seed * STREAMS + noise_stream);
-        let mut rig = Rig {
+        let mut head = CalibratedHead {
             head: &mut self.head,
             calibration: &self.calibration,
             timeout: TIMEOUT,
         };
-        rig.measure(function, shots, map, &|_| ())
+        head.measure(function, shots, map, &|_| ())
     }
 
     fn vertical(&self, fringes: f64) -> Result<PhaseFunction, MeasureError> {
