@@ -5,7 +5,7 @@ mod known;
 mod report;
 mod score;
 
-pub use report::{Manner, RecipeName, Report};
+pub use report::{Manner, Report};
 pub use score::{GROSS_MM, Score, Truth};
 
 use crate::error::{Exit, Failure};
@@ -20,7 +20,7 @@ use algo::phase::Decoder;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::AbsolutePhase;
 use hal::replay::Recording;
-use hal::replay::recording::PatternSpec;
+use hal::replay::recording::{PatternSpec, RecipeReference};
 use known::Known;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -166,8 +166,8 @@ fn measure_about(
             kind: channel.kind(),
             ratios: channel.ratios(),
             map,
-            recipe: recipe.map(|recipe| RecipeName {
-                number: recipe.id.number,
+            recipe: recipe.map(|recipe| RecipeReference {
+                number: u32::from(recipe.id.number),
                 fingerprint: recipe.id.fingerprint.clone(),
             }),
         },

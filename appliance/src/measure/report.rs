@@ -4,6 +4,7 @@ use super::{Score, Truth};
 use crate::output::cloud::Surface;
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
+use hal::replay::recording::RecipeReference;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -19,16 +20,7 @@ pub struct Manner {
     pub map: Option<&'static str>,
     /// The recipe that was given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub recipe: Option<RecipeName>,
-}
-
-/// Which recipe a recording was measured with.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct RecipeName {
-    /// Its number.
-    pub number: u16,
-    /// Its fingerprint.
-    pub fingerprint: String,
+    pub recipe: Option<RecipeReference>,
 }
 
 /// The summary of a measurement. Everything but the times is the same with any number of threads.
@@ -134,7 +126,7 @@ impl Report {
         if let Some(map) = map {
             line("unwrapped about", format!("the {map} map"));
         }
-        if let Some(RecipeName {
+        if let Some(RecipeReference {
             number,
             fingerprint,
         }) = recipe
