@@ -1,9 +1,10 @@
 //! Refusals for the log: what was refused to which address, with a rate limit, so that an attack cannot flood the log.
 
-use std::fmt;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
+
+use crate::system::progress::Progress;
 
 /// At most one line in this time.
 const PAUSE: Duration = Duration::from_secs(10);
@@ -32,17 +33,11 @@ impl Refused {
 }
 
 /// Logs refusals. Cheap to clone; clones share the rate limit.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Refusals {
-    say: Arc<dyn Fn(&str) + Send + Sync>,
+    progress: Progress,
     /// By kind, so that a flood of one does not hide another.
     limits: Arc<Mutex<[RateLimit; 3]>>,
-}
-
-impl fmt::Debug for Refusals {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Refusals").finish_non_exhaustive()
-    }
 }
 
 #[derive(Debug, Default)]
@@ -68,10 +63,10 @@ impl RateLimit {
 }
 
 impl Refusals {
-    /// `say` gets one line at a time.
-    pub fn new(say: impl Fn(&str) + Send + Sync + 'static) -> Self {
+    /// Logs refusals as warnings.
+    pub fn new(progress: Progress) -> Self {
         Self {
-            say: Arc::new(say),
+            progress,
             limits: Arc::default(),
         }
     }
@@ -79,14 +74,14 @@ impl Refusals {
     /// Logs a refusal, or counts it for the next line.
     pub(super) fn note(&self, refused: Refused, peer: IpAddr) {
         let mut limits = self.limits.lock().unwrap_or_else(PoisonError::into_inner);
-        match limits[refused as usize].pass(Instant::now()) {
-            None => {}
-            Some(0) => (self.say)(&format!("Modbus, {peer}: {}", refused.words())),
-            Some(silent) => (self.say)(&format!(
-                "Modbus, {peer}: {}; {silent} more since the last such line",
-                refused.words()
-            )),
+        let Some(silent) = limits[refused as usize].pass(Instant::now()) else {
+            return;
+        };
+        let mut line = format!("Modbus, {peer}: {}", refused.words());
+        if silent > 0 {
+            line += &format!("; {silent} more since the last such line");
         }
+        self.progress.warn(&line);
     }
 }
 

@@ -155,11 +155,10 @@ impl Daemon {
                 proxies: config.http.proxies.clone(),
             });
             let (station, config) = (station.clone(), config.clone());
-            let log = progress.clone();
             let plc = PlcSide {
                 listener: plc,
                 clients: clients.clone(),
-                refusals: modbus::Refusals::new(move |line| log.warn(line)),
+                refusals: modbus::Refusals::new(progress.clone()),
             };
             let serve = move || {
                 runtime.block_on(serve(plc, page, station, site, &config, stopped));

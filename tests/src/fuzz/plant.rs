@@ -6,6 +6,7 @@ use appliance::station::{
     ActiveRecipe, Effect, Event, Identity, Inspection, Job, Limits, Micros, RecipeKey, Request,
     Settings, Station, StationHandle, Verdict,
 };
+use appliance::system::progress::Progress;
 use std::future;
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -81,7 +82,7 @@ impl Plant {
             runtime.block_on(async {
                 let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
                 let address = listener.local_addr().expect("an address");
-                let refusals = Refusals::new(|_: &str| {});
+                let refusals = Refusals::new(Progress::new(true));
                 let clients = Clients::new(64);
                 let end = future::pending();
                 let served = serve(listener, handle.clone(), options, clients, refusals, end);

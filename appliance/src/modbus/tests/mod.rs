@@ -7,8 +7,8 @@ mod exceptions;
 mod handshakes;
 
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
-use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -22,13 +22,15 @@ use super::*;
 use crate::config::WordOrder;
 use crate::station::snapshot::status;
 use crate::station::*;
+use crate::system::logbook::Logbook;
+use crate::system::progress::Progress;
 
 /// A station behind a real server on a free port, with a worker that carries out orders when asked.
 struct Plant {
     address: SocketAddr,
     handle: StationHandle,
     orders: Receiver<Effect>,
-    log: Arc<Mutex<Vec<String>>>,
+    log: Logbook,
 }
 
 impl Plant {
@@ -64,11 +66,8 @@ impl Plant {
                 None
             },
         );
-        let log = Arc::new(Mutex::new(Vec::new()));
-        let refusals = {
-            let log = Arc::clone(&log);
-            Refusals::new(move |line: &str| log.lock().unwrap().push(line.to_owned()))
-        };
+        let progress = Progress::new(true);
+        let log = progress.logbook().clone();
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
         tokio::spawn(serve(
@@ -76,7 +75,7 @@ impl Plant {
             handle.clone(),
             options,
             Clients::new(places),
-            refusals,
+            Refusals::new(progress),
             std::future::pending(),
         ));
         let plant = Self {
