@@ -3,7 +3,7 @@
 use crate::station::error_code;
 pub use hal::bounds::shortened;
 use hal::error::{DeviceKind, Error};
-use std::fmt;
+use std::fmt::Display;
 use std::process::ExitCode;
 
 /// Exit codes, after BSD's `sysexits.h`. The README has the table.
@@ -27,7 +27,8 @@ pub enum Exit {
 }
 
 /// A command that could not be carried out.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
 pub struct Failure {
     /// The exit code.
     pub exit: Exit,
@@ -48,7 +49,7 @@ impl Failure {
     }
 
     /// `error` while doing `what`, which names the file.
-    pub fn because(exit: Exit, what: impl fmt::Display, error: impl fmt::Display) -> Self {
+    pub fn because(exit: Exit, what: impl Display, error: impl Display) -> Self {
         Self::new(exit, format!("{what}: {error}"))
     }
 }
@@ -66,14 +67,6 @@ pub fn code_of(error: &Error) -> u16 {
         Error::Protocol { .. } => error_code::PROTOCOL,
     }
 }
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.message)
-    }
-}
-
-impl std::error::Error for Failure {}
 
 impl From<Exit> for ExitCode {
     fn from(exit: Exit) -> Self {

@@ -3,25 +3,31 @@
 use super::entry::Entry;
 use crate::station::Verdict;
 use hal::replay::recorder::RecorderError;
-use std::fmt;
 use std::io::ErrorKind;
 
 /// Why the frames of a part that did not pass are not kept, or no longer. `docs/formats.md` has the texts in the database.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unkept {
     /// Recordings are switched off.
+    #[error("off")]
     Off,
     /// Those of another part were being written.
+    #[error("busy")]
     Busy,
     /// Removed, because all together were over the quota.
+    #[error("quota")]
     Quota,
     /// Removed, because the storage had no room for results.
+    #[error("room")]
     Room,
     /// Found missing at a start.
+    #[error("gone")]
     Gone,
     /// The storage was full; with the error in words.
+    #[error("full")]
     Full(String),
     /// They could not be written, for a reason in words.
+    #[error("failed: {0}")]
     Failed(String),
 }
 
@@ -32,20 +38,6 @@ impl Unkept {
             Self::Full(words) | Self::Failed(words) => Some(words),
             _ => None,
         }
-    }
-}
-
-impl fmt::Display for Unkept {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Off => "off",
-            Self::Busy => "busy",
-            Self::Quota => "quota",
-            Self::Room => "room",
-            Self::Gone => "gone",
-            Self::Full(_) => "full",
-            Self::Failed(words) => return write!(f, "failed: {words}"),
-        })
     }
 }
 

@@ -129,7 +129,7 @@ impl Store {
     /// # Errors
     /// If the folder cannot be created or written (exit code 73).
     pub fn of_state(state: &StateFolder) -> Result<Self, Failure> {
-        let folder = state.place("recipes");
+        let folder = state.path().join("recipes");
         let opened =
             Self::open(&folder).and_then(|store| store.remove_left_behind().map(|()| store));
         opened.map_err(|error| {

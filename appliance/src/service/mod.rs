@@ -266,7 +266,7 @@ const SECRET: &str = "fringed.secret";
 
 /// Opens the access control; the secret of a new device is written to stderr here and never again.
 fn open_access(state: &StateFolder) -> Result<Access, Failure> {
-    let folder = state.place("access");
+    let folder = state.path().join("access");
     let given =
         std::env::var_os("CREDENTIALS_DIRECTORY").map(|given| Path::new(&given).join(SECRET));
     let (access, secret) = Access::open(&folder, given.as_deref())?;

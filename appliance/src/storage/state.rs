@@ -82,11 +82,6 @@ impl StateFolder {
         &self.path
     }
 
-    /// The path of a file or folder in it.
-    pub fn place(&self, name: &str) -> PathBuf {
-        self.path.join(name)
-    }
-
     /// What the counter's file says; 0 without a file.
     ///
     /// # Errors
