@@ -6,10 +6,9 @@
 
 use algo::frame::{FrameView, Samples};
 use algo::geometry::{Pinhole, PinholeModel, Reference, Triangulator};
-use algo::inspect::{Comparison, Golden, Region, Weight};
 use algo::pattern::{Encoder, PhaseFunction, Sequence, Shot};
 use algo::phase::{Decoder, Trust};
-use algo::pipeline::{HeightMap, PhaseMap, decode, triangulate};
+use algo::pipeline::{PhaseMap, decode, triangulate};
 use algo::units::AbsolutePhase;
 use divan::Bencher;
 use divan::counter::ItemsCount;
@@ -17,7 +16,6 @@ use std::f64::consts::TAU;
 
 const SIDE: usize = 512;
 const PIXELS: usize = SIDE * SIDE;
-const NOISE_COUNTS: f64 = 3.7;
 
 fn main() {
     divan::main();
@@ -86,19 +84,6 @@ impl Scene {
     fn decode(&self) -> PhaseMap {
         decode(&self.decoder, &self.views(), Some(&self.map), None).unwrap()
     }
-
-    fn heights(&self) -> HeightMap {
-        let mut phases = self.decode();
-        let noise = Some(NOISE_COUNTS);
-        triangulate(
-            &triangulator(),
-            &self.decoder,
-            noise,
-            None,
-            None,
-            &mut phases,
-        )
-    }
 }
 
 fn bench_decode(bencher: Bencher<'_, '_>, scene: &Scene) {
@@ -163,23 +148,6 @@ fn reference_map(bencher: Bencher<'_, '_>) {
     bencher
         .counter(counter)
         .bench(|| triangulator.reference_map());
-}
-
-#[divan::bench]
-fn gauge_over_the_frame(bencher: Bencher<'_, '_>) {
-    let heights = Scene::geometric().heights();
-    let golden = Golden {
-        width: SIDE,
-        height: heights.height.clone(),
-        weight: vec![Weight::FULL; heights.height.len()],
-    };
-    let end = SIDE as f64;
-    let corners = [(0.0, 0.0), (end, 0.0), (end, end), (0.0, end)];
-    let region = Region::polygon(&corners, SIDE, SIDE).unwrap();
-    bencher.counter(ItemsCount::new(PIXELS)).bench(|| {
-        let comparison = Comparison::new(&golden, &heights);
-        comparison.deviation(&region, 9)
-    });
 }
 
 #[divan::bench]

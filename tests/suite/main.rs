@@ -47,4 +47,5 @@ mod triangulation;
 mod twin;
 mod two_clients;
 mod weights;
+mod whole_maps;
 mod written;

@@ -1,7 +1,8 @@
 //! Measurement in strips, as in production, compared with exact triangulation and with the comparison of whole maps.
 
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
-use algo::inspect::{Comparison, Findings, Golden, Measure, Production, Region, Weight};
+use super::whole_maps::{Comparison, Golden};
+use algo::inspect::{Findings, Measure, Production, Region, Weight};
 use algo::phase::Trust;
 use algo::pipeline::{HeightMap, decode};
 use algo::simd::Backend;

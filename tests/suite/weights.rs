@@ -2,7 +2,8 @@
 
 use super::placement::{bed, scenario, taught};
 use super::production::{compare, expected, frames, parts, plan, plan_with};
-use algo::inspect::{Comparison, Golden, Weight};
+use super::whole_maps::{Comparison, Golden};
+use algo::inspect::Weight;
 use algo::pipeline::HeightMap;
 use algo::units::Height;
 use appliance::head::seam;

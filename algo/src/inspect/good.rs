@@ -43,7 +43,7 @@
 
 use super::Weight;
 use super::align::{Alignment, Facet, GoldenSurface};
-use super::deviation::MIN_SUPPORT;
+use super::gauge::MIN_SUPPORT;
 use super::table::IntegralTable;
 use crate::geometry::Vector;
 use crate::pipeline::for_each_row;

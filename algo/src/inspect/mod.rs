@@ -1,7 +1,6 @@
 //! What a height map says about a part: regions, gauges and the comparison with the golden map.
 
 mod align;
-mod deviation;
 mod gauge;
 pub mod good;
 mod mask;
@@ -12,8 +11,7 @@ mod table;
 mod weight;
 
 pub use align::{Facet, GoldenSurface, Motion, Placed};
-pub use deviation::{Comparison, Golden, Reading};
-pub use gauge::{Axis, Measure, TooFine};
+pub use gauge::{Axis, Measure, Reading, TooFine};
 pub use mask::eroded;
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};

@@ -16,6 +16,19 @@ pub use level::{Weights, mean, sigma, step, tilt, volume};
 pub use taught::TaughtCell;
 pub(super) use taught::taught_cells;
 
+/// A mean over a square needs at least this share of its pixels.
+pub(super) const MIN_SUPPORT: f64 = 0.5;
+
+/// What a gauge found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// The value in mm or as a share.
+    pub value: f64,
+    /// Its error over repeated measurements of the same part, 1 σ, where the noise is known. Golden's own noise adds the same error
+    /// every time and is not in it.
+    pub sigma: Option<f64>,
+}
+
 /// The axes that a plane may be tilted about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
@@ -29,8 +42,8 @@ pub enum Axis {
 /// are averaged over, in camera pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Measure {
-    /// The largest mean deviation from golden of squares of `side` pixels about every pixel, mm; see
-    /// [`Comparison::deviation`](super::Comparison::deviation).
+    /// The mean weighted deviation from golden of largest magnitude, with its sign, of the squares of `side` pixels about every
+    /// pixel, mm: single noisy pixels do not decide. Squares of which less than half can be compared do not count.
     Deviation {
         /// Odd; 1 = single pixels.
         side: usize,

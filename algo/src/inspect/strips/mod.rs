@@ -19,8 +19,8 @@
 //! finds all squares about its own rows. Offsets and deviations are in nm.
 //!
 //! # Accuracy
-//! All sums are whole numbers, so the findings do not depend on the number of strips or threads. They are those of the comparison of
-//! whole maps ([`Comparison`](super::Comparison)): `strips_find_what_the_comparison_of_whole_maps_finds`,
+//! All sums are whole numbers, so the findings do not depend on the number of strips or threads. They are those of a comparison
+//! of whole maps: `strips_find_what_the_comparison_of_whole_maps_finds`,
 //! `strips_weigh_deviations_as_the_comparison_of_whole_maps_does`.
 
 mod coordinates;

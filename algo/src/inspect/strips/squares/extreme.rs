@@ -1,7 +1,7 @@
 //! The square of largest mean deviation, exactly, from packed sums down the columns.
 
 use super::COUNT_BIT;
-use crate::inspect::deviation::MIN_SUPPORT;
+use crate::inspect::gauge::MIN_SUPPORT;
 use crate::pipeline::NO_OFFSET;
 use core::ops::Range;
 

@@ -1,14 +1,13 @@
-//! A measured height map against the golden one: deviation and coverage of regions.
+//! A whole measured height map against the golden one, pixel by pixel: deviation and coverage of regions. Production by strips is
+//! compared with it.
 
-use super::table::IntegralTable;
-use super::{Region, Weight};
-use crate::pipeline::{HeightMap, Window};
-use crate::units::Height;
-use alloc::vec::Vec;
+use algo::inspect::{Reading, Region, Weight};
+use algo::pipeline::{HeightMap, Window};
+use algo::units::Height;
 
 /// The part as taught, row-major over the camera's frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Golden {
+pub(crate) struct Golden {
     /// Pixels per row.
     pub width: usize,
     /// Height as taught, [`Height::UNKNOWN`] where the part is not to be compared.
@@ -17,54 +16,49 @@ pub struct Golden {
     pub weight: Vec<Weight>,
 }
 
-/// What a gauge found.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reading {
-    /// The value in mm or as a share.
-    pub value: f64,
-    /// Its error over repeated measurements of the same part, 1 σ, where the noise is known. Golden's own noise adds the same error
-    /// every time and is not in it.
-    pub sigma: Option<f64>,
-}
-
-/// A measured height map beside the golden one.
-///
-/// The comparison of whole maps that production by strips ([`Production`](super::Production)) is tested against. Sums over
-/// rectangles come from integral tables.
+/// A measured height map beside the golden one. Places that only one of them knows do not count.
 #[derive(Clone, Debug)]
-pub struct Comparison<'a> {
+pub(crate) struct Comparison<'a> {
     golden: &'a Golden,
     measured: &'a HeightMap,
-    /// Deviation in nm, variance in nm², and 1 of each pixel that both maps know.
-    sums: IntegralTable<3>,
+    /// Weighted deviation in nm and its variance in nm² of each pixel that both maps know.
+    deviations: Vec<Option<(i64, f64)>>,
 }
 
 /// A mean over a square needs at least this share of its pixels.
-pub(super) const MIN_SUPPORT: f64 = 0.5;
+const MIN_SUPPORT: f64 = 0.5;
 
 impl<'a> Comparison<'a> {
-    /// Compares two maps of the same size; places that only one of them knows do not count.
+    /// Compares two maps of the same size.
     pub fn new(golden: &'a Golden, measured: &'a HeightMap) -> Self {
-        let sums = IntegralTable::new(golden.width, golden.height.len(), |place| {
-            let (deviation, variance) = at(golden, measured, place)?;
-            Some([deviation as f64, variance, 1.0])
-        });
+        let places = 0..golden.height.len();
         Self {
             golden,
             measured,
-            sums,
+            deviations: places.map(|place| at(golden, measured, place)).collect(),
         }
     }
 
     /// The mean weighted deviation over a square of `side` pixels around a place, in mm, and its σ.
     fn smoothed(&self, row: usize, column: usize, side: usize) -> Option<Reading> {
-        let [sum, variance, count] = self.sums.square(row, column, side);
+        let (width, half) = (self.golden.width, side / 2);
+        let columns = column.saturating_sub(half)..(column + half + 1).min(width);
+        let rows = self.deviations.chunks(width).skip(row.saturating_sub(half));
+        let (mut sum, mut variance, mut count) = (0, 0.0, 0);
+        for row in rows.take(row + half + 1 - row.saturating_sub(half)) {
+            for (deviation, noise) in row[columns.clone()].iter().flatten() {
+                sum += deviation;
+                variance += noise;
+                count += 1;
+            }
+        }
+        let count = f64::from(count);
         if count < MIN_SUPPORT * (side * side) as f64 {
             return None;
         }
-        let sigma = libm::sqrt(variance.max(0.0)) / count / 1e6;
+        let sigma = variance.sqrt() / count / 1e6;
         Some(Reading {
-            value: sum / count / 1e6,
+            value: sum as f64 / count / 1e6,
             sigma: (sigma > 0.0).then_some(sigma),
         })
     }
@@ -80,10 +74,10 @@ impl<'a> Comparison<'a> {
         places
             .filter(|(row, column)| {
                 let place = row * self.golden.width + column;
-                at(self.golden, self.measured, place).is_some()
+                self.deviations[place].is_some()
             })
             .filter_map(|(row, column)| self.smoothed(row, column, side))
-            .max_by(|a, b| libm::fabs(a.value).total_cmp(&libm::fabs(b.value)))
+            .max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()))
     }
 
     /// The share of a region's pixels that the measurement resolves. What noise does to it is not known here.
@@ -136,7 +130,6 @@ fn at(golden: &Golden, measured: &HeightMap, place: usize) -> Option<(i64, f64)>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use alloc::vec;
 
     const WIDTH: usize = 40;
 
