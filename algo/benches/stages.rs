@@ -109,36 +109,14 @@ fn decode_golden_4(bencher: Bencher<'_, '_>) {
 }
 
 #[divan::bench]
-fn triangulate_without_a_guess(bencher: Bencher<'_, '_>) {
+fn triangulate_every_pixel(bencher: Bencher<'_, '_>) {
     let (scene, triangulator) = (Scene::geometric(), triangulator());
     let phases = scene.decode();
     assert!(phases.count(Trust::Resolved) > PIXELS / 2);
     bencher
         .counter(ItemsCount::new(PIXELS))
         .with_inputs(|| phases.clone())
-        .bench_values(|mut phases| {
-            triangulate(&triangulator, &scene.decoder, None, None, None, &mut phases)
-        });
-}
-
-#[divan::bench]
-fn triangulate_near_a_guess(bencher: Bencher<'_, '_>) {
-    let (scene, triangulator) = (Scene::geometric(), triangulator());
-    let phases = scene.decode();
-    let guess = |_: usize, _: AbsolutePhase| Some(0.02);
-    bencher
-        .counter(ItemsCount::new(PIXELS))
-        .with_inputs(|| phases.clone())
-        .bench_values(|mut phases| {
-            triangulate(
-                &triangulator,
-                &scene.decoder,
-                None,
-                Some(&guess),
-                None,
-                &mut phases,
-            )
-        });
+        .bench_values(|mut phases| triangulate(&triangulator, &scene.decoder, None, &mut phases));
 }
 
 #[divan::bench]

@@ -2,7 +2,7 @@
 
 use algo::pattern::Shot;
 use algo::phase::Trust;
-use algo::units::AbsolutePhase;
+use algo::units::{AbsolutePhase, Height};
 use appliance::head::calibrated::CalibratedHead;
 use appliance::head::calibration::Calibration;
 use appliance::recipe::archive::{Arrays, pack};
@@ -99,9 +99,12 @@ fn wrong_orders(
             continue;
         }
         let height = f64::from(truth.height[at]);
-        let true_phase = measured
-            .triangulator
-            .phase_of(at % width, at / width, height);
+        let triangulator = &measured.triangulator;
+        let point = triangulator.point(at % width, at / width, Height::from_mm(height));
+        let light = point.and_then(|point| triangulator.projector_point(point));
+        let true_phase = light.map_or(AbsolutePhase::UNKNOWN, |(xi, eta)| {
+            AbsolutePhase::from_turns(function.at(xi, eta))
+        });
         compared += 1;
         if (measured.phases.phase[at] - true_phase).turns().abs() > 0.5 {
             wrong += 1;

@@ -305,12 +305,4 @@ impl Triangulator {
         let ray = self.falling_ray(u as f64, v as f64)?;
         height.is_known().then(|| self.on_ray(ray, height.mm()))
     }
-
-    /// The phase that pixel (u, v) has if its surface is at `height` (mm), [`AbsolutePhase::UNKNOWN`] where it
-    /// has none.
-    pub fn phase_of(&self, u: usize, v: usize, height: f64) -> AbsolutePhase {
-        self.point(u, v, Height::from_mm(height))
-            .and_then(|point| self.phase_at(point))
-            .map_or(AbsolutePhase::UNKNOWN, AbsolutePhase::from_turns)
-    }
 }

@@ -140,27 +140,18 @@ fn each_row(
     let map = map.unwrap_or(&[]);
     for_each(phases.rows(), |v, row| {
         let known = map.get(v * width..(v + 1) * width).unwrap_or(&[]);
-        decode(v, known, columns(window, v, width), row);
+        let columns = window.map_or(0..width, |window| window[v].clone());
+        decode(v, known, columns, row);
     });
     phases
 }
 
-/// The columns of row `v` inside the window.
-fn columns(window: Option<Window<'_>>, v: usize, width: usize) -> Range<usize> {
-    window.map_or(0..width, |window| window[v].clone())
-}
-
-/// A height in mm near the solution, if there is one, for a pixel (row-major index) and its phase.
-pub type Guess<'a> = &'a (dyn Fn(usize, AbsolutePhase) -> Option<f64> + Sync);
-
-/// Triangulates every resolved pixel inside `window`, and marks those without a height in the working range as
-/// [`Trust::OutOfRange`]. `noise` is σ of one sample in counts, for σ_z; `guess` makes it faster.
+/// Triangulates every resolved pixel, and marks those without a height in the working range as [`Trust::OutOfRange`]. `noise` is σ of
+/// one sample in counts, for σ_z.
 pub fn triangulate(
     triangulator: &Triangulator,
     decoder: &Decoder,
     noise: Option<f64>,
-    guess: Option<Guess<'_>>,
-    window: Option<Window<'_>>,
     phases: &mut PhaseMap,
 ) -> HeightMap {
     let width = phases.width;
@@ -175,18 +166,11 @@ pub fn triangulate(
         .zip(phases.rows())
         .collect();
     for_each(rows, |v, ((heights, sigmas), phases)| {
-        for u in window.map_or(0..heights.len(), |window| window[v].clone()) {
+        for u in 0..heights.len() {
             if phases.trust[u] != Trust::Resolved {
                 continue;
             }
-            let phase = phases.phase[u];
-            let near = guess.and_then(|guess| guess(v * width + u, phase));
-            let (column, row) = (u as f64, v as f64);
-            let solved = match near {
-                Some(near) => triangulator.solve_near(column, row, phase.turns(), near),
-                None => triangulator.solve(column, row, phase.turns()),
-            };
-            match solved {
+            match triangulator.solve(u as f64, v as f64, phases.phase[u].turns()) {
                 None => phases.trust[u] = Trust::OutOfRange,
                 Some(solution) => {
                     heights[u] = Height::from_mm(solution.point.z);

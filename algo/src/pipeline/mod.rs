@@ -11,7 +11,7 @@ pub(crate) use cubic::{
     offset_row, sum_variances,
 };
 pub use cubic::{HeightCubics, KnownSurface};
-pub use measure::{Guess, HeightMap, PhaseMap, Window, arrive, decode, decode_last, triangulate};
+pub use measure::{HeightMap, PhaseMap, Window, arrive, decode, decode_last, triangulate};
 pub use noise::sample_noise;
 pub use plate::{Plate, PlateError};
 pub use rows::for_each_row;

@@ -90,14 +90,7 @@ impl<'a> Scan<'a> {
         noise_counts: Option<f64>,
         phases: &mut PhaseMap,
     ) -> HeightMap {
-        pipeline::triangulate(
-            triangulator,
-            &self.decoder,
-            noise_counts,
-            None,
-            None,
-            phases,
-        )
+        pipeline::triangulate(triangulator, &self.decoder, noise_counts, phases)
     }
 }
 

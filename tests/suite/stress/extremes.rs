@@ -211,7 +211,7 @@ fn what_has_no_phase_has_no_height_whatever_the_frames_hold() {
             let decoder = stack.decoder();
             let run = || {
                 let mut phases = stack.decode();
-                let heights = triangulate(&solver, &decoder, Some(2.5), None, None, &mut phases);
+                let heights = triangulate(&solver, &decoder, Some(2.5), &mut phases);
                 (phases, heights)
             };
             let (phases, heights) = run();

@@ -232,6 +232,6 @@ fn score(measured: &Measured, truth: &sim::Truth, turns: &[f64]) -> Option<Score
             .collect(),
     };
     let (triangulator, decoder) = (&measured.triangulator, &measured.decoder);
-    let heights = pipeline::triangulate(triangulator, decoder, None, None, None, &mut phases);
+    let heights = pipeline::triangulate(triangulator, decoder, None, &mut phases);
     Truth::from(truth).score(&phases, &heights)
 }
