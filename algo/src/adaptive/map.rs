@@ -1,6 +1,7 @@
 //! The projector point that lights each camera pixel's point of the surface.
 
 use crate::geometry::Triangulator;
+use crate::math::around;
 use crate::pattern::PhaseFunction;
 use crate::pipeline::{HeightMap, for_each_row};
 use crate::units::AbsolutePhase;
@@ -81,23 +82,14 @@ impl ProjectorMap {
 
     /// Erodes the known region by one pixel, because silhouettes mix surfaces: a pixel stays known if all 3 × 3 pixels around it, inside the frame, are known.
     pub fn eroded(&self) -> Self {
-        let (width, height) = (self.width as isize, self.height() as isize);
-        let keep = |u: isize, v: isize| {
-            (-1..=1).all(|dv| {
-                (-1..=1).all(|du| {
-                    let (u, v) = (u + du, v + dv);
-                    let outside = u < 0 || v < 0 || u >= width || v >= height;
-                    outside || self.at(u, v).is_some()
-                })
-            })
-        };
         let points = (0..self.points.len()).map(|place| {
-            let (u, v) = (place % self.width, place / self.width);
-            if keep(u as isize, v as isize) {
-                self.points[place]
-            } else {
-                UNKNOWN
-            }
+            let columns = around(place % self.width, 1, self.width);
+            let mut rows = around(place / self.width, 1, self.height());
+            let known = rows.all(|v| {
+                let row = &self.points[v * self.width..][columns.clone()];
+                row.iter().all(|point| !point[0].is_nan())
+            });
+            if known { self.points[place] } else { UNKNOWN }
         });
         Self {
             width: self.width,

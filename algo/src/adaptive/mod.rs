@@ -15,7 +15,7 @@ mod placement;
 
 pub use field::Field;
 pub use map::ProjectorMap;
-pub use placement::{Surface, phase_reach};
+pub use placement::phase_reach;
 
 use crate::pattern::PhaseFunctionError;
 

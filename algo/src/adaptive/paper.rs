@@ -7,7 +7,7 @@
 use super::field::Field;
 use super::integrate::rows_from_zero;
 use super::{AdaptError, ProjectorMap};
-use crate::inspect::polygon_spans;
+use crate::inspect::{components, polygon_spans};
 use crate::pattern::PhaseFunction;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -48,8 +48,10 @@ pub fn adapt(
         .map(|slope| *slope > PROJECTOR_PITCH / image_pitch)
         .collect();
     let mut field = Field::uniform(columns, rows, 1.0 / PROJECTOR_PITCH);
-    for component in components(&steep, map.width) {
-        stretch(&mut field, &map, &slopes, &component, image_pitch);
+    for component in components(&steep, map.width, true) {
+        if component.len() >= MIN_COMPONENT {
+            stretch(&mut field, &map, &slopes, &component, image_pitch);
+        }
     }
     let turns = rows_from_zero(&field.smoothed(SMOOTHING));
     PhaseFunction::sampled(columns, rows, turns).map_err(AdaptError::Pattern)
@@ -67,38 +69,6 @@ fn slopes(map: &ProjectorMap) -> Vec<f64> {
     (0..map.points.len())
         .map(|place| slope(place).unwrap_or(f64::NAN))
         .collect()
-}
-
-/// The connected components (8 neighbours) of a mask, by region growing; small ones are dropped.
-fn components(mask: &[bool], width: usize) -> Vec<Vec<usize>> {
-    let height = mask.len() / width.max(1);
-    let mut seen = vec![false; mask.len()];
-    let mut found = Vec::new();
-    for start in 0..mask.len() {
-        if !mask[start] || seen[start] {
-            continue;
-        }
-        seen[start] = true;
-        let mut component = vec![start];
-        let mut next = 0;
-        while let Some(&place) = component.get(next) {
-            next += 1;
-            let (u, v) = (place % width, place / width);
-            for row in v.saturating_sub(1)..(v + 2).min(height) {
-                for column in u.saturating_sub(1)..(u + 2).min(width) {
-                    let beside = row * width + column;
-                    if mask[beside] && !seen[beside] {
-                        seen[beside] = true;
-                        component.push(beside);
-                    }
-                }
-            }
-        }
-        if component.len() >= MIN_COMPONENT {
-            found.push(component);
-        }
-    }
-    found
 }
 
 /// Eq. 7 over the component's image in the pattern: its boundary is mapped by eq. 4 and filled; each

@@ -5,21 +5,10 @@
 //! surface and the declared tolerance of placement decide which pixels are safe.
 
 use crate::geometry::{Triangulator, Vector};
-use crate::pipeline::{for_each_row, map_rows};
-use crate::units::{AbsolutePhase, Height};
+use crate::math::around;
+use crate::pipeline::{KnownSurface, for_each_row, map_rows};
 use alloc::vec;
 use alloc::vec::Vec;
-
-/// The part as taught, row-major over the camera's frame.
-#[derive(Clone, Copy, Debug)]
-pub struct Surface<'a> {
-    /// Pixels per row.
-    pub width: usize,
-    /// z, [`Height::UNKNOWN`] where not resolved.
-    pub height: &'a [Height],
-    /// Φ, [`AbsolutePhase::UNKNOWN`] where not resolved.
-    pub phase: &'a [AbsolutePhase],
-}
 
 /// Directions of the moves that are tried: the 26 neighbours of a cube's centre.
 const DIRECTIONS: usize = 26;
@@ -35,7 +24,7 @@ const BAND: usize = 64;
 /// Every golden point is moved along 26 directions and projected. Its phase there, extrapolated by the golden gradient to each
 /// of the four pixels around it, is compared with the golden phase of that pixel. Occlusion is neglected, which can only make the
 /// result larger.
-pub fn phase_reach(triangulator: &Triangulator, golden: Surface<'_>, tolerance: f64) -> Vec<f32> {
+pub fn phase_reach(triangulator: &Triangulator, golden: &KnownSurface, tolerance: f64) -> Vec<f32> {
     let width = golden.width.max(1);
     let rows = golden.height.len() / width;
     let points = points(triangulator, golden);
@@ -88,7 +77,7 @@ impl Moved {
     }
 
     /// Raises the reach of the four pixels around it.
-    fn raise(&self, reach: &mut [f32], golden: Surface<'_>) {
+    fn raise(&self, reach: &mut [f32], golden: &KnownSurface) {
         let (width, rows) = (golden.width, golden.height.len() / golden.width);
         let (left, top) = (libm::floor(self.to.0), libm::floor(self.to.1));
         for (u, v) in [
@@ -114,7 +103,7 @@ impl Moved {
 
 /// The golden gradient at a pixel in turns per pixel: the smaller of the differences to both sides,
 /// so that it does not cross an edge of the surface.
-fn gradient(golden: Surface<'_>, u: usize, v: usize) -> (f64, f64) {
+fn gradient(golden: &KnownSurface, u: usize, v: usize) -> (f64, f64) {
     let (width, rows) = (golden.width, golden.height.len() / golden.width);
     let at = |u: usize, v: usize| {
         let inside = u < width && v < rows;
@@ -136,7 +125,7 @@ fn gradient(golden: Surface<'_>, u: usize, v: usize) -> (f64, f64) {
     )
 }
 
-fn points(triangulator: &Triangulator, golden: Surface<'_>) -> Vec<Option<Vector>> {
+fn points(triangulator: &Triangulator, golden: &KnownSurface) -> Vec<Option<Vector>> {
     let mut points = vec![None; golden.height.len()];
     for_each_row(&mut points, golden.width, |v, row| {
         for (u, point) in row.iter_mut().enumerate() {
@@ -166,14 +155,12 @@ fn forbid_near_unknown(reach: &mut [f32], known: &[bool], width: usize, away: us
     for_each_row(&mut near_row, width, |v, row| {
         let line = &known[v * width..(v + 1) * width];
         for (u, near) in row.iter_mut().enumerate() {
-            let window = &line[u.saturating_sub(away)..(u + away + 1).min(width)];
-            *near = window.contains(&false);
+            *near = line[around(u, away, width)].contains(&false);
         }
     });
     for_each_row(reach, width, |v, row| {
         for (u, reach) in row.iter_mut().enumerate() {
-            let lines = v.saturating_sub(away)..(v + away + 1).min(rows);
-            if lines.into_iter().any(|v| near_row[v * width + u]) {
+            if around(v, away, rows).any(|v| near_row[v * width + u]) {
                 *reach = f32::INFINITY;
             }
         }

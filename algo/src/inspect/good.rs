@@ -46,6 +46,7 @@ use super::align::{Alignment, Facet, GoldenSurface};
 use super::gauge::MIN_SUPPORT;
 use super::table::IntegralTable;
 use crate::geometry::Vector;
+use crate::math::around;
 use crate::pipeline::for_each_row;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -78,8 +79,8 @@ impl DeviationNoise<'_> {
             let ratios = sigmas.iter().map(|sigma| most / f64::from(*sigma));
             for (place, ratio) in ratios.enumerate().filter(|(_, ratio)| *ratio < 1.0) {
                 let (row, column) = (place / width, place % width);
-                let columns = column.saturating_sub(reach)..(column + reach + 1).min(width);
-                for row in row.saturating_sub(reach)..(row + reach + 1).min(rows) {
+                let columns = around(column, reach, width);
+                for row in around(row, reach, rows) {
                     let shares = &mut shares[row * width..][columns.clone()];
                     shares
                         .iter_mut()

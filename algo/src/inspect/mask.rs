@@ -1,6 +1,39 @@
 //! Masks of pixels.
 
+use crate::math::around;
+use alloc::vec;
 use alloc::vec::Vec;
+
+/// The connected components of a mask, by region growing: their places in a row-major map. Pixels that share an edge are connected,
+/// and with `corners` those that share a corner.
+pub(crate) fn components(mask: &[bool], width: usize, corners: bool) -> Vec<Vec<usize>> {
+    let rows = mask.len() / width.max(1);
+    let mut left = mask.to_vec();
+    let mut found = Vec::new();
+    for start in 0..mask.len() {
+        if !left[start] {
+            continue;
+        }
+        left[start] = false;
+        let mut component = vec![start];
+        let mut next = 0;
+        while let Some(&place) = component.get(next) {
+            next += 1;
+            let (u, v) = (place % width, place / width);
+            for row in around(v, 1, rows) {
+                for column in around(u, 1, width) {
+                    let beside = row * width + column;
+                    if left[beside] && (corners || row == v || column == u) {
+                        left[beside] = false;
+                        component.push(beside);
+                    }
+                }
+            }
+        }
+        found.push(component);
+    }
+    found
+}
 
 /// Takes `by` pixels off every edge of a mask (square neighbourhood); the frame's border is an edge.
 pub fn eroded(mask: &[bool], width: usize, by: usize) -> Vec<bool> {

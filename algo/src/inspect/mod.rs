@@ -12,6 +12,7 @@ mod weight;
 
 pub use align::{Facet, GoldenSurface, Motion, Placed};
 pub use gauge::{Axis, Measure, Reading, TooFine};
+pub(crate) use mask::components;
 pub use mask::eroded;
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};

@@ -1,6 +1,6 @@
 //! Openings of a part: places inside it where nothing was resolved when it was taught.
 
-use alloc::vec;
+use super::mask::components;
 use alloc::vec::Vec;
 
 /// A connected set of unresolved pixels that does not touch the frame's border.
@@ -19,35 +19,16 @@ pub struct Opening {
 /// first. Connected means sharing an edge.
 pub fn openings(resolved: &[bool], width: usize, min_pixels: usize) -> Vec<Opening> {
     let rows = resolved.len() / width.max(1);
-    let mut seen = vec![false; resolved.len()];
-    let mut found = Vec::new();
-    let mut component = Vec::new();
-    for start in 0..resolved.len() {
-        if resolved[start] || seen[start] {
-            continue;
-        }
-        component.clear();
-        component.push(start);
-        seen[start] = true;
-        let (mut next, mut open) = (0, false);
-        while let Some(&place) = component.get(next) {
-            next += 1;
-            let (row, column) = (place / width, place % width);
-            if row == 0 || column == 0 || row + 1 == rows || column + 1 == width {
-                open = true;
-                continue;
-            }
-            for beside in [place - 1, place + 1, place - width, place + width] {
-                if !resolved[beside] && !seen[beside] {
-                    seen[beside] = true;
-                    component.push(beside);
-                }
-            }
-        }
-        if !open && component.len() >= min_pixels {
-            found.extend(opening(&component, resolved, width));
-        }
-    }
+    let inside = |&place: &usize| {
+        let (row, column) = (place / width, place % width);
+        row > 0 && column > 0 && row + 1 < rows && column + 1 < width
+    };
+    let unresolved: Vec<bool> = resolved.iter().map(|resolved| !resolved).collect();
+    let mut found: Vec<Opening> = components(&unresolved, width, false)
+        .iter()
+        .filter(|component| component.len() >= min_pixels && component.iter().all(inside))
+        .filter_map(|component| opening(component, resolved, width))
+        .collect();
     found.sort_by_key(|opening| core::cmp::Reverse(opening.pixels));
     found
 }
@@ -105,5 +86,18 @@ mod tests {
         assert_eq!(found[0].reach, 8);
         assert_eq!(openings(&resolved, WIDTH, 1).len(), 2);
         assert!(openings(&[false; 25], 5, 1).is_empty());
+    }
+
+    #[test]
+    fn a_notch_at_any_border_of_the_frame_is_no_opening() {
+        const WIDTH: usize = 20;
+        for (u, v) in [(0, 8), (16, 8), (8, 0), (8, 16)] {
+            let notch = |place| {
+                let (column, row) = (place % WIDTH, place / WIDTH);
+                (u..u + 4).contains(&column) && (v..v + 4).contains(&row)
+            };
+            let resolved: Vec<bool> = (0..WIDTH * WIDTH).map(|place| !notch(place)).collect();
+            assert!(openings(&resolved, WIDTH, 1).is_empty(), "({u}, {v})");
+        }
     }
 }

@@ -1,4 +1,11 @@
-//! Rounding to whole numbers, and least squares for a few unknowns.
+//! Rounding to whole numbers, neighbours in a frame, and least squares for a few unknowns.
 
 pub(crate) mod nearest;
 pub mod solve;
+
+use core::ops::Range;
+
+/// The columns or rows within `reach` of one, in a frame that has `end` of them.
+pub(crate) fn around(at: usize, reach: usize, end: usize) -> Range<usize> {
+    at.saturating_sub(reach)..(at + reach + 1).min(end)
+}

@@ -10,7 +10,7 @@ use super::{
     SequenceKind,
 };
 use crate::head::calibration::Calibration;
-use algo::adaptive::{Surface, phase_reach};
+use algo::adaptive::phase_reach;
 use algo::geometry::Triangulator;
 use algo::inspect::{eroded, openings};
 use algo::pattern::Shot;
@@ -128,10 +128,15 @@ impl GoldenPart<'_> {
             .map(|trust| *trust == Trust::Resolved)
             .collect();
         let (regions, mut gauges) = gauges(&resolved, self.phases.width);
-        let mut arrays = self.arrays(naming.placement_tolerance_mm);
+        let surface = KnownSurface {
+            width: self.phases.width,
+            phase: self.phases.phase.clone(),
+            height: self.heights.height.clone(),
+        };
+        let mut arrays = self.arrays(&surface, naming.placement_tolerance_mm);
         let sequences = self.sequences(&arrays);
         let mut choice = planner::choose(&sequences, &gauges);
-        let good_parts = self.weigh(&mut arrays, &sequences, choice.production);
+        let good_parts = self.weigh(surface, &mut arrays, &sequences, choice.production);
         choice.reasons.extend(good_parts.words());
         for gauge in &mut gauges {
             if matches!(gauge.measures, GaugeKind::Deviation { .. }) {
@@ -190,7 +195,7 @@ impl GoldenPart<'_> {
         })
     }
 
-    fn arrays(&self, placement_tolerance_mm: f64) -> Arrays {
+    fn arrays(&self, surface: &KnownSurface, placement_tolerance_mm: f64) -> Arrays {
         let (phases, heights) = (self.phases, self.heights);
         let width = phases.width;
         let resolved = |at: usize| phases.trust[at] == Trust::Resolved;
@@ -209,11 +214,6 @@ impl GoldenPart<'_> {
         });
         let certain = |at: usize| resolved(at) && f64::from(heights.sigma[at]) <= MAX_SIGMA_MM;
         let certain: Vec<bool> = (0..phases.phase.len()).map(certain).collect();
-        let surface = Surface {
-            width,
-            height: &heights.height,
-            phase: &phases.phase,
-        };
         let full_scale = self.decoder.full_scale();
         let function = self.triangulator.function();
         let turns = |at: usize| {
@@ -299,6 +299,7 @@ impl GoldenPart<'_> {
     /// for the limit get less weight.
     fn weigh(
         &self,
+        surface: KnownSurface,
         arrays: &mut Arrays,
         sequences: &[SequenceFile],
         production: usize,
@@ -316,11 +317,7 @@ impl GoldenPart<'_> {
         // Golden was measured with the full sequence, the last.
         let noise = Noise {
             triangulator: self.triangulator,
-            surface: KnownSurface {
-                width: self.phases.width,
-                phase: self.phases.phase.clone(),
-                height: self.heights.height.clone(),
-            },
+            surface,
             golden: variances(sequences.last()),
             production: variances(sequences.get(production)),
         };
