@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path};
 
-use super::failure::RecordingError;
+use super::failure::Wrong;
 use super::manifest::{Manifest, PatternEntry};
 use crate::bounds::{
     MAX_EXPOSURE_US, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_RANGE_MM, MAX_SHIFT_TURNS, MAX_SIDE,
@@ -23,15 +23,13 @@ pub(crate) const SHIFT_TOLERANCE_TURNS: f64 = 1e-6;
 /// Fewest frames that determine offset, modulation and phase.
 const MIN_SHIFTS: usize = 3;
 
-/// Checks everything that can be checked without opening another file; `path` is the manifest's.
-pub(crate) fn manifest(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
-    values(manifest).map_err(|problem| {
-        let remedy = "correct the value, or leave it out if it is optional";
-        RecordingError::content(path, problem, remedy)
-    })?;
-    patterns(manifest, path)?;
-    frames(manifest, path)?;
-    levels(manifest, path)
+/// Checks everything that can be checked without opening another file.
+pub(crate) fn manifest(manifest: &Manifest) -> Result<(), Wrong> {
+    let remedy = "correct the value, or leave it out if it is optional";
+    values(manifest).map_err(|problem| Wrong::new(problem, remedy))?;
+    patterns(manifest)?;
+    frames(manifest)?;
+    levels(manifest)
 }
 
 /// Checks the values that do not depend on others.
@@ -81,11 +79,10 @@ fn values(manifest: &Manifest) -> Result<(), String> {
     Ok(())
 }
 
-fn patterns(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
+fn patterns(manifest: &Manifest) -> Result<(), Wrong> {
     let patterns = &manifest.pattern.0;
     if !(1..=2).contains(&patterns.len()) {
-        return Err(RecordingError::content(
-            path,
+        return Err(Wrong::new(
             format!(
                 "the recording holds {} patterns, expected 1 or 2",
                 patterns.len()
@@ -97,8 +94,7 @@ fn patterns(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
         match pattern {
             PatternEntry::Vertical { fringes } | PatternEntry::Horizontal { fringes } => {
                 if !(*fringes > 0.0 && *fringes <= MAX_FRINGES) {
-                    return Err(RecordingError::content(
-                        path,
+                    return Err(Wrong::new(
                         format!(
                             "pattern {index} has {fringes} fringes, expected above 0 and at most {MAX_FRINGES}"
                         ),
@@ -106,14 +102,14 @@ fn patterns(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
                     ));
                 }
             }
-            PatternEntry::File { file } => inside(file, path)?,
+            PatternEntry::File { file } => inside(file)?,
         }
     }
     Ok(())
 }
 
-fn frames(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
-    let wrong = |problem: String, remedy: &str| Err(RecordingError::content(path, problem, remedy));
+fn frames(manifest: &Manifest) -> Result<(), Wrong> {
+    let wrong = |problem: String, remedy: &str| Err(Wrong::new(problem, remedy));
     let frames = &manifest.frames;
     let camera = &manifest.camera;
     let bytes = u64::from(camera.width)
@@ -132,7 +128,7 @@ fn frames(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
         );
     }
     for frame in frames {
-        inside(&frame.file, path)?;
+        inside(&frame.file)?;
         let [low, high] = RATIOS;
         let (most, shift) = (MAX_SHIFT_TURNS, frame.shift_turns);
         let checked = within("ratio", frame.ratio, low, high)
@@ -159,7 +155,7 @@ fn frames(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
 }
 
 /// Checks that a file that the manifest names lies inside the recording's folder.
-fn inside(file: &str, path: &Path) -> Result<(), RecordingError> {
+fn inside(file: &str) -> Result<(), Wrong> {
     let plain = !file.is_empty()
         && file.len() <= MAX_NAME
         && !file.contains('\\')
@@ -169,8 +165,7 @@ fn inside(file: &str, path: &Path) -> Result<(), RecordingError> {
     if plain {
         return Ok(());
     }
-    Err(RecordingError::content(
-        path,
+    Err(Wrong::new(
         format!(
             "the file {:?} does not lie inside the recording's folder",
             clipped(file)
@@ -180,7 +175,7 @@ fn inside(file: &str, path: &Path) -> Result<(), RecordingError> {
 }
 
 /// Checks that the frames of equal ratio and pattern form a level whose shifts divide one turn evenly.
-fn levels(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
+fn levels(manifest: &Manifest) -> Result<(), Wrong> {
     let mut seen: Vec<(u64, usize)> = Vec::new();
     for frame in &manifest.frames {
         let level = (frame.ratio.to_bits(), frame.pattern);
@@ -195,8 +190,7 @@ fn levels(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
             .map(|other| other.shift_turns)
             .collect();
         if shifts.len() < MIN_SHIFTS {
-            return Err(RecordingError::content(
-                path,
+            return Err(Wrong::new(
                 format!(
                     "the level of ratio {} (pattern {}) has {} frames, expected at least {MIN_SHIFTS}",
                     frame.ratio,
@@ -207,8 +201,7 @@ fn levels(manifest: &Manifest, path: &Path) -> Result<(), RecordingError> {
             ));
         }
         if !evenly_spaced(&shifts) {
-            return Err(RecordingError::content(
-                path,
+            return Err(Wrong::new(
                 format!(
                     "the shift_turns of ratio {} (pattern {}) are {shifts:?}, not equally spaced over one turn",
                     frame.ratio, frame.pattern

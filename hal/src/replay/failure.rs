@@ -16,15 +16,23 @@ pub enum RecordingError {
         what: &'static str,
     },
     /// Something in the folder is wrong; this includes a missing file that the manifest names.
-    #[error("open recording {}: {problem}: {remedy}", path.display())]
+    #[error("open recording {}: {wrong}", path.display())]
     Content {
         /// The file that is wrong.
         path: PathBuf,
-        /// What is wrong with it, with the numbers.
-        problem: String,
-        /// What to do about it.
-        remedy: String,
+        /// What is wrong with it.
+        wrong: Wrong,
     },
+}
+
+/// What is wrong with a file of a recording.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{problem}: {remedy}")]
+pub struct Wrong {
+    /// With the numbers.
+    problem: String,
+    /// What to do about it.
+    remedy: String,
 }
 
 impl RecordingError {
@@ -33,17 +41,21 @@ impl RecordingError {
     pub fn is_missing(&self) -> bool {
         matches!(self, Self::Missing { .. })
     }
+}
 
-    /// The content of `path` is wrong.
-    pub(crate) fn content(
-        path: &Path,
-        problem: impl Into<String>,
-        remedy: impl Into<String>,
-    ) -> Self {
-        Self::Content {
-            path: path.to_path_buf(),
+impl Wrong {
+    pub(crate) fn new(problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self {
             problem: shortened(&problem.into()),
             remedy: remedy.into(),
+        }
+    }
+
+    /// The error of opening the recording in which the file `path` is wrong.
+    pub(crate) fn at(self, path: &Path) -> RecordingError {
+        RecordingError::Content {
+            path: path.to_path_buf(),
+            wrong: self,
         }
     }
 }

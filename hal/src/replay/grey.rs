@@ -1,11 +1,10 @@
 //! Grey PNG files of 8 and 16 bits: one camera frame each.
 
 use std::io::Cursor;
-use std::path::Path;
 
 use png::{BitDepth, ColorType};
 
-use super::failure::RecordingError;
+use super::failure::Wrong;
 use crate::frame::{FrameFormat, Pixels, Samples};
 
 /// Bytes that the decoder may allocate in addition to the samples.
@@ -14,16 +13,11 @@ const DECODER_BYTES: usize = 64 << 20;
 /// Decodes the PNG in `bytes`, which must be grey, complete, and of exactly `format`.
 ///
 /// # Errors
-/// [`RecordingError::Content`], naming `path` and what is wrong: not a PNG, cut off, colour, another size or depth, or a sample
+/// What is wrong: not a PNG, cut off, colour, another size or depth, or a sample
 /// above 2^bits − 1.
-pub(crate) fn decode(
-    bytes: &[u8],
-    format: &FrameFormat,
-    path: &Path,
-) -> Result<Pixels, RecordingError> {
+pub(crate) fn decode(bytes: &[u8], format: &FrameFormat) -> Result<Pixels, Wrong> {
     let broken = |error: png::DecodingError| {
-        RecordingError::content(
-            path,
+        Wrong::new(
             format!("the picture cannot be decoded ({error})"),
             "copy the file again, it is cut off or damaged",
         )
@@ -37,8 +31,7 @@ pub(crate) fn decode(
 
     let (width, height) = reader.info().size();
     if (width, height) != (format.width, format.height) {
-        return Err(RecordingError::content(
-            path,
+        return Err(Wrong::new(
             format!(
                 "expected {}×{} pixels, got {width}×{height}",
                 format.width, format.height
@@ -54,8 +47,7 @@ pub(crate) fn decode(
     let found = reader.info().bit_depth;
     let colour = reader.info().color_type;
     if colour != ColorType::Grayscale || found != wanted || reader.info().is_animated() {
-        return Err(RecordingError::content(
-            path,
+        return Err(Wrong::new(
             format!(
                 "expected a still grey picture of {} bits for a camera of {} bits, got {colour:?} of {} bits",
                 wanted as u8, format.bit_depth, found as u8
@@ -66,8 +58,7 @@ pub(crate) fn decode(
 
     let size = format.samples() * if format.bit_depth == 8 { 1 } else { 2 };
     if reader.output_buffer_size() != Some(size) {
-        return Err(RecordingError::content(
-            path,
+        return Err(Wrong::new(
             format!("the picture does not hold {size} bytes of samples"),
             "save the frame again",
         ));
@@ -83,8 +74,7 @@ pub(crate) fn decode(
     let (pairs, _) = raw.as_chunks::<2>();
     let samples: Vec<u16> = pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect();
     match samples.iter().max() {
-        Some(&largest) if largest > format.full_scale() => Err(RecordingError::content(
-            path,
+        Some(&largest) if largest > format.full_scale() => Err(Wrong::new(
             format!(
                 "holds the sample {largest}, a camera of {} bits gives at most {}",
                 format.bit_depth,

@@ -1,12 +1,10 @@
 //! The file form of `recording.json`, format 1: its keys and types, before any value is checked.
 
-use std::path::Path;
-
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::failure::RecordingError;
+use super::failure::Wrong;
 use crate::model::DeviceModel;
 
 /// The name of the format, in every manifest.
@@ -139,26 +137,23 @@ impl<'de> Deserialize<'de> for PatternEntries {
     }
 }
 
-/// Reads the manifest in `text`; `path` is used in messages only.
+/// Reads the manifest in `text`.
 ///
 /// Format and version are checked first, so that a newer version is reported as such and not as
 /// unknown keys.
-pub(crate) fn parse(text: &str, path: &Path) -> Result<Manifest, RecordingError> {
-    let value: serde_json::Value = serde_json::from_str(text).map_err(|error| {
-        RecordingError::content(path, format!("not valid JSON: {error}"), "mend the file")
-    })?;
+pub(crate) fn parse(text: &str) -> Result<Manifest, Wrong> {
+    let value: serde_json::Value = serde_json::from_str(text)
+        .map_err(|error| Wrong::new(format!("not valid JSON: {error}"), "mend the file"))?;
     match value.get("format").and_then(|name| name.as_str()) {
         Some(FORMAT) => {}
         Some(other) => {
-            return Err(RecordingError::content(
-                path,
+            return Err(Wrong::new(
                 format!("format is {other:?}, expected {FORMAT:?}"),
                 "name a folder that holds a recording",
             ));
         }
         None => {
-            return Err(RecordingError::content(
-                path,
+            return Err(Wrong::new(
                 "the key format is missing or no text",
                 format!("write \"format\": {FORMAT:?}"),
             ));
@@ -167,23 +162,20 @@ pub(crate) fn parse(text: &str, path: &Path) -> Result<Manifest, RecordingError>
     match value.get("version").and_then(serde_json::Value::as_u64) {
         Some(VERSION) => {}
         Some(newer) if newer > VERSION => {
-            return Err(RecordingError::content(
-                path,
+            return Err(Wrong::new(
                 format!("version {newer} is newer than this program reads ({VERSION})"),
                 "update fringed",
             ));
         }
         _ => {
-            return Err(RecordingError::content(
-                path,
+            return Err(Wrong::new(
                 "the key version is missing or no whole number from 1",
                 format!("write \"version\": {VERSION}"),
             ));
         }
     }
     serde_json::from_str(text).map_err(|error| {
-        RecordingError::content(
-            path,
+        Wrong::new(
             error.to_string(),
             "correct or remove that key; docs/formats.md lists the keys of recording format 1",
         )

@@ -5,7 +5,6 @@ use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::failure::RecordingError;
 use super::manifest::{
     CameraEntry, FORMAT, FrameEntry, Manifest, PatternEntries, PatternEntry, VERSION,
 };
@@ -64,8 +63,13 @@ pub fn write_with(
         });
     }
     let manifest = manifest_of(recording);
-    check::manifest(&manifest, &folder.join(MANIFEST)).map_err(|error| wrong(folder, &error))?;
-    check_samples(recording, folder)?;
+    check::manifest(&manifest)
+        .map_err(|wrong| wrong.to_string())
+        .and_then(|()| check_samples(recording))
+        .map_err(|problem| RecorderError::Content {
+            path: folder.to_path_buf(),
+            problem,
+        })?;
 
     let partial = partial_name(folder);
     // Created here and not in `fill`: if this fails, the folder is not ours and must not be removed.
@@ -87,19 +91,6 @@ fn partial_name(folder: &Path) -> PathBuf {
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
     folder.with_file_name(format!(".{name}.partial-{}-{count}", std::process::id()))
-}
-
-fn wrong(folder: &Path, error: &RecordingError) -> RecorderError {
-    let problem = match error {
-        RecordingError::Content {
-            problem, remedy, ..
-        } => format!("{problem}: {remedy}"),
-        missing @ RecordingError::Missing { .. } => missing.to_string(),
-    };
-    RecorderError::Content {
-        path: folder.to_path_buf(),
-        problem,
-    }
 }
 
 fn create(path: &Path, source: io::Error) -> RecorderError {
@@ -200,13 +191,8 @@ fn manifest_of(recording: &Recording) -> Manifest {
     }
 }
 
-fn check_samples(recording: &Recording, folder: &Path) -> Result<(), RecorderError> {
-    let refuse = |problem: String| {
-        Err(RecorderError::Content {
-            path: folder.to_path_buf(),
-            problem: format!("{problem}: record it again"),
-        })
-    };
+fn check_samples(recording: &Recording) -> Result<(), String> {
+    let refuse = |problem: String| Err(format!("{problem}: record it again"));
     let wanted = recording.format();
     for (index, frame) in recording.frames.iter().enumerate() {
         let format = frame.frame.format();

@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::failure::RecordingError;
+use super::failure::{RecordingError, Wrong};
 use super::manifest::{self, Manifest, PatternEntry};
 use super::{check, grey};
 use crate::frame::{Frame, FrameFormat};
@@ -120,12 +120,11 @@ impl Recording {
         if !path.exists() {
             return Err(missing(&path, MANIFEST));
         }
-        let text =
-            String::from_utf8(read(folder, MANIFEST, MAX_MANIFEST_BYTES)?).map_err(|_| {
-                RecordingError::content(&path, "the file is not UTF-8 text", "mend the file")
-            })?;
-        let manifest = manifest::parse(&text, &path)?;
-        check::manifest(&manifest, &path)?;
+        let text = String::from_utf8(read(folder, MANIFEST, MAX_MANIFEST_BYTES)?)
+            .map_err(|_| Wrong::new("the file is not UTF-8 text", "mend the file").at(&path))?;
+        let manifest = manifest::parse(&text)
+            .and_then(|manifest| check::manifest(&manifest).map(|()| manifest))
+            .map_err(|wrong| wrong.at(&path))?;
 
         let format = FrameFormat::packed(
             manifest.camera.width,
@@ -174,12 +173,11 @@ fn frames(
     let mut frames = Vec::with_capacity(manifest.frames.len());
     for (place, entry) in manifest.frames.iter().enumerate() {
         let path = folder.join(&entry.file);
-        let pixels = grey::decode(&read(folder, &entry.file, MAX_FILE_BYTES)?, &format, &path)?;
+        let file = read(folder, &entry.file, MAX_FILE_BYTES)?;
+        let pixels = grey::decode(&file, &format).map_err(|wrong| wrong.at(&path))?;
         let timestamp = Timestamp(entry.timestamp_ns.unwrap_or(0));
-        let frame =
-            Frame::new(format, Arc::new(pixels), timestamp, place as u64).map_err(|error| {
-                RecordingError::content(&path, error.to_string(), "save the frame again")
-            })?;
+        let frame = Frame::new(format, Arc::new(pixels), timestamp, place as u64)
+            .map_err(|error| Wrong::new(error.to_string(), "save the frame again").at(&path))?;
         frames.push(RecordedFrame {
             ratio: entry.ratio,
             shift_turns: entry.shift_turns,
@@ -200,15 +198,12 @@ fn patterns(folder: &Path, manifest: &Manifest) -> Result<Vec<PatternSpec>, Reco
         PatternEntry::File { file } => {
             let turns: Vec<f64> = array(folder, file, (rows, columns), "projector")?;
             if let Some(at) = turns.iter().position(|turns| !turns.is_finite()) {
-                return Err(RecordingError::content(
-                    &folder.join(file),
-                    format!(
-                        "the phase at row {}, column {} is not finite",
-                        at / columns,
-                        at % columns
-                    ),
+                let (row, column) = (at / columns, at % columns);
+                return Err(Wrong::new(
+                    format!("the phase at row {row}, column {column} is not finite"),
                     "give every projector pixel a phase",
-                ));
+                )
+                .at(&folder.join(file)));
             }
             Ok(PatternSpec::File {
                 rows,
@@ -240,25 +235,25 @@ fn array<T: Element>(
 ) -> Result<Vec<T>, RecordingError> {
     let path = folder.join(name);
     let array = npy::read(&read(folder, name, MAX_FILE_BYTES)?)
-        .map_err(|error| RecordingError::content(&path, error.problem, error.remedy))?;
+        .map_err(|error| Wrong::new(error.problem, error.remedy).at(&path))?;
     if (array.rows, array.columns) == (rows, columns) {
         return Ok(array.elements);
     }
-    Err(RecordingError::content(
-        &path,
+    Err(Wrong::new(
         format!(
             "expected the {device}'s {rows} rows × {columns} columns, got {}×{}",
             array.rows, array.columns
         ),
         format!("correct the {device}'s size in {MANIFEST} or replace the array"),
-    ))
+    )
+    .at(&path))
 }
 
 /// Reads one file of the folder. It must be a regular file of at most `limit` bytes, and must not be reached
 /// through a link that leads out of the folder.
 fn read(folder: &Path, name: &str, limit: u64) -> Result<Vec<u8>, RecordingError> {
     let path = folder.join(name);
-    let wrong = |problem: String, remedy: &str| RecordingError::content(&path, problem, remedy);
+    let wrong = |problem: String, remedy: &str| Wrong::new(problem, remedy).at(&path);
     let failed = |error: std::io::Error| match error.kind() {
         std::io::ErrorKind::NotFound => wrong(
             "the file is missing".to_owned(),
