@@ -19,7 +19,7 @@
 //! # Accuracy
 //! `a_motion_of_a_shape_that_determines_it_is_found_in_all_six_components`, `a_dent_over_a_tenth_of_the_part_does_not_pull_it`.
 
-use super::Spot;
+use super::Alignment;
 use super::directions::{Directions, Matrix6, form};
 use super::motion::Motion;
 use super::normal::{Normal, TUKEY, WeightFunction};
@@ -123,14 +123,8 @@ pub struct FitBuffers {
 pub struct Fitting<'a> {
     /// The surface to be met.
     pub golden: GoldenSurface<'a>,
-    /// The point that is turned about.
-    pub centre: Vector,
-    /// RMS distance of the surface from it, mm: turns are measured as the way of a point at this radius.
-    pub radius: f64,
-    /// Corners of a box around the part.
-    pub corners: &'a [Vector],
-    /// Where it is looked at.
-    pub spots: &'a [Spot],
+    /// Where it is looked at, and the point that is turned about.
+    pub plan: &'a Alignment,
 }
 
 /// Where a descent ended.
@@ -181,7 +175,7 @@ impl Fitting<'_> {
         samples: &[Sample],
         buffers: &mut FitBuffers,
     ) -> Option<Descended> {
-        let mut motion = Motion::none(self.centre);
+        let mut motion = Motion::none(self.plan.centre);
         for round in 1..=ROUNDS {
             self.linearise(samples, &motion, round == 1, &mut buffers.equations);
             if buffers.equations.len() < LEAST_POINTS {
@@ -208,9 +202,9 @@ impl Fitting<'_> {
     /// A motion with a further one on top.
     fn then(&self, motion: &Motion, further: &[f64; 6]) -> Motion {
         let [x, y, z, a, b, c] = *further;
-        let turn = Vector::new(a, b, c) * (1.0 / self.radius);
+        let turn = Vector::new(a, b, c) * (1.0 / self.plan.radius);
         let shift = Vector::new(x, y, z);
-        Motion::new(self.centre, motion.shift + shift, motion.turn + turn)
+        Motion::new(self.plan.centre, motion.shift + shift, motion.turn + turn)
     }
 
     fn placed(&self, motion: Motion, solved: &Solved, equations: &[Equation]) -> Placed {
@@ -220,17 +214,17 @@ impl Fitting<'_> {
         Placed {
             motion,
             covariance: solved.directions.covariance(&spread),
-            radius: self.radius,
+            radius: self.plan.radius,
             left_out: solved.directions.left_out,
             points: inside,
             outliers: 1.0 - inside as f64 / equations.len() as f64,
-            reach: self.corners.iter().map(farthest).fold(0.0, f64::max),
+            reach: self.plan.corners.iter().map(farthest).fold(0.0, f64::max),
         }
     }
 
     /// Variance, mm², of how far the error of a motion lifts a facet at a point.
     pub fn lift_variance(&self, placed: &Placed, facet: &Facet, point: Vector) -> f64 {
-        let jacobian = facet.jacobian(point, (self.centre, self.radius));
+        let jacobian = facet.jacobian(point, (self.plan.centre, self.plan.radius));
         form(&jacobian, &placed.covariance, &jacobian).max(0.0)
     }
 
@@ -245,7 +239,7 @@ impl Fitting<'_> {
         equations.clear();
         equations.extend(samples.iter().filter_map(|sample| {
             if let (true, Some((at, above))) = (still, sample.over) {
-                let spot = self.spots.get(at)?;
+                let spot = self.plan.spots.get(at)?;
                 return Some(self.of_facet(sample, &spot.facet, spot.point, above));
             }
             let point = motion.undo(sample.point);
@@ -260,9 +254,9 @@ impl Fitting<'_> {
         let variance = sample.sigma * sample.sigma;
         Equation {
             residual: above,
-            jacobian: facet.jacobian(point, (self.centre, self.radius)),
+            jacobian: facet.jacobian(point, (self.plan.centre, self.plan.radius)),
             lift_noise: facet.lift_noise,
-            lever: (point - self.centre) * (1.0 / self.radius),
+            lever: (point - self.plan.centre) * (1.0 / self.plan.radius),
             variance,
             both: variance + facet.sigma * facet.sigma,
         }

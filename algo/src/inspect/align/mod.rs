@@ -135,13 +135,7 @@ impl Alignment {
 
     /// The fit of points to the surface.
     pub fn fitting<'a>(&'a self, golden: GoldenSurface<'a>) -> Fitting<'a> {
-        Fitting {
-            golden,
-            centre: self.centre,
-            radius: self.radius,
-            corners: &self.corners,
-            spots: &self.spots,
-        }
+        Fitting { golden, plan: self }
     }
 }
 
