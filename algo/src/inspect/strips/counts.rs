@@ -2,14 +2,13 @@
 
 use super::coordinates::TaughtCoordinates;
 use super::coverage::{add_variances, count_known};
-use super::decode::DecodedRow;
 use super::height::HeightRow;
 use super::pose::PoseField;
 use super::recent::RecentRows;
 use super::{Measure, Production, common};
 use crate::inspect::gauge::Sum;
 use crate::phase::Trust;
-use crate::pipeline::HeightTally;
+use crate::pipeline::{HeightTally, PhaseMap};
 use crate::simd::{Lanes, back_end_entry};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -62,7 +61,7 @@ impl Counts {
         plan: &Production,
         pose: &PoseField,
         v: usize,
-        (decoded, heights): (&DecodedRow, &HeightRow),
+        (decoded, heights): (&PhaseMap, &HeightRow),
         (coordinates, recent): (&TaughtCoordinates, &RecentRows),
     ) {
         let backend = plan.decoder.backend();

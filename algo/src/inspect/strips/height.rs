@@ -4,13 +4,13 @@
 //! exactly.
 
 use super::Production;
-use super::decode::DecodedRow;
 use super::recent::RecentRows;
 use super::squares::narrow::MAX_NARROW_NM;
 use crate::geometry::Solution;
 use crate::phase::Trust;
 use crate::pipeline::{
-    CubicInput, CubicOutput, HeightTally, NO_OFFSET, VARIANCE_UNIT_NM, offset_row, sum_variances,
+    CubicInput, CubicOutput, HeightTally, NO_OFFSET, PhaseMap, VARIANCE_UNIT_NM, offset_row,
+    sum_variances,
 };
 use crate::units::{AbsolutePhase, Height, Modulation};
 use alloc::vec;
@@ -48,7 +48,7 @@ impl HeightRow {
     pub fn find(
         &mut self,
         plan: &Production,
-        decoded: &mut DecodedRow,
+        decoded: &mut PhaseMap,
         v: usize,
         columns: Range<usize>,
         recent: &mut RecentRows,
@@ -105,7 +105,7 @@ impl HeightRow {
     fn triangulate(
         &mut self,
         plan: &Production,
-        decoded: &mut DecodedRow,
+        decoded: &mut PhaseMap,
         v: usize,
         columns: Range<usize>,
         recent: &mut RecentRows,

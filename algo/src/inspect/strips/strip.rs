@@ -2,14 +2,13 @@
 
 use super::coordinates::TaughtCoordinates;
 use super::counts::Counts;
-use super::decode::DecodedRow;
 use super::height::HeightRow;
 use super::pose::PoseField;
 use super::recent::RecentRows;
 use super::squares::Squares;
 use super::{Input, Production};
 use crate::inspect::align::{Alignment, Sample};
-use crate::pipeline::NO_OFFSET;
+use crate::pipeline::{NO_OFFSET, PhaseMap};
 use crate::units::Height;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -18,7 +17,8 @@ use core::ops::Range;
 #[derive(Debug)]
 pub(super) struct Strip {
     rows: Range<usize>,
-    decoded: DecodedRow,
+    /// Of the row that it works on.
+    decoded: PhaseMap,
     heights: HeightRow,
     coordinates: TaughtCoordinates,
     recent: RecentRows,
@@ -34,7 +34,7 @@ impl Strip {
         let width = plan.size().0;
         Self {
             rows,
-            decoded: DecodedRow::new(width),
+            decoded: PhaseMap::new(width, 1),
             heights: HeightRow::new(width),
             coordinates: TaughtCoordinates::new(width),
             recent: RecentRows::new(width, plan.gauges.largest_side()),
@@ -84,7 +84,7 @@ impl Strip {
     /// Stages 1 and 2 of columns of row `v`.
     fn measure(&mut self, plan: &Production, input: Input<'_>, v: usize, columns: Range<usize>) {
         if !columns.is_empty() {
-            self.decoded.decode(plan, input, v, columns.clone());
+            plan.decode(input, v, columns.clone(), &mut self.decoded);
         }
         let (decoded, recent) = (&mut self.decoded, &mut self.recent);
         self.heights.find(plan, decoded, v, columns, recent);

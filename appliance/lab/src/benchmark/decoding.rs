@@ -1,10 +1,10 @@
 //! Kernels of the product: its decoder, and all of production from frames to readings.
 
-use super::frames::{FrameSet, Output};
+use super::frames::FrameSet;
 use super::kernel::Kernel;
 use algo::inspect::{Production, Strips};
 use algo::phase::{Arrived, Decoder, PhaseRow};
-use algo::pipeline::arrive;
+use algo::pipeline::{PhaseMap, arrive};
 use appliance::production::stopwatch::timed;
 use appliance::recipe::plan::STRIPS;
 use std::hint::black_box;
@@ -97,10 +97,11 @@ impl Kernel for Decoding {
             .map_or(Vec::new(), <[_]>::to_vec);
         timed(|| {
             let (frames, map, out) = set.parts();
-            let Output {
+            let PhaseMap {
                 phase,
                 modulation,
                 trust,
+                ..
             } = out;
             let rows = phase
                 .chunks_mut(width)

@@ -3,6 +3,7 @@
 
 use algo::frame::{FrameView, Samples};
 use algo::phase::Trust;
+use algo::pipeline::PhaseMap;
 use algo::units::{AbsolutePhase, Modulation};
 use hal::frame::Frame;
 
@@ -14,7 +15,7 @@ pub struct FrameSet {
     samples: Buffer,
     map: Option<Vec<AbsolutePhase>>,
     /// The result of the kernel.
-    pub out: Output,
+    pub out: PhaseMap,
 }
 
 /// All frames of a set, one after the other, each row-major without padding.
@@ -26,17 +27,6 @@ pub enum Buffer {
     Sixteen(Vec<u16>),
 }
 
-/// The result of a kernel in each pixel, row-major.
-#[derive(Clone)]
-pub struct Output {
-    /// Φ.
-    pub phase: Vec<AbsolutePhase>,
-    /// B.
-    pub modulation: Vec<Modulation>,
-    /// Resolved or why not.
-    pub trust: Vec<Trust>,
-}
-
 impl FrameSet {
     /// Frames of `width` × `height` samples, one after the other, and the map for sequences that need one. Samples beyond the last
     /// whole frame are not used.
@@ -45,13 +35,10 @@ impl FrameSet {
         samples: Buffer,
         map: Option<Vec<AbsolutePhase>>,
     ) -> Self {
-        let pixels = width * height;
-        // Not zero, so that the system maps the memory before the first run.
-        let out = Output {
-            phase: vec![AbsolutePhase::UNKNOWN; pixels],
-            modulation: vec![Modulation::from_bits(1); pixels],
-            trust: vec![Trust::Dark; pixels],
-        };
+        let mut out = PhaseMap::new(width, height);
+        // Written, so that the system maps the memory before the first run.
+        out.modulation.fill(Modulation::from_bits(1));
+        out.trust.fill(Trust::Dark);
         Self {
             width,
             height,
@@ -104,7 +91,7 @@ impl FrameSet {
     }
 
     /// Frames, map and result, borrowed separately.
-    pub fn parts(&mut self) -> (Vec<FrameView<'_>>, Option<&[AbsolutePhase]>, &mut Output) {
+    pub fn parts(&mut self) -> (Vec<FrameView<'_>>, Option<&[AbsolutePhase]>, &mut PhaseMap) {
         let pixels = (self.width * self.height).max(1);
         let frames: Vec<Samples<'_>> = match &self.samples {
             Buffer::Eight(all) => all.chunks_exact(pixels).map(Samples::Eight).collect(),
