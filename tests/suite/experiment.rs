@@ -39,20 +39,20 @@ fn check(limits: &Limits, camera: u32, sequences: &[BetterSequence]) {
     };
     let mut runner = Runner::new(&scene, OpticsKind::Ideal).unwrap();
     let paper = runner.run(Method::Paper { image_pitch: 5 }, 1).unwrap();
-    let paper = paper.outcome.score.unwrap().rms_mm;
+    let paper = paper.values.rms_mm;
     for (sequence, limit) in limits
         .ratios
         .iter()
         .filter(|(sequence, _)| sequences.contains(sequence))
     {
-        let outcome = runner.run(Method::Better(*sequence), 1).unwrap().outcome;
-        let score = outcome.score.unwrap();
-        let ratio = score.rms_mm / paper;
+        let values = runner.run(Method::Better(*sequence), 1).unwrap().values;
+        let ratio = values.rms_mm / paper;
         let words = format!("{part}, {} frames: {ratio:.3}", sequence.count());
         assert!(ratio <= *limit, "{words} of the paper's");
-        assert_eq!(score.gross, 0, "{words}");
-        assert!(outcome.unresolved <= 50, "{words}: {}", outcome.unresolved);
-        let ratio = outcome.error_over_sigma;
+        assert_eq!(values.gross_px, 0.0, "{words}");
+        let unresolved = values.unresolved_px;
+        assert!(unresolved <= 50.0, "{words}: {unresolved}");
+        let ratio = values.error_over_sigma;
         assert!(ERROR_OVER_SIGMA.contains(&ratio), "{words}: {ratio}");
     }
 }

@@ -53,7 +53,7 @@ impl Campaign {
                     let words = format!("{about}, seed {seed}: {}", method.name());
                     progress(done / total, &words);
                     let run = runner.run(method, seed)?;
-                    let row = RunRow::new(scene, optics, method, seed, &run.outcome);
+                    let row = RunRow::new(scene, optics, method, seed, run.values);
                     results.rows.push(row);
                     if seed == 1 && [SHOWN_FIXED, SHOWN_ADAPTIVE].contains(&method) {
                         views.push(View::of(method, &run));

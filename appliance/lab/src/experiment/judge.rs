@@ -1,35 +1,15 @@
 //! Judges a run: errors against truth, coverage, and the fit of a cylinder.
 
-use super::cylinder::{self, Cylinder};
+use super::cylinder;
 use super::scenes::Judged;
+use super::table::Values;
 use algo::phase::Trust;
 use appliance::head::calibrated::Measured;
 use appliance::measure::{GROSS_MM, Score, Truth};
 
-/// The quality of one measurement of a part.
-#[derive(Clone, Debug)]
-pub struct Outcome {
-    /// Errors against truth; `None` where nothing was resolved.
-    pub score: Option<Score>,
-    /// Pixels that truth calls wholly lit. All figures are over these pixels, as in the study.
-    pub lit: usize,
-    /// Those that are not resolved.
-    pub unresolved: usize,
-    /// RMS of error / predicted σ_z over scored pixels without gross errors.
-    pub error_over_sigma: f64,
-    /// The cylinder fitted to the resolved points, of a part that is judged by it.
-    pub cylinder: Option<Cylinder>,
-}
-
-impl Outcome {
-    /// Share of the lit pixels that are resolved.
-    pub fn coverage(&self) -> f64 {
-        (self.lit - self.unresolved) as f64 / self.lit.max(1) as f64
-    }
-}
-
-/// Compares a measurement of a simulated part with the truth.
-pub fn judge(truth: &sim::Truth, measured: &Measured, judged: Judged) -> Outcome {
+/// Compares a measurement of a simulated part with the truth. All figures are over the pixels that truth calls wholly lit, as in the
+/// study; the ratio to the paper's run is not known yet.
+pub fn judge(truth: &sim::Truth, measured: &Measured, judged: Judged) -> Values {
     let known = Truth::from(truth);
     let (phases, heights) = (&measured.phases, &measured.heights);
     let whole: Vec<usize> = known.whole_pixels().collect();
@@ -59,11 +39,21 @@ pub fn judge(truth: &sim::Truth, measured: &Measured, judged: Judged) -> Outcome
             cylinder::fit(&resolved.iter().filter_map(point).collect::<Vec<_>>())
         })
         .flatten();
-    Outcome {
-        score: known.score(phases, heights),
-        lit: whole.len(),
-        unresolved: whole.len() - resolved.len(),
+    let score = known.score(phases, heights);
+    let scored = |value: fn(&Score) -> f64| score.as_ref().map(value);
+    Values {
+        scored_px: scored(|score| score.scored as f64).unwrap_or(0.0),
+        lit_px: whole.len() as f64,
+        unresolved_px: (whole.len() - resolved.len()) as f64,
+        gross_px: scored(|score| score.gross as f64).unwrap_or(0.0),
+        rms_mm: scored(|score| score.rms_mm).unwrap_or(f64::NAN),
+        bias_mm: scored(|score| score.bias_mm).unwrap_or(f64::NAN),
+        median_mm: scored(|score| score.median_mm).unwrap_or(f64::NAN),
+        p99_mm: scored(|score| score.p99_mm).unwrap_or(f64::NAN),
         error_over_sigma: (squares / f64::max(count, 1.0)).sqrt(),
-        cylinder,
+        ratio_to_paper: f64::NAN,
+        coverage: resolved.len() as f64 / whole.len().max(1) as f64,
+        fit_residual_mm: cylinder.map_or(f64::NAN, |fit| fit.residual_mm),
+        fit_radius_mm: cylinder.map_or(f64::NAN, |fit| fit.radius_mm),
     }
 }

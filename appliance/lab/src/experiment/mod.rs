@@ -13,9 +13,7 @@ mod shade;
 mod table;
 
 pub use campaign::{Campaign, Results};
-pub use cylinder::Cylinder;
 pub use figures::figures;
-pub use judge::Outcome;
 pub use methods::{BetterSequence, Method};
 pub use runner::{Run, Runner};
 pub use scenes::{Judged, OpticsKind, PARTS, Scene};

@@ -3,9 +3,10 @@
 //! Preliminary maps, patterns and the golden map of the part are measured once per noise seed, and shared by the runs that need
 //! them.
 
-use super::judge::{Outcome, judge};
+use super::judge::judge;
 use super::methods::{self, BetterSequence, Method};
 use super::scenes::{Judged, OpticsKind, Scene};
+use super::table::Values;
 use algo::adaptive::{ProjectorMap, noise, paper};
 use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
@@ -54,7 +55,7 @@ struct Better {
 /// A run: its measurement and how good it is.
 pub struct Run {
     /// Against truth.
-    pub outcome: Outcome,
+    pub values: Values,
     /// Frames, phases and heights.
     pub measured: Measured,
     /// The pattern.
@@ -115,7 +116,7 @@ impl Runner {
             reject_too_fine(&mut measured.phases);
         }
         Ok(Run {
-            outcome: judge(&self.truth, &measured, self.judged),
+            values: judge(&self.truth, &measured, self.judged),
             measured,
             function,
             finest: methods::finest(&shots),

@@ -1,6 +1,5 @@
 //! The results of the runs: one row per run as CSV, and their means over the noise seeds.
 
-use super::judge::Outcome;
 use super::methods::{Method, PAPER};
 use super::scenes::{Judged, OpticsKind, Scene};
 use serde::Serialize;
@@ -85,29 +84,6 @@ quantities! {
     }
 }
 
-impl Values {
-    fn of(outcome: &Outcome) -> Self {
-        let score = outcome.score.as_ref();
-        let scored = |value: fn(&appliance::measure::Score) -> f64| score.map_or(f64::NAN, value);
-        let fitted = outcome.cylinder;
-        Self {
-            scored_px: score.map_or(0.0, |score| score.scored as f64),
-            lit_px: outcome.lit as f64,
-            unresolved_px: outcome.unresolved as f64,
-            gross_px: score.map_or(0.0, |score| score.gross as f64),
-            rms_mm: scored(|score| score.rms_mm),
-            bias_mm: scored(|score| score.bias_mm),
-            median_mm: scored(|score| score.median_mm),
-            p99_mm: scored(|score| score.p99_mm),
-            error_over_sigma: outcome.error_over_sigma,
-            ratio_to_paper: f64::NAN,
-            coverage: outcome.coverage(),
-            fit_residual_mm: fitted.map_or(f64::NAN, |fit| fit.residual_mm),
-            fit_radius_mm: fitted.map_or(f64::NAN, |fit| fit.radius_mm),
-        }
-    }
-}
-
 impl RunRow {
     /// Of one run.
     pub fn new(
@@ -115,7 +91,7 @@ impl RunRow {
         optics: OpticsKind,
         method: Method,
         seed: u64,
-        outcome: &Outcome,
+        values: Values,
     ) -> Self {
         Self {
             part: scene.name,
@@ -123,7 +99,7 @@ impl RunRow {
             method: method.name(),
             frames: method.frame_count(),
             seed,
-            values: Values::of(outcome),
+            values,
         }
     }
 
