@@ -8,7 +8,7 @@ use appliance::head::calibration::Calibration;
 use appliance::head::seam;
 use appliance::recipe::Recipe;
 use appliance::recipe::teach::{Naming, teach};
-use hal::head::DynHead;
+use hal::head::Head;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedFrame};
 use sim::parts::Sphere;
@@ -243,7 +243,7 @@ struct Taught {
 }
 
 /// Teaches a recipe. Only this function knows how.
-fn taught_recipe(head: &mut DynHead, calibration: &Calibration) -> (Vec<u8>, Recipe) {
+fn taught_recipe(head: &mut Head, calibration: &Calibration) -> (Vec<u8>, Recipe) {
     let naming = Naming {
         number: 7,
         part_number: "S".into(),
@@ -298,7 +298,7 @@ impl Taught {
 
 /// Frames of the recipe's phase function as a recording without noise and working range, which the recipe has.
 fn record(
-    head: &mut DynHead,
+    head: &mut Head,
     stage: &Stage,
     calibration: &Calibration,
     recipe: &Recipe,

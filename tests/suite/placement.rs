@@ -9,7 +9,7 @@ use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, TaughtRecipe, teach};
 use appliance::recipe::{AlignmentKind, GaugeFile, Recipe, RecipeFile, RegionFile, safe};
-use hal::head::DynHead;
+use hal::head::Head;
 use sim::parts::{Cone, Plane, Sawtooth, SheetMetal, Sphere, Spline};
 use sim::{Part, Placement, Scenario, Stage};
 use std::time::{Duration, Instant};
@@ -18,7 +18,7 @@ pub(crate) const TIMEOUT: Duration = Duration::from_secs(5);
 const TOLERANCE_MM: f64 = 1.0;
 
 pub(crate) struct Bed {
-    pub head: DynHead,
+    pub head: Head,
     pub stage: Stage,
     pub calibration: Calibration,
 }

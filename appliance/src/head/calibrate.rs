@@ -15,7 +15,7 @@ use super::seam;
 use crate::error::{Exit, Failure};
 use algo::geometry::Vector;
 use algo::pipeline::Plate;
-use hal::head::{DynHead, Timing};
+use hal::head::{Head, Timing};
 use std::time::Duration;
 
 /// Most rounds of the delay: 100 s, where stamps jitter or the camera has few pixels.
@@ -74,11 +74,7 @@ fn models(words: impl Into<String>) -> Failure {
 ///
 /// # Errors
 /// Of a device; if too little light comes back, or too much, or there is no flat plate (69); if the models do not fit it (65).
-pub fn make(
-    head: &mut DynHead,
-    basis: Basis,
-    progress: &dyn Fn(f64, &str),
-) -> Result<Made, Failure> {
+pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Result<Made, Failure> {
     let mut calibration = basis.calibration;
     let mut notes = Vec::new();
     progress(0.0, "camera stamps");

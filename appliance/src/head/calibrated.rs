@@ -8,13 +8,13 @@ use algo::phase::Decoder;
 use algo::pipeline::{HeightMap, PhaseMap};
 use algo::units::AbsolutePhase;
 use hal::frame::Frame;
-use hal::head::DynHead;
+use hal::head::Head;
 use std::time::Duration;
 
 /// A head with its calibration, in front of a part.
 pub struct CalibratedHead<'a> {
     /// The devices.
-    pub head: &'a mut DynHead,
+    pub head: &'a mut Head,
     /// The calibration of the head.
     pub calibration: &'a Calibration,
     /// Longest wait for a device.

@@ -11,7 +11,7 @@ use algo::phase::Decoder;
 use algo::pipeline::{self, HeightMap, PhaseMap};
 use algo::units::AbsolutePhase;
 use hal::frame::Frame;
-use hal::head::DynHead;
+use hal::head::Head;
 use std::time::Duration;
 
 /// Projects the shots of a phase function and takes a frame of each, in their order. `progress` gets the share of the frames taken.
@@ -19,7 +19,7 @@ use std::time::Duration;
 /// # Errors
 /// Of the device that failed.
 pub fn take(
-    head: &mut DynHead,
+    head: &mut Head,
     calibration: &Calibration,
     function: &PhaseFunction,
     shots: &[Shot],

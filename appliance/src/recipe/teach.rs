@@ -15,7 +15,7 @@ use algo::adaptive::{AdaptError, ProjectorMap, noise};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
-use hal::head::DynHead;
+use hal::head::Head;
 use std::time::Duration;
 
 /// Projector pitch of the preliminary pattern, in pixels (c·p_P of the paper).
@@ -83,7 +83,7 @@ impl From<AdaptError> for TeachError {
 /// # Errors
 /// If a device fails or the scene cannot be taught.
 pub fn teach(
-    head: &mut DynHead,
+    head: &mut Head,
     calibration: &Calibration,
     naming: &Naming,
     timeout: Duration,
@@ -103,7 +103,7 @@ pub fn teach(
 /// # Errors
 /// As [`teach`]; [`TeachError::Ended`] if `progress` ended it.
 pub fn teach_while(
-    head: &mut DynHead,
+    head: &mut Head,
     calibration: &Calibration,
     naming: &Naming,
     timeout: Duration,

@@ -29,9 +29,6 @@ pub use watch::{Showing, Watched, WatchedFrame};
 /// A device may disappear without ending a wait; on a real clock the devices are polled at least this often.
 const UNNOTICED: Duration = Duration::from_millis(100);
 
-/// A head.
-pub type DynHead = Head;
-
 /// Camera, projector and trigger in front of the same part, and the clock that they share.
 pub struct Head {
     devices: Devices,

@@ -10,7 +10,7 @@ use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, teach};
 use appliance::recipe::{AlignmentKind, Recipe, archive};
 use hal::frame::Frame;
-use hal::head::DynHead;
+use hal::head::Head;
 use serde::{Serialize, Serializer};
 use sim::Scenario;
 use std::time::{Duration, Instant};
@@ -116,7 +116,7 @@ pub fn budgets(
 
 fn budget(
     plan: &Plan,
-    head: &mut DynHead,
+    head: &mut Head,
     calibration: &Calibration,
     refresh: Duration,
     effort: &Effort,

@@ -14,14 +14,14 @@ use algo::pipeline::PhaseMap;
 use algo::units::AbsolutePhase;
 use appliance::head::calibrated::{CalibratedHead, MeasureError, Measured};
 use appliance::head::calibration::Calibration;
-use hal::head::DynHead;
+use hal::head::Head;
 use sim::{Stage, Truth};
 use std::sync::Arc;
 use std::time::Duration;
 
 /// A simulated head in front of one part, with the preliminary measurements of the part.
 pub struct Runner {
-    head: DynHead,
+    head: Head,
     stage: Stage,
     truth: Truth,
     calibration: Calibration,

@@ -5,7 +5,7 @@ use crate::head::calibration::Calibration;
 use crate::head::examine::{self, Lit, SETTLE};
 use crate::head::examine::{LEAST_BRIGHT, LEAST_LIT, MOST_SATURATED};
 use hal::error::Error;
-use hal::head::DynHead;
+use hal::head::Head;
 use serde_json::{Value, json};
 
 /// Grey levels whose response is measured, besides black and white.
@@ -49,7 +49,7 @@ pub(super) fn exposure(lit: &Lit) -> Check {
 }
 
 pub(super) fn contrast(
-    head: &mut DynHead,
+    head: &mut Head,
     calibration: &Calibration,
     lit: &Lit,
 ) -> Result<Check, Error> {
@@ -75,7 +75,7 @@ pub(super) fn contrast(
 }
 
 pub(super) fn response(
-    head: &mut DynHead,
+    head: &mut Head,
     calibration: &Calibration,
     lit: &Lit,
 ) -> Result<Check, Error> {

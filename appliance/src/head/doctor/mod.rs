@@ -9,7 +9,7 @@ mod time;
 use crate::head::calibration::Calibration;
 use crate::head::examine::{Lit, SETTLE};
 use hal::error::Error;
-use hal::head::DynHead;
+use hal::head::Head;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -85,7 +85,7 @@ const CHECKS: [(&str, &[&str]); 10] = [
 /// Checks a head in front of any part, best a flat bright one. `progress` gets the share done and the name of the next check. For a head
 /// that is not `calibrated`, what the camera's time stamps mark is measured first, and the head is set accordingly.
 pub fn examine(
-    head: &mut DynHead,
+    head: &mut Head,
     calibration: &Calibration,
     calibrated: bool,
     progress: &dyn Fn(f64, &str),

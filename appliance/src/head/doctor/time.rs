@@ -4,7 +4,7 @@ use super::Check;
 use crate::head::examine::{Delay, Lit, PATIENCE, Stamps, load_black_and_white};
 use hal::camera::Starts;
 use hal::error::Error;
-use hal::head::{DynHead, Showing, TOLERANCE, Timing, Watched};
+use hal::head::{Head, Showing, TOLERANCE, Timing, Watched};
 use hal::projector::Flip;
 use hal::trigger::Spoiled;
 use serde_json::json;
@@ -25,7 +25,7 @@ fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
-pub(super) fn devices(head: &DynHead) -> Result<Check, Error> {
+pub(super) fn devices(head: &Head) -> Result<Check, Error> {
     head.present()?;
     let ((columns, rows), camera) = (head.projector_size(), head.camera_format());
     Ok(Check::new(
@@ -41,7 +41,7 @@ pub(super) fn devices(head: &DynHead) -> Result<Check, Error> {
     ))
 }
 
-pub(super) fn format(head: &DynHead) -> Check {
+pub(super) fn format(head: &Head) -> Check {
     let encoding = head.encoding();
     let measured = json!({ "encoding": encoding.name, "exact": encoding.exact });
     if encoding.exact {
@@ -57,7 +57,7 @@ pub(super) fn format(head: &DynHead) -> Check {
     Check::new(found, Some(remedy), measured)
 }
 
-pub(super) fn mode(head: &DynHead) -> Check {
+pub(super) fn mode(head: &Head) -> Check {
     let (camera, refresh) = (head.camera_timing(), head.refresh());
     let refreshes = camera.exposure.as_secs_f64() / refresh.as_secs_f64();
     let whole = refresh.mul_f64(refreshes.round().max(1.0));
@@ -80,7 +80,7 @@ pub(super) fn mode(head: &DynHead) -> Check {
     Check::new(found, (off > TOLERANCE).then_some(&*remedy), measured)
 }
 
-pub(super) fn cadence(head: &mut DynHead) -> Result<Check, Error> {
+pub(super) fn cadence(head: &mut Head) -> Result<Check, Error> {
     load_black_and_white(head)?;
     let showing = |index: u32| Showing {
         index: index as usize % 2,
@@ -133,7 +133,7 @@ pub(super) fn cadence(head: &mut DynHead) -> Result<Check, Error> {
     Ok(Check::new(found, remedy, measured))
 }
 
-pub(super) fn trigger(head: &mut DynHead, calibrated: bool) -> Result<Check, Error> {
+pub(super) fn trigger(head: &mut Head, calibrated: bool) -> Result<Check, Error> {
     load_black_and_white(head)?;
     let showing = Showing {
         index: WHITE,
@@ -230,7 +230,7 @@ fn by_itself(seen: &Watched<()>, nominal: Duration) -> Check {
 }
 
 /// The time from a flip to its light, from the brightness of the frames around many flips.
-pub(super) fn delay(head: &mut DynHead, lit: &Lit) -> Result<Check, Error> {
+pub(super) fn delay(head: &mut Head, lit: &Lit) -> Result<Check, Error> {
     let believed = head.timing().flip_to_light.as_secs_f64();
     let refresh = head.refresh().as_secs_f64();
     let Some(measured) = Delay::measure(head, lit, 1)? else {

@@ -9,7 +9,7 @@ use crate::head::calibration::file::{ContrastFile, PitchFile};
 use crate::head::rasters::rasters;
 use algo::pattern::{PhaseFunction, Shot};
 use hal::error::Error;
-use hal::head::DynHead;
+use hal::head::Head;
 use hal::projector::Raster;
 
 /// Pitches whose contrast is measured, projector pixels. The first is the coarsest: contrasts are relative to it.
@@ -22,7 +22,7 @@ const SHIFTS: usize = 4;
 /// # Errors
 /// Of a device, or if the projector is too small for a pitch.
 pub fn contrast(
-    head: &mut DynHead,
+    head: &mut Head,
     calibration: &Calibration,
     settle: u32,
     lit: &Lit,

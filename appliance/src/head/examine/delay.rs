@@ -9,7 +9,7 @@
 use super::PATIENCE;
 use super::pictures::{Lit, counts, load_black_and_white};
 use hal::error::Error;
-use hal::head::{DynHead, Showing};
+use hal::head::{Head, Showing};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::time::Duration;
@@ -50,7 +50,7 @@ impl Delay {
     ///
     /// # Errors
     /// Of a device.
-    pub fn measure(head: &mut DynHead, lit: &Lit, rounds: u32) -> Result<Option<Self>, Error> {
+    pub fn measure(head: &mut Head, lit: &Lit, rounds: u32) -> Result<Option<Self>, Error> {
         load_black_and_white(head)?;
         let exposure = head.camera_timing().exposure.as_secs_f64();
         let refresh = head.refresh().as_secs_f64();
@@ -73,7 +73,7 @@ impl Delay {
 }
 
 impl Round {
-    fn take(head: &mut DynHead, lit: &Lit, round: u32) -> Result<Self, Error> {
+    fn take(head: &mut Head, lit: &Lit, round: u32) -> Result<Self, Error> {
         let (exposure, refresh) = (head.camera_timing().exposure, head.refresh());
         let whole = exposure.as_nanos().div_ceil(refresh.as_nanos().max(1));
         let whole = u32::try_from(whole).unwrap_or(1).clamp(1, 100);

@@ -3,7 +3,7 @@
 use super::pictures::{Lit, greys, pictures};
 use algo::frame::{Noise, PhotonTransfer};
 use hal::error::Error;
-use hal::head::DynHead;
+use hal::head::Head;
 
 /// Grey levels of which two pictures are taken.
 const GREYS: [u8; 8] = [16, 48, 80, 112, 144, 176, 208, 240];
@@ -12,7 +12,7 @@ const GREYS: [u8; 8] = [16, 48, 80, 112, 144, 176, 208, 240];
 ///
 /// # Errors
 /// Of a device, or `Unsupported` if no level is clear of black and full scale.
-pub fn noise(head: &mut DynHead, settle: u32, lit: &Lit) -> Result<Noise, Error> {
+pub fn noise(head: &mut Head, settle: u32, lit: &Lit) -> Result<Noise, Error> {
     let levels = GREYS.iter().flat_map(|grey| [*grey, *grey]);
     let full_scale = lit.full_scale();
     let mut sums = PhotonTransfer::new(full_scale);

@@ -3,7 +3,7 @@
 use super::PATIENCE;
 use hal::error::Error;
 use hal::frame::{Frame, Samples};
-use hal::head::{DynHead, Showing};
+use hal::head::{Head, Showing};
 use hal::projector::Raster;
 
 /// Least share of the picture that must be lit.
@@ -42,7 +42,7 @@ fn rows<T: Copy + Into<f32>>(all: &[T], width: usize, stride: usize) -> Vec<f32>
 /// # Errors
 /// Of a device, or `Timeout` if the picture of a pattern did not come.
 pub fn pictures(
-    head: &mut DynHead,
+    head: &mut Head,
     settle: u32,
     patterns: impl IntoIterator<Item = Result<Raster, Error>>,
     keep: &mut dyn FnMut(Vec<f32>),
@@ -61,7 +61,7 @@ pub fn pictures(
 }
 
 fn take(
-    head: &mut DynHead,
+    head: &mut Head,
     settle: u32,
     patterns: Vec<Raster>,
     keep: &mut dyn FnMut(Vec<f32>),
@@ -122,7 +122,7 @@ impl Lit {
     ///
     /// # Errors
     /// As [`pictures`].
-    pub fn take(head: &mut DynHead, settle: u32) -> Result<Self, Error> {
+    pub fn take(head: &mut Head, settle: u32) -> Result<Self, Error> {
         let mut taken = Vec::with_capacity(2);
         pictures(
             head,
@@ -207,7 +207,7 @@ impl Lit {
 ///
 /// # Errors
 /// Of the projector.
-pub fn load_black_and_white(head: &mut DynHead) -> Result<(), Error> {
+pub fn load_black_and_white(head: &mut Head) -> Result<(), Error> {
     let patterns = greys(head.projector_size(), [0, u8::MAX]);
     head.load(patterns.collect::<Result<_, _>>()?)
 }

@@ -5,7 +5,7 @@ use crate::head::calibration::Calibration;
 use crate::head::scan::{self, Scan};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::pipeline::Plate;
-use hal::head::DynHead;
+use hal::head::Head;
 use std::time::Duration;
 
 /// Levels of the sequence.
@@ -26,7 +26,7 @@ fn unfit(error: impl std::fmt::Display) -> Failure {
 /// # Errors
 /// Of a device, or if too little of the frame shows a plate.
 pub fn plate(
-    head: &mut DynHead,
+    head: &mut Head,
     calibration: &Calibration,
     vertical: bool,
     timeout: Duration,

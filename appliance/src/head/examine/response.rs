@@ -2,7 +2,7 @@
 
 use super::pictures::{Lit, greys, pictures};
 use hal::error::Error;
-use hal::head::DynHead;
+use hal::head::Head;
 
 /// Largest decrease of the response that noise can explain, share of white.
 const MOST_FALL: f64 = 0.02;
@@ -12,7 +12,7 @@ const MOST_FALL: f64 = 0.02;
 /// # Errors
 /// Of a device.
 pub fn lights(
-    head: &mut DynHead,
+    head: &mut Head,
     settle: u32,
     lit: &Lit,
     levels: &[u8],
@@ -35,7 +35,7 @@ pub fn lights(
 /// # Errors
 /// Of a device, or if light falls where grey rises.
 pub fn response(
-    head: &mut DynHead,
+    head: &mut Head,
     settle: u32,
     lit: &Lit,
     progress: &dyn Fn(f64),

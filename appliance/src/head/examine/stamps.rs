@@ -7,7 +7,7 @@
 use super::PATIENCE;
 use hal::camera::{CameraTiming, Starts};
 use hal::error::Error;
-use hal::head::{DynHead, Showing, Stamp, TOLERANCE, Timing, WatchedFrame};
+use hal::head::{Head, Showing, Stamp, TOLERANCE, Timing, WatchedFrame};
 use hal::projector::Raster;
 use hal::units::Timestamp;
 use std::time::Duration;
@@ -29,7 +29,7 @@ impl Stamps {
     ///
     /// # Errors
     /// Of a device; `Protocol` if no frame comes or no meaning explains the stamps.
-    pub fn measure(head: &mut DynHead) -> Result<Self, Error> {
+    pub fn measure(head: &mut Head) -> Result<Self, Error> {
         let (columns, rows) = head.projector_size();
         head.load(vec![Raster::uniform(columns, rows, u8::MAX)?])?;
         let before = head.timing();

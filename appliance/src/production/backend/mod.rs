@@ -13,7 +13,7 @@ use crate::history::RECIPE;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::{Recipe, archive};
 use algo::pattern::Shot;
-use hal::head::DynHead;
+use hal::head::Head;
 use hal::replay::Recording;
 use sim::{Scenario, Stage};
 use std::fs;
@@ -22,7 +22,7 @@ use std::path::Path;
 /// An opened head.
 pub struct Opened {
     /// The devices.
-    pub head: DynHead,
+    pub head: Head,
     /// Their calibration.
     pub calibration: Calibration,
     /// Where parts are placed in front of a simulated head.
@@ -70,7 +70,7 @@ impl Played {
 
 impl Opened {
     /// A head and what is known of it, before a stored calibration is looked for.
-    fn new(head: DynHead, calibration: Calibration) -> Self {
+    fn new(head: Head, calibration: Calibration) -> Self {
         Self {
             head,
             calibration,

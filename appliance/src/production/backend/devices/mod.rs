@@ -8,7 +8,7 @@ use crate::config::{Backend, Config, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
 use hal::frame::FrameFormat;
-use hal::head::DynHead;
+use hal::head::Head;
 use hal::lines::{OutputLine, StartLine};
 use hal::model::DeviceModel;
 use hal::setup::{LinesSetup, TriggerSetup};
@@ -84,13 +84,13 @@ pub(super) fn rpi(config: &HeadConfig) -> Result<Opened, Failure> {
 }
 
 #[cfg(all(feature = "kms", feature = "libcamera"))]
-fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<DynHead, Failure> {
+fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<Head, Failure> {
     Ok(rpi::head(config, trigger)?)
 }
 
 /// Not reached: [`built_for_head`] refuses the head in this build.
 #[cfg(not(all(feature = "kms", feature = "libcamera")))]
-fn head(_: &HeadConfig, _: Box<dyn Trigger>) -> Result<DynHead, Failure> {
+fn head(_: &HeadConfig, _: Box<dyn Trigger>) -> Result<Head, Failure> {
     Err(uncalibrated())
 }
 

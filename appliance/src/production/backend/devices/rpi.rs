@@ -4,7 +4,7 @@ use crate::config::HeadConfig;
 use hal::camera::Starts;
 use hal::clock::Monotonic;
 use hal::error::Error;
-use hal::head::{DynHead, Head, Timing};
+use hal::head::{Head, Timing};
 use hal::libcamera::{LibCamera, Settings};
 use hal::trigger::Trigger;
 
@@ -15,7 +15,7 @@ const HOLD: u32 = 2;
 ///
 /// # Errors
 /// That of the device that is not there.
-pub fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<DynHead, Error> {
+pub fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<Head, Error> {
     let starts = match config.trigger.line {
         Some(_) => Starts::OnTrigger,
         None => Starts::ByItself,
