@@ -61,10 +61,7 @@ pub(super) fn find(label: &str, name: &str) -> Result<FoundLine, LineError> {
 
 /// All chips, each once: a second name in /dev may be a link to the same chip.
 fn open_chips(line: &str) -> Result<Vec<Chip>, LineError> {
-    let failed = |error: gpio_cdev::Error| LineError::Failed {
-        line: line.into(),
-        cause: error.to_string(),
-    };
+    let failed = |error: gpio_cdev::Error| LineError::failed(line, error);
     let mut found: Vec<Chip> = Vec::new();
     let mut denied = false;
     for chip in chips().map_err(failed)? {

@@ -91,6 +91,16 @@ pub enum LineError {
     },
 }
 
+impl LineError {
+    /// An error of the system that has no remedy of its own.
+    pub(super) fn failed(line: &str, cause: impl ToString) -> Self {
+        Self::Failed {
+            line: line.into(),
+            cause: cause.to_string(),
+        }
+    }
+}
+
 /// Most names that a message lists.
 const LISTED: usize = 32;
 
@@ -119,14 +129,11 @@ impl From<LineError> for Error {
 
 /// The `LineError` for an error of the library; `user` is what holds the line, if known.
 pub(super) fn means(error: &gpio_cdev::Error, line: &str, user: Option<String>) -> LineError {
-    let line = line.to_owned();
+    let name = line.to_owned();
     match errno(error) {
-        Some(Errno::EBUSY) => LineError::Busy { line, user },
-        Some(Errno::ENODEV) => LineError::Removed { line },
-        _ => LineError::Failed {
-            line,
-            cause: error.to_string(),
-        },
+        Some(Errno::EBUSY) => LineError::Busy { line: name, user },
+        Some(Errno::ENODEV) => LineError::Removed { line: name },
+        _ => LineError::failed(line, error),
     }
 }
 

@@ -62,10 +62,7 @@ impl Pulse {
             let put = handle.set_value(u8::from(on));
             put.map_err(|error| means(&error, &line, None))
         };
-        Self::of(Box::new(put), setup.pulse()).map_err(|error| LineError::Failed {
-            line: name.into(),
-            cause: error.to_string(),
-        })
+        Self::of(Box::new(put), setup.pulse()).map_err(|error| LineError::failed(name, error))
     }
 
     fn of(put: Box<Put>, width: Duration) -> std::io::Result<Self> {

@@ -31,10 +31,7 @@ impl Start {
         let edges = find(&setup.chip, name)?.edges(setup.start_active_low)?;
         let unblocked =
             fcntl_getfl(&edges).and_then(|flags| fcntl_setfl(&edges, flags | OFlags::NONBLOCK));
-        unblocked.map_err(|error| LineError::Failed {
-            line: name.into(),
-            cause: error.to_string(),
-        })?;
+        unblocked.map_err(|error| LineError::failed(name, error))?;
         let mut start = Self {
             edges,
             name: name.into(),
