@@ -6,7 +6,7 @@ use super::median::median;
 use super::variants;
 use super::workload::Workload;
 use appliance::production::stopwatch::timed;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::hint::black_box;
 use std::time::Duration;
 
@@ -67,15 +67,20 @@ pub struct Timing {
     pub right: f64,
 }
 
-/// The whole table.
-#[derive(Clone, Debug)]
+/// The whole table; in JSON each variant is a key.
+#[derive(Clone, Debug, Serialize)]
 pub struct KernelTable {
     /// Processor time of the floor per pixel, median over all rounds.
     pub floor_ns_per_px: f64,
     /// The least and the most of it.
     pub floor_range: [f64; 2],
     /// A row for each variant.
+    #[serde(flatten, serialize_with = "by_name")]
     pub rows: Vec<Timing>,
+}
+
+fn by_name<S: Serializer>(rows: &[Timing], out: S) -> Result<S::Ok, S::Error> {
+    out.collect_map(rows.iter().map(|row| (&row.name, row)))
 }
 
 /// A phase is right within this many turns: seven σ of the noise that the frames have.

@@ -4,19 +4,25 @@ use super::budget::Budget;
 use super::kernel::KernelTable;
 use super::machine::Machine;
 use super::point::{Point, means};
-use serde_json::{Map, Value, json};
+use serde::{Serialize, Serializer};
+use serde_json::{Map, json};
 use std::fmt::Write as _;
 
 /// What was measured; `None` where it was not asked for.
-#[derive(Debug)]
+///
+/// Its JSON is one object, whose keys are documented in the README of `algo`.
+#[derive(Debug, Serialize)]
 pub struct Report {
     /// The machine.
     pub machine: Machine,
     /// The kernel table.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub kernel: Option<KernelTable>,
-    /// Run time against error, a point for each part.
+    /// Run time against error, a point for each part; in JSON the means over the parts.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "as_means")]
     pub accuracy: Option<Vec<Point>>,
     /// From trigger to verdict.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "by_size")]
     pub budget: Option<Vec<Budget>>,
 }
 
@@ -25,22 +31,6 @@ pub const HEADER: &str = "part,implementation,sequence,frames,steps,bits,skippin
     ms_per_set,rms_mm,unresolved_px,gross_px";
 
 impl Report {
-    /// One object; its keys are documented in the README of `algo`.
-    pub fn json(&self) -> Value {
-        let mut all = Map::new();
-        all.insert("machine".into(), json!(self.machine));
-        if let Some(table) = &self.kernel {
-            all.insert("kernel".into(), kernel(table));
-        }
-        if let Some(points) = &self.accuracy {
-            all.insert("accuracy".into(), json!(means(points)));
-        }
-        if let Some(budgets) = &self.budget {
-            all.insert("budget".into(), budget(budgets));
-        }
-        Value::Object(all)
-    }
-
     /// The points of every part, if there are any.
     pub fn csv(&self) -> Option<String> {
         let points = self.accuracy.as_ref()?;
@@ -96,20 +86,14 @@ impl Report {
     }
 }
 
-fn kernel(table: &KernelTable) -> Value {
-    let mut all = Map::new();
-    all.insert("floor_ns_per_px".into(), json!(table.floor_ns_per_px));
-    all.insert("floor_range".into(), json!(table.floor_range));
-    for row in &table.rows {
-        all.insert(row.name.clone(), json!(row));
-    }
-    Value::Object(all)
+fn as_means<S: Serializer>(points: &Option<Vec<Point>>, out: S) -> Result<S::Ok, S::Error> {
+    points.as_deref().map(means).serialize(out)
 }
 
 /// `{"640x480": {"12": {…}, "4": {…}}}`: sizes, then frames of the sequence.
-fn budget(budgets: &[Budget]) -> Value {
+fn by_size<S: Serializer>(budgets: &Option<Vec<Budget>>, out: S) -> Result<S::Ok, S::Error> {
     let mut all = Map::new();
-    for budget in budgets {
+    for budget in budgets.iter().flatten() {
         let size = format!("{}x{}", budget.width, budget.height);
         let sizes = all.entry(size).or_insert_with(|| json!({}));
         if budget.aligned {
@@ -129,7 +113,7 @@ fn budget(budgets: &[Budget]) -> Value {
         });
         sizes[key("kernel")] = json!({ "ns_per_px": per_px(budget.kernel_ms) });
     }
-    Value::Object(all)
+    all.serialize(out)
 }
 
 fn kernel_table(text: &mut String, table: &KernelTable) {

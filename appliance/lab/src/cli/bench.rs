@@ -60,7 +60,7 @@ impl Bench {
         let report = self.measure(&on_progress);
         progress.clear();
         let report = report?;
-        let json = report.json();
+        let json = serde_json::json!(report);
         let tables = report.markdown();
         if let Some(folder) = &folder {
             folder.write("benchmarks.json", format!("{json:#}\n").as_bytes())?;
