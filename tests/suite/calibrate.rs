@@ -359,7 +359,7 @@ fn a_damaged_calibration_gives_way_to_the_one_before_and_is_never_guessed() {
         assert_eq!(loaded.file.checksum, first);
         let fallback = loaded.fallback.unwrap();
         assert!(
-            fallback.contains(words) && fallback.contains("one before"),
+            fallback.contains(words) && fallback.contains("previous generation"),
             "{fallback}"
         );
     }
