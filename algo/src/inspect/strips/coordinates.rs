@@ -1,7 +1,7 @@
 //! Stage 3, align: the taught coordinates of a row's pixels, and how far they deviate from golden there.
 
 use super::Production;
-use super::displaced::{AlignedRow, GoldenMap, OffsetRow, align_row};
+use super::displaced::{AlignedRow, GoldenMap, OffsetRow, align_row, taught_coordinates};
 use super::height::HeightRow;
 use super::pose::{Node, PoseField};
 use super::recent::RecentRows;
@@ -32,7 +32,7 @@ impl TaughtCoordinates {
     }
 
     /// Takes the part's motion back in row `v`, whose heights were found last: its deviations become those from golden at the
-    /// taught coordinates. Those of a part that lies as taught stay; its coordinates are needed for cells and weights only.
+    /// taught coordinates. Those of a part that lies as taught stay. Coordinates are found for cells and weights only.
     pub fn align(
         &mut self,
         plan: &Production,
@@ -44,7 +44,7 @@ impl TaughtCoordinates {
         if pose.placed.is_some() {
             let columns = common(&columns, &recent.extent(v));
             self.displace(plan, pose, v, columns, (heights, recent));
-        } else if !plan.gauges.patches.is_empty() || plan.weighted.is_some() {
+        } else if plan.needs_coordinates() {
             self.row[columns.clone()].fill(v as i32);
             for u in columns {
                 self.column[u] = u as i32;
@@ -76,11 +76,14 @@ impl TaughtCoordinates {
         let mut overflow = false;
         let aligned = AlignedRow {
             deviation: recent.row_mut(v).0,
-            column: &mut self.column,
-            row: &mut self.row,
             overflow: &mut overflow,
         };
-        align_row(plan.decoder.backend(), golden, row, columns, aligned);
+        let backend = plan.decoder.backend();
+        align_row(backend, golden, row, columns.clone(), aligned);
+        if plan.needs_coordinates() {
+            let taught = (&mut *self.column, &mut *self.row);
+            taught_coordinates(backend, golden, row, columns, taught);
+        }
         if overflow {
             recent.overflow = Some(v);
         }
@@ -122,5 +125,12 @@ impl TaughtCoordinates {
             cell.count += 1;
             cell.deviation += i64::from(deviation[u]);
         }
+    }
+}
+
+impl Production {
+    /// Whether the cells of a gauge or weights are looked up by taught coordinates.
+    fn needs_coordinates(&self) -> bool {
+        !self.gauges.patches.is_empty() || self.weighted.is_some()
     }
 }

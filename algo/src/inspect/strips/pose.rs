@@ -14,28 +14,11 @@ use alloc::vec::Vec;
 
 /// Pixels from node to node. A turn by half a degree seen through 22° over 1456 pixels is bent by 0.003 pixels between them.
 pub(super) const SPACING: usize = 64;
-/// Values of a node: du, dv (pixels), dz (mm).
-const VALUES: usize = 3;
+/// Values that are interpolated: du, dv (pixels), dz (mm).
+pub(super) const VALUES: usize = 3;
 
-/// The values of a node at the middle height, and their change per mm of height.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Node {
-    pub value: [f32; VALUES],
-    pub slope: [f32; VALUES],
-}
-
-impl Node {
-    /// Interpolates between this node (`share` 0) and another (1).
-    pub fn between(&self, other: &Self, share: f32) -> Self {
-        let mix = |a: [f32; VALUES], b: [f32; VALUES]| {
-            core::array::from_fn(|i| a[i] + (b[i] - a[i]) * share)
-        };
-        Self {
-            value: mix(self.value, other.value),
-            slope: mix(self.slope, other.slope),
-        }
-    }
-}
+/// The values at the middle height, then their change per mm of height.
+pub(super) type Node = [f32; 2 * VALUES];
 
 /// How the part of a cycle lies, and what that does to every pixel.
 #[derive(Debug)]
@@ -54,12 +37,12 @@ impl PoseField {
     /// Of a part that lies as taught.
     pub fn new(plan: &Production) -> Self {
         let (width, height) = plan.size();
-        let columns = (width - 1).div_ceil(SPACING) + 1;
+        let columns = columns_of(width);
         let rows = (height - 1).div_ceil(SPACING) + 1;
         let (regions, nodes) = match plan.alignment {
             Some(_) => (
                 plan.gauges.regions.clone(),
-                vec![Node::default(); columns * rows],
+                vec![[0.0; 2 * VALUES]; columns * rows],
             ),
             None => Default::default(),
         };
@@ -100,27 +83,29 @@ impl PoseField {
     }
 
     /// The nodes of row `v` of a frame of `height` rows, interpolated between the rows of nodes above and below.
-    pub fn row(&self, v: usize, height: usize, out: &mut Vec<Node>) {
+    pub fn row(&self, v: usize, height: usize, out: &mut [Node]) {
         let (upper, lower) = (
             v / SPACING,
             (v / SPACING + 1).min(self.nodes.len() / self.columns - 1),
         );
         let (top, bottom) = (upper * SPACING, (lower * SPACING).min(height - 1));
         let share = (v - top) as f32 / (bottom - top).max(1) as f32;
-        let row = |at: usize| &self.nodes[at * self.columns..(at + 1) * self.columns];
-        out.clear();
-        out.extend(
-            row(upper)
-                .iter()
-                .zip(row(lower))
-                .map(|(a, b)| a.between(b, share)),
-        );
+        let row = |at: usize| self.nodes[at * self.columns..][..self.columns].as_flattened();
+        let (above, below) = (row(upper), row(lower));
+        for ((out, a), b) in out.as_flattened_mut().iter_mut().zip(above).zip(below) {
+            *out = a + (b - a) * share;
+        }
     }
+}
+
+/// Nodes along a row of `width` pixels.
+fn columns_of(width: usize) -> usize {
+    (width - 1).div_ceil(SPACING) + 1
 }
 
 /// Nodes for a row of `width` pixels.
 pub(super) fn nodes_of_row(width: usize) -> Vec<Node> {
-    vec![Node::default(); width.div_ceil(SPACING) + 1]
+    vec![[0.0; 2 * VALUES]; columns_of(width)]
 }
 
 impl Production {
@@ -137,10 +122,10 @@ impl Production {
             values.unwrap_or([f64::NAN; VALUES])
         };
         let (low, high) = (at(middle - half), at(middle + half));
-        Node {
-            value: core::array::from_fn(|i| ((low[i] + high[i]) / 2.0) as f32),
-            slope: core::array::from_fn(|i| ((high[i] - low[i]) / (2.0 * half)) as f32),
-        }
+        core::array::from_fn(|i| match i.checked_sub(VALUES) {
+            None => ((low[i] + high[i]) / 2.0) as f32,
+            Some(i) => ((high[i] - low[i]) / (2.0 * half)) as f32,
+        })
     }
 
     /// The point at height `z` that pixel (u, v) sees.

@@ -1,10 +1,10 @@
 //! Stage 3, align: taught coordinates of a displaced row and its deviations from golden there.
 //!
 //! # Idea
-//! The pose field gives the displacement of each pixel. Golden's height between four pixels is bilinear. Displacements vary slowly:
-//! the pixels of a block mostly lie between the same neighbours relative to their own place (`same`), or some of them one
-//! neighbour further (`next`); then golden is read along rows, many pixels at a time. All other blocks go pixel by pixel
-//! (`each`). Plain loops over slices, compiled for each back-end's instructions.
+//! The pose field gives the displacement of each pixel; inside a block it is taken as linear in column and height (`linear`). Golden's
+//! height between four pixels is bilinear. The pixels of a block mostly have the whole displacement of its middle (`same`), or some
+//! of them one pixel more or less (`next`); then golden is read along rows, many pixels at a time, and each pixel is checked to
+//! have it. All other blocks go pixel by pixel (`each`). Plain loops over slices, compiled for each back-end's instructions.
 //!
 //! # Equations
 //! With the displacement (du, dv, dz) at height z, a pixel's deviation is (z + dz) − G(u + du, v + dv), G golden's height.
@@ -13,16 +13,19 @@
 //! The three ways have the same bits (`blocks_have_the_bits_of_one_pixel_after_the_other`); the deviation is within 50 nm of one of
 //! whole maps (`strips_weigh_deviations_as_the_comparison_of_whole_maps_does`).
 
-mod block;
+mod linear;
 
-use super::pose::{Node, SPACING};
+use super::pose::Node;
 use super::squares::narrow::MAX_NARROW_NM;
 use crate::math::nearest::whole;
 use crate::pipeline::{NO_OFFSET, SQUARE};
 use crate::simd::{Lanes, back_end_entry};
 use crate::units::Height;
-use block::{BLOCK, Block};
 use core::ops::Range;
+use linear::{Linear, floor, is_near};
+
+/// Pixels that are worked on together; the distance of two nodes is a multiple of it.
+const BLOCK: usize = 32;
 
 /// The golden map that rows are compared with.
 #[derive(Clone, Copy)]
@@ -38,7 +41,7 @@ pub(super) struct GoldenMap<'a> {
 pub(super) struct OffsetRow<'a> {
     pub v: usize,
     pub offset: &'a [i32],
-    /// Displacements at every [`SPACING`]th column.
+    /// Displacements at every [`SPACING`](super::pose::SPACING)th column.
     pub nodes: &'a [Node],
     /// The height that the nodes' values hold at, mm.
     pub middle: f32,
@@ -48,10 +51,6 @@ pub(super) struct OffsetRow<'a> {
 pub(super) struct AlignedRow<'a> {
     /// Deviations from golden at the taught coordinates.
     pub deviation: &'a mut [i32],
-    /// Taught coordinates.
-    pub column: &'a mut [i32],
-    /// Taught coordinates.
-    pub row: &'a mut [i32],
     /// Whether a deviation is above [`MAX_NARROW_NM`].
     pub overflow: &'a mut bool,
 }
@@ -66,6 +65,66 @@ back_end_entry! {
     )
 }
 
+back_end_entry! {
+    /// The taught coordinates of columns of a row, rounded to nearest: columns and rows.
+    fn taught_coordinates [] = round_coordinates(
+        golden: GoldenMap<'_>,
+        row: OffsetRow<'_>,
+        columns: Range<usize>,
+        taught: (&mut [i32], &mut [i32]),
+    )
+}
+
+/// The pixels of a block, or some of them, and what displaces them.
+struct Block<'a> {
+    linear: Linear,
+    /// The first pixel, and its number in the block.
+    u: usize,
+    v: usize,
+    skipped: usize,
+    /// Golden's heights that the offsets count from.
+    bases: &'a [Height],
+    offsets: &'a [i32],
+}
+
+impl<'a> Block<'a> {
+    /// The pixels in `columns`, which belong to one block.
+    #[inline(always)]
+    fn new(golden: GoldenMap<'a>, row: OffsetRow<'a>, columns: Range<usize>) -> Self {
+        let u = columns.start;
+        Self {
+            linear: Linear::of_block(u, row.nodes, golden.width, row.middle),
+            u,
+            v: row.v,
+            skipped: u % BLOCK,
+            bases: &golden.height[row.v * golden.width..][columns.clone()],
+            offsets: &row.offset[columns],
+        }
+    }
+
+    /// The place in golden of the first pixel after a whole displacement, if the block is whole, and golden has `more` neighbours
+    /// to the right of all its pixels and below.
+    #[inline(always)]
+    fn place(&self, golden: GoldenMap<'_>, [along, down]: [i32; 2], more: usize) -> Option<usize> {
+        let width = golden.width;
+        let column = (self.u as i32).wrapping_add(along);
+        let row = (self.v as i32).wrapping_add(down);
+        let inside = self.offsets.len() == BLOCK
+            && column >= 0
+            && row >= 0
+            && column as usize + BLOCK + more <= width
+            && (row as usize + 1 + more) * width <= golden.height.len();
+        inside.then(|| row as usize * width + column as usize)
+    }
+}
+
+/// The height that an offset leads to, nm.
+#[inline(always)]
+fn height(base: Height, offset: i32) -> i32 {
+    let base = if base.is_known() { base.nm() } else { 0 };
+    base.wrapping_add(offset)
+}
+
 #[inline(always)]
 fn align_columns<V: Lanes>(
     v: V,
@@ -74,105 +133,90 @@ fn align_columns<V: Lanes>(
     columns: Range<usize>,
     aligned: AlignedRow<'_>,
 ) {
-    let width = golden.width;
-    let bases = &golden.height[row.v * width..(row.v + 1) * width];
-    let last = row.nodes.len() - 1;
-    let mut block = Block::EMPTY;
     let mut overflow = false;
     let mut start = columns.start;
     while start < columns.end {
-        let node = start / SPACING;
-        let left = node * SPACING;
         let end = ((start / BLOCK + 1) * BLOCK).min(columns.end);
-        let length = end - start;
-        v.fetch(bases, start, bases.len());
-        let nodes = (row.nodes[node], row.nodes[(node + 1).min(last)]);
-        let unit = 1.0 / ((left + SPACING).min(width - 1) - left).max(1) as f32;
-        let seen = (&bases[start..end], &row.offset[start..end]);
-        block.take_back(nodes, ((start - left) as i32, unit), row.middle, seen);
-        let (column, line) = (
-            &mut aligned.column[start..end],
-            &mut aligned.row[start..end],
-        );
-        for i in 0..length {
-            column[i] = ((start + i) as i32).wrapping_add(block.along.nearest[i]);
-            line[i] = (row.v as i32).wrapping_add(block.down.nearest[i]);
-        }
-        let (left_most, right_most) = block.along.range(&block.known);
-        let (top_most, bottom_most) = block.down.range(&block.known);
-        let deviations = &mut aligned.deviation[start..end];
-        if left_most <= right_most {
-            let column = start as i32 + left_most;
-            let top = row.v as i32 + top_most;
-            // Three neighbours each way have room.
-            let inside = column >= 0
-                && top >= 0
-                && column as usize + length + 2 <= width
-                && (top as usize + 3) * width <= golden.height.len();
-            let spread = (right_most - left_most) | (bottom_most - top_most);
-            let place = (top as usize)
-                .wrapping_mul(width)
-                .wrapping_add(column as usize);
-            let small = if inside && spread == 0 {
-                same(golden, &block, place, deviations)
-            } else if inside && spread == 1 {
-                next(golden, &block, (left_most, top_most), place, deviations)
-            } else {
-                false
-            };
-            if !small {
-                overflow |= each(golden, &block, (start, row.v), deviations);
+        let block = Block::new(golden, row, start..end);
+        let out = &mut aligned.deviation[start..end];
+        v.fetch(golden.height, row.v * golden.width + start, golden.width);
+        if let Some([along, down]) = block.linear.whole() {
+            let mut small = false;
+            if let Some(place) = block.place(golden, [along, down], 1) {
+                v.fetch(golden.height, place, 2 * golden.width);
+                small = same(golden, &block, place, out);
             }
+            let lower = block.linear.lower;
+            if !small
+                && let from = [along + lower[0], down + lower[1]]
+                && let Some(place) = block.place(golden, from, 2)
+            {
+                small = next(golden, &block, place, out);
+            }
+            if !small {
+                overflow |= each(golden, &block, [along, down], out);
+            }
+        } else {
+            out.fill(NO_OFFSET);
         }
         start = end;
     }
     *aligned.overflow = overflow;
 }
 
-/// A block whose pixels all have the same whole displacement; its first pixel lies at `place`. The answer is whether all deviations
-/// are small.
+/// A block whose pixels all have its whole displacement, which leads from its first pixel to `place`. The answer is false if they
+/// have not, or if some deviation is not small.
 #[inline(always)]
-fn same(golden: GoldenMap<'_>, block: &Block, place: usize, out: &mut [i32]) -> bool {
-    let (length, width) = (out.len(), golden.width);
-    let upper = &golden.height[place..][..length + 1];
-    let lower = &golden.height[place + width..][..length + 1];
-    let taught = &golden.taught[place..][..length];
-    let mut large = 0;
-    for i in 0..length {
+fn same(golden: GoldenMap<'_>, block: &Block<'_>, place: usize, out: &mut [i32]) -> bool {
+    let upper = &golden.height[place..][..BLOCK + 1];
+    let lower = &golden.height[place + golden.width..][..BLOCK + 1];
+    let taught = &golden.taught[place..][..BLOCK];
+    let (bases, offsets) = (&block.bases[..BLOCK], &block.offsets[..BLOCK]);
+    let (linear, out) = (block.linear, &mut out[..BLOCK]);
+    let mut refused = 0;
+    for i in 0..BLOCK {
+        let z = height(bases[i], offsets[i]);
+        let [along, down, rise] = linear.at(i, z);
         let corners = [
             upper[i].nm(),
             upper[i + 1].nm(),
             lower[i].nm(),
             lower[i + 1].nm(),
         ];
-        let known = (block.known[i] != 0) & (taught[i] & SQUARE != 0);
-        let nm = block.deviation(i, corners);
-        out[i] = if known { whole(nm) } else { NO_OFFSET };
-        large |= i32::from(known & !is_small(nm));
+        let nm = deviation((z, rise), (along, down), corners);
+        // Masks of 32 bits, as wide as the heights: narrower ones would be widened again.
+        let measured = -i32::from(offsets[i] != NO_OFFSET);
+        let known = measured & -i32::from(i32::from(taught[i]) & i32::from(SQUARE) != 0);
+        out[i] = (whole(nm) & known) | (NO_OFFSET & !known);
+        let inside = lies_in(along, 0.0, 1.0) & lies_in(down, 0.0, 1.0);
+        refused |= (measured & -i32::from(!inside)) | (known & -i32::from(!is_small(nm)));
     }
-    large == 0
+    refused == 0
 }
 
-/// A block in which whole displacements along and down differ by one at most; the least ones lead from its first pixel to `place`.
-/// The answer is whether all deviations are small.
+/// A block whose pixels have a whole displacement that leads from the first one to `place`, or one pixel more along, down or
+/// both. The answer is false if they have not, or if some deviation is not small.
 #[inline(always)]
-fn next(
-    golden: GoldenMap<'_>,
-    block: &Block,
-    (left_most, top_most): (i32, i32),
-    place: usize,
-    out: &mut [i32],
-) -> bool {
-    let (length, width) = (out.len(), golden.width);
-    let first = &golden.height[place..][..length + 2];
-    let second = &golden.height[place + width..][..length + 2];
-    let third = &golden.height[place + 2 * width..][..length + 2];
-    let upper = &golden.taught[place..][..length + 1];
-    let lower = &golden.taught[place + width..][..length + 1];
-    let mut large = 0;
-    for i in 0..length {
-        let right = block.along.whole[i] > left_most;
-        let under = block.down.whole[i] > top_most;
+fn next(golden: GoldenMap<'_>, block: &Block<'_>, place: usize, out: &mut [i32]) -> bool {
+    let width = golden.width;
+    let first = &golden.height[place..][..BLOCK + 2];
+    let second = &golden.height[place + width..][..BLOCK + 2];
+    let third = &golden.height[place + 2 * width..][..BLOCK + 2];
+    let upper = &golden.taught[place..][..BLOCK + 1];
+    let lower = &golden.taught[place + width..][..BLOCK + 1];
+    let (bases, offsets) = (&block.bases[..BLOCK], &block.offsets[..BLOCK]);
+    let (linear, out) = (block.linear, &mut out[..BLOCK]);
+    let [left, top] = [linear.lower[0] as f32, linear.lower[1] as f32];
+    let mut refused = 0;
+    for i in 0..BLOCK {
+        let z = height(bases[i], offsets[i]);
+        let [along, down, rise] = linear.at(i, z);
+        let inside = lies_in(along, left, 2.0) & lies_in(down, top, 2.0);
+        let (right, under) = (along >= left + 1.0, down >= top + 1.0);
+        let shares = (
+            along - if right { left + 1.0 } else { left },
+            down - if under { top + 1.0 } else { top },
+        );
         let near = [
             pick(right, first, i),
             pick(right, second, i),
@@ -192,12 +236,19 @@ fn next(
         let upper = if right { upper[i + 1] } else { upper[i] };
         let lower = if right { lower[i + 1] } else { lower[i] };
         let taught = if under { lower } else { upper };
-        let known = (block.known[i] != 0) & (taught & SQUARE != 0);
-        let nm = block.deviation(i, corners);
+        let nm = deviation((z, rise), shares, corners);
+        let measured = offsets[i] != NO_OFFSET;
+        let known = measured & (taught & SQUARE != 0);
         out[i] = if known { whole(nm) } else { NO_OFFSET };
-        large |= i32::from(known & !is_small(nm));
+        refused |= i32::from((measured & !inside) | (known & !is_small(nm)));
     }
-    large == 0
+    refused == 0
+}
+
+/// Whether a displacement is at least `low` and less than so many pixels more.
+#[inline(always)]
+fn lies_in(displacement: f32, low: f32, pixels: f32) -> bool {
+    (displacement >= low) & (displacement < low + pixels)
 }
 
 /// The height at a place of a row, or the next one.
@@ -206,30 +257,35 @@ fn pick(next: bool, row: &[Height], at: usize) -> i32 {
     if next { row[at + 1].nm() } else { row[at].nm() }
 }
 
-/// A block pixel by pixel; `first` is the column and row of its first pixel. The answer is whether some deviation is large.
+/// A block pixel by pixel, from its whole displacement. The answer is whether some deviation is large.
 #[inline(always)]
-fn each(golden: GoldenMap<'_>, block: &Block, first: (usize, usize), out: &mut [i32]) -> bool {
+fn each(golden: GoldenMap<'_>, block: &Block<'_>, from: [i32; 2], out: &mut [i32]) -> bool {
     let width = golden.width;
+    let rows = golden.height.len() / width;
     let mut large = false;
     for (i, out) in out.iter_mut().enumerate() {
-        if block.known[i] == 0 {
-            *out = NO_OFFSET;
+        *out = NO_OFFSET;
+        if block.offsets[i] == NO_OFFSET {
             continue;
         }
-        let column = (first.0 + i) as i32 + block.along.whole[i];
-        let row = first.1 as i32 + block.down.whole[i];
+        let z = height(block.bases[i], block.offsets[i]);
+        let [along, down, rise] = block.linear.at(block.skipped + i, z);
+        if !is_near(along) || !is_near(down) {
+            continue;
+        }
+        let (left, top) = (floor(along), floor(down));
+        let column = (block.u + i) as i32 + from[0] + whole(left);
+        let row = block.v as i32 + from[1] + whole(top);
         let place = (row as usize)
             .wrapping_mul(width)
             .wrapping_add(column as usize);
-        let rows = golden.height.len() / width;
         let inside = column >= 0 && row >= 0 && column + 1 < width as i32 && row + 1 < rows as i32;
         if !inside || golden.taught[place] & SQUARE == 0 {
-            *out = NO_OFFSET;
             continue;
         }
         let (upper, lower) = (&golden.height[place..], &golden.height[place + width..]);
         let corners = [upper[0].nm(), upper[1].nm(), lower[0].nm(), lower[1].nm()];
-        let nm = block.deviation(i, corners);
+        let nm = deviation((z, rise), (along - left, down - top), corners);
         large |= !is_small(nm);
         *out = match is_small(nm) {
             true => whole(nm),
@@ -240,10 +296,54 @@ fn each(golden: GoldenMap<'_>, block: &Block, first: (usize, usize), out: &mut [
     large
 }
 
+/// How far a pixel at height `z` that moves up by `rise` lies above golden, nm. It lies between four corners (left and right, above and
+/// below), at these shares of the way from the first one along and down.
+#[inline(always)]
+fn deviation((z, rise): (i32, f32), (along, down): (f32, f32), corners: [i32; 4]) -> f32 {
+    let [first, right, under, both] = corners;
+    let upper = right.wrapping_sub(first);
+    let lower = both.wrapping_sub(under);
+    let twist = lower.wrapping_sub(upper) as f32;
+    let under = under.wrapping_sub(first) as f32;
+    let golden = along * upper as f32 + down * (under + along * twist);
+    let above = z.wrapping_sub(first) as f32;
+    (above + rise) - golden
+}
+
 /// Whether a deviation in nm is at most [`MAX_NARROW_NM`].
 #[inline(always)]
 fn is_small(nm: f32) -> bool {
     (nm > -(MAX_NARROW_NM as f32)) & (nm < MAX_NARROW_NM as f32)
+}
+
+#[inline(always)]
+fn round_coordinates<V: Lanes>(
+    _: V,
+    golden: GoldenMap<'_>,
+    row: OffsetRow<'_>,
+    columns: Range<usize>,
+    taught: (&mut [i32], &mut [i32]),
+) {
+    let mut start = columns.start;
+    while start < columns.end {
+        let end = ((start / BLOCK + 1) * BLOCK).min(columns.end);
+        let block = Block::new(golden, row, start..end);
+        let (column, line) = (&mut taught.0[start..end], &mut taught.1[start..end]);
+        let from = block.linear.whole().unwrap_or_default();
+        for i in 0..end - start {
+            let z = height(block.bases[i], block.offsets[i]);
+            let [along, down, _] = block.linear.at(block.skipped + i, z);
+            let known = (block.offsets[i] != NO_OFFSET) & is_near(along) & is_near(down);
+            let pixels = if known {
+                [whole(along), whole(down)]
+            } else {
+                [0; 2]
+            };
+            column[i] = ((start + i) as i32).wrapping_add(from[0] + pixels[0]);
+            line[i] = (row.v as i32).wrapping_add(from[1] + pixels[1]);
+        }
+        start = end;
+    }
 }
 
 #[cfg(test)]

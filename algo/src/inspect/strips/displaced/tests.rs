@@ -1,6 +1,7 @@
 //! Blocks of pixels against single ones.
 
 use super::*;
+use crate::inspect::strips::pose::SPACING;
 use crate::simd::Backend;
 use std::vec;
 use std::vec::Vec;
@@ -38,9 +39,9 @@ fn blocks_have_the_bits_of_one_pixel_after_the_other() {
         (1.5, 6.0),
         (-40.0, 1.0),
     ] {
-        let node = |at: usize| Node {
-            value: [shift + bend * at as f32, bend - shift * 0.5, 0.01],
-            slope: [0.02, -0.03, 0.001],
+        let node = |at: usize| {
+            let value = [shift + bend * at as f32, bend - shift * 0.5, 0.01];
+            [value[0], value[1], value[2], 0.02, -0.03, 0.001]
         };
         let nodes: Vec<_> = (0..WIDTH.div_ceil(SPACING) + 1).map(node).collect();
         for v in 0..ROWS {
@@ -62,11 +63,10 @@ fn blocks_have_the_bits_of_one_pixel_after_the_other() {
                 let mut overflow = false;
                 let out = AlignedRow {
                     deviation: &mut deviation,
-                    column: &mut column,
-                    row: &mut line,
                     overflow: &mut overflow,
                 };
-                align_row(backend, golden, row, columns, out);
+                align_row(backend, golden, row, columns.clone(), out);
+                taught_coordinates(backend, golden, row, columns, (&mut column, &mut line));
                 (deviation, column, line, overflow)
             };
             for backend in Backend::available() {
