@@ -148,8 +148,11 @@ impl Spans {
             firsts.push(spans.len());
             let v = row as f64;
             crossings.clear();
-            for (at, &(u0, v0)) in corners.iter().enumerate() {
-                let (u1, v1) = corners[(at + 1) % corners.len()];
+            if v < top || v > bottom {
+                continue;
+            }
+            let next = corners.iter().cycle().skip(1);
+            for (&(u0, v0), &(u1, v1)) in corners.iter().zip(next) {
                 if (v0 <= v) != (v1 <= v) {
                     crossings.push(u0 + (u1 - u0) * ((v - v0) / (v1 - v0)));
                 }
