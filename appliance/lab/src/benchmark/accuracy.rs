@@ -1,10 +1,11 @@
 //! Run time against error: processor time and height error of each implementation, sequence and bit depth on the simulated parts.
 
 use super::decoding::Decoding;
+use super::floor::FloorSets;
 use super::frames::{FrameSet, Rotation};
-use super::kernel::{Effort, FloorSets, Kernel, interleaved};
 use super::median::median;
 use super::point::Point;
+use super::timing::{Contender, Effort, Round, interleaved};
 use super::variants::{decoders, references};
 use super::words;
 use crate::experiment::{BetterSequence, Method, OpticsKind, Runner, Scene};
@@ -86,6 +87,7 @@ impl Study {
             bit_depths: vec![8, 10, 12],
             // Shorter for each: ten sequences of three depths on four parts.
             effort: Effort {
+                rounds: 5,
                 patience: Duration::from_millis(15),
                 ..Effort::FULL
             },
@@ -158,29 +160,30 @@ impl Study {
         let truth = runner.truth();
         let lit = Truth::from(truth).whole_pixels().count();
         let pixels = set.pixels();
-        let mut kernels: Vec<Box<dyn Kernel>> = Vec::new();
+        let mut contenders = Vec::new();
         let mut named = Vec::new();
         for (name, kernel) in references(&sequence, range, bits, pixels)? {
-            kernels.push(kernel);
+            contenders.push(Contender::cold(kernel));
             named.push((name, false));
         }
         for (name, decoder) in decoders(&sequence, range, bits)? {
             let window = rows_seen(truth, set.width());
-            let whole = Decoding::new(decoder.clone(), None);
-            kernels.push(Box::new(whole));
-            kernels.push(Box::new(Decoding::new(decoder, Some(window))));
+            for window in [None, Some(window)] {
+                let decoding = Decoding::new(decoder.clone(), window);
+                contenders.push(Contender::cold(Box::new(decoding)));
+            }
             named.extend([(name, false), (name, true)]);
         }
-        let mut sets = Rotation::of(set, self.effort.bytes);
-        let rounds = interleaved(&mut kernels, &mut sets, base, &self.effort);
+        let mut sets = [Rotation::of(set, self.effort.bytes)];
+        let rounds = interleaved(&mut contenders, &mut sets, base, &self.effort);
         let mut points = Vec::new();
-        for (((implementation, skipping), kernel), rounds) in
-            named.into_iter().zip(&mut kernels).zip(rounds)
+        for (((implementation, skipping), contender), rounds) in
+            named.into_iter().zip(&mut contenders).zip(rounds)
         {
-            let set = sets.next();
-            kernel.run(set);
-            let score = score(&measured, truth, &kernel.turns(set));
-            let ns_per_px = median(rounds.iter().map(|round| round.of).collect());
+            let set = sets[0].next();
+            contender.kernel.run(set);
+            let score = score(&measured, truth, &contender.kernel.turns(set));
+            let ns_per_px = median(rounds.iter().map(|round| round.cold.ns).collect());
             points.push(Point {
                 part,
                 implementation,
@@ -190,7 +193,7 @@ impl Study {
                 bits,
                 skipping,
                 ns_per_px,
-                x_floor: median(rounds.iter().map(|round| round.of / round.floor).collect()),
+                x_floor: median(rounds.iter().map(Round::x_floor).collect()),
                 ms_per_set: ns_per_px * pixels as f64 / 1e6,
                 rms_mm: score.as_ref().map_or(f64::NAN, |score| score.rms_mm),
                 unresolved_px: score

@@ -2,8 +2,8 @@
 
 use super::decoding::{Decoding, Inspecting};
 use super::frames::{FrameSet, Rotation};
-use super::kernel::{Effort, Kernel, rotate};
 use super::median::median;
+use super::timing::{Effort, Kernel, rotate};
 use super::words;
 use appliance::head::calibration::Calibration;
 use appliance::recipe::plan::Plan;
@@ -189,7 +189,7 @@ fn on_one_thread(plan: &Plan, frames: &[Frame], effort: &Effort) -> Result<[f64;
     for _ in 0..effort.rounds {
         let [inspection, phase] = alone.install(|| {
             [&mut whole as &mut dyn Kernel, &mut kernel]
-                .map(|kernel| rotate(kernel, &mut sets, effort.patience))
+                .map(|kernel| rotate(kernel, &mut sets, effort.patience).ns)
         });
         inspected.push(inspection * pixels / 1e6);
         decoded.push(phase * pixels / 1e6);

@@ -1,24 +1,31 @@
 //! Kernels of the product: its decoder, and all of production from frames to readings.
 
 use super::frames::FrameSet;
-use super::kernel::Kernel;
+use super::timing::Kernel;
 use algo::inspect::{Production, Strips};
 use algo::phase::{Arrived, Decoder, PhaseRow};
 use algo::pipeline::{PhaseMap, arrive};
-use appliance::production::stopwatch::timed;
 use appliance::recipe::plan::STRIPS;
+use std::collections::VecDeque;
 use std::hint::black_box;
 use std::ops::Range;
-use std::time::Duration;
 
 /// A decoder on one thread that writes into memory allocated before.
 pub struct Decoding {
     decoder: Decoder,
     /// The columns of each row that are decoded; `None` for all.
     window: Option<Vec<Range<usize>>>,
-    /// Whether the coarser levels are demodulated before the clock starts, as they are when each is decoded while the next
-    /// is being exposed.
-    on_arrival: bool,
+    /// What is decoded on arrival, before the clock starts; `None` for nothing.
+    on_arrival: Option<OnArrival>,
+}
+
+/// The coarser levels of frame sets that are decoded in turn. All sets of a rotation have the same samples, but every set needs its
+/// own decoded levels: they were last used as long ago as the frames, so that they come from no cache either.
+struct OnArrival {
+    /// How many are kept.
+    copies: usize,
+    /// The levels of each set, with those of the current one in front.
+    levels: VecDeque<Arrived>,
 }
 
 impl Decoding {
@@ -27,16 +34,19 @@ impl Decoding {
         Self {
             decoder,
             window,
-            on_arrival: false,
+            on_arrival: None,
         }
     }
 
-    /// With a decoder that times the last level only: the others are demodulated before.
-    pub fn after_the_last(decoder: Decoder) -> Self {
+    /// With a decoder that is timed on the last level only, for `copies` frame sets with the same samples.
+    pub fn after_the_last(decoder: Decoder, copies: usize) -> Self {
         Self {
             decoder,
             window: None,
-            on_arrival: true,
+            on_arrival: Some(OnArrival {
+                copies,
+                levels: VecDeque::new(),
+            }),
         }
     }
 
@@ -73,11 +83,11 @@ impl<'a> Inspecting<'a> {
 }
 
 impl Kernel for Inspecting<'_> {
-    fn run(&mut self, set: &mut FrameSet) -> Duration {
+    fn run(&mut self, set: &mut FrameSet) {
         let (frames, _, _) = set.parts();
-        let (production, strips) = (self.production, &mut self.strips);
         // The frames are those that it was made for.
-        timed(|| drop(black_box(production.inspect(&frames, strips, None))))
+        let inspected = self.production.inspect(&frames, &mut self.strips, None);
+        drop(black_box(inspected));
     }
 
     /// Empty: production keeps no phase map.
@@ -87,46 +97,54 @@ impl Kernel for Inspecting<'_> {
 }
 
 impl Kernel for Decoding {
-    fn run(&mut self, set: &mut FrameSet) -> Duration {
+    /// Takes the decoded levels that were used least recently; the first time, decodes those of all sets.
+    fn prepare(&mut self, set: &mut FrameSet) {
+        let Some(mut on_arrival) = self.on_arrival.take() else {
+            return;
+        };
+        let OnArrival { copies, levels } = &mut on_arrival;
+        if levels.is_empty() {
+            levels.extend((0..*copies).map(|_| self.before(set)));
+        } else {
+            levels.rotate_left(1);
+        }
+        self.on_arrival = Some(on_arrival);
+    }
+
+    fn run(&mut self, set: &mut FrameSet) {
         let width = set.width().max(1);
-        let arrived = self.on_arrival.then(|| self.before(set));
-        let last: Vec<usize> = self
-            .decoder
-            .levels()
-            .last()
-            .map_or(Vec::new(), <[_]>::to_vec);
-        timed(|| {
-            let (frames, map, out) = set.parts();
-            let PhaseMap {
+        let (frames, map, out) = set.parts();
+        let arrived = self.on_arrival.as_ref().and_then(|on| on.levels.front());
+        let last: Vec<_> = match self.decoder.levels().last() {
+            Some(places) => places.iter().map(|&at| frames[at]).collect(),
+            None => Vec::new(),
+        };
+        let PhaseMap {
+            phase,
+            modulation,
+            trust,
+            ..
+        } = out;
+        let rows = phase
+            .chunks_mut(width)
+            .zip(modulation.chunks_mut(width))
+            .zip(trust.chunks_mut(width));
+        for (v, ((phase, modulation), trust)) in rows.enumerate() {
+            let columns = match &self.window {
+                Some(window) => window[v].clone(),
+                None => 0..width,
+            };
+            let row = PhaseRow {
                 phase,
                 modulation,
                 trust,
-                ..
-            } = out;
-            let rows = phase
-                .chunks_mut(width)
-                .zip(modulation.chunks_mut(width))
-                .zip(trust.chunks_mut(width));
-            for (v, ((phase, modulation), trust)) in rows.enumerate() {
-                let columns = match &self.window {
-                    Some(window) => window[v].clone(),
-                    None => 0..width,
-                };
-                let row = PhaseRow {
-                    phase,
-                    modulation,
-                    trust,
-                };
-                let map = map.map_or(&[][..], |map| &map[v * width..(v + 1) * width]);
-                match &arrived {
-                    Some(arrived) => {
-                        let last: Vec<_> = last.iter().map(|&at| frames[at]).collect();
-                        self.decoder.last_row(arrived, &last, v, map, columns, row);
-                    }
-                    None => self.decoder.row(&frames, v, map, columns, row),
-                }
+            };
+            let map = map.map_or(&[][..], |map| &map[v * width..(v + 1) * width]);
+            match arrived {
+                Some(arrived) => self.decoder.last_row(arrived, &last, v, map, columns, row),
+                None => self.decoder.row(&frames, v, map, columns, row),
             }
-        })
+        }
     }
 
     fn turns(&self, set: &FrameSet) -> Vec<f64> {

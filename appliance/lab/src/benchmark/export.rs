@@ -11,7 +11,7 @@ pub fn frame_files((width, height): (usize, usize)) -> Vec<(String, Vec<u8>)> {
     let set = workload.render((width, height));
     let mut files = Vec::new();
     if let Buffer::Eight(all) = set.samples() {
-        for (at, frame) in all.chunks(set.pixels().max(1)).enumerate() {
+        for (at, frame) in all.frames(set.pixels()).enumerate() {
             files.push((format!("frame-{at:02}.npy"), npy::write(width, frame)));
         }
     }

@@ -1,6 +1,7 @@
 //! Sets of frames that kernels are timed on, and a rotation through copies of a set: with `Effort::FULL` more than fit into any cache,
 //! with `Effort::QUICK` one.
 
+use super::placed::{LINE, Placed};
 use algo::frame::{FrameView, Samples};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
@@ -12,24 +13,26 @@ use hal::frame::Frame;
 pub struct FrameSet {
     width: usize,
     height: usize,
+    /// Samples from one row to the next.
+    stride: usize,
     samples: Buffer,
     map: Option<Vec<AbsolutePhase>>,
     /// The result of the kernel.
     pub out: PhaseMap,
 }
 
-/// All frames of a set, one after the other, each row-major without padding.
+/// All frames of a set, each row-major.
 #[derive(Clone)]
 pub enum Buffer {
     /// 8 bits.
-    Eight(Vec<u8>),
+    Eight(Placed<u8>),
     /// 9 to 16 bits.
-    Sixteen(Vec<u16>),
+    Sixteen(Placed<u16>),
 }
 
 impl FrameSet {
-    /// Frames of `width` × `height` samples, one after the other, and the map for sequences that need one. Samples beyond the last
-    /// whole frame are not used.
+    /// Packed frames of `width` × `height` samples without padding, and the map for sequences that need one. Samples beyond the
+    /// last whole frame are not used.
     pub fn new(
         (width, height): (usize, usize),
         samples: Buffer,
@@ -42,9 +45,29 @@ impl FrameSet {
         Self {
             width,
             height,
+            stride: width,
             samples,
             map,
             out,
+        }
+    }
+
+    /// The same frames as a camera delivers them: each in a mapping of its own ([`Placed::Apart`]), its rows padded to whole lines
+    /// of the cache. A set that was made by [`FrameSet::new`].
+    pub fn aligned(&self) -> Self {
+        let samples_of_a_line = match &self.samples {
+            Buffer::Eight(_) => LINE,
+            Buffer::Sixteen(_) => LINE / 2,
+        };
+        let stride = self.width.next_multiple_of(samples_of_a_line);
+        let samples = match &self.samples {
+            Buffer::Eight(all) => Buffer::Eight(all.apart(self.pixels(), self.width, stride)),
+            Buffer::Sixteen(all) => Buffer::Sixteen(all.apart(self.pixels(), self.width, stride)),
+        };
+        Self {
+            stride,
+            samples,
+            ..self.clone()
         }
     }
 
@@ -68,9 +91,9 @@ impl FrameSet {
             }
         }
         let samples = if sixteen.is_empty() {
-            Buffer::Eight(eight)
+            Buffer::Eight(Placed::Packed(eight))
         } else {
-            Buffer::Sixteen(sixteen)
+            Buffer::Sixteen(Placed::Packed(sixteen))
         };
         Self::new(size, samples, map)
     }
@@ -92,24 +115,25 @@ impl FrameSet {
 
     /// Frames, map and result, borrowed separately.
     pub fn parts(&mut self) -> (Vec<FrameView<'_>>, Option<&[AbsolutePhase]>, &mut PhaseMap) {
-        let pixels = (self.width * self.height).max(1);
+        let pixels = self.width * self.height;
         let frames: Vec<Samples<'_>> = match &self.samples {
-            Buffer::Eight(all) => all.chunks_exact(pixels).map(Samples::Eight).collect(),
-            Buffer::Sixteen(all) => all.chunks_exact(pixels).map(Samples::Sixteen).collect(),
+            Buffer::Eight(all) => all.frames(pixels).map(Samples::Eight).collect(),
+            Buffer::Sixteen(all) => all.frames(pixels).map(Samples::Sixteen).collect(),
         };
         let views = frames
             .into_iter()
-            // A chunk has exactly the samples of a frame, so this cannot fail.
-            .filter_map(|frame| FrameView::new(frame, self.width, self.height, self.width).ok())
+            // Every frame has its rows at this stride, so this cannot fail.
+            .filter_map(|frame| FrameView::new(frame, self.width, self.height, self.stride).ok())
             .collect();
         (views, self.map.as_deref(), &mut self.out)
     }
 
     /// Bytes that a kernel reads.
     fn bytes(&self) -> usize {
+        let pixels = self.pixels();
         let frames = match &self.samples {
-            Buffer::Eight(all) => all.len(),
-            Buffer::Sixteen(all) => 2 * all.len(),
+            Buffer::Eight(all) => pixels * all.frames(pixels).count(),
+            Buffer::Sixteen(all) => 2 * pixels * all.frames(pixels).count(),
         };
         frames + 4 * self.map.as_ref().map_or(0, Vec::len)
     }

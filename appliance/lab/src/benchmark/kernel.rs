@@ -1,55 +1,15 @@
-//! The kernel table: processor time per pixel of every variant, in ns and in multiples of the floor.
+//! The kernel table: what a pixel costs in every variant, in ns, in instructions and in multiples of the floor.
 
-use super::floor::{self, floor};
+use super::floor::FloorSets;
 use super::frames::{FrameSet, Rotation};
 use super::median::median;
+use super::timing::{Contender, Effort, Kernel, Round, interleaved};
 use super::variants;
 use super::workload::Workload;
-use appliance::production::stopwatch::timed;
+use appliance::system::memory::give_back;
 use serde::{Serialize, Serializer};
-use std::hint::black_box;
-use std::time::Duration;
 
-/// An implementation that computes the phases of a set of frames.
-pub trait Kernel {
-    /// Decodes a set and returns the processor time of the timed part: of everything, or, where the coarser levels are decoded on
-    /// arrival, only of what remains after the last frame.
-    fn run(&mut self, set: &mut FrameSet) -> Duration;
-    /// Φ in turns that the last run found in `set`, NaN where rejected.
-    fn turns(&self, set: &FrameSet) -> Vec<f64>;
-}
-
-/// The size of the frames, and how often each kernel is timed.
-#[derive(Clone, Copy, Debug)]
-pub struct Effort {
-    /// Columns and rows of the frames.
-    pub size: (usize, usize),
-    /// Bytes that are read before the first frame set comes again: more than caches hold.
-    pub bytes: usize,
-    /// Rounds; figures are medians over them.
-    pub rounds: usize,
-    /// A time is measured over a whole rotation, or over fewer sets if these take this long already.
-    pub patience: Duration,
-}
-
-impl Effort {
-    /// For figures that are quoted.
-    pub const FULL: Self = Self {
-        size: (1456, 1088),
-        bytes: 210_000_000,
-        rounds: 5,
-        patience: Duration::from_millis(60),
-    };
-    /// For checking that everything works; the times mean nothing.
-    pub const QUICK: Self = Self {
-        size: (64, 48),
-        bytes: 1,
-        rounds: 1,
-        patience: Duration::ZERO,
-    };
-}
-
-/// One row of the table.
+/// One row of the table. Figures that a variant does not have, or that the machine does not offer, are left out of the JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct Timing {
     /// Implementation and workload, `f32_geometric_12`.
@@ -59,6 +19,17 @@ pub struct Timing {
     pub frames: usize,
     /// Processor time per pixel of one frame, median.
     pub ns_per_px: f64,
+    /// The least of it.
+    pub least_ns_per_px: f64,
+    /// The same for 8 rows that are in the cache, median.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hot_ns_per_px: Option<f64>,
+    /// What a row costs beside its pixels, ns, median: from hot frames of two widths and equal pixels, none of which is dark.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ns_per_row: Option<f64>,
+    /// Instructions per pixel of one frame, median.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub instructions_per_px: Option<f64>,
     /// Median of the ratios to the floor of the same round.
     pub x_floor: f64,
     /// The least and the most of these ratios.
@@ -85,38 +56,47 @@ fn by_name<S: Serializer>(rows: &[Timing], out: S) -> Result<S::Ok, S::Error> {
 
 /// A phase is right within this many turns: seven σ of the noise that the frames have.
 const RIGHT: f64 = 0.05;
+/// A kernel is bound by memory if frames that are in no cache take it at least this many times as long as those that are.
+const BOUND_BY_MEMORY: f64 = 1.15;
+
+impl Timing {
+    /// Whether memory limits the variant, so that the floor says how much faster it could become.
+    pub fn bound_by_memory(&self) -> bool {
+        self.hot_ns_per_px
+            .is_some_and(|hot| self.ns_per_px >= BOUND_BY_MEMORY * hot)
+    }
+}
 
 /// Times every variant on every workload. Frames of one workload at a time are in memory, beside those of the floor.
 ///
 /// # Errors
 /// If a sequence cannot be decoded.
 pub fn kernel_table(effort: &Effort, progress: &dyn Fn(f64, &str)) -> Result<KernelTable, String> {
+    // So that the frames of the aligned sets lie in mappings of their own.
+    give_back();
     let workloads = Workload::all();
     let mut base = FloorSets::new(effort);
     let (mut floors, mut rows) = (Vec::new(), Vec::new());
     for (at, workload) in workloads.iter().enumerate() {
-        progress(at as f64 / workloads.len() as f64, workload.name);
-        let mut sets = Rotation::of(workload.render(effort.size), effort.bytes);
-        let variants = variants::of(workload, effort.size)?;
-        let (names, mut kernels): (Vec<_>, Vec<_>) = variants.into_iter().unzip();
-        let right: Vec<f64> = kernels
-            .iter_mut()
-            .map(|kernel| share_right(&mut **kernel, workload, effort.size, sets.next()))
-            .collect();
-        let times = interleaved(&mut kernels, &mut sets, &mut base, effort);
-        for ((name, right), times) in names.into_iter().zip(right).zip(&times) {
-            let mut ratios: Vec<f64> = times.iter().map(|time| time.of / time.floor).collect();
-            ratios.sort_by(f64::total_cmp);
-            rows.push(Timing {
-                name,
-                frames: workload.frames.len(),
-                ns_per_px: median(times.iter().map(|time| time.of).collect()),
-                x_floor: median(ratios.clone()),
-                x_floor_range: ends(&ratios),
-                right,
-            });
+        progress(at as f64 / workloads.len() as f64, &workload.name);
+        let packed = workload.render(effort.size);
+        let aligned = workload.has_aligned.then(|| packed.aligned());
+        let sets = [packed].into_iter().chain(aligned);
+        let mut rotations: Vec<_> = sets.map(|set| Rotation::of(set, effort.bytes)).collect();
+        let (names, mut contenders) = contenders(workload, effort, &rotations)?;
+        let rounds = interleaved(&mut contenders, &mut rotations, &mut base, effort);
+        floors.extend(
+            rounds
+                .first()
+                .into_iter()
+                .flatten()
+                .map(|round| round.floor),
+        );
+        for ((name, contender), rounds) in names.into_iter().zip(&mut contenders).zip(&rounds) {
+            let set = rotations[contender.rotation].next();
+            let right = share_right(&mut *contender.kernel, workload, effort.size, set);
+            rows.push(row(name, workload, right, rounds, effort));
         }
-        floors.extend(times.first().into_iter().flatten().map(|time| time.floor));
     }
     floors.sort_by(f64::total_cmp);
     Ok(KernelTable {
@@ -126,51 +106,71 @@ pub fn kernel_table(effort: &Effort, progress: &dyn Fn(f64, &str)) -> Result<Ker
     })
 }
 
+/// Every variant of a workload: the decoders on each rotation, the first of which is packed and the second aligned, and the
+/// references on the first.
+fn contenders(
+    workload: &Workload,
+    effort: &Effort,
+    rotations: &[Rotation],
+) -> Result<(Vec<String>, Vec<Contender>), String> {
+    let mut all = Vec::new();
+    for (rotation, (sets, suffix)) in rotations.iter().zip(["", "_aligned"]).enumerate() {
+        let hot = |size| {
+            let set = workload.render(size);
+            let set = if rotation > 0 { set.aligned() } else { set };
+            let kernels = variants::decoding(workload, 1)?.into_iter();
+            Ok::<_, String>(kernels.map(move |(_, kernel)| (kernel, set.clone())))
+        };
+        let [wide, narrow] = effort.hot_sizes().map(hot);
+        let cold = variants::decoding(workload, sets.copies())?.into_iter();
+        for (((name, kernel), wide), narrow) in cold.zip(wide?).zip(narrow?) {
+            let contender = Contender {
+                kernel,
+                rotation,
+                hot: Some([wide, narrow]),
+            };
+            all.push((name + suffix, contender));
+        }
+    }
+    let textbooks = variants::textbooks(workload, effort.size)?.into_iter();
+    all.extend(textbooks.map(|(name, kernel)| (name, Contender::cold(kernel))));
+    Ok(all.into_iter().unzip())
+}
+
+/// The medians of the rounds of a variant.
+fn row(name: String, workload: &Workload, right: f64, rounds: &[Round], effort: &Effort) -> Timing {
+    let sorted = |of: &dyn Fn(&Round) -> f64| {
+        let mut all: Vec<f64> = rounds.iter().map(of).collect();
+        all.sort_by(f64::total_cmp);
+        all
+    };
+    let where_had = |of: &dyn Fn(&Round) -> Option<f64>| {
+        let all: Option<Vec<f64>> = rounds.iter().map(of).collect();
+        all.map(median)
+    };
+    let cold = sorted(&|round| round.cold.ns);
+    let ratios = sorted(&Round::x_floor);
+    // Rows per pixel of the narrow frames and of the wide ones.
+    let [wide, narrow] = effort.hot_sizes().map(|(width, _)| 1.0 / width as f64);
+    let of_a_row = |[of_wide, of_narrow]: [f64; 2]| (of_narrow - of_wide) / (narrow - wide);
+    // Where the part ends, a narrow row is not what a wide one is: other blocks of pixels are skipped.
+    let all_lit = workload.lit == 1.0;
+    Timing {
+        name,
+        frames: workload.frames.len(),
+        least_ns_per_px: ends(&cold)[0],
+        ns_per_px: median(cold),
+        hot_ns_per_px: where_had(&|round| round.hot.map(|[wide, _]| wide)),
+        ns_per_row: where_had(&|round| round.hot.filter(|_| all_lit).map(of_a_row)),
+        instructions_per_px: where_had(&|round| round.cold.instructions),
+        x_floor_range: ends(&ratios),
+        x_floor: median(ratios),
+        right,
+    }
+}
+
 fn ends(sorted: &[f64]) -> [f64; 2] {
     [sorted.first(), sorted.last()].map(|end| end.copied().unwrap_or(f64::NAN))
-}
-
-/// Times of one round, ns per pixel.
-pub(super) struct Round {
-    /// Of the kernel.
-    pub of: f64,
-    /// Of the floor.
-    pub floor: f64,
-}
-
-/// The rounds of each kernel. In every round the floor is timed first and then each kernel in turn, so that other work
-/// on the machine affects all of them alike.
-pub(super) fn interleaved(
-    kernels: &mut [Box<dyn Kernel>],
-    sets: &mut Rotation,
-    base: &mut FloorSets,
-    effort: &Effort,
-) -> Vec<Vec<Round>> {
-    let mut rounds: Vec<Vec<Round>> = kernels.iter().map(|_| Vec::new()).collect();
-    base.time();
-    for _ in 0..effort.rounds {
-        let floor = base.time();
-        for (kernel, rounds) in kernels.iter_mut().zip(&mut rounds) {
-            let of = rotate(&mut **kernel, sets, effort.patience);
-            rounds.push(Round { of, floor });
-        }
-    }
-    rounds
-}
-
-/// Processor time of `kernel` in ns per pixel, over at most one rotation of `sets`.
-pub fn rotate(kernel: &mut dyn Kernel, sets: &mut Rotation, patience: Duration) -> f64 {
-    let (mut taken, mut pixels) = (Duration::ZERO, 0);
-    for _ in 0..sets.copies() {
-        let set = sets.next();
-        taken += kernel.run(set);
-        pixels += set.pixels();
-        black_box(&set.out);
-        if taken >= patience {
-            break;
-        }
-    }
-    taken.as_secs_f64() * 1e9 / pixels.max(1) as f64
 }
 
 /// Share of the pixels that a kernel gets right.
@@ -180,6 +180,7 @@ fn share_right(
     size: (usize, usize),
     set: &mut FrameSet,
 ) -> f64 {
+    kernel.prepare(set);
     kernel.run(set);
     let found = kernel.turns(set);
     let right = found.iter().enumerate().filter(|&(at, found)| {
@@ -187,37 +188,4 @@ fn share_right(
         (phase.is_nan() && found.is_nan()) || (found - phase).abs() <= RIGHT
     });
     right.count() as f64 / found.len().max(1) as f64
-}
-
-/// The memory that the floor reads and writes.
-pub(super) struct FloorSets {
-    sets: Vec<(Vec<u8>, Vec<[u8; 4]>)>,
-    pixels: usize,
-}
-
-impl FloorSets {
-    pub(super) fn new(effort: &Effort) -> Self {
-        let pixels = effort.size.0 * effort.size.1;
-        let bytes = floor::FRAMES * pixels;
-        let frames: Vec<u8> = (0..bytes).map(|at| (at * 7 + at / 251) as u8 | 1).collect();
-        let copies = effort.bytes.div_ceil(bytes).max(1);
-        Self {
-            sets: vec![(frames, vec![[1; 4]; pixels]); copies],
-            pixels,
-        }
-    }
-
-    /// Processor time of one rotation, ns per pixel.
-    fn time(&mut self) -> f64 {
-        let pixels = self.pixels;
-        let taken = timed(|| {
-            for (frames, map) in &mut self.sets {
-                let mut frames = frames.chunks(pixels);
-                let frames = [(); floor::FRAMES].map(|()| frames.next().unwrap_or_default());
-                floor(&frames, map);
-                black_box(map);
-            }
-        });
-        taken.as_secs_f64() * 1e9 / (self.sets.len() * pixels).max(1) as f64
-    }
 }

@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod budget;
+mod counter;
 mod decoding;
 mod export;
 mod figure;
@@ -10,21 +11,24 @@ mod frames;
 mod kernel;
 mod machine;
 mod median;
+mod placed;
 mod point;
 mod real;
 mod reference;
 mod report;
+mod timing;
 mod variants;
 mod workload;
 
 pub use accuracy::Study;
 pub use budget::{Budget, budgets};
 pub use export::frame_files;
-pub use kernel::{Effort, KernelTable, Timing, kernel_table};
+pub use kernel::{KernelTable, Timing, kernel_table};
 pub use machine::Machine;
 pub use median::median;
 pub use point::{Point, means};
 pub use report::{HEADER, Report};
+pub use timing::Effort;
 
 /// An error in words.
 fn words(error: impl std::fmt::Display) -> String {

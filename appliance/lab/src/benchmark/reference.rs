@@ -5,13 +5,11 @@
 //! its size. The intermediate results are allocated once and reused, which favours the reference. It runs in `f64` and in `f32`.
 
 use super::frames::{Buffer, FrameSet};
-use super::kernel::Kernel;
 use super::real::Real;
+use super::timing::Kernel;
 use algo::pattern::{Level, PhaseRange, Sequence, Unwrapping};
 use algo::phase::{DecodeError, FULL_TRUST_SHIFTS, MIN_MODULATION_8_BIT};
 use algo::units::AbsolutePhase;
-use appliance::production::stopwatch::timed;
-use std::time::Duration;
 
 /// Largest residual of a level that is unwrapped, turns.
 const MAX_RESIDUAL: f64 = 0.40;
@@ -203,23 +201,22 @@ impl<T: Real> Textbook<T> {
 }
 
 impl<T: Real> Kernel for Textbook<T> {
-    fn run(&mut self, set: &mut FrameSet) -> Duration {
-        timed(|| {
-            let pixels = set.pixels().max(1);
-            match set.samples() {
-                Buffer::Eight(all) => self.demodulate(&all.chunks(pixels).collect::<Vec<_>>()),
-                Buffer::Sixteen(all) => self.demodulate(&all.chunks(pixels).collect::<Vec<_>>()),
+    /// Decodes packed frames.
+    fn run(&mut self, set: &mut FrameSet) {
+        let pixels = set.pixels();
+        match set.samples() {
+            Buffer::Eight(all) => self.demodulate(&all.frames(pixels).collect::<Vec<_>>()),
+            Buffer::Sixteen(all) => self.demodulate(&all.frames(pixels).collect::<Vec<_>>()),
+        }
+        match set.parts().1 {
+            Some(map) => self.about(map),
+            None => self.geometric(),
+        }
+        for (phase, &trusted) in self.phase.iter_mut().zip(&self.trusted) {
+            if !trusted {
+                *phase = T::of(f64::NAN);
             }
-            match set.parts().1 {
-                Some(map) => self.about(map),
-                None => self.geometric(),
-            }
-            for (phase, &trusted) in self.phase.iter_mut().zip(&self.trusted) {
-                if !trusted {
-                    *phase = T::of(f64::NAN);
-                }
-            }
-        })
+        }
     }
 
     fn turns(&self, _: &FrameSet) -> Vec<f64> {

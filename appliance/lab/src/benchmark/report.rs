@@ -71,8 +71,14 @@ impl Report {
             processor,
             cores,
             architecture,
+            clock_ghz,
+            memory_latency_ns,
+            copy_gb_per_s,
         } = &self.machine;
-        let mut text = format!("Machine: {processor}, {cores} cores, {architecture}.\n");
+        let mut text = format!(
+            "Machine: {processor}, {cores} cores, {architecture}; clock {clock_ghz:.2} GHz, memory latency {memory_latency_ns:.0} ns, \
+             copy {copy_gb_per_s:.1} GB/s.\n"
+        );
         if let Some(table) = &self.kernel {
             kernel_table(&mut text, table);
         }
@@ -121,15 +127,25 @@ fn kernel_table(text: &mut String, table: &KernelTable) {
     let _ = write!(
         text,
         "\n### Kernels\n\nFloor {:.3} ns/px ({least:.3} to {most:.3}).\n\n\
-         | variant | frames | ns/px | × floor | least to most |\n|---|---:|---:|---:|---:|\n",
+         | variant | frames | ns/px | least | hot | × floor | instructions/px | ns/row |\n\
+         |---|---:|---:|---:|---:|---:|---:|---:|\n",
         table.floor_ns_per_px
     );
     for row in &table.rows {
-        let [least, most] = row.x_floor_range;
+        let figure = |figure: Option<f64>, decimals| {
+            figure.map_or(String::new(), |figure| format!("{figure:.decimals$}"))
+        };
         let _ = writeln!(
             text,
-            "| {} | {} | {:.2} | {:.2} | {least:.2} to {most:.2} |",
-            row.name, row.frames, row.ns_per_px, row.x_floor
+            "| {} | {} | {:.2} | {:.2} | {} | {} | {} | {} |",
+            row.name,
+            row.frames,
+            row.ns_per_px,
+            row.least_ns_per_px,
+            figure(row.hot_ns_per_px, 2),
+            figure(row.bound_by_memory().then_some(row.x_floor), 2),
+            figure(row.instructions_per_px, 1),
+            figure(row.ns_per_row, 0),
         );
     }
 }

@@ -1,8 +1,8 @@
 //! Every variant that is timed, which is an implementation on a workload. New variants are added here.
 
 use super::decoding::Decoding;
-use super::kernel::Kernel;
 use super::reference::Textbook;
+use super::timing::Kernel;
 use super::words;
 use super::workload::{RANGE, Workload};
 use algo::pattern::{PhaseRange, Sequence};
@@ -42,28 +42,36 @@ pub fn references(
     Ok([("f64", Box::new(double)), ("f32", Box::new(single))])
 }
 
-/// The variants of a workload, by implementation and workload: `f32_geometric_12`, a key in JSON.
+/// The decoders of a workload, by implementation and workload: `avx2_geometric_12`, a key in JSON. Where the clock starts after the
+/// coarser levels were decoded, these are kept for `copies` frame sets in turn.
 ///
 /// # Errors
 /// If its sequence cannot be decoded.
-pub fn of(workload: &Workload, size: (usize, usize)) -> Result<Vec<Named<String>>, String> {
+pub fn decoding(workload: &Workload, copies: usize) -> Result<Vec<Named<String>>, String> {
     let sequence = Sequence::from_frames(&workload.frames).map_err(words)?;
-    let depth = workload.bit_depth;
-    let mut variants = Vec::new();
-    let mut push = |implementation: &str, kernel: Box<dyn Kernel>| {
-        variants.push((format!("{implementation}_{}", workload.name), kernel));
-    };
-    for (name, decoder) in decoders(&sequence, RANGE, depth)? {
+    let mut variants: Vec<Named<String>> = Vec::new();
+    for (name, decoder) in decoders(&sequence, RANGE, workload.bit_depth)? {
         if decoder.levels().len() > 1 && workload.has_references {
-            let last = Decoding::after_the_last(decoder.clone());
-            push(&format!("{name}_last_frames_of"), Box::new(last));
+            let last = Decoding::after_the_last(decoder.clone(), copies);
+            let name = format!("{name}_last_frames_of_{}", workload.name);
+            variants.push((name, Box::new(last)));
         }
-        push(name, Box::new(Decoding::new(decoder, None)));
-    }
-    if workload.has_references {
-        for (name, kernel) in references(&sequence, RANGE, depth, size.0 * size.1)? {
-            push(name, kernel);
-        }
+        let name = format!("{name}_{}", workload.name);
+        variants.push((name, Box::new(Decoding::new(decoder, None))));
     }
     Ok(variants)
+}
+
+/// The references of a workload that has them, by implementation and workload: `f32_geometric_12`.
+///
+/// # Errors
+/// If its sequence cannot be decoded.
+pub fn textbooks(workload: &Workload, size: (usize, usize)) -> Result<Vec<Named<String>>, String> {
+    if !workload.has_references {
+        return Ok(Vec::new());
+    }
+    let sequence = Sequence::from_frames(&workload.frames).map_err(words)?;
+    let both = references(&sequence, RANGE, workload.bit_depth, size.0 * size.1)?;
+    let named = both.map(|(name, kernel)| (format!("{name}_{}", workload.name), kernel));
+    Ok(named.into())
 }

@@ -1,17 +1,19 @@
 //! The input of the kernels: synthetic frames of every kind of sequence, and their true phase.
 
 use super::frames::{Buffer, FrameSet};
+use super::placed::Placed;
 use algo::pattern::{PhaseRange, Sequence, Shot};
 use algo::units::AbsolutePhase;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
 
 /// A kind of sequence, and how much of its frames is lit.
 #[derive(Clone, Debug)]
 pub struct Workload {
     /// For tables and keys.
-    pub name: &'static str,
+    pub name: String,
     /// What each frame shows.
     pub frames: Vec<Shot>,
     /// Share of the pixels on which the part is; the rest is dark.
@@ -22,7 +24,12 @@ pub struct Workload {
     pub about_map: bool,
     /// Whether the references are timed on it as well.
     pub has_references: bool,
+    /// Whether the decoders are timed on frames in mappings of their own as well.
+    pub has_aligned: bool,
 }
+
+/// Numbers of shifts N of the levels that are timed.
+const SHIFTS: RangeInclusive<usize> = 3..=9;
 
 /// Range of the phase function: 64 fringes, so that three geometric levels are 8 apart.
 pub const RANGE: PhaseRange = PhaseRange {
@@ -41,35 +48,33 @@ const NOISE: f64 = 0.025;
 const MAP_OFFSET: f64 = 0.25;
 
 impl Workload {
-    /// The first one: twelve frames of three geometric levels, all pixels lit.
-    pub fn geometric() -> Self {
+    /// Three geometric levels of `shifts` shifts, all pixels lit, 8 bits.
+    fn geometric_of(shifts: usize) -> Self {
         Self {
-            name: "geometric_12",
-            frames: Sequence::geometric(RANGE, 3, 4),
+            name: format!("geometric_{}", 3 * shifts),
+            frames: Sequence::geometric(RANGE, 3, shifts),
             lit: 1.0,
             bit_depth: 8,
             about_map: false,
+            has_references: false,
+            has_aligned: true,
+        }
+    }
+
+    /// The first one: twelve frames of three geometric levels, all pixels lit.
+    pub fn geometric() -> Self {
+        Self {
             has_references: true,
+            ..Self::geometric_of(4)
         }
     }
 
     /// All kinds.
     pub fn all() -> Vec<Self> {
-        let geometric = |name, shifts| Self {
-            name,
-            frames: Sequence::geometric(RANGE, 3, shifts),
-            has_references: false,
-            ..Self::geometric()
-        };
-        let twelve = |name| geometric(name, 4);
-        let compared = |workload| Self {
-            has_references: true,
-            ..workload
-        };
-        let about = |name, frames| Self {
-            frames,
-            about_map: true,
-            ..twelve(name)
+        let twelve = |name: &str| Self {
+            name: name.to_owned(),
+            has_aligned: false,
+            ..Self::geometric_of(4)
         };
         let lit = |name, lit| Self {
             lit,
@@ -79,23 +84,33 @@ impl Workload {
             bit_depth,
             ..twelve(name)
         };
-        vec![
+        let about = |name: &str, frames| Self {
+            frames,
+            about_map: true,
+            ..twelve(name)
+        };
+        let compared = |workload| Self {
+            has_references: true,
+            ..workload
+        };
+        let two_dense = |shifts| {
+            let levels = Shot::level(1.0, shifts).chain(Shot::level(0.8, shifts));
+            about(&format!("golden_{}", 2 * shifts), levels.collect())
+        };
+        let mut all = vec![
             Self::geometric(),
             lit("background_25", 0.75),
             lit("background_50", 0.50),
             lit("background_75", 0.25),
-            geometric("geometric_9", 3),
-            geometric("geometric_24", 8),
             bits("bits_10", 10),
             bits("bits_12", 12),
             compared(about("dense_12", Sequence::dense(DENSE_N, 4))),
             compared(about("golden_4", Shot::level(1.0, 4).collect())),
             about("golden_3", Shot::level(1.0, 3).collect()),
-            about(
-                "golden_6",
-                Shot::level(1.0, 3).chain(Shot::level(0.8, 3)).collect(),
-            ),
-        ]
+        ];
+        all.extend(SHIFTS.filter(|&shifts| shifts != 4).map(Self::geometric_of));
+        all.extend(SHIFTS.map(two_dense));
+        all
     }
 
     /// Its frames.
@@ -122,9 +137,10 @@ impl Workload {
             }));
         }
         let samples = if self.bit_depth == 8 {
-            Buffer::Eight(samples.into_iter().map(|sample| sample as u8).collect())
+            let bytes = samples.into_iter().map(|sample| sample as u8);
+            Buffer::Eight(Placed::Packed(bytes.collect()))
         } else {
-            Buffer::Sixteen(samples)
+            Buffer::Sixteen(Placed::Packed(samples))
         };
         let map = self.about_map.then(|| {
             let near = |(at, phase): (usize, &f64)| {

@@ -81,7 +81,7 @@ impl Bench {
         let wanted = |what| self.what.is_none_or(|asked| asked == what);
         let pool = self.threads.pool(0)?;
         let mut report = Report {
-            machine: Machine::this(),
+            machine: Machine::this(&self.effort()),
             kernel: None,
             accuracy: None,
             budget: None,
