@@ -8,7 +8,7 @@
 //! ```
 //!
 //! CASE is a case's name; with `/background` appended three quarters of the frames are dark, with `/arrival` the
-//! coarser levels are decoded on arrival.
+//! coarser levels are decoded on arrival, with `/aligned` every frame begins at a page of 16 KiB, as a camera's buffers do.
 //!
 //! The hashes must be those of `frozen.txt` on every machine and with every back-end; a test here checks it. After a
 //! change that is meant to change bits, `probe | sed 's/[^ ]* //' | awk '!seen[$0]++'` writes that file anew.
@@ -107,6 +107,10 @@ fn main() -> Outcome<()> {
                 None => widest,
             };
             let image = Image::new(case, light, width, height);
+            let image = match way {
+                "aligned" => image.aligned(),
+                _ => image,
+            };
             let frames = image.frames(rows.parse::<usize>()?.min(height))?;
             let decoder = case.decoder()?;
             let map = match way {

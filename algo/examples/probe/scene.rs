@@ -26,12 +26,54 @@ pub enum Lighting {
     Everything,
 }
 
+/// Bytes of which the address of a frame is a multiple, if it is aligned: a page of a Raspberry Pi 5.
+const PAGE: usize = 16 << 10;
+/// Bytes of which the length of a row is a multiple, if the frame is aligned: a line of the cache.
+const LINE: usize = 64;
+
 /// The frames of one case, and the map for cases that are unwrapped about one.
 pub struct Image {
-    eight: Vec<Vec<u8>>,
-    sixteen: Vec<Vec<u16>>,
+    eight: Vec<Frame<u8>>,
+    sixteen: Vec<Frame<u16>>,
     map: Vec<AbsolutePhase>,
     width: usize,
+}
+
+/// The samples of a frame from `start` on, in rows that are `stride` apart.
+struct Frame<T> {
+    samples: Vec<T>,
+    start: usize,
+    stride: usize,
+}
+
+impl<T: Copy + Default> Frame<T> {
+    fn padded(samples: Vec<T>, width: usize) -> Self {
+        Self {
+            samples,
+            start: 0,
+            stride: width + PADDING,
+        }
+    }
+
+    fn used(&self) -> &[T] {
+        &self.samples[self.start..]
+    }
+
+    /// The same rows as a camera delivers them: from a page on, each from a line of the cache on.
+    fn aligned(&self) -> Self {
+        let stride = self.stride.next_multiple_of(LINE / size_of::<T>());
+        let rows = self.used().chunks(self.stride);
+        let mut samples = vec![T::default(); PAGE / size_of::<T>() + rows.len() * stride];
+        let start = samples.as_ptr().align_offset(PAGE);
+        for (to, from) in samples[start..].chunks_mut(stride).zip(rows) {
+            to[..from.len()].copy_from_slice(from);
+        }
+        Self {
+            samples,
+            start,
+            stride,
+        }
+    }
 }
 
 impl Image {
@@ -56,7 +98,10 @@ impl Image {
             samples
         });
         let frames: Vec<Vec<u16>> = frames.collect();
-        let byte = |frame: &Vec<u16>| frame.iter().map(|&sample| sample as u8).collect();
+        let byte = |frame: &Vec<u16>| {
+            let bytes = frame.iter().map(|&sample| sample as u8).collect();
+            Frame::padded(bytes, width)
+        };
         let map = (0..width * height).map(|at| scene.known(at % width));
         Self {
             eight: if case.bits == 8 {
@@ -65,21 +110,36 @@ impl Image {
                 Vec::new()
             },
             map: map.collect(),
-            sixteen: frames,
+            sixteen: frames
+                .into_iter()
+                .map(|frame| Frame::padded(frame, width))
+                .collect(),
             width,
+        }
+    }
+
+    /// The same frames as a camera delivers them: each begins at a page of 16 KiB.
+    pub fn aligned(&self) -> Self {
+        Self {
+            eight: self.eight.iter().map(Frame::aligned).collect(),
+            sixteen: self.sixteen.iter().map(Frame::aligned).collect(),
+            map: self.map.clone(),
+            width: self.width,
         }
     }
 
     /// The first `rows` rows.
     pub fn frames(&self, rows: usize) -> Outcome<Vec<FrameView<'_>>> {
-        let view = |samples| FrameView::new(samples, self.width, rows, self.width + PADDING);
+        let view = |samples, stride| FrameView::new(samples, self.width, rows, stride);
         let views: Result<Vec<_>, _> = if self.eight.is_empty() {
             let frames = self.sixteen.iter();
-            frames.map(|frame| view(Samples::Sixteen(frame))).collect()
+            frames
+                .map(|frame| view(Samples::Sixteen(frame.used()), frame.stride))
+                .collect()
         } else {
-            self.eight
-                .iter()
-                .map(|frame| view(Samples::Eight(frame)))
+            let frames = self.eight.iter();
+            frames
+                .map(|frame| view(Samples::Eight(frame.used()), frame.stride))
                 .collect()
         };
         Ok(views?)

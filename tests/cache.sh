@@ -1,0 +1,49 @@
+#!/usr/bin/env bash
+# Counts the read misses in the first-level cache per pixel of decoding twelve aligned frames with AVX2, and fails if a ceiling is
+# exceeded.
+#
+#     tests/cache.sh
+#
+# Cachegrind simulates the caches of a Raspberry Pi's processors, so the count is the same in every run and on any machine. The frames
+# begin at pages of 16 KiB, as a camera's buffers do, so that equal pixels of all frames compete for the same sets of these caches.
+# As in aarch64/cost.sh, the program decodes frames of two heights, and in the difference everything cancels that does not grow with the
+# height. Ends with 69 (EX_UNAVAILABLE) and the reason if Valgrind is not available, or the processor is another.
+set -euo pipefail
+shopt -s inherit_errexit
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+case=geometric-3x4-8/aligned
+few=16 many=48 # rows
+# Size, ways and line of the cache; read misses per pixel; processor.
+ceilings='
+65536,4,64 0.40 Cortex-A76
+32768,2,64 0.40 Cortex-A72
+'
+
+[[ $(uname -m) == x86_64 ]] || { echo "misses cannot be counted: the ceilings are those of x86-64 with AVX2" >&2; exit 69; }
+command -v valgrind >/dev/null || { echo "misses cannot be counted: Valgrind is not installed (Debian package valgrind)" >&2; exit 69; }
+cargo build --quiet --profile dist -p algo --no-default-features --features std --example probe
+probe=${CARGO_TARGET_DIR:-target}/dist/examples/probe
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+# misses CACHE ROWS: prints the read misses and the number of pixels.
+misses() {
+    local pixels
+    pixels=$(valgrind --tool=cachegrind --cache-sim=yes --D1="$1" --cachegrind-out-file=/dev/null --log-file="$log" \
+        "$probe" decode $case "$2" </dev/null)
+    # "==1== D1  misses: ALL ( READ rd + WRITE wr)"
+    sed -nE "s/.*D1 +misses:.*\( *([0-9,]+) rd.*/\1 $pixels/p" "$log" | tr -d ,
+}
+
+failed=0
+while read -r cache ceiling processor; do
+    [[ -n $cache ]] || continue
+    per_pixel=$({ misses "$cache" $few && misses "$cache" $many; } |
+        awk '{ misses = $1 - misses; pixels = $2 - pixels } END { printf "%.3f", misses / pixels }')
+    echo "$processor ($cache): $per_pixel read misses/px, ceiling $ceiling"
+    if ! awk -v n="$per_pixel" -v c="$ceiling" 'BEGIN { exit !(n > 0 && n <= c) }'; then
+        echo "    FAILED: above the ceiling, or nothing was counted" >&2
+        failed=1
+    fi
+done <<<"$ceilings"
+exit $failed
