@@ -4,7 +4,7 @@
 #     tests/peers/run.sh target/dist/fringed-lab               kernels and peers, printed
 #     tests/peers/run.sh target/dist/fringed-lab docs          the whole benchmark; rewrites docs/benchmarks*
 #
-# Needs python3 with venv, and the network for the first run.
+# Needs python3 with venv, a C compiler, and the network for the first run.
 set -euo pipefail
 lab=$1
 docs=${2:-}
