@@ -7,8 +7,9 @@
 //!                                                   pixels
 //! ```
 //!
-//! CASE is a case's name; with `/background` appended three quarters of the frames are dark, with `/arrival` the
-//! coarser levels are decoded on arrival, with `/aligned` every frame begins at a page of 16 KiB, as a camera's buffers do.
+//! CASE is the name of a case, one of `cases.rs` or another of that form; with `/background` appended three quarters of the
+//! frames are dark, with `/arrival` the coarser levels are decoded on arrival, with `/aligned` every frame begins at a page of
+//! 16 KiB, as a camera's buffers do.
 //!
 //! The hashes must be those of `frozen.txt` on every machine and with every back-end; a test here checks it. After a
 //! change that is meant to change bits, `probe | sed 's/[^ ]* //' | awk '!seen[$0]++'` writes that file anew.
@@ -23,7 +24,7 @@ use algo::phase::Decoder;
 use algo::pipeline::{PhaseMap, arrive, decode, decode_last, triangulate};
 use algo::simd::Backend;
 use algo::units::AbsolutePhase;
-use cases::{CASES, Case};
+use cases::Case;
 use hash::Hash;
 use scene::{Image, Lighting};
 use std::env;
@@ -78,7 +79,7 @@ fn line(case: &Case, decoder: &Decoder) -> Outcome<String> {
             height.add(&z.nm().to_le_bytes());
         }
     }
-    let name = case.name;
+    let name = &case.name;
     Ok(format!("{name} {phase} {modulation} {trust} {height}"))
 }
 
@@ -86,9 +87,10 @@ fn main() -> Outcome<()> {
     let arguments: Vec<String> = env::args().skip(1).collect();
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         [] => {
-            for case in CASES {
+            for case in cases::all() {
+                let case = case?;
                 for (name, decoder) in backends(&case.decoder()?) {
-                    writeln!(stdout(), "{name} {}", line(case, &decoder)?)?;
+                    writeln!(stdout(), "{name} {}", line(&case, &decoder)?)?;
                 }
             }
             Ok(())
@@ -99,14 +101,13 @@ fn main() -> Outcome<()> {
                 "background" => Lighting::Background,
                 _ => Lighting::Even,
             };
-            let case = CASES.iter().find(|case| case.name == name);
-            let case = case.ok_or("no such case")?;
+            let case = Case::named(name)?;
             let (widest, height) = COUNTED;
             let width = match rest.first() {
                 Some(width) => width.parse::<usize>()?.min(widest),
                 None => widest,
             };
-            let image = Image::new(case, light, width, height);
+            let image = Image::new(&case, light, width, height);
             let image = match way {
                 "aligned" => image.aligned(),
                 _ => image,
@@ -114,8 +115,8 @@ fn main() -> Outcome<()> {
             let frames = image.frames(rows.parse::<usize>()?.min(height))?;
             let decoder = case.decoder()?;
             let map = match way {
-                "arrival" => arrival(&decoder, &frames, image.map(case))?,
-                _ => decode(&decoder, &frames, image.map(case), None)?,
+                "arrival" => arrival(&decoder, &frames, image.map(&case))?,
+                _ => decode(&decoder, &frames, image.map(&case), None)?,
             };
             Ok(writeln!(stdout(), "{}", black_box(map).phase.len())?)
         }
@@ -126,14 +127,15 @@ fn main() -> Outcome<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cases::CASES;
     use algo::phase::Trust;
 
     #[test]
     fn every_back_end_on_every_machine_gives_the_frozen_bits() {
         let frozen: Vec<&str> = include_str!("frozen.txt").lines().collect();
-        for case in CASES {
+        for case in cases::all().map(Result::unwrap) {
             for (name, decoder) in backends(&case.decoder().unwrap()) {
-                let line = line(case, &decoder).unwrap();
+                let line = line(&case, &decoder).unwrap();
                 assert!(frozen.contains(&line.as_str()), "{name} gives\n{line}");
             }
         }
@@ -142,23 +144,23 @@ mod tests {
 
     #[test]
     fn the_frames_show_every_reason_and_most_of_the_surface() {
-        for case in CASES {
+        for case in cases::all().map(Result::unwrap) {
             let (width, height) = SIZES[0];
-            let image = Image::new(case, Lighting::Everything, width, height);
+            let image = Image::new(&case, Lighting::Everything, width, height);
             let decoder = case.decoder().unwrap();
             let frames = image.frames(height).unwrap();
-            let mut map = decode(&decoder, &frames, image.map(case), None).unwrap();
+            let mut map = decode(&decoder, &frames, image.map(&case), None).unwrap();
             let rig = rig::triangulator(width, height).unwrap();
             triangulate(&rig, &decoder, None, &mut map);
             for reason in Trust::REASONS {
                 // A single level is the coarsest and has no unwrapping step, so no residual; only maps have unknown pixels; 8
                 // shifts tolerate saturation; a phase within a few turns of the map is within the working range.
                 let expected = match reason {
-                    Trust::LowModulation => case.ratios.len() > 1,
-                    Trust::Saturated => case.shifts < 8,
+                    Trust::LowModulation => case.levels.len() > 1,
+                    Trust::Saturated => case.levels[0].1 < 8,
                     Trust::Unexpected => case.needs_map(),
-                    Trust::Residual => case.ratios.len() > 1,
-                    Trust::OutOfRange => !case.needs_map() || case.ratios.len() > 2,
+                    Trust::Residual => case.levels.len() > 1,
+                    Trust::OutOfRange => !case.needs_map() || case.levels.len() > 2,
                     _ => true,
                 };
                 assert_eq!(map.count(reason) > 0, expected, "{}: {reason:?}", case.name);
@@ -170,11 +172,11 @@ mod tests {
 
     #[test]
     fn what_is_counted_is_resolved_everywhere() {
-        for case in CASES {
+        for case in cases::all().map(Result::unwrap) {
             let (width, height) = (COUNTED.0, 4);
-            let image = Image::new(case, Lighting::Even, width, height);
+            let image = Image::new(&case, Lighting::Even, width, height);
             let frames = image.frames(height).unwrap();
-            let map = decode(&case.decoder().unwrap(), &frames, image.map(case), None).unwrap();
+            let map = decode(&case.decoder().unwrap(), &frames, image.map(&case), None).unwrap();
             assert_eq!(map.count(Trust::Resolved), width * height, "{}", case.name);
         }
     }

@@ -86,12 +86,13 @@ impl Image {
             height,
         };
         // The frozen hashes depend on this generator and its seed.
-        let mut random = SplitMix64::seed_from_u64(u64::from(case.bits) << 8 | case.shifts as u64);
-        let frames = case.frames().map(|(ratio, k)| {
+        let mut random =
+            SplitMix64::seed_from_u64(u64::from(case.bits) << 8 | case.levels[0].1 as u64);
+        let frames = case.frames().map(|(ratio, k, shifts)| {
             let mut samples = vec![0; (width + PADDING) * height];
             for (v, row) in samples.chunks_mut(width + PADDING).enumerate() {
                 for (u, sample) in row.iter_mut().enumerate() {
-                    let turn = scene.turn(u, v, ratio) + (65_536 * k / case.shifts) as i64;
+                    let turn = scene.turn(u, v, ratio) + (65_536 * k / shifts) as i64;
                     *sample = scene.sample(u, v, turn as u16, ratio == 1.0, &mut random);
                 }
             }
