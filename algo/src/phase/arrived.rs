@@ -216,28 +216,6 @@ impl<W: AsMut<[u16]>, B: AsMut<[u8]>> Expected<W, B> {
     }
 }
 
-impl<W: AsRef<[u16]>, B: AsRef<[u8]>> Wrapped<W, B> {
-    /// Borrowed.
-    #[inline(always)]
-    pub fn row(&self) -> WrappedRow<'_> {
-        Wrapped {
-            phase: self.phase.as_ref(),
-            flags: self.flags.as_ref(),
-        }
-    }
-}
-
-impl<W: AsMut<[u16]>, B: AsMut<[u8]>> Wrapped<W, B> {
-    /// Borrowed to be written.
-    #[inline(always)]
-    pub fn row_mut(&mut self) -> WrappedRowMut<'_> {
-        Wrapped {
-            phase: self.phase.as_mut(),
-            flags: self.flags.as_mut(),
-        }
-    }
-}
-
 impl ExpectedRow<'_> {
     /// These columns.
     #[inline(always)]

@@ -1,7 +1,7 @@
 //! The plan of a level's demodulation, and demodulation itself: samples → wrapped phase and modulation.
 //!
-//! [`super::fold`] has the equations of S and C, [`super::angle`] those of phase and length. This file chooses, per number of
-//! shifts and bit depth, how S and C are computed, their scaling, and the thresholds in the units of that form.
+//! [`super::terms`] has the equations of S and C, [`super::angle`] those of phase and length. This file chooses, per number of
+//! shifts and bit depth, how S and C are computed, their scaling, and the threshold in their unit.
 //!
 //! Modulations come out as shares of full scale in units of full scale / 32767.5, that is half of a
 //! [`crate::units::Modulation`]; the stores double them.
@@ -18,13 +18,14 @@ use core::f64::consts::TAU;
 /// error of a slight saturation falls from 3e-3 turn (4 shifts) to 7e-4 turn.
 pub const FULL_TRUST_SHIFTS: usize = 8;
 
-/// Share of S² + C² that rounding may take off at the threshold, so that a modulation of exactly the minimum is trusted. It is
-/// 2e-3 of the change by one count.
-const TIE: f64 = 1e-4;
-/// Fractional bits of weights.
-const WEIGHT_BITS: u8 = 14;
-/// Largest bit depth of the forms for 3 and 4 shifts: 3·(2I₀ − I₁ − I₂) must fit a word.
+/// What rounding may take off √(S² + C²) at the threshold, in units of S and C, so that a modulation of exactly the minimum is
+/// trusted.
+const TIE: f64 = 0.75;
+/// Largest bit depth of the forms that subtract samples: four of them must fit a word.
 const WORD_FORM_BITS: u8 = 12;
+/// The largest S or C where its unit is chosen to fill a word, with room for roundings. With this one the rounded weights of N = 5,
+/// 7, 8 and 9 turn the pointer by at most 2.4e-7 turn; with others by up to 3e-6.
+const LARGEST: f64 = 32_694.0;
 
 /// A level prepared for demodulation at one bit depth.
 #[derive(Clone, Debug)]
@@ -33,36 +34,40 @@ pub(crate) struct Level {
     pub frames: Vec<usize>,
     /// How S and C come from the samples.
     pub samples: Samples,
-    /// Weights of the samples in S and in C, Q14; empty for the forms of 3 and 4 shifts.
-    pub weights: Vec<[i16; 2]>,
-    /// Bits by which S and C are shifted: left from counts to words, or right from 32-bit sums to words.
-    pub lift: u8,
-    /// Bits by which weighted products are shifted right before they are added.
-    pub drop: u8,
+    /// The weights of the terms of S and of C, in pairs ([`pair`]).
+    terms: [[i32; 2]; 2],
+    /// The weights of the samples in S and in C, two samples at a time ([`pair`]).
+    pub weights: Vec<[i32; 2]>,
+    /// Bits by which differences of samples are shifted left to fill words.
+    lift: u8,
+    /// Bits by which sums of products are shifted right to words.
+    pub down: u8,
+    /// Bits by which samples are shifted left to 16 bits.
+    to_16_bits: u8,
     /// Full scale less one count, unsigned.
-    pub below_full_scale: i16,
-    /// Middle of the range of samples, unsigned.
-    pub centre: i16,
-    /// S² + C² must be above this, in the units of the forms for 3 and 4 shifts.
+    below_full_scale: i16,
+    /// S² + C² must be above this.
     below_least_power: i32,
-    /// S² + C² must be above this, in the units of weighted sums.
-    below_least_sum_power: f32,
     /// Coefficients of √(1 + t²), scaled so that the product with a length is a modulation.
     hypotenuse: [i16; 3],
     /// Whether that product is half of the modulation, because the coefficients would not fit Q15.
     doubled: bool,
     /// Whether a sample at full scale rejects its pixel.
-    pub saturates: bool,
+    saturates: bool,
 }
 
-/// How S and C come from the samples of a level.
+/// How S and C come from the samples of a level ([`super::terms`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Samples {
-    /// By differences of opposite shifts, N = 4.
+    /// N = 4: differences of opposite shifts.
     Four,
-    /// By differences, N = 3.
-    Three,
-    /// By sums with weights cos 2πs_k for S and sin 2πs_k for C.
+    /// The same of more than 12 bits.
+    WideFour,
+    /// N = 3 and 6: sums and differences, and one product.
+    Thirds,
+    /// N = 5, 7, 8 and 9: products of differences.
+    Terms,
+    /// Products of the samples.
     Weighted,
 }
 
@@ -82,33 +87,47 @@ impl Level {
         let shifts = level.shifts();
         let mut frames: Vec<usize> = level.frames.iter().map(|&at| usize::from(at)).collect();
         let full_scale = f64::from((1_u32 << bit_depth) - 1);
-        let least = MIN_MODULATION_8_BIT * full_scale / 255.0;
         // A start of k/N gives the same shifts as 0, in another order.
         let places = level.start * shifts as f64;
         let on_grid = libm::fabs(places - libm::rint(places)) < 1e-9;
-        let form = (on_grid && bit_depth <= WORD_FORM_BITS).then_some(shifts);
-        let up = 15 - bit_depth.min(WORD_FORM_BITS);
-        let lifted = f64::from(1_u32 << up);
-        // `unit`: one count in the words of S and C. `powers`: factor from S² + C² in counts² to the units of the form's
-        // threshold.
-        let (mut weights, mut drop) = (Vec::new(), 0);
-        let (samples, lift, unit, powers) = match form {
-            Some(4) => (Samples::Four, up, lifted, lifted * lifted),
-            Some(3) => (Samples::Three, up, lifted, 4.0),
-            _ => {
-                let down;
-                (weights, drop, down) = weighted_samples(level, bit_depth);
-                let bits = f64::from(WEIGHT_BITS) - f64::from(drop);
-                let unit = libm::pow(2.0, bits - f64::from(down));
-                (Samples::Weighted, down, unit, libm::pow(4.0, bits))
-            }
+        let wide = bit_depth > WORD_FORM_BITS;
+        let samples = match shifts {
+            4 if on_grid && wide => Samples::WideFour,
+            4 if on_grid => Samples::Four,
+            3 | 6 if on_grid && !wide => Samples::Thirds,
+            5 | 7..=9 if on_grid && !wide => Samples::Terms,
+            _ => Samples::Weighted,
         };
         if samples != Samples::Weighted {
             let back = (shifts - libm::rint(places) as usize % shifts) % shifts;
             frames.rotate_left(back);
         }
-        let least_root = shifts as f64 / 2.0 * least;
-        let least_power = least_root * least_root * powers * (1.0 - TIE);
+        let to_16_bits = 16 - bit_depth;
+        // `unit`: one count in the words of S and C.
+        let (mut terms, mut weights) = ([[0; 2]; 2], Vec::new());
+        let (mut lift, mut down) = (0, 0);
+        let unit = match samples {
+            Samples::WideFour => f64::from(1_u32 << to_16_bits) / 4.0,
+            Samples::Four | Samples::Thirds => {
+                // The differences of 6 shifts are twice as large.
+                lift = to_16_bits - if shifts == 6 { 2 } else { 1 };
+                f64::from(1_u32 << lift)
+            }
+            Samples::Terms => {
+                down = bit_depth;
+                let scale = LARGEST / largest(shifts, 0.0);
+                terms = weights_of_terms(shifts, scale);
+                scale / f64::from(1_u32 << down)
+            }
+            Samples::Weighted => {
+                down = 16;
+                let scale = LARGEST / largest(shifts, level.start);
+                weights = weights_of_samples(level, scale);
+                scale / f64::from(1_u32 << bit_depth)
+            }
+        };
+        let least = MIN_MODULATION_8_BIT * full_scale / 255.0;
+        let least_length = shifts as f64 / 2.0 * least * unit - TIE;
         // B = (2/N) · length · √(1 + t²) / unit, here as a share of full scale in half units of `Modulation`.
         let mut factor = 2.0 / shifts as f64 / (unit * full_scale) * 32_767.5;
         let doubled = factor * core::f64::consts::SQRT_2 >= 0.999;
@@ -118,13 +137,13 @@ impl Level {
         Self {
             frames,
             samples,
+            terms,
             weights,
             lift,
-            drop,
+            down,
+            to_16_bits,
             below_full_scale: (((1_u32 << bit_depth) - 2) as u16).cast_signed(),
-            centre: ((1_u32 << (bit_depth - 1)) as u16).cast_signed(),
-            below_least_power: libm::ceil(least_power.min(f64::from(i32::MAX))) as i32 - 1,
-            below_least_sum_power: f32::from_bits((least_power as f32).to_bits() - 1),
+            below_least_power: libm::ceil(least_length * least_length) as i32 - 1,
             hypotenuse: LENGTH.map(|c| libm::rint(c * factor * 32_768.0) as i16),
             doubled,
             saturates: shifts < FULL_TRUST_SHIFTS,
@@ -136,12 +155,12 @@ impl Level {
 #[derive(Clone, Copy)]
 pub(super) struct LevelLanes<'a, V: Lanes> {
     pub plan: &'a Level,
+    pub terms: [[V::D; 2]; 2],
     pub lift: V::Count,
     /// `lift` less one bit.
     pub half_lift: V::Count,
+    pub to_16_bits: V::Count,
     pub below_least_power: V::D,
-    pub below_least_sum_power: V::F,
-    pub centre: V::W,
     /// Full scale less one count, with its sign bit inverted.
     pub below_full_scale: V::W,
     /// Mask: a sample at full scale rejects its pixel.
@@ -153,15 +172,18 @@ pub(super) struct LevelLanes<'a, V: Lanes> {
 impl<'a, V: Lanes> LevelLanes<'a, V> {
     #[inline(always)]
     pub fn new(v: V, plan: &'a Level) -> Self {
-        let turn = v.splat16(i16::MIN);
+        let [along, across] = plan.terms;
         Self {
             plan,
+            terms: [
+                [v.splat32(along[0]), v.splat32(along[1])],
+                [v.splat32(across[0]), v.splat32(across[1])],
+            ],
             lift: v.left(plan.lift),
             half_lift: v.left(plan.lift.saturating_sub(1)),
+            to_16_bits: v.left(plan.to_16_bits),
             below_least_power: v.splat32(plan.below_least_power),
-            below_least_sum_power: v.splat_single(plan.below_least_sum_power),
-            centre: v.splat16(plan.centre),
-            below_full_scale: v.xor(v.splat16(plan.below_full_scale), turn),
+            below_full_scale: v.xor(v.splat16(plan.below_full_scale), v.splat16(i16::MIN)),
             saturates: v.splat8(if plan.saturates { u8::MAX } else { 0 }),
             hypotenuse: [
                 v.splat16(plan.hypotenuse[0]),
@@ -203,40 +225,65 @@ impl<'a, V: Lanes> LevelLanes<'a, V> {
     }
 }
 
-/// The weights of a level's samples, the right shift of products before they are added, and that of the sums to words.
-///
-/// Samples count from the middle of their range, so that sums fit 31 bits. The weights of S add up to 0, and so do those of C:
-/// the offset A drops out exactly.
-fn weighted_samples(level: &pattern::Level, bit_depth: u8) -> (Vec<[i16; 2]>, u8, u8) {
-    let shifts = level.shifts();
-    let log_shifts = shifts.next_power_of_two().ilog2() as u8;
-    let drop = (bit_depth - 1 + WEIGHT_BITS + log_shifts).saturating_sub(30);
-    let angle = |k: usize| TAU * (level.start + k as f64 / shifts as f64);
-    let along: Vec<f64> = (0..shifts).map(|k| libm::cos(angle(k))).collect();
-    let across: Vec<f64> = (0..shifts).map(|k| libm::sin(angle(k))).collect();
-    let (along, across) = (balanced(&along), balanced(&across));
-    let largest = |weights: &[i16]| -> u64 {
-        let sum: u64 = weights.iter().map(|w| u64::from(w.unsigned_abs())).sum();
-        (sum << (bit_depth - 1)) >> drop
+/// The largest S or C of samples from 0 to 1: half of the sum of the weights' magnitudes, because the weights add up to 0.
+fn largest(shifts: usize, start: f64) -> f64 {
+    let sum = |weight: fn(f64) -> f64| -> f64 {
+        let weights = (0..shifts).map(|k| weight(TAU * (start + k as f64 / shifts as f64)));
+        weights.map(libm::fabs).sum()
     };
-    let mut down = 0;
-    while largest(&along).max(largest(&across)) >> down > 32_700 {
-        down += 1;
-    }
-    let weights = along.into_iter().zip(across).map(|(s, c)| [s, c]).collect();
-    (weights, drop, down)
+    sum(libm::cos).max(sum(libm::sin)) / 2.0
 }
 
-/// The numbers with [`WEIGHT_BITS`] fractional bits, rounded so that their sum stays 0.
+/// The weights of the terms of S and C ([`super::terms`]), multiplied by `scale`.
+fn weights_of_terms(shifts: usize, scale: f64) -> [[i32; 2]; 2] {
+    let angle = |k: usize| TAU * k as f64 / shifts as f64;
+    let mut terms = [[0.0; 4]; 2];
+    let [along, across] = &mut terms;
+    if shifts.is_multiple_of(2) {
+        // N = 8.
+        *along = [1.0, libm::cos(angle(1)), 0.0, 0.0];
+        *across = [1.0, libm::sin(angle(1)), 0.0, 0.0];
+    } else {
+        for k in 1..=shifts / 2 {
+            along[k - 1] = -libm::cos(angle(k));
+            across[k - 1] = libm::sin(angle(k));
+        }
+    }
+    terms.map(|terms| {
+        let [a, b, c, d] = terms.map(|weight| libm::rint(weight * scale) as i16);
+        [pair(a, b), pair(c, d)]
+    })
+}
+
+/// The weights of a level's samples in S and C, multiplied by `scale`, two samples at a time. Those of S add up to 0, and so do
+/// those of C: the offset A drops out exactly.
+fn weights_of_samples(level: &pattern::Level, scale: f64) -> Vec<[i32; 2]> {
+    let shifts = level.shifts();
+    let angle = |k: usize| TAU * (level.start + k as f64 / shifts as f64);
+    let along: Vec<f64> = (0..shifts).map(|k| scale * libm::cos(angle(k))).collect();
+    let across: Vec<f64> = (0..shifts).map(|k| scale * libm::sin(angle(k))).collect();
+    let (along, across) = (balanced(&along), balanced(&across));
+    let weights = along.chunks(2).zip(across.chunks(2));
+    let second = |weights: &[i16]| weights.get(1).copied().unwrap_or(0);
+    weights
+        .map(|(s, c)| [pair(s[0], second(s)), pair(c[0], second(c))])
+        .collect()
+}
+
+/// Two weights as the words of a double word, as [`Lanes::dot_pair`] takes them.
+fn pair(first: i16, second: i16) -> i32 {
+    i32::from(first.cast_unsigned()) | i32::from(second) << 16
+}
+
+/// The numbers, rounded so that their sum stays 0.
 fn balanced(exact: &[f64]) -> Vec<i16> {
-    let scale = f64::from(1_u32 << WEIGHT_BITS);
-    let mut rounded: Vec<i16> = exact.iter().map(|x| libm::rint(x * scale) as i16).collect();
+    let mut rounded: Vec<i16> = exact.iter().map(|&x| libm::rint(x) as i16).collect();
     let mut over: i32 = rounded.iter().map(|&x| i32::from(x)).sum();
     while over != 0 {
         let step = over.signum();
         // The number whose rounding the other way adds the least error.
         let cost = |at: usize| {
-            let error = f64::from(rounded[at]) - exact[at] * scale;
+            let error = f64::from(rounded[at]) - exact[at];
             -error * f64::from(step)
         };
         let best = (0..exact.len()).min_by(|&a, &b| cost(a).total_cmp(&cost(b)));

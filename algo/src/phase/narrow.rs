@@ -1,7 +1,7 @@
 //! Decoding fewer columns than a block: a block of the row around them, or a padded copy of rows that are narrower than a block.
 
 use super::PhaseRow;
-use super::fold::BlockSample;
+use super::samples::BlockSample;
 use crate::frame::{FrameView, Samples};
 use crate::trust::Trust;
 use crate::units::{AbsolutePhase, Modulation};

@@ -1,13 +1,14 @@
 //! Where a level's blocks come from: the rows of its frames, or maps if it was demodulated on arrival.
 //!
-//! Kernels are generic over this, so that decoding all levels at once and decoding on arrival share one body. [`Four`] is the
-//! form of four rows that are checked once per row and whose number the compiler knows; `&[&[T]]` takes any number of shifts.
+//! Kernels are generic over this, so that decoding all levels at once and decoding on arrival share one body. Four rows of bytes
+//! are a form of their own, the fastest; [`Rows`] takes any number of shifts of any sample type.
 
 use super::angle::AngleLanes;
 use super::arrived::WrappedRow;
-use super::fold::{BlockSample, Folded, fold};
+use super::fold::{Folded, fold, fold_four};
 use super::level::{Demodulated, LevelLanes};
-use crate::simd::{Four, Lanes};
+use super::samples::BlockSample;
+use crate::simd::{Lanes, Rows};
 
 /// The rows of a level's frames, in the order of their shifts.
 pub(crate) trait Frames: Copy {
@@ -22,35 +23,36 @@ pub(crate) trait Frames: Copy {
     -> Folded<V>;
 }
 
-impl<T: BlockSample> Frames for Four<'_, T> {
+impl Frames for [&[u8]; 4] {
     const DOUBLED: bool = false;
 
     #[inline(always)]
     fn first(self, columns: usize) -> Self {
-        Self::new(self.rows(), columns)
+        let [a, b, c, d] = self;
+        [&a[..columns], &b[..columns], &c[..columns], &d[..columns]]
     }
 
     #[inline(always)]
     fn fold<V: Lanes>(
         &self,
         v: V,
-        level: &LevelLanes<'_, V>,
+        _level: &LevelLanes<'_, V>,
         at: usize,
         after: usize,
     ) -> Folded<V> {
-        for row in self.rows() {
+        for row in self {
             v.fetch(row, at, after);
         }
-        T::four(v, level, self, at)
+        fold_four(v, self, at)
     }
 }
 
-impl<T: BlockSample> Frames for &[&[T]] {
+impl<T: BlockSample> Frames for Rows<'_, T> {
     const DOUBLED: bool = true;
 
     #[inline(always)]
-    fn first(self, _columns: usize) -> Self {
-        self
+    fn first(self, columns: usize) -> Self {
+        self.part(columns)
     }
 
     #[inline(always)]
@@ -61,10 +63,7 @@ impl<T: BlockSample> Frames for &[&[T]] {
         at: usize,
         after: usize,
     ) -> Folded<V> {
-        for row in *self {
-            v.fetch(row, at, after);
-        }
-        fold(v, level, self, at)
+        fold(v, level, self, at, after)
     }
 }
 

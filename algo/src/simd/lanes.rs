@@ -8,7 +8,6 @@
 //! signed or unsigned as the operation says; overflow wraps around unless the name says otherwise. Loads and stores
 //! panic outside of their slice.
 
-use super::rows::Four;
 use core::fmt::Debug;
 
 /// The components of the pointers of a block, scaled by a power of two (see [`Lanes::scaled`]).
@@ -45,8 +44,6 @@ pub(crate) trait Lanes: Copy + Debug {
     fn splat8(self, x: u8) -> Self::B;
     /// The block of `from` that starts at `at`.
     fn load8(self, from: &[u8], at: usize) -> Self::B;
-    /// The blocks of four rows that start at `at`.
-    fn load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [Self::B; 4];
     /// Prefetches what lies `after` samples behind the block at `at`. That is [`Self::AHEAD`] where whole rows are read, because
     /// rows follow one another in memory; where only some columns of each row are read it is the length of a row, so that the
     /// same columns of the next row are prefetched.
@@ -84,6 +81,10 @@ pub(crate) trait Lanes: Copy + Debug {
 
     /// Words low + 256 · high.
     fn widen(self, low: Self::B, high: Self::B) -> [Self::W; 2];
+    /// Words a + b.
+    fn sum(self, a: Self::B, b: Self::B) -> [Self::W; 2];
+    /// Words a − b.
+    fn difference(self, a: Self::B, b: Self::B) -> [Self::W; 2];
     /// Words −1 where a mask is set, else 1.
     fn signs(self, mask: Self::B) -> [Self::W; 2];
     /// Words 256 · x.
@@ -107,7 +108,9 @@ pub(crate) trait Lanes: Copy + Debug {
     fn add(self, a: Self::W, b: Self::W) -> Self::W;
     /// a − b.
     fn sub(self, a: Self::W, b: Self::W) -> Self::W;
-    /// a + b · sign, where the sign is 1 or −1.
+    /// The sign of x for [`Self::add_signed`]; 0 counts as positive.
+    fn sign_of(self, x: Self::W) -> Self::W;
+    /// a + b · sign, where the sign is 1 or −1, or comes from [`Self::sign_of`].
     fn add_signed(self, a: Self::W, b: Self::W, sign: Self::W) -> Self::W;
     /// a + b, signed, at most 32767.
     fn add_sat(self, a: Self::W, b: Self::W) -> Self::W;
@@ -131,6 +134,10 @@ pub(crate) trait Lanes: Copy + Debug {
     fn shr_by(self, x: Self::W, n: Self::Count) -> Self::W;
     /// (x + 1) / 2 rounded down, unsigned.
     fn halve(self, x: Self::W) -> Self::W;
+    /// (a + b + 1) / 2 rounded down, unsigned.
+    fn mean(self, a: Self::W, b: Self::W) -> Self::W;
+    /// Both times 2ⁿ, with n from 0 to 4 so that 2¹⁴ ≤ long < 2¹⁵. Unspecified where long < 2¹⁰ or short > long.
+    fn normalised(self, long: Self::W, short: Self::W) -> [Self::W; 2];
     /// |x|, 32768 of −32768 as an unsigned word.
     fn abs(self, x: Self::W) -> Self::W;
     /// The smaller, signed.
@@ -160,6 +167,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn split(self, x: [Self::D; 2]) -> (Self::W, Self::W);
     /// a · b + c · d, signed.
     fn dot(self, a: Self::W, b: Self::W, c: Self::W, d: Self::W) -> [Self::D; 2];
+    /// a · b + c · d, signed, where each double word is b + 65536 · d: the same b and d for every pixel.
+    fn dot_pair(self, a: Self::W, c: Self::W, bd: Self::D) -> [Self::D; 2];
     /// x / 2ⁿ rounded to nearest, signed and kept inside a word; n below 31.
     fn narrow_rounded(self, x: [Self::D; 2], n: u8) -> Self::W;
     /// Masks of double words as masks of words.
@@ -187,12 +196,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn to_whole(self, x: Self::F) -> Self::D;
     /// Every pixel `x`.
     fn splat_single(self, x: f32) -> Self::F;
-    /// a + b.
-    fn add_single(self, a: Self::F, b: Self::F) -> Self::F;
     /// a · b.
     fn mul_single(self, a: Self::F, b: Self::F) -> Self::F;
-    /// Mask: a < b.
-    fn lt_single(self, a: Self::F, b: Self::F) -> Self::D;
 }
 
 /// Defines the operations of a back-end that are one expression each, as `name(self, arguments) -> result = expression;`.

@@ -26,7 +26,7 @@ pub(crate) use lanes::Lanes;
 pub(crate) use neon::Neon;
 pub(crate) use portable::Portable;
 pub(crate) use results::Results;
-pub(crate) use rows::Four;
+pub(crate) use rows::Rows;
 
 /// A back-end of the phase kernels: the instructions that they are compiled for. All give the same bits.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! The back-end of aarch64, where NEON is always available.
 
 use super::lanes::{Lanes, Scaled, operations};
-use super::rows::{Four, block, block_mut};
+use super::rows::{block, block_mut};
 use core::arch::aarch64::*;
 
 /// Needs no proof: NEON is part of aarch64.
@@ -49,6 +49,7 @@ impl Lanes for Neon {
         splat16(self, x: i16) -> W = vdupq_n_s16(x);
         add(self, a: W, b: W) -> W = vaddq_s16(a, b);
         sub(self, a: W, b: W) -> W = vsubq_s16(a, b);
+        sign_of(self, x: W) -> W = vorrq_s16(vshrq_n_s16::<15>(x), vdupq_n_s16(1));
         add_signed(self, a: W, b: W, sign: W) -> W = vmlaq_s16(a, b, sign);
         add_sat(self, a: W, b: W) -> W = vqaddq_s16(a, b);
         mul_q15(self, a: W, b: W) -> W = vqrdmulhq_s16(a, b);
@@ -59,6 +60,7 @@ impl Lanes for Neon {
         sar_by(self, x: W, n: Count) -> W = vshlq_s16(x, n);
         shr_by(self, x: W, n: Count) -> W = vreinterpretq_s16_u16(vshlq_u16(vreinterpretq_u16_s16(x), n));
         halve(self, x: W) -> W = vreinterpretq_s16_u16(vrshrq_n_u16::<1>(vreinterpretq_u16_s16(x)));
+        mean(self, a: W, b: W) -> W = vreinterpretq_s16_u16(vrhaddq_u16(vreinterpretq_u16_s16(a), vreinterpretq_u16_s16(b)));
         abs(self, x: W) -> W = vabsq_s16(x);
         min(self, a: W, b: W) -> W = vminq_s16(a, b);
         max(self, a: W, b: W) -> W = vmaxq_s16(a, b);
@@ -78,9 +80,7 @@ impl Lanes for Neon {
         to_single(self, x: D) -> F = vcvtq_f32_s32(x);
         to_whole(self, x: F) -> D = vcvtnq_s32_f32(x);
         splat_single(self, x: f32) -> F = vdupq_n_f32(x);
-        add_single(self, a: F, b: F) -> F = vaddq_f32(a, b);
         mul_single(self, a: F, b: F) -> F = vmulq_f32(a, b);
-        lt_single(self, a: F, b: F) -> D = vreinterpretq_s32_u32(vcltq_f32(a, b));
     }
 
     #[inline(always)]
@@ -88,12 +88,6 @@ impl Lanes for Neon {
         let block = block(from, at, BYTES);
         // SAFETY: the slice holds the 16 bytes that are read.
         unsafe { vld1q_u8(block.as_ptr()) }
-    }
-    #[inline(always)]
-    fn load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [Self::B; 4] {
-        let [a, b, c, d] = from.blocks(at, BYTES);
-        // SAFETY: 16 bytes may be read from each (`Four::blocks`).
-        unsafe { [vld1q_u8(a), vld1q_u8(b), vld1q_u8(c), vld1q_u8(d)] }
     }
     #[inline(always)]
     fn fetch<T>(self, _row: &[T], _at: usize, _after: usize) {}
@@ -126,6 +120,20 @@ impl Lanes for Neon {
         neon!([
             vreinterpretq_s16_u8(vzip1q_u8(low, high)),
             vreinterpretq_s16_u8(vzip2q_u8(low, high))
+        ])
+    }
+    #[inline(always)]
+    fn sum(self, a: Self::B, b: Self::B) -> [Self::W; 2] {
+        neon!([
+            vreinterpretq_s16_u16(vaddl_u8(vget_low_u8(a), vget_low_u8(b))),
+            vreinterpretq_s16_u16(vaddl_high_u8(a, b))
+        ])
+    }
+    #[inline(always)]
+    fn difference(self, a: Self::B, b: Self::B) -> [Self::W; 2] {
+        neon!([
+            vreinterpretq_s16_u16(vsubl_u8(vget_low_u8(a), vget_low_u8(b))),
+            vreinterpretq_s16_u16(vsubl_high_u8(a, b))
         ])
     }
     #[inline(always)]
@@ -183,6 +191,13 @@ impl Lanes for Neon {
         neon!(vshrq_n_s16::<N>(x))
     }
     #[inline(always)]
+    fn normalised(self, long: Self::W, short: Self::W) -> [Self::W; 2] {
+        neon!({
+            let n = vsubq_s16(vclzq_s16(long), vdupq_n_s16(1));
+            [vshlq_s16(long, n), vshlq_s16(short, n)]
+        })
+    }
+    #[inline(always)]
     fn join(self, low: Self::W, high: Self::W) -> [Self::D; 2] {
         neon!([
             vreinterpretq_s32_s16(vzip1q_s16(low, high)),
@@ -208,12 +223,23 @@ impl Lanes for Neon {
         })
     }
     #[inline(always)]
+    fn dot_pair(self, a: Self::W, c: Self::W, bd: Self::D) -> [Self::D; 2] {
+        neon!({
+            let bd = vreinterpretq_s16_s32(bd);
+            let low = vmull_laneq_s16::<0>(vget_low_s16(a), bd);
+            let high = vmull_high_laneq_s16::<0>(a, bd);
+            [
+                vmlal_laneq_s16::<1>(low, vget_low_s16(c), bd),
+                vmlal_high_laneq_s16::<1>(high, c, bd),
+            ]
+        })
+    }
+    #[inline(always)]
     fn narrow_rounded(self, x: [Self::D; 2], n: u8) -> Self::W {
         neon!({
-            let half = vdupq_n_s32((1_i32 << n) >> 1);
             let down = vdupq_n_s32(-i32::from(n));
-            let low = vqmovn_s32(vshlq_s32(vaddq_s32(x[0], half), down));
-            vqmovn_high_s32(low, vshlq_s32(vaddq_s32(x[1], half), down))
+            let low = vqmovn_s32(vrshlq_s32(x[0], down));
+            vqmovn_high_s32(low, vrshlq_s32(x[1], down))
         })
     }
     #[inline(always)]

@@ -4,7 +4,6 @@
 //! kernels of hundreds of inlined loops take minutes to compile.
 
 use super::lanes::{Lanes, Scaled, operations};
-use super::rows::Four;
 use crate::math::nearest;
 
 /// Always available.
@@ -92,7 +91,6 @@ impl Lanes for Portable {
     operations! { plain, never;
         splat8(self, x: u8) -> B = [x; BYTES];
         load8(self, from: &[u8], at: usize) -> B = core::array::from_fn(|lane| from[at + lane]);
-        load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [B; 4] = from.rows().map(|row| self.load8(row, at));
         min8(self, a: B, b: B) -> B = pairs(a, b, u8::min);
         max8(self, a: B, b: B) -> B = pairs(a, b, u8::max);
         sub8(self, a: B, b: B) -> B = pairs(a, b, u8::wrapping_sub);
@@ -103,6 +101,8 @@ impl Lanes for Portable {
         all8(self, mask: B) -> bool = mask == [u8::MAX; BYTES];
         none8(self, mask: B) -> bool = mask == [0; BYTES];
         quarters8(self, half: B, quarter: B) -> B = pairs(half, quarter, |half, quarter| half & 128 | quarter & 64);
+        sum(self, a: B, b: B) -> [W; 2] = halves(pairs(a, b, |a, b| i16::from(a) + i16::from(b)), |half| half);
+        difference(self, a: B, b: B) -> [W; 2] = halves(pairs(a, b, |a, b| i16::from(a) - i16::from(b)), |half| half);
         signs(self, mask: B) -> [W; 2] = halves(mask, |mask| lanes(mask, |mask| if mask == 0 { 1 } else { -1 }));
         widen_256(self, x: B) -> [W; 2] = self.widen([0; BYTES], x);
         widen_128(self, x: B) -> [W; 2] = halves(x, |x| lanes(x, |x| i16::from(x) << 7));
@@ -110,6 +110,7 @@ impl Lanes for Portable {
         splat16(self, x: i16) -> W = [x; WORDS];
         add(self, a: W, b: W) -> W = pairs(a, b, i16::wrapping_add);
         sub(self, a: W, b: W) -> W = pairs(a, b, i16::wrapping_sub);
+        sign_of(self, x: W) -> W = lanes(x, |x| if x < 0 { -1 } else { 1 });
         add_signed(self, a: W, b: W, sign: W) -> W = self.add(a, pairs(b, sign, i16::wrapping_mul));
         add_sat(self, a: W, b: W) -> W = pairs(a, b, i16::saturating_add);
         mul_q15(self, a: W, b: W) -> W = pairs(a, b, |a, b| ((i32::from(a) * i32::from(b) + (1 << 14)) >> 15) as i16);
@@ -120,6 +121,7 @@ impl Lanes for Portable {
         sar_by(self, x: W, n: u8) -> W = lanes(x, |x| x >> n);
         shr_by(self, x: W, n: u8) -> W = lanes(x, |x| (x.cast_unsigned() >> n).cast_signed());
         halve(self, x: W) -> W = lanes(x, |x| x.cast_unsigned().div_ceil(2).cast_signed());
+        mean(self, a: W, b: W) -> W = pairs(a, b, |a, b| ((u32::from(a.cast_unsigned()) + u32::from(b.cast_unsigned())).div_ceil(2) as u16).cast_signed());
         abs(self, x: W) -> W = lanes(x, i16::wrapping_abs);
         min(self, a: W, b: W) -> W = pairs(a, b, i16::min);
         max(self, a: W, b: W) -> W = pairs(a, b, i16::max);
@@ -137,9 +139,7 @@ impl Lanes for Portable {
         to_single(self, x: D) -> F = lanes(x, |x| x as f32);
         to_whole(self, x: F) -> D = lanes(x, nearest::whole);
         splat_single(self, x: f32) -> F = [x; DOUBLES];
-        add_single(self, a: F, b: F) -> F = pairs(a, b, |a, b| a + b);
         mul_single(self, a: F, b: F) -> F = pairs(a, b, |a, b| a * b);
-        lt_single(self, a: F, b: F) -> D = pairs(a, b, |a, b| mask32(a < b));
     }
 
     #[inline(always)]
@@ -209,6 +209,11 @@ impl Lanes for Portable {
     }
 
     #[inline(never)]
+    fn normalised(self, long: Self::W, short: Self::W) -> [Self::W; 2] {
+        let n = lanes(long, |long| long.leading_zeros().clamp(1, 5) as i16 - 1);
+        [long, short].map(|x| pairs(x, n, |x, n| x << n))
+    }
+    #[inline(never)]
     fn join(self, low: Self::W, high: Self::W) -> [Self::D; 2] {
         let joined: [i32; WORDS] = pairs(low, high, |low, high| {
             i32::from(low.cast_unsigned()) | (i32::from(high) << 16)
@@ -225,6 +230,11 @@ impl Lanes for Portable {
         let product = |a, b| pairs(a, b, |a, b| i32::from(a) * i32::from(b));
         let sum: [i32; WORDS] = pairs(product(a, b), product(c, d), i32::wrapping_add);
         quarters(sum)
+    }
+    #[inline(never)]
+    fn dot_pair(self, a: Self::W, c: Self::W, bd: Self::D) -> [Self::D; 2] {
+        let (b, d) = (bd[0] as i16, (bd[0] >> 16) as i16);
+        self.dot(a, [b; WORDS], c, [d; WORDS])
     }
     #[inline(never)]
     fn narrow_rounded(self, x: [Self::D; 2], n: u8) -> Self::W {

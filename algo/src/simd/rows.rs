@@ -1,47 +1,48 @@
 //! Rows of samples that are read block by block, with one bounds check for several rows.
 
-/// Four rows of equal length.
+/// Any number of rows that are read up to one length.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Four<'a, T> {
-    rows: [&'a [T]; 4],
+pub(crate) struct Rows<'a, T> {
+    rows: &'a [&'a [T]],
     /// No row is shorter.
     length: usize,
 }
 
-impl<'a, T> Four<'a, T> {
+impl<'a, T> Rows<'a, T> {
     /// Rows that are read up to `length`.
     ///
     /// # Panics
     /// If a row ends before.
-    pub fn new(rows: [&'a [T]; 4], length: usize) -> Self {
+    pub fn new(rows: &'a [&'a [T]], length: usize) -> Self {
         for row in rows {
             assert!(row.len() >= length);
         }
         Self { rows, length }
     }
 
-    /// The rows.
-    pub fn rows(&self) -> [&'a [T]; 4] {
-        self.rows
-    }
-
-    /// The starts of the blocks of `pixels` samples at `at`, all of which may be read.
+    /// The first columns.
     ///
     /// # Panics
-    /// If a block does not end within the rows.
+    /// If there are fewer.
+    pub fn part(self, length: usize) -> Self {
+        assert!(length <= self.length);
+        Self { length, ..self }
+    }
+
+    /// How many rows.
     #[inline(always)]
-    pub(super) fn blocks(&self, at: usize, pixels: usize) -> [*const T; 4] {
-        assert_fits(at, pixels, self.length);
-        let [a, b, c, d] = self.rows;
-        // SAFETY: every row holds at least `length` samples, and the block ends before that, asserted above.
-        unsafe {
-            [
-                a.as_ptr().add(at),
-                b.as_ptr().add(at),
-                c.as_ptr().add(at),
-                d.as_ptr().add(at),
-            ]
-        }
+    pub fn count(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Row `at`. All have the same length, so that the compiler merges the checks of their blocks.
+    ///
+    /// # Panics
+    /// If there are fewer rows.
+    #[inline(always)]
+    pub fn row(&self, at: usize) -> &'a [T] {
+        // SAFETY: every row holds at least `length` samples, asserted by `new` and `part`.
+        unsafe { self.rows[at].get_unchecked(..self.length) }
     }
 }
 

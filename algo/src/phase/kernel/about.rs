@@ -13,21 +13,20 @@
 //! [`super::geometric`]. A level that was demodulated on arrival is a [`WrappedRow`].
 //!
 //! **Departures from the plain form.** One body, [`dense_columns`], serves levels from frames and levels from maps ([`Source`]).
-//! Three levels of four shifts and a single level are decoded in one pass; other sequences level by level.
 //!
 //! **Accuracy.** As [`crate::phase::about`]; on arrival the same bits (`every_back_end_and_levels_on_arrival_give_the_same_bits`).
 
 use super::known::{KnownBlock, store};
+use super::next_block;
 use super::quality::Quality;
 use super::temporal::four;
-use super::{STRETCH, next_block, of_stretch, stretches};
 use crate::phase::about::{About, AboutLanes, BlockLevels};
 use crate::phase::angle::AngleLanes;
-use crate::phase::arrived::{Wrapped, WrappedRow, WrappedRowMut};
-use crate::phase::fold::BlockSample;
+use crate::phase::arrived::{WrappedRow, WrappedRowMut};
 use crate::phase::level::{Demodulated, Level, LevelLanes};
+use crate::phase::samples::BlockSample;
 use crate::phase::source::{Frames, Source};
-use crate::simd::{Backend, Four, Lanes, Results, back_end_entry, plain};
+use crate::simd::{Backend, Lanes, Results, Rows, back_end_entry, plain};
 use crate::trust::Trust;
 use crate::units::AbsolutePhase;
 use core::ops::Range;
@@ -43,58 +42,24 @@ pub(crate) fn decode_row<T: BlockSample>(
     columns: Range<usize>,
     out: Results<'_>,
 ) {
-    let fours: heapless::Vec<Four<'_, T>, 3> = (levels.iter().zip(rows))
-        .map_while(|(level, rows)| four(level, rows, &columns))
+    let fours: heapless::Vec<[&[u8]; 4], 3> = (levels.iter().zip(rows))
+        .map_while(|(level, rows)| four(level, rows))
         .take(3)
         .collect();
+    let end = columns.end;
+    let all = |rows| Rows::new(rows, end);
     match (rows, &fours[..]) {
         (&[_], &[a]) => single(backend, plan, levels, a, map, columns, out),
-        (&[a], _) => single(backend, plan, levels, a, map, columns, out),
+        (&[a], _) => single(backend, plan, levels, all(a), map, columns, out),
+        (&[_, _], &[a, b]) => dense(backend, plan, levels, [a], b, map, columns, out),
         (&[_, _, _], &[a, b, c]) => dense(backend, plan, levels, [a, b], c, map, columns, out),
-        _ => level_by_level(backend, plan, levels, rows, map, columns, out),
-    }
-}
-
-/// Two or three levels, one after the other, in stretches of columns that fit on the stack.
-fn level_by_level<T: BlockSample>(
-    backend: Backend,
-    plan: &About,
-    levels: &[Level],
-    rows: &[&[&[T]]],
-    map: &[AbsolutePhase],
-    columns: Range<usize>,
-    mut out: Results<'_>,
-) {
-    let Some((last, others)) = rows.split_last() else {
-        return;
-    };
-    // There are at most three dense levels; the finest needs no room.
-    let mut room = [Wrapped {
-        phase: [0; STRETCH],
-        flags: [0; STRETCH],
-    }; 2];
-    for stretch in stretches(columns) {
-        let columns = 0..stretch.len();
-        let mut before: heapless::Vec<WrappedRow<'_>, 2> = heapless::Vec::new();
-        for ((level, rows), room) in levels.iter().zip(others).zip(&mut room) {
-            let rows = of_stretch(rows, &stretch);
-            let coarsest = before.first().copied();
-            demodulate_row(
-                backend,
-                level,
-                &rows,
-                coarsest,
-                columns.clone(),
-                room.row_mut(),
-            );
-            before.extend([room.row()]);
+        (&[a, b], _) => dense(backend, plan, levels, [all(a)], all(b), map, columns, out),
+        (&[a, b, c], _) => {
+            let others = [all(a), all(b)];
+            dense(backend, plan, levels, others, all(c), map, columns, out);
         }
-        let (rows, map, out) = (
-            of_stretch(last, &stretch),
-            &map[stretch.clone()],
-            out.part(&stretch),
-        );
-        finest_row(backend, plan, levels, &before, &rows, map, columns, out);
+        // There are at most three dense levels.
+        _ => {}
     }
 }
 
@@ -110,12 +75,13 @@ pub(crate) fn finest_row<T: BlockSample>(
     columns: Range<usize>,
     out: Results<'_>,
 ) {
+    let all = Rows::new(rows, columns.end);
     match *before {
         [] => decode_row(backend, plan, levels, &[rows], map, columns, out),
-        [a] => dense(backend, plan, levels, [a], rows, map, columns, out),
-        [a, b] => match levels.last().and_then(|level| four(level, rows, &columns)) {
+        [a] => dense(backend, plan, levels, [a], all, map, columns, out),
+        [a, b] => match levels.last().and_then(|level| four(level, rows)) {
             Some(frames) => dense(backend, plan, levels, [a, b], frames, map, columns, out),
-            None => dense(backend, plan, levels, [a, b], rows, map, columns, out),
+            None => dense(backend, plan, levels, [a, b], all, map, columns, out),
         },
         _ => {}
     }
@@ -155,6 +121,7 @@ pub(crate) fn demodulate_row<T: BlockSample>(
     columns: Range<usize>,
     out: WrappedRowMut<'_>,
 ) {
+    let rows = Rows::new(rows, columns.end);
     demodulate(backend, level, rows, coarsest, columns, out);
 }
 

@@ -34,11 +34,11 @@ use super::quality::dark_unless;
 use super::temporal::{FinerLevel, GeometricLanes, four};
 use super::{STRETCH, next_block, of_stretch, stretches};
 use crate::phase::arrived::{Expected, NO_REASON};
-use crate::phase::fold::BlockSample;
 use crate::phase::geometric::Geometric;
 use crate::phase::level::{Level, LevelLanes};
+use crate::phase::samples::BlockSample;
 use crate::phase::source::Frames;
-use crate::simd::{Backend, Four, Lanes, Results, back_end_entry};
+use crate::simd::{Backend, Lanes, Results, Rows, back_end_entry};
 use crate::trust::Trust;
 use core::ops::Range;
 
@@ -51,25 +51,28 @@ pub(crate) fn decode_row<T: BlockSample>(
     columns: Range<usize>,
     mut out: Results<'_>,
 ) {
-    let part = columns.clone();
-    let fours: heapless::Vec<Four<'_, T>, 3> = (levels.iter().zip(rows))
-        .map_while(|(level, rows)| four(level, rows, &columns))
+    let (part, out) = (columns.clone(), &mut out);
+    let fours: heapless::Vec<[&[u8]; 4], 3> = (levels.iter().zip(rows))
+        .map_while(|(level, rows)| four(level, rows))
         .take(3)
         .collect();
-    let out = &mut out;
-    let width = rows
-        .iter()
-        .flat_map(|rows| rows.iter())
-        .map(|row| row.len())
-        .next()
-        .unwrap_or(0);
+    let all = |rows| Rows::new(rows, part.end);
+    let width = rows[0].first().map_or(0, |row| row.len());
     match (rows, &fours[..]) {
-        (&[a], _) => single(backend, plan, levels, a, columns, out),
+        (&[_], &[a]) => single(backend, plan, levels, a, columns, out),
+        (&[a], _) => single(backend, plan, levels, all(a), columns, out),
         (&[_, _], &[a, b]) => one_pass(backend, plan, levels, (a, [], b), width, columns, out),
-        (&[_, _, _], &[a, b, c]) => {
-            one_pass(backend, plan, levels, (a, [b], c), width, columns, out)
+        (&[a, b], _) => {
+            let frames = (all(a), [], all(b));
+            one_pass(backend, plan, levels, frames, width, columns, out);
         }
-        (&[a, b, c], _) => one_pass(backend, plan, levels, (a, [b], c), width, columns, out),
+        (&[_, _, _], &[a, b, c]) => {
+            one_pass(backend, plan, levels, (a, [b], c), width, columns, out);
+        }
+        (&[a, b, c], _) => {
+            let frames = (all(a), [all(b)], all(c));
+            one_pass(backend, plan, levels, frames, width, columns, out);
+        }
         _ => level_by_level(backend, plan, levels, rows, columns, out),
     }
     plan.finish(&mut out.phase[part]);

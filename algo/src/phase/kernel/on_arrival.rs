@@ -23,12 +23,12 @@ use super::next_block;
 use super::quality::{Quality, dark_unless};
 use super::temporal::{ExpectedBlock, FinerLevel, GeometricLanes, four};
 use crate::phase::arrived::{ExpectedRow, ExpectedRowMut};
-use crate::phase::fold::BlockSample;
 use crate::phase::geometric::Geometric;
 use crate::phase::level::{Level, LevelLanes};
+use crate::phase::samples::BlockSample;
 use crate::phase::source::Frames;
 use crate::phase::unwrap_step::{ExpectedPhase, UnwrapStep, UnwrapStepLanes};
-use crate::simd::{Backend, Lanes, Results, back_end_entry};
+use crate::simd::{Backend, Lanes, Results, Rows, back_end_entry};
 use crate::trust::Trust;
 use core::ops::Range;
 
@@ -42,6 +42,7 @@ pub(crate) fn level_row<T: BlockSample>(
     columns: Range<usize>,
     out: ExpectedRowMut<'_>,
 ) {
+    let rows = Rows::new(rows, columns.end);
     match (&plan.steps[..at], &plan.steps[at..]) {
         ([], [next, ..]) => coarsest(backend, plan, next, level, rows, columns, out),
         ([.., step], [next, ..]) => between(backend, plan, [step, next], level, rows, columns, out),
@@ -75,9 +76,10 @@ pub(super) fn finest_row_unscaled<T: BlockSample>(
     columns: Range<usize>,
     out: &mut Results<'_>,
 ) {
-    match four(level, rows, &columns) {
+    let all = Rows::new(rows, columns.end);
+    match four(level, rows) {
         Some(frames) => finest(backend, plan, level, frames, before, columns, out),
-        None => finest(backend, plan, level, rows, before, columns, out),
+        None => finest(backend, plan, level, all, before, columns, out),
     }
 }
 

@@ -10,12 +10,12 @@ use crate::phase::angle::AngleLanes;
 use crate::phase::fold::Folded;
 use crate::phase::geometric::Geometric;
 use crate::phase::level::{Level, LevelLanes, Samples};
+use crate::phase::samples::BlockSample;
 use crate::phase::source::Frames;
 use crate::phase::unwrap_step::{ExpectedPhase, Turns, UnwrapStep, UnwrapStepLanes};
-use crate::simd::{Four, Lanes, Results};
+use crate::simd::{Lanes, Results};
 use crate::trust::Trust;
 use crate::units::AbsolutePhase;
-use core::ops::Range;
 
 /// [`Geometric`] with every constant in all lanes, for all blocks of a row.
 pub(super) struct GeometricLanes<V: Lanes> {
@@ -212,14 +212,10 @@ impl<'a, V: Lanes, S: Frames> FinerLevel<'a, V, S> {
     }
 }
 
-/// The four rows of a level that is demodulated by differences, checked up to the end of the columns.
-pub(super) fn four<'a, T>(
-    level: &Level,
-    rows: &[&'a [T]],
-    columns: &Range<usize>,
-) -> Option<Four<'a, T>> {
+/// The four rows of a level that is folded in bytes.
+pub(super) fn four<'a, T: BlockSample>(level: &Level, rows: &[&'a [T]]) -> Option<[&'a [u8]; 4]> {
     match (level.samples, rows) {
-        (Samples::Four, &[a, b, c, d]) => Some(Four::new([a, b, c, d], columns.end)),
+        (Samples::Four, &[a, b, c, d]) => T::bytes([a, b, c, d]),
         _ => None,
     }
 }

@@ -2,6 +2,7 @@
 
 mod backends;
 mod eight_bit;
+mod shifts;
 mod textbook;
 mod weights;
 

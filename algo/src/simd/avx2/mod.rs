@@ -6,7 +6,7 @@
 mod memory;
 
 use super::lanes::{Lanes, Scaled, operations};
-use super::rows::{Four, block, block_mut};
+use super::rows::{block, block_mut};
 use core::arch::x86_64::*;
 use memory::{AHEAD, hint, load_halves, store_halves};
 
@@ -69,11 +69,13 @@ impl Lanes for Avx2 {
         add_sat(self, a: W, b: W) -> W = _mm256_adds_epi16(a, b);
         mul_q15(self, a: W, b: W) -> W = _mm256_mulhrs_epi16(a, b);
         mul_low(self, a: W, b: W) -> W = _mm256_mullo_epi16(a, b);
+        sign_of(self, x: W) -> W = _mm256_or_si256(x, _mm256_set1_epi16(1));
         left(self, n: u8) -> Count = _mm_cvtsi32_si128(i32::from(n));
         shl_by(self, x: W, n: Count) -> W = _mm256_sll_epi16(x, n);
         sar_by(self, x: W, n: Count) -> W = _mm256_sra_epi16(x, n);
         shr_by(self, x: W, n: Count) -> W = _mm256_srl_epi16(x, n);
         halve(self, x: W) -> W = _mm256_avg_epu16(x, _mm256_setzero_si256());
+        mean(self, a: W, b: W) -> W = _mm256_avg_epu16(a, b);
         abs(self, x: W) -> W = _mm256_abs_epi16(x);
         min(self, a: W, b: W) -> W = _mm256_min_epi16(a, b);
         max(self, a: W, b: W) -> W = _mm256_max_epi16(a, b);
@@ -94,9 +96,7 @@ impl Lanes for Avx2 {
         to_single(self, x: D) -> F = _mm256_cvtepi32_ps(x);
         to_whole(self, x: F) -> D = _mm256_cvtps_epi32(x);
         splat_single(self, x: f32) -> F = _mm256_set1_ps(x);
-        add_single(self, a: F, b: F) -> F = _mm256_add_ps(a, b);
         mul_single(self, a: F, b: F) -> F = _mm256_mul_ps(a, b);
-        lt_single(self, a: F, b: F) -> D = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b));
     }
 
     #[inline(always)]
@@ -104,19 +104,6 @@ impl Lanes for Avx2 {
         let block = block(from, at, BYTES);
         // SAFETY: the slice holds the 32 bytes that are read; the load needs no alignment; `self` proves AVX2.
         unsafe { _mm256_loadu_si256(block.as_ptr().cast()) }
-    }
-    #[inline(always)]
-    fn load8_of_four(self, from: &Four<'_, u8>, at: usize) -> [Self::B; 4] {
-        let [a, b, c, d] = from.blocks(at, BYTES);
-        // SAFETY: 32 bytes may be read from each (`Four::blocks`); the loads need no alignment; `self` proves AVX2.
-        unsafe {
-            [
-                _mm256_loadu_si256(a.cast()),
-                _mm256_loadu_si256(b.cast()),
-                _mm256_loadu_si256(c.cast()),
-                _mm256_loadu_si256(d.cast()),
-            ]
-        }
     }
     #[inline(always)]
     fn fetch<T>(self, row: &[T], at: usize, after: usize) {
@@ -160,6 +147,29 @@ impl Lanes for Avx2 {
         avx2!(_mm256_testz_si256(mask, mask)) == 1
     }
 
+    #[inline(always)]
+    fn sum(self, a: Self::B, b: Self::B) -> [Self::W; 2] {
+        let [low, high] = self.widen(a, b);
+        avx2!({
+            let ones = _mm256_set1_epi8(1);
+            [
+                _mm256_maddubs_epi16(low, ones),
+                _mm256_maddubs_epi16(high, ones),
+            ]
+        })
+    }
+    #[inline(always)]
+    fn difference(self, a: Self::B, b: Self::B) -> [Self::W; 2] {
+        let [low, high] = self.widen(a, b);
+        avx2!({
+            // Bytes 1 and −1.
+            let signs = _mm256_set1_epi16(-255);
+            [
+                _mm256_maddubs_epi16(low, signs),
+                _mm256_maddubs_epi16(high, signs),
+            ]
+        })
+    }
     #[inline(always)]
     fn signs(self, mask: Self::B) -> [Self::W; 2] {
         self.widen(self.or8(mask, self.splat8(1)), mask)
@@ -228,6 +238,19 @@ impl Lanes for Avx2 {
         avx2!(_mm256_srai_epi16::<N>(x))
     }
     #[inline(always)]
+    fn normalised(self, long: Self::W, short: Self::W) -> [Self::W; 2] {
+        // The four bits below the sign decide the scale; bytes with the high bit set read 0.
+        let scale = avx2!({
+            let table = _mm256_setr_epi8(
+                16, 8, 4, 4, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1, //
+                16, 8, 4, 4, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1,
+            );
+            let index = _mm256_or_si256(_mm256_srli_epi16::<11>(long), _mm256_set1_epi16(i16::MIN));
+            _mm256_shuffle_epi8(table, index)
+        });
+        [self.mul_low(long, scale), self.mul_low(short, scale)]
+    }
+    #[inline(always)]
     fn right(self, n: u8) -> Self::Count {
         self.left(n)
     }
@@ -251,6 +274,11 @@ impl Lanes for Avx2 {
             _mm256_madd_epi16(ac[0], bd[0]),
             _mm256_madd_epi16(ac[1], bd[1])
         ])
+    }
+    #[inline(always)]
+    fn dot_pair(self, a: Self::W, c: Self::W, bd: Self::D) -> [Self::D; 2] {
+        let ac = self.join(a, c);
+        avx2!([_mm256_madd_epi16(ac[0], bd), _mm256_madd_epi16(ac[1], bd)])
     }
     #[inline(always)]
     fn narrow_rounded(self, x: [Self::D; 2], n: u8) -> Self::W {

@@ -1,0 +1,109 @@
+//! The sample types of frames, and what the kernels need of a block of samples: bytes of 8 bits, words of 9 to 16.
+
+use super::level::LevelLanes;
+use crate::frame::Sample;
+use crate::simd::Lanes;
+
+/// A sample type that the kernels can read blocks of.
+pub(crate) trait BlockSample: Sample {
+    /// A block of samples as it is loaded.
+    type Block<V: Lanes>: Copy;
+
+    /// The four rows as bytes, if samples are bytes.
+    fn bytes(rows: [&[Self]; 4]) -> Option<[&[u8]; 4]>;
+    /// The block of `row` that starts at `at`.
+    fn load<V: Lanes>(v: V, row: &[Self], at: usize) -> Self::Block<V>;
+    /// As words, unsigned.
+    fn words<V: Lanes>(v: V, block: Self::Block<V>) -> [V::W; 2];
+    /// As words, moved up to 16 bits and counted from the middle of their range.
+    fn centred<V: Lanes>(v: V, level: &LevelLanes<'_, V>, block: Self::Block<V>) -> [V::W; 2];
+    /// a + b, of at most 15 bits.
+    fn sum<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> [V::W; 2];
+    /// a − b, of at most 15 bits.
+    fn difference<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> [V::W; 2];
+    /// The brighter of two.
+    fn brighter<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> Self::Block<V>;
+    /// Mask: the sample is at full scale or above.
+    fn saturated<V: Lanes>(v: V, level: &LevelLanes<'_, V>, block: Self::Block<V>) -> V::B;
+}
+
+impl BlockSample for u8 {
+    type Block<V: Lanes> = V::B;
+
+    fn bytes(rows: [&[Self]; 4]) -> Option<[&[u8]; 4]> {
+        Some(rows)
+    }
+    #[inline(always)]
+    fn load<V: Lanes>(v: V, row: &[Self], at: usize) -> V::B {
+        v.load8(row, at)
+    }
+    #[inline(always)]
+    fn words<V: Lanes>(v: V, block: V::B) -> [V::W; 2] {
+        v.widen(block, v.splat8(0))
+    }
+    #[inline(always)]
+    fn centred<V: Lanes>(v: V, _level: &LevelLanes<'_, V>, block: V::B) -> [V::W; 2] {
+        v.widen_256(v.xor8(block, v.splat8(128)))
+    }
+    #[inline(always)]
+    fn sum<V: Lanes>(v: V, a: V::B, b: V::B) -> [V::W; 2] {
+        v.sum(a, b)
+    }
+    #[inline(always)]
+    fn difference<V: Lanes>(v: V, a: V::B, b: V::B) -> [V::W; 2] {
+        v.difference(a, b)
+    }
+    #[inline(always)]
+    fn brighter<V: Lanes>(v: V, a: V::B, b: V::B) -> V::B {
+        v.max8(a, b)
+    }
+    #[inline(always)]
+    fn saturated<V: Lanes>(v: V, _level: &LevelLanes<'_, V>, block: V::B) -> V::B {
+        v.eq8(block, v.splat8(u8::MAX))
+    }
+}
+
+impl BlockSample for u16 {
+    type Block<V: Lanes> = [V::W; 2];
+
+    fn bytes(_rows: [&[Self]; 4]) -> Option<[&[u8]; 4]> {
+        None
+    }
+    #[inline(always)]
+    fn load<V: Lanes>(v: V, row: &[Self], at: usize) -> [V::W; 2] {
+        v.load16(row, at)
+    }
+    #[inline(always)]
+    fn words<V: Lanes>(_v: V, block: [V::W; 2]) -> [V::W; 2] {
+        block
+    }
+    #[inline(always)]
+    fn centred<V: Lanes>(v: V, level: &LevelLanes<'_, V>, [low, high]: [V::W; 2]) -> [V::W; 2] {
+        let middle = v.splat16(i16::MIN);
+        [
+            v.xor(v.shl_by(low, level.to_16_bits), middle),
+            v.xor(v.shl_by(high, level.to_16_bits), middle),
+        ]
+    }
+    #[inline(always)]
+    fn sum<V: Lanes>(v: V, a: [V::W; 2], b: [V::W; 2]) -> [V::W; 2] {
+        [v.add(a[0], b[0]), v.add(a[1], b[1])]
+    }
+    #[inline(always)]
+    fn difference<V: Lanes>(v: V, a: [V::W; 2], b: [V::W; 2]) -> [V::W; 2] {
+        [v.sub(a[0], b[0]), v.sub(a[1], b[1])]
+    }
+    #[inline(always)]
+    fn brighter<V: Lanes>(v: V, a: [V::W; 2], b: [V::W; 2]) -> [V::W; 2] {
+        [v.max_unsigned(a[0], b[0]), v.max_unsigned(a[1], b[1])]
+    }
+    #[inline(always)]
+    fn saturated<V: Lanes>(v: V, level: &LevelLanes<'_, V>, [low, high]: [V::W; 2]) -> V::B {
+        // With the sign bit inverted, signed comparison orders unsigned words.
+        let turn = v.splat16(i16::MIN);
+        v.narrow_mask([
+            v.gt(v.xor(low, turn), level.below_full_scale),
+            v.gt(v.xor(high, turn), level.below_full_scale),
+        ])
+    }
+}
