@@ -21,9 +21,8 @@
 //! the modulation.
 
 use super::level::LevelLanes;
-use super::samples::BlockSample;
-use super::terms::{Pointers, pointers};
-use crate::simd::{Lanes, Rows};
+use super::terms::Pointers;
+use crate::simd::Lanes;
 
 /// The pointers of a block, folded into the first octant, and how to unfold their angles.
 pub(super) struct Folded<V: Lanes> {
@@ -61,7 +60,7 @@ const LEAST_SHORT: [u8; 16] = [
 
 /// Folds the block at `at` of four shifts of 8 bits, S = I₀ − I₂ and C = I₁ − I₃, in bytes with the signs apart.
 #[inline(always)]
-pub(super) fn fold_four<V: Lanes>(v: V, rows: &[&[u8]; 4], at: usize) -> Folded<V> {
+pub(super) fn fold_four<V: Lanes>(v: V, rows: [&[u8]; 4], at: usize) -> Folded<V> {
     let [i0, i1, i2, i3] = rows;
     let (i0, i1) = (v.load8(i0, at), v.load8(i1, at));
     let (i2, i3) = (v.load8(i2, at), v.load8(i3, at));
@@ -88,16 +87,13 @@ pub(super) fn fold_four<V: Lanes>(v: V, rows: &[&[u8]; 4], at: usize) -> Folded<
     }
 }
 
-/// Folds the block at `at` of any other level, in words.
+/// Folds the pointers of a block of any other level, in words.
 #[inline(always)]
-pub(super) fn fold<V: Lanes, T: BlockSample>(
+pub(super) fn fold<V: Lanes>(
     v: V,
     level: &LevelLanes<'_, V>,
-    rows: &Rows<'_, T>,
-    at: usize,
-    after: usize,
+    Pointers { s, c, brightest }: Pointers<V>,
 ) -> Folded<V> {
-    let Pointers { s, c, brightest } = pointers(v, level, rows, at, after);
     let strong = [strong(v, level, s[0], c[0]), strong(v, level, s[1], c[1])];
     let (low, high) = (octant(v, s[0], c[0]), octant(v, s[1], c[1]));
     Folded {

@@ -9,8 +9,8 @@ pub(crate) trait BlockSample: Sample {
     /// A block of samples as it is loaded.
     type Block<V: Lanes>: Copy;
 
-    /// The four rows as bytes, if samples are bytes.
-    fn bytes(rows: [&[Self]; 4]) -> Option<[&[u8]; 4]>;
+    /// The rows as bytes, if samples are bytes.
+    fn bytes<const N: usize>(rows: [&[Self]; N]) -> Option<[&[u8]; N]>;
     /// The block of `row` that starts at `at`.
     fn load<V: Lanes>(v: V, row: &[Self], at: usize) -> Self::Block<V>;
     /// As words, unsigned.
@@ -30,7 +30,7 @@ pub(crate) trait BlockSample: Sample {
 impl BlockSample for u8 {
     type Block<V: Lanes> = V::B;
 
-    fn bytes(rows: [&[Self]; 4]) -> Option<[&[u8]; 4]> {
+    fn bytes<const N: usize>(rows: [&[Self]; N]) -> Option<[&[u8]; N]> {
         Some(rows)
     }
     #[inline(always)]
@@ -66,7 +66,7 @@ impl BlockSample for u8 {
 impl BlockSample for u16 {
     type Block<V: Lanes> = [V::W; 2];
 
-    fn bytes(_rows: [&[Self]; 4]) -> Option<[&[u8]; 4]> {
+    fn bytes<const N: usize>(_rows: [&[Self]; N]) -> Option<[&[u8]; N]> {
         None
     }
     #[inline(always)]

@@ -8,6 +8,7 @@ use super::arrived::WrappedRow;
 use super::fold::{Folded, fold, fold_four};
 use super::level::{Demodulated, LevelLanes};
 use super::samples::BlockSample;
+use super::terms::{of_shifts, pointers};
 use crate::simd::{Lanes, Rows};
 
 /// The rows of a level's frames, in the order of their shifts.
@@ -23,27 +24,34 @@ pub(crate) trait Frames: Copy {
     -> Folded<V>;
 }
 
-impl Frames for [&[u8]; 4] {
-    const DOUBLED: bool = false;
+impl<const N: usize> Frames for [&[u8]; N] {
+    const DOUBLED: bool = N != 4;
 
     #[inline(always)]
-    fn first(self, columns: usize) -> Self {
-        let [a, b, c, d] = self;
-        [&a[..columns], &b[..columns], &c[..columns], &d[..columns]]
+    fn first(mut self, columns: usize) -> Self {
+        let mut k = 0;
+        while k < N {
+            self[k] = &self[k][..columns];
+            k += 1;
+        }
+        self
     }
 
     #[inline(always)]
     fn fold<V: Lanes>(
         &self,
         v: V,
-        _level: &LevelLanes<'_, V>,
+        level: &LevelLanes<'_, V>,
         at: usize,
         after: usize,
     ) -> Folded<V> {
+        if N != 4 {
+            return fold(v, level, of_shifts(v, level, self, at, after));
+        }
         for row in self {
             v.fetch(row, at, after);
         }
-        fold_four(v, self, at)
+        fold_four(v, [self[0], self[1], self[2], self[3]], at)
     }
 }
 
@@ -63,7 +71,7 @@ impl<T: BlockSample> Frames for Rows<'_, T> {
         at: usize,
         after: usize,
     ) -> Folded<V> {
-        fold(v, level, self, at, after)
+        fold(v, level, pointers(v, level, self, at, after))
     }
 }
 

@@ -50,13 +50,13 @@ pub(super) fn pointers<V: Lanes, T: BlockSample>(
 ) -> Pointers<V> {
     if level.plan.samples != Samples::Weighted {
         match rows.count() {
-            3 => return of_shifts::<V, T, 3>(v, level, rows, at, after),
-            4 => return of_shifts::<V, T, 4>(v, level, rows, at, after),
-            5 => return of_shifts::<V, T, 5>(v, level, rows, at, after),
-            6 => return of_shifts::<V, T, 6>(v, level, rows, at, after),
-            7 => return of_shifts::<V, T, 7>(v, level, rows, at, after),
-            8 => return of_shifts::<V, T, 8>(v, level, rows, at, after),
-            9 => return of_shifts::<V, T, 9>(v, level, rows, at, after),
+            3 => return of_shifts(v, level, &rows.all::<3>(), at, after),
+            4 => return of_shifts(v, level, &rows.all::<4>(), at, after),
+            5 => return of_shifts(v, level, &rows.all::<5>(), at, after),
+            6 => return of_shifts(v, level, &rows.all::<6>(), at, after),
+            7 => return of_shifts(v, level, &rows.all::<7>(), at, after),
+            8 => return of_shifts(v, level, &rows.all::<8>(), at, after),
+            9 => return of_shifts(v, level, &rows.all::<9>(), at, after),
             _ => {}
         }
     }
@@ -65,22 +65,20 @@ pub(super) fn pointers<V: Lanes, T: BlockSample>(
 
 /// N shifts that start at 0.
 #[inline(always)]
-fn of_shifts<V: Lanes, T: BlockSample, const N: usize>(
+pub(super) fn of_shifts<V: Lanes, T: BlockSample, const N: usize>(
     v: V,
     level: &LevelLanes<'_, V>,
-    rows: &Rows<'_, T>,
+    rows: &[&[T]; N],
     at: usize,
     after: usize,
 ) -> Pointers<V> {
-    let first = rows.row(0);
-    v.fetch(first, at, after);
-    let mut blocks = [T::load(v, first, at); N];
+    let mut blocks = [T::load(v, rows[0], at); N];
+    v.fetch(rows[0], at, after);
     let mut brightest = blocks[0];
     let mut k = 1;
     while k < N {
-        let row = rows.row(k);
-        v.fetch(row, at, after);
-        blocks[k] = T::load(v, row, at);
+        v.fetch(rows[k], at, after);
+        blocks[k] = T::load(v, rows[k], at);
         brightest = T::brighter(v, brightest, blocks[k]);
         k += 1;
     }

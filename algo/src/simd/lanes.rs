@@ -93,6 +93,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn widen_128(self, x: Self::B) -> [Self::W; 2];
     /// Both as words times 128 · 2ⁿ, with n so that 2¹⁴ ≤ long < 2¹⁵. Unspecified where long < 16 or short > long.
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W>;
+    /// The bytes of a mask of words, two per pixel and in any order: only whether one of them is set means anything.
+    fn bytes_of(self, mask: Self::W) -> Self::B;
     /// Masks of words as masks of bytes.
     fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B;
 

@@ -45,6 +45,7 @@ impl Lanes for Neon {
         xor8(self, a: B, b: B) -> B = veorq_u8(a, b);
         pick8(self, mask: B, a: B, b: B) -> B = vbslq_u8(mask, a, b);
         quarters8(self, half: B, quarter: B) -> B = vandq_u8(vsriq_n_u8::<1>(half, quarter), vdupq_n_u8(192));
+        bytes_of(self, mask: W) -> B = vreinterpretq_u8_s16(mask);
         narrow_mask(self, mask: [W; 2]) -> B = vuzp1q_u8(vreinterpretq_u8_s16(mask[0]), vreinterpretq_u8_s16(mask[1]));
         splat16(self, x: i16) -> W = vdupq_n_s16(x);
         add(self, a: W, b: W) -> W = vaddq_s16(a, b);

@@ -106,6 +106,7 @@ impl Lanes for Portable {
         signs(self, mask: B) -> [W; 2] = halves(mask, |mask| lanes(mask, |mask| if mask == 0 { 1 } else { -1 }));
         widen_256(self, x: B) -> [W; 2] = self.widen([0; BYTES], x);
         widen_128(self, x: B) -> [W; 2] = halves(x, |x| lanes(x, |x| i16::from(x) << 7));
+        bytes_of(self, mask: W) -> B = core::array::from_fn(|lane| mask[lane / 2] as u8);
         narrow_mask(self, mask: [W; 2]) -> B = lanes(whole::<_, WORDS, BYTES>(mask), |mask: i16| mask as u8);
         splat16(self, x: i16) -> W = [x; WORDS];
         add(self, a: W, b: W) -> W = pairs(a, b, i16::wrapping_add);

@@ -35,6 +35,21 @@ impl<'a, T> Rows<'a, T> {
         self.rows.len()
     }
 
+    /// The rows, of which there are N.
+    ///
+    /// # Panics
+    /// If there are fewer.
+    #[inline(always)]
+    pub fn all<const N: usize>(&self) -> [&'a [T]; N] {
+        let mut rows = [self.row(0); N];
+        let mut at = 1;
+        while at < N {
+            rows[at] = self.row(at);
+            at += 1;
+        }
+        rows
+    }
+
     /// Row `at`. All have the same length, so that the compiler merges the checks of their blocks.
     ///
     /// # Panics

@@ -19,7 +19,7 @@
 use super::known::{KnownBlock, store};
 use super::next_block;
 use super::quality::Quality;
-use super::temporal::four;
+use super::temporal::{of_bytes, rows_of_bytes};
 use crate::phase::about::{About, AboutLanes, BlockLevels};
 use crate::phase::angle::AngleLanes;
 use crate::phase::arrived::{WrappedRow, WrappedRowMut};
@@ -40,27 +40,63 @@ pub(crate) fn decode_row<T: BlockSample>(
     rows: &[&[&[T]]],
     map: &[AbsolutePhase],
     columns: Range<usize>,
-    out: Results<'_>,
+    mut out: Results<'_>,
 ) {
-    let fours: heapless::Vec<[&[u8]; 4], 3> = (levels.iter().zip(rows))
-        .map_while(|(level, rows)| four(level, rows))
-        .take(3)
-        .collect();
+    let kernels = [of_shifts::<T, 4>, of_shifts::<T, 3>];
+    let mut kernels = kernels.iter();
+    if kernels.any(|kernel| kernel(backend, plan, levels, rows, map, &columns, &mut out)) {
+        return;
+    }
     let end = columns.end;
     let all = |rows| Rows::new(rows, end);
-    match (rows, &fours[..]) {
-        (&[_], &[a]) => single(backend, plan, levels, a, map, columns, out),
-        (&[a], _) => single(backend, plan, levels, all(a), map, columns, out),
-        (&[_, _], &[a, b]) => dense(backend, plan, levels, [a], b, map, columns, out),
-        (&[_, _, _], &[a, b, c]) => dense(backend, plan, levels, [a, b], c, map, columns, out),
-        (&[a, b], _) => dense(backend, plan, levels, [all(a)], all(b), map, columns, out),
-        (&[a, b, c], _) => {
+    match *rows {
+        [a] => single(backend, plan, levels, all(a), map, columns, &mut out),
+        [a, b] => dense(
+            backend,
+            plan,
+            levels,
+            [all(a)],
+            all(b),
+            map,
+            columns,
+            &mut out,
+        ),
+        [a, b, c] => {
             let others = [all(a), all(b)];
-            dense(backend, plan, levels, others, all(c), map, columns, out);
+            dense(
+                backend,
+                plan,
+                levels,
+                others,
+                all(c),
+                map,
+                columns,
+                &mut out,
+            );
         }
         // There are at most three dense levels.
         _ => {}
     }
+}
+
+/// Levels of N shifts of 8 bits each, by the kernel for N; false for other levels.
+fn of_shifts<T: BlockSample, const N: usize>(
+    backend: Backend,
+    plan: &About,
+    levels: &[Level],
+    rows: &[&[&[T]]],
+    map: &[AbsolutePhase],
+    columns: &Range<usize>,
+    out: &mut Results<'_>,
+) -> bool {
+    let columns = columns.clone();
+    match rows_of_bytes::<T, N>(levels, rows)[..] {
+        [a] => single(backend, plan, levels, a, map, columns, out),
+        [a, b] => dense(backend, plan, levels, [a], b, map, columns, out),
+        [a, b, c] => dense(backend, plan, levels, [a, b], c, map, columns, out),
+        _ => return false,
+    }
+    true
 }
 
 /// As [`decode_row`], from the levels that have arrived and the frames of the finest.
@@ -73,15 +109,27 @@ pub(crate) fn finest_row<T: BlockSample>(
     rows: &[&[T]],
     map: &[AbsolutePhase],
     columns: Range<usize>,
-    out: Results<'_>,
+    mut out: Results<'_>,
 ) {
     let all = Rows::new(rows, columns.end);
     match *before {
         [] => decode_row(backend, plan, levels, &[rows], map, columns, out),
-        [a] => dense(backend, plan, levels, [a], all, map, columns, out),
-        [a, b] => match levels.last().and_then(|level| four(level, rows)) {
-            Some(frames) => dense(backend, plan, levels, [a, b], frames, map, columns, out),
-            None => dense(backend, plan, levels, [a, b], all, map, columns, out),
+        [a] => dense(backend, plan, levels, [a], all, map, columns, &mut out),
+        [a, b] => match levels
+            .last()
+            .and_then(|level| of_bytes::<T, 4>(level, rows))
+        {
+            Some(frames) => dense(
+                backend,
+                plan,
+                levels,
+                [a, b],
+                frames,
+                map,
+                columns,
+                &mut out,
+            ),
+            None => dense(backend, plan, levels, [a, b], all, map, columns, &mut out),
         },
         _ => {}
     }
@@ -95,7 +143,7 @@ back_end_entry! {
         frames: S,
         map: &[AbsolutePhase],
         columns: Range<usize>,
-        out: Results<'_>,
+        out: &mut Results<'_>,
     )
 }
 
@@ -108,7 +156,7 @@ back_end_entry! {
         finest: F,
         map: &[AbsolutePhase],
         columns: Range<usize>,
-        out: Results<'_>,
+        out: &mut Results<'_>,
     )
 }
 
@@ -143,7 +191,7 @@ fn single_columns<V: Lanes, S: Frames>(
     frames: S,
     map: &[AbsolutePhase],
     columns: Range<usize>,
-    mut out: Results<'_>,
+    out: &mut Results<'_>,
 ) {
     let ([level], Some(about)) = (levels, AboutLanes::new::<1>(v, plan)) else {
         return;
@@ -190,7 +238,7 @@ fn dense_columns<V: Lanes, S: Source, F: Frames, const OTHERS: usize>(
     finest: F,
     map: &[AbsolutePhase],
     columns: Range<usize>,
-    mut out: Results<'_>,
+    out: &mut Results<'_>,
 ) {
     let three = OTHERS == 2;
     let about = if three {

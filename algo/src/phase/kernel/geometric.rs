@@ -31,7 +31,7 @@
 
 use super::on_arrival::{finest_row_unscaled, level_row};
 use super::quality::dark_unless;
-use super::temporal::{FinerLevel, GeometricLanes, four};
+use super::temporal::{FinerLevel, GeometricLanes, rows_of_bytes};
 use super::{STRETCH, next_block, of_stretch, stretches};
 use crate::phase::arrived::{Expected, NO_REASON};
 use crate::phase::geometric::Geometric;
@@ -52,30 +52,49 @@ pub(crate) fn decode_row<T: BlockSample>(
     mut out: Results<'_>,
 ) {
     let (part, out) = (columns.clone(), &mut out);
-    let fours: heapless::Vec<[&[u8]; 4], 3> = (levels.iter().zip(rows))
-        .map_while(|(level, rows)| four(level, rows))
-        .take(3)
-        .collect();
-    let all = |rows| Rows::new(rows, part.end);
-    let width = rows[0].first().map_or(0, |row| row.len());
-    match (rows, &fours[..]) {
-        (&[_], &[a]) => single(backend, plan, levels, a, columns, out),
-        (&[a], _) => single(backend, plan, levels, all(a), columns, out),
-        (&[_, _], &[a, b]) => one_pass(backend, plan, levels, (a, [], b), width, columns, out),
-        (&[a, b], _) => {
-            let frames = (all(a), [], all(b));
-            one_pass(backend, plan, levels, frames, width, columns, out);
+    let kernels = [of_shifts::<T, 4>, of_shifts::<T, 3>, of_shifts::<T, 5>];
+    let mut kernels = kernels.iter();
+    if !kernels.any(|kernel| kernel(backend, plan, levels, rows, &columns, out)) {
+        let all = |rows| Rows::new(rows, part.end);
+        let width = width(rows);
+        match *rows {
+            [a] => single(backend, plan, levels, all(a), columns, out),
+            [a, b] => {
+                let frames = (all(a), [], all(b));
+                one_pass(backend, plan, levels, frames, width, columns, out);
+            }
+            [a, b, c] => {
+                let frames = (all(a), [all(b)], all(c));
+                one_pass(backend, plan, levels, frames, width, columns, out);
+            }
+            _ => level_by_level(backend, plan, levels, rows, columns, out),
         }
-        (&[_, _, _], &[a, b, c]) => {
-            one_pass(backend, plan, levels, (a, [b], c), width, columns, out);
-        }
-        (&[a, b, c], _) => {
-            let frames = (all(a), [all(b)], all(c));
-            one_pass(backend, plan, levels, frames, width, columns, out);
-        }
-        _ => level_by_level(backend, plan, levels, rows, columns, out),
     }
     plan.finish(&mut out.phase[part]);
+}
+
+/// Up to three levels of N shifts of 8 bits each, by the kernel for N; false for other levels.
+fn of_shifts<T: BlockSample, const N: usize>(
+    backend: Backend,
+    plan: &Geometric,
+    levels: &[Level],
+    rows: &[&[&[T]]],
+    columns: &Range<usize>,
+    out: &mut Results<'_>,
+) -> bool {
+    let (columns, width) = (columns.clone(), width(rows));
+    match rows_of_bytes::<T, N>(levels, rows)[..] {
+        [a] => single(backend, plan, levels, a, columns, out),
+        [a, b] => one_pass(backend, plan, levels, (a, [], b), width, columns, out),
+        [a, b, c] => one_pass(backend, plan, levels, (a, [b], c), width, columns, out),
+        _ => return false,
+    }
+    true
+}
+
+/// Pixels of a row of the frames.
+fn width<T>(rows: &[&[&[T]]]) -> usize {
+    rows[0].first().map_or(0, |row| row.len())
 }
 
 /// Any number of levels, one after the other, in stretches of columns whose predictions fit on the stack.
@@ -149,8 +168,8 @@ fn single_columns<V: Lanes, S: Frames>(
         let folded = frames.fold(v, &level, at, V::AHEAD);
         let (block, modulation) = level.fine(v, &lanes.angle, &folded, S::DOUBLED);
         let unwrapped = lanes.coarsest(v, block.phase, &folded);
-        let before = dark_unless(v, folded.strong);
-        lanes.store(v, &unwrapped, before, modulation, at, &mut out);
+        let (clear, before) = (folded.strong, dark_unless(v, folded.strong));
+        lanes.store(v, &unwrapped, clear, before, modulation, at, &mut out);
     }
 }
 
@@ -202,6 +221,8 @@ fn one_pass_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
             }
         };
         let (unwrapped, modulation) = finest.fine(v, &lanes, &expected, at, after);
-        lanes.store(v, &unwrapped, dark_unless(v, lit), modulation, at, &mut out);
+        // What is strong at every level is lit.
+        let (clear, before) = (unwrapped.quality.strong, dark_unless(v, lit));
+        lanes.store(v, &unwrapped, clear, before, modulation, at, &mut out);
     }
 }

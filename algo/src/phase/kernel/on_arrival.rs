@@ -21,7 +21,7 @@
 
 use super::next_block;
 use super::quality::{Quality, dark_unless};
-use super::temporal::{ExpectedBlock, FinerLevel, GeometricLanes, four};
+use super::temporal::{ExpectedBlock, FinerLevel, GeometricLanes, of_bytes};
 use crate::phase::arrived::{ExpectedRow, ExpectedRowMut};
 use crate::phase::geometric::Geometric;
 use crate::phase::level::{Level, LevelLanes};
@@ -77,7 +77,7 @@ pub(super) fn finest_row_unscaled<T: BlockSample>(
     out: &mut Results<'_>,
 ) {
     let all = Rows::new(rows, columns.end);
-    match four(level, rows) {
+    match of_bytes::<T, 4>(level, rows) {
         Some(frames) => finest(backend, plan, level, frames, before, columns, out),
         None => finest(backend, plan, level, all, before, columns, out),
     }
@@ -209,7 +209,7 @@ fn finest_columns<V: Lanes, S: Frames>(
             continue;
         }
         let (unwrapped, modulation) = finest.fine(v, &lanes, &before.expected(v, at), at, V::AHEAD);
-        lanes.store(v, &unwrapped, reason, modulation, at, &mut out);
+        lanes.store(v, &unwrapped, reason, reason, modulation, at, &mut out);
     }
 }
 

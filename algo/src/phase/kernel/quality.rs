@@ -46,11 +46,13 @@ impl<V: Lanes> Quality<V> {
         v.pick8(self.strong, first, v.splat8(Trust::LowModulation as u8))
     }
 
-    /// Whether all pixels of the block are resolved: no reason here, nor in `before`, the reasons of coarser levels.
+    /// Whether all pixels of the block are resolved: no reason here, and `clear` is 255.
     #[inline(always)]
-    pub fn all_resolved(&self, v: V, before: V::B) -> bool {
-        let against = v.or8(self.ambiguous(v), self.saturated(v));
-        v.all8(v.pick8(against, v.splat8(0), v.min8(self.strong, before)))
+    pub fn all_resolved(&self, v: V, clear: V::B) -> bool {
+        // Which pixel it is does not matter.
+        let ambiguous = too_large(v, v.max_unsigned(self.residual[0], self.residual[1]));
+        let against = v.or8(v.bytes_of(ambiguous), self.saturated(v));
+        v.all8(v.pick8(against, v.splat8(0), v.and8(self.strong, clear)))
     }
 
     /// Mask: the residual is too large for the fringe order to be trusted.

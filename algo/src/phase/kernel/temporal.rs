@@ -62,19 +62,21 @@ impl<V: Lanes> GeometricLanes<V> {
     }
 
     /// Stores a block at the finest level: absolute phase and modulation of resolved pixels, the reason of others. `before` are
-    /// the reasons of coarser levels.
+    /// the reasons of coarser levels; `clear` is 255 where there is none, or where `unwrapped` has one, too.
     #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
     pub fn store(
         &self,
         v: V,
         unwrapped: &UnwrappedBlock<V>,
+        clear: V::B,
         before: V::B,
         modulation: [V::W; 2],
         at: usize,
         out: &mut Results<'_>,
     ) {
         let [low, high] = unwrapped.phase;
-        if unwrapped.quality.all_resolved(v, before) {
+        if unwrapped.quality.all_resolved(v, clear) {
             // Nearly every block of the part.
             let phases = [
                 v.join(low.phase, v.add(low.order, self.origin)),
@@ -212,12 +214,36 @@ impl<'a, V: Lanes, S: Frames> FinerLevel<'a, V, S> {
     }
 }
 
-/// The four rows of a level that is folded in bytes.
-pub(super) fn four<'a, T: BlockSample>(level: &Level, rows: &[&'a [T]]) -> Option<[&'a [u8]; 4]> {
-    match (level.samples, rows) {
-        (Samples::Four, &[a, b, c, d]) => T::bytes([a, b, c, d]),
-        _ => None,
+/// The rows of levels of N shifts of 8 bits each, up to three, for the kernels that are compiled for N; empty for other levels.
+pub(super) fn rows_of_bytes<'a, T: BlockSample, const N: usize>(
+    levels: &[Level],
+    rows: &[&[&'a [T]]],
+) -> heapless::Vec<[&'a [u8]; N], 3> {
+    let mut bytes = heapless::Vec::new();
+    if rows.len() <= 3 {
+        bytes.extend(
+            levels
+                .iter()
+                .zip(rows)
+                .map_while(|(level, rows)| of_bytes(level, rows)),
+        );
     }
+    if bytes.len() < rows.len() {
+        bytes.clear();
+    }
+    bytes
+}
+
+/// The rows of a level of N shifts of 8 bits that start at 0.
+pub(super) fn of_bytes<'a, T: BlockSample, const N: usize>(
+    level: &Level,
+    rows: &[&'a [T]],
+) -> Option<[&'a [u8]; N]> {
+    let rows: &[&[T]; N] = rows.try_into().ok()?;
+    if level.samples == Samples::Weighted {
+        return None;
+    }
+    T::bytes(*rows)
 }
 
 /// Twice the words where the mask is set, 0 elsewhere.

@@ -148,6 +148,10 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
+    fn bytes_of(self, mask: Self::W) -> Self::B {
+        mask
+    }
+    #[inline(always)]
     fn sum(self, a: Self::B, b: Self::B) -> [Self::W; 2] {
         let [low, high] = self.widen(a, b);
         avx2!({
@@ -180,23 +184,29 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     fn widen_128(self, x: Self::B) -> [Self::W; 2] {
-        let [low, high] = self.widen(self.splat8(0), x);
-        avx2!([_mm256_srli_epi16::<1>(low), _mm256_srli_epi16::<1>(high)])
+        // Widened as in `scaled`, so that the compiler does it once.
+        let [low, high] = self.widen(x, self.splat8(0));
+        [self.shl::<7>(low), self.shl::<7>(high)]
     }
     #[inline(always)]
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W> {
-        // An eighth of the scale fits a byte, and the first nibble of the longer decides it.
-        let table = avx2!(_mm256_setr_epi8(
-            -128, -128, 64, 64, 32, 32, 32, 32, 16, 16, 16, 16, 16, 16, 16, 16, //
-            -128, -128, 64, 64, 32, 32, 32, 32, 16, 16, 16, 16, 16, 16, 16, 16
-        ));
-        let eighth = avx2!({
-            let high = _mm256_and_si256(_mm256_srli_epi16::<4>(long), _mm256_set1_epi8(15));
-            _mm256_shuffle_epi8(table, high)
+        // The first nibble of the longer decides the scale: 128 is a low byte, 256 to 1024 are high bytes.
+        let scale = avx2!({
+            let low = _mm256_setr_epi8(
+                0, 0, 0, 0, 0, 0, 0, 0, -128, -128, -128, -128, -128, -128, -128, -128, //
+                0, 0, 0, 0, 0, 0, 0, 0, -128, -128, -128, -128, -128, -128, -128, -128,
+            );
+            let high = _mm256_setr_epi8(
+                8, 4, 2, 2, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, //
+                8, 4, 2, 2, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0,
+            );
+            let nibble = _mm256_and_si256(_mm256_srli_epi16::<4>(long), _mm256_set1_epi8(15));
+            self.widen(
+                _mm256_shuffle_epi8(low, nibble),
+                _mm256_shuffle_epi8(high, nibble),
+            )
         });
         let zero = self.splat8(0);
-        let [low, high] = self.widen(eighth, zero);
-        let scale = [self.shl::<3>(low), self.shl::<3>(high)];
         let (long, short) = (self.widen(long, zero), self.widen(short, zero));
         let long = [
             self.mul_low(long[0], scale[0]),
