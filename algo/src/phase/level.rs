@@ -161,6 +161,8 @@ pub(super) struct LevelLanes<'a, V: Lanes> {
     pub half_lift: V::Count,
     pub to_16_bits: V::Count,
     pub below_least_power: V::D,
+    /// Full scale, all bits of a sample.
+    pub full_scale: V::W,
     /// Full scale less one count, with its sign bit inverted.
     pub below_full_scale: V::W,
     /// Mask: a sample at full scale rejects its pixel.
@@ -183,6 +185,7 @@ impl<'a, V: Lanes> LevelLanes<'a, V> {
             half_lift: v.left(plan.lift.saturating_sub(1)),
             to_16_bits: v.left(plan.to_16_bits),
             below_least_power: v.splat32(plan.below_least_power),
+            full_scale: v.splat16(plan.below_full_scale | 1),
             below_full_scale: v.xor(v.splat16(plan.below_full_scale), v.splat16(i16::MIN)),
             saturates: v.splat8(if plan.saturates { u8::MAX } else { 0 }),
             hypotenuse: [

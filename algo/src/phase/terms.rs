@@ -24,8 +24,9 @@
 //!
 //! **Shapes and units.** One block of each row. S and C are words of at most 32,700, in the unit that [`super::level`] chooses.
 //!
-//! **Accuracy.** S and C are within half a unit, and the weights turn the pointer by less than 3e-7 turn. The phase and the modulation of every N at every
-//! depth: `every_number_of_shifts_is_within_the_bounds` and `any_number_of_steps_at_any_depth_agrees_with_the_definition`.
+//! **Accuracy.** S and C are within half a unit, and the rounded weights of N = 5, 7, 8 and 9 turn the pointer by less than 3e-7
+//! turn. Phase and modulation of every N at every depth: `every_number_of_shifts_is_within_the_bounds` and
+//! `any_number_of_steps_at_any_depth_agrees_with_the_definition`.
 
 use super::level::{FULL_TRUST_SHIFTS, LevelLanes, Samples};
 use super::samples::BlockSample;
@@ -81,6 +82,13 @@ pub(super) fn of_shifts<V: Lanes, T: BlockSample, const N: usize>(
         blocks[k] = T::load(v, rows[k], at);
         brightest = T::brighter(v, brightest, blocks[k]);
         k += 1;
+    }
+    if N >= FULL_TRUST_SHIFTS {
+        let mut k = 0;
+        while k < N {
+            blocks[k] = T::of_depth(v, level, blocks[k]);
+            k += 1;
+        }
     }
     let [s, c] = match N {
         3 | 6 => thirds::<V, T, N>(v, level, &blocks),

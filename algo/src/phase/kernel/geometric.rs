@@ -20,9 +20,10 @@
 //! same columns.
 //!
 //! **Departures from the plain form.** Up to three levels are decoded in one pass over their frames ([`one_pass`]), so that only
-//! the result is written to memory. Level by level costs 30.5 instead of 22.1 instructions per pixel on NEON and 19.7 instead of 15.6
-//! on AVX2 (three levels of four shifts, 8 bits), so that is for longer sequences only. Coarser levels have rough angles: they
-//! only choose a fringe order, and 3.2e-4 turn more in a residual that may be 0.40 changes none.
+//! the result is written to memory. Level by level costs 30.5 instead of 21.9 instructions per pixel on NEON and 19.7 instead of 15.5
+//! on AVX2 (three levels of four shifts, 8 bits), so that is for longer sequences only. The kernel is compiled for 3, 4 and 5
+//! shifts of 8 bits; for any others it branches to the form of their number, which costs 2 of 20 instructions per pixel. Coarser
+//! levels have rough angles: they only choose a fringe order, and 3.2e-4 turn more in a residual that may be 0.40 changes none.
 //!
 //! **Accuracy.** ε / r_K turn of the textbook in f64, with ε from the arctangent and the rounding of samples (algo/README.md):
 //! `any_shifts_depth_ratios_size_and_stride_decode_as_the_textbook_says`; no wrong fringe order:

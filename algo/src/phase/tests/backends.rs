@@ -45,16 +45,17 @@ impl Map {
 const WIDTH: usize = 75;
 const HEIGHT: usize = 4;
 
-/// Frames of random samples, with dark and bright stretches.
+/// Frames of random samples, with dark stretches and, of words, some of samples above full scale.
 fn frames(count: usize, depth: u8, random: &mut SplitMix64) -> Vec<Vec<u16>> {
     (0..count)
         .map(|_| {
             (0..WIDTH * HEIGHT)
                 .map(|place| {
-                    let x = random.next_u64() as u16 >> (16 - depth);
+                    let x = random.next_u64() as u16;
                     match place / 40 % 4 {
-                        0 => x >> (depth - 3),
-                        _ => x,
+                        0 => x >> (16 - depth) >> (depth - 3),
+                        3 if depth > 8 => x,
+                        _ => x >> (16 - depth),
                     }
                 })
                 .collect()
