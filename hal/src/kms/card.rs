@@ -89,7 +89,7 @@ impl Card {
                     "becoming the program that sets modes on {}",
                     self.path.display()
                 ),
-                "stop the desktop, display manager or other program that shows something there; another user than root must belong to the group \"video\"",
+                "stop the desktop, display manager or another program that shows something there; another user than root must belong to the group \"video\"",
             )
         })
     }
