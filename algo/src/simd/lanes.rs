@@ -74,8 +74,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B;
     /// Whether every byte of a mask is set.
     fn all8(self, mask: Self::B) -> bool;
-    /// Whether no byte of a mask is set.
-    fn none8(self, mask: Self::B) -> bool;
+    /// Whether every byte is 0, of a mask or of any other bytes.
+    fn none8(self, bytes: Self::B) -> bool;
 
     // Between bytes and words.
 
@@ -171,7 +171,7 @@ pub(crate) trait Lanes: Copy + Debug {
     fn dot(self, a: Self::W, b: Self::W, c: Self::W, d: Self::W) -> [Self::D; 2];
     /// a · b + c · d, signed, where each double word is b + 65536 · d: the same b and d for every pixel.
     fn dot_pair(self, a: Self::W, c: Self::W, bd: Self::D) -> [Self::D; 2];
-    /// x / 2ⁿ rounded to nearest, signed and kept inside a word; n below 31.
+    /// x / 2ⁿ rounded to nearest, signed and kept inside a word; n below 31, and x + 2ⁿ⁻¹ must not overflow.
     fn narrow_rounded(self, x: [Self::D; 2], n: u8) -> Self::W;
     /// Masks of double words as masks of words.
     fn narrow_mask32(self, mask: [Self::D; 2]) -> Self::W;

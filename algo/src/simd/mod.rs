@@ -18,6 +18,8 @@ pub(crate) mod plain;
 mod portable;
 mod results;
 mod rows;
+#[cfg(test)]
+mod tests;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;

@@ -112,8 +112,8 @@ impl Lanes for Neon {
     }
 
     #[inline(always)]
-    fn none8(self, mask: Self::B) -> bool {
-        neon!(vmaxvq_u8(mask)) == 0
+    fn none8(self, bytes: Self::B) -> bool {
+        neon!(vmaxvq_u8(bytes)) == 0
     }
 
     #[inline(always)]

@@ -99,7 +99,7 @@ impl Lanes for Portable {
         or8(self, a: B, b: B) -> B = pairs(a, b, |a, b| a | b);
         xor8(self, a: B, b: B) -> B = pairs(a, b, |a, b| a ^ b);
         all8(self, mask: B) -> bool = mask == [u8::MAX; BYTES];
-        none8(self, mask: B) -> bool = mask == [0; BYTES];
+        none8(self, bytes: B) -> bool = bytes == [0; BYTES];
         quarters8(self, half: B, quarter: B) -> B = pairs(half, quarter, |half, quarter| half & 128 | quarter & 64);
         sum(self, a: B, b: B) -> [W; 2] = halves(pairs(a, b, |a, b| i16::from(a) + i16::from(b)), |half| half);
         difference(self, a: B, b: B) -> [W; 2] = halves(pairs(a, b, |a, b| i16::from(a) - i16::from(b)), |half| half);

@@ -143,8 +143,8 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn none8(self, mask: Self::B) -> bool {
-        avx2!(_mm256_testz_si256(mask, mask)) == 1
+    fn none8(self, bytes: Self::B) -> bool {
+        avx2!(_mm256_testz_si256(bytes, bytes)) == 1
     }
 
     #[inline(always)]
