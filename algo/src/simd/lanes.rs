@@ -22,6 +22,8 @@ pub(crate) struct Scaled<W> {
 }
 
 /// A back-end. A value of it proves that its instructions are available on this machine.
+///
+/// Operations with a body are composed of others; a back-end defines them itself only where it has a shorter way.
 pub(crate) trait Lanes: Copy + Debug {
     /// Pixels of a block.
     const PIXELS: usize;
@@ -69,7 +71,13 @@ pub(crate) trait Lanes: Copy + Debug {
     /// a where the mask is set, else b.
     fn pick8(self, mask: Self::B, a: Self::B, b: Self::B) -> Self::B;
     /// 128 where the first mask is set, and 64 more where the second is.
-    fn quarters8(self, half: Self::B, quarter: Self::B) -> Self::B;
+    #[inline(always)]
+    fn quarters8(self, half: Self::B, quarter: Self::B) -> Self::B {
+        self.or8(
+            self.and8(half, self.splat8(128)),
+            self.and8(quarter, self.splat8(64)),
+        )
+    }
     /// table\[x − 16\] for 16 ≤ x < 32, table\[0\] below, 0 above.
     fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B;
     /// Whether every byte of a mask is set.
@@ -86,11 +94,21 @@ pub(crate) trait Lanes: Copy + Debug {
     /// Words a − b.
     fn difference(self, a: Self::B, b: Self::B) -> [Self::W; 2];
     /// Words −1 where a mask is set, else 1.
-    fn signs(self, mask: Self::B) -> [Self::W; 2];
+    #[inline(always)]
+    fn signs(self, mask: Self::B) -> [Self::W; 2] {
+        self.widen(self.or8(mask, self.splat8(1)), mask)
+    }
     /// Words 256 · x.
-    fn widen_256(self, x: Self::B) -> [Self::W; 2];
+    #[inline(always)]
+    fn widen_256(self, x: Self::B) -> [Self::W; 2] {
+        self.widen(self.splat8(0), x)
+    }
     /// Words 128 · x.
-    fn widen_128(self, x: Self::B) -> [Self::W; 2];
+    #[inline(always)]
+    fn widen_128(self, x: Self::B) -> [Self::W; 2] {
+        let [low, high] = self.widen(x, self.splat8(0));
+        [self.shl::<7>(low), self.shl::<7>(high)]
+    }
     /// Both as words times 128 · 2ⁿ, with n so that 2¹⁴ ≤ long < 2¹⁵. Unspecified where long < 16 or short > long.
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W>;
     /// The bytes of a mask of words, two per pixel and in any order: only whether one of them is set means anything.

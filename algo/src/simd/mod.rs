@@ -1,7 +1,7 @@
 //! Vector instructions behind one small trait, and the choice of the back-end that this machine has.
 //!
-//! The phase kernels are written in the operations of `Lanes`. `Portable` defines them as plain code; `Avx2` and `Neon`
-//! give the same results by vector instructions. A value of a back-end proves that its instructions are available, so its
+//! The phase kernels are written in the operations of `Lanes`. `Portable` defines them as plain code; `Avx2`, `Ssse3` and
+//! `Neon` give the same results by vector instructions. A value of a back-end proves that its instructions are available, so its
 //! operations are safe to call. This is the only module with `unsafe`: intrinsics that the proof covers, and loads and
 //! stores inside slices whose length has been asserted.
 //!
@@ -18,8 +18,12 @@ pub(crate) mod plain;
 mod portable;
 mod results;
 mod rows;
+#[cfg(target_arch = "x86_64")]
+mod ssse3;
 #[cfg(test)]
 mod tests;
+#[cfg(target_arch = "x86_64")]
+mod x86;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
@@ -29,6 +33,8 @@ pub(crate) use neon::Neon;
 pub(crate) use portable::Portable;
 pub(crate) use results::Results;
 pub(crate) use rows::Rows;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use ssse3::Ssse3;
 
 /// A back-end of the phase kernels: the instructions that they are compiled for. All give the same bits.
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +45,9 @@ pub struct Backend(pub(crate) Proof);
 pub(crate) enum Proof {
     /// Plain code.
     Portable(Portable),
+    /// x86-64 with SSSE3.
+    #[cfg(target_arch = "x86_64")]
+    Ssse3(Ssse3),
     /// x86-64 with AVX2.
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
@@ -53,13 +62,16 @@ impl Backend {
 
     /// The back-ends that this machine has, the fastest last.
     pub fn available() -> impl Iterator<Item = Self> {
-        #[cfg(target_arch = "x86_64")]
-        let special = Avx2::detect().map(|proof| Self(Proof::Avx2(proof)));
-        #[cfg(target_arch = "aarch64")]
-        let special = Some(Self(Proof::Neon(Neon)));
-        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-        let special = None;
-        core::iter::once(Self::PORTABLE).chain(special)
+        let all = [
+            Some(Self::PORTABLE),
+            #[cfg(target_arch = "x86_64")]
+            Ssse3::detect().map(|proof| Self(Proof::Ssse3(proof))),
+            #[cfg(target_arch = "x86_64")]
+            Avx2::detect().map(|proof| Self(Proof::Avx2(proof))),
+            #[cfg(target_arch = "aarch64")]
+            Some(Self(Proof::Neon(Neon))),
+        ];
+        all.into_iter().flatten()
     }
 
     /// The fastest that this machine has.
@@ -67,10 +79,12 @@ impl Backend {
         Self::available().last().unwrap_or(Self::PORTABLE)
     }
 
-    /// The word for reports: portable, avx2 or neon.
+    /// The word for reports: portable, ssse3, avx2 or neon.
     pub fn name(self) -> &'static str {
         match self.0 {
             Proof::Portable(_) => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Proof::Ssse3(_) => "ssse3",
             #[cfg(target_arch = "x86_64")]
             Proof::Avx2(_) => "avx2",
             #[cfg(target_arch = "aarch64")]
@@ -87,6 +101,12 @@ macro_rules! back_end_entry {
         #[allow(clippy::too_many_arguments, unsafe_code)]
         pub(crate) fn $name<$($generics)*>(backend: $crate::simd::Backend, $($arg: $type),*) {
             #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "ssse3")]
+            #[inline(never)]
+            fn ssse3<$($generics)*>(lanes: $crate::simd::Ssse3, $($arg: $type),*) {
+                $kernel(lanes, $($arg),*);
+            }
+            #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx2")]
             #[inline(never)]
             fn avx2<$($generics)*>(lanes: $crate::simd::Avx2, $($arg: $type),*) {
@@ -98,6 +118,11 @@ macro_rules! back_end_entry {
             }
             match backend.0 {
                 $crate::simd::Proof::Portable(lanes) => plain(lanes, $($arg),*),
+                #[cfg(target_arch = "x86_64")]
+                $crate::simd::Proof::Ssse3(lanes) => {
+                    // SAFETY: an `Ssse3` exists only where the processor has SSSE3.
+                    unsafe { ssse3(lanes, $($arg),*) }
+                }
                 #[cfg(target_arch = "x86_64")]
                 $crate::simd::Proof::Avx2(lanes) => {
                     // SAFETY: an `Avx2` exists only where the processor has AVX2.

@@ -143,10 +143,6 @@ impl Lanes for Neon {
         neon!([vmovl_s8(vget_low_s8(signs)), vmovl_high_s8(signs)])
     }
     #[inline(always)]
-    fn widen_256(self, x: Self::B) -> [Self::W; 2] {
-        self.widen(self.splat8(0), x)
-    }
-    #[inline(always)]
     fn widen_128(self, x: Self::B) -> [Self::W; 2] {
         neon!([
             vreinterpretq_s16_u16(vshll_n_u8::<7>(vget_low_u8(x))),

@@ -104,7 +104,6 @@ impl Lanes for Portable {
         sum(self, a: B, b: B) -> [W; 2] = halves(pairs(a, b, |a, b| i16::from(a) + i16::from(b)), |half| half);
         difference(self, a: B, b: B) -> [W; 2] = halves(pairs(a, b, |a, b| i16::from(a) - i16::from(b)), |half| half);
         signs(self, mask: B) -> [W; 2] = halves(mask, |mask| lanes(mask, |mask| if mask == 0 { 1 } else { -1 }));
-        widen_256(self, x: B) -> [W; 2] = self.widen([0; BYTES], x);
         widen_128(self, x: B) -> [W; 2] = halves(x, |x| lanes(x, |x| i16::from(x) << 7));
         bytes_of(self, mask: W) -> B = core::array::from_fn(|lane| mask[lane / 2] as u8);
         narrow_mask(self, mask: [W; 2]) -> B = lanes(whole::<_, WORDS, BYTES>(mask), |mask: i16| mask as u8);

@@ -1,7 +1,7 @@
 //! The back-end of x86-64 with SSSE3, for processors without AVX2.
 //!
-//! The operations are those of AVX2 on half as many pixels. What AVX2 has of SSE4.1 (to pick by a mask, the larger unsigned word, to
-//! test for zero) takes two or three instructions here.
+//! Every operation is that of AVX2 on half as many pixels. Three of the instructions that AVX2 uses have no form in SSSE3 (they came with
+//! SSE4.1) and are composed here: picking by a mask, the larger of unsigned words, and the test for zero.
 
 use super::lanes::{Lanes, Scaled, operations};
 use super::rows::{block, block_mut};

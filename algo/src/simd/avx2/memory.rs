@@ -1,13 +1,8 @@
-//! Loads and stores of vectors from two places of 16 bytes each, and prefetching.
+//! Loads and stores of vectors from two places of 16 bytes each.
 
 use super::BYTES;
 use crate::simd::rows::{block, block_mut};
 use core::arch::x86_64::*;
-
-/// Rows are prefetched this many samples ahead, about 500 ns of work.
-pub(super) const AHEAD: usize = 512;
-/// Bytes of a cache line.
-const LINE: usize = 64;
 
 /// The vector whose lower and upper 128 bits are the elements from `low` and from `high` of the block at `at`.
 #[inline(always)]
@@ -30,23 +25,5 @@ pub(super) fn store_halves<T>(to: &mut [T], at: usize, low: usize, high: usize, 
     unsafe {
         let start = block.as_mut_ptr();
         _mm256_storeu2_m128i(start.add(high).cast(), start.add(low).cast(), x);
-    }
-}
-
-/// Prefetches the cache lines of the block `after` samples behind the one at `at`: there are more rows than the processor's own
-/// prefetcher follows.
-#[inline(always)]
-pub(super) fn hint<T, const HINT: i32>(row: &[T], at: usize, after: usize) {
-    let lines = BYTES * size_of::<T>() / LINE;
-    // Two blocks of bytes are one line.
-    if lines == 0 && !(at / BYTES).is_multiple_of(2) {
-        return;
-    }
-    let ahead = row.as_ptr().wrapping_add(at + after).cast::<i8>();
-    let mut line = 0;
-    while line < lines.max(1) {
-        // SAFETY: a hint, which no address makes fail.
-        unsafe { _mm_prefetch::<HINT>(ahead.wrapping_add(line * LINE)) };
-        line += 1;
     }
 }

@@ -7,8 +7,9 @@ mod memory;
 
 use super::lanes::{Lanes, Scaled, operations};
 use super::rows::{block, block_mut};
+use super::x86::{AHEAD, hint, scaled_by};
 use core::arch::x86_64::*;
-use memory::{AHEAD, hint, load_halves, store_halves};
+use memory::{load_halves, store_halves};
 
 /// The proof that this machine has AVX2: only [`Avx2::detect`] makes one.
 #[derive(Clone, Copy, Debug)]
@@ -107,24 +108,17 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     fn fetch<T>(self, row: &[T], at: usize, after: usize) {
-        hint::<T, _MM_HINT_T0>(row, at, after);
+        hint::<T, BYTES, _MM_HINT_T0>(row, at, after);
     }
     #[inline(always)]
     fn claim_ahead<T>(self, row: &[T], at: usize) {
-        hint::<T, _MM_HINT_ET0>(row, at, AHEAD);
+        hint::<T, BYTES, _MM_HINT_ET0>(row, at, AHEAD);
     }
     #[inline(always)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
         let block = block_mut(to, at, BYTES);
         // SAFETY: the slice holds the 32 bytes that are written; the store needs no alignment; `self` proves AVX2.
         unsafe { _mm256_storeu_si256(block.as_mut_ptr().cast(), x) }
-    }
-    #[inline(always)]
-    fn quarters8(self, half: Self::B, quarter: Self::B) -> Self::B {
-        self.or8(
-            self.and8(half, self.splat8(128)),
-            self.and8(quarter, self.splat8(64)),
-        )
     }
     #[inline(always)]
     fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
@@ -175,20 +169,6 @@ impl Lanes for Avx2 {
         })
     }
     #[inline(always)]
-    fn signs(self, mask: Self::B) -> [Self::W; 2] {
-        self.widen(self.or8(mask, self.splat8(1)), mask)
-    }
-    #[inline(always)]
-    fn widen_256(self, x: Self::B) -> [Self::W; 2] {
-        self.widen(self.splat8(0), x)
-    }
-    #[inline(always)]
-    fn widen_128(self, x: Self::B) -> [Self::W; 2] {
-        // Widened as in `scaled`, so that the compiler does it once.
-        let [low, high] = self.widen(x, self.splat8(0));
-        [self.shl::<7>(low), self.shl::<7>(high)]
-    }
-    #[inline(always)]
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W> {
         // The first nibble of the longer decides the scale: 128 is a low byte, 256 to 1024 are high bytes.
         let scale = avx2!({
@@ -206,25 +186,7 @@ impl Lanes for Avx2 {
                 _mm256_shuffle_epi8(high, nibble),
             )
         });
-        let zero = self.splat8(0);
-        let (long, short) = (self.widen(long, zero), self.widen(short, zero));
-        let long = [
-            self.mul_low(long[0], scale[0]),
-            self.mul_low(long[1], scale[1]),
-        ];
-        let short = [
-            self.mul_low(short[0], scale[0]),
-            self.mul_low(short[1], scale[1]),
-        ];
-        let turn = self.splat16(i16::MIN);
-        Scaled {
-            long,
-            short,
-            centred: [
-                self.xor(self.shl::<2>(long[0]), turn),
-                self.xor(self.shl::<2>(long[1]), turn),
-            ],
-        }
+        scaled_by(self, long, short, scale)
     }
     #[inline(always)]
     fn load16(self, from: &[u16], at: usize) -> [Self::W; 2] {
