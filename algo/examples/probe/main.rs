@@ -9,7 +9,7 @@
 //!
 //! CASE is the name of a case, one of `cases.rs` or another of that form; with `/background` appended three quarters of the
 //! frames are dark, with `/arrival` the coarser levels are decoded on arrival, with `/aligned` every frame begins at a page of
-//! 16 KiB, as a camera's buffers do.
+//! 16 KiB, as a camera's buffers do. At the end may stand a back-end, as in `single-4-8@ssse3`; without it the fastest is used.
 //!
 //! The hashes must be those of `frozen.txt` on every machine and with every back-end; a test here checks it. After a
 //! change that is meant to change bits, `probe | sed 's/[^ ]* //' | awk '!seen[$0]++'` writes that file anew.
@@ -44,6 +44,12 @@ fn backends(decoder: &Decoder) -> Vec<(&'static str, Decoder)> {
     Backend::available()
         .map(|backend| (backend.name(), decoder.clone().with_backend(backend)))
         .collect()
+}
+
+/// The back-end of that name.
+fn backend(name: &str) -> Outcome<Backend> {
+    let found = Backend::available().find(|backend| backend.name() == name);
+    found.ok_or_else(|| format!("{name} is not a back-end of this machine").into())
 }
 
 /// Decodes level by level, on arrival.
@@ -96,7 +102,11 @@ fn main() -> Outcome<()> {
             Ok(())
         }
         ["decode", counted, rows, ref rest @ ..] if rest.len() <= 1 => {
-            let (name, way) = counted.split_once('/').unwrap_or((counted, ""));
+            let (case, backend) = match counted.split_once('@') {
+                Some((case, name)) => (case, backend(name)?),
+                None => (counted, Backend::best()),
+            };
+            let (name, way) = case.split_once('/').unwrap_or((case, ""));
             let light = match way {
                 "background" => Lighting::Background,
                 _ => Lighting::Even,
@@ -113,7 +123,7 @@ fn main() -> Outcome<()> {
                 _ => image,
             };
             let frames = image.frames(rows.parse::<usize>()?.min(height))?;
-            let decoder = case.decoder()?;
+            let decoder = case.decoder()?.with_backend(backend);
             let map = match way {
                 "arrival" => arrival(&decoder, &frames, image.map(&case))?,
                 _ => decode(&decoder, &frames, image.map(&case), None)?,
