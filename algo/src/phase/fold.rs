@@ -132,8 +132,6 @@ fn octant<V: Lanes>(v: V, s: V::W, c: V::W) -> Octant<V::W> {
     let (length, short) = (v.max(along, across), v.min(along, across));
     let steep = v.eq(length, along);
     let backwards = v.xor(v.xor(s, c), steep);
-    let half = v.and(v.pick(steep, s, c), v.splat16(i16::MIN));
-    let quarter = v.and(steep, v.splat16(0x4000));
     let [long, short] = v.normalised(length, short);
     Octant {
         long,
@@ -141,6 +139,7 @@ fn octant<V: Lanes>(v: V, s: V::W, c: V::W) -> Octant<V::W> {
         centred: v.xor(v.shl::<2>(long), v.splat16(i16::MIN)),
         length,
         sign: v.sign_of(backwards),
-        axis: v.or(half, quarter),
+        // Where S is the longer component, it is 0 only in a pixel that is not strong.
+        axis: v.quarters(steep, s, c),
     }
 }

@@ -40,10 +40,10 @@ pub(crate) struct Level {
     pub weights: Vec<[i32; 2]>,
     /// Bits by which differences of samples are shifted left to fill words.
     lift: u8,
-    /// Bits by which sums of products are shifted right to words.
+    /// Bits by which sums of products of differences are shifted right to words.
     pub down: u8,
     /// Bits by which samples are shifted left to 16 bits.
-    to_16_bits: u8,
+    pub to_16_bits: u8,
     /// Full scale less one count, unsigned.
     below_full_scale: i16,
     /// S² + C² must be above this.
@@ -53,7 +53,7 @@ pub(crate) struct Level {
     /// Whether that product is half of the modulation, because the coefficients would not fit Q15.
     doubled: bool,
     /// Whether a sample at full scale rejects its pixel.
-    saturates: bool,
+    pub saturates: bool,
 }
 
 /// How S and C come from the samples of a level ([`super::terms`]).
@@ -120,7 +120,6 @@ impl Level {
                 scale / f64::from(1_u32 << down)
             }
             Samples::Weighted => {
-                down = 16;
                 let scale = LARGEST / largest(shifts, level.start);
                 weights = weights_of_samples(level, scale);
                 scale / f64::from(1_u32 << bit_depth)
@@ -165,8 +164,6 @@ pub(super) struct LevelLanes<'a, V: Lanes> {
     pub full_scale: V::W,
     /// Full scale less one count, with its sign bit inverted.
     pub below_full_scale: V::W,
-    /// Mask: a sample at full scale rejects its pixel.
-    pub saturates: V::B,
     hypotenuse: [V::W; 3],
     doubled: V::Count,
 }
@@ -187,7 +184,6 @@ impl<'a, V: Lanes> LevelLanes<'a, V> {
             below_least_power: v.splat32(plan.below_least_power),
             full_scale: v.splat16(plan.below_full_scale | 1),
             below_full_scale: v.xor(v.splat16(plan.below_full_scale), v.splat16(i16::MIN)),
-            saturates: v.splat8(if plan.saturates { u8::MAX } else { 0 }),
             hypotenuse: [
                 v.splat16(plan.hypotenuse[0]),
                 v.splat16(plan.hypotenuse[1]),

@@ -16,17 +16,19 @@ pub(crate) trait BlockSample: Sample {
     /// The bits of the depth: samples above full scale, which levels of many shifts tolerate, must not overflow sums.
     fn of_depth<V: Lanes>(v: V, level: &LevelLanes<'_, V>, block: Self::Block<V>)
     -> Self::Block<V>;
-    /// As words, unsigned.
-    fn words<V: Lanes>(v: V, block: Self::Block<V>) -> [V::W; 2];
     /// As words, moved up to 16 bits and counted from the middle of their range.
     fn centred<V: Lanes>(v: V, level: &LevelLanes<'_, V>, block: Self::Block<V>) -> [V::W; 2];
+    /// The same of samples of 16 bits.
+    fn centred_16<V: Lanes>(v: V, block: Self::Block<V>) -> [V::W; 2];
     /// a + b, of at most 15 bits.
     fn sum<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> [V::W; 2];
     /// a − b, of at most 15 bits.
     fn difference<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> [V::W; 2];
     /// The brighter of two.
     fn brighter<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> Self::Block<V>;
-    /// Mask: the sample is at full scale or above.
+    /// S or C from a sum of products ([`super::level::Samples::Terms`]).
+    fn rounded<V: Lanes>(v: V, level: &LevelLanes<'_, V>, sum: [V::D; 2]) -> V::W;
+    /// 255 where the sample is at full scale or above, less elsewhere.
     fn saturated<V: Lanes>(v: V, level: &LevelLanes<'_, V>, block: Self::Block<V>) -> V::B;
 }
 
@@ -45,11 +47,11 @@ impl BlockSample for u8 {
         block
     }
     #[inline(always)]
-    fn words<V: Lanes>(v: V, block: V::B) -> [V::W; 2] {
-        v.widen(block, v.splat8(0))
+    fn centred<V: Lanes>(v: V, _level: &LevelLanes<'_, V>, block: V::B) -> [V::W; 2] {
+        Self::centred_16(v, block)
     }
     #[inline(always)]
-    fn centred<V: Lanes>(v: V, _level: &LevelLanes<'_, V>, block: V::B) -> [V::W; 2] {
+    fn centred_16<V: Lanes>(v: V, block: V::B) -> [V::W; 2] {
         v.widen_256(v.xor8(block, v.splat8(128)))
     }
     #[inline(always)]
@@ -65,8 +67,12 @@ impl BlockSample for u8 {
         v.max8(a, b)
     }
     #[inline(always)]
-    fn saturated<V: Lanes>(v: V, _level: &LevelLanes<'_, V>, block: V::B) -> V::B {
-        v.eq8(block, v.splat8(u8::MAX))
+    fn rounded<V: Lanes>(v: V, _level: &LevelLanes<'_, V>, sum: [V::D; 2]) -> V::W {
+        v.narrow_rounded_by::<8>(sum)
+    }
+    #[inline(always)]
+    fn saturated<V: Lanes>(_v: V, _level: &LevelLanes<'_, V>, block: V::B) -> V::B {
+        block
     }
 }
 
@@ -85,16 +91,17 @@ impl BlockSample for u16 {
         [v.and(low, level.full_scale), v.and(high, level.full_scale)]
     }
     #[inline(always)]
-    fn words<V: Lanes>(_v: V, block: [V::W; 2]) -> [V::W; 2] {
-        block
-    }
-    #[inline(always)]
     fn centred<V: Lanes>(v: V, level: &LevelLanes<'_, V>, [low, high]: [V::W; 2]) -> [V::W; 2] {
         let middle = v.splat16(i16::MIN);
         [
             v.xor(v.shl_by(low, level.to_16_bits), middle),
             v.xor(v.shl_by(high, level.to_16_bits), middle),
         ]
+    }
+    #[inline(always)]
+    fn centred_16<V: Lanes>(v: V, [low, high]: [V::W; 2]) -> [V::W; 2] {
+        let middle = v.splat16(i16::MIN);
+        [v.xor(low, middle), v.xor(high, middle)]
     }
     #[inline(always)]
     fn sum<V: Lanes>(v: V, a: [V::W; 2], b: [V::W; 2]) -> [V::W; 2] {
@@ -107,6 +114,10 @@ impl BlockSample for u16 {
     #[inline(always)]
     fn brighter<V: Lanes>(v: V, a: [V::W; 2], b: [V::W; 2]) -> [V::W; 2] {
         [v.max_unsigned(a[0], b[0]), v.max_unsigned(a[1], b[1])]
+    }
+    #[inline(always)]
+    fn rounded<V: Lanes>(v: V, level: &LevelLanes<'_, V>, sum: [V::D; 2]) -> V::W {
+        v.narrow_rounded(sum, level.plan.down)
     }
     #[inline(always)]
     fn saturated<V: Lanes>(v: V, level: &LevelLanes<'_, V>, [low, high]: [V::W; 2]) -> V::B {

@@ -13,8 +13,8 @@ use crate::simd::{Lanes, Rows};
 
 /// The rows of a level's frames, in the order of their shifts.
 pub(crate) trait Frames: Copy {
-    /// Whether the modulation may come out halved ([`LevelLanes::fine`]): never with four shifts, where the pointer is twice as
-    /// long as the modulation.
+    /// Whether the modulation may come out halved ([`LevelLanes::fine`]): never with bytes in the forms of [`super::terms`], where
+    /// the pointer is 1.49 times as long as the modulation or longer.
     const DOUBLED: bool;
 
     /// The first columns, so that one check of the length serves all blocks.
@@ -25,7 +25,7 @@ pub(crate) trait Frames: Copy {
 }
 
 impl<const N: usize> Frames for [&[u8]; N] {
-    const DOUBLED: bool = N != 4;
+    const DOUBLED: bool = false;
 
     #[inline(always)]
     fn first(mut self, columns: usize) -> Self {

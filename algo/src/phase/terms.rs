@@ -100,8 +100,8 @@ pub(super) fn of_shifts<V: Lanes, T: BlockSample, const N: usize>(
             let [along, across] = terms::<V, T, N>(v, &blocks);
             let four = N == 7 || N == 9;
             [
-                products(v, level, &along, level.terms[0], four),
-                products(v, level, &across, level.terms[1], four),
+                products::<V, T>(v, level, &along, level.terms[0], four),
+                products::<V, T>(v, level, &across, level.terms[1], four),
             ]
         }
     };
@@ -188,8 +188,7 @@ fn terms<V: Lanes, T: BlockSample, const N: usize>(
             k += 1;
         }
     } else {
-        let first = T::words(v, blocks[0]);
-        let twice = add(v, first, first);
+        let twice = T::sum(v, blocks[0], blocks[0]);
         while k <= half {
             let (a, b) = (blocks[k], blocks[N - k]);
             along[k - 1] = sub(v, twice, T::sum(v, a, b));
@@ -202,7 +201,7 @@ fn terms<V: Lanes, T: BlockSample, const N: usize>(
 
 /// Two or four terms times their weights, in pairs, rounded to words once.
 #[inline(always)]
-fn products<V: Lanes>(
+fn products<V: Lanes, T: BlockSample>(
     v: V,
     level: &LevelLanes<'_, V>,
     terms: &[[V::W; 2]; 4],
@@ -217,7 +216,7 @@ fn products<V: Lanes>(
             let more = v.dot_pair(terms[2][half], terms[3][half], weights[1]);
             sum = add32(v, sum, more);
         }
-        words[half] = v.narrow_rounded(sum, level.plan.down);
+        words[half] = T::rounded(v, level, sum);
         half += 1;
     }
     words
@@ -245,9 +244,14 @@ fn weighted<V: Lanes, T: BlockSample>(
         v.fetch(first, at, after);
         v.fetch(second, at, after);
         let (first, second) = (T::load(v, first, at), T::load(v, second, at));
-        brightest = T::brighter(v, brightest, T::brighter(v, first, second));
-        let first = T::centred(v, level, first);
-        let second = T::centred(v, level, second);
+        if level.plan.saturates {
+            brightest = T::brighter(v, brightest, T::brighter(v, first, second));
+        }
+        let [first, second] = if level.plan.to_16_bits == 0 {
+            [T::centred_16(v, first), T::centred_16(v, second)]
+        } else {
+            [T::centred(v, level, first), T::centred(v, level, second)]
+        };
         let (along, across) = (v.splat32(along), v.splat32(across));
         let mut half = 0;
         while half < 2 {
@@ -256,12 +260,23 @@ fn weighted<V: Lanes, T: BlockSample>(
             half += 1;
         }
     }
-    let down = level.plan.down;
     Pointers {
-        s: [v.narrow_rounded(s[0], down), v.narrow_rounded(s[1], down)],
-        c: [v.narrow_rounded(c[0], down), v.narrow_rounded(c[1], down)],
-        brightest: v.and8(T::saturated(v, level, brightest), level.saturates),
+        s: rounded_sums(v, s),
+        c: rounded_sums(v, c),
+        brightest: if level.plan.saturates {
+            T::saturated(v, level, brightest)
+        } else {
+            v.splat8(0)
+        },
     }
+}
+
+#[inline(always)]
+fn rounded_sums<V: Lanes>(v: V, [low, high]: [[V::D; 2]; 2]) -> [V::W; 2] {
+    [
+        v.narrow_rounded_by::<16>(low),
+        v.narrow_rounded_by::<16>(high),
+    ]
 }
 
 #[inline(always)]

@@ -178,6 +178,12 @@ pub(crate) trait Lanes: Copy + Debug {
     fn xor(self, a: Self::W, b: Self::W) -> Self::W;
     /// a where the mask is set, else b.
     fn pick(self, mask: Self::W, a: Self::W, b: Self::W) -> Self::W;
+    /// The sign bit of s and 2¹⁴ where the mask is set, else the sign bit of c. Unspecified where the mask is set and s is 0.
+    #[inline(always)]
+    fn quarters(self, mask: Self::W, s: Self::W, c: Self::W) -> Self::W {
+        let half = self.and(self.pick(mask, s, c), self.splat16(i16::MIN));
+        self.or(half, self.and(mask, self.splat16(1 << 14)))
+    }
 
     // Between words and double words.
 
@@ -191,6 +197,11 @@ pub(crate) trait Lanes: Copy + Debug {
     fn dot_pair(self, a: Self::W, c: Self::W, bd: Self::D) -> [Self::D; 2];
     /// x / 2ⁿ rounded to nearest, signed and kept inside a word; n below 31, and x + 2ⁿ⁻¹ must not overflow.
     fn narrow_rounded(self, x: [Self::D; 2], n: u8) -> Self::W;
+    /// The same for a fixed n from 1 to 16.
+    #[inline(always)]
+    fn narrow_rounded_by<const N: i32>(self, x: [Self::D; 2]) -> Self::W {
+        self.narrow_rounded(x, N as u8)
+    }
     /// Masks of double words as masks of words.
     fn narrow_mask32(self, mask: [Self::D; 2]) -> Self::W;
 

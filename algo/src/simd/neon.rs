@@ -44,7 +44,8 @@ impl Lanes for Neon {
         or8(self, a: B, b: B) -> B = vorrq_u8(a, b);
         xor8(self, a: B, b: B) -> B = veorq_u8(a, b);
         pick8(self, mask: B, a: B, b: B) -> B = vbslq_u8(mask, a, b);
-        quarters8(self, half: B, quarter: B) -> B = vandq_u8(vsriq_n_u8::<1>(half, quarter), vdupq_n_u8(192));
+        // Shifts to the right that round make 128 and 64 of 255.
+        quarters8(self, half: B, quarter: B) -> B = vrsraq_n_u8::<2>(vrshrq_n_u8::<1>(half), quarter);
         bytes_of(self, mask: W) -> B = vreinterpretq_u8_s16(mask);
         narrow_mask(self, mask: [W; 2]) -> B = vuzp1q_u8(vreinterpretq_u8_s16(mask[0]), vreinterpretq_u8_s16(mask[1]));
         splat16(self, x: i16) -> W = vdupq_n_s16(x);
@@ -102,9 +103,11 @@ impl Lanes for Neon {
     }
     #[inline(always)]
     fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
+        let below = self.splat8(table[0]);
         // SAFETY: the table holds the 16 bytes that are read.
         let table = unsafe { vld1q_u8(table.as_ptr()) };
-        neon!(vqtbl1q_u8(table, vqsubq_u8(x, vdupq_n_u8(16))))
+        // An index outside of both tables reads 0.
+        neon!(vqtbl2q_u8(uint8x16x2_t(below, table), x))
     }
     #[inline(always)]
     fn all8(self, mask: Self::B) -> bool {
@@ -190,9 +193,19 @@ impl Lanes for Neon {
     #[inline(always)]
     fn normalised(self, long: Self::W, short: Self::W) -> [Self::W; 2] {
         neon!({
-            let n = vsubq_s16(vclzq_s16(long), vdupq_n_s16(1));
+            // The bits after the sign that equal it.
+            let n = vclsq_s16(long);
             [vshlq_s16(long, n), vshlq_s16(short, n)]
         })
+    }
+    #[inline(always)]
+    fn quarters(self, mask: Self::W, s: Self::W, c: Self::W) -> Self::W {
+        let half = self.and(self.pick(mask, s, c), self.splat16(i16::MIN));
+        // A shift to the right that rounds makes 2¹⁴ of 65535.
+        neon!(vreinterpretq_s16_u16(vrsraq_n_u16::<2>(
+            vreinterpretq_u16_s16(half),
+            vreinterpretq_u16_s16(mask)
+        )))
     }
     #[inline(always)]
     fn join(self, low: Self::W, high: Self::W) -> [Self::D; 2] {
@@ -238,6 +251,10 @@ impl Lanes for Neon {
             let low = vqmovn_s32(vrshlq_s32(x[0], down));
             vqmovn_high_s32(low, vrshlq_s32(x[1], down))
         })
+    }
+    #[inline(always)]
+    fn narrow_rounded_by<const N: i32>(self, x: [Self::D; 2]) -> Self::W {
+        neon!(vqrshrn_high_n_s32::<N>(vqrshrn_n_s32::<N>(x[0]), x[1]))
     }
     #[inline(always)]
     fn load32(self, from: &[i32], at: usize) -> [[Self::D; 2]; 2] {

@@ -13,6 +13,8 @@
 //! [`super::geometric`]. A level that was demodulated on arrival is a [`WrappedRow`].
 //!
 //! **Departures from the plain form.** One body, [`dense_columns`], serves levels from frames and levels from maps ([`Source`]).
+//! It is compiled for 3 and for 4 shifts of 8 bits, and for two levels of 7 and 5; any others branch to the form of their number in
+//! every block.
 //!
 //! **Accuracy.** As [`crate::phase::about`]; on arrival the same bits (`every_back_end_and_levels_on_arrival_give_the_same_bits`).
 
@@ -46,6 +48,11 @@ pub(crate) fn decode_row<T: BlockSample>(
     let mut kernels = kernels.iter();
     if kernels.any(|kernel| kernel(backend, plan, levels, rows, map, &columns, &mut out)) {
         return;
+    }
+    if let ([coarse, fine], [a, b]) = (levels, rows)
+        && let (Some(a), Some(b)) = (of_bytes::<T, 7>(coarse, a), of_bytes::<T, 5>(fine, b))
+    {
+        return dense(backend, plan, levels, [a], b, map, columns, &mut out);
     }
     let end = columns.end;
     let all = |rows| Rows::new(rows, end);
