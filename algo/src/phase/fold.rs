@@ -72,7 +72,7 @@ pub(super) fn fold_four<V: Lanes>(v: V, rows: [&[u8]; 4], at: usize) -> Folded<V
     let (long, short) = (v.max8(s, c), v.min8(s, c));
     let steep = v.eq8(long, s);
     let backwards = v.xor8(v.xor8(s_down, c_down), steep);
-    let axis = v.quarters8(v.pick8(steep, s_down, c_down), steep);
+    let axis = v.quarters8(steep, s_down, c_down);
     let scaled = v.scaled(long, short);
     let least = v.by_excess(&LEAST_SHORT, long);
     Folded {
@@ -94,8 +94,8 @@ pub(super) fn fold<V: Lanes>(
     level: &LevelLanes<'_, V>,
     Pointers { s, c, brightest }: Pointers<V>,
 ) -> Folded<V> {
-    let strong = [strong(v, level, s[0], c[0]), strong(v, level, s[1], c[1])];
-    let (low, high) = (octant(v, s[0], c[0]), octant(v, s[1], c[1]));
+    let low = octant(v, level, s[0], c[0]);
+    let high = octant(v, level, s[1], c[1]);
     Folded {
         long: [low.long, high.long],
         short: [low.short, high.short],
@@ -103,15 +103,15 @@ pub(super) fn fold<V: Lanes>(
         length: [low.length, high.length],
         sign: [low.sign, high.sign],
         axis: [low.axis, high.axis],
-        strong: v.narrow_mask(strong),
+        strong: v.narrow_mask([low.strong, high.strong]),
         brightest,
     }
 }
 
-/// Mask: S² + C² is at least the level's least power.
+/// Mask: the sum of both squares is at least the level's least power.
 #[inline(always)]
-fn strong<V: Lanes>(v: V, level: &LevelLanes<'_, V>, s: V::W, c: V::W) -> V::W {
-    let power = v.dot(s, s, c, c);
+fn strong<V: Lanes>(v: V, level: &LevelLanes<'_, V>, a: V::W, b: V::W) -> V::W {
+    let power = v.dot(a, a, b, b);
     let below = level.below_least_power;
     v.narrow_mask32([v.gt32(power[0], below), v.gt32(power[1], below)])
 }
@@ -124,10 +124,11 @@ struct Octant<W> {
     length: W,
     sign: W,
     axis: W,
+    strong: W,
 }
 
 #[inline(always)]
-fn octant<V: Lanes>(v: V, s: V::W, c: V::W) -> Octant<V::W> {
+fn octant<V: Lanes>(v: V, level: &LevelLanes<'_, V>, s: V::W, c: V::W) -> Octant<V::W> {
     let (along, across) = (v.abs(s), v.abs(c));
     let (length, short) = (v.max(along, across), v.min(along, across));
     let steep = v.eq(length, along);
@@ -141,5 +142,7 @@ fn octant<V: Lanes>(v: V, s: V::W, c: V::W) -> Octant<V::W> {
         sign: v.sign_of(backwards),
         // Where S is the longer component, it is 0 only in a pixel that is not strong.
         axis: v.quarters(steep, s, c),
+        // From the magnitudes: of S and C the compiler for NEON would narrow one half twice.
+        strong: strong(v, level, along, across),
     }
 }

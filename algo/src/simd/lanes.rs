@@ -70,13 +70,17 @@ pub(crate) trait Lanes: Copy + Debug {
     fn xor8(self, a: Self::B, b: Self::B) -> Self::B;
     /// a where the mask is set, else b.
     fn pick8(self, mask: Self::B, a: Self::B, b: Self::B) -> Self::B;
-    /// 128 where the first mask is set, and 64 more where the second is.
+    /// a − b, at least 0.
     #[inline(always)]
-    fn quarters8(self, half: Self::B, quarter: Self::B) -> Self::B {
-        self.or8(
-            self.and8(half, self.splat8(128)),
-            self.and8(quarter, self.splat8(64)),
-        )
+    fn excess8(self, a: Self::B, b: Self::B) -> Self::B {
+        self.sub8(self.max8(a, b), b)
+    }
+    /// 128 where s is set, of pixels where the first mask is set, or c of others; and 64 more where the first mask is set. All are
+    /// masks.
+    #[inline(always)]
+    fn quarters8(self, mask: Self::B, s: Self::B, c: Self::B) -> Self::B {
+        let half = self.and8(self.pick8(mask, s, c), self.splat8(128));
+        self.or8(half, self.and8(mask, self.splat8(64)))
     }
     /// table\[x − 16\] for 16 ≤ x < 32, table\[0\] below, 0 above.
     fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B;
@@ -111,8 +115,8 @@ pub(crate) trait Lanes: Copy + Debug {
     }
     /// Both as words times 128 · 2ⁿ, with n so that 2¹⁴ ≤ long < 2¹⁵. Unspecified where long < 16 or short > long.
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W>;
-    /// The bytes of a mask of words, two per pixel and in any order: only whether one of them is set means anything.
-    fn bytes_of(self, mask: Self::W) -> Self::B;
+    /// The bytes of words, two per pixel, in any order.
+    fn bytes_of(self, x: Self::W) -> Self::B;
     /// Masks of words as masks of bytes.
     fn narrow_mask(self, mask: [Self::W; 2]) -> Self::B;
 
@@ -160,6 +164,11 @@ pub(crate) trait Lanes: Copy + Debug {
     fn normalised(self, long: Self::W, short: Self::W) -> [Self::W; 2];
     /// |x|, 32768 of −32768 as an unsigned word.
     fn abs(self, x: Self::W) -> Self::W;
+    /// a − b, unsigned, at least 0.
+    #[inline(always)]
+    fn excess(self, a: Self::W, b: Self::W) -> Self::W {
+        self.sub(self.max_unsigned(a, b), b)
+    }
     /// The smaller, signed.
     fn min(self, a: Self::W, b: Self::W) -> Self::W;
     /// The larger, signed.

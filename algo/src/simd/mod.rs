@@ -93,6 +93,17 @@ impl Backend {
     }
 }
 
+/// Makes the compiler align the stack of the function that this is inlined into to a line of the cache. It would not do so for vectors
+/// that it later finds no register for; where one of these lies across the border of two pages, a kernel takes twice as long.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+pub(crate) fn align_stack() {
+    #[repr(align(64))]
+    struct Line(u8);
+    let line = Line(0);
+    core::hint::black_box(&line.0);
+}
+
 /// Defines `fn name(backend: Backend, arguments)`, which runs the generic `kernel(lanes, arguments)` compiled for that
 /// back-end's instructions.
 macro_rules! back_end_entry {
@@ -110,6 +121,7 @@ macro_rules! back_end_entry {
             #[target_feature(enable = "avx2")]
             #[inline(never)]
             fn avx2<$($generics)*>(lanes: $crate::simd::Avx2, $($arg: $type),*) {
+                $crate::simd::align_stack();
                 $kernel(lanes, $($arg),*);
             }
             #[inline(never)]

@@ -44,9 +44,8 @@ impl Lanes for Neon {
         or8(self, a: B, b: B) -> B = vorrq_u8(a, b);
         xor8(self, a: B, b: B) -> B = veorq_u8(a, b);
         pick8(self, mask: B, a: B, b: B) -> B = vbslq_u8(mask, a, b);
-        // Shifts to the right that round make 128 and 64 of 255.
-        quarters8(self, half: B, quarter: B) -> B = vrsraq_n_u8::<2>(vrshrq_n_u8::<1>(half), quarter);
-        bytes_of(self, mask: W) -> B = vreinterpretq_u8_s16(mask);
+        excess8(self, a: B, b: B) -> B = vqsubq_u8(a, b);
+        bytes_of(self, x: W) -> B = vreinterpretq_u8_s16(x);
         narrow_mask(self, mask: [W; 2]) -> B = vuzp1q_u8(vreinterpretq_u8_s16(mask[0]), vreinterpretq_u8_s16(mask[1]));
         splat16(self, x: i16) -> W = vdupq_n_s16(x);
         add(self, a: W, b: W) -> W = vaddq_s16(a, b);
@@ -64,6 +63,7 @@ impl Lanes for Neon {
         halve(self, x: W) -> W = vreinterpretq_s16_u16(vrshrq_n_u16::<1>(vreinterpretq_u16_s16(x)));
         mean(self, a: W, b: W) -> W = vreinterpretq_s16_u16(vrhaddq_u16(vreinterpretq_u16_s16(a), vreinterpretq_u16_s16(b)));
         abs(self, x: W) -> W = vabsq_s16(x);
+        excess(self, a: W, b: W) -> W = vreinterpretq_s16_u16(vqsubq_u16(vreinterpretq_u16_s16(a), vreinterpretq_u16_s16(b)));
         min(self, a: W, b: W) -> W = vminq_s16(a, b);
         max(self, a: W, b: W) -> W = vmaxq_s16(a, b);
         max_unsigned(self, a: W, b: W) -> W = vreinterpretq_s16_u16(vmaxq_u16(vreinterpretq_u16_s16(a), vreinterpretq_u16_s16(b)));
@@ -100,6 +100,13 @@ impl Lanes for Neon {
         let block = block_mut(to, at, BYTES);
         // SAFETY: the slice holds the 16 bytes that are written.
         unsafe { vst1q_u8(block.as_mut_ptr(), x) }
+    }
+    #[inline(always)]
+    fn quarters8(self, mask: Self::B, s: Self::B, c: Self::B) -> Self::B {
+        // Not `pick8`: the compiler would compute the inverse of a mask that comes from a comparison, too.
+        let half = self.xor8(self.and8(mask, self.xor8(s, c)), c);
+        // Shifts to the right that round make 128 and 64 of 255.
+        neon!(vrsraq_n_u8::<2>(vrshrq_n_u8::<1>(half), mask))
     }
     #[inline(always)]
     fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {

@@ -100,12 +100,11 @@ impl Lanes for Portable {
         xor8(self, a: B, b: B) -> B = pairs(a, b, |a, b| a ^ b);
         all8(self, mask: B) -> bool = mask == [u8::MAX; BYTES];
         none8(self, bytes: B) -> bool = bytes == [0; BYTES];
-        quarters8(self, half: B, quarter: B) -> B = pairs(half, quarter, |half, quarter| half & 128 | quarter & 64);
         sum(self, a: B, b: B) -> [W; 2] = halves(pairs(a, b, |a, b| i16::from(a) + i16::from(b)), |half| half);
         difference(self, a: B, b: B) -> [W; 2] = halves(pairs(a, b, |a, b| i16::from(a) - i16::from(b)), |half| half);
         signs(self, mask: B) -> [W; 2] = halves(mask, |mask| lanes(mask, |mask| if mask == 0 { 1 } else { -1 }));
         widen_128(self, x: B) -> [W; 2] = halves(x, |x| lanes(x, |x| i16::from(x) << 7));
-        bytes_of(self, mask: W) -> B = core::array::from_fn(|lane| mask[lane / 2] as u8);
+        bytes_of(self, x: W) -> B = core::array::from_fn(|lane| x[lane / 2].to_le_bytes()[lane % 2]);
         narrow_mask(self, mask: [W; 2]) -> B = lanes(whole::<_, WORDS, BYTES>(mask), |mask: i16| mask as u8);
         splat16(self, x: i16) -> W = [x; WORDS];
         add(self, a: W, b: W) -> W = pairs(a, b, i16::wrapping_add);

@@ -22,7 +22,7 @@
 use super::next_block;
 use super::quality::{Quality, dark_unless};
 use super::temporal::{ExpectedBlock, FinerLevel, GeometricLanes, of_bytes};
-use crate::phase::arrived::{ExpectedRow, ExpectedRowMut};
+use crate::phase::arrived::{ExpectedRow, ExpectedRowMut, NO_REASON};
 use crate::phase::geometric::Geometric;
 use crate::phase::level::{Level, LevelLanes};
 use crate::phase::samples::BlockSample;
@@ -209,7 +209,8 @@ fn finest_columns<V: Lanes, S: Frames>(
             continue;
         }
         let (unwrapped, modulation) = finest.fine(v, &lanes, &before.expected(v, at), at, V::AHEAD);
-        lanes.store(v, &unwrapped, reason, reason, modulation, at, &mut out);
+        let clear = v.eq8(reason, v.splat8(NO_REASON));
+        lanes.store(v, &unwrapped, clear, reason, modulation, at, &mut out);
     }
 }
 

@@ -4,7 +4,7 @@
 //! is the reason that comes first, and levels are combined by a minimum.
 
 use crate::phase::arrived::NO_REASON;
-use crate::phase::unwrap::too_large;
+use crate::phase::unwrap::{MAX_RESIDUAL_BITS, too_large};
 use crate::simd::Lanes;
 use crate::trust::Trust;
 
@@ -46,13 +46,15 @@ impl<V: Lanes> Quality<V> {
         v.pick8(self.strong, first, v.splat8(Trust::LowModulation as u8))
     }
 
-    /// Whether all pixels of the block are resolved: no reason here, and `clear` is 255.
+    /// Whether all pixels of the block are resolved: no reason here, and the mask `clear` is set.
     #[inline(always)]
     pub fn all_resolved(&self, v: V, clear: V::B) -> bool {
         // Which pixel it is does not matter.
-        let ambiguous = too_large(v, v.max_unsigned(self.residual[0], self.residual[1]));
-        let against = v.or8(v.bytes_of(ambiguous), self.saturated(v));
-        v.all8(v.pick8(against, v.splat8(0), v.and8(self.strong, clear)))
+        let residual = v.max_unsigned(self.residual[0], self.residual[1]);
+        let ambiguous = v.excess(residual, v.splat16(MAX_RESIDUAL_BITS));
+        // 255 less the brightest sample is 0 where that is at full scale.
+        let good = v.excess8(v.and8(self.strong, clear), self.brightest);
+        v.none8(v.or8(v.bytes_of(ambiguous), v.eq8(good, v.splat8(0))))
     }
 
     /// Mask: the residual is too large for the fringe order to be trusted.

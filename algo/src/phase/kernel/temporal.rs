@@ -62,7 +62,7 @@ impl<V: Lanes> GeometricLanes<V> {
     }
 
     /// Stores a block at the finest level: absolute phase and modulation of resolved pixels, the reason of others. `before` are
-    /// the reasons of coarser levels; `clear` is 255 where there is none, or where `unwrapped` has one, too.
+    /// the reasons of coarser levels; the mask `clear` is set where there is none, or where `unwrapped` has one, too.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
     pub fn store(

@@ -62,6 +62,7 @@ impl Lanes for Avx2 {
         or8(self, a: B, b: B) -> B = _mm256_or_si256(a, b);
         xor8(self, a: B, b: B) -> B = _mm256_xor_si256(a, b);
         pick8(self, mask: B, a: B, b: B) -> B = _mm256_blendv_epi8(b, a, mask);
+        excess8(self, a: B, b: B) -> B = _mm256_subs_epu8(a, b);
         widen(self, low: B, high: B) -> [W; 2] = [_mm256_unpacklo_epi8(low, high), _mm256_unpackhi_epi8(low, high)];
         narrow_mask(self, mask: [W; 2]) -> B = _mm256_packs_epi16(mask[0], mask[1]);
         splat16(self, x: i16) -> W = _mm256_set1_epi16(x);
@@ -78,6 +79,7 @@ impl Lanes for Avx2 {
         halve(self, x: W) -> W = _mm256_avg_epu16(x, _mm256_setzero_si256());
         mean(self, a: W, b: W) -> W = _mm256_avg_epu16(a, b);
         abs(self, x: W) -> W = _mm256_abs_epi16(x);
+        excess(self, a: W, b: W) -> W = _mm256_subs_epu16(a, b);
         min(self, a: W, b: W) -> W = _mm256_min_epi16(a, b);
         max(self, a: W, b: W) -> W = _mm256_max_epi16(a, b);
         max_unsigned(self, a: W, b: W) -> W = _mm256_max_epu16(a, b);
@@ -142,8 +144,8 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn bytes_of(self, mask: Self::W) -> Self::B {
-        mask
+    fn bytes_of(self, x: Self::W) -> Self::B {
+        x
     }
     #[inline(always)]
     fn sum(self, a: Self::B, b: Self::B) -> [Self::W; 2] {
