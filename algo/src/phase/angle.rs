@@ -40,22 +40,22 @@ const ROUGH_ARCTANGENT: [i16; 3] = [21_455, -7_158, -6_092];
 /// √(1 + t²) on 0 ≤ t ≤ 1, coefficients of 1, t² and t⁴: relative error 6.5e-4.
 pub(super) const LENGTH: [f64; 3] = [1.000_644, 0.484_927, -0.072_269];
 
-/// The constants in all lanes.
+/// The constants in all lanes, for both halves of a block.
 pub(super) struct AngleLanes<V: Lanes> {
-    reciprocal: [V::W; 3],
-    rough_reciprocal: [V::W; 4],
-    arctangent: [V::W; 5],
-    rough_arctangent: [V::W; 3],
+    reciprocal: [[V::W; 3]; 2],
+    rough_reciprocal: [[V::W; 4]; 2],
+    arctangent: [[V::W; 5]; 2],
+    rough_arctangent: [[V::W; 3]; 2],
 }
 
 impl<V: Lanes> AngleLanes<V> {
     #[inline(always)]
     pub fn new(v: V) -> Self {
         Self {
-            reciprocal: splat(v, RECIPROCAL),
-            rough_reciprocal: splat(v, ROUGH_RECIPROCAL),
-            arctangent: splat(v, ARCTANGENT),
-            rough_arctangent: splat(v, ROUGH_ARCTANGENT),
+            reciprocal: halves(v, RECIPROCAL),
+            rough_reciprocal: halves(v, ROUGH_RECIPROCAL),
+            arctangent: halves(v, ARCTANGENT),
+            rough_arctangent: halves(v, ROUGH_ARCTANGENT),
         }
     }
 
@@ -63,24 +63,37 @@ impl<V: Lanes> AngleLanes<V> {
     #[inline(always)]
     pub fn fine(&self, v: V, folded: &Folded<V>, half: usize) -> (V::W, V::W) {
         let (short, long) = (folded.short[half], folded.long[half]);
-        let reciprocal = polynomial(v, self.reciprocal, folded.centred[half]);
+        let reciprocal = polynomial(v, self.reciprocal[half], folded.centred[half]);
         let quotient = v.mul_q15(short, reciprocal);
         let quotient = v.add_sat(quotient, quotient);
         let remainder = v.sub(short, v.mul_q15(quotient, long));
         let correction = v.mul_q15(v.add(remainder, remainder), reciprocal);
         let t = v.add_sat(quotient, correction);
-        let angle = v.halve(v.mul_q15(t, polynomial(v, self.arctangent, t)));
+        let angle = v.halve(v.mul_q15(t, polynomial(v, self.arctangent[half], t)));
         (folded.unfold(v, half, angle), t)
     }
 
     /// φ of half a block in rough quality, 1/65536 turn.
     #[inline(always)]
     pub fn rough(&self, v: V, folded: &Folded<V>, half: usize) -> V::W {
-        let reciprocal = polynomial(v, self.rough_reciprocal, folded.centred[half]);
+        let reciprocal = polynomial(v, self.rough_reciprocal[half], folded.centred[half]);
         let h = v.mul_q15(folded.short[half], reciprocal);
-        let angle = v.mul_q15(h, polynomial(v, self.rough_arctangent, h));
+        let angle = v.mul_q15(h, polynomial(v, self.rough_arctangent[half], h));
         folded.unfold(v, half, angle)
     }
+}
+
+/// Constants in all lanes, for each half. With few registers they stay in memory; copies of their own let each instruction read its
+/// operand from there, where a copy for both would be loaded to a register first.
+#[inline(always)]
+fn halves<V: Lanes, const N: usize>(v: V, constants: [i16; N]) -> [[V::W; N]; 2] {
+    let low = splat(v, constants);
+    let high = if V::FEW_REGISTERS {
+        splat(v, constants)
+    } else {
+        low
+    };
+    [low, high]
 }
 
 #[inline(always)]

@@ -58,12 +58,9 @@ const LEAST_SHORT: [u8; 16] = [
     255, 255, 255, 255, 255, 255, 255, 23, 22, 20, 19, 18, 16, 14, 12, 8,
 ];
 
-/// Folds the block at `at` of four shifts of 8 bits, S = I₀ − I₂ and C = I₁ − I₃, in bytes with the signs apart.
+/// Folds a block of four shifts of 8 bits, S = I₀ − I₂ and C = I₁ − I₃, in bytes with the signs apart.
 #[inline(always)]
-pub(super) fn fold_four<V: Lanes>(v: V, rows: [&[u8]; 4], at: usize) -> Folded<V> {
-    let [i0, i1, i2, i3] = rows;
-    let (i0, i1) = (v.load8(i0, at), v.load8(i1, at));
-    let (i2, i3) = (v.load8(i2, at), v.load8(i3, at));
+pub(super) fn fold_four<V: Lanes>(v: V, [i0, i1, i2, i3]: [V::B; 4]) -> Folded<V> {
     let (even, odd) = (v.max8(i0, i2), v.max8(i1, i3));
     let s = v.sub8(even, v.min8(i0, i2));
     let c = v.sub8(odd, v.min8(i1, i3));

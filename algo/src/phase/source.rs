@@ -8,24 +8,73 @@ use super::arrived::WrappedRow;
 use super::fold::{Folded, fold, fold_four};
 use super::level::{Demodulated, LevelLanes};
 use super::samples::BlockSample;
-use super::terms::{of_shifts, pointers};
+use super::terms::{blocks, of_shifts, pointers};
 use crate::simd::{Lanes, Rows};
+use core::sync::atomic::{Ordering, compiler_fence};
 
 /// The rows of a level's frames, in the order of their shifts.
 pub(crate) trait Frames: Copy {
     /// Whether the modulation may come out halved ([`LevelLanes::fine`]): never with bytes in the forms of [`super::terms`], where
     /// the pointer is 1.49 times as long as the modulation or longer.
     const DOUBLED: bool;
+    /// Whether [`Self::fold_in_line`] keeps anything.
+    const LINES: bool;
+    /// What is kept of the cache lines of a level.
+    type Kept<V: Lanes>: Copy;
 
+    /// Nothing is kept yet.
+    fn nothing_kept<V: Lanes>(v: V) -> Self::Kept<V>;
+    /// Samples from `at` to the next cache line of the first row.
+    fn to_line(&self, at: usize) -> usize;
     /// The first columns, so that one check of the length serves all blocks.
     fn first(self, columns: usize) -> Self;
     /// The block at `at`, folded; samples `after` behind it are prefetched.
     fn fold<V: Lanes>(&self, v: V, level: &LevelLanes<'_, V>, at: usize, after: usize)
     -> Folded<V>;
+    /// As [`Self::fold`], for the blocks of a cache line in their order. The first loads all of each row's line before the next row's,
+    /// and keeps the others: frames that begin at pages have equal pixels in the same set of the cache, which holds fewer lines
+    /// than there are frames. The line of the sample `ahead` is prefetched. With [`Place::Other`] nothing is read.
+    fn fold_in_line<V: Lanes>(
+        &self,
+        v: V,
+        level: &LevelLanes<'_, V>,
+        at: usize,
+        ahead: usize,
+        place: Place,
+        kept: &mut Self::Kept<V>,
+    ) -> Folded<V>;
+}
+
+/// Bytes of a cache line.
+pub(crate) const LINE: usize = 64;
+
+/// Which block of a cache line is folded.
+#[derive(Clone, Copy)]
+pub(crate) enum Place {
+    /// The first: the others are kept.
+    First,
+    /// One of the others, 1 for the second.
+    Other(usize),
+    /// Any, without those around it.
+    Alone,
 }
 
 impl<const N: usize> Frames for [&[u8]; N] {
     const DOUBLED: bool = false;
+    const LINES: bool = true;
+    /// Of each block but the first.
+    type Kept<V: Lanes> = [[V::B; N]; 3];
+
+    #[inline(always)]
+    fn nothing_kept<V: Lanes>(v: V) -> Self::Kept<V> {
+        [[v.splat8(0); N]; 3]
+    }
+
+    #[inline(always)]
+    fn to_line(&self, at: usize) -> usize {
+        let address = self[0].as_ptr() as usize + at;
+        address.next_multiple_of(LINE) - address
+    }
 
     #[inline(always)]
     fn first(mut self, columns: usize) -> Self {
@@ -45,18 +94,69 @@ impl<const N: usize> Frames for [&[u8]; N] {
         at: usize,
         after: usize,
     ) -> Folded<V> {
-        if N != 4 {
-            return fold(v, level, of_shifts(v, level, self, at, after));
-        }
-        for row in self {
-            v.fetch(row, at, after);
-        }
-        fold_four(v, [self[0], self[1], self[2], self[3]], at)
+        fold_bytes(v, level, blocks(v, self, at, after))
     }
+
+    #[inline(always)]
+    fn fold_in_line<V: Lanes>(
+        &self,
+        v: V,
+        level: &LevelLanes<'_, V>,
+        at: usize,
+        ahead: usize,
+        place: Place,
+        kept: &mut Self::Kept<V>,
+    ) -> Folded<V> {
+        let mut blocks = [v.splat8(0); N];
+        let mut k = 0;
+        match place {
+            Place::Alone => return self.fold(v, level, at, ahead.wrapping_sub(at)),
+            Place::Other(block) => blocks = kept[block - 1],
+            Place::First => {
+                while k < N {
+                    v.fetch_line(self[k], ahead);
+                    blocks[k] = v.load8(self[k], at);
+                    let mut block = 1;
+                    while block < LINE / V::PIXELS {
+                        kept[block - 1][k] = v.load8(self[k], at + block * V::PIXELS);
+                        block += 1;
+                    }
+                    k += 1;
+                    // Keeps the compiler from reading the second halves later.
+                    if k.is_multiple_of(2) {
+                        compiler_fence(Ordering::SeqCst);
+                    }
+                }
+            }
+        }
+        fold_bytes(v, level, blocks)
+    }
+}
+
+#[inline(always)]
+fn fold_bytes<V: Lanes, const N: usize>(
+    v: V,
+    level: &LevelLanes<'_, V>,
+    blocks: [V::B; N],
+) -> Folded<V> {
+    if N == 4 {
+        return fold_four(v, [blocks[0], blocks[1], blocks[2], blocks[N - 1]]);
+    }
+    fold(v, level, of_shifts::<V, u8, N>(v, level, &blocks))
 }
 
 impl<T: BlockSample> Frames for Rows<'_, T> {
     const DOUBLED: bool = true;
+    const LINES: bool = false;
+    type Kept<V: Lanes> = ();
+
+    #[inline(always)]
+    fn nothing_kept<V: Lanes>(_v: V) {}
+
+    #[inline(always)]
+    fn to_line(&self, _at: usize) -> usize {
+        0
+    }
 
     #[inline(always)]
     fn first(self, columns: usize) -> Self {
@@ -72,6 +172,19 @@ impl<T: BlockSample> Frames for Rows<'_, T> {
         after: usize,
     ) -> Folded<V> {
         fold(v, level, pointers(v, level, self, at, after))
+    }
+
+    #[inline(always)]
+    fn fold_in_line<V: Lanes>(
+        &self,
+        v: V,
+        level: &LevelLanes<'_, V>,
+        at: usize,
+        ahead: usize,
+        _place: Place,
+        _kept: &mut (),
+    ) -> Folded<V> {
+        self.fold(v, level, at, ahead.wrapping_sub(at))
     }
 }
 

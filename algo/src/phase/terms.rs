@@ -51,17 +51,35 @@ pub(super) fn pointers<V: Lanes, T: BlockSample>(
 ) -> Pointers<V> {
     if level.plan.samples != Samples::Weighted {
         match rows.count() {
-            3 => return of_shifts(v, level, &rows.all::<3>(), at, after),
-            4 => return of_shifts(v, level, &rows.all::<4>(), at, after),
-            5 => return of_shifts(v, level, &rows.all::<5>(), at, after),
-            6 => return of_shifts(v, level, &rows.all::<6>(), at, after),
-            7 => return of_shifts(v, level, &rows.all::<7>(), at, after),
-            8 => return of_shifts(v, level, &rows.all::<8>(), at, after),
-            9 => return of_shifts(v, level, &rows.all::<9>(), at, after),
+            3 => return of_shifts::<V, T, 3>(v, level, &blocks(v, &rows.all(), at, after)),
+            4 => return of_shifts::<V, T, 4>(v, level, &blocks(v, &rows.all(), at, after)),
+            5 => return of_shifts::<V, T, 5>(v, level, &blocks(v, &rows.all(), at, after)),
+            6 => return of_shifts::<V, T, 6>(v, level, &blocks(v, &rows.all(), at, after)),
+            7 => return of_shifts::<V, T, 7>(v, level, &blocks(v, &rows.all(), at, after)),
+            8 => return of_shifts::<V, T, 8>(v, level, &blocks(v, &rows.all(), at, after)),
+            9 => return of_shifts::<V, T, 9>(v, level, &blocks(v, &rows.all(), at, after)),
             _ => {}
         }
     }
     weighted(v, level, rows, at, after)
+}
+
+/// The blocks of N rows at `at`; samples `after` behind them are prefetched.
+#[inline(always)]
+pub(super) fn blocks<V: Lanes, T: BlockSample, const N: usize>(
+    v: V,
+    rows: &[&[T]; N],
+    at: usize,
+    after: usize,
+) -> [T::Block<V>; N] {
+    let mut blocks = [T::load(v, rows[0], at); N];
+    let mut k = 0;
+    while k < N {
+        v.fetch(rows[k], at, after);
+        blocks[k] = T::load(v, rows[k], at);
+        k += 1;
+    }
+    blocks
 }
 
 /// N shifts that start at 0.
@@ -69,17 +87,12 @@ pub(super) fn pointers<V: Lanes, T: BlockSample>(
 pub(super) fn of_shifts<V: Lanes, T: BlockSample, const N: usize>(
     v: V,
     level: &LevelLanes<'_, V>,
-    rows: &[&[T]; N],
-    at: usize,
-    after: usize,
+    blocks: &[T::Block<V>; N],
 ) -> Pointers<V> {
-    let mut blocks = [T::load(v, rows[0], at); N];
-    v.fetch(rows[0], at, after);
+    let mut blocks = *blocks;
     let mut brightest = blocks[0];
     let mut k = 1;
     while k < N {
-        v.fetch(rows[k], at, after);
-        blocks[k] = T::load(v, rows[k], at);
         brightest = T::brighter(v, brightest, blocks[k]);
         k += 1;
     }

@@ -27,6 +27,8 @@ pub(crate) struct Scaled<W> {
 pub(crate) trait Lanes: Copy + Debug {
     /// Pixels of a block.
     const PIXELS: usize;
+    /// Whether there are too few registers for the constants of a kernel.
+    const FEW_REGISTERS: bool = true;
     /// How many samples ahead of their use rows are prefetched.
     const AHEAD: usize;
     /// A byte per pixel of a block.
@@ -50,6 +52,9 @@ pub(crate) trait Lanes: Copy + Debug {
     /// rows follow one another in memory; where only some columns of each row are read it is the length of a row, so that the
     /// same columns of the next row are prefetched.
     fn fetch<T>(self, row: &[T], at: usize, after: usize);
+    /// Prefetches the cache line of sample `at`, which may lie behind the row.
+    #[inline(always)]
+    fn fetch_line<T>(self, _row: &[T], _at: usize) {}
     /// Prefetches for writing, [`Self::AHEAD`] samples behind the block at `at`.
     fn claim_ahead<T>(self, row: &[T], at: usize);
     /// Writes the block of `to` that starts at `at`.

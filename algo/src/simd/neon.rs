@@ -26,6 +26,7 @@ type Count = int16x8_t;
 
 impl Lanes for Neon {
     const PIXELS: usize = BYTES;
+    const FEW_REGISTERS: bool = false;
     /// Nothing is prefetched.
     const AHEAD: usize = 0;
     type B = B;

@@ -178,7 +178,8 @@ fn between_columns<V: Lanes, S: Frames>(
         if all_dark(v, reason) {
             continue;
         }
-        let unwrapped = finer.rough(v, &lanes, &expected, at, V::AHEAD);
+        let folded = finer.frames.fold(v, &finer.level, at, V::AHEAD);
+        let unwrapped = finer.rough(v, &lanes, &expected, &folded);
         let reason = v.min8(reason, unwrapped.quality.first_reason(v));
         out.store(v, at, &unwrapped.expected(v, &next), reason);
     }
@@ -208,7 +209,8 @@ fn finest_columns<V: Lanes, S: Frames>(
             out.store_unknown(v, at, reason);
             continue;
         }
-        let (unwrapped, modulation) = finest.fine(v, &lanes, &before.expected(v, at), at, V::AHEAD);
+        let folded = finest.frames.fold(v, &finest.level, at, V::AHEAD);
+        let (unwrapped, modulation) = finest.fine(v, &lanes, &before.expected(v, at), &folded);
         let clear = v.eq8(reason, v.splat8(NO_REASON));
         lanes.store(v, &unwrapped, clear, reason, modulation, at, &mut out);
     }

@@ -146,8 +146,8 @@ pub(super) struct ExpectedBlock<V: Lanes> {
 /// A level, its frames and the unwrapping step to it.
 #[derive(Clone, Copy)]
 pub(super) struct FinerLevel<'a, V: Lanes, S> {
-    level: LevelLanes<'a, V>,
-    frames: S,
+    pub level: LevelLanes<'a, V>,
+    pub frames: S,
     pub step: UnwrapStepLanes<V>,
 }
 
@@ -161,18 +161,16 @@ impl<'a, V: Lanes, S: Frames> FinerLevel<'a, V, S> {
         }
     }
 
-    /// Unwraps a block at this level in rough quality; `after` as in [`Frames::fold`].
+    /// Unwraps a block at this level in rough quality.
     #[inline(always)]
     pub fn rough(
         &self,
         v: V,
         lanes: &GeometricLanes<V>,
         expected: &ExpectedBlock<V>,
-        at: usize,
-        after: usize,
+        folded: &Folded<V>,
     ) -> UnwrappedBlock<V> {
-        let folded = self.frames.fold(v, &self.level, at, after);
-        self.unwrap(v, expected, lanes.rough(v, &folded), &folded)
+        self.unwrap(v, expected, lanes.rough(v, folded), folded)
     }
 
     /// Unwraps a block at this level in fine quality, with its modulation.
@@ -182,12 +180,10 @@ impl<'a, V: Lanes, S: Frames> FinerLevel<'a, V, S> {
         v: V,
         lanes: &GeometricLanes<V>,
         expected: &ExpectedBlock<V>,
-        at: usize,
-        after: usize,
+        folded: &Folded<V>,
     ) -> (UnwrappedBlock<V>, [V::W; 2]) {
-        let folded = self.frames.fold(v, &self.level, at, after);
-        let (block, modulation) = (self.level).fine(v, &lanes.angle, &folded, S::DOUBLED);
-        (self.unwrap(v, expected, block.phase, &folded), modulation)
+        let (block, modulation) = (self.level).fine(v, &lanes.angle, folded, S::DOUBLED);
+        (self.unwrap(v, expected, block.phase, folded), modulation)
     }
 
     #[inline(always)]

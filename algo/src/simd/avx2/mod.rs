@@ -113,6 +113,11 @@ impl Lanes for Avx2 {
         hint::<T, BYTES, _MM_HINT_T0>(row, at, after);
     }
     #[inline(always)]
+    fn fetch_line<T>(self, row: &[T], at: usize) {
+        // SAFETY: a hint, which no address makes fail.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(row.as_ptr().wrapping_add(at).cast()) }
+    }
+    #[inline(always)]
     fn claim_ahead<T>(self, row: &[T], at: usize) {
         hint::<T, BYTES, _MM_HINT_ET0>(row, at, AHEAD);
     }
