@@ -5,7 +5,7 @@
 
 use super::lanes::{Lanes, Scaled, operations};
 use super::rows::{block, block_mut};
-use super::x86::{AHEAD, hint, scaled_by};
+use super::x86::{AHEAD, hint, hint_line, scaled_by};
 use core::arch::x86_64::*;
 
 /// The proof that this machine has SSSE3: only [`Ssse3::detect`] makes one.
@@ -54,6 +54,7 @@ impl Lanes for Ssse3 {
         min8(self, a: B, b: B) -> B = _mm_min_epu8(a, b);
         max8(self, a: B, b: B) -> B = _mm_max_epu8(a, b);
         sub8(self, a: B, b: B) -> B = _mm_sub_epi8(a, b);
+        excess8(self, a: B, b: B) -> B = _mm_subs_epu8(a, b);
         eq8(self, a: B, b: B) -> B = _mm_cmpeq_epi8(a, b);
         and8(self, a: B, b: B) -> B = _mm_and_si128(a, b);
         or8(self, a: B, b: B) -> B = _mm_or_si128(a, b);
@@ -106,6 +107,10 @@ impl Lanes for Ssse3 {
     #[inline(always)]
     fn fetch<T>(self, row: &[T], at: usize, after: usize) {
         hint::<T, BYTES, _MM_HINT_T0>(row, at, after);
+    }
+    #[inline(always)]
+    fn fetch_line<T>(self, row: &[T], at: usize) {
+        hint_line(row, at);
     }
     #[inline(always)]
     fn claim_ahead<T>(self, row: &[T], at: usize) {

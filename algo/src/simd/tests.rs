@@ -134,7 +134,8 @@ fn operations_of_bytes<V: Lanes>(v: V, inputs: &Inputs, at: usize, out: &mut Out
         bytes or8(a, b);
         bytes xor8(a, b);
         bytes pick8(mask, a, b);
-        bytes quarters8(mask, other);
+        bytes excess8(a, b);
+        bytes quarters8(mask, other, v.xor8(mask, other));
         bytes by_excess(&table, a);
         words widen(a, b);
         words sum(a, b);

@@ -1,7 +1,7 @@
 //! What the back-ends of x86-64 share: prefetching, and an operation that both compose in the same way.
 
 use super::lanes::{Lanes, Scaled};
-use core::arch::x86_64::_mm_prefetch;
+use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
 
 /// Rows are prefetched this many samples ahead, about 500 ns of work with AVX2.
 pub(super) const AHEAD: usize = 512;
@@ -25,6 +25,13 @@ pub(super) fn hint<T, const PIXELS: usize, const HINT: i32>(row: &[T], at: usize
         unsafe { _mm_prefetch::<HINT>(ahead.wrapping_add(line * LINE)) };
         line += 1;
     }
+}
+
+/// Prefetches the cache line of sample `at`, which may lie behind the row.
+#[inline(always)]
+pub(super) fn hint_line<T>(row: &[T], at: usize) {
+    // SAFETY: a hint, which no address makes fail; SSE is part of x86-64.
+    unsafe { _mm_prefetch::<_MM_HINT_T0>(row.as_ptr().wrapping_add(at).cast()) }
 }
 
 /// [`Lanes::scaled`] by the words of `scale`.

@@ -7,7 +7,7 @@ mod memory;
 
 use super::lanes::{Lanes, Scaled, operations};
 use super::rows::{block, block_mut};
-use super::x86::{AHEAD, hint, scaled_by};
+use super::x86::{AHEAD, hint, hint_line, scaled_by};
 use core::arch::x86_64::*;
 use memory::{load_halves, store_halves};
 
@@ -114,8 +114,7 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     fn fetch_line<T>(self, row: &[T], at: usize) {
-        // SAFETY: a hint, which no address makes fail.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(row.as_ptr().wrapping_add(at).cast()) }
+        hint_line(row, at);
     }
     #[inline(always)]
     fn claim_ahead<T>(self, row: &[T], at: usize) {
