@@ -1,9 +1,9 @@
 //! Stage 3, align: the taught coordinates of a row's pixels, and how far they deviate from golden there.
 
 use super::Production;
-use super::displaced::{AlignedRow, GoldenMap, OffsetRow, align_row, taught_coordinates};
+use super::displaced::{BlockNumbers, GoldenMap, OffsetRow, align_row, taught_coordinates};
 use super::height::HeightRow;
-use super::pose::{Node, PoseField};
+use super::pose::PoseField;
 use super::recent::RecentRows;
 use super::{common, pose};
 use crate::inspect::Weight;
@@ -16,7 +16,8 @@ use core::ops::Range;
 /// For each pixel of a row the pixel of golden's frame that saw the same point of the part.
 #[derive(Debug)]
 pub(super) struct TaughtCoordinates {
-    nodes: Vec<Node>,
+    /// Displacements along the row.
+    blocks: Vec<BlockNumbers>,
     column: Vec<i32>,
     row: Vec<i32>,
 }
@@ -25,7 +26,7 @@ impl TaughtCoordinates {
     /// Of `width` pixels.
     pub fn new(width: usize) -> Self {
         Self {
-            nodes: pose::nodes_of_row(width),
+            blocks: pose::blocks_of_row(width),
             column: vec![0; width],
             row: vec![0; width],
         }
@@ -61,7 +62,8 @@ impl TaughtCoordinates {
         (heights, recent): (&HeightRow, &mut RecentRows),
     ) {
         let (width, height) = plan.size();
-        pose.row(v, height, &mut self.nodes);
+        let backend = plan.decoder.backend();
+        pose.row(backend, v, height, &mut self.blocks);
         let golden = GoldenMap {
             height: &plan.cubics.surface().height,
             taught: plan.taught.pixels(),
@@ -70,16 +72,18 @@ impl TaughtCoordinates {
         let row = OffsetRow {
             v,
             offset: &heights.offset,
-            nodes: &self.nodes,
-            middle: plan.levels.0 as f32,
+            blocks: &self.blocks,
         };
         let mut overflow = false;
-        let aligned = AlignedRow {
-            deviation: recent.row_mut(v).0,
-            overflow: &mut overflow,
-        };
-        let backend = plan.decoder.backend();
-        align_row(backend, golden, row, columns.clone(), aligned);
+        let deviation = recent.row_mut(v).0;
+        align_row(
+            backend,
+            golden,
+            row,
+            columns.clone(),
+            deviation,
+            &mut overflow,
+        );
         if plan.needs_coordinates() {
             let taught = (&mut *self.column, &mut *self.row);
             taught_coordinates(backend, golden, row, columns, taught);

@@ -5,53 +5,60 @@
 //! and the heights of a part they are linear in good approximation (0.003 pixels, see [`SPACING`]).
 
 use super::Production;
+use super::displaced::{BLOCK, BlockNumbers, Node, VALUES, between, interpolate};
 use crate::geometry::Vector;
 use crate::inspect::Region;
 use crate::inspect::align::{Motion, Placed};
 use crate::pipeline::for_each_row;
+use crate::simd::Backend;
 use alloc::vec;
 use alloc::vec::Vec;
 
 /// Pixels from node to node. A turn by half a degree seen through 22° over 1456 pixels is bent by 0.003 pixels between them.
-pub(super) const SPACING: usize = 64;
-/// Values that are interpolated: du, dv (pixels), dz (mm).
-pub(super) const VALUES: usize = 3;
+const SPACING: usize = 64;
 
-/// The values at the middle height, then their change per mm of height.
-pub(super) type Node = [f32; 2 * VALUES];
+/// The points that a node's pixel sees below and above the middle height; NaN where it sees nothing.
+type Sight = [Vector; 2];
 
 /// How the part of a cycle lies, and what that does to every pixel.
 #[derive(Debug)]
 pub(super) struct PoseField {
-    /// None if the part is taken to lie as taught; then regions and nodes are not used.
+    /// None if the part is taken to lie as taught; then regions and blocks are not used.
     pub placed: Option<Placed>,
     /// The regions of the gauges, moved with the part.
     regions: Vec<Region>,
     crossings: Vec<f64>,
-    /// Row-major.
-    nodes: Vec<Node>,
-    columns: usize,
+    /// Of the nodes, row-major.
+    sights: Vec<Sight>,
+    /// The displacements of the blocks along the rows of nodes, row-major.
+    blocks: Vec<BlockNumbers>,
+    /// Blocks of a row.
+    across: usize,
 }
 
 impl PoseField {
     /// Of a part that lies as taught.
     pub fn new(plan: &Production) -> Self {
         let (width, height) = plan.size();
-        let columns = columns_of(width);
-        let rows = (height - 1).div_ceil(SPACING) + 1;
-        let (regions, nodes) = match plan.alignment {
-            Some(_) => (
-                plan.gauges.regions.clone(),
-                vec![[0.0; 2 * VALUES]; columns * rows],
-            ),
+        let across = width.div_ceil(BLOCK);
+        let (regions, sights, blocks) = match plan.alignment {
+            Some(_) => {
+                let sights: Vec<_> = nodes(height)
+                    .flat_map(|v| nodes(width).map(move |u| plan.sight((u, v))))
+                    .collect();
+                let rows = nodes(height).count();
+                let blocks = vec![BlockNumbers::default(); across * rows];
+                (plan.gauges.regions.clone(), sights, blocks)
+            }
             None => Default::default(),
         };
         Self {
             placed: None,
             regions,
             crossings: Vec::new(),
-            nodes,
-            columns,
+            sights,
+            blocks,
+            across,
         }
     }
 
@@ -61,11 +68,10 @@ impl PoseField {
         // Without an alignment parts are taken to lie as taught.
         self.placed = placed.filter(|_| plan.alignment.is_some());
         if let Some(Placed { motion, .. }) = &self.placed {
-            for_each_row(&mut self.nodes, self.columns, |row, nodes| {
-                let v = (row * SPACING).min(height - 1);
-                for (column, node) in nodes.iter_mut().enumerate() {
-                    *node = plan.node(motion, ((column * SPACING).min(width - 1), v));
-                }
+            let (sights, columns) = (&self.sights, nodes(width).count());
+            for_each_row(&mut self.blocks, self.across, |row, blocks| {
+                let sights = &sights[row * columns..][..columns];
+                plan.displace(motion, nodes(width).zip(sights), row * SPACING, blocks);
             });
             for (region, taught) in self.regions.iter_mut().zip(&plan.gauges.regions) {
                 let to = |at| plan.moved(motion, at);
@@ -82,49 +88,76 @@ impl PoseField {
         }
     }
 
-    /// The nodes of row `v` of a frame of `height` rows, interpolated between the rows of nodes above and below.
-    pub fn row(&self, v: usize, height: usize, out: &mut [Node]) {
+    /// The displacements of the blocks of row `v` of a frame of `height` rows, interpolated between the rows of nodes above and below.
+    pub fn row(&self, backend: Backend, v: usize, height: usize, out: &mut [BlockNumbers]) {
         let (upper, lower) = (
             v / SPACING,
-            (v / SPACING + 1).min(self.nodes.len() / self.columns - 1),
+            (v / SPACING + 1).min(self.blocks.len() / self.across - 1),
         );
         let (top, bottom) = (upper * SPACING, (lower * SPACING).min(height - 1));
         let share = (v - top) as f32 / (bottom - top).max(1) as f32;
-        let row = |at: usize| self.nodes[at * self.columns..][..self.columns].as_flattened();
-        let (above, below) = (row(upper), row(lower));
-        for ((out, a), b) in out.as_flattened_mut().iter_mut().zip(above).zip(below) {
-            *out = a + (b - a) * share;
-        }
+        let row = |at: usize| self.blocks[at * self.across..][..self.across].as_flattened();
+        interpolate(
+            backend,
+            row(upper),
+            row(lower),
+            share,
+            out.as_flattened_mut(),
+        );
     }
 }
 
-/// Nodes along a row of `width` pixels.
-fn columns_of(width: usize) -> usize {
-    (width - 1).div_ceil(SPACING) + 1
+/// The places of the nodes along `pixels` pixels: every [`SPACING`]th, and the last.
+fn nodes(pixels: usize) -> impl Iterator<Item = usize> {
+    (0..(pixels - 1).div_ceil(SPACING) + 1).map(move |at| (at * SPACING).min(pixels - 1))
 }
 
-/// Nodes for a row of `width` pixels.
-pub(super) fn nodes_of_row(width: usize) -> Vec<Node> {
-    vec![[0.0; 2 * VALUES]; columns_of(width)]
+/// Displacements for the blocks of a row of `width` pixels.
+pub(super) fn blocks_of_row(width: usize) -> Vec<BlockNumbers> {
+    vec![BlockNumbers::default(); width.div_ceil(BLOCK)]
 }
 
 impl Production {
-    /// The node at pixel (u, v); NaN where the pixel sees nothing.
-    fn node(&self, motion: &Motion, (u, v): (usize, usize)) -> Node {
+    /// What the node at pixel (u, v) sees.
+    fn sight(&self, (u, v): (usize, usize)) -> Sight {
         let (middle, half) = self.levels;
-        let at = |z: f64| {
-            let values = self.seen(u, v, z).and_then(|point| {
-                let back = motion.undo(point);
-                let (column, row) = self.triangulator.camera().project(back)?;
-                let (du, dv) = (column - u as f64, row - v as f64);
-                Some([du, dv, back.z - point.z])
-            });
-            values.unwrap_or([f64::NAN; VALUES])
+        let nothing = Vector::new(f64::NAN, f64::NAN, f64::NAN);
+        [middle - half, middle + half].map(|z| self.seen(u, v, z).unwrap_or(nothing))
+    }
+
+    /// The displacements by a motion of the blocks between nodes along row `v`, given with their columns; NaN where one sees
+    /// nothing.
+    fn displace<'a>(
+        &self,
+        motion: &Motion,
+        nodes: impl Iterator<Item = (usize, &'a Sight)>,
+        v: usize,
+        blocks: &mut [BlockNumbers],
+    ) {
+        let v = v.min(self.size().1 - 1);
+        let mut left: Option<(usize, Node)> = None;
+        for (u, sight) in nodes {
+            let node = self.node(motion, (u, v), sight);
+            let (start, from) = left.unwrap_or((u, node));
+            for block in start / BLOCK..u / BLOCK + 1 {
+                blocks[block] = between([&from, &node], start..u, block, self.levels.0);
+            }
+            left = Some((u, node));
+        }
+    }
+
+    /// The displacement by a motion of what the node at pixel (u, v) sees.
+    fn node(&self, motion: &Motion, (u, v): (usize, usize), sight: &Sight) -> Node {
+        let at = |point: Vector| {
+            let back = motion.undo(point);
+            let to = self.triangulator.camera().project(back);
+            let (column, row) = to.unwrap_or((f64::NAN, f64::NAN));
+            [column - u as f64, row - v as f64, back.z - point.z]
         };
-        let (low, high) = (at(middle - half), at(middle + half));
+        let [low, high] = sight.map(at);
         core::array::from_fn(|i| match i.checked_sub(VALUES) {
-            None => ((low[i] + high[i]) / 2.0) as f32,
-            Some(i) => ((high[i] - low[i]) / (2.0 * half)) as f32,
+            None => (low[i] + high[i]) / 2.0,
+            Some(i) => (high[i] - low[i]) / (2.0 * self.levels.1),
         })
     }
 

@@ -2,18 +2,67 @@
 //!
 //! # Equations
 //! In column i of a block and at height z, du = a + b i + c z; dv and dz likewise. a and b follow from the nodes left and right of the
-//! block; c, which differs by about 1 % from node to node, is that of the block's middle.
+//! block; c, which differs by about 1 % from node to node, is that of the block's middle. From a row of nodes to the next, a, b and c
+//! are interpolated.
 //!
 //! # Accuracy
 //! c is off by at most a quarter of that difference: below 0.001 pixels for a turn by half a degree and heights within 5 mm of the
-//! middle one, less than between nodes ([`SPACING`]).
+//! middle one, less than between nodes ([`SPACING`](crate::inspect::strips::pose)).
 
-use super::BLOCK;
-use crate::inspect::strips::pose::{Node, SPACING, VALUES};
 use crate::math::nearest::{nearest, whole};
+use crate::simd::{Lanes, back_end_entry};
+use core::ops::Range;
 
+/// Pixels that are worked on together; the distance of two nodes is a multiple of it.
+pub const BLOCK: usize = 32;
+/// Values of a displacement: du, dv (pixels), dz (mm).
+pub const VALUES: usize = 3;
 /// Larger displacements, pixels, are taken as not known.
 const MAX_AWAY: f32 = 4096.0;
+
+/// The displacement that a pixel has at the middle height, then its change per mm of height.
+pub type Node = [f64; 2 * VALUES];
+
+/// The numbers of a block: a, b and c of the three values (pixels and nm, heights in nm), then du and dv of its middle.
+pub type BlockNumbers = [f32; 3 * VALUES + 2];
+
+/// The numbers of a block between two nodes in these columns; `middle` is the middle height, mm.
+pub fn between(
+    [from, to]: [&Node; 2],
+    columns: Range<usize>,
+    block: usize,
+    middle: f64,
+) -> BlockNumbers {
+    let unit = 1.0 / columns.len().max(1) as f64;
+    let first = (block * BLOCK - columns.start) as f64 * unit;
+    let centre = first + (BLOCK / 2) as f64 * unit;
+    let mut numbers = [0.0; 3 * VALUES + 2];
+    for i in 0..VALUES {
+        let way = to[i] - from[i];
+        let slope = from[VALUES + i] + (to[VALUES + i] - from[VALUES + i]) * centre;
+        // dz from mm to nm.
+        let scale = if i < 2 { 1.0 } else { 1e6 };
+        numbers[i] = (((from[i] + way * first) - slope * middle) * scale) as f32;
+        numbers[VALUES + i] = (way * unit * scale) as f32;
+        numbers[2 * VALUES + i] = (slope * 1e-6 * scale) as f32;
+        if i < 2 {
+            numbers[3 * VALUES + i] = (from[i] + way * centre) as f32;
+        }
+    }
+    numbers
+}
+
+back_end_entry! {
+    /// Interpolates the numbers of the blocks of a row between two rows of nodes; `share` is the way from the one above.
+    fn interpolate [] = interpolate_row(above: &[f32], below: &[f32], share: f32, row: &mut [f32])
+}
+
+#[inline(always)]
+fn interpolate_row<V: Lanes>(_: V, above: &[f32], below: &[f32], share: f32, row: &mut [f32]) {
+    for ((out, a), b) in row.iter_mut().zip(above).zip(below) {
+        *out = a + (b - a) * share;
+    }
+}
 
 /// du, dv (pixels, less those of `whole`) and dz (nm) of the pixels of a block.
 #[derive(Clone, Copy, Default)]
@@ -32,35 +81,33 @@ pub(super) struct Linear {
 }
 
 impl Linear {
-    /// Of the block of column `u` in a row of `width` pixels. `middle` is the height that the nodes' values hold at, mm.
+    /// Of these numbers.
     #[inline(always)]
-    pub fn of_block(u: usize, nodes: &[Node], width: usize, middle: f32) -> Self {
-        let (node, u) = (u / SPACING, u / BLOCK * BLOCK);
-        let left = node * SPACING;
-        let unit = 1.0 / ((left + SPACING).min(width - 1) - left).max(1) as f32;
-        let (from, to) = (nodes[node], nodes[(node + 1).min(nodes.len() - 1)]);
-        let first = (u - left) as f32 * unit;
-        let centre = first + (BLOCK / 2) as f32 * unit;
-        let mut linear = Self::default();
-        for i in 0..VALUES {
-            let way = to[i] - from[i];
-            let slope = from[VALUES + i] + (to[VALUES + i] - from[VALUES + i]) * centre;
-            let mut value = from[i];
-            if i < 2 {
-                let pixels = value + way * centre;
-                linear.whole[i] = floor(pixels);
-                linear.lower[i] = -i32::from(pixels - linear.whole[i] < 0.5);
-                value -= linear.whole[i];
-            }
-            linear.first[i] = (value + way * first) - slope * middle;
-            linear.step[i] = way * unit;
-            linear.slope[i] = slope * 1e-6;
+    pub fn of(numbers: &BlockNumbers) -> Self {
+        let [
+            u,
+            v,
+            z,
+            step_u,
+            step_v,
+            step_z,
+            by_u,
+            by_v,
+            by_z,
+            along,
+            down,
+        ] = *numbers;
+        let whole = [floor(along), floor(down)];
+        Self {
+            first: [u - whole[0], v - whole[1], z],
+            step: [step_u, step_v, step_z],
+            slope: [by_u, by_v, by_z],
+            whole,
+            lower: [
+                -i32::from(along - whole[0] < 0.5),
+                -i32::from(down - whole[1] < 0.5),
+            ],
         }
-        // From mm to nm.
-        linear.first[2] *= 1e6;
-        linear.step[2] *= 1e6;
-        linear.slope[2] *= 1e6;
-        linear
     }
 
     /// Of pixel `i` at height `z`, nm.

@@ -15,17 +15,14 @@
 
 mod linear;
 
-use super::pose::Node;
 use super::squares::narrow::MAX_NARROW_NM;
 use crate::math::nearest::whole;
 use crate::pipeline::{NO_OFFSET, SQUARE};
 use crate::simd::{Lanes, back_end_entry};
 use crate::units::Height;
 use core::ops::Range;
+pub(super) use linear::{BLOCK, BlockNumbers, Node, VALUES, between, interpolate};
 use linear::{Linear, floor, is_near};
-
-/// Pixels that are worked on together; the distance of two nodes is a multiple of it.
-const BLOCK: usize = 32;
 
 /// The golden map that rows are compared with.
 #[derive(Clone, Copy)]
@@ -41,27 +38,19 @@ pub(super) struct GoldenMap<'a> {
 pub(super) struct OffsetRow<'a> {
     pub v: usize,
     pub offset: &'a [i32],
-    /// Displacements at every [`SPACING`](super::pose::SPACING)th column.
-    pub nodes: &'a [Node],
-    /// The height that the nodes' values hold at, mm.
-    pub middle: f32,
-}
-
-/// What an aligned row is written to.
-pub(super) struct AlignedRow<'a> {
-    /// Deviations from golden at the taught coordinates.
-    pub deviation: &'a mut [i32],
-    /// Whether a deviation is above [`MAX_NARROW_NM`].
-    pub overflow: &'a mut bool,
+    /// Displacements of its blocks.
+    pub blocks: &'a [BlockNumbers],
 }
 
 back_end_entry! {
-    /// Aligns columns of a row.
+    /// Aligns columns of a row: writes their deviations from golden at the taught coordinates, and whether one is above
+    /// [`MAX_NARROW_NM`].
     fn align_row [] = align_columns(
         golden: GoldenMap<'_>,
         row: OffsetRow<'_>,
         columns: Range<usize>,
-        aligned: AlignedRow<'_>,
+        deviation: &mut [i32],
+        overflow: &mut bool,
     )
 }
 
@@ -93,7 +82,7 @@ impl<'a> Block<'a> {
     fn new(golden: GoldenMap<'a>, row: OffsetRow<'a>, columns: Range<usize>) -> Self {
         let u = columns.start;
         Self {
-            linear: Linear::of_block(u, row.nodes, golden.width, row.middle),
+            linear: Linear::of(&row.blocks[u / BLOCK]),
             u,
             v: row.v,
             skipped: u % BLOCK,
@@ -131,14 +120,15 @@ fn align_columns<V: Lanes>(
     golden: GoldenMap<'_>,
     row: OffsetRow<'_>,
     columns: Range<usize>,
-    aligned: AlignedRow<'_>,
+    deviation: &mut [i32],
+    overflow: &mut bool,
 ) {
-    let mut overflow = false;
+    *overflow = false;
     let mut start = columns.start;
     while start < columns.end {
         let end = ((start / BLOCK + 1) * BLOCK).min(columns.end);
         let block = Block::new(golden, row, start..end);
-        let out = &mut aligned.deviation[start..end];
+        let out = &mut deviation[start..end];
         v.fetch(golden.height, row.v * golden.width + start, golden.width);
         if let Some([along, down]) = block.linear.whole() {
             let mut small = false;
@@ -154,14 +144,13 @@ fn align_columns<V: Lanes>(
                 small = next(golden, &block, place, out);
             }
             if !small {
-                overflow |= each(golden, &block, [along, down], out);
+                *overflow |= each(golden, &block, [along, down], out);
             }
         } else {
             out.fill(NO_OFFSET);
         }
         start = end;
     }
-    *aligned.overflow = overflow;
 }
 
 /// A block whose pixels all have its whole displacement, which leads from its first pixel to `place`. The answer is false if they
@@ -173,7 +162,7 @@ fn same(golden: GoldenMap<'_>, block: &Block<'_>, place: usize, out: &mut [i32])
     let taught = &golden.taught[place..][..BLOCK];
     let (bases, offsets) = (&block.bases[..BLOCK], &block.offsets[..BLOCK]);
     let (linear, out) = (block.linear, &mut out[..BLOCK]);
-    let mut refused = 0;
+    let (mut farthest, mut largest) = (0, 0);
     for i in 0..BLOCK {
         let z = height(bases[i], offsets[i]);
         let [along, down, rise] = linear.at(i, z);
@@ -188,10 +177,16 @@ fn same(golden: GoldenMap<'_>, block: &Block<'_>, place: usize, out: &mut [i32])
         let measured = -i32::from(offsets[i] != NO_OFFSET);
         let known = measured & -i32::from(i32::from(taught[i]) & i32::from(SQUARE) != 0);
         out[i] = (whole(nm) & known) | (NO_OFFSET & !known);
-        let inside = lies_in(along, 0.0, 1.0) & lies_in(down, 0.0, 1.0);
-        refused |= (measured & -i32::from(!inside)) | (known & -i32::from(!is_small(nm)));
+        farthest = farthest.max(order(along).max(order(down)) & measured.cast_unsigned());
+        largest = largest.max(order(nm.abs()) & known.cast_unsigned());
     }
-    refused == 0
+    farthest < order(1.0) && largest < order(MAX_NARROW_NM as f32)
+}
+
+/// The bits of a number: from 0 up in the order of the numbers; those of negative ones and NaN are larger than all others.
+#[inline(always)]
+fn order(number: f32) -> u32 {
+    number.to_bits()
 }
 
 /// A block whose pixels have a whole displacement that leads from the first one to `place`, or one pixel more along, down or

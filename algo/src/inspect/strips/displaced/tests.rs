@@ -1,7 +1,6 @@
 //! Blocks of pixels against single ones.
 
 use super::*;
-use crate::inspect::strips::pose::SPACING;
 use crate::simd::Backend;
 use std::vec;
 use std::vec::Vec;
@@ -40,10 +39,15 @@ fn blocks_have_the_bits_of_one_pixel_after_the_other() {
         (-40.0, 1.0),
     ] {
         let node = |at: usize| {
-            let value = [shift + bend * at as f32, bend - shift * 0.5, 0.01];
+            let value = [shift + bend * at as f64, bend - shift * 0.5, 0.01];
             [value[0], value[1], value[2], 0.02, -0.03, 0.001]
         };
-        let nodes: Vec<_> = (0..WIDTH.div_ceil(SPACING) + 1).map(node).collect();
+        let block = |at: usize| {
+            let left = at / 2;
+            let columns = 64 * left..(64 * left + 64).min(WIDTH - 1);
+            between([&node(left), &node(left + 1)], columns, at, 0.3)
+        };
+        let blocks: Vec<_> = (0..WIDTH.div_ceil(BLOCK)).map(block).collect();
         for v in 0..ROWS {
             let offset: Vec<_> = (0..WIDTH)
                 .map(|u| match scatter(u + v) % 5 {
@@ -54,18 +58,14 @@ fn blocks_have_the_bits_of_one_pixel_after_the_other() {
             let row = OffsetRow {
                 v,
                 offset: &offset,
-                nodes: &nodes,
-                middle: 0.3,
+                blocks: &blocks,
             };
             let found = |backend, columns: Range<usize>| {
                 let mut deviation = vec![NO_OFFSET; WIDTH];
                 let (mut column, mut line) = (vec![0; WIDTH], vec![0; WIDTH]);
                 let mut overflow = false;
-                let out = AlignedRow {
-                    deviation: &mut deviation,
-                    overflow: &mut overflow,
-                };
-                align_row(backend, golden, row, columns.clone(), out);
+                let out = (&mut *deviation, &mut overflow);
+                align_row(backend, golden, row, columns.clone(), out.0, out.1);
                 taught_coordinates(backend, golden, row, columns, (&mut column, &mut line));
                 (deviation, column, line, overflow)
             };
