@@ -305,4 +305,10 @@ impl Triangulator {
         let ray = self.falling_ray(u as f64, v as f64)?;
         height.is_known().then(|| self.on_ray(ray, height.mm()))
     }
+
+    /// The point `rise` mm higher than another one on the same ray of the camera.
+    pub fn higher(&self, point: Vector, rise: f64) -> Vector {
+        let from = point - self.camera.centre();
+        point + from * (rise / from.z)
+    }
 }

@@ -20,6 +20,15 @@ struct Spans {
     firsts: Vec<usize>,
 }
 
+/// An edge of a polygon that a row crosses.
+#[derive(Debug)]
+pub(super) struct CrossedEdge {
+    from: (f64, f64),
+    way: (f64, f64),
+    /// The column where it is crossed.
+    u: f64,
+}
+
 /// A polygon that encloses nothing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -73,12 +82,12 @@ impl Region {
         other: &Self,
         size: (usize, usize),
         to: impl Fn((f64, f64)) -> (f64, f64),
-        crossings: &mut Vec<f64>,
+        crossed: &mut Vec<CrossedEdge>,
     ) {
         self.corners.clear();
         self.corners
             .extend(other.corners.iter().map(|&corner| to(corner)));
-        self.spans.fill(&self.corners, size, crossings);
+        self.spans.fill(&self.corners, size, crossed);
     }
 
     /// Number of pixels.
@@ -125,12 +134,12 @@ pub fn polygon_spans(
 }
 
 impl Spans {
-    /// Becomes those of a polygon in a frame (width, height); `crossings` is a buffer.
+    /// Becomes those of a polygon in a frame (width, height); `crossed` is a buffer.
     fn fill(
         &mut self,
         corners: &[(f64, f64)],
         (width, height): (usize, usize),
-        crossings: &mut Vec<f64>,
+        crossed: &mut Vec<CrossedEdge>,
     ) {
         let (mut top, mut bottom) = (height as f64, 0.0_f64);
         for (_, v) in corners {
@@ -144,23 +153,37 @@ impl Spans {
         if spans.capacity() < rows {
             spans.reserve(rows + rows / 8);
         }
+        // The same edges are crossed until the next corner.
+        let mut corner = f64::NEG_INFINITY;
         for row in 0..height {
             firsts.push(spans.len());
             let v = row as f64;
-            crossings.clear();
             if v < top || v > bottom {
                 continue;
             }
-            let next = corners.iter().cycle().skip(1);
-            for (&(u0, v0), &(u1, v1)) in corners.iter().zip(next) {
-                if (v0 <= v) != (v1 <= v) {
-                    crossings.push(u0 + (u1 - u0) * ((v - v0) / (v1 - v0)));
+            if v >= corner {
+                crossed.clear();
+                corner = f64::INFINITY;
+                let mut from = corners[corners.len() - 1];
+                for &to in corners {
+                    if (from.1 <= v) != (to.1 <= v) {
+                        let way = (to.0 - from.0, to.1 - from.1);
+                        crossed.push(CrossedEdge { from, way, u: 0.0 });
+                    }
+                    if to.1 > v {
+                        corner = corner.min(to.1);
+                    }
+                    from = to;
                 }
             }
-            crossings.sort_unstable_by(f64::total_cmp);
-            for pair in crossings.chunks_exact(2) {
-                let column = |u: f64| libm::ceil(u).clamp(0.0, width as f64) as usize;
-                let (start, end) = (column(pair[0]), column(pair[1]));
+            for CrossedEdge { from, way, u } in crossed.iter_mut() {
+                *u = from.0 + way.0 * ((v - from.1) / way.1);
+            }
+            if !crossed.is_sorted_by(|a, b| a.u <= b.u) {
+                crossed.sort_unstable_by(|a, b| a.u.total_cmp(&b.u));
+            }
+            for pair in crossed.chunks_exact(2) {
+                let (start, end) = (column(pair[0].u, width), column(pair[1].u, width));
                 if start < end {
                     spans.push((row, start..end));
                 }
@@ -168,6 +191,13 @@ impl Spans {
         }
         firsts.push(spans.len());
     }
+}
+
+/// u rounded up, inside a row of `width` pixels.
+fn column(u: f64, width: usize) -> usize {
+    // Casts cut off, and keep to the range of their type.
+    let whole = u as usize;
+    (whole + usize::from((whole as f64) < u)).min(width)
 }
 
 #[cfg(test)]
@@ -208,6 +238,40 @@ mod tests {
             region.spans().iter().filter(|(row, _)| *row == 5).count(),
             1
         );
+    }
+
+    #[test]
+    fn a_pixel_is_inside_where_an_odd_number_of_edges_is_crossed_on_its_left() {
+        const SIDE: usize = 24;
+        let mut state = 7_u32;
+        let mut inside = 0;
+        for polygon in 0..200 {
+            // Quarters of pixels, so that corners meet centres of pixels.
+            let mut coordinate = || {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                f64::from(state >> 25) / 4.0 - 4.0
+            };
+            let corners: Vec<_> = (0..3 + polygon % 6)
+                .map(|_| (coordinate(), coordinate()))
+                .collect();
+            let mut pixels = [[false; SIDE]; SIDE];
+            for (v, columns) in polygon_spans(&corners, SIDE, SIDE) {
+                pixels[v][columns].fill(true);
+            }
+            for v in 0..SIDE {
+                for u in 0..SIDE {
+                    let next = corners.iter().cycle().skip(1);
+                    let crossed = corners.iter().zip(next).filter(|&(&(u0, v0), &(u1, v1))| {
+                        let y = v as f64;
+                        let at = u0 + (u1 - u0) * ((y - v0) / (v1 - v0));
+                        (v0 <= y) != (v1 <= y) && at <= u as f64
+                    });
+                    assert_eq!(pixels[v][u], crossed.count() % 2 == 1, "{corners:?}");
+                    inside += usize::from(pixels[v][u]);
+                }
+            }
+        }
+        assert!(inside > 10_000, "{inside}");
     }
 
     #[test]

@@ -3,8 +3,10 @@
 /// A symmetric matrix of the six unknowns: shifts along x, y, z, turns about x, y, z.
 pub type Matrix6 = [[f64; 6]; 6];
 
-/// Sweeps of Jacobi's method; six unknowns need five at most to reach the precision of `f64`.
+/// Largest number of sweeps of Jacobi's method; six unknowns need five at most to reach the precision of `f64`.
 const SWEEPS: usize = 12;
+/// Off-diagonal entries below this share of the diagonal are taken as 0: rounding adds as much.
+const ROUNDING: f64 = 1e-17;
 
 /// Eigenvalues and eigenvectors (as rows) of a symmetric matrix, by cyclic Jacobi rotations
 /// (Golub, Van Loan, *Matrix Computations*, 8.5).
@@ -15,11 +17,14 @@ pub fn eigen(matrix: &Matrix6) -> ([f64; 6], Matrix6) {
         row[i] = 1.0;
     }
     for _ in 0..SWEEPS {
+        let mut rotated = false;
         for p in 0..5 {
             for q in p + 1..6 {
-                if a[p][q] == 0.0 {
+                let size = libm::fabs(a[p][p]) + libm::fabs(a[q][q]);
+                if libm::fabs(a[p][q]) <= ROUNDING * size {
                     continue;
                 }
+                rotated = true;
                 let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
                 let sign = if theta < 0.0 { -1.0 } else { 1.0 };
                 let t = sign / (libm::fabs(theta) + libm::sqrt(theta * theta + 1.0));
@@ -37,6 +42,9 @@ pub fn eigen(matrix: &Matrix6) -> ([f64; 6], Matrix6) {
                     }
                 }
             }
+        }
+        if !rotated {
+            break;
         }
     }
     (core::array::from_fn(|i| a[i][i]), vectors)

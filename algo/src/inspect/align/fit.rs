@@ -21,11 +21,12 @@
 
 use super::Alignment;
 use super::directions::{Directions, Matrix6, form};
+use super::equations::{Equation, Equations};
 use super::motion::Motion;
 use super::normal::{Normal, TUKEY, WeightFunction};
 use super::surface::{Facet, GoldenSurface};
 use crate::geometry::Vector;
-use alloc::vec::Vec;
+use crate::simd::Backend;
 
 /// A measured point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,39 +84,10 @@ const ROUNDS: usize = 8;
 const NEAR_MM: f64 = 0.05;
 /// With a larger share of outliers a bent part may have been taken for a moved one.
 const SUSPICIOUS: f64 = 0.05;
-/// From the median of absolute deviations to σ of a normal distribution.
-const MEDIAN_TO_SIGMA: f64 = 1.4826;
-
-/// The equation of a point in the linear problem.
-#[derive(Debug)]
-pub(super) struct Equation {
-    /// At the motion about which the problem is linear, mm.
-    pub residual: f64,
-    /// What a further motion takes off it, see [`Facet::jacobian`].
-    pub jacobian: [f64; 6],
-    /// Error of the x and y of the facet's lift (1 σ).
-    pub lift_noise: f64,
-    /// From the centre to the point, in radii.
-    pub lever: Vector,
-    /// Variance of the point's height, mm².
-    pub variance: f64,
-    /// The same, with the variance of the surface's height, mm².
-    pub both: f64,
-}
-
-impl Equation {
-    /// The residual after a further motion, mm.
-    pub fn residual_after(&self, further: &[f64; 6]) -> f64 {
-        let taken: f64 = self.jacobian.iter().zip(further).map(|(r, x)| r * x).sum();
-        self.residual - taken
-    }
-}
-
 /// Buffers of a fit, which the next one uses again.
 #[derive(Debug, Default)]
 pub struct FitBuffers {
-    equations: Vec<Equation>,
-    sizes: Vec<f64>,
+    equations: Equations,
 }
 
 /// The fit of measured points to a part.
@@ -125,6 +97,7 @@ pub struct Fitting<'a> {
     pub golden: GoldenSurface<'a>,
     /// Where it is looked at, and the point that is turned about.
     pub plan: &'a Alignment,
+    pub(super) backend: Backend,
 }
 
 /// Where a descent ended.
@@ -139,7 +112,6 @@ struct Solved {
     further: [f64; 6],
     directions: Directions,
     normal: Normal,
-    scale: f64,
 }
 
 impl Fitting<'_> {
@@ -158,8 +130,7 @@ impl Fitting<'_> {
         let limit = moved.limit.min(bent.limit);
         let mut agreeing = |motion: &Motion| {
             self.linearise(samples, motion, false, &mut buffers.equations);
-            let agrees = |equation: &&Equation| libm::fabs(equation.residual) < limit;
-            buffers.equations.iter().filter(agrees).count()
+            buffers.equations.agreeing(limit)
         };
         let found = match agreeing(&bent.placed.motion) > agreeing(&moved.placed.motion) {
             true => bent,
@@ -177,22 +148,23 @@ impl Fitting<'_> {
     ) -> Option<Descended> {
         let mut motion = Motion::none(self.plan.centre);
         for round in 1..=ROUNDS {
-            self.linearise(samples, &motion, round == 1, &mut buffers.equations);
-            if buffers.equations.len() < LEAST_POINTS {
+            let equations = &mut buffers.equations;
+            self.linearise(samples, &motion, round == 1, equations);
+            if equations.len() < LEAST_POINTS {
                 return None;
             }
-            let mut solved = solve(weights, [0.0; 6], buffers);
+            let mut solved = self.solve(weights, [0.0; 6], equations);
             if weights == WeightFunction::Huber && (is_near(&solved.further) || 2 * round >= ROUNDS)
             {
                 weights = WeightFunction::Tukey;
-                solved = solve(weights, solved.further, buffers);
+                solved = self.solve(weights, solved.further, equations);
             }
             motion = self.then(&motion, &solved.further);
             let found = weights == WeightFunction::Tukey && is_near(&solved.further);
             if found || round == ROUNDS {
                 return Some(Descended {
-                    placed: self.placed(motion, &solved, &buffers.equations),
-                    limit: TUKEY * solved.scale,
+                    placed: self.placed(motion, &solved, equations),
+                    limit: TUKEY * solved.normal.scale,
                 });
             }
         }
@@ -207,8 +179,8 @@ impl Fitting<'_> {
         Motion::new(self.plan.centre, motion.shift + shift, motion.turn + turn)
     }
 
-    fn placed(&self, motion: Motion, solved: &Solved, equations: &[Equation]) -> Placed {
-        let spread = Normal::covariance(equations, &solved.further, solved.scale);
+    fn placed(&self, motion: Motion, solved: &Solved, equations: &mut Equations) -> Placed {
+        let spread = equations.covariance(self.backend, &solved.further, solved.normal.scale);
         let farthest = |corner: &Vector| (motion.apply(*corner) - *corner).length();
         let inside = solved.normal.inside;
         Placed {
@@ -234,20 +206,26 @@ impl Fitting<'_> {
         samples: &[Sample],
         motion: &Motion,
         still: bool,
-        equations: &mut Vec<Equation>,
+        equations: &mut Equations,
     ) {
         equations.clear();
-        equations.extend(samples.iter().filter_map(|sample| {
-            if let (true, Some((at, above))) = (still, sample.over) {
-                let spot = self.plan.spots.get(at)?;
-                return Some(self.of_facet(sample, &spot.facet, spot.point, above));
+        for sample in samples {
+            if let Some(equation) = self.equation(sample, motion, still) {
+                equations.push(&equation);
             }
-            let point = motion.undo(sample.point);
-            let seen = self.golden.triangulator.camera().project(point)?;
-            let above = point.z - self.golden.height_at(seen.0, seen.1)?;
-            let facet = self.golden.quiet_facet(point, seen)?;
-            Some(self.of_facet(sample, &facet, point, above))
-        }));
+        }
+    }
+
+    fn equation(&self, sample: &Sample, motion: &Motion, still: bool) -> Option<Equation> {
+        if let (true, Some((at, above))) = (still, sample.over) {
+            let spot = self.plan.spots.get(at)?;
+            return Some(self.of_facet(sample, &spot.facet, spot.point, above));
+        }
+        let point = motion.undo(sample.point);
+        let seen = self.golden.triangulator.camera().project(point)?;
+        let above = point.z - self.golden.height_at(seen.0, seen.1)?;
+        let facet = self.golden.quiet_facet(point, seen)?;
+        Some(self.of_facet(sample, &facet, point, above))
     }
 
     fn of_facet(&self, sample: &Sample, facet: &Facet, point: Vector, above: f64) -> Equation {
@@ -261,34 +239,30 @@ impl Fitting<'_> {
             both: variance + facet.sigma * facet.sigma,
         }
     }
-}
 
-/// Solves the linear problem by reweighting, from a first guess.
-fn solve(weights: WeightFunction, guess: [f64; 6], buffers: &mut FitBuffers) -> Solved {
-    let FitBuffers { equations, sizes } = buffers;
-    let predicted = equations.iter().map(|e| e.both).sum::<f64>() / equations.len() as f64;
-    let predicted = libm::sqrt(predicted);
-    let mut further = guess;
-    let mut left = REWEIGHTINGS;
-    loop {
-        let scale = scale(equations, &further, sizes).max(predicted);
-        let normal = Normal::of(equations, weights, &further, scale);
-        let directions = Directions::of(&normal.matrix, &normal.noise, predicted);
-        let next = directions.solve(&normal.right_side);
-        let change: f64 = next
-            .iter()
-            .zip(further)
-            .map(|(a, b)| (a - b) * (a - b))
-            .sum();
-        further = next;
-        left -= 1;
-        if left == 0 || libm::sqrt(change) < SMALL_CHANGE_MM {
-            return Solved {
-                further,
-                directions,
-                normal,
-                scale,
-            };
+    /// Solves the linear problem by reweighting, from a first guess.
+    fn solve(&self, weights: WeightFunction, guess: [f64; 6], equations: &mut Equations) -> Solved {
+        let predicted = equations.predicted();
+        let mut further = guess;
+        let mut left = REWEIGHTINGS;
+        loop {
+            let normal = Normal::of(equations, self.backend, weights, &further, predicted);
+            let directions = Directions::of(&normal.matrix, &normal.noise, predicted);
+            let next = directions.solve(&normal.right_side);
+            let change: f64 = next
+                .iter()
+                .zip(further)
+                .map(|(a, b)| (a - b) * (a - b))
+                .sum();
+            further = next;
+            left -= 1;
+            if left == 0 || libm::sqrt(change) < SMALL_CHANGE_MM {
+                return Solved {
+                    further,
+                    directions,
+                    normal,
+                };
+            }
         }
     }
 }
@@ -296,17 +270,4 @@ fn solve(weights: WeightFunction, guess: [f64; 6], buffers: &mut FitBuffers) -> 
 /// Whether the linear problem still holds after a further motion.
 fn is_near(further: &[f64; 6]) -> bool {
     further.iter().map(|x| x * x).sum::<f64>() < NEAR_MM * NEAR_MM
-}
-
-/// σ of the residuals by their median.
-fn scale(equations: &[Equation], further: &[f64; 6], sizes: &mut Vec<f64>) -> f64 {
-    sizes.clear();
-    sizes.extend(
-        equations
-            .iter()
-            .map(|e| libm::fabs(e.residual_after(further))),
-    );
-    let middle = sizes.len() / 2;
-    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-    MEDIAN_TO_SIGMA * *median
 }

@@ -1,6 +1,7 @@
 //! How a part lies against how it was taught: a small rigid motion, by least squares of measured points to the golden surface.
 
 mod directions;
+mod equations;
 mod fit;
 mod motion;
 mod normal;
@@ -13,6 +14,7 @@ pub use surface::{Facet, GoldenSurface};
 
 use crate::geometry::Vector;
 use crate::pipeline::Window;
+use crate::simd::Backend;
 use crate::units::Height;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -135,7 +137,11 @@ impl Alignment {
 
     /// The fit of points to the surface.
     pub fn fitting<'a>(&'a self, golden: GoldenSurface<'a>) -> Fitting<'a> {
-        Fitting { golden, plan: self }
+        Fitting {
+            golden,
+            plan: self,
+            backend: Backend::best(),
+        }
     }
 }
 

@@ -44,7 +44,9 @@ impl TaughtCoordinates {
     ) {
         if pose.placed.is_some() {
             let columns = common(&columns, &recent.extent(v));
-            self.displace(plan, pose, v, columns, (heights, recent));
+            if !columns.is_empty() {
+                self.displace(plan, pose, v, columns, (heights, recent));
+            }
         } else if plan.needs_coordinates() {
             self.row[columns.clone()].fill(v as i32);
             for u in columns {
@@ -63,7 +65,7 @@ impl TaughtCoordinates {
     ) {
         let (width, height) = plan.size();
         let backend = plan.decoder.backend();
-        pose.row(backend, v, height, &mut self.blocks);
+        pose.row(backend, (v, height), &columns, &mut self.blocks);
         let golden = GoldenMap {
             height: &plan.cubics.surface().height,
             taught: plan.taught.pixels(),

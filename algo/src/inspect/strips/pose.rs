@@ -9,10 +9,12 @@ use super::displaced::{BLOCK, BlockNumbers, Node, VALUES, between, interpolate};
 use crate::geometry::Vector;
 use crate::inspect::Region;
 use crate::inspect::align::{Motion, Placed};
+use crate::inspect::region::CrossedEdge;
 use crate::pipeline::for_each_row;
 use crate::simd::Backend;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 /// Pixels from node to node. A turn by half a degree seen through 22° over 1456 pixels is bent by 0.003 pixels between them.
 const SPACING: usize = 64;
@@ -27,7 +29,7 @@ pub(super) struct PoseField {
     pub placed: Option<Placed>,
     /// The regions of the gauges, moved with the part.
     regions: Vec<Region>,
-    crossings: Vec<f64>,
+    crossed: Vec<CrossedEdge>,
     /// Of the nodes, row-major.
     sights: Vec<Sight>,
     /// The displacements of the blocks along the rows of nodes, row-major.
@@ -55,7 +57,7 @@ impl PoseField {
         Self {
             placed: None,
             regions,
-            crossings: Vec::new(),
+            crossed: Vec::new(),
             sights,
             blocks,
             across,
@@ -75,7 +77,7 @@ impl PoseField {
             });
             for (region, taught) in self.regions.iter_mut().zip(&plan.gauges.regions) {
                 let to = |at| plan.moved(motion, at);
-                region.become_moved(taught, (width, height), to, &mut self.crossings);
+                region.become_moved(taught, (width, height), to, &mut self.crossed);
             }
         }
     }
@@ -88,22 +90,25 @@ impl PoseField {
         }
     }
 
-    /// The displacements of the blocks of row `v` of a frame of `height` rows, interpolated between the rows of nodes above and below.
-    pub fn row(&self, backend: Backend, v: usize, height: usize, out: &mut [BlockNumbers]) {
+    /// The displacements of the blocks of some columns of row `v` of a frame of `height` rows, interpolated between the rows of nodes
+    /// above and below. The others are left as they are.
+    pub fn row(
+        &self,
+        backend: Backend,
+        (v, height): (usize, usize),
+        columns: &Range<usize>,
+        out: &mut [BlockNumbers],
+    ) {
         let (upper, lower) = (
             v / SPACING,
             (v / SPACING + 1).min(self.blocks.len() / self.across - 1),
         );
         let (top, bottom) = (upper * SPACING, (lower * SPACING).min(height - 1));
         let share = (v - top) as f32 / (bottom - top).max(1) as f32;
-        let row = |at: usize| self.blocks[at * self.across..][..self.across].as_flattened();
-        interpolate(
-            backend,
-            row(upper),
-            row(lower),
-            share,
-            out.as_flattened_mut(),
-        );
+        let here = columns.start / BLOCK..columns.end.div_ceil(BLOCK);
+        let row = |at: usize| &self.blocks[at * self.across..][here.clone()];
+        let (above, below) = (row(upper), row(lower));
+        interpolate(backend, above, below, share, &mut out[here.clone()]);
     }
 }
 

@@ -9,7 +9,6 @@ use super::squares::Squares;
 use super::{Input, Production};
 use crate::inspect::align::{Alignment, Sample};
 use crate::pipeline::{NO_OFFSET, PhaseMap};
-use crate::units::Height;
 use alloc::vec::Vec;
 use core::ops::Range;
 
@@ -100,26 +99,23 @@ impl Strip {
     pub fn sample(&mut self, plan: &Production, alignment: &Alignment, input: Input<'_>) {
         self.samples.clear();
         let (first, spots) = alignment.spots(self.rows.clone());
-        let mut measured = None;
-        for (at, spot) in spots.iter().enumerate() {
-            let (u, v) = (spot.u, spot.v);
-            if measured != Some(v) {
-                self.measure(plan, input, v, plan.window[v].clone());
-                measured = Some(v);
-            }
-            let offset = self.heights.offset[u];
-            if offset == NO_OFFSET {
-                continue;
-            }
-            let golden = plan.cubics.surface().height[v * plan.size().0 + u];
-            let height = Height::from_nm(golden.nm().saturating_add(offset));
-            let slope = plan.slope((u, v), self.decoded.phase[u]);
-            if let Some(point) = plan.triangulator.point(u, v, height) {
-                self.samples.push(Sample {
-                    point,
-                    sigma: plan.sigma_nm(self.decoded.modulation[u], slope) * 1e-6,
-                    over: Some((first + at, f64::from(offset) * 1e-6)),
-                });
+        let mut at = first;
+        for row in spots.chunk_by(|a, b| a.v == b.v) {
+            let (v, columns) = (row[0].v, row[0].u..row[row.len() - 1].u + 1);
+            self.measure(plan, input, v, columns);
+            for spot in row {
+                let offset = self.heights.offset[spot.u];
+                if offset != NO_OFFSET {
+                    let slope = plan.slope((spot.u, v), self.decoded.phase[spot.u]);
+                    let modulation = self.decoded.modulation[spot.u];
+                    let above = f64::from(offset) * 1e-6;
+                    self.samples.push(Sample {
+                        point: plan.triangulator.higher(spot.point, above),
+                        sigma: plan.sigma_nm(modulation, slope) * 1e-6,
+                        over: Some((at, above)),
+                    });
+                }
+                at += 1;
             }
         }
     }

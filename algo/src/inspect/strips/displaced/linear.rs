@@ -23,8 +23,9 @@ const MAX_AWAY: f32 = 4096.0;
 /// The displacement that a pixel has at the middle height, then its change per mm of height.
 pub type Node = [f64; 2 * VALUES];
 
-/// The numbers of a block: a, b and c of the three values (pixels and nm, heights in nm), then du and dv of its middle.
-pub type BlockNumbers = [f32; 3 * VALUES + 2];
+/// The numbers of a block: a, b and c of the three values (pixels and nm, heights in nm), du and dv of its middle, and a 0: a multiple
+/// of a vector's length.
+pub type BlockNumbers = [f32; 4 * VALUES];
 
 /// The numbers of a block between two nodes in these columns; `middle` is the middle height, mm.
 pub fn between(
@@ -36,7 +37,7 @@ pub fn between(
     let unit = 1.0 / columns.len().max(1) as f64;
     let first = (block * BLOCK - columns.start) as f64 * unit;
     let centre = first + (BLOCK / 2) as f64 * unit;
-    let mut numbers = [0.0; 3 * VALUES + 2];
+    let mut numbers = BlockNumbers::default();
     for i in 0..VALUES {
         let way = to[i] - from[i];
         let slope = from[VALUES + i] + (to[VALUES + i] - from[VALUES + i]) * centre;
@@ -54,13 +55,26 @@ pub fn between(
 
 back_end_entry! {
     /// Interpolates the numbers of the blocks of a row between two rows of nodes; `share` is the way from the one above.
-    fn interpolate [] = interpolate_row(above: &[f32], below: &[f32], share: f32, row: &mut [f32])
+    fn interpolate [] = interpolate_row(
+        above: &[BlockNumbers],
+        below: &[BlockNumbers],
+        share: f32,
+        row: &mut [BlockNumbers],
+    )
 }
 
 #[inline(always)]
-fn interpolate_row<V: Lanes>(_: V, above: &[f32], below: &[f32], share: f32, row: &mut [f32]) {
+fn interpolate_row<V: Lanes>(
+    _: V,
+    above: &[BlockNumbers],
+    below: &[BlockNumbers],
+    share: f32,
+    row: &mut [BlockNumbers],
+) {
     for ((out, a), b) in row.iter_mut().zip(above).zip(below) {
-        *out = a + (b - a) * share;
+        for i in 0..out.len() {
+            out[i] = a[i] + (b[i] - a[i]) * share;
+        }
     }
 }
 
@@ -96,6 +110,7 @@ impl Linear {
             by_z,
             along,
             down,
+            _,
         ] = *numbers;
         let whole = [floor(along), floor(down)];
         Self {

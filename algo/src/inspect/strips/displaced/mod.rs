@@ -24,6 +24,9 @@ use core::ops::Range;
 pub(super) use linear::{BLOCK, BlockNumbers, Node, VALUES, between, interpolate};
 use linear::{Linear, floor, is_near};
 
+/// Shifts [`SQUARE`] to the sign of 32 bits.
+const TO_SIGN: u32 = SQUARE.leading_zeros() + 16;
+
 /// The golden map that rows are compared with.
 #[derive(Clone, Copy)]
 pub(super) struct GoldenMap<'a> {
@@ -175,7 +178,7 @@ fn same(golden: GoldenMap<'_>, block: &Block<'_>, place: usize, out: &mut [i32])
         let nm = deviation((z, rise), (along, down), corners);
         // Masks of 32 bits, as wide as the heights: narrower ones would be widened again.
         let measured = -i32::from(offsets[i] != NO_OFFSET);
-        let known = measured & -i32::from(i32::from(taught[i]) & i32::from(SQUARE) != 0);
+        let known = measured & (i32::from(taught[i]) << TO_SIGN) >> 31;
         out[i] = (whole(nm) & known) | (NO_OFFSET & !known);
         farthest = farthest.max(order(along).max(order(down)) & measured.cast_unsigned());
         largest = largest.max(order(nm.abs()) & known.cast_unsigned());
