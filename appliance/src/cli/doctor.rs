@@ -3,8 +3,9 @@
 use super::options::Measuring;
 use crate::config::Backend;
 use crate::error::{Exit, Failure};
-use crate::head::doctor::{Check, Verdict, examine};
+use crate::head::doctor::{Check, Verdict, computer, examine};
 use crate::production::backend;
+use crate::system::host::Host;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -45,14 +46,17 @@ impl Doctor {
         let mut opened = pool.install(|| backend::open_as_it_is(&config.head, &on_progress))?;
         let calibrated = opened.problem.is_none();
         let on_progress = |share: f64, name: &str| progress.tell(0.5 + 0.5 * share, name);
-        let checks = pool.install(|| {
+        let real = config.head.backend == Backend::Rpi;
+        let trigger = real.then_some(&config.head.trigger);
+        let mut checks = computer::examine(&Host::default(), &config.lines, trigger);
+        checks.extend(pool.install(|| {
             examine(
                 &mut opened.head,
                 &opened.calibration,
                 calibrated,
                 &on_progress,
             )
-        });
+        }));
         progress.clear();
         let failed = checks.iter().filter(|check| check.verdict == Verdict::Fail);
         let failed: Vec<&str> = failed.map(|check| check.name).collect();

@@ -15,6 +15,7 @@ mod config;
 mod demo;
 mod doctor;
 mod history;
+mod idle;
 mod measure;
 pub mod names;
 pub mod numbers;
@@ -81,6 +82,8 @@ enum Command {
     /// Check a configuration, or list its keys.
     #[command(subcommand)]
     Config(config::ConfigCommand),
+    /// Leave the output lines at their idle levels: no trigger pulse, busy and ok off, fault on.
+    Idle(idle::Idle),
     /// Print the register map as CSV (or JSON with --json).
     Registers(Json),
     /// Print what makes a shell complete the command line.
@@ -148,6 +151,7 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Replay(command)) => command.run(),
         Some(Command::Recipe(command)) => command.run(),
         Some(Command::Config(command)) => command.run(),
+        Some(Command::Idle(command)) => command.run(),
         Some(Command::Registers(format)) => {
             registers(format);
             Ok(())

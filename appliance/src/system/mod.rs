@@ -4,6 +4,7 @@ use crate::error::{Exit, Failure};
 
 pub mod clock;
 pub mod computing;
+pub mod host;
 pub mod journal;
 pub mod logbook;
 pub mod memory;

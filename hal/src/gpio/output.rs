@@ -6,6 +6,7 @@ use super::chip::find;
 use super::failure::{LineError, means};
 use crate::error::Error;
 use crate::lines::OutputLine;
+use crate::setup::{LinesSetup, TriggerSetup};
 
 /// An output line. When dropped, it returns to its idle state.
 #[derive(Debug)]
@@ -32,6 +33,23 @@ impl Output {
         let put = self.handle.set_value(u8::from(on));
         put.map_err(|error| means(&error, &self.name, None))
     }
+}
+
+/// Leaves every named output of a station at its idle level: no trigger pulse, busy and ok off, fault on. For lines that a killed
+/// process left at their last level; all of them are tried. Returns the errors of those that cannot be used.
+#[must_use]
+pub fn leave_idle(trigger: &TriggerSetup, lines: &LinesSetup) -> Vec<LineError> {
+    let press = lines.outputs_active_low;
+    let outputs = [
+        (&trigger.chip, &trigger.line, trigger.active_low, false),
+        (&lines.chip, &lines.busy, press, false),
+        (&lines.chip, &lines.ok, press, false),
+        (&lines.chip, &lines.fault, press, true),
+    ];
+    let leave = |(chip, line, active_low, idle): (&String, &Option<String>, bool, bool)| {
+        Output::open(chip, line.as_ref()?, active_low, idle).err()
+    };
+    outputs.into_iter().filter_map(leave).collect()
 }
 
 impl OutputLine for Output {

@@ -88,6 +88,7 @@ const SHARED: &[(&str, &str, &str)] = &[
     ("config check", "quiet", "no closing line"),
     ("config check", "json", "what is wrong"),
     ("config keys", "json", "the keys"),
+    ("idle", "config", "which lines"),
     ("registers", "json", "the map"),
 ];
 

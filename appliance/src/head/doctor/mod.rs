@@ -3,6 +3,7 @@
 //! A check runs only if the checks that it depends on have passed, so a fault is reported once and its consequences are not. Pictures are
 //! taken long after each flip, so only the check of the flip-to-light delay depends on that delay.
 
+pub mod computer;
 mod light;
 mod time;
 
@@ -68,6 +69,11 @@ impl Check {
     }
 }
 
+/// A check with its name.
+fn named(name: &'static str, check: Check) -> Check {
+    Check { name, ..check }
+}
+
 /// The checks in their order, each with the checks that must have passed before it.
 const CHECKS: [(&str, &[&str]); 10] = [
     ("devices", &[]),
@@ -131,7 +137,7 @@ pub fn examine(
             let (found, remedy) = text.rsplit_once(": ").unwrap_or((&text, ""));
             Check::new(found, Some(remedy), json!({}))
         });
-        checks.push(Check { name, ..checked });
+        checks.push(named(name, checked));
     }
     progress(1.0, "examined");
     checks

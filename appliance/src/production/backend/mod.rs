@@ -2,7 +2,7 @@
 
 mod devices;
 
-pub use devices::{Wires, built_for, lines};
+pub use devices::{Wires, built_for, leave_lines_idle, lines};
 
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};

@@ -150,6 +150,37 @@ pub fn lines(setup: &LinesSetup) -> Result<Wires, Failure> {
     wired(setup)
 }
 
+/// Leaves every line that the station drives at its idle level: no trigger pulse, busy and ok off, fault on. All of them are tried.
+///
+/// # Errors
+/// If this build has no lines (78), or some of them cannot be used (69).
+pub fn leave_lines_idle(config: &Config) -> Result<(), Failure> {
+    let mut trigger = config.head.trigger.clone();
+    // Other heads do not use the trigger's line.
+    trigger.line.take_if(|_| config.head.backend != Backend::Rpi);
+    if trigger.line.is_some() {
+        built_with("head.trigger.line", &["gpio"], "gpio")?;
+    }
+    built_for_lines(&config.lines)?;
+    let errors = unusable(&trigger, &config.lines);
+    if errors.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::new(Exit::Unavailable, errors.join("; ")))
+}
+
+#[cfg(feature = "gpio")]
+fn unusable(trigger: &TriggerSetup, lines: &LinesSetup) -> Vec<String> {
+    let errors = hal::gpio::leave_idle(trigger, lines).into_iter();
+    errors.map(|error| error.to_string()).collect()
+}
+
+/// Without GPIO no line is configured: [`leave_lines_idle`] refuses those that are.
+#[cfg(not(feature = "gpio"))]
+fn unusable(_: &TriggerSetup, _: &LinesSetup) -> Vec<String> {
+    Vec::new()
+}
+
 #[cfg(feature = "gpio")]
 fn wired(setup: &LinesSetup) -> Result<Wires, Failure> {
     use hal::gpio::{LineError, Output, Start};
@@ -193,6 +224,26 @@ mod tests {
             assert_eq!(exit, Exit::Configuration);
             assert!(message.starts_with("lines: this fringed was built without gpio: "));
             assert!(message.ends_with("--features gpio`"), "{message}");
+        }
+    }
+
+    #[test]
+    fn lines_are_left_idle_where_some_are_named_and_the_trigger_only_on_a_real_head() {
+        let mut config = Config::default();
+        assert_eq!(leave_lines_idle(&config), Ok(()));
+        config.head.trigger.chip = "no such chip".into();
+        config.head.trigger.line = Some("GPIO17".into());
+        assert_eq!(leave_lines_idle(&config), Ok(()));
+        config.head.backend = Backend::Rpi;
+        let trigger = leave_lines_idle(&config).unwrap_err().message;
+        config.lines.chip = "no such chip".into();
+        config.lines.fault = Some("GPIO5".into());
+        let both = leave_lines_idle(&config).unwrap_err().message;
+        if cfg!(feature = "gpio") {
+            assert!(trigger.contains("GPIO17"), "{trigger}");
+            assert!(both.contains("GPIO17") && both.contains("GPIO5"), "{both}");
+        } else {
+            assert!(trigger.contains("built without gpio"), "{trigger}");
         }
     }
 

@@ -2,20 +2,22 @@
 
 #![allow(clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
 
+mod chip;
+mod killed;
+#[path = "../machine/mod.rs"]
 mod machine;
 
+use chip::{Chip, QUIET_MS, Trace};
 use hal::clock::{Clock, Monotonic, monotonic};
 use hal::contract::{check_clock, check_trigger};
 use hal::error::ErrorKind;
 use hal::gpio::{LineError, Output, Pulse, Start};
 use hal::lines::{OutputLine, StartLine};
-use hal::setup::{LinesSetup, TriggerSetup};
 use hal::trigger::Trigger;
 use hal::units::Timestamp;
 use machine::in_the_machine;
 use std::fs;
 use std::os::fd::AsFd;
-use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 
@@ -24,93 +26,8 @@ use std::time::Duration;
 const PULSE_TOLERANCE: Duration = Duration::from_micros(21);
 /// From this width on, half a percent of a pulse is much longer than its edges take.
 const MEASURED: Duration = Duration::from_millis(10);
-/// Debounce time in these tests: longer than a change of a simulated line takes.
-const QUIET_MS: u32 = 5;
 /// Longer than a start takes that comes; how long to wait for one that must not come.
 const PATIENCE: Duration = Duration::from_millis(200);
-
-/// A chip that the kernel simulates.
-struct Chip {
-    label: &'static str,
-    folder: PathBuf,
-    lines: PathBuf,
-    width: usize,
-}
-
-impl Chip {
-    fn new(label: &'static str, names: &[&str]) -> Self {
-        let folder = PathBuf::from("/sys/kernel/config/gpio-sim").join(label);
-        let bank = folder.join("bank0");
-        fs::create_dir(&folder).unwrap();
-        fs::create_dir(&bank).unwrap();
-        fs::write(bank.join("num_lines"), names.len().to_string()).unwrap();
-        fs::write(bank.join("label"), label).unwrap();
-        for (at, name) in names.iter().enumerate() {
-            let line = bank.join(format!("line{at}"));
-            fs::create_dir(&line).unwrap();
-            fs::write(line.join("name"), name).unwrap();
-        }
-        fs::write(folder.join("live"), "1").unwrap();
-        let word = |path: PathBuf| fs::read_to_string(path).unwrap().trim().to_owned();
-        let device = word(folder.join("dev_name"));
-        let chip = word(bank.join("chip_name"));
-        Self {
-            label,
-            lines: PathBuf::from("/sys/devices/platform")
-                .join(device)
-                .join(chip),
-            folder,
-            width: names.len(),
-        }
-    }
-
-    /// The level on the wire.
-    fn level(&self, line: usize) -> bool {
-        let value = self.lines.join(format!("sim_gpio{line}/value"));
-        fs::read_to_string(value).unwrap().trim() == "1"
-    }
-
-    /// Pulls the wire to a level, as a switch or a resistor would.
-    fn pull(&self, line: usize, high: bool) {
-        let pull = if high { "pull-up" } else { "pull-down" };
-        fs::write(self.lines.join(format!("sim_gpio{line}/pull")), pull).unwrap();
-    }
-
-    fn unplug(&self) {
-        fs::write(self.folder.join("live"), "0").unwrap();
-    }
-
-    fn trigger(&self, pulse_us: u32, active_low: bool) -> TriggerSetup {
-        TriggerSetup {
-            chip: self.label.into(),
-            line: None,
-            pulse_us,
-            active_low,
-        }
-    }
-
-    fn start(&self) -> Start {
-        let setup = LinesSetup {
-            chip: self.label.into(),
-            debounce_ms: QUIET_MS,
-            start_active_low: false,
-            ..LinesSetup::default()
-        };
-        Start::open(&setup, "start").unwrap()
-    }
-}
-
-impl Drop for Chip {
-    fn drop(&mut self) {
-        let _ = fs::write(self.folder.join("live"), "0");
-        let bank = self.folder.join("bank0");
-        for line in 0..self.width {
-            let _ = fs::remove_dir(bank.join(format!("line{line}")));
-        }
-        let _ = fs::remove_dir(bank);
-        let _ = fs::remove_dir(&self.folder);
-    }
-}
 
 /// Waits as a station does, for the descriptor and for the line to settle; returns the start that comes within `patience`.
 fn next_start(start: &mut Start, patience: Duration) -> Option<Timestamp> {
@@ -166,49 +83,6 @@ fn a_trigger_and_the_clock_keep_their_promises() {
     let mut clock = Monotonic::default();
     check_clock(&mut clock).unwrap();
     check_trigger(&mut pulse, &mut clock).unwrap();
-}
-
-/// When the kernel set a line, by its own record.
-struct Trace;
-
-const TRACING: &str = "/sys/kernel/debug/tracing";
-
-impl Trace {
-    fn begin() -> Self {
-        let set = |file: &str, value: &str| {
-            fs::write(Path::new(TRACING).join(file), value).unwrap();
-        };
-        set("trace_clock", "mono");
-        set("trace", "");
-        set("events/gpio/gpio_value/enable", "1");
-        Self
-    }
-
-    /// Every setting since: when (to the µs), and whether to high.
-    fn settings(&self) -> Vec<(Timestamp, bool)> {
-        let text = fs::read_to_string(Path::new(TRACING).join("trace")).unwrap();
-        let settings = text.lines().filter_map(|line| {
-            let (before, after) = line.split_once(": gpio_value: ")?;
-            let (seconds, micros) = before.rsplit(' ').next()?.split_once('.')?;
-            let at: u64 = format!("{seconds}{micros}").parse().ok()?;
-            Some((Timestamp(at * 1000), after.ends_with("set 1")))
-        });
-        settings.collect()
-    }
-
-    /// The level that a line was last set to by its owner, which does not depend on a resistor.
-    fn left_at(&self) -> bool {
-        self.settings().last().unwrap().1
-    }
-}
-
-impl Drop for Trace {
-    fn drop(&mut self) {
-        let _ = fs::write(
-            Path::new(TRACING).join("events/gpio/gpio_value/enable"),
-            "0",
-        );
-    }
 }
 
 #[test]
