@@ -7,6 +7,8 @@ pub mod bounds;
 pub mod camera;
 pub mod clock;
 pub mod contract;
+pub mod controller;
+pub mod dlpc347x;
 pub mod error;
 pub mod frame;
 #[cfg(feature = "gpio")]

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::controller::ControllerState;
 use crate::error::Error;
 use crate::units::Timestamp;
 
@@ -89,6 +90,11 @@ pub trait Projector: Send {
     /// `Disconnected` if it is gone.
     fn present(&self) -> Result<(), Error> {
         Ok(())
+    }
+
+    /// What the projector's controller said of itself when it was last asked; `None` if there is none to ask.
+    fn controller(&self) -> Option<ControllerState> {
+        None
     }
 
     /// Replaces the patterns; nothing is shown until [`Projector::queue`].

@@ -47,8 +47,31 @@ impl Default for CameraSetup {
     }
 }
 
+/// The kinds of controllers of projectors that can be set up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ControllerKind {
+    /// None: the projector shows what it gets, or is set up by hand.
+    #[default]
+    None,
+    /// TI's DLPC3470, DLPC3478 or DLPC3479 over I²C.
+    Dlpc347x,
+}
+
+/// An LED of a projector.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Led {
+    /// Red.
+    Red,
+    /// Green.
+    Green,
+    /// Blue.
+    Blue,
+}
+
 /// Which projector, and in which mode.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ProjectorSetup {
     /// The card's device file, such as "/dev/dri/card1"; none = the only one with a connector that fits.
@@ -61,6 +84,34 @@ pub struct ProjectorSetup {
     pub height: Option<u32>,
     /// Refreshes per second; none = the preferred mode's.
     pub refresh_hz: Option<f64>,
+    /// The kind of its controller.
+    pub controller: ControllerKind,
+    /// Device file of the controller's I²C bus.
+    pub controller_bus: PathBuf,
+    /// The controller's address on it, 7 bits.
+    pub controller_address: u8,
+    /// The LED that patterns are shown with.
+    pub led: Led,
+    /// Its current in steps of the LED's driver; none = as the projector's firmware sets it.
+    pub led_current: Option<u16>,
+}
+
+impl Default for ProjectorSetup {
+    /// Any projector, in its preferred mode, without a controller to set up.
+    fn default() -> Self {
+        Self {
+            card: None,
+            connector: None,
+            width: None,
+            height: None,
+            refresh_hz: None,
+            controller: ControllerKind::None,
+            controller_bus: "/dev/i2c-1".into(),
+            controller_address: 0x1B,
+            led: Led::Blue,
+            led_current: None,
+        }
+    }
 }
 
 /// The line that starts an exposure of the camera.

@@ -46,7 +46,7 @@ tail -n 1 <<<"$rated"
 # The user, its groups and its folders, created in that root folder.
 systemd-sysusers --root="$root" fringed.conf >"$root/said" 2>&1 || complain "systemd does not take the users"
 grep -q '^fringed:[^:]*:[0-9]*:[0-9]*:[^:]*:/var/lib/fringed:[^:]*nologin$' "$root/etc/passwd" || complain "there is no user fringed"
-for group in gpio render video; do
+for group in gpio i2c render video; do
     grep -q "^$group:.*:fringed$" "$root/etc/group" || complain "fringed is not in the group $group"
 done
 if [[ $(id -u) == 0 ]]; then
@@ -56,7 +56,7 @@ fi
 
 # Each rule matches a kind of device and sets who may use it.
 while read -r line; do
-    [[ $line =~ ^SUBSYSTEM==\"[a-z0-9_]+\",\ (KERNEL==\"[a-zA-Z0-9*|,-]+\",\ )?GROUP=\"(gpio|render|video)\",\ MODE=\"0660\"$ ]] ||
+    [[ $line =~ ^SUBSYSTEM==\"[a-z0-9_-]+\",\ (KERNEL==\"[a-zA-Z0-9*|,-]+\",\ )?GROUP=\"(gpio|i2c|render|video)\",\ MODE=\"0660\"$ ]] ||
         complain "no rule of udev as expected: $line"
 done < <(grep -v '^#' systemd/60-fringed.rules)
 exit "$failed"

@@ -3,7 +3,7 @@
 use super::options::Measuring;
 use crate::config::Backend;
 use crate::error::{Exit, Failure};
-use crate::head::doctor::{Check, Verdict, computer, examine};
+use crate::head::doctor::{Check, Verdict, computer, controller, examine};
 use crate::production::backend;
 use crate::system::host::Host;
 use serde_json::json;
@@ -57,6 +57,8 @@ impl Doctor {
                 &on_progress,
             )
         }));
+        let state = opened.head.controller();
+        checks.extend(state.as_ref().map(controller::examine));
         progress.clear();
         let failed = checks.iter().filter(|check| check.verdict == Verdict::Fail);
         let failed: Vec<&str> = failed.map(|check| check.name).collect();

@@ -53,11 +53,23 @@ pub(super) fn check(config: &Config) -> Result<(), String> {
         width,
         height,
         refresh_hz,
+        controller_address,
+        led_current,
         ..
     } = projector;
     size("head.projector", *width, *height)?;
     if let Some(refresh) = refresh_hz {
         within("head.projector.refresh_hz", *refresh, 1.0, 1000.0)?;
+    }
+    // The others are reserved (I²C-bus specification, UM10204, section 3.1.12).
+    within(
+        "head.projector.controller_address",
+        *controller_address,
+        8,
+        119,
+    )?;
+    if let Some(current) = led_current {
+        within("head.projector.led_current", *current, 0, 1023)?;
     }
     let TriggerSetup { pulse_us, .. } = trigger;
     within("head.trigger.pulse_us", *pulse_us, 1, 1_000_000)?;

@@ -66,6 +66,8 @@ mod tests {
                     width: Some(1),
                     height: Some(1),
                     refresh_hz: Some(1.0),
+                    led_current: Some(1),
+                    ..ProjectorSetup::default()
                 },
                 trigger: TriggerSetup {
                     line: word(),

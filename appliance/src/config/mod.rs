@@ -275,7 +275,11 @@ impl Config {
             .into_iter()
             .filter_map(|(key, path)| Some((key, path.as_ref()?)));
         let recordings = head.recordings.iter().map(|path| ("head.recordings", path));
-        for (key, path) in paths.chain(recordings) {
+        let bus = (
+            "head.projector.controller_bus",
+            &head.projector.controller_bus,
+        );
+        for (key, path) in paths.chain(recordings).chain([bus]) {
             text(key, &path.to_string_lossy(), LONGEST_PATH)?;
         }
         devices::check(self)?;

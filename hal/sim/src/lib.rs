@@ -4,6 +4,7 @@
 //! them. It implements a scene of hal's virtual head: it computes the camera's frames from the rasters that the projector shows.
 
 mod blur;
+pub mod controller;
 mod limits;
 pub mod optics;
 pub mod parts;

@@ -16,6 +16,7 @@ use std::time::Duration;
 
 use crate::camera::{Camera, CameraTiming, Encoding};
 use crate::clock::Clock;
+use crate::controller::ControllerState;
 use crate::error::Error;
 use crate::frame::{Frame, FrameFormat};
 use crate::projector::{Projector, Raster};
@@ -134,6 +135,11 @@ impl Head {
     /// Columns and rows of the rasters that [`Head::load`] takes.
     pub fn projector_size(&self) -> (u32, u32) {
         self.devices.projector.size()
+    }
+
+    /// What the projector's controller said of itself when it was last asked; `None` if there is none to ask.
+    pub fn controller(&self) -> Option<ControllerState> {
+        self.devices.projector.controller()
     }
 
     /// Time between two refreshes of the projector.

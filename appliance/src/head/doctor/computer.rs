@@ -36,7 +36,9 @@ fn released(host: &Host, chips: &[&str]) -> Check {
     let remedy = unsafe_lines.then_some(
         "add dtparam=strict_gpiod to /boot/firmware/config.txt and restart the computer: else the fault line may go on saying \"no fault\" after a crash",
     );
-    let measured = kept.iter().map(|(chip, kept)| json!({ "chip": chip, "keeps_level": kept }));
+    let measured = kept
+        .iter()
+        .map(|(chip, kept)| json!({ "chip": chip, "keeps_level": kept }));
     let measured = json!({ "chips": measured.collect::<Vec<_>>() });
     Check::new(found, remedy, measured)
 }

@@ -4,6 +4,7 @@
 //! taken long after each flip, so only the check of the flip-to-light delay depends on that delay.
 
 pub mod computer;
+pub mod controller;
 mod light;
 mod time;
 

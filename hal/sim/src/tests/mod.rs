@@ -1,6 +1,7 @@
 //! Promises of the simulated head: the contract, any number of threads, scenarios, speed; the submodules have the other topics.
 
 mod cables;
+mod controller;
 mod light;
 mod staging;
 mod surfaces;

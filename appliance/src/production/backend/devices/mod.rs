@@ -11,7 +11,7 @@ use hal::frame::FrameFormat;
 use hal::head::Head;
 use hal::lines::{OutputLine, StartLine};
 use hal::model::DeviceModel;
-use hal::setup::{LinesSetup, TriggerSetup};
+use hal::setup::{ControllerKind, LinesSetup, TriggerSetup};
 use hal::trigger::{NoTrigger, Trigger};
 
 /// The lines that are wired.
@@ -28,10 +28,11 @@ pub struct Wires {
 }
 
 /// The device libraries, and whether this build has them.
-const LIBRARIES: [(&str, bool); 3] = [
+const LIBRARIES: [(&str, bool); 4] = [
     ("libcamera", cfg!(feature = "libcamera")),
     ("kms", cfg!(feature = "kms")),
     ("gpio", cfg!(feature = "gpio")),
+    ("i2c", cfg!(feature = "i2c")),
 ];
 
 /// Checks that this build has the device libraries that a configuration needs.
@@ -44,12 +45,14 @@ pub fn built_for(config: &Config) -> Result<(), Failure> {
 }
 
 fn built_for_head(config: &HeadConfig) -> Result<(), Failure> {
-    let needed: &[&str] = match (config.backend, &config.trigger.line) {
-        (Backend::Sim | Backend::Replay, _) => &[],
-        (Backend::Rpi, None) => &["libcamera", "kms"],
-        (Backend::Rpi, Some(_)) => &["libcamera", "kms", "gpio"],
-    };
-    built_with("head.backend = \"rpi\"", needed, "rpi")
+    if config.backend != Backend::Rpi {
+        return Ok(());
+    }
+    let mut needed = vec!["libcamera", "kms"];
+    needed.extend(config.trigger.line.as_ref().map(|_| "gpio"));
+    let controlled = config.projector.controller != ControllerKind::None;
+    needed.extend(controlled.then_some("i2c"));
+    built_with("head.backend = \"rpi\"", &needed, "rpi")
 }
 
 fn built_for_lines(setup: &LinesSetup) -> Result<(), Failure> {
@@ -157,7 +160,9 @@ pub fn lines(setup: &LinesSetup) -> Result<Wires, Failure> {
 pub fn leave_lines_idle(config: &Config) -> Result<(), Failure> {
     let mut trigger = config.head.trigger.clone();
     // Other heads do not use the trigger's line.
-    trigger.line.take_if(|_| config.head.backend != Backend::Rpi);
+    trigger
+        .line
+        .take_if(|_| config.head.backend != Backend::Rpi);
     if trigger.line.is_some() {
         built_with("head.trigger.line", &["gpio"], "gpio")?;
     }
@@ -257,6 +262,12 @@ mod tests {
         let free = lacks(&config);
         config.trigger.line = Some("GPIO24".into());
         let triggered = lacks(&config);
+        config.projector.controller = ControllerKind::Dlpc347x;
+        let controlled = lacks(&config);
+        assert_eq!(
+            controlled.is_err_and(|said| said.contains("i2c")),
+            !cfg!(feature = "i2c")
+        );
         let says_gpio = |said: Result<(), String>| said.is_err_and(|said| said.contains("gpio"));
         assert!(!says_gpio(free));
         assert_eq!(says_gpio(triggered), !cfg!(feature = "gpio"));

@@ -3,10 +3,18 @@
 use crate::config::HeadConfig;
 use hal::camera::Starts;
 use hal::clock::Monotonic;
+#[cfg(feature = "i2c")]
+use hal::dlpc347x::{Controlled, Controller, bus::Bus};
 use hal::error::Error;
 use hal::head::{Head, Timing};
 use hal::libcamera::{LibCamera, Settings};
+use hal::projector::Projector;
+#[cfg(feature = "i2c")]
+use hal::setup::ControllerKind;
+use hal::setup::ProjectorSetup;
 use hal::trigger::Trigger;
+#[cfg(feature = "i2c")]
+use std::time::Duration;
 
 /// Refreshes that each pattern stays in view: an exposure of one whole refresh fits two from wherever it starts.
 const HOLD: u32 = 2;
@@ -21,17 +29,46 @@ pub fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<Head, Erro
         None => Starts::ByItself,
     };
     let camera = LibCamera::open(Settings::new(&config.camera, starts))?;
-    let projector = hal::kms::open(&config.projector)?;
-    let clock = Monotonic::new(vec![camera.ready()?, projector.descriptor()?]);
+    let display = hal::kms::open(&config.projector)?;
+    let clock = Monotonic::new(vec![camera.ready()?, display.descriptor()?]);
+    let projector = controlled(&config.projector, Box::new(display))?;
     let timing = Timing {
         hold: HOLD,
         ..Timing::default()
     };
     Ok(Head::new(
         Box::new(camera),
-        Box::new(projector),
+        projector,
         trigger,
         Box::new(clock),
         timing,
     ))
+}
+
+/// How often the controller of the projector is asked whether it still streams patterns.
+#[cfg(feature = "i2c")]
+const WATCHED: Duration = Duration::from_secs(1);
+
+/// The projector, whose controller is set up for patterns if one is configured.
+#[cfg(feature = "i2c")]
+fn controlled(
+    setup: &ProjectorSetup,
+    display: Box<dyn Projector>,
+) -> Result<Box<dyn Projector>, Error> {
+    if setup.controller == ControllerKind::None {
+        return Ok(display);
+    }
+    let bus = Bus::open(&setup.controller_bus)?;
+    let controller = Controller::open(bus, setup.controller_address, setup.led)?;
+    let projector = Controlled::new(display, controller, setup.led_current, WATCHED)?;
+    Ok(Box::new(projector))
+}
+
+/// Without I²C no controller is configured: a build without it refuses one.
+#[cfg(not(feature = "i2c"))]
+fn controlled(
+    _: &ProjectorSetup,
+    display: Box<dyn Projector>,
+) -> Result<Box<dyn Projector>, Error> {
+    Ok(display)
 }
