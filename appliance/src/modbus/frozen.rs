@@ -109,6 +109,14 @@ const VERSION_1: &str = "\
 936 TEST_U32 u32 IDENTITY
 938 TEST_F32 f32 IDENTITY";
 
+/// Rows that version 1.2 adds.
+const VERSION_1_2: &str = "\
+630 POWER bits HEALTH
+631 PROJECTOR_FAULT bits HEALTH
+632 LED_CURRENT u16 HEALTH
+633 KERNEL_VERSION u16x2 HEALTH
+635 LIBCAMERA_VERSION u16x2 HEALTH";
+
 /// Name, first and last address of every block of version 1.0, and whether it can be written. All of them are served.
 const BLOCKS_1: [(&str, u16, u16, bool); 8] = [
     ("CONTROL", 0, 31, true),
@@ -122,11 +130,15 @@ const BLOCKS_1: [(&str, u16, u16, bool); 8] = [
 ];
 
 /// The meanings in version 1.0 of the rows whose meaning a later version extends.
-const MEANINGS_1: [(u16, &str); 2] = [
+const MEANINGS_1: [(u16, &str); 3] = [
     (2, "1-9999; 0 leave the recipe; 65535 select by PART_NUMBER"),
     (
         120,
         "of the last rejected request: 1 not ready, 2 offline, 3 no recipe, 4 teach not allowed, 5 fault",
+    ),
+    (
+        103,
+        "0 temperature, 1 storage, 2 plc_lost, 3 clock_unsynced, 4 low_light, 5 saturation, 6 pattern_unfit, 7 frame_slip",
     ),
 ];
 
@@ -139,14 +151,19 @@ const MEANINGS_1_1: [(u16, &str); 2] = [
     (120, ", 6 another recipe is active"),
 ];
 
+/// Version 1.2 adds rows, and a bit of WARNING.
+const MEANINGS_1_2: [(u16, &str); 1] = [(103, ", 8 power")];
+
 fn row(address: u16) -> Register {
     let mut rows = registers().map(|(_, row)| row);
     rows.find(|row| row.address == address).expect("a row")
 }
 
 #[test]
-fn version_1_1_says_more_of_two_rows_and_takes_nothing_back() {
-    for ((address, first), (_, added)) in MEANINGS_1.into_iter().zip(MEANINGS_1_1) {
+fn later_versions_say_more_of_three_rows_and_take_nothing_back() {
+    let added = MEANINGS_1_1.into_iter().chain(MEANINGS_1_2);
+    for ((address, first), (same, added)) in MEANINGS_1.into_iter().zip(added) {
+        assert_eq!(address, same);
         let meaning = row(address).meaning;
         let rest = meaning.strip_prefix(first).expect(meaning);
         assert!(rest.starts_with(added), "{meaning}");
@@ -156,7 +173,7 @@ fn version_1_1_says_more_of_two_rows_and_takes_nothing_back() {
 #[test]
 fn the_version_is_the_same_wherever_it_is_said() {
     let (major, minor) = (VERSION >> 8, VERSION & 0xFF);
-    assert_eq!((major, minor), (1, 1));
+    assert_eq!((major, minor), (1, 2));
     assert_eq!(row(121).meaning, format!("{VERSION:#06x}"));
     assert_eq!(registers_json()["version"], format!("{major}.{minor}"));
 }
@@ -193,15 +210,16 @@ fn version_1_of_the_map_is_frozen_word_for_word() {
         })
         .collect();
     let now: Vec<&str> = rows.iter().map(String::as_str).collect();
-    for (number, frozen) in VERSION_1.lines().enumerate() {
+    let frozen = || VERSION_1.lines().chain(VERSION_1_2.lines());
+    for frozen in frozen() {
         assert!(
             now.contains(&frozen),
-            "row {number} of version 1, {frozen:?}, is no longer in the map"
+            "the row {frozen:?} is no longer in the map"
         );
     }
     assert_eq!(
         registers().count(),
-        VERSION_1.lines().count(),
+        frozen().count(),
         "a new row belongs to a new version with a list of its own"
     );
 }

@@ -25,12 +25,14 @@ use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::store::Stamp;
 use crate::recipe::{LoadError, Store};
 use crate::station::{
-    ActiveRecipe, Condition, Event, Job, JobId, RecipeKey, RecipeResult, Request, StationHandle,
+    ActiveRecipe, Condition, Event, Job, JobId, ProjectorHealth, RecipeKey, RecipeResult, Request,
+    StationHandle,
 };
 use crate::system::computing::Computing;
 use crate::system::notify::Pulse;
 use crate::system::progress::Progress;
 use cycle::JudgedBy;
+use hal::controller::{ControllerState, fault};
 use hal::error::Error;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -138,6 +140,7 @@ impl Worker {
                 Err(RecvTimeoutError::Timeout) => {
                     self.station.event(Event::Alive);
                     self.lost = self.opened.head.present().err();
+                    self.tell_projector(self.opened.head.controller());
                 }
             }
             if let Some(error) = self.lost.take() {
@@ -146,6 +149,19 @@ impl Worker {
                     return;
                 }
             }
+        }
+    }
+
+    /// Reports what the projector's controller says of itself, if that has changed; nothing is known of one that is lost.
+    fn tell_projector(&self, state: Option<ControllerState>) {
+        let known = state.map_or_else(ProjectorHealth::default, |state| ProjectorHealth {
+            temperature_c: state.temperature_c,
+            led_current: Some(state.led_current),
+            faults: Some(state.faults),
+            fault_words: Some(fault::words(state.faults).collect()),
+        });
+        if self.station.snapshot().health.projector != known {
+            self.station.event(Event::Projector(known));
         }
     }
 

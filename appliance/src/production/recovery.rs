@@ -43,6 +43,7 @@ impl Worker {
             cause: error.to_string().into(),
             remedy: REMEDY.into(),
         });
+        self.tell_projector(None);
         let before = self.opened.calibration.fingerprint();
         let mut pause = Pause::default();
         let mut reported = String::new();

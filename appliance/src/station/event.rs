@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::clock::Micros;
 use super::control::ControlWrite;
-use super::health::{Pace, System};
+use super::health::{Pace, ProjectorHealth, System};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 use super::result::{Inspection, ResultRecord};
 
@@ -136,6 +136,8 @@ pub enum Event {
     },
     /// A sequence was exposed: its timing.
     Paced(Pace),
+    /// What the projector's controller says of itself.
+    Projector(ProjectorHealth),
     /// A survey of the system.
     Surveyed(System),
     /// The answer to [`Effect::PersistSeq`].

@@ -10,6 +10,69 @@ pub const LOW_STORAGE_MIB: u64 = 256;
 pub const FULL_STORAGE_MIB: u64 = 24;
 /// From here on the processor is a warning, °C: small computers slow themselves down at 80 to 85.
 pub const HOT_PROCESSOR_C: f64 = 80.0;
+/// From here on the projector is a warning, °C: the long-term limit of the micromirror array (data sheet of the DLP3010, recommended
+/// operating conditions).
+pub const HOT_PROJECTOR_C: f64 = 70.0;
+
+/// What the firmware of a Raspberry Pi says of power and throttling.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Power(u16);
+
+impl Power {
+    /// Words for bits 0–3.
+    const WORDS: [&str; 4] = [
+        "under-voltage",
+        "frequency capped",
+        "throttled",
+        "soft temperature limit",
+    ];
+
+    /// From the bits of `get_throttled`: 0–3 now, 16–19 the same since the computer's start (Raspberry Pi documentation, *vcgencmd*,
+    /// get_throttled). Reading may reset the latter, so those of the reading `before` stay.
+    pub fn of(firmware: u32, before: Option<Self>) -> Self {
+        let nibble = |at: u32| ((firmware >> at) & 0xF) as u16;
+        let seen = before.unwrap_or_default().0 & 0xF0;
+        Self(nibble(0) | (nibble(0) | nibble(16)) << 4 | seen)
+    }
+
+    /// Bits 0–3 as in [`Power::of`]; 4–7 the same since the computer's start.
+    pub fn bits(self) -> u16 {
+        self.0
+    }
+
+    /// What is so now.
+    pub fn now(self) -> Vec<&'static str> {
+        Self::words(self.0)
+    }
+
+    /// What has been so since the computer's start.
+    pub fn since_start(self) -> Vec<&'static str> {
+        Self::words(self.0 >> 4)
+    }
+
+    fn words(bits: u16) -> Vec<&'static str> {
+        let words = Self::WORDS.into_iter().enumerate();
+        let set = words.filter(|(bit, _)| bits >> bit & 1 == 1);
+        set.map(|(_, word)| word).collect()
+    }
+}
+
+/// What the controller of the projector says of itself; nothing where there is none.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ProjectorHealth {
+    /// Its temperature, °C.
+    #[serde(rename = "projector_temperature_c")]
+    pub temperature_c: Option<f64>,
+    /// The current of the LED that is on, in steps of its driver.
+    #[serde(rename = "led_current_steps")]
+    pub led_current: Option<u16>,
+    /// Its faults, as bits.
+    #[serde(skip)]
+    pub faults: Option<u16>,
+    /// The same in words.
+    #[serde(rename = "projector_faults")]
+    pub fault_words: Option<Vec<&'static str>>,
+}
 
 /// One survey of the system; about one a second.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -22,6 +85,15 @@ pub struct System {
     pub free_storage_mib: Option<u64>,
     /// Processor temperature, °C.
     pub cpu_temperature_c: Option<f64>,
+    /// Power and throttling.
+    #[serde(skip)]
+    pub power: Option<Power>,
+    /// The kernel's version: its first two numbers.
+    #[serde(skip)]
+    pub kernel: Option<[u16; 2]>,
+    /// The version of libcamera: its first two numbers.
+    #[serde(skip)]
+    pub libcamera: Option<[u16; 2]>,
     /// Starts of the daemon with this state folder, this one included.
     pub boots: u32,
     /// Starts that followed an end without a stop: a crash, a kill, a loss of power.
@@ -70,6 +142,9 @@ pub struct Health {
     /// The last sequence; its counts are sums since the start.
     #[serde(flatten)]
     pub pace: Pace,
+    /// The projector's controller.
+    #[serde(flatten)]
+    pub projector: ProjectorHealth,
     /// Processing of the last cycle that was measured, µs: all stages but waiting and exposure.
     pub processing_us: u32,
     /// The longest of them since the start, µs.
@@ -110,9 +185,16 @@ impl Health {
         self.system.free_storage_mib.is_some_and(|free| free < mib)
     }
 
-    pub(super) fn processor_is_hot(&self) -> bool {
+    pub(super) fn is_hot(&self) -> bool {
+        let above = |celsius: Option<f64>, limit: f64| celsius.is_some_and(|is| is >= limit);
+        above(self.system.cpu_temperature_c, HOT_PROCESSOR_C)
+            || above(self.projector.temperature_c, HOT_PROJECTOR_C)
+    }
+
+    /// Whether the supply is too weak or the computer slows itself down.
+    pub(super) fn lacks_power(&self) -> bool {
         self.system
-            .cpu_temperature_c
-            .is_some_and(|celsius| celsius >= HOT_PROCESSOR_C)
+            .power
+            .is_some_and(|power| !power.now().is_empty())
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! [`step()`] is a function `(station, event, now) → (station, effects)`. It knows no thread, no socket and no clock: time is
 //! an argument ([`Micros`]), the worker and the PLC are [`Event`]s, and everything it wants done is an [`Effect`]. Its
-//! registers follow `docs/modbus.md`, version 1.1. Modbus and the page see nothing but one immutable [`Snapshot`].
+//! registers follow `docs/modbus.md`, version 1.2. Modbus and the page see nothing but one immutable [`Snapshot`].
 //! [`StationHandle`] is the one place where the machine meets a clock, a mutex and channels.
 //!
 //! [`machine`] holds the parts: clock, PLC, request counters, recipes, worker, results. Each part has its own file and is changed
@@ -76,7 +76,7 @@ pub use event::{Condition, Effect, Effects, Event, Job, JobId, Request, Unstored
 pub use fault::Fault;
 pub use gauge::{Decision, GaugeValue, Unit};
 pub use handle::{StationHandle, tick};
-pub use health::{FULL_STORAGE_MIB, Health, Pace, System};
+pub use health::{FULL_STORAGE_MIB, HOT_PROJECTOR_C, Health, Pace, Power, ProjectorHealth, System};
 pub use machine::{Limits, Settings, Station};
 pub use recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 pub use result::{Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, Verdict};

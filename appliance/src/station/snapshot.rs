@@ -66,8 +66,10 @@ pub mod warning {
     pub const PATTERN_UNFIT: u16 = 1 << 6;
     /// Camera and projector slipped by a frame.
     pub const FRAME_SLIP: u16 = 1 << 7;
-    /// The words for bits 0–7, in order.
-    pub const WORDS: [&str; 8] = [
+    /// The computer's supply is too weak, or the computer slows itself down.
+    pub const POWER: u16 = 1 << 8;
+    /// The words for bits 0–8, in order.
+    pub const WORDS: [&str; 9] = [
         "temperature",
         "storage",
         "PLC lost",
@@ -76,6 +78,7 @@ pub mod warning {
         "saturation",
         "pattern unfit",
         "frame slip",
+        "power",
     ];
 }
 
@@ -249,7 +252,8 @@ impl Station {
                 ),
                 (warning::CLOCK_UNSYNCED, self.clock.utc_us(now).is_none()),
                 (warning::STORAGE, storage),
-                (warning::TEMPERATURE, self.health.processor_is_hot()),
+                (warning::TEMPERATURE, self.health.is_hot()),
+                (warning::POWER, self.health.lacks_power()),
             ])
     }
 

@@ -83,6 +83,7 @@ impl Station {
             }
             Event::Recovered { recipe } => self.recovered(recipe, effects),
             Event::Paced(pace) => self.health.paced(pace),
+            Event::Projector(projector) => self.health.projector = projector,
             Event::Surveyed(system) => self.surveyed(system, effects),
             Event::Stored { seq, failed } => self.stored(seq, failed, effects),
             Event::History { problem } => self.history_changed(problem, effects),

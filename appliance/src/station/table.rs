@@ -235,6 +235,7 @@ fn events(job: JobId) -> Vec<(Event, [u16; 12])> {
             Event::Paced(Pace::default()),
             [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 1, 8],
         ),
+        (Event::Projector(ProjectorHealth::default()), alive),
         (room(0), [0, 7, 2, 3, 4, 5, 7, 7, 7, 7, 7, 8]),
         (room(1000), [0, 1, 2, 3, 4, 5, 6, 7, 7, 1, 7, 8]),
         (

@@ -30,6 +30,60 @@ impl Host {
         Some(text.trim().to_owned())
     }
 
+    /// The paths below the root of the entries of a folder whose name begins with `begin` and ends with `end`, sorted.
+    fn entries(&self, folder: &str, begin: &str, end: &str) -> Vec<String> {
+        let entries = fs::read_dir(self.root.join(folder)).into_iter().flatten();
+        let names = entries
+            .flatten()
+            .filter_map(|entry| entry.file_name().into_string().ok());
+        let names = names.filter(|name| name.starts_with(begin) && name.ends_with(end));
+        let mut paths: Vec<String> = names.map(|name| format!("{folder}/{name}")).collect();
+        paths.sort();
+        paths
+    }
+
+    /// What the firmware of a Raspberry Pi says of power and throttling: the bits of `vcgencmd get_throttled`, as its driver shows them.
+    pub fn throttled(&self) -> Option<u32> {
+        let devices = "sys/devices/platform";
+        // soc/soc:firmware; on a Raspberry Pi 5 the node has an address in its name.
+        let nodes = self.entries(devices, "soc", "");
+        let firmware = nodes
+            .iter()
+            .flat_map(|soc| self.entries(soc, "soc", ":firmware"));
+        firmware
+            .filter_map(|node| self.text(&format!("{node}/get_throttled")))
+            .find_map(|text| u32::from_str_radix(text.trim_start_matches("0x"), 16).ok())
+    }
+
+    /// The hottest thermal zone, °C.
+    pub fn temperature_c(&self) -> Option<f64> {
+        let zones = self.entries("sys/class/thermal", "thermal_zone", "");
+        let degrees = zones.iter().filter_map(|zone| {
+            let millidegrees = self.text(&format!("{zone}/temp"))?;
+            Some(millidegrees.parse::<f64>().ok()? / 1000.0)
+        });
+        degrees.max_by(f64::total_cmp)
+    }
+
+    /// The kernel's release, such as "6.12.34+rpt-rpi-2712".
+    pub fn kernel(&self) -> Option<String> {
+        self.text("proc/sys/kernel/osrelease")
+    }
+
+    /// The version of libcamera that this process has loaded, such as "0.7.0": from the name of its file.
+    pub fn libcamera(&self) -> Option<String> {
+        let maps = self.text("proc/self/maps")?;
+        let mut names = maps.lines().filter_map(|line| line.rsplit('/').next());
+        let version = names.find_map(|name| name.strip_prefix("libcamera.so."))?;
+        Some(version.to_owned())
+    }
+
+    /// Whether the driver of the IMX296 waits for triggers; `None` if it is not loaded or has no such parameter.
+    pub fn sensor_waits_for_triggers(&self) -> Option<bool> {
+        let mode = self.text("sys/module/imx296/parameters/trigger_mode")?;
+        mode.parse::<u32>().ok().map(|mode| mode != 0)
+    }
+
     /// Whether the driver of the GPIO chip with this label keeps the level of an output whose owner has gone: the parameter
     /// `persist_gpio_outputs` of Raspberry Pi's kernels. `None` if the driver has no such parameter.
     pub fn keeps_released_outputs(&self, chip: &str) -> Option<bool> {
@@ -46,6 +100,13 @@ impl Host {
             _ => None,
         }
     }
+}
+
+/// The first two numbers of a version.
+pub fn major_minor(version: &str) -> Option<[u16; 2]> {
+    let mut numbers = version.split(|c: char| !c.is_ascii_digit());
+    let mut next = || numbers.next()?.parse().ok();
+    Some([next()?, next()?])
 }
 
 #[cfg(test)]
@@ -79,5 +140,46 @@ pub(crate) mod tests {
         let empty = tempfile::tempdir().unwrap();
         let nothing = Host::at(empty.path());
         assert_eq!(nothing.keeps_released_outputs("pinctrl-rp1"), None);
+    }
+
+    #[test]
+    fn what_a_computer_reports_is_understood_and_what_it_does_not_is_not_known() {
+        for node in ["soc/soc:firmware", "soc@107c000000/soc@107c000000:firmware"] {
+            let throttled = format!("sys/devices/platform/{node}/get_throttled");
+            let root = root(&[
+                (&throttled, "50005\n"),
+                ("sys/class/thermal/thermal_zone0/temp", "51240\n"),
+                ("sys/class/thermal/thermal_zone1/temp", "61000\n"),
+                ("proc/sys/kernel/osrelease", "6.12.34+rpt-rpi-2712\n"),
+                (
+                    "proc/self/maps",
+                    "7f00 r-xp 00000000 fd:00 1 /usr/lib/libc.so.6\n7f01 r-xp 00000000 fd:00 2 /usr/lib/aarch64-linux-gnu/libcamera.so.0.7.0\n",
+                ),
+                ("sys/module/imx296/parameters/trigger_mode", "1\n"),
+            ]);
+            let host = Host::at(root.path());
+            assert_eq!(host.throttled(), Some(0x50005), "{node}");
+            assert_eq!(host.temperature_c(), Some(61.0));
+            assert_eq!(host.kernel().as_deref(), Some("6.12.34+rpt-rpi-2712"));
+            assert_eq!(host.libcamera().as_deref(), Some("0.7.0"));
+            assert_eq!(host.sensor_waits_for_triggers(), Some(true));
+            fs::write(root.path().join(throttled), "what?\n").unwrap();
+            assert_eq!(host.throttled(), None);
+        }
+        let empty = tempfile::tempdir().unwrap();
+        let host = Host::at(empty.path());
+        assert_eq!((host.throttled(), host.temperature_c()), (None, None));
+        assert_eq!((host.kernel(), host.libcamera()), (None, None));
+        assert_eq!(host.sensor_waits_for_triggers(), None);
+    }
+
+    #[test]
+    fn a_version_is_its_first_two_numbers() {
+        assert_eq!(major_minor("6.12.34+rpt-rpi-2712"), Some([6, 12]));
+        assert_eq!(major_minor("7.2-rc1"), Some([7, 2]));
+        assert_eq!(major_minor("0.7"), Some([0, 7]));
+        for wrong in ["", "seven", "7", "99999.1", "-1.2"] {
+            assert_eq!(major_minor(wrong), None, "{wrong}");
+        }
     }
 }

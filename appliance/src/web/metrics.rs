@@ -7,8 +7,8 @@ use axum::http::header;
 use axum::response::IntoResponse;
 
 use super::site::Site;
-use crate::station::ResultRecord;
 use crate::station::snapshot::status;
+use crate::station::{Health, Power, ResultRecord};
 
 const KIND: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
@@ -54,6 +54,7 @@ pub(super) fn text(site: &Site) -> String {
         now.uptime_s,
         "Time since the start.",
     );
+    out.health(&now.health);
     let counts = now.counts;
     out.family(
         "fringed_results",
@@ -90,6 +91,42 @@ pub(super) fn text(site: &Site) -> String {
 struct Text(String);
 
 impl Text {
+    /// Temperatures, power and the projector's controller; what is not known is left out.
+    fn health(&mut self, health: &Health) {
+        let (system, projector) = (&health.system, &health.projector);
+        let name = "fringed_temperature_celsius";
+        self.family(name, "gauge", "Temperatures by part.");
+        for (part, celsius) in [
+            ("processor", system.cpu_temperature_c),
+            ("projector", projector.temperature_c),
+        ] {
+            if let Some(celsius) = celsius {
+                self.sample(name, &[("part", part)], celsius);
+            }
+        }
+        for (name, value, meaning) in [
+            (
+                "fringed_power",
+                system.power.map(Power::bits),
+                "Register 630: under-voltage and throttling.",
+            ),
+            (
+                "fringed_projector_fault",
+                projector.faults,
+                "Register 631: faults of the projector's controller.",
+            ),
+            (
+                "fringed_led_current_steps",
+                projector.led_current,
+                "Current of the projector's LED, steps of its driver.",
+            ),
+        ] {
+            if let Some(value) = value {
+                self.gauge(name, value, meaning);
+            }
+        }
+    }
+
     /// The metrics of the last cycle.
     fn result(&mut self, result: &ResultRecord) {
         let seconds = |us: u32| f64::from(us) / 1e6;

@@ -59,6 +59,16 @@ fn health(health: &Health) -> Value {
     let mut shown = json!(health);
     shown["camera_hz"] = json!(f64::from(pace.camera_centihertz) / 100.0);
     shown["projector_hz"] = json!(f64::from(pace.refresh_millihertz) / 1000.0);
+    let system = &health.system;
+    shown["power"] = json!(
+        system
+            .power
+            .map(|power| json!({ "now": power.now(), "since_start": power.since_start() }))
+    );
+    let version =
+        |numbers: Option<[u16; 2]>| numbers.map(|[major, minor]| format!("{major}.{minor}"));
+    shown["kernel"] = json!(version(system.kernel));
+    shown["libcamera"] = json!(version(system.libcamera));
     shown
 }
 

@@ -48,6 +48,13 @@ pub(super) struct Opened {
     pub configured: Configured,
 }
 
+/// What to do where the library lists no camera. A module of image algorithms (IPA) that is not signed with the library's key runs in a
+/// process of its own, in user and network namespaces of its own (libcamera, `Process::isolate`); where these are forbidden, its cameras
+/// are missing.
+const NO_CAMERA: &str = "libcamera finds no camera at all: check cable and overlay, and that this user may open /dev/media* (group `video`). \
+     If libcamera's messages say \"Failed to unshare execution context\" or that an IPA proxy failed, its algorithms (IPA modules) are not signed for it and need \
+     namespaces, which RestrictNamespaces= of the service forbids: install libcamera and libcamera-ipa of one source";
+
 /// The error for a call that the library refused.
 pub(super) fn refused(id: &str, attempt: &str, cause: &io::Error) -> Error {
     let attempt = format!("{attempt} the camera `{id}`");
@@ -172,7 +179,7 @@ fn find(manager: &CameraManager, id: Option<&str>) -> Result<Camera<'static>, Er
             format!("opening the camera `{id}`")
         }),
         remedy: if all.is_empty() {
-            "libcamera finds no camera at all: check cable and overlay, and that this user may open /dev/media* (group `video`)".into()
+            NO_CAMERA.into()
         } else {
             format!("check its cable, or set head.camera.id to one that is there: {there}")
         },

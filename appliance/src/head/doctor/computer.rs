@@ -1,12 +1,22 @@
-//! The doctor's checks of the computer, which need no head: what becomes of lines whose program ends.
+//! The doctor's checks of the computer, which need no head: lines whose program ends, power, versions, the sensor's mode.
 
 use super::{Check, named};
-use crate::system::host::Host;
+use crate::station::Power;
+use crate::system::host::{Host, major_minor};
 use hal::setup::{LinesSetup, TriggerSetup};
 use serde_json::json;
 
-/// Checks a computer with these lines; `trigger` is that of a real head. There are only checks of what is used.
+/// The oldest kernel: since 5.7 edges of lines are stamped on the clock of the head (`CLOCK_MONOTONIC`).
+const OLDEST_KERNEL: [u16; 2] = [5, 7];
+/// The versions of libcamera that the bindings know.
+const LIBCAMERA: [[u16; 2]; 2] = [[0, 4], [0, 7]];
+
+/// Checks a computer with these lines; `trigger` is that of a real head. There are only checks of what is used and known.
 pub fn examine(host: &Host, lines: &LinesSetup, trigger: Option<&TriggerSetup>) -> Vec<Check> {
+    let power = host.throttled().map(|bits| power(Power::of(bits, None)));
+    let versions = trigger.map(|_| versions(host));
+    let sensor = trigger.zip(host.sensor_waits_for_triggers());
+    let sensor = sensor.map(|(trigger, waits)| sensor_mode(waits, trigger.line.is_some()));
     let trigger = trigger.filter(|trigger| trigger.line.is_some());
     let outputs = [&lines.busy, &lines.ok, &lines.fault];
     let press = outputs.into_iter().any(Option::is_some);
@@ -16,8 +26,86 @@ pub fn examine(host: &Host, lines: &LinesSetup, trigger: Option<&TriggerSetup>) 
     ];
     let mut chips: Vec<&str> = chips.into_iter().flatten().collect();
     chips.dedup();
-    let released = (!chips.is_empty()).then(|| named("lines", released(host, &chips)));
-    released.into_iter().collect()
+    let released = (!chips.is_empty()).then(|| released(host, &chips));
+    let checks = [
+        ("lines", released),
+        ("power", power),
+        ("versions", versions),
+        ("sensor", sensor),
+    ];
+    let checks = checks.into_iter();
+    checks
+        .filter_map(|(name, check)| Some(named(name, check?)))
+        .collect()
+}
+
+/// A Raspberry Pi's supply and cooling: a computer that slows itself down ends pulses late, and one without voltage loses its card.
+fn power(power: Power) -> Check {
+    let (now, since) = (power.now(), power.since_start());
+    let words = |of: &[&str]| match of {
+        [] => "nothing".to_owned(),
+        of => of.join(", "),
+    };
+    let found = format!(
+        "the firmware reports {}; since the computer's start {}",
+        words(&now),
+        words(&since)
+    );
+    let weak = since.contains(&"under-voltage");
+    let remedy = if weak {
+        Some(
+            "use the supply that is made for this model (5.1 V, 5 A for a Raspberry Pi 5) and a short, thick cable",
+        )
+    } else if !now.is_empty() {
+        Some("cool the computer: it slows itself down")
+    } else {
+        None
+    };
+    Check::new(found, remedy, json!({ "now": now, "since_start": since }))
+}
+
+/// The kernel and libcamera.
+fn versions(host: &Host) -> Check {
+    let (kernel, libcamera) = (host.kernel(), host.libcamera());
+    let shown = |version: &Option<String>| version.clone().unwrap_or_else(|| "not known".into());
+    let found = format!("kernel {}, libcamera {}", shown(&kernel), shown(&libcamera));
+    let of = |version: &Option<String>| major_minor(version.as_deref()?);
+    let [oldest, newest] = LIBCAMERA;
+    let remedy = if of(&kernel).is_some_and(|is| is < OLDEST_KERNEL) {
+        Some("use a kernel of 5.7 or newer: older ones stamp the edges of lines on another clock")
+    } else if of(&libcamera).is_some_and(|is| !(oldest..=newest).contains(&is)) {
+        Some("install libcamera 0.4 to 0.7, for which this program is built")
+    } else {
+        None
+    };
+    Check::new(
+        found,
+        remedy,
+        json!({ "kernel": kernel, "libcamera": libcamera }),
+    )
+}
+
+/// Whether the driver of the IMX296 is in the mode that the configuration says.
+fn sensor_mode(waits: bool, triggered: bool) -> Check {
+    let found = format!(
+        "the driver imx296 {} triggers, head.trigger.line is {}",
+        if waits { "waits for" } else { "takes no" },
+        if triggered { "named" } else { "not named" }
+    );
+    let remedy = match (waits, triggered) {
+        (false, true) => Some(
+            "write \"options imx296 trigger_mode=1\" to /etc/modprobe.d/imx296.conf and restart the computer: without it the camera runs by itself",
+        ),
+        (true, false) => Some(
+            "name head.trigger.line, or remove trigger_mode=1 from /etc/modprobe.d/imx296.conf and restart the computer: without triggers there are no frames",
+        ),
+        _ => None,
+    };
+    Check::new(
+        found,
+        remedy,
+        json!({ "trigger_mode": waits, "triggered": triggered }),
+    )
 }
 
 /// Whether lines become inputs when their program ends.
@@ -64,9 +152,7 @@ mod tests {
         for (parameter, verdict) in [("Y\n", Verdict::Fail), ("N\n", Verdict::Pass)] {
             let root = root(&[(PARAMETER, parameter)]);
             let checks = examine(&Host::at(root.path()), &lines, Some(&trigger));
-            let [check] = &checks[..] else {
-                panic!("{checks:?}");
-            };
+            let check = &checks[0];
             assert_eq!((check.name, check.verdict), ("lines", verdict));
             assert!(check.found.contains("pinctrl-rp1"), "{}", check.found);
             assert_eq!(
@@ -78,7 +164,64 @@ mod tests {
         let empty = tempfile::tempdir().unwrap();
         let host = Host::at(empty.path());
         assert_eq!(examine(&host, &lines, None)[0].verdict, Verdict::Pass);
-        let unused = TriggerSetup::default();
-        assert!(examine(&host, &LinesSetup::default(), Some(&unused)).is_empty());
+        assert!(examine(&host, &LinesSetup::default(), None).is_empty());
+    }
+
+    /// The checks of a real head, with a line for its trigger or none, that fail.
+    fn failed(files: &[(&str, &str)], line: Option<&str>) -> Vec<Check> {
+        let root = root(files);
+        let trigger = TriggerSetup {
+            line: line.map(ToOwned::to_owned),
+            ..TriggerSetup::default()
+        };
+        let lines = LinesSetup::default();
+        let mut checks = examine(&Host::at(root.path()), &lines, Some(&trigger));
+        checks.retain(|check| check.verdict == Verdict::Fail);
+        checks
+    }
+
+    #[test]
+    fn power_versions_and_the_sensors_mode_are_named_when_they_are_wrong() {
+        let throttled = "sys/devices/platform/soc/soc:firmware/get_throttled";
+        let maps = "proc/self/maps";
+        let release = "proc/sys/kernel/osrelease";
+        let mode = "sys/module/imx296/parameters/trigger_mode";
+        let well = [
+            (throttled, "20000"),
+            (maps, "7f01 r-xp 0 0 2 /usr/lib/libcamera.so.0.7.0"),
+            (release, "6.12.34+rpt-rpi-2712"),
+            (mode, "1"),
+        ];
+        assert_eq!(failed(&well, Some("GPIO17")).len(), 0);
+        assert_eq!(failed(&[], Some("GPIO17")).len(), 0, "nothing is known");
+        for (file, text, name, word) in [
+            (throttled, "50005", "power", "supply"),
+            (throttled, "10000", "power", "supply"),
+            (throttled, "2", "power", "cool"),
+            (
+                maps,
+                "a /usr/lib/libcamera.so.0.3.2",
+                "versions",
+                "0.4 to 0.7",
+            ),
+            (
+                maps,
+                "a /usr/lib/libcamera.so.0.8",
+                "versions",
+                "0.4 to 0.7",
+            ),
+            (release, "5.4.0", "versions", "5.7"),
+            (mode, "0", "sensor", "trigger_mode=1"),
+        ] {
+            let files = well.map(|(path, said)| (path, if path == file { text } else { said }));
+            let failed = failed(&files, Some("GPIO17"));
+            let [check] = &failed[..] else {
+                panic!("{file} {text}: {failed:?}");
+            };
+            assert_eq!(check.name, name);
+            assert!(check.remedy.contains(word), "{}", check.remedy);
+        }
+        let runs_by_itself = failed(&well, None);
+        assert_eq!(runs_by_itself[0].name, "sensor");
     }
 }

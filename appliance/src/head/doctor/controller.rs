@@ -1,12 +1,9 @@
 //! The doctor's check of a projector's controller: it shows patterns as they are, is cool enough and reports no fault.
 
 use super::{Check, named};
+use crate::station::HOT_PROJECTOR_C;
 use hal::controller::{ControllerState, fault, processing};
 use serde_json::json;
-
-/// From here on a projector is too hot, °C: the long-term limit of the micromirror array (data sheet of the DLP3010, recommended
-/// operating conditions).
-pub const HOT_PROJECTOR_C: f64 = 70.0;
 
 /// Checks what a controller said of itself.
 pub fn examine(state: &ControllerState) -> Check {

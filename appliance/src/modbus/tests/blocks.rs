@@ -189,11 +189,15 @@ async fn health_says_what_is_known_and_what_is_not() {
         unknown[22..28],
         [0xFFFF, 0xFFFF, 0xFFFF, 0x8000, 0x8000, 0x8000]
     );
+    assert_eq!(unknown[30..37], [0xFFFF; 7]);
     plant.handle.event(Event::Surveyed(System {
         cpu_percent: Some(37),
         free_memory_mib: Some(1234),
         free_storage_mib: Some(1 << 30),
         cpu_temperature_c: Some(51.24),
+        power: Some(Power::of(0x5_0004, None)),
+        kernel: Some([6, 12]),
+        libcamera: Some([0, 7]),
         boots: 0x1_0002,
         unclean_boots: 3,
         watchdog_restarts: 1,
@@ -212,13 +216,23 @@ async fn health_says_what_is_known_and_what_is_not() {
     };
     plant.handle.event(Event::Paced(pace));
     plant.handle.event(Event::Paced(pace));
+    plant.handle.event(Event::Projector(ProjectorHealth {
+        temperature_c: Some(70.04),
+        led_current: Some(600),
+        faults: Some(0b10),
+        fault_words: Some(vec!["LED"]),
+    }));
     let words = plc.read_input_registers(600, 40).await.unwrap().unwrap();
     let long = |k: usize| u32_at(&words, k);
     assert_eq!((long(0), long(2), long(4)), (2000, 60_000, 12));
     assert_eq!((long(6), long(8)), (4, 2), "counted since the start");
     assert_eq!((long(16), long(18), long(20)), (0x1_0002, 3, 1));
-    assert_eq!(words[22..30], [37, 1234, 65534, 512, 0x8000, 0x8000, 2, 1]);
-    assert_eq!(words[30..], [0; 10], "reserved registers read 0");
+    assert_eq!(words[22..30], [37, 1234, 65534, 512, 0x8000, 700, 2, 1]);
+    // Throttled now; under-voltage at some time before.
+    assert_eq!(words[30..37], [0b0101_0100, 0b10, 600, 6, 12, 0, 7]);
+    assert_eq!(words[37..], [0; 3], "reserved registers read 0");
+    let warning = plc.read_input_registers(103, 1).await.unwrap().unwrap();
+    assert_eq!(warning[0] & 0x101, 0x101, "power and temperature");
     let stored = plc.read_input_registers(700, 64).await.unwrap().unwrap();
     assert_eq!((stored[0], stored[1], stored[63]), (0b11, 1, 1 << 15));
     assert_eq!(stored.iter().map(|word| word.count_ones()).sum::<u32>(), 4);

@@ -1,4 +1,4 @@
-//! The survey: load, memory, storage, temperature, stored recipes and Modbus clients, once a second.
+//! The survey: load, memory, storage, temperature, power, versions, stored recipes and Modbus clients, once a second.
 //!
 //! It has its own thread, so that a storage that hangs delays neither sockets nor measuring.
 
@@ -7,7 +7,8 @@ mod system;
 
 use crate::modbus::Clients;
 use crate::recipe::Store;
-use crate::station::{Event, StationHandle, System};
+use crate::station::{Event, Power, StationHandle, System};
+use crate::system::host::{Host, major_minor};
 use crate::system::progress::Progress;
 use boots::{Boots, Condition};
 use std::path::{Path, PathBuf};
@@ -49,13 +50,21 @@ impl Survey {
     pub fn run(mut self, station: &StationHandle, stopped: &Receiver<()>) {
         let mut processors = system::Processors::default();
         let mut late = 0_u32;
+        let host = Host::default();
+        let version = |text: Option<String>| major_minor(&text?);
+        let kernel = version(host.kernel());
+        let mut power: Option<Power> = None;
         loop {
+            power = host.throttled().map(|bits| Power::of(bits, power));
             let (clients, writer_connected) = self.clients.open();
             let after = station.event(Event::Surveyed(System {
                 cpu_percent: processors.load_percent(),
                 free_memory_mib: system::free_memory_mib(),
                 free_storage_mib: system::free_storage_mib(&self.folder),
-                cpu_temperature_c: system::temperature_c(),
+                cpu_temperature_c: host.temperature_c(),
+                power,
+                kernel,
+                libcamera: version(host.libcamera()),
                 boots: self.boots.starts,
                 unclean_boots: self.boots.unclean,
                 watchdog_restarts: self.boots.after_hanging,

@@ -1,4 +1,4 @@
-//! Load, memory, storage and temperature as the kernel reports them; `None` where it does not.
+//! Load, memory and storage as the kernel reports them; `None` where it does not.
 
 use std::fs;
 use std::path::Path;
@@ -55,18 +55,6 @@ fn available(meminfo: &str) -> Option<u64> {
 pub fn free_storage_mib(folder: &Path) -> Option<u64> {
     let storage = rustix::fs::statvfs(folder).ok()?;
     Some(storage.f_bavail.checked_mul(storage.f_frsize)? / MIB)
-}
-
-/// The hottest thermal zone, °C.
-pub fn temperature_c() -> Option<f64> {
-    let zones = fs::read_dir("/sys/class/thermal").ok()?;
-    zones
-        .flatten()
-        .filter_map(|zone| {
-            let millidegrees = fs::read_to_string(zone.path().join("temp")).ok()?;
-            Some(millidegrees.trim().parse::<f64>().ok()? / 1000.0)
-        })
-        .max_by(f64::total_cmp)
 }
 
 #[cfg(test)]

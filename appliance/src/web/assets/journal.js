@@ -17,6 +17,17 @@ function known(value, unit, places = 0) {
   return value === null || value === undefined ? "not known" : count(value.toFixed(places)) + unit;
 }
 
+function listed(words) {
+  return words.length ? words.join(", ") : "none";
+}
+
+// What the firmware of a Raspberry Pi says; other computers say nothing.
+function power(now) {
+  if (!now) return "not known";
+  if (now.now.length) return listed(now.now);
+  return now.since_start.length ? `good; since the start of the computer: ${listed(now.since_start)}` : "good";
+}
+
 function condition(now) {
   const { health, result } = now;
   const pairs = [
@@ -26,6 +37,10 @@ function condition(now) {
     ["Head temperature", result && result.temperature_c !== null ? `${result.temperature_c.toFixed(1)} °C` : "not known"],
     ["Processor load", known(health.cpu_percent, " %")],
     ["Processor temperature", known(health.cpu_temperature_c, " °C", 1)],
+    ["Power", power(health.power)],
+    ["Projector temperature", known(health.projector_temperature_c, " °C", 1)],
+    ["Projector LED current", known(health.led_current_steps, " steps")],
+    ["Projector faults", health.projector_faults === null ? "not known" : listed(health.projector_faults)],
     ["Free memory", known(health.free_memory_mib, " MiB")],
     ["Free storage", known(health.free_storage_mib, " MiB")],
     ["Storage errors", count(health.storage_errors)],
@@ -44,6 +59,8 @@ function condition(now) {
     ["Up for", duration(now.uptime_s)],
     ["Serial number", now.identity.serial],
     ["Program", now.identity.version],
+    ["Kernel", health.kernel || "not known"],
+    ["libcamera", health.libcamera || "not in use"],
   ];
   return pairs.map(([name, value]) => make("div", "", make("dt", "", name), make("dd", "", value)));
 }
