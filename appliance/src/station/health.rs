@@ -198,3 +198,20 @@ impl Health {
             .is_some_and(|power| !power.now().is_empty())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_reported_once_stays_reported_for_the_time_since_the_start() {
+        let first = Power::of(0x5_0005, None);
+        assert_eq!(first.now(), ["under-voltage", "throttled"]);
+        // The firmware has forgotten it, and something else began.
+        let later = Power::of(0x8, Some(first));
+        assert_eq!(later.now(), ["soft temperature limit"]);
+        let since = ["under-voltage", "throttled", "soft temperature limit"];
+        assert_eq!(later.since_start(), since);
+        assert_eq!(later.bits(), 0b1101_1000);
+    }
+}

@@ -28,6 +28,16 @@ function power(now) {
   return now.since_start.length ? `good; since the start of the computer: ${listed(now.since_start)}` : "good";
 }
 
+// What the projector's controller says, if there is one.
+function controller(health) {
+  if (!health.projector_faults) return [];
+  return [
+    ["Projector temperature", known(health.projector_temperature_c, " °C", 1)],
+    ["Projector LED current", known(health.led_current_steps, " steps")],
+    ["Projector faults", listed(health.projector_faults)],
+  ];
+}
+
 function condition(now) {
   const { health, result } = now;
   const pairs = [
@@ -38,14 +48,12 @@ function condition(now) {
     ["Processor load", known(health.cpu_percent, " %")],
     ["Processor temperature", known(health.cpu_temperature_c, " °C", 1)],
     ["Power", power(health.power)],
-    ["Projector temperature", known(health.projector_temperature_c, " °C", 1)],
-    ["Projector LED current", known(health.led_current_steps, " steps")],
-    ["Projector faults", health.projector_faults === null ? "not known" : listed(health.projector_faults)],
     ["Free memory", known(health.free_memory_mib, " MiB")],
     ["Free storage", known(health.free_storage_mib, " MiB")],
     ["Storage errors", count(health.storage_errors)],
     ["Camera", `${health.camera_hz.toFixed(1)} frames/s`],
     ["Projector", `${health.projector_hz.toFixed(2)} Hz`],
+    ...controller(health),
     ["Pattern to exposure", `${count(health.lag_us)} µs at most`],
     ["Dropped frames", count(health.dropped_frames)],
     ["Missed flips", count(health.missed_flips)],

@@ -110,6 +110,50 @@ async fn metrics_are_whole_and_end_as_openmetrics_must() {
 }
 
 #[tokio::test]
+async fn power_and_projector_are_shown_where_they_are_known_and_left_out_of_metrics_elsewhere() {
+    let served = served().await;
+    let health = || async {
+        let snapshot = served.get("/api/snapshot").await.body;
+        serde_json::from_str::<Value>(&snapshot).unwrap()["health"].clone()
+    };
+    let shown = health().await;
+    for unknown in ["power", "kernel", "projector_faults", "led_current_steps"] {
+        assert_eq!(shown[unknown], Value::Null, "{unknown}");
+    }
+    let metrics = served.get("/metrics").await.body;
+    assert!(!metrics.contains("fringed_power") && !metrics.contains("{part="));
+
+    served.handle.event(Event::Surveyed(System {
+        power: Some(Power::of(0x1_0000, None)),
+        kernel: Some([6, 12]),
+        ..System::default()
+    }));
+    served.handle.event(Event::Projector(ProjectorHealth {
+        temperature_c: Some(41.2),
+        led_current: Some(600),
+        faults: Some(2),
+        fault_words: Some(vec!["LED"]),
+    }));
+    let shown = health().await;
+    assert_eq!(shown["power"]["now"], serde_json::json!([]));
+    assert_eq!(shown["power"]["since_start"][0], "under-voltage");
+    assert_eq!(
+        (&shown["kernel"], &shown["libcamera"]),
+        (&"6.12".into(), &Value::Null)
+    );
+    assert_eq!(shown["projector_faults"][0], "LED");
+    let metrics = served.get("/metrics").await.body;
+    for sample in [
+        "fringed_temperature_celsius{part=\"projector\"} 41.2\n",
+        "fringed_power 16\n",
+        "fringed_projector_fault 2\n",
+        "fringed_led_current_steps 600\n",
+    ] {
+        assert!(metrics.contains(sample), "{metrics}");
+    }
+}
+
+#[tokio::test]
 async fn what_is_not_there_yet_says_what_to_do() {
     let served = served().await;
     for path in [
