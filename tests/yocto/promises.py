@@ -300,7 +300,7 @@ def limits_of_memory_hold(layer):
 def the_head_is_that_of_the_hardware_guide(layer):
     """config.txt, the command line and the camera's trigger are those of docs/hardware.md."""
     guide = (layer.workspace / "docs/hardware.md").read_text()
-    blocks = re.findall(r"^```\n(.*?)^```", guide, re.M | re.S)
+    blocks = re.findall(r"^```\w*\n(.*?)^```", guide, re.M | re.S)
     config = next(block for block in blocks if "camera_auto_detect" in block)
     cameras = {"pi4": "imx296", "pi5": "imx296,cam0"}
     for model, camera in cameras.items():
