@@ -36,6 +36,13 @@ pub fn array(path: &Path) -> Array {
     }
 }
 
+/// Reads the elements of a `.npy` of `u8`.
+pub fn flags(path: &Path) -> Vec<u8> {
+    let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let file = npyz::NpyFile::new(&bytes[..]).expect("a NumPy array");
+    file.into_vec().expect("elements of u8")
+}
+
 /// A decoded picture.
 #[derive(Clone, Debug)]
 pub struct Picture {

@@ -261,30 +261,6 @@ fn absurd_models_are_refused_by_device_and_number() {
 }
 
 #[test]
-fn a_dense_or_single_recording_without_a_model_is_refused_with_the_remedy() {
-    for frames in [
-        levels(&[1.0, 35.0 / 36.0, 5.0 / 6.0], 4),
-        levels(&[0.8, 1.0], 3),
-        levels(&[1.0], 4),
-    ] {
-        let scene = Scene {
-            size: 16,
-            ..Scene::new(81.0, frames)
-        };
-        let remove = |written: &Written| {
-            written.edit(|m| {
-                m["projector"].as_object_mut().unwrap().remove("model");
-            });
-        };
-        refused(
-            &scene.record(),
-            remove,
-            &["recording.json", "no model of the projector", "recipe"],
-        );
-    }
-}
-
-#[test]
 fn a_broken_pattern_or_truth_is_refused_by_name() {
     let spec = PatternSpec::File {
         rows: 24,

@@ -8,13 +8,25 @@ use tests::oracle::{self, Device, Pattern, Reason, Rig};
 use tests::render::{Scene, levels};
 use tests::{files, program::Run};
 
-const WITH_HEIGHT: [&str; 6] = [
+const WITH_HEIGHT: [&str; 10] = [
     "cloud.ply",
     "height.npy",
     "height.png",
+    "mask.npy",
+    "modulation.npy",
     "phase.npy",
+    "picture.png",
     "report.json",
     "sigma.npy",
+    "wrapped.npy",
+];
+const WITHOUT_HEIGHT: [&str; 6] = [
+    "mask.npy",
+    "modulation.npy",
+    "phase.npy",
+    "picture.png",
+    "report.json",
+    "wrapped.npy",
 ];
 
 #[test]
@@ -216,7 +228,9 @@ fn of_two_patterns_the_vertical_one_is_the_phase_and_gives_the_height() {
     let written = Written::new(&recording);
     written.measure(&[]).succeeded();
     let mut names = WITH_HEIGHT.map(str::to_owned).to_vec();
-    names.extend(["phase-0.npy".to_owned(), "phase-1.npy".to_owned()]);
+    for name in ["mask", "modulation", "phase", "wrapped"] {
+        names.extend([format!("{name}-0.npy"), format!("{name}-1.npy")]);
+    }
     names.sort();
     assert_eq!(files::names(&written.out()), names);
     let read = |name: &str| fs::read(written.out().join(name)).unwrap();
@@ -233,7 +247,7 @@ fn of_two_patterns_the_vertical_one_is_the_phase_and_gives_the_height() {
 
 /// Checks which files a measurement without geometry writes and which not.
 fn check_no_height(written: &Written, run: &Run) {
-    assert_eq!(files::names(&written.out()), ["phase.npy", "report.json"]);
+    assert_eq!(files::names(&written.out()), WITHOUT_HEIGHT);
     let report = files::report(&written.out());
     let why = report["no_height"].as_str().expect("a reason");
     assert!(why.contains("model"), "{why}");
@@ -302,7 +316,7 @@ fn results_that_a_measurement_has_not_are_not_left_from_the_one_before() {
     let written = Written::new(&geometric().record());
     written.measure(&[]).succeeded();
     // As after a recording of two patterns.
-    for name in ["phase-0.npy", "phase-1.npy"] {
+    for name in ["phase-0.npy", "phase-1.npy", "wrapped-0.npy", "mask-0.npy"] {
         fs::write(written.out().join(name), "old").unwrap();
     }
     written.edit(|manifest| {
@@ -311,4 +325,88 @@ fn results_that_a_measurement_has_not_are_not_left_from_the_one_before() {
     });
     let run = written.measure(&[]);
     check_no_height(&written, &run);
+}
+
+/// The distance of a phase from another on the short way round a turn.
+fn turns_apart(a: f64, b: f64) -> f64 {
+    let apart = a - b;
+    (apart - apart.round()).abs()
+}
+
+#[test]
+fn wrapped_phase_modulation_mask_and_picture_are_those_of_the_finest_level() {
+    let mut recording = geometric().record();
+    recording.camera_model = None;
+    let written = Written::new(&recording);
+    written.measure(&[]).succeeded();
+    let twin = oracle::decode(&recording, 0);
+    let array = |name: &str| files::array(&written.out().join(name)).values;
+    let (phase, wrapped) = (array("phase.npy"), array("wrapped.npy"));
+    let modulation = array("modulation.npy");
+    let mask = files::flags(&written.out().join("mask.npy"));
+    let picture = files::picture(&written.out().join("picture.png"));
+    assert_eq!(
+        (picture.width, picture.height, picture.channels),
+        (96, 96, 1)
+    );
+    let finest = oracle::levels_of(&recording, 0).pop().unwrap();
+    let mut compared = 0;
+    for pixel in 0..96 * 96 {
+        let resolved = twin.reason[pixel] == Reason::Resolved;
+        assert_eq!(mask[pixel] == 1, resolved, "pixel {pixel}");
+        if !resolved {
+            continue;
+        }
+        // Two errors of the arctangent, and those of f32.
+        let bound = 5e-5 + 4e-6;
+        let apart = turns_apart(f64::from(wrapped[pixel]), f64::from(phase[pixel]));
+        assert!(apart < bound, "pixel {pixel}: {apart}");
+        let samples = oracle::samples(&recording, &finest, pixel);
+        let mean = samples.iter().sum::<f64>() / samples.len() as f64;
+        assert!((f64::from(picture.samples[pixel]) - mean).abs() <= 0.5);
+        let fit = oracle::demodulate(&samples, &finest.shifts);
+        let error = f64::from(modulation[pixel]) - fit.modulation;
+        assert!(error.abs() < 0.25, "pixel {pixel}: {error} counts");
+        compared += 1;
+    }
+    assert!(compared > 7000, "{compared}");
+}
+
+#[test]
+fn levels_that_need_a_map_and_have_none_give_the_wrapped_phase_and_name_the_remedy() {
+    for frames in [
+        levels(&[1.0, 35.0 / 36.0, 5.0 / 6.0], 4),
+        levels(&[0.8, 1.0], 3),
+        levels(&[1.0], 4),
+    ] {
+        let with_models = Scene::new(81.0, frames).record();
+        let mut bare = with_models.clone();
+        bare.projector.model = None;
+        let written = Written::new(&bare);
+        let run = written.measure(&[]).succeeded();
+        let names: Vec<_> = WITHOUT_HEIGHT
+            .into_iter()
+            .filter(|name| *name != "phase.npy")
+            .collect();
+        assert_eq!(files::names(&written.out()), names);
+        let report = files::report(&written.out());
+        let why = report["no_phase"].as_str().expect("a reason");
+        for word in ["no model of the projector", "recipe"] {
+            assert!(why.contains(word) && run.stdout.contains(word), "{why}");
+        }
+        let absolute = oracle::decode(&with_models, 0);
+        let wrapped = files::array(&written.out().join("wrapped.npy")).values;
+        let mask = files::flags(&written.out().join("mask.npy"));
+        let mut compared = 0;
+        for (pixel, &phase) in wrapped.iter().enumerate() {
+            assert_eq!(mask[pixel] == 1, !phase.is_nan());
+            if absolute.reason[pixel] == Reason::Resolved {
+                let apart = turns_apart(f64::from(phase), absolute.phase[pixel]);
+                // About a map all levels are averaged, so this is the noise of one: σ 5e-3 turn.
+                assert!(apart < 0.05, "pixel {pixel}: {apart}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 6000, "{compared}");
+    }
 }

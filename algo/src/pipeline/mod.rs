@@ -5,6 +5,7 @@ mod measure;
 mod noise;
 mod plate;
 mod rows;
+mod wrapped;
 
 pub(crate) use cubic::{
     COMPARED, CubicInput, CubicOutput, HeightTally, NO_OFFSET, SIGMA, SQUARE, VARIANCE_UNIT_NM,
@@ -16,3 +17,4 @@ pub use noise::sample_noise;
 pub use plate::{Plate, PlateError};
 pub use rows::for_each_row;
 pub(crate) use rows::{for_each, for_each_item, for_each_row_of_two, map_rows};
+pub use wrapped::wrapped;

@@ -5,7 +5,7 @@ use super::options::{Output, Threads};
 use crate::error::{Exit, Failure};
 use crate::history::kept;
 use crate::measure::{Measurement, measure_with};
-use crate::output::picture;
+use crate::output::{canvas, picture};
 use crate::storage::folder::OutputFolder;
 use crate::storage::unpack::Unpacked;
 use algo::pipeline::PhaseMap;
@@ -58,25 +58,27 @@ impl Measure {
 /// Files that are written only if there are heights.
 const SURFACE: [&str; 4] = ["height.npy", "sigma.npy", "height.png", "cloud.ply"];
 
-/// The file of one pattern's phase, where a recording has several.
-fn phase_of(pattern: usize) -> String {
-    format!("phase-{pattern}.npy")
-}
+/// Files of each pattern, by the beginning of their names.
+const OF_PATTERN: [&str; 4] = ["phase", "wrapped", "modulation", "mask"];
 
 fn write(folder: &OutputFolder, measurement: &Measurement) -> Result<(), Failure> {
     let array = |name: &str, width, values: &[f32]| folder.write(name, &npy::write(width, values));
-    let phases = &measurement.phases;
-    let primary = &phases[measurement.primary];
-    array("phase.npy", primary.width, &turns(primary))?;
-    let patterns = if phases.len() > 1 { phases.len() } else { 0 };
-    for (at, phase) in phases[..patterns].iter().enumerate() {
-        array(&phase_of(at), phase.width, &turns(phase))?;
+    let patterns = measurement.phases.len();
+    write_pattern(folder, measurement, measurement.primary, "")?;
+    let several = if patterns > 1 { patterns } else { 0 };
+    for pattern in 0..several {
+        write_pattern(folder, measurement, pattern, &format!("-{pattern}"))?;
     }
     // Files of an earlier measurement that this one does not write would be taken for its results.
-    let mut beyond = patterns;
-    while folder.remove(&phase_of(beyond))? {
-        beyond += 1;
+    for name in OF_PATTERN {
+        let mut beyond = several;
+        while folder.remove(&format!("{name}-{beyond}.npy"))? {
+            beyond += 1;
+        }
     }
+    let width = measurement.phases[measurement.primary].width;
+    let picture = canvas::grey_png(width, &measurement.intensity);
+    folder.write("picture.png", &picture)?;
     if measurement.heights.is_err() {
         for name in SURFACE {
             folder.remove(name)?;
@@ -96,7 +98,40 @@ fn write(folder: &OutputFolder, measurement: &Measurement) -> Result<(), Failure
     Ok(())
 }
 
-/// Absolute phase in turns, NaN where modulation, saturation or residual reject the pixel.
+/// The phases, the modulation and the mask of one pattern, in files whose names end in `suffix`.
+fn write_pattern(
+    folder: &OutputFolder,
+    measurement: &Measurement,
+    pattern: usize,
+    suffix: &str,
+) -> Result<(), Failure> {
+    let (absolute, wrapped) = (&measurement.phases[pattern], &measurement.wrapped[pattern]);
+    let width = wrapped.width;
+    let named = OF_PATTERN.map(|name| format!("{name}{suffix}.npy"));
+    let [phase_file, wrapped_file, modulation_file, mask_file] = &named;
+    let valid = match measurement.wrapped_only[pattern] {
+        None => {
+            folder.write(phase_file, &npy::write(width, &turns(absolute)))?;
+            absolute
+        }
+        Some(_) => {
+            folder.remove(phase_file)?;
+            wrapped
+        }
+    };
+    folder.write(wrapped_file, &npy::write(width, &turns(wrapped)))?;
+    let full_scale = measurement.decoder.full_scale();
+    let counts = wrapped.modulation.iter();
+    let counts: Vec<f32> = counts
+        .map(|modulation| modulation.counts(full_scale) as f32)
+        .collect();
+    folder.write(modulation_file, &npy::write(width, &counts))?;
+    let mask = valid.trust.iter().map(|trust| u8::from(trust.has_phase()));
+    let mask: Vec<u8> = mask.collect();
+    folder.write(mask_file, &npy::write(width, &mask))
+}
+
+/// Phase in turns, NaN where modulation, saturation or residual reject the pixel.
 fn turns(phases: &PhaseMap) -> Vec<f32> {
     let pixels = phases.phase.iter().zip(&phases.trust);
     pixels

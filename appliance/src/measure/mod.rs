@@ -29,8 +29,12 @@ use std::time::Instant;
 /// A measured recording.
 #[derive(Debug)]
 pub struct Measurement {
-    /// One phase map per pattern of the recording.
+    /// The absolute phase of each pattern of the recording; without any phase where `wrapped_only` says why.
     pub phases: Vec<PhaseMap>,
+    /// The wrapped phase of each pattern's finest level, in turns of that level, with its modulation and trust.
+    pub wrapped: Vec<PhaseMap>,
+    /// For each pattern why it has no absolute phase; `None` if it has one.
+    pub wrapped_only: Vec<Option<String>>,
     /// Which of them the height comes from.
     pub primary: usize,
     /// Height and σ_z, or why there is none.
@@ -46,8 +50,7 @@ pub struct Measurement {
 /// Measures every pattern of a recording; the first vertical one gives the height.
 ///
 /// # Errors
-/// If levels cannot be unwrapped, a model is absurd, or a map is needed that nothing gives; the
-/// message names `folder`.
+/// If levels cannot be unwrapped or a model is absurd; the message names `folder`.
 pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement, Failure> {
     measure_with(recording, folder, None)
 }
@@ -102,7 +105,7 @@ fn measure_about(
         let us = u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX);
         *stage_us.entry(stage).or_default() += us;
     };
-    let mut phases = Vec::new();
+    let (mut phases, mut wrapped, mut wrapped_only) = (Vec::new(), Vec::new(), Vec::new());
     let mut chosen = None;
     for at in 0..recording.patterns.len() {
         let channel = Channel::new(recording, at).map_err(|error| wrong(&error))?;
@@ -110,32 +113,24 @@ fn measure_about(
         let geometry = devices.triangulator(&channel.function);
         let geometry = geometry.map_err(|error| wrong(&error))?;
         let golden = known.as_ref().filter(|known| known.pattern == at);
-        let made;
-        let map: Option<(&str, &[AbsolutePhase])> = if !channel.scan.needs_map() {
-            None
-        } else if let Some(known) = golden {
-            made = known.map(channel.scan.decoder.unwrapping());
-            Some((known.name, &made))
-        } else {
-            let about = geometry.as_ref().map_err(|missing| {
-                wrong(&format!(
-                    "{} levels {:?} are unwrapped about a known map, and {missing}: add both models, or \
-                     give a recipe with a golden map",
-                    channel.kind(),
-                    channel.ratios(),
-                ))
-            })?;
-            made = about.reference_map();
-            Some(("reference", &made))
-        };
+        let map = channel.map(golden, &geometry);
         stage_ended("map", started);
         let started = Instant::now();
-        let decoded = channel.scan.phases(map.map(|(_, map)| map));
-        let decoded = decoded.map_err(|error| wrong(&error))?;
+        let finest = channel.wrapped().map_err(|error| wrong(&error))?;
+        let (decoded, name, missing) = match map {
+            Ok(map) => {
+                let known = map.as_ref().map(|(_, map)| &map[..]);
+                let decoded = channel.scan.phases(known).map_err(|error| wrong(&error))?;
+                (decoded, map.map(|(name, _)| name), None)
+            }
+            Err(missing) => (without_phase(&finest), None, Some(missing)),
+        };
         stage_ended("phase", started);
         phases.push(decoded);
+        wrapped.push(finest);
+        wrapped_only.push(missing);
         if at == primary {
-            chosen = Some((channel, geometry, map.map(|(name, _)| name)));
+            chosen = Some((channel, geometry, name));
         }
     }
     let Some((channel, geometry, map)) = chosen else {
@@ -152,6 +147,11 @@ fn measure_about(
     });
     stage_ended("noise", started);
     let started = Instant::now();
+    let no_phase = wrapped_only[primary].as_ref();
+    let geometry = match (geometry, no_phase) {
+        (Ok(_), Some(_)) => Err("there is no absolute phase".into()),
+        (geometry, _) => geometry,
+    };
     let heights = geometry.map(|triangulator| Surface {
         map: channel
             .scan
@@ -175,9 +175,15 @@ fn measure_about(
         &Truth::of(recording),
         stage_us,
     );
+    let report = Report {
+        no_phase: no_phase.cloned(),
+        ..report
+    };
     Ok(Measurement {
         intensity: channel.intensity(),
         phases,
+        wrapped,
+        wrapped_only,
         primary,
         heights,
         decoder: channel.scan.decoder,
@@ -191,9 +197,21 @@ pub fn primary_of(recording: &Recording) -> usize {
     recording.patterns.iter().position(vertical).unwrap_or(0)
 }
 
+/// The modulation and trust of a level of a pattern without an absolute phase.
+fn without_phase(level: &PhaseMap) -> PhaseMap {
+    PhaseMap {
+        phase: vec![AbsolutePhase::UNKNOWN; level.phase.len()],
+        ..level.clone()
+    }
+}
+
+/// A map about which levels are unwrapped, row-major, and its name for reports.
+type KnownMap = (&'static str, Vec<AbsolutePhase>);
+
 /// The frames of one pattern of a recording, with its phase function.
 struct Channel<'a> {
     function: PhaseFunction,
+    bit_depth: u8,
     scan: Scan<'a>,
 }
 
@@ -211,7 +229,48 @@ impl<'a> Channel<'a> {
         let shots: Vec<_> = recorded.iter().map(|frame| seam::shot(frame)).collect();
         let frames = recorded.iter().map(|recorded| &recorded.frame);
         let scan = Scan::new(function.range(), &shots, frames)?;
-        Ok(Self { function, scan })
+        Ok(Self {
+            function,
+            bit_depth: recording.bit_depth,
+            scan,
+        })
+    }
+
+    /// The map about which the levels are unwrapped, with its name; `None` if they need none.
+    ///
+    /// # Errors
+    /// In words: a map is needed, and what is missing for it.
+    fn map(
+        &self,
+        known: Option<&Known>,
+        geometry: &Result<Triangulator, String>,
+    ) -> Result<Option<KnownMap>, String> {
+        if !self.scan.needs_map() {
+            return Ok(None);
+        }
+        if let Some(known) = known {
+            let map = known.map(self.scan.decoder.unwrapping());
+            return Ok(Some((known.name, map)));
+        }
+        match geometry {
+            Ok(triangulator) => Ok(Some(("reference", triangulator.reference_map()))),
+            Err(missing) => Err(format!(
+                "{} levels {:?} are unwrapped about a known map, and {missing}: add both models, or give a \
+                 recipe with a golden map",
+                self.kind(),
+                self.ratios(),
+            )),
+        }
+    }
+
+    /// The wrapped phase of the finest level.
+    fn wrapped(&self) -> Result<PhaseMap, String> {
+        let Scan {
+            sequence, frames, ..
+        } = &self.scan;
+        let levels = sequence.levels();
+        let finest = &levels[levels.len() - 1];
+        pipeline::wrapped(finest, frames, self.bit_depth).map_err(|error| error.to_string())
     }
 
     /// The ratios from coarse to fine.

@@ -41,6 +41,9 @@ pub struct Report {
     pub stage_us: BTreeMap<&'static str, u64>,
     /// σ of one sample in counts: the recording's, else the recipe's, else from the frames' redundancy (N ≥ 4).
     pub noise_counts: Option<f64>,
+    /// Why there is only the wrapped phase of the finest level, if there is no absolute phase.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub no_phase: Option<String>,
     /// Why there is no height, if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub no_height: Option<String>,
@@ -98,6 +101,7 @@ impl Report {
             manner,
             stage_us,
             noise_counts,
+            no_phase: None,
             no_height: heights.as_ref().err().cloned(),
             no_sigma: noise_counts.is_none().then_some(
                 "the recording has no camera.noise_counts and no level of 4 shifts to estimate it",
@@ -137,6 +141,9 @@ impl Report {
         line("resolved", format!("{} px", self.resolved));
         for (reason, count) in self.unresolved.iter().filter(|(_, count)| **count > 0) {
             line(&format!("  unresolved: {reason}"), format!("{count} px"));
+        }
+        if let Some(reason) = &self.no_phase {
+            line("absolute phase", format!("none: {reason}"));
         }
         if let Some([low, high]) = self.height_mm {
             line("height", format!("{low:.3} to {high:.3} mm"));

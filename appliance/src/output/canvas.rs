@@ -73,23 +73,45 @@ impl<const N: usize> Canvas<N> {
 
     /// As a PNG.
     pub fn png(&self, compression: png::Compression) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
-        encoder.set_color(match N {
+        let colour = match N {
             1 => png::ColorType::Grayscale,
             _ => png::ColorType::Rgb,
-        });
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_compression(compression);
-        let written = encoder
-            .write_header()
-            .and_then(|mut writer| writer.write_image_data(self.pixels.as_flattened()));
-        debug_assert!(
-            written.is_ok(),
-            "a canvas has at least one pixel and memory does not fail"
-        );
-        bytes
+        };
+        let size = (self.width, self.height);
+        encoded(size, colour, compression, self.pixels.as_flattened())
     }
+}
+
+/// A PNG of grey levels, row-major in rows of `width`.
+pub fn grey_png(width: usize, grey: &[u8]) -> Vec<u8> {
+    let size = (width, grey.len() / width.max(1));
+    encoded(
+        size,
+        png::ColorType::Grayscale,
+        png::Compression::Fast,
+        grey,
+    )
+}
+
+fn encoded(
+    (width, height): (usize, usize),
+    colour: png::ColorType,
+    compression: png::Compression,
+    pixels: &[u8],
+) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
+    encoder.set_color(colour);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(compression);
+    let written = encoder
+        .write_header()
+        .and_then(|mut writer| writer.write_image_data(pixels));
+    debug_assert!(
+        written.is_ok(),
+        "a picture has at least one pixel and memory does not fail"
+    );
+    bytes
 }
 
 /// A canvas on which text is drawn in one colour.

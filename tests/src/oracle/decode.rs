@@ -125,7 +125,8 @@ pub fn sample_noise(recording: &Recording, at: usize, reason: &[Reason]) -> Opti
     (freedom > 0.0).then(|| (squares / freedom).sqrt())
 }
 
-fn samples(recording: &Recording, level: &Level, pixel: usize) -> Vec<f64> {
+/// The samples of a pixel in the frames of a level, in the order of the level's shifts.
+pub fn samples(recording: &Recording, level: &Level, pixel: usize) -> Vec<f64> {
     let sample = |&frame: &usize| match recording.frames[frame].frame.samples() {
         Samples::Eight(samples) => f64::from(samples[pixel]),
         Samples::Sixteen(samples) => f64::from(samples[pixel]),

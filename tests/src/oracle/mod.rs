@@ -13,7 +13,8 @@ pub mod pixel;
 pub mod reason;
 pub mod unwrap;
 
-pub use decode::{Level, PhaseTwin, decode, levels_from, levels_of, sample_noise};
+pub use decode::{Level, PhaseTwin, decode, levels_from, levels_of, sample_noise, samples};
+pub use demodulate::demodulate;
 pub use device::Device;
 pub use height::Rig;
 pub use pattern::Pattern;
