@@ -190,10 +190,10 @@ fn missing_keys_and_wrong_types_are_refused_by_name() {
 fn a_newer_version_is_called_that() {
     refused_manifest(
         |m| {
-            m["version"] = json!(2);
+            m["version"] = json!(3);
             m["something_new"] = json!(true);
         },
-        &["version 2", "newer", "update"],
+        &["version 3", "newer", "update"],
     );
     refused_manifest(
         |m| m["format"] = json!("fringed-recipe"),

@@ -6,6 +6,7 @@ mod bench;
 mod calibrate;
 mod calibrated_station;
 mod cases;
+mod chains;
 mod changeover;
 mod cli;
 mod doctor;

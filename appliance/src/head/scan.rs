@@ -59,8 +59,35 @@ impl<'a> Scan<'a> {
     ) -> Result<Self, String> {
         let sequence = Sequence::from_frames(shots).map_err(words)?;
         let frames: Vec<&Frame> = frames.into_iter().collect();
-        let bit_depth = frames.first().map_or(0, |first| first.format().bit_depth);
-        let decoder = Decoder::new(&sequence, range, bit_depth).map_err(words)?;
+        let decoder = Decoder::new(&sequence, range, bit_depth(&frames)).map_err(words)?;
+        Self::with(sequence, decoder, frames)
+    }
+
+    /// As [`Self::new`] for levels that the decoder cannot unwrap. Its decoder is that of the finest level alone: it gives the noise
+    /// of a phase that was unwrapped in another way ([`algo::chain`]).
+    ///
+    /// # Errors
+    /// In words: the shots are no levels, the finest is too fine or too coarse, or a frame is not one of its format.
+    pub fn of_levels(
+        range: PhaseRange,
+        shots: &[Shot],
+        frames: impl IntoIterator<Item = &'a Frame>,
+    ) -> Result<Self, String> {
+        let sequence = Sequence::from_frames(shots).map_err(words)?;
+        let levels = sequence.levels();
+        let finest = levels[levels.len() - 1].ratio;
+        let alone: Vec<Shot> = shots
+            .iter()
+            .filter(|shot| shot.ratio == finest)
+            .copied()
+            .collect();
+        let frames: Vec<&Frame> = frames.into_iter().collect();
+        let alone = Sequence::from_frames(&alone).map_err(words)?;
+        let decoder = Decoder::new(&alone, range, bit_depth(&frames)).map_err(words)?;
+        Self::with(sequence, decoder, frames)
+    }
+
+    fn with(sequence: Sequence, decoder: Decoder, frames: Vec<&'a Frame>) -> Result<Self, String> {
         let frames: Result<_, _> = frames.into_iter().map(seam::view).collect();
         Ok(Self {
             sequence,
@@ -92,6 +119,10 @@ impl<'a> Scan<'a> {
     ) -> HeightMap {
         pipeline::triangulate(triangulator, &self.decoder, noise_counts, phases)
     }
+}
+
+fn bit_depth(frames: &[&Frame]) -> u8 {
+    frames.first().map_or(0, |first| first.format().bit_depth)
 }
 
 fn words(error: impl std::fmt::Display) -> String {

@@ -1,6 +1,7 @@
 //! Measures a recording: phase, height and report (`fringed measure`).
 
 pub mod adapt;
+mod channel;
 mod known;
 mod report;
 mod score;
@@ -18,7 +19,7 @@ use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
 use algo::pattern::PhaseFunction;
 use algo::phase::Decoder;
 use algo::pipeline::{self, PhaseMap};
-use algo::units::AbsolutePhase;
+use channel::Channel;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecipeReference};
 use known::Known;
@@ -113,27 +114,20 @@ fn measure_about(
         let geometry = devices.triangulator(&channel.function);
         let geometry = geometry.map_err(|error| wrong(&error))?;
         let golden = known.as_ref().filter(|known| known.pattern == at);
-        let map = channel.map(golden, &geometry);
+        let unwrapping = channel.unwrapping(golden, &geometry);
+        let unwrapping = unwrapping.map_err(|error| wrong(&error))?;
         stage_ended("map", started);
         let started = Instant::now();
-        let finest = channel.wrapped().map_err(|error| wrong(&error))?;
-        let (decoded, name, missing) = match map {
-            Ok(map) => {
-                let known = map.as_ref().map(|(_, map)| &map[..]);
-                let decoded = channel.scan.phases(known).map_err(|error| wrong(&error))?;
-                (decoded, map.map(|(name, _)| name), None)
-            }
-            Err(missing) => (without_phase(&finest), None, Some(missing)),
-        };
+        let decoded = channel.decode(&unwrapping).map_err(|error| wrong(&error))?;
         stage_ended("phase", started);
-        phases.push(decoded);
-        wrapped.push(finest);
-        wrapped_only.push(missing);
+        phases.push(decoded.absolute);
+        wrapped.push(decoded.wrapped);
+        wrapped_only.push(unwrapping.missing().map(str::to_owned));
         if at == primary {
-            chosen = Some((channel, geometry, name));
+            chosen = Some((channel, geometry, unwrapping));
         }
     }
-    let Some((channel, geometry, map)) = chosen else {
+    let Some((channel, geometry, unwrapping)) = chosen else {
         return Err(wrong(&"the recording has no pattern"));
     };
     let started = Instant::now();
@@ -163,9 +157,10 @@ fn measure_about(
         &phases[primary],
         &heights,
         Manner {
-            kind: channel.kind(),
+            kind: unwrapping.kind(&channel),
             ratios: channel.ratios(),
-            map,
+            chain: unwrapping.steps(),
+            map: unwrapping.map(),
             recipe: recipe.map(|recipe| RecipeReference {
                 number: u32::from(recipe.id.number),
                 fingerprint: recipe.id.fingerprint.clone(),
@@ -195,102 +190,6 @@ fn measure_about(
 pub fn primary_of(recording: &Recording) -> usize {
     let vertical = |spec: &PatternSpec| matches!(spec, PatternSpec::Vertical { .. });
     recording.patterns.iter().position(vertical).unwrap_or(0)
-}
-
-/// The modulation and trust of a level of a pattern without an absolute phase.
-fn without_phase(level: &PhaseMap) -> PhaseMap {
-    PhaseMap {
-        phase: vec![AbsolutePhase::UNKNOWN; level.phase.len()],
-        ..level.clone()
-    }
-}
-
-/// A map about which levels are unwrapped, row-major, and its name for reports.
-type KnownMap = (&'static str, Vec<AbsolutePhase>);
-
-/// The frames of one pattern of a recording, with its phase function.
-struct Channel<'a> {
-    function: PhaseFunction,
-    bit_depth: u8,
-    scan: Scan<'a>,
-}
-
-impl<'a> Channel<'a> {
-    fn new(recording: &'a Recording, pattern: usize) -> Result<Self, String> {
-        let projector = &recording.projector;
-        let function = seam::phase_function(
-            &recording.patterns[pattern],
-            projector.width as usize,
-            projector.height as usize,
-        )
-        .map_err(|error| error.to_string())?;
-        let taken = recording.frames.iter();
-        let recorded: Vec<_> = taken.filter(|frame| frame.pattern == pattern).collect();
-        let shots: Vec<_> = recorded.iter().map(|frame| seam::shot(frame)).collect();
-        let frames = recorded.iter().map(|recorded| &recorded.frame);
-        let scan = Scan::new(function.range(), &shots, frames)?;
-        Ok(Self {
-            function,
-            bit_depth: recording.bit_depth,
-            scan,
-        })
-    }
-
-    /// The map about which the levels are unwrapped, with its name; `None` if they need none.
-    ///
-    /// # Errors
-    /// In words: a map is needed, and what is missing for it.
-    fn map(
-        &self,
-        known: Option<&Known>,
-        geometry: &Result<Triangulator, String>,
-    ) -> Result<Option<KnownMap>, String> {
-        if !self.scan.needs_map() {
-            return Ok(None);
-        }
-        if let Some(known) = known {
-            let map = known.map(self.scan.decoder.unwrapping());
-            return Ok(Some((known.name, map)));
-        }
-        match geometry {
-            Ok(triangulator) => Ok(Some(("reference", triangulator.reference_map()))),
-            Err(missing) => Err(format!(
-                "{} levels {:?} are unwrapped about a known map, and {missing}: add both models, or give a \
-                 recipe with a golden map",
-                self.kind(),
-                self.ratios(),
-            )),
-        }
-    }
-
-    /// The wrapped phase of the finest level.
-    fn wrapped(&self) -> Result<PhaseMap, String> {
-        let Scan {
-            sequence, frames, ..
-        } = &self.scan;
-        let levels = sequence.levels();
-        let finest = &levels[levels.len() - 1];
-        pipeline::wrapped(finest, frames, self.bit_depth).map_err(|error| error.to_string())
-    }
-
-    /// The ratios from coarse to fine.
-    fn ratios(&self) -> Vec<f64> {
-        let levels = self.scan.sequence.levels().iter();
-        levels.map(|level| level.ratio).collect()
-    }
-
-    fn kind(&self) -> &'static str {
-        self.scan.decoder.unwrapping().kind()
-    }
-
-    fn intensity(&self) -> Vec<u8> {
-        let levels = self.scan.sequence.levels();
-        let finest = levels[levels.len() - 1].frames.iter();
-        let frames: Vec<_> = finest
-            .map(|&at| self.scan.frames[usize::from(at)])
-            .collect();
-        algo::frame::mean(&frames, self.scan.decoder.full_scale())
-    }
 }
 
 /// The devices of a recording, where it has models of them, and its working range.

@@ -12,10 +12,13 @@ use std::fmt::Write as _;
 /// How the levels were unwrapped.
 #[derive(Clone, Debug, Serialize)]
 pub struct Manner {
-    /// Geometric, dense or single.
+    /// Geometric, dense, single, heterodyne, gray code, or wrapped where nothing is known.
     pub kind: &'static str,
     /// The levels' ratios from coarse to fine.
     pub ratios: Vec<f64>,
+    /// Ratios of the levels and beats (in brackets) by which they were unwrapped, from coarse to fine, if by a chain.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chain: Option<Vec<String>>,
     /// The map that they were unwrapped about: reference, golden or preliminary; `None` if they are absolute by themselves.
     pub map: Option<&'static str>,
     /// The recipe that was given.
@@ -122,11 +125,15 @@ impl Report {
         let Manner {
             kind,
             ratios,
+            chain,
             map,
             recipe,
         } = &self.manner;
         let ratios: Vec<String> = ratios.iter().map(|ratio| format!("{ratio:.6}")).collect();
         line("levels", format!("{kind}, ratios {}", ratios.join(" ")));
+        if let Some(chain) = chain {
+            line("unwrapped by", chain.join(", "));
+        }
         if let Some(map) = map {
             line("unwrapped about", format!("the {map} map"));
         }

@@ -3,7 +3,7 @@
 use std::path::{Component, Path};
 
 use super::failure::Wrong;
-use super::manifest::{Manifest, PatternEntry};
+use super::manifest::{CodeEntry, Manifest, PatternEntry};
 use crate::bounds::{
     MAX_EXPOSURE_US, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_RANGE_MM, MAX_SHIFT_TURNS, MAX_SIDE,
     MIN_NOISE_COUNTS, RATIOS, clipped, fingerprint, text, within,
@@ -20,6 +20,10 @@ const MAX_FRAMES: usize = 1024;
 const MAX_BYTES: u64 = 2 << 30;
 /// How far the shifts of a level may be off even spacing, turns.
 pub(crate) const SHIFT_TOLERANCE_TURNS: f64 = 1e-6;
+/// Narrowest cell of a Gray code, projector pixels.
+const MIN_CELL_PX: f64 = 1.0;
+/// Most bits of a Gray code: enough for the widest projector.
+const MAX_BITS: usize = 13;
 /// Fewest frames that determine offset, modulation and phase.
 const MIN_SHIFTS: usize = 3;
 
@@ -29,6 +33,7 @@ pub(crate) fn manifest(manifest: &Manifest) -> Result<(), Wrong> {
     values(manifest).map_err(|problem| Wrong::new(problem, remedy))?;
     patterns(manifest)?;
     frames(manifest)?;
+    codes(manifest)?;
     levels(manifest)
 }
 
@@ -115,7 +120,7 @@ fn frames(manifest: &Manifest) -> Result<(), Wrong> {
     let bytes = u64::from(camera.width)
         * u64::from(camera.height)
         * if camera.bit_depth == 8 { 1 } else { 2 }
-        * frames.len() as u64;
+        * (frames.len() + manifest.pictures().count()) as u64;
     if frames.is_empty() || frames.len() > MAX_FRAMES || bytes > MAX_BYTES {
         return wrong(
             format!(
@@ -148,6 +153,65 @@ fn frames(manifest: &Manifest) -> Result<(), Wrong> {
                     manifest.pattern.0.len()
                 ),
                 "correct the frame's pattern",
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Checks the Gray codes, and the names of all pictures that are not frames of levels.
+fn codes(manifest: &Manifest) -> Result<(), Wrong> {
+    for picture in manifest.pictures() {
+        inside(picture)?;
+    }
+    let wrong = |problem: String, remedy: &str| Err(Wrong::new(problem, remedy));
+    for (at, code) in manifest.codes.iter().enumerate() {
+        let CodeEntry {
+            pattern,
+            cell_px,
+            bits,
+            inverse,
+        } = code;
+        let length = match manifest.pattern.0.get(*pattern) {
+            Some(PatternEntry::Vertical { .. }) => manifest.projector.width,
+            Some(PatternEntry::Horizontal { .. }) => manifest.projector.height,
+            _ => {
+                return wrong(
+                    format!("codes names pattern {pattern}, which is not vertical or horizontal"),
+                    "name the pattern whose fringes the code numbers, counted from 0",
+                );
+            }
+        };
+        if manifest.codes[..at]
+            .iter()
+            .any(|other| other.pattern == *pattern)
+        {
+            return wrong(
+                format!("codes has two entries for pattern {pattern}"),
+                "keep one of them",
+            );
+        }
+        within("cell_px", *cell_px, MIN_CELL_PX, f64::from(MAX_SIDE))
+            .map_err(|problem| Wrong::new(problem, "the width of a cell in projector pixels"))?;
+        let count = bits.len();
+        if !(1..=MAX_BITS).contains(&count) || ![0, count].contains(&inverse.len()) {
+            return wrong(
+                format!(
+                    "codes has {count} bits and {} inverse pictures, expected 1 to {MAX_BITS} bits and as many \
+                     inverse pictures or none",
+                    inverse.len()
+                ),
+                "name one picture per bit, the most significant first",
+            );
+        }
+        let cells = (f64::from(length) / cell_px - 1e-9).ceil();
+        if cells > f64::from(1_u32 << count) {
+            return wrong(
+                format!(
+                    "{count} bits number {} cells, but cells of cell_px {cell_px} are {cells} on {length} projector pixels",
+                    1_u32 << count
+                ),
+                "correct cell_px, or name all bits",
             );
         }
     }

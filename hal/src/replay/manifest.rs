@@ -1,4 +1,4 @@
-//! The file form of `recording.json`, format 1: its keys and types, before any value is checked.
+//! The file form of `recording.json`, versions 1 and 2: its keys and types, before any value is checked.
 
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
@@ -9,8 +9,9 @@ use crate::model::DeviceModel;
 
 /// The name of the format, in every manifest.
 pub const FORMAT: &str = "fringed-recording";
-/// The version that this program reads and writes.
-pub const VERSION: u64 = 1;
+/// The newest version that this program reads: with codes, white and black. A recording without these is written as version 1, which
+/// older programs read.
+pub const VERSION: u64 = 2;
 
 /// The whole of `recording.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,6 +27,12 @@ pub(crate) struct Manifest {
     pub projector: RecordedProjector,
     pub pattern: PatternEntries,
     pub frames: Vec<FrameEntry>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub codes: Vec<CodeEntry>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub white: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub black: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub range_mm: Option<[f64; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -79,6 +86,28 @@ pub(crate) struct FrameEntry {
     pub timestamp_ns: Option<u64>,
     #[serde(default, skip_serializing_if = "is_first")]
     pub pattern: usize,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct CodeEntry {
+    #[serde(default, skip_serializing_if = "is_first")]
+    pub pattern: usize,
+    pub cell_px: f64,
+    pub bits: Vec<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inverse: Vec<String>,
+}
+
+impl Manifest {
+    /// The files of all pictures that are not frames of levels.
+    pub fn pictures(&self) -> impl Iterator<Item = &String> {
+        let coded = self
+            .codes
+            .iter()
+            .flat_map(|code| code.bits.iter().chain(&code.inverse));
+        coded.chain(&self.white).chain(&self.black)
+    }
 }
 
 /// The recipe of a measurement in production.
@@ -160,7 +189,7 @@ pub(crate) fn parse(text: &str) -> Result<Manifest, Wrong> {
         }
     }
     match value.get("version").and_then(serde_json::Value::as_u64) {
-        Some(VERSION) => {}
+        Some(1..=VERSION) => {}
         Some(newer) if newer > VERSION => {
             return Err(Wrong::new(
                 format!("version {newer} is newer than this program reads ({VERSION})"),
@@ -170,14 +199,14 @@ pub(crate) fn parse(text: &str) -> Result<Manifest, Wrong> {
         _ => {
             return Err(Wrong::new(
                 "the key version is missing or no whole number from 1",
-                format!("write \"version\": {VERSION}"),
+                "write \"version\": 1",
             ));
         }
     }
     serde_json::from_str(text).map_err(|error| {
         Wrong::new(
             error.to_string(),
-            "correct or remove that key; docs/formats.md lists the keys of recording format 1",
+            "correct or remove that key; docs/formats.md lists the keys of recordings",
         )
     })
 }

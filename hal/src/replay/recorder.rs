@@ -1,4 +1,4 @@
-//! Writing a recording in format 1: to a folder with a temporary name, which is synced and then renamed.
+//! Writing a recording: to a folder with a temporary name, which is synced and then renamed.
 
 use std::fs;
 use std::io::{self, ErrorKind, Write};
@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::manifest::{
-    CameraEntry, FORMAT, FrameEntry, Manifest, PatternEntries, PatternEntry, VERSION,
+    CameraEntry, CodeEntry, FORMAT, FrameEntry, Manifest, PatternEntries, PatternEntry, VERSION,
 };
 use super::recording::{MANIFEST, PatternSpec, Recording, TRUTH_CLASS, TRUTH_HEIGHT};
 use super::{check, grey};
-use crate::frame::Samples;
+use crate::frame::{Frame, Samples};
 use crate::npy;
 
 /// Errors of writing a recording. Nothing is left behind.
@@ -138,6 +138,34 @@ fn frame_file(index: usize) -> String {
     format!("frames/{index:03}.png")
 }
 
+/// The file of the scene under a white raster.
+const WHITE: &str = "frames/white.png";
+/// The same under a black one.
+const BLACK: &str = "frames/black.png";
+
+fn code_file(pattern: usize, bit: usize, inverse: bool) -> String {
+    let end = if inverse { "-inverse" } else { "" };
+    format!("frames/code-{pattern}-{bit:02}{end}.png")
+}
+
+/// All pictures of a recording with their files: the frames of its levels first, in their order.
+fn pictures<'a>(recording: &'a Recording) -> Vec<(String, &'a Frame)> {
+    let frames = recording.frames.iter().enumerate();
+    let mut all: Vec<_> = frames
+        .map(|(index, recorded)| (frame_file(index), &recorded.frame))
+        .collect();
+    for code in &recording.codes {
+        for (inverse, frames) in [(false, &code.bits), (true, &code.inverse)] {
+            let named = |(bit, frame)| (code_file(code.pattern, bit, inverse), frame);
+            all.extend(frames.iter().enumerate().map(named));
+        }
+    }
+    let uniform = [(WHITE, &recording.white), (BLACK, &recording.black)];
+    let taken = |(file, frame): (&str, &'a Option<Frame>)| Some((file.to_owned(), frame.as_ref()?));
+    all.extend(uniform.into_iter().filter_map(taken));
+    all
+}
+
 /// File name of a pattern: the format's name for the first pattern from a file, a numbered name for the second.
 fn phase_file(patterns: &[PatternSpec], index: usize) -> String {
     let first = patterns
@@ -169,9 +197,24 @@ fn manifest_of(recording: &Recording) -> Manifest {
             timestamp_ns: frame.timestamp_ns,
             pattern: frame.pattern,
         });
+    let codes = recording.codes.iter().map(|code| CodeEntry {
+        pattern: code.pattern,
+        cell_px: code.cell_px,
+        bits: (0..code.bits.len())
+            .map(|bit| code_file(code.pattern, bit, false))
+            .collect(),
+        inverse: (0..code.inverse.len())
+            .map(|bit| code_file(code.pattern, bit, true))
+            .collect(),
+    });
+    // Version 1 has neither, and older programs read it.
+    let plain = [&recording.white, &recording.black]
+        .iter()
+        .all(|uniform| uniform.is_none())
+        && recording.codes.is_empty();
     Manifest {
         format: FORMAT.to_owned(),
-        version: VERSION,
+        version: if plain { 1 } else { VERSION },
         description: recording.description.clone(),
         source: recording.source.clone(),
         camera: CameraEntry {
@@ -184,6 +227,9 @@ fn manifest_of(recording: &Recording) -> Manifest {
         projector: recording.projector.clone(),
         pattern: PatternEntries(recording.patterns.iter().enumerate().map(pattern).collect()),
         frames: frames.collect(),
+        codes: codes.collect(),
+        white: recording.white.as_ref().map(|_| WHITE.to_owned()),
+        black: recording.black.as_ref().map(|_| BLACK.to_owned()),
         range_mm: recording.range_mm,
         exposure_us: recording.exposure_us,
         part_id: recording.part_id.clone(),
@@ -194,22 +240,22 @@ fn manifest_of(recording: &Recording) -> Manifest {
 fn check_samples(recording: &Recording) -> Result<(), String> {
     let refuse = |problem: String| Err(format!("{problem}: record it again"));
     let wanted = recording.format();
-    for (index, frame) in recording.frames.iter().enumerate() {
-        let format = frame.frame.format();
+    for (file, frame) in pictures(recording) {
+        let format = frame.format();
         if (format.width, format.height, format.bit_depth)
             != (wanted.width, wanted.height, wanted.bit_depth)
         {
             return refuse(format!(
-                "frame {index} is {}, the recording {}",
+                "{file} is {}, the recording {}",
                 format.describe(),
                 wanted.describe()
             ));
         }
-        if let Samples::Sixteen(samples) = frame.frame.samples()
+        if let Samples::Sixteen(samples) = frame.samples()
             && let Some(sample) = samples.iter().find(|sample| **sample > wanted.full_scale())
         {
             return refuse(format!(
-                "frame {index} holds the sample {sample} of {}",
+                "{file} holds the sample {sample} of {}",
                 wanted.describe()
             ));
         }
@@ -251,9 +297,9 @@ fn check_samples(recording: &Recording) -> Result<(), String> {
 }
 
 fn fill(recording: &Recording, manifest: &Manifest, partial: &Path) -> Result<(), RecorderError> {
-    for (index, frame) in recording.frames.iter().enumerate() {
-        let path = partial.join(frame_file(index));
-        let file = grey::encode(&frame.frame.format(), frame.frame.samples())
+    for (file, frame) in pictures(recording) {
+        let path = partial.join(file);
+        let file = grey::encode(&frame.format(), frame.samples())
             .map_err(|error| create(&path, io::Error::other(error)))?;
         put(&path, &file)?;
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::failure::{RecordingError, Wrong};
-use super::manifest::{self, Manifest, PatternEntry};
+use super::manifest::{self, CodeEntry, Manifest, PatternEntry};
 use super::{check, grey};
 use crate::frame::{Frame, FrameFormat};
 use crate::model::DeviceModel;
@@ -65,7 +65,20 @@ pub struct RecordedFrame {
     pub frame: Frame,
 }
 
-/// A recording of format 1, checked.
+/// The pictures of a Gray code: cell c of the projector shows the bits of c ^ (c >> 1).
+#[derive(Clone, Debug)]
+pub struct RecordedCode {
+    /// Index of the pattern whose fringes it numbers: cells lie along ξ for a vertical one, along η for a horizontal one.
+    pub pattern: usize,
+    /// Width of a cell in projector pixels; the first begins at the raster's edge.
+    pub cell_px: f64,
+    /// One picture per bit, the most significant first.
+    pub bits: Vec<Frame>,
+    /// The inverse of each, or none.
+    pub inverse: Vec<Frame>,
+}
+
+/// A recording of version 1 or 2, checked.
 #[derive(Clone, Debug)]
 pub struct Recording {
     /// Camera columns.
@@ -88,6 +101,12 @@ pub struct Recording {
     pub patterns: Vec<PatternSpec>,
     /// The frames in the order of the manifest.
     pub frames: Vec<RecordedFrame>,
+    /// Gray codes, at most one per pattern.
+    pub codes: Vec<RecordedCode>,
+    /// The scene under a white raster.
+    pub white: Option<Frame>,
+    /// The scene under a black raster.
+    pub black: Option<Frame>,
     /// Lowest and highest z of the working range in mm, if it was stated.
     pub range_mm: Option<[f64; 2]>,
     /// Exposure of one frame in µs.
@@ -133,6 +152,12 @@ impl Recording {
         );
         let frames = frames(folder, &manifest, format)?;
         let patterns = patterns(folder, &manifest)?;
+        let codes = codes(folder, &manifest, format)?;
+        let uniform = |file: &Option<String>| {
+            let file = file.as_ref();
+            file.map(|file| picture(folder, file, format)).transpose()
+        };
+        let (white, black) = (uniform(&manifest.white)?, uniform(&manifest.black)?);
         let shape = (format.height as usize, format.width as usize);
         let truth_height = truth(folder, TRUTH_HEIGHT, shape)?;
         let truth_class = truth(folder, TRUTH_CLASS, shape)?;
@@ -149,6 +174,9 @@ impl Recording {
             projector: manifest.projector,
             patterns,
             frames,
+            codes,
+            white,
+            black,
             range_mm: manifest.range_mm,
             exposure_us: manifest.exposure_us,
             part_id: manifest.part_id,
@@ -172,12 +200,8 @@ fn frames(
 ) -> Result<Vec<RecordedFrame>, RecordingError> {
     let mut frames = Vec::with_capacity(manifest.frames.len());
     for (place, entry) in manifest.frames.iter().enumerate() {
-        let path = folder.join(&entry.file);
-        let file = read(folder, &entry.file, MAX_FILE_BYTES)?;
-        let pixels = grey::decode(&file, &format).map_err(|wrong| wrong.at(&path))?;
         let timestamp = Timestamp(entry.timestamp_ns.unwrap_or(0));
-        let frame = Frame::new(format, Arc::new(pixels), timestamp, place as u64)
-            .map_err(|error| Wrong::new(error.to_string(), "save the frame again").at(&path))?;
+        let frame = frame(folder, &entry.file, format, timestamp, place as u64)?;
         frames.push(RecordedFrame {
             ratio: entry.ratio,
             shift_turns: entry.shift_turns,
@@ -187,6 +211,46 @@ fn frames(
         });
     }
     Ok(frames)
+}
+
+/// A frame of the folder.
+fn frame(
+    folder: &Path,
+    file: &str,
+    format: FrameFormat,
+    timestamp: Timestamp,
+    count: u64,
+) -> Result<Frame, RecordingError> {
+    let path = folder.join(file);
+    let bytes = read(folder, file, MAX_FILE_BYTES)?;
+    let pixels = grey::decode(&bytes, &format).map_err(|wrong| wrong.at(&path))?;
+    Frame::new(format, Arc::new(pixels), timestamp, count)
+        .map_err(|error| Wrong::new(error.to_string(), "save the frame again").at(&path))
+}
+
+/// A picture that is no frame of a level.
+fn picture(folder: &Path, file: &str, format: FrameFormat) -> Result<Frame, RecordingError> {
+    frame(folder, file, format, Timestamp(0), 0)
+}
+
+fn codes(
+    folder: &Path,
+    manifest: &Manifest,
+    format: FrameFormat,
+) -> Result<Vec<RecordedCode>, RecordingError> {
+    let pictures = |files: &[String]| -> Result<Vec<Frame>, RecordingError> {
+        let files = files.iter();
+        files.map(|file| picture(folder, file, format)).collect()
+    };
+    let load = |entry: &CodeEntry| {
+        Ok(RecordedCode {
+            pattern: entry.pattern,
+            cell_px: entry.cell_px,
+            bits: pictures(&entry.bits)?,
+            inverse: pictures(&entry.inverse)?,
+        })
+    };
+    manifest.codes.iter().map(load).collect()
 }
 
 fn patterns(folder: &Path, manifest: &Manifest) -> Result<Vec<PatternSpec>, RecordingError> {

@@ -8,7 +8,7 @@ use std::time::Duration;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-use super::recording::{PatternSpec, RecordedFrame, RecordedProjector, Recording};
+use super::recording::{PatternSpec, RecordedCode, RecordedFrame, RecordedProjector, Recording};
 use super::{RecordingError, head, recorder};
 use crate::contract::check_head;
 use crate::error::ErrorKind;
@@ -76,6 +76,9 @@ fn small(bit_depth: u8, seed: u64) -> Recording {
             },
         ],
         frames,
+        codes: Vec::new(),
+        white: None,
+        black: None,
         range_mm: Some([-20.0, 30.5]),
         exposure_us: Some(33_333.0),
         part_id: Some("A-1".into()),
@@ -89,6 +92,28 @@ fn small(bit_depth: u8, seed: u64) -> Recording {
     }
 }
 
+/// [`small`] with a Gray code of three bits over the 5 columns, and pictures under white and black.
+fn coded(bit_depth: u8, inverse: bool) -> Recording {
+    let mut recording = small(bit_depth, 3);
+    let frame = |at: usize| {
+        let frame = &small(bit_depth, 4 + at as u64).frames[0].frame;
+        let pixels = match frame.samples() {
+            Samples::Eight(samples) => Pixels::Eight(samples.to_vec()),
+            Samples::Sixteen(samples) => Pixels::Sixteen(samples.to_vec()),
+        };
+        Frame::new(frame.format(), Arc::new(pixels), Timestamp(0), 0).unwrap()
+    };
+    recording.codes = vec![RecordedCode {
+        pattern: 0,
+        cell_px: 1.0,
+        bits: (0..3).map(frame).collect(),
+        inverse: (3..if inverse { 6 } else { 3 }).map(frame).collect(),
+    }];
+    recording.white = Some(frame(6));
+    recording.black = Some(frame(7));
+    recording
+}
+
 fn written(folder: &Path, recording: &Recording) -> std::path::PathBuf {
     let path = folder.join("r");
     recorder::write(recording, &path).unwrap();
@@ -97,9 +122,10 @@ fn written(folder: &Path, recording: &Recording) -> std::path::PathBuf {
 
 #[test]
 fn a_recording_that_was_written_opens_as_the_same() {
-    for bit_depth in [8, 10, 12, 16] {
+    let plain = [8, 10, 12, 16].map(|bit_depth| (small(bit_depth, 1), 1));
+    let coded = [(coded(8, true), 2), (coded(12, false), 2)];
+    for (before, version) in plain.into_iter().chain(coded) {
         let folder = tempfile::tempdir().unwrap();
-        let before = small(bit_depth, 1);
         let path = written(folder.path(), &before);
         let after = Recording::open(&path).unwrap();
         // NaN is not equal to itself, so the truth is compared by its bits and the rest by its text.
@@ -112,6 +138,9 @@ fn a_recording_that_was_written_opens_as_the_same() {
                 .collect()
         };
         assert_eq!(bits(&before), bits(&after));
+        let manifest = fs::read_to_string(path.join("recording.json")).unwrap();
+        let line = format!("\"version\": {version},");
+        assert!(manifest.contains(&line), "older programs read version 1");
         assert_eq!(format!("{before:?}"), format!("{after:?}"));
         assert_eq!(
             fs::read_dir(folder.path()).unwrap().count(),
@@ -163,8 +192,8 @@ fn every_wrong_manifest_is_refused_with_a_message_that_names_the_fault() {
     for (from, to, expected) in [
         (
             "\"version\": 1",
-            "\"version\": 2, \"new\": 1",
-            "version 2 is newer than this program reads (1): update fringed",
+            "\"version\": 3, \"new\": 1",
+            "version 3 is newer than this program reads (2): update fringed",
         ),
         ("\"version\": 1", "\"version\": \"1\"", "version"),
         ("fringed-recording", "other", "format is \"other\""),
@@ -243,6 +272,48 @@ fn every_wrong_manifest_is_refused_with_a_message_that_names_the_fault() {
         let message = error.to_string();
         assert!(message.contains(expected), "{to}: {message}");
         assert!(!error.is_missing(), "{message}");
+    }
+}
+
+#[test]
+fn every_wrong_code_is_refused_with_a_message_that_names_the_fault() {
+    for (from, to, expected) in [
+        ("\"cell_px\": 1.0", "\"cell_px\": 0.5", "cell_px is 0.5"),
+        (
+            "\"cell_px\": 1.0",
+            "\"cell_px\": 1e999",
+            "number out of range",
+        ),
+        (
+            "\"cell_px\": 1.0",
+            "\"cell_px\": 1.0, \"pattern\": 1",
+            "codes names pattern 1",
+        ),
+        (
+            "\"frames/code-0-00.png\",",
+            "",
+            "2 bits and 3 inverse pictures",
+        ),
+        (
+            "\"frames/code-0-00.png\"",
+            "\"../code-0-00.png\"",
+            "does not lie inside",
+        ),
+        (
+            "\"frames/black.png\"",
+            "\"frames/none.png\"",
+            "none.png: the file is missing",
+        ),
+        ("\"width\": 5", "\"width\": 9", "3 bits number 8 cells"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = written(folder.path(), &coded(8, true));
+        let file = path.join("recording.json");
+        let text = fs::read_to_string(&file).unwrap();
+        assert!(text.contains(from), "{from} in {text}");
+        fs::write(&file, text.replacen(from, to, 1)).unwrap();
+        let message = Recording::open(&path).unwrap_err().to_string();
+        assert!(message.contains(expected), "{to}: {message}");
     }
 }
 
