@@ -3,7 +3,7 @@
 use crate::written::Written;
 use hal::replay::Recording;
 use tests::files;
-use tests::oracle::{self, Pattern, Rig};
+use tests::oracle::{Pattern, Rig};
 use tests::render::{Scene, levels};
 
 /// A scene without spoilt patches, with ± 0.5 % noise: the order of two levels of 32 and 31 fringes has 45 times the noise of one,
@@ -68,7 +68,9 @@ fn levels_with_a_chain_of_beats_give_absolute_phase_without_models_and_heights_w
 
 #[test]
 fn levels_without_a_chain_give_the_wrapped_phase_and_say_what_to_add() {
-    let recording = scene(64.0, &[1.0, 60.0 / 64.0, 0.5], 4);
+    let mut recording = scene(64.0, &[1.0, 60.0 / 64.0, 0.5], 4);
+    // With models heights are expected, so it would be refused.
+    recording.projector.model = None;
     let written = Written::new(&recording);
     let run = written.measure(&[]).succeeded();
     let report = files::report(&written.out());
@@ -77,6 +79,4 @@ fn levels_without_a_chain_give_the_wrapped_phase_and_say_what_to_add() {
     assert!(run.stdout.contains(why), "{}", run.stdout);
     assert!(!written.out().join("phase.npy").exists());
     assert!(written.out().join("wrapped.npy").exists());
-    let finest = oracle::levels_of(&recording, 0).pop().unwrap();
-    assert_eq!(finest.ratio, 1.0);
 }

@@ -11,6 +11,7 @@ mod changeover;
 mod cli;
 mod doctor;
 mod experiment;
+mod foreign;
 mod formats;
 mod fuzz;
 mod gauges;

@@ -17,6 +17,17 @@ impl Chain {
     /// it is the coarsest of them; its phase is a `Residual` where a fringe order would be a guess or the cell is none of the
     /// projector's.
     pub fn unwrap(&self, wrapped: &[PhaseMap], cells: Option<&[u16]>) -> PhaseMap {
+        self.unwrap_within(MAX_RESIDUAL, wrapped, cells)
+    }
+
+    /// As [`Self::unwrap`], with another largest residual of the steps between levels, in turns: of phases that have nothing to do with
+    /// each other a share of twice this limit passes each step. The step from a code is as in [`Self::unwrap`].
+    pub fn unwrap_within(
+        &self,
+        residual: f64,
+        wrapped: &[PhaseMap],
+        cells: Option<&[u16]>,
+    ) -> PhaseMap {
         let finest = &wrapped[wrapped.len() - 1];
         let width = finest.width;
         let uses = self.uses();
@@ -35,7 +46,7 @@ impl Chain {
                         Trust::LowModulation
                     }
                     Some(refusal) => refusal,
-                    None => match self.phase(wrapped, cells, at) {
+                    None => match self.phase(residual, wrapped, cells, at) {
                         None => Trust::Residual,
                         Some(turns) => {
                             pixel.0 = AbsolutePhase::from_turns(turns);
@@ -56,7 +67,13 @@ impl Chain {
     }
 
     /// Φ of a pixel in turns; `None` if a residual is too large.
-    fn phase(&self, wrapped: &[PhaseMap], cells: Option<&[u16]>, at: usize) -> Option<f64> {
+    fn phase(
+        &self,
+        residual: f64,
+        wrapped: &[PhaseMap],
+        cells: Option<&[u16]>,
+        at: usize,
+    ) -> Option<f64> {
         let mut estimate = match (self.cells, cells) {
             (Some(code), Some(cells)) => {
                 let cell = cells[at];
@@ -66,6 +83,11 @@ impl Chain {
                 Some(code.origin + (f64::from(cell) + 0.5) * code.width)
             }
             _ => None,
+        };
+        let mut limit = if estimate.is_some() {
+            MAX_RESIDUAL
+        } else {
+            residual
         };
         for link in &self.links {
             let terms = wrapped.iter().zip(&link.weights);
@@ -80,9 +102,10 @@ impl Chain {
                 Some(turns) => {
                     let order = link.ratio * turns - phase;
                     let whole = libm::rint(order);
-                    if libm::fabs(order - whole) > MAX_RESIDUAL {
+                    if libm::fabs(order - whole) > limit {
                         return None;
                     }
+                    limit = residual;
                     phase + whole
                 }
             };

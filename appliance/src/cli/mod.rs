@@ -10,17 +10,21 @@ macro_rules! say {
 
 mod adapt;
 mod calibrate;
+mod capture;
 mod completions;
 mod config;
 mod demo;
+mod described;
 mod doctor;
 mod history;
 mod idle;
+mod import;
 mod measure;
 pub mod names;
 pub mod numbers;
 mod options;
 mod part;
+mod patterns;
 mod recipe;
 mod record;
 mod replay;
@@ -68,6 +72,12 @@ enum Command {
     Doctor(doctor::Doctor),
     /// Calibrate the head: import its models, measure the rest.
     Calibrate(calibrate::Calibrate),
+    /// Write the pictures to project: fringes, adaptive fringes, Gray code.
+    Patterns(patterns::Patterns),
+    /// Make a recording of pictures that other programs took.
+    Import(import::Import),
+    /// Take pictures with a head that need not be calibrated.
+    Capture(capture::Capture),
     /// Record a sequence from the configured head.
     Record(record::Record),
     /// Make a recipe from a good part in front of the head, or from recordings.
@@ -145,6 +155,9 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Adapt(command)) => command.run(),
         Some(Command::Doctor(command)) => command.run(),
         Some(Command::Calibrate(command)) => command.run(),
+        Some(Command::Patterns(command)) => command.run(),
+        Some(Command::Import(command)) => command.run(),
+        Some(Command::Capture(command)) => command.run(),
         Some(Command::Record(command)) => command.run(),
         Some(Command::Teach(command)) => command.run(),
         Some(Command::History(command)) => command.run(),

@@ -1,6 +1,7 @@
 //! Numbers on the command line: each has bounds, which a refusal names.
 
 use clap::builder::TypedValueParser;
+use hal::bounds::MAX_SIDE;
 use std::fmt::Display;
 use std::net::SocketAddr;
 use std::str::FromStr;
@@ -30,6 +31,47 @@ pub fn numbers<const N: usize>(most: f64) -> impl TypedValueParser<Value = [f64;
                 format!("write {N} numbers from -{most} to {most} with commas between them")
             })
     }
+}
+
+/// Numbers in a list of any length.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series<T>(pub Vec<T>);
+
+/// One number or several with commas between them, at most `most`, each from `low` to `high`.
+pub fn series<T>(low: T, high: T, most: usize) -> impl TypedValueParser<Value = Series<T>>
+where
+    T: FromStr + PartialOrd + Display + Copy + Send + Sync + 'static,
+{
+    move |text: &str| {
+        let numbers = text.split(',').map(|number| number.trim().parse().ok());
+        let numbers: Option<Vec<T>> = numbers.collect();
+        numbers
+            .filter(|all| {
+                all.len() <= most && all.iter().all(|number| (low..=high).contains(number))
+            })
+            .map(Series)
+            .ok_or_else(|| {
+                format!("write 1 to {most} numbers from {low} to {high} with commas between them")
+            })
+    }
+}
+
+/// Columns and rows of a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size(pub u32, pub u32);
+
+/// Columns and rows with an x between them.
+pub fn size(text: &str) -> Result<Size, String> {
+    let sides = text.split_once('x');
+    let sides =
+        sides.and_then(|(width, height)| Some(Size(width.parse().ok()?, height.parse().ok()?)));
+    sides
+        .filter(|Size(width, height)| {
+            [width, height]
+                .iter()
+                .all(|side| (1..=MAX_SIDE).contains(*side))
+        })
+        .ok_or_else(|| format!("write columns and rows from 1 to {MAX_SIDE}, as 1280x800"))
 }
 
 /// An address with its port.

@@ -6,7 +6,7 @@ use crate::head::seam;
 use algo::chain::{Cells, Chain, CodePictures, GrayCode};
 use algo::frame::FrameView;
 use algo::geometry::Triangulator;
-use algo::pattern::PhaseFunction;
+use algo::pattern::{Level, PhaseFunction};
 use algo::pipeline::{self, PhaseMap};
 use algo::units::AbsolutePhase;
 use hal::frame::Frame;
@@ -118,7 +118,11 @@ impl<'a> Channel<'a> {
         Ok(Unwrapping::Planned(Some(map)))
     }
 
-    fn chain(&self) -> Result<Chain, String> {
+    /// The chain of the levels, from the code if there is one.
+    ///
+    /// # Errors
+    /// In words: there is none, and what to add.
+    pub fn chain(&self) -> Result<Chain, String> {
         let cells = self.code.as_ref().map(|code| code.cells);
         Chain::new(self.scan.sequence.levels(), self.function.range(), cells).map_err(words)
     }
@@ -128,18 +132,14 @@ impl<'a> Channel<'a> {
     /// # Errors
     /// In words: frames and map, or frames and code, do not fit each other.
     pub fn decode(&self, unwrapping: &Unwrapping) -> Result<Phases, String> {
-        let levels = self.scan.sequence.levels();
-        let wrapped =
-            |level| pipeline::wrapped(level, &self.scan.frames, self.bit_depth).map_err(words);
         if let Unwrapping::Chain(chain) = unwrapping {
-            let cells = self.code.as_ref().map(|code| code.pictures.cells());
-            let cells = cells.transpose().map_err(words)?;
-            let mut maps: Vec<PhaseMap> = levels.iter().map(wrapped).collect::<Result<_, _>>()?;
+            let (mut maps, cells) = (self.wrapped_levels()?, self.cells()?);
             let absolute = chain.unwrap(&maps, cells.as_deref());
-            let wrapped = maps.swap_remove(levels.len() - 1);
+            let wrapped = maps.swap_remove(maps.len() - 1);
             return Ok(Phases { absolute, wrapped });
         }
-        let wrapped = wrapped(&levels[levels.len() - 1])?;
+        let levels = self.scan.sequence.levels();
+        let wrapped = self.wrapped(&levels[levels.len() - 1])?;
         let absolute = match unwrapping {
             Unwrapping::Planned(map) => {
                 let map = map.as_ref().map(|(_, map)| &map[..]);
@@ -151,6 +151,28 @@ impl<'a> Channel<'a> {
             },
         };
         Ok(Phases { absolute, wrapped })
+    }
+
+    fn wrapped(&self, level: &Level) -> Result<PhaseMap, String> {
+        pipeline::wrapped(level, &self.scan.frames, self.bit_depth).map_err(words)
+    }
+
+    /// The wrapped phases of all levels, from coarse to fine.
+    ///
+    /// # Errors
+    /// In words: frames and levels do not fit each other.
+    pub fn wrapped_levels(&self) -> Result<Vec<PhaseMap>, String> {
+        let levels = self.scan.sequence.levels().iter();
+        levels.map(|level| self.wrapped(level)).collect()
+    }
+
+    /// The cell of the code that each pixel sees, if there is a code.
+    ///
+    /// # Errors
+    /// In words: its pictures do not form a code.
+    pub fn cells(&self) -> Result<Option<Vec<u16>>, String> {
+        let cells = self.code.as_ref().map(|code| code.pictures.cells());
+        cells.transpose().map_err(words)
     }
 
     /// The ratios from coarse to fine.

@@ -2,7 +2,9 @@
 
 pub mod adapt;
 mod channel;
+pub mod import;
 mod known;
+pub mod layout;
 mod report;
 mod score;
 

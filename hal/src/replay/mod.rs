@@ -1,6 +1,7 @@
 //! The replay back-end: recordings in format 1 are read, written, and played as a head.
 
 mod check;
+mod entries;
 pub mod failure;
 mod grey;
 mod manifest;

@@ -5,9 +5,8 @@ use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::manifest::{
-    CameraEntry, CodeEntry, FORMAT, FrameEntry, Manifest, PatternEntries, PatternEntry, VERSION,
-};
+use super::entries::{Names, manifest_of, phase_file, pictures};
+use super::manifest::Manifest;
 use super::recording::{MANIFEST, PatternSpec, Recording, TRUTH_CLASS, TRUTH_HEIGHT};
 use super::{check, grey};
 use crate::frame::{Frame, Samples};
@@ -57,27 +56,102 @@ pub fn write_with(
     folder: &Path,
     add: impl FnOnce(&Path),
 ) -> Result<(), RecorderError> {
-    if fs::symlink_metadata(folder).is_ok() {
-        return Err(RecorderError::Exists {
-            path: folder.to_path_buf(),
-        });
-    }
-    let manifest = manifest_of(recording);
-    check::manifest(&manifest)
-        .map_err(|wrong| wrong.to_string())
-        .and_then(|()| check_samples(recording))
-        .map_err(|problem| RecorderError::Content {
-            path: folder.to_path_buf(),
-            problem,
-        })?;
+    let manifest = checked(recording, Names::Kinds, folder)?;
+    check_samples(recording).map_err(|problem| RecorderError::Content {
+        path: folder.to_path_buf(),
+        problem,
+    })?;
+    settled(folder, |partial| {
+        put_pictures(recording, partial)?;
+        fill(recording, &manifest, partial)?;
+        add(partial);
+        Ok(())
+    })
+}
 
+/// Writes everything of `recording` but its frames, as the new folder `folder`, for frames that are yet to be taken: the manifest
+/// names the file of each frame by its `count`, the place in the order of projection. `beside` are further files with their names.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_outline(
+    recording: &Recording,
+    folder: &Path,
+    beside: &[(String, Vec<u8>)],
+) -> Result<(), RecorderError> {
+    let manifest = checked(recording, Names::Counts, folder)?;
+    settled(folder, |partial| {
+        let frames = partial.join("frames");
+        fs::create_dir(&frames).map_err(|source| create(&frames, source))?;
+        for (name, bytes) in beside {
+            put(&partial.join(name), bytes)?;
+        }
+        fill(recording, &manifest, partial)
+    })
+}
+
+/// Writes the frames of `recording`, and further ones with their names, as the new folder `folder`. It is a recording if there are
+/// frames of levels; a recording without them could not be opened, so then it is pictures only.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_frames(
+    recording: &Recording,
+    folder: &Path,
+    beside: &[(String, Frame)],
+) -> Result<(), RecorderError> {
+    let manifest = match recording.frames.is_empty() {
+        true => {
+            absent(folder)?;
+            None
+        }
+        false => Some(checked(recording, Names::Kinds, folder)?),
+    };
+    settled(folder, |partial| {
+        for (name, frame) in beside {
+            put_frame(&partial.join("frames").join(name), frame)?;
+        }
+        put_pictures(recording, partial)?;
+        match &manifest {
+            Some(manifest) => fill(recording, manifest, partial),
+            None => Ok(()),
+        }
+    })
+}
+
+/// Checks that a folder does not exist.
+fn absent(folder: &Path) -> Result<(), RecorderError> {
+    match fs::symlink_metadata(folder) {
+        Err(_) => Ok(()),
+        Ok(_) => Err(RecorderError::Exists {
+            path: folder.to_path_buf(),
+        }),
+    }
+}
+
+/// The manifest of a recording, if it can be opened again and its folder does not exist.
+fn checked(recording: &Recording, names: Names, folder: &Path) -> Result<Manifest, RecorderError> {
+    absent(folder)?;
+    let manifest = manifest_of(recording, names);
+    match check::manifest(&manifest) {
+        Ok(()) => Ok(manifest),
+        Err(wrong) => Err(RecorderError::Content {
+            path: folder.to_path_buf(),
+            problem: wrong.to_string(),
+        }),
+    }
+}
+
+/// Makes a folder with `fill` under a temporary name, syncs it and renames it. Nothing is left behind if that fails.
+fn settled(
+    folder: &Path,
+    fill: impl FnOnce(&Path) -> Result<(), RecorderError>,
+) -> Result<(), RecorderError> {
     let partial = partial_name(folder);
     // Created here and not in `fill`: if this fails, the folder is not ours and must not be removed.
     fs::create_dir(&partial).map_err(|source| create(&partial, source))?;
-    let written = fill(recording, &manifest, &partial).and_then(|()| {
-        add(&partial);
-        settle(&partial, folder).map_err(|source| create(folder, source))
-    });
+    let written = fill(&partial)
+        .and_then(|()| settle(&partial, folder).map_err(|source| create(folder, source)));
     if written.is_err() {
         // The first error is returned; that the temporary folder cannot be removed either is not worth another.
         let _ = fs::remove_dir_all(&partial);
@@ -131,109 +205,6 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
             Ok(())
         }
         synced => synced,
-    }
-}
-
-fn frame_file(index: usize) -> String {
-    format!("frames/{index:03}.png")
-}
-
-/// The file of the scene under a white raster.
-const WHITE: &str = "frames/white.png";
-/// The same under a black one.
-const BLACK: &str = "frames/black.png";
-
-fn code_file(pattern: usize, bit: usize, inverse: bool) -> String {
-    let end = if inverse { "-inverse" } else { "" };
-    format!("frames/code-{pattern}-{bit:02}{end}.png")
-}
-
-/// All pictures of a recording with their files: the frames of its levels first, in their order.
-fn pictures<'a>(recording: &'a Recording) -> Vec<(String, &'a Frame)> {
-    let frames = recording.frames.iter().enumerate();
-    let mut all: Vec<_> = frames
-        .map(|(index, recorded)| (frame_file(index), &recorded.frame))
-        .collect();
-    for code in &recording.codes {
-        for (inverse, frames) in [(false, &code.bits), (true, &code.inverse)] {
-            let named = |(bit, frame)| (code_file(code.pattern, bit, inverse), frame);
-            all.extend(frames.iter().enumerate().map(named));
-        }
-    }
-    let uniform = [(WHITE, &recording.white), (BLACK, &recording.black)];
-    let taken = |(file, frame): (&str, &'a Option<Frame>)| Some((file.to_owned(), frame.as_ref()?));
-    all.extend(uniform.into_iter().filter_map(taken));
-    all
-}
-
-/// File name of a pattern: the format's name for the first pattern from a file, a numbered name for the second.
-fn phase_file(patterns: &[PatternSpec], index: usize) -> String {
-    let first = patterns
-        .iter()
-        .position(|pattern| matches!(pattern, PatternSpec::File { .. }));
-    if first == Some(index) {
-        "pattern/phase.npy".to_owned()
-    } else {
-        format!("pattern/phase-{index}.npy")
-    }
-}
-
-fn manifest_of(recording: &Recording) -> Manifest {
-    let pattern = |(index, pattern): (usize, &PatternSpec)| match pattern {
-        PatternSpec::Vertical { fringes } => PatternEntry::Vertical { fringes: *fringes },
-        PatternSpec::Horizontal { fringes } => PatternEntry::Horizontal { fringes: *fringes },
-        PatternSpec::File { .. } => PatternEntry::File {
-            file: phase_file(&recording.patterns, index),
-        },
-    };
-    let frames = recording
-        .frames
-        .iter()
-        .enumerate()
-        .map(|(index, frame)| FrameEntry {
-            file: frame_file(index),
-            ratio: frame.ratio,
-            shift_turns: frame.shift_turns,
-            timestamp_ns: frame.timestamp_ns,
-            pattern: frame.pattern,
-        });
-    let codes = recording.codes.iter().map(|code| CodeEntry {
-        pattern: code.pattern,
-        cell_px: code.cell_px,
-        bits: (0..code.bits.len())
-            .map(|bit| code_file(code.pattern, bit, false))
-            .collect(),
-        inverse: (0..code.inverse.len())
-            .map(|bit| code_file(code.pattern, bit, true))
-            .collect(),
-    });
-    // Version 1 has neither, and older programs read it.
-    let plain = [&recording.white, &recording.black]
-        .iter()
-        .all(|uniform| uniform.is_none())
-        && recording.codes.is_empty();
-    Manifest {
-        format: FORMAT.to_owned(),
-        version: if plain { 1 } else { VERSION },
-        description: recording.description.clone(),
-        source: recording.source.clone(),
-        camera: CameraEntry {
-            width: recording.width,
-            height: recording.height,
-            bit_depth: recording.bit_depth,
-            model: recording.camera_model.clone(),
-            noise_counts: recording.noise_counts,
-        },
-        projector: recording.projector.clone(),
-        pattern: PatternEntries(recording.patterns.iter().enumerate().map(pattern).collect()),
-        frames: frames.collect(),
-        codes: codes.collect(),
-        white: recording.white.as_ref().map(|_| WHITE.to_owned()),
-        black: recording.black.as_ref().map(|_| BLACK.to_owned()),
-        range_mm: recording.range_mm,
-        exposure_us: recording.exposure_us,
-        part_id: recording.part_id.clone(),
-        recipe: recording.recipe.clone(),
     }
 }
 
@@ -296,13 +267,21 @@ fn check_samples(recording: &Recording) -> Result<(), String> {
     }
 }
 
-fn fill(recording: &Recording, manifest: &Manifest, partial: &Path) -> Result<(), RecorderError> {
+fn put_pictures(recording: &Recording, partial: &Path) -> Result<(), RecorderError> {
     for (file, frame) in pictures(recording) {
-        let path = partial.join(file);
-        let file = grey::encode(&frame.format(), frame.samples())
-            .map_err(|error| create(&path, io::Error::other(error)))?;
-        put(&path, &file)?;
+        put_frame(&partial.join(file), frame)?;
     }
+    Ok(())
+}
+
+fn put_frame(path: &Path, frame: &Frame) -> Result<(), RecorderError> {
+    let file = grey::encode(&frame.format(), frame.samples())
+        .map_err(|error| create(path, io::Error::other(error)))?;
+    put(path, &file)
+}
+
+/// Writes everything but the frames.
+fn fill(recording: &Recording, manifest: &Manifest, partial: &Path) -> Result<(), RecorderError> {
     for (index, pattern) in recording.patterns.iter().enumerate() {
         if let PatternSpec::File { columns, turns, .. } = pattern {
             let path = partial.join(phase_file(&recording.patterns, index));

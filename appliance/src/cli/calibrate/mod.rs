@@ -176,15 +176,8 @@ impl Calibrate {
             z_away: self.z_away,
         };
         let name = |path: &Path| path.display().to_string();
-        let missing = [&self.camera, &self.projector, &self.models];
-        let missing = missing.into_iter().flatten().find(|path| !path.exists());
-        if let Some(path) = missing {
-            let words = format!(
-                "import {}: there is no such file: name one that cv2.FileStorage wrote",
-                name(path)
-            );
-            return Err(Failure::new(Exit::Missing, words));
-        }
+        let named = [&self.camera, &self.projector, &self.models];
+        model_files(named.into_iter().flatten())?;
         let content = |error| Failure::new(Exit::Content, error);
         Ok(match (&self.camera, &self.projector, &self.models) {
             (Some(camera), Some(projector), _) => {
@@ -198,6 +191,23 @@ impl Calibrate {
             }
             _ => None,
         })
+    }
+}
+
+/// Checks that the files of models exist.
+///
+/// # Errors
+/// If one does not (66).
+pub(super) fn model_files<'a>(named: impl IntoIterator<Item = &'a PathBuf>) -> Result<(), Failure> {
+    match named.into_iter().find(|path| !path.exists()) {
+        None => Ok(()),
+        Some(path) => Err(Failure::new(
+            Exit::Missing,
+            format!(
+                "import {}: there is no such file: name one that cv2.FileStorage wrote",
+                path.display()
+            ),
+        )),
     }
 }
 

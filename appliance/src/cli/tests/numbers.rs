@@ -1,5 +1,6 @@
 //! Boundary values in every number of the command line: each is refused with its option and bounds, or lies within them.
 
+use super::super::numbers::{self, Size};
 use super::super::part::SimulatedPart;
 use super::{Arg, leaves};
 use crate::config::HeadConfig;
@@ -18,6 +19,10 @@ enum Takes {
     Number(f64, f64),
     /// So many numbers, each so far from 0 at most.
     List(usize, f64),
+    /// One number or several, each within bounds.
+    Series(f64, f64),
+    /// Columns and rows.
+    Sides,
     /// An address with a port.
     Address,
     /// A date; none of the values is one.
@@ -27,7 +32,7 @@ enum Takes {
     /// Text, which has no numeric bounds.
     Words,
 }
-use Takes::{Address, Date, Defect, List, Number, Words};
+use Takes::{Address, Date, Defect, List, Number, Series, Sides, Words};
 
 /// Every option and positional argument that takes neither a path nor one word of a list; `*` is every command.
 const TABLE: &[(&str, &str, Takes)] = &[
@@ -45,6 +50,29 @@ const TABLE: &[(&str, &str, Takes)] = &[
     ("adapt", "projector_pitch", Number(2.0, 128.0)),
     ("adapt", "image_pitch", Number(2.0, 128.0)),
     ("calibrate", "temperature", Number(COLDEST_C, HOTTEST_C)),
+    ("patterns", "projector", Sides),
+    ("patterns", "fringes", Series(1e-3, 1000.0)),
+    ("patterns", "pitch", Series(2.0, 1e6)),
+    ("patterns", "steps", Series(3.0, 64.0)),
+    ("patterns", "first_shift", Number(-1000.0, 1000.0)),
+    ("patterns", "gray", Series(1.0, 13.0)),
+    ("patterns", "gray_cell", Number(1.0, 8192.0)),
+    ("import", "projector", Sides),
+    ("import", "fringes", Series(1e-3, 1000.0)),
+    ("import", "pitch", Series(2.0, 1e6)),
+    ("import", "steps", Series(3.0, 64.0)),
+    ("import", "first_shift", Number(-1000.0, 1000.0)),
+    ("import", "gray", Series(1.0, 13.0)),
+    ("import", "gray_cell", Number(1.0, 8192.0)),
+    ("patterns", "camera", Sides),
+    ("patterns", "bit_depth", Number(8.0, 16.0)),
+    ("import", "bit_depth", Number(9.0, 16.0)),
+    ("import", "name", Words),
+    ("capture", "patterns", Words),
+    ("capture", "poses", Number(1.0, 99.0)),
+    ("capture", "fringes", Number(1e-3, 1000.0)),
+    ("capture", "levels", Number(1.0, 8.0)),
+    ("capture", "steps", Number(3.0, 64.0)),
     ("record", "fringes", Number(1e-3, 1000.0)),
     ("record", "levels", Number(1.0, 8.0)),
     ("record", "steps", Number(3.0, 64.0)),
@@ -92,6 +120,8 @@ impl Takes {
         };
         match self {
             Number(..) | Date => vec![value.to_owned()],
+            Series(low, _) => vec![value.to_owned(), format!("{low},{value}")],
+            Sides => vec![format!("{value}x768"), format!("1024x{value}")],
             List(count, _) => beside(&["0"; 3][..count]),
             Address => vec![format!("127.0.0.1:{value}")],
             Defect => {
@@ -107,7 +137,8 @@ impl Takes {
     /// What a refusal says in addition to the option's name.
     fn bounds(self) -> Vec<String> {
         match self {
-            Number(low, high) => vec![format!("from {low} to {high}")],
+            Number(low, high) | Series(low, high) => vec![format!("from {low} to {high}")],
+            Sides => vec!["from 1 to 8192".into()],
             List(_, most) => vec![format!("from -{most} to {most}")],
             Address => vec!["0 to 65535".into()],
             Date => vec!["write a date".into()],
@@ -129,6 +160,21 @@ fn read(matches: &ArgMatches, id: &str) -> Vec<f64> {
         .or_else(|| one::<u64>(matches, id).map(|whole| whole as f64));
     let list = one::<[f64; 2]>(matches, id).map(Vec::from);
     let list = list.or_else(|| one::<[f64; 3]>(matches, id).map(Vec::from));
+    let series = |matches: &ArgMatches| {
+        let wide = matches
+            .try_get_one::<numbers::Series<f64>>(id)
+            .ok()
+            .flatten();
+        let whole = matches
+            .try_get_one::<numbers::Series<u8>>(id)
+            .ok()
+            .flatten();
+        let wide = wide.map(|numbers::Series(all)| all.clone());
+        wide.or_else(|| {
+            whole.map(|numbers::Series(all)| all.iter().copied().map(f64::from).collect())
+        })
+    };
+    let list = list.or_else(|| series(matches));
     single
         .map(|number| vec![number])
         .or(list)
@@ -175,7 +221,7 @@ fn a_boundary_value_of_an_option_is_refused_with_its_bounds_or_lies_within_them(
     }
     println!("{cases} boundary values of options, {taken} of them can be used");
     assert_eq!(known.len(), TABLE.len(), "an option is gone");
-    assert_eq!(cases, 731);
+    assert_eq!(cases, 1326);
 }
 
 /// Checks the outcome of a case; returns whether its value was accepted.
@@ -213,6 +259,25 @@ fn check(
             let numbers = read(&matches, id);
             assert_eq!(numbers.len(), count, "{case}");
             assert!(numbers.iter().all(|number| number.abs() <= most), "{case}");
+        }
+        Series(low, high) => {
+            let all = read(&matches, id);
+            assert!(!all.is_empty(), "{case}: of another type");
+            assert!(
+                all.iter().all(|number| (low..=high).contains(number)),
+                "{case}"
+            );
+        }
+        Sides => {
+            let Some(Size(width, height)) = matches.get_one::<Size>(id) else {
+                panic!("{case}: of another type");
+            };
+            assert!(
+                [width, height]
+                    .iter()
+                    .all(|side| (1..=8192).contains(*side)),
+                "{case}"
+            );
         }
         Address => assert!(matches.get_one::<SocketAddr>(id).is_some(), "{case}"),
         Defect => {

@@ -1,0 +1,265 @@
+//! `fringed capture DIR`: pictures of white, black, fringes or files, with a head that need not be calibrated.
+
+use super::names;
+use super::numbers::number;
+use super::options::{Files, Quiet, Threads};
+use crate::error::{Exit, Failure};
+use crate::head::calibration::Calibration;
+use crate::head::rasters::rasters;
+use crate::head::seam;
+use crate::measure::import::{Channel, Picture};
+use crate::production::backend::{self, Opened};
+use algo::pattern::{PhaseFunction, Sequence, Shot};
+use hal::bounds::MAX_FRINGES;
+use hal::frame::Frame;
+use hal::projector::Raster;
+use hal::replay::recorder;
+use hal::replay::recording::{PatternSpec, RecordedFrame};
+use std::io::{BufRead as _, IsTerminal as _};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Take pictures with a head that need not be calibrated.
+#[derive(Debug, clap::Args)]
+pub struct Capture {
+    /// Folder for the pictures; must not exist yet. With fringes it is a recording without models.
+    #[arg(value_parser = names::folder())]
+    folder: PathBuf,
+    /// What to show: white, black, vertical, horizontal, all of these, or grey PNG files of the projector's size.
+    #[arg(long, value_name = "PATTERN,...", default_value = "all", value_delimiter = ',', value_parser = Showing::parse)]
+    patterns: Vec<Showing>,
+    /// Poses of a board, each in a folder of its own; before each, a line is read from standard input.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = number(1u8, 99))]
+    poses: u8,
+    /// Fringes over the projector; without it, one per 12 pixels.
+    #[arg(long, value_name = "N", value_parser = number(1e-3, MAX_FRINGES))]
+    fringes: Option<f64>,
+    /// Levels, from coarse to fine.
+    #[arg(long, default_value_t = 3, value_parser = number(1u8, 8))]
+    levels: u8,
+    /// Shifts per level.
+    #[arg(long, default_value_t = 4, value_parser = number(3u8, 64))]
+    steps: u8,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    quiet: Quiet,
+}
+
+/// What is shown.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Showing {
+    /// White, black, vertical and horizontal fringes.
+    All,
+    White,
+    Black,
+    Vertical,
+    Horizontal,
+    /// A picture.
+    File(PathBuf),
+}
+
+impl Showing {
+    fn parse(word: &str) -> Result<Self, &'static str> {
+        match word {
+            "all" => Ok(Self::All),
+            "white" => Ok(Self::White),
+            "black" => Ok(Self::Black),
+            "vertical" => Ok(Self::Vertical),
+            "horizontal" => Ok(Self::Horizontal),
+            file if file.to_ascii_lowercase().ends_with(".png") => Ok(Self::File(file.into())),
+            _ => Err("write white, black, vertical, horizontal, all, or names of PNG files"),
+        }
+    }
+}
+
+/// Longest wait for one frame.
+const TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Fringes of one direction.
+struct Fringes {
+    spec: PatternSpec,
+    shots: Vec<Shot>,
+}
+
+/// Everything that is shown in a pose: fringes first, then white and black, then files.
+struct Plan {
+    rasters: Vec<Raster>,
+    fringes: Vec<Fringes>,
+    white: bool,
+    black: bool,
+    /// Names of the files' frames.
+    files: Vec<String>,
+}
+
+impl Capture {
+    /// Opens the head, takes the pictures of each pose and writes them.
+    ///
+    /// # Errors
+    /// If the head cannot be opened (69), a picture cannot be shown (64, 65, 66), the folder cannot be written (73), or standard input
+    /// ends before the last pose (64).
+    pub fn run(&self) -> Result<(), Failure> {
+        if self.folder.exists() {
+            let words = format!(
+                "capture to {}: it exists already: name a folder that does not exist",
+                self.folder.display()
+            );
+            return Err(Failure::new(Exit::CannotCreate, words));
+        }
+        let config = self.files.configuration()?;
+        let progress = self.quiet.progress();
+        let on_progress =
+            |share: f64| progress.tell(0.8 * share, "working out the light of the scene");
+        let pool = self.threads.pool(config.threads)?;
+        let mut opened = pool.install(|| backend::open(&self.files.head(&config), &on_progress))?;
+        progress.clear();
+        let plan = self.plan(&opened.calibration)?;
+        opened.head.load(plan.rasters.clone())?;
+        for pose in 1..=self.poses {
+            let folder = match self.poses {
+                1 => self.folder.clone(),
+                _ => {
+                    self.wait_for(pose)?;
+                    self.folder.join(format!("pose-{pose:02}"))
+                }
+            };
+            let indices: Vec<usize> = (0..plan.rasters.len()).collect();
+            let mut taken = Vec::with_capacity(indices.len());
+            opened
+                .head
+                .acquire(&indices, TIMEOUT, &mut |_, frame| taken.push(frame))?;
+            let count = taken.len();
+            if self.poses > 1 {
+                std::fs::create_dir_all(&self.folder).map_err(|error| {
+                    Failure::because(Exit::CannotCreate, self.folder.display(), error)
+                })?;
+            }
+            plan.write(&opened, taken, &folder)?;
+            self.quiet
+                .say(|| format!("took {count} pictures to {}", folder.display()));
+        }
+        Ok(())
+    }
+
+    /// Waits until somebody has laid the board.
+    fn wait_for(&self, pose: u8) -> Result<(), Failure> {
+        let poses = self.poses;
+        if std::io::stdin().is_terminal() {
+            self.quiet
+                .say(|| format!("pose {pose} of {poses}: lay the board, then press Enter"));
+        }
+        let mut line = String::new();
+        let read = std::io::stdin().lock().read_line(&mut line);
+        match read {
+            Ok(1..) => Ok(()),
+            _ => Err(Failure::new(
+                Exit::Usage,
+                format!(
+                    "capture pose {pose} of {poses}: standard input has ended: run it in a terminal, or give it a line per pose"
+                ),
+            )),
+        }
+    }
+
+    /// The rasters to show.
+    fn plan(&self, calibration: &Calibration) -> Result<Plan, Failure> {
+        let (columns, rows) = calibration.raster();
+        let shows =
+            |one: &Showing| self.patterns.contains(one) || self.patterns.contains(&Showing::All);
+        let mut plan = Plan {
+            rasters: Vec::new(),
+            fringes: Vec::new(),
+            white: shows(&Showing::White),
+            black: shows(&Showing::Black),
+            files: Vec::new(),
+        };
+        for (showing, length) in [(Showing::Vertical, columns), (Showing::Horizontal, rows)] {
+            if !shows(&showing) {
+                continue;
+            }
+            let fringes = self.fringes.unwrap_or(f64::from(length) / 12.0);
+            let spec = match showing {
+                Showing::Vertical => PatternSpec::Vertical { fringes },
+                _ => PatternSpec::Horizontal { fringes },
+            };
+            let function: PhaseFunction =
+                seam::phase_function(&spec, columns as usize, rows as usize)
+                    .map_err(|error| Failure::because(Exit::Usage, "--fringes", error))?;
+            let (levels, steps) = (usize::from(self.levels), usize::from(self.steps));
+            let shots = Sequence::geometric(function.range(), levels, steps);
+            plan.rasters
+                .extend(rasters(&function, &shots, calibration)?);
+            plan.fringes.push(Fringes { spec, shots });
+        }
+        for (wanted, grey) in [(plan.white, u8::MAX), (plan.black, 0)] {
+            if wanted {
+                plan.rasters.push(Raster::uniform(columns, rows, grey)?);
+            }
+        }
+        for showing in &self.patterns {
+            if let Showing::File(path) = showing {
+                plan.rasters.push(raster_of(path, (columns, rows))?);
+                let name = path.file_name().unwrap_or(path.as_os_str());
+                plan.files.push(format!("file-{}", name.to_string_lossy()));
+            }
+        }
+        Ok(plan)
+    }
+}
+
+impl Plan {
+    /// Writes the frames of a pose: a recording if there are fringes, else pictures alone.
+    fn write(&self, opened: &Opened, taken: Vec<Frame>, folder: &Path) -> Result<(), Failure> {
+        let mut frames = taken.into_iter();
+        let mut recording = opened.calibration.recording();
+        recording.description = "taken without models".into();
+        recording.source = match opened.stage {
+            Some(_) => "fringed's simulated head".into(),
+            None => "a head of fringed".into(),
+        };
+        (recording.camera_model, recording.projector.model) = (None, None);
+        recording.noise_counts = None;
+        for (pattern, fringes) in self.fringes.iter().enumerate() {
+            recording.patterns.push(fringes.spec.clone());
+            let shown = fringes.shots.iter().zip(frames.by_ref());
+            let recorded = shown.map(|(&shot, frame)| RecordedFrame {
+                pattern,
+                ..seam::recorded(shot, frame)
+            });
+            recording.frames.extend(recorded);
+        }
+        recording.white = self.white.then(|| frames.next()).flatten();
+        recording.black = self.black.then(|| frames.next()).flatten();
+        let named: Vec<(String, Frame)> = self.files.iter().cloned().zip(frames).collect();
+        let refused =
+            |error: recorder::RecorderError| Failure::new(Exit::CannotCreate, error.to_string());
+        recorder::write_frames(&recording, folder, &named).map_err(refused)
+    }
+}
+
+/// The raster of a grey picture of 8 bits.
+fn raster_of(path: &Path, (columns, rows): (u32, u32)) -> Result<Raster, Failure> {
+    let name = path.display();
+    if !path.exists() {
+        let words =
+            format!("show {name}: there is no such file: name a grey PNG of the projector's size");
+        return Err(Failure::new(Exit::Missing, words));
+    }
+    let wrong = |problem: String| Failure::because(Exit::Content, format!("show {name}"), problem);
+    let picture = Picture::read(path).map_err(wrong)?;
+    let (width, height) = picture.size;
+    if picture.size != (columns, rows) || picture.bits != 8 {
+        return Err(wrong(format!(
+            "{width}×{height} pixels of {} bits, the projector has {columns}×{rows} of 8: save it with these",
+            picture.bits
+        )));
+    }
+    let levels = picture.grey(Channel::Luminance).into_iter();
+    Ok(Raster::new(
+        columns,
+        rows,
+        levels.map(|level| level as u8).collect(),
+    )?)
+}

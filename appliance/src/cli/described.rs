@@ -1,0 +1,104 @@
+//! Options that describe projected pictures, for `fringed import` and `fringed patterns`.
+
+use super::numbers::{Series, Size, number, series, size};
+use crate::error::{Exit, Failure};
+use crate::measure::layout::{
+    Convention, Description, Direction, Fringes, Gray, Section, ShiftSign, Shifts,
+};
+use hal::bounds::{MAX_FRINGES, MAX_SHIFT_TURNS, MAX_SIDE};
+
+/// Most levels of a recording that can be decoded.
+const MAX_LEVELS: usize = 8;
+
+/// What was or will be projected.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Described {
+    /// Columns and rows of the projector.
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    projector: Size,
+    /// Fringes over the projector of each level, in the order of projection; need not be whole numbers.
+    #[arg(long, value_name = "F,...", conflicts_with = "pitch", value_parser = series(1e-3, MAX_FRINGES, MAX_LEVELS))]
+    fringes: Option<Series<f64>>,
+    /// Projector pixels per fringe of each level, instead of --fringes.
+    #[arg(long, value_name = "PX,...", value_parser = series(2.0, 1e6, MAX_LEVELS))]
+    pitch: Option<Series<f64>>,
+    /// Shifts of all levels, or of each.
+    #[arg(long, value_name = "N,...", default_value = "4", value_parser = series(3u8, 64, MAX_LEVELS))]
+    steps: Series<u8>,
+    /// Whether the phase is that of a sine or of a cosine.
+    #[arg(long, default_value = "sin")]
+    convention: Convention,
+    /// Whether the shift rises or falls from frame to frame.
+    #[arg(long, default_value = "+", allow_hyphen_values = true)]
+    shift: ShiftSign,
+    /// Shift of each level's first frame, turns.
+    #[arg(long, value_name = "TURNS", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(-MAX_SHIFT_TURNS, MAX_SHIFT_TURNS))]
+    first_shift: f64,
+    /// Direction of the fringes; both: all vertical ones, then all horizontal ones.
+    #[arg(long, default_value = "vertical")]
+    direction: Direction,
+    /// Bits of a Gray code beside the fringes; two numbers for the vertical and the horizontal one.
+    #[arg(long, value_name = "BITS", value_parser = series(1u8, 13, 2))]
+    gray: Option<Series<u8>>,
+    /// Width of the Gray code's cells, projector pixels; without it one cell per fringe of the finest level.
+    #[arg(long, value_name = "PX", value_parser = number(1.0, f64::from(MAX_SIDE)))]
+    gray_cell: Option<f64>,
+    /// Each picture of the Gray code is followed by its inverse.
+    #[arg(long)]
+    gray_inverse: bool,
+    /// Order of projection; without it sine, then gray if there is one.
+    #[arg(long, value_name = "PART,...", value_delimiter = ',')]
+    order: Vec<Section>,
+}
+
+impl Described {
+    /// The projector's columns and rows.
+    pub fn projector(&self) -> (u32, u32) {
+        let Size(width, height) = self.projector;
+        (width, height)
+    }
+
+    /// The description, with a phase function instead of straight fringes if one is given.
+    ///
+    /// # Errors
+    /// If neither fringes nor pitches are given, or a Gray code is described that there is not (64).
+    pub fn description(&self, function: Option<Vec<f64>>) -> Result<Description, Failure> {
+        let fringes = match (&self.fringes, &self.pitch) {
+            (Some(Series(fringes)), _) => Fringes::Count(fringes.clone()),
+            (None, Some(Series(pitch))) => Fringes::Pitch(pitch.clone()),
+            (None, None) => return Err(Failure::new(Exit::Usage, "give --fringes or --pitch")),
+        };
+        if self.gray.is_none() && (self.gray_cell.is_some() || self.gray_inverse) {
+            let words =
+                "--gray-cell and --gray-inverse describe a Gray code: give its bits with --gray";
+            return Err(Failure::new(Exit::Usage, words));
+        }
+        let gray = self.gray.as_ref().map(|Series(bits)| Gray {
+            bits: bits.clone(),
+            cell_px: self.gray_cell,
+            inverse: self.gray_inverse,
+        });
+        let usual = match gray {
+            Some(_) => vec![Section::Sine, Section::Gray],
+            None => vec![Section::Sine],
+        };
+        Ok(Description {
+            projector: self.projector(),
+            fringes,
+            steps: self.steps.0.clone(),
+            shifts: Shifts {
+                convention: self.convention,
+                sign: self.shift,
+                first: self.first_shift,
+            },
+            direction: self.direction,
+            gray,
+            order: if self.order.is_empty() {
+                usual
+            } else {
+                self.order.clone()
+            },
+            function,
+        })
+    }
+}

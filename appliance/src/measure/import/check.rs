@@ -1,0 +1,316 @@
+//! What looks wrong with an imported recording: its levels are unwrapped as stated and under the other conventions, and the
+//! frames of each level are compared with a sine.
+
+use crate::measure::channel::Channel;
+use crate::measure::layout::{Convention, ShiftSign, Shifts};
+use algo::chain::Chain;
+use algo::phase::Trust;
+use algo::pipeline::{self, PhaseMap};
+use algo::units::{AbsolutePhase, WrappedPhase};
+use hal::frame::Samples;
+use hal::replay::Recording;
+use hal::replay::recording::PatternSpec;
+
+/// Rows that conventions are compared on.
+const ROWS: usize = 128;
+/// Largest residual of levels that agree, in turns: unrelated phases agree in 40 % of the pixels per step.
+const CLOSE: f64 = 0.2;
+/// Share of the pixels whose levels must agree.
+const AGREE: f64 = 0.6;
+/// By how much another convention must agree better.
+const BETTER: f64 = 0.3;
+/// Share of the rows in which a convention may jump by most of a turn of its coarsest level.
+const JUMPS: f64 = 0.5;
+/// Share of the pattern that is a jump.
+const JUMP: f64 = 0.4;
+/// Share of the neighbours along which a phase falls that is named.
+const FALLING: f64 = 0.8;
+/// Noise of a sample, as a share of the modulation, above which frames are no sine.
+const NOISE: f64 = 0.2;
+/// Share of the pixels that must be modulated.
+const LIT: f64 = 0.01;
+/// Share of the modulated pixels that may be at full scale.
+const SATURATED: f64 = 0.05;
+
+/// What looks wrong, in words with remedies.
+///
+/// # Errors
+/// In words: the frames do not form levels.
+pub(super) fn notes(recording: &Recording, stated: Shifts) -> Result<Vec<String>, String> {
+    let mut notes = Vec::new();
+    same_pictures(recording, &mut notes);
+    unused_bits(recording, &mut notes);
+    for (pattern, spec) in recording.patterns.iter().enumerate() {
+        let channel = Channel::new(recording, pattern)?;
+        let levels = channel.wrapped_levels()?;
+        let direction = match spec {
+            PatternSpec::Horizontal { .. } => "horizontal",
+            _ => "vertical",
+        };
+        let mut note = |words: String| notes.push(format!("{direction} fringes: {words}"));
+        light(&channel, &levels, &mut note);
+        match channel.chain() {
+            Err(missing) => note(missing),
+            Ok(chain) => {
+                let cells = channel.cells()?;
+                let rows = Rows::of(&levels, cells.as_deref());
+                conventions(&channel, &chain, &rows, stated, &mut note);
+                let mirrored = recording.camera_model.is_none();
+                if mirrored && rows.falls(&rows.unwrap(&chain), direction == "vertical") {
+                    let along = if direction == "vertical" {
+                        "from left to right"
+                    } else {
+                        "from top to bottom"
+                    };
+                    note(format!(
+                        "the phase falls {along}: --shift is reversed, or the camera is mirrored or upside down against the \
+                         projector"
+                    ));
+                }
+            }
+        }
+    }
+    Ok(notes)
+}
+
+/// Pictures that follow each other and are the same.
+fn same_pictures(recording: &Recording, notes: &mut Vec<String>) {
+    let pairs = recording.frames.windows(2).enumerate();
+    for (at, pair) in pairs {
+        if pair[0].frame.samples() == pair[1].frame.samples() {
+            notes.push(format!(
+                "frames {at} and {} are the same picture: was one saved twice?",
+                at + 1
+            ));
+        }
+    }
+}
+
+/// Samples of 16 bits that use fewer: then full scale is not recognised as saturated.
+fn unused_bits(recording: &Recording, notes: &mut Vec<String>) {
+    let largest = |samples: Samples<'_>| match samples {
+        Samples::Eight(_) => u16::MAX,
+        Samples::Sixteen(samples) => samples.iter().copied().max().unwrap_or(0),
+    };
+    let frames = recording.frames.iter();
+    let largest = frames.map(|frame| largest(frame.frame.samples())).max();
+    let bits = u16::BITS - largest.unwrap_or(0).leading_zeros();
+    if recording.bit_depth == 16 && (1..=12).contains(&bits) {
+        notes.push(format!(
+            "no sample of 16 bits uses more than {bits}: give --bit-depth {}, or saturated pixels are not recognised",
+            bits.max(9)
+        ));
+    }
+}
+
+/// Modulation, saturation, and whether the frames of a level are a sine.
+fn light(channel: &Channel<'_>, levels: &[PhaseMap], note: &mut impl FnMut(String)) {
+    let finest = &levels[levels.len() - 1];
+    let pixels = finest.trust.len() as f64;
+    let (resolved, saturated) = (
+        finest.count(Trust::Resolved),
+        finest.count(Trust::Saturated),
+    );
+    let lit = (resolved + saturated) as f64;
+    if lit < LIT * pixels {
+        note(format!(
+            "only {:.1} % of the pixels are modulated at the finest level by 16 of 255 counts or more: check the order of the \
+             pictures, --fringes and --steps",
+            100.0 * lit / pixels
+        ));
+        return;
+    }
+    if saturated as f64 > SATURATED * lit {
+        note(format!(
+            "{:.0} % of the modulated pixels are at full scale: expose for a shorter time",
+            100.0 * saturated as f64 / lit
+        ));
+    }
+    let scan = &channel.scan;
+    let noise = pipeline::sample_noise(&scan.sequence, &scan.frames, &finest.trust);
+    let full_scale = scan.decoder.full_scale();
+    let counts = finest.modulation.iter();
+    let sum: f64 = counts.map(|modulation| modulation.counts(full_scale)).sum();
+    let mean = sum / resolved.max(1) as f64;
+    if let Some(noise) = noise.filter(|noise| *noise > NOISE * mean) {
+        note(format!(
+            "the frames are off a sine by {noise:.1} counts, {:.0} % of the modulation: check the order of the pictures and \
+             --steps, and that the projector's response is linear",
+            100.0 * noise / mean
+        ));
+    }
+}
+
+/// Every so many rows of the wrapped phases.
+struct Rows {
+    levels: Vec<PhaseMap>,
+    cells: Option<Vec<u16>>,
+}
+
+/// How well the levels agree under a convention.
+#[derive(Clone, Copy)]
+struct Agreement {
+    /// Share of the modulated pixels that are resolved.
+    share: f64,
+    /// Share of the rows in which the phase jumps by most of the pattern.
+    jumps: f64,
+}
+
+impl Rows {
+    fn of(levels: &[PhaseMap], cells: Option<&[u16]>) -> Self {
+        let width = levels[0].width.max(1);
+        let height = levels[0].phase.len() / width;
+        let step = height.div_ceil(ROWS).max(1);
+        fn every<T: Copy>(step: usize, width: usize, all: &[T]) -> Vec<T> {
+            let rows = all.chunks(width).step_by(step);
+            rows.flatten().copied().collect()
+        }
+        let thin = |map: &PhaseMap| PhaseMap {
+            width,
+            phase: every(step, width, &map.phase),
+            modulation: every(step, width, &map.modulation),
+            trust: every(step, width, &map.trust),
+        };
+        Self {
+            levels: levels.iter().map(thin).collect(),
+            cells: cells.map(|cells| every(step, width, cells)),
+        }
+    }
+
+    fn unwrap(&self, chain: &Chain) -> PhaseMap {
+        chain.unwrap(&self.levels, self.cells.as_deref())
+    }
+
+    /// The rows as they would be decoded under another convention: each phase φ becomes ± φ + `offset`.
+    fn under(&self, reversed: bool, offset: f64) -> Self {
+        let turn = |map: &PhaseMap| {
+            let phase = map.phase.iter().map(|phase| {
+                let turns = if reversed {
+                    -phase.turns()
+                } else {
+                    phase.turns()
+                };
+                AbsolutePhase::from_turns(WrappedPhase::from_turns(turns + offset).turns())
+            });
+            PhaseMap {
+                phase: phase.collect(),
+                ..map.clone()
+            }
+        };
+        Self {
+            levels: self.levels.iter().map(turn).collect(),
+            cells: self.cells.clone(),
+        }
+    }
+
+    fn agreement(&self, chain: &Chain, span: f64) -> Agreement {
+        let map = chain.unwrap_within(CLOSE, &self.levels, self.cells.as_deref());
+        let resolved = map.count(Trust::Resolved);
+        let modulated = resolved + map.count(Trust::Residual);
+        let rows = map.phase.len() / map.width.max(1);
+        let jumps = map.phase.chunks(map.width.max(1)).filter(|row| {
+            let apart = |pair: &[AbsolutePhase]| {
+                pair[0].is_known()
+                    && pair[1].is_known()
+                    && (pair[1] - pair[0]).turns().abs() > JUMP * span
+            };
+            row.windows(2).any(apart)
+        });
+        Agreement {
+            share: resolved as f64 / modulated.max(1) as f64,
+            jumps: jumps.count() as f64 / rows.max(1) as f64,
+        }
+    }
+
+    /// Whether the phase falls along the rows, or from row to row.
+    fn falls(&self, map: &PhaseMap, along_rows: bool) -> bool {
+        let (width, pixels) = (map.width.max(1), map.phase.len());
+        let step = if along_rows { 1 } else { width };
+        let (mut falling, mut rising) = (0_usize, 0_usize);
+        for at in (0..pixels.saturating_sub(step)).filter(|at| !along_rows || (at + 1) % width != 0)
+        {
+            let (here, next) = (map.phase[at], map.phase[at + step]);
+            if here.is_known() && next.is_known() {
+                let turns = (next - here).turns();
+                falling += usize::from(turns < 0.0);
+                rising += usize::from(turns > 0.0);
+            }
+        }
+        falling as f64 > FALLING * (falling + rising) as f64
+    }
+}
+
+/// Compares the stated convention of shifts with the three others.
+///
+/// Frames with the shifts s_k = ± k/N + s₀ + c (c = 0 for a sine, ¼ for a cosine) that are decoded with the shifts of another
+/// convention give, instead of φ, the phase φ + c − c' where the sign is the same, and ½ − φ − 2 s₀ − c − c' where it is reversed.
+fn conventions(
+    channel: &Channel<'_>,
+    chain: &Chain,
+    rows: &Rows,
+    stated: Shifts,
+    note: &mut impl FnMut(String),
+) {
+    let span = channel.function.range().span();
+    let own = rows.agreement(chain, span);
+    let mut best: Option<(Agreement, String)> = None;
+    for convention in [Convention::Sin, Convention::Cos] {
+        for reversed in [false, true] {
+            if convention == stated.convention && !reversed {
+                continue;
+            }
+            let (here, there) = (stated.convention.turns(), convention.turns());
+            let offset = match reversed {
+                false => here - there,
+                true => 0.5 - 2.0 * stated.first - here - there,
+            };
+            let found = rows.under(reversed, offset).agreement(chain, span);
+            let better = match &best {
+                None => true,
+                Some((known, _)) => {
+                    found.share > known.share + 0.05
+                        || (found.share > known.share - 0.05 && found.jumps < known.jumps)
+                }
+            };
+            if better {
+                best = Some((found, named(convention, reversed, stated.sign)));
+            }
+        }
+    }
+    let Some((best, words)) = best else {
+        return;
+    };
+    let percent = |share: f64| 100.0 * share;
+    if best.share > own.share + BETTER {
+        note(format!(
+            "levels agree in {:.0} % of the modulated pixels, with {words} in {:.0} %: give {words}",
+            percent(own.share),
+            percent(best.share)
+        ));
+    } else if own.share < AGREE {
+        note(format!(
+            "levels agree in only {:.0} % of the modulated pixels, whatever the convention of the shifts: check --fringes, \
+             --steps and the order of the pictures",
+            percent(own.share)
+        ));
+    } else if own.jumps > JUMPS && best.jumps < own.jumps / 2.0 && best.share > own.share - 0.05 {
+        note(format!(
+            "the phase jumps by a turn of the coarsest level in {:.0} % of the rows, with {words} in {:.0} %: give {words}",
+            percent(own.jumps),
+            percent(best.jumps)
+        ));
+    }
+}
+
+/// The options of a convention.
+fn named(convention: Convention, reversed: bool, stated: ShiftSign) -> String {
+    let convention = match convention {
+        Convention::Sin => "--convention sin",
+        Convention::Cos => "--convention cos",
+    };
+    let sign = match (stated, reversed) {
+        (ShiftSign::Rising, false) | (ShiftSign::Falling, true) => "+",
+        _ => "-",
+    };
+    format!("{convention} --shift {sign}")
+}
