@@ -1,5 +1,6 @@
 //! From absolute phase to height: models of camera and projector, the reference phase map, triangulation.
 
+mod lens;
 mod pinhole;
 mod reference;
 mod root;
@@ -7,6 +8,7 @@ mod sight;
 mod triangulate;
 mod vector;
 
+pub use lens::Lens;
 pub use pinhole::{ModelError, Pinhole, PinholeModel};
 pub use reference::{FittedMap, Reference, ReferenceError, fit_map};
 pub use sight::Sight;

@@ -1,12 +1,9 @@
 //! The model of camera and projector: a pinhole with Brown's distortion, in OpenCV's convention. A projector is an inverse camera.
 //!
-//! X_device = R · X_world + t; x = X/Z, y = Y/Z; with r² = x² + y²
-//! x_d = x(1 + k₁r² + k₂r⁴ + k₃r⁶) + 2p₁xy + p₂(r² + 2x²),
-//! y_d = y(1 + k₁r² + k₂r⁴ + k₃r⁶) + p₁(r² + 2y²) + 2p₂xy;
-//! u = f_x x_d + c_x, v = f_y y_d + c_y. Pixel centres at integers, x right, y down, z forward.
-//! Source: D. C. Brown, "Decentering distortion of lenses", 1966, as in OpenCV's calib3d.
+//! X_device = R · X_world + t; x = X/Z, y = Y/Z; from (x, y) to pixels as in [`Lens`]. Pixel centres at integers, x right, y down,
+//! z forward.
 
-use super::Vector;
+use super::{Lens, Vector};
 
 /// The parameters of a device model as a calibration gives them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +28,7 @@ pub struct PinholeModel {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pinhole {
     model: PinholeModel,
+    lens: Lens,
     width: usize,
     height: usize,
     centre: Vector,
@@ -98,8 +96,6 @@ pub enum ModelError {
 const ROTATION_TOLERANCE: f64 = 1e-4;
 /// A kilometre in mm: a larger translation is in another unit, and f64 no longer resolves 1e-9 mm.
 const MAX_DISTANCE: f64 = 1e6;
-/// Newton iterations after which the undistortion must have converged; real lenses take 4.
-const NEWTON_STEPS: usize = 25;
 /// Radii up to which the distortion is checked, as multiples of the radius at the frame's border: the reference phase map is
 /// evaluated up to 15 % outside. The largest that is one-to-one is used; a model must reach the last.
 const REACHES: [f64; 4] = [1.3, 1.2, 1.1, 1.02];
@@ -142,6 +138,7 @@ impl Pinhole {
         let centre = (rows[0] * a + rows[1] * b + rows[2] * c) * -1.0;
         let pinhole = Self {
             model,
+            lens: Lens::of(&model),
             width,
             height,
             centre,
@@ -162,11 +159,11 @@ impl Pinhole {
             let (u, v) = (-0.5 + share * (right + 0.5), -0.5 + share * (bottom + 0.5));
             for (u, v) in [(u, -0.5), (u, bottom), (-0.5, v), (right, v)] {
                 let error = ModelError::Distortion { u, v };
-                let (x, y) = self.undistorted(u, v).ok_or(error.clone())?;
+                let (x, y) = self.lens.undistorted(u, v).ok_or(error.clone())?;
                 let one_to_one = |reach: f64| {
                     (0..=16).all(|step| {
                         let along = reach * f64::from(step) / 16.0;
-                        self.jacobian(x * along, y * along).3 > 0.0
+                        self.lens.jacobian(x * along, y * along).3 > 0.0
                     })
                 };
                 while !one_to_one(REACHES[reach_left]) {
@@ -211,7 +208,7 @@ impl Pinhole {
     /// The direction of pixel (u, v)'s ray in the world, with a component of 1 along the
     /// optical axis; `None` where the iteration does not converge (never inside the frame).
     pub fn ray(&self, u: f64, v: f64) -> Option<Vector> {
-        let (x, y) = self.undistorted(u, v)?;
+        let (x, y) = self.lens.undistorted(u, v)?;
         Some(self.rows[0] * x + self.rows[1] * y + self.rows[2])
     }
 
@@ -238,65 +235,13 @@ impl Pinhole {
         let (x, y) = (from.x / depth, from.y / depth);
         let r2 = x * x + y * y;
         let (xd, yd) = if r2 <= self.radius_square {
-            self.distorted(x, y)
+            self.lens.distorted(x, y)
         } else {
             let outside = libm::sqrt(r2 / self.radius_square);
-            let (xd, yd) = self.distorted(x / outside, y / outside);
+            let (xd, yd) = self.lens.distorted(x / outside, y / outside);
             (xd * outside, yd * outside)
         };
-        let model = &self.model;
-        Some((model.fx * xd + model.cx, model.fy * yd + model.cy))
-    }
-
-    /// (x, y) → (x_d, y_d).
-    #[inline]
-    fn distorted(&self, x: f64, y: f64) -> (f64, f64) {
-        let [k1, k2, p1, p2, k3] = self.model.distortion;
-        let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-        (
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        )
-    }
-
-    /// ∂x_d/∂x, ∂x_d/∂y = ∂y_d/∂x, ∂y_d/∂y and the determinant.
-    #[inline]
-    fn jacobian(&self, x: f64, y: f64) -> (f64, f64, f64, f64) {
-        let [k1, k2, p1, p2, k3] = self.model.distortion;
-        let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-        // d(radial)/d(r²)
-        let slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
-        let xx = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x;
-        let xy = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
-        let yy = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x;
-        (xx, xy, yy, xx * yy - xy * xy)
-    }
-
-    /// Pixel → undistorted (x, y), by Newton's method from the distorted point.
-    fn undistorted(&self, u: f64, v: f64) -> Option<(f64, f64)> {
-        let model = &self.model;
-        let (xd, yd) = ((u - model.cx) / model.fx, (v - model.cy) / model.fy);
-        let (mut x, mut y) = (xd, yd);
-        for _ in 0..NEWTON_STEPS {
-            let (found_x, found_y) = self.distorted(x, y);
-            let (ex, ey) = (found_x - xd, found_y - yd);
-            // 1e-14 of the focal length: 1e-11 px.
-            if libm::fabs(ex) + libm::fabs(ey) <= 1e-14 {
-                return Some((x, y));
-            }
-            let (xx, xy, yy, determinant) = self.jacobian(x, y);
-            if !(determinant > 1e-9) {
-                return None;
-            }
-            x -= (yy * ex - xy * ey) / determinant;
-            y -= (xx * ey - xy * ex) / determinant;
-        }
-        // Where |x| is large rounding prevents 1e-14; 1e-12 (1e-9 px) is enough.
-        let (found_x, found_y) = self.distorted(x, y);
-        let left = libm::fabs(found_x - xd) + libm::fabs(found_y - yd);
-        (left <= 1e-12).then_some((x, y))
+        Some(self.lens.scaled(xd, yd))
     }
 }
 
