@@ -13,6 +13,7 @@ extern crate alloc;
 extern crate std;
 
 pub mod adaptive;
+pub mod calibration;
 pub mod chain;
 pub mod frame;
 pub mod geometry;

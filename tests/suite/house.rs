@@ -202,7 +202,7 @@ fn the_stations_decisions_are_pure() {
 #[test]
 fn imports_inside_algo_only_go_backwards_along_the_flow() {
     let rule = "Imports only go backwards along the flow: units, trust, math ← simd ← frame ← pattern, \
-                phase ← geometry ← pipeline ← chain, inspect ← adaptive.";
+                phase ← geometry ← pipeline ← calibration, chain, inspect ← adaptive.";
     let order = [
         &["units", "trust", "math"][..],
         &["simd"],
@@ -210,7 +210,7 @@ fn imports_inside_algo_only_go_backwards_along_the_flow() {
         &["pattern", "phase"],
         &["geometry"],
         &["pipeline"],
-        &["chain", "inspect"],
+        &["calibration", "chain", "inspect"],
         &["adaptive"],
     ];
     for (at, here) in order.iter().enumerate() {

@@ -1,0 +1,265 @@
+//! The board: its corners' places, and where it was found in a picture.
+
+use super::candidates::candidates;
+use super::corner::{Corner, locate};
+use super::grid::{Grid, grown, predicted};
+use super::picture::Picture;
+use alloc::vec::Vec;
+
+/// A checkerboard, by its inner corners.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Board {
+    /// Inner corners along x.
+    pub columns: usize,
+    /// Inner corners along y.
+    pub rows: usize,
+    /// Side of a square, mm.
+    pub square: f64,
+}
+
+/// The corners of a board in one picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoundBoard {
+    /// Row by row as [`Board::place`] counts them; `None` for a corner that was not located.
+    pub corners: Vec<Option<Corner>>,
+    /// Median length of a square's side in the picture, px.
+    pub step: f64,
+}
+
+/// A picture in which the board was not found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BoardError {
+    /// There is no grid of corners.
+    #[error(
+        "no checkerboard is in the picture: light the whole board, and show it sharp and less tilted"
+    )]
+    None,
+    /// The grid has another size.
+    #[error(
+        "a grid of {} × {} inner corners was found: show the whole board, in even light without reflections, or correct --board",
+        found.0, found.1
+    )]
+    Size {
+        /// Corners along the longer and the shorter side, or as found.
+        found: (usize, usize),
+    },
+    /// Too many corners of the grid could not be located.
+    #[error(
+        "only {located} of {all} corners could be located: show the board sharp, in even light without reflections"
+    )]
+    Few {
+        /// How many could.
+        located: usize,
+        /// How many the board has.
+        all: usize,
+    },
+}
+
+/// Share of the corners that must be located.
+const LEAST_LOCATED: f64 = 0.9;
+/// Radius of the window about a corner, as a share of the shortest side of the squares beside it, and its bounds in px.
+const WINDOW: f64 = 0.3;
+const WINDOW_BOUNDS: (f64, f64) = (4.0, 14.0);
+/// How often the picture is halved in search of a large or blurred board.
+const HALVINGS: usize = 3;
+
+impl Board {
+    /// The number of inner corners.
+    pub fn corners(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// The place of a corner on the flat board, mm from its centre.
+    pub fn place(&self, corner: usize) -> (f64, f64) {
+        let columns = self.columns.max(1);
+        let (column, row) = (corner % columns, corner / columns);
+        let from_centre = |at: usize, all: usize| at as f64 - (all as f64 - 1.0) / 2.0;
+        (
+            from_centre(column, self.columns) * self.square,
+            from_centre(row, self.rows) * self.square,
+        )
+    }
+
+    /// Finds the board in a picture under even light. x runs along the columns, y such that the board's z points to the camera; of the two
+    /// ways round, that with x to the right, or down.
+    ///
+    /// # Errors
+    /// If there is no grid of corners, one of another size, or too few of its corners can be located.
+    pub fn find(&self, picture: &Picture) -> Result<FoundBoard, BoardError> {
+        let brightest = picture.counts.iter().copied().fold(0.0, f32::max);
+        // Noise and stray light of 2 % of the brightest are not to look like print.
+        let floor = (0.02 * brightest).max(1.0);
+        let mut halved = picture.clone();
+        let mut outcome = Err(BoardError::None);
+        for halving in 0..=HALVINGS {
+            if halving > 0 {
+                halved = halved.halved();
+            }
+            let scale = f64::from(1_u32 << halving);
+            let mut found = candidates(&halved.levelled(floor));
+            for candidate in &mut found {
+                // The centre of a halved pixel lies between four.
+                candidate.u = (candidate.u + 0.5) * scale - 0.5;
+                candidate.v = (candidate.v + 0.5) * scale - 0.5;
+            }
+            let grid = grown(&found, self.corners());
+            match self.located(picture, &grid) {
+                Ok(board) => return Ok(board),
+                Err(error) => outcome = Err(worse(outcome, error)),
+            }
+        }
+        outcome
+    }
+
+    /// Locates the corners of a grid that has the board's size.
+    fn located(&self, picture: &Picture, grid: &Grid) -> Result<FoundBoard, BoardError> {
+        let (columns, rows) = (
+            extent(grid.keys().map(|at| at.0)),
+            extent(grid.keys().map(|at| at.1)),
+        );
+        let found = (columns.1, rows.1);
+        if found.0 < 2 || found.1 < 2 {
+            return Err(BoardError::None);
+        }
+        let swapped = found == (self.rows, self.columns) && self.rows != self.columns;
+        if !swapped && found != (self.columns, self.rows) {
+            return Err(BoardError::Size { found });
+        }
+        let place = |column: usize, row: usize| {
+            let (along, across) = if swapped {
+                (row, column)
+            } else {
+                (column, row)
+            };
+            (columns.0 + along as i32, rows.0 + across as i32)
+        };
+        let places: Vec<_> = (0..self.rows)
+            .flat_map(|row| (0..self.columns).map(move |column| (column, row)))
+            .collect();
+        let mut corners: Vec<Option<Corner>> = Vec::new();
+        let mut steps = Vec::new();
+        for &(column, row) in &places {
+            let (edges, step) = edges(grid, place(column, row));
+            let at = grid
+                .get(&place(column, row))
+                .map(|candidate| (candidate.u, candidate.v))
+                .or_else(|| predicted(grid, place(column, row)).map(|(at, _)| at));
+            let corner = at.zip(edges).and_then(|(at, edges)| {
+                let radius = (WINDOW * step).clamp(WINDOW_BOUNDS.0, WINDOW_BOUNDS.1);
+                steps.push(step);
+                locate(picture, at, edges, radius)
+            });
+            corners.push(corner);
+        }
+        let count = corners.iter().flatten().count();
+        if (count as f64) < LEAST_LOCATED * self.corners() as f64 {
+            let all = self.corners();
+            return Err(BoardError::Few {
+                located: count,
+                all,
+            });
+        }
+        self.turn(&mut corners);
+        steps.sort_by(f64::total_cmp);
+        Ok(FoundBoard {
+            corners,
+            step: steps[steps.len() / 2],
+        })
+    }
+
+    /// Orders the corners so that the board's z points to the camera and x to the right, or down.
+    fn turn(&self, corners: &mut [Option<Corner>]) {
+        let mean = |step: usize, inside: &dyn Fn(usize) -> bool| {
+            let pairs = (0..corners.len()).filter(|&at| inside(at));
+            let pairs = pairs.filter_map(|at| corners[at].zip(*corners.get(at + step)?));
+            pairs.fold((0.0, 0.0), |sum, (a, b)| {
+                (sum.0 + b.u - a.u, sum.1 + b.v - a.v)
+            })
+        };
+        let x = mean(1, &|at| (at + 1) % self.columns != 0);
+        let y = mean(self.columns, &|_| true);
+        // Rows of the picture run down: a right-handed board that faces the camera has a negative cross product.
+        if x.0 * y.1 - x.1 * y.0 > 0.0 {
+            let flipped: Vec<_> = corners
+                .chunks(self.columns)
+                .rev()
+                .flatten()
+                .copied()
+                .collect();
+            corners.copy_from_slice(&flipped);
+        }
+        let (right, down) = (x.0, x.1);
+        let away = if right.abs() >= down.abs() {
+            right < 0.0
+        } else {
+            down < 0.0
+        };
+        if away {
+            corners.reverse();
+        }
+    }
+}
+
+/// The first number and how many there are up to the last.
+fn extent(numbers: impl Iterator<Item = i32> + Clone) -> (i32, usize) {
+    let (low, high) = (
+        numbers.clone().min().unwrap_or(0),
+        numbers.max().unwrap_or(-1),
+    );
+    (low, usize::try_from(high - low + 1).unwrap_or(0))
+}
+
+/// Directions of the two edges through a corner, from its neighbours in the grid, and the length of the shorter side beside it.
+fn edges(grid: &Grid, (column, row): (i32, i32)) -> (Option<[(f64, f64); 2]>, f64) {
+    let at = |right: i32, down: i32| grid.get(&(column + right, row + down));
+    let mut shortest = f64::INFINITY;
+    let mut edge = |right: i32, down: i32| {
+        let ends = [at(-right, -down), at(0, 0), at(right, down)];
+        let mut known = ends
+            .iter()
+            .enumerate()
+            .filter_map(|(i, end)| Some((i, (*end)?)));
+        let (first, from) = known.next()?;
+        let (last, to) = known.next_back()?;
+        let step = (to.u - from.u, to.v - from.v);
+        let squares = (last - first) as f64;
+        shortest = shortest.min(libm::hypot(step.0, step.1) / squares);
+        Some(step)
+    };
+    let edges = edge(1, 0).zip(edge(0, 1)).map(|(a, b)| [a, b]);
+    (edges, shortest)
+}
+
+/// The error that says more.
+fn worse(before: Result<FoundBoard, BoardError>, now: BoardError) -> BoardError {
+    match (before, now) {
+        (Err(before @ BoardError::Few { .. }), _) => before,
+        (Err(before @ BoardError::Size { .. }), BoardError::None) => before,
+        (Err(BoardError::Size { found }), BoardError::Size { found: other })
+            if found.0 * found.1 >= other.0 * other.1 =>
+        {
+            BoardError::Size { found }
+        }
+        (_, now) => now,
+    }
+}
+
+impl FoundBoard {
+    /// Median σ of the edges' blur, px.
+    pub fn blur(&self) -> f64 {
+        let mut blurs: Vec<f64> = self
+            .corners
+            .iter()
+            .flatten()
+            .map(|corner| corner.blur)
+            .collect();
+        blurs.sort_by(f64::total_cmp);
+        blurs.get(blurs.len() / 2).copied().unwrap_or(0.0)
+    }
+
+    /// The corners that were located.
+    pub fn located(&self) -> usize {
+        self.corners.iter().flatten().count()
+    }
+}

@@ -1,0 +1,192 @@
+//! First values of the adjustment, in closed form.
+//!
+//! Camera: homographies H from the board to the picture; with the principal point in the middle, each gives two linear equations for 1/f_x²
+//! and 1/f_y² (Z. Zhang, "A flexible new technique for camera calibration", PAMI 22, 2000, eqs. 3–4), then the board's pose.
+//! Projector: all points of all poses are then known in the camera's coordinates and do not lie in one plane, so that its 3 × 4 matrix follows
+//! from linear equations (Y. I. Abdel-Aziz, H. M. Karara, "Direct linear transformation", 1971), and from that its lens and pose (R. Hartley,
+//! A. Zisserman, "Multiple View Geometry", section 6.2.4). No shift of the projector's lens disturbs it.
+
+use super::board::Board;
+use super::pose::Pose;
+use crate::geometry::{Lens, Vector};
+use crate::math::solve::solve_symmetric;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// Linear least squares: equations a·x = b.
+struct Equations {
+    normal: Vec<f64>,
+    right: Vec<f64>,
+}
+
+impl Equations {
+    fn new(unknowns: usize) -> Self {
+        Self {
+            normal: vec![0.0; unknowns * unknowns],
+            right: vec![0.0; unknowns],
+        }
+    }
+
+    fn add(&mut self, a: &[f64], b: f64) {
+        let n = self.right.len();
+        for i in 0..n {
+            self.right[i] += a[i] * b;
+            for j in 0..=i {
+                self.normal[i * n + j] += a[i] * a[j];
+            }
+        }
+    }
+
+    fn solve(mut self) -> Option<Vec<f64>> {
+        solve_symmetric(&mut self.normal, &mut self.right)
+    }
+}
+
+/// A corner's place on the board and in the picture.
+pub(super) type Pair = ((f64, f64), (f64, f64));
+
+/// The columns of H from places on the board to places in the picture, both about their centres and of the order of 1: then its last element
+/// is not 0 and is set to 1.
+fn homography(pairs: impl Iterator<Item = Pair>) -> Option<[Vector; 3]> {
+    let mut equations = Equations::new(8);
+    for ((x, y), (u, v)) in pairs {
+        equations.add(&[x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y], u);
+        equations.add(&[0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y], v);
+    }
+    let h = equations.solve()?;
+    Some([
+        Vector::new(h[0], h[3], h[6]),
+        Vector::new(h[1], h[4], h[7]),
+        Vector::new(h[2], h[5], 1.0),
+    ])
+}
+
+/// Lens of the camera and poses of the board, from the corners of each pose in a picture of `width` × `height` pixels. `None` if they do not
+/// determine them: no pose is tilted.
+pub(super) fn camera(
+    board: &Board,
+    (width, height): (usize, usize),
+    poses: &[Vec<Pair>],
+) -> Option<(Lens, Vec<Pose>)> {
+    let (cx, cy) = ((width as f64 - 1.0) / 2.0, (height as f64 - 1.0) / 2.0);
+    let (scale, size) = (
+        cx.max(cy).max(1.0),
+        board.square * board.columns.max(board.rows) as f64,
+    );
+    let mut equations = Equations::new(2);
+    let mut homographies = Vec::with_capacity(poses.len());
+    for pairs in poses {
+        let scaled = pairs
+            .iter()
+            .map(|&((x, y), (u, v))| ((x / size, y / size), ((u - cx) / scale, (v - cy) / scale)));
+        let h = homography(scaled)?;
+        let [a, b, _] = h;
+        // Both columns have about the length of the board's picture; equal weight for all poses.
+        let weight = 1.0 / (a.dot(a) + b.dot(b));
+        equations.add(
+            &[a.x * b.x * weight, a.y * b.y * weight],
+            -a.z * b.z * weight,
+        );
+        let differ = (a.z * a.z - b.z * b.z) * weight;
+        equations.add(
+            &[
+                (a.x * a.x - b.x * b.x) * weight,
+                (a.y * a.y - b.y * b.y) * weight,
+            ],
+            -differ,
+        );
+        homographies.push(h);
+    }
+    let inverse_squares = equations.solve()?;
+    let focal = |of: f64| (of > 1e-4 && of < 1e4).then(|| libm::sqrt(1.0 / of));
+    let (fx, fy) = (focal(inverse_squares[0])?, focal(inverse_squares[1])?);
+    let poses = homographies.into_iter().map(|h| {
+        let [x, y, t] = h.map(|h| Vector::new(h.x / fx, h.y / fy, h.z));
+        let length = size * 2.0 / (x.length() + y.length());
+        Pose::from_axes(x, y, t * length)
+    });
+    let lens = Lens {
+        fx: fx * scale,
+        fy: fy * scale,
+        cx,
+        cy,
+        distortion: [0.0; 5],
+    };
+    Some((lens, poses.collect()))
+}
+
+/// Lens and pose of the projector, from points in the camera's coordinates and the projector pixels that light them.
+pub(super) fn projector(points: &[(Vector, (f64, f64))]) -> Option<(Lens, Pose)> {
+    let n = points.len().max(1) as f64;
+    let centre = points
+        .iter()
+        .fold(Vector::default(), |sum, (point, _)| sum + *point)
+        * (1.0 / n);
+    let spread = points
+        .iter()
+        .map(|(point, _)| (*point - centre).length())
+        .sum::<f64>()
+        / n;
+    let pixels = points
+        .iter()
+        .fold((0.0, 0.0), |sum, (_, p)| (sum.0 + p.0 / n, sum.1 + p.1 / n));
+    let far = |p: &(f64, f64)| libm::hypot(p.0 - pixels.0, p.1 - pixels.1);
+    let scale = points.iter().map(|(_, p)| far(p)).sum::<f64>() / n;
+    if !(spread > 0.0 && scale > 0.0) {
+        return None;
+    }
+    let mut equations = Equations::new(11);
+    for (point, pixel) in points {
+        let p = (*point - centre) * (1.0 / spread);
+        let (u, v) = ((pixel.0 - pixels.0) / scale, (pixel.1 - pixels.1) / scale);
+        let (o, i) = (0.0, 1.0);
+        equations.add(
+            &[p.x, p.y, p.z, i, o, o, o, o, -u * p.x, -u * p.y, -u * p.z],
+            u,
+        );
+        equations.add(
+            &[o, o, o, o, p.x, p.y, p.z, i, -v * p.x, -v * p.y, -v * p.z],
+            v,
+        );
+    }
+    let m = equations.solve()?;
+    let row = |at: usize| Vector::new(m[at], m[at + 1], m[at + 2]);
+    let (a, b, c) = (row(0), row(4), row(8));
+    // M = λK[R|t] in the scaled coordinates, with λ·depth of the centre = 1: R's last row is c/λ.
+    let size = c.length();
+    let z = c * (1.0 / size);
+    let (cx, cy) = (a.dot(z) / size, b.dot(z) / size);
+    let (x, y) = (a * (1.0 / size) + z * -cx, b * (1.0 / size) + z * -cy);
+    let (fx, fy) = (x.length(), y.length());
+    let turn = Pose::from_axes(x, y, Vector::default()).inverse();
+    // A mirrored picture has no such pose.
+    if !(x.cross(y).dot(z) > 0.0) {
+        return None;
+    }
+    let depth = 1.0 / size;
+    let shift = Vector::new(
+        (m[3] / size - cx * depth) / fx,
+        (m[7] / size - cy * depth) / fy,
+        depth,
+    );
+    let rows = turn.rows;
+    let about_centre = Pose {
+        rows,
+        shift: shift * spread,
+    };
+    let lens = Lens {
+        fx: fx * scale,
+        fy: fy * scale,
+        cx: cx * scale + pixels.0,
+        cy: cy * scale + pixels.1,
+        distortion: [0.0; 5],
+    };
+    let back = about_centre.turned(centre);
+    Some((
+        lens,
+        Pose {
+            rows,
+            shift: about_centre.shift - back,
+        },
+    ))
+}

@@ -1,0 +1,29 @@
+//! Calibration of the geometry: from pictures and phases of a checkerboard in several poses to the models of camera and projector.
+
+mod adjust;
+mod board;
+mod candidates;
+mod corner;
+mod grid;
+mod initial;
+mod look;
+mod nodes;
+mod picture;
+mod pose;
+mod predict;
+mod rig;
+mod solve;
+
+pub use adjust::{Adjusted, Residuals, Undetermined, View};
+pub use board::{Board, BoardError, FoundBoard};
+pub use corner::Corner;
+pub use look::{PoseError, look};
+pub use nodes::{Fringes, Node};
+pub use picture::Picture;
+pub use pose::Pose;
+pub use predict::Prediction;
+pub use rig::Rig;
+pub use solve::{CalibrationError, calibrate};
+
+#[cfg(test)]
+mod tests;

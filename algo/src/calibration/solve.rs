@@ -1,0 +1,254 @@
+//! From views of a board to an adjusted rig, or the pose that is to blame.
+
+use super::adjust::{Adjusted, Undetermined, View, adjust};
+use super::board::Board;
+use super::initial::{self, Pair};
+use super::pose::Pose;
+use super::rig::{Rig, SHARED};
+use crate::geometry::Vector;
+use crate::math::solve::solve_symmetric;
+use alloc::vec::Vec;
+
+/// Least poses: three give the equations, and no more.
+const LEAST_POSES: usize = 3;
+/// Least angle between two of the board's normals, rad: parallel boards do not tell focal lengths from distances.
+const LEAST_TILT: f64 = 10.0 / 180.0 * core::f64::consts::PI;
+/// Poses from which the board's bow is adjusted: with fewer, it cannot be told from the lenses' distortion.
+const BOWED_FROM: usize = 6;
+/// χ² of three degrees of freedom that a flat board exceeds once in 10⁶.
+const BOWED: f64 = 31.8;
+/// Largest RMS residual of a pose, camera or projector px.
+const MOST_RESIDUAL: f64 = 1.0;
+/// A pose whose residuals are this many times the median pose's, and above half of a tenth of a pixel, is not of this board and head.
+const OUTLYING: (f64, f64) = (3.0, 0.05);
+/// A pose whose blur is this many times the median pose's, and above a pixel, is out of focus.
+const BLURRED: (f64, f64) = (2.5, 1.0);
+/// Largest relative σ of a focal length.
+const MOST_FOCAL_SIGMA: f64 = 0.01;
+
+/// Views that make no calibration; poses are counted from 0.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrationError {
+    /// There are too few poses.
+    #[error(
+        "{given} poses are given, at least {LEAST_POSES} are needed and 6 to 10 are recommended: take more, tilted to all sides"
+    )]
+    Few {
+        /// How many there are.
+        given: usize,
+    },
+    /// The board lies parallel in all poses.
+    #[error(
+        "the board is tilted by {degrees:.1}° between the poses at most: tilt it by 20 to 40° to all sides"
+    )]
+    NotTilted {
+        /// The largest angle between two normals, degrees.
+        degrees: f64,
+    },
+    /// One pose is blurred.
+    #[error(
+        "its picture is blurred: edges have a σ of {blur:.1} px, {median:.1} px in the other poses: hold the board still and in focus"
+    )]
+    Blurred {
+        /// The pose.
+        pose: usize,
+        /// σ of its edges, px.
+        blur: f64,
+        /// Median of all poses, px.
+        median: f64,
+    },
+    /// One pose does not fit the others.
+    #[error(
+        "its residuals are {camera:.2} camera px and {projector:.2} projector px, {median:.2} and less in the other poses: the board moved or was bent, or it is another one: take this pose again"
+    )]
+    Outlying {
+        /// The pose.
+        pose: usize,
+        /// RMS in the camera, px.
+        camera: f64,
+        /// RMS in the projector, px.
+        projector: f64,
+        /// Median of the larger of both over the poses, px.
+        median: f64,
+    },
+    /// All poses together do not fit.
+    #[error(
+        "the residuals are {camera:.2} camera px and {projector:.2} projector px, largest in this pose: check focus, that frames and patterns belong together, and that the board is flat"
+    )]
+    Residual {
+        /// The pose with the largest.
+        pose: usize,
+        /// RMS in the camera, px.
+        camera: f64,
+        /// RMS in the projector, px.
+        projector: f64,
+    },
+    /// The poses do not determine the models.
+    #[error(transparent)]
+    Undetermined(#[from] Undetermined),
+}
+
+impl CalibrationError {
+    /// The pose to blame, if it is one.
+    pub fn pose(&self) -> Option<usize> {
+        match self {
+            Self::Blurred { pose, .. }
+            | Self::Outlying { pose, .. }
+            | Self::Residual { pose, .. } => Some(*pose),
+            _ => None,
+        }
+    }
+}
+
+/// Calibrates camera and projector with all views of a board. `frame` is the size of the camera's picture.
+///
+/// # Errors
+/// If the views do not determine the models, or one of them does not fit the others.
+pub fn calibrate(
+    board: &Board,
+    frame: (usize, usize),
+    views: &[View],
+) -> Result<Adjusted, CalibrationError> {
+    if views.len() < LEAST_POSES {
+        return Err(CalibrationError::Few { given: views.len() });
+    }
+    sharp(views)?;
+    let first = first(board, frame, views)?;
+    let flat = adjust(first, views, false)?;
+    fits(&flat)?;
+    let bowed = (views.len() >= BOWED_FROM)
+        .then(|| adjust(flat.rig.clone(), views, true).ok())
+        .flatten()
+        .filter(|bowed| bowed.bow_chi_square() > BOWED);
+    let adjusted = bowed.unwrap_or(flat);
+    let degrees = adjusted.largest_tilt().to_degrees();
+    if degrees < LEAST_TILT.to_degrees() {
+        return Err(CalibrationError::NotTilted { degrees });
+    }
+    let focal = adjusted.rig.camera.fx;
+    if !(adjusted.sigma_of(0) <= MOST_FOCAL_SIGMA * focal) {
+        return Err(Undetermined.into());
+    }
+    Ok(adjusted)
+}
+
+/// First values in closed form.
+fn first(board: &Board, frame: (usize, usize), views: &[View]) -> Result<Rig, Undetermined> {
+    let pairs: Vec<Vec<Pair>> = views
+        .iter()
+        .map(|view| {
+            let corners = view.found.corners.iter().enumerate();
+            let pair = corners.filter_map(|(at, corner)| {
+                corner.map(|corner| (board.place(at), (corner.u, corner.v)))
+            });
+            pair.collect()
+        })
+        .collect();
+    let (camera, poses) = initial::camera(board, frame, &pairs).ok_or(Undetermined)?;
+    let mut points = Vec::new();
+    for (view, pose) in views.iter().zip(&poses) {
+        let back = pose.inverse();
+        for node in &view.nodes {
+            let (x, y) = camera
+                .undistorted(node.at.0, node.at.1)
+                .ok_or(Undetermined)?;
+            let ray = Vector::new(x, y, 1.0);
+            let (from, along) = (back.shift, back.turned(ray));
+            points.push((ray * (-from.z / along.z), node.lit_by));
+        }
+    }
+    let (projector, relative) = initial::projector(&points).ok_or(Undetermined)?;
+    Ok(Rig {
+        board: *board,
+        camera,
+        projector,
+        relative,
+        poses,
+        bow: [0.0; 3],
+    })
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Checks that no pose is much less sharp than the others.
+fn sharp(views: &[View]) -> Result<(), CalibrationError> {
+    let median = median(views.iter().map(|view| view.found.blur()));
+    for (pose, view) in views.iter().enumerate() {
+        let blur = view.found.blur();
+        if blur > BLURRED.0 * median && blur > BLURRED.1 {
+            return Err(CalibrationError::Blurred { pose, blur, median });
+        }
+    }
+    Ok(())
+}
+
+/// Checks that the residuals are small, and those of no pose much larger than the others'.
+fn fits(adjusted: &Adjusted) -> Result<(), CalibrationError> {
+    let each: Vec<[f64; 2]> = adjusted
+        .residuals
+        .iter()
+        .map(|pose| pose.map(|of| of.rms()))
+        .collect();
+    let larger = |rms: &[f64; 2]| rms[0].max(rms[1]);
+    let worst = (0..each.len()).max_by(|&a, &b| larger(&each[a]).total_cmp(&larger(&each[b])));
+    let Some(pose) = worst else { return Ok(()) };
+    let [camera, projector] = each[pose];
+    let median = median(each.iter().map(larger));
+    let rms = larger(&each[pose]);
+    if rms > OUTLYING.0 * median && rms > OUTLYING.1 {
+        return Err(CalibrationError::Outlying {
+            pose,
+            camera,
+            projector,
+            median,
+        });
+    }
+    if rms > MOST_RESIDUAL {
+        return Err(CalibrationError::Residual {
+            pose,
+            camera,
+            projector,
+        });
+    }
+    Ok(())
+}
+
+impl Adjusted {
+    /// The largest angle between the board's normals in two poses, rad.
+    pub fn largest_tilt(&self) -> f64 {
+        let normal = |pose: &Pose| pose.turned(Vector::new(0.0, 0.0, 1.0));
+        let normals: Vec<Vector> = self.rig.poses.iter().map(normal).collect();
+        let mut largest = 0.0_f64;
+        for (i, a) in normals.iter().enumerate() {
+            for b in &normals[i + 1..] {
+                largest = largest.max(libm::atan2(a.cross(*b).length(), a.dot(*b)));
+            }
+        }
+        largest
+    }
+
+    /// σ of one of the rig's numbers.
+    fn sigma_of(&self, number: usize) -> f64 {
+        libm::sqrt(self.covariance[number * self.rig.numbers() + number])
+    }
+
+    /// The squared length of the board's bow in its own standard deviations: χ² of three degrees of freedom if the board is flat.
+    fn bow_chi_square(&self) -> f64 {
+        let all = self.rig.numbers();
+        let mut covariance = [0.0; 9];
+        for i in 0..3 {
+            for j in 0..3 {
+                covariance[i * 3 + j] = self.covariance[(SHARED - 3 + i) * all + SHARED - 3 + j];
+            }
+        }
+        let solved = solve_symmetric(&mut covariance, &mut self.rig.bow.clone());
+        solved.map_or(0.0, |solved| {
+            solved.iter().zip(&self.rig.bow).map(|(a, b)| a * b).sum()
+        })
+    }
+}

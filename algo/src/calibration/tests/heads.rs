@@ -1,0 +1,268 @@
+//! Heads of unknown pose and lens in front of a board: whether the calibration finds them, and whether it knows how well.
+
+use super::Random;
+use crate::calibration::{
+    Board, CalibrationError, Corner, FoundBoard, Node, Pose, Rig, View, calibrate,
+};
+use crate::geometry::{Lens, Vector};
+use std::string::ToString;
+use std::vec::Vec;
+
+const FRAME: (usize, usize) = (1456, 1088);
+const RASTER: (usize, usize) = (1280, 800);
+/// σ of a corner's coordinate, camera px, and of a node's, projector px.
+const NOISE: (f64, f64) = (0.05, 0.05);
+
+fn turned(x: f64, y: f64, z: f64) -> Pose {
+    let axis = |x, y, z| Vector::new(x, y, z);
+    // A board that faces the camera: its y runs up, its z to the camera.
+    let facing = Pose {
+        rows: [
+            axis(1.0, 0.0, 0.0),
+            axis(0.0, -1.0, 0.0),
+            axis(0.0, 0.0, -1.0),
+        ],
+        shift: Vector::default(),
+    };
+    facing.moved(&[x, y, z, 0.0, 0.0, 0.0])
+}
+
+/// A head of unknown pose and lens, and `poses` poses of a board with 30 µm of bow whose scale is off by `scale`.
+fn head(random: &mut Random, board: &Board, poses: usize, scale: f64) -> Rig {
+    let mut lens = |focal: f64, (width, height): (usize, usize), lift: f64| {
+        let focal = focal * (1.0 + 0.1 * random.signed());
+        Lens {
+            fx: focal,
+            fy: focal * (1.0 + 0.003 * random.signed()),
+            cx: width as f64 * (0.5 + 0.02 * random.signed()),
+            cy: height as f64 * (0.5 + lift + 0.02 * random.signed()),
+            distortion: [
+                -0.08 + 0.05 * random.signed(),
+                0.05 * random.signed(),
+                5e-4 * random.signed(),
+                5e-4 * random.signed(),
+                0.0,
+            ],
+        }
+    };
+    let (camera, projector) = (lens(2300.0, FRAME, 0.0), lens(2000.0, RASTER, 0.3));
+    // The projector stands 200 mm beside and 50 mm below the camera and looks at what lies 400 mm before it, with its lens shifted up.
+    let (sin, cos) = (0.447, libm::sqrt(1.0 - 0.447 * 0.447));
+    let aimed = Pose {
+        rows: [
+            Vector::new(cos, 0.0, sin),
+            Vector::new(0.0, 1.0, 0.0),
+            Vector::new(-sin, 0.0, cos),
+        ],
+        shift: Vector::default(),
+    };
+    let mut by = |most: f64| most * random.signed();
+    let aimed = aimed.moved(&[by(0.03), by(0.03), by(0.03), 0.0, 0.0, 0.0]);
+    let centre = Vector::new(200.0 + by(10.0), 50.0 + by(10.0), by(10.0));
+    let relative = Pose {
+        shift: aimed.turned(centre) * -1.0,
+        ..aimed
+    };
+    let mut all = Vec::new();
+    for at in 0..poses {
+        let last = at + 1 == poses;
+        let tilt = if last { 0.05 } else { 0.55 };
+        let mut by = |most: f64| most * random.signed();
+        let pose = turned(by(tilt), by(tilt), by(0.4));
+        let shift = Vector::new(
+            by(20.0),
+            by(20.0),
+            400.0 + by(if last { 5.0 } else { 40.0 }),
+        );
+        all.push(Pose { shift, ..pose });
+    }
+    Rig {
+        board: Board {
+            square: board.square * (1.0 + scale),
+            ..*board
+        },
+        camera,
+        projector,
+        relative,
+        poses: all,
+        bow: [0.015, 0.01, -0.005],
+    }
+}
+
+/// What the head sees of the board, with noise.
+fn views(random: &mut Random, rig: &Rig) -> Vec<View> {
+    let board = &rig.board;
+    let view = |pose: &Pose| {
+        let mut noisy = |(a, b): (f64, f64), sigma: f64| {
+            (a + sigma * random.normal(), b + sigma * random.normal())
+        };
+        let corner = |at: usize| rig.corner(pose, board.place(at)).unwrap();
+        let corners: Vec<_> = (0..board.corners())
+            .map(|at| {
+                let (u, v) = noisy(corner(at), NOISE.0);
+                Some(Corner { u, v, blur: 0.7 })
+            })
+            .collect();
+        let mut nodes = Vec::new();
+        for at in 0..board.corners() - board.columns {
+            let square = (at % board.columns, at / board.columns);
+            if square.0 + 1 < board.columns {
+                let (a, b) = (corner(at), corner(at + board.columns + 1));
+                let middle = ((a.0 + b.0) / 2.0, (a.1 + b.1) / 2.0);
+                let lit_by = noisy(rig.node(pose, middle).unwrap(), NOISE.1);
+                nodes.push(Node {
+                    at: middle,
+                    lit_by,
+                    square,
+                });
+            }
+        }
+        View {
+            found: FoundBoard {
+                corners,
+                step: 60.0,
+            },
+            nodes,
+        }
+    };
+    rig.poses.iter().map(view).collect()
+}
+
+/// RMS errors of heights and of lengths scaled to 100 mm, as the calibration `found` measures what `truth` sees, mm.
+fn errors(truth: &Rig, found: &Rig) -> (f64, f64) {
+    let volume = truth.volume().unwrap();
+    let targets = truth.targets(volume, FRAME, RASTER);
+    assert!(targets.len() > 40, "{} points", targets.len());
+    let rms = |errors: Vec<f64>| {
+        libm::sqrt(errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64)
+    };
+    let heights = targets
+        .iter()
+        .map(|target| found.measured(target).unwrap().z - target.at.z);
+    let lengths = truth
+        .lengths(&targets, volume)
+        .into_iter()
+        .map(|(from, to)| {
+            let far = (to.at - from.at).length();
+            let measured = (found.measured(&to).unwrap() - found.measured(&from).unwrap()).length();
+            (measured - far) / far * 100.0
+        });
+    (rms(heights.collect()), rms(lengths.collect()))
+}
+
+#[test]
+fn ten_poses_of_a_bowed_board_give_heights_to_15_micrometres_and_lengths_to_30() {
+    let board = Board {
+        columns: 9,
+        rows: 13,
+        square: 10.0,
+    };
+    let mut squares = (0.0, 0.0);
+    for seed in 0..3 {
+        let mut random = Random::new(seed);
+        let truth = head(&mut random, &board, 10, 2e-4);
+        let adjusted = calibrate(&board, FRAME, &views(&mut random, &truth)).unwrap();
+        let (height, length) = errors(&truth, &adjusted.rig);
+        squares.0 += height * height / 3.0;
+        squares.1 += length * length / 3.0;
+        assert!(
+            (adjusted.sigma[0] / NOISE.0 - 1.0).abs() < 0.1,
+            "{:?}",
+            adjusted.sigma
+        );
+        assert!(
+            (adjusted.sigma[1] / NOISE.1 - 1.0).abs() < 0.1,
+            "{:?}",
+            adjusted.sigma
+        );
+    }
+    assert!(libm::sqrt(squares.0) < 0.015, "{squares:?}");
+    assert!(libm::sqrt(squares.1) < 0.030, "{squares:?}");
+}
+
+#[test]
+fn the_predicted_errors_cover_the_true_ones_of_50_heads() {
+    let board = Board {
+        columns: 6,
+        rows: 8,
+        square: 14.0,
+    };
+    let scale = 2e-4;
+    let mut covered = [[0; 2]; 2];
+    for seed in 0..50 {
+        let mut random = Random::new(100 + seed);
+        let off = scale * random.normal();
+        let truth = head(&mut random, &board, 10, off);
+        let adjusted = calibrate(&board, FRAME, &views(&mut random, &truth)).unwrap();
+        let prediction = adjusted.prediction(FRAME, RASTER, scale).unwrap();
+        let (height, length) = errors(&truth, &adjusted.rig);
+        for (sigmas, covered) in [1.0, 2.0].into_iter().zip(&mut covered) {
+            covered[0] += i32::from(height <= sigmas * prediction.height);
+            covered[1] += i32::from(length <= sigmas * prediction.length);
+        }
+    }
+    for of in 0..2 {
+        assert!(
+            (25..=43).contains(&covered[0][of]),
+            "within 1 σ: {covered:?}"
+        );
+        assert!(covered[1][of] >= 45, "within 2 σ: {covered:?}");
+    }
+}
+
+#[test]
+fn a_pose_of_another_board_and_poses_that_determine_nothing_are_refused() {
+    let board = Board {
+        columns: 6,
+        rows: 8,
+        square: 14.0,
+    };
+    let mut random = Random::new(7);
+    let mut truth = head(&mut random, &board, 6, 0.0);
+    let mut seen = views(&mut random, &truth);
+    assert_eq!(
+        calibrate(&board, FRAME, &seen[..2]),
+        Err(CalibrationError::Few { given: 2 })
+    );
+    let whole = seen.clone();
+    let other = Board {
+        square: 14.2,
+        ..board
+    };
+    let stretched = Rig {
+        board: Board { rows: 8, ..other },
+        ..truth.clone()
+    };
+    seen[3] = views(&mut random, &stretched)[3].clone();
+    // Larger squares alone look like a nearer board; one axis of them does not.
+    for (corner, was) in seen[3]
+        .found
+        .corners
+        .iter_mut()
+        .zip(&whole[3].found.corners)
+    {
+        corner.as_mut().unwrap().u = was.unwrap().u;
+    }
+    let error = calibrate(&board, FRAME, &seen).unwrap_err();
+    assert_eq!(error.pose(), Some(3), "{error}");
+    let mut blurred = whole.clone();
+    for corner in blurred[2].found.corners.iter_mut().flatten() {
+        corner.blur = 2.5;
+    }
+    let error = calibrate(&board, FRAME, &blurred).unwrap_err();
+    assert!(
+        matches!(error, CalibrationError::Blurred { pose: 2, .. }),
+        "{error}"
+    );
+    for (at, pose) in truth.poses.iter_mut().enumerate() {
+        let shift = pose.shift;
+        *pose = Pose {
+            shift,
+            ..turned(0.02 * at as f64, 0.01, 0.3 * at as f64)
+        };
+    }
+    let flat = views(&mut random, &truth);
+    let error = calibrate(&board, FRAME, &flat).unwrap_err();
+    assert!(error.pose().is_none(), "{error}");
+    assert!(error.to_string().contains("tilt"), "{error}");
+}
