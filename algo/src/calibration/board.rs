@@ -152,20 +152,22 @@ impl Board {
             });
             corners.push(corner);
         }
-        let count = corners.iter().flatten().count();
-        if (count as f64) < LEAST_LOCATED * self.corners() as f64 {
-            let all = self.corners();
-            return Err(BoardError::Few {
-                located: count,
-                all,
-            });
-        }
+        self.enough(&corners)?;
         self.turn(&mut corners);
         steps.sort_by(f64::total_cmp);
         Ok(FoundBoard {
             corners,
             step: steps[steps.len() / 2],
         })
+    }
+
+    /// Checks that enough corners were located.
+    pub(super) fn enough(&self, corners: &[Option<Corner>]) -> Result<(), BoardError> {
+        let (located, all) = (corners.iter().flatten().count(), self.corners());
+        if (located as f64) < LEAST_LOCATED * all as f64 {
+            return Err(BoardError::Few { located, all });
+        }
+        Ok(())
     }
 
     /// Orders the corners so that the board's z points to the camera and x to the right, or down.

@@ -57,16 +57,18 @@ pub fn look(board: &Board, levels: &[Picture], fringes: &Fringes<'_>) -> Result<
         each.push(board.find(level)?);
     }
     let found = mean(&each).ok_or(BoardError::None)?;
+    board.enough(&found.corners)?;
+    // First of all: what is blurred seems to move as well.
+    let (blur, most) = (found.blur(), MOST_BLUR * found.step);
+    if blur > most {
+        return Err(PoseError::Blurred { blur, most });
+    }
     let pixels = each
         .iter()
         .map(|level| apart(level, &found))
         .fold(0.0, f64::max);
     if pixels > MOST_MOTION {
         return Err(PoseError::Moved { pixels });
-    }
-    let (blur, most) = (found.blur(), MOST_BLUR * found.step);
-    if blur > most {
-        return Err(PoseError::Blurred { blur, most });
     }
     let nodes = fringes.nodes(board, &found);
     let share = covered(

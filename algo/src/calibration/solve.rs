@@ -19,9 +19,9 @@ const BOWED_FROM: usize = 6;
 const BOWED: f64 = 31.8;
 /// Largest RMS residual of a pose, camera or projector px.
 const MOST_RESIDUAL: f64 = 1.0;
-/// A pose whose residuals are this many times the median pose's, and above half of a tenth of a pixel, is not of this board and head.
-const OUTLYING: (f64, f64) = (3.0, 0.05);
-/// A pose whose blur is this many times the median pose's, and above a pixel, is out of focus.
+/// A pose whose residuals are this many times the median pose's, and above so many px, is not of this board and head.
+const OUTLYING: (f64, f64) = (3.0, 0.3);
+/// A pose whose blur is this many times the median pose's, and above so many px, is out of focus.
 const BLURRED: (f64, f64) = (2.5, 1.0);
 /// Largest relative σ of a focal length.
 const MOST_FOCAL_SIGMA: f64 = 0.01;
