@@ -10,6 +10,7 @@
 //! - [`fuzz`]: functions of bytes that must not panic.
 //! - [`power`]: a model of what a loss of power leaves of a folder.
 
+pub mod board;
 pub mod files;
 pub mod fuzz;
 pub mod oracle;

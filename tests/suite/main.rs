@@ -3,6 +3,7 @@
 mod adapt;
 mod bad_input;
 mod bench;
+mod board;
 mod calibrate;
 mod calibrated_station;
 mod cases;

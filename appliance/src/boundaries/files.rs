@@ -7,6 +7,7 @@ use crate::head::calibration::file::{
     CalibrationFile, CameraFile, ContrastFile, FORMAT, LevelFile, MapFile, NoiseFile, PitchFile,
     ProjectorFile, ReferenceFile, TimingFile, VERSION,
 };
+use crate::head::calibration::geometry::{BoardFile, GeometryFile, PoseFile};
 use crate::head::calibration::opencv::{Declared, Sizes, from_two};
 use crate::head::seam;
 use crate::measure::measure;
@@ -62,13 +63,13 @@ fn a_boundary_value_in_a_calibration_is_refused_by_its_key_or_the_head_is_known_
             height: rig.projector.height,
             model: rig.projector.model(),
         },
-        timing: TimingFile {
+        timing: Some(TimingFile {
             flip_to_light_ns: 1000,
             sigma_ns: 10,
             stamp: Stamp::ExposureStart,
             readout_ns: 0,
-        },
-        noise: NoiseFile {
+        }),
+        noise: Some(NoiseFile {
             counts: 3.0,
             read_counts: 1.0,
             shot: 0.01,
@@ -76,20 +77,42 @@ fn a_boundary_value_in_a_calibration_is_refused_by_its_key_or_the_head_is_known_
                 level: 100.0,
                 counts: 3.0,
             }],
-        },
-        response: (0..256).map(f64::from).collect(),
-        contrast: ContrastFile {
+        }),
+        response: Some((0..256).map(f64::from).collect()),
+        contrast: Some(ContrastFile {
             modulation_counts: 90.0,
             pitches: vec![PitchFile {
                 pitch_px: 16,
                 contrast: 1.0,
             }],
-        },
+        }),
         reference: Some(ReferenceFile {
             pitch_px: 16.0,
             models_off_px: 0.01,
             vertical: map("reference_vertical"),
             horizontal: map("reference_horizontal"),
+        }),
+        geometry: Some(GeometryFile {
+            board: BoardFile {
+                columns: 9,
+                rows: 13,
+                square_mm: 10.0,
+                sigma_ppm: 200.0,
+                bow_mm: [0.01, 0.02, -0.03],
+            },
+            baseline_mm: 250.0,
+            camera_px: 0.1,
+            projector_px: 0.1,
+            height_sigma_mm: 0.01,
+            length_sigma_mm: 0.03,
+            poses: vec![PoseFile {
+                recording: "pose-1".into(),
+                corners: 117,
+                camera_px: 0.1,
+                projector_px: 0.1,
+                tilt_degrees: 20.0,
+                distance_mm: 400.0,
+            }],
         }),
     };
     let (file, _) = file.sealed().unwrap();

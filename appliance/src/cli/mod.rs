@@ -9,6 +9,7 @@ macro_rules! say {
 }
 
 mod adapt;
+mod board;
 mod calibrate;
 mod capture;
 mod completions;
@@ -70,7 +71,7 @@ enum Command {
     Adapt(adapt::Adapt),
     /// Examine the head step by step.
     Doctor(doctor::Doctor),
-    /// Calibrate the head: import its models, measure the rest.
+    /// Calibrate the head: make models from a board or import them, measure the rest.
     Calibrate(calibrate::Calibrate),
     /// Write the pictures to project: fringes, adaptive fringes, Gray code.
     Patterns(patterns::Patterns),
@@ -78,6 +79,8 @@ enum Command {
     Import(import::Import),
     /// Take pictures with a head that need not be calibrated.
     Capture(capture::Capture),
+    /// Draw a checkerboard to print, for `calibrate --board`.
+    Board(board::Print),
     /// Record a sequence from the configured head.
     Record(record::Record),
     /// Make a recipe from a good part in front of the head, or from recordings.
@@ -158,6 +161,7 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Patterns(command)) => command.run(),
         Some(Command::Import(command)) => command.run(),
         Some(Command::Capture(command)) => command.run(),
+        Some(Command::Board(command)) => command.run(),
         Some(Command::Record(command)) => command.run(),
         Some(Command::Teach(command)) => command.run(),
         Some(Command::History(command)) => command.run(),

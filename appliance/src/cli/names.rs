@@ -4,9 +4,11 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 
 /// Endings of the files that this program writes.
-const ENDINGS: [&str; 8] = ["csv", "json", "npy", "ply", "png", "recipe", "svg", "zip"];
+const ENDINGS: [&str; 9] = [
+    "csv", "json", "npy", "pdf", "ply", "png", "recipe", "svg", "zip",
+];
 
-/// A file whose name must have the ending of its content, `npy` or `recipe`.
+/// A file whose name must have the ending of its content, for example `npy`.
 pub(super) fn file(ending: &'static str) -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(move |path| match ends_in(&path, ending) {
         true => Ok(path),

@@ -6,6 +6,7 @@ use super::calibration::file::{
     CalibrationFile, CameraFile, FORMAT, LevelFile, MapFile, NoiseFile, ProjectorFile,
     ReferenceFile, TimingFile, VERSION, inverted,
 };
+use super::calibration::geometry::GeometryFile;
 use super::calibration::place::Place;
 use super::examine::{
     Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, PLATE_PITCH, SETTLE, Stamps, contrast,
@@ -41,6 +42,8 @@ pub struct Basis {
     pub models_from: String,
     /// The response of the previous calibration.
     pub response: Option<Vec<f64>>,
+    /// How the models were made, where they come from poses of a board.
+    pub geometry: Option<GeometryFile>,
     /// Temperature of the head.
     pub temperature_c: Option<f64>,
     /// Whether a flat plate lies in the plane z = 0.
@@ -152,13 +155,13 @@ pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Resu
             height: rows,
             model: seam::device_model(&calibration.projector),
         },
-        timing: TimingFile {
+        timing: Some(TimingFile {
             flip_to_light_ns: nanoseconds(delay.duration()),
             sigma_ns: (delay.error * 1e9).ceil() as u64,
             stamp: stamps.stamp,
             readout_ns: nanoseconds(stamps.readout),
-        },
-        noise: NoiseFile {
+        }),
+        noise: Some(NoiseFile {
             counts: noise.counts,
             read_counts: noise.read_counts,
             shot: noise.shot,
@@ -170,10 +173,11 @@ pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Resu
                     counts: point.counts,
                 })
                 .collect(),
-        },
-        response: greys,
-        contrast,
+        }),
+        response: Some(greys),
+        contrast: Some(contrast),
         reference,
+        geometry: basis.geometry,
     };
     let (file, bytes) = file.sealed().map_err(scene)?;
     Ok(Made {

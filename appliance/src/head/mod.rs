@@ -5,6 +5,7 @@ pub mod calibrated;
 pub mod calibration;
 pub mod doctor;
 pub mod examine;
+pub mod geometry;
 pub mod placed;
 pub mod rasters;
 pub mod scan;

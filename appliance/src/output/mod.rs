@@ -1,5 +1,6 @@
 //! Output of a measurement for people: pictures and point clouds.
 
+pub mod board;
 pub mod canvas;
 pub mod cloud;
 pub mod colour;

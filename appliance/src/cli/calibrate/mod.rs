@@ -1,5 +1,6 @@
-//! `fringed calibrate`: imports the models, measures the rest of the calibration on the head, and writes `calibration.json`.
+//! `fringed calibrate`: makes or imports the models, measures the rest of the calibration on the head, and writes `calibration.json`.
 
+mod poses;
 mod report;
 
 use super::numbers::number;
@@ -16,15 +17,16 @@ use crate::production::backend::{self, Opened};
 use crate::storage::state::StateFolder;
 use algo::geometry::{Reference, RigError, Triangulator};
 use algo::pattern::PhaseFunction;
+use poses::Poses;
 use sim::{Part, Stage};
 use std::path::{Path, PathBuf};
 
-/// Calibrate the head: import its models, measure delay, stamps, grey response, noise, contrast and the reference plane.
+/// Calibrate the head: make its models from a board or import them, measure delay, stamps, grey response, noise, contrast and the reference plane.
 #[derive(Debug, clap::Args)]
-#[command(group = clap::ArgGroup::new("imported").args(["camera", "projector", "models"]).multiple(true))]
+#[command(group = clap::ArgGroup::new("imported").args(["camera", "projector", "models"]).multiple(true).conflicts_with("board"))]
 pub struct Calibrate {
     /// Calibrate a simulated head of this scenario instead of the configured head.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "board")]
     scenario: Option<PathBuf>,
     /// The camera's model, written by OpenCV (YAML, XML, JSON). Without models those of before stay.
     #[arg(long, value_name = "FILE", requires = "projector")]
@@ -42,11 +44,13 @@ pub struct Calibrate {
     #[arg(long, requires = "imported")]
     z_away: bool,
     /// No flat plate lies in the plane z = 0: leave the reference plane to the models.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "board")]
     no_plate: bool,
     /// How warm the head is, °C: kept in the calibration.
-    #[arg(long, value_name = "CELSIUS", allow_negative_numbers = true, value_parser = number(COLDEST_C, HOTTEST_C))]
+    #[arg(long, value_name = "CELSIUS", allow_negative_numbers = true, conflicts_with = "board", value_parser = number(COLDEST_C, HOTTEST_C))]
     temperature: Option<f64>,
+    #[command(flatten)]
+    poses: Poses,
     #[command(flatten)]
     measuring: Measuring,
 }
@@ -62,6 +66,9 @@ impl Calibrate {
     /// calibration before is then unchanged.
     pub fn run(&self) -> Result<(), Failure> {
         let options = &self.measuring;
+        if self.poses.given() {
+            return self.poses.run(options);
+        }
         let mut config = options.files.configuration()?;
         if let Some(scenario) = &self.scenario {
             (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
@@ -132,6 +139,7 @@ impl Calibrate {
                 sizes(stored) == sizes(&calibration)
             });
         let mut models_from = OF_SCENARIO.to_owned();
+        let mut geometry = None;
         if let Some((from, (camera, projector))) = self.imported(&calibration)? {
             models_from = from;
             let (frames, raster) = (calibration.frames(), calibration.raster());
@@ -143,22 +151,24 @@ impl Calibrate {
             && file.models_from != OF_SCENARIO
         {
             models_from = file.models_from.clone();
+            geometry = file.geometry.clone();
             calibration.camera = stored.camera.clone();
             calibration.projector = stored.projector.clone();
         } else if opened.problem.is_some() {
-            let words = "calibrate: the models of camera and projector are not known yet: import them with --camera and --projector, \
-                         or with --models";
+            let words = "calibrate: the models of camera and projector are not known yet: make them with --board and --poses, or import them with \
+                         --camera and --projector, or with --models";
             return Err(Failure::new(Exit::Usage, words));
         }
         if models_from == OF_SCENARIO && opened.stage.is_none() {
-            let message = "calibrate: the models of this head are not known: make them with OpenCV and name them with --camera and --projector";
+            let message = "calibrate: the models of this head are not known: make them with --board and --poses, or with OpenCV and name them with --camera and --projector";
             return Err(Failure::new(Exit::Usage, message));
         }
         calibration.response = None;
         Ok(Basis {
             calibration,
             models_from,
-            response: stored.map(|(file, _)| file.response.clone()),
+            response: stored.and_then(|(file, _)| file.response.clone()),
+            geometry,
             temperature_c: self.temperature.filter(|celsius| celsius.is_finite()),
             plate: !self.no_plate,
         })

@@ -58,6 +58,7 @@ const SHARED: &[(&str, &str, &str)] = &[
     ("capture", "state", "where the head's calibration is"),
     ("capture", "threads", "of the simulated light"),
     ("capture", "quiet", "no progress, no closing line"),
+    ("board", "quiet", "no closing line"),
     ("record", "config", "which head"),
     ("record", "state", "where the head's calibration is"),
     ("record", "threads", "of the simulated light"),
@@ -304,6 +305,8 @@ fn options_that_contradict_each_other_are_refused() {
         "fringed doctor --scenario s.toml --state s",
         "fringed calibrate --unit mm",
         "fringed calibrate --z-away",
+        "fringed calibrate --board checker:9x13:10 --poses a b --camera c --projector p",
+        "fringed calibrate --board checker:9x13:10 --poses a b --scenario s.toml",
         "fringed history --csv --json",
     ] {
         let error = refused(line);

@@ -6,6 +6,7 @@ use super::{Arg, leaves};
 use crate::config::HeadConfig;
 use crate::error::Exit;
 use crate::head::calibration::bounds::{COLDEST_C, HOTTEST_C};
+use algo::calibration::Board;
 use clap::{ArgMatches, FromArgMatches as _};
 use std::any::TypeId;
 use std::collections::BTreeSet;
@@ -29,10 +30,12 @@ enum Takes {
     Date,
     /// A defect of a simulated part.
     Defect,
+    /// A checkerboard.
+    Checker,
     /// Text, which has no numeric bounds.
     Words,
 }
-use Takes::{Address, Date, Defect, List, Number, Series, Sides, Words};
+use Takes::{Address, Checker, Date, Defect, List, Number, Series, Sides, Words};
 
 /// Every option and positional argument that takes neither a path nor one word of a list; `*` is every command.
 const TABLE: &[(&str, &str, Takes)] = &[
@@ -73,6 +76,10 @@ const TABLE: &[(&str, &str, Takes)] = &[
     ("capture", "fringes", Number(1e-3, 1000.0)),
     ("capture", "levels", Number(1.0, 8.0)),
     ("capture", "steps", Number(3.0, 64.0)),
+    ("calibrate", "board", Checker),
+    ("calibrate", "board_sigma_ppm", Number(0.0, 1e5)),
+    ("calibrate", "check_length", Number(1e-3, 1e5)),
+    ("board", "board", Checker),
     ("record", "fringes", Number(1e-3, 1000.0)),
     ("record", "levels", Number(1.0, 8.0)),
     ("record", "steps", Number(3.0, 64.0)),
@@ -130,6 +137,9 @@ impl Takes {
                 let others = ["missing_hole", "bent_flange"].map(|kind| format!("{kind}:{value}"));
                 dents.chain(others).collect()
             }
+            Checker => ["{}x13:10", "9x{}:10", "9x13:{}"]
+                .map(|form| format!("checker:{}", form.replace("{}", value)))
+                .into(),
             Words => Vec::new(),
         }
     }
@@ -143,6 +153,7 @@ impl Takes {
             Address => vec!["0 to 65535".into()],
             Date => vec!["write a date".into()],
             Defect => vec!["write ".into()],
+            Checker => vec!["write checker:".into()],
             Words => Vec::new(),
         }
     }
@@ -221,7 +232,7 @@ fn a_boundary_value_of_an_option_is_refused_with_its_bounds_or_lies_within_them(
     }
     println!("{cases} boundary values of options, {taken} of them can be used");
     assert_eq!(known.len(), TABLE.len(), "an option is gone");
-    assert_eq!(cases, 1326);
+    assert_eq!(cases, 1462);
 }
 
 /// Checks the outcome of a case; returns whether its value was accepted.
@@ -290,6 +301,7 @@ fn check(
                 return false;
             }
         }
+        Checker => assert!(matches.get_one::<Board>(id).is_some(), "{case}"),
         Date | Words => panic!("{case} was taken"),
     }
     true

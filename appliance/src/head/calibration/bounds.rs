@@ -39,31 +39,40 @@ impl CalibrationFile {
         within("camera.bit_depth", camera.bit_depth, 8, 16)?;
         within("projector.width", projector.width, 1, MAX_SIDE)?;
         within("projector.height", projector.height, 1, MAX_SIDE)?;
-        let timing = &self.timing;
-        for (key, ns) in [
-            ("timing.flip_to_light_ns", timing.flip_to_light_ns),
-            ("timing.sigma_ns", timing.sigma_ns),
-            ("timing.readout_ns", timing.readout_ns),
-        ] {
-            within(key, ns, 0, MAX_TIME_NS)?;
+        let most = MAX_NOISE_COUNTS;
+        if let Some(timing) = &self.timing {
+            for (key, ns) in [
+                ("timing.flip_to_light_ns", timing.flip_to_light_ns),
+                ("timing.sigma_ns", timing.sigma_ns),
+                ("timing.readout_ns", timing.readout_ns),
+            ] {
+                within(key, ns, 0, MAX_TIME_NS)?;
+            }
         }
-        let (noise, most) = (&self.noise, MAX_NOISE_COUNTS);
-        within("noise.counts", noise.counts, MIN_NOISE_COUNTS, most)?;
-        within("noise.read_counts", noise.read_counts, 0.0, most)?;
-        within("noise.shot", noise.shot, 0.0, most)?;
-        length("noise.levels", noise.levels.len(), 0, MAX_LEVELS)?;
-        for level in &noise.levels {
-            within("noise.levels.level", level.level, 0.0, most)?;
-            within("noise.levels.counts", level.counts, 0.0, most)?;
+        if let Some(noise) = &self.noise {
+            within("noise.counts", noise.counts, MIN_NOISE_COUNTS, most)?;
+            within("noise.read_counts", noise.read_counts, 0.0, most)?;
+            within("noise.shot", noise.shot, 0.0, most)?;
+            length("noise.levels", noise.levels.len(), 0, MAX_LEVELS)?;
+            for level in &noise.levels {
+                within("noise.levels.level", level.level, 0.0, most)?;
+                within("noise.levels.counts", level.counts, 0.0, most)?;
+            }
         }
-        length("response", self.response.len(), 256, 256)?;
-        let contrast = &self.contrast;
-        let modulation = contrast.modulation_counts;
-        within("contrast.modulation_counts", modulation, 0.0, most)?;
-        length("contrast.pitches", contrast.pitches.len(), 0, MAX_LEVELS)?;
-        for pitch in &contrast.pitches {
-            within("contrast.pitches.pitch_px", pitch.pitch_px, 1, MAX_SIDE)?;
-            within("contrast.pitches.contrast", pitch.contrast, 0.0, 100.0)?;
+        if let Some(response) = &self.response {
+            length("response", response.len(), 256, 256)?;
+        }
+        if let Some(contrast) = &self.contrast {
+            let modulation = contrast.modulation_counts;
+            within("contrast.modulation_counts", modulation, 0.0, most)?;
+            length("contrast.pitches", contrast.pitches.len(), 0, MAX_LEVELS)?;
+            for pitch in &contrast.pitches {
+                within("contrast.pitches.pitch_px", pitch.pitch_px, 1, MAX_SIDE)?;
+                within("contrast.pitches.contrast", pitch.contrast, 0.0, 100.0)?;
+            }
+        }
+        if let Some(geometry) = &self.geometry {
+            geometry.check_bounds()?;
         }
         let Some(reference) = &self.reference else {
             return Ok(());

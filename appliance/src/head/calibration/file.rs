@@ -1,6 +1,7 @@
-//! `calibration.json`, version 1: its keys, its checks, its fingerprint and its checksum.
+//! `calibration.json`, version 2: its keys, its checks, its fingerprint and its checksum.
 
 use super::Calibration;
+use super::geometry::GeometryFile;
 use crate::storage::hex;
 use algo::pattern::GreyResponse;
 use hal::bounds::{clipped, shortened};
@@ -12,10 +13,12 @@ use std::time::Duration;
 
 /// The name of the format.
 pub const FORMAT: &str = "fringed-calibration";
-/// Its version.
-pub const VERSION: u32 = 1;
+/// Its version. In version 1, timing, noise, response and contrast are required.
+pub const VERSION: u32 = 2;
 /// Stands in place of the checksum while it is computed.
 const NO_CHECKSUM: &str = "0000000000000000000000000000000000000000000000000000000000000000";
+/// σ of a sample in counts where it was not measured. Nothing is measured with such a calibration ([`CalibrationFile::missing`]).
+const NOMINAL_NOISE: f64 = 1.0;
 
 /// The file. docs/formats.md lists the keys.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,16 +46,23 @@ pub struct CalibrationFile {
     /// The projector.
     pub projector: ProjectorFile,
     /// Flips, light and stamps.
-    pub timing: TimingFile,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timing: Option<TimingFile>,
     /// The camera's noise.
-    pub noise: NoiseFile,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<NoiseFile>,
     /// The light of each of the 256 grey levels, 0 for black, 255 for white.
-    pub response: Vec<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub response: Option<Vec<f64>>,
     /// Contrast of fringes against their pitch.
-    pub contrast: ContrastFile,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contrast: Option<ContrastFile>,
     /// The reference phase maps, if a plate was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<ReferenceFile>,
+    /// How the models were made, if they come from poses of a board.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<GeometryFile>,
 }
 
 /// Size and geometry of the camera.
@@ -202,13 +212,16 @@ impl CalibrationFile {
                 clipped(&header.format)
             ));
         }
-        if header.version != VERSION {
+        if !(1..=VERSION).contains(&header.version) {
             return Err(format!(
                 "it has version {}, this program reads {VERSION}: update the program, or calibrate anew",
                 header.version
             ));
         }
         let file: Self = serde_json::from_slice(bytes).map_err(damaged)?;
+        if let (1, [first, ..]) = (file.version, &file.missing()[..]) {
+            return Err(format!("it is damaged: it has no {first}: calibrate anew"));
+        }
         if file.checksum != file.checksummed() {
             return Err(
                 "it does not agree with its checksum: it is damaged, or was edited; calibrate anew"
@@ -235,22 +248,39 @@ impl CalibrationFile {
             .map_err(|error| format!("{error}: calibrate anew"))?;
         let (camera, projector) = (&self.camera, &self.projector);
         Ok(Calibration {
-            response: inverted(&self.response)?,
+            response: self.response.as_deref().map_or(Ok(None), inverted)?,
             ..Calibration::new(
                 (camera.width, camera.height, camera.bit_depth),
                 (projector.width, projector.height),
                 (&camera.model, &projector.model),
-                self.noise.counts,
+                self.noise
+                    .as_ref()
+                    .map_or(NOMINAL_NOISE, |noise| noise.counts),
             )?
         })
     }
 
+    /// What is still to be measured on the head before anything can be measured with it; empty if nothing is.
+    pub fn missing(&self) -> Vec<&'static str> {
+        let keys = [
+            ("timing", self.timing.is_some()),
+            ("noise", self.noise.is_some()),
+            ("response", self.response.is_some()),
+            ("contrast", self.contrast.is_some()),
+        ];
+        let missing = keys.into_iter().filter(|(_, there)| !there);
+        missing.map(|(key, _)| key).collect()
+    }
+
     /// The head's timing by this calibration; what is not calibrated stays as `before`.
     pub fn timing(&self, before: Timing) -> Timing {
+        let Some(timing) = &self.timing else {
+            return before;
+        };
         Timing {
-            flip_to_light: Duration::from_nanos(self.timing.flip_to_light_ns),
-            stamp: self.timing.stamp,
-            readout: Duration::from_nanos(self.timing.readout_ns),
+            flip_to_light: Duration::from_nanos(timing.flip_to_light_ns),
+            stamp: timing.stamp,
+            readout: Duration::from_nanos(timing.readout_ns),
             ..before
         }
     }
@@ -260,6 +290,9 @@ impl CalibrationFile {
     /// # Errors
     /// If a number in it is not finite or the response cannot be inverted.
     pub fn sealed(mut self) -> Result<(Self, Vec<u8>), String> {
+        // The oldest version that can hold it, so that a complete calibration can be read by older programs as well.
+        let first = self.missing().is_empty() && self.geometry.is_none();
+        self.version = if first { 1 } else { VERSION };
         // The bounds ask for a fingerprint's form before there is one.
         self.fingerprint = NO_CHECKSUM.into();
         self.fingerprint = self.calibration()?.fingerprint();

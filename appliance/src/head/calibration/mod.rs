@@ -3,6 +3,7 @@
 pub mod bounds;
 mod current;
 pub mod file;
+pub mod geometry;
 pub mod opencv;
 pub mod place;
 

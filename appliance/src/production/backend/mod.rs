@@ -125,9 +125,9 @@ impl Opened {
                 if misfit.is_none() {
                     self.head.set_timing(loaded.file.timing(self.head.timing()));
                     self.calibration = calibration;
-                    self.fallback = loaded.fallback;
+                    self.fallback = loaded.fallback.clone();
                 }
-                misfit
+                misfit.or_else(|| unfinished(config, &loaded))
             }
             Err(problem) => Some(problem),
         };
@@ -206,6 +206,19 @@ fn misfit(config: &HeadConfig, head: &Calibration, stored: &Calibration) -> Opti
     ))
 }
 
+/// What is still to be measured before a stored calibration can be used; `None` if nothing is.
+fn unfinished(config: &HeadConfig, stored: &Loaded) -> Option<String> {
+    let missing = stored.file.missing();
+    let place = config.calibration.as_deref().unwrap_or(Path::new(""));
+    (!missing.is_empty()).then(|| {
+        format!(
+            "calibration {} has models, but {} of the head are still to be measured: run `fringed calibrate`",
+            place.display(),
+            missing.join(", ")
+        )
+    })
+}
+
 /// The calibration of the configured head, without opening it.
 ///
 /// # Errors
@@ -217,7 +230,8 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
             let exact = exact(&scenario(config.scenario.as_deref())?)?;
             match stored(config).map_err(wrong)? {
                 None => Ok(exact),
-                Some((_, calibration)) => misfit(config, &exact, &calibration)
+                Some((loaded, calibration)) => misfit(config, &exact, &calibration)
+                    .or_else(|| unfinished(config, &loaded))
                     .map_or(Ok(calibration), |why| Err(wrong(why))),
             }
         }
@@ -230,7 +244,9 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
             calibration_of(&config.recordings, &first.collect::<Result<Vec<_>, _>>()?)
         }
         Backend::Rpi => match stored(config).map_err(wrong)? {
-            Some((_, calibration)) => Ok(calibration),
+            Some((loaded, calibration)) => {
+                unfinished(config, &loaded).map_or(Ok(calibration), |why| Err(wrong(why)))
+            }
             None => Err(devices::uncalibrated()),
         },
     }

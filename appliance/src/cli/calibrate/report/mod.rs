@@ -1,5 +1,7 @@
 //! The report of `fringed calibrate`, as a table and as JSON.
 
+pub(super) mod poses;
+
 use crate::head::calibration::file::{CalibrationFile, MapFile};
 use hal::head::Stamp;
 use serde_json::{Value, json};
@@ -31,39 +33,45 @@ impl Report<'_> {
             let _ = writeln!(lines, "{name:9} {found}");
         };
         line("models", format!("of {}", file.models_from));
-        let timing = &file.timing;
-        let marks = match timing.stamp {
-            Stamp::ExposureStart => "start of the exposure",
-            Stamp::ExposureEnd => "end of the exposure",
-            Stamp::ReadoutEnd => "end of the readout",
-        };
-        line("stamps", format!("the camera's mark the {marks}"));
-        line(
-            "delay",
-            format!(
-                "light comes {:.3} ms after its flip (1 σ {:.2} µs)",
-                timing.flip_to_light_ns as f64 * 1e-6,
-                timing.sigma_ns as f64 * 1e-3
-            ),
-        );
-        let off = file.response.iter().enumerate();
-        let off = off.map(|(grey, light)| (light - grey as f64).abs());
-        line(
-            "response",
-            format!(
-                "off proportion by {:.1} of 255 levels at most; patterns are corrected for it",
-                off.fold(0.0, f64::max)
-            ),
-        );
-        let noise = &file.noise;
-        line(
-            "noise",
-            format!(
-                "{:.2} counts at half of white; {:.2} in the dark, and {:.4} counts² per count of light",
-                noise.counts, noise.read_counts, noise.shot
-            ),
-        );
-        line("contrast", file.contrast.words());
+        if let Some(timing) = &file.timing {
+            let marks = match timing.stamp {
+                Stamp::ExposureStart => "start of the exposure",
+                Stamp::ExposureEnd => "end of the exposure",
+                Stamp::ReadoutEnd => "end of the readout",
+            };
+            line("stamps", format!("the camera's mark the {marks}"));
+            line(
+                "delay",
+                format!(
+                    "light comes {:.3} ms after its flip (1 σ {:.2} µs)",
+                    timing.flip_to_light_ns as f64 * 1e-6,
+                    timing.sigma_ns as f64 * 1e-3
+                ),
+            );
+        }
+        if let Some(response) = &file.response {
+            let off = response.iter().enumerate();
+            let off = off.map(|(grey, light)| (light - grey as f64).abs());
+            line(
+                "response",
+                format!(
+                    "off proportion by {:.1} of 255 levels at most; patterns are corrected for it",
+                    off.fold(0.0, f64::max)
+                ),
+            );
+        }
+        if let Some(noise) = &file.noise {
+            line(
+                "noise",
+                format!(
+                    "{:.2} counts at half of white; {:.2} in the dark, and {:.4} counts² per count of light",
+                    noise.counts, noise.read_counts, noise.shot
+                ),
+            );
+        }
+        if let Some(contrast) = &file.contrast {
+            line("contrast", contrast.words());
+        }
         if let Some(maps) = &file.reference {
             let residual = |name: &str, map: &MapFile| {
                 format!(

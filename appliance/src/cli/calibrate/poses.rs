@@ -1,0 +1,247 @@
+//! `fringed calibrate --board … --poses …`: the models of camera and projector from recordings of a checkerboard.
+
+use super::super::board::board;
+use super::super::names;
+use super::super::numbers::number;
+use super::super::options::Measuring;
+use super::report::poses::Report;
+use crate::error::{Exit, Failure};
+use crate::head::calibration::Calibration;
+use crate::head::calibration::file::{CalibrationFile, CameraFile, FORMAT, ProjectorFile, VERSION};
+use crate::head::calibration::geometry::{GeometryFile, MAX_POSES, MAX_SIGMA_PPM};
+use crate::head::calibration::place::Place;
+use crate::head::geometry::{Geometry, SeenPose};
+use crate::head::seam;
+use crate::storage::state::StateFolder;
+use crate::storage::unpack::Unpacked;
+use algo::calibration::Board;
+use algo::geometry::Pinhole;
+use hal::replay::Recording;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// Largest difference from a stated length, and of the baseline from the calibration before, as a share.
+const MOST_SCALE: f64 = 0.01;
+/// Longest length that can be checked, mm.
+const MAX_LENGTH_MM: f64 = 1e5;
+
+/// Models from recordings of a board.
+#[derive(Debug, clap::Args)]
+pub struct Poses {
+    /// Make the models from recordings of this board: checker:COLUMNSxROWS:MM, counted in inner corners, MM the side of a square.
+    #[arg(long, value_name = "BOARD", value_parser = board)]
+    board: Option<Board>,
+    /// Recordings of the board, each with vertical and horizontal fringes; in the last the board lies in the plane z = 0.
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    poses: Vec<PathBuf>,
+    /// Write the calibration to this file instead of the station's.
+    #[arg(long, value_name = "FILE", value_parser = names::file("json"))]
+    out: Option<PathBuf>,
+    /// σ of the board's scale in parts per million, as its maker or a ruler gives it; counts towards σ of heights and lengths.
+    #[arg(long, value_name = "PPM", value_parser = number(0.0, MAX_SIGMA_PPM))]
+    board_sigma_ppm: Option<f64>,
+    /// Length on the board from its first to its last inner corner along the longer side, as measured with a ruler.
+    #[arg(long, value_name = "MM", value_parser = number(1e-3, MAX_LENGTH_MM))]
+    check_length: Option<f64>,
+}
+
+/// How the scale of the models was checked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Scale {
+    /// Nobody checked the size of the board's squares.
+    Unchecked,
+    /// With a length on the board.
+    Length,
+    /// With the baseline of the calibration before.
+    Baseline,
+}
+
+impl Poses {
+    /// Whether the models are to come from a board.
+    pub fn given(&self) -> bool {
+        let beside = [self.board_sigma_ppm, self.check_length];
+        let named = self.board.is_some() || self.out.is_some() || !self.poses.is_empty();
+        named || beside.iter().any(Option::is_some)
+    }
+
+    /// Makes the models, writes the calibration and prints the report.
+    ///
+    /// # Errors
+    /// If options are missing (64), a recording is missing (66), a pose cannot be used or the poses do not fit (65), or the calibration cannot be written (73). The
+    /// calibration before is then unchanged.
+    pub fn run(&self, options: &Measuring) -> Result<(), Failure> {
+        let Some(board) = self.board.as_ref().filter(|_| !self.poses.is_empty()) else {
+            let words = "calibrate: models are made of a board in several poses: name both with --board and --poses";
+            return Err(Failure::new(Exit::Usage, words));
+        };
+        let config = options.files.configuration()?;
+        // The station's calibration is locked until it is written.
+        let state = match self.out {
+            Some(_) => None,
+            None => Some(StateFolder::open(&options.files.state_folder()?)?),
+        };
+        let head = state.as_ref().map(|state| config.head_in(state.path()));
+        let stored = head.as_ref().and_then(|head| head.calibration.as_deref());
+        let place = Place::at(self.out.as_deref().or(stored).unwrap_or(Path::new("")));
+        let mut notes = Vec::new();
+        let before = place.load().unwrap_or_else(|problem| {
+            notes.push(format!("{problem}; it is left behind"));
+            None
+        });
+        let before = before.map(|loaded| loaded.file);
+        self.check_length(board)?;
+        let progress = options.output.progress();
+        progress.tell(0.0, "looking for the board");
+        let pool = options.threads.pool(config.threads)?;
+        let seen = pool.install(|| self.seen(board));
+        progress.clear();
+        let poses = seen?;
+        let geometry = Geometry::of(board, self.board_sigma_ppm.unwrap_or(0.0), &poses)
+            .map_err(|error| content(&error))?;
+        let scale = self.scale(before.as_ref(), &geometry.file)?;
+        let (file, bytes) = file(&poses, &geometry, before.as_ref(), board)
+            .and_then(CalibrationFile::sealed)
+            .map_err(|error| content(&error))?;
+        place.save(&bytes, &[]).map_err(|error| {
+            let what = format!("write {}", place.path().display());
+            let words = format!("{error}: free space, or name another file with --out");
+            Failure::because(Exit::CannotCreate, what, words)
+        })?;
+        let report = Report {
+            file: &file,
+            geometry: &geometry,
+            seen: &poses,
+            scale,
+            before: before.as_ref().map(|file| file.fingerprint.as_str()),
+            place: place.path(),
+            notes: &notes,
+        };
+        options.output.answer(&report.json(), || report.table())
+    }
+
+    /// The board in each recording.
+    fn seen(&self, board: &Board) -> Result<Vec<SeenPose>, Failure> {
+        if self.poses.len() > MAX_POSES {
+            let words = format!("{} poses: at most {MAX_POSES} are used", self.poses.len());
+            return Err(content(&words));
+        }
+        let seen = |path: &PathBuf| {
+            let unpacked = Unpacked::of(path)?;
+            let recording = Recording::open(unpacked.folder())?;
+            let name = path.file_name().map(|name| name.to_string_lossy());
+            let name = name.unwrap_or_else(|| path.to_string_lossy());
+            SeenPose::of(&recording, &name, board)
+                .map_err(|error| content(&format!("{}: {error}", path.display())))
+        };
+        // The first pose that fails is named, in whatever order they end.
+        let each: Vec<Result<SeenPose, Failure>> = self.poses.par_iter().map(seen).collect();
+        each.into_iter().collect()
+    }
+
+    /// Compares the board's length with the one stated.
+    fn check_length(&self, board: &Board) -> Result<(), Failure> {
+        let nominal = (board.columns.max(board.rows) - 1) as f64 * board.square;
+        match self.check_length {
+            Some(length) if (length / nominal - 1.0).abs() > MOST_SCALE => Err(content(&format!(
+                "the board is {length} mm from the first to the last inner corner, and {nominal} mm by --board: state the size of its squares as it is"
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// How the scale was checked.
+    fn scale(
+        &self,
+        before: Option<&CalibrationFile>,
+        now: &GeometryFile,
+    ) -> Result<Scale, Failure> {
+        if self.check_length.is_some() {
+            return Ok(Scale::Length);
+        }
+        let Some(before) = before else {
+            return Ok(Scale::Unchecked);
+        };
+        let then = baseline(before).map_err(|error| content(&error))?;
+        if !((now.baseline_mm / then - 1.0).abs() <= MOST_SCALE) {
+            return Err(content(&format!(
+                "camera and projector are {:.2} mm apart, and {then:.2} mm in the calibration before: correct the size of the squares in --board, or \
+                 measure the board and state it with --check-length if the head was changed",
+                now.baseline_mm
+            )));
+        }
+        Ok(Scale::Baseline)
+    }
+}
+
+fn content(words: &str) -> Failure {
+    Failure::new(Exit::Content, format!("calibrate: {words}"))
+}
+
+/// Distance between the centres of camera and projector of a calibration, mm.
+fn baseline(file: &CalibrationFile) -> Result<f64, String> {
+    let calibration = file.calibration()?;
+    let (camera, projector) = (&calibration.camera, &calibration.projector);
+    Ok((projector.centre() - camera.centre()).length())
+}
+
+/// The calibration with these models. What the one before has measured on a head of the same size stays.
+fn file(
+    poses: &[SeenPose],
+    geometry: &Geometry,
+    before: Option<&CalibrationFile>,
+    board: &Board,
+) -> Result<CalibrationFile, String> {
+    let Some(first) = poses.first() else {
+        return Err("there is no pose".into());
+    };
+    let (width, height, bit_depth) = first.frames;
+    let (columns, rows) = first.raster;
+    let checked = |model, (columns, rows): (u32, u32)| {
+        Pinhole::new(model, columns as usize, rows as usize).map_err(|error| error.to_string())
+    };
+    let camera = checked(geometry.camera, (width, height))?;
+    let projector = checked(geometry.projector, first.raster)?;
+    let models = (seam::device_model(&camera), seam::device_model(&projector));
+    let made = Calibration::new(first.frames, first.raster, (&models.0, &models.1), 1.0)?;
+    let same = |before: &&CalibrationFile| {
+        let sizes = |of: &Calibration| (of.frames(), of.raster());
+        before
+            .calibration()
+            .is_ok_and(|of| sizes(&of) == sizes(&made))
+    };
+    let before = before.filter(same);
+    Ok(CalibrationFile {
+        format: FORMAT.into(),
+        version: VERSION,
+        fingerprint: String::new(),
+        checksum: String::new(),
+        made_by: concat!("fringed ", env!("CARGO_PKG_VERSION")).into(),
+        made_at_unix_s: crate::system::clock::utc_us().unwrap_or(0) / 1_000_000,
+        temperature_c: None,
+        models_from: format!(
+            "{} poses of checker:{}x{}:{}",
+            poses.len(),
+            board.columns,
+            board.rows,
+            board.square
+        ),
+        camera: CameraFile {
+            width,
+            height,
+            bit_depth,
+            model: models.0,
+        },
+        projector: ProjectorFile {
+            width: columns,
+            height: rows,
+            model: models.1,
+        },
+        timing: before.and_then(|file| file.timing.clone()),
+        noise: before.and_then(|file| file.noise.clone()),
+        response: before.and_then(|file| file.response.clone()),
+        contrast: before.and_then(|file| file.contrast.clone()),
+        reference: None,
+        geometry: Some(geometry.file.clone()),
+    })
+}

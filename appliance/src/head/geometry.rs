@@ -1,0 +1,225 @@
+//! The geometry of a head from recordings of a checkerboard: one pose at a time, then all together.
+
+use super::calibration::geometry::{BoardFile, GeometryFile, PoseFile};
+use super::scan::Scan;
+use super::seam;
+use algo::calibration::{
+    Adjusted, Board, CalibrationError, Fringes, MeasuredBoard, Picture, Prediction, Residuals,
+    View, calibrate, look,
+};
+use algo::geometry::{Pinhole, PinholeModel};
+use algo::pipeline::PhaseMap;
+use hal::replay::Recording;
+use hal::replay::recording::{PatternSpec, RecordedFrame};
+
+/// Columns and rows of the frame that are looked at for corners.
+const CELLS: (usize, usize) = (8, 6);
+
+/// One pose of the board, as a head saw it.
+#[derive(Clone, Debug)]
+pub struct SeenPose {
+    /// Name of its recording.
+    pub recording: String,
+    /// Columns, rows and bits of the camera's frames.
+    pub frames: (u32, u32, u8),
+    /// Columns and rows of the projector's raster.
+    pub raster: (u32, u32),
+    /// Corners and projector points.
+    pub view: View,
+}
+
+impl SeenPose {
+    /// Finds the board in a recording with vertical and horizontal fringes.
+    ///
+    /// # Errors
+    /// In words: what the recording lacks, or why the pose cannot be used.
+    pub fn of(recording: &Recording, name: &str, board: &Board) -> Result<Self, String> {
+        let fringes = |vertical: bool| {
+            let wanted = |spec: &PatternSpec| match spec {
+                PatternSpec::Vertical { fringes } if vertical => Some(*fringes),
+                PatternSpec::Horizontal { fringes } if !vertical => Some(*fringes),
+                _ => None,
+            };
+            let mut patterns = recording.patterns.iter().enumerate();
+            let found = patterns.find_map(|(at, spec)| Some((at, wanted(spec)?)));
+            let direction = if vertical { "vertical" } else { "horizontal" };
+            found.ok_or_else(|| {
+                format!("it has no {direction} fringes: both directions are needed, each with all of its levels")
+            })
+        };
+        let (vertical, horizontal) = (fringes(true)?, fringes(false)?);
+        let mut levels = Vec::new();
+        let vertical_map = decoded(recording, vertical.0, &mut levels)?;
+        let horizontal_map = decoded(recording, horizontal.0, &mut levels)?;
+        let projector = &recording.projector;
+        let raster = (projector.width, projector.height);
+        let fringes = Fringes {
+            vertical: &vertical_map,
+            horizontal: &horizontal_map,
+            pitch: (
+                f64::from(raster.0) / vertical.1,
+                f64::from(raster.1) / horizontal.1,
+            ),
+        };
+        let view = look(board, &levels, &fringes).map_err(|error| error.to_string())?;
+        Ok(Self {
+            recording: name.to_owned(),
+            frames: (recording.width, recording.height, recording.bit_depth),
+            raster,
+            view,
+        })
+    }
+}
+
+/// The phases of one pattern of a recording, and the offset of each of its levels.
+fn decoded(
+    recording: &Recording,
+    pattern: usize,
+    levels: &mut Vec<Picture>,
+) -> Result<PhaseMap, String> {
+    let projector = &recording.projector;
+    let (columns, rows) = (projector.width as usize, projector.height as usize);
+    let function = seam::phase_function(&recording.patterns[pattern], columns, rows)
+        .map_err(|error| error.to_string())?;
+    let taken = recording.frames.iter();
+    let taken: Vec<&RecordedFrame> = taken.filter(|frame| frame.pattern == pattern).collect();
+    let shots: Vec<_> = taken.iter().map(|frame| seam::shot(frame)).collect();
+    let frames = taken.iter().map(|taken| &taken.frame);
+    let scan = Scan::new(function.range(), &shots, frames)?;
+    if scan.needs_map() {
+        return Err(
+            "its levels can be unwrapped about a known map only: take geometric ones, the coarsest of at most one fringe".into(),
+        );
+    }
+    for level in scan.sequence.levels() {
+        let frames = level.frames.iter().map(|&at| scan.frames[usize::from(at)]);
+        levels.push(Picture::mean(&frames.collect::<Vec<_>>()));
+    }
+    scan.phases(None)
+}
+
+/// Models of camera and projector from poses of a board.
+#[derive(Clone, Debug)]
+pub struct Geometry {
+    /// The camera, with the board's last pose as z = 0.
+    pub camera: PinholeModel,
+    /// The projector.
+    pub projector: PinholeModel,
+    /// What calibration.json keeps.
+    pub file: GeometryFile,
+    /// Predicted errors of measurements.
+    pub prediction: Prediction,
+    /// The board in each pose, as the calibrated head measures it.
+    pub measured: Vec<Option<MeasuredBoard>>,
+    /// Largest angle between the board in two poses, degrees.
+    pub tilt_degrees: f64,
+    /// Share of the camera's frame in which there were corners.
+    pub frame_covered: f64,
+}
+
+impl Geometry {
+    /// Adjusts all poses together. `sigma_ppm` is σ of the board's scale.
+    ///
+    /// # Errors
+    /// In words, with the recording to blame: the poses are of different heads, do not determine the models, or do not fit each other.
+    pub fn of(board: &Board, sigma_ppm: f64, poses: &[SeenPose]) -> Result<Self, String> {
+        let Some(first) = poses.first() else {
+            return Err(CalibrationError::Few { given: 0 }.to_string());
+        };
+        let other = |pose: &&SeenPose| (pose.frames, pose.raster) != (first.frames, first.raster);
+        if let Some(other) = poses.iter().find(other) {
+            return Err(format!(
+                "{}: its frames or its projector's raster have another size than those of {}: calibrate with recordings of one head",
+                other.recording, first.recording
+            ));
+        }
+        let frame = (first.frames.0 as usize, first.frames.1 as usize);
+        let raster = (first.raster.0 as usize, first.raster.1 as usize);
+        let views: Vec<View> = poses.iter().map(|pose| pose.view.clone()).collect();
+        let blame = |error: CalibrationError| match error.pose() {
+            Some(pose) => format!("{}: {error}", poses[pose].recording),
+            None => error.to_string(),
+        };
+        let adjusted = calibrate(board, frame, &views).map_err(blame)?;
+        let last = poses.len() - 1;
+        let (camera, projector) = adjusted.rig.models(last);
+        let baseline = {
+            let checked = |what, model, (columns, rows)| {
+                let checked = Pinhole::new(model, columns, rows);
+                checked.map_err(|error| format!("the {what}'s model: {error}"))
+            };
+            let centre = checked("camera", camera, frame)?.centre();
+            (checked("projector", projector, raster)?.centre() - centre).length()
+        };
+        let prediction = adjusted
+            .prediction(frame, raster, sigma_ppm * 1e-6)
+            .ok_or_else(|| "camera and projector see no part of the volume of all poses together: place the board where both see it".to_owned())?;
+        let file = file(board, sigma_ppm, poses, &adjusted, &prediction, baseline);
+        Ok(Self {
+            camera,
+            projector,
+            file,
+            prediction,
+            measured: views
+                .iter()
+                .enumerate()
+                .map(|(at, view)| adjusted.measured_board(at, view))
+                .collect(),
+            tilt_degrees: adjusted.largest_tilt().to_degrees(),
+            frame_covered: covered(frame, &views),
+        })
+    }
+}
+
+fn file(
+    board: &Board,
+    sigma_ppm: f64,
+    poses: &[SeenPose],
+    adjusted: &Adjusted,
+    prediction: &Prediction,
+    baseline: f64,
+) -> GeometryFile {
+    let all = |device: usize| {
+        let each = adjusted.residuals.iter().map(|pose| pose[device]);
+        each.fold(Residuals::default(), |sum, pose| sum.and(&pose))
+            .rms()
+    };
+    let pose = |(at, pose): (usize, &SeenPose)| PoseFile {
+        recording: pose.recording.clone(),
+        corners: pose.view.found.located(),
+        camera_px: adjusted.residuals[at][0].rms(),
+        projector_px: adjusted.residuals[at][1].rms(),
+        tilt_degrees: adjusted.tilt(at).to_degrees(),
+        distance_mm: adjusted.rig.poses[at].shift.length(),
+    };
+    GeometryFile {
+        board: BoardFile {
+            columns: board.columns,
+            rows: board.rows,
+            square_mm: board.square,
+            sigma_ppm,
+            bow_mm: adjusted.rig.bow,
+        },
+        baseline_mm: baseline,
+        camera_px: all(0),
+        projector_px: all(1),
+        height_sigma_mm: prediction.height,
+        length_sigma_mm: prediction.length,
+        poses: poses.iter().enumerate().map(pose).collect(),
+    }
+}
+
+/// Share of the cells of the frame in which a corner was seen.
+fn covered((width, height): (usize, usize), views: &[View]) -> f64 {
+    let mut seen = [false; CELLS.0 * CELLS.1];
+    let corners = views.iter().flat_map(|view| view.found.corners.iter());
+    for corner in corners.flatten() {
+        let cell = |at: f64, size: usize, cells: usize| {
+            let cell = at / size.max(1) as f64 * cells as f64;
+            (cell.max(0.0) as usize).min(cells - 1)
+        };
+        let row = cell(corner.v, height, CELLS.1);
+        seen[row * CELLS.0 + cell(corner.u, width, CELLS.0)] = true;
+    }
+    seen.iter().filter(|seen| **seen).count() as f64 / seen.len() as f64
+}

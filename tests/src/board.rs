@@ -1,0 +1,179 @@
+//! A checkerboard in front of a camera and a projector, rendered to recordings without models.
+
+use crate::random::Random;
+use serde_json::json;
+use std::f64::consts::TAU;
+use std::fs;
+use std::path::Path;
+
+/// Columns and rows of the camera's frames.
+pub const FRAME: (usize, usize) = (420, 360);
+/// Columns and rows of the projector's raster.
+pub const RASTER: (usize, usize) = (640, 480);
+/// Focal lengths of camera and projector, px.
+pub const FOCAL: (f64, f64) = (900.0, 950.0);
+/// Centre of the projector in the camera's coordinates, mm. Its axis meets the camera's 400 mm away.
+pub const PROJECTOR: [f64; 3] = [150.0, 0.0, 20.0];
+/// Inner corners and side of a square, mm.
+pub const BOARD: (usize, usize, f64) = (6, 8, 10.0);
+/// Fringes over the raster.
+const FRINGES: f64 = 16.0;
+/// Rays per pixel along each axis.
+const SUB: usize = 3;
+
+/// One pose of the board in the camera's coordinates, and what is wrong with it.
+#[derive(Clone, Copy, Debug)]
+pub struct Pose {
+    /// Turn about x, then about y, then about the board's normal, rad.
+    pub turn: [f64; 3],
+    /// Centre of the board, mm.
+    pub centre: [f64; 3],
+    /// Side of a ray bundle in pixels; 1 is a sharp picture.
+    pub blur: f64,
+    /// By how much the board has moved along x before the horizontal fringes, mm.
+    pub moved: f64,
+    /// Columns of the raster that are dark, from the left.
+    pub dark: f64,
+}
+
+impl Pose {
+    /// A good pose.
+    pub fn new(turn: [f64; 3], centre: [f64; 3]) -> Self {
+        Self {
+            turn,
+            centre,
+            blur: 1.0,
+            moved: 0.0,
+            dark: 0.0,
+        }
+    }
+}
+
+/// Six poses, the last nearly across the camera's axis.
+pub fn poses() -> [Pose; 6] {
+    [
+        Pose::new([0.4, 0.1, 0.1], [5.0, -4.0, 380.0]),
+        Pose::new([-0.4, 0.2, -0.1], [-6.0, 5.0, 400.0]),
+        Pose::new([0.1, 0.45, 0.3], [2.0, 6.0, 420.0]),
+        Pose::new([-0.1, -0.4, 0.0], [0.0, -5.0, 390.0]),
+        Pose::new([0.3, -0.3, -0.2], [-4.0, 0.0, 430.0]),
+        Pose::new([0.03, -0.02, 0.05], [0.0, 0.0, 400.0]),
+    ]
+}
+
+type V = [f64; 3];
+
+fn dot(a: V, b: V) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn less(a: V, b: V) -> V {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn turned([x, y, z]: V, [a, b, c]: V) -> V {
+    let (x, y) = (x * c.cos() - y * c.sin(), x * c.sin() + y * c.cos());
+    let (x, z) = (x * b.cos() + z * b.sin(), z * b.cos() - x * b.sin());
+    [x, y * a.cos() - z * a.sin(), y * a.sin() + z * a.cos()]
+}
+
+/// Albedo and projector pixel of what a ray of the camera meets; `None` beside the board.
+fn met(pose: &Pose, (x, y): (f64, f64), shift: f64) -> Option<(f64, f64, f64)> {
+    let axes =
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| turned(axis, pose.turn));
+    let (ray, centre) = ([x, y, 1.0], less(pose.centre, [-shift, 0.0, 0.0]));
+    let far = dot(axes[2], centre) / dot(axes[2], ray);
+    let point = ray.map(|along| along * far);
+    let on_board = less(point, centre);
+    let (columns, rows, square) = BOARD;
+    let side =
+        |axis: V, corners: usize| dot(axis, on_board) / square + (corners as f64 - 1.0) / 2.0;
+    let (column, row) = (side(axes[0], columns), side(axes[1], rows));
+    let within =
+        |at: f64, corners: usize, margin: f64| at > -1.0 - margin && at < corners as f64 + margin;
+    if !(within(column, columns, 0.8) && within(row, rows, 0.8)) {
+        return None;
+    }
+    let squares = within(column, columns, 0.0) && within(row, rows, 0.0);
+    let black = squares && (column.floor() + row.floor()) as i64 % 2 != 0;
+    // The projector's axis goes through (0, 0, 400).
+    let z = less([0.0, 0.0, 400.0], PROJECTOR);
+    let z = z.map(|along| along / dot(z, z).sqrt());
+    let across = [z[2], 0.0, -z[0]];
+    let across = across.map(|along| along / dot(across, across).sqrt());
+    let down = [
+        z[1] * across[2] - z[2] * across[1],
+        z[2] * across[0] - z[0] * across[2],
+        z[0] * across[1] - z[1] * across[0],
+    ];
+    let from = less(point, PROJECTOR);
+    let pixel =
+        |axis: V, size: usize| FOCAL.1 * dot(axis, from) / dot(z, from) + (size as f64 - 1.0) / 2.0;
+    Some((
+        if black { 0.3 } else { 0.9 },
+        pixel(across, RASTER.0),
+        pixel(down, RASTER.1),
+    ))
+}
+
+/// Writes the recording of a pose into a new folder: three shifts of one and of sixteen fringes, vertical, then horizontal.
+pub fn write(pose: &Pose, seed: u64, folder: &Path) {
+    fs::create_dir_all(folder.join("frames")).expect("the folder can be made");
+    let mut random = Random::new(seed);
+    let mut entries = Vec::new();
+    for pattern in 0..2 {
+        let shift = if pattern == 0 { 0.0 } else { pose.moved };
+        let mut frames = vec![Vec::new(); 6];
+        for at in 0..FRAME.0 * FRAME.1 {
+            let mut sums = [0.0; 6];
+            for ray in 0..SUB * SUB {
+                let off = |at: usize| pose.blur * ((at as f64 + 0.5) / SUB as f64 - 0.5);
+                let place = |at: usize, size: usize, ray: usize| {
+                    (at as f64 + off(ray) - (size as f64 - 1.0) / 2.0) / FOCAL.0
+                };
+                let x = place(at % FRAME.0, FRAME.0, ray % SUB);
+                let y = place(at / FRAME.0, FRAME.1, ray / SUB);
+                let Some((albedo, xi, eta)) = met(pose, (x, y), shift) else {
+                    continue;
+                };
+                if xi < pose.dark {
+                    continue;
+                }
+                let phase = [xi / RASTER.0 as f64, eta / RASTER.1 as f64][pattern] * FRINGES;
+                for (frame, sum) in sums.iter_mut().enumerate() {
+                    let ratio = [1.0 / FRINGES, 1.0][frame / 3];
+                    let turns = ratio * phase + (frame % 3) as f64 / 3.0;
+                    *sum += albedo * (0.5 + 0.5 * (TAU * turns).sin());
+                }
+            }
+            for (frame, sum) in frames.iter_mut().zip(sums) {
+                let counts = 12.0 + 210.0 * sum / (SUB * SUB) as f64 + 2.0 * (random.share() - 0.5);
+                frame.push(counts.round() as u8);
+            }
+        }
+        for (at, counts) in frames.iter().enumerate() {
+            let file = format!("frames/{pattern}-{at}.png");
+            png(&folder.join(&file), counts);
+            let (ratio, shift) = ([1.0 / FRINGES, 1.0][at / 3], (at % 3) as f64 / 3.0);
+            entries.push(
+                json!({ "file": file, "pattern": pattern, "ratio": ratio, "shift_turns": shift }),
+            );
+        }
+    }
+    let manifest = json!({
+        "format": "fringed-recording", "version": 1,
+        "camera": { "width": FRAME.0, "height": FRAME.1, "bit_depth": 8 },
+        "projector": { "width": RASTER.0, "height": RASTER.1 },
+        "pattern": [{ "kind": "vertical", "fringes": FRINGES }, { "kind": "horizontal", "fringes": FRINGES }],
+        "frames": entries,
+    });
+    fs::write(folder.join("recording.json"), manifest.to_string()).expect("it can be written");
+}
+
+fn png(path: &Path, counts: &[u8]) {
+    let file = fs::File::create(path).expect("it can be written");
+    let mut encoder = png::Encoder::new(file, FRAME.0 as u32, FRAME.1 as u32);
+    encoder.set_color(png::ColorType::Grayscale);
+    let mut writer = encoder.write_header().expect("it can be written");
+    writer.write_image_data(counts).expect("it can be written");
+}
