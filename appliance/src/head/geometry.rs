@@ -7,7 +7,7 @@ use algo::calibration::{
     Adjusted, Board, CalibrationError, Fringes, MeasuredBoard, Picture, Prediction, Residuals,
     View, calibrate, look,
 };
-use algo::geometry::{Pinhole, PinholeModel};
+use algo::geometry::Pinhole;
 use algo::pipeline::PhaseMap;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedFrame};
@@ -102,9 +102,9 @@ fn decoded(
 #[derive(Clone, Debug)]
 pub struct Geometry {
     /// The camera, with the board's last pose as z = 0.
-    pub camera: PinholeModel,
+    pub camera: Pinhole,
     /// The projector.
-    pub projector: PinholeModel,
+    pub projector: Pinhole,
     /// What calibration.json keeps.
     pub file: GeometryFile,
     /// Predicted errors of measurements.
@@ -143,14 +143,13 @@ impl Geometry {
         let adjusted = calibrate(board, frame, &views).map_err(blame)?;
         let last = poses.len() - 1;
         let (camera, projector) = adjusted.rig.models(last);
-        let baseline = {
-            let checked = |what, model, (columns, rows)| {
-                let checked = Pinhole::new(model, columns, rows);
-                checked.map_err(|error| format!("the {what}'s model: {error}"))
-            };
-            let centre = checked("camera", camera, frame)?.centre();
-            (checked("projector", projector, raster)?.centre() - centre).length()
+        let checked = |what, model, (columns, rows)| {
+            let checked = Pinhole::new(model, columns, rows);
+            checked.map_err(|error| format!("the {what}'s model: {error}"))
         };
+        let camera = checked("camera", camera, frame)?;
+        let projector = checked("projector", projector, raster)?;
+        let baseline = (projector.centre() - camera.centre()).length();
         let prediction = adjusted
             .prediction(frame, raster, sigma_ppm * 1e-6)
             .ok_or_else(|| "camera and projector see no part of the volume of all poses together: place the board where both see it".to_owned())?;

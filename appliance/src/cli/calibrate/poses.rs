@@ -6,7 +6,6 @@ use super::super::numbers::number;
 use super::super::options::Measuring;
 use super::report::poses::Report;
 use crate::error::{Exit, Failure};
-use crate::head::calibration::Calibration;
 use crate::head::calibration::file::{CalibrationFile, CameraFile, FORMAT, ProjectorFile, VERSION};
 use crate::head::calibration::geometry::{GeometryFile, MAX_POSES, MAX_SIGMA_PPM};
 use crate::head::calibration::place::Place;
@@ -15,7 +14,6 @@ use crate::head::seam;
 use crate::storage::state::StateFolder;
 use crate::storage::unpack::Unpacked;
 use algo::calibration::Board;
-use algo::geometry::Pinhole;
 use hal::replay::Recording;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -99,10 +97,14 @@ impl Poses {
         let poses = seen?;
         let geometry = Geometry::of(board, self.board_sigma_ppm.unwrap_or(0.0), &poses)
             .map_err(|error| content(&error))?;
-        let scale = self.scale(before.as_ref(), &geometry.file)?;
-        let (file, bytes) = file(&poses, &geometry, before.as_ref(), board)
-            .and_then(CalibrationFile::sealed)
-            .map_err(|error| content(&error))?;
+        let head = &poses[0];
+        let same = before.as_ref().filter(|before| is_of(before, head));
+        let scale = self.scale(same, &geometry.file)?;
+        if same.is_some_and(|before| before.reference.is_some()) {
+            notes.push("the reference plane was measured with other models: run `fringed calibrate` with a plate".into());
+        }
+        let sealed = file(head, &geometry, same).sealed();
+        let (file, bytes) = sealed.map_err(|error| content(&error))?;
         place.save(&bytes, &[]).map_err(|error| {
             let what = format!("write {}", place.path().display());
             let words = format!("{error}: free space, or name another file with --out");
@@ -185,33 +187,19 @@ fn baseline(file: &CalibrationFile) -> Result<f64, String> {
     Ok((projector.centre() - camera.centre()).length())
 }
 
-/// The calibration with these models. What the one before has measured on a head of the same size stays.
-fn file(
-    poses: &[SeenPose],
-    geometry: &Geometry,
-    before: Option<&CalibrationFile>,
-    board: &Board,
-) -> Result<CalibrationFile, String> {
-    let Some(first) = poses.first() else {
-        return Err("there is no pose".into());
-    };
-    let (width, height, bit_depth) = first.frames;
-    let (columns, rows) = first.raster;
-    let checked = |model, (columns, rows): (u32, u32)| {
-        Pinhole::new(model, columns as usize, rows as usize).map_err(|error| error.to_string())
-    };
-    let camera = checked(geometry.camera, (width, height))?;
-    let projector = checked(geometry.projector, first.raster)?;
-    let models = (seam::device_model(&camera), seam::device_model(&projector));
-    let made = Calibration::new(first.frames, first.raster, (&models.0, &models.1), 1.0)?;
-    let same = |before: &&CalibrationFile| {
-        let sizes = |of: &Calibration| (of.frames(), of.raster());
-        before
-            .calibration()
-            .is_ok_and(|of| sizes(&of) == sizes(&made))
-    };
-    let before = before.filter(same);
-    Ok(CalibrationFile {
+/// Whether a calibration is of a head whose devices have the sizes of this one's.
+fn is_of(file: &CalibrationFile, head: &SeenPose) -> bool {
+    let (camera, projector) = (&file.camera, &file.projector);
+    let frames = (camera.width, camera.height, camera.bit_depth);
+    frames == head.frames && (projector.width, projector.height) == head.raster
+}
+
+/// The calibration with these models. What the one before has measured on the head stays, without the reference plane.
+fn file(head: &SeenPose, geometry: &Geometry, before: Option<&CalibrationFile>) -> CalibrationFile {
+    let (width, height, bit_depth) = head.frames;
+    let (columns, rows) = head.raster;
+    let board = &geometry.file.board;
+    CalibrationFile {
         format: FORMAT.into(),
         version: VERSION,
         fingerprint: String::new(),
@@ -221,21 +209,21 @@ fn file(
         temperature_c: None,
         models_from: format!(
             "{} poses of checker:{}x{}:{}",
-            poses.len(),
+            geometry.file.poses.len(),
             board.columns,
             board.rows,
-            board.square
+            board.square_mm
         ),
         camera: CameraFile {
             width,
             height,
             bit_depth,
-            model: models.0,
+            model: seam::device_model(&geometry.camera),
         },
         projector: ProjectorFile {
             width: columns,
             height: rows,
-            model: models.1,
+            model: seam::device_model(&geometry.projector),
         },
         timing: before.and_then(|file| file.timing.clone()),
         noise: before.and_then(|file| file.noise.clone()),
@@ -243,5 +231,5 @@ fn file(
         contrast: before.and_then(|file| file.contrast.clone()),
         reference: None,
         geometry: Some(geometry.file.clone()),
-    })
+    }
 }
