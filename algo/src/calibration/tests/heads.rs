@@ -162,6 +162,9 @@ fn ten_poses_of_a_bowed_board_give_heights_to_15_micrometres_and_lengths_to_30()
         let mut random = Random::new(seed);
         let truth = head(&mut random, &board, 10, 2e-4);
         let adjusted = calibrate(&board, FRAME, &views(&mut random, &truth)).unwrap();
+        for (found, bow) in adjusted.rig.bow.iter().zip(truth.bow) {
+            assert!((found - bow).abs() < 0.006, "{:?}", adjusted.rig.bow);
+        }
         let (height, length) = errors(&truth, &adjusted.rig);
         squares.0 += height * height / 3.0;
         squares.1 += length * length / 3.0;
