@@ -43,6 +43,28 @@ pub fn flags(path: &Path) -> Vec<u8> {
     file.into_vec().expect("elements of u8")
 }
 
+/// The model of a device as OpenCV writes it (YAML); `unit` is a millimetre in the file's unit of length.
+pub fn opencv(model: &hal::model::DeviceModel, unit: f64) -> String {
+    let matrix = |name: &str, rows: usize, numbers: &[f64]| {
+        let columns = numbers.len() / rows;
+        format!(
+            "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: {numbers:?}\n"
+        )
+    };
+    let k = [
+        model.fx, 0.0, model.cx, 0.0, model.fy, model.cy, 0.0, 0.0, 1.0,
+    ];
+    let t = model.translation_mm.map(|mm| mm * unit);
+    [
+        "%YAML:1.0\n---\n".to_owned(),
+        matrix("K", 3, &k),
+        matrix("D", 1, &model.distortion),
+        matrix("R", 3, &model.rotation),
+        matrix("T", 3, &t),
+    ]
+    .concat()
+}
+
 /// A decoded picture.
 #[derive(Clone, Debug)]
 pub struct Picture {

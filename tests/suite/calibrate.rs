@@ -6,6 +6,7 @@ use serde_json::Value;
 use sim::Scenario;
 use std::fs;
 use std::path::Path;
+use tests::files;
 use tests::program::Run;
 use tests::small_head::SMALL_HEAD as HEAD;
 
@@ -173,28 +174,8 @@ fn models_made_with_opencv_are_imported_and_stay() {
     let scenario = format!("{HEAD}[timing]\nflip_to_light_us = 16667\n");
     let rig = Scenario::from_toml(&scenario, "here").unwrap().rig;
     let write = |name: &str, model: &hal::model::DeviceModel, metres: f64| {
-        let row = |numbers: &[f64]| format!("{numbers:?}");
-        let matrix = |name: &str, rows: usize, numbers: &[f64]| {
-            let columns = numbers.len() / rows;
-            format!(
-                "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: {}\n",
-                row(numbers)
-            )
-        };
-        let k = [
-            model.fx, 0.0, model.cx, 0.0, model.fy, model.cy, 0.0, 0.0, 1.0,
-        ];
-        let t = model.translation_mm.map(|mm| mm * metres);
-        let text = [
-            "%YAML:1.0\n---\n".to_owned(),
-            matrix("K", 3, &k),
-            matrix("D", 1, &model.distortion),
-            matrix("R", 3, &model.rotation),
-            matrix("T", 3, &t),
-        ]
-        .concat();
         let path = folder.path().join(name);
-        fs::write(&path, text).unwrap();
+        fs::write(&path, files::opencv(model, metres)).unwrap();
         path.to_str().unwrap().to_owned()
     };
     let camera = write("camera.yml", &rig.camera.model(), 1e-3);

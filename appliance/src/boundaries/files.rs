@@ -15,7 +15,7 @@ use algo::pattern::Shot;
 use hal::frame::{Frame, FrameFormat, Pixels};
 use hal::head::Stamp;
 use hal::replay::Recording;
-use hal::replay::recording::{PatternSpec, RecipeReference};
+use hal::replay::recording::{PatternSpec, RecipeReference, RecordedCode};
 use hal::units::Timestamp;
 use serde_json::{Value, json};
 use sim::Scenario;
@@ -198,6 +198,10 @@ unit: mm
 
 /// A recording of a few pixels with every optional key.
 fn recording() -> Recording {
+    let picture = || {
+        let format = FrameFormat::packed(16, 12, 8);
+        Frame::new(format, Arc::new(Pixels::zeroed(&format)), Timestamp(0), 0).unwrap()
+    };
     let scenario = small_head();
     let calibration = Calibration::of_scenario(&scenario).unwrap();
     let format = FrameFormat::packed(16, 12, 8);
@@ -218,6 +222,14 @@ fn recording() -> Recording {
         noise_counts: Some(3.7),
         patterns: vec![PatternSpec::Vertical { fringes: 30.0 }],
         frames: frames.collect(),
+        codes: vec![RecordedCode {
+            pattern: 0,
+            cell_px: 8.0,
+            bits: (0..2).map(|_| picture()).collect(),
+            inverse: (0..2).map(|_| picture()).collect(),
+        }],
+        white: Some(picture()),
+        black: Some(picture()),
         range_mm: Some([-50.0, 50.0]),
         exposure_us: Some(33_333.0),
         part_id: Some("7".into()),

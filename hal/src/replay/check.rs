@@ -161,8 +161,8 @@ fn frames(manifest: &Manifest) -> Result<(), Wrong> {
 
 /// Checks the Gray codes, and the names of all pictures that are not frames of levels.
 fn codes(manifest: &Manifest) -> Result<(), Wrong> {
-    for picture in manifest.pictures() {
-        inside(picture)?;
+    for (key, picture) in manifest.pictures() {
+        inside(picture).map_err(|wrong| wrong.of(key))?;
     }
     let wrong = |problem: String, remedy: &str| Err(Wrong::new(problem, remedy));
     for (at, code) in manifest.codes.iter().enumerate() {

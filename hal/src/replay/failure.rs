@@ -51,6 +51,14 @@ impl Wrong {
         }
     }
 
+    /// The same, naming the key of the manifest that is concerned.
+    pub(crate) fn of(self, key: &str) -> Self {
+        Self {
+            problem: format!("{key}: {}", self.problem),
+            ..self
+        }
+    }
+
     /// The error of opening the recording in which the file `path` is wrong.
     pub(crate) fn at(self, path: &Path) -> RecordingError {
         RecordingError::Content {

@@ -100,13 +100,15 @@ pub(crate) struct CodeEntry {
 }
 
 impl Manifest {
-    /// The files of all pictures that are not frames of levels.
-    pub fn pictures(&self) -> impl Iterator<Item = &String> {
-        let coded = self
-            .codes
-            .iter()
-            .flat_map(|code| code.bits.iter().chain(&code.inverse));
-        coded.chain(&self.white).chain(&self.black)
+    /// The files of all pictures that are not frames of levels, each with its key.
+    pub fn pictures(&self) -> impl Iterator<Item = (&'static str, &String)> {
+        let coded = self.codes.iter().flat_map(|code| {
+            let bits = code.bits.iter().map(|file| ("bits", file));
+            bits.chain(code.inverse.iter().map(|file| ("inverse", file)))
+        });
+        let white = self.white.iter().map(|file| ("white", file));
+        let black = self.black.iter().map(|file| ("black", file));
+        coded.chain(white).chain(black)
     }
 }
 

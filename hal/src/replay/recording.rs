@@ -153,11 +153,13 @@ impl Recording {
         let frames = frames(folder, &manifest, format)?;
         let patterns = patterns(folder, &manifest)?;
         let codes = codes(folder, &manifest, format)?;
-        let uniform = |file: &Option<String>| {
+        let uniform = |key, file: &Option<String>| {
             let file = file.as_ref();
-            file.map(|file| picture(folder, file, format)).transpose()
+            let picture = file.map(|file| picture(folder, key, file, format));
+            picture.transpose()
         };
-        let (white, black) = (uniform(&manifest.white)?, uniform(&manifest.black)?);
+        let white = uniform("white", &manifest.white)?;
+        let black = uniform("black", &manifest.black)?;
         let shape = (format.height as usize, format.width as usize);
         let truth_height = truth(folder, TRUTH_HEIGHT, shape)?;
         let truth_class = truth(folder, TRUTH_CLASS, shape)?;
@@ -228,9 +230,18 @@ fn frame(
         .map_err(|error| Wrong::new(error.to_string(), "save the frame again").at(&path))
 }
 
-/// A picture that is no frame of a level.
-fn picture(folder: &Path, file: &str, format: FrameFormat) -> Result<Frame, RecordingError> {
-    frame(folder, file, format, Timestamp(0), 0)
+/// A picture that is no frame of a level, under this key of the manifest.
+fn picture(
+    folder: &Path,
+    key: &str,
+    file: &str,
+    format: FrameFormat,
+) -> Result<Frame, RecordingError> {
+    let found = frame(folder, file, format, Timestamp(0), 0);
+    found.map_err(|error| match error {
+        RecordingError::Content { path, wrong } => wrong.of(key).at(&path),
+        missing @ RecordingError::Missing { .. } => missing,
+    })
 }
 
 fn codes(
@@ -238,16 +249,18 @@ fn codes(
     manifest: &Manifest,
     format: FrameFormat,
 ) -> Result<Vec<RecordedCode>, RecordingError> {
-    let pictures = |files: &[String]| -> Result<Vec<Frame>, RecordingError> {
+    let pictures = |key, files: &[String]| -> Result<Vec<Frame>, RecordingError> {
         let files = files.iter();
-        files.map(|file| picture(folder, file, format)).collect()
+        files
+            .map(|file| picture(folder, key, file, format))
+            .collect()
     };
     let load = |entry: &CodeEntry| {
         Ok(RecordedCode {
             pattern: entry.pattern,
             cell_px: entry.cell_px,
-            bits: pictures(&entry.bits)?,
-            inverse: pictures(&entry.inverse)?,
+            bits: pictures("bits", &entry.bits)?,
+            inverse: pictures("inverse", &entry.inverse)?,
         })
     };
     manifest.codes.iter().map(load).collect()

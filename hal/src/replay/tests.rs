@@ -302,7 +302,7 @@ fn every_wrong_code_is_refused_with_a_message_that_names_the_fault() {
         (
             "\"frames/black.png\"",
             "\"frames/none.png\"",
-            "none.png: the file is missing",
+            "none.png: black: the file is missing",
         ),
         ("\"width\": 5", "\"width\": 9", "3 bits number 8 cells"),
     ] {

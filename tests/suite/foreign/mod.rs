@@ -3,7 +3,7 @@
 mod own;
 mod scene;
 
-use crate::written::program;
+use crate::written::{Written, geometric, program};
 use scene::{HEIGHT, Scene, WIDTH, check_phase, import, lit_by, notes, png_of, save};
 use std::f64::consts::TAU;
 use std::fs;
@@ -254,6 +254,49 @@ fn what_cannot_be_imported_is_refused_with_its_exit_code_and_the_remedy() {
     let small = png_of(3, 2);
     fs::write(scene.path("pictures/pat3.png"), small).unwrap();
     refused(&["--fringes", "1,8"], 65, "all must come from one camera");
+}
+
+#[test]
+fn frames_that_are_imported_with_models_of_opencv_give_the_heights_of_their_recording() {
+    let recording = geometric().record();
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let direct = Written::new(&recording);
+    direct.measure(&[]).succeeded();
+    let mut options = Vec::new();
+    for (option, model) in [
+        ("--camera-model", &recording.camera_model),
+        ("--projector-model", &recording.projector.model),
+    ] {
+        let file = path(&format!("{}.yml", &option[2..]));
+        fs::write(&file, files::opencv(model.as_ref().unwrap(), 0.1)).unwrap();
+        options.extend([option.to_owned(), file.to_str().unwrap().to_owned()]);
+    }
+    let fringes = [0.0192, 0.138, 1.0].map(|ratio: f64| (49.0 * ratio).to_string());
+    options.extend(["--fringes".to_owned(), fringes.join(",")]);
+    let options: Vec<&str> = options.iter().map(String::as_str).collect();
+    let frames = direct.recording().join("frames");
+    let imported = path("imported");
+    let without_unit = import(&frames, &imported, "256x192", &options);
+    assert_eq!(without_unit.code, 65, "{}", without_unit.stderr);
+    let options = [&options[..], &["--unit", "cm", "--json"]].concat();
+    let run = import(&frames, &imported, "256x192", &options).succeeded();
+    // The scene has a patch that is too bright.
+    assert!(
+        notes(&run).iter().all(|note| note.contains("full scale")),
+        "{:?}",
+        notes(&run)
+    );
+    let out = path("out");
+    program().measure(&imported, &out, &[]).succeeded();
+    let heights = |folder: &Path| files::array(&folder.join("height.npy")).values;
+    let pairs = heights(&out).into_iter().zip(heights(&direct.out()));
+    let mut compared = 0;
+    for (found, expected) in pairs.filter(|(a, b)| !a.is_nan() && !b.is_nan()) {
+        assert!((found - expected).abs() < 1e-3, "{found} {expected}");
+        compared += 1;
+    }
+    assert!(compared > 7000, "{compared}");
 }
 
 #[test]
