@@ -15,8 +15,8 @@ case=geometric-3x4-8/aligned
 few=16 many=48 # rows
 # Back-end; size, ways and line of the cache; read misses per pixel; processor. SSSE3 reads 16 pixels of a frame at a time, as NEON does.
 ceilings='
-avx2 65536,4,64 0.40 Cortex-A76
-avx2 32768,2,64 0.40 Cortex-A72
+avx2 65536,4,64 0.22 Cortex-A76
+avx2 32768,2,64 0.23 Cortex-A72
 ssse3 65536,4,64 0.78 Cortex-A76
 ssse3 32768,2,64 0.79 Cortex-A72
 '

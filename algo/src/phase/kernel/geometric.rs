@@ -20,7 +20,7 @@
 //! same columns.
 //!
 //! **Departures from the plain form.** Up to three levels are decoded in one pass over their frames ([`one_pass`]), so that only
-//! the result is written to memory. Level by level costs 30.5 instead of 21.9 instructions per pixel on NEON and 19.7 instead of 15.5
+//! the result is written to memory. Level by level costs 32.6 instead of 23.2 instructions per pixel on NEON and 20.6 instead of 15.0
 //! on AVX2 (three levels of four shifts, 8 bits), so that is for longer sequences only. The kernel is compiled for 3 to 9
 //! shifts of 8 bits; for any others it branches to the form of their number, which costs 2 of 20 instructions per pixel. Coarser
 //! levels have rough angles: they only choose a fringe order, and 3.2e-4 turn more in a residual that may be 0.40 changes none.
