@@ -54,10 +54,11 @@ pub(super) fn notes(recording: &Recording, stated: Shifts) -> Result<Vec<String>
             Ok(chain) => {
                 let cells = channel.cells()?;
                 let rows = Rows::of(&levels, cells.as_deref());
-                conventions(&channel, &chain, &rows, stated, &mut note);
-                let mirrored = recording.camera_model.is_none();
-                if mirrored && rows.falls(&rows.unwrap(&chain), direction == "vertical") {
-                    let along = if direction == "vertical" {
+                let along_rows = direction == "vertical";
+                let named = conventions(&channel, &chain, &rows, along_rows, stated, &mut note);
+                let may_fall = named || recording.camera_model.is_some();
+                if !may_fall && rows.falls(&rows.unwrap(&chain), along_rows) {
+                    let along = if along_rows {
                         "from left to right"
                     } else {
                         "from top to bottom"
@@ -154,6 +155,21 @@ struct Agreement {
     share: f64,
     /// Share of the rows in which the phase jumps by most of the pattern.
     jumps: f64,
+    /// Whether the phase falls from left to right, or from top to bottom.
+    falls: bool,
+}
+
+impl Agreement {
+    /// In clearly more pixels; else with a rising phase, since a reversed shift agrees as well; else with fewer jumps.
+    fn betters(self, other: Self) -> bool {
+        if (self.share - other.share).abs() > 0.05 {
+            return self.share > other.share;
+        }
+        match self.falls == other.falls {
+            true => self.jumps < other.jumps,
+            false => other.falls,
+        }
+    }
 }
 
 impl Rows {
@@ -203,7 +219,7 @@ impl Rows {
         }
     }
 
-    fn agreement(&self, chain: &Chain, span: f64) -> Agreement {
+    fn agreement(&self, chain: &Chain, span: f64, along_rows: bool) -> Agreement {
         let map = chain.unwrap_within(CLOSE, &self.levels, self.cells.as_deref());
         let resolved = map.count(Trust::Resolved);
         let modulated = resolved + map.count(Trust::Residual);
@@ -219,6 +235,7 @@ impl Rows {
         Agreement {
             share: resolved as f64 / modulated.max(1) as f64,
             jumps: jumps.count() as f64 / rows.max(1) as f64,
+            falls: self.falls(&map, along_rows),
         }
     }
 
@@ -240,7 +257,7 @@ impl Rows {
     }
 }
 
-/// Compares the stated convention of shifts with the three others.
+/// Compares the stated convention of shifts with the three others; returns whether another one is named.
 ///
 /// Frames with the shifts s_k = ± k/N + s₀ + c (c = 0 for a sine, ¼ for a cosine) that are decoded with the shifts of another
 /// convention give, instead of φ, the phase φ + c − c' where the sign is the same, and ½ − φ − 2 s₀ − c − c' where it is reversed.
@@ -248,11 +265,12 @@ fn conventions(
     channel: &Channel<'_>,
     chain: &Chain,
     rows: &Rows,
+    along_rows: bool,
     stated: Shifts,
     note: &mut impl FnMut(String),
-) {
+) -> bool {
     let span = channel.function.range().span();
-    let own = rows.agreement(chain, span);
+    let own = rows.agreement(chain, span, along_rows);
     let mut best: Option<(Agreement, String)> = None;
     for convention in [Convention::Sin, Convention::Cos] {
         for reversed in [false, true] {
@@ -264,21 +282,16 @@ fn conventions(
                 false => here - there,
                 true => 0.5 - 2.0 * stated.first - here - there,
             };
-            let found = rows.under(reversed, offset).agreement(chain, span);
-            let better = match &best {
-                None => true,
-                Some((known, _)) => {
-                    found.share > known.share + 0.05
-                        || (found.share > known.share - 0.05 && found.jumps < known.jumps)
-                }
-            };
+            let found = rows.under(reversed, offset);
+            let found = found.agreement(chain, span, along_rows);
+            let better = best.as_ref().is_none_or(|(known, _)| found.betters(*known));
             if better {
                 best = Some((found, named(convention, reversed, stated.sign)));
             }
         }
     }
     let Some((best, words)) = best else {
-        return;
+        return false;
     };
     let percent = |share: f64| 100.0 * share;
     if best.share > own.share + BETTER {
@@ -293,13 +306,17 @@ fn conventions(
              --steps and the order of the pictures",
             percent(own.share)
         ));
+        return false;
     } else if own.jumps > JUMPS && best.jumps < own.jumps / 2.0 && best.share > own.share - 0.05 {
         note(format!(
             "the phase jumps by a turn of the coarsest level in {:.0} % of the rows, with {words} in {:.0} %: give {words}",
             percent(own.jumps),
             percent(best.jumps)
         ));
+    } else {
+        return false;
     }
+    true
 }
 
 /// The options of a convention.
