@@ -258,16 +258,16 @@ mod tests {
             for (v, columns) in polygon_spans(&corners, SIDE, SIDE) {
                 pixels[v][columns].fill(true);
             }
-            for v in 0..SIDE {
-                for u in 0..SIDE {
+            for (v, row) in pixels.iter().enumerate() {
+                for (u, &filled) in row.iter().enumerate() {
                     let next = corners.iter().cycle().skip(1);
                     let crossed = corners.iter().zip(next).filter(|&(&(u0, v0), &(u1, v1))| {
                         let y = v as f64;
                         let at = u0 + (u1 - u0) * ((y - v0) / (v1 - v0));
                         (v0 <= y) != (v1 <= y) && at <= u as f64
                     });
-                    assert_eq!(pixels[v][u], crossed.count() % 2 == 1, "{corners:?}");
-                    inside += usize::from(pixels[v][u]);
+                    assert_eq!(filled, crossed.count() % 2 == 1, "{corners:?}");
+                    inside += usize::from(filled);
                 }
             }
         }

@@ -49,7 +49,7 @@ pub struct Alignment {
 
 /// About so many rows of the part are used.
 const ROWS: usize = 48;
-/// About so many points are used: the error of their mean is about 1/40 of a pixel's, and the fit takes about half a millisecond.
+/// About so many points are used: the error of their mean is about 1/40 of a pixel's, and the fit takes about 0.15 ms.
 const POINTS: usize = 1800;
 /// Where a wall is seen at a grazing angle, an error of the motion of a µm lifts it by tens of µm: the number of points is doubled, up
 /// to this factor, until no spot is lifted by more than [`MOST_LIFT_MM`].

@@ -144,8 +144,9 @@ impl Production {
         for (u, sight) in nodes {
             let node = self.node(motion, (u, v), sight);
             let (start, from) = left.unwrap_or((u, node));
-            for block in start / BLOCK..u / BLOCK + 1 {
-                blocks[block] = between([&from, &node], start..u, block, self.levels.0);
+            let here = &mut blocks[start / BLOCK..u / BLOCK + 1];
+            for (at, block) in here.iter_mut().enumerate() {
+                *block = between([&from, &node], u - start, at * BLOCK, self.levels.0);
             }
             left = Some((u, node));
         }

@@ -11,7 +11,6 @@
 
 use crate::math::nearest::{nearest, whole};
 use crate::simd::{Lanes, back_end_entry};
-use core::ops::Range;
 
 /// Pixels that are worked on together; the distance of two nodes is a multiple of it.
 pub const BLOCK: usize = 32;
@@ -27,15 +26,11 @@ pub type Node = [f64; 2 * VALUES];
 /// of a vector's length.
 pub type BlockNumbers = [f32; 4 * VALUES];
 
-/// The numbers of a block between two nodes in these columns; `middle` is the middle height, mm.
-pub fn between(
-    [from, to]: [&Node; 2],
-    columns: Range<usize>,
-    block: usize,
-    middle: f64,
-) -> BlockNumbers {
-    let unit = 1.0 / columns.len().max(1) as f64;
-    let first = (block * BLOCK - columns.start) as f64 * unit;
+/// The numbers of the block that begins `column` pixels after the first of two nodes, which are `pixels` apart; `middle` is the middle
+/// height, mm.
+pub fn between([from, to]: [&Node; 2], pixels: usize, column: usize, middle: f64) -> BlockNumbers {
+    let unit = 1.0 / pixels.max(1) as f64;
+    let first = column as f64 * unit;
     let centre = first + (BLOCK / 2) as f64 * unit;
     let mut numbers = BlockNumbers::default();
     for i in 0..VALUES {

@@ -43,9 +43,9 @@ fn blocks_have_the_bits_of_one_pixel_after_the_other() {
             [value[0], value[1], value[2], 0.02, -0.03, 0.001]
         };
         let block = |at: usize| {
-            let left = at / 2;
-            let columns = 64 * left..(64 * left + 64).min(WIDTH - 1);
-            between([&node(left), &node(left + 1)], columns, at, 0.3)
+            let (left, column) = (at / 2, at % 2 * BLOCK);
+            let pixels = (64 * left + 64).min(WIDTH - 1) - 64 * left;
+            between([&node(left), &node(left + 1)], pixels, column, 0.3)
         };
         let blocks: Vec<_> = (0..WIDTH.div_ceil(BLOCK)).map(block).collect();
         for v in 0..ROWS {
