@@ -64,8 +64,8 @@ SYSTEMD_SERVICE:${PN} = "fringed.service"
 
 USERADD_PACKAGES = "${PN}"
 # Of the groups below only video always exists; groups that another recipe also creates are not created twice.
-GROUPADD_PARAM:${PN} = "--system gpio; --system render; --system fringed"
-USERADD_PARAM:${PN} = "--system --no-create-home --home-dir ${localstatedir}/lib/fringed --shell ${base_sbindir}/nologin --gid fringed --groups video,render,gpio fringed"
+GROUPADD_PARAM:${PN} = "--system gpio; --system i2c; --system render; --system fringed"
+USERADD_PARAM:${PN} = "--system --no-create-home --home-dir ${localstatedir}/lib/fringed --shell ${base_sbindir}/nologin --gid fringed --groups video,render,gpio,i2c fringed"
 
 # The commit that FRINGED_REPOSITORY has checked out.
 def fringed_commit(d):
