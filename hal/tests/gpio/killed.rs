@@ -35,9 +35,11 @@ fn setups(active_low: bool) -> (TriggerSetup, LinesSetup) {
 #[test]
 #[ignore = "run by the test below, as the process that it kills"]
 fn holds_the_lines_as_in_a_cycle_until_it_is_killed() {
-    // A pulse is on, the station is busy, the last part passed, there is no fault.
+    // A pulse is on, the station is busy, the last part passed, there is no fault. The trigger is the last line to be taken:
+    // when it is high, all are held.
     let _held: Vec<Output> = LINES
         .iter()
+        .rev()
         .map(|line| {
             let mut output = Output::open(LABEL, line, false, *line == "fault").unwrap();
             output.set(*line != "fault").unwrap();
@@ -59,7 +61,7 @@ fn lines_of_a_killed_process_are_left_idle_and_those_that_are_held_are_named() {
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
-    while !(chip.level(0) && chip.level(1) && chip.level(2)) {
+    while !chip.level(0) {
         assert!(station.try_wait().unwrap().is_none(), "the station ended");
         thread::sleep(Duration::from_millis(10));
     }
