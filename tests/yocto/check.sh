@@ -154,6 +154,7 @@ broken parse yocto/meta-fringed/recipes-core/rauc/files/system.conf 's/^path=.us
 broken parse yocto/meta-fringed/recipes-core/rauc/files/system.conf 's/boot-b/boot-c/'
 broken parse $recipes/bundle/fringed-bundle_1.0.bb 's/"boot rootfs"/"rootfs"/'
 broken parse $recipes/boot/files/config.txt '/strict_gpiod/d'
+broken parse $recipes/boot/files/config.txt '/i2c_arm/d'
 broken parse $recipes/boot/files/config.txt '/imx296,cam0/d'
 broken parse $recipes/boot/files/config.txt 's/boot_partition=3/boot_partition=4/'
 broken parse $recipes/boot/files/config.txt '/^\[pi4\]/,/^\[all\]/{/^\[all\]/d}'

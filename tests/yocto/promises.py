@@ -281,10 +281,10 @@ def state_is_on_the_data_partition(layer):
 
 
 def the_kernel_has_the_devices(layer):
-    """The kernel has the lines, the display, the camera, partitions by name and what RAUC needs."""
+    """The kernel has the lines, the display, the bus of its controller, the camera, partitions by name and what RAUC needs."""
     yield from missing(["file://fringed.cfg"], layer.words("linux-raspberrypi", "SRC_URI"))
     options = layer.file("recipes-kernel/linux/files/fringed.cfg").splitlines()
-    wanted = ["CONFIG_GPIO_CDEV_V1=y", "CONFIG_DRM_VC4=m", "CONFIG_VIDEO_IMX296=m", "CONFIG_EFI_PARTITION=y", "CONFIG_DM_VERITY=y"]
+    wanted = ["CONFIG_GPIO_CDEV_V1=y", "CONFIG_DRM_VC4=m", "CONFIG_I2C_CHARDEV=y", "CONFIG_VIDEO_IMX296=m", "CONFIG_EFI_PARTITION=y", "CONFIG_DM_VERITY=y"]
     yield from missing(wanted + ["CONFIG_SQUASHFS=y", "CONFIG_BLK_DEV_LOOP=y", "CONFIG_BCM2835_WDT=y"], options)
     overlays = layer.text("fringed-image", "RPI_KERNEL_DEVICETREE_OVERLAYS").split()
     yield from missing(["overlays/imx296.dtbo"], overlays)
