@@ -92,6 +92,11 @@ pub trait Projector: Send {
         Ok(())
     }
 
+    /// Whether light may come seconds after it was opened: opening sets the mode, and a projector has to lock on to its signal.
+    fn starts_dark(&self) -> bool {
+        false
+    }
+
     /// What the projector's controller said of itself when it was last asked; `None` if there is none to ask.
     fn controller(&self) -> Option<ControllerState> {
         None

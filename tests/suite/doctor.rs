@@ -105,6 +105,38 @@ fn each_single_fault_is_named_with_a_remedy_and_nothing_else_is() {
 }
 
 #[test]
+fn light_that_comes_late_after_the_mode_was_set_is_named_and_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let examined = |seconds: u32| {
+        let keys = format!("{HEAD}[timing]\nfirst_light_us = {seconds}000000\n");
+        let run = doctor(folder.path(), &keys);
+        let report: Value = serde_json::from_str(&run.stdout).unwrap();
+        (step(&report, "light").clone(), with(&report, "fail"))
+    };
+    let (light, failed) = examined(3);
+    let waited = light["measured"]["first_light_s"].as_f64().unwrap();
+    assert!((3.0..4.0).contains(&waited), "{light:#}");
+    assert!(
+        light["found"]
+            .as_str()
+            .unwrap()
+            .contains(" s after its mode was set")
+    );
+    assert!(failed.is_empty(), "{failed:?}");
+    // The next checks take two seconds, after which it has come.
+    for (seconds, word) in [(17, "lock on"), (60, "lamp")] {
+        let (light, failed) = examined(seconds);
+        assert_eq!(failed, ["light"], "{light:#}");
+        assert!(light["measured"]["first_light_s"].is_null(), "{light:#}");
+        assert!(light["found"].as_str().unwrap().contains("within 15 s"));
+        assert!(
+            light["remedy"].as_str().unwrap().contains(word),
+            "{light:#}"
+        );
+    }
+}
+
+#[test]
 fn a_head_that_nobody_has_calibrated_fails_in_nothing_but_what_calibration_measures() {
     // As on a Raspberry Pi, stamps mark the start of the readout. Neither this nor the delay has been measured yet.
     let timing = "[timing]\nflip_to_light_us = 33333\nstamp = \"exposure_end\"\nreadout_us = 16000\nexposure_refreshes = 1.0\n";

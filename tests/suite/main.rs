@@ -25,6 +25,7 @@ mod independent_simulator;
 mod inputs;
 mod kept;
 mod licences;
+mod light;
 mod limits;
 mod measured;
 mod outputs;

@@ -115,6 +115,7 @@ impl Capture {
         let pool = self.threads.pool(config.threads)?;
         let mut opened = pool.install(|| backend::open(&self.files.head(&config), &on_progress))?;
         progress.clear();
+        opened.dark.iter().for_each(|words| progress.warn(words));
         let plan = self.plan(&opened.calibration)?;
         opened.head.load(plan.rasters.clone())?;
         for pose in 1..=self.poses {

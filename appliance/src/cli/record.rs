@@ -58,6 +58,7 @@ impl Record {
             progress.tell(0.8 + 0.2 * share, "recording")
         });
         progress.clear();
+        opened.dark.iter().for_each(|words| progress.warn(words));
         let recording = taken?;
         recorder::write(&recording, &self.folder)
             .map_err(|error| Failure::new(Exit::CannotCreate, error.to_string()))?;

@@ -170,12 +170,13 @@ impl Worker {
         let Opened {
             problem,
             fallback,
+            dark,
             calibration,
             ..
         } = &self.opened;
         let trusted = problem.is_none().then_some(calibration);
         self.calibration.set(trusted);
-        for words in [problem, fallback].into_iter().flatten() {
+        for words in [problem, fallback, dark].into_iter().flatten() {
             self.progress.warn(words);
         }
         self.station.event(Event::Condition(Condition {

@@ -20,6 +20,8 @@ pub struct Timing {
     pub readout_us: u64,
     /// From a flip to its pattern's light, 0…1 000 000 µs.
     pub flip_to_light_us: u64,
+    /// From opening the head, which sets the projector's mode, to its first light, 0…60 000 000 µs.
+    pub first_light_us: u64,
     /// The flip-to-light delay according to the head's calibration; if left out, the true one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibrated_flip_to_light_us: Option<u64>,
@@ -37,6 +39,7 @@ impl Default for Timing {
             exposure_refreshes: 2.0,
             readout_us: 0,
             flip_to_light_us: 0,
+            first_light_us: 0,
             calibrated_flip_to_light_us: None,
             camera_period_us: 0,
             camera_phase_us: 0,
@@ -60,6 +63,7 @@ impl Scenario {
         Mechanics {
             refresh,
             flip_to_light: us(timing.flip_to_light_us),
+            first_light: us(timing.first_light_us),
             calibrated_flip_to_light: us(believed.unwrap_or(timing.flip_to_light_us)),
             exposure: self.exposure(),
             readout: us(timing.readout_us),
@@ -93,6 +97,7 @@ impl Scenario {
         for (key, us, most) in [
             ("timing.readout_us", timing.readout_us, 1e6),
             ("timing.flip_to_light_us", timing.flip_to_light_us, 1e6),
+            ("timing.first_light_us", timing.first_light_us, 6e7),
             ("timing.calibrated_flip_to_light_us", believed, 1e6),
             ("timing.camera_period_us", timing.camera_period_us, 1e7),
             ("timing.camera_phase_us", timing.camera_phase_us, 1e7),

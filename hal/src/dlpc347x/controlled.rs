@@ -78,6 +78,10 @@ impl<I: I2c + Send> Projector for Controlled<I> {
         watched.look()
     }
 
+    fn starts_dark(&self) -> bool {
+        self.projector.starts_dark()
+    }
+
     fn controller(&self) -> Option<ControllerState> {
         Some(self.watched.borrow().state.clone())
     }

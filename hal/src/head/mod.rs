@@ -137,6 +137,16 @@ impl Head {
         self.devices.projector.size()
     }
 
+    /// Whether the projector's light may come seconds after the head was opened.
+    pub fn starts_dark(&self) -> bool {
+        self.devices.projector.starts_dark()
+    }
+
+    /// The time on the clock that the devices share.
+    pub fn now(&self) -> Timestamp {
+        self.devices.clock.now()
+    }
+
     /// What the projector's controller said of itself when it was last asked; `None` if there is none to ask.
     pub fn controller(&self) -> Option<ControllerState> {
         self.devices.projector.controller()

@@ -201,7 +201,12 @@ impl Projector for Display {
     }
 
     fn present(&self) -> Result<(), Error> {
-        self.output.present("looking for the projector")
+        self.output.present("looking for the projector")?;
+        self.output.same_display()
+    }
+
+    fn starts_dark(&self) -> bool {
+        true
     }
 
     /// Waits until black is shown, at most a few refreshes, so that no visible picture is drawn over.

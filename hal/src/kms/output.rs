@@ -18,6 +18,9 @@ use crate::setup::ProjectorSetup;
 /// Where the kernel shows the state of its connectors.
 const CONNECTORS: &str = "/sys/class/drm";
 
+/// As much of a display's description (EDID) as tells it from another: its first block. All zero without a display that answers.
+type Edid = [u8; 128];
+
 /// A connector in its mode.
 #[derive(Debug)]
 pub(super) struct Output {
@@ -34,6 +37,8 @@ pub(super) struct Output {
     framebuffer: property::Handle,
     /// The kernel's status file of the connector, which does not probe the display; none if there is no such file.
     status: Option<File>,
+    /// The kernel's file of the display's description, and what it held when the mode was chosen.
+    edid: Option<(File, Edid)>,
 }
 
 impl Output {
@@ -60,9 +65,14 @@ impl Output {
                 "use a driver that has it",
             )
         })?;
-        let status = card.path.file_name().and_then(|card| {
-            let folder = format!("{}-{name}", card.to_string_lossy());
-            File::open(PathBuf::from(CONNECTORS).join(folder).join("status")).ok()
+        let file = |of: &str| {
+            let folder = format!("{}-{name}", card.path.file_name()?.to_string_lossy());
+            File::open(PathBuf::from(CONNECTORS).join(folder).join(of)).ok()
+        };
+        let status = file("status");
+        let edid = file("edid").map(|file| {
+            let known = described(&file);
+            (file, known)
         });
         let plane = card.properties(plane)?;
         Ok(Self {
@@ -74,6 +84,7 @@ impl Output {
             framebuffer: plane.named("FB_ID")?,
             plane,
             status,
+            edid,
             name,
             card,
         })
@@ -92,6 +103,24 @@ impl Output {
             }
             Ok(_) => Ok(()),
             Err(error) => Err(refused(attempt(), &error)),
+        }
+    }
+
+    /// Checks that the display is the one whose modes are known. One that is switched on after the head was opened describes itself
+    /// only then, and one of those modes may be the only one that it shows. The kernel reads the description on a hotplug.
+    pub fn same_display(&self) -> Result<(), Error> {
+        let now = self
+            .edid
+            .as_ref()
+            .map(|(file, known)| (known, described(file)));
+        match now {
+            Some((known, now)) if now != [0; 128] && now != *known => Err(Error::Disconnected {
+                device: error::DeviceKind::Projector,
+                attempt: format!("showing {} on {}", self.timings, self.name),
+                remedy: "another display answers there now, or the same one with other modes (EDID): the head is opened again with its modes"
+                    .into(),
+            }),
+            _ => Ok(()),
         }
     }
 
@@ -221,5 +250,14 @@ impl Output {
             }
         }
         Ok(())
+    }
+}
+
+/// The description in the kernel's file; zero if there is none.
+fn described(file: &File) -> Edid {
+    let mut edid = [0; 128];
+    match file.read_at(&mut edid, 0) {
+        Ok(128) => edid,
+        _ => [0; 128],
     }
 }

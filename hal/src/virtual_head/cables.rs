@@ -52,6 +52,7 @@ impl<S: Scene> Bench<S> {
         }
         self.sensor.stop();
         self.blank();
+        self.first_light = self.now + self.mechanics.first_light;
         Ok(())
     }
 }

@@ -72,6 +72,8 @@ struct Bench<S> {
     now: Timestamp,
     screen: Screen,
     light: LightHistory,
+    /// The projector is dark before this.
+    first_light: Timestamp,
     sensor: Sensor,
     pulses: Pulses,
     waits: u64,
@@ -118,6 +120,7 @@ pub fn head<S: Scene + 'static>(scene: S, mechanics: Mechanics) -> (Head, Contro
         now: Timestamp(0),
         screen: Screen::default(),
         light: LightHistory::new(),
+        first_light: Timestamp(0) + mechanics.first_light,
         sensor: Sensor::default(),
         pulses: Pulses::default(),
         waits: 0,

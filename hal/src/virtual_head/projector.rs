@@ -83,8 +83,8 @@ impl<S: Scene> Bench<S> {
             news: Some(at + news),
         });
         let needed = self.sensor.oldest(self.now, &self.mechanics);
-        self.light
-            .change(at + self.mechanics.flip_to_light, Some(index), needed);
+        let lit = (at + self.mechanics.flip_to_light).max(self.first_light);
+        self.light.change(lit, Some(index), needed);
     }
 }
 
@@ -100,6 +100,10 @@ impl<S: Scene> Projector for VirtualDevice<S> {
     fn present(&self) -> Result<(), Error> {
         self.plugged(DEVICE, "looking for the projector")
             .map(|_| ())
+    }
+
+    fn starts_dark(&self) -> bool {
+        !lock(&self.bench).mechanics.first_light.is_zero()
     }
 
     fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {

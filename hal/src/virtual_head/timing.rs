@@ -13,6 +13,8 @@ pub struct Mechanics {
     pub refresh: Duration,
     /// From a flip to its pattern's light.
     pub flip_to_light: Duration,
+    /// From opening the projector, which sets its mode, to its first light.
+    pub first_light: Duration,
     /// The flip-to-light delay according to the head's calibration.
     pub calibrated_flip_to_light: Duration,
     /// Planned exposure.
@@ -34,6 +36,7 @@ impl Mechanics {
         Self {
             refresh,
             flip_to_light: Duration::ZERO,
+            first_light: Duration::ZERO,
             calibrated_flip_to_light: Duration::ZERO,
             exposure: refresh * refreshes,
             readout: Duration::ZERO,

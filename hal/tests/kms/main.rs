@@ -3,6 +3,7 @@
 #![allow(clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
 
 mod crc;
+mod described;
 #[path = "../machine/mod.rs"]
 mod machine;
 mod readback;

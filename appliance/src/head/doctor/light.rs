@@ -3,10 +3,11 @@
 use super::Check;
 use crate::head::calibration::Calibration;
 use crate::head::examine::{self, Lit, SETTLE};
-use crate::head::examine::{LEAST_BRIGHT, LEAST_LIT, MOST_SATURATED};
+use crate::head::examine::{LEAST_BRIGHT, LEAST_LIT, LONGEST_DARK, MOST_SATURATED};
 use hal::error::Error;
 use hal::head::Head;
 use serde_json::{Value, json};
+use std::time::Duration;
 
 /// Grey levels whose response is measured, besides black and white.
 const GREYS: [u8; 7] = [32, 64, 96, 128, 160, 192, 224];
@@ -17,13 +18,29 @@ const LEAST_CONTRAST: f64 = 0.5;
 /// Largest deviation of light from proportionality to grey, share of white. A gamma of 1.1 deviates by 0.035.
 const MOST_NONLINEAR: f64 = 0.03;
 
-pub(super) fn light(lit: &Lit) -> Check {
+/// `first` is when light first came after the head was opened, where that may take seconds.
+pub(super) fn light(lit: &Lit, first: Option<Option<Duration>>) -> Check {
     let share = lit.share();
-    let measured = json!({ "lit_percent": share * 100.0 });
-    let found = format!(
+    let mut measured = json!({ "lit_percent": share * 100.0 });
+    let mut found = format!(
         "{:.1} % of the picture is lit by the projector",
         share * 100.0
     );
+    if let Some(first) = first {
+        let seconds = first.map(|first| first.as_secs_f64());
+        measured["first_light_s"] = json!(seconds);
+        found += &match seconds {
+            Some(seconds) => format!(", at the latest {seconds:.1} s after its mode was set"),
+            None => format!(
+                ", not within {} s after its mode was set",
+                LONGEST_DARK.as_secs()
+            ),
+        };
+        if share >= LEAST_LIT && first.is_none() {
+            let remedy = "the projector needs too long to lock on to its signal: let it stay switched on, and give it the mode that its own description prefers";
+            return Check::new(found, Some(remedy), measured);
+        }
+    }
     let remedy = "switch the projector's lamp on, take off the lens caps, open the apertures, and put a part into view";
     Check::new(found, (share < LEAST_LIT).then_some(remedy), measured)
 }

@@ -9,7 +9,7 @@ mod light;
 mod time;
 
 use crate::head::calibration::Calibration;
-use crate::head::examine::{Lit, SETTLE};
+use crate::head::examine::{Lit, SETTLE, first_light};
 use hal::error::Error;
 use hal::head::Head;
 use serde::Serialize;
@@ -99,6 +99,8 @@ pub fn examine(
 ) -> Vec<Check> {
     let mut checks: Vec<Check> = Vec::with_capacity(CHECKS.len());
     let mut lit: Option<Result<Lit, Error>> = None;
+    let dark = head.starts_dark();
+    let first = dark.then(|| first_light(head).unwrap_or_default());
     for (at, (name, needs)) in CHECKS.into_iter().enumerate() {
         progress(at as f64 / CHECKS.len() as f64, name);
         let missing = needs.iter().find(|need| {
@@ -125,7 +127,7 @@ pub fn examine(
                 let lit = lit.get_or_insert_with(|| Lit::take(head, SETTLE));
                 match (name, lit) {
                     (_, Err(error)) => Err(error.clone()),
-                    ("light", Ok(lit)) => Ok(light::light(lit)),
+                    ("light", Ok(lit)) => Ok(light::light(lit, first)),
                     ("exposure", Ok(lit)) => Ok(light::exposure(lit)),
                     ("delay", Ok(lit)) => time::delay(head, lit),
                     ("contrast", Ok(lit)) => light::contrast(head, calibration, lit),

@@ -5,6 +5,7 @@
 
 mod contrast;
 mod delay;
+mod first_light;
 mod noise;
 mod pictures;
 mod plate;
@@ -13,6 +14,7 @@ mod stamps;
 
 pub use contrast::{PITCHES, contrast};
 pub use delay::Delay;
+pub use first_light::{LONGEST_DARK, first_light};
 pub use noise::noise;
 pub use pictures::{
     LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, SETTLE, counts, load_black_and_white, pictures,

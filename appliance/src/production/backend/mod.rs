@@ -8,6 +8,7 @@ use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::place::{Loaded, Place};
+use crate::head::examine::{LONGEST_DARK, first_light};
 use crate::head::seam;
 use crate::history::RECIPE;
 use crate::recipe::plan::{Plan, PlanError};
@@ -31,6 +32,8 @@ pub struct Opened {
     pub problem: Option<String>,
     /// If the calibration is the previous generation: why the newest could not be used.
     pub fallback: Option<String>,
+    /// That the projector's light did not come after the head was opened.
+    pub dark: Option<String>,
     /// The recordings of a replay head.
     pub played: Option<Played>,
 }
@@ -77,6 +80,7 @@ impl Opened {
             stage: None,
             problem: None,
             fallback: None,
+            dark: None,
             played: None,
         }
     }
@@ -93,6 +97,7 @@ impl Opened {
                     .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
                 self.problem = None;
                 self.adopt(config);
+                self.await_light();
             }
             None => {
                 // A device must be closed before it can be opened again.
@@ -112,6 +117,18 @@ impl Opened {
             None => Ok(()),
             Some(problem) => Err(Failure::new(Exit::Content, problem.clone())),
         }
+    }
+
+    /// Waits until the projector has locked on to its mode, where opening has set one.
+    fn await_light(&mut self) {
+        // An error comes again with the next measurement, which reports it.
+        let dark = self.head.starts_dark() && first_light(&mut self.head) == Ok(None);
+        self.dark = dark.then(|| {
+            format!(
+                "no light of the projector has come within {} s: unless no part is there, check its power and its input; `fringed doctor` says more",
+                LONGEST_DARK.as_secs()
+            )
+        });
     }
 
     /// Uses the stored calibration if there is one, else that of the back-end.
@@ -139,7 +156,7 @@ impl Opened {
 /// # Errors
 /// If a file of the head is missing or wrong, or a device is not there.
 pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
-    let opened = open_as_it_is(config, progress)?;
+    let mut opened = open_as_it_is(config, progress)?;
     let encoding = opened.head.encoding();
     // Luma has passed an image processor, so it is used only if the configuration asks for it.
     let luma = config.backend == Backend::Rpi && config.camera.luma;
@@ -151,6 +168,7 @@ pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Open
         );
         return Err(Failure::new(Exit::Unavailable, message));
     }
+    opened.await_light();
     Ok(opened)
 }
 

@@ -111,6 +111,7 @@ fn schedule(seed: u64) -> (Mechanics, usize) {
         free_running,
         stamp: stamps[draw.below(3) as usize],
         faults,
+        ..plain()
     };
     let patterns = 1 + draw.below(16) as usize;
     (mechanics, patterns)
