@@ -119,6 +119,10 @@ fn a_tilted_plate_saturation_darkness_and_a_recording_are_refused_with_the_remed
         ("[optics]\ngain = 3.0\n", "expose less"),
         ("[optics]\ngain = 0.15\n", "expose more"),
         ("[light]\ndiffuse = 0.0\n", "lamp"),
+        (
+            "[optics]\ncontent_gain = -0.2\n",
+            "depends on the rest of the picture",
+        ),
         ("[faults]\nwire_open = true\n", "trigger"),
         ("[faults]\ncompressed = true\n", "compressed"),
     ] {

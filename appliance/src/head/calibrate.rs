@@ -9,8 +9,8 @@ use super::calibration::file::{
 use super::calibration::geometry::GeometryFile;
 use super::calibration::place::Place;
 use super::examine::{
-    Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, PLATE_PITCH, SETTLE, Stamps, contrast,
-    noise, plate, response,
+    Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_BY_CONTENT, MOST_SATURATED, PLATE_PITCH, SETTLE,
+    Stamps, by_content, contrast, noise, plate, response,
 };
 use super::seam;
 use crate::error::{Exit, Failure};
@@ -106,6 +106,8 @@ pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Resu
         .as_nanos()
         .div_ceil(head.refresh().as_nanos().max(1));
     let settle = u32::try_from(refreshes).unwrap_or(SETTLE) + BEYOND;
+    progress(0.18, "light by content");
+    alike(by_content(head, settle, &lit)?)?;
     let share = |share: f64| progress(0.2 + 0.4 * share, "grey response");
     let mut greys = response(head, settle, &lit, &share)?.to_vec();
     if let Some(before) = basis.response.filter(|before| same(before, &greys)) {
@@ -220,6 +222,17 @@ fn bright_enough(lit: &Lit) -> Result<(), Failure> {
     Err(scene(format!(
         "calibrate: {words}; `fringed doctor` says more"
     )))
+}
+
+/// Refuses a projector whose light depends on the content of a picture: no response holds for it.
+fn alike(by_content: Option<f64>) -> Result<(), Failure> {
+    match by_content {
+        Some(off) if off.abs() > MOST_BY_CONTENT => Err(scene(format!(
+            "calibrate: the light of a grey depends on the rest of the picture, by {:.1} %: `fringed doctor` says what to switch off",
+            off * 100.0
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// The description of the reference phase maps; their bytes go to `maps`.

@@ -55,6 +55,7 @@ impl Scenario {
         )?;
         within("optics.gamma", self.optics.gamma, 0.1, 10.0)?;
         within("optics.gain", self.optics.gain, 0.0, 100.0)?;
+        within("optics.content_gain", self.optics.content_gain, -1.0, 10.0)?;
         self.check_timing()?;
         self.placement.check()?;
         self.part.check()

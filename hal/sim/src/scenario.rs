@@ -99,6 +99,9 @@ pub struct Optics {
     pub gamma: f64,
     /// Factor on all light before the camera clips it, 0…100.
     pub gain: f64,
+    /// By how much more light than its grey asks for a picture gets whose mean light is almost 0, as a share, −1…10; one of mean 1 gets
+    /// none, and others in proportion. So do projectors that adapt their LEDs to the content of a picture.
+    pub content_gain: f64,
 }
 
 /// How a part lies: rotated about x, then y (tilt), then z (rotation), then shifted.
@@ -179,6 +182,7 @@ impl Default for Optics {
             camera_blur_px: 0.0,
             gamma: 1.0,
             gain: 1.0,
+            content_gain: 0.0,
         }
     }
 }

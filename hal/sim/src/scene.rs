@@ -97,6 +97,7 @@ impl Scene for SimScene {
                 raster.width() as usize,
                 optics.projector_blur_px,
             );
+            adapt(&mut light, optics.content_gain);
             light
         };
         self.rasters = rasters.into_iter().map(light).collect();
@@ -153,6 +154,16 @@ impl Scene for SimScene {
             Pixels::Sixteen(samples) => sensor.read(picture, random, samples, |count| count as u16),
         })
     }
+}
+
+/// Brightens a raster's light by its mean, as a projector does that adapts to the content of a picture.
+fn adapt(light: &mut [f32], content_gain: f64) {
+    if content_gain == 0.0 {
+        return;
+    }
+    let sum: f64 = light.iter().copied().map(f64::from).sum();
+    let factor = 1.0 + content_gain * (1.0 - sum / light.len().max(1) as f64);
+    light.iter_mut().for_each(|light| *light *= factor as f32);
 }
 
 /// The random numbers of frame number `frame` with `seed`. The frame number is spread over all bits, so that neighbouring frames and

@@ -3,7 +3,9 @@
 use super::Check;
 use crate::head::calibration::Calibration;
 use crate::head::examine::{self, Lit, SETTLE};
-use crate::head::examine::{LEAST_BRIGHT, LEAST_LIT, LONGEST_DARK, MOST_SATURATED};
+use crate::head::examine::{
+    LEAST_BRIGHT, LEAST_LIT, LONGEST_DARK, MOST_BY_CONTENT, MOST_SATURATED, by_content,
+};
 use hal::error::Error;
 use hal::head::Head;
 use serde_json::{Value, json};
@@ -44,6 +46,9 @@ pub(super) fn light(lit: &Lit, first: Option<Option<Duration>>) -> Check {
     let remedy = "switch the projector's lamp on, take off the lens caps, open the apertures, and put a part into view";
     Check::new(found, (share < LEAST_LIT).then_some(remedy), measured)
 }
+
+/// The remedy for a projector that adapts to content.
+const ADAPTS: &str = "switch off what adapts the projector to the content of a picture (CAIC, dynamic contrast, eco mode): for TI's DLPC3470, DLPC3478 and DLPC3479 write head.projector.controller = \"dlpc347x\"";
 
 pub(super) fn exposure(lit: &Lit) -> Check {
     let saturated = lit.saturated();
@@ -89,6 +94,23 @@ pub(super) fn contrast(
         LEAST_CONTRAST * 100.0
     );
     Ok(Check::new(found, blurred.then_some(&*remedy), measured))
+}
+
+pub(super) fn content(head: &mut Head, lit: &Lit) -> Result<Check, Error> {
+    let Some(off) = by_content(head, SETTLE, lit)? else {
+        return Ok(Check::new(
+            "too little of the part shows one grey stripe alone to tell how its light depends on its surroundings",
+            Some("put a flat, bright part into view, and focus projector and camera on it"),
+            json!({}),
+        ));
+    };
+    let found = format!(
+        "the light of a grey between white stripes differs by {:.1} % from that between black ones",
+        off * 100.0
+    );
+    let measured = json!({ "by_content_percent": off * 100.0 });
+    let adapts = (off.abs() > MOST_BY_CONTENT).then_some(ADAPTS);
+    Ok(Check::new(found, adapts, measured))
 }
 
 pub(super) fn response(

@@ -76,7 +76,7 @@ fn named(name: &'static str, check: Check) -> Check {
 }
 
 /// The checks in their order, each with the checks that must have passed before it.
-const CHECKS: [(&str, &[&str]); 10] = [
+const CHECKS: [(&str, &[&str]); 11] = [
     ("devices", &[]),
     ("format", &["devices"]),
     ("mode", &["devices"]),
@@ -86,7 +86,11 @@ const CHECKS: [(&str, &[&str]); 10] = [
     ("exposure", &["devices", "trigger", "light"]),
     ("delay", &["devices", "trigger", "light", "exposure"]),
     ("contrast", &["devices", "trigger", "light", "exposure"]),
-    ("response", &["devices", "trigger", "light", "exposure"]),
+    ("content", &["devices", "trigger", "light", "exposure"]),
+    (
+        "response",
+        &["devices", "trigger", "light", "exposure", "content"],
+    ),
 ];
 
 /// Checks a head in front of any part, best a flat bright one. `progress` gets the share done and the name of the next check. For a head
@@ -131,6 +135,7 @@ pub fn examine(
                     ("exposure", Ok(lit)) => Ok(light::exposure(lit)),
                     ("delay", Ok(lit)) => time::delay(head, lit),
                     ("contrast", Ok(lit)) => light::contrast(head, calibration, lit),
+                    ("content", Ok(lit)) => light::content(head, lit),
                     (_, Ok(lit)) => light::response(head, calibration, lit),
                 }
             }

@@ -3,6 +3,7 @@
 //! Pictures are taken long after each flip ([`Lit`], [`pictures`]), so their measurements need no timing. The two measurements of time
 //! itself, what the camera's stamps mark ([`Stamps`]) and when the light of a flip comes ([`Delay`]), need no calibration.
 
+mod content;
 mod contrast;
 mod delay;
 mod first_light;
@@ -12,6 +13,7 @@ mod plate;
 mod response;
 mod stamps;
 
+pub use content::{MOST_BY_CONTENT, by_content};
 pub use contrast::{PITCHES, contrast};
 pub use delay::Delay;
 pub use first_light::{LONGEST_DARK, first_light};
