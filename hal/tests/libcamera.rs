@@ -5,6 +5,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic)]
 
+mod isolated;
 mod machine;
 
 use std::collections::BTreeSet;

@@ -52,7 +52,7 @@ pub(super) struct Opened {
 /// process of its own, in user and network namespaces of its own (libcamera, `Process::isolate`); where these are forbidden, its cameras
 /// are missing.
 const NO_CAMERA: &str = "libcamera finds no camera at all: check cable and overlay, and that this user may open /dev/media* (group `video`). \
-     If libcamera's messages say \"Failed to unshare execution context\" or that an IPA proxy failed, its algorithms (IPA modules) are not signed for it and need \
+     If libcamera's messages say \"Failed to start proxy worker process\" (before 0.6: \"Failed to unshare execution context\"), its algorithms (IPA modules) are not signed for it and need \
      namespaces, which RestrictNamespaces= of the service forbids: install libcamera and libcamera-ipa of one source";
 
 /// The error for a call that the library refused.
