@@ -1,4 +1,4 @@
-//! One camera image: its format, its samples, its time stamp, and the memory of the samples.
+//! One camera image: its format, its samples and its time stamp.
 
 use std::sync::Arc;
 
@@ -80,15 +80,7 @@ impl Pixels {
             Self::Sixteen(vec![0; format.samples()])
         }
     }
-}
 
-/// The memory of a frame's samples: [`Pixels`], or a buffer that a camera lends until the last clone of the frame is dropped.
-pub trait Memory: std::fmt::Debug + Send + Sync {
-    /// The samples; the same at every call.
-    fn samples(&self) -> Samples<'_>;
-}
-
-impl Memory for Pixels {
     fn samples(&self) -> Samples<'_> {
         match self {
             Self::Eight(samples) => Samples::Eight(samples),
@@ -101,7 +93,7 @@ impl Memory for Pixels {
 #[derive(Clone, Debug)]
 pub struct Frame {
     format: FrameFormat,
-    memory: Arc<dyn Memory>,
+    pixels: Arc<Pixels>,
     timestamp: Timestamp,
     count: u64,
 }
@@ -111,14 +103,14 @@ impl Frame {
     ///
     /// # Errors
     /// `Unsupported` if the format has no pixels, a stride below its width or a depth outside 8…16, or if
-    /// the memory does not have the format's number and kind of samples.
+    /// `pixels` does not have the format's number and kind of samples.
     pub fn new(
         format: FrameFormat,
-        memory: Arc<dyn Memory>,
+        pixels: Arc<Pixels>,
         timestamp: Timestamp,
         count: u64,
     ) -> Result<Self, Error> {
-        let fits = match memory.samples() {
+        let fits = match pixels.samples() {
             Samples::Eight(samples) => format.bit_depth == 8 && samples.len() == format.samples(),
             Samples::Sixteen(samples) => format.bit_depth != 8 && samples.len() == format.samples(),
         };
@@ -138,7 +130,7 @@ impl Frame {
         }
         Ok(Self {
             format,
-            memory,
+            pixels,
             timestamp,
             count,
         })
@@ -153,7 +145,7 @@ impl Frame {
     /// The samples, without a copy.
     #[must_use]
     pub fn samples(&self) -> Samples<'_> {
-        self.memory.samples()
+        self.pixels.samples()
     }
 
     /// Start of the exposure.

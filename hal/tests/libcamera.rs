@@ -5,6 +5,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic)]
 
+mod copied;
 mod isolated;
 mod machine;
 
@@ -234,11 +235,11 @@ fn what_a_camera_adjusts_is_taken_only_if_it_is_what_was_wanted() {
     assert_eq!(camera.format(), FrameFormat::packed(SIZE.0, SIZE.1, 8));
     let encoding = camera.encoding();
     assert_eq!((encoding.name.as_str(), encoding.exact), ("NV12", false));
-    assert_eq!(camera.buffers(), 4, "16 were asked for, and 4 granted");
+    assert_eq!(camera.buffers(), 4, "8 were asked for, and 4 granted");
 }
 
 #[test]
-fn replayed_fringes_come_in_order_without_a_gap_in_memory_that_is_not_copied() {
+fn replayed_fringes_come_in_order_without_a_gap_in_memory_that_is_used_again() {
     if !with_cameras() {
         return;
     }
@@ -279,7 +280,7 @@ fn replayed_fringes_come_in_order_without_a_gap_in_memory_that_is_not_copied() {
         steps.windows(2).all(|two| two[1] == (two[0] + 1) % IMAGES),
         "{steps:?}"
     );
-    assert!(places.len() <= camera.buffers(), "{places:?}");
+    assert!(places.len() <= camera.buffers() + 2, "{places:?}");
 }
 
 #[test]

@@ -19,8 +19,10 @@ failed() {
     exit 1
 }
 
+# The crate rustix, which the buffers' crate makes its calls with, goes through the C library, where udmabuf.so replaces them.
+through_libc=(--config 'target.aarch64-unknown-linux-gnu.rustflags=["--cfg=rustix_use_libc"]')
 # With the profile of the tests, so that nothing is built twice.
-"$dir/bin/cargo-rpi" build --profile test -p appliance --features rpi
+"$dir/bin/cargo-rpi" "${through_libc[@]}" build --profile test -p appliance --features rpi
 fringed=$dir/build/aarch64-unknown-linux-gnu/debug/fringed
 
 needed=$(readelf --wide --dynamic "$fringed" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p')
@@ -46,9 +48,9 @@ rm -rf "$root/replay" "$root/usr/share/libcamera/pipeline/virtual/virtual.yaml"
 export QEMU_SET_ENV=LD_PRELOAD=$dir/udmabuf.so LIBCAMERA_LOG_LEVELS='*:ERROR'
 log=$dir/rpi.log
 # Skipped: tests that need the kernel's camera or start themselves again, and those that measure waiting times.
-"$dir/bin/cargo-rpi" test -p hal --features kms,gpio,libcamera --test libcamera -- \
+"$dir/bin/cargo-rpi" "${through_libc[@]}" test -p hal --features kms,gpio,libcamera --test libcamera -- \
     --test-threads 1 --nocapture --skip cameras_are_listed --skip a_real_driver --skip stopping_takes_back --skip without_any_camera \
-    --skip a_wait_ends | tee "$log"
+    --skip a_wait_ends --skip copied:: --skip isolated:: | tee "$log"
 grep -q '^test result: ok. [1-9]' "$log" || failed "the tests of the camera proved nothing"
 
 # doctor CAMERA: runs `fringed doctor` with this camera.

@@ -48,7 +48,7 @@ fn a_head_that_is_well_passes_every_step_whatever_its_timing() {
         let run = doctor(folder.path(), &format!("{HEAD}{timing}")).succeeded();
         let report: Value = serde_json::from_str(&run.stdout).unwrap();
         assert_eq!(report["healthy"], true, "{report:#}");
-        assert_eq!(with(&report, "pass").len(), 11, "{report:#}");
+        assert_eq!(with(&report, "pass").len(), 12, "{report:#}");
     }
 }
 
@@ -68,6 +68,7 @@ fn each_single_fault_is_named_with_a_remedy_and_nothing_else_is() {
             "-1.0 refreshes",
         ),
         ("[optics]\ngamma = 2.2\n", "response", "gamma"),
+        ("[timing]\ncopy_us = 20000\n", "delivery", "dma_heap"),
         ("[optics]\ncontent_gain = 0.2\n", "content", "CAIC"),
         ("[optics]\nprojector_blur_px = 4.0\n", "contrast", "focus"),
         ("[optics]\ngain = 3.0\n", "exposure", "gain"),

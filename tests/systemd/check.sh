@@ -54,9 +54,9 @@ if [[ $(id -u) == 0 ]]; then
     [[ $(stat -c %a "$root/var/lib/fringed") == 750 ]] || complain "the state folder is open to others"
 fi
 
-# Each rule matches a kind of device and sets who may use it.
+# Each rule matches a kind of device and sets who may use it; one also names it.
 while read -r line; do
-    [[ $line =~ ^SUBSYSTEM==\"[a-z0-9_-]+\",\ (KERNEL==\"[a-zA-Z0-9*|,-]+\",\ )?GROUP=\"(gpio|i2c|render|video)\",\ MODE=\"0660\"$ ]] ||
+    [[ $line =~ ^SUBSYSTEM==\"[a-z0-9_-]+\",\ (KERNEL==\"[a-zA-Z0-9*|,-]+\",\ )?GROUP=\"(gpio|i2c|render|video)\",\ MODE=\"0660\"(,\ SYMLINK\+=\"[a-z_/]+\",\ OPTIONS\+=\"link_priority=-[0-9]+\")?$ ]] ||
         complain "no rule of udev as expected: $line"
 done < <(grep -v '^#' systemd/60-fringed.rules)
 exit "$failed"

@@ -18,6 +18,8 @@ pub struct Timing {
     pub exposure_refreshes: f64,
     /// From the end of an exposure until its frame can be fetched, 0…1 000 000 µs.
     pub readout_us: u64,
+    /// How long it takes to copy a frame out of the camera's buffer, in a thread of its own, 0…1 000 000 µs.
+    pub copy_us: u64,
     /// From a flip to its pattern's light, 0…1 000 000 µs.
     pub flip_to_light_us: u64,
     /// From opening the head, which sets the projector's mode, to its first light, 0…60 000 000 µs.
@@ -38,6 +40,7 @@ impl Default for Timing {
         Self {
             exposure_refreshes: 2.0,
             readout_us: 0,
+            copy_us: 0,
             flip_to_light_us: 0,
             first_light_us: 0,
             calibrated_flip_to_light_us: None,
@@ -67,6 +70,7 @@ impl Scenario {
             calibrated_flip_to_light: us(believed.unwrap_or(timing.flip_to_light_us)),
             exposure: self.exposure(),
             readout: us(timing.readout_us),
+            copy: us(timing.copy_us),
             free_running: (timing.camera_period_us > 0)
                 .then(|| (us(timing.camera_period_us), us(timing.camera_phase_us))),
             stamp: timing.stamp,
@@ -97,6 +101,7 @@ impl Scenario {
         for (key, us, most) in [
             ("timing.readout_us", timing.readout_us, 1e6),
             ("timing.flip_to_light_us", timing.flip_to_light_us, 1e6),
+            ("timing.copy_us", timing.copy_us, 1e6),
             ("timing.first_light_us", timing.first_light_us, 6e7),
             ("timing.calibrated_flip_to_light_us", believed, 1e6),
             ("timing.camera_period_us", timing.camera_period_us, 1e7),

@@ -11,21 +11,16 @@ use ::libcamera::properties;
 use rustix::event::{EventfdFlags, eventfd};
 
 use super::open::Configured;
-use super::owner::{Arrived, Event, Order, Wires, own, with_manager};
+use super::owner::{Event, Order, Wires, own, with_manager};
 use super::report::ContinuedCount;
 use super::{Reading, Settings};
 use crate::camera::{Camera, CameraTiming, Encoding};
 use crate::error::{DeviceKind, Error};
-use crate::frame::{Frame, FrameFormat, Pool};
+use crate::frame::{Frame, FrameFormat};
 
 /// Longest time for opening, starting and stopping a camera, in which the sensor is powered up and programmed over I²C. If it takes
 /// longer, the driver hangs.
 const PATIENCE: Duration = Duration::from_secs(15);
-/// Buffers that the camera needs to write without a gap: one being written, one queued in the driver, one on its way there.
-const IN_FLIGHT: usize = 3;
-/// Copied frames whose memory is reused.
-const COPIES: usize = 64;
-
 /// A camera that libcamera lists.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Listed {
@@ -45,10 +40,8 @@ pub struct LibCamera {
     events: Receiver<Event>,
     ready: Arc<OwnedFd>,
     gone: Arc<AtomicBool>,
-    out: Arc<AtomicUsize>,
     in_flight: Arc<AtomicUsize>,
     ended: Receiver<()>,
-    copies: Pool,
     count: ContinuedCount,
     running: bool,
 }
@@ -92,7 +85,7 @@ impl LibCamera {
         )
         .map_err(|cause| system(&cause))?;
         let (ready, gone) = (Arc::new(ready), Arc::default());
-        let (out, in_flight) = (Arc::default(), Arc::default());
+        let in_flight = Arc::default();
         let (orders, ordered) = mpsc::channel();
         let (told, events) = mpsc::channel();
         let (answer, opened) = mpsc::channel();
@@ -104,7 +97,6 @@ impl LibCamera {
             events: told,
             ready: Arc::clone(&ready),
             gone: Arc::clone(&gone),
-            out: Arc::clone(&out),
             in_flight: Arc::clone(&in_flight),
         };
         thread::Builder::new()
@@ -120,7 +112,6 @@ impl LibCamera {
         };
         let (id, configured) = answered(&opened, attempt)?;
         Ok(Self {
-            copies: Pool::new(configured.format, COPIES),
             id,
             settings,
             configured,
@@ -128,7 +119,6 @@ impl LibCamera {
             events,
             ready,
             gone,
-            out,
             in_flight,
             ended,
             count: ContinuedCount::default(),
@@ -158,10 +148,16 @@ impl LibCamera {
         &self.id
     }
 
-    /// Buffers that the camera has; three fewer frames can be kept without a copy.
+    /// Buffers that the camera has.
     #[must_use]
     pub fn buffers(&self) -> usize {
         self.configured.buffers
+    }
+
+    /// Whether the processor caches these buffers. If not, reading them takes many times as long.
+    #[must_use]
+    pub fn cached(&self) -> bool {
+        self.configured.cached
     }
 
     fn ask(
@@ -180,6 +176,9 @@ impl LibCamera {
         match self.events.try_recv() {
             Ok(event) => {
                 let _ = rustix::io::read(&*self.ready, &mut [0_u8; 8]);
+                if let Event::Frame(_, index) = event {
+                    let _ = self.orders.send(Order::Fetched(index));
+                }
                 Ok(Some(event))
             }
             Err(TryRecvError::Empty) => Ok(None),
@@ -190,23 +189,6 @@ impl LibCamera {
     fn lost(&self) -> Error {
         let attempt = format!("waiting for a frame of the camera `{}`", self.id);
         Error::disconnected(DeviceKind::Camera, attempt)
-    }
-
-    /// Makes a frame that borrows the buffer, or a copy of it if the camera would have too few buffers left.
-    fn frame(&mut self, arrived: Arrived) -> Result<Frame, Error> {
-        let Configured {
-            readable,
-            format,
-            stride,
-            buffers,
-        } = self.configured;
-        let count = self.count.of(arrived.count);
-        if readable.is_plain() && self.out.load(Ordering::Relaxed) + IN_FLIGHT <= buffers {
-            return Frame::new(format, Arc::new(arrived.lease), arrived.stamp, count);
-        }
-        self.copies.frame(arrived.stamp, count, |pixels| {
-            readable.copy(arrived.lease.bytes(), stride, &format, pixels);
-        })
     }
 }
 
@@ -281,7 +263,10 @@ impl Camera for LibCamera {
             ));
         }
         match self.fetch()? {
-            Some(Event::Frame(arrived)) => self.frame(arrived).map(Some),
+            Some(Event::Frame(frame, _)) => {
+                let count = self.count.of(frame.count());
+                Ok(Some(frame.restamped(frame.timestamp(), count)))
+            }
             Some(Event::Refused(error)) => Err(error),
             None => self.present().map(|()| None),
         }

@@ -1,9 +1,8 @@
 //! A camera through libcamera, such as the Raspberry Pi's: chosen by its id, configured before it starts, each frame verified.
 //!
 //! One thread owns all objects of the library ([`LibCamera::open`] starts it, dropping the camera ends it); frames arrive from it
-//! through a channel, and buffers return to it. A frame borrows the buffer that the camera wrote, which is mapped once when the camera
-//! is opened; a frame that is kept may outlive the camera. Samples are copied only if the camera would have too few buffers left,
-//! or if they are packed.
+//! through a channel. It copies the samples of each frame out of the camera's buffer, so that neither a kept frame nor slow
+//! memory can delay the camera or the next trigger.
 //!
 //! The choice of the format, the check of metadata and the conversion of stamps do not depend on the library.
 
@@ -27,8 +26,8 @@ pub use device::{LibCamera, Listed};
 pub use layout::Reading;
 pub use report::Exposing;
 
-/// Buffers to ask for: enough for the frames of the longest sequence without a copy, and for those that the camera writes meanwhile.
-const BUFFERS: u32 = 16;
+/// Buffers to ask for: one that is copied, one being written, one queued in the driver, and five that wait to be fetched when the computer is busy.
+const BUFFERS: u32 = 8;
 
 /// Which camera, and how it takes its frames.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +48,7 @@ pub struct Settings {
     pub controlled: bool,
     /// From the end of an exposure until its frame can be fetched, without any delay.
     pub delivery: Duration,
-    /// Buffers to ask for. A camera may grant fewer; frames that are kept beyond them are copied.
+    /// Buffers to ask for. A camera may grant fewer.
     pub buffers: u32,
 }
 

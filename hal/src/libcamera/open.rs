@@ -6,15 +6,16 @@ use ::libcamera::camera::{ActiveCamera, Camera, CameraConfiguration};
 use ::libcamera::camera_manager::CameraManager;
 use ::libcamera::control::ControlEntry;
 use ::libcamera::controls;
-use ::libcamera::framebuffer_allocator::{FrameBuffer, FrameBufferAllocator};
+use ::libcamera::framebuffer::AsFrameBuffer;
+use ::libcamera::framebuffer_allocator::FrameBufferAllocator;
 use ::libcamera::geometry::Size;
 use ::libcamera::pixel_format::PixelFormat;
 use ::libcamera::request::Request;
 use ::libcamera::stream::{Stream, StreamRole};
-use bytes::Bytes;
 
+use super::Settings;
+use super::buffers::{self, Mapped};
 use super::layout::{Granted, Readable, Reading, choose, sensor_bits, worth_asking};
-use super::{Settings, buffers};
 use crate::error::{DeviceKind, Error};
 use crate::frame::FrameFormat;
 
@@ -27,15 +28,15 @@ pub(super) struct Configured {
     pub stride: usize,
     /// Buffers that the camera has.
     pub buffers: usize,
+    /// Whether the processor caches them.
+    pub cached: bool,
 }
 
 /// A request and the memory of its buffer.
 pub(super) struct Slot {
     /// None while the library has it.
     pub request: Option<Request>,
-    pub bytes: Bytes,
-    /// Whether its buffer is lent with a frame.
-    pub lent: bool,
+    pub memory: Mapped,
 }
 
 /// A configured camera. Its parts must be dropped in this order, and the camera manager after them.
@@ -106,18 +107,33 @@ pub(super) fn open(manager: &CameraManager, settings: &Settings) -> Result<Opene
     let stream = granted.stream().ok_or_else(|| no_stream(id))?;
 
     let mut allocator = FrameBufferAllocator::new(&camera);
-    let allocated = allocator
-        .alloc(&stream)
-        .map_err(|cause| refused(id, "allocating buffers of", &cause))?;
-    let mut slots = Vec::with_capacity(allocated.len());
-    for (index, buffer) in allocated.into_iter().enumerate() {
-        slots.push(slot(&mut camera, id, index, buffer, length, &stream)?);
+    let mut slots = Vec::new();
+    // A buffer from the heap has one plane.
+    if readable.reading != Reading::Luma {
+        let size = granted.get_frame_size() as usize;
+        for index in 0..granted.get_buffer_count() as usize {
+            let Some((buffer, memory)) = buffers::cached(size, length)? else {
+                break;
+            };
+            slots.push(slot(&mut camera, id, index, buffer, memory, &stream)?);
+        }
+    }
+    let cached = !slots.is_empty();
+    if !cached {
+        let allocated = allocator
+            .alloc(&stream)
+            .map_err(|cause| refused(id, "allocating buffers of", &cause))?;
+        for (index, buffer) in allocated.into_iter().enumerate() {
+            let memory = Mapped::of(&buffer, length)?;
+            slots.push(slot(&mut camera, id, index, buffer, memory, &stream)?);
+        }
     }
     let configured = Configured {
         readable,
         format,
         stride,
         buffers: slots.len(),
+        cached,
     };
     Ok(Opened {
         slots,
@@ -133,11 +149,10 @@ fn slot(
     camera: &mut ActiveCamera<'static>,
     id: &str,
     index: usize,
-    buffer: FrameBuffer,
-    length: usize,
+    buffer: impl AsFrameBuffer + 'static,
+    memory: Mapped,
     stream: &Stream,
 ) -> Result<Slot, Error> {
-    let bytes = buffers::map(&buffer, length)?;
     let mut request = camera
         .create_request(Some(index as u64))
         .ok_or_else(|| no_stream(id))?;
@@ -146,8 +161,7 @@ fn slot(
         .map_err(|cause| refused(id, "adding a buffer of", &cause))?;
     Ok(Slot {
         request: Some(request),
-        bytes,
-        lent: false,
+        memory,
     })
 }
 

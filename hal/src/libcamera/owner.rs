@@ -1,4 +1,6 @@
-//! The thread that owns a camera and the library: it starts and stops the camera, queues requests, and reads completed ones.
+//! The thread that owns a camera and the library: it starts and stops the camera, queues requests, and copies the frames of completed ones.
+//!
+//! Copying here keeps it out of the thread that has to fire the next trigger.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
@@ -8,23 +10,24 @@ use std::time::Duration;
 use ::libcamera::camera_manager::CameraManager;
 use ::libcamera::control::ControlList;
 use ::libcamera::controls;
-use ::libcamera::framebuffer::{AsFrameBuffer, FrameMetadataStatus};
+use ::libcamera::framebuffer::{AsFrameBuffer, FrameMetadataStatus, OwnedFrameBuffer};
 use ::libcamera::framebuffer_allocator::FrameBuffer;
 use ::libcamera::request::{Request, RequestStatus, ReuseFlag};
 use rustix::fd::OwnedFd;
 use rustix::time::ClockId;
 
 use super::Settings;
-use super::buffers::Lease;
-use super::layout::Layout;
 use super::open::{Configured, Opened, open, refused};
 use super::report::{Clocks, Reported, on_the_heads_clock};
 use crate::clock::{monotonic, read};
 use crate::error::{DeviceKind, Error};
-use crate::units::Timestamp;
+use crate::frame::{Frame, Pixels, Pool};
 
 /// Longest time in which the library returns its requests after it has stopped.
 const CANCELLED: Duration = Duration::from_secs(2);
+
+/// Copied frames whose memory is reused.
+const COPIES: usize = 64;
 
 /// The library allows one camera manager in a process.
 static ONE_MANAGER: Mutex<()> = Mutex::new(());
@@ -35,8 +38,8 @@ pub(super) enum Order {
     Stop(Sender<Result<(), Error>>),
     /// The library has completed a request.
     Done(Request),
-    /// The last frame in this buffer was dropped.
-    Free(usize),
+    /// The frame of this request was fetched. Until then the camera does not get the request back, so frames that nobody fetches do not pile up.
+    Fetched(usize),
     /// Close the camera and end.
     Close,
 }
@@ -44,18 +47,10 @@ pub(super) enum Order {
 /// An event of a running camera.
 #[derive(Debug)]
 pub(super) enum Event {
-    Frame(Arrived),
+    /// A frame with the count since the camera's start, and the request that it is from.
+    Frame(Frame, usize),
     /// A frame that cannot be used, and why.
     Refused(Error),
-}
-
-/// A frame in its buffer.
-#[derive(Debug)]
-pub(super) struct Arrived {
-    pub lease: Lease,
-    pub stamp: Timestamp,
-    /// The camera's count since its start.
-    pub count: u32,
 }
 
 /// The settings, channels and counters that the thread shares with `LibCamera`.
@@ -68,8 +63,6 @@ pub(super) struct Wires {
     pub ready: Arc<OwnedFd>,
     /// Whether the camera is disconnected.
     pub gone: Arc<AtomicBool>,
-    /// Number of buffers that are lent with frames.
-    pub out: Arc<AtomicUsize>,
     /// Number of requests that the library has.
     pub in_flight: Arc<AtomicUsize>,
 }
@@ -122,6 +115,7 @@ pub(super) fn own(wires: Wires, answer: &Sender<Result<(String, Configured), Err
             ring(&ready);
         });
         let mut owner = Owner {
+            copies: Pool::new(opened.configured.format, COPIES),
             opened,
             wires: &wires,
             running: false,
@@ -142,6 +136,7 @@ fn ring(ready: &OwnedFd) {
 
 struct Owner<'a> {
     opened: Opened,
+    copies: Pool,
     wires: &'a Wires,
     running: bool,
     closing: bool,
@@ -162,7 +157,7 @@ impl Owner<'_> {
                     let _ = answer.send(stopped);
                 }
                 Order::Done(request) => self.done(request),
-                Order::Free(index) => self.free(index),
+                Order::Fetched(index) => self.again(index),
                 Order::Close => self.closing = true,
             }
         }
@@ -213,10 +208,9 @@ impl Owner<'_> {
                 Ok(Order::Done(request)) => {
                     self.keep(request);
                 }
-                Ok(Order::Free(index)) => self.free(index),
                 // `LibCamera` was dropped without waiting for an answer.
                 Ok(Order::Close) => self.closing = true,
-                Ok(Order::Start(_) | Order::Stop(_)) => {}
+                Ok(Order::Start(_) | Order::Stop(_) | Order::Fetched(_)) => {}
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
                     return Err(Error::timeout(
                         format!(
@@ -239,23 +233,9 @@ impl Owner<'_> {
         Some(index)
     }
 
-    fn free(&mut self, index: usize) {
-        if let Some(slot) = self.opened.slots.get_mut(index) {
-            slot.lent = false;
-        }
-        if self.running
-            && let Err(error) = self.queue(index)
-        {
-            self.tell(Event::Refused(error));
-        }
-    }
-
-    /// Queues a request, unless its buffer is lent or the library has it already.
+    /// Queues a request, unless the library has it already.
     fn queue(&mut self, index: usize) -> Result<(), Error> {
         let slot = &mut self.opened.slots[index];
-        if slot.lent {
-            return Ok(());
-        }
         let Some(mut request) = slot.request.take() else {
             return Ok(());
         };
@@ -289,27 +269,37 @@ impl Owner<'_> {
             return;
         }
         match self.read(index) {
-            Some(event) => {
-                self.opened.slots[index].lent = matches!(event, Event::Frame(_));
-                let again = !self.opened.slots[index].lent;
-                self.tell(event);
-                if again {
-                    self.free(index);
-                }
+            Some(Event::Refused(error)) => {
+                self.tell(Event::Refused(error));
+                self.again(index);
             }
+            Some(frame) => self.tell(frame),
             // An erroneous frame, or one of the sensor's start-up: it shows as a gap in the count.
-            None => self.free(index),
+            None => self.again(index),
+        }
+    }
+
+    /// Queues a request once more.
+    fn again(&mut self, index: usize) {
+        if self.running
+            && let Err(error) = self.queue(index)
+        {
+            self.tell(Event::Refused(error));
         }
     }
 
     /// The event of a completed request; none if its frame is erroneous.
-    fn read(&self, index: usize) -> Option<Event> {
+    fn read(&mut self, index: usize) -> Option<Event> {
         let clocks =
             Clocks::of(&[(); 3].map(|()| (monotonic(), read(ClockId::Boottime), monotonic())));
         let slot = &self.opened.slots[index];
         let request = slot.request.as_ref()?;
-        let buffer: &FrameBuffer = request.buffer(&self.opened.stream)?;
-        let frame = buffer.metadata()?;
+        let stream = &self.opened.stream;
+        let from_driver = request.buffer::<FrameBuffer>(stream);
+        let frame = match from_driver {
+            Some(buffer) => buffer.metadata()?,
+            None => request.buffer::<OwnedFrameBuffer>(stream)?.metadata()?,
+        };
         if frame.status() != FrameMetadataStatus::Success {
             return None;
         }
@@ -329,20 +319,24 @@ impl Owner<'_> {
             Ok(())
         };
         let stamp = verified.and_then(|()| on_the_heads_clock(stamp, clocks));
-        Some(match stamp {
-            Ok(stamp) => Event::Frame(Arrived {
-                lease: Lease::new(
-                    index,
-                    slot.bytes.clone(),
-                    self.opened.configured.readable.layout == Layout::Words,
-                    self.wires.home.clone(),
-                    &self.wires.out,
-                ),
-                stamp,
-                count: frame.sequence(),
-            }),
-            Err(error) => Event::Refused(error),
-        })
+        let copied = stamp.and_then(|stamp| {
+            let Configured {
+                readable,
+                format,
+                stride,
+                ..
+            } = self.opened.configured;
+            let copy = |bytes: &[u8], pixels: &mut Pixels| {
+                readable.copy(bytes, stride, &format, pixels);
+            };
+            let mut read = Ok(());
+            let count = frame.sequence().into();
+            let frame = self.copies.frame(stamp, count, |pixels| {
+                read = slot.memory.read(pixels, &copy);
+            });
+            read.and(frame)
+        });
+        Some(copied.map_or_else(Event::Refused, |frame| Event::Frame(frame, index)))
     }
 
     fn tell(&self, event: Event) {

@@ -136,8 +136,8 @@ impl ContinuedCount {
     }
 
     /// The continued count of the frame with this count since the camera's start.
-    pub fn of(&mut self, since_start: u32) -> u64 {
-        let count = self.base + u64::from(since_start);
+    pub fn of(&mut self, since_start: u64) -> u64 {
+        let count = self.base + since_start;
         self.next = self.next.max(count + 1);
         count
     }

@@ -28,6 +28,8 @@ pub(super) struct Sensor {
     started: Timestamp,
     since: u64,
     count: u64,
+    /// When the copying of the latest frame ends.
+    copied: Timestamp,
     /// In the order in which their frames arrive.
     exposures: VecDeque<PendingExposure>,
     /// The last frame, if it is to arrive a second time.
@@ -83,6 +85,10 @@ impl Sensor {
         let mut ready = start + (length + mechanics.readout + late);
         if dice.happens(Kind::Swapped, n, faults.swapped) {
             ready = ready + (mechanics.camera().period + mechanics.exposure / 4);
+        }
+        if !mechanics.copy.is_zero() {
+            ready = ready.max(self.copied) + mechanics.copy;
+            self.copied = ready;
         }
         let exposure = PendingExposure {
             start,

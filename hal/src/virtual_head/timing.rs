@@ -21,6 +21,8 @@ pub struct Mechanics {
     pub exposure: Duration,
     /// From the end of an exposure until its frame can be fetched.
     pub readout: Duration,
+    /// How long it takes to copy a frame out of the camera's buffer. A thread of its own copies one after the other.
+    pub copy: Duration,
     /// Of a camera that runs by itself: its period, and the time from its start to its first exposure.
     pub free_running: Option<(Duration, Duration)>,
     /// What the camera's stamps mark.
@@ -40,6 +42,7 @@ impl Mechanics {
             calibrated_flip_to_light: Duration::ZERO,
             exposure: refresh * refreshes,
             readout: Duration::ZERO,
+            copy: Duration::ZERO,
             free_running: None,
             stamp: Stamp::default(),
             faults: Faults::default(),

@@ -5,6 +5,7 @@
 
 pub mod computer;
 pub mod controller;
+mod delivery;
 mod light;
 mod time;
 
@@ -76,12 +77,13 @@ fn named(name: &'static str, check: Check) -> Check {
 }
 
 /// The checks in their order, each with the checks that must have passed before it.
-const CHECKS: [(&str, &[&str]); 11] = [
+const CHECKS: [(&str, &[&str]); 12] = [
     ("devices", &[]),
     ("format", &["devices"]),
     ("mode", &["devices"]),
     ("cadence", &["devices"]),
     ("trigger", &["devices"]),
+    ("delivery", &["devices", "trigger"]),
     ("light", &["devices", "trigger"]),
     ("exposure", &["devices", "trigger", "light"]),
     ("delay", &["devices", "trigger", "light", "exposure"]),
@@ -127,6 +129,7 @@ pub fn examine(
             "mode" => Ok(time::mode(head)),
             "cadence" => time::cadence(head),
             "trigger" => time::trigger(head, calibrated),
+            "delivery" => delivery::delivery(head),
             _ => {
                 let lit = lit.get_or_insert_with(|| Lit::take(head, SETTLE));
                 match (name, lit) {

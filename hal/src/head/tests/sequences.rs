@@ -75,6 +75,27 @@ fn a_camera_that_needs_two_refreshes_takes_a_pattern_in_two_while_the_next_flip_
 }
 
 #[test]
+fn copying_a_frame_for_longer_than_a_refresh_costs_none() {
+    let taken = |copy: u64| {
+        let exposure = all_right(&mut labelled(
+            Mechanics {
+                readout: Duration::from_millis(16),
+                copy: Duration::from_millis(copy),
+                ..plain()
+            },
+            COUNT,
+        ));
+        (
+            refreshes(&exposure).round(),
+            exposure.retaken,
+            exposure.missed_flips,
+        )
+    };
+    assert_eq!(taken(0), (22.0, 0, 0));
+    assert_eq!(taken(20), taken(0));
+}
+
+#[test]
 fn a_camera_that_runs_by_itself_is_followed_from_any_phase() {
     for phase_us in (0..40_000).step_by(1111) {
         for drift_ppm in [-300, 0, 300] {

@@ -189,12 +189,8 @@ impl Readable {
         }
     }
 
-    /// Whether samples are stored as in a frame, so that a frame can borrow them.
-    pub fn is_plain(&self) -> bool {
-        matches!(self.layout, Layout::Bytes | Layout::Words)
-    }
-
-    /// The format of frames from buffers with `stride` bytes per row, and the number of bytes of a frame in a buffer.
+    /// The format of frames from buffers of pictures of this size with `stride` bytes per row, and the number of bytes of a picture in a
+    /// buffer. A plane of a colour sensor has half the columns and rows of its pictures.
     ///
     /// # Errors
     /// `Protocol` if a row does not fit into `stride` bytes or `stride` holds no whole number of samples.
