@@ -27,6 +27,18 @@ pub struct DeviceModel {
 }
 
 impl DeviceModel {
+    /// The geometry of a picture of every second column and row, from these on: one plane of a colour sensor.
+    #[must_use]
+    pub fn every_second(&self, column: u32, row: u32) -> Self {
+        Self {
+            fx: self.fx / 2.0,
+            fy: self.fy / 2.0,
+            cx: (self.cx - f64::from(column)) / 2.0,
+            cy: (self.cy - f64::from(row)) / 2.0,
+            ..self.clone()
+        }
+    }
+
     /// The name of the first number that is not finite, if any.
     #[must_use]
     pub fn first_not_finite(&self) -> Option<&'static str> {

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 pub struct CameraSetup {
     /// libcamera's id; none = the only camera that is there.
     pub id: Option<String>,
-    /// Pixels per row; none = the sensor's.
+    /// Pixels per row of the sensor's picture; none = the sensor's. A frame of a colour sensor has half.
     pub width: Option<u32>,
     /// Rows; none = the sensor's.
     pub height: Option<u32>,

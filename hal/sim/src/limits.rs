@@ -29,6 +29,12 @@ impl Scenario {
                 .map_err(|problem| format!("{name}.{problem}"))?;
         }
         let camera = &self.rig.camera;
+        if self.colour && camera.width.min(camera.height) < 2 {
+            return Err(format!(
+                "rig.camera of {}×{} pixels with colour = true has no green plane: write at least 2 columns and rows",
+                camera.width, camera.height
+            ));
+        }
         let pixels = u64::from(camera.width) * u64::from(camera.height);
         let rays = pixels * u64::from(self.sub_rays).pow(2);
         if rays > MAX_RAYS {

@@ -10,12 +10,17 @@ use hal::bounds::shortened;
 use hal::model::DeviceModel;
 use hal::virtual_head::Faults;
 
+/// Column and row of the green pixel that is read of each 2×2 pixels of a colour sensor.
+const GREEN: (u32, u32) = (1, 0);
+
 /// A whole simulated head. Keys that are missing in the TOML have their default values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Scenario {
     /// Camera bits, 8, 10 or 12.
     pub bit_depth: u8,
+    /// Whether the camera has a colour sensor (RGGB), of which one green plane is read: its frames have half its columns and rows.
+    pub colour: bool,
     /// Rays per pixel along each side, 1…16.
     pub sub_rays: u32,
     /// Refresh rate of the projector, 1…1000 Hz.
@@ -120,6 +125,7 @@ impl Default for Scenario {
     fn default() -> Self {
         Self {
             bit_depth: 8,
+            colour: false,
             sub_rays: 4,
             refresh_hz: 60.0,
             rig: Rig::default(),
@@ -264,6 +270,34 @@ impl Scenario {
         let scenario: Self = toml::from_str(text).map_err(|error| failed(error.to_string()))?;
         scenario.check().map_err(failed)?;
         Ok(scenario)
+    }
+
+    /// Columns and rows of a frame.
+    #[must_use]
+    pub fn frame_size(&self) -> (u32, u32) {
+        let (camera, cell) = (&self.rig.camera, if self.colour { 2 } else { 1 });
+        (camera.width / cell, camera.height / cell)
+    }
+
+    /// The exact geometry of the camera's frames.
+    #[must_use]
+    pub fn camera_model(&self) -> DeviceModel {
+        let sensor = self.rig.camera.model();
+        match self.colour {
+            true => sensor.every_second(GREEN.0, GREEN.1),
+            false => sensor,
+        }
+    }
+
+    /// Of one value per pixel of the sensor, row by row, those of the pixels in a frame.
+    pub(super) fn in_frame<T: Copy>(&self, sensor: &[T]) -> Vec<T> {
+        if !self.colour {
+            return sensor.to_vec();
+        }
+        let ((width, height), columns) = (self.frame_size(), self.rig.camera.width);
+        let place = |at: u32| (2 * (at / width) + GREEN.1) * columns + 2 * (at % width) + GREEN.0;
+        let places = (0..width * height).map(|at| place(at) as usize);
+        places.map(|at| sensor[at]).collect()
     }
 
     /// Standard deviation of one sample in counts of this camera, from uniform noise and rounding.

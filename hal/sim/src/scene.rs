@@ -38,12 +38,14 @@ pub(crate) struct SimScene {
 impl SimScene {
     pub(super) fn new(scenario: Arc<Scenario>, placed: Staged) -> Self {
         let camera = &scenario.rig.camera;
-        let format = FrameFormat::packed(camera.width, camera.height, scenario.bit_depth);
+        let sensor = camera.width as usize * camera.height as usize;
+        let (width, height) = scenario.frame_size();
+        let format = FrameFormat::packed(width, height, scenario.bit_depth);
         Self {
             placed,
             rasters: Vec::new(),
-            picture: vec![0.0; format.samples()],
-            part: vec![0.0; format.samples()],
+            picture: vec![0.0; sensor],
+            part: vec![0.0; sensor],
             pool: Pool::new(format, MAX_KEPT_FRAMES),
             seed: scenario.noise.seed,
             exposed: 0,
@@ -70,8 +72,15 @@ impl SimScene {
 
 impl Scene for SimScene {
     fn format(&self) -> FrameFormat {
-        let camera = &self.scenario.rig.camera;
-        FrameFormat::packed(camera.width, camera.height, self.scenario.bit_depth)
+        let (width, height) = self.scenario.frame_size();
+        FrameFormat::packed(width, height, self.scenario.bit_depth)
+    }
+
+    fn encoding(&self) -> &'static str {
+        match self.scenario.colour {
+            true => "one green plane of RGGB, with half its columns and rows",
+            false => "RAW",
+        }
     }
 
     fn projector_size(&self) -> (u32, u32) {
@@ -148,7 +157,11 @@ impl Scene for SimScene {
         };
         let random = noise_of(self.seed, self.exposed);
         self.exposed += 1;
-        let picture = &self.picture;
+        let plane = self
+            .scenario
+            .colour
+            .then(|| self.scenario.in_frame(&self.picture));
+        let picture = plane.as_ref().unwrap_or(&self.picture);
         self.pool.frame(timestamp, count, |pixels| match pixels {
             Pixels::Eight(samples) => sensor.read(picture, random, samples, |count| count as u8),
             Pixels::Sixteen(samples) => sensor.read(picture, random, samples, |count| count as u16),

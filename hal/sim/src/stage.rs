@@ -172,11 +172,15 @@ impl Stage {
         self.control.reopen()
     }
 
-    /// The true heights and classes of the part that is in place.
+    /// The true heights and classes of the part that is in place, per pixel of a frame.
     #[must_use]
     pub fn truth(&self) -> Truth {
         let staged = self.control.scene(|scene| scene.placed());
-        staged.transport.truth.clone()
+        let truth = &staged.transport.truth;
+        Truth {
+            height: self.scenario.in_frame(&truth.height),
+            class: self.scenario.in_frame(&truth.class),
+        }
     }
 
     /// Restarts the noise with `seed`: the next frame has the noise of frame 0.

@@ -214,7 +214,7 @@ impl Camera for LibCamera {
 
     fn encoding(&self) -> Encoding {
         Encoding {
-            name: self.configured.readable.name.into(),
+            name: self.configured.readable.describe(),
             exact: self.configured.readable.reading == Reading::Raw,
         }
     }

@@ -24,6 +24,8 @@ use crate::frame::FrameFormat;
 pub(super) struct Configured {
     pub readable: Readable,
     pub format: FrameFormat,
+    /// Rows of the sensor's pictures.
+    pub rows: u32,
     /// Bytes from the start of one row of a buffer to the next.
     pub stride: usize,
     /// Buffers that the camera has.
@@ -131,6 +133,7 @@ pub(super) fn open(manager: &CameraManager, settings: &Settings) -> Result<Opene
     let configured = Configured {
         readable,
         format,
+        rows: size.1,
         stride,
         buffers: slots.len(),
         cached,

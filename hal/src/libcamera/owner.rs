@@ -313,7 +313,7 @@ impl Owner<'_> {
                 gain: metadata.get::<controls::AnalogueGain>().ok().map(|v| v.0),
                 period: metadata.get::<controls::FrameDuration>().ok().map(|v| v.0),
             };
-            let rows = self.opened.configured.format.height;
+            let rows = self.opened.configured.rows;
             self.wires.settings.exposing.verify(rows, &reported)
         } else {
             Ok(())

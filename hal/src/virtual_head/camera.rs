@@ -186,7 +186,8 @@ impl<S: Scene> Camera for VirtualDevice<S> {
     }
 
     fn encoding(&self) -> Encoding {
-        lock(&self.bench).mechanics.encoding()
+        let bench = lock(&self.bench);
+        bench.mechanics.encoding(bench.scene.encoding())
     }
 
     fn timing(&self) -> CameraTiming {

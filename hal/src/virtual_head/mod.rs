@@ -38,6 +38,11 @@ pub trait Scene: Send {
     /// The format of every frame.
     fn format(&self) -> FrameFormat;
 
+    /// How the camera's samples are encoded, where they are exact.
+    fn encoding(&self) -> &'static str {
+        "RAW"
+    }
+
     /// Columns and rows of the projector.
     fn projector_size(&self) -> (u32, u32);
 

@@ -72,10 +72,10 @@ impl Mechanics {
         }
     }
 
-    pub(super) fn encoding(&self) -> Encoding {
+    pub(super) fn encoding(&self, raw: &str) -> Encoding {
         let exact = !self.faults.compressed;
         Encoding {
-            name: if exact { "RAW" } else { "COMPRESSED" }.into(),
+            name: if exact { raw } else { "COMPRESSED" }.into(),
             exact,
         }
     }

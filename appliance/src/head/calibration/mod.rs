@@ -60,11 +60,11 @@ impl Calibration {
     /// # Errors
     /// As [`Self::new`].
     pub fn of_scenario(scenario: &Scenario) -> Result<Self, String> {
-        let (camera, projector) = (&scenario.rig.camera, &scenario.rig.projector);
+        let ((width, height), projector) = (scenario.frame_size(), &scenario.rig.projector);
         Self::new(
-            (camera.width, camera.height, scenario.bit_depth),
+            (width, height, scenario.bit_depth),
             (projector.width, projector.height),
-            (&camera.model(), &projector.model()),
+            (&scenario.camera_model(), &projector.model()),
             scenario.noise_sigma_counts(),
         )
     }

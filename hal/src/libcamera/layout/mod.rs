@@ -8,7 +8,7 @@ use crate::frame::{FrameFormat, Pixels};
 /// Which samples of a camera's images are used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reading {
-    /// The raw counts of a monochrome sensor.
+    /// The raw counts of a monochrome sensor, or of one of the two green planes of a colour sensor.
     #[default]
     Raw,
     /// Raw counts if available, else the luma plane of a YUV format, which an image processor has computed.
@@ -42,6 +42,8 @@ pub(crate) struct Readable {
     pub reading: Reading,
     pub layout: Layout,
     pub bits: u8,
+    /// Column and row of the green pixel that is read of each 2×2 pixels of a colour sensor.
+    pub green: Option<(usize, usize)>,
 }
 
 const fn readable(name: &'static str, reading: Reading, layout: Layout, bits: u8) -> Readable {
@@ -50,10 +52,43 @@ const fn readable(name: &'static str, reading: Reading, layout: Layout, bits: u8
         reading,
         layout,
         bits,
+        green: None,
     }
 }
 
-/// Every format that can be read, the best of each reading first: more bits, then those that need no unpacking.
+/// The raw formats of a colour sensor whose green pixels are in this column of the even rows. Green sees most of white light, and has
+/// twice as many pixels as red and blue; those of the odd rows are not read, as a picture that is made of both planes would be sampled
+/// unevenly, and interpolated samples are no counts.
+macro_rules! bayer {
+    ($order:literal, $column:literal) => {
+        [
+            green(concat!($order, "16"), Layout::Words, 16, $column),
+            green(concat!($order, "14"), Layout::Words, 14, $column),
+            green(concat!($order, "12"), Layout::Words, 12, $column),
+            green(concat!($order, "12_CSI2P"), Layout::TwoInThree, 12, $column),
+            green(concat!($order, "10"), Layout::Words, 10, $column),
+            green(concat!($order, "10_CSI2P"), Layout::FourInFive, 10, $column),
+            green(concat!($order, "8"), Layout::Bytes, 8, $column),
+        ]
+    };
+}
+
+const fn green(name: &'static str, layout: Layout, bits: u8, column: usize) -> Readable {
+    Readable {
+        green: Some((column, 0)),
+        ..readable(name, Reading::Raw, layout, bits)
+    }
+}
+
+/// The formats of colour sensors, by the colours of the first two pixels of the first two rows.
+const BAYER: [[Readable; 7]; 4] = [
+    bayer!("SRGGB", 1),
+    bayer!("SBGGR", 1),
+    bayer!("SGRBG", 0),
+    bayer!("SGBRG", 0),
+];
+
+/// Every format of monochrome and processed pictures that can be read, the best of each reading first: more bits, then those that need no unpacking.
 const FORMATS: [Readable; 19] = [
     readable("R16", Reading::Raw, Layout::Words, 16),
     readable("R14", Reading::Raw, Layout::Words, 14),
@@ -76,6 +111,11 @@ const FORMATS: [Readable; 19] = [
     readable("RGB888", Reading::Green, Layout::MiddleOfThree, 8),
 ];
 
+/// Every format that can be read, the best of each reading first.
+fn formats() -> impl Iterator<Item = &'static Readable> {
+    FORMATS.iter().chain(BAYER.iter().flatten())
+}
+
 /// The format that a camera granted when it was asked for one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Granted {
@@ -87,7 +127,7 @@ pub(crate) struct Granted {
 
 /// The formats to ask a camera for. It may grant a different one, so all are asked for before one is chosen.
 pub(crate) fn worth_asking(reading: Reading) -> impl Iterator<Item = &'static Readable> {
-    FORMATS.iter().filter(move |f| reading.takes(f.reading))
+    formats().filter(move |f| reading.takes(f.reading))
 }
 
 /// The index in `granted` of the best format, and how to read it.
@@ -124,37 +164,28 @@ pub(crate) fn choose(
         let wanted = size.map_or(String::new(), |(w, h)| format!(" of {w}×{h} pixels"));
         Error::unsupported(
             format!("taking {} frames{wanted} with the camera `{camera}`", reading.word()),
-            format!("it grants {offers}; set head.camera.width and height to a size that it has, head.camera.luma for a YUV format, or take a camera with a raw monochrome one"),
+            format!("it grants {offers}; set head.camera.width and height to a size that it has, head.camera.luma for a YUV format, or take a camera with a raw one"),
         )
     })
 }
 
-/// The bits of a monochrome sensor in frames of `size`, from the raw formats that its camera lists with their sizes: those of the
+/// The bits of a sensor in pictures of `size`, from the raw formats that its camera lists with their sizes: those of the
 /// deepest mode of that size, which a camera uses when it is asked for 16 bits.
 pub(crate) fn sensor_bits(listed: &[(String, Vec<(u32, u32)>)], size: (u32, u32)) -> Option<u8> {
-    let format = |name: &str| {
-        FORMATS
-            .iter()
-            .find(|f| f.name == name && f.reading == Reading::Raw)
-    };
+    let format = |name: &str| formats().find(|f| f.name == name && f.reading == Reading::Raw);
     let modes = listed.iter().filter(|(_, sizes)| sizes.contains(&size));
     modes.filter_map(|(name, _)| Some(format(name)?.bits)).max()
 }
 
 /// Why a format cannot be used; none if it can.
 pub(crate) fn objection(reading: Reading, name: &str) -> Option<String> {
-    if let Some(format) = FORMATS.iter().find(|format| format.name == name) {
+    if let Some(format) = formats().find(|format| format.name == name) {
         return (!reading.takes(format.reading))
             .then(|| format!("only where {} is to be read", format.reading.word()));
     }
     let compressed = name.contains("_COMP") || name.contains("JPEG") || name.starts_with("IPU");
-    let coloured = [
-        "SBGGR", "SGBRG", "SGRBG", "SRGGB", "BGGR", "GBRG", "GRBG", "RGGB",
-    ];
     Some(if compressed {
         "compressed: its samples are not what the sensor counted".into()
-    } else if coloured.iter().any(|order| name.starts_with(order)) {
-        "of a colour sensor: neighbouring pixels see different light".into()
     } else {
         "unknown here".into()
     })
@@ -176,6 +207,17 @@ impl Reading {
 }
 
 impl Readable {
+    /// Its name, and what is read of it.
+    pub fn describe(&self) -> String {
+        match self.green {
+            Some(_) => format!(
+                "one green plane of {}, with half its columns and rows",
+                self.name
+            ),
+            None => self.name.into(),
+        }
+    }
+
     /// The same format for a sensor of `bits`. If a format has more bits (R16 of a Pi 5), the sensor's are the upper ones. They must be
     /// shifted down: otherwise full scale would not be 2^bits − 1, and saturated pixels would not be recognised.
     pub fn of_sensor(self, bits: Option<u8>) -> Self {
@@ -208,13 +250,12 @@ impl Readable {
             Layout::TwoInThree => (columns.div_ceil(2) * 3, Some(columns)),
             Layout::MiddleOfThree => (columns * 3, Some(columns)),
         };
+        let cell = if self.green.is_some() { 2 } else { 1 };
         match samples {
-            Some(samples) if row <= stride && columns > 0 && height > 0 => Ok((
+            Some(samples) if row <= stride && width >= cell && height >= cell => Ok((
                 FrameFormat {
-                    width,
-                    height,
-                    stride: samples,
-                    bit_depth: self.bits,
+                    stride: if cell == 1 { samples } else { columns / 2 },
+                    ..FrameFormat::packed(width / cell, height / cell, self.bits)
                 },
                 stride * height as usize,
             )),
@@ -228,8 +269,41 @@ impl Readable {
         }
     }
 
+    /// The sample of one column of a row.
+    fn sample(&self, row: &[u8], column: usize) -> u16 {
+        let word = |at: usize| u16::from_le_bytes([row[at], row[at + 1]]);
+        // A group of packed samples has the upper bytes of each, then the lower bits of all.
+        let packed = |of: usize, bits: usize| {
+            let (group, at) = (column / of * (of + 1), column % of);
+            let lower = u16::from(row[group + of]) >> (bits * at) & ((1 << bits) - 1);
+            u16::from(row[group + at]) << bits | lower
+        };
+        match self.layout {
+            Layout::Bytes => row[column].into(),
+            Layout::Words => word(2 * column),
+            Layout::UpperBits(bits) => word(2 * column) >> (16 - u32::from(bits)),
+            Layout::FourInFive => packed(4, 2),
+            Layout::TwoInThree => packed(2, 4),
+            Layout::MiddleOfThree => row[3 * column + 1].into(),
+        }
+    }
+
     /// Copies the samples of a whole frame of `format` out of a buffer with `stride` bytes per row.
     pub fn copy(&self, buffer: &[u8], stride: usize, format: &FrameFormat, pixels: &mut Pixels) {
+        if let Some((column, row)) = self.green {
+            let rows = buffer.chunks(stride.max(1)).skip(row).step_by(2);
+            match pixels {
+                Pixels::Eight(samples) => {
+                    let sample = |row: &[u8], at| self.sample(row, at) as u8;
+                    every_second(rows, column, samples, format.stride, sample);
+                }
+                Pixels::Sixteen(samples) => {
+                    let sample = |row: &[u8], at| self.sample(row, at);
+                    every_second(rows, column, samples, format.stride, sample);
+                }
+            }
+            return;
+        }
         let (columns, width) = (format.width as usize, format.stride);
         let rows = buffer.chunks(stride.max(1));
         match pixels {
@@ -262,6 +336,21 @@ impl Readable {
                     }
                 }
             }
+        }
+    }
+}
+
+/// Fills rows of `width` samples with every second sample of each row, from `column` on.
+fn every_second<'a, T>(
+    rows: impl Iterator<Item = &'a [u8]>,
+    column: usize,
+    samples: &mut [T],
+    width: usize,
+    sample: impl Fn(&[u8], usize) -> T,
+) {
+    for (row, into) in rows.zip(samples.chunks_exact_mut(width)) {
+        for (at, into) in into.iter_mut().enumerate() {
+            *into = sample(row, 2 * at + column);
         }
     }
 }

@@ -42,13 +42,11 @@ fn raw_mono_is_taken_with_the_most_bits_and_unpacked_before_packed() {
 }
 
 #[test]
-fn compressed_coloured_and_unknown_formats_are_refused_by_name_and_reason() {
+fn compressed_and_unknown_formats_are_refused_by_name_and_reason() {
     for (name, reason) in [
         ("MONO_PISP_COMP1", "compressed"),
         ("BGGR_PISP_COMP1", "compressed"),
         ("MJPEG", "compressed"),
-        ("SRGGB10", "colour sensor"),
-        ("SBGGR10_CSI2P", "colour sensor"),
         ("YUYV", "unknown"),
     ] {
         for reading in [Reading::Raw, Reading::Luma, Reading::Green] {
@@ -172,10 +170,9 @@ fn the_upper_bits_of_a_wider_format_are_the_sensors() {
     let both: &[_] = &[small, large];
     assert_eq!(bits(&[("R8", both), ("R10_CSI2P", both)], large), Some(10));
     assert_eq!(bits(&[("R10_CSI2P", &[IMX296])], IMX296), Some(10));
-    assert_eq!(
-        bits(&[("SRGGB12_CSI2P", both), ("NV12", both)], large),
-        None
-    );
+    let colour = [("SRGGB12_CSI2P", both), ("NV12", both)];
+    assert_eq!(bits(&colour, large), Some(12));
+    assert_eq!(bits(&[("NV12", both)], large), None);
     let mixed: &[(&str, &[_])] = &[("R8", &[large]), ("R10_CSI2P", &[small])];
     assert_eq!(
         (bits(mixed, large), bits(mixed, small)),
@@ -205,4 +202,60 @@ fn the_upper_bits_of_a_wider_format_are_the_sensors() {
     let buffer = [0, 255, 0, 1, 7, 7, 0, 0, 0, 128, 7, 7];
     upper.copy(&buffer, 6, &frames, &mut pixels);
     assert_eq!(pixels, Pixels::Eight(vec![255, 1, 0, 128]));
+}
+
+#[test]
+fn a_colour_sensor_is_read_through_one_green_plane_where_there_is_no_monochrome_format() {
+    // As a Pi 5 and a Pi 4 grant them for the official Global Shutter Camera.
+    let pi5 = ["SRGGB16", "RGGB_PISP_COMP1"];
+    assert_eq!(chosen(Reading::Raw, &pi5).unwrap(), "SRGGB16");
+    let pi4 = ["SRGGB10_CSI2P", "SRGGB10"];
+    assert_eq!(chosen(Reading::Raw, &pi4).unwrap(), "SRGGB10");
+    assert_eq!(chosen(Reading::Raw, &["SRGGB10", "R8"]).unwrap(), "R8");
+    assert_eq!(chosen(Reading::Luma, &["SRGGB10", "NV12"]).unwrap(), "NV12");
+    let listed = [("SRGGB10_CSI2P".to_owned(), vec![IMX296])];
+    assert_eq!(sensor_bits(&listed, IMX296), Some(10));
+
+    let plane = formats().find(|format| format.name == "SRGGB10").unwrap();
+    let said = "one green plane of SRGGB10, with half its columns and rows";
+    assert_eq!(plane.describe(), said);
+
+    // A picture whose sample is 100 × row + column, of which green is at other places in each order.
+    let format = |name: &str| *formats().find(|format| format.name == name).unwrap();
+    let size = (8, 4);
+    let sample = |row: u16, column: u16| 100 * row + column;
+    for (name, first) in [("SRGGB", 1), ("SBGGR", 1), ("SGRBG", 0), ("SGBRG", 0)] {
+        let green = [0, 2].map(|row| [0, 2, 4, 6].map(|column| sample(row, column + first)));
+        let green = Pixels::Sixteen(green.concat());
+        let read = |readable: Readable, stride: usize, buffer: &[u8]| {
+            let (frames, bytes) = readable.frames(size, stride).unwrap();
+            assert_eq!(frames, FrameFormat::packed(4, 2, 10));
+            assert_eq!(bytes, buffer.len());
+            let mut pixels = Pixels::zeroed(&frames);
+            readable.copy(buffer, stride, &frames, &mut pixels);
+            pixels
+        };
+        let words = |shift: u32| -> Vec<u8> {
+            let all = (0..4).flat_map(|row| (0..8).map(move |column| sample(row, column)));
+            all.flat_map(|sample| (sample << shift).to_le_bytes())
+                .collect()
+        };
+        let unpacked = format(&format!("{name}10"));
+        assert_eq!(read(unpacked, 16, &words(0)), green, "{name}");
+        let upper = format(&format!("{name}16")).of_sensor(Some(10));
+        assert_eq!(read(upper, 16, &words(6)), green, "{name}");
+        let mut packed = Vec::new();
+        for group in words(0).chunks(8) {
+            let samples: Vec<u16> = group
+                .chunks(2)
+                .map(|two| u16::from_le_bytes([two[0], two[1]]))
+                .collect();
+            packed.extend(samples.iter().map(|sample| (sample >> 2) as u8));
+            let lower = samples.iter().enumerate();
+            packed.push(lower.fold(0, |byte, (at, sample)| {
+                byte | ((sample & 3) << (2 * at)) as u8
+            }));
+        }
+        assert_eq!(read(format(&format!("{name}10_CSI2P")), 10, &packed), green);
+    }
 }
