@@ -32,7 +32,7 @@ pub struct CameraSetup {
 }
 
 impl Default for CameraSetup {
-    /// The reference head: two refreshes of 60 Hz per frame, one of them exposed; 1088 rows of 14.8 µs are read out in 16.1 ms.
+    /// The reference head: one refresh of 60 Hz is exposed, then 1118 lines of 14.8 µs are read out in 16.56 ms.
     fn default() -> Self {
         Self {
             id: None,

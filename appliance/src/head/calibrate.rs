@@ -1,4 +1,4 @@
-//! Measures a calibration: time stamps, light, flip-to-light delay, grey response, noise, contrast and reference plane, in this order, since
+//! Measures a calibration: time stamps, pace, light, flip-to-light delay, grey response, noise, contrast and reference plane, in this order, since
 //! each measurement uses the results of those before it.
 
 use super::calibration::Calibration;
@@ -10,7 +10,7 @@ use super::calibration::geometry::GeometryFile;
 use super::calibration::place::Place;
 use super::examine::{
     Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_BY_CONTENT, MOST_SATURATED, PLATE_PITCH, SETTLE,
-    Stamps, by_content, contrast, noise, plate, response,
+    Spaced, Stamps, by_content, contrast, noise, pace, plate, response,
 };
 use super::seam;
 use crate::error::{Exit, Failure};
@@ -88,6 +88,12 @@ pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Resu
         readout: stamps.readout,
         ..head.timing()
     });
+    progress(0.02, "pace of the camera");
+    let pace = proven(&pace(head)?, &mut notes);
+    head.set_timing(Timing {
+        hold: pace.unwrap_or(head.timing().hold),
+        ..head.timing()
+    });
     progress(0.05, "light");
     let lit = Lit::take(head, SETTLE)?;
     bright_enough(&lit)?;
@@ -162,6 +168,7 @@ pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Resu
             sigma_ns: (delay.error * 1e9).ceil() as u64,
             stamp: stamps.stamp,
             readout_ns: nanoseconds(stamps.readout),
+            refreshes: pace,
         }),
         noise: Some(NoiseFile {
             counts: noise.counts,
@@ -188,6 +195,19 @@ pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Resu
         maps,
         notes,
     })
+}
+
+/// The refreshes per pattern at which no trigger is lost, if there are any; otherwise patterns are shown as long as before.
+fn proven(tried: &[Spaced], notes: &mut Vec<String>) -> Option<u32> {
+    let last = tried.last()?;
+    if last.none_lost() {
+        return Some(last.refreshes);
+    }
+    notes.push(format!(
+        "triggers are lost however far apart they are ({}), so the pace of the camera is not known: check the wire of the trigger, then calibrate anew",
+        last.words()
+    ));
+    None
 }
 
 fn nanoseconds(time: Duration) -> u64 {

@@ -10,3 +10,6 @@ pub mod placed;
 pub mod rasters;
 pub mod scan;
 pub mod seam;
+
+#[cfg(test)]
+mod traits;

@@ -20,6 +20,11 @@ pub struct Timing {
     pub readout_us: u64,
     /// How long it takes to copy a frame out of the camera's buffer, in a thread of its own, 0…1 000 000 µs.
     pub copy_us: u64,
+    /// For how long after its readout a triggered camera still loses triggers, which its stated times do not contain, 0…1 000 000 µs.
+    pub dead_us: u64,
+    /// Refreshes per pattern according to the head's calibration, 1…100; if left out, as many as the camera needs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibrated_refreshes: Option<u32>,
     /// From a flip to its pattern's light, 0…1 000 000 µs.
     pub flip_to_light_us: u64,
     /// From opening the head, which sets the projector's mode, to its first light, 0…60 000 000 µs.
@@ -41,6 +46,8 @@ impl Default for Timing {
             exposure_refreshes: 2.0,
             readout_us: 0,
             copy_us: 0,
+            dead_us: 0,
+            calibrated_refreshes: None,
             flip_to_light_us: 0,
             first_light_us: 0,
             calibrated_flip_to_light_us: None,
@@ -71,11 +78,23 @@ impl Scenario {
             exposure: self.exposure(),
             readout: us(timing.readout_us),
             copy: us(timing.copy_us),
+            dead: us(timing.dead_us),
+            calibrated_hold: timing.calibrated_refreshes.unwrap_or(self.needed()),
             free_running: (timing.camera_period_us > 0)
                 .then(|| (us(timing.camera_period_us), us(timing.camera_phase_us))),
             stamp: timing.stamp,
             faults: self.faults.clone(),
         }
+    }
+
+    /// Refreshes per pattern that the camera needs, where the times that it states are not all.
+    fn needed(&self) -> u32 {
+        if self.timing.dead_us == 0 {
+            return 1;
+        }
+        let unready = Duration::from_micros(self.timing.readout_us + self.timing.dead_us);
+        let busy = (self.exposure() + unready).as_nanos();
+        u32::try_from(busy.div_ceil(self.refresh().as_nanos())).unwrap_or(u32::MAX)
     }
 
     /// The exposure. Whole refreshes are computed exactly, as a rounding error could let an exposure end after the flip that is due at
@@ -100,6 +119,7 @@ impl Scenario {
         let believed = timing.calibrated_flip_to_light_us.unwrap_or(0);
         for (key, us, most) in [
             ("timing.readout_us", timing.readout_us, 1e6),
+            ("timing.dead_us", timing.dead_us, 1e6),
             ("timing.flip_to_light_us", timing.flip_to_light_us, 1e6),
             ("timing.copy_us", timing.copy_us, 1e6),
             ("timing.first_light_us", timing.first_light_us, 6e7),
@@ -116,6 +136,8 @@ impl Scenario {
         ] {
             within(key, us as f64, 0.0, most)?;
         }
+        let refreshes = timing.calibrated_refreshes.unwrap_or(1);
+        within("timing.calibrated_refreshes", refreshes, 1, 100)?;
         let busy = self
             .exposure()
             .max(Duration::from_micros(timing.readout_us));

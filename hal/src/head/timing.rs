@@ -2,11 +2,16 @@
 
 use std::time::Duration;
 
-use crate::camera::CameraTiming;
+use crate::camera::{CameraTiming, Starts};
 use crate::units::Timestamp;
 
 /// Default of [`Timing::tolerance`]: an exposure of exactly one refresh leaves no slack for jitter otherwise.
 pub const TOLERANCE: Duration = Duration::from_micros(200);
+/// Refreshes per pattern where a trigger starts the exposures and nothing is proven. After an exposure of one refresh (16.667 ms at 60 Hz) an IMX296 is
+/// read out for 1118 lines of 14.8148 µs (16.563 ms): of two refreshes 0.1 ms would be left for its own delays.
+const TRIGGERED_HOLD: u32 = 3;
+/// Refreshes per pattern where the camera runs by itself: an exposure of one whole refresh fits two from wherever it starts.
+const OWN_HOLD: u32 = 2;
 
 /// The moment that a camera's stamp marks. It depends on the driver, so it is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -32,7 +37,7 @@ pub struct Timing {
     pub readout: Duration,
     /// How far an exposure may reach beyond its pattern's time in view, at each end.
     pub tolerance: Duration,
-    /// Refreshes that each pattern stays in view, at least.
+    /// Refreshes that each pattern stays in view, at least. A camera that is triggered once in so many refreshes must lose no trigger.
     pub hold: u32,
 }
 
@@ -49,6 +54,18 @@ impl Default for Timing {
 }
 
 impl Timing {
+    /// The times of a real head that is not calibrated.
+    #[must_use]
+    pub fn unproven(starts: Starts) -> Self {
+        Self {
+            hold: match starts {
+                Starts::OnTrigger => TRIGGERED_HOLD,
+                Starts::ByItself => OWN_HOLD,
+            },
+            ..Self::default()
+        }
+    }
+
     /// The start of an exposure of `camera` with this stamp.
     #[must_use]
     pub fn exposure_start(&self, camera: &CameraTiming, stamp: Timestamp) -> Timestamp {

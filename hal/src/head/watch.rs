@@ -61,7 +61,7 @@ impl<M> Watched<M> {
 }
 
 impl Head {
-    /// Shows `showings` one after the other while the camera exposes as often as it can, and measures every frame. Flips and
+    /// Shows `showings` one after the other while the camera exposes as often as it does in a sequence, and measures every frame. Flips and
     /// frames that do not arrive are missing in the result, without an error. Ends at the latest `timeout` after its planned end.
     ///
     /// # Errors
@@ -72,8 +72,24 @@ impl Head {
         timeout: Duration,
         measure: &mut dyn FnMut(&Frame) -> M,
     ) -> Result<Watched<M>, Error> {
+        let spacing = self.refresh() * self.timing.hold.max(1);
+        self.watch_spaced(showings, spacing, timeout, measure)
+    }
+
+    /// As [`Head::watch`], with triggers `spacing` apart, or as far apart as the camera says if that is more.
+    ///
+    /// # Errors
+    /// The first error of a device.
+    pub fn watch_spaced<M>(
+        &mut self,
+        showings: &[Showing],
+        spacing: Duration,
+        timeout: Duration,
+        measure: &mut dyn FnMut(&Frame) -> M,
+    ) -> Result<Watched<M>, Error> {
         let (camera, refresh, timing) = (self.camera_timing(), self.refresh(), self.timing);
         let triggered = camera.starts == Starts::OnTrigger;
+        let spacing = spacing.max(camera.period);
         let mut seen = Watched {
             flips: Vec::new(),
             triggers: Vec::new(),
@@ -135,7 +151,7 @@ impl Head {
                     if due <= now {
                         let at = devices.trigger.fire()?;
                         seen.triggers.push(at);
-                        free = at + camera.period;
+                        free = at + spacing;
                         continue;
                     }
                     next = next.min(due);

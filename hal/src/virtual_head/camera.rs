@@ -66,7 +66,7 @@ impl Sensor {
         let jitter = Duration::from_micros(faults.trigger_jitter_us);
         let start = now + dice.up_to(Kind::TriggerJitter, self.count, 1.0, jitter);
         let longer = length.saturating_sub(mechanics.exposure);
-        self.busy_until = now + (mechanics.camera().period + longer);
+        self.busy_until = now + (mechanics.camera().period + mechanics.dead + longer);
         self.expose(start, length, mechanics, dice);
     }
 

@@ -23,6 +23,10 @@ pub struct Mechanics {
     pub readout: Duration,
     /// How long it takes to copy a frame out of the camera's buffer. A thread of its own copies one after the other.
     pub copy: Duration,
+    /// For how long after its readout a triggered camera still loses triggers, which it does not say.
+    pub dead: Duration,
+    /// Refreshes per pattern according to the head's calibration.
+    pub calibrated_hold: u32,
     /// Of a camera that runs by itself: its period, and the time from its start to its first exposure.
     pub free_running: Option<(Duration, Duration)>,
     /// What the camera's stamps mark.
@@ -43,6 +47,8 @@ impl Mechanics {
             exposure: refresh * refreshes,
             readout: Duration::ZERO,
             copy: Duration::ZERO,
+            dead: Duration::ZERO,
+            calibrated_hold: 1,
             free_running: None,
             stamp: Stamp::default(),
             faults: Faults::default(),
@@ -54,6 +60,7 @@ impl Mechanics {
             flip_to_light: self.calibrated_flip_to_light,
             stamp: self.stamp,
             readout: self.readout,
+            hold: self.calibrated_hold,
             ..Timing::default()
         }
     }

@@ -11,6 +11,8 @@ pub const COLDEST_C: f64 = -100.0;
 pub const HOTTEST_C: f64 = 200.0;
 /// Longest delay, standard deviation of it, and readout, ns.
 const MAX_TIME_NS: u64 = 10_000_000_000;
+/// Most refreshes per pattern.
+const MAX_REFRESHES: u32 = 1000;
 /// Longest name of a program or a file, characters.
 const MAX_NAME: usize = 255;
 /// Longest list of the files that models came from, characters.
@@ -47,6 +49,9 @@ impl CalibrationFile {
                 ("timing.readout_ns", timing.readout_ns),
             ] {
                 within(key, ns, 0, MAX_TIME_NS)?;
+            }
+            if let Some(refreshes) = timing.refreshes {
+                within("timing.refreshes", refreshes, 1, MAX_REFRESHES)?;
             }
         }
         if let Some(noise) = &self.noise {

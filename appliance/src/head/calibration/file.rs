@@ -103,6 +103,9 @@ pub struct TimingFile {
     pub stamp: Stamp,
     /// From the end of an exposure to the end of its readout.
     pub readout_ns: u64,
+    /// Refreshes per pattern at which a triggered camera was proven to lose no trigger.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refreshes: Option<u32>,
 }
 
 /// The camera's noise.
@@ -281,6 +284,7 @@ impl CalibrationFile {
             flip_to_light: Duration::from_nanos(timing.flip_to_light_ns),
             stamp: timing.stamp,
             readout: Duration::from_nanos(timing.readout_ns),
+            hold: timing.refreshes.unwrap_or(before.hold),
             ..before
         }
     }
@@ -291,7 +295,10 @@ impl CalibrationFile {
     /// If a number in it is not finite or the response cannot be inverted.
     pub fn sealed(mut self) -> Result<(Self, Vec<u8>), String> {
         // The oldest version that can hold it, so that a complete calibration can be read by older programs as well.
-        let first = self.missing().is_empty() && self.geometry.is_none();
+        let proven = |timing: &TimingFile| timing.refreshes.is_some();
+        let first = self.missing().is_empty()
+            && self.geometry.is_none()
+            && !self.timing.as_ref().is_some_and(proven);
         self.version = if first { 1 } else { VERSION };
         // The bounds ask for a fingerprint's form before there is one.
         self.fingerprint = NO_CHECKSUM.into();

@@ -1,13 +1,13 @@
 //! The doctor's checks of devices and time: devices answer, format and mode, flips, triggers, flip-to-light delay.
 
 use super::Check;
-use crate::head::examine::{Delay, Lit, PATIENCE, Stamps, load_black_and_white};
+use crate::head::examine::{Delay, Lit, PATIENCE, Spaced, Stamps, load_black_and_white, pace};
 use hal::camera::Starts;
 use hal::error::Error;
 use hal::head::{Head, Showing, TOLERANCE, Timing, Watched};
 use hal::projector::Flip;
 use hal::trigger::Spoiled;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::time::Duration;
 
 /// Flips whose cadence is judged.
@@ -153,12 +153,12 @@ pub(super) fn trigger(head: &mut Head, calibrated: bool) -> Result<Check, Error>
         seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
     }
     Ok(match head.camera_timing().starts {
-        Starts::OnTrigger => triggered(&seen),
+        Starts::OnTrigger => triggered(head, &seen)?,
         Starts::ByItself => by_itself(&seen, head.camera_timing().period),
     })
 }
 
-fn triggered(seen: &Watched<()>) -> Check {
+fn triggered(head: &mut Head, seen: &Watched<()>) -> Result<Check, Error> {
     let (pulses, frames) = (seen.triggers.len(), seen.frames.len());
     let latest = |frame: &hal::head::WatchedFrame<()>| {
         let off = seen.triggers.iter().map(|at| at.0.abs_diff(frame.start.0));
@@ -175,30 +175,47 @@ fn triggered(seen: &Watched<()>) -> Check {
     if frames == 0 {
         let found = format!("no frame for {pulses} triggers");
         let remedy = "check the wire from the trigger output to the camera's trigger input, and that the camera is in trigger mode";
-        return Check::new(found, Some(remedy), measured);
+        return Ok(Check::new(found, Some(remedy), measured));
     }
     if let Some(off) = pulse_off {
-        return Check::new(
+        return Ok(Check::new(
             format!(
                 "{spoiled} of {pulses} pulses were too long or too short, by up to {:.2} ms, and so was the exposure",
                 ms(off)
             ),
             Some("stop what else loads the computer, and give fringed a real-time priority"),
             measured,
-        );
+        ));
     }
-    let remedy = if frames < pulses {
-        Some(
-            "triggers are lost: check the wire's contact and level, and that the camera's period fits its exposure and readout",
-        )
-    } else if u128::from(off_us) > TOLERANCE.as_micros() {
+    if frames < pulses {
+        return Ok(lost(head.timing().hold, &pace(head)?, found, measured));
+    }
+    let remedy = if u128::from(off_us) > TOLERANCE.as_micros() {
         Some(
             "the camera's stamps mark another moment of the exposure than the calibration says: calibrate anew",
         )
     } else {
         None
     };
-    Check::new(found, remedy, measured)
+    Ok(Check::new(found, remedy, measured))
+}
+
+/// Triggers were lost with so many refreshes per pattern: because the camera was not ready for them, or by a bad contact.
+fn lost(refreshes: u32, tried: &[Spaced], found: String, mut measured: Value) -> Check {
+    let words = tried.iter().map(|spaced| format!("; {}", spaced.words()));
+    let found = found + &words.collect::<String>();
+    let needed = tried.last().filter(|spaced| spaced.none_lost());
+    measured["refreshes"] = json!(refreshes);
+    measured["refreshes_needed"] = json!(needed.map(|spaced| spaced.refreshes));
+    let remedy = match needed {
+        Some(needed) if needed.refreshes > refreshes => format!(
+            "the camera's readout and dead time need {} refreshes per pattern instead of {refreshes}: calibrate anew, or use a slower mode of \
+             the projector (58 Hz or less for an IMX296)",
+            needed.refreshes
+        ),
+        _ => "triggers are lost: check the wire's contact and level".into(),
+    };
+    Check::new(found, Some(&*remedy), measured)
 }
 
 fn by_itself(seen: &Watched<()>, nominal: Duration) -> Check {

@@ -1,13 +1,15 @@
 //! Measurements of a head: the doctor judges them, calibration stores them.
 //!
-//! Pictures are taken long after each flip ([`Lit`], [`pictures`]), so their measurements need no timing. The two measurements of time
-//! itself, what the camera's stamps mark ([`Stamps`]) and when the light of a flip comes ([`Delay`]), need no calibration.
+//! Pictures are taken long after each flip ([`Lit`], [`pictures`]), so their measurements need no timing. The measurements of time
+//! itself need no calibration: what the camera's stamps mark ([`Stamps`]), how soon it can be triggered again ([`pace`]), and when the light of a
+//! flip comes ([`Delay`]).
 
 mod content;
 mod contrast;
 mod delay;
 mod first_light;
 mod noise;
+mod pace;
 mod pictures;
 mod plate;
 mod response;
@@ -18,6 +20,7 @@ pub use contrast::{PITCHES, contrast};
 pub use delay::Delay;
 pub use first_light::{LONGEST_DARK, first_light};
 pub use noise::noise;
+pub use pace::{Spaced, pace};
 pub use pictures::{
     LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, SETTLE, counts, load_black_and_white, pictures,
 };

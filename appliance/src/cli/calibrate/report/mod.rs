@@ -40,6 +40,12 @@ impl Report<'_> {
                 Stamp::ReadoutEnd => "end of the readout",
             };
             line("stamps", format!("the camera's mark the {marks}"));
+            if let Some(refreshes) = timing.refreshes {
+                line(
+                    "pace",
+                    format!("no trigger is lost with a pattern in {refreshes} refreshes"),
+                );
+            }
             line(
                 "delay",
                 format!(

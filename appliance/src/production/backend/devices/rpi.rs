@@ -16,10 +16,7 @@ use hal::trigger::Trigger;
 #[cfg(feature = "i2c")]
 use std::time::Duration;
 
-/// Refreshes that each pattern stays in view: an exposure of one whole refresh fits two from wherever it starts.
-const HOLD: u32 = 2;
-
-/// Opens camera and projector. The delays between them are set later, from the calibration.
+/// Opens camera and projector. The times between them are set later, from the calibration.
 ///
 /// # Errors
 /// That of the device that is not there.
@@ -32,16 +29,12 @@ pub fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<Head, Erro
     let display = hal::kms::open(&config.projector)?;
     let clock = Monotonic::new(vec![camera.ready()?, display.descriptor()?]);
     let projector = controlled(&config.projector, Box::new(display))?;
-    let timing = Timing {
-        hold: HOLD,
-        ..Timing::default()
-    };
     Ok(Head::new(
         Box::new(camera),
         projector,
         trigger,
         Box::new(clock),
-        timing,
+        Timing::unproven(starts),
     ))
 }
 
