@@ -283,6 +283,7 @@ const CALIBRATION: [&str; 63] = [
     "timing.refreshes",
     "timing.sigma_ns",
     "timing.stamp",
+    "timing.stamp_late_ns",
     "version",
 ];
 

@@ -67,6 +67,7 @@ fn a_boundary_value_in_a_calibration_is_refused_by_its_key_or_the_head_is_known_
             flip_to_light_ns: 1000,
             sigma_ns: 10,
             stamp: Stamp::ExposureStart,
+            stamp_late_ns: Some(150_000),
             readout_ns: 0,
             refreshes: Some(3),
         }),
@@ -302,6 +303,7 @@ fn a_boundary_value_in_a_scenario_is_refused_by_its_key_or_the_scene_can_be_lit(
     let mut scenario = small_head();
     scenario.timing.calibrated_flip_to_light_us = Some(0);
     scenario.timing.calibrated_refreshes = Some(2);
+    scenario.timing.calibrated_stamp_late_us = Some(0);
     let mut tree = serde_json::to_value(&scenario).unwrap();
     tree["part"]["defects"] = json!([
         { "kind": "dent", "x": 0.0, "y": -8.0, "depth_mm": 0.6, "diameter_mm": 14.0 },

@@ -84,9 +84,7 @@ pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Resu
     let stamps = Stamps::measure(head)?;
     head.set_timing(Timing {
         flip_to_light: Duration::ZERO,
-        stamp: stamps.stamp,
-        readout: stamps.readout,
-        ..head.timing()
+        ..stamps.timing(head.timing())
     });
     progress(0.02, "pace of the camera");
     let pace = proven(&pace(head)?, &mut notes);
@@ -167,6 +165,7 @@ pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Resu
             flip_to_light_ns: nanoseconds(delay.duration()),
             sigma_ns: (delay.error * 1e9).ceil() as u64,
             stamp: stamps.stamp,
+            stamp_late_ns: stamps.late.map(nanoseconds),
             readout_ns: nanoseconds(stamps.readout),
             refreshes: pace,
         }),

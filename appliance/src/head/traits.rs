@@ -128,3 +128,41 @@ fn a_bad_contact_of_the_trigger_is_not_taken_for_a_slow_camera() {
     );
     assert!(!pace(&mut own.0).unwrap().last().unwrap().none_lost());
 }
+
+#[test]
+fn stamps_that_are_late_by_a_constant_are_named_measured_and_corrected() {
+    for late_us in [0, 150, 190, 300, 400] {
+        let more = format!(
+            "readout_us = 12000\nstamp_late_us = {late_us}\ncalibrated_stamp_late_us = 0\n[faults]\nstamp_jitter_us = 40\n"
+        );
+        let mut own = head(&more);
+        let checks = failed(&mut own);
+        assert_eq!(
+            checks.len(),
+            usize::from(late_us > 0),
+            "{late_us}: {checks:#?}"
+        );
+        if let Some(check) = checks.first() {
+            assert_eq!(check.name, "trigger");
+            assert!(check.remedy.contains("later than"), "{}", check.remedy);
+        }
+        // Uncorrected, stamps at 190 µs with 40 µs of jitter are beyond the tolerance now and then, and at 300 µs always.
+        let uncorrected = sequence(&mut own.0);
+        match late_us {
+            0 => assert_eq!(uncorrected.unwrap().unexplained, 0),
+            150 => {}
+            190 => assert!(uncorrected.unwrap().unexplained > 0),
+            _ => assert!(uncorrected.is_err(), "{uncorrected:?}"),
+        }
+        let made = calibrated(&mut own);
+        let found = made.file.timing.as_ref().unwrap().stamp_late_ns.unwrap();
+        assert!(
+            found.abs_diff(late_us * 1000) < 25_000,
+            "{late_us}: {found}"
+        );
+        let taken = sequence(&mut own.0).unwrap();
+        assert_eq!((taken.unexplained, taken.retaken), (0, 0), "{taken:?}");
+        let checks = failed(&mut own);
+        assert!(checks.is_empty(), "{checks:#?}");
+    }
+}

@@ -38,6 +38,11 @@ pub struct Timing {
     pub camera_phase_us: u64,
     /// What the camera's stamps mark: "exposure_start", "exposure_end" or "readout_end".
     pub stamp: Stamp,
+    /// From the moment that they mark to the stamps, 0…1 000 000 µs.
+    pub stamp_late_us: u64,
+    /// The same according to the head's calibration; if left out, the true one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibrated_stamp_late_us: Option<u64>,
 }
 
 impl Default for Timing {
@@ -54,6 +59,8 @@ impl Default for Timing {
             camera_period_us: 0,
             camera_phase_us: 0,
             stamp: Stamp::default(),
+            stamp_late_us: 0,
+            calibrated_stamp_late_us: None,
         }
     }
 }
@@ -70,6 +77,7 @@ impl Scenario {
         let (timing, refresh) = (&self.timing, self.refresh());
         let us = Duration::from_micros;
         let believed = timing.calibrated_flip_to_light_us;
+        let believed_late = timing.calibrated_stamp_late_us;
         Mechanics {
             refresh,
             flip_to_light: us(timing.flip_to_light_us),
@@ -83,6 +91,8 @@ impl Scenario {
             free_running: (timing.camera_period_us > 0)
                 .then(|| (us(timing.camera_period_us), us(timing.camera_phase_us))),
             stamp: timing.stamp,
+            stamp_late: us(timing.stamp_late_us),
+            calibrated_stamp_late: us(believed_late.unwrap_or(timing.stamp_late_us)),
             faults: self.faults.clone(),
         }
     }
@@ -117,6 +127,7 @@ impl Scenario {
             100.0,
         )?;
         let believed = timing.calibrated_flip_to_light_us.unwrap_or(0);
+        let believed_late = timing.calibrated_stamp_late_us.unwrap_or(0);
         for (key, us, most) in [
             ("timing.readout_us", timing.readout_us, 1e6),
             ("timing.dead_us", timing.dead_us, 1e6),
@@ -124,6 +135,8 @@ impl Scenario {
             ("timing.copy_us", timing.copy_us, 1e6),
             ("timing.first_light_us", timing.first_light_us, 6e7),
             ("timing.calibrated_flip_to_light_us", believed, 1e6),
+            ("timing.stamp_late_us", timing.stamp_late_us, 1e6),
+            ("timing.calibrated_stamp_late_us", believed_late, 1e6),
             ("timing.camera_period_us", timing.camera_period_us, 1e7),
             ("timing.camera_phase_us", timing.camera_phase_us, 1e7),
             ("faults.flip_jitter_us", faults.flip_jitter_us, 1e6),

@@ -33,6 +33,8 @@ pub struct Timing {
     pub flip_to_light: Duration,
     /// What the camera's stamps mark.
     pub stamp: Stamp,
+    /// From the moment that they mark to the stamp itself: a driver that stamps in an interrupt is late by a constant time.
+    pub stamp_late: Duration,
     /// From the end of an exposure to the end of its readout; used only where stamps mark the end of the readout.
     pub readout: Duration,
     /// How far an exposure may reach beyond its pattern's time in view, at each end.
@@ -46,6 +48,7 @@ impl Default for Timing {
         Self {
             flip_to_light: Duration::ZERO,
             stamp: Stamp::default(),
+            stamp_late: Duration::ZERO,
             readout: Duration::ZERO,
             tolerance: TOLERANCE,
             hold: 1,
@@ -69,10 +72,11 @@ impl Timing {
     /// The start of an exposure of `camera` with this stamp.
     #[must_use]
     pub fn exposure_start(&self, camera: &CameraTiming, stamp: Timestamp) -> Timestamp {
+        let marked = stamp - self.stamp_late;
         match self.stamp {
-            Stamp::ExposureStart => stamp,
-            Stamp::ExposureEnd => stamp - camera.exposure,
-            Stamp::ReadoutEnd => stamp - (camera.exposure + self.readout),
+            Stamp::ExposureStart => marked,
+            Stamp::ExposureEnd => marked - camera.exposure,
+            Stamp::ReadoutEnd => marked - (camera.exposure + self.readout),
         }
     }
 

@@ -170,9 +170,11 @@ impl<S: Scene> Bench<S> {
         let off = self
             .dice
             .up_to(Kind::StampJitter, exposure.count, 1.0, 2 * jitter);
-        let frame = self
-            .scene
-            .expose(seen, marked + off - jitter, exposure.count)?;
+        let frame = self.scene.expose(
+            seen,
+            marked + (mechanics.stamp_late + off) - jitter,
+            exposure.count,
+        )?;
         if exposure.twice {
             self.sensor.again = Some(frame.clone());
         }

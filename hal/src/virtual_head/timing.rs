@@ -31,6 +31,10 @@ pub struct Mechanics {
     pub free_running: Option<(Duration, Duration)>,
     /// What the camera's stamps mark.
     pub stamp: Stamp,
+    /// From the moment that they mark to the stamps.
+    pub stamp_late: Duration,
+    /// The same according to the head's calibration.
+    pub calibrated_stamp_late: Duration,
     /// What goes wrong.
     pub faults: Faults,
 }
@@ -51,6 +55,8 @@ impl Mechanics {
             calibrated_hold: 1,
             free_running: None,
             stamp: Stamp::default(),
+            stamp_late: Duration::ZERO,
+            calibrated_stamp_late: Duration::ZERO,
             faults: Faults::default(),
         }
     }
@@ -59,6 +65,7 @@ impl Mechanics {
         Timing {
             flip_to_light: self.calibrated_flip_to_light,
             stamp: self.stamp,
+            stamp_late: self.calibrated_stamp_late,
             readout: self.readout,
             hold: self.calibrated_hold,
             ..Timing::default()

@@ -47,6 +47,7 @@ impl CalibrationFile {
                 ("timing.flip_to_light_ns", timing.flip_to_light_ns),
                 ("timing.sigma_ns", timing.sigma_ns),
                 ("timing.readout_ns", timing.readout_ns),
+                ("timing.stamp_late_ns", timing.stamp_late_ns.unwrap_or(0)),
             ] {
                 within(key, ns, 0, MAX_TIME_NS)?;
             }

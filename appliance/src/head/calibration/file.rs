@@ -101,6 +101,9 @@ pub struct TimingFile {
     pub sigma_ns: u64,
     /// What the camera's stamps mark.
     pub stamp: Stamp,
+    /// From the moment that they mark to the stamps; of a triggered camera only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stamp_late_ns: Option<u64>,
     /// From the end of an exposure to the end of its readout.
     pub readout_ns: u64,
     /// Refreshes per pattern at which a triggered camera was proven to lose no trigger.
@@ -283,6 +286,7 @@ impl CalibrationFile {
         Timing {
             flip_to_light: Duration::from_nanos(timing.flip_to_light_ns),
             stamp: timing.stamp,
+            stamp_late: Duration::from_nanos(timing.stamp_late_ns.unwrap_or(0)),
             readout: Duration::from_nanos(timing.readout_ns),
             hold: timing.refreshes.unwrap_or(before.hold),
             ..before
@@ -295,10 +299,11 @@ impl CalibrationFile {
     /// If a number in it is not finite or the response cannot be inverted.
     pub fn sealed(mut self) -> Result<(Self, Vec<u8>), String> {
         // The oldest version that can hold it, so that a complete calibration can be read by older programs as well.
-        let proven = |timing: &TimingFile| timing.refreshes.is_some();
+        let newer =
+            |timing: &TimingFile| timing.refreshes.is_some() || timing.stamp_late_ns.is_some();
         let first = self.missing().is_empty()
             && self.geometry.is_none()
-            && !self.timing.as_ref().is_some_and(proven);
+            && !self.timing.as_ref().is_some_and(newer);
         self.version = if first { 1 } else { VERSION };
         // The bounds ask for a fingerprint's form before there is one.
         self.fingerprint = NO_CHECKSUM.into();

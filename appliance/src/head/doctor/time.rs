@@ -1,12 +1,15 @@
 //! The doctor's checks of devices and time: devices answer, format and mode, flips, triggers, flip-to-light delay.
 
 use super::Check;
-use crate::head::examine::{Delay, Lit, PATIENCE, Spaced, Stamps, load_black_and_white, pace};
+use crate::head::examine::{
+    Delay, Lit, MOST_LATE, PATIENCE, Spaced, Stamps, load_black_and_white, pace,
+};
 use hal::camera::Starts;
 use hal::error::Error;
-use hal::head::{Head, Showing, TOLERANCE, Timing, Watched};
+use hal::head::{Head, Showing, TOLERANCE, Watched, WatchedFrame};
 use hal::projector::Flip;
 use hal::trigger::Spoiled;
+use hal::units::Timestamp;
 use serde_json::{Value, json};
 use std::time::Duration;
 
@@ -143,12 +146,8 @@ pub(super) fn trigger(head: &mut Head, calibrated: bool) -> Result<Check, Error>
     let mut seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
     if !calibrated && !seen.frames.is_empty() {
         // The doctor runs before the head is calibrated, so it measures the stamps as calibrating will.
-        let Stamps { stamp, readout } = Stamps::measure(head)?;
-        head.set_timing(Timing {
-            stamp,
-            readout,
-            ..head.timing()
-        });
+        let stamps = Stamps::measure(head)?;
+        head.set_timing(stamps.timing(head.timing()));
         load_black_and_white(head)?;
         seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
     }
@@ -160,15 +159,22 @@ pub(super) fn trigger(head: &mut Head, calibrated: bool) -> Result<Check, Error>
 
 fn triggered(head: &mut Head, seen: &Watched<()>) -> Result<Check, Error> {
     let (pulses, frames) = (seen.triggers.len(), seen.frames.len());
-    let latest = |frame: &hal::head::WatchedFrame<()>| {
-        let off = seen.triggers.iter().map(|at| at.0.abs_diff(frame.start.0));
-        off.min().unwrap_or(u64::MAX)
+    let after = |frame: &WatchedFrame<()>| {
+        let after = |at: &Timestamp| (i128::from(frame.start.0) - i128::from(at.0)) / 1000;
+        seen.triggers.iter().map(after).min_by_key(|us| us.abs())
     };
-    let off_us = seen.frames.iter().map(latest).max().unwrap_or(0) / 1000;
+    let mut after_us: Vec<_> = seen.frames.iter().filter_map(after).collect();
+    after_us.sort_unstable();
+    let late_us = after_us.get(after_us.len() / 2).copied().unwrap_or(0);
+    let off_us = after_us
+        .iter()
+        .map(|us| us.unsigned_abs())
+        .max()
+        .unwrap_or(0);
     let spoiled = seen.spoiled.len();
     let pulse_off = seen.spoiled.iter().map(Spoiled::off).max();
     let measured = json!({
-        "triggers": pulses, "frames": frames, "off_us": off_us, "spoiled": spoiled,
+        "triggers": pulses, "frames": frames, "off_us": off_us as u64, "late_us": late_us as i64, "spoiled": spoiled,
     });
     let found =
         format!("{frames} frames for {pulses} triggers, exposed {off_us} µs from them at most");
@@ -190,14 +196,23 @@ fn triggered(head: &mut Head, seen: &Watched<()>) -> Result<Check, Error> {
     if frames < pulses {
         return Ok(lost(head.timing().hold, &pace(head)?, found, measured));
     }
-    let remedy = if u128::from(off_us) > TOLERANCE.as_micros() {
+    let tolerance = TOLERANCE.as_micros();
+    let remedy = if late_us.unsigned_abs() > MOST_LATE.as_micros() {
         Some(
-            "the camera's stamps mark another moment of the exposure than the calibration says: calibrate anew",
+            "the camera's stamps mark another moment of the exposure than the calibration says: calibrate anew".to_owned(),
         )
+    } else if late_us.unsigned_abs() > tolerance / 2 {
+        Some(format!(
+            "the camera's stamps are {late_us} µs later than the calibration says, of {tolerance} µs that are tolerated: calibrate anew"
+        ))
+    } else if off_us > tolerance {
+        Some(format!(
+            "the camera's stamps are not regular (off by {late_us} µs in the middle, {off_us} µs at most): the driver must stamp frames in its interrupt"
+        ))
     } else {
         None
     };
-    Ok(Check::new(found, remedy, measured))
+    Ok(Check::new(found, remedy.as_deref(), measured))
 }
 
 /// Triggers were lost with so many refreshes per pattern: because the camera was not ready for them, or by a bad contact.

@@ -26,7 +26,7 @@ pub use pictures::{
 };
 pub use plate::{PITCH as PLATE_PITCH, plate};
 pub use response::{lights, response};
-pub use stamps::Stamps;
+pub use stamps::{MOST_LATE, Stamps};
 
 use std::time::Duration;
 

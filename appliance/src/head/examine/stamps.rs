@@ -1,6 +1,7 @@
 //! Which moment the camera's time stamps mark: the start of the exposure, its end, or the end of the readout.
 //!
-//! For a triggered camera it follows from the time between trigger and stamp. For a free-running camera only the time from the stamp to the
+//! For a triggered camera it follows from the time between trigger and stamp. Drivers stamp in an interrupt, so stamps are later than the
+//! moment that they mark by a constant time and some jitter: the median of that time is measured, too, and subtracted from then on. For a free-running camera only the time from the stamp to the
 //! delivery of its frame is known: exposure and readout, the readout, or zero. The length of a readout is then taken as configured,
 //! and a time that fits none of the three is an error.
 
@@ -14,17 +15,33 @@ use std::time::Duration;
 
 /// Showings over which frames are taken.
 const SHOWINGS: usize = 6;
+/// How late stamps may be; a longer time after the exposure is a readout.
+pub const MOST_LATE: Duration = Duration::from_micros(500);
 
 /// What the time stamps mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamps {
     /// The moment.
     pub stamp: Stamp,
+    /// How much later than that moment the stamps are, the median. Unknown of a camera that runs by itself, where the flip-to-light delay
+    /// contains it.
+    pub late: Option<Duration>,
     /// From the end of an exposure to the end of its readout, or to the delivery of its frame.
     pub readout: Duration,
 }
 
 impl Stamps {
+    /// A head's timing with these stamps.
+    #[must_use]
+    pub fn timing(&self, before: Timing) -> Timing {
+        Timing {
+            stamp: self.stamp,
+            stamp_late: self.late.unwrap_or_default(),
+            readout: self.readout,
+            ..before
+        }
+    }
+
     /// Takes frames of any scene. The head's timing is not used, and is as before afterwards.
     ///
     /// # Errors
@@ -36,6 +53,7 @@ impl Stamps {
         // With this, `start` of a frame is its stamp.
         head.set_timing(Timing {
             stamp: Stamp::ExposureStart,
+            stamp_late: Duration::ZERO,
             ..before
         });
         let camera = head.camera_timing();
@@ -101,22 +119,29 @@ fn by_triggers(
             ms(after[after.len() - 1])
         ));
     }
-    let fetched = |stamp: Stamp, before: Duration| {
+    let fetched = |stamp: Stamp, late: i128, before: Duration| {
         let waits = frames.iter().map(|frame| frame.arrived.since(frame.start));
+        // No stamp is early: a negative time is that of reading the clock after the trigger.
+        let late = Duration::from_nanos(u64::try_from(late).unwrap_or(0));
+        let waited = waits.min().unwrap_or_default() + late;
         Ok(Stamps {
             stamp,
-            readout: waits.min().unwrap_or_default().saturating_sub(before),
+            late: Some(late),
+            readout: waited.saturating_sub(before),
         })
     };
-    if middle.abs() <= slack {
-        return fetched(Stamp::ExposureStart, camera.exposure);
+    let late = -slack..=nanoseconds(MOST_LATE.min(camera.exposure / 4));
+    if late.contains(&middle) {
+        return fetched(Stamp::ExposureStart, middle, camera.exposure);
     }
-    if (middle - exposure).abs() <= slack {
-        return fetched(Stamp::ExposureEnd, Duration::ZERO);
+    if late.contains(&(middle - exposure)) {
+        return fetched(Stamp::ExposureEnd, middle - exposure, Duration::ZERO);
     }
     match u64::try_from(middle - exposure) {
         Ok(readout) if readout <= camera.delivery.as_nanos() as u64 + slack as u64 => Ok(Stamps {
             stamp: Stamp::ReadoutEnd,
+            // The readout contains how late the stamps are.
+            late: Some(Duration::ZERO),
             readout: Duration::from_nanos(readout),
         }),
         _ => wrong(format!(
@@ -148,6 +173,7 @@ fn by_waiting(camera: &CameraTiming, frames: &[WatchedFrame<()>]) -> Result<Stam
     match best {
         Some((stamp, expected, before)) if wait.abs_diff(expected) <= exposure / 3 => Ok(Stamps {
             stamp,
+            late: None,
             readout: match stamp {
                 Stamp::ReadoutEnd => delivery,
                 _ => wait.saturating_sub(before),
@@ -243,6 +269,7 @@ mod tests {
                 found,
                 Stamps {
                     stamp,
+                    late: Some(Duration::ZERO),
                     readout: ms(readout)
                 },
                 "{mark} ms after the trigger"

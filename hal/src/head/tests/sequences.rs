@@ -126,6 +126,8 @@ fn stamps_mean_what_calibration_says() {
     for stamp in [Stamp::ExposureStart, Stamp::ExposureEnd, Stamp::ReadoutEnd] {
         let mechanics = Mechanics {
             stamp,
+            stamp_late: Duration::from_micros(400),
+            calibrated_stamp_late: Duration::from_micros(400),
             readout: Duration::from_millis(9),
             ..plain()
         };

@@ -39,7 +39,11 @@ impl Report<'_> {
                 Stamp::ExposureEnd => "end of the exposure",
                 Stamp::ReadoutEnd => "end of the readout",
             };
-            line("stamps", format!("the camera's mark the {marks}"));
+            let late = timing
+                .stamp_late_ns
+                .map(|ns| format!(", {} µs late", ns / 1000));
+            let late = late.unwrap_or_default();
+            line("stamps", format!("the camera's mark the {marks}{late}"));
             if let Some(refreshes) = timing.refreshes {
                 line(
                     "pace",
