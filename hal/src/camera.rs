@@ -51,6 +51,12 @@ pub trait Camera: Send {
     /// How the camera takes its frames.
     fn timing(&self) -> CameraTiming;
 
+    /// How long it may stay on without an exposure; zero if it is to be stopped after each sequence. A triggered camera that stays on
+    /// is ready for the next sequence at once.
+    fn stays_on(&self) -> Duration {
+        Duration::ZERO
+    }
+
     /// Checks that the camera is still connected, without disturbing it. A back-end whose driver cannot tell returns `Ok`.
     ///
     /// # Errors

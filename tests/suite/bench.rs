@@ -153,6 +153,8 @@ fn time_stands_against_error_and_the_cycle_has_its_stages() {
             positive(cycle, key);
         }
         assert!(positive(cycle, "total_ms") >= positive(cycle, "exposure_ms"));
+        // The camera takes half a second to start, and is on.
+        assert_eq!(cycle["start_ms"], 0.0);
         assert!(!cycle["stages"].as_object().unwrap().is_empty());
     }
 }

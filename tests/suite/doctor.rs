@@ -48,7 +48,7 @@ fn a_head_that_is_well_passes_every_step_whatever_its_timing() {
         let run = doctor(folder.path(), &format!("{HEAD}{timing}")).succeeded();
         let report: Value = serde_json::from_str(&run.stdout).unwrap();
         assert_eq!(report["healthy"], true, "{report:#}");
-        assert_eq!(with(&report, "pass").len(), 12, "{report:#}");
+        assert_eq!(with(&report, "pass").len(), 13, "{report:#}");
     }
 }
 
@@ -83,6 +83,11 @@ fn each_single_fault_is_named_with_a_remedy_and_nothing_else_is() {
             "[faults]\nlong_pulse = 0.3\nlong_pulse_us = 5000\nseed = 3\n",
             "trigger",
             "loads the computer",
+        ),
+        (
+            "[timing]\nstart_up_us = 500000\nstays_on_s = 0\n",
+            "start",
+            "always-on",
         ),
         ("[faults]\ncompressed = true\n", "format", "R16"),
         (

@@ -302,7 +302,7 @@ def the_head_is_that_of_the_hardware_guide(layer):
     guide = (layer.workspace / "docs/hardware.md").read_text()
     blocks = re.findall(r"^```\w*\n(.*?)^```", guide, re.M | re.S)
     config = next(block for block in blocks if "camera_auto_detect" in block)
-    cameras = {"pi4": "imx296", "pi5": "imx296,cam0"}
+    cameras = {"pi4": "imx296,always-on", "pi5": "imx296,cam0,always-on"}
     for model, camera in cameras.items():
         found = firmware.settings(layer.file(f"{BOOT}/config.txt"), model, 2)
         for line in config.replace(f"={cameras['pi5']}\n", f"={camera}\n").split():

@@ -166,3 +166,24 @@ fn stamps_that_are_late_by_a_constant_are_named_measured_and_corrected() {
         assert!(checks.is_empty(), "{checks:#?}");
     }
 }
+
+#[test]
+fn a_slow_start_of_the_camera_is_named_where_it_is_stopped_after_each_cycle_and_is_waited_for_once()
+{
+    let more = "readout_us = 12000\nstart_up_us = 500000\n";
+    let mut own = head(&format!("{more}stays_on_s = 0\n"));
+    let checks = failed(&mut own);
+    let [check] = &checks[..] else {
+        panic!("{checks:#?}");
+    };
+    assert_eq!(check.name, "start");
+    assert_eq!(check.measured["start_ms"], 500.0);
+    let waits = |head: &mut Head| [(); 3].map(|()| sequence(head).unwrap().start_up.as_millis());
+    assert_eq!(waits(&mut own.0), [500, 500, 500]);
+    let mut own = head(more);
+    assert_eq!(failed(&mut own).len(), 0);
+    assert_eq!(waits(&mut own.0), [500, 0, 0]);
+    // A camera that runs by itself is always stopped.
+    let mut own = head(&format!("{more}camera_period_us = 33333\n"));
+    assert!(failed(&mut own)[0].remedy.contains("always-on"));
+}

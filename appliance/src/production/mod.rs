@@ -139,7 +139,7 @@ impl Worker {
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
                 Err(RecvTimeoutError::Timeout) => {
                     self.station.event(Event::Alive);
-                    self.lost = self.opened.head.present().err();
+                    self.lost = self.opened.head.rest().err();
                     self.tell_projector(self.opened.head.controller());
                 }
             }

@@ -4,6 +4,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// A computer, by the root of its file system.
 #[derive(Clone, Debug)]
@@ -102,6 +103,28 @@ impl Host {
     }
 }
 
+/// How long libcamera waits for a frame before it gives a camera up, where its configuration says so: the file that the variable
+/// `LIBCAMERA_RPI_CONFIG_FILE` names. Zero if it says nothing: about a second.
+pub fn libcamera_patience() -> Duration {
+    let file = std::env::var_os("LIBCAMERA_RPI_CONFIG_FILE");
+    let text = file.and_then(|file| fs::read_to_string(file).ok());
+    text.map_or(Duration::ZERO, |text| patience_in(&text))
+}
+
+/// `camera_timeout_value_ms` in a file of libcamera, whose YAML is one object of JSON with comments.
+fn patience_in(text: &str) -> Duration {
+    let lines = text
+        .lines()
+        .map(|line| line.split('#').next().unwrap_or(""));
+    let value = lines.filter_map(|line| line.split_once("camera_timeout_value_ms"));
+    let number = value.map(|(_, value)| {
+        let digits = value.trim_start_matches(['"', ':', ' ', '\t']);
+        let end = digits.find(|c: char| !c.is_ascii_digit());
+        digits[..end.unwrap_or(digits.len())].parse().unwrap_or(0)
+    });
+    Duration::from_millis(number.last().unwrap_or(0))
+}
+
 /// The first two numbers of a version.
 pub fn major_minor(version: &str) -> Option<[u16; 2]> {
     let mut numbers = version.split(|c: char| !c.is_ascii_digit());
@@ -171,6 +194,22 @@ pub(crate) mod tests {
         assert_eq!((host.throttled(), host.temperature_c()), (None, None));
         assert_eq!((host.kernel(), host.libcamera()), (None, None));
         assert_eq!(host.sensor_waits_for_triggers(), None);
+    }
+
+    #[test]
+    fn the_patience_of_libcamera_is_that_of_its_file() {
+        for (text, ms) in [
+            (
+                "# Comment\n{ \"version\": 1.0, \"pipeline_handler\": { \"camera_timeout_value_ms\": 60000 } }",
+                60_000,
+            ),
+            ("{\n  # \"camera_timeout_value_ms\": 5\n}\n", 0),
+            ("camera_timeout_value_ms: 900\n", 900),
+            ("\"camera_timeout_value_ms\": -3", 0),
+            ("", 0),
+        ] {
+            assert_eq!(patience_in(text), Duration::from_millis(ms), "{text}");
+        }
     }
 
     #[test]

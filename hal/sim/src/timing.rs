@@ -20,6 +20,10 @@ pub struct Timing {
     pub readout_us: u64,
     /// How long it takes to copy a frame out of the camera's buffer, in a thread of its own, 0…1 000 000 µs.
     pub copy_us: u64,
+    /// From the camera's start until it can be triggered or runs, 0…10 000 000 µs.
+    pub start_up_us: u64,
+    /// How long a triggered camera may stay on without an exposure, 0…1000 s; 0: it is stopped after each sequence.
+    pub stays_on_s: u64,
     /// For how long after its readout a triggered camera still loses triggers, which its stated times do not contain, 0…1 000 000 µs.
     pub dead_us: u64,
     /// Refreshes per pattern according to the head's calibration, 1…100; if left out, as many as the camera needs.
@@ -51,6 +55,8 @@ impl Default for Timing {
             exposure_refreshes: 2.0,
             readout_us: 0,
             copy_us: 0,
+            start_up_us: 0,
+            stays_on_s: 30,
             dead_us: 0,
             calibrated_refreshes: None,
             flip_to_light_us: 0,
@@ -86,6 +92,8 @@ impl Scenario {
             exposure: self.exposure(),
             readout: us(timing.readout_us),
             copy: us(timing.copy_us),
+            start_up: us(timing.start_up_us),
+            stays_on: Duration::from_secs(timing.stays_on_s),
             dead: us(timing.dead_us),
             calibrated_hold: timing.calibrated_refreshes.unwrap_or(self.needed()),
             free_running: (timing.camera_period_us > 0)
@@ -130,6 +138,8 @@ impl Scenario {
         let believed_late = timing.calibrated_stamp_late_us.unwrap_or(0);
         for (key, us, most) in [
             ("timing.readout_us", timing.readout_us, 1e6),
+            ("timing.start_up_us", timing.start_up_us, 1e7),
+            ("timing.stays_on_s", timing.stays_on_s, 1e3),
             ("timing.dead_us", timing.dead_us, 1e6),
             ("timing.flip_to_light_us", timing.flip_to_light_us, 1e6),
             ("timing.copy_us", timing.copy_us, 1e6),

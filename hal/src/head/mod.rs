@@ -8,6 +8,7 @@ mod failure;
 mod identity;
 mod pacing;
 mod sequencer;
+mod streaming;
 mod timing;
 mod watch;
 
@@ -24,6 +25,7 @@ use crate::trigger::Trigger;
 use crate::units::Timestamp;
 use pacing::Pacing;
 use sequencer::{Act, Sequencer};
+use streaming::Streaming;
 pub use timing::{Stamp, TOLERANCE, Timing};
 pub use watch::{Showing, Watched, WatchedFrame};
 
@@ -42,11 +44,15 @@ pub(crate) struct Devices {
     pub projector: Box<dyn Projector>,
     pub trigger: Box<dyn Trigger>,
     pub clock: Box<dyn Clock>,
+    /// Whether the camera stayed on after a sequence, and which frames it had given.
+    streaming: Streaming,
 }
 
 /// How a sequence was taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Exposure {
+    /// How long the camera took to start; zero if it was on.
+    pub start_up: Duration,
     /// When the first pattern came into view.
     pub started: Timestamp,
     /// When the exposure of the last frame started.
@@ -101,6 +107,7 @@ impl Head {
                 projector,
                 trigger,
                 clock,
+                streaming: Streaming::default(),
             },
             timing,
             sequencer: Sequencer::default(),
@@ -180,7 +187,8 @@ impl Head {
     /// A frame belongs to a pattern if its whole exposure lies within the pattern's time in view, by the times and
     /// counts of flips and frames and never by the order of arrival, and if no pulse of the trigger spoiled it. A pattern
     /// without such a frame is shown again. The sequence ends at the latest `timeout` after its planned end.
-    /// However it ends, the camera is stopped and the projector blank afterwards. `sink` delays no flip: another thread serves the
+    /// However it ends, the projector is blank afterwards. The camera is stopped, unless it stays on ([`Camera::stays_on`]) and each trigger
+    /// gave its frame. `sink` delays no flip: another thread serves the
     /// devices while `sink` runs.
     ///
     /// # Errors
@@ -222,29 +230,20 @@ impl Head {
         } = self;
         let camera = devices.camera.timing();
         let pacing = Pacing::new(devices.projector.refresh(), &camera, timing);
-        let deadline = devices.clock.now() + (pacing.planned(indices.len()) + timeout);
-        sequencer.begin(pacing, indices, deadline);
+        let planned = pacing.planned(indices.len()) + timeout;
         let start_of = |frame: &Frame| timing.exposure_start(&camera, frame.timestamp());
-        devices.exposing(|devices| {
-            if devices.clock.stands_still() {
-                return carry_out(devices, sequencer, timeout, &start_of, sink);
-            }
-            std::thread::scope(|scope| {
-                let (frames, taken) = mpsc::channel();
-                let start_of = &start_of;
-                let served = scope.spawn(move || {
-                    let mut hand = |index, frame| frames.send((index, frame)).is_ok();
-                    carry_out(devices, sequencer, timeout, start_of, &mut hand)
-                });
-                for (index, frame) in taken {
-                    if !sink(index, frame) {
-                        break;
-                    }
-                }
-                served
-                    .join()
-                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-            })
+        devices.exposing(|devices, start_up| {
+            sequencer.begin(pacing, indices, devices.clock.now() + planned);
+            let served = if devices.clock.stands_still() {
+                carry_out(devices, sequencer, timeout, &start_of, sink)
+            } else {
+                beside(devices, sequencer, timeout, &start_of, sink)
+            };
+            let exposure = Exposure {
+                start_up,
+                ..served?
+            };
+            Ok((exposure, sequencer.all_answered()))
         })
     }
 
@@ -254,24 +253,29 @@ impl Head {
     }
 }
 
-impl Devices {
-    /// Calls `work` with a running camera. However it ends, the camera is stopped and the projector blank afterwards.
-    pub fn exposing<R>(
-        &mut self,
-        work: impl FnOnce(&mut Self) -> Result<R, Error>,
-    ) -> Result<R, Error> {
-        let result = match self.camera.start() {
-            Ok(()) => work(self),
-            Err(error) => Err(error),
-        };
-        // Both calls are made even if the first fails; an error of `work` is more useful than theirs and goes first.
-        let stopped = self.camera.stop();
-        let blanked = self.projector.blank();
-        let result = result?;
-        stopped?;
-        blanked?;
-        Ok(result)
-    }
+/// As [`carry_out`], in another thread, so that `sink` delays no flip.
+fn beside(
+    devices: &mut Devices,
+    sequencer: &mut Sequencer,
+    timeout: Duration,
+    start_of: &(dyn Fn(&Frame) -> Timestamp + Sync),
+    sink: &mut dyn FnMut(usize, Frame) -> bool,
+) -> Result<Exposure, Error> {
+    std::thread::scope(|scope| {
+        let (frames, taken) = mpsc::channel();
+        let served = scope.spawn(move || {
+            let mut hand = |index, frame| frames.send((index, frame)).is_ok();
+            carry_out(devices, sequencer, timeout, start_of, &mut hand)
+        });
+        for (index, frame) in taken {
+            if !sink(index, frame) {
+                break;
+            }
+        }
+        served
+            .join()
+            .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
 }
 
 /// Passes events to the sequencer and does what it decides, until the sequence ends or `hand` returns `false`.
@@ -287,12 +291,16 @@ fn carry_out(
         projector,
         trigger,
         clock,
+        streaming,
     } = devices;
     loop {
         while let Some(flip) = projector.poll_flip()? {
             sequencer.flipped(flip);
         }
         while let Some(frame) = camera.poll_frame()? {
+            if !streaming.is_new(&frame) {
+                continue;
+            }
             let (start, count) = (start_of(&frame), frame.count());
             sequencer.frame(frame.restamped(start, count));
         }

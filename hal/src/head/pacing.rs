@@ -107,6 +107,11 @@ impl Pacing {
         self.count += 1;
     }
 
+    /// Triggers so far.
+    pub fn triggers(&self) -> usize {
+        self.count
+    }
+
     /// Whether a trigger explains an exposure that started at `start`, with `before` exposures before it in this sequence: a triggered
     /// camera starts an exposure at a trigger, and each exposure needs a trigger of its own. Otherwise its stamp is wrong.
     pub fn explains(&self, start: Timestamp, before: u64) -> bool {

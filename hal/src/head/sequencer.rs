@@ -127,6 +127,11 @@ impl Sequencer {
         }
     }
 
+    /// Whether each trigger of this sequence gave a frame that was handed over, so that no other can arrive later.
+    pub fn all_answered(&self) -> bool {
+        self.handed == self.positions.len() && self.pacing.triggers() == self.handed
+    }
+
     /// The queued flip has happened. A flip that was not queued is ignored.
     pub fn flipped(&mut self, flip: Flip) {
         let Some(queued) = self.queued.take() else {

@@ -99,7 +99,7 @@ impl Head {
         let refreshes: u32 = showings.iter().map(|showing| showing.refreshes + 1).sum();
         // The last exposure ends, and its frame arrives, after the last pattern.
         let rest = camera.exposure + camera.period + camera.delivery + timing.flip_to_light;
-        self.devices.exposing(|devices| {
+        self.devices.exposing(|devices, _| {
             let deadline = devices.clock.now() + (refresh * refreshes + rest + timeout);
             let (mut queued, mut next_flip, mut settled) = (0, devices.clock.now(), None);
             let mut free = devices.clock.now();
@@ -115,6 +115,9 @@ impl Head {
                     settled = Some(flip.timestamp + refresh * showing.settle);
                 }
                 while let Some(frame) = devices.camera.poll_frame()? {
+                    if !devices.streaming.is_new(&frame) {
+                        continue;
+                    }
                     seen.frames.push(WatchedFrame {
                         start: timing.exposure_start(&camera, frame.timestamp()),
                         arrived: devices.clock.now(),
@@ -132,7 +135,8 @@ impl Head {
                 let shown = seen.flips.len() == showings.len();
                 let end = next_flip + (refresh + timing.flip_to_light);
                 if now >= deadline || shown && now >= end + rest {
-                    return Ok(());
+                    // Frames of the last triggers may still be missing.
+                    return Ok(((), false));
                 }
                 if !shown && queued == seen.flips.len() && now >= next_flip {
                     devices.projector.queue(showings[queued].index)?;

@@ -14,7 +14,7 @@ use super::open::Configured;
 use super::owner::{Event, Order, Wires, own, with_manager};
 use super::report::ContinuedCount;
 use super::{Reading, Settings};
-use crate::camera::{Camera, CameraTiming, Encoding};
+use crate::camera::{Camera, CameraTiming, Encoding, Starts};
 use crate::error::{DeviceKind, Error};
 use crate::frame::{Frame, FrameFormat};
 
@@ -225,6 +225,13 @@ impl Camera for LibCamera {
             exposure: self.settings.exposing.exposure,
             period: self.settings.exposing.period,
             delivery: self.settings.delivery,
+        }
+    }
+
+    fn stays_on(&self) -> Duration {
+        match self.settings.starts {
+            Starts::OnTrigger => self.settings.stays_on,
+            Starts::ByItself => Duration::ZERO,
         }
     }
 

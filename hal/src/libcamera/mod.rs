@@ -48,6 +48,8 @@ pub struct Settings {
     pub controlled: bool,
     /// From the end of an exposure until its frame can be fetched, without any delay.
     pub delivery: Duration,
+    /// How long a triggered camera may stay on without an exposure: less than the time after which the library gives it up.
+    pub stays_on: Duration,
     /// Buffers to ask for. A camera may grant fewer.
     pub buffers: u32,
 }
@@ -73,6 +75,7 @@ impl Settings {
             },
             controlled: true,
             delivery: microseconds(setup.delivery_us),
+            stays_on: Duration::ZERO,
             buffers: BUFFERS,
         }
     }

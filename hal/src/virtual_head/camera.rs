@@ -196,6 +196,14 @@ impl<S: Scene> Camera for VirtualDevice<S> {
         lock(&self.bench).mechanics.camera()
     }
 
+    fn stays_on(&self) -> Duration {
+        let mechanics = &lock(&self.bench).mechanics;
+        match mechanics.free_running {
+            Some(_) => Duration::ZERO,
+            None => mechanics.stays_on,
+        }
+    }
+
     fn present(&self) -> Result<(), Error> {
         self.plugged(DEVICE, "looking for the camera").map(|_| ())
     }
@@ -209,6 +217,7 @@ impl<S: Scene> Camera for VirtualDevice<S> {
             ));
         }
         bench.sensor.armed = true;
+        bench.now = bench.now + bench.mechanics.start_up;
         (bench.sensor.started, bench.sensor.since) = (bench.now, 0);
         Ok(())
     }

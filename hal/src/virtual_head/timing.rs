@@ -6,6 +6,9 @@ use super::Faults;
 use crate::camera::{CameraTiming, Encoding, Starts};
 use crate::head::{Stamp, Timing};
 
+/// How long a triggered camera stays on between sequences, unless stated otherwise.
+const STAYS_ON: Duration = Duration::from_secs(30);
+
 /// The true times of a virtual head, and its faults.
 #[derive(Clone, Debug)]
 pub struct Mechanics {
@@ -27,6 +30,10 @@ pub struct Mechanics {
     pub dead: Duration,
     /// Refreshes per pattern according to the head's calibration.
     pub calibrated_hold: u32,
+    /// From the camera's start until it can be triggered.
+    pub start_up: Duration,
+    /// How long a triggered camera may stay on without an exposure.
+    pub stays_on: Duration,
     /// Of a camera that runs by itself: its period, and the time from its start to its first exposure.
     pub free_running: Option<(Duration, Duration)>,
     /// What the camera's stamps mark.
@@ -53,6 +60,8 @@ impl Mechanics {
             copy: Duration::ZERO,
             dead: Duration::ZERO,
             calibrated_hold: 1,
+            start_up: Duration::ZERO,
+            stays_on: STAYS_ON,
             free_running: None,
             stamp: Stamp::default(),
             stamp_late: Duration::ZERO,

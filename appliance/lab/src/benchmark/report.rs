@@ -233,4 +233,11 @@ fn budget_table(text: &mut String, budgets: &[Budget]) {
             budget.x_kernel,
         );
     }
+    if let Some(budget) = budgets.first() {
+        let _ = writeln!(
+            text,
+            "\nStart of the camera: {:.0} ms in each cycle, 500 ms in the first one after a pause. The camera stays on between cycles.",
+            budget.start_ms
+        );
+    }
 }

@@ -77,10 +77,11 @@ fn named(name: &'static str, check: Check) -> Check {
 }
 
 /// The checks in their order, each with the checks that must have passed before it.
-const CHECKS: [(&str, &[&str]); 12] = [
+const CHECKS: [(&str, &[&str]); 13] = [
     ("devices", &[]),
     ("format", &["devices"]),
     ("mode", &["devices"]),
+    ("start", &["devices"]),
     ("cadence", &["devices"]),
     ("trigger", &["devices"]),
     ("delivery", &["devices", "trigger"]),
@@ -127,6 +128,7 @@ pub fn examine(
             "devices" => time::devices(head),
             "format" => Ok(time::format(head)),
             "mode" => Ok(time::mode(head)),
+            "start" => time::start(head),
             "cadence" => time::cadence(head),
             "trigger" => time::trigger(head, calibrated),
             "delivery" => delivery::delivery(head),

@@ -17,6 +17,8 @@ use std::time::Duration;
 const FLIPS: u32 = 60;
 /// Largest relative deviation of the period of flips from the mode's: a mode that says 60 Hz may run at 59.94.
 const PERIOD_TOLERANCE: f64 = 2e-3;
+/// A start of the camera that takes longer is noticed in a cycle.
+const SLOW_START: Duration = Duration::from_millis(100);
 /// Refreshes over which the trigger is judged.
 const TRIGGERED: u32 = 24;
 /// The index of white among the patterns of [`load_black_and_white`].
@@ -81,6 +83,29 @@ pub(super) fn mode(head: &Head) -> Check {
         ms(whole)
     );
     Check::new(found, (off > TOLERANCE).then_some(&*remedy), measured)
+}
+
+/// How long a cycle waits for the camera to start.
+pub(super) fn start(head: &mut Head) -> Result<Check, Error> {
+    let (took, stays_on) = (head.start_up()?, head.stays_on());
+    let triggered = head.camera_timing().starts == Starts::OnTrigger;
+    let measured = json!({ "start_ms": ms(took), "stays_on_s": stays_on.as_secs_f64() });
+    let then = match stays_on.is_zero() {
+        true => "is stopped after each cycle".to_owned(),
+        false => format!("stays on between cycles for up to {} s", stays_on.as_secs()),
+    };
+    let found = format!("the camera starts in {:.0} ms and {then}", ms(took));
+    let remedy = if took <= SLOW_START || !stays_on.is_zero() {
+        None
+    } else if triggered {
+        Some(
+            "each cycle takes so much longer: set camera_timeout_value_ms to 60000 in the file that LIBCAMERA_RPI_CONFIG_FILE names, so that the \
+             camera may stay on, and add always-on to its overlay in config.txt",
+        )
+    } else {
+        Some("each cycle takes so much longer: add always-on to the camera's overlay in config.txt")
+    };
+    Ok(Check::new(found, remedy, measured))
 }
 
 pub(super) fn cadence(head: &mut Head) -> Result<Check, Error> {

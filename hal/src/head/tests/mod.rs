@@ -2,6 +2,7 @@
 
 mod schedules;
 mod sequences;
+mod streaming;
 
 use std::sync::Arc;
 use std::time::Duration;

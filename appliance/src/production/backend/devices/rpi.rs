@@ -1,6 +1,7 @@
 //! A head of a camera through libcamera and a projector on a display connector.
 
 use crate::config::HeadConfig;
+use crate::system::host::libcamera_patience;
 use hal::camera::Starts;
 use hal::clock::Monotonic;
 #[cfg(feature = "i2c")]
@@ -25,7 +26,11 @@ pub fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<Head, Erro
         Some(_) => Starts::OnTrigger,
         None => Starts::ByItself,
     };
-    let camera = LibCamera::open(Settings::new(&config.camera, starts))?;
+    let settings = Settings {
+        stays_on: libcamera_patience() / 2,
+        ..Settings::new(&config.camera, starts)
+    };
+    let camera = LibCamera::open(settings)?;
     let display = hal::kms::open(&config.projector)?;
     let clock = Monotonic::new(vec![camera.ready()?, display.descriptor()?]);
     let projector = controlled(&config.projector, Box::new(display))?;
