@@ -10,7 +10,10 @@ use crate::frame::{Frame, FrameFormat};
 pub enum Starts {
     /// The trigger of the head: one exposure per pulse. A pulse while the camera is busy is lost.
     OnTrigger,
-    /// The camera itself, one exposure per period; also one that the projector triggers by wire.
+    /// The trigger output of the projector, by a wire of its own: one exposure with each refresh for which the camera is ready. Its
+    /// length is that of the projector's pulse, on which no program has an influence.
+    ByProjector,
+    /// The camera itself, one exposure per period.
     ByItself,
 }
 

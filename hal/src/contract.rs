@@ -123,7 +123,9 @@ pub fn check_camera(camera: &mut dyn Camera, clock: &mut dyn Clock) -> Result<()
     }
     let (promise, holds) = match timing.starts {
         Starts::OnTrigger => ("a camera without a trigger gives no frame", frames == 0),
-        Starts::ByItself => ("a camera that runs by itself gives frames", frames > 0),
+        Starts::ByProjector | Starts::ByItself => {
+            ("a camera that runs by itself gives frames", frames > 0)
+        }
     };
     ensure(promise, holds, || {
         format!("{frames} frames within {patience:?}")

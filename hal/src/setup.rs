@@ -9,6 +9,8 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use crate::camera::Starts;
+
 /// Which camera, and how it exposes. Nothing changes while it runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -120,8 +122,10 @@ impl Default for ProjectorSetup {
 pub struct TriggerSetup {
     /// Label of the GPIO chip.
     pub chip: String,
-    /// Name of the line; none = the camera runs by itself.
+    /// Name of the line; none = the camera runs by itself, or the projector triggers it.
     pub line: Option<String>,
+    /// Whether the projector's trigger output is wired to the camera.
+    pub by_projector: bool,
     /// How long a pulse lasts, µs. Many cameras expose for as long as the pulse lasts; a pulse shorter than half the exposure is
     /// assumed to start the exposure only.
     pub pulse_us: u32,
@@ -135,6 +139,7 @@ impl Default for TriggerSetup {
         Self {
             chip: "pinctrl-rp1".into(),
             line: None,
+            by_projector: false,
             pulse_us: 16_653,
             active_low: false,
         }
@@ -142,6 +147,22 @@ impl Default for TriggerSetup {
 }
 
 impl TriggerSetup {
+    /// Who starts exposures.
+    #[must_use]
+    pub fn starts(&self) -> Starts {
+        match (&self.line, self.by_projector) {
+            (Some(_), _) => Starts::OnTrigger,
+            (None, true) => Starts::ByProjector,
+            (None, false) => Starts::ByItself,
+        }
+    }
+
+    /// Whether the camera waits for triggers.
+    #[must_use]
+    pub fn wired(&self) -> bool {
+        self.starts() != Starts::ByItself
+    }
+
     /// How long a pulse lasts.
     #[must_use]
     pub fn pulse(&self) -> Duration {

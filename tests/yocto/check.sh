@@ -161,6 +161,7 @@ broken parse $recipes/boot/files/config.txt 's/boot_partition=3/boot_partition=4
 broken parse $recipes/boot/files/config.txt '/^\[pi4\]/,/^\[all\]/{/^\[all\]/d}'
 broken parse $recipes/boot/files/config.txt '/^\[pi5\]/d'
 broken parse $recipes/boot/fringed-boot_1.0.bb 's/ cgroup_enable=memory//'
+broken parse $recipes/boot/fringed-boot_1.0.bb 's/ isolcpus=3//'
 broken parse $recipes/system/files/boot-complete.conf '/^After/d'
 broken parse $recipes/system/files/var-lib-fringed.mount 's/^What=.*/What=\/data\/fring/'
 broken parse $recipes/system/files/journald.conf '/^RuntimeMaxUse/d'

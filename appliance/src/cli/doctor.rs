@@ -6,6 +6,7 @@ use crate::error::{Exit, Failure};
 use crate::head::doctor::{Check, Verdict, computer, controller, examine};
 use crate::production::backend;
 use crate::system::host::Host;
+use crate::system::priority;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -48,7 +49,9 @@ impl Doctor {
         let on_progress = |share: f64, name: &str| progress.tell(0.5 + 0.5 * share, name);
         let real = config.head.backend == Backend::Rpi;
         let trigger = real.then_some(&config.head.trigger);
-        let mut checks = computer::examine(&Host::default(), &config.lines, trigger);
+        let host = Host::default();
+        let prompt = priority::prompt(host.isolated_core());
+        let mut checks = computer::examine(&host, &config.lines, trigger, prompt);
         checks.extend(pool.install(|| {
             examine(
                 &mut opened.head,

@@ -80,6 +80,11 @@ pub(super) fn check(config: &Config) -> Result<(), String> {
              lasts would expose longer than it is said to"
         ));
     }
+    if trigger.line.is_some() && trigger.by_projector {
+        return Err(
+            "head.trigger.line and head.trigger.by_projector: write one of them: a camera has one trigger input".into(),
+        );
+    }
     let lines = &config.lines;
     for (key, name) in [
         ("head.camera.id", camera.id.as_deref()),

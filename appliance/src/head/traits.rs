@@ -187,3 +187,22 @@ fn a_slow_start_of_the_camera_is_named_where_it_is_stopped_after_each_cycle_and_
     let mut own = head(&format!("{more}camera_period_us = 33333\n"));
     assert!(failed(&mut own)[0].remedy.contains("always-on"));
 }
+
+#[test]
+fn a_camera_that_the_projector_triggers_is_paced_by_its_readout_and_dead_time() {
+    let more = format!("{IMX296}calibrated_refreshes = 2\nby_projector = true\n");
+    let mut own = head(&more);
+    let checks = failed(&mut own);
+    let [check] = &checks[..] else {
+        panic!("{checks:#?}");
+    };
+    assert_eq!(check.name, "trigger");
+    assert!(check.remedy.contains("3 refreshes"), "{}", check.remedy);
+    let made = calibrated(&mut own);
+    let timing = made.file.timing.as_ref().unwrap();
+    assert_eq!(timing.refreshes, Some(3));
+    assert!(timing.flip_to_light_ns.abs_diff(20_000_000) < 50_000);
+    let taken = sequence(&mut own.0).unwrap();
+    assert_eq!(taken.retaken, 0, "{taken:?}");
+    assert_eq!(failed(&mut own).len(), 0);
+}

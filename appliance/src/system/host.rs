@@ -79,6 +79,12 @@ impl Host {
         Some(version.to_owned())
     }
 
+    /// The last core that the kernel keeps free of ordinary threads (`isolcpus` on its command line).
+    pub fn isolated_core(&self) -> Option<usize> {
+        let cores = self.text("sys/devices/system/cpu/isolated")?;
+        cores.rsplit([',', '-']).next()?.parse().ok()
+    }
+
     /// Whether the driver of the IMX296 waits for triggers; `None` if it is not loaded or has no such parameter.
     pub fn sensor_waits_for_triggers(&self) -> Option<bool> {
         let mode = self.text("sys/module/imx296/parameters/trigger_mode")?;
@@ -122,7 +128,7 @@ fn patience_in(text: &str) -> Duration {
         let end = digits.find(|c: char| !c.is_ascii_digit());
         digits[..end.unwrap_or(digits.len())].parse().unwrap_or(0)
     });
-    Duration::from_millis(number.last().unwrap_or(0))
+    Duration::from_millis(number.max().unwrap_or(0))
 }
 
 /// The first two numbers of a version.
@@ -209,6 +215,19 @@ pub(crate) mod tests {
             ("", 0),
         ] {
             assert_eq!(patience_in(text), Duration::from_millis(ms), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_isolated_core_is_the_last_of_the_kernels_list() {
+        for (list, core) in [
+            ("3\n", Some(3)),
+            ("1,2-3\n", Some(3)),
+            ("1-2,5", Some(5)),
+            ("\n", None),
+        ] {
+            let root = root(&[("sys/devices/system/cpu/isolated", list)]);
+            assert_eq!(Host::at(root.path()).isolated_core(), core, "{list:?}");
         }
     }
 

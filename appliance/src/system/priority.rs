@@ -1,8 +1,20 @@
-//! Priority of threads that must not slow the measuring task down.
+//! Priorities of threads: those that must not slow the measuring task down, and the one that must not be late.
 
-/// Nice value of such a thread: on a busy core it gets a tenth of the share of another thread.
+/// Nice value of a thread that must not slow others down: on a busy core it gets a tenth of the share of another thread.
 #[cfg(target_os = "linux")]
 const NICE: libc::c_int = 10;
+/// Real-time priority of a thread that must not be late: above all ordinary threads, below the kernel's handlers of interrupts (50).
+#[cfg(target_os = "linux")]
+const PROMPT: libc::c_int = 20;
+
+/// What a thread got that must not be late.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Prompt {
+    /// A real-time priority.
+    pub real_time: bool,
+    /// The core that it has for itself.
+    pub core: Option<usize>,
+}
 
 /// Lowers the calling thread's priority below that of the program's other threads, also where a service manager has given the
 /// program a real-time priority, which a new thread inherits.
@@ -23,3 +35,47 @@ pub fn give_way() {
 /// Elsewhere all threads have the same priority.
 #[cfg(not(target_os = "linux"))]
 pub fn give_way() {}
+
+/// Gives the calling thread a real-time priority, and `core` if there is one that the kernel keeps free of other work, as far as the
+/// system permits: `LimitRTPRIO=` of the service. Otherwise the thread goes on as it is.
+#[cfg(target_os = "linux")]
+#[expect(
+    unsafe_code,
+    reason = "the call that sets a thread's scheduling policy has no safe wrapper that is kept"
+)]
+pub fn be_prompt(core: Option<usize>) -> Prompt {
+    let prompt = libc::sched_param {
+        sched_priority: PROMPT,
+    };
+    // SAFETY: the call only reads its arguments, and 0 names the calling thread.
+    let refused = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const prompt) };
+    let core = core.filter(|core| {
+        let mut only = rustix::thread::CpuSet::new();
+        *core < rustix::thread::CpuSet::MAX_CPU && {
+            only.set(*core);
+            rustix::thread::sched_setaffinity(None, &only).is_ok()
+        }
+    });
+    Prompt {
+        real_time: refused == 0,
+        core,
+    }
+}
+
+/// Elsewhere all threads have the same priority.
+#[cfg(not(target_os = "linux"))]
+pub fn be_prompt(_: Option<usize>) -> Prompt {
+    Prompt {
+        real_time: false,
+        core: None,
+    }
+}
+
+/// What the thread that ends the trigger's pulses gets on this computer.
+pub fn prompt(core: Option<usize>) -> Prompt {
+    let tried = std::thread::spawn(move || be_prompt(core)).join();
+    tried.unwrap_or(Prompt {
+        real_time: false,
+        core: None,
+    })
+}

@@ -36,6 +36,8 @@ pub struct Timing {
     /// The flip-to-light delay according to the head's calibration; if left out, the true one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibrated_flip_to_light_us: Option<u64>,
+    /// Whether the projector triggers the camera, with the light of each refresh for which the camera is ready.
+    pub by_projector: bool,
     /// Period of a camera that runs by itself, at least exposure or readout, up to 10 000 000 µs; 0: the camera is triggered.
     pub camera_period_us: u64,
     /// From the start of a camera that runs by itself to its first exposure, 0…10 000 000 µs.
@@ -62,6 +64,7 @@ impl Default for Timing {
             flip_to_light_us: 0,
             first_light_us: 0,
             calibrated_flip_to_light_us: None,
+            by_projector: false,
             camera_period_us: 0,
             camera_phase_us: 0,
             stamp: Stamp::default(),
@@ -96,6 +99,7 @@ impl Scenario {
             stays_on: Duration::from_secs(timing.stays_on_s),
             dead: us(timing.dead_us),
             calibrated_hold: timing.calibrated_refreshes.unwrap_or(self.needed()),
+            by_projector: timing.by_projector,
             free_running: (timing.camera_period_us > 0)
                 .then(|| (us(timing.camera_period_us), us(timing.camera_phase_us))),
             stamp: timing.stamp,
@@ -161,6 +165,11 @@ impl Scenario {
         }
         let refreshes = timing.calibrated_refreshes.unwrap_or(1);
         within("timing.calibrated_refreshes", refreshes, 1, 100)?;
+        if timing.by_projector && timing.camera_period_us > 0 {
+            return Err(
+                "timing.camera_period_us: write 0 for a camera that the projector triggers (timing.by_projector)".into(),
+            );
+        }
         let busy = self
             .exposure()
             .max(Duration::from_micros(timing.readout_us));

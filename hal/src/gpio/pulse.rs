@@ -1,7 +1,8 @@
 //! An output line that starts exposures with pulses of a given width.
 //!
 //! The caller begins a pulse, and a thread of this module ends it. A camera may expose for as long as the pulse lasts, so the width
-//! must not depend on how long a sleeping thread takes to wake: the thread wakes a little early and then polls the clock. Both
+//! must not depend on how long a sleeping thread takes to wake: the thread wakes a little early and then polls the clock. The caller gives it
+//! a real-time priority and a core of its own, as far as the system permits. Both
 //! threads may still be interrupted by other work of the computer, so the clock is read before and after each edge, and a pulse
 //! that was too long or too short is reported.
 
@@ -51,21 +52,31 @@ struct State {
 }
 
 impl Pulse {
-    /// Opens the line `name` of the chip as it is set up; it is idle.
+    /// Opens the line `name` of the chip as it is set up; it is idle. The thread that ends its pulses calls `prepare` first, to get the
+    /// priority and the core that it is to have.
     ///
     /// # Errors
     /// Why it cannot be opened.
-    pub fn open(setup: &TriggerSetup, name: &str) -> Result<Self, LineError> {
+    pub fn open(
+        setup: &TriggerSetup,
+        name: &str,
+        prepare: impl FnOnce() + Send + 'static,
+    ) -> Result<Self, LineError> {
         let handle = find(&setup.chip, name)?.output(setup.active_low, false)?;
         let line: Box<str> = name.into();
         let put = move |on| {
             let put = handle.set_value(u8::from(on));
             put.map_err(|error| means(&error, &line, None))
         };
-        Self::of(Box::new(put), setup.pulse()).map_err(|error| LineError::failed(name, error))
+        Self::of(Box::new(put), setup.pulse(), prepare)
+            .map_err(|error| LineError::failed(name, error))
     }
 
-    fn of(put: Box<Put>, width: Duration) -> std::io::Result<Self> {
+    fn of(
+        put: Box<Put>,
+        width: Duration,
+        prepare: impl FnOnce() + Send + 'static,
+    ) -> std::io::Result<Self> {
         let line = Arc::new(Pulsed {
             put,
             width,
@@ -80,7 +91,10 @@ impl Pulse {
         let ended = Arc::clone(&line);
         let ending = std::thread::Builder::new()
             .name("pulse".into())
-            .spawn(move || ended.end_pulses())?;
+            .spawn(move || {
+                prepare();
+                ended.end_pulses();
+            })?;
         Ok(Self {
             line,
             ending: Some(ending),
@@ -185,7 +199,7 @@ mod tests {
             std::thread::sleep(if on { rise } else { fall });
             Ok(())
         };
-        let mut pulse = Pulse::of(Box::new(put), WIDTH).unwrap();
+        let mut pulse = Pulse::of(Box::new(put), WIDTH, || ()).unwrap();
         let fired = pulse.fire().unwrap();
         ended.recv().unwrap();
         let told = pulse.poll_spoiled();
@@ -213,7 +227,7 @@ mod tests {
             std::thread::sleep(if on { Duration::ZERO } else { fall });
             Ok(())
         };
-        let mut pulse = Pulse::of(Box::new(put), Duration::from_micros(1)).unwrap();
+        let mut pulse = Pulse::of(Box::new(put), Duration::from_micros(1), || ()).unwrap();
         let mut fired = Vec::new();
         for _ in 0..REMEMBERED + 3 {
             fired.push(pulse.fire().unwrap());

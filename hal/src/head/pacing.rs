@@ -59,13 +59,22 @@ pub(super) struct Pacing {
 
 impl Pacing {
     pub fn new(refresh: Duration, camera: &CameraTiming, timing: &Timing) -> Self {
+        let refresh = refresh.max(Duration::from_nanos(1));
+        let period = match camera.starts {
+            // With the first refresh for which the camera is ready.
+            Starts::ByProjector => {
+                let refreshes = camera.period.as_nanos().div_ceil(refresh.as_nanos());
+                refresh.saturating_mul(u32::try_from(refreshes).unwrap_or(u32::MAX))
+            }
+            Starts::OnTrigger | Starts::ByItself => camera.period,
+        };
         Self {
-            refresh: refresh.max(Duration::from_nanos(1)),
+            refresh,
             flip_to_light: timing.flip_to_light,
             tolerance: timing.tolerance_for(camera.exposure),
             exposure: camera.exposure,
             hold: timing.hold.max(1),
-            period: camera.period.max(Duration::from_nanos(1)),
+            period: period.max(Duration::from_nanos(1)),
             delivery: camera.delivery,
             triggered: camera.starts == Starts::OnTrigger,
             promptness: timing.tolerance,

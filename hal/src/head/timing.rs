@@ -7,7 +7,7 @@ use crate::units::Timestamp;
 
 /// Default of [`Timing::tolerance`]: an exposure of exactly one refresh leaves no slack for jitter otherwise.
 pub const TOLERANCE: Duration = Duration::from_micros(200);
-/// Refreshes per pattern where a trigger starts the exposures and nothing is proven. After an exposure of one refresh (16.667 ms at 60 Hz) an IMX296 is
+/// Refreshes per pattern where a trigger or the projector starts the exposures and nothing is proven. After an exposure of one refresh (16.667 ms at 60 Hz) an IMX296 is
 /// read out for 1118 lines of 14.8148 µs (16.563 ms): of two refreshes 0.1 ms would be left for its own delays.
 const TRIGGERED_HOLD: u32 = 3;
 /// Refreshes per pattern where the camera runs by itself: an exposure of one whole refresh fits two from wherever it starts.
@@ -62,7 +62,7 @@ impl Timing {
     pub fn unproven(starts: Starts) -> Self {
         Self {
             hold: match starts {
-                Starts::OnTrigger => TRIGGERED_HOLD,
+                Starts::OnTrigger | Starts::ByProjector => TRIGGERED_HOLD,
                 Starts::ByItself => OWN_HOLD,
             },
             ..Self::default()

@@ -231,7 +231,7 @@ impl Camera for LibCamera {
     fn stays_on(&self) -> Duration {
         match self.settings.starts {
             Starts::OnTrigger => self.settings.stays_on,
-            Starts::ByItself => Duration::ZERO,
+            Starts::ByProjector | Starts::ByItself => Duration::ZERO,
         }
     }
 

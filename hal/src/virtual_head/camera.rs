@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::faults::{Dice, Kind};
 use super::timing::Mechanics;
 use super::{Bench, Scene, VirtualDevice, lock};
-use crate::camera::{Camera, CameraTiming, Encoding};
+use crate::camera::{Camera, CameraTiming, Encoding, Starts};
 use crate::error::{DeviceKind, Error};
 use crate::frame::{Frame, FrameFormat};
 use crate::head::Stamp;
@@ -56,7 +56,7 @@ impl Sensor {
     pub fn fire(&mut self, now: Timestamp, length: Duration, mechanics: &Mechanics, dice: Dice) {
         let faults = &mechanics.faults;
         let lost = !self.armed
-            || mechanics.free_running.is_some()
+            || mechanics.camera().starts != Starts::OnTrigger
             || now < self.busy_until
             || faults.wire_open
             || dice.happens(Kind::LostTrigger, self.count ^ now.0, faults.lost_trigger);
@@ -105,8 +105,15 @@ impl Sensor {
         self.exposures.insert(place, exposure);
     }
 
-    /// The start of the next exposure of a camera that runs by itself.
+    /// The start of the next exposure of a camera that runs by itself, or that the projector triggers.
     fn next_start(&self, mechanics: &Mechanics) -> Option<Timestamp> {
+        if self.armed && mechanics.by_projector {
+            let refresh = u64::try_from(mechanics.refresh.as_nanos()).unwrap_or(u64::MAX);
+            let lag = mechanics.flip_to_light.as_nanos() as u64 % refresh.max(1);
+            let ready = self.started.max(self.busy_until).0.saturating_sub(lag);
+            let start = ready.div_ceil(refresh.max(1)).saturating_mul(refresh);
+            return Some(Timestamp(start.saturating_add(lag)));
+        }
         let (period, phase) = mechanics.free_running.filter(|_| self.armed)?;
         let drifted =
             period.as_nanos() as f64 * (1.0 + f64::from(mechanics.faults.drift_ppm) * 1e-6);
@@ -123,6 +130,8 @@ impl Sensor {
             self.since += 1;
             let off = dice.up_to(Kind::TriggerJitter, self.count, 1.0, jitter);
             self.expose(start + off, mechanics.exposure, mechanics, dice);
+            let busy = mechanics.exposure + mechanics.readout + mechanics.dead;
+            self.busy_until = start + off + busy;
         }
         // Frames that were not fetched in time are lost.
         while self.exposures.len() > MAX_WAITING && self.exposures[MAX_WAITING].ready <= now {
@@ -198,9 +207,9 @@ impl<S: Scene> Camera for VirtualDevice<S> {
 
     fn stays_on(&self) -> Duration {
         let mechanics = &lock(&self.bench).mechanics;
-        match mechanics.free_running {
-            Some(_) => Duration::ZERO,
-            None => mechanics.stays_on,
+        match mechanics.camera().starts {
+            Starts::OnTrigger => mechanics.stays_on,
+            Starts::ByProjector | Starts::ByItself => Duration::ZERO,
         }
     }
 

@@ -34,6 +34,8 @@ pub struct Mechanics {
     pub start_up: Duration,
     /// How long a triggered camera may stay on without an exposure.
     pub stays_on: Duration,
+    /// Whether the projector triggers the camera, with the light of each refresh for which the camera is ready.
+    pub by_projector: bool,
     /// Of a camera that runs by itself: its period, and the time from its start to its first exposure.
     pub free_running: Option<(Duration, Duration)>,
     /// What the camera's stamps mark.
@@ -62,6 +64,7 @@ impl Mechanics {
             calibrated_hold: 1,
             start_up: Duration::ZERO,
             stays_on: STAYS_ON,
+            by_projector: false,
             free_running: None,
             stamp: Stamp::default(),
             stamp_late: Duration::ZERO,
@@ -84,6 +87,7 @@ impl Mechanics {
     pub(super) fn camera(&self) -> CameraTiming {
         let (starts, period) = match self.free_running {
             Some((period, _)) => (Starts::ByItself, period),
+            None if self.by_projector => (Starts::ByProjector, self.exposure + self.readout),
             // Exposure and readout of a triggered camera do not overlap.
             None => (Starts::OnTrigger, self.exposure + self.readout),
         };

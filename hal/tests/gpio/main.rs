@@ -79,7 +79,7 @@ fn a_trigger_and_the_clock_keep_their_promises() {
         return;
     }
     let chip = Chip::new("promises", &["trigger"]);
-    let mut pulse = Pulse::open(&chip.trigger(100, false), "trigger").unwrap();
+    let mut pulse = Pulse::open(&chip.trigger(100, false), "trigger", || ()).unwrap();
     let mut clock = Monotonic::default();
     check_clock(&mut clock).unwrap();
     check_trigger(&mut pulse, &mut clock).unwrap();
@@ -94,7 +94,7 @@ fn a_pulse_has_its_width_and_begins_when_it_says() {
     let count = 20;
     for width_us in [100_u32, 1_000, 16_653] {
         let width = Duration::from_micros(u64::from(width_us));
-        let mut pulse = Pulse::open(&chip.trigger(width_us, false), "trigger").unwrap();
+        let mut pulse = Pulse::open(&chip.trigger(width_us, false), "trigger", || ()).unwrap();
         let trace = Trace::begin();
         let (mut fired, mut spoiled) = (Vec::new(), Vec::new());
         for _ in 0..count {
@@ -126,7 +126,7 @@ fn a_pulse_while_one_is_on_is_lost_and_makes_it_no_longer() {
         return;
     }
     let chip = Chip::new("overlap", &["trigger"]);
-    let mut pulse = Pulse::open(&chip.trigger(20_000, false), "trigger").unwrap();
+    let mut pulse = Pulse::open(&chip.trigger(20_000, false), "trigger", || ()).unwrap();
     pulse.fire().unwrap();
     thread::sleep(Duration::from_millis(15));
     pulse.fire().unwrap();
@@ -146,14 +146,14 @@ fn a_trigger_is_idle_after_it_is_dropped_and_after_a_panic_also_in_a_pulse() {
         chip.pull(0, active_low);
         let long = chip.trigger(60_000_000, active_low);
         let trace = Trace::begin();
-        let mut pulse = Pulse::open(&long, "trigger").unwrap();
+        let mut pulse = Pulse::open(&long, "trigger", || ()).unwrap();
         assert_eq!(chip.level(0), active_low, "idle when opened");
         pulse.fire().unwrap();
         assert_eq!(chip.level(0), !active_low, "a pulse is on");
         drop(pulse);
         assert_eq!(trace.left_at(), active_low, "idle after a drop");
         let panicked = thread::spawn(move || {
-            let mut pulse = Pulse::open(&long, "trigger").unwrap();
+            let mut pulse = Pulse::open(&long, "trigger", || ()).unwrap();
             pulse.fire().unwrap();
             panic!("on purpose");
         });
@@ -277,7 +277,7 @@ fn a_chip_that_goes_is_said_by_every_line_of_it_and_ends_a_wait() {
         return;
     }
     let chip = Chip::new("removed", &["trigger", "busy", "start"]);
-    let mut pulse = Pulse::open(&chip.trigger(1000, false), "trigger").unwrap();
+    let mut pulse = Pulse::open(&chip.trigger(1000, false), "trigger", || ()).unwrap();
     let mut busy = Output::open(chip.label, "busy", false, false).unwrap();
     let mut start = chip.start();
     let mut clock = Monotonic::new(vec![start.as_fd().try_clone_to_owned().unwrap()]);
@@ -309,7 +309,7 @@ fn a_line_is_opened_all_day_without_a_descriptor_left_behind() {
     let open = || fs::read_dir("/proc/self/fd").unwrap().count();
     let before = open();
     for _ in 0..20 {
-        let mut pulse = Pulse::open(&chip.trigger(100, false), "trigger").unwrap();
+        let mut pulse = Pulse::open(&chip.trigger(100, false), "trigger", || ()).unwrap();
         let mut start = chip.start();
         pulse.fire().unwrap();
         assert_eq!(start.poll_start().unwrap(), None);

@@ -126,7 +126,7 @@ fn rig(_: &Chip, kind: Kind, knows_patterns: bool) -> Head {
     Head::new(
         Box::new(camera),
         Box::new(projector),
-        Box::new(Pulse::open(&trigger, chip::LINE).unwrap()),
+        Box::new(Pulse::open(&trigger, chip::LINE, || ()).unwrap()),
         Box::new(clock),
         timing,
     )

@@ -3,6 +3,7 @@
 use super::{Check, named};
 use crate::station::Power;
 use crate::system::host::{Host, major_minor};
+use crate::system::priority::Prompt;
 use hal::setup::{LinesSetup, TriggerSetup};
 use serde_json::json;
 
@@ -11,13 +12,19 @@ const OLDEST_KERNEL: [u16; 2] = [5, 7];
 /// The versions of libcamera that the bindings know.
 const LIBCAMERA: [[u16; 2]; 2] = [[0, 4], [0, 7]];
 
-/// Checks a computer with these lines; `trigger` is that of a real head. There are only checks of what is used and known.
-pub fn examine(host: &Host, lines: &LinesSetup, trigger: Option<&TriggerSetup>) -> Vec<Check> {
+/// Checks a computer with these lines; `trigger` is that of a real head, `prompt` what the thread gets that ends its pulses. There are only checks of what is used and known.
+pub fn examine(
+    host: &Host,
+    lines: &LinesSetup,
+    trigger: Option<&TriggerSetup>,
+    prompt: Prompt,
+) -> Vec<Check> {
     let power = host.throttled().map(|bits| power(Power::of(bits, None)));
     let versions = trigger.map(|_| versions(host));
     let sensor = trigger.zip(host.sensor_waits_for_triggers());
-    let sensor = sensor.map(|(trigger, waits)| sensor_mode(waits, trigger.line.is_some()));
+    let sensor = sensor.map(|(trigger, waits)| sensor_mode(waits, trigger.wired()));
     let trigger = trigger.filter(|trigger| trigger.line.is_some());
+    let pulses = trigger.map(|_| pulses(prompt));
     let outputs = [&lines.busy, &lines.ok, &lines.fault];
     let press = outputs.into_iter().any(Option::is_some);
     let chips = [
@@ -29,6 +36,7 @@ pub fn examine(host: &Host, lines: &LinesSetup, trigger: Option<&TriggerSetup>) 
     let released = (!chips.is_empty()).then(|| released(host, &chips));
     let checks = [
         ("lines", released),
+        ("pulses", pulses),
         ("power", power),
         ("versions", versions),
         ("sensor", sensor),
@@ -37,6 +45,37 @@ pub fn examine(host: &Host, lines: &LinesSetup, trigger: Option<&TriggerSetup>) 
     checks
         .filter_map(|(name, check)| Some(named(name, check?)))
         .collect()
+}
+
+/// The thread that ends the pulses of the trigger: the exposure lasts as long as a pulse, and decoding uses every other core.
+fn pulses(prompt: Prompt) -> Check {
+    let Prompt { real_time, core } = prompt;
+    let found = format!(
+        "the thread that ends the pulses of the trigger gets {} and {}",
+        match real_time {
+            true => "a real-time priority",
+            false => "no real-time priority",
+        },
+        core.map_or("no core of its own".into(), |core| format!(
+            "core {core} for itself"
+        ))
+    );
+    let remedy = match (real_time, core) {
+        (false, _) => Some(
+            "permit it: LimitRTPRIO=20 in the service, \"fringed - rtprio 20\" in /etc/security/limits.d/fringed.conf for programs that are \
+             started by hand; or let the projector's trigger output start the exposures (head.trigger.by_projector)",
+        ),
+        (true, None) => Some(
+            "add isolcpus=3 to /boot/firmware/cmdline.txt and restart the computer; or let the projector's trigger output start the \
+             exposures (head.trigger.by_projector)",
+        ),
+        (true, Some(_)) => None,
+    };
+    Check::new(
+        found,
+        remedy,
+        json!({ "real_time": real_time, "core": core }),
+    )
 }
 
 /// A Raspberry Pi's supply and cooling: a computer that slows itself down ends pulses late, and one without voltage loses its card.
@@ -88,16 +127,16 @@ fn versions(host: &Host) -> Check {
 /// Whether the driver of the IMX296 is in the mode that the configuration says.
 fn sensor_mode(waits: bool, triggered: bool) -> Check {
     let found = format!(
-        "the driver imx296 {} triggers, head.trigger.line is {}",
+        "the driver imx296 {} triggers, and {} is configured",
         if waits { "waits for" } else { "takes no" },
-        if triggered { "named" } else { "not named" }
+        if triggered { "a trigger" } else { "none" }
     );
     let remedy = match (waits, triggered) {
         (false, true) => Some(
             "write \"options imx296 trigger_mode=1\" to /etc/modprobe.d/imx296.conf and restart the computer: without it the camera runs by itself",
         ),
         (true, false) => Some(
-            "name head.trigger.line, or remove trigger_mode=1 from /etc/modprobe.d/imx296.conf and restart the computer: without triggers there are no frames",
+            "name head.trigger.line, or set head.trigger.by_projector if the projector triggers the camera, or remove trigger_mode=1 from /etc/modprobe.d/imx296.conf and restart the computer: without triggers there are no frames",
         ),
         _ => None,
     };
@@ -137,6 +176,10 @@ mod tests {
     use crate::head::doctor::Verdict;
     use crate::system::host::tests::root;
 
+    const ALL: Prompt = Prompt {
+        real_time: true,
+        core: Some(3),
+    };
     const PARAMETER: &str = "sys/module/pinctrl_rp1/parameters/persist_gpio_outputs";
 
     #[test]
@@ -151,7 +194,7 @@ mod tests {
         };
         for (parameter, verdict) in [("Y\n", Verdict::Fail), ("N\n", Verdict::Pass)] {
             let root = root(&[(PARAMETER, parameter)]);
-            let checks = examine(&Host::at(root.path()), &lines, Some(&trigger));
+            let checks = examine(&Host::at(root.path()), &lines, Some(&trigger), ALL);
             let check = &checks[0];
             assert_eq!((check.name, check.verdict), ("lines", verdict));
             assert!(check.found.contains("pinctrl-rp1"), "{}", check.found);
@@ -163,8 +206,8 @@ mod tests {
         // Another computer, and no lines at all.
         let empty = tempfile::tempdir().unwrap();
         let host = Host::at(empty.path());
-        assert_eq!(examine(&host, &lines, None)[0].verdict, Verdict::Pass);
-        assert!(examine(&host, &LinesSetup::default(), None).is_empty());
+        assert_eq!(examine(&host, &lines, None, ALL)[0].verdict, Verdict::Pass);
+        assert!(examine(&host, &LinesSetup::default(), None, ALL).is_empty());
     }
 
     /// The checks of a real head, with a line for its trigger or none, that fail.
@@ -175,7 +218,7 @@ mod tests {
             ..TriggerSetup::default()
         };
         let lines = LinesSetup::default();
-        let mut checks = examine(&Host::at(root.path()), &lines, Some(&trigger));
+        let mut checks = examine(&Host::at(root.path()), &lines, Some(&trigger), ALL);
         checks.retain(|check| check.verdict == Verdict::Fail);
         checks
     }
@@ -223,5 +266,20 @@ mod tests {
         }
         let runs_by_itself = failed(&well, None);
         assert_eq!(runs_by_itself[0].name, "sensor");
+    }
+
+    #[test]
+    fn pulses_that_ordinary_work_may_delay_are_named_with_what_the_thread_lacks() {
+        for (real_time, core, word) in [
+            (false, None, "LimitRTPRIO"),
+            (false, Some(3), "LimitRTPRIO"),
+            (true, None, "isolcpus"),
+        ] {
+            let check = pulses(Prompt { real_time, core });
+            assert_eq!(check.verdict, Verdict::Fail);
+            assert!(check.remedy.contains(word), "{}", check.remedy);
+            assert!(check.remedy.contains("by_projector"));
+        }
+        assert_eq!(pulses(ALL).verdict, Verdict::Pass);
     }
 }

@@ -178,6 +178,7 @@ pub(super) fn trigger(head: &mut Head, calibrated: bool) -> Result<Check, Error>
     }
     Ok(match head.camera_timing().starts {
         Starts::OnTrigger => triggered(head, &seen)?,
+        Starts::ByProjector => by_projector(head, &seen)?,
         Starts::ByItself => by_itself(&seen, head.camera_timing().period),
     })
 }
@@ -214,7 +215,10 @@ fn triggered(head: &mut Head, seen: &Watched<()>) -> Result<Check, Error> {
                 "{spoiled} of {pulses} pulses were too long or too short, by up to {:.2} ms, and so was the exposure",
                 ms(off)
             ),
-            Some("stop what else loads the computer, and give fringed a real-time priority"),
+            Some(
+                "stop what else loads the computer, and see the check pulses; or let the projector's trigger output start the exposures \
+                 (head.trigger.by_projector)",
+            ),
             measured,
         ));
     }
@@ -256,6 +260,34 @@ fn lost(refreshes: u32, tried: &[Spaced], found: String, mut measured: Value) ->
         _ => "triggers are lost: check the wire's contact and level".into(),
     };
     Check::new(found, Some(&*remedy), measured)
+}
+
+/// A camera that the projector triggers has a frame in every so many refreshes.
+fn by_projector(head: &mut Head, seen: &Watched<()>) -> Result<Check, Error> {
+    let (hold, refresh) = (head.timing().hold, head.refresh());
+    let Some(needed) = pace(head)?.pop() else {
+        return Ok(Check::new(
+            format!(
+                "{} frames of a camera that the projector triggers",
+                seen.frames.len()
+            ),
+            Some(
+                "check the wire from the projector's trigger output to the camera's trigger input and its level, that the output is enabled \
+                 (head.projector.controller), and that the camera is in trigger mode",
+            ),
+            json!({ "frames": seen.frames.len() }),
+        ));
+    };
+    if needed.refreshes > hold {
+        return Ok(lost(
+            hold,
+            &[needed],
+            "the projector triggers the camera".into(),
+            json!({}),
+        ));
+    }
+    // Its period must be that of so many refreshes, or something else triggers it.
+    Ok(by_itself(seen, refresh * needed.refreshes))
 }
 
 fn by_itself(seen: &Watched<()>, nominal: Duration) -> Check {

@@ -151,7 +151,7 @@ fn fit(rounds: &[Round], exposure: f64, refresh: f64) -> Option<Delay> {
         .filter_map(|delay| Some((delay, straight(shares(delay))?.2)))
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
     let mut delay = best.0;
-    let mut known = None;
+    let (mut known, mut weight) = (None, None);
     for _ in 0..ITERATIONS {
         let (black, white, _) = straight(shares(delay))?;
         let mut normal = [[0.0; 3]; 3];
@@ -170,10 +170,17 @@ fn fit(rounds: &[Round], exposure: f64, refresh: f64) -> Option<Delay> {
             frames += 1;
         }
         // Black and white are fitted already, so the right-hand side is zero except for the delay.
-        let inverse = last_of_inverse(&normal)?;
-        delay += (inverse * right[2]).clamp(-step, step);
+        match last_of_inverse(&normal) {
+            Some(inverse) => {
+                delay += (inverse * right[2]).clamp(-step, step);
+                weight = Some(inverse);
+            }
+            // Exposures that begin with the light of a refresh have no change inside them with the true delay, but with any other.
+            None if weight.is_none() => delay += step / 2.0,
+            None => {}
+        }
         let scatter = (squares / f64::from((frames - 3).max(1))).sqrt();
-        known = Some((white, scatter, scatter * inverse.sqrt()));
+        known = weight.map(|inverse: f64| (white, scatter, scatter * inverse.sqrt()));
     }
     let (white, scatter, error) = known?;
     // Adding 0 turns a negative zero into 0.

@@ -47,17 +47,20 @@ impl Spaced {
 }
 
 /// Tries spacings from the shortest that the camera states on, until none of the triggers is lost. The last one tried is the last of the
-/// result, which is empty for a camera that no trigger starts.
+/// result, which is empty for a camera that runs by itself. A camera that the projector triggers takes one refresh in so many by itself.
 ///
 /// # Errors
 /// Of a device.
 pub fn pace(head: &mut Head) -> Result<Vec<Spaced>, Error> {
     let (camera, refresh) = (head.camera_timing(), head.refresh());
     let mut tried = Vec::new();
-    if camera.starts != Starts::OnTrigger {
+    if camera.starts == Starts::ByItself {
         return Ok(tried);
     }
     load_black_and_white(head)?;
+    if camera.starts == Starts::ByProjector {
+        return by_projector(head);
+    }
     let states = camera.period.as_nanos().div_ceil(refresh.as_nanos().max(1));
     let least = u32::try_from(states).unwrap_or(1).clamp(1, 1000);
     for refreshes in least..=least + MORE {
@@ -80,4 +83,30 @@ pub fn pace(head: &mut Head) -> Result<Vec<Spaced>, Error> {
         }
     }
     Ok(tried)
+}
+
+/// The largest distance of two frames of a camera that the projector triggers.
+fn by_projector(head: &mut Head) -> Result<Vec<Spaced>, Error> {
+    let refresh = head.refresh();
+    let showing = Showing {
+        index: 0,
+        refreshes: MORE * TRIGGERS,
+        settle: 0,
+    };
+    let frames = head.watch(&[showing], PATIENCE, &mut |_| ())?.frames;
+    let apart = frames.windows(2).filter_map(|pair| {
+        let [before, after] = pair else { return None };
+        // A frame that was lost on its way says nothing of the camera.
+        let next = after.count == before.count + 1;
+        next.then(|| after.start.since(before.start).as_secs_f64() / refresh.as_secs_f64())
+    });
+    let largest = apart.fold(0.0, f64::max).round() as u32;
+    Ok((largest > 0)
+        .then_some(Spaced {
+            refreshes: largest,
+            triggers: frames.len(),
+            frames: frames.len(),
+        })
+        .into_iter()
+        .collect())
 }

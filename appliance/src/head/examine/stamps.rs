@@ -68,7 +68,7 @@ impl Stamps {
         }
         match camera.starts {
             Starts::OnTrigger => by_triggers(&camera, &seen.triggers, &seen.frames),
-            Starts::ByItself => by_waiting(&camera, &seen.frames),
+            Starts::ByProjector | Starts::ByItself => by_waiting(&camera, &seen.frames),
         }
     }
 }

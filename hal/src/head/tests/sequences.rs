@@ -122,6 +122,29 @@ fn a_camera_that_runs_by_itself_is_followed_from_any_phase() {
 }
 
 #[test]
+fn a_camera_that_the_projector_triggers_gives_each_pattern_a_whole_exposure() {
+    for (dead_us, needed) in [(0, 2), (240, 3)] {
+        for (hold, delay_us) in [(needed, 0), (needed, 5_000), (needed, 25_000), (3, 21_000)] {
+            let mechanics = Mechanics {
+                by_projector: true,
+                readout: Duration::from_micros(16_500),
+                dead: Duration::from_micros(dead_us),
+                flip_to_light: Duration::from_micros(delay_us),
+                calibrated_flip_to_light: Duration::from_micros(delay_us),
+                calibrated_hold: hold,
+                ..plain()
+            };
+            let exposure = all_right(&mut labelled(mechanics, COUNT));
+            let most = f64::from(hold) * 12.0 + 3.0;
+            assert!(
+                exposure.retaken == 0 && refreshes(&exposure) < most,
+                "{dead_us} {hold} {delay_us} {exposure:?}"
+            );
+        }
+    }
+}
+
+#[test]
 fn stamps_mean_what_calibration_says() {
     for stamp in [Stamp::ExposureStart, Stamp::ExposureEnd, Stamp::ReadoutEnd] {
         let mechanics = Mechanics {

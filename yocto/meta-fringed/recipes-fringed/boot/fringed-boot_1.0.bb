@@ -25,7 +25,7 @@ SELECT_SIZE = "16384"
 
 # The projector's mode, and nothing that draws on it; memory limits per service, which the Pi's kernel disables by default;
 # a restart after a kernel panic, which ends a trial.
-FRINGED_CMDLINE ?= "video=HDMI-A-1:1280x720@60D consoleblank=0 vt.global_cursor_default=0 console=serial0,115200 cgroup_enable=memory panic=10 quiet"
+FRINGED_CMDLINE ?= "video=HDMI-A-1:1280x720@60D consoleblank=0 vt.global_cursor_default=0 console=serial0,115200 cgroup_enable=memory isolcpus=3 panic=10 quiet"
 ROOT_CMDLINE = "ro rootfstype=ext4 rootwait"
 
 do_configure[noexec] = "1"

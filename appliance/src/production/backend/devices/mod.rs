@@ -102,7 +102,11 @@ fn trigger(setup: &TriggerSetup) -> Result<Box<dyn Trigger>, Failure> {
     let Some(line) = &setup.line else {
         return Ok(Box::new(NoTrigger));
     };
-    match hal::gpio::Pulse::open(setup, line) {
+    let prepare = || {
+        // What it does not get, `fringed doctor` names.
+        crate::system::priority::be_prompt(crate::system::host::Host::default().isolated_core());
+    };
+    match hal::gpio::Pulse::open(setup, line, prepare) {
         Ok(pulse) => Ok(Box::new(pulse)),
         Err(error) => Err(Failure::new(Exit::Unavailable, error.to_string())),
     }

@@ -2,7 +2,6 @@
 
 use crate::config::HeadConfig;
 use crate::system::host::libcamera_patience;
-use hal::camera::Starts;
 use hal::clock::Monotonic;
 #[cfg(feature = "i2c")]
 use hal::dlpc347x::{Controlled, Controller, bus::Bus};
@@ -22,10 +21,7 @@ use std::time::Duration;
 /// # Errors
 /// That of the device that is not there.
 pub fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<Head, Error> {
-    let starts = match config.trigger.line {
-        Some(_) => Starts::OnTrigger,
-        None => Starts::ByItself,
-    };
+    let starts = config.trigger.starts();
     let settings = Settings {
         stays_on: libcamera_patience() / 2,
         ..Settings::new(&config.camera, starts)
