@@ -22,7 +22,7 @@ lab=${package/fringed_/fringed-lab_}
 dpkg-deb --raw-extract "$package" "$work"
 dpkg-deb --raw-extract "$lab" "$work-lab"
 for file in usr/bin/fringed usr/lib/systemd/system/fringed.service usr/lib/sysusers.d/fringed.conf usr/lib/tmpfiles.d/fringed.conf \
-    usr/lib/udev/rules.d/60-fringed.rules usr/share/{bash-completion/completions/fringed,zsh/vendor-completions/_fringed,fish/vendor_completions.d/fringed.fish} \
+    usr/lib/udev/rules.d/60-fringed.rules etc/security/limits.d/fringed.conf usr/share/{bash-completion/completions/fringed,zsh/vendor-completions/_fringed,fish/vendor_completions.d/fringed.fish} \
     usr/share/man/man1/fringed.1.gz usr/share/doc/fringed/{README.md,licences.txt,copyright,examples/fringed.toml}; do
     [[ -s $work/$file ]] || broken "there is no $file"
 done
@@ -31,7 +31,7 @@ for file in fringed.service 60-fringed.rules; do
 done
 # Other files than those of the program and its documentation must not be in the package.
 stray=$(cd "$work" && find . -type f -not -path './DEBIAN/*' -not -path './usr/bin/fringed' -not -path './usr/share/doc/fringed/*' \
-    -not -path ./usr/share/man/man1/fringed.1.gz -not -path './usr/lib/s*' -not -path './usr/lib/tmpfiles.d/*' -not -path './usr/lib/udev/*' -not -path './usr/share/*completions*/*fringed*' -not -path ./etc/fringed/fringed.toml)
+    -not -path ./usr/share/man/man1/fringed.1.gz -not -path './usr/lib/s*' -not -path './usr/lib/tmpfiles.d/*' -not -path './usr/lib/udev/*' -not -path './usr/share/*completions*/*fringed*' -not -path ./etc/fringed/fringed.toml -not -path ./etc/security/limits.d/fringed.conf)
 [[ -z $stray ]] || broken "nobody asked for $stray"
 
 # The completion of each shell has the commands, and the options of one command.
@@ -45,7 +45,7 @@ completed=$(bash -c 'source "$1"; COMP_WORDS=(fringed doctor --sc); COMP_CWORD=2
     _fringed fringed --sc doctor; echo "${COMPREPLY[*]}"' - "$work/usr/share/bash-completion/completions/fringed")
 [[ $completed == --scenario ]] || broken "bash completes doctor --sc to $completed"
 
-[[ $(cat "$work/DEBIAN/conffiles") == /etc/fringed/fringed.toml ]] || broken "the configuration is not a file of the user's"
+[[ $(sort "$work/DEBIAN/conffiles" | xargs) == "/etc/fringed/fringed.toml /etc/security/limits.d/fringed.conf" ]] || broken "the configuration is not a file of the user's"
 case $(dpkg-deb --field "$package" Architecture) in
 amd64) configuration=debian/fringed.toml ;;
 arm64) configuration=docs/fringed.toml ;;
