@@ -79,3 +79,69 @@ pub fn prompt(core: Option<usize>) -> Prompt {
         core: None,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::sync::{Condvar, Mutex};
+    use std::time::{Duration, Instant};
+
+    const WIDTH: Duration = Duration::from_micros(16_653);
+    /// Half a percent of it.
+    const SPOILED: Duration = Duration::from_micros(83);
+    const PULSES: usize = 150;
+
+    /// How late a thread ends pulses that waits as the one of the trigger does, sorted.
+    fn late(prepare: impl FnOnce() + Send) -> Vec<Duration> {
+        let pulse = || {
+            let (mutex, never) = (Mutex::new(()), Condvar::new());
+            let begun = Instant::now();
+            let early = WIDTH - Duration::from_micros(200);
+            drop(never.wait_timeout(mutex.lock().unwrap(), early));
+            while begun.elapsed() < WIDTH {
+                std::hint::spin_loop();
+            }
+            begun.elapsed() - WIDTH
+        };
+        let mut late: Vec<_> = std::thread::scope(|scope| {
+            let pulses = scope.spawn(|| {
+                prepare();
+                (0..PULSES).map(|_| pulse()).collect()
+            });
+            pulses.join().unwrap()
+        });
+        late.sort_unstable();
+        late
+    }
+
+    #[test]
+    #[ignore = "a measurement that needs the right to a real-time priority, and loads every core"]
+    fn a_prompt_thread_ends_pulses_in_time_beside_busy_ones() {
+        let over = AtomicBool::new(false);
+        let [ordinary, prompt] = std::thread::scope(|scope| {
+            for _ in 0..2 * std::thread::available_parallelism().unwrap().get() {
+                scope.spawn(|| {
+                    while !over.load(Ordering::Relaxed) {
+                        std::hint::spin_loop();
+                    }
+                });
+            }
+            let measured = [
+                late(|| ()),
+                late(|| assert!(be_prompt(None).real_time, "not permitted")),
+            ];
+            over.store(true, Ordering::Relaxed);
+            measured
+        });
+        let spoiled = |late: &[Duration]| late.iter().filter(|late| **late > SPOILED).count();
+        for (who, late) in [("ordinary", &ordinary), ("prompt", &prompt)] {
+            let (median, worst) = (late[PULSES / 2], late[PULSES - 1]);
+            println!(
+                "{who}: {} of {PULSES} pulses spoiled, median {median:?}, worst {worst:?}",
+                spoiled(late)
+            );
+        }
+        assert!(spoiled(&prompt) * 10 < spoiled(&ordinary));
+    }
+}

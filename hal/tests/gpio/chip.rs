@@ -63,9 +63,9 @@ impl Chip {
     pub fn trigger(&self, pulse_us: u32, active_low: bool) -> TriggerSetup {
         TriggerSetup {
             chip: self.label.into(),
-            line: None,
             pulse_us,
             active_low,
+            ..TriggerSetup::default()
         }
     }
 

@@ -109,7 +109,7 @@ fn rig(_: &Chip, kind: Kind, knows_patterns: bool) -> Head {
         chip: chip::LABEL.into(),
         line: Some(chip::LINE.into()),
         pulse_us: 2_000,
-        active_low: false,
+        ..TriggerSetup::default()
     };
     let clock = Monotonic::new(vec![display.descriptor().unwrap(), camera.descriptor()]);
     let timing = Timing {
