@@ -329,6 +329,7 @@ fn a_boundary_value_in_a_scenario_is_refused_by_its_key_or_the_scene_can_be_lit(
         "flowerpot",
         "spline",
         "plane",
+        "board",
     ] {
         let text = format!("[part]\nkind = \"{part}\"\n");
         let part = Scenario::from_toml(&text, "here").unwrap().part;

@@ -6,16 +6,20 @@ use crate::error::{Exit, Failure};
 use crate::head::placed::Placed;
 use crate::production::backend;
 use hal::bounds::{MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG, clipped};
+use sim::parts::Board;
 
 /// The part in front of a simulated head, if not the scenario's.
 #[derive(Clone, Debug, clap::Args)]
 pub struct SimulatedPart {
-    /// Put this stock part in front of the simulated head: sheet_metal, flowerpot, cone, sawtooth, sphere, tube, spline, plane or empty.
+    /// Put this stock part in front of the simulated head: sheet_metal, flowerpot, cone, sawtooth, sphere, tube, spline, plane, board or empty.
     #[arg(long, value_name = "KIND")]
     part: Option<String>,
     /// Give the simulated part a defect: dent:X,Y,DEPTH,DIAMETER in mm, missing_hole:INDEX or bent_flange:DEGREES; more than once for more.
     #[arg(long, value_name = "KIND:NUMBERS")]
     defect: Vec<String>,
+    /// Place the simulated board in this one of the ten poses that are recommended for a calibration; 10 lies in z = 0.
+    #[arg(long, value_name = "NUMBER", value_parser = number(1, Board::POSES.len() as u8), conflicts_with_all = ["shift", "tilt", "rotate"])]
+    pose: Option<u8>,
     /// Move the simulated part by this, mm.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>(MAX_PLACEMENT_MM), allow_hyphen_values = true)]
     shift: Option<[f64; 3]>,
@@ -34,14 +38,19 @@ impl SimulatedPart {
     /// If the configured head is not simulated, or there is no such part, defect or placement (64).
     pub fn placed(&self, head: &HeadConfig) -> Result<Option<Placed>, Failure> {
         let asked = self.part.is_some() || !self.defect.is_empty();
-        if !asked && self.shift.is_none() && self.tilt.is_none() && self.rotate.is_none() {
+        if !asked
+            && self.pose.is_none()
+            && self.shift.is_none()
+            && self.tilt.is_none()
+            && self.rotate.is_none()
+        {
             return Ok(None);
         }
         let usage =
             |words: String| Failure::because(Exit::Usage, "put a part in front of the head", words);
         if head.backend != Backend::Sim {
             return Err(usage(
-                "the configured head is not simulated: leave out --part, --defect, --shift, --tilt and --rotate".into(),
+                "the configured head is not simulated: leave out --part, --defect, --pose, --shift, --tilt and --rotate".into(),
             ));
         }
         let scenario = backend::scenario(head.scenario.as_deref())?;
@@ -55,6 +64,10 @@ impl SimulatedPart {
         for defect in &self.defect {
             let added = placed.add_defect(defect).and_then(|()| placed.check());
             added.map_err(|words| usage(format!("--defect {}: {words}", clipped(defect))))?;
+        }
+        if let Some(pose) = self.pose {
+            let posed = placed.pose(pose);
+            posed.map_err(|words| usage(format!("--pose: {words}")))?;
         }
         let place = &mut placed.placement;
         place.shift_mm = self.shift.unwrap_or(place.shift_mm);

@@ -35,6 +35,8 @@ pub(super) struct Hit {
     pub point: Vector,
     /// The unit normal, on the side from which the ray came.
     pub normal: Vector,
+    /// Share of the light that the material reflects, of what white would.
+    pub albedo: f64,
 }
 
 impl<'a> Traced<'a> {
@@ -58,7 +60,12 @@ impl<'a> Traced<'a> {
         };
         let up = normalised([-slope(SLOPE_STEP_MM, 0.0), -slope(0.0, SLOPE_STEP_MM), 1.0]);
         let normal = if above { up } else { [-up[0], -up[1], -up[2]] };
-        Some(Hit { point, normal })
+        let albedo = self.surface.albedo(x, y);
+        Some(Hit {
+            point,
+            normal,
+            albedo,
+        })
     }
 
     /// Whether material lies between `hit` and a distant point in direction `towards`, a unit vector on the side of the normal.

@@ -4,7 +4,7 @@
 //! camera pixel the point of the surface, its normal, whether it sees the projector, and the projector
 //! point (ξ, η) that lights it. The bilinear taps of all sub-rays of a pixel are merged into one row of a sparse
 //! matrix; a frame is then matrix × raster. The model of light is
-//! I = ambient + diffuse · max(0, n·l) · pattern, averaged over the sub-rays, without fall-off with distance. Ambient light
+//! I = albedo · (ambient + diffuse · max(0, n·l) · pattern), averaged over the sub-rays, without fall-off with distance. Ambient light
 //! reaches shadowed points, too; a sub-ray that meets nothing has I = 0.
 //!
 //! The result does not depend on the number of threads: every pixel is computed by itself.
@@ -68,7 +68,7 @@ impl Placed {
 }
 
 /// Rz(rotation) · Ry(tilt y) · Rx(tilt x), row-major.
-fn rotation_of(placement: &Placement) -> [f64; 9] {
+pub(crate) fn rotation_of(placement: &Placement) -> [f64; 9] {
     let (sx, cx) = placement.tilt_deg[0].to_radians().sin_cos();
     let (sy, cy) = placement.tilt_deg[1].to_radians().sin_cos();
     let (sz, cz) = placement.rotation_deg.to_radians().sin_cos();
@@ -175,10 +175,10 @@ struct Tracer<'a> {
     traced: Option<Traced<'a>>,
 }
 
-/// A point of the part that the projector lights: its place on the raster, and the cosine of its angle to the light.
+/// A point of the part that the projector lights: its place on the raster, and the share of the light that it reflects.
 struct Lit {
     raster: [f64; 2],
-    cosine: f64,
+    share: f64,
 }
 
 impl Tracer<'_> {
@@ -194,7 +194,7 @@ impl Tracer<'_> {
             let (u, v) = (f64::from(u), f64::from(v));
             let centre = self.hit(u, v);
             let mut whole = true;
-            let mut met = 0_u32;
+            let mut bright = 0.0;
             for sub in 0..n * n {
                 let offset = |i: u32| (f64::from(i) + 0.5) / f64::from(n) - 0.5;
                 let Some((hit, direction)) = self.hit(u + offset(sub % n), v + offset(sub / n))
@@ -202,7 +202,7 @@ impl Tracer<'_> {
                     whole = false;
                     continue;
                 };
-                met += 1;
+                bright += hit.albedo;
                 whole &= centre
                     .as_ref()
                     .is_some_and(|(at, _)| !depth_edge(at, &hit, direction));
@@ -224,7 +224,7 @@ impl Tracer<'_> {
                 .height
                 .push(seen.map_or(f32::NAN, |point| self.placed.to_world(point)[2] as f32));
             row.ambient
-                .push((self.scenario.light.ambient * f64::from(met) * share) as f32);
+                .push((self.scenario.light.ambient * bright * share) as f32);
             merge(&mut pixel, &mut row.taps);
             row.ends.push(row.taps.len() as u32);
         }
@@ -251,7 +251,8 @@ impl Tracer<'_> {
         if !on(raster[0], device.width) || !on(raster[1], device.height) {
             return None;
         }
-        (!self.traced.as_ref()?.shadowed(hit, towards)).then_some(Lit { raster, cosine })
+        let share = cosine * hit.albedo;
+        (!self.traced.as_ref()?.shadowed(hit, towards)).then_some(Lit { raster, share })
     }
 
     /// The four bilinear taps of a lit point; beyond the outermost pixel centres the edge pixels are repeated.
@@ -264,7 +265,7 @@ impl Tracer<'_> {
         };
         let (left, right, x) = split(lit.raster[0], device.width);
         let (top, bottom, y) = split(lit.raster[1], device.height);
-        let strength = self.scenario.light.diffuse * lit.cosine * share;
+        let strength = self.scenario.light.diffuse * lit.share * share;
         for (row, wy) in [(top, 1.0 - y), (bottom, y)] {
             for (column, wx) in [(left, 1.0 - x), (right, x)] {
                 pixel.push((row * device.width + column, strength * wx * wy));

@@ -47,6 +47,7 @@ const TABLE: &[(&str, &str, Takes)] = &[
     ("serve", "defect", Defect),
     ("serve", "shift", List(3, 1000.0)),
     ("serve", "tilt", List(2, 80.0)),
+    ("serve", "pose", Number(1.0, 10.0)),
     ("serve", "rotate", Number(-360.0, 360.0)),
     ("adapt", "projector_blur", Number(0.0, 20.0)),
     ("adapt", "camera_blur", Number(0.0, 20.0)),
@@ -232,7 +233,7 @@ fn a_boundary_value_of_an_option_is_refused_with_its_bounds_or_lies_within_them(
     }
     println!("{cases} boundary values of options, {taken} of them can be used");
     assert_eq!(known.len(), TABLE.len(), "an option is gone");
-    assert_eq!(cases, 1462);
+    assert_eq!(cases, 1478);
 }
 
 /// Checks the outcome of a case; returns whether its value was accepted.

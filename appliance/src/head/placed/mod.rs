@@ -3,6 +3,7 @@
 use hal::bounds::clipped;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
+use sim::parts::Board;
 use sim::{Part, Placement, Scenario};
 
 /// The most defects of a part: each ray is traced against all of them.
@@ -24,13 +25,42 @@ const DEFECTS: [(&str, &[(&str, f64)]); 3] = [
 
 /// A part and its placement, as a scenario has them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "PlacedFile")]
 pub struct Placed {
     /// The part with its defects.
     pub part: Part,
-    /// Where it lies; in its designed pose, if left out.
-    #[serde(default)]
+    /// Where it lies.
     pub placement: Placement,
+}
+
+/// A part as clients write it: the part itself or the name of a stock part, with its placement or the number of a board's pose.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlacedFile {
+    part: Value,
+    placement: Option<Placement>,
+    pose: Option<u8>,
+}
+
+impl TryFrom<PlacedFile> for Placed {
+    type Error = String;
+
+    fn try_from(file: PlacedFile) -> Result<Self, String> {
+        let mut placed = match file.part {
+            Value::String(kind) => Self::stock(&kind)?,
+            part => Self {
+                part: serde_json::from_value(part).map_err(|error| format!("part: {error}"))?,
+                ..Self::default()
+            },
+        };
+        match (file.placement, file.pose) {
+            (Some(_), Some(_)) => return Err("placement and pose: write one of them".into()),
+            (Some(placement), None) => placed.placement = placement,
+            (None, Some(pose)) => placed.pose(pose)?,
+            (None, None) => (),
+        }
+        Ok(placed)
+    }
 }
 
 impl Placed {
@@ -49,6 +79,29 @@ impl Placed {
             part,
             ..Self::default()
         })
+    }
+
+    /// Places a board in one of the poses that are recommended for a calibration, 1…10.
+    ///
+    /// # Errors
+    /// If the part is no board, or there is no such pose.
+    pub fn pose(&mut self, number: u8) -> Result<(), String> {
+        if !matches!(self.part, Part::Board(_)) {
+            return Err(format!(
+                "pose {number}: only a board has poses with numbers; write the placement of a {}",
+                kind(&self.part)
+            ));
+        }
+        let pose = number
+            .checked_sub(1)
+            .and_then(|at| Board::POSES.get(usize::from(at)));
+        self.placement = *pose.ok_or_else(|| {
+            format!(
+                "there is no pose {number}: write 1 to {}",
+                Board::POSES.len()
+            )
+        })?;
+        Ok(())
     }
 
     /// The same part without its defects, in its designed pose.
@@ -160,7 +213,7 @@ fn with_defect(part: &Part, defect: Value) -> Result<Part, String> {
     serde_json::from_value(value).map_err(|error| error.to_string())
 }
 
-/// Every stock part with an example of each defect that it can have.
+/// Every stock part with an example of each defect that it can have, and the recommended poses of a board.
 pub fn kinds() -> Vec<Value> {
     let offers = |part: &Part| -> Vec<Value> {
         let all = DEFECTS
@@ -179,7 +232,10 @@ pub fn kinds() -> Vec<Value> {
     };
     let parts = Part::stock().into_iter();
     parts
-        .map(|part| json!({ "part": part, "defects": offers(&part) }))
+        .map(|part| match part {
+            Part::Board(_) => json!({ "part": part, "defects": [], "poses": Board::POSES }),
+            part => json!({ "part": part, "defects": offers(&part) }),
+        })
         .collect()
 }
 

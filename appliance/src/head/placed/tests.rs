@@ -76,7 +76,7 @@ fn every_number_is_bounded() {
 #[test]
 fn the_page_is_offered_every_stock_part_with_the_defects_that_it_can_have() {
     let kinds = kinds();
-    assert_eq!(kinds.len(), 9);
+    assert_eq!(kinds.len(), 10);
     for one in &kinds {
         let part: Part = serde_json::from_value(one["part"].clone()).unwrap();
         for defect in one["defects"].as_array().unwrap() {
@@ -88,4 +88,35 @@ fn the_page_is_offered_every_stock_part_with_the_defects_that_it_can_have() {
         }
     }
     assert_eq!(kinds[0]["defects"].as_array().unwrap().len(), 3);
+}
+
+#[test]
+fn a_board_is_placed_by_the_number_of_a_pose() {
+    let read = |value: Value| -> Result<Placed, String> {
+        serde_json::from_value(value).map_err(|error| error.to_string())
+    };
+    let third = read(json!({ "part": "board", "pose": 3 })).unwrap();
+    assert_eq!(third.part, Part::Board(Board::default()));
+    assert_eq!(third.placement, Board::POSES[2]);
+    let bowed = json!({ "kind": "board", "bow_um": 30.0, "scale_ppm": 200.0 });
+    let last = read(json!({ "part": bowed, "pose": 10 })).unwrap();
+    assert_eq!(last.placement, Placement::default());
+    last.check().unwrap();
+    let placement = json!({ "tilt_deg": [5.0, 7.0] });
+    let tilted = read(json!({ "part": bowed, "placement": placement })).unwrap();
+    assert_eq!(tilted.placement.tilt_deg, [5.0, 7.0]);
+    for (wrong, words) in [
+        (json!({ "part": "board", "pose": 0 }), "write 1 to 10"),
+        (json!({ "part": "board", "pose": 11 }), "write 1 to 10"),
+        (json!({ "part": "plane", "pose": 1 }), "only a board"),
+        (
+            json!({ "part": "board", "pose": 1, "placement": {} }),
+            "write one of them",
+        ),
+        (json!({ "part": "teapot" }), "flowerpot"),
+        (json!({ "part": { "kind": "board", "bow": 1.0 } }), "bow"),
+    ] {
+        let error = read(wrong.clone()).unwrap_err();
+        assert!(error.contains(words), "{wrong}: {error}");
+    }
 }

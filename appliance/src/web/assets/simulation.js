@@ -31,9 +31,15 @@ function showDefects() {
     return make("p", "line", make("b", "", words(defect.kind)), ...numbers.map((name) => field(name, defect[name], (number) => { defect[name] = number; })), remove);
   });
   fill($("part-defects"), ...rows);
-  const offered = kinds.find((one) => one.part.kind === part.kind).defects;
+  const { defects: offered, poses = [] } = kinds.find((one) => one.part.kind === part.kind);
+  show("part-pose", poses.length > 0);
+  fill($("pose"), new Option("as below", ""), ...poses.map((pose, at) => new Option(String(at + 1), String(at))));
   show("part-defect", offered.length > 0);
   fill($("defect-kind"), ...offered.map((defect) => new Option(words(defect.kind), defect.kind)));
+}
+
+function showPlacement({ shift_mm, tilt_deg, rotation_deg }) {
+  [...shift_mm, ...tilt_deg, rotation_deg].forEach((number, at) => { $(`place-${at}`).value = String(number); });
 }
 
 function showPart(answer) {
@@ -42,8 +48,7 @@ function showPart(answer) {
   ({ kinds, part } = answer);
   fill($("part-kind"), ...kinds.map((one) => new Option(words(one.part.kind), one.part.kind)));
   $("part-kind").value = part.kind;
-  const { shift_mm, tilt_deg, rotation_deg } = answer.placement;
-  [...shift_mm, ...tilt_deg, rotation_deg].forEach((number, at) => { $(`place-${at}`).value = String(number); });
+  showPlacement(answer.placement);
   showDefects();
 }
 
@@ -68,6 +73,10 @@ export function start() {
   $("part-kind").addEventListener("change", () => {
     part = copy(kinds.find((one) => one.part.kind === $("part-kind").value).part);
     showDefects();
+  });
+  $("pose").addEventListener("change", () => {
+    const { poses } = kinds.find((one) => one.part.kind === part.kind);
+    if ($("pose").value !== "") showPlacement(poses[Number($("pose").value)]);
   });
   $("defect-add").addEventListener("click", () => {
     const offered = kinds.find((one) => one.part.kind === part.kind).defects;

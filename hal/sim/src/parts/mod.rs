@@ -3,6 +3,7 @@
 //! Default sizes are those of the parts in Peng & Gupta's study (2008; docs/measurement.md, *The study's head and parts*); a scenario may
 //! change them.
 
+mod board;
 mod dented;
 mod shapes;
 mod sheet_metal;
@@ -13,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::limits::within;
 use super::optics::Vector;
 
+pub use board::Board;
 pub use shapes::{Cone, Flowerpot, Plane, Sawtooth, Sphere, Tube};
 pub use sheet_metal::{Defect, SheetMetal};
 pub use spline::Spline;
@@ -35,6 +37,8 @@ pub enum Part {
     Spline(Box<Spline>),
     /// A flat square.
     Plane(Plane),
+    /// A printed checkerboard.
+    Board(Board),
     /// A stamped bracket, the default.
     SheetMetal(SheetMetal),
     /// Nothing at all.
@@ -58,6 +62,11 @@ pub(crate) trait Surface: Send + Sync {
     /// Whether there is material at (x, y).
     fn present(&self, x: f64, y: f64) -> bool;
 
+    /// Share of the light that the material reflects at (x, y), of what white would.
+    fn albedo(&self, _x: f64, _y: f64) -> f64 {
+        1.0
+    }
+
     /// No slope of `height` is larger than this, in any direction.
     fn slope_bound(&self) -> f64;
 
@@ -68,7 +77,7 @@ pub(crate) trait Surface: Send + Sync {
 impl Part {
     /// One good part of each kind with its default measures.
     #[must_use]
-    pub fn stock() -> [Self; 9] {
+    pub fn stock() -> [Self; 10] {
         [
             Self::SheetMetal(SheetMetal::default()),
             Self::Flowerpot(Flowerpot::default()),
@@ -78,6 +87,7 @@ impl Part {
             Self::Tube(Tube::default()),
             Self::Spline(Box::default()),
             Self::Plane(Plane::default()),
+            Self::Board(Board::default()),
             Self::Empty {},
         ]
     }
@@ -133,6 +143,7 @@ impl Part {
             }
             Self::Spline(part) => part.check(),
             Self::Plane(part) => positive("half_size", part.half_size),
+            Self::Board(part) => part.check(),
             Self::SheetMetal(part) => part.check(),
             Self::Empty {} => Ok(()),
         }
@@ -148,6 +159,7 @@ impl Part {
             Self::Flowerpot(part) => Box::new(dented::Dented::new(part.clone(), &part.defects)),
             Self::Spline(part) => Box::new((**part).clone()),
             Self::Plane(part) => Box::new(part.clone()),
+            Self::Board(part) => Box::new(part.clone()),
             Self::SheetMetal(part) => Box::new(sheet_metal::Stamping::new(part)),
             Self::Empty {} => return None,
         })

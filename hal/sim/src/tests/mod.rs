@@ -1,5 +1,6 @@
 //! Promises of the simulated head: the contract, any number of threads, scenarios, speed; the submodules have the other topics.
 
+mod board;
 mod cables;
 mod controller;
 mod light;
@@ -8,7 +9,7 @@ mod surfaces;
 
 use std::time::{Duration, Instant};
 
-use super::parts::{Cone, Defect, Flowerpot, Plane, Sawtooth, SheetMetal, Sphere, Tube};
+use super::parts::{Board, Cone, Defect, Flowerpot, Plane, Sawtooth, SheetMetal, Sphere, Tube};
 use super::{Part, Scenario, head};
 use hal::contract::check_head;
 use hal::frame::{Frame, Samples};
@@ -37,6 +38,10 @@ fn all_parts() -> Vec<Part> {
         Part::Flowerpot(Flowerpot::default()),
         Part::Spline(Box::default()),
         Part::Plane(Plane::default()),
+        Part::Board(Board {
+            bow_um: 300.0,
+            ..Board::default()
+        }),
         Part::SheetMetal(SheetMetal::default()),
         Part::SheetMetal(SheetMetal {
             defects: vec![
