@@ -65,11 +65,10 @@ pub(super) fn locate(
         let mut next = fit;
         next.iter_mut().zip(&step).for_each(|(x, dx)| *x += dx);
         next[4] = next[4].clamp(SHARPEST, radius / 2.0);
-        if libm::hypot(next[0] - u, next[1] - v) > radius / 2.0 {
-            return None;
-        }
+        // A step to another corner is too long, as one that raises the cost.
+        let near = libm::hypot(next[0] - u, next[1] - v) <= radius / 2.0;
         let found = window.cost(&next);
-        if found <= cost {
+        if near && found <= cost {
             let moved = libm::hypot(step[0], step[1]);
             (fit, cost, damping) = (next, found, damping * 0.1);
             if moved < STILL {

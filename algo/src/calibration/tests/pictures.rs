@@ -1,6 +1,7 @@
 //! Pictures of boards, rendered from their geometry.
 
 use super::Random;
+use crate::calibration::corner::locate;
 use crate::calibration::{Board, BoardError, Fringes, Picture, PoseError, look};
 use crate::pipeline::PhaseMap;
 use crate::trust::Trust;
@@ -194,4 +195,37 @@ fn a_moved_a_blurred_and_a_badly_lit_pose_are_refused_with_the_reason() {
     assert!((0.3..0.7).contains(&share), "{share}");
     let all: Vec<_> = (1..4).map(still).collect();
     assert!(looked(&all, 0).is_ok());
+}
+
+#[test]
+fn a_sharp_corner_of_small_squares_is_located_from_a_pixel_away() {
+    let (width, height, sub) = (24, 24, 8);
+    let mut random = Random::new(5);
+    for case in 0..200 {
+        let mut by = |most: f64| most * random.signed();
+        let (u, v) = (11.5 + by(0.5), 11.5 + by(0.5));
+        let first = by(3.0);
+        let second = first + core::f64::consts::FRAC_PI_2 + by(0.5);
+        let start = (u + by(0.7), v + by(0.7));
+        let edges = [first, second].map(|angle| (libm::cos(angle), libm::sin(angle)));
+        let pixels = (0..width * height).map(|at| {
+            let colour = |ray: usize| {
+                let off = |at: usize| (at as f64 + 0.5) / sub as f64 - 0.5;
+                let x = (at % width) as f64 + off(ray % sub) - u;
+                let y = (at / width) as f64 + off(ray / sub) - v;
+                let [a, b] = edges.map(|(cos, sin)| y * cos - x * sin > 0.0);
+                if a == b { 15.0 } else { 180.0 }
+            };
+            ((0..sub * sub).map(colour).sum::<f64>() / (sub * sub) as f64) as f32
+        });
+        let picture = Picture {
+            width,
+            height,
+            counts: pixels.collect(),
+        };
+        let found = locate(&picture, start, edges, 4.0);
+        let found = found.unwrap_or_else(|| panic!("case {case}: not located"));
+        let off = libm::hypot(found.u - u, found.v - v);
+        assert!(off < 0.15, "case {case}: {off}");
+    }
 }
