@@ -42,6 +42,7 @@ mod rooms;
 mod sequences;
 mod service;
 mod shared_recordings;
+mod simulated_board;
 mod simulated_part;
 mod station;
 mod station_plc;
