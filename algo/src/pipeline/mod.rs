@@ -1,6 +1,7 @@
 //! Whole frames: decoding, triangulation, heights about a known surface. Rows run serially or on a rayon pool, with the same bits.
 
 mod cubic;
+mod epipolar;
 mod measure;
 mod noise;
 mod plate;
@@ -12,6 +13,7 @@ pub(crate) use cubic::{
     offset_row, sum_variances,
 };
 pub use cubic::{HeightCubics, KnownSurface};
+pub use epipolar::Epipolar;
 pub use measure::{HeightMap, PhaseMap, Window, arrive, decode, decode_last, triangulate};
 pub use noise::sample_noise;
 pub use plate::{Plate, PlateError};

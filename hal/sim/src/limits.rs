@@ -102,6 +102,9 @@ impl RigDevice {
         }
         within("angle_deg", self.angle_deg, -80.0, 80.0)?;
         within("distance_mm", self.distance_mm, 10.0, 100_000.0)?;
+        for angle in self.knocked_deg {
+            within("knocked_deg", angle, -10.0, 10.0)?;
+        }
         for coefficient in self.distortion {
             within("distortion", coefficient, -1.0, 1.0)?;
         }

@@ -102,6 +102,22 @@ fn undistort(coefficients: &[f64; 5], seen: [f64; 2]) -> [f64; 2] {
     [x, y]
 }
 
+/// Rz · Ry · Rx for turns about x, y and z in degrees, row-major.
+pub(crate) fn turn(degrees: [f64; 3]) -> [f64; 9] {
+    let [(sx, cx), (sy, cy), (sz, cz)] = degrees.map(|angle| angle.to_radians().sin_cos());
+    [
+        cz * cy,
+        cz * sy * sx - sz * cx,
+        cz * sy * cx + sz * sx,
+        sz * cy,
+        sz * sy * sx + cz * cx,
+        sz * sy * cx - cz * sx,
+        -sy,
+        cy * sx,
+        cy * cx,
+    ]
+}
+
 /// R · v, R row-major.
 pub(crate) fn turned(r: &[f64; 9], v: Vector) -> Vector {
     [

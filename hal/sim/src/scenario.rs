@@ -4,6 +4,7 @@
 
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::optics::{Lens, turn, turned};
 use super::parts::Part;
 use super::timing::Timing;
 use hal::bounds::shortened;
@@ -70,6 +71,8 @@ pub struct RigDevice {
     pub distance_mm: f64,
     /// Brown distortion k1, k2, p1, p2, k3.
     pub distortion: [f64; 5],
+    /// By how much it was turned about its own x, y and z since its models were made, degrees.
+    pub knocked_deg: [f64; 3],
 }
 
 /// Phong's model without its specular part: I = ambient + diffuse · max(0, n·l) · pattern/255, 1 = full scale.
@@ -150,6 +153,7 @@ impl Default for Rig {
                 angle_deg: 20.0,
                 distance_mm: 600.0,
                 distortion: [-0.12, 0.15, 2e-4, -3e-4, 0.0],
+                knocked_deg: [0.0; 3],
             },
             projector: RigDevice {
                 width: 1024,
@@ -158,6 +162,7 @@ impl Default for Rig {
                 angle_deg: -7.0,
                 distance_mm: 600.0,
                 distortion: [-0.05, 0.03, -3e-4, 2e-4, 0.0],
+                knocked_deg: [0.0; 3],
             },
         }
     }
@@ -194,7 +199,23 @@ impl Default for Optics {
 }
 
 impl RigDevice {
-    /// The exact geometry of this device, in the form of files.
+    /// The geometry with which frames are made: that of the models, turned by what has knocked the device since.
+    pub(crate) fn lens(&self) -> Lens {
+        let model = self.model();
+        let knock = turn(self.knocked_deg);
+        // X_device = K (R X + t).
+        let columns = [0, 1, 2].map(|at| {
+            let r = &model.rotation;
+            turned(&knock, [r[at], r[at + 3], r[at + 6]])
+        });
+        Lens::new(DeviceModel {
+            rotation: std::array::from_fn(|at| columns[at % 3][at / 3]),
+            translation_mm: turned(&knock, model.translation_mm),
+            ..model
+        })
+    }
+
+    /// The exact geometry of this device when its models were made, in the form of files.
     #[must_use]
     pub fn model(&self) -> DeviceModel {
         let (sin, cos) = self.angle_deg.to_radians().sin_cos();
@@ -224,6 +245,7 @@ struct DeviceFile {
     angle_deg: Option<f64>,
     distance_mm: Option<f64>,
     distortion: Option<[f64; 5]>,
+    knocked_deg: Option<[f64; 3]>,
 }
 
 impl DeviceFile {
@@ -235,6 +257,7 @@ impl DeviceFile {
             angle_deg: self.angle_deg.unwrap_or(base.angle_deg),
             distance_mm: self.distance_mm.unwrap_or(base.distance_mm),
             distortion: self.distortion.unwrap_or(base.distortion),
+            knocked_deg: self.knocked_deg.unwrap_or(base.knocked_deg),
         }
     }
 }

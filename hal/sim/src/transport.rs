@@ -11,7 +11,7 @@
 
 use rayon::prelude::*;
 
-use super::optics::{Lens, Vector, dot, minus, normalised, plus, turned, turned_back};
+use super::optics::{Lens, Vector, dot, minus, normalised, plus, turn, turned, turned_back};
 use super::parts::Part;
 use super::scenario::{Placement, Scenario};
 use super::trace::{Hit, Traced, facing};
@@ -67,22 +67,10 @@ impl Placed {
     }
 }
 
-/// Rz(rotation) · Ry(tilt y) · Rx(tilt x), row-major.
+/// Rz(rotation) · Ry(tilt y) · Rx(tilt x).
 pub(crate) fn rotation_of(placement: &Placement) -> [f64; 9] {
-    let (sx, cx) = placement.tilt_deg[0].to_radians().sin_cos();
-    let (sy, cy) = placement.tilt_deg[1].to_radians().sin_cos();
-    let (sz, cz) = placement.rotation_deg.to_radians().sin_cos();
-    [
-        cz * cy,
-        cz * sy * sx - sz * cx,
-        cz * sy * cx + sz * sx,
-        sz * cy,
-        sz * sy * sx + cz * cx,
-        sz * sy * cx - cz * sx,
-        -sy,
-        cy * sx,
-        cy * cx,
-    ]
+    let [x, y] = placement.tilt_deg;
+    turn([x, y, placement.rotation_deg])
 }
 
 impl Transport {
@@ -94,8 +82,8 @@ impl Transport {
         placement: &Placement,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Self {
-        let camera = Lens::new(scenario.rig.camera.model());
-        let projector = Lens::new(scenario.rig.projector.model());
+        let camera = scenario.rig.camera.lens();
+        let projector = scenario.rig.projector.lens();
         let placed = Placed::new(placement, &camera, &projector);
         let surface = part.surface();
         let tracer = Tracer {

@@ -6,6 +6,7 @@
 pub mod computer;
 pub mod controller;
 mod delivery;
+mod geometry;
 mod light;
 mod time;
 
@@ -77,7 +78,7 @@ fn named(name: &'static str, check: Check) -> Check {
 }
 
 /// The checks in their order, each with the checks that must have passed before it.
-const CHECKS: [(&str, &[&str]); 13] = [
+const CHECKS: [(&str, &[&str]); 14] = [
     ("devices", &[]),
     ("format", &["devices"]),
     ("mode", &["devices"]),
@@ -93,6 +94,12 @@ const CHECKS: [(&str, &[&str]); 13] = [
     (
         "response",
         &["devices", "trigger", "light", "exposure", "content"],
+    ),
+    (
+        "geometry",
+        &[
+            "devices", "format", "mode", "cadence", "trigger", "light", "exposure", "delay",
+        ],
     ),
 ];
 
@@ -132,6 +139,7 @@ pub fn examine(
             "cadence" => time::cadence(head),
             "trigger" => time::trigger(head, calibrated),
             "delivery" => delivery::delivery(head),
+            "geometry" => geometry::geometry(head, calibration, calibrated),
             _ => {
                 let lit = lit.get_or_insert_with(|| Lit::take(head, SETTLE));
                 match (name, lit) {

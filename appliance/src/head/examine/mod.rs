@@ -8,6 +8,7 @@ mod content;
 mod contrast;
 mod delay;
 mod first_light;
+mod drift;
 mod noise;
 mod pace;
 mod pictures;
@@ -19,6 +20,7 @@ pub use content::{MOST_BY_CONTENT, by_content};
 pub use contrast::{PITCHES, contrast};
 pub use delay::Delay;
 pub use first_light::{LONGEST_DARK, first_light};
+pub use drift::{MOST_DRIFT_PX, drift};
 pub use noise::noise;
 pub use pace::{Spaced, pace};
 pub use pictures::{

@@ -1,0 +1,38 @@
+//! The doctor's check of the geometry: camera and projector stand to each other as when they were calibrated.
+
+use super::{Check, Verdict};
+use crate::head::calibration::Calibration;
+use crate::head::examine::{MOST_DRIFT_PX, PATIENCE, drift};
+use hal::error::Error;
+use hal::head::Head;
+use serde_json::json;
+
+pub(super) fn geometry(
+    head: &mut Head,
+    calibration: &Calibration,
+    calibrated: bool,
+) -> Result<Check, Error> {
+    let skipped = |words: &str| Check {
+        verdict: Verdict::Skipped,
+        ..Check::new(words, None, json!({}))
+    };
+    if !calibrated {
+        return Ok(skipped("cannot be judged before the head is calibrated"));
+    }
+    let Some(seen) = drift(head, calibration, PATIENCE)? else {
+        return Ok(skipped(
+            "cannot be judged: too little of the picture shows fringes; put a larger part into view",
+        ));
+    };
+    let found = format!(
+        "projector points are {:.2} px off their epipolar lines (limit {MOST_DRIFT_PX} px, noise of a point {:.2} px)",
+        seen.rms, seen.noise
+    );
+    let remedy = "camera or projector was knocked or refocused since the calibration: calibrate the geometry anew";
+    let measured = json!({
+        "epipolar_px": seen.rms, "offset_px": seen.offset, "gradient_px": seen.gradient,
+        "noise_px": seen.noise, "pixels": seen.pixels,
+    });
+    let moved = !(seen.rms <= MOST_DRIFT_PX);
+    Ok(Check::new(found, moved.then_some(remedy), measured))
+}
