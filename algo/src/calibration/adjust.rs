@@ -330,7 +330,10 @@ impl Problem<'_> {
 }
 
 /// Located corners of a view and their places on the board.
-fn places<'a>(rig: &'a Rig, view: &'a View) -> impl Iterator<Item = ((f64, f64), (f64, f64))> + 'a {
+pub(super) fn places<'a>(
+    rig: &'a Rig,
+    view: &'a View,
+) -> impl Iterator<Item = ((f64, f64), (f64, f64))> + 'a {
     let corners = view.found.corners.iter().enumerate();
     corners.filter_map(|(at, corner)| {
         let corner = (*corner)?;

@@ -1,6 +1,7 @@
 //! Calibration of the geometry: from pictures and phases of a checkerboard in several poses to the models of camera and projector.
 
 mod adjust;
+mod arrows;
 mod board;
 mod candidates;
 mod corner;
@@ -16,6 +17,7 @@ mod rig;
 mod solve;
 
 pub use adjust::{Adjusted, Residuals, Undetermined, View};
+pub use arrows::Arrow;
 pub use board::{Board, BoardError, FoundBoard};
 pub use corner::Corner;
 pub use lengths::MeasuredBoard;

@@ -4,8 +4,8 @@ use super::calibration::geometry::{BoardFile, GeometryFile, PoseFile};
 use super::scan::Scan;
 use super::seam;
 use algo::calibration::{
-    Adjusted, Board, CalibrationError, Fringes, MeasuredBoard, Picture, Prediction, Residuals,
-    View, calibrate, look,
+    Adjusted, Arrow, Board, CalibrationError, Fringes, MeasuredBoard, Picture, Prediction,
+    Residuals, View, calibrate, look,
 };
 use algo::geometry::Pinhole;
 use algo::pipeline::PhaseMap;
@@ -13,7 +13,7 @@ use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedFrame};
 
 /// Columns and rows of the frame that are looked at for corners.
-const CELLS: (usize, usize) = (8, 6);
+pub const CELLS: (usize, usize) = (8, 6);
 
 /// One pose of the board, as a head saw it.
 #[derive(Clone, Debug)]
@@ -111,6 +111,8 @@ pub struct Geometry {
     pub prediction: Prediction,
     /// The board in each pose, as the calibrated head measures it.
     pub measured: Vec<Option<MeasuredBoard>>,
+    /// The residuals of each pose: of its corners in the camera, and of its points in the projector.
+    pub arrows: Vec<[Vec<Arrow>; 2]>,
     /// Largest angle between the board in two poses, degrees.
     pub tilt_degrees: f64,
     /// Share of the camera's frame in which there were corners.
@@ -163,6 +165,11 @@ impl Geometry {
                 .iter()
                 .enumerate()
                 .map(|(at, view)| adjusted.measured_board(at, view))
+                .collect(),
+            arrows: views
+                .iter()
+                .enumerate()
+                .map(|(at, view)| adjusted.arrows(at, view))
                 .collect(),
             tilt_degrees: adjusted.largest_tilt().to_degrees(),
             frame_covered: covered(frame, &views),

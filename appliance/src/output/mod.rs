@@ -5,3 +5,4 @@ pub mod canvas;
 pub mod cloud;
 pub mod colour;
 pub mod picture;
+pub mod residuals;

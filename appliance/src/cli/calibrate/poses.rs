@@ -9,11 +9,13 @@ use crate::error::{Exit, Failure};
 use crate::head::calibration::file::{CalibrationFile, CameraFile, FORMAT, ProjectorFile, VERSION};
 use crate::head::calibration::geometry::{GeometryFile, MAX_POSES, MAX_SIGMA_PPM};
 use crate::head::calibration::place::Place;
-use crate::head::geometry::{Geometry, SeenPose};
+use crate::head::geometry::{CELLS, Geometry, SeenPose};
 use crate::head::seam;
+use crate::output::residuals::{arrows_png, coverage_png};
+use crate::storage::folder::OutputFolder;
 use crate::storage::state::StateFolder;
 use crate::storage::unpack::Unpacked;
-use algo::calibration::Board;
+use algo::calibration::{Arrow, Board};
 use hal::replay::Recording;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -35,6 +37,9 @@ pub struct Poses {
     /// Write the calibration to this file instead of the station's.
     #[arg(long, value_name = "FILE", value_parser = names::file("json"))]
     out: Option<PathBuf>,
+    /// Write pictures to this folder: the residuals of camera and projector as arrows × 200, and where in the frame corners were seen.
+    #[arg(long, value_name = "DIR", value_parser = names::folder())]
+    pictures: Option<PathBuf>,
     /// σ of the board's scale in parts per million, as its maker or a ruler gives it; counts towards σ of heights and lengths.
     #[arg(long, value_name = "PPM", value_parser = number(0.0, MAX_SIGMA_PPM))]
     board_sigma_ppm: Option<f64>,
@@ -60,6 +65,7 @@ impl Poses {
     pub fn given(&self) -> bool {
         let beside = [self.board_sigma_ppm, self.check_length];
         let named = self.board.is_some() || self.out.is_some() || !self.poses.is_empty();
+        let named = named || self.pictures.is_some();
         named || beside.iter().any(Option::is_some)
     }
 
@@ -98,6 +104,9 @@ impl Poses {
         let geometry = Geometry::of(board, self.board_sigma_ppm.unwrap_or(0.0), &poses)
             .map_err(|error| content(&error))?;
         let head = &poses[0];
+        if let Some(folder) = &self.pictures {
+            draw(&OutputFolder::create(folder)?, head, &geometry)?;
+        }
         let same = before.as_ref().filter(|before| is_of(before, head));
         let scale = self.scale(same, &geometry.file)?;
         if same.is_some_and(|before| before.reference.is_some()) {
@@ -178,6 +187,28 @@ impl Poses {
 
 fn content(words: &str) -> Failure {
     Failure::new(Exit::Content, format!("calibrate: {words}"))
+}
+
+/// Draws residuals and coverage.
+fn draw(folder: &OutputFolder, head: &SeenPose, geometry: &Geometry) -> Result<(), Failure> {
+    let size = |(width, height): (u32, u32)| (width as usize, height as usize);
+    let frame = size((head.frames.0, head.frames.1));
+    let of = |device: usize| -> Vec<&[Arrow]> {
+        let poses = geometry.arrows.iter();
+        poses.map(|pose| pose[device].as_slice()).collect()
+    };
+    let [camera, projector] = [of(0), of(1)];
+    let drawn = [
+        ("camera.png", arrows_png("camera", frame, &camera)),
+        (
+            "projector.png",
+            arrows_png("projector", size(head.raster), &projector),
+        ),
+        ("coverage.png", coverage_png(frame, CELLS, &camera)),
+    ];
+    drawn
+        .iter()
+        .try_for_each(|(name, bytes)| folder.write(name, bytes))
 }
 
 /// Distance between the centres of camera and projector of a calibration, mm.

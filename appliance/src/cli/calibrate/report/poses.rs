@@ -63,11 +63,12 @@ impl Report<'_> {
         for (pose, measured) in file.poses.iter().zip(&geometry.measured) {
             let board = measured.map_or(String::new(), |board| {
                 let (x, y) = board.pitch;
-                format!("{x:7.3} × {y:.3}  {:.3} mm", board.flatness)
+                let pitch = format!("{x:.3} × {y:.3}");
+                format!("{pitch:>18}{:7.3} mm", board.flatness)
             });
             let _ = writeln!(
                 lines,
-                "{:22}{:7}{:11.3}{:14.3}{:6.0}°{:7.0} mm  {board}",
+                "{:22}{:7}{:11.3}{:14.3}{:6.0}°{:7.0} mm{board}",
                 pose.recording,
                 pose.corners,
                 pose.camera_px,
