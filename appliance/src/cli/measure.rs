@@ -1,10 +1,10 @@
-//! `fringed measure RECORDING [--recipe FILE] --out DIR`.
+//! `fringed measure RECORDING [--recipe FILE] [--calibration FILE] --out DIR`.
 
 use super::names;
 use super::options::{Output, Threads};
 use crate::error::{Exit, Failure};
 use crate::history::kept;
-use crate::measure::{Measurement, measure_with};
+use crate::measure::{Measurement, measure_with, models};
 use crate::output::{canvas, picture};
 use crate::storage::folder::OutputFolder;
 use crate::storage::unpack::Unpacked;
@@ -24,6 +24,9 @@ pub struct Measure {
     /// Recipe of the part: dense and single levels are unwrapped about its golden map.
     #[arg(long, value_name = "FILE")]
     recipe: Option<PathBuf>,
+    /// Measure with the models of this calibration.json instead of the recording's.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
@@ -37,7 +40,10 @@ impl Measure {
     /// If the recording cannot be opened or measured, or the results cannot be written.
     pub fn run(&self) -> Result<(), Failure> {
         let unpacked = Unpacked::of(&self.recording)?;
-        let recording = Recording::open(unpacked.folder())?;
+        let mut recording = Recording::open(unpacked.folder())?;
+        if let Some(calibration) = &self.calibration {
+            models::replace(&mut recording, calibration)?;
+        }
         let recipe = self.recipe.as_deref().map(kept::read).transpose()?;
         let pool = self.threads.pool(0)?;
         let measured = || measure_with(&recording, unpacked.folder(), recipe.as_ref());

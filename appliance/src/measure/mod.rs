@@ -5,6 +5,7 @@ mod channel;
 pub mod import;
 mod known;
 pub mod layout;
+pub mod models;
 mod report;
 mod score;
 

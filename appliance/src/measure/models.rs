@@ -1,0 +1,58 @@
+//! Measuring a recording with the models of a `calibration.json` instead of its own.
+
+use crate::error::{Exit, Failure};
+use crate::head::calibration::file::CalibrationFile;
+use crate::head::seam;
+use hal::replay::Recording;
+use std::io::ErrorKind;
+use std::path::Path;
+
+/// Heights are looked for within this share of the lower device's height about z = 0: the calibration's plane need not be near the
+/// part, because it was not taken for this recording.
+const REACH: f64 = 0.5;
+
+/// Replaces the models of a recording by those of a calibration, and its working range, which was stated about another plane.
+///
+/// # Errors
+/// If there is no such file (66), or it cannot be used or is of a head with frames or a raster of another size (65).
+pub fn replace(recording: &mut Recording, path: &Path) -> Result<(), Failure> {
+    let failed = |exit, words: String| Failure::because(exit, path.display(), words);
+    let bytes = std::fs::read(path).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => failed(Exit::Missing, "there is no such calibration".into()),
+        _ => failed(Exit::Content, error.to_string()),
+    })?;
+    let file = CalibrationFile::read(&bytes).map_err(|words| failed(Exit::Content, words))?;
+    let (camera, projector) = (&file.camera, &file.projector);
+    let frames = [
+        (camera.width, camera.height),
+        (recording.width, recording.height),
+    ];
+    let raster = &recording.projector;
+    let rasters = [
+        (projector.width, projector.height),
+        (raster.width, raster.height),
+    ];
+    for (of, [calibrated, recorded]) in [("frames", frames), ("a raster", rasters)] {
+        if calibrated != recorded {
+            let words = format!(
+                "the calibration is of a head with {of} of {} × {} pixels, and the recording has {} × {}: name the calibration of the head that took it",
+                calibrated.0, calibrated.1, recorded.0, recorded.1
+            );
+            return Err(failed(Exit::Content, words));
+        }
+    }
+    let lowest = [
+        ("camera", &camera.model, frames[0]),
+        ("projector", &projector.model, rasters[0]),
+    ]
+    .into_iter()
+    .map(|(device, model, size)| Ok(seam::pinhole(device, model, size)?.centre().z))
+    .collect::<Result<Vec<f64>, String>>()
+    .map_err(|words| failed(Exit::Content, words))?
+    .into_iter()
+    .fold(f64::INFINITY, f64::min);
+    recording.range_mm = Some([-REACH * lowest, REACH * lowest]);
+    recording.camera_model = Some(file.camera.model);
+    recording.projector.model = Some(file.projector.model);
+    Ok(())
+}
