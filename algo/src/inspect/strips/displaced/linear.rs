@@ -73,8 +73,47 @@ fn interpolate_row<V: Lanes>(
     }
 }
 
-/// du, dv (pixels, less those of `whole`) and dz (nm) of the pixels of a block.
-#[derive(Clone, Copy, Default)]
+/// The whole displacement of a block's middle, along and down: pixels, rounded down.
+#[derive(Clone, Copy)]
+pub(super) struct Whole([f32; 2]);
+
+impl Whole {
+    /// Of these numbers; none if it is not known.
+    #[inline(always)]
+    pub fn of(numbers: &BlockNumbers) -> Option<Self> {
+        let [along, down] = [floor(numbers[3 * VALUES]), floor(numbers[3 * VALUES + 1])];
+        (is_near(along) & is_near(down)).then_some(Self([along, down]))
+    }
+
+    /// As whole numbers.
+    #[inline(always)]
+    pub fn pixels(self) -> [i32; 2] {
+        self.0.map(whole)
+    }
+
+    /// Whether all pixels of a block have it at the middle height.
+    #[inline(always)]
+    pub fn fits(self, numbers: &BlockNumbers) -> bool {
+        let mut fits = true;
+        for i in 0..2 {
+            let way = numbers[VALUES + i].abs() * (BLOCK / 2) as f32;
+            let middle = numbers[3 * VALUES + i] - self.0[i];
+            fits &= (middle - way >= 0.0) & (middle + way < 1.0);
+        }
+        fits
+    }
+
+    /// −1 where the displacement of the middle is nearer to this than to one pixel more, else 0: pixels with another whole
+    /// displacement mostly lie between this and two more.
+    #[inline(always)]
+    pub fn lower(self, numbers: &BlockNumbers) -> [i32; 2] {
+        let nearer = |i: usize| -i32::from(numbers[3 * VALUES + i] - self.0[i] < 0.5);
+        [nearer(0), nearer(1)]
+    }
+}
+
+/// du, dv (pixels, less whole ones) and dz (nm) of the pixels of a block.
+#[derive(Clone, Copy)]
 pub(super) struct Linear {
     /// Of the first pixel at height 0.
     first: [f32; VALUES],
@@ -82,63 +121,30 @@ pub(super) struct Linear {
     step: [f32; VALUES],
     /// Change per nm of height.
     slope: [f32; VALUES],
-    /// Whole pixels of du and dv in the middle of the block, rounded down.
-    whole: [f32; 2],
-    /// −1 where du and dv of the middle are nearer to `whole` than to one pixel more, else 0: pixels with another whole
-    /// displacement mostly lie between this and two more.
-    pub lower: [i32; 2],
 }
 
 impl Linear {
-    /// Of these numbers.
+    /// Of these numbers, less a whole displacement.
     #[inline(always)]
-    pub fn of(numbers: &BlockNumbers) -> Self {
-        let [
-            u,
-            v,
-            z,
-            step_u,
-            step_v,
-            step_z,
-            by_u,
-            by_v,
-            by_z,
-            along,
-            down,
-            _,
-        ] = *numbers;
-        let whole = [floor(along), floor(down)];
+    pub fn of(numbers: &BlockNumbers, less: Whole) -> Self {
+        let [u, v, z, step_u, step_v, step_z, by_u, by_v, by_z, ..] = *numbers;
         Self {
-            first: [u - whole[0], v - whole[1], z],
+            first: [u - less.0[0], v - less.0[1], z],
             step: [step_u, step_v, step_z],
             slope: [by_u, by_v, by_z],
-            whole,
-            lower: [
-                -i32::from(along - whole[0] < 0.5),
-                -i32::from(down - whole[1] < 0.5),
-            ],
         }
     }
 
     /// Of pixel `i` at height `z`, nm.
     #[inline(always)]
     pub fn at(&self, i: usize, z: i32) -> [f32; VALUES] {
-        let Self {
-            first, step, slope, ..
-        } = self;
+        let Self { first, step, slope } = self;
         let (column, z) = (i as i32 as f32, z as f32);
         [
             (first[0] + step[0] * column) + slope[0] * z,
             (first[1] + step[1] * column) + slope[1] * z,
             (first[2] + step[2] * column) + slope[2] * z,
         ]
-    }
-
-    /// The whole displacement of the block, along and down; none if it is not known.
-    #[inline(always)]
-    pub fn whole(&self) -> Option<[i32; 2]> {
-        let [along, down] = self.whole;
-        (is_near(along) & is_near(down)).then(|| [whole(along), whole(down)])
     }
 }
 

@@ -1,6 +1,7 @@
 //! Blocks of pixels against single ones.
 
 use super::*;
+use crate::pipeline::SQUARE;
 use crate::simd::Backend;
 use std::vec;
 use std::vec::Vec;
