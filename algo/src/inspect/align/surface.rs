@@ -3,6 +3,7 @@
 use crate::geometry::{Triangulator, Vector};
 use crate::inspect::Taught;
 use crate::pipeline::KnownSurface;
+use core::ops::Range;
 
 /// The part as taught, where it is compared.
 #[derive(Clone, Copy, Debug)]
@@ -71,19 +72,19 @@ impl GoldenSurface<'_> {
 
     /// The facet about the pixel next to (u, v), where `point` is seen; none unless all pixels of its square are compared.
     pub fn facet(&self, point: Vector, seen: (f64, f64)) -> Option<Facet> {
-        self.facet_of(point, seen, Taught::compared)
+        self.facet_of(point, seen, Taught::all_compared)
     }
 
     /// As [`Self::facet`]; none unless all pixels of its square count in full.
     pub(super) fn quiet_facet(&self, point: Vector, seen: (f64, f64)) -> Option<Facet> {
-        self.facet_of(point, seen, Taught::full)
+        self.facet_of(point, seen, Taught::all_full)
     }
 
     fn facet_of(
         &self,
         point: Vector,
         (u, v): (f64, f64),
-        counts: impl Fn(&Taught, usize) -> bool,
+        count: impl Fn(&Taught, Range<usize>) -> bool,
     ) -> Option<Facet> {
         let width = self.surface.width;
         let inside = |x: f64, end: usize| x >= REACH as f64 && x + REACH as f64 + 1.0 < end as f64;
@@ -95,14 +96,17 @@ impl GoldenSurface<'_> {
         let (mut along, mut down) = (0, 0);
         for i in 0..=2 * REACH {
             let start = place + i * width - REACH * width - REACH;
-            for j in 0..=2 * REACH {
-                if !counts(self.taught, start + j) {
-                    return None;
-                }
-                let z = i64::from(self.surface.height[start + j].nm());
-                along += z * (j as i64 - REACH as i64);
-                down += z * (i as i64 - REACH as i64);
+            let row = start..start + 2 * REACH + 1;
+            if !count(self.taught, row.clone()) {
+                return None;
             }
+            let mut sum = 0;
+            for (j, height) in self.surface.height[row].iter().enumerate() {
+                let z = i64::from(height.nm());
+                along += z * (j as i64 - REACH as i64);
+                sum += z;
+            }
+            down += sum * (i as i64 - REACH as i64);
         }
         let (along, down) = (along as f64 / SQUARES * 1e-6, down as f64 / SQUARES * 1e-6);
         let camera = self.triangulator.camera();

@@ -3,6 +3,7 @@
 use crate::inspect::Weight;
 use crate::pipeline::{COMPARED, SIGMA, SQUARE};
 use alloc::vec::Vec;
+use core::ops::Range;
 
 /// The part as taught, as far as parts are compared with it; row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -80,6 +81,21 @@ impl Taught {
     /// Whether the part is compared at a place.
     pub(in crate::inspect) fn compared(&self, place: usize) -> bool {
         self.pixels[place] & COMPARED != 0
+    }
+
+    /// Whether the part is compared at all of these places.
+    pub(in crate::inspect) fn all_compared(&self, places: Range<usize>) -> bool {
+        let common = self.pixels[places]
+            .iter()
+            .fold(COMPARED, |all, at| all & at);
+        common != 0
+    }
+
+    /// The same, and all their deviations count in full.
+    pub(in crate::inspect) fn all_full(&self, places: Range<usize>) -> bool {
+        let partial = |weights: &[Weight]| weights.iter().any(|weight| *weight != Weight::FULL);
+        self.all_compared(places.clone())
+            && (self.weights.is_empty() || !partial(&self.weights[places]))
     }
 
     /// σ in units of 32 nm, 0 where not known.
