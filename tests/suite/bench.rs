@@ -139,7 +139,7 @@ fn time_stands_against_error_and_the_cycle_has_its_stages() {
     for frames in ["4", "12"] {
         let sizes = &all["budget"]["160x120"];
         let cycle = &sizes[frames];
-        for name in ["production", "aligned", "kernel"] {
+        for name in ["production", "aligned", "moved", "kernel"] {
             positive(&sizes[format!("{name}_golden_{frames}")], "ns_per_px");
         }
         positive(&sizes[format!("production_golden_{frames}")], "x_kernel");

@@ -12,7 +12,7 @@ use appliance::recipe::{AlignmentKind, Recipe, archive};
 use hal::frame::Frame;
 use hal::head::Head;
 use serde::{Serialize, Serializer};
-use sim::Scenario;
+use sim::{Placement, Scenario};
 use std::time::{Duration, Instant};
 
 /// Angles of view of the physical head of the study (section 5.2), degrees.
@@ -23,6 +23,12 @@ const TIMEOUT: Duration = Duration::from_secs(5);
 const START_UP_US: u64 = 500_000;
 /// Placement tolerance, mm: small enough for single levels.
 const PLACEMENT_MM: f64 = 0.5;
+/// Where a moved part lies: displaced by some pixels that differ over the frame.
+const MOVED: Placement = Placement {
+    shift_mm: [0.4, -0.3, 0.1],
+    tilt_deg: [0.1, -0.15],
+    rotation_deg: 0.3,
+};
 
 /// The time of one cycle, stage by stage.
 #[derive(Clone, Debug, Serialize)]
@@ -36,9 +42,9 @@ pub struct Budget {
     /// Frames of the production sequence.
     #[serde(skip)]
     pub frames: usize,
-    /// Whether the part's motion is measured and compensated.
+    /// How the part lies, and whether its motion is measured and compensated.
     #[serde(skip)]
-    pub aligned: bool,
+    pub lies: Lies,
     /// What a cycle waits for the camera's start, ms: 0, although it takes 500 ms (the imx296 overlay's), because the camera stays on.
     pub start_ms: f64,
     /// From the trigger to the end of the last exposure at the projector's refresh rate, ms.
@@ -58,8 +64,37 @@ pub struct Budget {
     pub x_kernel: f64,
 }
 
+/// How a part lies, and what is made of that.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lies {
+    /// As taught, and is taken to.
+    AsTaught,
+    /// As taught; its motion, which is noise only, is compensated.
+    Aligned,
+    /// Shifted, tilted and turned; its motion is compensated.
+    Moved,
+}
+
+impl Lies {
+    const ALL: [Self; 3] = [Self::AsTaught, Self::Aligned, Self::Moved];
+
+    fn alignment(self) -> AlignmentKind {
+        match self {
+            Self::AsTaught => AlignmentKind::None,
+            Self::Aligned | Self::Moved => AlignmentKind::Rigid,
+        }
+    }
+
+    fn placement(self) -> Placement {
+        match self {
+            Self::AsTaught | Self::Aligned => Placement::default(),
+            Self::Moved => MOVED,
+        }
+    }
+}
+
 /// Budgets of a camera of this size: with four frames of one level about the golden map, and with the full sequence; each without and
-/// with compensation of the part's motion.
+/// with compensation of the part's motion, and with that of a part that was moved.
 ///
 /// # Errors
 /// If something cannot be simulated or taught.
@@ -93,20 +128,21 @@ pub fn budgets(
         .position(|sequence| sequence.frames.len() == 4);
     let mut found = Vec::new();
     let cycles = four.into_iter().chain([full]);
-    let kinds = [AlignmentKind::None, AlignmentKind::Rigid];
-    for (production, alignment) in cycles.flat_map(|at| kinds.map(|kind| (at, kind))) {
+    let (part, _) = stage.placed();
+    for (production, lies) in cycles.flat_map(|at| Lies::ALL.map(|lies| (at, lies))) {
         progress(
             0.8,
             &format!("{about}: {} frames", sequences[production].frames.len()),
         );
         let mut file = taught.manifest.clone();
         file.production = production;
-        file.alignment = alignment;
+        file.alignment = lies.alignment();
         let (bytes, _) = archive::pack(&file, &taught.recipe.arrays)?;
         let recipe = Recipe::from_bytes(&bytes)?;
         let plan = Plan::new(recipe, &calibration, true).map_err(words)?;
+        stage.place(&part, &lies.placement()).map_err(words)?;
         found.push(Budget {
-            aligned: alignment == AlignmentKind::Rigid,
+            lies,
             ..budget(
                 &plan,
                 &mut head,
@@ -170,7 +206,7 @@ fn budget(
         width,
         height,
         frames: frames.len(),
-        aligned: false,
+        lies: Lies::AsTaught,
         start_ms,
         exposure_ms,
         stages,
