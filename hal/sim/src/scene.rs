@@ -33,6 +33,8 @@ pub(crate) struct SimScene {
     pool: Pool,
     seed: u64,
     exposed: u64,
+    /// Factor on all light: the gain, and the exposure relative to the scenario's.
+    brightness: f64,
 }
 
 impl SimScene {
@@ -49,6 +51,7 @@ impl SimScene {
             pool: Pool::new(format, MAX_KEPT_FRAMES),
             seed: scenario.noise.seed,
             exposed: 0,
+            brightness: scenario.optics.gain,
             scenario,
         }
     }
@@ -61,6 +64,11 @@ impl SimScene {
     /// The part in place.
     pub(super) fn placed(&self) -> Staged {
         self.placed.clone()
+    }
+
+    /// Sets the factor on all light.
+    pub(super) fn set_brightness(&mut self, brightness: f64) {
+        self.brightness = brightness;
     }
 
     /// Restarts the noise with another seed.
@@ -152,7 +160,7 @@ impl Scene for SimScene {
         let full_scale = self.scenario.full_scale();
         let sensor = Sensor {
             full_scale: full_scale as f32,
-            gain: (self.scenario.optics.gain * full_scale) as f32,
+            gain: (self.brightness * full_scale) as f32,
             half_width: (self.scenario.noise.noise_counts / 255.0 * full_scale) as f32,
         };
         let random = noise_of(self.seed, self.exposed);

@@ -1,7 +1,9 @@
 //! The simulated head and its stage, on which parts are placed and which knows their true heights.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
+use super::limits::within;
 use super::parts::Part;
 use super::scenario::{Placement, Scenario};
 use super::scene::SimScene;
@@ -20,6 +22,7 @@ pub struct Stage {
     scenario: Arc<Scenario>,
     /// Light transports of the last placed parts; the most recent is the last.
     remembered: Arc<Mutex<Vec<Staged>>>,
+    gain: Arc<Mutex<f64>>,
 }
 
 /// A placed part with its light transport, ready to be put in place.
@@ -70,6 +73,7 @@ pub fn head_with_progress(
     let (head, control) = virtual_head::head(scene, scenario.mechanics());
     let stage = Stage {
         control,
+        gain: Arc::new(Mutex::new(scenario.optics.gain)),
         scenario,
         remembered: Arc::new(Mutex::new(vec![staged])),
     };
@@ -170,6 +174,36 @@ impl Stage {
     /// `Disconnected` if camera or projector is unplugged.
     pub fn reopen(&self) -> Result<Head, Error> {
         self.control.reopen()
+    }
+
+    /// The exposure and the gain of the camera.
+    #[must_use]
+    pub fn exposing(&self) -> (Duration, f64) {
+        let gain = self.gain.lock().unwrap_or_else(PoisonError::into_inner);
+        (self.control.exposure(), *gain)
+    }
+
+    /// Sets the exposure and the gain of the camera. Longer exposures get more light, and more gain makes more counts of it.
+    ///
+    /// # Errors
+    /// `Unsupported` if the camera runs by itself with a shorter period, or the gain is out of its range.
+    pub fn expose(&self, exposure: Duration, gain: f64) -> Result<(), Error> {
+        let period = Duration::from_micros(self.scenario.timing.camera_period_us);
+        if !period.is_zero() && exposure > period {
+            return Err(Error::unsupported(
+                format!("exposing for {exposure:?} every {period:?}"),
+                "expose for less than the camera's period",
+            ));
+        }
+        within("gain", gain, 0.0, 100.0)
+            .map_err(|problem| Error::unsupported("setting the gain", problem))?;
+        let planned = self.scenario.mechanics().exposure;
+        let longer = exposure.as_secs_f64() / planned.as_secs_f64();
+        self.control.set_exposure(exposure);
+        self.control
+            .scene(|scene| scene.set_brightness(gain * longer));
+        *self.gain.lock().unwrap_or_else(PoisonError::into_inner) = gain;
+        Ok(())
     }
 
     /// The true heights and classes of the part that is in place, per pixel of a frame.

@@ -73,7 +73,7 @@ impl Head {
         measure: &mut dyn FnMut(&Frame) -> M,
     ) -> Result<Watched<M>, Error> {
         let spacing = self.refresh() * self.timing.hold.max(1);
-        self.watch_spaced(showings, spacing, timeout, measure)
+        self.watching(showings, spacing, timeout, measure, None)
     }
 
     /// As [`Head::watch`], with triggers `spacing` apart, or as far apart as the camera says if that is more.
@@ -86,6 +86,32 @@ impl Head {
         spacing: Duration,
         timeout: Duration,
         measure: &mut dyn FnMut(&Frame) -> M,
+    ) -> Result<Watched<M>, Error> {
+        self.watching(showings, spacing, timeout, measure, None)
+    }
+
+    /// As [`Head::watch`], but ends within a refresh when `go_on` returns `false`; what has arrived by then is the result.
+    ///
+    /// # Errors
+    /// As [`Head::watch`].
+    pub fn watch_while<M>(
+        &mut self,
+        showings: &[Showing],
+        timeout: Duration,
+        measure: &mut dyn FnMut(&Frame) -> M,
+        go_on: &dyn Fn() -> bool,
+    ) -> Result<Watched<M>, Error> {
+        let spacing = self.refresh() * self.timing.hold.max(1);
+        self.watching(showings, spacing, timeout, measure, Some(go_on))
+    }
+
+    fn watching<M>(
+        &mut self,
+        showings: &[Showing],
+        spacing: Duration,
+        timeout: Duration,
+        measure: &mut dyn FnMut(&Frame) -> M,
+        go_on: Option<&dyn Fn() -> bool>,
     ) -> Result<Watched<M>, Error> {
         let (camera, refresh, timing) = (self.camera_timing(), self.refresh(), self.timing);
         let triggered = camera.starts == Starts::OnTrigger;
@@ -134,7 +160,10 @@ impl Head {
                 let now = devices.clock.now();
                 let shown = seen.flips.len() == showings.len();
                 let end = next_flip + (refresh + timing.flip_to_light);
-                if now >= deadline || shown && now >= end + rest {
+                if go_on.is_some_and(|go_on| !go_on())
+                    || now >= deadline
+                    || shown && now >= end + rest
+                {
                     // Frames of the last triggers may still be missing.
                     return Ok(((), false));
                 }
@@ -159,6 +188,9 @@ impl Head {
                         continue;
                     }
                     next = next.min(due);
+                }
+                if go_on.is_some() {
+                    next = next.min(now + refresh);
                 }
                 wait(&mut *devices.clock, next.min(deadline));
             }

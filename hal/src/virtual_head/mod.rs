@@ -107,6 +107,17 @@ impl<S: Scene + 'static> Control<S> {
         act(&mut lock(&self.bench).scene)
     }
 
+    /// The planned exposure.
+    #[must_use]
+    pub fn exposure(&self) -> Duration {
+        lock(&self.bench).mechanics.exposure
+    }
+
+    /// Replaces the planned exposure; the scene is told by its owner how much brighter that is.
+    pub fn set_exposure(&self, exposure: Duration) {
+        lock(&self.bench).mechanics.exposure = exposure;
+    }
+
     /// Opens the devices again: a stopped camera and a blank projector.
     ///
     /// # Errors

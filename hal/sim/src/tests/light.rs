@@ -175,3 +175,24 @@ fn noise_is_uniform_independent_between_frames_and_the_same_again_from_the_same_
     let other: Vec<_> = frames(&mut head, &[128; 40]).iter().map(counts).collect();
     assert!(first != other);
 }
+
+#[test]
+fn gain_and_exposure_make_frames_brighter_until_they_are_set_again() {
+    let mut scenario = small(Part::Plane(Plane::default()));
+    scenario.noise.noise_counts = 0.0;
+    scenario.light.ambient = 0.0;
+    let (mut head, stage) = head(&scenario).unwrap();
+    let middle = 24 * 64 + 32;
+    let mut light = |head: &mut Head| counts(&frames(head, &[40])[0])[middle];
+    let plain = light(&mut head);
+    let (exposure, gain) = stage.exposing();
+    assert_eq!((exposure, gain), (scenario.refresh() * 2, 1.0));
+    stage.expose(exposure, 3.0).unwrap();
+    assert!((light(&mut head) - 3.0 * plain).abs() <= 2.0);
+    stage.expose(exposure * 2, 1.0).unwrap();
+    assert_eq!(head.camera_timing().exposure, exposure * 2);
+    assert!((light(&mut head) - 2.0 * plain).abs() <= 2.0);
+    assert!(stage.expose(exposure, 101.0).is_err());
+    stage.expose(exposure, 1.0).unwrap();
+    assert!((light(&mut head) - plain).abs() <= 1.0);
+}

@@ -3,6 +3,7 @@
 mod schedules;
 mod sequences;
 mod streaming;
+mod watching;
 
 use std::sync::Arc;
 use std::time::Duration;
