@@ -5,16 +5,13 @@ use super::numbers::number;
 use super::options::{Files, Quiet, Threads};
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
-use crate::head::rasters::rasters;
-use crate::head::seam;
+use crate::head::capture::Shown;
 use crate::measure::import::{Channel, Picture};
 use crate::production::backend::{self, Opened};
-use algo::pattern::{PhaseFunction, Sequence, Shot};
 use hal::bounds::MAX_FRINGES;
 use hal::frame::Frame;
 use hal::projector::Raster;
 use hal::replay::recorder;
-use hal::replay::recording::{PatternSpec, RecordedFrame};
 use std::io::{BufRead as _, IsTerminal as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -78,18 +75,10 @@ impl Showing {
 /// Longest wait for one frame.
 const TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Fringes of one direction.
-struct Fringes {
-    spec: PatternSpec,
-    shots: Vec<Shot>,
-}
-
-/// Everything that is shown in a pose: fringes first, then white and black, then files.
+/// Everything that is shown in a pose: fringes, white and black, then files.
 struct Plan {
+    shown: Shown,
     rasters: Vec<Raster>,
-    fringes: Vec<Fringes>,
-    white: bool,
-    black: bool,
     /// Names of the files' frames.
     files: Vec<String>,
 }
@@ -166,42 +155,26 @@ impl Capture {
 
     /// The rasters to show.
     fn plan(&self, calibration: &Calibration) -> Result<Plan, Failure> {
-        let (columns, rows) = calibration.raster();
         let shows =
             |one: &Showing| self.patterns.contains(one) || self.patterns.contains(&Showing::All);
+        let (levels, steps) = (usize::from(self.levels), usize::from(self.steps));
+        let mut shown = Shown::default();
+        for (showing, vertical) in [(Showing::Vertical, true), (Showing::Horizontal, false)] {
+            if shows(&showing) {
+                shown
+                    .add_fringes(calibration, vertical, self.fringes, levels, steps)
+                    .map_err(|error| Failure::because(Exit::Usage, "--fringes", error))?;
+            }
+        }
+        (shown.white, shown.black) = (shows(&Showing::White), shows(&Showing::Black));
         let mut plan = Plan {
-            rasters: Vec::new(),
-            fringes: Vec::new(),
-            white: shows(&Showing::White),
-            black: shows(&Showing::Black),
+            rasters: shown.rasters(calibration)?,
+            shown,
             files: Vec::new(),
         };
-        for (showing, length) in [(Showing::Vertical, columns), (Showing::Horizontal, rows)] {
-            if !shows(&showing) {
-                continue;
-            }
-            let fringes = self.fringes.unwrap_or(f64::from(length) / 12.0);
-            let spec = match showing {
-                Showing::Vertical => PatternSpec::Vertical { fringes },
-                _ => PatternSpec::Horizontal { fringes },
-            };
-            let function: PhaseFunction =
-                seam::phase_function(&spec, columns as usize, rows as usize)
-                    .map_err(|error| Failure::because(Exit::Usage, "--fringes", error))?;
-            let (levels, steps) = (usize::from(self.levels), usize::from(self.steps));
-            let shots = Sequence::geometric(function.range(), levels, steps);
-            plan.rasters
-                .extend(rasters(&function, &shots, calibration)?);
-            plan.fringes.push(Fringes { spec, shots });
-        }
-        for (wanted, grey) in [(plan.white, u8::MAX), (plan.black, 0)] {
-            if wanted {
-                plan.rasters.push(Raster::uniform(columns, rows, grey)?);
-            }
-        }
         for showing in &self.patterns {
             if let Showing::File(path) = showing {
-                plan.rasters.push(raster_of(path, (columns, rows))?);
+                plan.rasters.push(raster_of(path, calibration.raster())?);
                 let name = path.file_name().unwrap_or(path.as_os_str());
                 plan.files.push(format!("file-{}", name.to_string_lossy()));
             }
@@ -214,25 +187,11 @@ impl Plan {
     /// Writes the frames of a pose: a recording if there are fringes, else pictures alone.
     fn write(&self, opened: &Opened, taken: Vec<Frame>, folder: &Path) -> Result<(), Failure> {
         let mut frames = taken.into_iter();
-        let mut recording = opened.calibration.recording();
-        recording.description = "taken without models".into();
+        let mut recording = self.shown.recording(&opened.calibration, &mut frames);
         recording.source = match opened.stage {
             Some(_) => "fringed's simulated head".into(),
             None => "a head of fringed".into(),
         };
-        (recording.camera_model, recording.projector.model) = (None, None);
-        recording.noise_counts = None;
-        for (pattern, fringes) in self.fringes.iter().enumerate() {
-            recording.patterns.push(fringes.spec.clone());
-            let shown = fringes.shots.iter().zip(frames.by_ref());
-            let recorded = shown.map(|(&shot, frame)| RecordedFrame {
-                pattern,
-                ..seam::recorded(shot, frame)
-            });
-            recording.frames.extend(recorded);
-        }
-        recording.white = self.white.then(|| frames.next()).flatten();
-        recording.black = self.black.then(|| frames.next()).flatten();
         let named: Vec<(String, Frame)> = self.files.iter().cloned().zip(frames).collect();
         let refused =
             |error: recorder::RecorderError| Failure::new(Exit::CannotCreate, error.to_string());

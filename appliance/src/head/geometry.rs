@@ -172,7 +172,13 @@ impl Geometry {
                 .map(|(at, view)| adjusted.arrows(at, view))
                 .collect(),
             tilt_degrees: adjusted.largest_tilt().to_degrees(),
-            frame_covered: covered(frame, &views),
+            frame_covered: covered(
+                frame,
+                views
+                    .iter()
+                    .flat_map(|view| view.found.corners.iter().flatten())
+                    .map(|corner| (corner.u, corner.v)),
+            ),
         })
     }
 }
@@ -216,16 +222,15 @@ fn file(
 }
 
 /// Share of the cells of the frame in which a corner was seen.
-fn covered((width, height): (usize, usize), views: &[View]) -> f64 {
+pub fn covered((width, height): (usize, usize), corners: impl Iterator<Item = (f64, f64)>) -> f64 {
     let mut seen = [false; CELLS.0 * CELLS.1];
-    let corners = views.iter().flat_map(|view| view.found.corners.iter());
-    for corner in corners.flatten() {
+    for (u, v) in corners {
         let cell = |at: f64, size: usize, cells: usize| {
             let cell = at / size.max(1) as f64 * cells as f64;
             (cell.max(0.0) as usize).min(cells - 1)
         };
-        let row = cell(corner.v, height, CELLS.1);
-        seen[row * CELLS.0 + cell(corner.u, width, CELLS.0)] = true;
+        let row = cell(v, height, CELLS.1);
+        seen[row * CELLS.0 + cell(u, width, CELLS.0)] = true;
     }
     seen.iter().filter(|seen| **seen).count() as f64 / seen.len() as f64
 }

@@ -1,13 +1,16 @@
 //! The head as a measuring instrument: its calibration, what can be measured on it, and the doctor that checks it.
 
+pub mod board;
 pub mod calibrate;
 pub mod calibrated;
 pub mod calibration;
+pub mod capture;
 pub mod doctor;
 pub mod examine;
 pub mod geometry;
 pub mod placed;
 pub mod rasters;
+pub mod scale;
 pub mod scan;
 pub mod seam;
 

@@ -1,15 +1,16 @@
 //! `fringed calibrate --board … --poses …`: the models of camera and projector from recordings of a checkerboard.
 
-use super::super::board::board;
 use super::super::names;
 use super::super::numbers::number;
 use super::super::options::Measuring;
 use super::report::poses::Report;
 use crate::error::{Exit, Failure};
+use crate::head::board;
 use crate::head::calibration::file::{CalibrationFile, CameraFile, FORMAT, ProjectorFile, VERSION};
-use crate::head::calibration::geometry::{GeometryFile, MAX_POSES, MAX_SIGMA_PPM};
+use crate::head::calibration::geometry::{MAX_POSES, MAX_SIGMA_PPM};
 use crate::head::calibration::place::Place;
 use crate::head::geometry::{CELLS, Geometry, SeenPose};
+use crate::head::scale::Scale;
 use crate::head::seam;
 use crate::output::residuals::{arrows_png, coverage_png};
 use crate::storage::folder::OutputFolder;
@@ -20,8 +21,6 @@ use hal::replay::Recording;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
-/// Largest difference from a stated length, and of the baseline from the calibration before, as a share.
-const MOST_SCALE: f64 = 0.01;
 /// Longest length that can be checked, mm.
 const MAX_LENGTH_MM: f64 = 1e5;
 
@@ -29,7 +28,7 @@ const MAX_LENGTH_MM: f64 = 1e5;
 #[derive(Debug, clap::Args)]
 pub struct Poses {
     /// Make the models from recordings of this board: checker:COLUMNSxROWS:MM, counted in inner corners, MM the side of a square.
-    #[arg(long, value_name = "BOARD", value_parser = board)]
+    #[arg(long, value_name = "BOARD", value_parser = board::parse)]
     board: Option<Board>,
     /// Recordings of the board, each with vertical and horizontal fringes; in the last the board lies in the plane z = 0.
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
@@ -46,18 +45,6 @@ pub struct Poses {
     /// Length on the board from its first to its last inner corner along the longer side, as measured with a ruler.
     #[arg(long, value_name = "MM", value_parser = number(1e-3, MAX_LENGTH_MM))]
     check_length: Option<f64>,
-}
-
-/// How the scale of the models was checked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum Scale {
-    /// Nobody checked the size of the board's squares.
-    Unchecked,
-    /// With a length on the board.
-    Length,
-    /// With the baseline of the calibration before.
-    Baseline,
 }
 
 impl Poses {
@@ -94,7 +81,7 @@ impl Poses {
             None
         });
         let before = before.map(|loaded| loaded.file);
-        self.check_length(board)?;
+        Scale::check_length(board, self.check_length).map_err(|error| content(&error))?;
         let progress = options.output.progress();
         progress.tell(0.0, "looking for the board");
         let pool = options.threads.pool(config.threads)?;
@@ -108,7 +95,8 @@ impl Poses {
             draw(&OutputFolder::create(folder)?, head, &geometry)?;
         }
         let same = before.as_ref().filter(|before| is_of(before, head));
-        let scale = self.scale(same, &geometry.file)?;
+        let scale =
+            Scale::of(self.check_length, same, &geometry.file).map_err(|error| content(&error))?;
         if same.is_some_and(|before| before.reference.is_some()) {
             notes.push("the reference plane was measured with other models: run `fringed calibrate` with a plate".into());
         }
@@ -149,40 +137,6 @@ impl Poses {
         let each: Vec<Result<SeenPose, Failure>> = self.poses.par_iter().map(seen).collect();
         each.into_iter().collect()
     }
-
-    /// Compares the board's length with the one stated.
-    fn check_length(&self, board: &Board) -> Result<(), Failure> {
-        let nominal = (board.columns.max(board.rows) - 1) as f64 * board.square;
-        match self.check_length {
-            Some(length) if (length / nominal - 1.0).abs() > MOST_SCALE => Err(content(&format!(
-                "the board is {length} mm from the first to the last inner corner, and {nominal} mm by --board: state the size of its squares as it is"
-            ))),
-            _ => Ok(()),
-        }
-    }
-
-    /// How the scale was checked.
-    fn scale(
-        &self,
-        before: Option<&CalibrationFile>,
-        now: &GeometryFile,
-    ) -> Result<Scale, Failure> {
-        if self.check_length.is_some() {
-            return Ok(Scale::Length);
-        }
-        let Some(before) = before else {
-            return Ok(Scale::Unchecked);
-        };
-        let then = baseline(before).map_err(|error| content(&error))?;
-        if !((now.baseline_mm / then - 1.0).abs() <= MOST_SCALE) {
-            return Err(content(&format!(
-                "camera and projector are {:.2} mm apart, and {then:.2} mm in the calibration before: correct the size of the squares in --board, or \
-                 measure the board and state it with --check-length if the head was changed",
-                now.baseline_mm
-            )));
-        }
-        Ok(Scale::Baseline)
-    }
 }
 
 fn content(words: &str) -> Failure {
@@ -209,13 +163,6 @@ fn draw(folder: &OutputFolder, head: &SeenPose, geometry: &Geometry) -> Result<(
     drawn
         .iter()
         .try_for_each(|(name, bytes)| folder.write(name, bytes))
-}
-
-/// Distance between the centres of camera and projector of a calibration, mm.
-fn baseline(file: &CalibrationFile) -> Result<f64, String> {
-    let calibration = file.calibration()?;
-    let (camera, projector) = (&calibration.camera, &calibration.projector);
-    Ok((projector.centre() - camera.centre()).length())
 }
 
 /// Whether a calibration is of a head whose devices have the sizes of this one's.

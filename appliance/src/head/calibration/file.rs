@@ -111,6 +111,20 @@ pub struct TimingFile {
     pub refreshes: Option<u32>,
 }
 
+impl TimingFile {
+    /// The head's timing with these times; what is not measured stays as `before`.
+    pub fn over(&self, before: Timing) -> Timing {
+        Timing {
+            flip_to_light: Duration::from_nanos(self.flip_to_light_ns),
+            stamp: self.stamp,
+            stamp_late: Duration::from_nanos(self.stamp_late_ns.unwrap_or(0)),
+            readout: Duration::from_nanos(self.readout_ns),
+            hold: self.refreshes.unwrap_or(before.hold),
+            ..before
+        }
+    }
+}
+
 /// The camera's noise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -280,17 +294,9 @@ impl CalibrationFile {
 
     /// The head's timing by this calibration; what is not calibrated stays as `before`.
     pub fn timing(&self, before: Timing) -> Timing {
-        let Some(timing) = &self.timing else {
-            return before;
-        };
-        Timing {
-            flip_to_light: Duration::from_nanos(timing.flip_to_light_ns),
-            stamp: timing.stamp,
-            stamp_late: Duration::from_nanos(timing.stamp_late_ns.unwrap_or(0)),
-            readout: Duration::from_nanos(timing.readout_ns),
-            hold: timing.refreshes.unwrap_or(before.hold),
-            ..before
-        }
+        self.timing
+            .as_ref()
+            .map_or(before, |timing| timing.over(before))
     }
 
     /// The file's bytes, with fingerprint and checksum.

@@ -111,12 +111,27 @@ pub fn examine(
     calibrated: bool,
     progress: &dyn Fn(f64, &str),
 ) -> Vec<Check> {
-    let mut checks: Vec<Check> = Vec::with_capacity(CHECKS.len());
+    examine_for(head, calibration, calibrated, &|_| true, progress)
+}
+
+/// As [`examine`], but makes only the checks whose names are `wanted`; of those that a check needs, only wanted ones count.
+pub fn examine_for(
+    head: &mut Head,
+    calibration: &Calibration,
+    calibrated: bool,
+    wanted: &dyn Fn(&str) -> bool,
+    progress: &dyn Fn(f64, &str),
+) -> Vec<Check> {
+    let all: Vec<_> = CHECKS
+        .into_iter()
+        .filter(|(name, _)| wanted(name))
+        .collect();
+    let mut checks: Vec<Check> = Vec::with_capacity(all.len());
     let mut lit: Option<Result<Lit, Error>> = None;
     let dark = head.starts_dark();
     let first = dark.then(|| first_light(head).unwrap_or_default());
-    for (at, (name, needs)) in CHECKS.into_iter().enumerate() {
-        progress(at as f64 / CHECKS.len() as f64, name);
+    for (at, (name, needs)) in all.iter().copied().enumerate() {
+        progress(at as f64 / all.len() as f64, name);
         let missing = needs.iter().find(|need| {
             checks
                 .iter()

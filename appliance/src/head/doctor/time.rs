@@ -322,7 +322,7 @@ fn by_itself(seen: &Watched<()>, nominal: Duration) -> Check {
 pub(super) fn delay(head: &mut Head, lit: &Lit) -> Result<Check, Error> {
     let believed = head.timing().flip_to_light.as_secs_f64();
     let refresh = head.refresh().as_secs_f64();
-    let Some(measured) = Delay::measure(head, lit, 1)? else {
+    let Some(measured) = Delay::measure(head, lit, 1, &|_| ())? else {
         return Ok(Check::new(
             "no light follows the flips from black to white",
             Some("check the projector's input: it may show another source"),

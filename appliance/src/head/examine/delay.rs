@@ -46,17 +46,23 @@ struct Round {
 
 impl Delay {
     /// Measures it in at most `rounds` of about four seconds each; none if no light follows the flips. The camera's stamps are
-    /// interpreted as the head's timing says.
+    /// interpreted as the head's timing says. `progress` gets the share of the rounds done.
     ///
     /// # Errors
     /// Of a device.
-    pub fn measure(head: &mut Head, lit: &Lit, rounds: u32) -> Result<Option<Self>, Error> {
+    pub fn measure(
+        head: &mut Head,
+        lit: &Lit,
+        rounds: u32,
+        progress: &dyn Fn(f64),
+    ) -> Result<Option<Self>, Error> {
         load_black_and_white(head)?;
         let exposure = head.camera_timing().exposure.as_secs_f64();
         let refresh = head.refresh().as_secs_f64();
         let mut taken = Vec::new();
         let mut fitted = None;
         for round in 0..rounds.max(1) {
+            progress(f64::from(round) / f64::from(rounds.max(1)));
             taken.push(Round::take(head, lit, round)?);
             fitted = fit(&taken, exposure, refresh);
             if fitted.is_none_or(|delay: Self| delay.error <= GOAL_S) {

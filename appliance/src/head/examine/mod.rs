@@ -24,7 +24,8 @@ pub use drift::{MOST_DRIFT_PX, drift};
 pub use noise::noise;
 pub use pace::{Spaced, pace};
 pub use pictures::{
-    LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, SETTLE, counts, load_black_and_white, pictures,
+    LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, SETTLE, counts, load_black_and_white, picture,
+    pictures,
 };
 pub use plate::{PITCH as PLATE_PITCH, plate};
 pub use response::{lights, response};

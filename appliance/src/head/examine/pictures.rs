@@ -1,10 +1,12 @@
 //! Pictures of patterns, each exposed after the light of its flip has settled, and the pixels that the projector lights.
 
 use super::PATIENCE;
+use hal::camera::Starts;
 use hal::error::Error;
 use hal::frame::{Frame, Samples};
-use hal::head::{Head, Showing};
+use hal::head::{Head, Showing, Watched};
 use hal::projector::Raster;
+use std::cell::Cell;
 
 /// Least share of the picture that must be lit.
 pub const LEAST_LIT: f64 = 0.01;
@@ -68,32 +70,13 @@ fn take(
 ) -> Result<(), Error> {
     let count = patterns.len();
     head.load(patterns)?;
-    let (camera, refresh) = (head.camera_timing(), head.refresh());
-    // Long enough for one whole exposure of settled light, whatever the phase of a free-running camera.
-    let room = (camera.exposure + camera.period)
-        .as_nanos()
-        .div_ceil(refresh.as_nanos().max(1));
-    let most = u32::MAX / 64;
-    let refreshes = settle + 1 + u32::try_from(room).unwrap_or(most).min(most);
-    let showing = |index| Showing {
-        index,
-        refreshes,
-        settle,
-    };
-    let showings: Vec<Showing> = (0..count).map(showing).collect();
+    let showings: Vec<Showing> = (0..count).map(|at| showing(head, at, settle)).collect();
     for _ in 0..ATTEMPTS {
         let seen = head.watch(&showings, PATIENCE, &mut |frame| frame.clone())?;
-        let picture = |at: usize| {
-            let from = seen.flips.get(at)?.timestamp + refresh * settle;
-            let until = seen.flips.get(at + 1).map(|next| next.timestamp);
-            let inside =
-                |start| start >= from && until.is_none_or(|until| start + camera.exposure <= until);
-            let fits = |start| inside(start) && !seen.spoiled_near(start);
-            seen.frames.iter().find(|frame| fits(frame.start))
-        };
+        let picture = |at: usize| settled(head, &seen, at, settle);
         let taken: Option<Vec<_>> = (0..count).map(picture).collect();
         if let Some(taken) = taken {
-            taken.iter().for_each(|frame| keep(counts(&frame.measured)));
+            taken.into_iter().for_each(|frame| keep(counts(frame)));
             return Ok(());
         }
     }
@@ -102,6 +85,54 @@ fn take(
         PATIENCE,
         "check the cables of camera and projector, and the load of the computer",
     ))
+}
+
+/// One picture of a loaded pattern; none if `go_on` has ended it or the frame was lost. It ends as soon as the frame of a triggered camera has arrived.
+///
+/// # Errors
+/// Of a device.
+pub fn picture(
+    head: &mut Head,
+    index: usize,
+    settle: u32,
+    go_on: &dyn Fn() -> bool,
+) -> Result<Option<Frame>, Error> {
+    // A camera that runs by itself has frames of before the light has settled.
+    let triggered = head.camera_timing().starts == Starts::OnTrigger;
+    let there = Cell::new(false);
+    let showings = [showing(head, index, settle)];
+    let mut measure = |frame: &Frame| {
+        there.set(true);
+        frame.clone()
+    };
+    let still = || go_on() && !(triggered && there.get());
+    let seen = head.watch_while(&showings, PATIENCE, &mut measure, &still)?;
+    Ok(settled(head, &seen, 0, settle).cloned())
+}
+
+/// A pattern, shown long enough for one whole exposure of settled light, whatever the phase of a free-running camera.
+fn showing(head: &Head, index: usize, settle: u32) -> Showing {
+    let (camera, refresh) = (head.camera_timing(), head.refresh());
+    let room = (camera.exposure + camera.period)
+        .as_nanos()
+        .div_ceil(refresh.as_nanos().max(1));
+    let most = u32::MAX / 64;
+    Showing {
+        index,
+        refreshes: settle + 1 + u32::try_from(room).unwrap_or(most).min(most),
+        settle,
+    }
+}
+
+/// The first frame that was exposed whole to the settled light of a showing.
+fn settled<'a>(head: &Head, seen: &'a Watched<Frame>, at: usize, settle: u32) -> Option<&'a Frame> {
+    let exposure = head.camera_timing().exposure;
+    let from = seen.flips.get(at)?.timestamp + head.refresh() * settle;
+    let until = seen.flips.get(at + 1).map(|next| next.timestamp);
+    let inside = |start| start >= from && until.is_none_or(|until| start + exposure <= until);
+    let fits = |start| inside(start) && !seen.spoiled_near(start);
+    let frame = seen.frames.iter().find(|frame| fits(frame.start))?;
+    Some(&frame.measured)
 }
 
 /// The pixels that the projector lights, and their samples of black and white.

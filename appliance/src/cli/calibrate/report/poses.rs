@@ -1,8 +1,8 @@
 //! The report of a calibration from poses of a board, as a table and as JSON.
 
-use super::super::poses::Scale;
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::geometry::{Geometry, SeenPose};
+use crate::head::scale::Scale;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,37 +1,30 @@
 //! Measures a calibration: time stamps, pace, light, flip-to-light delay, grey response, noise, contrast and reference plane, in this order, since
 //! each measurement uses the results of those before it.
 
+mod characteristics;
+
+pub use characteristics::{Characteristics, characterise, settled};
+
 use super::calibration::Calibration;
 use super::calibration::file::{
-    CalibrationFile, CameraFile, FORMAT, LevelFile, MapFile, NoiseFile, ProjectorFile,
-    ReferenceFile, TimingFile, VERSION, inverted,
+    CalibrationFile, CameraFile, FORMAT, MapFile, ProjectorFile, ReferenceFile, VERSION,
 };
 use super::calibration::geometry::GeometryFile;
 use super::calibration::place::Place;
-use super::examine::{
-    Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_BY_CONTENT, MOST_SATURATED, PLATE_PITCH, SETTLE,
-    Spaced, Stamps, by_content, contrast, noise, pace, plate, response,
-};
+use super::examine::{PLATE_PITCH, plate};
 use super::seam;
 use crate::error::{Exit, Failure};
 use algo::geometry::Vector;
 use algo::pipeline::Plate;
-use hal::head::{Head, Timing};
+use characteristics::scene;
+use hal::head::Head;
 use std::time::Duration;
 
-/// Most rounds of the delay: 100 s, where stamps jitter or the camera has few pixels.
-const ROUNDS: u32 = 24;
-/// A measured delay below this is refused: light does not come before its flip.
-const LEAST_DELAY_S: f64 = -200e-6;
-/// Refreshes that light gets to settle beyond its delay.
-const BEYOND: u32 = 2;
 /// Longest wait for a flip or a frame beyond the plan.
 const TIMEOUT: Duration = Duration::from_secs(5);
 /// Largest RMS distance of the models from the measured plane, projector pixels: a millimetre of height, with devices 27° apart
 /// 600 mm away.
 const MOST_OFF_PX: f64 = 2.0;
-/// A response that differs from the previous one by less than this many levels replaces nothing, so recipes stay valid.
-const SAME_RESPONSE: f64 = 1.0;
 
 /// What a calibration starts from.
 #[derive(Debug)]
@@ -63,11 +56,6 @@ pub struct Made {
     pub notes: Vec<String>,
 }
 
-/// A scene in front of the head, or settings of the head, that do not allow a calibration.
-fn scene(words: impl Into<String>) -> Failure {
-    Failure::new(Exit::Unavailable, words)
-}
-
 /// Models that are those of another head.
 fn models(words: impl Into<String>) -> Failure {
     Failure::new(Exit::Content, words)
@@ -78,60 +66,38 @@ fn models(words: impl Into<String>) -> Failure {
 /// # Errors
 /// Of a device; if too little light comes back, or too much, or there is no flat plate (69); if the models do not fit it (65).
 pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Result<Made, Failure> {
-    let mut calibration = basis.calibration;
+    let mut basis = basis;
     let mut notes = Vec::new();
-    progress(0.0, "camera stamps");
-    let stamps = Stamps::measure(head)?;
-    head.set_timing(Timing {
-        flip_to_light: Duration::ZERO,
-        ..stamps.timing(head.timing())
-    });
-    progress(0.02, "pace of the camera");
-    let pace = proven(&pace(head)?, &mut notes);
-    head.set_timing(Timing {
-        hold: pace.unwrap_or(head.timing().hold),
-        ..head.timing()
-    });
-    progress(0.05, "light");
-    let lit = Lit::take(head, SETTLE)?;
-    bright_enough(&lit)?;
-    progress(0.1, "flip-to-light delay");
-    let delay = Delay::measure(head, &lit, ROUNDS)?
-        .filter(|delay| delay.seconds >= LEAST_DELAY_S)
-        .ok_or_else(|| {
-            scene("measure the flip-to-light delay: light does not follow the flips: `fringed doctor` says more")
-        })?;
-    head.set_timing(Timing {
-        flip_to_light: delay.duration(),
-        ..head.timing()
-    });
-    let refreshes = delay
-        .duration()
-        .as_nanos()
-        .div_ceil(head.refresh().as_nanos().max(1));
-    let settle = u32::try_from(refreshes).unwrap_or(SETTLE) + BEYOND;
-    progress(0.18, "light by content");
-    alike(by_content(head, settle, &lit)?)?;
-    let share = |share: f64| progress(0.2 + 0.4 * share, "grey response");
-    let mut greys = response(head, settle, &lit, &share)?.to_vec();
-    if let Some(before) = basis.response.filter(|before| same(before, &greys)) {
-        notes.push(
-            "the grey response equals the previous one within noise: that one is kept, and recipes stay valid"
-                .into(),
-        );
-        greys = before;
-    }
-    calibration.response = inverted(&greys).map_err(scene)?;
-    progress(0.6, "noise");
-    let noise = noise(head, settle, &lit)?;
-    calibration.noise_counts = noise.counts;
-    progress(0.65, "contrast");
-    let contrast = contrast(head, &calibration, settle, &lit)?;
+    let early = |share: f64, words: &str| progress(0.75 * share, words);
+    let calibration = &mut basis.calibration;
+    let before = basis.response.take();
+    let measured = characterise(head, calibration, before, &mut notes, &early)?;
+    let late = |share: f64, words: &str| progress(0.75 + 0.25 * share, words);
+    let mut made = complete(head, &measured, basis, &late)?;
+    notes.append(&mut made.notes);
+    made.notes = notes;
+    Ok(made)
+}
+
+/// Measures the reference plane, if the basis has a plate, and makes the calibration of models and characteristics, to which the head's timing
+/// must be set. `progress` is that of [`make`].
+///
+/// # Errors
+/// Of a device; if there is no flat plate (69); if the models do not fit it (65).
+pub fn complete(
+    head: &mut Head,
+    measured: &Characteristics,
+    basis: Basis,
+    progress: &dyn Fn(f64, &str),
+) -> Result<Made, Failure> {
+    let mut calibration = basis.calibration;
+    measured.adopt(&mut calibration).map_err(models)?;
+    let mut notes = Vec::new();
     let mut maps = Vec::new();
     let reference = if basis.plate {
-        progress(0.75, "reference plane, vertical fringes");
+        progress(0.0, "reference plane, vertical fringes");
         let vertical = plate(head, &calibration, true, TIMEOUT)?;
-        progress(0.88, "reference plane, horizontal fringes");
+        progress(0.5, "reference plane, horizontal fringes");
         let horizontal = plate(head, &calibration, false, TIMEOUT)?;
         Some(reference(&calibration, &vertical, &horizontal, &mut maps)?)
     } else {
@@ -161,29 +127,10 @@ pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Resu
             height: rows,
             model: seam::device_model(&calibration.projector),
         },
-        timing: Some(TimingFile {
-            flip_to_light_ns: nanoseconds(delay.duration()),
-            sigma_ns: (delay.error * 1e9).ceil() as u64,
-            stamp: stamps.stamp,
-            stamp_late_ns: stamps.late.map(nanoseconds),
-            readout_ns: nanoseconds(stamps.readout),
-            refreshes: pace,
-        }),
-        noise: Some(NoiseFile {
-            counts: noise.counts,
-            read_counts: noise.read_counts,
-            shot: noise.shot,
-            levels: noise
-                .points
-                .iter()
-                .map(|point| LevelFile {
-                    level: point.level,
-                    counts: point.counts,
-                })
-                .collect(),
-        }),
-        response: Some(greys),
-        contrast: Some(contrast),
+        timing: Some(measured.timing.clone()),
+        noise: Some(measured.noise.clone()),
+        response: Some(measured.response.clone()),
+        contrast: Some(measured.contrast.clone()),
         reference,
         geometry: basis.geometry,
     };
@@ -194,64 +141,6 @@ pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Resu
         maps,
         notes,
     })
-}
-
-/// The refreshes per pattern at which no trigger is lost, if there are any; otherwise patterns are shown as long as before.
-fn proven(tried: &[Spaced], notes: &mut Vec<String>) -> Option<u32> {
-    let last = tried.last()?;
-    if last.none_lost() {
-        return Some(last.refreshes);
-    }
-    notes.push(format!(
-        "triggers are lost however far apart they are ({}), so the pace of the camera is not known: check the wire of the trigger, then calibrate anew",
-        last.words()
-    ));
-    None
-}
-
-fn nanoseconds(time: Duration) -> u64 {
-    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
-}
-
-fn same(before: &[f64], now: &[f64]) -> bool {
-    let near = |(a, b): (&f64, &f64)| (a - b).abs() < SAME_RESPONSE;
-    before.len() == now.len() && before.iter().zip(now).all(near)
-}
-
-fn bright_enough(lit: &Lit) -> Result<(), Failure> {
-    let (share, bright) = (lit.share(), lit.bright() / lit.full_scale());
-    let words = if share < LEAST_LIT {
-        format!(
-            "{:.1} % of the picture is lit: switch the lamp on, open the apertures",
-            share * 100.0
-        )
-    } else if lit.saturated() > MOST_SATURATED {
-        format!(
-            "{:.0} % of the lit pixels are saturated: expose less",
-            lit.saturated() * 100.0
-        )
-    } else if bright < LEAST_BRIGHT {
-        format!(
-            "white is {:.0} % of full scale: expose more",
-            bright * 100.0
-        )
-    } else {
-        return Ok(());
-    };
-    Err(scene(format!(
-        "calibrate: {words}; `fringed doctor` says more"
-    )))
-}
-
-/// Refuses a projector whose light depends on the content of a picture: no response holds for it.
-fn alike(by_content: Option<f64>) -> Result<(), Failure> {
-    match by_content {
-        Some(off) if off.abs() > MOST_BY_CONTENT => Err(scene(format!(
-            "calibrate: the light of a grey depends on the rest of the picture, by {:.1} %: `fringed doctor` says what to switch off",
-            off * 100.0
-        ))),
-        _ => Ok(()),
-    }
 }
 
 /// The description of the reference phase maps; their bytes go to `maps`.

@@ -1,0 +1,214 @@
+//! What is measured on a head whatever its geometry: time stamps, pace, flip-to-light delay, grey response, noise and contrast.
+
+use crate::error::{Exit, Failure};
+use crate::head::calibration::Calibration;
+use crate::head::calibration::file::{
+    CalibrationFile, ContrastFile, LevelFile, NoiseFile, TimingFile, inverted,
+};
+use crate::head::examine::{
+    Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_BY_CONTENT, MOST_SATURATED, SETTLE, Spaced, Stamps,
+    by_content, contrast, noise, pace, response,
+};
+use hal::head::{Head, Timing};
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+/// Most rounds of the delay: 100 s, where stamps jitter or the camera has few pixels.
+const ROUNDS: u32 = 24;
+/// A measured delay below this is refused: light does not come before its flip.
+const LEAST_DELAY_S: f64 = -200e-6;
+/// Refreshes that light gets to settle beyond its delay.
+const BEYOND: u32 = 2;
+/// A response that differs from the previous one by less than this many levels replaces nothing, so recipes stay valid.
+const SAME_RESPONSE: f64 = 1.0;
+
+/// What is measured on a head whatever its geometry.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Characteristics {
+    /// Flips, light and stamps.
+    pub timing: TimingFile,
+    /// The camera's noise.
+    pub noise: NoiseFile,
+    /// The light of each of the 256 grey levels, 0 for black, 255 for white.
+    pub response: Vec<f64>,
+    /// Contrast of fringes against their pitch.
+    pub contrast: ContrastFile,
+}
+
+impl Characteristics {
+    /// Those of a calibration that has all of them.
+    pub fn of(file: &CalibrationFile) -> Option<Self> {
+        Some(Self {
+            timing: file.timing.clone()?,
+            noise: file.noise.clone()?,
+            response: file.response.clone()?,
+            contrast: file.contrast.clone()?,
+        })
+    }
+
+    /// Gives a calibration the response and the noise.
+    ///
+    /// # Errors
+    /// In words: the response cannot be inverted.
+    pub fn adopt(&self, calibration: &mut Calibration) -> Result<(), String> {
+        calibration.response = inverted(&self.response)?;
+        calibration.noise_counts = self.noise.counts;
+        Ok(())
+    }
+}
+
+/// A scene in front of the head, or settings of the head, that do not allow a calibration.
+pub(super) fn scene(words: impl Into<String>) -> Failure {
+    Failure::new(Exit::Unavailable, words)
+}
+
+/// Measures what does not depend on the geometry, and gives it to head and `calibration`. The response `before` is kept where the new one
+/// equals it within noise. `progress` gets the share done and what is measured next; `notes` remarks for the user.
+///
+/// # Errors
+/// Of a device; if too little light comes back, or too much (69).
+pub fn characterise(
+    head: &mut Head,
+    calibration: &mut Calibration,
+    before: Option<Vec<f64>>,
+    notes: &mut Vec<String>,
+    progress: &dyn Fn(f64, &str),
+) -> Result<Characteristics, Failure> {
+    // Patterns are shown as they are until their response is known.
+    calibration.response = None;
+    progress(0.0, "camera stamps");
+    let stamps = Stamps::measure(head)?;
+    head.set_timing(Timing {
+        flip_to_light: Duration::ZERO,
+        ..stamps.timing(head.timing())
+    });
+    progress(0.02, "pace of the camera");
+    let pace = proven(&pace(head)?, notes);
+    head.set_timing(Timing {
+        hold: pace.unwrap_or(head.timing().hold),
+        ..head.timing()
+    });
+    progress(0.05, "light");
+    let lit = Lit::take(head, SETTLE)?;
+    bright_enough(&lit)?;
+    progress(0.1, "flip-to-light delay");
+    let share = |share: f64| progress(0.1 + 0.28 * share, "flip-to-light delay");
+    let delay = Delay::measure(head, &lit, ROUNDS, &share)?
+        .filter(|delay| delay.seconds >= LEAST_DELAY_S)
+        .ok_or_else(|| {
+            scene("measure the flip-to-light delay: light does not follow the flips: `fringed doctor` says more")
+        })?;
+    head.set_timing(Timing {
+        flip_to_light: delay.duration(),
+        ..head.timing()
+    });
+    let settle = settled(head);
+    progress(0.38, "light by content");
+    alike(by_content(head, settle, &lit)?)?;
+    let share = |share: f64| progress(0.4 + 0.4 * share, "grey response");
+    let mut greys = response(head, settle, &lit, &share)?.to_vec();
+    if let Some(before) = before.filter(|before| same(before, &greys)) {
+        notes.push(
+            "the grey response equals the previous one within noise: that one is kept, and recipes stay valid"
+                .into(),
+        );
+        greys = before;
+    }
+    calibration.response = inverted(&greys).map_err(scene)?;
+    progress(0.8, "noise");
+    let noise = noise(head, settle, &lit)?;
+    calibration.noise_counts = noise.counts;
+    progress(0.9, "contrast");
+    let contrast = contrast(head, calibration, settle, &lit)?;
+    Ok(Characteristics {
+        timing: TimingFile {
+            flip_to_light_ns: nanoseconds(delay.duration()),
+            sigma_ns: (delay.error * 1e9).ceil() as u64,
+            stamp: stamps.stamp,
+            stamp_late_ns: stamps.late.map(nanoseconds),
+            readout_ns: nanoseconds(stamps.readout),
+            refreshes: pace,
+        },
+        noise: NoiseFile {
+            counts: noise.counts,
+            read_counts: noise.read_counts,
+            shot: noise.shot,
+            levels: noise
+                .points
+                .iter()
+                .map(|point| LevelFile {
+                    level: point.level,
+                    counts: point.counts,
+                })
+                .collect(),
+        },
+        response: greys,
+        contrast,
+    })
+}
+
+/// Refreshes after a flip when its light has come and settled, by the head's timing.
+pub fn settled(head: &Head) -> u32 {
+    let delay = head.timing().flip_to_light.as_nanos();
+    let refreshes = delay.div_ceil(head.refresh().as_nanos().max(1));
+    u32::try_from(refreshes).unwrap_or(SETTLE) + BEYOND
+}
+
+/// The refreshes per pattern at which no trigger is lost, if there are any; otherwise patterns are shown as long as before.
+fn proven(tried: &[Spaced], notes: &mut Vec<String>) -> Option<u32> {
+    let last = tried.last()?;
+    if last.none_lost() {
+        return Some(last.refreshes);
+    }
+    notes.push(format!(
+        "triggers are lost however far apart they are ({}), so the pace of the camera is not known: check the wire of the trigger, then calibrate anew",
+        last.words()
+    ));
+    None
+}
+
+fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
+}
+
+fn same(before: &[f64], now: &[f64]) -> bool {
+    let near = |(a, b): (&f64, &f64)| (a - b).abs() < SAME_RESPONSE;
+    before.len() == now.len() && before.iter().zip(now).all(near)
+}
+
+fn bright_enough(lit: &Lit) -> Result<(), Failure> {
+    let (share, bright) = (lit.share(), lit.bright() / lit.full_scale());
+    let words = if share < LEAST_LIT {
+        format!(
+            "{:.1} % of the picture is lit: switch the lamp on, open the apertures",
+            share * 100.0
+        )
+    } else if lit.saturated() > MOST_SATURATED {
+        format!(
+            "{:.0} % of the lit pixels are saturated: expose less",
+            lit.saturated() * 100.0
+        )
+    } else if bright < LEAST_BRIGHT {
+        format!(
+            "white is {:.0} % of full scale: expose more",
+            bright * 100.0
+        )
+    } else {
+        return Ok(());
+    };
+    Err(scene(format!(
+        "calibrate: {words}; `fringed doctor` says more"
+    )))
+}
+
+/// Refuses a projector whose light depends on the content of a picture: no response holds for it.
+fn alike(by_content: Option<f64>) -> Result<(), Failure> {
+    match by_content {
+        Some(off) if off.abs() > MOST_BY_CONTENT => Err(scene(format!(
+            "calibrate: the light of a grey depends on the rest of the picture, by {:.1} %: `fringed doctor` says what to switch off",
+            off * 100.0
+        ))),
+        _ => Ok(()),
+    }
+}
