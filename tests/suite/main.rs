@@ -10,6 +10,7 @@ mod cases;
 mod chains;
 mod changeover;
 mod cli;
+mod commissioning;
 mod doctor;
 mod experiment;
 mod foreign;

@@ -1,12 +1,14 @@
 //! The configuration: one TOML file, every key optional.
 
 mod devices;
+mod exposing;
 mod keys;
 
 pub use keys::{Key, TABLE, keys};
 
 use crate::error::{Exit, Failure};
 use crate::head::calibration::place::IN_STATE;
+use crate::head::commission::{Commissioning, Exposing};
 use crate::head::placed::Placed;
 use hal::bounds::{length, shortened, text, within};
 use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
@@ -139,6 +141,9 @@ pub struct HeadConfig {
     /// The part in front of the simulated head instead of the scenario's, from the command line.
     #[serde(skip)]
     pub part: Option<Placed>,
+    /// Exposure and gain that were kept on the page.
+    #[serde(skip)]
+    pub exposing: Option<Exposing>,
 }
 
 /// The kinds of head.
@@ -243,6 +248,9 @@ impl Config {
     pub fn head_in(&self, state: &Path) -> HeadConfig {
         let mut head = self.head.clone();
         head.calibration.get_or_insert_with(|| state.join(IN_STATE));
+        if let Some(kept) = Commissioning::kept_exposing(state) {
+            head.expose(kept);
+        }
         head
     }
 

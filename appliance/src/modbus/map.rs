@@ -143,7 +143,7 @@ registers! {
         101 HEARTBEAT U16 x 1 = now.heartbeat, "+1 every 100 ms as long as the measuring task meets its deadlines";
         102 ERROR_CODE U16 x 1 = now.error_code, "0 none, 1xx camera, 2xx projector, 3xx sync, 4xx recipe, 5xx calibration, 6xx storage, 7xx thermal, 8xx internal";
         103 WARNING Bits x 1 = now.warnings, "0 temperature, 1 storage, 2 plc_lost, 3 clock_unsynced, 4 low_light, 5 saturation, 6 pattern_unfit, 7 frame_slip, 8 power";
-        104 STATE U16 x 1 = now.state, "0 boot, 1 ready, 2 acquiring, 3 processing, 4 loading, 5 teaching, 6 offline, 7 fault, 8 stopping";
+        104 STATE U16 x 1 = now.state, "0 boot, 1 ready, 2 acquiring, 3 processing, 4 loading, 5 teaching, 6 offline, 7 fault, 8 stopping, 9 commissioning";
         105 ACTIVE_RECIPE U16 x 1 = now.active().unwrap_or(0), "number of the active recipe, 0 none";
         106 RECIPE_CRC32 U32 x 1 = now.recipe.as_ref().map_or(0, |recipe| recipe.crc), "first 32 bits of the active recipe's fingerprint";
         108 REQUESTED_RECIPE U16 x 1 = now.requested_recipe, "number of the last requested recipe";

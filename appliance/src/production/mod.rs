@@ -2,6 +2,7 @@
 
 mod aborts;
 pub mod backend;
+pub mod commissioning;
 mod cycle;
 pub mod latest;
 pub mod opening;
@@ -18,6 +19,8 @@ use crate::head::calibration::Current;
 use crate::head::placed::Placed;
 use crate::history::{History, JudgedPart};
 use crate::production::backend::Opened;
+use crate::production::commissioning::Commission;
+use crate::production::commissioning::live::Look;
 use crate::production::latest::LastCycleRequests;
 use crate::production::shelf::Shelf;
 use crate::production::simulation::Placing;
@@ -48,6 +51,10 @@ pub enum Order {
     Load(JobId, RecipeKey),
     /// Teach the part in front of the head as the recipe of this number; whether to keep the gauges of the one that it replaces.
     Teach(JobId, u16, bool),
+    /// Carry out the step of commissioning that waits.
+    Commission(JobId),
+    /// Take a live picture.
+    Look(Look),
     /// Put another part in front of a simulated head.
     Place(Placing),
     /// End.
@@ -94,6 +101,10 @@ pub struct Worker {
     pub computing: Computing,
     /// The part that is put in front of a simulated head once a good one is taught.
     pub waiting: Option<Placed>,
+    /// Steps of commissioning, and what they have found.
+    pub commission: Commission,
+    /// The first of the patterns for live pictures, if the projector has them behind those of the recipe.
+    pub live: Option<usize>,
 }
 
 impl Worker {
@@ -129,12 +140,20 @@ impl Worker {
                 }
                 Ok(Order::Load(job, key)) => {
                     last = JudgedBy::default();
+                    self.live = None;
                     self.load(job, &key, &mut plan);
                 }
                 Ok(Order::Teach(job, number, keep_gauges)) => {
                     last = JudgedBy::default();
+                    self.live = None;
                     self.teach(job, number, keep_gauges, &mut plan);
                 }
+                Ok(Order::Commission(job)) => {
+                    last = JudgedBy::default();
+                    self.live = None;
+                    self.commission(job, &mut plan);
+                }
+                Ok(Order::Look(look)) => self.look(look, plan.as_ref()),
                 Ok(Order::Place(placing)) => placing.carry_out(),
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
                 Err(RecvTimeoutError::Timeout) => {
@@ -145,6 +164,7 @@ impl Worker {
             }
             if let Some(error) = self.lost.take() {
                 last = JudgedBy::default();
+                self.live = None;
                 if self.recover(&error, &mut plan, orders).is_break() {
                     return;
                 }
@@ -165,8 +185,9 @@ impl Worker {
         }
     }
 
-    /// Reports whether the head's calibration can be trusted.
-    fn tell_condition(&self) {
+    /// Reports whether the head's calibration can be trusted, and what is known of the head.
+    fn tell_condition(&mut self) {
+        self.tell_head();
         let Opened {
             problem,
             fallback,

@@ -19,6 +19,8 @@ use crate::head::calibration::Current;
 use crate::head::placed::Placed;
 use crate::history::{self, Bounds, History, Numbering, Reader};
 use crate::production::backend;
+use crate::production::commissioning::Commission;
+use crate::production::commissioning::live::Live;
 use crate::production::latest::LastCycleRequests;
 use crate::production::opening::Opening;
 use crate::production::shelf::Shelf;
@@ -124,6 +126,11 @@ impl Daemon {
         let last_cycle = LastCycleRequests::default();
         let calibration = Current::default();
         let simulation = Simulation::new(orders.clone());
+        let (commission, complaint) = Commission::open(&path);
+        if let Some(complaint) = complaint {
+            progress.warn(&complaint);
+        }
+        let live = Live::new(orders.clone(), commission.clone());
         let computing = Computing::default();
         let (sockets, stopped) = watch::channel(false);
         let wiring = {
@@ -146,6 +153,8 @@ impl Daemon {
                 calibration: calibration.clone(),
                 last_cycle: last_cycle.clone(),
                 simulation: simulation.clone(),
+                commission: commission.clone(),
+                live,
                 history: Reader::of(&path),
                 date: Box::new(move |utc_us| dating.date(boot_id, utc_us)),
                 log: progress.logbook().clone(),
@@ -215,6 +224,8 @@ impl Daemon {
                     pulse,
                     computing,
                     waiting,
+                    commission,
+                    live: None,
                 };
                 worker.run(&inbox, begin, first);
             })?
@@ -359,6 +370,7 @@ fn effects(
                 number,
                 keep_gauges,
             } => order(Order::Teach(job, number, keep_gauges)),
+            Effect::Commission { job } => order(Order::Commission(job)),
             Effect::PersistSeq(seq) => {
                 let failed = history.take(seq).err();
                 return Some(Event::Stored { seq, failed });

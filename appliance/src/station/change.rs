@@ -1,4 +1,4 @@
-//! A change of recipe: a load or a teach, from its order to the worker's answer.
+//! A change of recipe or head: a load, a teach or a step of commissioning, from its order to the worker's answer.
 
 use super::control::BY_PART_NUMBER;
 use super::error_code;
@@ -100,6 +100,22 @@ impl Station {
         None
     }
 
+    /// Orders a step of commissioning, unless the worker has something else to do.
+    pub(super) fn commission(&mut self, effects: &mut Effects) {
+        if self.busy().is_some() {
+            let state = self.state.word();
+            log(
+                effects,
+                format!("no step of commissioning can begin while {state}"),
+            );
+            return;
+        }
+        let job = self.worker.next_job();
+        push(effects, Effect::Commission { job });
+        let deadline = self.within(self.settings.limits.teaching);
+        self.state = State::Commissioning { job, deadline };
+    }
+
     /// Why no recipe can be loaded or taught now; it can be while offline.
     fn busy(&self) -> Option<u16> {
         match self.state {
@@ -155,7 +171,7 @@ impl Station {
         }
     }
 
-    /// Teaching goes on: its deadline moves.
+    /// Teaching or commissioning goes on: its deadline moves.
     pub(super) fn progress(
         &mut self,
         job: JobId,
@@ -176,6 +192,10 @@ impl Station {
                 progress.words = doing;
                 *deadline = until;
             }
+            State::Commissioning {
+                job: awaited,
+                deadline,
+            } if *awaited == job => *deadline = until,
             _ => self.late("progress", job, effects),
         }
     }
@@ -192,6 +212,19 @@ impl Station {
             );
             self.recipes.activate(recipe);
             self.failure = None;
+        }
+    }
+
+    /// A step of commissioning has ended. After one that changed the calibration no recipe is active.
+    pub(super) fn commissioned(
+        &mut self,
+        job: JobId,
+        recipe: Option<ActiveRecipe>,
+        effects: &mut Effects,
+    ) {
+        let waits = matches!(self.state, State::Commissioning { .. });
+        if self.ends(waits, job, "a step of commissioning", effects) {
+            self.recipes.active = recipe;
         }
     }
 

@@ -24,6 +24,8 @@ pub enum Request {
         /// Whether regions, gauges and limits of the recipe that it replaces stay.
         keep_gauges: bool,
     },
+    /// Carry out the step of commissioning that is waiting for the worker.
+    Commission,
 }
 
 /// What the worker knows about the head, sent whenever it changes.
@@ -88,7 +90,7 @@ pub enum Event {
         /// Why, in words.
         message: Arc<str>,
     },
-    /// Teaching goes on.
+    /// Teaching or a step of commissioning goes on.
     Progress {
         /// Quoted.
         job: JobId,
@@ -112,6 +114,13 @@ pub enum Event {
         error_code: u16,
         /// Why.
         message: Arc<str>,
+    },
+    /// A step of commissioning has ended, however it ended.
+    Commissioned {
+        /// Quoted.
+        job: JobId,
+        /// The recipe that the worker is ready to measure with now.
+        recipe: Option<ActiveRecipe>,
     },
     /// The head's condition changed.
     Condition(Condition),
@@ -220,6 +229,11 @@ pub enum Effect {
         number: u16,
         /// Whether regions, gauges and limits of the recipe that it replaces stay.
         keep_gauges: bool,
+    },
+    /// Carry out the step of commissioning that is waiting for the worker.
+    Commission {
+        /// To quote.
+        job: JobId,
     },
     /// End the running job early; the station still waits for its answer.
     Abort {

@@ -26,7 +26,7 @@ pub struct Limits {
     pub processing: Micros,
     /// A recipe is loaded.
     pub loading: Micros,
-    /// Teaching: from one sign of progress to the next.
+    /// Teaching and commissioning: from one sign of progress to the next.
     pub teaching: Micros,
     /// The worker's signs of life while it waits for orders.
     pub idle: Micros,

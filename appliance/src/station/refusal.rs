@@ -3,7 +3,7 @@
 use super::control::{self, BY_PART_NUMBER};
 use super::machine::Station;
 use super::recipes::{ActiveRecipe, RecipeResult};
-use super::snapshot::Snapshot;
+use super::snapshot::{Snapshot, status};
 use super::state::State;
 
 /// REJECT_REASON, register 120: why the last rejected request was rejected.
@@ -45,6 +45,9 @@ impl Snapshot {
         Some(match (self.refusal?, &self.fault, &self.recipe) {
             (reject::OFFLINE, ..) => {
                 "offline: the PLC does not ask for ONLINE; it sets CONTROL bit 0".into()
+            }
+            (reject::NO_RECIPE, ..) if !self.is(status::CALIBRATION_VALID) => {
+                "the head is not calibrated: commission it on the page, under Head, or run `fringed calibrate`".into()
             }
             (reject::NO_RECIPE, ..) => "no recipe is active: load or teach one".into(),
             (reject::FAULT, Some(fault), _) => {

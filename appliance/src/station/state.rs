@@ -57,6 +57,13 @@ pub enum State {
         /// The next sign of progress must come by then.
         deadline: Micros,
     },
+    /// The worker carries out a step of commissioning.
+    Commissioning {
+        /// What the worker quotes in its answers.
+        job: JobId,
+        /// The next sign of progress must come by then.
+        deadline: Micros,
+    },
     /// As ready, but the PLC does not ask for ONLINE.
     Offline,
     /// A lasting condition; triggers are rejected with reason 5.
@@ -81,6 +88,7 @@ impl State {
             Self::Offline => (6, "offline"),
             Self::Fault(_) => (7, "fault"),
             Self::Stopping { .. } => (8, "stopping"),
+            Self::Commissioning { .. } => (9, "commissioning"),
         }
     }
 
@@ -96,7 +104,8 @@ impl State {
             | Self::Acquiring { deadline, .. }
             | Self::Processing { deadline, .. }
             | Self::Loading { deadline, .. }
-            | Self::Teaching { deadline, .. } => Some(*deadline),
+            | Self::Teaching { deadline, .. }
+            | Self::Commissioning { deadline, .. } => Some(*deadline),
             Self::Ready | Self::Offline | Self::Fault(_) | Self::Stopping { .. } => None,
         }
     }
@@ -106,7 +115,9 @@ impl State {
         match self {
             Self::Acquiring { cycle, .. } | Self::Processing { cycle, .. } => Some(cycle.order.job),
             Self::Stopping { cycle } => cycle.as_ref().map(|cycle| cycle.order.job),
-            Self::Loading { job, .. } | Self::Teaching { job, .. } => Some(*job),
+            Self::Loading { job, .. }
+            | Self::Teaching { job, .. }
+            | Self::Commissioning { job, .. } => Some(*job),
             Self::Boot { .. } | Self::Ready | Self::Offline | Self::Fault(_) => None,
         }
     }

@@ -33,6 +33,7 @@ impl Station {
             }) => {
                 self.teach(number, keep_gauges, effects);
             }
+            Event::Request(Request::Commission) => self.commission(effects),
             Event::Started => self.started(effects),
             Event::ExposureDone { job } => self.exposed(job, effects),
             Event::Finished { job, inspection } => self.finished(job, inspection, effects),
@@ -66,6 +67,7 @@ impl Station {
             } => {
                 self.teach_failed(job, error_code, message, effects);
             }
+            Event::Commissioned { job, recipe } => self.commissioned(job, recipe, effects),
             Event::Condition(condition) => self.condition = condition,
             Event::Faulted {
                 error_code,

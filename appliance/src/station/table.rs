@@ -7,13 +7,14 @@ use super::tests::{Bench, good, recipe, settings};
 use super::*;
 
 /// The states by their numbers in register 104; a fault once for each way in which it is cleared.
-const STATES: [u16; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 7, 8];
+const STATES: [u16; 13] = [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 7, 8, 9];
 /// Columns of the table that are faults: a lost device, a missed deadline, storage, an idle worker's silence.
 const LOST: usize = 7;
 const LATE: usize = 8;
 const FULL: usize = 9;
 const SILENT: usize = 10;
 const STOPPING: usize = 11;
+const COMMISSIONING: usize = 12;
 
 /// A survey that found this much room, in MiB.
 fn room(mib: u64) -> Event {
@@ -78,6 +79,9 @@ fn in_state(column: usize) -> Bench {
         STOPPING => {
             bench.event(Event::Stop);
         }
+        COMMISSIONING => {
+            bench.event(Event::Request(Request::Commission));
+        }
         _ => {}
     }
     assert_eq!(bench.station.snapshot().state, STATES[column]);
@@ -85,7 +89,7 @@ fn in_state(column: usize) -> Bench {
 }
 
 /// Every event with a given job, and the state that it leads to from each column's.
-fn events(job: JobId) -> Vec<(Event, [u16; 12])> {
+fn events(job: JobId) -> Vec<(Event, [u16; 13])> {
     let words: Arc<str> = "w".into();
     let write = |bits: u16, rising: u16, token: u16| Event::Write {
         write: ControlWrite {
@@ -108,60 +112,60 @@ fn events(job: JobId) -> Vec<(Event, [u16; 12])> {
     let mut alive = STATES;
     alive[SILENT] = 1;
     vec![
-        (write(1, 0, 0), [0, 1, 2, 3, 4, 5, 1, 7, 7, 7, 7, 8]),
-        (write(0, 0, 0), [0, 6, 2, 3, 4, 5, 6, 7, 7, 7, 7, 8]),
+        (write(1, 0, 0), [0, 1, 2, 3, 4, 5, 1, 7, 7, 7, 7, 8, 9]),
+        (write(0, 0, 0), [0, 6, 2, 3, 4, 5, 6, 7, 7, 7, 7, 8, 9]),
         (
             write(3, control::TRIGGER, 0),
-            [0, 2, 2, 3, 4, 5, 2, 7, 7, 7, 7, 8],
+            [0, 2, 2, 3, 4, 5, 2, 7, 7, 7, 7, 8, 9],
         ),
-        (write(1, 0, 99), [0, 2, 2, 3, 4, 5, 2, 7, 7, 7, 7, 8]),
+        (write(1, 0, 99), [0, 2, 2, 3, 4, 5, 2, 7, 7, 7, 7, 8, 9]),
         (
             other_recipe(control::TRIGGER, 0),
-            [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 7, 8],
+            [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 7, 8, 9],
         ),
-        (other_recipe(0, 99), [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 7, 8]),
+        (other_recipe(0, 99), [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 7, 8, 9]),
         (
             write(5, control::RESULT_ACK, 0),
-            [0, 1, 2, 3, 4, 5, 1, 7, 7, 7, 7, 8],
+            [0, 1, 2, 3, 4, 5, 1, 7, 7, 7, 7, 8, 9],
         ),
         (
             write(9, control::RECIPE_LOAD, 0),
-            [0, 4, 2, 3, 4, 5, 4, 7, 7, 7, 7, 8],
+            [0, 4, 2, 3, 4, 5, 4, 7, 7, 7, 7, 8, 9],
         ),
         (
             write(17, control::ERROR_RESET, 0),
-            [0, 1, 2, 3, 4, 5, 1, 7, 7, 7, 7, 8],
+            [0, 1, 2, 3, 4, 5, 1, 7, 7, 7, 7, 8, 9],
         ),
         (
             write(33, control::ABORT, 0),
-            [0, 1, 2, 3, 4, 5, 1, 7, 7, 7, 7, 8],
+            [0, 1, 2, 3, 4, 5, 1, 7, 7, 7, 7, 8, 9],
         ),
         (
             write(129, control::TEACH, 0),
-            [0, 1, 2, 3, 4, 5, 1, 7, 7, 7, 7, 8],
+            [0, 1, 2, 3, 4, 5, 1, 7, 7, 7, 7, 8, 9],
         ),
         (
             Event::Request(Request::Load(RecipeKey::PartNumber("x".into()))),
-            [0, 4, 2, 3, 4, 5, 4, 7, 7, 7, 7, 8],
+            [0, 4, 2, 3, 4, 5, 4, 7, 7, 7, 7, 8, 9],
         ),
         (
             Event::Request(Request::Teach {
                 number: 9,
                 keep_gauges: false,
             }),
-            [0, 5, 2, 3, 4, 5, 5, 7, 7, 7, 7, 8],
+            [0, 5, 2, 3, 4, 5, 5, 7, 7, 7, 7, 8, 9],
         ),
-        (Event::Started, [1, 1, 2, 3, 4, 5, 6, 7, 1, 7, 1, 8]),
+        (Event::Started, [1, 1, 2, 3, 4, 5, 6, 7, 1, 7, 1, 8, 9]),
         (
             Event::ExposureDone { job },
-            [0, 1, 3, 3, 4, 5, 6, 7, 7, 7, 1, 8],
+            [0, 1, 3, 3, 4, 5, 6, 7, 7, 7, 1, 8, 9],
         ),
         (
             Event::Finished {
                 job,
                 inspection: good(),
             },
-            [0, 1, 1, 1, 4, 5, 6, 7, 7, 7, 1, 8],
+            [0, 1, 1, 1, 4, 5, 6, 7, 7, 7, 1, 8, 9],
         ),
         (
             Event::MeasureFailed {
@@ -169,14 +173,14 @@ fn events(job: JobId) -> Vec<(Event, [u16; 12])> {
                 error_code: 0,
                 message: words.clone(),
             },
-            [0, 1, 1, 1, 4, 5, 6, 7, 7, 7, 1, 8],
+            [0, 1, 1, 1, 4, 5, 6, 7, 7, 7, 1, 8, 9],
         ),
         (
             Event::RecipeLoaded {
                 job,
                 recipe: recipe(2),
             },
-            [0, 1, 2, 3, 1, 5, 6, 7, 7, 7, 1, 8],
+            [0, 1, 2, 3, 1, 5, 6, 7, 7, 7, 1, 8, 9],
         ),
         (
             Event::LoadFailed {
@@ -184,7 +188,7 @@ fn events(job: JobId) -> Vec<(Event, [u16; 12])> {
                 result: RecipeResult::Corrupt,
                 message: words.clone(),
             },
-            [0, 1, 2, 3, 1, 5, 6, 7, 7, 7, 1, 8],
+            [0, 1, 2, 3, 1, 5, 6, 7, 7, 7, 1, 8, 9],
         ),
         (
             Event::Progress {
@@ -199,7 +203,7 @@ fn events(job: JobId) -> Vec<(Event, [u16; 12])> {
                 job,
                 recipe: recipe(2),
             },
-            [0, 1, 2, 3, 4, 1, 6, 7, 7, 7, 1, 8],
+            [0, 1, 2, 3, 4, 1, 6, 7, 7, 7, 1, 8, 9],
         ),
         (
             Event::TeachFailed {
@@ -207,7 +211,18 @@ fn events(job: JobId) -> Vec<(Event, [u16; 12])> {
                 error_code: 0,
                 message: words.clone(),
             },
-            [0, 1, 2, 3, 4, 1, 6, 7, 7, 7, 1, 8],
+            [0, 1, 2, 3, 4, 1, 6, 7, 7, 7, 1, 8, 9],
+        ),
+        (
+            Event::Request(Request::Commission),
+            [0, 9, 2, 3, 4, 5, 9, 7, 7, 7, 7, 8, 9],
+        ),
+        (
+            Event::Commissioned {
+                job,
+                recipe: Some(recipe(1)),
+            },
+            [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 1, 8, 1],
         ),
         (
             Event::Condition(Condition {
@@ -223,21 +238,21 @@ fn events(job: JobId) -> Vec<(Event, [u16; 12])> {
                 cause: words.clone(),
                 remedy: words.clone(),
             },
-            [7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 8],
+            [7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 8, 7],
         ),
         (
             Event::Recovered {
                 recipe: Some(recipe(2)),
             },
-            [0, 1, 2, 3, 4, 5, 6, 1, 7, 7, 1, 8],
+            [0, 1, 2, 3, 4, 5, 6, 1, 7, 7, 1, 8, 9],
         ),
         (
             Event::Paced(Pace::default()),
-            [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 1, 8],
+            [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 1, 8, 9],
         ),
         (Event::Projector(ProjectorHealth::default()), alive),
-        (room(0), [0, 7, 2, 3, 4, 5, 7, 7, 7, 7, 7, 8]),
-        (room(1000), [0, 1, 2, 3, 4, 5, 6, 7, 7, 1, 7, 8]),
+        (room(0), [0, 7, 2, 3, 4, 5, 7, 7, 7, 7, 7, 8, 9]),
+        (room(1000), [0, 1, 2, 3, 4, 5, 6, 7, 7, 1, 7, 8, 9]),
         (
             Event::Stored {
                 seq: 40,
@@ -250,11 +265,11 @@ fn events(job: JobId) -> Vec<(Event, [u16; 12])> {
                 seq: 40,
                 failed: Some(Unstored::Refused(words)),
             },
-            [0, 7, 2, 3, 4, 5, 7, 7, 7, 7, 7, 8],
+            [0, 7, 2, 3, 4, 5, 7, 7, 7, 7, 7, 8, 9],
         ),
         (Event::Alive, alive),
         (Event::Tick { utc_us: Some(0) }, stay),
-        (Event::Stop, [8; 12]),
+        (Event::Stop, [8; 13]),
     ]
 }
 
@@ -292,6 +307,7 @@ fn an_answer_of_another_job_changes_no_state() {
                     | Event::Progress { .. }
                     | Event::Taught { .. }
                     | Event::TeachFailed { .. }
+                    | Event::Commissioned { .. }
             );
             if answer {
                 let (station, effects) = step(bench.station.clone(), event.clone(), bench.now);

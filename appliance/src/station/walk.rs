@@ -118,6 +118,11 @@ fn any_event(random: &mut Random, edges: &mut ConnectionEdges, last: JobId) -> E
             number,
             keep_gauges: number.is_multiple_of(2),
         }),
+        32 => Event::Request(Request::Commission),
+        36 => Event::Commissioned {
+            job,
+            recipe: Some(recipe(number)),
+        },
         33 => Event::Started,
         34 => Event::Condition(Condition::default()),
         35 => Event::Alive,

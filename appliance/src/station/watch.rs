@@ -26,7 +26,11 @@ impl Station {
                 }
                 return;
             }
-            State::Boot { .. } | State::Ready | State::Offline | State::Fault(_) => {}
+            State::Boot { .. }
+            | State::Ready
+            | State::Offline
+            | State::Commissioning { .. }
+            | State::Fault(_) => {}
         }
         self.state = State::Fault(fault);
     }
@@ -107,6 +111,7 @@ impl Station {
             State::Processing { .. } => ("process the frames", limits.processing),
             State::Loading { .. } => ("load a recipe", limits.loading),
             State::Teaching { .. } => ("get on with teaching", limits.teaching),
+            State::Commissioning { .. } => ("get on with commissioning", limits.teaching),
             State::Ready | State::Offline => {
                 // A worker without orders that gives no sign of life would not take one either.
                 let silent = now.since(self.worker.last_alive);

@@ -22,6 +22,7 @@ pub mod view;
 
 mod downloads;
 mod gate;
+mod head;
 mod history;
 mod kept;
 mod metrics;

@@ -17,13 +17,13 @@ use crate::station::control::{ERROR_RESET, TRIGGER};
 use crate::station::{ControlWrite, Event, RecipeKey, RecipeResult, Request, Snapshot};
 
 /// The answer to an accepted order; its progress comes with the events.
-type Accepted = (StatusCode, Json<Value>);
+pub(super) type Accepted = (StatusCode, Json<Value>);
 
-fn accepted() -> Accepted {
+pub(super) fn accepted() -> Accepted {
     (StatusCode::ACCEPTED, Json(json!({ "accepted": true })))
 }
 
-fn not_now(what: &str, snapshot: &Snapshot) -> Problem {
+pub(super) fn not_now(what: &str, snapshot: &Snapshot) -> Problem {
     Problem::busy(format!(
         "{what}: the station is in state {}; try again when it is ready",
         snapshot.state_word

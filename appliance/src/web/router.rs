@@ -12,7 +12,7 @@ use super::gate::{Action, own_page_only, signed_in_only};
 use super::problem::Problem;
 use super::site::Site;
 use super::{
-    assets, downloads, events, history, host, kept, look, metrics, orders, recipes, sessions,
+    assets, downloads, events, head, history, host, kept, look, metrics, orders, recipes, sessions,
     simulation,
 };
 
@@ -119,6 +119,16 @@ pub fn routes() -> Vec<Route> {
         ),
         change(POST, "/api/trigger", "trigger", orders::trigger),
         change(POST, "/api/reset", "reset errors", orders::reset),
+        look("/api/head", head::state),
+        look("/api/head/live", head::live),
+        look("/api/head/live/figures", head::figures),
+        look("/api/head/poses/{number}/picture", head::pose),
+        change(
+            POST,
+            "/api/head/steps/{name}",
+            "commission head",
+            head::step,
+        ),
         look("/api/simulation/part", simulation::part),
         change(
             PUT,

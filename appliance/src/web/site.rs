@@ -12,6 +12,8 @@ use super::problem::Problem;
 use super::slots::Slots;
 use crate::head::calibration::Current;
 use crate::history::Reader;
+use crate::production::commissioning::Commission;
+use crate::production::commissioning::live::Live;
 use crate::production::latest::LastCycleRequests;
 use crate::production::simulation::Simulation;
 use crate::recipe::Store;
@@ -47,6 +49,10 @@ pub struct Parts {
     pub last_cycle: LastCycleRequests,
     /// The part in front of a simulated head.
     pub simulation: Simulation,
+    /// Steps of commissioning.
+    pub commission: Commission,
+    /// Live pictures of the head.
+    pub live: Live,
     /// The stored results.
     pub history: Reader,
     /// Stores the time of this start of the daemon, µs since 1970 UTC, by the clock of a signed-in user's browser; answers whether

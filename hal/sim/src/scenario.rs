@@ -18,6 +18,8 @@ const GREEN: (u32, u32) = (1, 0);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Scenario {
+    /// Whether the pose and lens of both devices and their times are known from the start; a head without a calibration is commissioned first.
+    pub calibrated: bool,
     /// Camera bits, 8, 10 or 12.
     pub bit_depth: u8,
     /// Whether the camera has a colour sensor (RGGB), of which one green plane is read: its frames have half its columns and rows.
@@ -127,6 +129,7 @@ pub struct Placement {
 impl Default for Scenario {
     fn default() -> Self {
         Self {
+            calibrated: true,
             bit_depth: 8,
             colour: false,
             sub_rays: 4,

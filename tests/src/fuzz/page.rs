@@ -3,6 +3,8 @@
 use super::part::PART;
 use super::plant::{runtime, settings};
 use appliance::history::Reader;
+use appliance::production::commissioning::Commission;
+use appliance::production::commissioning::live::Live;
 use appliance::production::latest::LastCycleRequests;
 use appliance::production::simulation::Simulation;
 use appliance::recipe::Store;
@@ -56,13 +58,17 @@ impl Page {
         let station = StationHandle::new(station, Instant::now(), |_| None);
         let (access, secret) = Access::open(&folder.path().join("access"), None).expect("access");
         let recipes = folder.path().join("recipes");
+        let (orders, _) = mpsc::channel();
+        let (commission, _) = Commission::open(folder.path());
         let site = Site::new(Parts {
             station,
             access: access.clone(),
             recipes: Store::open(&recipes).expect("a store"),
             calibration: Default::default(),
             last_cycle: no_cycle(),
-            simulation: Simulation::new(mpsc::channel().0),
+            simulation: Simulation::new(orders.clone()),
+            live: Live::new(orders, commission.clone()),
+            commission,
             history: Reader::of(folder.path()),
             date: Box::new(|_| false),
             log: Default::default(),

@@ -7,8 +7,8 @@
 mod content;
 mod contrast;
 mod delay;
-mod first_light;
 mod drift;
+mod first_light;
 mod noise;
 mod pace;
 mod pictures;
@@ -19,8 +19,8 @@ mod stamps;
 pub use content::{MOST_BY_CONTENT, by_content};
 pub use contrast::{PITCHES, contrast};
 pub use delay::Delay;
-pub use first_light::{LONGEST_DARK, first_light};
 pub use drift::{MOST_DRIFT_PX, drift};
+pub use first_light::{LONGEST_DARK, first_light};
 pub use noise::noise;
 pub use pace::{Spaced, pace};
 pub use pictures::{

@@ -8,13 +8,14 @@ use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::place::{Loaded, Place};
+use crate::head::commission::Exposing;
 use crate::head::examine::{LONGEST_DARK, first_light};
 use crate::head::seam;
 use crate::history::RECIPE;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::{Recipe, archive};
 use algo::pattern::Shot;
-use hal::head::Head;
+use hal::head::{Head, Timing};
 use hal::replay::Recording;
 use sim::{Scenario, Stage};
 use std::fs;
@@ -95,7 +96,9 @@ impl Opened {
                 self.head = stage
                     .reopen()
                     .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
-                self.problem = None;
+                if !stage.scenario().calibrated {
+                    self.head.set_timing(Timing::default());
+                }
                 self.adopt(config);
                 self.await_light();
             }
@@ -131,12 +134,49 @@ impl Opened {
         });
     }
 
+    /// Whether the calibration of the back-end is nominal only: that of real devices, and of a simulated head that is to be commissioned.
+    fn is_bare(&self, config: &HeadConfig) -> bool {
+        let bare = |stage: &Stage| !stage.scenario().calibrated;
+        config.backend == Backend::Rpi || self.stage.as_ref().is_some_and(bare)
+    }
+
+    /// Sets exposure and gain of the camera, and keeps them in the configuration for when the head is opened again.
+    ///
+    /// # Errors
+    /// If the head cannot expose in this way, or a device is not there.
+    pub fn expose(&mut self, config: &mut HeadConfig, exposing: Exposing) -> Result<(), Failure> {
+        let before = config.clone();
+        config.expose(exposing);
+        let set = match &self.stage {
+            Some(stage) => exposed(stage, exposing),
+            None => self.reopen(config),
+        };
+        if set.is_err() {
+            *config = before;
+        }
+        set
+    }
+
+    /// Exposure and gain of the camera.
+    pub fn exposing(&self, config: &HeadConfig) -> Exposing {
+        let gain = match &self.stage {
+            Some(stage) => stage.exposing().1,
+            None => config.camera.gain,
+        };
+        let exposure = self.head.camera_timing().exposure;
+        Exposing {
+            exposure_us: u32::try_from(exposure.as_micros()).unwrap_or(u32::MAX),
+            gain,
+        }
+    }
+
     /// Uses the stored calibration if there is one, else that of the back-end.
-    fn adopt(&mut self, config: &HeadConfig) {
+    pub fn adopt(&mut self, config: &HeadConfig) {
         self.fallback = None;
         self.problem = match stored(config) {
-            // Without a stored calibration, that of real devices is nominal only.
-            Ok(None) => (config.backend == Backend::Rpi).then(|| devices::uncalibrated().message),
+            Ok(None) => self
+                .is_bare(config)
+                .then(|| devices::uncalibrated().message),
             Ok(Some((loaded, calibration))) => {
                 let misfit = misfit(config, &self.calibration, &calibration);
                 if misfit.is_none() {
@@ -245,8 +285,10 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
     let wrong = |problem| Failure::new(Exit::Content, problem);
     match config.backend {
         Backend::Sim => {
-            let exact = exact(&scenario(config.scenario.as_deref())?)?;
+            let scenario = scenario(config.scenario.as_deref())?;
+            let exact = exact(&scenario)?;
             match stored(config).map_err(wrong)? {
+                None if !scenario.calibrated => Err(devices::uncalibrated()),
                 None => Ok(exact),
                 Some((loaded, calibration)) => misfit(config, &exact, &calibration)
                     .or_else(|| unfinished(config, &loaded))
@@ -302,12 +344,28 @@ fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Ope
     if let Some(placed) = &config.part {
         (scenario.part, scenario.placement) = (placed.part.clone(), placed.placement);
     }
-    let (head, stage) = sim::head_with_progress(&scenario, progress)
+    let (mut head, stage) = sim::head_with_progress(&scenario, progress)
         .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+    if let Some(exposing) = config.exposing {
+        exposed(&stage, exposing)?;
+    }
+    let calibration = if scenario.calibrated {
+        exact(&scenario)?
+    } else {
+        head.set_timing(Timing::default());
+        devices::nominal(head.camera_format(), head.projector_size())?
+    };
     Ok(Opened {
         stage: Some(stage),
-        ..Opened::new(head, exact(&scenario)?)
+        ..Opened::new(head, calibration)
     })
+}
+
+/// Sets exposure and gain of a simulated camera.
+fn exposed(stage: &Stage, exposing: Exposing) -> Result<(), Failure> {
+    stage
+        .expose(exposing.exposure(), exposing.gain)
+        .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))
 }
 
 fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened, Failure> {

@@ -21,7 +21,7 @@ const VIEWS = ["live", "history", "recipes", "registers", "device"];
 const STATES = {
   boot: ["starting", "wait"], ready: ["ready", "ready"], acquiring: ["exposing", "busy"], processing: ["computing", "busy"],
   loading: ["loading a recipe", "busy"], teaching: ["teaching", "busy"], offline: ["offline: the PLC has not set ONLINE", "wait"],
-  fault: ["fault", "fault"], stopping: ["stopping", "wait"],
+  fault: ["fault", "fault"], commissioning: ["commissioning", "busy"], stopping: ["stopping", "wait"],
 };
 // Why a station in state ready accepts no trigger (its READY bit is 0), by REJECT_REASON.
 const WAITING = { 3: "no recipe is active", 6: "another recipe is asked for" };

@@ -17,6 +17,8 @@ use tokio::net::{TcpListener, TcpStream};
 
 use super::*;
 use crate::history::Reader;
+use crate::production::commissioning::Commission;
+use crate::production::commissioning::live::Live;
 use crate::production::simulation::Simulation;
 use crate::recipe::Store;
 use crate::station::*;
@@ -51,13 +53,17 @@ async fn served() -> Served {
     let handle = StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| None);
     let (access, secret) = Access::open(&folder.path().join("access"), None).unwrap();
     let (dates, dated) = mpsc::channel();
+    let (orders, _) = mpsc::channel();
+    let (commission, _) = Commission::open(folder.path());
     let site = Site::new(Parts {
         station: handle.clone(),
         access,
         recipes: Store::open(&folder.path().join("recipes")).unwrap(),
         calibration: Default::default(),
         last_cycle: Default::default(),
-        simulation: Simulation::new(mpsc::channel().0),
+        simulation: Simulation::new(orders.clone()),
+        live: Live::new(orders, commission.clone()),
+        commission,
         history: Reader::of(folder.path()),
         date: Box::new(move |utc_us| dates.send(utc_us).is_ok()),
         log: Default::default(),

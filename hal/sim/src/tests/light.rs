@@ -4,7 +4,7 @@ use super::{PATIENT, counts, frames, small};
 use crate::optics::normalised;
 use crate::parts::Plane;
 use crate::{Part, Scenario, head};
-use hal::head::Showing;
+use hal::head::{Head, Showing};
 use hal::projector::Raster;
 
 #[test]
@@ -183,7 +183,7 @@ fn gain_and_exposure_make_frames_brighter_until_they_are_set_again() {
     scenario.light.ambient = 0.0;
     let (mut head, stage) = head(&scenario).unwrap();
     let middle = 24 * 64 + 32;
-    let mut light = |head: &mut Head| counts(&frames(head, &[40])[0])[middle];
+    let light = |head: &mut Head| counts(&frames(head, &[40])[0])[middle];
     let plain = light(&mut head);
     let (exposure, gain) = stage.exposing();
     assert_eq!((exposure, gain), (scenario.refresh() * 2, 1.0));

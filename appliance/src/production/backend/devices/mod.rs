@@ -119,7 +119,7 @@ fn trigger(_: &TriggerSetup) -> Result<Box<dyn Trigger>, Failure> {
 }
 
 /// A placeholder until the head is calibrated: lenses and poses like those of the reference head. No height may be computed with it.
-fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Result<Calibration, Failure> {
+pub(super) fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Result<Calibration, Failure> {
     let model = |width: u32, height: u32, aside_mm: f64| DeviceModel {
         fx: 1.6 * f64::from(width),
         fy: 1.6 * f64::from(width),
@@ -144,7 +144,7 @@ fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Result<Calibration, Fa
 
 /// The failure of a head without a calibration.
 pub(super) fn uncalibrated() -> Failure {
-    let message = "the head is not calibrated: calibrate it with `fringed calibrate`";
+    let message = "the head is not calibrated: commission it on the page, under Head, or calibrate it with `fringed calibrate`";
     Failure::new(Exit::Missing, message)
 }
 

@@ -1,0 +1,70 @@
+//! How a step ended: what was found, and what to do if something is wrong.
+
+use crate::error::Failure;
+use crate::head::doctor::{Check, Verdict};
+use crate::system::clock;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+
+/// The result of a step, as it is kept.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Outcome {
+    /// When it ended, s since 1970 UTC; 0 if the clock was not synchronised.
+    pub at_unix_s: u64,
+    /// Whether everything is as it must be.
+    pub passed: bool,
+    /// What was found, a sentence each.
+    pub said: Vec<String>,
+    /// What to do about it; none if it passed.
+    pub remedy: Option<String>,
+    /// The numbers by name.
+    pub figures: Value,
+}
+
+impl Outcome {
+    /// A step that passed.
+    pub fn passed(said: impl Into<String>, figures: Value) -> Self {
+        Self {
+            at_unix_s: clock::utc_us().unwrap_or(0) / 1_000_000,
+            passed: true,
+            said: vec![said.into()],
+            remedy: None,
+            figures,
+        }
+    }
+
+    /// A step that failed, from words that end in ": " and the remedy.
+    pub fn failed(words: &str) -> Self {
+        let (said, remedy) = words.split_once(": ").unwrap_or((words, words));
+        Self {
+            passed: false,
+            remedy: Some(remedy.into()),
+            ..Self::passed(said, json!({}))
+        }
+    }
+
+    /// The doctor's checks as one result: passed if all of them are, with the remedy of the first that failed.
+    pub fn of(checks: &[Check]) -> Self {
+        let said = checks
+            .iter()
+            .map(|check| format!("{}: {}", check.name, check.found));
+        let figures: Map<String, Value> = checks
+            .iter()
+            .map(|check| (check.name.to_owned(), check.measured.clone()))
+            .collect();
+        let failed = checks.iter().find(|check| check.verdict == Verdict::Fail);
+        Self {
+            passed: checks.iter().all(|check| check.verdict == Verdict::Pass),
+            remedy: failed.map(|check| check.remedy.clone()),
+            said: said.collect(),
+            ..Self::passed("", Value::Object(figures))
+        }
+    }
+}
+
+impl From<Failure> for Outcome {
+    fn from(failure: Failure) -> Self {
+        Self::failed(&failure.message)
+    }
+}

@@ -1,0 +1,194 @@
+//! What live pictures say: histogram, saturation, sharpness of edges, and the modulation of fringes over the last pictures.
+
+use super::patterns::{SHIFTS, Show};
+use super::picture::Picture;
+use serde::Serialize;
+
+/// Bins of the histogram.
+const BINS: usize = 64;
+/// Share of the pixels that may be brighter than the brightest that counts.
+const GLINTS: f64 = 0.001;
+/// Share of the pixels with the steepest edges that is left out.
+const STEEPEST: f64 = 0.005;
+/// A pixel is lit if its mean over the shifts is this share of full scale.
+const LIT: f64 = 0.05;
+
+/// The figures of one picture.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// Pixels by their light, from dark to full scale.
+    pub histogram: Vec<u32>,
+    /// Share of the pixels at full scale.
+    pub saturated: f64,
+    /// The brightest pixels but for glints, share of full scale.
+    pub brightest: f64,
+    /// Mean, share of full scale.
+    pub mean: f64,
+    /// The steepest edge, share of the picture's contrast per pixel of the frame.
+    pub sharpness: f64,
+}
+
+impl Figures {
+    /// Of a picture.
+    pub fn of(picture: &Picture) -> Self {
+        let full = f64::from(picture.full_scale.max(1));
+        let mut histogram = vec![0; BINS];
+        let (mut saturated, mut sum) = (0.0, 0.0);
+        for count in &picture.counts {
+            let share = f64::from(*count) / full;
+            histogram[((share * BINS as f64) as usize).min(BINS - 1)] += 1;
+            saturated += f64::from(u8::from(*count >= picture.full_scale));
+            sum += share;
+        }
+        let pixels = picture.counts.len().max(1) as f64;
+        let mut sorted = picture.counts.clone();
+        let mut share = |part: f64| {
+            let last = sorted.len().saturating_sub(1);
+            let at = (part * last as f64) as usize;
+            match sorted.is_empty() {
+                true => 0.0,
+                false => f64::from(*sorted.select_nth_unstable(at).1) / full,
+            }
+        };
+        let (dark, brightest) = (share(0.01), share(1.0 - GLINTS));
+        Self {
+            histogram,
+            saturated: saturated / pixels,
+            brightest,
+            mean: sum / pixels,
+            sharpness: steepest(picture)
+                / full
+                / f64::max(brightest - dark, 1e-3)
+                / picture.every as f64,
+        }
+    }
+}
+
+/// Half the difference of the neighbours of the steepest pixels, counts.
+fn steepest(picture: &Picture) -> f64 {
+    let (width, counts) = (picture.width, &picture.counts);
+    let mut slopes = Vec::with_capacity(counts.len());
+    for row in counts.chunks(width.max(1)) {
+        slopes.extend(row.windows(3).map(|three| three[2].abs_diff(three[0])));
+    }
+    if slopes.is_empty() {
+        return 0.0;
+    }
+    let at = ((1.0 - STEEPEST) * (slopes.len() - 1) as f64) as usize;
+    f64::from(*slopes.select_nth_unstable(at).1) / 2.0
+}
+
+/// The last picture of each shift of the fringes of each pitch.
+#[derive(Debug, Default)]
+pub struct Fringes {
+    pitches: Vec<Shifts>,
+}
+
+#[derive(Debug, Default)]
+struct Shifts {
+    pitch: u32,
+    /// The shift that is shown next.
+    next: usize,
+    pictures: [Option<Picture>; SHIFTS],
+}
+
+impl Fringes {
+    fn of(&self, pitch: u32) -> Option<&Shifts> {
+        self.pitches.iter().find(|shifts| shifts.pitch == pitch)
+    }
+
+    /// The shift to show next.
+    pub fn next(&self, show: Show) -> usize {
+        let shifts = show.pitch().and_then(|pitch| self.of(pitch));
+        shifts.map_or(0, |shifts| shifts.next)
+    }
+
+    /// Keeps a picture of the shift that was to be shown next.
+    pub fn add(&mut self, show: Show, picture: Picture) {
+        let Some(pitch) = show.pitch() else { return };
+        if self.of(pitch).is_none() {
+            self.pitches.push(Shifts {
+                pitch,
+                ..Shifts::default()
+            });
+        }
+        let mut all = self.pitches.iter_mut();
+        if let Some(shifts) = all.find(|shifts| shifts.pitch == pitch) {
+            shifts.pictures[shifts.next] = Some(picture);
+            shifts.next = (shifts.next + 1) % SHIFTS;
+        }
+    }
+
+    /// Modulation over offset, B/A, of the fringes of a pitch: the median over the lit pixels, 0…1. None until each shift was seen.
+    ///
+    /// B = ½ √((I₀ − I₂)² + (I₁ − I₃)²) for shifts of a quarter of a turn (Creath 1988).
+    pub fn modulation(&self, pitch: u32) -> Option<f64> {
+        let [Some(a), Some(b), Some(c), Some(d)] = &self.of(pitch)?.pictures else {
+            return None;
+        };
+        let size = |picture: &Picture| (picture.width, picture.height);
+        if [b, c, d].into_iter().any(|other| size(other) != size(a)) {
+            return None;
+        }
+        let least = 4.0 * LIT * f64::from(a.full_scale);
+        let mut shares: Vec<f64> = (0..a.counts.len())
+            .filter_map(|at| {
+                let [a, b, c, d] = [a, b, c, d].map(|picture| f64::from(picture.counts[at]));
+                let sum = a + b + c + d;
+                (sum >= least).then(|| 2.0 * (a - c).hypot(b - d) / sum)
+            })
+            .collect();
+        if shares.is_empty() {
+            return Some(0.0);
+        }
+        let middle = shares.len() / 2;
+        Some(*shares.select_nth_unstable_by(middle, f64::total_cmp).1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(counts: Vec<u16>) -> Picture {
+        Picture {
+            width: counts.len() / 2,
+            height: 2,
+            every: 1,
+            counts,
+            full_scale: 255,
+        }
+    }
+
+    #[test]
+    fn light_saturation_and_edges_are_counted() {
+        // Two rows, half dark, half at full scale, with one step between them.
+        let row = [vec![10; 50], vec![255; 50]].concat();
+        let figures = Figures::of(&picture([row.clone(), row].concat()));
+        assert_eq!((figures.histogram[2], figures.histogram[63]), (100, 100));
+        assert!((figures.saturated - 0.5).abs() < 1e-12 && figures.brightest == 1.0);
+        assert!((figures.sharpness - 0.5).abs() < 1e-9, "{figures:?}");
+    }
+
+    #[test]
+    fn modulation_needs_all_shifts_and_is_that_of_the_fringes() {
+        let mut fringes = Fringes::default();
+        let shift = |shift: usize| {
+            let light = |at: usize| {
+                let turns = at as f64 / 16.0 - shift as f64 / 4.0;
+                (100.0 + 60.0 * (turns * std::f64::consts::TAU).cos()).round() as u16
+            };
+            picture((0..64).map(light).collect())
+        };
+        for at in 0..3 {
+            assert_eq!(fringes.next(Show::Fringes8), at);
+            fringes.add(Show::Fringes8, shift(at));
+        }
+        assert_eq!(fringes.modulation(8), None);
+        fringes.add(Show::Fringes8, shift(3));
+        assert_eq!(fringes.next(Show::Fringes8), 0);
+        let modulation = fringes.modulation(8).unwrap();
+        assert!((modulation - 0.6).abs() < 0.01, "{modulation}");
+        assert_eq!(fringes.modulation(12), None);
+    }
+}

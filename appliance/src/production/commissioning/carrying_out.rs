@@ -1,0 +1,208 @@
+//! The measuring task carries out a step.
+
+use super::{Asked, OpenHead, PICTURES};
+use crate::config::Backend;
+use crate::head::calibration::file::CalibrationFile;
+use crate::head::calibration::place::Place;
+use crate::head::commission::{Commissioning, Exposing, Name, Outcome, Step, Subject};
+use crate::head::live::Picture;
+use crate::production::{SIGN_OF_LIFE, Worker, active};
+use crate::recipe::plan::Plan;
+use crate::station::{Event, JobId};
+use crate::storage::folder::write_whole;
+use hal::frame::Frame;
+use std::fs;
+use std::panic::resume_unwind;
+use std::path::Path;
+use std::sync::Arc;
+use std::thread;
+
+impl Worker {
+    /// Carries out the step that waits. The plan stays if the calibration does.
+    pub(in crate::production) fn commission(&mut self, job: JobId, plan: &mut Option<Arc<Plan>>) {
+        if let Some(asked) = self.commission.take() {
+            let before = self.opened.calibration.fingerprint();
+            self.carry_out(job, &asked);
+            let same =
+                self.opened.problem.is_none() && self.opened.calibration.fingerprint() == before;
+            if !same && plan.take().is_some() {
+                self.progress
+                    .warn("the head has another calibration: teach the recipes anew");
+            }
+            // Steps show patterns of their own.
+            self.restore(plan);
+            self.progress.clear();
+        }
+        self.commission.ended();
+        let recipe = plan.as_deref().map(active);
+        self.station.event(Event::Commissioned { job, recipe });
+    }
+
+    fn carry_out(&mut self, job: JobId, asked: &Asked) {
+        let mut kept = self.commission.kept();
+        let head = self.head_of();
+        if kept.head != head {
+            // What other devices have shown is of no use here; exposure and gain are those of this camera already.
+            kept = Commissioning::of(head, kept.exposing);
+        }
+        if let Err(problem) = self.set_exposing(asked, &mut kept) {
+            kept.steps
+                .insert(asked.step.name(), Outcome::failed(&problem));
+            return self.keep(kept);
+        }
+        let timing = self.opened.head.timing();
+        let white = self.step(job, &asked.step, &mut kept);
+        if self.opened.problem.is_none() {
+            // The calibration in use stays so until another one is complete.
+            self.opened.head.set_timing(timing);
+        }
+        if let Step::Pose(board, number) = &asked.step {
+            let pose = kept.poses.get(number);
+            let corners = pose.map_or(&[][..], |pose| &pose.corners);
+            let marked: Vec<[f64; 2]> =
+                corners.iter().flatten().map(|[u, v, _]| [*u, *v]).collect();
+            self.keep_picture(*number, white.as_ref(), &marked);
+            self.progress.log(&format!(
+                "pose {number}: {} of {} corners",
+                marked.len(),
+                board.columns * board.rows
+            ));
+        }
+        let completed = matches!(asked.step, Step::Plane)
+            && kept.steps.get(&Name::Plane).is_some_and(|step| step.passed);
+        self.keep(kept);
+        if completed {
+            self.opened.adopt(&self.config);
+        }
+        self.tell_condition();
+    }
+
+    /// Runs the step on the head.
+    fn step(&mut self, job: JobId, step: &Step, kept: &mut Commissioning) -> Option<Frame> {
+        let before = self.stored();
+        let (station, pulse, bar) = (&self.station, &self.pulse, &self.progress);
+        let commission = &self.commission;
+        let progress = move |share: f64, words: &str| {
+            pulse.beat();
+            bar.tell(share, words);
+            commission.tell(share, words);
+            station.event(Event::Progress {
+                job,
+                fraction: share as f32,
+                words: words.into(),
+            });
+        };
+        progress(0.0, "beginning");
+        let opened = &mut self.opened;
+        let mut calibration = opened.calibration.clone();
+        let calibrated = opened.problem.is_none();
+        let mut subject = Subject {
+            exact: calibrated && opened.stage.is_some(),
+            calibrated: calibrated || kept.measured.is_some(),
+            head: &mut opened.head,
+            calibration: &mut calibration,
+            before,
+            place: self.config.calibration.as_deref().unwrap_or(Path::new("")),
+            progress: &progress,
+        };
+        let pool = &self.pool;
+        if !matches!(step, Step::Solve(_)) {
+            return pool.install(|| step.run(&mut subject, kept));
+        }
+        // It computes for long, without a device and without telling how far it is.
+        self.computing.on(|| {
+            thread::scope(|scope| {
+                let solving = scope.spawn(|| pool.install(|| step.run(&mut subject, kept)));
+                while !solving.is_finished() {
+                    progress(0.1, "adjusting the models");
+                    thread::sleep(SIGN_OF_LIFE);
+                }
+                solving.join().unwrap_or_else(|panic| resume_unwind(panic))
+            })
+        })
+    }
+
+    /// The stored calibration, if it is of this head.
+    fn stored(&self) -> Option<CalibrationFile> {
+        let place = self.config.calibration.as_deref()?;
+        let file = Place::at(place).load().ok()??.file;
+        let [width, height, bits, columns, rows] = self.head_of();
+        let camera = (file.camera.width, file.camera.height);
+        let projector = (file.projector.width, file.projector.height);
+        let same = camera == (width, height) && projector == (columns, rows);
+        (same && u32::from(file.camera.bit_depth) == bits).then_some(file)
+    }
+
+    /// The sizes that tell heads apart.
+    fn head_of(&self) -> [u32; 5] {
+        let (width, height, bits) = self.opened.calibration.frames();
+        let (columns, rows) = self.opened.calibration.raster();
+        [width, height, u32::from(bits), columns, rows]
+    }
+
+    /// Sets exposure and gain, if the step asks for it.
+    fn set_exposing(&mut self, asked: &Asked, kept: &mut Commissioning) -> Result<(), String> {
+        let Some((exposing, keep)) = asked.exposing else {
+            return Ok(());
+        };
+        let before = self.opened.exposing(&self.config);
+        if exposing != before {
+            let timing = self.opened.head.timing();
+            let set = self.opened.expose(&mut self.config, exposing);
+            set.map_err(|failure| failure.message)?;
+            self.opened.head.set_timing(timing);
+        }
+        if keep {
+            if kept.exposing != Some(exposing) {
+                // Response and noise were measured with other ones.
+                kept.steps.remove(&Name::Timing);
+            }
+            kept.exposing = Some(exposing);
+        }
+        Ok(())
+    }
+
+    fn keep(&self, kept: Commissioning) {
+        if let Err(problem) = self.commission.keep(kept) {
+            self.progress.warn(&problem);
+        }
+    }
+
+    /// Keeps the picture of a pose, or removes that of a former one.
+    fn keep_picture(&self, number: u32, white: Option<&Frame>, marked: &[[f64; 2]]) {
+        let file = self.commission.picture_file(number);
+        let kept = match white {
+            None => fs::remove_file(&file),
+            Some(frame) => fs::create_dir_all(self.commission.state.join(PICTURES))
+                .and_then(|()| write_whole(&file, &Picture::of(frame).png(marked))),
+        };
+        if let (Err(error), Some(_)) = (kept, white) {
+            self.progress
+                .warn(&format!("write {}: {error}: free space", file.display()));
+        }
+    }
+
+    /// Gives a head without a calibration what the steps have measured of it, and publishes what is known of the head.
+    pub(in crate::production) fn tell_head(&mut self) {
+        let kept = self.commission.kept();
+        if self.opened.problem.is_some()
+            && kept.head == self.head_of()
+            && let Some(measured) = &kept.measured
+        {
+            let head = &mut self.opened.head;
+            head.set_timing(measured.timing.over(head.timing()));
+            // The response was inverted when it was measured.
+            let _ = measured.adopt(&mut self.opened.calibration);
+        }
+        let opened = &self.opened;
+        let exposing: Exposing = opened.exposing(&self.config);
+        self.commission.set_head(Some(OpenHead {
+            simulated: opened.stage.is_some(),
+            adjustable: self.config.backend != Backend::Replay,
+            problem: opened.problem.clone(),
+            calibration: opened.calibration.clone(),
+            exposing,
+            refresh_us: opened.head.refresh().as_micros() as u64,
+        }));
+    }
+}

@@ -1,0 +1,123 @@
+//! The head and its commissioning as `GET /api/head` answers.
+
+use super::{Commission, Inside, OpenHead};
+use crate::head::commission::{Commissioning, Name, Outcome};
+use crate::station::Snapshot;
+use serde_json::{Value, json};
+
+impl Commission {
+    /// The state of head and steps; whether a recipe is active comes from the snapshot.
+    pub fn view(&self, snapshot: &Snapshot) -> Value {
+        let inside = self.inside();
+        let Some(head) = &inside.head else {
+            let words = match &snapshot.fault {
+                Some(fault) => format!("{}; {}", fault.cause, fault.remedy),
+                None => "the head is being opened".into(),
+            };
+            return json!({ "open": false, "problem": words, "running": null, "steps": [] });
+        };
+        let running = inside.running.as_ref().map(|running| {
+            json!({
+                "step": running.name, "said": running.said, "share": running.share,
+                "since_ms": running.since.elapsed().as_millis() as u64,
+            })
+        });
+        let (width, height, bits) = head.calibration.frames();
+        let (columns, rows) = head.calibration.raster();
+        json!({
+            "open": true,
+            "simulated": head.simulated,
+            "calibrated": head.problem.is_none(),
+            "problem": head.problem,
+            "camera": {
+                "columns": width, "rows": height, "bits": bits, "exposure_us": head.exposing.exposure_us, "gain": head.exposing.gain,
+                "refresh_us": head.refresh_us, "adjustable": head.adjustable,
+            },
+            "projector": { "columns": columns, "rows": rows },
+            "running": running,
+            "steps": steps(&inside, snapshot),
+            "geometry": geometry(&inside.kept, head),
+            "drift": null,
+        })
+    }
+}
+
+fn steps(inside: &Inside, snapshot: &Snapshot) -> Vec<Value> {
+    let running = inside.running.as_ref().map(|running| running.name);
+    let mut steps: Vec<Value> = Name::ALL
+        .into_iter()
+        .map(|name| {
+            let outcome = inside.kept.steps.get(&name);
+            step(name.word(), outcome, running == Some(name.word()))
+        })
+        .collect();
+    let state = match (&snapshot.teach, &snapshot.recipe) {
+        (Some(_), _) => "running",
+        (None, Some(_)) => "done",
+        (None, None) => "open",
+    };
+    let said = snapshot
+        .recipe
+        .as_ref()
+        .map(|recipe| format!("recipe {} ({}) is active", recipe.number, recipe.name));
+    steps.push(json!({
+        "name": "teach", "state": state, "at_unix_s": null, "said": Vec::from_iter(said), "remedy": null, "figures": {},
+    }));
+    steps
+}
+
+fn step(name: &str, outcome: Option<&Outcome>, running: bool) -> Value {
+    let state = match outcome {
+        _ if running => "running",
+        None => "open",
+        Some(outcome) if outcome.passed => "done",
+        Some(_) => "failed",
+    };
+    let Some(outcome) = outcome else {
+        return json!({
+            "name": name, "state": state, "at_unix_s": null, "said": [], "remedy": null, "figures": {},
+        });
+    };
+    json!({
+        "name": name, "state": state, "at_unix_s": outcome.at_unix_s, "said": outcome.said, "remedy": outcome.remedy,
+        "figures": outcome.figures,
+    })
+}
+
+/// The poses, and the models if there are any. What a pose has left in the models is known by its name there.
+fn geometry(kept: &Commissioning, head: &OpenHead) -> Value {
+    let models = kept.models.as_ref();
+    let of = kept.board.as_deref().and_then(corners_of).unwrap_or(0);
+    let poses: Vec<Value> = kept
+        .poses
+        .iter()
+        .map(|(number, pose)| {
+            let name = format!("pose {number}");
+            let fitted = models.and_then(|models| {
+                let mut poses = models.geometry.poses.iter();
+                poses.find(|fitted| fitted.recording == name)
+            });
+            json!({
+                "number": number, "corners": pose.located(), "of": of, "usable": pose.problem.is_none(), "problem": pose.problem,
+                "tilt_degrees": fitted.map(|pose| pose.tilt_degrees), "camera_px": fitted.map(|pose| pose.camera_px),
+                "projector_px": fitted.map(|pose| pose.projector_px),
+            })
+        })
+        .collect();
+    let result = models.map(|models| {
+        let file = &models.geometry;
+        json!({
+            "camera_px": file.camera_px, "projector_px": file.projector_px, "height_sigma_mm": file.height_sigma_mm,
+            "length_sigma_mm": file.length_sigma_mm, "baseline_mm": file.baseline_mm, "scale": models.scale,
+        })
+    });
+    json!({
+        "board": kept.board, "poses": poses, "frame_covered": kept.covered(head.calibration.frames()),
+        "tilt_degrees": models.map(|models| models.tilt_degrees), "result": result,
+    })
+}
+
+fn corners_of(board: &str) -> Option<usize> {
+    let board = crate::head::board::parse(board).ok()?;
+    Some(board.columns * board.rows)
+}

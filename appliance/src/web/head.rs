@@ -1,0 +1,249 @@
+//! The head: its commissioning step by step, and the live picture.
+
+use axum::body::Body;
+use axum::extract::{Path, Query, Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Json, Response};
+use serde::Deserialize;
+use serde_json::Value;
+use tokio::sync::oneshot;
+
+use super::body;
+use super::gate::is_signed_in;
+use super::orders::{Accepted, accepted, not_now};
+use super::problem::Problem;
+use super::site::Site;
+use crate::head::board;
+use crate::head::calibration::geometry::{MAX_POSES, MAX_SIGMA_PPM};
+use crate::head::commission::{Exposing, Solving, Step};
+use crate::head::live::Show;
+use crate::production::commissioning::Asked;
+use crate::system::priority;
+
+/// The number of a live picture, which its figures have as well.
+const NUMBER: HeaderName = HeaderName::from_static("x-picture");
+/// Longest length on a board, mm.
+const MAX_LENGTH_MM: f64 = 1e5;
+
+pub(super) async fn state(State(site): State<Site>) -> Json<Value> {
+    Json(site.commission.view(&site.station.snapshot()))
+}
+
+/// A step without options.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Nothing {}
+
+/// Exposure and gain; what is left out stays.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Exposure {
+    exposure_us: Option<u32>,
+    gain: Option<f64>,
+    /// They stay over a restart.
+    keep: bool,
+}
+
+/// What to do with the poses.
+#[derive(Debug, Deserialize)]
+#[serde(tag = "action", rename_all = "lowercase", deny_unknown_fields)]
+enum Poses {
+    Pose {
+        board: String,
+        pose: Option<u32>,
+    },
+    Forget {
+        pose: Option<u32>,
+    },
+    Solve {
+        check_length_mm: Option<f64>,
+        #[serde(default)]
+        board_sigma_ppm: f64,
+    },
+}
+
+pub(super) async fn step(
+    State(site): State<Site>,
+    Path(name): Path<String>,
+    request: Request,
+) -> Result<Accepted, Problem> {
+    let asked = asked(&site, &name, request.into_body()).await?;
+    // Also says why, if the head is not open or the station has something to do.
+    let snapshot = site.station.snapshot();
+    if site.commission.head().is_none() || !site.commission.begin(&site.station, asked) {
+        return Err(not_now(
+            &format!("commission the head, step {name}"),
+            &snapshot,
+        ));
+    }
+    Ok(accepted())
+}
+
+async fn asked(site: &Site, name: &str, body: Body) -> Result<Asked, Problem> {
+    let plain = match name {
+        "devices" => Some(Step::Devices),
+        "aim" => Some(Step::Aim),
+        "timing" => Some(Step::Timing),
+        "plane" => Some(Step::Plane),
+        _ => None,
+    };
+    if let Some(step) = plain {
+        let Nothing {} = body::json_if_any(body).await?;
+        return Ok(Asked {
+            step,
+            exposing: None,
+        });
+    }
+    match name {
+        "exposure" => exposure(site, body::json_if_any(body).await?),
+        "geometry" => {
+            let step = geometry(site, body::json(body).await?).map_err(Problem::unfit)?;
+            Ok(Asked {
+                step,
+                exposing: None,
+            })
+        }
+        _ => Err(Problem::missing(
+            "there are the steps devices, aim, exposure, timing, geometry and plane",
+        )),
+    }
+}
+
+fn exposure(site: &Site, wanted: Exposure) -> Result<Asked, Problem> {
+    let head = site.commission.head();
+    let head = head.ok_or_else(|| Problem::busy("set the exposure: no head is open"))?;
+    let exposing = Exposing {
+        exposure_us: wanted.exposure_us.unwrap_or(head.exposing.exposure_us),
+        gain: wanted.gain.unwrap_or(head.exposing.gain),
+    };
+    let given = wanted.exposure_us.is_some() || wanted.gain.is_some() || wanted.keep;
+    if given {
+        exposing.check().map_err(Problem::unfit)?;
+        if !head.adjustable {
+            let words = "set the exposure: recordings cannot be exposed anew";
+            return Err(Problem::unfit(words));
+        }
+    }
+    Ok(Asked {
+        step: Step::Exposure,
+        exposing: given.then_some((exposing, wanted.keep)),
+    })
+}
+
+fn geometry(site: &Site, wanted: Poses) -> Result<Step, String> {
+    let most = MAX_POSES as u32;
+    let within = |pose: u32| match (1..=most).contains(&pose) {
+        true => Ok(pose),
+        false => Err(format!("pose {pose}: poses are numbered 1 to {most}")),
+    };
+    Ok(match wanted {
+        Poses::Pose { board, pose } => {
+            let board = board::parse(&board).map_err(|error| format!("board: {error}"))?;
+            let number = pose.unwrap_or_else(|| site.commission.free_pose());
+            Step::Pose(board, within(number)?)
+        }
+        Poses::Forget { pose } => Step::Forget(pose.map(within).transpose()?),
+        Poses::Solve {
+            check_length_mm,
+            board_sigma_ppm,
+        } => {
+            let length = check_length_mm.unwrap_or(1.0);
+            if !(length > 0.0 && length <= MAX_LENGTH_MM) {
+                let words = format!(
+                    "check_length_mm is {length}: write a length above 0 to {MAX_LENGTH_MM}"
+                );
+                return Err(words);
+            }
+            if !(0.0..=MAX_SIGMA_PPM).contains(&board_sigma_ppm) {
+                let words =
+                    format!("board_sigma_ppm is {board_sigma_ppm}: write 0 to {MAX_SIGMA_PPM}");
+                return Err(words);
+            }
+            Step::Solve(Solving {
+                check_length_mm,
+                board_sigma_ppm,
+            })
+        }
+    })
+}
+
+/// What a live picture is to show.
+#[derive(Debug, Deserialize)]
+pub(super) struct Shown {
+    #[serde(default)]
+    show: String,
+}
+
+/// Refuses who is not signed in: a live picture lights the part.
+fn signed_in(site: &Site, headers: &HeaderMap) -> Result<(), Problem> {
+    match is_signed_in(site, headers) {
+        true => Ok(()),
+        false => {
+            let words = "sign in first: POST the device's secret to /api/session";
+            Err(Problem::new(StatusCode::UNAUTHORIZED, words))
+        }
+    }
+}
+
+pub(super) async fn live(
+    State(site): State<Site>,
+    headers: HeaderMap,
+    Query(shown): Query<Shown>,
+) -> Result<Response, Problem> {
+    signed_in(&site, &headers)?;
+    let Some(show) = Show::parse(&shown.show) else {
+        let words = Show::ALL.map(Show::word).join(", ");
+        return Err(Problem::unclear(format!("show: write one of {words}")));
+    };
+    let snapshot = site.station.snapshot();
+    if snapshot.is_working() || snapshot.fault.is_some() {
+        return Err(not_now("take a picture", &snapshot));
+    }
+    let live = site.live.clone();
+    let taken = aside(move || live.look(show)).await?;
+    let (number, png) = taken.map_err(|error| Problem::busy(error.to_string()))?;
+    let mut response = ([(header::CONTENT_TYPE, "image/png")], png).into_response();
+    let headers = response.headers_mut();
+    headers.insert(NUMBER, HeaderValue::from(number));
+    Ok(response)
+}
+
+/// Works on a thread of its own with a low priority: the measuring task needs the cores.
+async fn aside<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Problem> {
+    let broken = || Problem::broken("taking the picture failed; see the log");
+    let (done, answer) = oneshot::channel();
+    std::thread::Builder::new()
+        .name("looking".into())
+        .spawn(move || {
+            priority::give_way();
+            // The client may have closed its connection.
+            let _ = done.send(work());
+        })
+        .map_err(|_| broken())?;
+    answer.await.map_err(|_| broken())
+}
+
+pub(super) async fn figures(
+    State(site): State<Site>,
+    headers: HeaderMap,
+) -> Result<Json<Value>, Problem> {
+    signed_in(&site, &headers)?;
+    let words = "no live picture was taken yet: ask for one first";
+    site.live
+        .figures()
+        .map(Json)
+        .ok_or_else(|| Problem::missing(words))
+}
+
+pub(super) async fn pose(
+    State(site): State<Site>,
+    Path(number): Path<u32>,
+) -> Result<Response, Problem> {
+    let png = site
+        .aside(move |site| {
+            let picture = site.commission.pose_picture(number);
+            picture.ok_or_else(|| Problem::missing(format!("there is no picture of pose {number}")))
+        })
+        .await?;
+    Ok(([(header::CONTENT_TYPE, "image/png")], png).into_response())
+}
