@@ -329,7 +329,7 @@ fn a_damaged_calibration_gives_way_to_the_one_before_and_is_never_guessed() {
         Place::at(&json).load()
     };
     let digit = text.replacen("\"counts\": 3.", "\"counts\": 4.", 1);
-    let newer = text.replacen("\"version\": 1", "\"version\": 3", 1);
+    let newer = text.replacen("\"version\": 2", "\"version\": 3", 1);
     let unknown = text.replacen("\"version\"", "\"vesion\": 1, \"version\"", 1);
     for (damaged, words) in [
         (&text[..text.len() / 2], "damaged"),
