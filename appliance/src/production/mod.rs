@@ -153,7 +153,11 @@ impl Worker {
                     self.live = None;
                     self.commission(job, &mut plan);
                 }
-                Ok(Order::Look(look)) => self.look(look, plan.as_ref()),
+                Ok(Order::Look(look)) => {
+                    // Pictures that are asked for one after another leave no time for the sign of life below.
+                    self.station.event(Event::Alive);
+                    self.look(look, plan.as_ref());
+                }
                 Ok(Order::Place(placing)) => placing.carry_out(),
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
                 Err(RecvTimeoutError::Timeout) => {
