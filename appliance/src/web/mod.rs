@@ -7,7 +7,8 @@
 
 pub mod access;
 pub mod assets;
-pub mod body;
+pub mod board;
+mod body;
 pub mod events;
 pub mod host;
 pub mod look;

@@ -12,7 +12,7 @@ use super::gate::{Action, own_page_only, signed_in_only};
 use super::problem::Problem;
 use super::site::Site;
 use super::{
-    assets, downloads, events, head, history, host, kept, look, metrics, orders, recipes, sessions,
+    assets, board, downloads, events, head, history, host, kept, look, metrics, orders, recipes, sessions,
     simulation,
 };
 
@@ -120,6 +120,7 @@ pub fn routes() -> Vec<Route> {
         change(POST, "/api/trigger", "trigger", orders::trigger),
         change(POST, "/api/reset", "reset errors", orders::reset),
         look("/api/head", head::state),
+        look("/api/head/board.pdf", board::pdf),
         look("/api/head/live", head::live),
         look("/api/head/live/figures", head::figures),
         look("/api/head/poses/{number}/picture", head::pose),
