@@ -21,6 +21,13 @@ export async function ask(method, path, body) {
   return response.json().catch(() => null);
 }
 
+// A picture, to be drawn on a canvas.
+export async function picture(path) {
+  const response = await fetch(path, { credentials: "same-origin", cache: "no-store" });
+  if (!response.ok) throw await failure(response);
+  return createImageBitmap(await response.blob());
+}
+
 // A map: its description and its values, NaN where there is none. Where there is no map, the error says why.
 export async function map(path) {
   const response = await fetch(path, { credentials: "same-origin" });

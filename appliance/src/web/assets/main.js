@@ -10,6 +10,7 @@ import { start as startEditor } from "./editor.js";
 import { showRegisters, start as startRegisters } from "./registers.js";
 import { openDevice, showDevice } from "./journal.js";
 import { openHistory, start as startHistory } from "./history.js";
+import { openHead, start as startHead } from "./head.js";
 import { start as startKept } from "./kept.js";
 import { start as startQuestion } from "./question.js";
 import { showSimulation, start as startSimulation } from "./simulation.js";
@@ -17,11 +18,11 @@ import { change, start as startSession } from "./session.js";
 import { ask } from "./api.js";
 import { count, duration, measures } from "./number.js";
 
-const VIEWS = ["live", "history", "recipes", "registers", "device"];
+const VIEWS = ["live", "history", "recipes", "registers", "head", "device"];
 const STATES = {
   boot: ["starting", "wait"], ready: ["ready", "ready"], acquiring: ["exposing", "busy"], processing: ["computing", "busy"],
   loading: ["loading a recipe", "busy"], teaching: ["teaching", "busy"], offline: ["offline: the PLC has not set ONLINE", "wait"],
-  fault: ["fault", "fault"], commissioning: ["commissioning", "busy"], stopping: ["stopping", "wait"],
+  commissioning: ["setting up", "busy"], fault: ["fault", "fault"], stopping: ["stopping", "wait"],
 };
 // Why a station in state ready accepts no trigger (its READY bit is 0), by REJECT_REASON.
 const WAITING = { 3: "no recipe is active", 6: "another recipe is asked for" };
@@ -47,7 +48,8 @@ function showSnapshot(now) {
   const [words, kind] = STATES[now.state] || [now.state, "wait"];
   const waiting = now.state === "ready" && !now.ready;
   $("state").dataset.state = waiting ? "wait" : kind;
-  text("state-words", waiting ? WAITING[now.refusal.reason] || "not ready" : words);
+  const why = now.calibration_valid ? WAITING[now.refusal && now.refusal.reason] : "uncalibrated";
+  text("state-words", waiting ? why || "not ready" : words);
   show("refusal", waiting);
   text("refusal", waiting ? `No trigger is accepted: ${now.refusal.words}.` : "");
   $("trigger").disabled = !now.ready;
@@ -89,6 +91,7 @@ function openView() {
   }
   if (view === "recipes") list();
   showRegisters(view === "registers");
+  openHead(view === "head");
   if (last) {
     openHistory(view === "history", last);
     openDevice(view === "device", last);
@@ -106,6 +109,7 @@ startRegisters();
 startSimulation();
 startHistory();
 startKept();
+startHead();
 $("trigger").addEventListener("click", () => change(() => ask("POST", "/api/trigger")));
 $("reset").addEventListener("click", () => change(() => ask("POST", "/api/reset"), "errors are reset"));
 window.addEventListener("hashchange", openView);

@@ -65,6 +65,10 @@ assets! {
     "/scale.js" "text/javascript; charset=utf-8" "scale.js";
     "/history.js" "text/javascript; charset=utf-8" "history.js";
     "/simulation.js" "text/javascript; charset=utf-8" "simulation.js";
+    "/head.js" "text/javascript; charset=utf-8" "head.js";
+    "/live.js" "text/javascript; charset=utf-8" "live.js";
+    "/steps.js" "text/javascript; charset=utf-8" "steps.js";
+    "/geometry.js" "text/javascript; charset=utf-8" "geometry.js";
     "/registers.js" "text/javascript; charset=utf-8" "registers.js";
     "/journal.js" "text/javascript; charset=utf-8" "journal.js";
 }

@@ -115,6 +115,20 @@ async function consent(number) {
   return choose(`Replace recipe ${number}?`, words, keep.concat([["Replace, with new gauges", { replace: true }]]));
 }
 
+async function teach(number) {
+  const wanted = await consent(number);
+  if (!wanted) return;
+  await ask("POST", `/api/recipes/${number}/teach`, wanted);
+  notice(`teaching recipe ${number} has begun: leave the part where it is`);
+}
+
+// Teaches the part as the first number that is free.
+export async function teachNext() {
+  const { free } = await ask("GET", "/api/recipes");
+  if (free === null) throw new Error("every recipe number is taken: delete a recipe, or teach one anew under Recipes");
+  await teach(free);
+}
+
 // How the limit of the deviation was set when the part was taught. The requested limit is the default of teaching.
 function held(good) {
   if (!good) return "";
@@ -175,13 +189,7 @@ export function showRecipes(now, visible) {
 export function start() {
   $("teach").addEventListener("submit", (event) => {
     event.preventDefault();
-    const number = Number($("teach-as").value);
-    change(async () => {
-      const wanted = await consent(number);
-      if (!wanted) return;
-      await ask("POST", `/api/recipes/${number}/teach`, wanted);
-      notice(`teaching recipe ${number} has begun: leave the part where it is`);
-    });
+    change(() => teach(Number($("teach-as").value)));
   });
   $("import").addEventListener("submit", (event) => {
     event.preventDefault();

@@ -5,10 +5,14 @@ import { ask } from "./api.js";
 let signedIn = false;
 let after = null;
 
+export const isSignedIn = () => signedIn;
+
 function mark(yes) {
+  const changed = yes !== signedIn;
   signedIn = yes;
   text("sign", yes ? "Sign out" : "Sign in");
   document.body.classList.toggle("signed-in", yes);
+  if (changed) window.dispatchEvent(new Event("session"));
 }
 
 export async function refresh() {
@@ -24,7 +28,8 @@ export function notice(words, bad = false) {
   if (words && !bad) notice.timer = setTimeout(() => { element.hidden = true; }, 8000);
 }
 
-function open(next) {
+// Asks for the secret, then does what comes `next`.
+export function open(next) {
   after = next;
   show("sign-in", true);
   text("sign-words", next ? "a change needs the secret of this device" : "");

@@ -1,7 +1,7 @@
 // The part in front of a simulated head: shows it, and replaces it.
 import { $, button, fill, make, show, text } from "./element.js";
 import { ask } from "./api.js";
-import { change } from "./session.js";
+import { change, notice } from "./session.js";
 
 const PLACE = "/api/simulation/part";
 const UNITS = { x: "mm", y: "mm", depth_mm: "mm", diameter_mm: "mm", degrees: "°" };
@@ -52,13 +52,21 @@ function showPart(answer) {
   showDefects();
 }
 
+// Puts something else in front of the simulated head.
+export async function place(wanted, words) {
+  const answer = await change(() => {
+    notice("the light of it is being computed…");
+    return ask("PUT", PLACE, wanted);
+  }, words);
+  if (answer) showPart(answer);
+}
+
 async function put() {
   const number = (at) => Number($(`place-${at}`).value);
   const placement = { shift_mm: [0, 1, 2].map(number), tilt_deg: [3, 4].map(number), rotation_deg: number(5) };
   text("simulation-words", "the light of the part is being computed…");
-  const answer = await change(() => ask("PUT", PLACE, { part, placement }), "the part is in place: the next cycle sees it");
+  await place({ part, placement }, "the part is in place: the next cycle sees it");
   text("simulation-words", "");
-  if (answer) showPart(answer);
 }
 
 // Shows the part again after a start, and after teaching, which places the part that was asked for.

@@ -1,0 +1,56 @@
+// The head: its live picture, its set-up step by step, and its drift.
+import { $, show, text } from "./element.js";
+import { ask } from "./api.js";
+import { openLive, showCamera, start as startLive } from "./live.js";
+import { showSteps, start as startSteps } from "./steps.js";
+import { showGeometry, start as startGeometry } from "./geometry.js";
+
+const EVERY_MS = 500;
+let timer = 0;
+let visible = false;
+
+// Whether camera and projector are still where they were calibrated, by the last check.
+function showDrift(drift) {
+  text("drift-words", drift ? `Camera and projector fit each other within ${drift.epipolar_px.toFixed(2)} px; from ${drift.limit_px.toFixed(2)} px on, the geometry is to be made anew.` : "");
+}
+
+async function refresh() {
+  let head;
+  try { head = await ask("GET", "/api/head"); } catch (error) { head = { open: false, problem: error.message }; }
+  show("setup", head.open);
+  if (!head.open) {
+    show("bare", true);
+    text("bare-problem", head.problem);
+    text("bare-next", "");
+    return;
+  }
+  openLive(visible, head.running ? head.running.said : "");
+  showCamera(head.camera);
+  showSteps(head);
+  showGeometry(head);
+  showDrift(head.drift);
+  for (const line of document.querySelectorAll(".simulated")) line.hidden = !head.simulated;
+}
+
+export function openHead(open) {
+  clearInterval(timer);
+  visible = open;
+  openLive(visible);
+  if (!visible) return;
+  refresh();
+  timer = setInterval(refresh, EVERY_MS);
+}
+
+// A first visit to a head that is not calibrated starts with its set-up.
+async function lead() {
+  const { open, calibrated } = await ask("GET", "/api/head");
+  if (open && !calibrated && !location.hash) location.replace("#head");
+}
+
+export function start() {
+  startLive();
+  startSteps();
+  startGeometry();
+  window.addEventListener("head", refresh);
+  if (!location.hash) lead().catch(() => {});
+}
