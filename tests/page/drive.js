@@ -7,6 +7,7 @@ import { Daemon, Place } from "./daemon.js";
 import { forms } from "./forms.js";
 import { pictures } from "./pictures.js";
 import { recipes } from "./recipes.js";
+import { wizard } from "./wizard.js";
 
 const [program, browserPath, folder] = process.argv.slice(2);
 // Longest wait for anything that must happen.
@@ -400,6 +401,7 @@ try {
   });
 
   assert.deepEqual(complaints, [], "the browser complains");
+  await wizard({ browser, program, step, folder });
   if (folder) await step("pictures", () => pictures(browser, program, folder));
   console.log("the page does what it promises");
 } catch (error) {

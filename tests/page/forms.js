@@ -1,8 +1,8 @@
 // The page on a phone, a tablet and a desktop, light and dark: use with fingers, keyboard and screen reader.
 import { strict as assert } from "node:assert";
 
-const SIZES = [[390, 844], [820, 1180], [1280, 800]];
-const VIEWS = ["live", "history", "recipes", "registers", "device"];
+const SIZES = [[360, 780], [390, 844], [820, 1180], [1280, 800]];
+const VIEWS = ["live", "history", "recipes", "registers", "head", "device"];
 // Side of the smallest target that a finger hits (WCAG 2.5.8), in pixels of the screen.
 const FINGER = 24;
 // The longest text for the station's state in the header.
