@@ -63,9 +63,8 @@ export async function wizard({ browser, program, step, folder }) {
 
   async function run(name) {
     await page.waitForSelector(`#step-${name}[open] > button:enabled`);
-    await page.click(`#step-${name} > button`);
-    await is(name, "running");
-    // In the middle of the step.
+    // Reloaded as soon as the step has begun.
+    await Promise.all([page.waitForResponse((response) => response.url().endsWith(`/steps/${name}`)), page.click(`#step-${name} > button`)]);
     await page.reload();
     await ended(name);
     const { state: outcome, said, remedy } = await state(name);
