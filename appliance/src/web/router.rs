@@ -12,8 +12,8 @@ use super::gate::{Action, own_page_only, signed_in_only};
 use super::problem::Problem;
 use super::site::Site;
 use super::{
-    assets, board, downloads, events, head, history, host, kept, look, metrics, orders, recipes, sessions,
-    simulation,
+    assets, board, downloads, events, head, history, host, kept, look, metrics, orders, recipes,
+    sessions, simulation,
 };
 
 /// Only files of this device, nothing inline, not inside a frame of another page.
