@@ -38,6 +38,7 @@ const SEEN: [(&str, &[&str]); 3] = [
             "history",
             "recipe",
             "head",
+            "output",
             "storage",
             "system",
             "error",

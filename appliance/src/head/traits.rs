@@ -181,8 +181,8 @@ fn a_slow_start_of_the_camera_is_named_where_it_is_stopped_after_each_cycle_and_
     let waits = |head: &mut Head| [(); 3].map(|()| sequence(head).unwrap().start_up.as_millis());
     assert_eq!(waits(&mut own.0), [500, 500, 500]);
     let mut own = head(more);
-    assert_eq!(failed(&mut own).len(), 0);
     assert_eq!(waits(&mut own.0), [500, 0, 0]);
+    assert_eq!(failed(&mut own).len(), 0);
     // A camera that runs by itself is always stopped.
     let mut own = head(&format!("{more}camera_period_us = 33333\n"));
     assert!(failed(&mut own)[0].remedy.contains("always-on"));

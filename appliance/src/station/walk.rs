@@ -118,7 +118,7 @@ fn any_event(random: &mut Random, edges: &mut ConnectionEdges, last: JobId) -> E
             number,
             keep_gauges: number.is_multiple_of(2),
         }),
-        32 => Event::Request(Request::Commission),
+        32 if random.below(12) == 0 => Event::Request(Request::Commission),
         36 => Event::Commissioned {
             job,
             recipe: Some(recipe(number)),

@@ -292,5 +292,11 @@ fn every_reason_has_words_that_say_what_to_do() {
     assert!(words.contains("boot"), "{words}");
     bench.event(Event::Started);
     let words = bench.station.snapshot().refusal_words().expect("a reason");
+    assert!(words.contains("fringed calibrate"), "{words}");
+    bench.event(Event::Condition(Condition {
+        calibration_valid: true,
+        ..Condition::default()
+    }));
+    let words = bench.station.snapshot().refusal_words().expect("a reason");
     assert!(words.contains("load or teach"), "{words}");
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 
-const CHANGES: [(&str, &str); 9] = [
+const CHANGES: [(&str, &str); 10] = [
     ("POST", "/api/trigger"),
     ("POST", "/api/reset"),
     ("POST", "/api/recipes"),
@@ -11,6 +11,7 @@ const CHANGES: [(&str, &str); 9] = [
     ("POST", "/api/recipes/1/undo"),
     ("POST", "/api/recipes/1/load"),
     ("POST", "/api/recipes/1/teach"),
+    ("POST", "/api/head/steps/plane"),
     ("PUT", "/api/simulation/part"),
 ];
 
@@ -23,7 +24,8 @@ async fn looking_needs_no_login_and_every_change_needs_one() {
             .path
             .replace("{number}", "1")
             .replace("{layer}", "height")
-            .replace("{seq}", "1");
+            .replace("{seq}", "1")
+            .replace("{name}", "plane");
         let method = route.method.as_str();
         if route.path == "/events" || route.path == "/api/session" {
             continue;
@@ -40,7 +42,9 @@ async fn looking_needs_no_login_and_every_change_needs_one() {
                 method, "GET",
                 "{path} changes something without being recorded"
             );
-            assert_ne!(answer.status, 401, "{path}");
+            // Only a live picture makes the head expose.
+            let exposes = path.starts_with("/api/head/live");
+            assert_eq!(answer.status == 401, exposes, "{path}: {answer:?}");
         }
     }
     assert_eq!(guarded, CHANGES.len());
