@@ -6,12 +6,11 @@ use super::super::options::Measuring;
 use super::report::poses::Report;
 use crate::error::{Exit, Failure};
 use crate::head::board;
-use crate::head::calibration::file::{CalibrationFile, CameraFile, FORMAT, ProjectorFile, VERSION};
+use crate::head::calibration::file::CalibrationFile;
 use crate::head::calibration::geometry::{MAX_POSES, MAX_SIGMA_PPM};
 use crate::head::calibration::place::Place;
 use crate::head::geometry::{CELLS, Geometry, SeenPose};
 use crate::head::scale::Scale;
-use crate::head::seam;
 use crate::output::residuals::{arrows_png, coverage_png};
 use crate::storage::folder::OutputFolder;
 use crate::storage::state::StateFolder;
@@ -174,40 +173,21 @@ fn is_of(file: &CalibrationFile, head: &SeenPose) -> bool {
 
 /// The calibration with these models. What the one before has measured on the head stays, without the reference plane.
 fn file(head: &SeenPose, geometry: &Geometry, before: Option<&CalibrationFile>) -> CalibrationFile {
-    let (width, height, bit_depth) = head.frames;
-    let (columns, rows) = head.raster;
     let board = &geometry.file.board;
+    let from = format!(
+        "{} poses of checker:{}x{}:{}",
+        geometry.file.poses.len(),
+        board.columns,
+        board.rows,
+        board.square_mm
+    );
+    let (camera, projector) = (&geometry.camera, &geometry.projector);
     CalibrationFile {
-        format: FORMAT.into(),
-        version: VERSION,
-        fingerprint: String::new(),
-        checksum: String::new(),
-        made_by: concat!("fringed ", env!("CARGO_PKG_VERSION")).into(),
-        made_at_unix_s: crate::system::clock::utc_us().unwrap_or(0) / 1_000_000,
-        temperature_c: None,
-        models_from: format!(
-            "{} poses of checker:{}x{}:{}",
-            geometry.file.poses.len(),
-            board.columns,
-            board.rows,
-            board.square_mm
-        ),
-        camera: CameraFile {
-            width,
-            height,
-            bit_depth,
-            model: seam::device_model(&geometry.camera),
-        },
-        projector: ProjectorFile {
-            width: columns,
-            height: rows,
-            model: seam::device_model(&geometry.projector),
-        },
         timing: before.and_then(|file| file.timing.clone()),
         noise: before.and_then(|file| file.noise.clone()),
         response: before.and_then(|file| file.response.clone()),
         contrast: before.and_then(|file| file.contrast.clone()),
-        reference: None,
         geometry: Some(geometry.file.clone()),
+        ..CalibrationFile::of_models(head.frames.2, camera, projector, from)
     }
 }

@@ -6,13 +6,10 @@ mod characteristics;
 pub use characteristics::{Characteristics, characterise, settled};
 
 use super::calibration::Calibration;
-use super::calibration::file::{
-    CalibrationFile, CameraFile, FORMAT, MapFile, ProjectorFile, ReferenceFile, VERSION,
-};
+use super::calibration::file::{CalibrationFile, MapFile, ReferenceFile};
 use super::calibration::geometry::GeometryFile;
 use super::calibration::place::Place;
 use super::examine::{PLATE_PITCH, plate};
-use super::seam;
 use crate::error::{Exit, Failure};
 use algo::geometry::Vector;
 use algo::pipeline::Plate;
@@ -105,34 +102,20 @@ pub fn complete(
         None
     };
     progress(1.0, "calibrated");
-    let (width, height, bit_depth) = calibration.frames();
-    let (columns, rows) = calibration.raster();
     let file = CalibrationFile {
-        format: FORMAT.into(),
-        version: VERSION,
-        fingerprint: String::new(),
-        checksum: String::new(),
-        made_by: concat!("fringed ", env!("CARGO_PKG_VERSION")).into(),
-        made_at_unix_s: crate::system::clock::utc_us().unwrap_or(0) / 1_000_000,
         temperature_c: basis.temperature_c,
-        models_from: basis.models_from,
-        camera: CameraFile {
-            width,
-            height,
-            bit_depth,
-            model: seam::device_model(&calibration.camera),
-        },
-        projector: ProjectorFile {
-            width: columns,
-            height: rows,
-            model: seam::device_model(&calibration.projector),
-        },
         timing: Some(measured.timing.clone()),
         noise: Some(measured.noise.clone()),
         response: Some(measured.response.clone()),
         contrast: Some(measured.contrast.clone()),
         reference,
         geometry: basis.geometry,
+        ..CalibrationFile::of_models(
+            calibration.bit_depth,
+            &calibration.camera,
+            &calibration.projector,
+            basis.models_from,
+        )
     };
     let (file, bytes) = file.sealed().map_err(scene)?;
     Ok(Made {

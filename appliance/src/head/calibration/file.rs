@@ -1,8 +1,11 @@
 //! `calibration.json`, version 2: its keys, its checks, its fingerprint and its checksum.
 
-use super::Calibration;
 use super::geometry::GeometryFile;
+use super::{Calibration, size};
+use crate::head::seam;
 use crate::storage::hex;
+use crate::system::clock;
+use algo::geometry::Pinhole;
 use algo::pattern::GreyResponse;
 use hal::bounds::{clipped, shortened};
 use hal::head::{Stamp, Timing};
@@ -211,6 +214,38 @@ pub struct MapFile {
 }
 
 impl CalibrationFile {
+    /// A file that is made now and has models only. It gets its fingerprint and its checksum when it is [sealed](Self::sealed).
+    pub fn of_models(bit_depth: u8, camera: &Pinhole, projector: &Pinhole, from: String) -> Self {
+        let ((width, height), (columns, rows)) = (size(camera), size(projector));
+        Self {
+            format: FORMAT.into(),
+            version: VERSION,
+            fingerprint: String::new(),
+            checksum: String::new(),
+            made_by: concat!("fringed ", env!("CARGO_PKG_VERSION")).into(),
+            made_at_unix_s: clock::utc_us().unwrap_or(0) / 1_000_000,
+            temperature_c: None,
+            models_from: from,
+            camera: CameraFile {
+                width,
+                height,
+                bit_depth,
+                model: seam::device_model(camera),
+            },
+            projector: ProjectorFile {
+                width: columns,
+                height: rows,
+                model: seam::device_model(projector),
+            },
+            timing: None,
+            noise: None,
+            response: None,
+            contrast: None,
+            reference: None,
+            geometry: None,
+        }
+    }
+
     /// Reads and checks one.
     ///
     /// # Errors
