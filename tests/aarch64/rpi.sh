@@ -19,8 +19,18 @@ failed() {
     exit 1
 }
 
-# The crate rustix, which the buffers' crate makes its calls with, goes through the C library, where udmabuf.so replaces them.
-through_libc=(--config 'target.aarch64-unknown-linux-gnu.rustflags=["--cfg=rustix_use_libc"]')
+# The crate rustix, which the buffers' crates make their calls with, goes through the C library, where udmabuf.so replaces them. The crate
+# dma-heap takes its other way for granted, so a copy of the tree is built with the right type.
+tree=$dir/rpi
+rm -rf "$tree" && mkdir "$tree"
+git ls-files -z | tar --create --null --files-from - | tar --extract --directory "$tree"
+cargo fetch --locked --quiet
+heap=$(cargo metadata --all-features --format-version 1 | grep -o '[^"]*/dma-heap-[^"/]*/Cargo.toml')
+cp -r "${heap%/Cargo.toml}" "$tree/dma-heap"
+sed -i 's/\(ALLOC_OPCODE: \)u32/\1rustix::ioctl::Opcode/' "$tree/dma-heap/src/ioctl.rs"
+through_libc=(--config 'target.aarch64-unknown-linux-gnu.rustflags=["--cfg=rustix_use_libc"]'
+    --config 'patch.crates-io.dma-heap.path="dma-heap"')
+cd "$tree"
 # With the profile of the tests, so that nothing is built twice.
 "$dir/bin/cargo-rpi" "${through_libc[@]}" build --profile test -p appliance --features rpi
 fringed=$dir/build/aarch64-unknown-linux-gnu/debug/fringed
