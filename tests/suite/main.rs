@@ -37,6 +37,7 @@ mod precision;
 mod production;
 mod promises_own;
 mod promises_shared;
+mod real_board;
 mod recovery;
 mod replacing;
 mod rooms;
