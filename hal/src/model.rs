@@ -4,6 +4,7 @@
 //! A projector has the model of a camera; light only goes the other way. Here the numbers are only stored, and refused if
 //! they are not finite; the crate that measures with them checks whether they describe a usable camera.
 
+use crate::bounds::{MAX_SIDE, within};
 use serde::{Deserialize, Serialize};
 
 /// `MODEL` of recording format 1 (docs/formats.md).
@@ -24,6 +25,31 @@ pub struct DeviceModel {
     pub rotation: [f64; 9],
     /// Translation from the world to the device, mm.
     pub translation_mm: [f64; 3],
+}
+
+/// What the measured projector points of the plane z = 0 are off those of the models: two polynomials of degree 6 over the camera's frame.
+///
+/// Each has 28 coefficients of T_i(x)·T_j(y), i + j ≤ 6, ordered by i and then by j, where T are Chebyshev polynomials and x, y run from
+/// -1 to 1 over the frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlaneModel {
+    /// Of ξ(u, v), in projector columns.
+    pub xi: [f64; 28],
+    /// Of η(u, v), in projector rows.
+    pub eta: [f64; 28],
+}
+
+impl PlaneModel {
+    /// Checks the coefficients, none of which can be longer than the longest raster.
+    ///
+    /// # Errors
+    /// In words that name the `key`, the value and the bounds.
+    pub fn check_bounds(&self, key: &str) -> Result<(), String> {
+        let most = f64::from(MAX_SIDE);
+        let mut all = self.xi.iter().chain(&self.eta);
+        all.try_for_each(|&coefficient| within(key, coefficient, -most, most))
+    }
 }
 
 impl DeviceModel {

@@ -70,6 +70,7 @@ impl Scene {
                 width: columns,
                 height: rows,
                 model: Some(rig::projector(columns, rows)),
+                plane: None,
             },
             patterns: self.patterns.clone(),
             frames: Vec::new(),

@@ -18,6 +18,7 @@ mod formats;
 mod fuzz;
 mod gauges;
 mod guide;
+mod heights_by;
 mod history;
 mod hostile;
 mod house;

@@ -10,7 +10,7 @@ mod vector;
 
 pub use lens::Lens;
 pub use pinhole::{ModelError, Pinhole, PinholeModel};
-pub use reference::{FittedMap, Reference, ReferenceError, fit_map};
+pub use reference::{FittedMap, Reference, ReferenceError, TERMS, fit_map};
 pub use sight::Sight;
 pub use triangulate::{Expansion, HeightRange, RigError, Solution, Triangulator};
 pub use vector::Vector;

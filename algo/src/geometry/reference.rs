@@ -2,9 +2,10 @@
 //!
 //! For any phase function, Φ_R(u, v) = Φ_P(ξ, η) at the projector point that lights the plane where
 //! the camera pixel looks (Peng & Gupta 2008, eqs. 10–11). That point comes from the device models,
-//! or from two measured maps of the plane, ξ = Φ_R^V / c_V and η = Φ_R^H / c_H: raw, their noise is
-//! twice the measurement's, so they are fitted smoothly (a polynomial of degree 6 brought 0.0098
-//! down to 0.0004 turn).
+//! or from two measured maps of the plane, ξ = Φ_R^V / c_V and η = Φ_R^H / c_H. Raw, their noise is
+//! twice the measurement's, so what they are off the models is fitted smoothly: models that are exact
+//! then leave nothing to fit, and beyond the frame, where nothing was measured, the correction stays
+//! that of the frame's edge.
 
 use crate::math::solve::solve_symmetric;
 use alloc::vec;
@@ -12,8 +13,8 @@ use alloc::vec::Vec;
 
 /// Degree of the fit.
 const DEGREE: usize = 6;
-/// Coefficients of a polynomial of total degree [`DEGREE`] in two variables.
-const TERMS: usize = (DEGREE + 1) * (DEGREE + 2) / 2;
+/// Coefficients of a polynomial of total degree 6 in two variables.
+pub const TERMS: usize = (DEGREE + 1) * (DEGREE + 2) / 2;
 
 /// How the projector point of a camera pixel on the reference plane is found.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,16 +22,16 @@ const TERMS: usize = (DEGREE + 1) * (DEGREE + 2) / 2;
 pub enum Reference {
     /// Computed from the two device models.
     Models,
-    /// Measured on a plate in the plane z = 0 with a vertical and a horizontal pattern.
+    /// Computed from the models and corrected by what a plate in the plane z = 0 was off them under a vertical and a horizontal pattern.
     Measured {
-        /// ξ(u, v) in projector columns.
+        /// Measured ξ(u, v) less that of the models, projector columns.
         xi: FittedMap,
-        /// η(u, v) in projector rows.
+        /// Measured η(u, v) less that of the models, projector rows.
         eta: FittedMap,
     },
 }
 
-/// A smooth map over the camera's frame: a polynomial of degree 6, defined beyond the frame as well.
+/// A smooth map over the camera's frame: a polynomial of degree 6. Beyond the frame it has the values of the frame's edge.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FittedMap {
     coefficients: [f64; TERMS],
@@ -52,6 +53,26 @@ pub struct ReferenceError {
 }
 
 impl FittedMap {
+    /// The map with these coefficients over a frame of `width` × `height` pixels. It has no samples, so its residual is 0.
+    pub fn new(width: usize, height: usize, coefficients: [f64; TERMS]) -> Self {
+        let half = (
+            (width as f64 / 2.0).max(0.5),
+            (height as f64 / 2.0).max(0.5),
+        );
+        Self {
+            coefficients,
+            centre: (half.0 - 0.5, half.1 - 0.5),
+            half,
+            residual: 0.0,
+        }
+    }
+
+    /// The coefficients of the products T_i(x)·T_j(y), i + j ≤ 6, of Chebyshev polynomials, ordered by i and then by j; x and y run from
+    /// -1 to 1 over the frame.
+    pub fn coefficients(&self) -> &[f64; TERMS] {
+        &self.coefficients
+    }
+
     /// The value at pixel (u, v), also outside the frame.
     pub fn at(&self, u: f64, v: f64) -> f64 {
         let terms = self.terms(u, v);
@@ -67,10 +88,10 @@ impl FittedMap {
         self.residual
     }
 
-    /// The products T_i(x)·T_j(y), i + j ≤ 6, of Chebyshev polynomials over the frame.
+    /// The products that [`Self::coefficients`] belong to.
     fn terms(&self, u: f64, v: f64) -> [f64; TERMS] {
-        let x = chebyshev((u - self.centre.0) / self.half.0);
-        let y = chebyshev((v - self.centre.1) / self.half.1);
+        let x = chebyshev(((u - self.centre.0) / self.half.0).clamp(-1.0, 1.0));
+        let y = chebyshev(((v - self.centre.1) / self.half.1).clamp(-1.0, 1.0));
         let mut terms = [0.0; TERMS];
         let pairs = (0..=DEGREE).flat_map(|i| (0..=DEGREE - i).map(move |j| (i, j)));
         for (term, (i, j)) in terms.iter_mut().zip(pairs) {
@@ -100,16 +121,7 @@ pub fn fit_map(
     height: usize,
     samples: impl Iterator<Item = (f64, f64, f64)> + Clone,
 ) -> Result<FittedMap, ReferenceError> {
-    let half = (
-        (width as f64 / 2.0).max(0.5),
-        (height as f64 / 2.0).max(0.5),
-    );
-    let mut map = FittedMap {
-        coefficients: [0.0; TERMS],
-        centre: (half.0 - 0.5, half.1 - 0.5),
-        half,
-        residual: 0.0,
-    };
+    let mut map = FittedMap::new(width, height, [0.0; TERMS]);
     let mut normal = vec![0.0; TERMS * TERMS];
     let mut right: Vec<f64> = vec![0.0; TERMS];
     let mut count = 0_usize;

@@ -3,7 +3,7 @@
 //! The light ray from the projector through the point X(z), at height z on pixel (u, v)'s ray, meets the reference plane at R(z),
 //! which the camera would see at the pixel π(R(z)). So z solves Φ_R(π(R(z))) = Φ(u, v) in the working range, for any pattern and
 //! any distortion of either lens. With a reference map computed from the models, Φ_R(π(R(z))) is Φ_P at the projector pixel that
-//! lights X(z).
+//! lights X(z); with a measured one, at that pixel corrected by what the plane was off the models at π(R(z)).
 //!
 //! Units: mm and turns. Accuracy: z within 2.5e-7 mm of the textbook for the same phase
 //! (`heights_beyond_the_raster_and_about_the_ends_of_the_range_are_the_textbooks`).
@@ -185,7 +185,8 @@ impl Triangulator {
                 let down = point - lamp;
                 let on_plane = lamp + down * (-lamp.z / down.z);
                 let (u, v) = self.camera.project(on_plane)?;
-                Some((xi.at(u, v), eta.at(u, v)))
+                let by_models = self.projector.project(on_plane)?;
+                Some((by_models.0 + xi.at(u, v), by_models.1 + eta.at(u, v)))
             }
         }
     }

@@ -2,18 +2,19 @@
 
 use super::{Place, Tally, values};
 use crate::config::Config;
-use crate::head::calibration::Calibration;
 use crate::head::calibration::file::{
     CalibrationFile, CameraFile, ContrastFile, FORMAT, LevelFile, MapFile, NoiseFile, PitchFile,
     ProjectorFile, ReferenceFile, TimingFile, VERSION,
 };
 use crate::head::calibration::geometry::{BoardFile, GeometryFile, PoseFile};
 use crate::head::calibration::opencv::{Declared, Sizes, from_two};
+use crate::head::calibration::{Calibration, HeightsBy};
 use crate::head::seam;
 use crate::measure::measure;
 use algo::pattern::Shot;
 use hal::frame::{Frame, FrameFormat, Pixels};
 use hal::head::Stamp;
+use hal::model::PlaneModel;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecipeReference, RecordedCode};
 use hal::units::Timestamp;
@@ -88,9 +89,14 @@ fn a_boundary_value_in_a_calibration_is_refused_by_its_key_or_the_head_is_known_
                 contrast: 1.0,
             }],
         }),
+        heights_by: HeightsBy::Measured,
         reference: Some(ReferenceFile {
             pitch_px: 16.0,
             models_off_px: 0.01,
+            plane: Some(PlaneModel {
+                xi: [0.5; 28],
+                eta: [0.5; 28],
+            }),
             vertical: map("reference_vertical"),
             horizontal: map("reference_horizontal"),
         }),

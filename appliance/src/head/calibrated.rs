@@ -2,7 +2,7 @@
 
 use crate::head::calibration::Calibration;
 use crate::head::scan::{self, Scan};
-use algo::geometry::{Reference, Triangulator};
+use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, Shot};
 use algo::phase::Decoder;
 use algo::pipeline::{HeightMap, PhaseMap};
@@ -66,14 +66,8 @@ impl CalibratedHead<'_> {
         progress: &dyn Fn(f64),
     ) -> Result<Measured, MeasureError> {
         let (calibration, timeout) = (self.calibration, self.timeout);
-        let triangulator = Triangulator::new(
-            calibration.camera.clone(),
-            calibration.projector.clone(),
-            Reference::Models,
-            function.clone(),
-            None,
-        )
-        .map_err(impossible)?;
+        let triangulator = calibration.triangulator(function.clone(), None);
+        let triangulator = triangulator.map_err(impossible)?;
         let frames = scan::take(self.head, calibration, function, shots, timeout, progress)?;
         let scan = Scan::new(function.range(), shots, &frames).map_err(impossible)?;
         let reference;

@@ -1,10 +1,10 @@
 //! Converts between devices and computation: `hal`'s frames, models and patterns, and the types of `algo`.
 
 use algo::frame::{FrameError, FrameView, Samples};
-use algo::geometry::{Pinhole, PinholeModel};
+use algo::geometry::{FittedMap, Pinhole, PinholeModel, Reference};
 use algo::pattern::{PhaseFunction, PhaseFunctionError, Shot};
 use hal::frame::Frame;
-use hal::model::DeviceModel;
+use hal::model::{DeviceModel, PlaneModel};
 use hal::replay::recording::{PatternSpec, RecordedFrame};
 
 /// Borrows a device's frame without a copy.
@@ -62,6 +62,19 @@ pub fn device_model(device: &Pinhole) -> DeviceModel {
         distortion: model.distortion,
         rotation: model.rotation,
         translation_mm: model.translation,
+    }
+}
+
+/// How projector points on the reference plane are found: by the models, and by what measured ones
+/// over frames of `(columns, rows)` are off them.
+pub fn reference(plane: Option<&PlaneModel>, (columns, rows): (u32, u32)) -> Reference {
+    let map = |coefficients| FittedMap::new(columns as usize, rows as usize, coefficients);
+    match plane {
+        Some(plane) => Reference::Measured {
+            xi: map(plane.xi),
+            eta: map(plane.eta),
+        },
+        None => Reference::Models,
     }
 }
 

@@ -1,7 +1,7 @@
 //! Traits of real devices that data sheets leave out: the doctor names each, calibration measures it, and sequences cope with it.
 
 use super::calibrate::{Basis, Made, make};
-use super::calibration::Calibration;
+use super::calibration::{Calibration, HeightsBy};
 use super::doctor::{Check, Verdict, examine};
 use super::examine::pace;
 use hal::head::{Exposure, Head, Timing};
@@ -58,6 +58,7 @@ fn calibrated((head, calibration): &mut (Head, Calibration)) -> Made {
         geometry: None,
         temperature_c: None,
         plate: false,
+        heights_by: HeightsBy::Models,
     };
     make(head, basis, &|_, _| ()).unwrap()
 }

@@ -281,6 +281,7 @@ impl Layout {
                 width,
                 height,
                 model: None,
+                plane: None,
             },
             patterns: self.patterns.clone(),
             frames: Vec::new(),

@@ -197,7 +197,7 @@ pub fn primary_of(recording: &Recording) -> usize {
 
 /// The devices of a recording, where it has models of them, and its working range.
 struct Geometry {
-    devices: Result<(Pinhole, Pinhole), String>,
+    devices: Result<(Pinhole, Pinhole, Reference), String>,
     range: Option<HeightRange>,
 }
 
@@ -206,10 +206,12 @@ impl Geometry {
         let projector = &recording.projector;
         let frames = (recording.width, recording.height);
         let raster = (projector.width, projector.height);
+        let plane = &projector.plane;
         let devices = match (&recording.camera_model, &projector.model) {
             (Some(camera), Some(projector)) => Ok((
                 seam::pinhole("camera", camera, frames)?,
                 seam::pinhole("projector", projector, raster)?,
+                seam::reference(plane.as_ref(), frames),
             )),
             (None, None) => Err("the recording has no model of camera and projector"),
             (None, _) => Err("the recording has no model of the camera"),
@@ -231,10 +233,10 @@ impl Geometry {
     ) -> Result<Result<Triangulator, String>, algo::geometry::RigError> {
         match &self.devices {
             Err(missing) => Ok(Err(missing.clone())),
-            Ok((camera, projector)) => Triangulator::new(
+            Ok((camera, projector, reference)) => Triangulator::new(
                 camera.clone(),
                 projector.clone(),
-                Reference::Models,
+                reference.clone(),
                 function.clone(),
                 self.range,
             )

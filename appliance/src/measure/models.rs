@@ -51,8 +51,11 @@ pub fn replace(recording: &mut Recording, path: &Path) -> Result<(), Failure> {
     .map_err(|words| failed(Exit::Content, words))?
     .into_iter()
     .fold(f64::INFINITY, f64::min);
+    let calibration = file.calibration();
+    let calibration = calibration.map_err(|words| failed(Exit::Content, words))?;
     recording.range_mm = Some([-REACH * lowest, REACH * lowest]);
     recording.camera_model = Some(file.camera.model);
     recording.projector.model = Some(file.projector.model);
+    recording.projector.plane = calibration.plane_by().cloned();
     Ok(())
 }

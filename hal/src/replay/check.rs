@@ -54,6 +54,9 @@ fn values(manifest: &Manifest) -> Result<(), String> {
             return Err(format!("{device}.model.{name} is not finite"));
         }
     }
+    if let Some(plane) = &projector.plane {
+        plane.check_bounds("projector.plane")?;
+    }
     if let Some(noise) = camera.noise_counts {
         let key = "camera.noise_counts";
         within(key, noise, MIN_NOISE_COUNTS, MAX_NOISE_COUNTS)?;

@@ -5,7 +5,7 @@ use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::failure::Wrong;
-use crate::model::DeviceModel;
+use crate::model::{DeviceModel, PlaneModel};
 
 /// The name of the format, in every manifest.
 pub const FORMAT: &str = "fringed-recording";
@@ -66,6 +66,9 @@ pub struct RecordedProjector {
     /// Its geometry, if it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<DeviceModel>,
+    /// What the projector points of the plane z = 0 are off the models, where heights go by the measured ones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plane: Option<PlaneModel>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -13,7 +13,7 @@ use super::{RecordingError, head, recorder};
 use crate::contract::check_head;
 use crate::error::ErrorKind;
 use crate::frame::{Frame, FrameFormat, Pixels, Samples};
-use crate::model::DeviceModel;
+use crate::model::{DeviceModel, PlaneModel};
 use crate::projector::Raster;
 use crate::units::Timestamp;
 
@@ -66,6 +66,10 @@ fn small(bit_depth: u8, seed: u64) -> Recording {
             width: 5,
             height: 4,
             model: Some(model()),
+            plane: Some(PlaneModel {
+                xi: [0.5; 28],
+                eta: [-0.25; 28],
+            }),
         },
         patterns: vec![
             PatternSpec::Vertical { fringes: 16.0 },

@@ -8,14 +8,14 @@ use super::options::Measuring;
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::head::calibrate::{Basis, make};
-use crate::head::calibration::Calibration;
 use crate::head::calibration::bounds::{COLDEST_C, HOTTEST_C};
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::calibration::opencv::{self, Declared, Models, Sizes, Unit};
 use crate::head::calibration::place::Place;
+use crate::head::calibration::{Calibration, HeightsBy};
 use crate::production::backend::{self, Opened};
 use crate::storage::state::StateFolder;
-use algo::geometry::{Reference, RigError, Triangulator};
+use algo::geometry::RigError;
 use algo::pattern::PhaseFunction;
 use poses::Poses;
 use sim::{Part, Stage};
@@ -46,6 +46,9 @@ pub struct Calibrate {
     /// No flat plate lies in the plane z = 0: leave the reference plane to the models.
     #[arg(long, conflicts_with = "board")]
     no_plate: bool,
+    /// What heights go by: the models, or the projector points that are measured on the plate. By default as in the calibration before, else the models.
+    #[arg(long, conflicts_with_all = ["board", "no_plate"])]
+    heights_by: Option<HeightsBy>,
     /// How warm the head is, °C: kept in the calibration.
     #[arg(long, value_name = "CELSIUS", allow_negative_numbers = true, conflicts_with = "board", value_parser = number(COLDEST_C, HOTTEST_C))]
     temperature: Option<f64>,
@@ -171,6 +174,11 @@ impl Calibrate {
             geometry,
             temperature_c: self.temperature.filter(|celsius| celsius.is_finite()),
             plate: !self.no_plate,
+            heights_by: match (self.no_plate, self.heights_by, before) {
+                (true, ..) => HeightsBy::Models,
+                (false, Some(chosen), _) => chosen,
+                (false, None, before) => before.map_or(HeightsBy::Models, |file| file.heights_by),
+            },
         })
     }
 
@@ -223,11 +231,11 @@ pub(super) fn model_files<'a>(named: impl IntoIterator<Item = &'a PathBuf>) -> R
 
 /// Checks that camera and projector look down at the plane z = 0 from two different places.
 fn fits(calibration: &Calibration) -> Result<(), String> {
-    let (camera, projector) = (calibration.camera.clone(), calibration.projector.clone());
+    let projector = &calibration.projector;
     let (columns, rows) = (projector.width(), projector.height());
     let function =
         PhaseFunction::vertical(columns, rows, 1.0).map_err(|error| error.to_string())?;
-    match Triangulator::new(camera, projector, Reference::Models, function, None) {
+    match calibration.triangulator(function, None) {
         Ok(_) => Ok(()),
         Err(error @ RigError::NotAbove(_)) => Err(format!(
             "{error}; OpenCV's boards have their z pointing away from the camera: then add --z-away"

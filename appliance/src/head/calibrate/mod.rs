@@ -5,16 +5,16 @@ mod characteristics;
 
 pub use characteristics::{Characteristics, characterise, settled};
 
-use super::calibration::Calibration;
 use super::calibration::file::{CalibrationFile, MapFile, ReferenceFile};
 use super::calibration::geometry::GeometryFile;
 use super::calibration::place::Place;
-use super::examine::{PLATE_PITCH, plate};
+use super::calibration::{Calibration, HeightsBy};
+use super::examine::{PLATE_PITCH, ReferencePlane, plate};
 use crate::error::{Exit, Failure};
-use algo::geometry::Vector;
-use algo::pipeline::Plate;
+use algo::geometry::FittedMap;
 use characteristics::scene;
 use hal::head::Head;
+use hal::model::PlaneModel;
 use std::time::Duration;
 
 /// Longest wait for a flip or a frame beyond the plan.
@@ -38,6 +38,8 @@ pub struct Basis {
     pub temperature_c: Option<f64>,
     /// Whether a flat plate lies in the plane z = 0.
     pub plate: bool,
+    /// What heights will go by; without a plate by the models.
+    pub heights_by: HeightsBy,
 }
 
 /// A calibration, ready to be written.
@@ -108,6 +110,7 @@ pub fn complete(
         noise: Some(measured.noise.clone()),
         response: Some(measured.response.clone()),
         contrast: Some(measured.contrast.clone()),
+        heights_by: basis.heights_by,
         reference,
         geometry: basis.geometry,
         ..CalibrationFile::of_models(
@@ -129,20 +132,21 @@ pub fn complete(
 /// The description of the reference phase maps; their bytes go to `maps`.
 fn reference(
     calibration: &Calibration,
-    vertical: &Plate,
-    horizontal: &Plate,
+    vertical: &ReferencePlane,
+    horizontal: &ReferencePlane,
     maps: &mut Vec<(String, Vec<u8>)>,
 ) -> Result<ReferenceFile, Failure> {
-    let models_off_px = models_off(calibration, vertical, horizontal).map_err(models)?;
+    let corrections = [&vertical.plate.correction, &horizontal.plate.correction];
+    let models_off_px = PLATE_PITCH * rms(corrections, calibration.frames());
     if !(models_off_px <= MOST_OFF_PX) {
         return Err(models(format!(
             "the models are off the measured plate by {models_off_px:.1} projector pixels, more than {MOST_OFF_PX}: put the \
              plate into the plane z = 0 of the models, or import the models of this head"
         )));
     }
-    let (width, height) = (calibration.camera.width(), calibration.camera.height());
-    let mut map = |name: &str, plate: &Plate| {
-        let bytes = hal::npy::write(width, &plate.map(width, height));
+    let mut map = |name: &str, plane: &ReferencePlane| {
+        let bytes = hal::npy::write(calibration.camera.width(), &plane.map());
+        let plate = &plane.plate;
         let (file, sha256) = Place::name_of_map(name, &bytes);
         maps.push((file.clone(), bytes));
         MapFile {
@@ -153,47 +157,24 @@ fn reference(
             filled: plate.filled,
         }
     };
+    let [xi, eta] = corrections.map(|map| map.coefficients().map(|turns| turns * PLATE_PITCH));
     Ok(ReferenceFile {
         pitch_px: PLATE_PITCH,
         models_off_px,
+        plane: Some(PlaneModel { xi, eta }),
         vertical: map("reference_vertical", vertical),
         horizontal: map("reference_horizontal", horizontal),
     })
 }
 
-/// RMS distance between the projector points that the models predict and those measured, over a grid of camera pixels, projector pixels.
-fn models_off(
-    calibration: &Calibration,
-    vertical: &Plate,
-    horizontal: &Plate,
-) -> Result<f64, String> {
+/// RMS of the corrections of projector points over the frame, in their unit.
+fn rms(corrections: [&FittedMap; 2], (width, height, _): (u32, u32, u8)) -> f64 {
     const GRID: u32 = 16;
-    let (camera, projector) = (&calibration.camera, &calibration.projector);
-    let (width, height, _) = calibration.frames();
-    let centre = camera.centre();
-    let (mut squares, mut points) = (0.0, 0.0);
-    for at in 0..GRID * GRID {
-        let place =
-            |at: u32, pixels: u32| (f64::from(at) + 0.5) / f64::from(GRID) * f64::from(pixels);
-        let u = place(at % GRID, width);
-        let v = place(at / GRID, height);
-        let on_plane = camera
-            .ray(u, v)
-            .map(|ray| centre + ray * (-centre.z / ray.z));
-        let predicted = on_plane.and_then(|point: Vector| projector.project(point));
-        let Some((xi, eta)) = predicted else { continue };
-        let off = (
-            xi - PLATE_PITCH * vertical.turns(u, v),
-            eta - PLATE_PITCH * horizontal.turns(u, v),
-        );
-        squares += off.0 * off.0 + off.1 * off.1;
-        points += 1.0;
-    }
-    if points < f64::from(GRID * GRID) / 2.0 {
-        return Err(
-            "the models do not see the plane z = 0: import models of this head, with +z towards it"
-                .into(),
-        );
-    }
-    Ok((squares / points).sqrt())
+    let place = |at: u32, pixels: u32| (f64::from(at) + 0.5) / f64::from(GRID) * f64::from(pixels);
+    let squares = (0..GRID * GRID).map(|at| {
+        let (u, v) = (place(at % GRID, width), place(at / GRID, height));
+        let square = |of: &FittedMap| of.at(u, v).powi(2);
+        corrections.into_iter().map(square).sum::<f64>()
+    });
+    (squares.sum::<f64>() / f64::from(GRID * GRID)).sqrt()
 }

@@ -86,6 +86,9 @@ impl CalibrationFile {
         let (pitch, off) = (reference.pitch_px, reference.models_off_px);
         within("reference.pitch_px", pitch, 1.0, f64::from(MAX_SIDE))?;
         within("reference.models_off_px", off, 0.0, f64::from(MAX_SIDE))?;
+        if let Some(plane) = &reference.plane {
+            plane.check_bounds("reference.plane")?;
+        }
         reference.vertical.check_bounds("reference.vertical")?;
         reference.horizontal.check_bounds("reference.horizontal")
     }

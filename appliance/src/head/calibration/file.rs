@@ -1,7 +1,7 @@
 //! `calibration.json`, version 2: its keys, its checks, its fingerprint and its checksum.
 
 use super::geometry::GeometryFile;
-use super::{Calibration, size};
+use super::{Calibration, HeightsBy, size};
 use crate::head::seam;
 use crate::storage::hex;
 use crate::system::clock;
@@ -9,7 +9,7 @@ use algo::geometry::Pinhole;
 use algo::pattern::GreyResponse;
 use hal::bounds::{clipped, shortened};
 use hal::head::{Stamp, Timing};
-use hal::model::DeviceModel;
+use hal::model::{DeviceModel, PlaneModel};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::time::Duration;
@@ -60,6 +60,9 @@ pub struct CalibrationFile {
     /// Contrast of fringes against their pitch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contrast: Option<ContrastFile>,
+    /// What heights go by.
+    #[serde(default, skip_serializing_if = "HeightsBy::is_models")]
+    pub heights_by: HeightsBy,
     /// The reference phase maps, if a plate was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<ReferenceFile>,
@@ -191,6 +194,9 @@ pub struct ReferenceFile {
     pub pitch_px: f64,
     /// RMS distance of the models from the measured plane, projector pixels.
     pub models_off_px: f64,
+    /// The projector points of the plane, as the maps say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plane: Option<PlaneModel>,
     /// Under vertical fringes.
     pub vertical: MapFile,
     /// Under horizontal fringes.
@@ -241,6 +247,7 @@ impl CalibrationFile {
             noise: None,
             response: None,
             contrast: None,
+            heights_by: HeightsBy::Models,
             reference: None,
             geometry: None,
         }
@@ -287,7 +294,15 @@ impl CalibrationFile {
         Ok(file)
     }
 
+    /// What the measured reference plane is off the models.
+    fn plane(&self) -> Option<PlaneModel> {
+        self.reference.as_ref()?.plane.clone()
+    }
+
     fn check(&self) -> Result<(), String> {
+        if self.heights_by == HeightsBy::Measured && self.plane().is_none() {
+            return Err("heights_by is \"measured\", and reference.plane is missing: calibrate anew with a plate".into());
+        }
         if self.calibration()?.fingerprint() != self.fingerprint {
             return Err("its fingerprint is not that of its content: calibrate anew".into());
         }
@@ -303,6 +318,8 @@ impl CalibrationFile {
             .map_err(|error| format!("{error}: calibrate anew"))?;
         let (camera, projector) = (&self.camera, &self.projector);
         Ok(Calibration {
+            plane: self.plane(),
+            heights_by: self.heights_by,
             response: self.response.as_deref().map_or(Ok(None), inverted)?,
             ..Calibration::new(
                 (camera.width, camera.height, camera.bit_depth),
@@ -344,6 +361,7 @@ impl CalibrationFile {
             |timing: &TimingFile| timing.refreshes.is_some() || timing.stamp_late_ns.is_some();
         let first = self.missing().is_empty()
             && self.geometry.is_none()
+            && self.plane().is_none()
             && !self.timing.as_ref().is_some_and(newer);
         self.version = if first { 1 } else { VERSION };
         // The bounds ask for a fingerprint's form before there is one.

@@ -11,13 +11,32 @@ pub use current::Current;
 
 use crate::head::seam;
 use crate::storage::hex;
-use algo::geometry::Pinhole;
-use algo::pattern::GreyResponse;
-use hal::model::DeviceModel;
+use algo::geometry::{HeightRange, Pinhole, RigError, Triangulator};
+use algo::pattern::{GreyResponse, PhaseFunction};
+use hal::model::{DeviceModel, PlaneModel};
 use hal::replay::Recording;
 use hal::replay::recording::RecordedProjector;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use sim::Scenario;
+
+/// What heights go by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum HeightsBy {
+    /// The models of camera and projector.
+    #[default]
+    Models,
+    /// The models, corrected by what the measured reference plane is off them (Peng & Gupta 2008, eqs. 10–11).
+    Measured,
+}
+
+impl HeightsBy {
+    /// Whether it is what files without the key have.
+    pub fn is_models(&self) -> bool {
+        *self == Self::Models
+    }
+}
 
 /// The calibration of a head. Its models are checked: each pixel has one ray.
 #[derive(Clone, Debug)]
@@ -28,6 +47,10 @@ pub struct Calibration {
     pub bit_depth: u8,
     /// The projector's geometry and the size of its raster.
     pub projector: Pinhole,
+    /// What the measured reference plane is off the models, if it was measured.
+    pub plane: Option<PlaneModel>,
+    /// What heights go by.
+    pub heights_by: HeightsBy,
     /// σ of one sample in counts.
     pub noise_counts: f64,
     /// The projector's measured grey response, where it is not linear.
@@ -36,7 +59,7 @@ pub struct Calibration {
 
 impl Calibration {
     /// A head whose camera has frames of `(columns, rows, bits)` and whose projector a raster of `(columns, rows)`; its response
-    /// is linear.
+    /// is linear, and heights go by the models.
     ///
     /// # Errors
     /// In words: the model of the camera or of the projector is absurd, and why.
@@ -50,6 +73,8 @@ impl Calibration {
             camera: seam::pinhole("camera", camera, (width, height))?,
             bit_depth,
             projector: seam::pinhole("projector", projector, raster)?,
+            plane: None,
+            heights_by: HeightsBy::Models,
             noise_counts,
             response: None,
         })
@@ -80,13 +105,21 @@ impl Calibration {
             camera.ok_or("has no camera model")?,
             projector.model.as_ref().ok_or("has no projector model")?,
         );
-        Self::new(
-            (recording.width, recording.height, recording.bit_depth),
+        let frames = (recording.width, recording.height);
+        let by_models = Self::new(
+            (frames.0, frames.1, recording.bit_depth),
             (projector.width, projector.height),
             models,
             noise_counts,
-        )
-        .map_err(|error| format!("has an absurd model: {error}"))
+        );
+        Ok(Self {
+            plane: projector.plane.clone(),
+            heights_by: match projector.plane {
+                Some(_) => HeightsBy::Measured,
+                None => HeightsBy::Models,
+            },
+            ..by_models.map_err(|error| format!("has an absurd model: {error}"))?
+        })
     }
 
     /// A recording of this head, without patterns and frames.
@@ -105,6 +138,7 @@ impl Calibration {
                 width: columns,
                 height: rows,
                 model: Some(seam::device_model(&self.projector)),
+                plane: self.plane_by().cloned(),
             },
             patterns: Vec::new(),
             frames: Vec::new(),
@@ -117,6 +151,28 @@ impl Calibration {
             recipe: None,
             truth_height: None,
             truth_class: None,
+        }
+    }
+
+    /// Turns the phase of a pattern into height; the working range is by default that of [`Triangulator::new`].
+    ///
+    /// # Errors
+    /// If camera and projector do not look down at the reference plane from two different points, or the range is unusable.
+    pub fn triangulator(
+        &self,
+        function: PhaseFunction,
+        range: Option<HeightRange>,
+    ) -> Result<Triangulator, RigError> {
+        let (camera, projector) = (self.camera.clone(), self.projector.clone());
+        let reference = seam::reference(self.plane_by(), size(&camera));
+        Triangulator::new(camera, projector, reference, function, range)
+    }
+
+    /// What the measured reference plane is off the models, where heights go by it.
+    pub fn plane_by(&self) -> Option<&PlaneModel> {
+        match self.heights_by {
+            HeightsBy::Models => None,
+            HeightsBy::Measured => self.plane.as_ref(),
         }
     }
 
@@ -147,6 +203,11 @@ impl Calibration {
                 .chain(model.translation);
             for number in numbers {
                 hash.update(number.to_le_bytes());
+            }
+        }
+        if let Some(plane) = self.plane_by() {
+            for coefficient in plane.xi.iter().chain(&plane.eta) {
+                hash.update(coefficient.to_le_bytes());
             }
         }
         // A linear response changes nothing that is projected, so it leaves the fingerprint as it was.

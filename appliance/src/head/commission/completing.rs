@@ -5,8 +5,8 @@ use super::outcome::Outcome;
 use super::step::Subject;
 use crate::error::{Exit, Failure};
 use crate::head::calibrate::{Basis, Characteristics, Made, complete};
-use crate::head::calibration::Calibration;
 use crate::head::calibration::place::Place;
+use crate::head::calibration::{Calibration, HeightsBy};
 use crate::head::seam;
 use serde_json::json;
 
@@ -79,6 +79,7 @@ impl Commissioning {
             geometry,
             temperature_c: None,
             plate: true,
+            heights_by: before.map_or(HeightsBy::Models, |file| file.heights_by),
         };
         Ok((basis, measured))
     }

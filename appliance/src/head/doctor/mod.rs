@@ -7,6 +7,7 @@ pub mod computer;
 pub mod controller;
 mod delivery;
 mod geometry;
+mod heights;
 mod light;
 mod time;
 
@@ -78,7 +79,7 @@ fn named(name: &'static str, check: Check) -> Check {
 }
 
 /// The checks in their order, each with the checks that must have passed before it.
-const CHECKS: [(&str, &[&str]); 14] = [
+const CHECKS: [(&str, &[&str]); 15] = [
     ("devices", &[]),
     ("format", &["devices"]),
     ("mode", &["devices"]),
@@ -101,6 +102,7 @@ const CHECKS: [(&str, &[&str]); 14] = [
             "devices", "format", "mode", "cadence", "trigger", "light", "exposure", "delay",
         ],
     ),
+    ("heights", &[]),
 ];
 
 /// Checks a head in front of any part, best a flat bright one. `progress` gets the share done and the name of the next check. For a head
@@ -155,6 +157,7 @@ pub fn examine_for(
             "trigger" => time::trigger(head, calibrated),
             "delivery" => delivery::delivery(head),
             "geometry" => geometry::geometry(head, calibration, calibrated),
+            "heights" => Ok(heights::heights(calibration)),
             _ => {
                 let lit = lit.get_or_insert_with(|| Lit::take(head, SETTLE));
                 match (name, lit) {

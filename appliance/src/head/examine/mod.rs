@@ -27,7 +27,7 @@ pub use pictures::{
     LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, SETTLE, counts, load_black_and_white, picture,
     pictures,
 };
-pub use plate::{PITCH as PLATE_PITCH, plate};
+pub use plate::{PITCH as PLATE_PITCH, ReferencePlane, plate};
 pub use response::{lights, response};
 pub use stamps::{MOST_LATE, Stamps};
 

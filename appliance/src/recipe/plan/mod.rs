@@ -19,7 +19,7 @@ use crate::station::error_code::WRONG_FRAMES;
 use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
 use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
-use algo::geometry::{HeightRange, Reference, Triangulator};
+use algo::geometry::{HeightRange, Triangulator};
 use algo::inspect::{Findings, Input, Production, Strips};
 use algo::pattern::{MAX_FRAMES, Shot};
 use algo::phase::Arrived;
@@ -161,13 +161,7 @@ impl Plan {
         }
         let size = (camera.0 as usize, camera.1 as usize);
         let [low, high] = conditions.range_mm;
-        let triangulator = Triangulator::new(
-            calibration.camera.clone(),
-            calibration.projector.clone(),
-            Reference::Models,
-            function,
-            Some(HeightRange { low, high }),
-        );
+        let triangulator = calibration.triangulator(function, Some(HeightRange { low, high }));
         let triangulator = triangulator.map_err(|error| error.to_string())?;
         let aligned = demands.aligned;
         let away = match aligned {
