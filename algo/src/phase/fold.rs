@@ -34,10 +34,12 @@ pub(super) struct Folded<V: Lanes> {
     pub centred: [V::W; 2],
     /// The longer component before scaling, in the level's unit.
     pub length: [V::W; 2],
-    /// −1 where the octant's angle is subtracted from the axis, 1 where it is added.
+    /// −1 where the angle is subtracted from the axis, 1 where it is added.
     pub sign: [V::W; 2],
-    /// The axis that the octant's angle is measured from, 1/65536 turn.
+    /// The axis that the angle is measured from, 1/65536 turn.
     pub axis: [V::W; 2],
+    /// In words, where that takes fewer operations: the angle is this less the octant's (0 or a quarter of a turn, 1/65536 turn).
+    pub base: Option<[V::W; 2]>,
     /// Mask: the modulation is at least the trusted minimum.
     pub strong: V::B,
     /// 255 where a sample is at full scale and the level does not tolerate that.
@@ -48,6 +50,10 @@ impl<V: Lanes> Folded<V> {
     /// The phases of half a block from the angles in its octants.
     #[inline(always)]
     pub fn unfold(&self, v: V, half: usize, angle: V::W) -> V::W {
+        let angle = match self.base {
+            Some(base) => v.sub(base[half], angle),
+            None => angle,
+        };
         v.add_signed(self.axis[half], angle, self.sign[half])
     }
 }
@@ -79,6 +85,7 @@ pub(super) fn fold_four<V: Lanes>(v: V, [i0, i1, i2, i3]: [V::B; 4]) -> Folded<V
         length: v.widen_128(long),
         sign: v.signs(backwards),
         axis: v.widen_256(axis),
+        base: None,
         strong: v.eq8(v.max8(short, least), short),
         brightest: v.max8(even, odd),
     }
@@ -91,25 +98,38 @@ pub(super) fn fold<V: Lanes>(
     level: &LevelLanes<'_, V>,
     Pointers { s, c, brightest }: Pointers<V>,
 ) -> Folded<V> {
-    let low = octant(v, level, s[0], c[0]);
-    let high = octant(v, level, s[1], c[1]);
+    let (along, across) = ([v.abs(s[0]), v.abs(s[1])], [v.abs(c[0]), v.abs(c[1])]);
+    let length = [v.max(along[0], across[0]), v.max(along[1], across[1])];
+    // On most of a part the longer component is enough by itself.
+    let enough = v.gt(v.min(length[0], length[1]), level.below_long_enough);
+    let strong = if v.all8(v.bytes_of(enough)) {
+        v.splat8(u8::MAX)
+    } else {
+        let low = strong(v, level, along[0], across[0]);
+        v.narrow_mask([low, strong(v, level, along[1], across[1])])
+    };
+    let low = octant(v, [s[0], c[0]], [along[0], across[0]], length[0]);
+    let high = octant(v, [s[1], c[1]], [along[1], across[1]], length[1]);
     Folded {
         long: [low.long, high.long],
         short: [low.short, high.short],
         centred: [low.centred, high.centred],
-        length: [low.length, high.length],
+        length,
         sign: [low.sign, high.sign],
         axis: [low.axis, high.axis],
-        strong: v.narrow_mask([low.strong, high.strong]),
+        base: Some([low.base, high.base]),
+        strong,
         brightest,
     }
 }
 
-/// Mask: the sum of both squares is at least the level's least power.
+/// Mask: the sum of both squares is at least the level's least power. Takes the magnitudes: of S and C the compiler for NEON would
+/// narrow one half twice.
 #[inline(always)]
 fn strong<V: Lanes>(v: V, level: &LevelLanes<'_, V>, a: V::W, b: V::W) -> V::W {
     let power = v.dot(a, a, b, b);
-    let below = level.below_least_power;
+    // Not kept in all lanes: it is needed too seldom.
+    let below = v.splat32(level.plan.below_least_power);
     v.narrow_mask32([v.gt32(power[0], below), v.gt32(power[1], below)])
 }
 
@@ -118,28 +138,30 @@ struct Octant<W> {
     long: W,
     short: W,
     centred: W,
-    length: W,
     sign: W,
     axis: W,
-    strong: W,
+    base: W,
 }
 
 #[inline(always)]
-fn octant<V: Lanes>(v: V, level: &LevelLanes<'_, V>, s: V::W, c: V::W) -> Octant<V::W> {
-    let (along, across) = (v.abs(s), v.abs(c));
-    let (length, short) = (v.max(along, across), v.min(along, across));
-    let steep = v.eq(length, along);
-    let backwards = v.xor(v.xor(s, c), steep);
+fn octant<V: Lanes>(
+    v: V,
+    [s, c]: [V::W; 2],
+    [along, across]: [V::W; 2],
+    length: V::W,
+) -> Octant<V::W> {
+    let short = v.min(along, across);
+    let flat = v.gt(across, along);
+    let backwards = v.xor(v.xor(s, c), flat);
+    let quarter = v.splat16(1 << 14);
     let [long, short] = v.normalised(length, short);
     Octant {
         long,
         short,
         centred: v.xor(v.shl::<2>(long), v.splat16(i16::MIN)),
-        length,
         sign: v.sign_of(backwards),
-        // Where S is the longer component, it is 0 only in a pixel that is not strong.
-        axis: v.quarters(steep, s, c),
-        // From the magnitudes: of S and C the compiler for NEON would narrow one half twice.
-        strong: strong(v, level, along, across),
+        // 0 or half a turn.
+        axis: v.and(c, v.splat16(i16::MIN)),
+        base: v.xor(v.and(flat, quarter), quarter),
     }
 }

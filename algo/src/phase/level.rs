@@ -47,7 +47,9 @@ pub(crate) struct Level {
     /// Full scale less one count, unsigned.
     below_full_scale: i16,
     /// S² + C² must be above this.
-    below_least_power: i32,
+    pub below_least_power: i32,
+    /// Where |S| or |C| is above this, S² + C² is above `below_least_power`.
+    below_long_enough: i16,
     /// Coefficients of √(1 + t²), scaled so that the product with a length is a modulation.
     hypotenuse: [i16; 3],
     /// Whether that product is half of the modulation, because the coefficients would not fit Q15.
@@ -109,8 +111,7 @@ impl Level {
         let unit = match samples {
             Samples::WideFour => f64::from(1_u32 << to_16_bits) / 4.0,
             Samples::Four | Samples::Thirds => {
-                // The differences of 6 shifts are twice as large.
-                lift = to_16_bits - if shifts == 6 { 2 } else { 1 };
+                lift = lift_of(bit_depth, shifts);
                 f64::from(1_u32 << lift)
             }
             Samples::Terms => {
@@ -143,6 +144,7 @@ impl Level {
             to_16_bits,
             below_full_scale: (((1_u32 << bit_depth) - 2) as u16).cast_signed(),
             below_least_power: libm::ceil(least_length * least_length) as i32 - 1,
+            below_long_enough: libm::ceil(least_length) as i16 - 1,
             hypotenuse: LENGTH.map(|c| libm::rint(c * factor * 32_768.0) as i16),
             doubled,
             saturates: shifts < FULL_TRUST_SHIFTS,
@@ -159,7 +161,7 @@ pub(super) struct LevelLanes<'a, V: Lanes> {
     /// `lift` less one bit.
     pub half_lift: V::Count,
     pub to_16_bits: V::Count,
-    pub below_least_power: V::D,
+    pub below_long_enough: V::W,
     /// Full scale, all bits of a sample.
     pub full_scale: V::W,
     /// Full scale less one count, with its sign bit inverted.
@@ -181,7 +183,7 @@ impl<'a, V: Lanes> LevelLanes<'a, V> {
             lift: v.left(plan.lift),
             half_lift: v.left(plan.lift.saturating_sub(1)),
             to_16_bits: v.left(plan.to_16_bits),
-            below_least_power: v.splat32(plan.below_least_power),
+            below_long_enough: v.splat16(plan.below_long_enough),
             full_scale: v.splat16(plan.below_full_scale | 1),
             below_full_scale: v.xor(v.splat16(plan.below_full_scale), v.splat16(i16::MIN)),
             hypotenuse: [
@@ -222,6 +224,12 @@ impl<'a, V: Lanes> LevelLanes<'a, V> {
         };
         (block, modulation)
     }
+}
+
+/// Bits by which differences of samples are shifted left to fill words, for N = 3, 4 and 6.
+pub(super) const fn lift_of(bit_depth: u8, shifts: usize) -> u8 {
+    // The differences of 6 shifts are twice as large.
+    16 - bit_depth - if shifts == 6 { 2 } else { 1 }
 }
 
 /// The largest S or C of samples from 0 to 1: half of the sum of the weights' magnitudes, because the weights add up to 0.

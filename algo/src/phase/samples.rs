@@ -1,6 +1,6 @@
 //! The sample types of frames, and what the kernels need of a block of samples: bytes of 8 bits, words of 9 to 16.
 
-use super::level::LevelLanes;
+use super::level::{LevelLanes, lift_of};
 use crate::frame::Sample;
 use crate::simd::Lanes;
 
@@ -24,6 +24,8 @@ pub(crate) trait BlockSample: Sample {
     fn sum<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> [V::W; 2];
     /// a − b, of at most 15 bits.
     fn difference<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> [V::W; 2];
+    /// Bits by which differences of N = 3, 4 or 6 samples are shifted left to fill words, less one, and as they are.
+    fn lift<V: Lanes, const N: usize>(v: V, level: &LevelLanes<'_, V>) -> [V::Count; 2];
     /// The brighter of two.
     fn brighter<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> Self::Block<V>;
     /// S or C from a sum of products ([`super::level::Samples::Terms`]).
@@ -61,6 +63,12 @@ impl BlockSample for u8 {
     #[inline(always)]
     fn difference<V: Lanes>(v: V, a: V::B, b: V::B) -> [V::W; 2] {
         v.difference(a, b)
+    }
+    #[inline(always)]
+    fn lift<V: Lanes, const N: usize>(v: V, _level: &LevelLanes<'_, V>) -> [V::Count; 2] {
+        // Known to the compiler: a shift by a number in a register takes twice as long with AVX2.
+        let lift = const { lift_of(8, N) };
+        [v.left(lift - 1), v.left(lift)]
     }
     #[inline(always)]
     fn brighter<V: Lanes>(v: V, a: V::B, b: V::B) -> V::B {
@@ -110,6 +118,10 @@ impl BlockSample for u16 {
     #[inline(always)]
     fn difference<V: Lanes>(v: V, a: [V::W; 2], b: [V::W; 2]) -> [V::W; 2] {
         [v.sub(a[0], b[0]), v.sub(a[1], b[1])]
+    }
+    #[inline(always)]
+    fn lift<V: Lanes, const N: usize>(_v: V, level: &LevelLanes<'_, V>) -> [V::Count; 2] {
+        [level.half_lift, level.lift]
     }
     #[inline(always)]
     fn brighter<V: Lanes>(v: V, a: [V::W; 2], b: [V::W; 2]) -> [V::W; 2] {

@@ -138,7 +138,8 @@ fn four<V: Lanes, T: BlockSample>(
     b: T::Block<V>,
 ) -> [V::W; 2] {
     if level.plan.samples != Samples::WideFour {
-        return up(v, T::difference(v, a, b), level.lift);
+        let [_, lift] = T::lift::<V, 4>(v, level);
+        return up(v, T::difference(v, a, b), lift);
     }
     let middle = v.splat16(i16::MIN);
     let (a, b) = (T::centred(v, level, a), T::centred(v, level, b));
@@ -168,10 +169,11 @@ fn thirds<V: Lanes, T: BlockSample, const N: usize>(
         3 => along[0],
         _ => add(v, add(v, along[0], along[0]), along[1]),
     };
-    let across = up(v, across[0], level.lift);
+    let [half_lift, lift] = T::lift::<V, N>(v, level);
+    let across = up(v, across[0], lift);
     let root = v.splat16(ROOT_3_HALVES);
     [
-        up(v, along, level.half_lift),
+        up(v, along, half_lift),
         [v.mul_q15(across[0], root), v.mul_q15(across[1], root)],
     ]
 }

@@ -192,12 +192,6 @@ pub(crate) trait Lanes: Copy + Debug {
     fn xor(self, a: Self::W, b: Self::W) -> Self::W;
     /// a where the mask is set, else b.
     fn pick(self, mask: Self::W, a: Self::W, b: Self::W) -> Self::W;
-    /// The sign bit of s and 2¹⁴ where the mask is set, else the sign bit of c. Unspecified where the mask is set and s is 0.
-    #[inline(always)]
-    fn quarters(self, mask: Self::W, s: Self::W, c: Self::W) -> Self::W {
-        let half = self.and(self.pick(mask, s, c), self.splat16(i16::MIN));
-        self.or(half, self.and(mask, self.splat16(1 << 14)))
-    }
 
     // Between words and double words.
 

@@ -207,15 +207,6 @@ impl Lanes for Neon {
         })
     }
     #[inline(always)]
-    fn quarters(self, mask: Self::W, s: Self::W, c: Self::W) -> Self::W {
-        let half = self.and(self.pick(mask, s, c), self.splat16(i16::MIN));
-        // A shift to the right that rounds makes 2¹⁴ of 65535.
-        neon!(vreinterpretq_s16_u16(vrsraq_n_u16::<2>(
-            vreinterpretq_u16_s16(half),
-            vreinterpretq_u16_s16(mask)
-        )))
-    }
-    #[inline(always)]
     fn join(self, low: Self::W, high: Self::W) -> [Self::D; 2] {
         neon!([
             vreinterpretq_s32_s16(vzip1q_s16(low, high)),

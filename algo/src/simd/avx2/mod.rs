@@ -208,12 +208,6 @@ impl Lanes for Avx2 {
         self.add(a, avx2!(_mm256_sign_epi16(b, sign)))
     }
     #[inline(always)]
-    fn quarters(self, mask: Self::W, s: Self::W, c: Self::W) -> Self::W {
-        // 2¹⁴ with the sign of s is 2¹⁴ and the sign bit of s.
-        let steep = avx2!(_mm256_sign_epi16(_mm256_set1_epi16(1 << 14), s));
-        self.pick(mask, steep, self.and(c, self.splat16(i16::MIN)))
-    }
-    #[inline(always)]
     fn shl<const N: i32>(self, x: Self::W) -> Self::W {
         avx2!(_mm256_slli_epi16::<N>(x))
     }
