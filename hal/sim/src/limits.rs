@@ -4,7 +4,7 @@ use super::scenario::{Placement, RigDevice, Scenario};
 pub(crate) use hal::bounds::within;
 use hal::bounds::{MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG};
 
-/// Most rays of a light transport. Each has at most four taps, so all taps fit the 32-bit offsets of the matrix.
+/// Most rays of a light transport; so many take minutes.
 const MAX_RAYS: u64 = 1 << 28;
 
 impl Scenario {

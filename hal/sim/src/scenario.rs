@@ -101,7 +101,7 @@ pub struct Noise {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Optics {
-    /// σ of the projector's Gaussian blur, projector pixels, 0…20.
+    /// σ of the Gaussian with which the projector's lens blurs its square pixels, projector pixels, 0…20.
     pub projector_blur_px: f64,
     /// σ of the camera's Gaussian blur, camera pixels, 0…20.
     pub camera_blur_px: f64,
@@ -192,7 +192,7 @@ impl Default for Noise {
 impl Default for Optics {
     fn default() -> Self {
         Self {
-            projector_blur_px: 0.0,
+            projector_blur_px: 0.5,
             camera_blur_px: 0.0,
             gamma: 1.0,
             gain: 1.0,

@@ -10,7 +10,9 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 use super::blur;
 use super::scenario::Scenario;
+use super::spread;
 use super::stage::Staged;
+use super::transport::PADDING;
 use hal::error::Error;
 use hal::frame::{Frame, FrameFormat, Pixels, Pool};
 use hal::projector::Raster;
@@ -24,7 +26,7 @@ const MAX_KEPT_FRAMES: usize = 64;
 pub(crate) struct SimScene {
     scenario: Arc<Scenario>,
     placed: Staged,
-    /// The light of each loaded raster, 1 = white, row by row.
+    /// The light of each loaded raster, 1 = white, row by row, with [`PADDING`].
     rasters: Vec<Vec<f32>>,
     /// The light on the camera; the memory is reused for each frame.
     picture: Vec<f32>,
@@ -112,9 +114,10 @@ impl Scene for SimScene {
             blur::gaussian(
                 &mut light,
                 raster.width() as usize,
-                optics.projector_blur_px,
+                spread::split(optics.projector_blur_px).1,
             );
             adapt(&mut light, optics.content_gain);
+            light.resize(light.len() + PADDING, 0.0);
             light
         };
         self.rasters = rasters.into_iter().map(light).collect();
