@@ -139,7 +139,7 @@ fn true_mean(bed: &Bed, corners: [[f64; 2]; 4]) -> f64 {
 fn gauges_give_what_is_true_of_the_part_wherever_it_lies_within_its_tolerance() {
     let part = Part::SheetMetal(SheetMetal::default());
     let mut scene = scenario(part.clone());
-    scene.noise.noise_counts = 0.0;
+    scene.noise.noise_counts = Some(0.0);
     let mut bed = bed(&scene);
     let taught = taught(&mut bed).unwrap();
     let (mean, bead) = (true_mean(&bed, PLATE), true_mean(&bed, BEAD));

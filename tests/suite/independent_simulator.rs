@@ -50,7 +50,7 @@ fn compare(name: &str, part: Part) {
     };
     scenario.rig.camera.width = recording.width;
     scenario.rig.camera.height = recording.height;
-    scenario.noise.noise_counts = 0.0;
+    scenario.noise.noise_counts = Some(0.0);
     scenario.optics.projector_blur_px = TRIANGLE_PX;
     let (mut head, stage) = head(&scenario).unwrap();
 

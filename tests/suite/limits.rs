@@ -8,6 +8,7 @@ use appliance::recipe::good_parts::GoodPartsFile;
 use appliance::recipe::plan::Plan;
 use appliance::station::{Inspection, Verdict};
 use sim::parts::{Defect, Flowerpot, SheetMetal};
+use sim::scenario::Noise;
 use sim::{Part, Placement, Scenario};
 use std::time::Instant;
 use tests::random::Random;
@@ -35,9 +36,9 @@ const POT_COSINE: f64 = 0.967;
 /// Neighbours that are further apart are not on the same surface.
 const STEP_MM: f64 = 6.0;
 
-/// The default head with a stock part, and noise from a seed.
+/// The default head with a stock part, and the paper's noise from a seed.
 fn scenario(kind: &str, seed: u64) -> Scenario {
-    let text = format!("[noise]\nseed = {seed}\n[part]\nkind = \"{kind}\"\n");
+    let text = format!("[noise]\nnoise_counts = 6.375\nseed = {seed}\n[part]\nkind = \"{kind}\"\n");
     Scenario::from_toml(&text, kind).unwrap()
 }
 
@@ -315,7 +316,7 @@ fn dents_where_pixels_have_weights_are_found_and_would_be_missed_without_these_p
 #[test]
 fn a_head_that_is_too_noisy_for_the_tolerance_says_so_with_the_numbers_and_good_parts_pass() {
     let mut scenario = small("flowerpot", 1);
-    scenario.noise.noise_counts *= 2.0;
+    scenario.noise.noise_counts = Some(2.0 * Noise::PAPER);
     let mut line = line(&scenario);
     let GoodPartsFile {
         limit_mm,

@@ -49,7 +49,7 @@ fn head_of(random: &mut Random, taking: &Taking, scale_ppm: f64, bow_um: f64) ->
         }),
         ..Scenario::default()
     };
-    scenario.noise.noise_counts = 1.5;
+    scenario.noise.noise_counts = Some(1.5);
     scenario.noise.seed = random.bits();
     (
         scenario.optics.camera_blur_px,

@@ -10,6 +10,7 @@ pub mod optics;
 pub mod parts;
 pub mod scenario;
 mod scene;
+mod sensor;
 mod spread;
 mod stage;
 pub mod timing;

@@ -46,7 +46,13 @@ impl Scenario {
         within("refresh_hz", self.refresh_hz, 1.0, 1000.0)?;
         within("light.ambient", self.light.ambient, 0.0, 100.0)?;
         within("light.diffuse", self.light.diffuse, 0.0, 100.0)?;
-        within("noise.noise_counts", self.noise.noise_counts, 0.0, 255.0)?;
+        let noise = &self.noise;
+        within("noise.full_well_e", noise.full_well_e, 100.0, 1e7)?;
+        within("noise.read_noise_e", noise.read_noise_e, 0.0, 1000.0)?;
+        within("noise.prnu", noise.prnu, 0.0, 0.1)?;
+        if let Some(counts) = noise.noise_counts {
+            within("noise.noise_counts", counts, 0.0, 255.0)?;
+        }
         within(
             "optics.projector_blur_px",
             self.optics.projector_blur_px,

@@ -87,12 +87,22 @@ pub struct Lighting {
     pub diffuse: f64,
 }
 
-/// Uniform noise of the camera.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Noise of the camera. The defaults are what public photon models state of cameras with Sony's IMX296: saturation capacity 10 636 e⁻,
+/// temporal dark noise 4.81 e⁻ (with an ADC of 10 bits). No data sheet says so, and the spread of responses is an assumption: a head's
+/// calibration measures its own noise.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Noise {
-    /// Half-width of the uniform noise, in counts of 8 bits; cameras with more bits have the same share of full scale.
-    pub noise_counts: f64,
+    /// Electrons of a sample at full scale, with gain 1, 100…10 000 000.
+    pub full_well_e: f64,
+    /// σ of the read noise, electrons, 0…1000.
+    pub read_noise_e: f64,
+    /// σ of the pixels' response (photo-response non-uniformity), as a share, 0…0.1.
+    pub prnu: f64,
+    /// If given, the sensor has no other noise than a uniform one of this half-width, in counts of 8 bits; cameras with more bits have
+    /// the same share of full scale.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_counts: Option<f64>,
     /// Seed; frame n of a head has the same noise whenever the seed is the same.
     pub seed: u64,
 }
@@ -107,7 +117,7 @@ pub struct Optics {
     pub camera_blur_px: f64,
     /// Exponent of the projector's response: light = (grey / 255)^gamma, 0.1…10.
     pub gamma: f64,
-    /// Factor on all light before the camera clips it, 0…100.
+    /// The camera's gain: counts at full scale for 1 / gain of the light, 0…100.
     pub gain: f64,
     /// By how much more light than its grey asks for a picture gets whose mean light is almost 0, as a share, −1…10; one of mean 1 gets
     /// none, and others in proportion. So do projectors that adapt their LEDs to the content of a picture.
@@ -183,9 +193,23 @@ impl Default for Lighting {
 impl Default for Noise {
     fn default() -> Self {
         Self {
-            noise_counts: 6.375,
+            full_well_e: 10_636.0,
+            read_noise_e: 4.81,
+            prnu: 0.005,
+            noise_counts: None,
             seed: 1,
         }
+    }
+}
+
+impl Noise {
+    /// The half-width of the paper's uniform noise: 2.5 % of full scale.
+    pub const PAPER: f64 = 0.025 * 255.0;
+
+    /// Variance of a sample in counts²: of read noise, and per count of shot noise. `counts` is what a full well is converted to.
+    pub(super) fn variance(&self, counts: f64) -> [f64; 2] {
+        let per_electron = counts / self.full_well_e;
+        [(self.read_noise_e * per_electron).powi(2), per_electron]
     }
 }
 
@@ -326,12 +350,18 @@ impl Scenario {
         places.map(|at| sensor[at]).collect()
     }
 
-    /// Standard deviation of one sample in counts of this camera, from uniform noise and rounding.
+    /// Standard deviation of one sample in counts of this camera at half of full scale, with rounding.
     #[must_use]
     pub fn noise_sigma_counts(&self) -> f64 {
-        let half_width = self.noise.noise_counts * self.full_scale() / 255.0;
-        // Variances of the uniform distributions of half-widths h and 1/2.
-        ((half_width * half_width + 0.25) / 3.0).sqrt()
+        let full_scale = self.full_scale();
+        let variance = match self.noise.noise_counts {
+            Some(counts) => (counts * full_scale / 255.0).powi(2) / 3.0,
+            None => {
+                let [read, shot] = self.noise.variance(self.optics.gain * full_scale);
+                read + shot * full_scale / 2.0
+            }
+        };
+        (variance + 1.0 / 12.0).sqrt()
     }
 
     /// The largest sample.

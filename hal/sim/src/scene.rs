@@ -5,11 +5,9 @@
 
 use std::sync::Arc;
 
-use rand_xoshiro::Xoshiro256PlusPlus;
-use rand_xoshiro::rand_core::{Rng, SeedableRng};
-
 use super::blur;
 use super::scenario::Scenario;
+use super::sensor::Sensor;
 use super::spread;
 use super::stage::Staged;
 use super::transport::PADDING;
@@ -33,10 +31,9 @@ pub(crate) struct SimScene {
     /// The light on the camera of one pattern, where several were in view.
     part: Vec<f32>,
     pool: Pool,
-    seed: u64,
-    exposed: u64,
-    /// Factor on all light: the gain, and the exposure relative to the scenario's.
-    brightness: f64,
+    sensor: Sensor,
+    /// The exposure relative to the scenario's, and the camera's gain.
+    exposing: [f64; 2],
 }
 
 impl SimScene {
@@ -51,9 +48,8 @@ impl SimScene {
             picture: vec![0.0; sensor],
             part: vec![0.0; sensor],
             pool: Pool::new(format, MAX_KEPT_FRAMES),
-            seed: scenario.noise.seed,
-            exposed: 0,
-            brightness: scenario.optics.gain,
+            sensor: Sensor::new(&scenario),
+            exposing: [1.0, scenario.optics.gain],
             scenario,
         }
     }
@@ -68,15 +64,14 @@ impl SimScene {
         self.placed.clone()
     }
 
-    /// Sets the factor on all light.
-    pub(super) fn set_brightness(&mut self, brightness: f64) {
-        self.brightness = brightness;
+    /// Sets the exposure relative to the scenario's, and the camera's gain.
+    pub(super) fn set_exposing(&mut self, exposing: [f64; 2]) {
+        self.exposing = exposing;
     }
 
     /// Restarts the noise with another seed.
     pub(super) fn reseed(&mut self, seed: u64) {
-        self.seed = seed;
-        self.exposed = 0;
+        self.sensor.reseed(seed);
     }
 }
 
@@ -160,22 +155,18 @@ impl Scene for SimScene {
             self.scenario.optics.camera_blur_px,
         );
 
-        let full_scale = self.scenario.full_scale();
-        let sensor = Sensor {
-            full_scale: full_scale as f32,
-            gain: (self.brightness * full_scale) as f32,
-            half_width: (self.scenario.noise.noise_counts / 255.0 * full_scale) as f32,
-        };
-        let random = noise_of(self.seed, self.exposed);
-        self.exposed += 1;
+        let (random, exposing) = (self.sensor.next_frame(), self.exposing);
         let plane = self
             .scenario
             .colour
             .then(|| self.scenario.in_frame(&self.picture));
         let picture = plane.as_ref().unwrap_or(&self.picture);
+        let sensor = &self.sensor;
         self.pool.frame(timestamp, count, |pixels| match pixels {
-            Pixels::Eight(samples) => sensor.read(picture, random, samples, |count| count as u8),
-            Pixels::Sixteen(samples) => sensor.read(picture, random, samples, |count| count as u16),
+            Pixels::Eight(samples) => sensor.read(exposing, picture, random, samples, |n| n as u8),
+            Pixels::Sixteen(samples) => {
+                sensor.read(exposing, picture, random, samples, |n| n as u16);
+            }
         })
     }
 }
@@ -188,41 +179,4 @@ fn adapt(light: &mut [f32], content_gain: f64) {
     let sum: f64 = light.iter().copied().map(f64::from).sum();
     let factor = 1.0 + content_gain * (1.0 - sum / light.len().max(1) as f64);
     light.iter_mut().for_each(|light| *light *= factor as f32);
-}
-
-/// The random numbers of frame number `frame` with `seed`. The frame number is spread over all bits, so that neighbouring frames and
-/// seeds are uncorrelated. Everything else draws from SplitMix64; Xoshiro256++ stays here because the demonstration's verdicts
-/// and many measured figures depend on these frames.
-fn noise_of(seed: u64, frame: u64) -> Xoshiro256PlusPlus {
-    let spread = frame.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    Xoshiro256PlusPlus::seed_from_u64(seed ^ spread.rotate_left(17))
-}
-
-/// Conversion of light to counts.
-struct Sensor {
-    full_scale: f32,
-    gain: f32,
-    half_width: f32,
-}
-
-impl Sensor {
-    /// Counts = gain · light + uniform noise, clipped, rounded to nearest.
-    fn read<T>(
-        &self,
-        light: &[f32],
-        mut random: Xoshiro256PlusPlus,
-        samples: &mut [T],
-        count: impl Fn(f32) -> T,
-    ) {
-        // Half of a random word in −1…1: 2⁻³¹ times a signed half.
-        let unit = 1.0 / 2_147_483_648.0_f32;
-        for (pair, light) in samples.chunks_mut(2).zip(light.chunks(2)) {
-            let word = random.next_u64();
-            for (half, (sample, light)) in pair.iter_mut().zip(light).enumerate() {
-                let noise = ((word >> (32 * half)) as u32 as i32) as f32 * unit;
-                let value = self.gain * light + self.half_width * noise;
-                *sample = count((value.clamp(0.0, self.full_scale) + 0.5).floor());
-            }
-        }
-    }
 }

@@ -201,7 +201,7 @@ impl Stage {
         let longer = exposure.as_secs_f64() / planned.as_secs_f64();
         self.control.set_exposure(exposure);
         self.control
-            .scene(|scene| scene.set_brightness(gain * longer));
+            .scene(|scene| scene.set_exposing([longer, gain]));
         *self.gain.lock().unwrap_or_else(PoisonError::into_inner) = gain;
         Ok(())
     }

@@ -41,7 +41,7 @@ fn both_devices_see_all_squares_in_every_recommended_pose() {
 #[test]
 fn black_squares_reflect_less_of_all_light() {
     let mut scenario = small(Part::Board(Board::default()));
-    scenario.noise.noise_counts = 0.0;
+    scenario.noise.noise_counts = Some(0.0);
     (scenario.rig.camera.width, scenario.rig.camera.height) = (256, 256);
     let (mut head, _) = head(&scenario).unwrap();
     let seen = frames(&mut head, &[0, 255]);

@@ -3,6 +3,7 @@
 use super::{PATIENT, counts, frames, small};
 use crate::optics::normalised;
 use crate::parts::Plane;
+use crate::scenario::Noise;
 use crate::{Part, Scenario, head};
 use hal::head::{Head, Showing};
 use hal::projector::Raster;
@@ -11,7 +12,7 @@ use std::f64::consts::TAU;
 #[test]
 fn a_lit_plane_is_as_bright_as_its_angle_to_the_projector_says() {
     let mut scenario = small(Part::Plane(Plane::default()));
-    scenario.noise.noise_counts = 0.0;
+    scenario.noise.noise_counts = Some(0.0);
     let (mut head, stage) = head(&scenario).unwrap();
     let frames = frames(&mut head, &[0, 128, 255]);
     assert!(stage.truth().class.iter().all(|class| *class == 2));
@@ -34,7 +35,7 @@ fn a_lit_plane_is_as_bright_as_its_angle_to_the_projector_says() {
 #[test]
 fn a_long_pulse_makes_a_frame_brighter_and_is_told() {
     let mut scenario = small(Part::Plane(Plane::default()));
-    scenario.noise.noise_counts = 0.0;
+    scenario.noise.noise_counts = Some(0.0);
     (scenario.faults.long_pulse, scenario.faults.long_pulse_us) = (0.5, 20_000);
     let (mut head, _) = head(&scenario).unwrap();
     let (width, height) = head.projector_size();
@@ -74,7 +75,7 @@ fn a_long_pulse_makes_a_frame_brighter_and_is_told() {
 #[test]
 fn an_empty_stage_is_dark_and_its_truth_is_unseen() {
     let mut scenario = small(Part::Empty {});
-    scenario.noise.noise_counts = 0.0;
+    scenario.noise.noise_counts = Some(0.0);
     let (mut head, stage) = head(&scenario).unwrap();
     assert!(
         frames(&mut head, &[255])
@@ -89,7 +90,7 @@ fn an_empty_stage_is_dark_and_its_truth_is_unseen() {
 #[test]
 fn gain_response_and_blur_do_what_they_say() {
     let mut scenario = small(Part::Plane(Plane::default()));
-    scenario.noise.noise_counts = 0.0;
+    scenario.noise.noise_counts = Some(0.0);
     scenario.optics.gain = 2.0;
     let middle = 24 * 64 + 32;
     assert_eq!(
@@ -114,7 +115,7 @@ fn gain_response_and_blur_do_what_they_say() {
         };
         (scenario.rig.camera.width, scenario.rig.camera.height) = (512, 8);
         scenario.rig.camera.fov_deg = [20.0, 0.3125_f64.max(1.0)];
-        scenario.noise.noise_counts = 0.0;
+        scenario.noise.noise_counts = Some(0.0);
         scenario.optics.projector_blur_px = projector_blur_px;
         scenario.optics.camera_blur_px = camera_blur_px;
         let (mut head, _) = head(&scenario).unwrap();
@@ -145,8 +146,50 @@ fn gain_response_and_blur_do_what_they_say() {
 }
 
 #[test]
-fn noise_is_uniform_independent_between_frames_and_the_same_again_from_the_same_seed() {
-    let scenario = small(Part::Plane(Plane::default()));
+fn a_sensors_noise_grows_with_the_light_as_its_electrons_say_and_its_pixels_differ_as_stated() {
+    const FRAMES: usize = 40;
+    let mut scenario = small(Part::Plane(Plane::default()));
+    (scenario.bit_depth, scenario.noise.prnu) = (12, 0.01);
+    for gain in [1.0, 2.0] {
+        scenario.optics.gain = gain;
+        let (mut head, _) = head(&scenario).unwrap();
+        let per_electron = gain * 4095.0 / scenario.noise.full_well_e;
+        for grey in [0, 60, 110] {
+            let shown = frames(&mut head, &[grey; FRAMES]);
+            let shown: Vec<_> = shown.iter().map(counts).collect();
+            let (mut variances, mut spread, mut sum) = (0.0, 0.0, 0.0);
+            let pixels = shown[0].len();
+            for pixel in 0..pixels {
+                let mean = mean_of(&shown, pixel);
+                let squares = shown.iter().map(|frame| (frame[pixel] - mean).powi(2));
+                variances += squares.sum::<f64>() / (FRAMES - 1) as f64 / pixels as f64;
+                sum += mean / pixels as f64;
+                // Against its neighbour, as the plane is not equally bright everywhere.
+                spread += (mean / mean_of(&shown, pixel ^ 1) - 1.0).powi(2) / pixels as f64;
+            }
+            let electrons = sum / per_electron;
+            let expected = per_electron.powi(2) * (4.81_f64.powi(2) + electrons) + 1.0 / 12.0;
+            // 3072 pixels · 39 degrees of freedom know a variance to 0.4 %.
+            assert!(
+                (variances / expected - 1.0).abs() < 0.02,
+                "{grey}, gain {gain}: {variances} instead of {expected}"
+            );
+            let noise = expected / FRAMES as f64 / sum.powi(2);
+            let responses = (spread / 2.0 - noise).max(0.0).sqrt();
+            assert!((responses - 0.01).abs() < 0.001, "{grey}: {responses}");
+        }
+    }
+}
+
+/// The mean of a pixel over the frames.
+fn mean_of(shown: &[Vec<f64>], pixel: usize) -> f64 {
+    shown.iter().map(|frame| frame[pixel]).sum::<f64>() / shown.len() as f64
+}
+
+#[test]
+fn the_papers_noise_is_uniform_independent_between_frames_and_the_same_again_from_the_same_seed() {
+    let mut scenario = small(Part::Plane(Plane::default()));
+    scenario.noise.noise_counts = Some(Noise::PAPER);
     let (mut head, stage) = head(&scenario).unwrap();
     let first: Vec<_> = frames(&mut head, &[128; 40]).iter().map(counts).collect();
     let pixels = first[0].len();
@@ -181,7 +224,7 @@ fn noise_is_uniform_independent_between_frames_and_the_same_again_from_the_same_
 #[test]
 fn gain_and_exposure_make_frames_brighter_until_they_are_set_again() {
     let mut scenario = small(Part::Plane(Plane::default()));
-    scenario.noise.noise_counts = 0.0;
+    scenario.noise.noise_counts = Some(0.0);
     scenario.light.ambient = 0.0;
     let (mut head, stage) = head(&scenario).unwrap();
     let middle = 24 * 64 + 32;
@@ -211,7 +254,7 @@ fn periodic_error(projector_blur_px: f64) -> f64 {
     ) = (12, 1, 0.95);
     scenario.rig.camera.fov_deg = [1.7, 1.275];
     scenario.rig.camera.distortion = [0.0; 5];
-    scenario.noise.noise_counts = 0.0;
+    scenario.noise.noise_counts = Some(0.0);
     scenario.optics.projector_blur_px = projector_blur_px;
     let (camera, projector) = (scenario.rig.camera.lens(), scenario.rig.projector.lens());
     let (mut head, _) = head(&scenario).unwrap();
