@@ -37,7 +37,7 @@ fn check(limits: &Limits, camera: u32, sequences: &[BetterSequence]) {
         camera,
         ..Scene::named(part).unwrap()
     };
-    let mut runner = Runner::new(&scene, OpticsKind::Ideal).unwrap();
+    let mut runner = Runner::new(&scene, OpticsKind::Sharp).unwrap();
     let paper = runner.run(Method::Paper { image_pitch: 5 }, 1).unwrap();
     let paper = paper.values.rms_mm;
     for (sequence, limit) in limits

@@ -12,7 +12,7 @@ use hal::error::{DeviceKind, Error};
 use hal::head::Head;
 use hal::virtual_head::{self, Control, Scene as _};
 
-/// Placed parts whose light transport is kept; one of 512 × 512 pixels takes about 20 MB.
+/// Placed parts whose light transport is kept; one that fills 512 × 512 pixels takes about 40 MB (lens of σ 0.5 px).
 const MAX_REMEMBERED: usize = 8;
 
 /// The part in front of a simulated head. Clones place parts in front of the same head.

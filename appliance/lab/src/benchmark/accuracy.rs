@@ -121,7 +121,7 @@ impl Study {
                     bit_depth,
                     ..scene
                 };
-                let mut runner = Runner::new(&scene, OpticsKind::Ideal).map_err(words)?;
+                let mut runner = Runner::new(&scene, OpticsKind::Sharp).map_err(words)?;
                 for compared in &SEQUENCES {
                     let words = format!(
                         "{part}, {bit_depth} bit, {} {}x{}",

@@ -13,7 +13,7 @@ pub struct Experiment {
     #[arg(long, value_name = "NAME", num_args = 1.., default_value = "all")]
     part: Vec<String>,
     /// How sharp projector and camera are.
-    #[arg(long, value_enum, default_value = "ideal")]
+    #[arg(long, value_enum, default_value = "sharp")]
     optics: OpticsKind,
     /// Noise seeds.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = numbers::number(1_u64, 100))]

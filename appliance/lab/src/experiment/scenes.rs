@@ -2,7 +2,7 @@
 
 use super::methods::Method;
 use sim::parts::{Cone, Flowerpot, Sawtooth, Sphere, Spline, Tube};
-use sim::scenario::Optics;
+use sim::scenario::{Noise, Optics};
 use sim::{Part, Placement, Scenario};
 
 /// A part of the paper's experiments, placed.
@@ -106,7 +106,7 @@ impl Scene {
         kinds
     }
 
-    /// The study's scenario with this part.
+    /// The study's scenario with this part, with the paper's uniform noise.
     pub fn scenario(&self, optics: OpticsKind, seed: u64) -> Scenario {
         let mut scenario = Scenario {
             part: self.part.clone(),
@@ -122,7 +122,7 @@ impl Scene {
             *fov = 2.0 * half.atan().to_degrees();
         }
         (camera.width, camera.height) = (self.camera, self.camera);
-        scenario.noise.seed = seed;
+        (scenario.noise.noise_counts, scenario.noise.seed) = (Some(Noise::PAPER), seed);
         scenario
     }
 }
@@ -130,8 +130,8 @@ impl Scene {
 /// How sharp projector and camera are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum OpticsKind {
-    /// No blur but the pixels' own.
-    Ideal,
+    /// Projector blur σ 0.5 px.
+    Sharp,
     /// Projector blur σ 1.0 px, camera blur σ 0.5 px.
     Real,
     /// Projector blur σ 1.6 px.
@@ -142,7 +142,7 @@ impl OpticsKind {
     /// For tables and file names.
     pub fn word(self) -> &'static str {
         match self {
-            Self::Ideal => "ideal",
+            Self::Sharp => "sharp",
             Self::Real => "real",
             Self::Defocused => "defocused",
         }
@@ -151,7 +151,7 @@ impl OpticsKind {
     /// The simulator's blur.
     pub fn blur(self) -> Optics {
         let (projector_blur_px, camera_blur_px) = match self {
-            Self::Ideal => (0.0, 0.0),
+            Self::Sharp => (0.5, 0.0),
             Self::Real => (1.0, 0.5),
             Self::Defocused => (1.6, 0.0),
         };

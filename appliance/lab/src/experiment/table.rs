@@ -230,7 +230,7 @@ mod tests {
         values[11] = f64::NAN;
         RunRow {
             part: "cone",
-            optics: "ideal",
+            optics: "sharp",
             method: method.to_owned(),
             frames: 12,
             seed,
