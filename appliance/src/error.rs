@@ -65,6 +65,7 @@ pub fn code_of(error: &Error) -> u16 {
         },
         Error::Unsupported { .. } => error_code::UNSUPPORTED,
         Error::Protocol { .. } => error_code::PROTOCOL,
+        Error::Ended { .. } => error_code::ABORTED,
     }
 }
 

@@ -165,6 +165,19 @@ pub fn check_projector(
         projector.load(rasters?),
     )?;
     must_fail(
+        "patterns that are not there are not kept",
+        ErrorKind::Protocol,
+        || projector.load_behind(patterns + 1, Vec::new()),
+    )?;
+    must(
+        "a pattern is loaded behind others",
+        projector.load_behind(patterns, vec![raster(width, height, 0)?]),
+    )?;
+    must(
+        "patterns behind others are dropped",
+        projector.load_behind(patterns, Vec::new()),
+    )?;
+    must_fail(
         "a pattern that is not loaded is not shown",
         ErrorKind::Protocol,
         || projector.queue(patterns),

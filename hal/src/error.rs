@@ -13,6 +13,8 @@ pub enum ErrorKind {
     Unsupported,
     /// The call is out of order, or the device gave an answer that does not fit.
     Protocol,
+    /// The caller ended it early.
+    Ended,
 }
 
 /// A kind of device that can be disconnected.
@@ -77,6 +79,12 @@ pub enum Error {
         /// What to do about it.
         remedy: String,
     },
+    /// The caller ended it early, which is not a fault of a device.
+    #[error("{attempt} was ended early: begin it again when nothing else is to be done")]
+    Ended {
+        /// What was attempted.
+        attempt: String,
+    },
 }
 
 impl Error {
@@ -88,6 +96,7 @@ impl Error {
             Self::Disconnected { .. } => ErrorKind::Disconnected,
             Self::Unsupported { .. } => ErrorKind::Unsupported,
             Self::Protocol { .. } => ErrorKind::Protocol,
+            Self::Ended { .. } => ErrorKind::Ended,
         }
     }
 
@@ -118,6 +127,13 @@ impl Error {
         Self::Unsupported {
             attempt: attempt.into(),
             remedy: remedy.into(),
+        }
+    }
+
+    /// The caller ended `attempt` early.
+    pub fn ended(attempt: impl Into<String>) -> Self {
+        Self::Ended {
+            attempt: attempt.into(),
         }
     }
 

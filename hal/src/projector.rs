@@ -102,11 +102,19 @@ pub trait Projector: Send {
         None
     }
 
-    /// Replaces the patterns; nothing is shown until [`Projector::queue`].
+    /// Replaces the patterns behind the first `kept`; nothing is shown until [`Projector::queue`].
+    ///
+    /// # Errors
+    /// `Unsupported` if a raster does not have the projector's size, `Protocol` if fewer than `kept` patterns are loaded.
+    fn load_behind(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error>;
+
+    /// Replaces all patterns.
     ///
     /// # Errors
     /// `Unsupported` if a raster does not have the projector's size.
-    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error>;
+    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
+        self.load_behind(0, rasters)
+    }
 
     /// Queues pattern `index` for the next refresh and returns at once.
     ///
@@ -125,6 +133,20 @@ pub trait Projector: Send {
     /// # Errors
     /// The device's error.
     fn blank(&mut self) -> Result<(), Error>;
+}
+
+/// Checks that the patterns which are to stay are among the `loaded` ones.
+///
+/// # Errors
+/// `Protocol` if they are not.
+pub(crate) fn all_kept(kept: usize, loaded: usize) -> Result<(), Error> {
+    match kept <= loaded {
+        true => Ok(()),
+        false => Err(Error::protocol(
+            format!("loading patterns behind the first {kept} of {loaded}"),
+            "load the first ones before",
+        )),
+    }
 }
 
 /// Checks that all rasters have the projector's size (width, height).

@@ -95,7 +95,7 @@ impl Scene for SimScene {
         )
     }
 
-    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
+    fn load(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
         let optics = &self.scenario.optics;
         let response: Vec<f32> = (0..256_u32)
             .map(|grey| (f64::from(grey) / 255.0).powf(optics.gamma) as f32)
@@ -115,7 +115,8 @@ impl Scene for SimScene {
             light.resize(light.len() + PADDING, 0.0);
             light
         };
-        self.rasters = rasters.into_iter().map(light).collect();
+        self.rasters.truncate(kept);
+        self.rasters.extend(rasters.into_iter().map(light));
         Ok(())
     }
 

@@ -159,7 +159,7 @@ impl Stage {
         self.control.plug(device, false);
         if device == DeviceKind::Projector {
             // The projector loses the patterns in its memory. Loading none never fails.
-            let _ = self.control.scene(|scene| scene.load(Vec::new()));
+            let _ = self.control.scene(|scene| scene.load(0, Vec::new()));
         }
     }
 

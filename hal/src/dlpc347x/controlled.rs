@@ -86,8 +86,8 @@ impl<I: I2c + Send> Projector for Controlled<I> {
         Some(self.watched.borrow().state.clone())
     }
 
-    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
-        self.projector.load(rasters)
+    fn load_behind(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
+        self.projector.load_behind(kept, rasters)
     }
 
     fn queue(&mut self, index: usize) -> Result<(), Error> {

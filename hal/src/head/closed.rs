@@ -89,7 +89,7 @@ impl Projector for Closed {
         gone(DeviceKind::Projector)
     }
 
-    fn load(&mut self, _: Vec<Raster>) -> Result<(), Error> {
+    fn load_behind(&mut self, _: usize, _: Vec<Raster>) -> Result<(), Error> {
         gone(DeviceKind::Projector)
     }
 

@@ -2,6 +2,7 @@
 //!
 //! The `sequencer` decides and knows no device; the loop here carries its decisions out.
 
+mod aside;
 mod closed;
 mod count;
 mod failure;
@@ -15,14 +16,15 @@ mod watch;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use crate::camera::{Camera, CameraTiming, Encoding};
+use crate::camera::{Camera, CameraTiming, Encoding, Starts};
 use crate::clock::Clock;
 use crate::controller::ControllerState;
 use crate::error::Error;
 use crate::frame::{Frame, FrameFormat};
-use crate::projector::{Projector, Raster};
+use crate::projector::Projector;
 use crate::trigger::Trigger;
 use crate::units::Timestamp;
+pub use aside::GoOn;
 use pacing::Pacing;
 use sequencer::{Act, Sequencer};
 use streaming::Streaming;
@@ -37,6 +39,8 @@ pub struct Head {
     devices: Devices,
     timing: Timing,
     sequencer: Sequencer,
+    /// What ends everything that the head does; see [`Head::aside`].
+    go_on: Option<GoOn>,
 }
 
 pub(crate) struct Devices {
@@ -46,6 +50,8 @@ pub(crate) struct Devices {
     pub clock: Box<dyn Clock>,
     /// Whether the camera stayed on after a sequence, and which frames it had given.
     streaming: Streaming,
+    /// The first patterns, which stay loaded; indices of the others count from behind them.
+    kept: usize,
 }
 
 /// How a sequence was taken.
@@ -108,9 +114,11 @@ impl Head {
                 trigger,
                 clock,
                 streaming: Streaming::default(),
+                kept: 0,
             },
             timing,
             sequencer: Sequencer::default(),
+            go_on: None,
         }
     }
 
@@ -173,14 +181,6 @@ impl Head {
         self.devices.projector.present()
     }
 
-    /// Replaces the patterns.
-    ///
-    /// # Errors
-    /// As [`Projector::load`].
-    pub fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
-        self.devices.projector.load(rasters)
-    }
-
     /// Shows the patterns `indices` in this order, exposes one frame of each, and passes each frame to `sink` with
     /// its pattern's index as soon as it and all frames before it have arrived, stamped with the start of its exposure.
     ///
@@ -227,7 +227,9 @@ impl Head {
             devices,
             timing,
             sequencer,
+            go_on,
         } = self;
+        let go_on = go_on.as_ref();
         let camera = devices.camera.timing();
         let pacing = Pacing::new(devices.projector.refresh(), &camera, timing);
         let planned = pacing.planned(indices.len()) + timeout;
@@ -235,16 +237,22 @@ impl Head {
         devices.exposing(|devices, start_up| {
             sequencer.begin(pacing, indices, devices.clock.now() + planned);
             let served = if devices.clock.stands_still() {
-                carry_out(devices, sequencer, timeout, &start_of, sink)
+                carry_out(devices, sequencer, timeout, &start_of, go_on, sink)
             } else {
-                beside(devices, sequencer, timeout, &start_of, sink)
+                beside(devices, sequencer, timeout, &start_of, go_on, sink)
             };
-            let exposure = Exposure {
-                start_up,
-                ..served?
-            };
-            Ok((exposure, sequencer.all_answered()))
-        })
+            match served {
+                Ok(so_far) => {
+                    let exposure = Exposure { start_up, ..so_far };
+                    Ok((Ok(exposure), sequencer.all_answered()))
+                }
+                Err(ended @ Error::Ended { .. }) => {
+                    let triggered = camera.starts == Starts::OnTrigger;
+                    Ok((Err(ended), triggered && sequencer.none_is_awaited()))
+                }
+                Err(error) => Err(error),
+            }
+        })?
     }
 
     /// The devices, for the contract checks and for [`Head::watch`].
@@ -259,13 +267,14 @@ fn beside(
     sequencer: &mut Sequencer,
     timeout: Duration,
     start_of: &(dyn Fn(&Frame) -> Timestamp + Sync),
+    go_on: Option<&GoOn>,
     sink: &mut dyn FnMut(usize, Frame) -> bool,
 ) -> Result<Exposure, Error> {
     std::thread::scope(|scope| {
         let (frames, taken) = mpsc::channel();
         let served = scope.spawn(move || {
             let mut hand = |index, frame| frames.send((index, frame)).is_ok();
-            carry_out(devices, sequencer, timeout, start_of, &mut hand)
+            carry_out(devices, sequencer, timeout, start_of, go_on, &mut hand)
         });
         for (index, frame) in taken {
             if !sink(index, frame) {
@@ -284,6 +293,7 @@ fn carry_out(
     sequencer: &mut Sequencer,
     timeout: Duration,
     start_of: &(dyn Fn(&Frame) -> Timestamp + Sync),
+    go_on: Option<&GoOn>,
     hand: &mut dyn FnMut(usize, Frame) -> bool,
 ) -> Result<Exposure, Error> {
     let Devices {
@@ -292,7 +302,12 @@ fn carry_out(
         trigger,
         clock,
         streaming,
+        kept,
     } = devices;
+    let refresh = projector.refresh();
+    let timing = camera.timing();
+    // Once it is to be ended: until when the frames of the triggers that have fired are waited for, so that the camera can stay on.
+    let mut ending: Option<Timestamp> = None;
     loop {
         while let Some(flip) = projector.poll_flip()? {
             sequencer.flipped(flip);
@@ -308,14 +323,26 @@ fn carry_out(
         while let Some(pulse) = trigger.poll_spoiled() {
             sequencer.spoiled(pulse);
         }
-        match sequencer.act(clock.now()) {
-            Act::Queue(index) => projector.queue(index)?,
+        let now = clock.now();
+        if ending.is_none() && go_on.is_some_and(|go_on| !go_on()) {
+            ending = Some(now + (timing.exposure + timing.delivery + refresh));
+        }
+        if let Some(end) = ending {
+            if now >= end || sequencer.none_is_awaited() {
+                return Err(Error::ended("acquiring a sequence"));
+            }
+            wait(&mut **clock, end);
+            continue;
+        }
+        match sequencer.act(now) {
+            Act::Queue(index) => projector.queue(*kept + index)?,
             Act::Fire => sequencer.fired(trigger.fire()?),
             Act::Hand(index, frame) => {
                 if !hand(index, frame) {
                     return Ok(sequencer.so_far());
                 }
             }
+            Act::Wait(until) if go_on.is_some() => wait(&mut **clock, until.min(now + refresh)),
             Act::Wait(until) => wait(&mut **clock, until),
             Act::Done => return Ok(sequencer.so_far()),
             Act::Fail(failure) => return Err(failure.error(timeout)),

@@ -82,6 +82,8 @@ pub(super) struct Sequencer {
     /// Attempts that were given up since the last frame arrived.
     unanswered: u32,
     handed: usize,
+    /// Frames that arrived, without repetitions.
+    arrived: usize,
     exhausted: Option<usize>,
     deadline: Timestamp,
     /// When the light of the first pattern that gave a frame came.
@@ -130,6 +132,11 @@ impl Sequencer {
     /// Whether each trigger of this sequence gave a frame that was handed over, so that no other can arrive later.
     pub fn all_answered(&self) -> bool {
         self.handed == self.positions.len() && self.pacing.triggers() == self.handed
+    }
+
+    /// Whether each trigger of this sequence gave a frame, whatever it shows.
+    pub fn none_is_awaited(&self) -> bool {
+        self.arrived >= self.pacing.triggers()
     }
 
     /// The queued flip has happened. A flip that was not queued is ignored.
@@ -184,6 +191,7 @@ impl Sequencer {
             self.so_far.duplicated = self.so_far.duplicated.saturating_add(1);
             return;
         }
+        self.arrived += 1;
         self.pacing.exposed(frame.timestamp());
         if latest::keep(&mut self.undecided, frame).is_some() {
             self.so_far.stale = self.so_far.stale.saturating_add(1);

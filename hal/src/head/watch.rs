@@ -114,6 +114,7 @@ impl Head {
         go_on: Option<&dyn Fn() -> bool>,
     ) -> Result<Watched<M>, Error> {
         let (camera, refresh, timing) = (self.camera_timing(), self.refresh(), self.timing);
+        let head_goes_on = self.go_on.clone();
         let triggered = camera.starts == Starts::OnTrigger;
         let spacing = spacing.max(camera.period);
         let mut seen = Watched {
@@ -157,6 +158,9 @@ impl Head {
                 };
                 let spoiled = std::iter::from_fn(|| devices.trigger.poll_spoiled());
                 seen.spoiled.extend(spoiled.filter(fired));
+                if head_goes_on.as_ref().is_some_and(|go_on| !go_on()) {
+                    return Err(Error::ended("watching the head"));
+                }
                 let now = devices.clock.now();
                 let shown = seen.flips.len() == showings.len();
                 let end = next_flip + (refresh + timing.flip_to_light);
@@ -168,7 +172,9 @@ impl Head {
                     return Ok(((), false));
                 }
                 if !shown && queued == seen.flips.len() && now >= next_flip {
-                    devices.projector.queue(showings[queued].index)?;
+                    devices
+                        .projector
+                        .queue(devices.kept + showings[queued].index)?;
                     queued += 1;
                     continue;
                 }
@@ -189,7 +195,7 @@ impl Head {
                     }
                     next = next.min(due);
                 }
-                if go_on.is_some() {
+                if go_on.is_some() || head_goes_on.is_some() {
                     next = next.min(now + refresh);
                 }
                 wait(&mut *devices.clock, next.min(deadline));

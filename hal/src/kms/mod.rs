@@ -23,7 +23,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::clock::monotonic;
 use crate::error::Error;
-use crate::projector::{Flip, Projector, Raster, all_of_size};
+use crate::projector::{Flip, Projector, Raster, all_kept, all_of_size};
 use crate::setup::ProjectorSetup;
 use crate::units::Timestamp;
 use canvas::Canvas;
@@ -210,26 +210,25 @@ impl Projector for Display {
     }
 
     /// Waits until black is shown, at most a few refreshes, so that no visible picture is drawn over.
-    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
+    fn load_behind(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
         let size = self.size();
         all_of_size(&rasters, size)?;
+        all_kept(kept, self.loaded)?;
         self.blank()?;
         self.settle()?;
-        self.loaded = 0;
+        self.loaded = kept;
         let card = &self.output.card;
-        for spare in self
-            .canvases
-            .drain(rasters.len().min(self.canvases.len())..)
-        {
+        let wanted = kept + rasters.len();
+        for spare in self.canvases.drain(wanted.min(self.canvases.len())..) {
             spare.free(card);
         }
-        for (index, raster) in rasters.iter().enumerate() {
+        for (index, raster) in (kept..).zip(&rasters) {
             if index == self.canvases.len() {
                 self.canvases.push(Canvas::new(card, size)?);
             }
             self.canvases[index].draw(card, raster)?;
         }
-        self.loaded = rasters.len();
+        self.loaded = wanted;
         Ok(())
     }
 

@@ -88,14 +88,12 @@ impl Scene for Played {
         (projector.width, projector.height)
     }
 
-    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
+    fn load(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
         let recorded = self.played.len();
-        if rasters.len() != recorded {
+        let loaded = kept + rasters.len();
+        if loaded != recorded {
             return Err(Error::protocol(
-                format!(
-                    "loading {} rasters to replay {recorded} recorded frames",
-                    rasters.len()
-                ),
+                format!("loading {loaded} rasters to replay {recorded} recorded frames"),
                 format!("load {recorded} rasters, one per recorded frame"),
             ));
         }

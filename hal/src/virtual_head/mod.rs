@@ -46,11 +46,11 @@ pub trait Scene: Send {
     /// Columns and rows of the projector.
     fn projector_size(&self) -> (u32, u32);
 
-    /// Replaces the patterns, whose size has been checked.
+    /// Replaces the patterns behind the first `kept`, which are loaded; the size of the rasters has been checked.
     ///
     /// # Errors
     /// If the scene cannot show them.
-    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error>;
+    fn load(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error>;
 
     /// Patterns loaded.
     fn loaded(&self) -> usize;

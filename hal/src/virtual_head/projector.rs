@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::faults::Kind;
 use super::{Bench, Scene, VirtualDevice, lock};
 use crate::error::{DeviceKind, Error};
-use crate::projector::{Flip, Projector, Raster, all_of_size};
+use crate::projector::{Flip, Projector, Raster, all_kept, all_of_size};
 use crate::units::Timestamp;
 
 const DEVICE: DeviceKind = DeviceKind::Projector;
@@ -106,11 +106,12 @@ impl<S: Scene> Projector for VirtualDevice<S> {
         !lock(&self.bench).mechanics.first_light.is_zero()
     }
 
-    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
+    fn load_behind(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
         let mut bench = self.plugged(DEVICE, "loading patterns")?;
         all_of_size(&rasters, bench.scene.projector_size())?;
+        all_kept(kept, bench.scene.loaded())?;
         bench.blank();
-        bench.scene.load(rasters)
+        bench.scene.load(kept, rasters)
     }
 
     fn queue(&mut self, index: usize) -> Result<(), Error> {

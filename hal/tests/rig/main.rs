@@ -45,8 +45,8 @@ impl Projector for Late {
         self.display.refresh()
     }
 
-    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
-        self.display.load(rasters)
+    fn load_behind(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
+        self.display.load_behind(kept, rasters)
     }
 
     fn queue(&mut self, index: usize) -> Result<(), Error> {

@@ -34,7 +34,7 @@ impl Projector for Screen {
         REFRESH
     }
 
-    fn load(&mut self, _: Vec<Raster>) -> Result<(), Error> {
+    fn load_behind(&mut self, _: usize, _: Vec<Raster>) -> Result<(), Error> {
         Ok(())
     }
 

@@ -1,5 +1,6 @@
 //! Promises of the head: each frame that it returns shows the pattern that the frame names, whatever the devices do.
 
+mod aside;
 mod schedules;
 mod sequences;
 mod streaming;
@@ -10,6 +11,7 @@ use std::time::Duration;
 
 use super::*;
 use crate::frame::{Pixels, Samples};
+use crate::projector::Raster;
 use crate::virtual_head::{self, Faults, Mechanics, Scene};
 
 const REFRESH: Duration = Duration::from_micros(16_667);
@@ -44,8 +46,8 @@ impl Scene for Labels {
         (1, 1)
     }
 
-    fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
-        self.loaded = rasters.len();
+    fn load(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
+        self.loaded = kept + rasters.len();
         Ok(())
     }
 
