@@ -60,6 +60,11 @@ pub trait Camera: Send {
         Duration::ZERO
     }
 
+    /// The temperature of its sensor as of the last frame, °C; none if it does not say.
+    fn temperature_c(&self) -> Option<f64> {
+        None
+    }
+
     /// Checks that the camera is still connected, without disturbing it. A back-end whose driver cannot tell returns `Ok`.
     ///
     /// # Errors

@@ -162,6 +162,11 @@ impl Head {
         self.devices.clock.now()
     }
 
+    /// The temperature of the camera's sensor as of the last frame, °C; `None` if it does not say.
+    pub fn camera_temperature_c(&self) -> Option<f64> {
+        self.devices.camera.temperature_c()
+    }
+
     /// What the projector's controller said of itself when it was last asked; `None` if there is none to ask.
     pub fn controller(&self) -> Option<ControllerState> {
         self.devices.projector.controller()

@@ -2,7 +2,7 @@
 
 use std::os::fd::OwnedFd;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
 use std::thread;
 use std::time::Duration;
@@ -41,6 +41,7 @@ pub struct LibCamera {
     ready: Arc<OwnedFd>,
     gone: Arc<AtomicBool>,
     in_flight: Arc<AtomicUsize>,
+    celsius: Arc<AtomicU32>,
     ended: Receiver<()>,
     count: ContinuedCount,
     running: bool,
@@ -86,6 +87,7 @@ impl LibCamera {
         .map_err(|cause| system(&cause))?;
         let (ready, gone) = (Arc::new(ready), Arc::default());
         let in_flight = Arc::default();
+        let celsius = Arc::new(AtomicU32::new(f32::NAN.to_bits()));
         let (orders, ordered) = mpsc::channel();
         let (told, events) = mpsc::channel();
         let (answer, opened) = mpsc::channel();
@@ -98,6 +100,7 @@ impl LibCamera {
             ready: Arc::clone(&ready),
             gone: Arc::clone(&gone),
             in_flight: Arc::clone(&in_flight),
+            celsius: Arc::clone(&celsius),
         };
         thread::Builder::new()
             .name("libcamera".into())
@@ -120,6 +123,7 @@ impl LibCamera {
             ready,
             gone,
             in_flight,
+            celsius,
             ended,
             count: ContinuedCount::default(),
             running: false,
@@ -233,6 +237,11 @@ impl Camera for LibCamera {
             Starts::OnTrigger => self.settings.stays_on,
             Starts::ByProjector | Starts::ByItself => Duration::ZERO,
         }
+    }
+
+    fn temperature_c(&self) -> Option<f64> {
+        let celsius = f32::from_bits(self.celsius.load(Ordering::Relaxed));
+        celsius.is_finite().then(|| celsius.into())
     }
 
     fn present(&self) -> Result<(), Error> {

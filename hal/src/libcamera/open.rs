@@ -4,7 +4,7 @@ use std::io;
 
 use ::libcamera::camera::{ActiveCamera, Camera, CameraConfiguration};
 use ::libcamera::camera_manager::CameraManager;
-use ::libcamera::control::ControlEntry;
+use ::libcamera::control::{ControlEntry, ControlInfo};
 use ::libcamera::controls;
 use ::libcamera::framebuffer::AsFrameBuffer;
 use ::libcamera::framebuffer_allocator::FrameBufferAllocator;
@@ -96,7 +96,7 @@ pub(super) fn open(manager: &CameraManager, settings: &Settings) -> Result<Opene
         .acquire()
         .map_err(|cause| refused(id, "acquiring", &cause))?;
     if settings.controlled {
-        must_be_settable(&camera, id)?;
+        must_be_settable(&camera, id, settings)?;
     }
     let (mut configuration, readable) = agree(&camera, id, settings)?;
     camera
@@ -210,8 +210,8 @@ fn no_stream(id: &str) -> Error {
     )
 }
 
-/// Checks that exposure, gain and frame length can be set.
-fn must_be_settable(camera: &Camera<'_>, id: &str) -> Result<(), Error> {
+/// Checks that exposure, gain and frame length can be set, and that the sensor has the gain: the library takes the nearest that it has.
+fn must_be_settable(camera: &Camera<'_>, id: &str, settings: &Settings) -> Result<(), Error> {
     let all = camera.controls();
     let missing: Vec<&str> = [
         ("exposure", controls::ExposureTime::ID),
@@ -222,12 +222,24 @@ fn must_be_settable(camera: &Camera<'_>, id: &str) -> Result<(), Error> {
     .filter_map(|(name, control)| all.find(control).is_err().then_some(name))
     .collect();
     if missing.is_empty() {
-        return Ok(());
+        return match all.find(controls::AnalogueGain::ID).map(limits) {
+            Ok(Some((least, most))) => settings.exposing.check_gain(id, least, most),
+            _ => Ok(()),
+        };
     }
     Err(Error::unsupported(
         format!("setting the {} of the camera `{id}`", missing.join(", ")),
         "use a camera that has these controls: nothing can be measured with an unknown exposure",
     ))
+}
+
+/// The least and the largest value of a control; none where the camera states none.
+fn limits(control: &ControlInfo) -> Option<(f32, f32)> {
+    let (least, most) = (control.min().try_into(), control.max().try_into());
+    least
+        .ok()
+        .zip(most.ok())
+        .filter(|(least, most)| least < most)
 }
 
 /// Asks for every format that has the wanted samples ([`Reading`]), and returns the configuration of the best one that was granted.

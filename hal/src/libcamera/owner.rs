@@ -2,7 +2,7 @@
 //!
 //! Copying here keeps it out of the thread that has to fire the next trigger.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, Mutex, TryLockError};
 use std::time::Duration;
@@ -65,6 +65,8 @@ pub(super) struct Wires {
     pub gone: Arc<AtomicBool>,
     /// Number of requests that the library has.
     pub in_flight: Arc<AtomicUsize>,
+    /// Temperature of the sensor as of the last frame, °C, as bits of an `f32`; NaN if it does not say.
+    pub celsius: Arc<AtomicU32>,
 }
 
 /// Calls `work` with the camera manager; a second one at the same time would abort the process.
@@ -304,6 +306,11 @@ impl Owner<'_> {
             return None;
         }
         let metadata = request.metadata();
+        let celsius = metadata.get::<controls::SensorTemperature>();
+        let celsius = celsius.map_or(f32::NAN, |celsius| celsius.0);
+        self.wires
+            .celsius
+            .store(celsius.to_bits(), Ordering::Relaxed);
         let sensor = metadata.get::<controls::SensorTimestamp>();
         let stamp = sensor.ok().and_then(|stamp| u64::try_from(stamp.0).ok());
         let stamp = stamp.unwrap_or_else(|| frame.timestamp());

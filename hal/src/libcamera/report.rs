@@ -34,6 +34,21 @@ pub(crate) struct Reported {
 }
 
 impl Exposing {
+    /// Checks that the sensor of the camera `id` has the gain, from the `least` to the `most` that it has.
+    ///
+    /// # Errors
+    /// `Unsupported`, naming the limits.
+    pub(crate) fn check_gain(&self, id: &str, least: f32, most: f32) -> Result<(), Error> {
+        let increment = 1.0 + GAIN_INCREMENT;
+        if (least / increment..=most * increment).contains(&self.gain) {
+            return Ok(());
+        }
+        Err(Error::unsupported(
+            format!("a gain of {} of the camera `{id}`", self.gain),
+            format!("set a gain (head.camera.gain) of {least} to {most}, which its sensor has"),
+        ))
+    }
+
     /// Checks that a frame of `rows` rows was taken as set.
     ///
     /// A sensor's exposure and period are whole numbers of lines, and a line lasts at most the period divided by the number of rows (a
@@ -161,6 +176,18 @@ mod tests {
             exposure: Some(exposure),
             gain: Some(gain),
             period: Some(period),
+        }
+    }
+
+    #[test]
+    fn a_gain_that_the_sensor_does_not_have_is_refused_with_its_limits() {
+        let of = |gain| Exposing { gain, ..SET };
+        for gain in [0.99, 1.0, 15.9, 16.3] {
+            of(gain).check_gain("imx", 1.0, 16.0).unwrap();
+        }
+        for gain in [0.0, 0.5, 17.0, f32::NAN] {
+            let words = of(gain).check_gain("imx", 1.0, 16.0).unwrap_err();
+            assert!(words.to_string().contains("1 to 16"), "{words}");
         }
     }
 
