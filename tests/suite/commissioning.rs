@@ -353,6 +353,50 @@ fn a_bare_head_is_commissioned_over_the_page_and_then_judges_parts_right() {
     assert_eq!(technician.head()["calibrated"], true);
 }
 
+#[test]
+fn a_step_ends_at_once_when_somebody_or_the_daemon_stops_it_and_leaves_what_was_found_before() {
+    const AT_ONCE: Duration = Duration::from_secs(1);
+    let place = Place::new();
+    fs::write(place.path("small.toml"), BARE).unwrap();
+    let daemon = Daemon::start(&place);
+    let (_, rest) = daemon.log.split_once("shown this once: ").unwrap();
+    let secret = rest.split(' ').next().unwrap().to_owned();
+    let mut technician = Technician::sign_in(&daemon, &secret);
+    technician.passes("exposure", &json!({ "gain": 4.5, "keep": true }));
+    let begins = |technician: &mut Technician| {
+        let path = "/api/head/steps/timing";
+        let (status, answer) = technician.browser.json("POST", path, &json!({}));
+        assert_eq!(status, 202, "{answer}");
+        let began = Instant::now();
+        while technician.head()["running"]["share"].as_f64().unwrap() == 0.0 {
+            assert!(began.elapsed() < STEP);
+        }
+    };
+    begins(&mut technician);
+    let mut end = |name: &str| {
+        let path = format!("/api/head/steps/{name}");
+        technician.browser.ask("DELETE", &path, &[]).0
+    };
+    assert_eq!(end("aim"), 409, "another step");
+    let stopped = Instant::now();
+    assert_eq!(end("timing"), 202);
+    while !technician.head()["running"].is_null() {
+        assert!(stopped.elapsed() < AT_ONCE);
+    }
+    let head = technician.head();
+    let states =
+        ["exposure", "timing"].map(|name| Technician::step_of(&head, name)["state"].clone());
+    assert_eq!(states, ["done", "open"]);
+    begins(&mut technician);
+    let stopped = Instant::now();
+    assert!(daemon.terminate().success());
+    assert!(stopped.elapsed() < AT_ONCE, "{:?}", stopped.elapsed());
+    let daemon = Daemon::start(&place);
+    let mut technician = Technician::sign_in(&daemon, &secret);
+    assert_eq!(technician.head()["steps"], head["steps"]);
+    technician.passes("timing", &json!({}));
+}
+
 /// The median of times, ms.
 fn median(mut times: Vec<f64>) -> f64 {
     times.sort_by(f64::total_cmp);

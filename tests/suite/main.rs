@@ -12,6 +12,7 @@ mod changeover;
 mod cli;
 mod commissioning;
 mod doctor;
+mod drift;
 mod experiment;
 mod foreign;
 mod formats;

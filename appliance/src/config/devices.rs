@@ -1,9 +1,12 @@
 //! Checks the configuration of real devices: the ranges that the types do not express.
 
 use super::{Config, HeadConfig};
+use crate::head::commission::MOST_GAIN;
 use hal::bounds::{MAX_SIDE, text, within};
 use hal::setup::{CameraSetup, ProjectorSetup, TriggerSetup};
 
+/// Least gain of a real camera: the amplifier of a sensor does not make less of its samples.
+pub(super) const NO_GAIN: f64 = 1.0;
 /// Longest name of a device or a line, characters.
 const LONGEST_NAME: usize = 255;
 
@@ -47,7 +50,7 @@ pub(super) fn check(config: &Config) -> Result<(), String> {
         *exposure_us,
         10_000_000,
     )?;
-    within("head.camera.gain", *gain, 1.0, 64.0)?;
+    within("head.camera.gain", *gain, NO_GAIN, MOST_GAIN)?;
     within("head.camera.delivery_us", *delivery_us, 0, 1_000_000)?;
     let ProjectorSetup {
         width,

@@ -1,9 +1,18 @@
 //! Exposure and gain that were kept on the page: they take the place of the configured ones.
 
-use super::HeadConfig;
-use crate::head::commission::Exposing;
+use super::devices::NO_GAIN;
+use super::{Backend, HeadConfig};
+use crate::head::commission::{Exposing, LEAST_GAIN};
 
 impl HeadConfig {
+    /// The least gain that the camera can be set to.
+    pub fn least_gain(&self) -> f64 {
+        match self.backend {
+            Backend::Rpi => NO_GAIN,
+            Backend::Sim | Backend::Replay => LEAST_GAIN,
+        }
+    }
+
     /// Sets exposure and gain. What follows from the exposure changes with it: the camera's period keeps its time between two exposures, and a
     /// pulse that sets the exposure keeps its difference from it.
     pub fn expose(&mut self, exposing: Exposing) {
@@ -25,6 +34,24 @@ impl HeadConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_a_simulated_camera_can_have_less_gain_than_none() {
+        let exposing = Exposing {
+            exposure_us: 16_667,
+            gain: 0.5,
+        };
+        let of = |backend| HeadConfig {
+            backend,
+            ..HeadConfig::default()
+        };
+        exposing.check(of(Backend::Sim).least_gain()).unwrap();
+        let words = exposing.check(of(Backend::Rpi).least_gain()).unwrap_err();
+        assert!(
+            words.contains("gain") && words.contains("1.0 to 64.0"),
+            "{words}"
+        );
+    }
 
     #[test]
     fn period_and_pulse_follow_the_exposure() {

@@ -77,6 +77,8 @@ pub struct StationConfig {
     pub teach_allowed: bool,
     /// PLC_HEARTBEAT may stand still for this long, s.
     pub plc_timeout_s: u32,
+    /// Cycles between two checks of the geometry; 0 = never.
+    pub geometry_check_cycles: u32,
 }
 
 /// Modbus TCP.
@@ -172,6 +174,7 @@ impl Default for StationConfig {
             recipe: 1,
             teach_allowed: false,
             plc_timeout_s: 5,
+            geometry_check_cycles: 200,
         }
     }
 }
@@ -248,7 +251,9 @@ impl Config {
     pub fn head_in(&self, state: &Path) -> HeadConfig {
         let mut head = self.head.clone();
         head.calibration.get_or_insert_with(|| state.join(IN_STATE));
-        if let Some(kept) = Commissioning::kept_exposing(state) {
+        let kept = Commissioning::kept_exposing(state);
+        // Those of another camera are of no use.
+        if let Some(kept) = kept.filter(|kept| kept.check(head.least_gain()).is_ok()) {
             head.expose(kept);
         }
         head
@@ -262,6 +267,8 @@ impl Config {
         within("threads", self.threads, 0, 256)?;
         within("station.recipe", self.station.recipe, 1, 9999)?;
         within("station.plc_timeout_s", self.station.plc_timeout_s, 1, 3600)?;
+        let cycles = self.station.geometry_check_cycles;
+        within("station.geometry_check_cycles", cycles, 0, 1_000_000)?;
         let modbus = &self.modbus;
         within("modbus.connections", modbus.connections, 2, 64)?;
         length("modbus.readers", modbus.readers.len(), 0, MAX_LISTED)?;

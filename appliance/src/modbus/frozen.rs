@@ -117,6 +117,9 @@ const VERSION_1_2: &str = "\
 633 KERNEL_VERSION u16x2 HEALTH
 635 LIBCAMERA_VERSION u16x2 HEALTH";
 
+/// Rows that version 1.3 adds.
+const VERSION_1_3: &str = "637 DRIFT u16 HEALTH";
+
 /// Name, first and last address of every block of version 1.0, and whether it can be written. All of them are served.
 const BLOCKS_1: [(&str, u16, u16, bool); 8] = [
     ("CONTROL", 0, 31, true),
@@ -154,6 +157,9 @@ const MEANINGS_1_1: [(u16, &str); 2] = [
 /// Version 1.2 adds rows, and a bit of WARNING.
 const MEANINGS_1_2: [(u16, &str); 1] = [(103, ", 8 power")];
 
+/// Version 1.3 adds a row, and another bit of WARNING.
+const MEANINGS_1_3: [(u16, &str); 1] = [(103, ", 8 power, 9 geometry")];
+
 fn row(address: u16) -> Register {
     let mut rows = registers().map(|(_, row)| row);
     rows.find(|row| row.address == address).expect("a row")
@@ -168,12 +174,16 @@ fn later_versions_say_more_of_three_rows_and_take_nothing_back() {
         let rest = meaning.strip_prefix(first).expect(meaning);
         assert!(rest.starts_with(added), "{meaning}");
     }
+    for (address, added) in MEANINGS_1_3 {
+        let meaning = row(address).meaning;
+        assert!(meaning.contains(added), "{meaning}");
+    }
 }
 
 #[test]
 fn the_version_is_the_same_wherever_it_is_said() {
     let (major, minor) = (VERSION >> 8, VERSION & 0xFF);
-    assert_eq!((major, minor), (1, 2));
+    assert_eq!((major, minor), (1, 3));
     assert_eq!(row(121).meaning, format!("{VERSION:#06x}"));
     assert_eq!(registers_json()["version"], format!("{major}.{minor}"));
 }
@@ -210,7 +220,10 @@ fn version_1_of_the_map_is_frozen_word_for_word() {
         })
         .collect();
     let now: Vec<&str> = rows.iter().map(String::as_str).collect();
-    let frozen = || VERSION_1.lines().chain(VERSION_1_2.lines());
+    let frozen = || {
+        let all = [VERSION_1, VERSION_1_2, VERSION_1_3];
+        all.into_iter().flat_map(str::lines)
+    };
     for frozen in frozen() {
         assert!(
             now.contains(&frozen),

@@ -1,13 +1,13 @@
-//! The register map, version 1.2: one table, append-only, from which everything else is derived.
+//! The register map, version 1.3: one table, append-only, from which everything else is derived.
 
 use super::encode::{
-    INVALID_F32, INVALID_I32, MAGIC, UNKNOWN_I16, UNKNOWN_U16, Words, f32_bits, gauges, i32_steps,
-    known, mask, measured, saturated_u16, stored, tenths,
+    INVALID_F32, INVALID_I32, MAGIC, UNKNOWN_U16, Words, f32_bits, gauges, i32_steps, known, mask,
+    measured, saturated_u16, stored, tenths,
 };
 use crate::station::{Power, ResultRecord, Snapshot};
 
 /// MAP_VERSION, register 121.
-pub const VERSION: u16 = 0x0102;
+pub const VERSION: u16 = 0x0103;
 
 /// How a register's words are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,7 +142,7 @@ registers! {
         100 STATUS Bits x 1 = now.status, "0 ONLINE, 1 READY, 2 BUSY, 3 PROCESSING, 4 EXPOSURE_DONE, 5 RESULT_VALID, 6 RESULT_TOGGLE, 7 TRIGGER_ACK, 8 RECIPE_LOADING, 9 RECIPE_OK, 10 WARNING, 11 ERROR, 12 MISSED_TRIGGER, 13 BUFFER_OVERFLOW, 14 WARMING_UP, 15 CALIBRATION_VALID";
         101 HEARTBEAT U16 x 1 = now.heartbeat, "+1 every 100 ms as long as the measuring task meets its deadlines";
         102 ERROR_CODE U16 x 1 = now.error_code, "0 none, 1xx camera, 2xx projector, 3xx sync, 4xx recipe, 5xx calibration, 6xx storage, 7xx thermal, 8xx internal";
-        103 WARNING Bits x 1 = now.warnings, "0 temperature, 1 storage, 2 plc_lost, 3 clock_unsynced, 4 low_light, 5 saturation, 6 pattern_unfit, 7 frame_slip, 8 power";
+        103 WARNING Bits x 1 = now.warnings, "0 temperature, 1 storage, 2 plc_lost, 3 clock_unsynced, 4 low_light, 5 saturation, 6 pattern_unfit, 7 frame_slip, 8 power, 9 geometry";
         104 STATE U16 x 1 = now.state, "0 boot, 1 ready, 2 acquiring, 3 processing, 4 loading, 5 teaching, 6 offline, 7 fault, 8 stopping, 9 commissioning";
         105 ACTIVE_RECIPE U16 x 1 = now.active().unwrap_or(0), "number of the active recipe, 0 none";
         106 RECIPE_CRC32 U32 x 1 = now.recipe.as_ref().map_or(0, |recipe| recipe.crc), "first 32 bits of the active recipe's fingerprint";
@@ -155,7 +155,7 @@ registers! {
         117 BUFFERED U16 x 1 = now.buffered, "results waiting for RESULT_ACK";
         118 UPTIME U32 x 1 = now.uptime_s, "s";
         120 REJECT_REASON U16 x 1 = now.reject_reason, "of the last rejected request: 1 not ready, 2 offline, 3 no recipe, 4 teach not allowed, 5 fault, 6 another recipe is active";
-        121 MAP_VERSION U16 x 1 = VERSION, "0x0102";
+        121 MAP_VERSION U16 x 1 = VERSION, "0x0103";
         122 BOOT_ID U32 x 1 = now.boot_id, "random per start: tokens and counters restarted";
     }
     result RESULT 200..=319, false, record: ResultRecord {
@@ -206,8 +206,7 @@ registers! {
         623 FREE_MEMORY U16 x 1 = known(now.health.system.free_memory_mib), "MiB, saturating at 65534, 65535 not known";
         624 FREE_STORAGE U16 x 1 = known(now.health.system.free_storage_mib), "MiB, saturating at 65534, 65535 not known";
         625 CPU_TEMPERATURE I16 x 1 = tenths(now.health.system.cpu_temperature_c), "0.1 degC, 0x8000 not known";
-        // No camera of this version has a thermometer.
-        626 CAMERA_TEMPERATURE I16 x 1 = UNKNOWN_I16, "0.1 degC, 0x8000 not known";
+        626 CAMERA_TEMPERATURE I16 x 1 = tenths(now.health.camera_temperature_c), "0.1 degC, 0x8000 not known";
         627 PROJECTOR_TEMPERATURE I16 x 1 = tenths(now.health.projector.temperature_c), "0.1 degC, 0x8000 not known";
         628 MODBUS_CLIENTS U16 x 1 = now.health.system.clients, "open connections";
         629 WRITER_CONNECTED U16 x 1 = u16::from(now.health.system.writer_connected), "1 if a client that may write is connected";
@@ -216,6 +215,7 @@ registers! {
         632 LED_CURRENT U16 x 1 = known(now.health.projector.led_current.map(u64::from)), "of the projector, steps of the LED's driver, 65535 not known";
         633 KERNEL_VERSION U16 x 2 = now.health.system.kernel.unwrap_or([UNKNOWN_U16; 2]), "major, minor; 65535 not known";
         635 LIBCAMERA_VERSION U16 x 2 = now.health.system.libcamera.unwrap_or([UNKNOWN_U16; 2]), "major, minor; 65535 not known";
+        637 DRIFT U16 x 1 = known(now.health.drift.map(|drift| (drift.rms_px * 1000.0).round() as u64)), "0.001 projector pixels, RMS distance from the epipolar lines at the last check of the geometry, saturating at 65534, 65535 not known";
     }
     recipe_directory RECIPE_DIRECTORY 700..=763, false, now: Snapshot {
         700 STORED_RECIPES Bits x 64 = stored(&now.health.system.recipes), "recipe r in register 700 + (r - 1) / 16, bit (r - 1) mod 16, r = 1-1024";

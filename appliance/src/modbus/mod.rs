@@ -1,4 +1,4 @@
-//! Modbus TCP: the register map, version 1.2, and the server that shows a [`Snapshot`](crate::station::Snapshot) through it.
+//! Modbus TCP: the register map, version 1.3, and the server that shows a [`Snapshot`](crate::station::Snapshot) through it.
 //!
 //! [`map`] is the one table; [`encode`] turns a snapshot into words, [`decode`] words into a write of the PLC, [`service`]
 //! answers one request, [`guard`] checks one connection's frames and times, [`places`] limits the connections, [`refusals`] logs

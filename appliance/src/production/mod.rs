@@ -4,6 +4,7 @@ mod aborts;
 pub mod backend;
 pub mod commissioning;
 mod cycle;
+pub mod drift;
 pub mod latest;
 pub mod opening;
 mod recovery;
@@ -21,6 +22,7 @@ use crate::history::{History, JudgedPart};
 use crate::production::backend::Opened;
 use crate::production::commissioning::Commission;
 use crate::production::commissioning::live::Look;
+use crate::production::drift::Watch;
 use crate::production::latest::LastCycleRequests;
 use crate::production::shelf::Shelf;
 use crate::production::simulation::Placing;
@@ -103,8 +105,10 @@ pub struct Worker {
     pub waiting: Option<Placed>,
     /// Steps of commissioning, and what they have found.
     pub commission: Commission,
-    /// The first of the patterns for live pictures, if the projector has them behind those of the recipe.
-    pub live: Option<usize>,
+    /// Whether the projector has the patterns for live pictures behind those of the recipe.
+    pub live: bool,
+    /// When the geometry is checked.
+    pub watch: Watch,
 }
 
 impl Worker {
@@ -132,25 +136,29 @@ impl Worker {
                 Err(TryRecvError::Disconnected) => Err(RecvTimeoutError::Disconnected),
                 Ok(order) => Ok(order),
             };
+            if order.is_ok() {
+                self.watch.due.disturbed();
+            }
             match order {
                 Ok(Order::Measure(job)) => {
+                    self.watch.due.cycle();
                     // Freed first: the head reuses the memory for the new frames.
                     drop(last);
                     last = self.measure(plan.as_ref(), &job);
                 }
                 Ok(Order::Load(job, key)) => {
                     last = JudgedBy::default();
-                    self.live = None;
+                    self.live = false;
                     self.load(job, &key, &mut plan);
                 }
                 Ok(Order::Teach(job, number, keep_gauges)) => {
                     last = JudgedBy::default();
-                    self.live = None;
+                    self.live = false;
                     self.teach(job, number, keep_gauges, &mut plan);
                 }
                 Ok(Order::Commission(job)) => {
                     last = JudgedBy::default();
-                    self.live = None;
+                    self.live = false;
                     self.commission(job, &mut plan);
                 }
                 Ok(Order::Look(look)) => {
@@ -164,11 +172,15 @@ impl Worker {
                     self.station.event(Event::Alive);
                     self.lost = self.opened.head.rest().err();
                     self.tell_projector(self.opened.head.controller());
+                    self.tell_camera(self.opened.head.camera_temperature_c());
+                    if self.lost.is_none() {
+                        self.rest_and_check(plan.as_ref());
+                    }
                 }
             }
             if let Some(error) = self.lost.take() {
                 last = JudgedBy::default();
-                self.live = None;
+                self.live = false;
                 if self.recover(&error, &mut plan, orders).is_break() {
                     return;
                 }
@@ -186,6 +198,13 @@ impl Worker {
         });
         if self.station.snapshot().health.projector != known {
             self.station.event(Event::Projector(known));
+        }
+    }
+
+    /// Reports the temperature of the camera's sensor, if that has changed.
+    fn tell_camera(&self, celsius: Option<f64>) {
+        if self.station.snapshot().health.camera_temperature_c != celsius {
+            self.station.event(Event::CameraTemperature(celsius));
         }
     }
 
@@ -208,6 +227,7 @@ impl Worker {
             calibration_valid: self.opened.problem.is_none(),
             ..Condition::default()
         }));
+        self.tell_drift();
     }
 
     /// Answers the requests about the last cycle.

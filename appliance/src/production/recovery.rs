@@ -44,6 +44,7 @@ impl Worker {
             remedy: REMEDY.into(),
         });
         self.tell_projector(None);
+        self.tell_camera(None);
         self.commission.set_head(None);
         let before = self.opened.calibration.fingerprint();
         let mut pause = Pause::default();

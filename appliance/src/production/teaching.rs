@@ -18,7 +18,9 @@ impl Worker {
         plan: &mut Option<Arc<Plan>>,
     ) {
         let replaced = self.recipes.present(number);
-        let taught = self.taught(job, number, replaced.as_ref(), keep_gauges);
+        let taught = self
+            .taught(job, number, replaced.as_ref(), keep_gauges)
+            .and_then(|taught| self.check_taught(job).map(|()| taught));
         self.progress.clear();
         let stored = match taught {
             Ok(taught) => self.store(&taught, replaced.filter(|_| keep_gauges)),

@@ -21,6 +21,7 @@ use crate::history::{self, Bounds, History, Numbering, Reader};
 use crate::production::backend;
 use crate::production::commissioning::Commission;
 use crate::production::commissioning::live::Live;
+use crate::production::drift::Watch;
 use crate::production::latest::LastCycleRequests;
 use crate::production::opening::Opening;
 use crate::production::shelf::Shelf;
@@ -126,8 +127,8 @@ impl Daemon {
         let last_cycle = LastCycleRequests::default();
         let calibration = Current::default();
         let simulation = Simulation::new(orders.clone());
-        let (commission, complaint) = Commission::open(&path);
-        if let Some(complaint) = complaint {
+        let (commission, complaints) = Commission::open(&path);
+        for complaint in complaints {
             progress.warn(&complaint);
         }
         let live = Live::new(orders.clone(), commission.clone());
@@ -184,6 +185,7 @@ impl Daemon {
         let simulated = config.head.backend == Backend::Sim;
         let first = first_request(config, simulated, &recipes);
         let awaited = first.is_some();
+        let checks = config.station.geometry_check_cycles;
         let measuring = {
             let (station, recipes) = (station.clone(), recipes.clone());
             let (mut config, progress, history) =
@@ -225,7 +227,8 @@ impl Daemon {
                     computing,
                     waiting,
                     commission,
-                    live: None,
+                    live: false,
+                    watch: Watch::every(checks),
                 };
                 worker.run(&inbox, begin, first);
             })?

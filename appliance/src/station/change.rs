@@ -116,6 +116,13 @@ impl Station {
         self.state = State::Commissioning { job, deadline };
     }
 
+    /// Has the worker end the step of commissioning that is under way, if there is one.
+    pub(super) fn end_step(&self, effects: &mut Effects) {
+        if let State::Commissioning { job, .. } = self.state {
+            push(effects, Effect::Abort { job });
+        }
+    }
+
     /// Why no recipe can be loaded or taught now; it can be while offline.
     fn busy(&self) -> Option<u16> {
         match self.state {

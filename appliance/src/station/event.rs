@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::clock::Micros;
 use super::control::ControlWrite;
-use super::health::{Pace, ProjectorHealth, System};
+use super::health::{Drift, Pace, ProjectorHealth, System};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 use super::result::{Inspection, ResultRecord};
 
@@ -26,6 +26,8 @@ pub enum Request {
     },
     /// Carry out the step of commissioning that is waiting for the worker.
     Commission,
+    /// End the step of commissioning that is under way.
+    EndStep,
 }
 
 /// What the worker knows about the head, sent whenever it changes.
@@ -147,6 +149,10 @@ pub enum Event {
     Paced(Pace),
     /// What the projector's controller says of itself.
     Projector(ProjectorHealth),
+    /// The temperature of the camera's sensor, °C; none if it does not say.
+    CameraTemperature(Option<f64>),
+    /// What the last check of the geometry has found; none if there was none with this calibration.
+    Drift(Option<Drift>),
     /// A survey of the system.
     Surveyed(System),
     /// The answer to [`Effect::PersistSeq`].
@@ -175,6 +181,7 @@ impl Event {
             Self::Write { .. }
                 | Self::Request(_)
                 | Self::History { .. }
+                | Self::Drift(_)
                 | Self::Surveyed(_)
                 | Self::Stored { .. }
                 | Self::Tick { .. }

@@ -133,6 +133,15 @@ pub struct Pace {
     pub sync_error_us: u32,
 }
 
+/// What the last check of the geometry has found.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Drift {
+    /// RMS distance of projector points from their epipolar lines, projector pixels.
+    pub rms_px: f64,
+    /// Whether camera and projector no longer stand to each other as they were calibrated.
+    pub drifted: bool,
+}
+
 /// Everything that the HEALTH registers show. The page shows it as JSON; null is what is not known.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Health {
@@ -145,6 +154,11 @@ pub struct Health {
     /// The projector's controller.
     #[serde(flatten)]
     pub projector: ProjectorHealth,
+    /// Temperature of the camera's sensor, °C.
+    pub camera_temperature_c: Option<f64>,
+    /// The last check of the geometry with this calibration.
+    #[serde(skip)]
+    pub drift: Option<Drift>,
     /// Processing of the last cycle that was measured, µs: all stages but waiting and exposure.
     pub processing_us: u32,
     /// The longest of them since the start, µs.
@@ -189,6 +203,11 @@ impl Health {
         let above = |celsius: Option<f64>, limit: f64| celsius.is_some_and(|is| is >= limit);
         above(self.system.cpu_temperature_c, HOT_PROCESSOR_C)
             || above(self.projector.temperature_c, HOT_PROJECTOR_C)
+    }
+
+    /// Whether the head is not as it was calibrated.
+    pub(super) fn has_drifted(&self) -> bool {
+        self.drift.is_some_and(|drift| drift.drifted)
     }
 
     /// Whether the supply is too weak or the computer slows itself down.

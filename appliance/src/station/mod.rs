@@ -76,7 +76,9 @@ pub use event::{Condition, Effect, Effects, Event, Job, JobId, Request, Unstored
 pub use fault::Fault;
 pub use gauge::{Decision, GaugeValue, Unit};
 pub use handle::{StationHandle, tick};
-pub use health::{FULL_STORAGE_MIB, HOT_PROJECTOR_C, Health, Pace, Power, ProjectorHealth, System};
+pub use health::{
+    Drift, FULL_STORAGE_MIB, HOT_PROJECTOR_C, Health, Pace, Power, ProjectorHealth, System,
+};
 pub use machine::{Limits, Settings, Station};
 pub use recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 pub use result::{Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, Verdict};

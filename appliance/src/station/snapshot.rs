@@ -68,8 +68,10 @@ pub mod warning {
     pub const FRAME_SLIP: u16 = 1 << 7;
     /// The computer's supply is too weak, or the computer slows itself down.
     pub const POWER: u16 = 1 << 8;
-    /// The words for bits 0–8, in order.
-    pub const WORDS: [&str; 9] = [
+    /// Camera and projector no longer stand to each other as they were calibrated.
+    pub const GEOMETRY: u16 = 1 << 9;
+    /// The words for bits 0–9, in order.
+    pub const WORDS: [&str; 10] = [
         "temperature",
         "storage",
         "PLC lost",
@@ -79,6 +81,7 @@ pub mod warning {
         "pattern unfit",
         "frame slip",
         "power",
+        "geometry",
     ];
 }
 
@@ -180,6 +183,11 @@ impl Snapshot {
         !matches!(self.state, 1 | 6 | 7)
     }
 
+    /// Whether nothing is under way and nothing is wrong: the head may be used for something else.
+    pub fn is_at_rest(&self) -> bool {
+        !self.is_working() && self.fault.is_none()
+    }
+
     /// Whether a STATUS bit is set.
     pub fn is(&self, bit: u16) -> bool {
         self.status & bit != 0
@@ -254,6 +262,7 @@ impl Station {
                 (warning::STORAGE, storage),
                 (warning::TEMPERATURE, self.health.is_hot()),
                 (warning::POWER, self.health.lacks_power()),
+                (warning::GEOMETRY, self.health.has_drifted()),
             ])
     }
 

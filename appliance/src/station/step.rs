@@ -34,6 +34,7 @@ impl Station {
                 self.teach(number, keep_gauges, effects);
             }
             Event::Request(Request::Commission) => self.commission(effects),
+            Event::Request(Request::EndStep) => self.end_step(effects),
             Event::Started => self.started(effects),
             Event::ExposureDone { job } => self.exposed(job, effects),
             Event::Finished { job, inspection } => self.finished(job, inspection, effects),
@@ -86,6 +87,8 @@ impl Station {
             Event::Recovered { recipe } => self.recovered(recipe, effects),
             Event::Paced(pace) => self.health.paced(pace),
             Event::Projector(projector) => self.health.projector = projector,
+            Event::CameraTemperature(celsius) => self.health.camera_temperature_c = celsius,
+            Event::Drift(drift) => self.health.drift = drift,
             Event::Surveyed(system) => self.surveyed(system, effects),
             Event::Stored { seq, failed } => self.stored(seq, failed, effects),
             Event::History { problem } => self.history_changed(problem, effects),

@@ -218,6 +218,10 @@ fn events(job: JobId) -> Vec<(Event, [u16; 13])> {
             [0, 9, 2, 3, 4, 5, 9, 7, 7, 7, 7, 8, 9],
         ),
         (
+            Event::Request(Request::EndStep),
+            [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 7, 8, 9],
+        ),
+        (
             Event::Commissioned {
                 job,
                 recipe: Some(recipe(1)),

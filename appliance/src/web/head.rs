@@ -18,6 +18,7 @@ use crate::head::calibration::geometry::{MAX_POSES, MAX_SIGMA_PPM};
 use crate::head::commission::{Exposing, Solving, Step};
 use crate::head::live::Show;
 use crate::production::commissioning::Asked;
+use crate::station::{Event, Request as Command};
 use crate::system::priority;
 
 /// The number of a live picture, which its figures have as well.
@@ -79,6 +80,18 @@ pub(super) async fn step(
     Ok(accepted())
 }
 
+pub(super) async fn end(
+    State(site): State<Site>,
+    Path(name): Path<String>,
+) -> Result<Accepted, Problem> {
+    if !site.commission.is_running(&name) {
+        let words = format!("end the step {name}: it is not running");
+        return Err(Problem::busy(words));
+    }
+    site.station.event(Event::Request(Command::EndStep));
+    Ok(accepted())
+}
+
 async fn asked(site: &Site, name: &str, body: Body) -> Result<Asked, Problem> {
     let plain = match name {
         "devices" => Some(Step::Devices),
@@ -118,7 +131,7 @@ fn exposure(site: &Site, wanted: Exposure) -> Result<Asked, Problem> {
     };
     let given = wanted.exposure_us.is_some() || wanted.gain.is_some() || wanted.keep;
     if given {
-        exposing.check().map_err(Problem::unfit)?;
+        exposing.check(head.least_gain).map_err(Problem::unfit)?;
         if !head.adjustable {
             let words = "set the exposure: recordings cannot be exposed anew";
             return Err(Problem::unfit(words));

@@ -98,6 +98,7 @@ impl Text {
         self.family(name, "gauge", "Temperatures by part.");
         for (part, celsius) in [
             ("processor", system.cpu_temperature_c),
+            ("camera", health.camera_temperature_c),
             ("projector", projector.temperature_c),
         ] {
             if let Some(celsius) = celsius {
@@ -124,6 +125,10 @@ impl Text {
             if let Some(value) = value {
                 self.gauge(name, value, meaning);
             }
+        }
+        if let Some(drift) = health.drift {
+            let meaning = "Distance of projector points from their epipolar lines at the last check, RMS, projector pixels.";
+            self.gauge("fringed_drift_pixels", drift.rms_px, meaning);
         }
     }
 

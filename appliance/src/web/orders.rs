@@ -83,7 +83,7 @@ pub(super) async fn reload(site: &Site, number: u16) -> Reload {
     let mut snapshots = site.station.subscribe();
     let begin = async {
         loop {
-            let rest = snapshots.wait_for(|now| !is_active(now) || at_rest(now));
+            let rest = snapshots.wait_for(|now| !is_active(now) || now.is_at_rest());
             match rest.await.map(|now| is_active(&now)) {
                 Ok(true) if begin_load(site, number).is_ok() => return true,
                 // A trigger came first.
@@ -98,11 +98,6 @@ pub(super) async fn reload(site: &Site, number: u16) -> Reload {
         active: loading || is_active(&site.station.snapshot()),
         loading,
     }
-}
-
-/// Whether nothing is under way, so that a recipe can be loaded.
-fn at_rest(snapshot: &Snapshot) -> bool {
-    !snapshot.is_working() && snapshot.fault.is_none()
 }
 
 /// Refuses to change recipe files while the station reads or writes them.

@@ -130,6 +130,12 @@ pub fn routes() -> Vec<Route> {
             "commission head",
             head::step,
         ),
+        change(
+            DELETE,
+            "/api/head/steps/{name}",
+            "end step of commissioning",
+            head::end,
+        ),
         look("/api/simulation/part", simulation::part),
         change(
             PUT,

@@ -65,6 +65,7 @@ fn health(health: &Health) -> Value {
             .power
             .map(|power| json!({ "now": power.now(), "since_start": power.since_start() }))
     );
+    shown["drift_px"] = json!(health.drift.map(|drift| drift.rms_px));
     let version =
         |numbers: Option<[u16; 2]>| numbers.map(|[major, minor]| format!("{major}.{minor}"));
     shown["kernel"] = json!(version(system.kernel));

@@ -26,6 +26,11 @@ const MAX_BOARD: usize = 64;
 /// Most poses that are kept.
 pub const MAX_POSES: usize = crate::head::calibration::geometry::MAX_POSES;
 
+/// Least gain of any camera: a simulated one may be darker than its light.
+pub const LEAST_GAIN: f64 = 0.01;
+/// Largest gain of any camera.
+pub const MOST_GAIN: f64 = 64.0;
+
 /// Exposure and gain of the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -42,13 +47,13 @@ impl Exposing {
         Duration::from_micros(u64::from(self.exposure_us))
     }
 
-    /// Checks the ranges.
+    /// Checks the ranges; `least_gain` is that of the camera.
     ///
     /// # Errors
     /// In words that name the key and its range.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self, least_gain: f64) -> Result<(), String> {
         within("exposure_us", self.exposure_us, 1, 1_000_000)?;
-        within("gain", self.gain, 0.01, 64.0)
+        within("gain", self.gain, least_gain, MOST_GAIN)
     }
 }
 
@@ -139,7 +144,7 @@ impl Commissioning {
 
     fn check(&self) -> Result<(), String> {
         if let Some(exposing) = &self.exposing {
-            exposing.check()?;
+            exposing.check(LEAST_GAIN)?;
         }
         text("board", self.board.as_deref().unwrap_or(""), MAX_BOARD)?;
         length("poses", self.poses.len(), 0, MAX_POSES)?;

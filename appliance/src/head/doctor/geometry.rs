@@ -2,7 +2,7 @@
 
 use super::{Check, Verdict};
 use crate::head::calibration::Calibration;
-use crate::head::examine::{MOST_DRIFT_PX, PATIENCE, drift};
+use crate::head::examine::{CrossedFringes, DRIFT_REMEDY, MOST_DRIFT_PX, PATIENCE};
 use hal::error::Error;
 use hal::head::Head;
 use serde_json::json;
@@ -19,7 +19,8 @@ pub(super) fn geometry(
     if !calibrated {
         return Ok(skipped("cannot be judged before the head is calibrated"));
     }
-    let Some(seen) = drift(head, calibration, PATIENCE)? else {
+    let fringes = CrossedFringes::take(head, calibration, PATIENCE, &|| ())?;
+    let Some(seen) = fringes.compare(calibration)? else {
         return Ok(skipped(
             "cannot be judged: too little of the picture shows fringes; put a larger part into view",
         ));
@@ -28,11 +29,10 @@ pub(super) fn geometry(
         "projector points are {:.2} px off their epipolar lines (limit {MOST_DRIFT_PX} px, noise of a point {:.2} px)",
         seen.rms, seen.noise
     );
-    let remedy = "camera or projector was knocked or refocused since the calibration: calibrate the geometry anew";
     let measured = json!({
         "epipolar_px": seen.rms, "offset_px": seen.offset, "gradient_px": seen.gradient,
         "noise_px": seen.noise, "pixels": seen.pixels,
     });
     let moved = !(seen.rms <= MOST_DRIFT_PX);
-    Ok(Check::new(found, moved.then_some(remedy), measured))
+    Ok(Check::new(found, moved.then_some(DRIFT_REMEDY), measured))
 }

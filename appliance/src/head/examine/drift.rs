@@ -2,9 +2,10 @@
 
 use crate::head::calibration::Calibration;
 use crate::head::scan::{self, Scan};
-use algo::pattern::{PhaseFunction, Sequence};
+use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
 use algo::pipeline::{Epipolar, PhaseMap};
 use hal::error::Error;
+use hal::frame::Frame;
 use hal::head::Head;
 use std::time::Duration;
 
@@ -17,37 +18,58 @@ const PITCH: f64 = 16.0;
 /// Beyond this RMS distance of projector points from their epipolar lines, projector pixels, the models are not those of the head any
 /// more: a real board in poses that were not used for the calibration left 0.08 to 0.43, a camera that was turned by 0.05° leaves 1.
 pub const MOST_DRIFT_PX: f64 = 0.5;
+/// What to do about a head beyond that.
+pub const DRIFT_REMEDY: &str = "camera or projector was knocked or refocused since the calibration: calibrate the geometry anew";
 
-/// Compares the head with its models; `None` if too little of the frame shows fringes. The head's timing must be calibrated.
-///
-/// # Errors
-/// Of a device, or if the projector is too small for the fringes.
-pub fn drift(
-    head: &mut Head,
-    calibration: &Calibration,
-    timeout: Duration,
-) -> Result<Option<Epipolar>, Error> {
-    let (columns, rows) = head.projector_size();
-    let (columns, rows) = (columns as usize, rows as usize);
-    let mut maps = Vec::with_capacity(2);
-    for vertical in [true, false] {
-        let function = match vertical {
-            true => PhaseFunction::vertical(columns, rows, columns as f64 / PITCH),
-            false => PhaseFunction::horizontal(columns, rows, rows as f64 / PITCH),
+/// Frames of a part under vertical and then under horizontal fringes.
+pub struct CrossedFringes([(PhaseRange, Vec<Shot>, Vec<Frame>); 2]);
+
+impl CrossedFringes {
+    /// Takes them. The head's timing must be calibrated. `progress` is called after each frame.
+    ///
+    /// # Errors
+    /// Of a device, or if the projector is too small for the fringes.
+    pub fn take(
+        head: &mut Head,
+        calibration: &Calibration,
+        timeout: Duration,
+        progress: &dyn Fn(),
+    ) -> Result<Self, Error> {
+        let mut take = |vertical: bool| {
+            let (columns, rows) = head.projector_size();
+            let (columns, rows) = (columns as usize, rows as usize);
+            let function = match vertical {
+                true => PhaseFunction::vertical(columns, rows, columns as f64 / PITCH),
+                false => PhaseFunction::horizontal(columns, rows, rows as f64 / PITCH),
+            };
+            let function = function.map_err(|error| small(&error.to_string()))?;
+            let shots = Sequence::geometric(function.range(), LEVELS, SHIFTS);
+            let said = |_| progress();
+            let taken = scan::take(head, calibration, &function, &shots, timeout, &said)?;
+            Ok::<_, Error>((function.range(), shots, taken))
         };
-        let small = |problem: String| {
-            Error::unsupported(
-                format!("fringes of {PITCH} px: {problem}, which"),
-                "use a projector of more pixels",
-            )
-        };
-        let function = function.map_err(|error| small(error.to_string()))?;
-        let shots = Sequence::geometric(function.range(), LEVELS, SHIFTS);
-        let taken = scan::take(head, calibration, &function, &shots, timeout, &|_| ())?;
-        let map: Result<PhaseMap, String> =
-            Scan::new(function.range(), &shots, &taken).and_then(|scan| scan.phases(None));
-        maps.push(map.map_err(small)?);
+        Ok(Self([take(true)?, take(false)?]))
     }
-    let devices = (&calibration.camera, &calibration.projector);
-    Ok(Epipolar::of(devices, [&maps[0], &maps[1]], [PITCH; 2]))
+
+    /// Compares what they show with the models of the head; `None` if too little of the frame shows fringes.
+    ///
+    /// # Errors
+    /// If the projector is too small for the fringes.
+    pub fn compare(&self, calibration: &Calibration) -> Result<Option<Epipolar>, Error> {
+        let phases = |at: usize| -> Result<PhaseMap, Error> {
+            let (range, shots, taken) = &self.0[at];
+            let map = Scan::new(*range, shots, taken).and_then(|scan| scan.phases(None));
+            map.map_err(|error| small(&error))
+        };
+        let devices = (&calibration.camera, &calibration.projector);
+        let (vertical, horizontal) = (phases(0)?, phases(1)?);
+        Ok(Epipolar::of(devices, [&vertical, &horizontal], [PITCH; 2]))
+    }
+}
+
+fn small(problem: &str) -> Error {
+    Error::unsupported(
+        format!("fringes of {PITCH} px: {problem}, which"),
+        "use a projector of more pixels",
+    )
 }

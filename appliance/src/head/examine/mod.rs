@@ -19,7 +19,7 @@ mod stamps;
 pub use content::{MOST_BY_CONTENT, by_content};
 pub use contrast::{PITCHES, contrast};
 pub use delay::Delay;
-pub use drift::{MOST_DRIFT_PX, drift};
+pub use drift::{CrossedFringes, DRIFT_REMEDY, MOST_DRIFT_PX};
 pub use first_light::{LONGEST_DARK, first_light};
 pub use noise::noise;
 pub use pace::{Spaced, pace};

@@ -87,16 +87,11 @@ fn take(
     ))
 }
 
-/// One picture of a loaded pattern; none if `go_on` has ended it or the frame was lost. It ends as soon as the frame of a triggered camera has arrived.
+/// One picture of a loaded pattern; none if the frame was lost. It ends as soon as the frame of a triggered camera has arrived.
 ///
 /// # Errors
 /// Of a device.
-pub fn picture(
-    head: &mut Head,
-    index: usize,
-    settle: u32,
-    go_on: &dyn Fn() -> bool,
-) -> Result<Option<Frame>, Error> {
+pub fn picture(head: &mut Head, index: usize, settle: u32) -> Result<Option<Frame>, Error> {
     // A camera that runs by itself has frames of before the light has settled.
     let triggered = head.camera_timing().starts == Starts::OnTrigger;
     let there = Cell::new(false);
@@ -105,7 +100,7 @@ pub fn picture(
         there.set(true);
         frame.clone()
     };
-    let still = || go_on() && !(triggered && there.get());
+    let still = || !(triggered && there.get());
     let seen = head.watch_while(&showings, PATIENCE, &mut measure, &still)?;
     Ok(settled(head, &seen, 0, settle).cloned())
 }

@@ -189,7 +189,7 @@ async fn health_says_what_is_known_and_what_is_not() {
         unknown[22..28],
         [0xFFFF, 0xFFFF, 0xFFFF, 0x8000, 0x8000, 0x8000]
     );
-    assert_eq!(unknown[30..37], [0xFFFF; 7]);
+    assert_eq!(unknown[30..38], [0xFFFF; 8]);
     plant.handle.event(Event::Surveyed(System {
         cpu_percent: Some(37),
         free_memory_mib: Some(1234),
@@ -222,17 +222,26 @@ async fn health_says_what_is_known_and_what_is_not() {
         faults: Some(0b10),
         fault_words: Some(vec!["LED"]),
     }));
+    plant.handle.event(Event::CameraTemperature(Some(-3.26)));
+    plant.handle.event(Event::Drift(Some(Drift {
+        rms_px: 1.2344,
+        drifted: true,
+    })));
     let words = plc.read_input_registers(600, 40).await.unwrap().unwrap();
     let long = |k: usize| u32_at(&words, k);
     assert_eq!((long(0), long(2), long(4)), (2000, 60_000, 12));
     assert_eq!((long(6), long(8)), (4, 2), "counted since the start");
     assert_eq!((long(16), long(18), long(20)), (0x1_0002, 3, 1));
-    assert_eq!(words[22..30], [37, 1234, 65534, 512, 0x8000, 700, 2, 1]);
+    assert_eq!(
+        words[22..30],
+        [37, 1234, 65534, 512, (-33_i16).cast_unsigned(), 700, 2, 1]
+    );
     // Throttled now; under-voltage at some time before.
     assert_eq!(words[30..37], [0b0101_0100, 0b10, 600, 6, 12, 0, 7]);
-    assert_eq!(words[37..], [0; 3], "reserved registers read 0");
+    assert_eq!(words[37], 1234);
+    assert_eq!(words[38..], [0; 2], "reserved registers read 0");
     let warning = plc.read_input_registers(103, 1).await.unwrap().unwrap();
-    assert_eq!(warning[0] & 0x101, 0x101, "power and temperature");
+    assert_eq!(warning[0] & 0x301, 0x301, "geometry, power and temperature");
     let stored = plc.read_input_registers(700, 64).await.unwrap().unwrap();
     assert_eq!((stored[0], stored[1], stored[63]), (0b11, 1, 1 << 15));
     assert_eq!(stored.iter().map(|word| word.count_ones()).sum::<u32>(), 4);

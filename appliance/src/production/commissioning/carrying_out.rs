@@ -11,10 +11,12 @@ use crate::recipe::plan::Plan;
 use crate::station::{Event, JobId};
 use crate::storage::folder::write_whole;
 use hal::frame::Frame;
+use hal::head::Head;
 use std::fs;
 use std::panic::resume_unwind;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 impl Worker {
@@ -51,7 +53,13 @@ impl Worker {
             return self.keep(kept);
         }
         let timing = self.opened.head.timing();
-        let white = self.step(job, &asked.step, &mut kept);
+        let (white, ended) = self.step(job, &asked.step, &mut kept);
+        if ended {
+            // What it has found so far is not kept.
+            self.opened.head.set_timing(timing);
+            let name = asked.step.name().word();
+            return self.progress.log(&format!("the step {name} was ended"));
+        }
         if self.opened.problem.is_none() {
             // The calibration in use stays so until another one is complete.
             self.opened.head.set_timing(timing);
@@ -77,8 +85,8 @@ impl Worker {
         self.tell_condition();
     }
 
-    /// Runs the step on the head.
-    fn step(&mut self, job: JobId, step: &Step, kept: &mut Commissioning) -> Option<Frame> {
+    /// Runs the step on the head. Returns the white frame of a pose, and whether a stop, the page or the PLC has ended the step.
+    fn step(&mut self, job: JobId, step: &Step, kept: &mut Commissioning) -> (Option<Frame>, bool) {
         let before = self.stored();
         let (station, pulse, bar) = (&self.station, &self.pulse, &self.progress);
         let commission = &self.commission;
@@ -96,30 +104,43 @@ impl Worker {
         let opened = &mut self.opened;
         let mut calibration = opened.calibration.clone();
         let calibrated = opened.problem.is_none();
-        let mut subject = Subject {
-            exact: calibrated && opened.stage.is_some(),
-            calibrated: calibrated || kept.measured.is_some(),
-            head: &mut opened.head,
-            calibration: &mut calibration,
-            before,
-            place: self.config.calibration.as_deref().unwrap_or(Path::new("")),
-            progress: &progress,
-        };
-        let pool = &self.pool;
-        if !matches!(step, Step::Solve(_)) {
-            return pool.install(|| step.run(&mut subject, kept));
-        }
-        // It computes for long, without a device and without telling how far it is.
-        self.computing.on(|| {
-            thread::scope(|scope| {
-                let solving = scope.spawn(|| pool.install(|| step.run(&mut subject, kept)));
-                while !solving.is_finished() {
-                    progress(0.1, "adjusting the models");
-                    thread::sleep(SIGN_OF_LIFE);
-                }
-                solving.join().unwrap_or_else(|panic| resume_unwind(panic))
+        let exact = calibrated && opened.stage.is_some();
+        let place = self.config.calibration.as_deref().unwrap_or(Path::new(""));
+        let (pool, computing) = (&self.pool, &self.computing);
+        let run = |head: &mut Head| {
+            let mut subject = Subject {
+                exact,
+                calibrated: calibrated || kept.measured.is_some(),
+                head,
+                calibration: &mut calibration,
+                before,
+                place,
+                progress: &progress,
+            };
+            if !matches!(step, Step::Solve(_)) {
+                return pool.install(|| step.run(&mut subject, kept));
+            }
+            // It computes for long, without a device and without telling how far it is.
+            computing.on(|| {
+                thread::scope(|scope| {
+                    let solving = scope.spawn(|| pool.install(|| step.run(&mut subject, kept)));
+                    while !solving.is_finished() {
+                        progress(0.1, "adjusting the models");
+                        thread::sleep(SIGN_OF_LIFE);
+                    }
+                    solving.join().unwrap_or_else(|panic| resume_unwind(panic))
+                })
             })
-        })
+        };
+        let ended = Arc::new(AtomicBool::new(false));
+        let (aborts, refused) = (self.aborts.clone(), ended.clone());
+        let go_on = move || {
+            let ends = aborts.has(job);
+            refused.fetch_or(ends, Ordering::Relaxed);
+            !ends
+        };
+        let white = opened.head.aside(0, Arc::new(go_on), run);
+        (white, ended.load(Ordering::Relaxed))
     }
 
     /// The stored calibration, if it is of this head.
@@ -202,6 +223,7 @@ impl Worker {
             problem: opened.problem.clone(),
             calibration: opened.calibration.clone(),
             exposing,
+            least_gain: self.config.least_gain(),
             refresh_us: opened.head.refresh().as_micros() as u64,
         }));
     }

@@ -125,34 +125,30 @@ impl Worker {
     }
 
     fn looked(&mut self, look: &Look, plan: Option<&Arc<Plan>>) -> Result<Option<Picture>, Error> {
-        let station = &self.station;
-        let at_rest = || !station.snapshot().is_working();
+        let station = self.station.clone();
+        let at_rest = move || !station.snapshot().is_working();
         if !at_rest() {
             return Ok(None);
         }
         let (pool, calibration) = (&self.pool, &self.opened.calibration);
-        let first = match self.live {
-            Some(first) => first,
-            None => {
-                let mut all = match plan {
-                    Some(plan) => pool.install(|| plan.rasters(calibration))?,
-                    None => Vec::new(),
-                };
-                let first = all.len();
-                all.extend(pool.install(|| rasters(calibration))?);
-                self.opened.head.load(all)?;
-                self.live = Some(first);
-                first
-            }
-        };
         let head = &mut self.opened.head;
         // Nothing is known of the delay before it is measured.
         let known =
             self.opened.problem.is_none() || self.commission.inside().kept.measured.is_some();
         let settle = if known { settled(head) } else { SETTLE };
-        let index = first + look.show.at(look.shift);
-        let taken = picture(head, index, settle, &at_rest);
+        let index = look.show.at(look.shift);
+        let (kept, live) = (plan.map_or(0, |plan| plan.patterns()), &mut self.live);
+        let taken = head.aside(kept, Arc::new(at_rest), |head| {
+            if !*live {
+                head.load(pool.install(|| rasters(calibration))?)?;
+                *live = true;
+            }
+            picture(head, index, settle)
+        });
         self.pulse.beat();
-        Ok(taken?.map(|frame| Picture::of(&frame)))
+        match taken {
+            Err(Error::Ended { .. }) => Ok(None),
+            taken => Ok(taken?.map(|frame| Picture::of(&frame))),
+        }
     }
 }

@@ -9,6 +9,7 @@ mod view;
 
 use crate::head::calibration::Calibration;
 use crate::head::commission::{Commissioning, Exposing, Step};
+use crate::production::drift::Trend;
 use crate::station::{Event, Request, StationHandle};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -39,6 +40,8 @@ pub struct OpenHead {
     pub calibration: Calibration,
     /// Exposure and gain.
     pub exposing: Exposing,
+    /// The least gain that the camera can be set to.
+    pub least_gain: f64,
     /// Time between two refreshes of the projector, µs.
     pub refresh_us: u64,
 }
@@ -65,11 +68,13 @@ struct Inside {
 pub struct Commission {
     state: PathBuf,
     inside: Arc<Mutex<Inside>>,
+    drift: Trend,
 }
 
 impl Commission {
-    /// With what is kept in the state folder, and a complaint if that cannot be used: then the steps begin anew.
-    pub fn open(state: &Path) -> (Self, Option<String>) {
+    /// With what is kept in the state folder, and complaints about what of it cannot be used and begins anew.
+    pub fn open(state: &Path) -> (Self, Vec<String>) {
+        let (drift, unfit) = Trend::open(state);
         let (kept, complaint) = match Commissioning::load(state) {
             Ok(kept) => (kept, None),
             Err(problem) => {
@@ -84,8 +89,14 @@ impl Commission {
         let opened = Self {
             state: state.to_path_buf(),
             inside: Arc::new(Mutex::new(inside)),
+            drift,
         };
-        (opened, complaint)
+        (opened, complaint.into_iter().chain(unfit).collect())
+    }
+
+    /// What the checks of the geometry have found.
+    pub fn drift(&self) -> &Trend {
+        &self.drift
     }
 
     fn inside(&self) -> MutexGuard<'_, Inside> {
@@ -113,6 +124,15 @@ impl Commission {
             self.ended();
         }
         begun
+    }
+
+    /// Whether this step is under way.
+    pub fn is_running(&self, name: &str) -> bool {
+        let inside = self.inside();
+        inside
+            .running
+            .as_ref()
+            .is_some_and(|running| running.name == name)
     }
 
     /// The number that the next pose gets.

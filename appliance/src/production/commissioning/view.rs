@@ -30,14 +30,14 @@ impl Commission {
             "calibrated": head.problem.is_none(),
             "problem": head.problem,
             "camera": {
-                "columns": width, "rows": height, "bits": bits, "exposure_us": head.exposing.exposure_us, "gain": head.exposing.gain,
+                "columns": width, "rows": height, "bits": bits, "exposure_us": head.exposing.exposure_us, "gain": head.exposing.gain, "least_gain": head.least_gain,
                 "refresh_us": head.refresh_us, "adjustable": head.adjustable,
             },
             "projector": { "columns": columns, "rows": rows },
             "running": running,
             "steps": steps(&inside, snapshot),
             "geometry": geometry(&inside.kept, head),
-            "drift": null,
+            "drift": self.drift.view(&head.calibration.fingerprint()),
         })
     }
 }

@@ -276,6 +276,11 @@ impl Plan {
         rasters(function, &self.shots, calibration)
     }
 
+    /// How many rasters [`Self::rasters`] makes.
+    pub fn patterns(&self) -> usize {
+        self.shots.len()
+    }
+
     /// Judges a part from the frames of a sequence; the times of its stages begin at `exposed`. A part that cannot be measured
     /// is INVALID with a reason.
     pub fn inspect(&self, sequence: usize, frames: &[Frame], exposed: Instant) -> Inspection {

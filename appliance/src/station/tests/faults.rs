@@ -364,3 +364,27 @@ fn a_fault_of_storage_gives_way_to_a_lost_head_and_comes_again_after_it() {
     bench.event(recovered(Some(recipe(1))));
     assert_eq!(bench.event(room(0)).error_code, error_code::STORAGE_FULL);
 }
+
+#[test]
+fn a_step_of_commissioning_can_be_ended_and_nothing_else_is_by_that() {
+    let mut bench = Bench::ready();
+    let ended = |bench: &Bench| {
+        let aborts = bench.effects.iter();
+        aborts
+            .filter(|effect| matches!(effect, Effect::Abort { .. }))
+            .count()
+    };
+    bench.event(Event::Request(Request::EndStep));
+    assert_eq!(ended(&bench), 0);
+    bench.event(Event::Request(Request::Commission));
+    let Some(Effect::Commission { job }) = bench.effects.last().cloned() else {
+        panic!("{:?}", bench.effects);
+    };
+    bench.event(Event::Request(Request::EndStep));
+    assert!(
+        bench.effects.contains(&Effect::Abort { job }),
+        "{:?}",
+        bench.effects
+    );
+    assert_eq!(bench.station.snapshot().state_word, "commissioning");
+}

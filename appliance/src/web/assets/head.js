@@ -1,6 +1,8 @@
 // The head: its live picture, its set-up step by step, and its drift.
-import { $, show, text } from "./element.js";
+import { $, fill, show, text } from "./element.js";
 import { ask } from "./api.js";
+import { moment } from "./number.js";
+import { trend } from "./trend.js";
 import { openLive, showCamera, start as startLive } from "./live.js";
 import { showSteps, start as startSteps } from "./steps.js";
 import { showGeometry, start as startGeometry } from "./geometry.js";
@@ -9,9 +11,21 @@ const EVERY_MS = 500;
 let timer = 0;
 let visible = false;
 
-// Whether camera and projector are still where they were calibrated, by the last check.
+// Whether camera and projector are still where they were calibrated, by the last checks.
 function showDrift(drift) {
-  text("drift-words", drift ? `Camera and projector fit each other within ${drift.epipolar_px.toFixed(2)} px; from ${drift.limit_px.toFixed(2)} px on, the geometry is to be made anew.` : "");
+  show("drift", Boolean(drift));
+  if (!drift) return;
+  const when = drift.at_unix_s ? ` Checked ${moment({ utc_us: 1e6 * drift.at_unix_s })}.` : "";
+  const off = `${drift.epipolar_px.toFixed(2)} px off their epipolar lines, limit ${drift.limit_px.toFixed(2)} px`;
+  text("drift-words", drift.drifted
+    ? `Camera and projector no longer stand as they were calibrated (${off}).${when}`
+    : `Camera and projector stand as they were calibrated (${off}).${when}`);
+  text("drift-remedy", drift.remedy ? `What to do: ${drift.remedy}` : "");
+  const key = `${drift.trend.length} ${drift.at_unix_s} ${drift.epipolar_px}`;
+  if ($("drift-trend").dataset.key === key) return;
+  $("drift-trend").dataset.key = key;
+  const points = drift.trend.map((point) => ({ value: point.epipolar_px, pass: point.epipolar_px <= drift.limit_px }));
+  fill($("drift-trend"), trend(points, { unit: "px", lowest: null, highest: drift.limit_px }));
 }
 
 async function refresh() {

@@ -71,7 +71,8 @@ function showRate() {
 }
 
 // Offers the exposures of a camera, and fills in the one in use unless somebody is changing it.
-export function showCamera({ refresh_us, exposure_us, gain, adjustable }) {
+export function showCamera({ refresh_us, exposure_us, gain, least_gain, adjustable }) {
+  $("live-gain").min = String(least_gain);
   if (refresh_us !== state.refresh_us) {
     state.refresh_us = refresh_us;
     const offered = REFRESHES.map((refreshes) => refreshes * refresh_us).concat(exposure_us);

@@ -21,6 +21,7 @@ function form(unit) {
   if (unit === "mm") return [1, 3, " mm"];
   if (unit === "mm³") return [1, 2, " mm³"];
   if (unit === "°") return [1, 3, "°"];
+  if (unit === "px") return [1, 2, " px"];
   return [100, 2, " %"];
 }
 

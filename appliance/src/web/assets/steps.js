@@ -56,7 +56,8 @@ function showStep(step, running) {
   bar.value = now ? now.share : 0;
   place.querySelector(".now").textContent = now ? now.said : "";
   place.querySelector(".at").textContent = step.at_unix_s ? `last run ${moment({ utc_us: 1e6 * step.at_unix_s })}` : "";
-  for (const button of place.querySelectorAll("button:not(.open)")) button.disabled = Boolean(running);
+  for (const button of place.querySelectorAll("button:not(.open, .end)")) button.disabled = Boolean(running);
+  place.querySelector(".end").hidden = !now;
   announce(step);
 }
 
@@ -94,7 +95,11 @@ function furnish(name, at) {
   const bar = make("progress", "bar");
   bar.max = 1;
   bar.setAttribute("aria-label", `how far ${title(name)} is`);
-  for (const part of [make("ul", "said"), make("p", "remedy"), bar, make("p", "now quiet")]) place.insertBefore(part, act);
+  const end = make("button", "end", "Stop this step");
+  end.type = "button";
+  end.hidden = true;
+  end.addEventListener("click", () => change(() => ask("DELETE", `/api/head/steps/${name}`)));
+  for (const part of [make("ul", "said"), make("p", "remedy"), bar, make("p", "now quiet"), end]) place.insertBefore(part, act);
   place.append(make("span", "at quiet"));
 }
 

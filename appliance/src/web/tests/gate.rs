@@ -2,7 +2,7 @@
 
 use super::*;
 
-const CHANGES: [(&str, &str); 10] = [
+const CHANGES: [(&str, &str); 11] = [
     ("POST", "/api/trigger"),
     ("POST", "/api/reset"),
     ("POST", "/api/recipes"),
@@ -12,6 +12,7 @@ const CHANGES: [(&str, &str); 10] = [
     ("POST", "/api/recipes/1/load"),
     ("POST", "/api/recipes/1/teach"),
     ("POST", "/api/head/steps/plane"),
+    ("DELETE", "/api/head/steps/plane"),
     ("PUT", "/api/simulation/part"),
 ];
 
