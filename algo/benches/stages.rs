@@ -58,7 +58,7 @@ impl Scene {
     fn new(frames: &[Shot]) -> Self {
         let map = triangulator().reference_map();
         let sequence = Sequence::from_frames(frames).unwrap();
-        let light = |&Shot { ratio, shift }: &Shot| {
+        let light = |&Shot { ratio, shift, .. }: &Shot| {
             let sample = |phase: &AbsolutePhase| {
                 let sine = (TAU * (ratio * phase.turns() + shift)).sin();
                 (122.0 + 100.0 * sine).round() as u8
@@ -131,12 +131,9 @@ fn reference_map(bencher: Bencher<'_, '_>) {
 #[divan::bench]
 fn pattern_raster(bencher: Bencher<'_, '_>) {
     let function = function();
-    let shot = Shot {
-        ratio: 1.0,
-        shift: 0.25,
-    };
+    let shot = Shot::sine(1.0, 0.25);
     let counter = ItemsCount::new(1024_usize * 768);
     bencher
         .counter(counter)
-        .bench(|| Encoder::new(None).raster(&function, shot));
+        .bench(|| Encoder::new(None, &[]).raster(&function, shot));
 }

@@ -20,6 +20,8 @@ pub const MAX_EXPOSURE_US: f64 = 10_000_000.0;
 pub const RATIOS: [f64; 2] = [1e-6, 1000.0];
 /// Largest shift of a frame in either direction, turns; only its fraction matters.
 pub const MAX_SHIFT_TURNS: f64 = 1000.0;
+/// Highest order of a harmonic of a projected waveform.
+pub const MAX_HARMONIC: u8 = 15;
 /// Farthest that a simulated part is moved along an axis, mm.
 pub const MAX_PLACEMENT_MM: f64 = 1000.0;
 /// Farthest that a simulated part is tilted about x or y, degrees.

@@ -117,6 +117,7 @@ impl Scene {
                 recording.frames.push(RecordedFrame {
                     ratio,
                     shift_turns,
+                    harmonics: Vec::new(),
                     pattern,
                     timestamp_ns: Some(1_000_000 * place),
                     frame: frame(format, samples, place),

@@ -5,6 +5,7 @@ mod function;
 mod interpolate;
 mod sequence;
 mod shot;
+mod waveform;
 
 pub use encode::{Encoder, GreyRaster, GreyResponse, ResponseError};
 pub use function::{MAX_TURNS, PhaseFunction, PhaseFunctionError, PhaseRange};
@@ -13,3 +14,4 @@ pub use sequence::{
     SequenceError, Unwrapping,
 };
 pub use shot::Shot;
+pub use waveform::{MAX_ORDER, Waveform, Waveforms};

@@ -1,7 +1,7 @@
 //! Sequences: which level and shift each frame is, and how the levels are unwrapped.
 
 use super::function::MAX_TURNS;
-use super::{PhaseRange, Shot};
+use super::{PhaseRange, Shot, Waveform};
 use alloc::vec::Vec;
 
 /// Levels that a sequence may have.
@@ -31,6 +31,8 @@ pub struct Level {
     pub start: f64,
     /// For k = 0 … N−1, the place in the sequence of the frame with shift start + k/N.
     pub frames: heapless::Vec<u16, MAX_SHIFTS>,
+    /// What each frame shows for a turn of phase.
+    pub waveform: Waveform,
 }
 
 impl Level {
@@ -56,10 +58,14 @@ pub enum SequenceError {
     Empty,
     /// A ratio is not a positive finite number, or a shift not finite.
     #[error(
-        "a frame with ratio {} and shift {}: both must be finite and the ratio positive",
-        .0.ratio, .0.shift
+        "a frame with ratio {ratio} and shift {shift}: both must be finite and the ratio positive"
     )]
-    NotFinite(Shot),
+    NotFinite {
+        /// Its ratio.
+        ratio: f64,
+        /// Its shift in turns.
+        shift: f64,
+    },
     /// More levels than [`MAX_LEVELS`].
     #[error("{0} levels where at most {MAX_LEVELS} can be decoded")]
     TooManyLevels(usize),
@@ -83,6 +89,24 @@ pub enum SequenceError {
         shifts: usize,
         /// The shift that is not on the grid, in turns.
         shift: f64,
+    },
+    /// The frames of a level show different waveforms.
+    #[error(
+        "the frames of the level of ratio {0} have different harmonics: all frames of a level show the same waveform"
+    )]
+    Waveforms(f64),
+    /// A harmonic of a level would be taken for the fundamental.
+    #[error(
+        "harmonic {order} of the level of ratio {ratio} cannot be told from its fundamental by {shifts} shifts: \
+         harmonics must not be 1 more or less than a multiple of the number of shifts"
+    )]
+    Alias {
+        /// The level's ratio.
+        ratio: f64,
+        /// The harmonic.
+        order: u8,
+        /// The level's number of shifts.
+        shifts: usize,
     },
     /// The ratios have no form that can be unwrapped.
     #[error(
@@ -122,16 +146,16 @@ impl Sequence {
     /// anywhere.
     ///
     /// # Errors
-    /// If a level has a number of shifts out of range or they are not equally spaced, or there are
-    /// too many levels.
+    /// If a level has a number of shifts out of range or they are not equally spaced, its frames show different waveforms or one
+    /// that its shifts cannot demodulate, or there are too many levels.
     pub fn from_frames(frames: &[Shot]) -> Result<Self, SequenceError> {
         if frames.is_empty() {
             return Err(SequenceError::Empty);
         }
         let finite =
             |shot: &Shot| shot.ratio.is_finite() && shot.ratio > 0.0 && shot.shift.is_finite();
-        if let Some(&shot) = frames.iter().find(|shot| !finite(shot)) {
-            return Err(SequenceError::NotFinite(shot));
+        if let Some(&Shot { ratio, shift, .. }) = frames.iter().find(|shot| !finite(shot)) {
+            return Err(SequenceError::NotFinite { ratio, shift });
         }
         let mut ratios: Vec<f64> = frames.iter().map(|shot| shot.ratio).collect();
         ratios.sort_by(f64::total_cmp);
@@ -149,6 +173,12 @@ impl Sequence {
     }
 
     fn level(ratio: f64, frames: &[Shot]) -> Result<Level, SequenceError> {
+        let of_level = || frames.iter().filter(|shot| shot.ratio == ratio);
+        let waveform = of_level().map(|shot| shot.waveform).next();
+        let waveform = waveform.unwrap_or_default();
+        if of_level().any(|shot| shot.waveform != waveform) {
+            return Err(SequenceError::Waveforms(ratio));
+        }
         let frames: Vec<(u16, f64)> = (0..)
             .zip(frames)
             .filter(|(_, shot)| shot.ratio == ratio)
@@ -157,6 +187,13 @@ impl Sequence {
         let shifts = frames.len();
         if !(3..=MAX_SHIFTS).contains(&shifts) {
             return Err(SequenceError::Shifts { ratio, shifts });
+        }
+        if let Some(order) = waveform.alias(shifts) {
+            return Err(SequenceError::Alias {
+                ratio,
+                order,
+                shifts,
+            });
         }
         let start = frames[0].1 - libm::floor(frames[0].1);
         let mut places = [None; MAX_SHIFTS];
@@ -182,6 +219,7 @@ impl Sequence {
             ratio,
             start,
             frames: places.iter().flatten().copied().collect(),
+            waveform,
         })
     }
 
@@ -325,8 +363,7 @@ mod tests {
     }
 
     fn shifted(shifts: &[f64]) -> Vec<Shot> {
-        let shot = |&shift| Shot { ratio: 1.0, shift };
-        shifts.iter().map(shot).collect()
+        shifts.iter().map(|&shift| Shot::sine(1.0, shift)).collect()
     }
 
     #[test]
@@ -364,11 +401,27 @@ mod tests {
             Err(SequenceError::Shifts { shifts: 2, .. })
         ));
         assert_eq!(Sequence::from_frames(&[]), Err(SequenceError::Empty));
-        let unknown = Shot {
-            ratio: f64::NAN,
-            shift: 0.0,
-        };
+        let unknown = Shot::sine(f64::NAN, 0.0);
         assert!(Sequence::from_frames(&[unknown; 3]).is_err());
+    }
+
+    #[test]
+    fn a_level_of_mixed_waveforms_or_with_an_alias_is_refused() {
+        let mut mixed: Vec<Shot> = Shot::level_as(1.0, 5, Waveform::brightest).collect();
+        assert!(Sequence::from_frames(&mixed).is_ok());
+        mixed[3].waveform = Waveform::SINE;
+        assert_eq!(
+            Sequence::from_frames(&mixed),
+            Err(SequenceError::Waveforms(1.0))
+        );
+        let waveform = Waveform::brightest(5);
+        let four: Vec<_> = Shot::level(1.0, 4)
+            .map(|shot| Shot { waveform, ..shot })
+            .collect();
+        assert!(matches!(
+            Sequence::from_frames(&four),
+            Err(SequenceError::Alias { order: 3, .. })
+        ));
     }
 
     #[test]

@@ -18,7 +18,7 @@ pub struct Decoder {
     pub(super) levels: Vec<Level>,
     pub(super) unwrapper: Unwrapper,
     unwrapping: Unwrapping,
-    /// Σ N_i r_i² over the levels that carry the result's accuracy.
+    /// Σ N_i r_i² (b_i/b_f)² over the levels that carry the result's accuracy ([`information`]).
     information: f64,
     pub(super) backend: Backend,
     frame_count: usize,

@@ -8,14 +8,14 @@
 
 use super::angle::{AngleLanes, LENGTH, hypotenuse};
 use super::fold::Folded;
-use crate::pattern;
+use crate::pattern::{self, Waveform};
 use crate::simd::Lanes;
 use crate::trust::MIN_MODULATION_8_BIT;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
-/// Levels of at least this many shifts are trusted even with samples at full scale: the periodic
-/// error of a slight saturation falls from 3e-3 turn (4 shifts) to 7e-4 turn.
+/// Sines of at least this many shifts are trusted even with samples at full scale: the periodic
+/// error of a slight saturation falls from 3e-3 turn (4 shifts) to 7e-4 turn. The flat tops of other waveforms keep it at 3e-3 turn.
 pub const FULL_TRUST_SHIFTS: usize = 8;
 
 /// What rounding may take off √(S² + C²) at the threshold, in units of S and C, so that a modulation of exactly the minimum is
@@ -147,7 +147,7 @@ impl Level {
             below_long_enough: libm::ceil(least_length) as i16 - 1,
             hypotenuse: LENGTH.map(|c| libm::rint(c * factor * 32_768.0) as i16),
             doubled,
-            saturates: shifts < FULL_TRUST_SHIFTS,
+            saturates: shifts < FULL_TRUST_SHIFTS || level.waveform != Waveform::SINE,
         }
     }
 }

@@ -121,7 +121,7 @@ pub(super) fn of_shifts<V: Lanes, T: BlockSample, const N: usize>(
     Pointers {
         s,
         c,
-        brightest: if N < FULL_TRUST_SHIFTS {
+        brightest: if N < FULL_TRUST_SHIFTS || level.plan.saturates {
             T::saturated(v, level, brightest)
         } else {
             v.splat8(0)

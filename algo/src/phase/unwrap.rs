@@ -35,17 +35,22 @@ impl Unwrapper {
     }
 }
 
-/// Σ N_i r_i² over the levels that carry the result's accuracy: of geometric levels only the finest, because the coarser ones
-/// only give fringe orders; of dense levels all, because they are averaged.
+/// Σ N_i r_i² (b_i/b_f)² over the levels that carry the result's accuracy: of geometric levels only the finest, because the coarser
+/// ones only give fringe orders; of dense levels all, because they are averaged. b_i/b_f is the fundamental of a level's waveform
+/// over that of the finest level, whose modulation is known.
 pub(super) fn information(unwrapping: Unwrapping, sequence: &Sequence) -> f64 {
     let levels = sequence.levels();
     let accurate = match unwrapping {
         Unwrapping::Geometric => &levels[levels.len() - 1..],
         Unwrapping::DenseThree { .. } | Unwrapping::DenseTwo { .. } | Unwrapping::Single => levels,
     };
+    let finest = levels[levels.len() - 1].waveform.fundamental();
     accurate
         .iter()
-        .map(|level| level.shifts() as f64 * level.ratio * level.ratio)
+        .map(|level| {
+            let share = level.waveform.fundamental() / finest;
+            level.shifts() as f64 * level.ratio * level.ratio * share * share
+        })
         .sum()
 }
 

@@ -7,19 +7,17 @@ use crate::phase::Trust;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
-/// σ_I, the noise of one sample in counts; `None` if no level has 4 or more shifts or no
-/// pixel is resolved.
+/// σ_I, the noise of one sample in counts; `None` if no level has redundancy or no pixel is resolved.
 ///
 /// A level of N shifts has N − 3 degrees of freedom beside offset, modulation and phase:
 /// Σ I² − (ΣI)²/N − (2/N)(S² + C²) has the expectation (N − 3) σ_I²; for N = 4 it is
 /// (I₀ + I₂ − I₁ − I₃)²/4. Averaged over all resolved pixels and all such levels.
+///
+/// A harmonic h of the projected waveform takes the place h mod N of the level's discrete Fourier transform, and N − h mod N. What
+/// optics leave of it is not known, so these places are left out as S and C are, each with its degree of freedom. The waveforms
+/// for 5, 7 and 9 shifts leave none, those for 6 and 8 shifts 2 and 3.
 pub fn sample_noise(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trust]) -> Option<f64> {
-    let levels: Vec<Fit> = sequence
-        .levels()
-        .iter()
-        .filter(|level| level.shifts() >= 4)
-        .map(Fit::new)
-        .collect();
+    let levels: Vec<Fit> = sequence.levels().iter().filter_map(Fit::new).collect();
     let width = frames.first()?.width();
     let rows = map_rows(frames[0].height(), |v| {
         let rows: Vec<Samples<'_>> = frames.iter().map(|frame| frame.row(v)).collect();
@@ -27,7 +25,7 @@ pub fn sample_noise(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trus
         for u in (0..width).filter(|u| trust[v * width + u] == Trust::Resolved) {
             for level in &levels {
                 squares += level.residual_square(&rows, u);
-                freedom += (level.taps.len() - 3) as f64;
+                freedom += level.freedom as f64;
             }
         }
         (squares, freedom)
@@ -39,38 +37,118 @@ pub fn sample_noise(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trus
     (freedom > 0.0).then(|| libm::sqrt(squares / freedom))
 }
 
-/// A level's frames with cosine and sine of their shifts.
+/// What a level's samples are fitted by: offset, fundamental, and the places of the waveform's harmonics.
 struct Fit {
-    taps: Vec<(usize, f64, f64)>,
+    /// Places of the frames in the sequence.
+    frames: Vec<usize>,
+    /// For each place of the transform that is fitted, its share of the sum of squares (2/N, or 1/N at N/2), and cosine and sine for
+    /// each frame.
+    places: Vec<(f64, Vec<(f64, f64)>)>,
+    /// Degrees of freedom that are left.
+    freedom: usize,
 }
 
 impl Fit {
-    fn new(level: &Level) -> Self {
+    /// `None` if nothing is left.
+    fn new(level: &Level) -> Option<Self> {
         let shifts = level.shifts();
-        let taps = (0..shifts)
-            .map(|k| {
-                let angle = TAU * (level.start + k as f64 / shifts as f64);
-                let frame = usize::from(level.frames[k]);
-                (frame, libm::cos(angle), libm::sin(angle))
-            })
-            .collect();
-        Self { taps }
+        // Each place stands for its mirror image, too; the offset is place 0.
+        let mut orders = alloc::vec![1];
+        for (order, _) in level.waveform.harmonics() {
+            let rest = usize::from(order) % shifts;
+            let place = rest.min(shifts - rest);
+            if place > 0 && !orders.contains(&place) {
+                orders.push(place);
+            }
+        }
+        let alone = |place: usize| 2 * place == shifts;
+        let fitted = orders.iter().map(|&place| if alone(place) { 1 } else { 2 });
+        let freedom = (shifts - 1).checked_sub(fitted.sum::<usize>())?;
+        let places = orders.iter().map(|&place| {
+            let taps = (0..shifts).map(|k| {
+                let angle = TAU * place as f64 * (level.start + k as f64 / shifts as f64);
+                (libm::cos(angle), libm::sin(angle))
+            });
+            let share = if alone(place) { 1.0 } else { 2.0 } / shifts as f64;
+            (share, taps.collect())
+        });
+        (freedom > 0).then(|| Self {
+            frames: level.frames.iter().map(|&at| usize::from(at)).collect(),
+            places: places.collect(),
+            freedom,
+        })
     }
 
-    /// Σ of the squared deviations of pixel `u` from its fitted sine, in counts².
+    /// Σ of the squared deviations of pixel `u` from its fitted waveform, in counts².
     fn residual_square(&self, rows: &[Samples<'_>], u: usize) -> f64 {
-        let shifts = self.taps.len() as f64;
-        let (mut sum, mut squares, mut s, mut c) = (0.0, 0.0, 0.0, 0.0);
-        for &(frame, cos, sin) in &self.taps {
-            let count = match rows[frame] {
-                Samples::Eight(row) => f64::from(row[u]),
-                Samples::Sixteen(row) => f64::from(row[u]),
-            };
-            sum += count;
-            squares += count * count;
-            s += count * cos;
-            c += count * sin;
+        let count = |frame: usize| match rows[frame] {
+            Samples::Eight(row) => f64::from(row[u]),
+            Samples::Sixteen(row) => f64::from(row[u]),
+        };
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for &frame in &self.frames {
+            sum += count(frame);
+            squares += count(frame) * count(frame);
         }
-        (squares - sum * sum / shifts - 2.0 / shifts * (s * s + c * c)).max(0.0)
+        let mut left = squares - sum * sum / self.frames.len() as f64;
+        for (share, taps) in &self.places {
+            let (mut s, mut c) = (0.0, 0.0);
+            for (&frame, (cos, sin)) in self.frames.iter().zip(taps) {
+                s += count(frame) * cos;
+                c += count(frame) * sin;
+            }
+            left -= share * (s * s + c * c);
+        }
+        left.max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pattern::{Shot, Waveform};
+
+    /// σ of uniform noise of ±6 counts, from samples of a waveform with half of the harmonics' contrast.
+    #[test]
+    fn harmonics_of_a_waveform_are_not_taken_for_noise() {
+        const SIDE: usize = 128;
+        let mut state = 1_u64;
+        let mut noise = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            12.0 * ((state >> 33) as f64 / f64::from(1_u32 << 31)) - 6.0
+        };
+        for (shifts, freedom) in [(3, 0), (4, 1), (5, 0), (6, 2), (7, 0), (8, 3), (9, 0)] {
+            let shots: Vec<Shot> = Shot::level_as(1.0, shifts, Waveform::brightest).collect();
+            let sequence = Sequence::from_frames(&shots).unwrap();
+            let fit = Fit::new(&sequence.levels()[0]);
+            assert_eq!(fit.map_or(0, |fit| fit.freedom), freedom, "{shifts} shifts");
+            let blurred = shots[0].waveform.harmonics();
+            let blurred: Vec<_> = blurred.map(|(order, share)| (order, share / 2.0)).collect();
+            let blurred = Waveform::of(&blurred);
+            let frames: Vec<Vec<u8>> = shots
+                .iter()
+                .map(|shot| {
+                    let light = |at: usize| {
+                        let turns = at as f64 / 37.3 + shot.shift;
+                        libm::rint(120.0 + 80.0 * blurred.unscaled(turns) + noise()) as u8
+                    };
+                    (0..SIDE * SIDE).map(light).collect()
+                })
+                .collect();
+            let views: Vec<_> = frames
+                .iter()
+                .map(|frame| FrameView::new(Samples::Eight(frame), SIDE, SIDE, SIDE).unwrap())
+                .collect();
+            let trust = [Trust::Resolved; SIDE * SIDE];
+            let found = sample_noise(&sequence, &views, &trust);
+            assert_eq!(found.is_some(), freedom > 0, "{shifts} shifts");
+            // 6/√3, and rounding to whole counts.
+            let expected = libm::sqrt(12.0 + 1.0 / 12.0);
+            if let Some(found) = found {
+                assert!((found / expected - 1.0).abs() < 0.03, "{shifts}: {found}");
+            }
+        }
     }
 }

@@ -20,10 +20,7 @@ pub fn wrapped(
     bit_depth: u8,
 ) -> Result<PhaseMap, DecodeError> {
     let shifts = level.shifts();
-    let shots = (0..shifts).map(|k| Shot {
-        ratio: 1.0,
-        shift: level.start + k as f64 / shifts as f64,
-    });
+    let shots = (0..shifts).map(|k| Shot::sine(1.0, level.start + k as f64 / shifts as f64));
     let sequence = Sequence::from_frames(&shots.collect::<Vec<_>>())?;
     let one_turn = PhaseRange { min: 0.0, max: 1.0 };
     let decoder = Decoder::new(&sequence, one_turn, bit_depth)?;
@@ -48,10 +45,7 @@ mod tests {
     #[test]
     fn a_level_alone_gives_its_fraction_of_a_turn_whatever_its_ratio_and_first_shift() {
         for (shifts, start) in [(3, 0.0), (4, 0.25), (5, -1.0 / 3.0), (8, 0.1)] {
-            let shot = |k: usize| Shot {
-                ratio: 0.37,
-                shift: start + k as f64 / shifts as f64,
-            };
+            let shot = |k: usize| Shot::sine(0.37, start + k as f64 / shifts as f64);
             let shots: Vec<_> = (0..shifts).map(shot).collect();
             let turns = |u: usize| u as f64 / 64.0 * 3.0;
             let sample = |shot: &Shot, u: usize| {

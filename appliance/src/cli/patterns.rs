@@ -63,7 +63,7 @@ impl Patterns {
             .map(|spec| seam::phase_function(spec, columns, rows))
             .collect::<Result<_, _>>()
             .map_err(|error| usage(&error))?;
-        let encoder = Encoder::new(None);
+        let encoder = Encoder::new(None, &[Shot::sine(1.0, 0.0)]);
         let picture = |(at, shown): (usize, &Shown)| {
             let pixels = raster(*shown, &layout, &functions, &encoder, projector);
             (format!("show/{at:03}.png"), grey_png(columns, &pixels))
@@ -145,7 +145,7 @@ fn raster(
             shift,
         } => {
             encoder
-                .raster(&functions[pattern], Shot { ratio, shift })
+                .raster(&functions[pattern], Shot::sine(ratio, shift))
                 .pixels
         }
         Shown::Bit {

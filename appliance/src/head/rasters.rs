@@ -14,7 +14,7 @@ pub fn rasters(
     shots: &[Shot],
     calibration: &Calibration,
 ) -> Result<Vec<Raster>, hal::error::Error> {
-    let encoder = Encoder::new(calibration.response.as_ref());
+    let encoder = Encoder::new(calibration.response.as_ref(), shots);
     shots
         .par_iter()
         .map(|&shot| {

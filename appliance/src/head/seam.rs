@@ -2,7 +2,7 @@
 
 use algo::frame::{FrameError, FrameView, Samples};
 use algo::geometry::{FittedMap, Pinhole, PinholeModel, Reference};
-use algo::pattern::{PhaseFunction, PhaseFunctionError, Shot};
+use algo::pattern::{PhaseFunction, PhaseFunctionError, Shot, Waveform};
 use hal::frame::Frame;
 use hal::model::{DeviceModel, PlaneModel};
 use hal::replay::recording::{PatternSpec, RecordedFrame};
@@ -94,11 +94,12 @@ pub fn phase_function(
     }
 }
 
-/// Ratio and shift of a recorded frame.
+/// What a recorded frame shows.
 pub fn shot(recorded: &RecordedFrame) -> Shot {
     Shot {
         ratio: recorded.ratio,
         shift: recorded.shift_turns,
+        waveform: Waveform::of(&recorded.harmonics),
     }
 }
 
@@ -107,6 +108,7 @@ pub fn recorded(shot: Shot, frame: Frame) -> RecordedFrame {
     RecordedFrame {
         ratio: shot.ratio,
         shift_turns: shot.shift,
+        harmonics: shot.waveform.harmonics().collect(),
         pattern: 0,
         timestamp_ns: Some(frame.timestamp().0),
         frame,

@@ -304,6 +304,7 @@ impl Layout {
                 } => recording.frames.push(RecordedFrame {
                     ratio,
                     shift_turns: shift,
+                    harmonics: Vec::new(),
                     pattern,
                     timestamp_ns: None,
                     frame,

@@ -116,9 +116,11 @@ impl SequenceFile {
     fn check_bounds(&self) -> Result<(), String> {
         length("frames", self.frames.len(), 3, MAX_FRAMES)?;
         let [low, high] = RATIOS;
-        each("frames", ": ", &self.frames, |&Shot { ratio, shift }| {
-            within("ratio", ratio, low, high)?;
-            within("shift", shift, -MAX_SHIFT_TURNS, MAX_SHIFT_TURNS)
+        each("frames", ": ", &self.frames, |shot: &Shot| {
+            within("ratio", shot.ratio, low, high)?;
+            within("shift", shot.shift, -MAX_SHIFT_TURNS, MAX_SHIFT_TURNS)?;
+            let mut harmonics = shot.waveform.harmonics();
+            harmonics.try_for_each(|(_, share)| within("share of a harmonic", share, -1.0, 1.0))
         })?;
         within("sigma_mm", self.sigma_mm, 0.0, MAX_SIGMA_MM)?;
         within("safe_share", self.safe_share, 0.0, 1.0)?;

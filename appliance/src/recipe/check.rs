@@ -73,6 +73,14 @@ pub struct RecipeSequence {
     pub levels: Sequence,
 }
 
+impl RecipeSequence {
+    /// The fundamental of the finest level's waveform, relative to a sine's.
+    pub fn fundamental(&self) -> f64 {
+        let finest = self.levels.levels().last();
+        finest.map_or(1.0, |level| level.waveform.fundamental())
+    }
+}
+
 /// Regions of a recipe.
 pub const MAX_REGIONS: usize = 32;
 

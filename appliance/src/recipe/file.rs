@@ -117,30 +117,14 @@ pub enum PatternFile {
 pub struct SequenceFile {
     /// What it can unwrap.
     pub kind: SequenceKind,
-    /// What each frame shows: [ratio, shift in turns].
-    #[serde(with = "shots")]
+    /// What each frame shows: [ratio, shift in turns], and the harmonics of a waveform that is not a sine.
+    #[serde(with = "super::shots")]
     pub frames: Vec<Shot>,
     /// Predicted σ_z, RMS over the golden surface, mm.
     pub sigma_mm: f64,
     /// Share of the golden surface whose phase stays within the sequence's reach for every
     /// placement inside the tolerance.
     pub safe_share: f64,
-}
-
-/// Shots as pairs of numbers.
-mod shots {
-    use algo::pattern::Shot;
-    use serde::{Deserialize, Deserializer, Serializer};
-
-    pub(super) fn serialize<S: Serializer>(shots: &[Shot], to: S) -> Result<S::Ok, S::Error> {
-        to.collect_seq(shots.iter().map(|shot| [shot.ratio, shot.shift]))
-    }
-
-    pub(super) fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<Vec<Shot>, D::Error> {
-        let pairs: Vec<[f64; 2]> = Vec::deserialize(from)?;
-        let shots = pairs.into_iter();
-        Ok(shots.map(|[ratio, shift]| Shot { ratio, shift }).collect())
-    }
 }
 
 /// The kinds of sequence, ordered by how far from the golden map they can unwrap. Dense levels have the ratios 1, 1 − 1/n and perhaps

@@ -13,7 +13,7 @@ use crate::head::calibration::Calibration;
 use algo::adaptive::phase_reach;
 use algo::geometry::Triangulator;
 use algo::inspect::{eroded, openings};
-use algo::pattern::Shot;
+use algo::pattern::{Shot, Waveform};
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
 use std::io::Cursor;
@@ -257,12 +257,14 @@ impl GoldenPart<'_> {
         full.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
         // Levels of ratios 0.8 and 1 repeat together only after 5 turns: unambiguous within ± 2.5 turns of golden, less a margin for
         // noise ([`SequenceKind::reach`]).
+        let waveforms = self.calibration.waveforms();
+        let level = |ratio, shifts| Shot::level_as(ratio, shifts, waveforms);
         let candidates = [
-            (SequenceKind::SingleLevel, Shot::level(1.0, 3).collect()),
-            (SequenceKind::SingleLevel, Shot::level(1.0, 4).collect()),
+            (SequenceKind::SingleLevel, level(1.0, 3).collect()),
+            (SequenceKind::SingleLevel, level(1.0, 4).collect()),
             (
                 SequenceKind::TwoLevels,
-                Shot::level(0.8, 3).chain(Shot::level(1.0, 3)).collect(),
+                level(0.8, 3).chain(level(1.0, 3)).collect(),
             ),
             (SequenceKind::Full, full),
         ];
@@ -281,10 +283,12 @@ impl GoldenPart<'_> {
         // Of a geometric sequence only the finest level contributes to the accuracy.
         let absolute = !self.decoder.unwrapping().needs_map() && kind == SequenceKind::Full;
         let carries = |ratio: f64| !absolute || ratio >= 0.999;
+        // The modulation as taught is that of golden's finest level; other waveforms have another share of it.
+        let taught = finest_waveform(self.full).fundamental();
         let squares = frames
             .iter()
             .filter(|shot| carries(shot.ratio))
-            .map(|shot| shot.ratio * shot.ratio);
+            .map(|shot| (shot.ratio * shot.waveform.fundamental() / taught).powi(2));
         let information: f64 = squares.sum();
         let noise = self.calibration.noise_counts;
         move |at| {
@@ -341,6 +345,12 @@ impl GoldenPart<'_> {
             safe_share: valid().filter(safe).count() as f64 / count,
         }
     }
+}
+
+/// What the finest level shows.
+fn finest_waveform(shots: &[Shot]) -> Waveform {
+    let finest = shots.iter().max_by(|a, b| a.ratio.total_cmp(&b.ratio));
+    finest.map(|shot| shot.waveform).unwrap_or_default()
 }
 
 /// The regions and gauges of a part with these resolved pixels: those of the whole frame, and those of its openings.

@@ -23,6 +23,7 @@ pub mod incoming;
 pub mod plan;
 pub mod planner;
 pub mod replace;
+mod shots;
 pub mod store;
 pub mod teach;
 

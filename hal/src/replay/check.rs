@@ -5,8 +5,8 @@ use std::path::{Component, Path};
 use super::failure::Wrong;
 use super::manifest::{CodeEntry, Manifest, PatternEntry};
 use crate::bounds::{
-    MAX_EXPOSURE_US, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_RANGE_MM, MAX_SHIFT_TURNS, MAX_SIDE,
-    MIN_NOISE_COUNTS, RATIOS, clipped, fingerprint, text, within,
+    MAX_EXPOSURE_US, MAX_FRINGES, MAX_HARMONIC, MAX_NOISE_COUNTS, MAX_RANGE_MM, MAX_SHIFT_TURNS,
+    MAX_SIDE, MIN_NOISE_COUNTS, RATIOS, clipped, fingerprint, text, within,
 };
 use crate::model::DeviceModel;
 
@@ -146,6 +146,23 @@ fn frames(manifest: &Manifest) -> Result<(), Wrong> {
                 format!("frame {:?}: {problem}", frame.file),
                 "the level's share of the full phase function, and the shift in turns",
             );
+        }
+        for (at, &(order, share)) in frame.harmonics.iter().enumerate() {
+            let repeated = frame.harmonics[..at]
+                .iter()
+                .any(|(other, _)| *other == order);
+            let checked = within("order", order, 2, MAX_HARMONIC)
+                .and_then(|()| within("share", share, -1.0, 1.0))
+                .and_then(|()| match repeated {
+                    true => Err(format!("order {order} is there twice")),
+                    false => Ok(()),
+                });
+            if let Err(problem) = checked {
+                return wrong(
+                    format!("frame {:?}: harmonics: {problem}", frame.file),
+                    "a list of [order, share of the fundamental's amplitude]",
+                );
+            }
         }
         if frame.pattern >= manifest.pattern.0.len() {
             return wrong(

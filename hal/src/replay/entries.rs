@@ -110,6 +110,7 @@ pub(super) fn manifest_of(recording: &Recording, names: Names) -> Manifest {
             shift_turns: frame.shift_turns,
             timestamp_ns: frame.timestamp_ns,
             pattern: frame.pattern,
+            harmonics: frame.harmonics.clone(),
         });
     let codes = recording.codes.iter().map(|code| CodeEntry {
         pattern: code.pattern,
@@ -117,14 +118,22 @@ pub(super) fn manifest_of(recording: &Recording, names: Names) -> Manifest {
         bits: files(names.bits(code)),
         inverse: files(names.inverse(code)),
     });
-    // Version 1 has neither, and older programs read it.
+    let waveforms = recording
+        .frames
+        .iter()
+        .any(|frame| !frame.harmonics.is_empty());
+    // Version 1 has none of these, and older programs read it.
     let plain = [&recording.white, &recording.black]
         .iter()
         .all(|uniform| uniform.is_none())
         && recording.codes.is_empty();
     Manifest {
         format: FORMAT.to_owned(),
-        version: if plain { 1 } else { VERSION },
+        version: match (waveforms, plain) {
+            (true, _) => VERSION,
+            (false, false) => 2,
+            (false, true) => 1,
+        },
         description: recording.description.clone(),
         source: recording.source.clone(),
         camera: CameraEntry {

@@ -50,13 +50,16 @@ pub enum PatternSpec {
 }
 
 /// One frame of a recording, and the ratio and shift of the pattern that the projector showed:
-/// I_max/2 · (1 + sin 2π(ratio · Φ_P + shift)), with the projector's brightest grey I_max.
+/// I_max/2 · (1 + f(ratio · Φ_P + shift)), with the projector's brightest grey I_max and f(x) = sin 2πx, or that and harmonics
+/// with a peak of 1.
 #[derive(Clone, Debug)]
 pub struct RecordedFrame {
     /// The level's share of the full phase function, above 0.
     pub ratio: f64,
     /// Phase shift in turns.
     pub shift_turns: f64,
+    /// Harmonics of the projected waveform, each with its order and its amplitude as a share of the fundamental's; none for a sine.
+    pub harmonics: Vec<(u8, f64)>,
     /// Index into the recording's patterns.
     pub pattern: usize,
     /// Start of the exposure, if it was recorded, in ns of the recording head's clock.
@@ -207,6 +210,7 @@ fn frames(
         frames.push(RecordedFrame {
             ratio: entry.ratio,
             shift_turns: entry.shift_turns,
+            harmonics: entry.harmonics.clone(),
             pattern: entry.pattern,
             timestamp_ns: entry.timestamp_ns,
             frame,

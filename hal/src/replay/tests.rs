@@ -47,6 +47,7 @@ fn small(bit_depth: u8, seed: u64) -> Recording {
             frames.push(RecordedFrame {
                 ratio,
                 shift_turns: f64::from(shift) / f64::from(shifts) - 0.3,
+                harmonics: Vec::new(),
                 pattern,
                 timestamp_ns: Some(1000 * count),
                 frame: Frame::new(format, Arc::new(pixels), Timestamp(1000 * count), count)

@@ -54,7 +54,7 @@ fn exhaust(name: &str, mut stack: Stack, middle: i32) -> Error {
         let turns = f64::from(s).atan2(f64::from(c)) / TAU;
         let phase = 40.0 + turns;
         for frame in 0..finest {
-            let Shot { ratio, shift } = stack.frames[frame];
+            let Shot { ratio, shift, .. } = stack.frames[frame];
             let light = 127.0 + 100.0 * (TAU * (ratio * phase + shift)).sin();
             stack.set(frame, pixel, light.round() as u16);
         }

@@ -55,7 +55,7 @@ fn lit(frames: Vec<Shot>, (min, max): (f64, f64), reach: f64) -> (Stack, Vec<f64
         })
         .collect();
     for frame in 0..stack.frames.len() {
-        let Shot { ratio, shift } = stack.frames[frame];
+        let Shot { ratio, shift, .. } = stack.frames[frame];
         for (pixel, phase) in phases.iter().enumerate() {
             let light = 2047.5 + 1800.0 * (TAU * (ratio * phase + shift)).sin();
             stack.set(frame, pixel, light.round() as u16);

@@ -61,7 +61,7 @@ pub fn stack(random: &mut Random, draw: Draw) -> Stack {
         let (offset, modulation, noise) = light(random);
         let wild = random.below(6) == 0;
         for frame in 0..stack.frames.len() {
-            let Shot { ratio, shift } = stack.frames[frame];
+            let Shot { ratio, shift, .. } = stack.frames[frame];
             let sine = (TAU * (ratio * phase + shift)).sin();
             let share = offset + modulation * sine + between(random, -noise, noise);
             let share = if wild { random.share() } else { share };
@@ -145,7 +145,7 @@ fn frames(random: &mut Random, ratios: &[f64], shifts: Option<usize>) -> Vec<Sho
         let start = [0.0, 0.0, 0.25, random.share() - 0.5][random.below(4)];
         let sign = [1.0, -1.0][random.below(2)];
         let shift = |k| start + sign * k as f64 / count as f64;
-        frames.extend((0..count).map(shift).map(|shift| Shot { ratio, shift }));
+        frames.extend((0..count).map(shift).map(|shift| Shot::sine(ratio, shift)));
     }
     if random.below(2) == 0 {
         for place in (1..frames.len()).rev() {

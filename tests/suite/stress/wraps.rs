@@ -45,7 +45,7 @@ fn stack(phases: &[f64], min: f64, bit_depth: u8, frames: Vec<Shot>, reach: f64)
     let full = f64::from(stack.full_scale());
     for (pixel, phase) in phases.iter().enumerate() {
         for frame in 0..stack.frames.len() {
-            let Shot { ratio, shift } = stack.frames[frame];
+            let Shot { ratio, shift, .. } = stack.frames[frame];
             let sine = (TAU * (ratio * phase + shift)).sin();
             let light = full * (LIGHT.0 + LIGHT.1 * sine);
             stack.set(frame, pixel, light.round() as u16);
@@ -101,10 +101,9 @@ fn no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes() {
                 let frames = Sequence::geometric(range, count, shifts);
                 // Shifts from 0 are symmetric at the ends; with any other start rounding moves them over the end.
                 for start in [0.0, 0.137] {
-                    let moved = frames.iter().map(|&Shot { ratio, shift }| Shot {
-                        ratio,
-                        shift: start + shift,
-                    });
+                    let moved = frames
+                        .iter()
+                        .map(|&Shot { ratio, shift, .. }| Shot::sine(ratio, start + shift));
                     let stack = stack(&phases, min, bit_depth, moved.collect(), 0.0);
                     let name =
                         format!("{count} levels of {shifts}, {bit_depth} bit, from {min}, {start}");

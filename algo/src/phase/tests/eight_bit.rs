@@ -64,7 +64,7 @@ fn every_pair_of_8_bit_differences_is_within_the_bound() {
 
 #[test]
 fn every_rough_angle_is_within_the_bound() {
-    let levels = [1.0 / 8.0, 1.0].map(|ratio| SHIFTS.map(|shift| Shot { ratio, shift }));
+    let levels = [1.0 / 8.0, 1.0].map(|ratio| SHIFTS.map(|shift| Shot::sine(ratio, shift)));
     let sequence = Sequence::from_frames(levels.as_flattened()).unwrap();
     let range = PhaseRange { min: 0.0, max: 8.0 };
     let decoder = Decoder::new(&sequence, range, 8).unwrap();

@@ -19,7 +19,7 @@ const ONE_TURN: PhaseRange = PhaseRange { min: 0.0, max: 1.0 };
 
 /// A decoder of one level with these shifts.
 fn level(shifts: &[f64], depth: u8) -> Decoder {
-    let shot = |&shift| Shot { ratio: 1.0, shift };
+    let shot = |&shift| Shot::sine(1.0, shift);
     let frames: Vec<_> = shifts.iter().map(shot).collect();
     Decoder::new(&Sequence::from_frames(&frames).unwrap(), ONE_TURN, depth).unwrap()
 }

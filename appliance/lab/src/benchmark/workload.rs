@@ -123,7 +123,7 @@ impl Workload {
         let phases: Vec<f64> = (0..width * height).map(|at| self.phase(at, size)).collect();
         let mut random = SplitMix64::seed_from_u64(0);
         let mut samples = Vec::with_capacity(self.frames.len() * phases.len());
-        for &Shot { ratio, shift } in &self.frames {
+        for &Shot { ratio, shift, .. } in &self.frames {
             samples.extend(phases.iter().map(|phase| {
                 let light = if phase.is_nan() {
                     DARK * full

@@ -24,11 +24,8 @@ const LEVELS: u8 = 16;
 impl View {
     /// Of a run.
     pub fn of(method: Method, run: &Run) -> Self {
-        let shot = Shot {
-            ratio: 1.0,
-            shift: 0.0,
-        };
-        let raster = Encoder::new(None).raster(&run.function, shot);
+        let shot = Shot::sine(1.0, 0.0);
+        let raster = Encoder::new(None, &[]).raster(&run.function, shot);
         let frame = &run.measured.frames[run.finest];
         let format = frame.format();
         let bytes: Vec<u8> = match frame.samples() {

@@ -321,6 +321,7 @@ impl CalibrationFile {
             plane: self.plane(),
             heights_by: self.heights_by,
             response: self.response.as_deref().map_or(Ok(None), inverted)?,
+            linear: self.response.is_some(),
             ..Calibration::new(
                 (camera.width, camera.height, camera.bit_depth),
                 (projector.width, projector.height),

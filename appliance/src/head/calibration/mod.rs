@@ -12,7 +12,7 @@ pub use current::Current;
 use crate::head::seam;
 use crate::storage::hex;
 use algo::geometry::{HeightRange, Pinhole, RigError, Triangulator};
-use algo::pattern::{GreyResponse, PhaseFunction};
+use algo::pattern::{GreyResponse, PhaseFunction, Waveform, Waveforms};
 use hal::model::{DeviceModel, PlaneModel};
 use hal::replay::Recording;
 use hal::replay::recording::RecordedProjector;
@@ -55,11 +55,14 @@ pub struct Calibration {
     pub noise_counts: f64,
     /// The projector's measured grey response, where it is not linear.
     pub response: Option<GreyResponse>,
+    /// Whether the light is known to be linear in the grey level, by itself or with the inverse of `response`. Only then may a
+    /// waveform have harmonics.
+    pub linear: bool,
 }
 
 impl Calibration {
     /// A head whose camera has frames of `(columns, rows, bits)` and whose projector a raster of `(columns, rows)`; its response
-    /// is linear, and heights go by the models.
+    /// is not known, and heights go by the models.
     ///
     /// # Errors
     /// In words: the model of the camera or of the projector is absurd, and why.
@@ -77,6 +80,7 @@ impl Calibration {
             heights_by: HeightsBy::Models,
             noise_counts,
             response: None,
+            linear: false,
         })
     }
 
@@ -86,12 +90,25 @@ impl Calibration {
     /// As [`Self::new`].
     pub fn of_scenario(scenario: &Scenario) -> Result<Self, String> {
         let ((width, height), projector) = (scenario.frame_size(), &scenario.rig.projector);
-        Self::new(
+        let head = Self::new(
             (width, height, scenario.bit_depth),
             (projector.width, projector.height),
             (&scenario.camera_model(), &projector.model()),
             scenario.noise_sigma_counts(),
-        )
+        )?;
+        Ok(Self {
+            linear: scenario.optics.gamma == 1.0,
+            ..head
+        })
+    }
+
+    /// What a level of so many shifts shows on this head: the waveform with the most modulation where the light is linear, else a
+    /// sine.
+    pub fn waveforms(&self) -> Waveforms {
+        match self.linear {
+            true => Waveform::brightest,
+            false => Waveform::sine,
+        }
     }
 
     /// The calibration of the head that took a recording, from its models, with the noise of a sample in counts.

@@ -14,7 +14,7 @@ pub use layers::Layers;
 use crate::head::calibration::Calibration;
 use crate::head::rasters::rasters;
 use crate::head::seam;
-use crate::recipe::{Conditions, Demands, Recipe, RecipeId, SequenceKind};
+use crate::recipe::{Conditions, Demands, Recipe, RecipeId, RecipeSequence, SequenceKind};
 use crate::station::error_code::WRONG_FRAMES;
 use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
 use crate::station::{Inspection, Stage, Stages, Verdict};
@@ -176,8 +176,10 @@ impl Plan {
         let mut shots = Vec::new();
         let prepared = || {
             let (noise, range) = (conditions.noise_counts, (range, camera.2));
+            // Golden was measured with the full sequence, the last.
+            let taught = sequences.last().map_or(1.0, RecipeSequence::fundamental);
             let runs = sequences.into_iter();
-            runs.map(|sequence| prepare(sequence, noise, &arrays, range, &mut shots))
+            runs.map(|sequence| prepare(sequence, (noise, taught), &arrays, range, &mut shots))
                 .collect::<Result<Vec<_>, _>>()
         };
         let (prepared, surface) = rayon::join(prepared, || golden::surface(size.0, &arrays));

@@ -34,14 +34,16 @@ pub(super) struct Shared {
 }
 
 /// Prepares a sequence of the recipe, for phases of `range`, and returns what joins it with what all sequences share: the recipe's
-/// arrays are dropped in between. `rasters` are what all runs show; what only this one shows is added.
+/// arrays are dropped in between. `rasters` are what all runs show; what only this one shows is added. `fundamental` is that of the
+/// waveform that golden's modulation was measured with.
 pub(super) fn prepare(
     sequence: RecipeSequence,
-    noise_counts: f64,
+    (noise_counts, fundamental): (f64, f64),
     arrays: &Arrays,
     (range, bit_depth): (PhaseRange, u8),
     rasters: &mut Vec<Shot>,
 ) -> Result<impl FnOnce(&Shared) -> Result<Run, String> + use<>, String> {
+    let brighter = sequence.fundamental() / fundamental;
     let RecipeSequence {
         kind,
         shots,
@@ -56,7 +58,7 @@ pub(super) fn prepare(
         })
     });
     let indices: Vec<usize> = indices.collect();
-    let taught = golden::taught(noise_counts, arrays, &decoder);
+    let taught = golden::taught(noise_counts / brighter, arrays, &decoder);
     let map = golden::safe_map(arrays, kind);
     Ok(move |shared: &Shared| {
         let bytes = size_of_val(map.as_deref().unwrap_or(&[])) + taught.bytes();
