@@ -39,7 +39,7 @@ fn json(run: &Run) -> serde_json::Value {
 }
 
 /// Reads a phase function from a file of f64: rows, columns and turns.
-fn turns(path: &Path) -> (usize, usize, Vec<f64>) {
+pub fn turns(path: &Path) -> (usize, usize, Vec<f64>) {
     let bytes = std::fs::read(path).expect("a phase function");
     let file = npyz::NpyFile::new(&bytes[..]).expect("a NumPy array");
     let shape = file.shape().to_vec();

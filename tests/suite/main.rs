@@ -37,6 +37,7 @@ mod placement;
 mod power;
 mod precision;
 mod production;
+mod projected;
 mod promises_own;
 mod promises_shared;
 mod real_board;

@@ -5,6 +5,7 @@ mod function;
 mod interpolate;
 mod sequence;
 mod shot;
+mod split;
 mod waveform;
 
 pub use encode::{Encoder, GreyRaster, GreyResponse, ResponseError};
@@ -14,4 +15,5 @@ pub use sequence::{
     SequenceError, Unwrapping,
 };
 pub use shot::Shot;
+pub use split::Split;
 pub use waveform::{MAX_ORDER, Waveform, Waveforms};

@@ -1,15 +1,43 @@
-//! `fringed adapt RECORDING --method paper|fringed --out phase.npy`.
+//! `fringed adapt RECORDING --method paper|fringed --out phase.npy [--patterns DIR]`.
 
 use super::names;
 use super::numbers::number;
 use super::options::{Output, Threads};
 use crate::error::{Exit, Failure};
 use crate::measure::adapt::{AdaptOptions, Method, adapt};
+use crate::measure::projected::Projected;
 use crate::storage::folder::OutputFolder;
 use algo::adaptive::{noise, paper};
+use algo::pattern::{Waveform, Waveforms};
 use hal::npy;
 use hal::replay::Recording;
 use std::path::{Path, PathBuf};
+
+/// Numbers of frames that a sequence is made for.
+const FRAMES: [usize; 7] = [24, 12, 9, 6, 5, 4, 3];
+
+fn frames(text: &str) -> Result<usize, String> {
+    let known = FRAMES.into_iter().find(|frames| frames.to_string() == text);
+    known.ok_or_else(|| "write 24, 12, 9, 6, 5, 4 or 3".into())
+}
+
+/// The waveforms of a sequence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Form {
+    /// The one with the most modulation.
+    Bright,
+    /// Sines.
+    Sine,
+}
+
+impl Form {
+    fn choice(self) -> Waveforms {
+        match self {
+            Self::Bright => Waveform::brightest,
+            Self::Sine => Waveform::sine,
+        }
+    }
+}
 
 /// Make the phase function of a pattern for the part of a preliminary recording.
 #[derive(Debug, clap::Args)]
@@ -35,6 +63,16 @@ pub struct Adapt {
     /// Smallest pitch in camera pixels; if not given 2.2, and 5 for the paper's method.
     #[arg(long, value_name = "PX", value_parser = number(2.0, 128.0))]
     image_pitch: Option<f64>,
+    /// Folder for what to project and to decode it with: pictures, sequence.json, phase function, expected phase.
+    #[arg(long, value_name = "DIR", value_parser = names::folder())]
+    patterns: Option<PathBuf>,
+    /// How many pictures to project.
+    #[arg(long, value_name = "N", default_value_t = 12, requires = "patterns", value_parser = frames)]
+    frames: usize,
+    /// What each level shows: the waveform with the most modulation for its number of shifts, or a sine. The former needs a
+    /// projector whose light is linear in the grey level within 1 %.
+    #[arg(long, value_enum, default_value_t = Form::Bright, requires = "patterns")]
+    waveform: Form,
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
@@ -59,6 +97,12 @@ impl Adapt {
         let function = &adapted.function;
         let array = npy::write(function.columns(), &function.turns());
         folder.write(name, &array)?;
+        if let Some(patterns) = &self.patterns {
+            let width = recording.width as usize;
+            let projected = Projected::new(&adapted, width, self.frames, self.waveform.choice())
+                .map_err(|error| Failure::because(Exit::Usage, "--frames", error))?;
+            pool.install(|| projected.write(patterns))?;
+        }
         let text = || {
             let table = adapted.report.table();
             format!("{}\nwritten to {}", table.trim_end(), self.out.display())
@@ -71,6 +115,13 @@ impl Adapt {
             Method::Fringed => (noise::PROJECTOR_PITCH, noise::IMAGE_PITCH),
             Method::Paper => (paper::PROJECTOR_PITCH, paper::IMAGE_PITCH),
         };
+        if self.method == Method::Paper && self.patterns.is_some() {
+            return Err(Failure::new(
+                Exit::Usage,
+                "--patterns: the sequences are those of --method fringed; the paper's is three geometric levels of four \
+                 sines each, which patterns makes of the phase function",
+            ));
+        }
         if self.method == Method::Paper && self.projector_pitch.is_some() {
             return Err(Failure::new(
                 Exit::Usage,

@@ -1,17 +1,17 @@
-//! `fringed measure RECORDING [--recipe FILE] [--calibration FILE] --out DIR`.
+//! `fringed measure RECORDING [--recipe FILE | --about FILE] [--calibration FILE] --out DIR`.
 
 use super::names;
 use super::options::{Output, Threads};
 use crate::error::{Exit, Failure};
 use crate::history::kept;
-use crate::measure::{Measurement, measure_with, models};
+use crate::measure::{Measurement, measure_about_map, measure_with, models};
 use crate::output::{canvas, picture};
 use crate::storage::folder::OutputFolder;
 use crate::storage::unpack::Unpacked;
 use algo::pipeline::PhaseMap;
 use hal::npy;
 use hal::replay::Recording;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Measure a recording.
 #[derive(Debug, clap::Args)]
@@ -24,6 +24,9 @@ pub struct Measure {
     /// Recipe of the part: dense and single levels are unwrapped about its golden map.
     #[arg(long, value_name = "FILE")]
     recipe: Option<PathBuf>,
+    /// Expected phase as adapt writes it: dense and single levels are unwrapped about this map.
+    #[arg(long, value_name = "FILE.npy", conflicts_with = "recipe")]
+    about: Option<PathBuf>,
     /// Measure with the models of this calibration.json instead of the recording's.
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
@@ -46,7 +49,11 @@ impl Measure {
         }
         let recipe = self.recipe.as_deref().map(kept::read).transpose()?;
         let pool = self.threads.pool(0)?;
-        let measured = || measure_with(&recording, unpacked.folder(), recipe.as_ref());
+        let about = self.about.as_deref().map(expected_phase).transpose()?;
+        let measured = || match &about {
+            Some(map) => measure_about_map(&recording, unpacked.folder(), map),
+            None => measure_with(&recording, unpacked.folder(), recipe.as_ref()),
+        };
         let measurement = pool.install(measured)?;
         let folder = OutputFolder::create(&self.out)?;
         pool.install(|| write(&folder, &measurement))?;
@@ -59,6 +66,25 @@ impl Measure {
         };
         self.output.answer(&measurement.report, text)
     }
+}
+
+/// The largest file of an expected phase: f64 of the largest camera.
+const MAX_MAP: u64 = 1 << 30;
+
+/// The expected phase in a file.
+fn expected_phase(path: &Path) -> Result<npy::Array<f64>, Failure> {
+    let what = || format!("read {}", path.display());
+    let missing = |error| {
+        let words = format!("{error}: name the expected phase that adapt wrote");
+        Failure::because(Exit::Missing, what(), words)
+    };
+    if std::fs::metadata(path).map_err(missing)?.len() > MAX_MAP {
+        let words =
+            "it is larger than a map of any camera: name the expected phase that adapt wrote";
+        return Err(Failure::because(Exit::Content, what(), words));
+    }
+    let bytes = std::fs::read(path).map_err(missing)?;
+    npy::read::<f64>(&bytes).map_err(|error| Failure::because(Exit::Content, what(), error))
 }
 
 /// Files that are written only if there are heights.

@@ -32,6 +32,7 @@ mod replay;
 mod serve;
 mod teach;
 
+pub use adapt::Form;
 pub use completions::Completions;
 pub use options::{Output, Threads};
 

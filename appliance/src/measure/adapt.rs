@@ -5,6 +5,7 @@ use crate::head::seam;
 use crate::measure::{measure, wrong};
 use algo::adaptive::{ProjectorMap, noise, paper};
 use algo::pattern::PhaseFunction;
+use algo::units::AbsolutePhase;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
 use serde::Serialize;
@@ -35,6 +36,8 @@ pub enum Method {
 pub struct Adapted {
     /// Φ_P over the projector's raster.
     pub function: PhaseFunction,
+    /// Φ that the preliminary measurement expects in each camera pixel under this pattern, unknown where it was not resolved.
+    pub expected: Vec<AbsolutePhase>,
     /// The summary.
     pub report: Report,
 }
@@ -113,7 +116,11 @@ pub fn adapt(
         preliminary_sigma_mm: sigmas.map(|[before, _]| before),
         predicted_sigma_mm: sigmas.map(|[_, after]| after),
     };
-    Ok(Adapted { function, report })
+    Ok(Adapted {
+        expected: map.expected_phase(&function),
+        function,
+        report,
+    })
 }
 
 /// Vertical and horizontal fringes of a recording.

@@ -1,10 +1,12 @@
-//! The phase that is expected in a recording: a recipe's golden map, or the prediction from a preliminary measurement.
+//! The phase that is expected in a recording: a recipe's golden map, the prediction from a preliminary measurement, or a map from a
+//! file.
 
 use crate::head::seam;
 use crate::recipe::{Recipe, SequenceKind, safe};
 use algo::adaptive::ProjectorMap;
 use algo::pattern::{PhaseFunction, Unwrapping};
 use algo::units::AbsolutePhase;
+use hal::npy::Array;
 use hal::replay::Recording;
 
 type AnyError = Box<dyn std::error::Error>;
@@ -15,7 +17,7 @@ const SAME: f64 = 1e-9;
 /// An expected phase map that fits a recording.
 #[derive(Debug)]
 pub(super) struct Known {
-    /// "golden" or "preliminary", for reports.
+    /// "golden", "preliminary" or "given", for reports.
     pub name: &'static str,
     /// Which of the recording's patterns it is of.
     pub pattern: usize,
@@ -62,6 +64,31 @@ impl Known {
             name: "preliminary",
             pattern,
             phase: preliminary.expected_phase(&function),
+            reach: None,
+        })
+    }
+
+    /// A map from a file, of the recording's first vertical pattern, else of its first.
+    ///
+    /// # Errors
+    /// If it has not the size of the frames.
+    pub fn given(map: &Array<f64>, recording: &Recording) -> Result<Self, AnyError> {
+        let (width, height) = (recording.width as usize, recording.height as usize);
+        if (map.columns, map.rows) != (width, height) {
+            return Err(format!(
+                "the expected phase has {}x{} pixels, the recording {width}x{height}: name the expected phase \
+                 that was made with this camera",
+                map.columns, map.rows
+            )
+            .into());
+        }
+        let turns = map.elements.iter();
+        Ok(Self {
+            name: "given",
+            pattern: super::primary_of(recording),
+            phase: turns
+                .map(|&turns| AbsolutePhase::from_turns(turns))
+                .collect(),
             reach: None,
         })
     }

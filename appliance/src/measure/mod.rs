@@ -6,6 +6,7 @@ pub mod import;
 mod known;
 pub mod layout;
 pub mod models;
+pub mod projected;
 mod report;
 mod score;
 
@@ -23,6 +24,7 @@ use algo::pattern::PhaseFunction;
 use algo::phase::Decoder;
 use algo::pipeline::{self, PhaseMap};
 use channel::Channel;
+use hal::npy::Array;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecipeReference};
 use known::Known;
@@ -69,6 +71,19 @@ pub fn measure_after(
     preliminary: &ProjectorMap,
 ) -> Result<Measurement, Failure> {
     let known = Known::expected(preliminary, recording).map_err(|error| wrong(folder, &*error))?;
+    measure_about(recording, folder, None, Some(known))
+}
+
+/// As [`measure`], with levels that need a map unwrapped about this one: Φ in turns, NaN where it is not known.
+///
+/// # Errors
+/// As for [`measure`], and if the map has not the size of the frames.
+pub fn measure_about_map(
+    recording: &Recording,
+    folder: &Path,
+    map: &Array<f64>,
+) -> Result<Measurement, Failure> {
+    let known = Known::given(map, recording).map_err(|error| wrong(folder, &*error))?;
     measure_about(recording, folder, None, Some(known))
 }
 

@@ -19,7 +19,7 @@ pub struct Manner {
     /// Ratios of the levels and beats (in brackets) by which they were unwrapped, from coarse to fine, if by a chain.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chain: Option<Vec<String>>,
-    /// The map that they were unwrapped about: reference, golden or preliminary; `None` if they are absolute by themselves.
+    /// The map that they were unwrapped about: reference, golden, preliminary or given; `None` if they are absolute by themselves.
     pub map: Option<&'static str>,
     /// The recipe that was given.
     #[serde(skip_serializing_if = "Option::is_none")]
