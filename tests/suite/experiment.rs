@@ -47,7 +47,7 @@ fn check(limits: &Limits, camera: u32, sequences: &[BetterSequence]) {
     {
         let values = runner.run(Method::Better(*sequence), 1).unwrap().values;
         let ratio = values.rms_mm / paper;
-        let words = format!("{part}, {} frames: {ratio:.3}", sequence.count());
+        let words = format!("{part}, {} frames: {ratio:.3}", sequence.frames);
         assert!(ratio <= *limit, "{words} of the paper's");
         assert_eq!(values.gross_px, 0.0, "{words}");
         let unresolved = values.unresolved_px;

@@ -1,7 +1,7 @@
 //! `fringed-lab experiment --out DIR`: the paper's experiments as tables, plots and pictures.
 
 use crate::experiment::{Campaign, OpticsKind, PARTS, Results, RunRow, Scene, csv, figures, means};
-use appliance::cli::{Output, Threads, names, numbers};
+use appliance::cli::{Form, Output, Threads, names, numbers};
 use appliance::error::{Exit, Failure};
 use appliance::storage::folder::OutputFolder;
 use std::path::PathBuf;
@@ -18,6 +18,9 @@ pub struct Experiment {
     /// Noise seeds.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = numbers::number(1_u64, 100))]
     seeds: u64,
+    /// What the better sequences show: the waveform with the most modulation for each number of shifts, or a sine.
+    #[arg(long, value_enum, default_value_t = Form::Bright)]
+    waveform: Form,
     /// Folder for tables, plots and pictures; made if it does not exist.
     #[arg(long, value_name = "DIR", value_parser = names::folder())]
     out: PathBuf,
@@ -37,6 +40,7 @@ impl Experiment {
             scenes: self.scenes()?,
             optics: self.optics,
             seeds: self.seeds,
+            sines: self.waveform == Form::Sine,
         };
         let folder = OutputFolder::create(&self.out)?;
         let pool = self.threads.pool(0)?;

@@ -16,6 +16,8 @@ pub struct Campaign {
     pub optics: OpticsKind,
     /// Noise seeds 1…seeds.
     pub seeds: u64,
+    /// Whether the better sequences show sines instead of the brightest waveforms.
+    pub sines: bool,
 }
 
 /// The results of all runs.
@@ -39,7 +41,7 @@ impl Campaign {
             kinds.into_iter().map(move |optics| (scene, optics))
         });
         let settings: Vec<_> = settings.collect();
-        let count = |(scene, _): &(&Scene, _)| scene.methods().len() as u64 * self.seeds;
+        let count = |(scene, _): &(&Scene, _)| scene.methods(self.sines).len() as u64 * self.seeds;
         let total = settings.iter().map(count).sum::<u64>().max(1) as f64;
         for (scene, optics) in settings {
             let about = format!("{}, {} optics", scene.name, optics.word());
@@ -48,7 +50,7 @@ impl Campaign {
             let mut runner = Runner::new(scene, optics)?;
             let mut views = Vec::new();
             for seed in 1..=self.seeds {
-                for method in scene.methods() {
+                for method in scene.methods(self.sines) {
                     let done = results.rows.len() as f64;
                     let words = format!("{about}, seed {seed}: {}", method.name());
                     progress(done / total, &words);

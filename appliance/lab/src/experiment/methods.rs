@@ -1,6 +1,6 @@
 //! The methods that are compared, and the frames of each.
 
-use algo::pattern::{PhaseFunction, Sequence, Shot};
+use algo::pattern::{PhaseFunction, Shot, Split, Waveform, Waveforms};
 
 /// A way to measure a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,17 +19,18 @@ pub enum Method {
     Better(BetterSequence),
 }
 
-/// A sequence of the better method: three dense levels, two of them, or a single one.
+/// A sequence of the better method: as many levels and shifts as [`Split`] divides the frames among.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BetterSequence {
-    /// Three are unwrapped about the map of the preliminary measurement, fewer about the golden map.
-    pub levels: usize,
-    /// Shifts of each level.
-    pub shifts: usize,
+    /// Number of frames: 3 to 27.
+    pub frames: usize,
+    /// Whether all levels show sines instead of the brightest waveforms.
+    pub sines: bool,
 }
 
-/// n of the dense levels: reaches ± 4 turns, as recipes have it.
-const DENSE_N: f64 = 4.0;
+/// Reach of sequences that can show a wrong fringe order, turns, and of a single level.
+const REACH: f64 = 2.3;
+const REACH_OF_ONE: f64 = 0.4;
 
 /// The fixed pattern that pictures show.
 pub const SHOWN_FIXED: Method = Method::Fixed { fringes: 100 };
@@ -39,11 +40,12 @@ pub const SHOWN_ADAPTIVE: Method = Method::Better(BetterSequence::TWELVE);
 pub const PAPER: Method = Method::Paper { image_pitch: 5 };
 
 impl Method {
-    /// The methods of a figure with these fixed patterns; the paper's pattern is among them.
-    pub fn table(fringes: &[u32]) -> Vec<Self> {
+    /// The methods of a figure with these fixed patterns; the paper's pattern is among them. With `sines` the better sequences show
+    /// sines.
+    pub fn table(fringes: &[u32], sines: bool) -> Vec<Self> {
         let fixed = fringes.iter().map(|&fringes| Self::Fixed { fringes });
         let papers = [PAPER, Self::Paper { image_pitch: 4 }];
-        let better = BetterSequence::ALL.map(Self::Better);
+        let better = BetterSequence::all(sines).map(Self::Better);
         fixed.chain(papers).chain(better).collect()
     }
 
@@ -52,7 +54,7 @@ impl Method {
         match self {
             Self::Fixed { fringes } => format!("fixed-{fringes}"),
             Self::Paper { image_pitch } => format!("paper-{image_pitch}"),
-            Self::Better(frames) => format!("better-{}", frames.count()),
+            Self::Better(sequence) => format!("better-{}", sequence.frames),
         }
     }
 
@@ -60,62 +62,65 @@ impl Method {
     pub fn frame_count(self) -> usize {
         match self {
             Self::Fixed { .. } | Self::Paper { .. } => 12,
-            Self::Better(frames) => frames.count(),
+            Self::Better(sequence) => sequence.frames,
         }
     }
 
     /// What each frame of its measurement shows. Geometric levels are the paper's: 1, n, n² with n = √(max Φ_P), N = 4.
-    pub fn shots(self, function: &PhaseFunction) -> Vec<Shot> {
+    ///
+    /// # Errors
+    /// As [`BetterSequence::shots`].
+    pub fn shots(self, function: &PhaseFunction) -> Result<Vec<Shot>, String> {
         if let Self::Better(sequence) = self {
             return sequence.shots();
         }
         let max = function.range().max;
         let ratios = [1.0 / max, 1.0 / max.sqrt(), 1.0].into_iter();
-        ratios.flat_map(|ratio| Shot::level(ratio, 4)).collect()
+        Ok(ratios.flat_map(|ratio| Shot::level(ratio, 4)).collect())
     }
 }
 
 impl BetterSequence {
-    /// Three levels of four shifts.
-    pub const TWELVE: Self = Self::new(3, 4);
-    /// Three levels of three shifts.
-    pub const NINE: Self = Self::new(3, 3);
-    /// Two levels of three shifts.
-    pub const SIX: Self = Self::new(2, 3);
-    /// One level of four shifts.
-    pub const FOUR: Self = Self::new(1, 4);
-    /// All that are compared with the paper's pattern.
-    const ALL: [Self; 5] = [
-        Self::TWELVE,
-        Self::NINE,
-        Self::SIX,
-        Self::FOUR,
-        Self::new(1, 3),
-    ];
+    /// 12 frames.
+    pub const TWELVE: Self = Self::new(12);
+    /// 9 frames.
+    pub const NINE: Self = Self::new(9);
+    /// 6 frames.
+    pub const SIX: Self = Self::new(6);
+    /// 4 frames.
+    pub const FOUR: Self = Self::new(4);
 
-    /// So many levels of so many shifts.
-    pub const fn new(levels: usize, shifts: usize) -> Self {
-        Self { levels, shifts }
+    /// Of so many frames, with the brightest waveforms.
+    pub const fn new(frames: usize) -> Self {
+        let sines = false;
+        Self { frames, sines }
     }
 
-    /// Number of frames.
-    pub fn count(self) -> usize {
-        self.levels * self.shifts
+    /// All that are compared with the paper's pattern.
+    fn all(sines: bool) -> impl Iterator<Item = Self> {
+        let counts = [24, 12, 9, 6, 5, 4, 3].into_iter();
+        counts.map(move |frames| Self { frames, sines })
     }
 
     /// Whether it is unwrapped about the golden map, not about the preliminary one.
     pub fn needs_golden(self) -> bool {
-        self.levels < 3
+        self.frames < 9
     }
 
     /// What each frame shows.
-    pub fn shots(self) -> Vec<Shot> {
-        let level = |ratio| Shot::level(ratio, self.shifts);
-        match self.levels {
-            3 => Sequence::dense(DENSE_N, self.shifts),
-            2 => level(1.0).chain(level(0.8)).collect(),
-            _ => level(1.0).collect(),
-        }
+    ///
+    /// # Errors
+    /// In words: there is no sequence of so many frames.
+    pub fn shots(self) -> Result<Vec<Shot>, String> {
+        let waveforms: Waveforms = match self.sines {
+            true => Waveform::sine,
+            false => Waveform::brightest,
+        };
+        let split = Split::best(self.frames, REACH, waveforms);
+        let split = split.or_else(|| Split::best(self.frames, REACH_OF_ONE, waveforms));
+        split
+            .map(|split| split.shots(waveforms))
+            .ok_or_else(|| format!("{} frames make no sequence", self.frames))
     }
 }
 

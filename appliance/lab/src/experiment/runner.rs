@@ -78,7 +78,7 @@ const CHOSEN_STREAM: u64 = 3;
 fn stream(method: Method) -> u64 {
     match method {
         Method::Paper { image_pitch } => 10 + u64::from(image_pitch),
-        Method::Better(sequence) => 30 + sequence.count() as u64,
+        Method::Better(sequence) => 30 + sequence.frames as u64,
         Method::Fixed { fringes } => 100 + u64::from(fringes),
     }
 }
@@ -110,7 +110,7 @@ impl Runner {
     pub fn run(&mut self, method: Method, seed: u64) -> Result<Run, MeasureError> {
         self.learn_with(seed);
         let (function, map) = self.pattern(method)?;
-        let shots = method.shots(&function);
+        let shots = method.shots(&function).map_err(rig)?;
         let mut measured = self.measure(stream(method), &function, &shots, map.as_deref())?;
         if map.is_none() {
             reject_too_fine(&mut measured.phases);
@@ -263,7 +263,7 @@ impl Runner {
         }
         let better = self.better()?;
         let map = Some(&better.expected[..]);
-        let shots = BetterSequence::TWELVE.shots();
+        let shots = BetterSequence::TWELVE.shots().map_err(rig)?;
         let measured = self.measure(GOLDEN_STREAM, &better.function, &shots, map)?;
         let found = Arc::new(measured.phases.phase);
         Ok(Arc::clone(self.learnt.golden.insert(found)))

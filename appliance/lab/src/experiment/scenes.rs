@@ -87,12 +87,12 @@ impl Scene {
         })
     }
 
-    /// The methods that its figure compares.
-    pub fn methods(&self) -> Vec<Method> {
+    /// The methods that its figure compares; with `sines` the better sequences show sines.
+    pub fn methods(&self, sines: bool) -> Vec<Method> {
         match self.judged {
-            Judged::Error => Method::table(&[49, 64, 81, 100, 121]),
+            Judged::Error => Method::table(&[49, 64, 81, 100, 121], sines),
             Judged::Coverage | Judged::CylinderFit => {
-                Method::table(&[32, 49, 64, 81, 100, 121, 144])
+                Method::table(&[32, 49, 64, 81, 100, 121, 144], sines)
             }
         }
     }
