@@ -271,12 +271,16 @@ fn golden_sigma(recipe: &Recipe, plan: &Plan) -> Vec<f32> {
     let arrays = &recipe.arrays;
     let decoder = plan.production().decoder();
     let full_scale = f64::from(decoder.full_scale());
+    // The modulation as taught is that of the last sequence's waveform.
+    let fundamental = |at: usize| recipe.sequences[at].fundamental();
+    let brighter = fundamental(0) / fundamental(recipe.sequences.len() - 1);
+    let noise = recipe.conditions.noise_counts / brighter;
     let sigma = arrays.modulation.iter().zip(&arrays.height_slope);
     sigma
         .map(|(&counts, &slope)| {
             let share = (f64::from(counts) / full_scale * 65_535.0).round() as u16;
             let modulation = algo::units::Modulation::from_bits(share);
-            let turns = decoder.phase_noise(modulation, recipe.conditions.noise_counts);
+            let turns = decoder.phase_noise(modulation, noise);
             (turns * f64::from(slope).abs()) as f32
         })
         .collect()

@@ -97,15 +97,19 @@ impl Adapt {
         let function = &adapted.function;
         let array = npy::write(function.columns(), &function.turns());
         folder.write(name, &array)?;
+        let mut frames = None;
         if let Some(patterns) = &self.patterns {
             let width = recording.width as usize;
             let projected = Projected::new(&adapted, width, self.frames, self.waveform.choice())
                 .map_err(|error| Failure::because(Exit::Usage, "--frames", error))?;
             pool.install(|| projected.write(patterns))?;
+            frames = Some(projected.words());
         }
         let text = || {
-            let table = adapted.report.table();
-            format!("{}\nwritten to {}", table.trim_end(), self.out.display())
+            let mut lines = vec![adapted.report.table().trim_end().to_owned()];
+            lines.extend(frames);
+            lines.push(format!("written to {}", self.out.display()));
+            lines.join("\n")
         };
         self.output.answer(&adapted.report, text)
     }

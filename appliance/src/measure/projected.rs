@@ -29,6 +29,7 @@ pub struct Projected<'a> {
     /// Of each camera pixel, row-major in rows of `width`.
     expected: &'a [AbsolutePhase],
     width: usize,
+    split: Split,
     shots: Vec<Shot>,
 }
 
@@ -38,6 +39,8 @@ struct SequenceFile<'a> {
     format: &'a str,
     version: u32,
     frames: Vec<FrameFile>,
+    reach_turns: f64,
+    unseen_orders: f64,
     phase_function: &'a str,
     expected_phase: &'a str,
 }
@@ -74,7 +77,27 @@ impl<'a> Projected<'a> {
             expected: &adapted.expected,
             width,
             shots: split.shots(waveforms),
+            split,
         })
+    }
+
+    /// The sequence in words, with what it accepts.
+    pub fn words(&self) -> String {
+        let levels = self.split.levels.iter();
+        let levels: Vec<String> = levels
+            .map(|(ratio, shifts)| format!("{shifts} of ratio {ratio:.6}"))
+            .collect();
+        let Split { reach, slips, .. } = self.split;
+        let orders = match self.split.levels.len() {
+            1 => "a wrong fringe order leaves no residual".to_owned(),
+            _ => format!(
+                "wrong fringe orders without a residual: {slips:.1e} of the pixels of the least trusted modulation"
+            ),
+        };
+        format!(
+            "frames                    {}; right within {reach:.1} turns of the expected phase; {orders}",
+            levels.join(" + ")
+        )
     }
 
     /// Writes the folder. Pictures of a longer sequence that was written there before are removed.
@@ -118,6 +141,8 @@ impl<'a> Projected<'a> {
             format: FORMAT,
             version: VERSION,
             frames: frames.collect(),
+            reach_turns: self.split.reach,
+            unseen_orders: self.split.slips,
             phase_function: PHASE_FUNCTION,
             expected_phase: EXPECTED_PHASE,
         };

@@ -283,7 +283,8 @@ impl GoldenPart<'_> {
         // Of a geometric sequence only the finest level contributes to the accuracy.
         let absolute = !self.decoder.unwrapping().needs_map() && kind == SequenceKind::Full;
         let carries = |ratio: f64| !absolute || ratio >= 0.999;
-        // The modulation as taught is that of golden's finest level; other waveforms have another share of it.
+        // The modulation as taught is that of golden's finest level, which is the full sequence's; other waveforms have another
+        // share of it.
         let taught = finest_waveform(self.full).fundamental();
         let squares = frames
             .iter()

@@ -319,7 +319,47 @@ fn evenly_spaced(shifts: &[f64]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::evenly_spaced;
+    use super::{evenly_spaced, manifest};
+    use crate::replay::manifest::parse;
+
+    /// What is wrong with a recording of one level whose first frame has these harmonics.
+    fn problem(harmonics: &str) -> Option<String> {
+        let frame = |k: u32, harmonics: &str| {
+            let shift = f64::from(k) / 4.0;
+            format!(
+                "{{\"file\": \"{k}.png\", \"ratio\": 1.0, \"shift_turns\": {shift}, \"harmonics\": {harmonics}}}"
+            )
+        };
+        let frames = [
+            frame(0, harmonics),
+            frame(1, "[]"),
+            frame(2, "[]"),
+            frame(3, "[]"),
+        ]
+        .join(", ");
+        let text = format!(
+            "{{\"format\": \"fringed-recording\", \"version\": 1, \"camera\": {{\"width\": 8, \"height\": 8, \
+             \"bit_depth\": 8}}, \"projector\": {{\"width\": 8, \"height\": 8}}, \"pattern\": {{\"kind\": \"vertical\", \
+             \"fringes\": 2.0}}, \"frames\": [{frames}]}}"
+        );
+        let found = parse(&text).and_then(|read| manifest(&read));
+        found.err().map(|wrong| wrong.to_string())
+    }
+
+    #[test]
+    fn harmonics_have_orders_and_shares_within_bounds_and_each_order_once() {
+        assert_eq!(problem("[[2, 0.1], [15, -1.0]]"), None);
+        for (harmonics, words) in [
+            ("[[1, 0.1]]", "order is 1"),
+            ("[[16, 0.1]]", "order is 16"),
+            ("[[3, 1.5]]", "share is 1.5"),
+            ("[[3, 0.1], [3, 0.2]]", "twice"),
+            ("[3, 0.1]", "invalid type"),
+        ] {
+            let problem = problem(harmonics).unwrap_or_default();
+            assert!(problem.contains(words), "{harmonics}: {problem}");
+        }
+    }
 
     #[test]
     fn shifts_divide_a_turn_in_any_order_and_from_any_start() {

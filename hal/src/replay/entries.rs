@@ -118,22 +118,14 @@ pub(super) fn manifest_of(recording: &Recording, names: Names) -> Manifest {
         bits: files(names.bits(code)),
         inverse: files(names.inverse(code)),
     });
-    let waveforms = recording
-        .frames
-        .iter()
-        .any(|frame| !frame.harmonics.is_empty());
-    // Version 1 has none of these, and older programs read it.
+    // Version 1 has neither, and older programs read it.
     let plain = [&recording.white, &recording.black]
         .iter()
         .all(|uniform| uniform.is_none())
         && recording.codes.is_empty();
     Manifest {
         format: FORMAT.to_owned(),
-        version: match (waveforms, plain) {
-            (true, _) => VERSION,
-            (false, false) => 2,
-            (false, true) => 1,
-        },
+        version: if plain { 1 } else { VERSION },
         description: recording.description.clone(),
         source: recording.source.clone(),
         camera: CameraEntry {

@@ -9,9 +9,9 @@ use crate::model::{DeviceModel, PlaneModel};
 
 /// The name of the format, in every manifest.
 pub const FORMAT: &str = "fringed-recording";
-/// The newest version that this program reads: with harmonics. Version 2 has codes, white and black. A recording is written as the
-/// oldest version that can hold it, which older programs read.
-pub const VERSION: u64 = 3;
+/// The newest version that this program reads: with codes, white and black. A recording without these is written as version 1, which
+/// older programs read.
+pub const VERSION: u64 = 2;
 
 /// The whole of `recording.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
