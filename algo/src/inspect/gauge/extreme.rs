@@ -67,22 +67,42 @@ fn motion(g: &[f64; 6], placed: Option<&Placed>) -> f64 {
     placed.map_or(0.0, |placed| form(g, &placed.covariance, g).max(0.0))
 }
 
+/// Estimates of true values: the measured ones, moved towards their mean until their scatter is less by σ², so that the scatter that
+/// the errors make does not count twice.
+struct Drawn {
+    mean: f64,
+    share: f64,
+}
+
+impl Drawn {
+    /// Of values with an error of `sigma` each.
+    fn of(values: impl Iterator<Item = f64> + Clone, sigma: f64) -> Self {
+        let count = values.clone().count() as f64;
+        let mean = values.clone().sum::<f64>() / count;
+        let scatter = values.map(|x| (x - mean) * (x - mean)).sum::<f64>() / count;
+        let noise = sigma * sigma / scatter.max(f64::MIN_POSITIVE);
+        let share = libm::sqrt((1.0 - noise).max(0.0));
+        Self { mean, share }
+    }
+
+    /// The estimate for a measured value.
+    fn value(&self, measured: f64) -> f64 {
+        self.mean + (measured - self.mean) * self.share
+    }
+}
+
 /// Bins per σ, and bins from the largest value down that are counted.
 const BINS_PER_SIGMA: f64 = 4.0;
 const BINS: usize = 40;
 
 /// Standard deviation, over repeated measurements, of the largest of values with an error of `sigma` each, from its distribution
-/// F(x) = Π Φ((x − mᵢ)/σ). The true values m are the measured ones, moved towards their mean until their scatter is less by σ²: the
-/// scatter that the errors make must not count twice.
+/// F(x) = Π Φ((x − mᵢ)/σ), m the true values ([`Drawn`]).
 fn spread_of_largest(values: &[f64], sigma: f64) -> f64 {
     if !(sigma > 0.0) {
         return 0.0;
     }
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let scatter = values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / count;
-    let shrink = libm::sqrt((1.0 - sigma * sigma / scatter.max(f64::MIN_POSITIVE)).max(0.0));
-    let drawn = |value: &f64| mean + (value - mean) * shrink;
+    let drawn = Drawn::of(values.iter().copied(), sigma);
+    let drawn = |value: &f64| drawn.value(*value);
     let top = values.iter().map(drawn).fold(f64::NEG_INFINITY, f64::max);
     let mut bins = [0.0; BINS];
     for value in values.iter().map(drawn) {
@@ -112,6 +132,11 @@ fn below(x: f64) -> f64 {
     (0.5 * libm::erfc(-x / SQRT_2)).max(f64::MIN_POSITIVE)
 }
 
+/// φ, its density.
+fn density(x: f64) -> f64 {
+    libm::exp(-x * x / 2.0) / libm::sqrt(2.0 * PI)
+}
+
 /// Root of the mean square of the deviations, mm. Var(mean d²) = (4σ² Σd² − 2nσ⁴) / n² + gᵀ C g: the scatter of d² about fixed true
 /// deviations, whose squares are estimated by d² − σ², and the error of the motion, g = Σ 2dᵢ jᵢ / n.
 pub fn rms(cells: &[Cell], sigma: f64, placed: Option<&Placed>) -> Option<Reading> {
@@ -138,25 +163,40 @@ pub fn rms(cells: &[Cell], sigma: f64, placed: Option<&Placed>) -> Option<Readin
     })
 }
 
-/// Share of the cells that deviate by more than `tolerance` mm. A cell lies outside with p = Φ((|d| − T)/σ), so σ² = Σ p(1 − p) / n² for
-/// known d. Only the measured d is known: p(1 − p) is averaged over its error, e^(−x²/4)/(2π) with x = (|d| − T)/σ, which has the same
-/// integral over all d, σ/√π.
-pub fn share_outside(cells: &[Cell], sigma: f64, tolerance: f64) -> Option<Reading> {
+/// Cells further than this many σ from the tolerance lie on the same side of it in every measurement.
+const SURE: f64 = 8.0;
+
+/// Share of the cells that deviate by more than `tolerance` mm. A cell of true deviation m lies outside with
+/// p = Q((T − m)/σ) + Q((T + m)/σ), Q the upper tail of the normal distribution, so σ² = Σ p(1 − p) / n² + gᵀ C g: the error of the motion
+/// moves all cells together, g = Σ p′ j / n. True deviations are drawn as [`Drawn`].
+pub fn share_outside(
+    cells: &[Cell],
+    sigma: f64,
+    tolerance: f64,
+    placed: Option<&Placed>,
+) -> Option<Reading> {
     if cells.is_empty() {
         return None;
     }
     let count = cells.len() as f64;
-    let sizes = || cells.iter().map(|cell| libm::fabs(cell.deviation));
-    let outside = sizes().filter(|size| *size > tolerance).count() as f64;
-    let variance: f64 = match sigma > 0.0 {
-        true => sizes()
-            .map(|size| (size - tolerance) / sigma)
-            .map(|x| libm::exp(-x * x / 4.0) / (2.0 * PI))
-            .sum(),
-        false => 0.0,
-    };
+    let sizes = cells.iter().map(|cell| libm::fabs(cell.deviation));
+    let outside = sizes.filter(|size| *size > tolerance).count() as f64;
+    let drawn = Drawn::of(cells.iter().map(|cell| cell.deviation), sigma);
+    let (mut variance, mut g) = (0.0, [0.0; 6]);
+    for cell in cells {
+        let m = drawn.value(cell.deviation);
+        let [upper, lower] = [(tolerance - m) / sigma, (tolerance + m) / sigma];
+        if libm::fabs(upper).min(libm::fabs(lower)) < SURE {
+            let p = below(-upper) + below(-lower);
+            variance += (p * (1.0 - p)).max(0.0);
+            let slope = (density(upper) - density(lower)) / (sigma * count);
+            for (g, j) in g.iter_mut().zip(cell.taught.jacobian) {
+                *g += slope * j;
+            }
+        }
+    }
     Some(Reading {
         value: outside / count,
-        sigma: Some(libm::sqrt(variance) / count),
+        sigma: Some(libm::sqrt(variance / (count * count) + motion(&g, placed))),
     })
 }

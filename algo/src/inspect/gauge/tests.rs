@@ -108,15 +108,15 @@ fn deviations_have_a_root_mean_square_and_a_share_out_of_tolerance() {
     let cells = seen(&sums, &taught, None);
     let expected: f64 = (4.0 * 0.09 + 12.0 * 0.01) / 16.0;
     close(rms(&cells, 0.0, None).unwrap().value, expected.sqrt());
-    let share = share_outside(&cells, 0.001, 0.2).unwrap();
+    let share = share_outside(&cells, 0.001, 0.2, None).unwrap();
     close(share.value, 0.25);
     // Nothing lies within 100 σ of the tolerance.
     close(share.sigma.unwrap(), 0.0);
-    // One cell at the tolerance is a coin: next to 0.4 of σ 0.5 / 16, as its place is not known better than σ.
+    // One cell at the tolerance is a coin.
     let (sums, taught) = grid(1, |_, _| 0.2);
     let one = seen(&sums, &taught, None);
-    let coin = share_outside(&one, 0.01, 0.2).unwrap().sigma.unwrap();
-    close(coin, (0.5 / core::f64::consts::PI).sqrt());
+    let coin = share_outside(&one, 0.01, 0.2, None).unwrap().sigma.unwrap();
+    close(coin, 0.5);
 }
 
 #[test]

@@ -2,9 +2,9 @@
 //!
 //! A pixel is resolved if its modulation B is at least B_min. Where B lies within its noise σ of that, the pixel is resolved in one
 //! measurement and not in the next: its variance is p(1 − p) with p = Φ((B − B_min)/σ). Only the measured B is known, so p(1 − p) is
-//! averaged over its error: e^(−x²/4)/(2π), x = (B − B_min)/σ, has the same integral over all B (as in
-//! [`share_outside`](crate::inspect::gauge::share_outside)). It counts twice, for the pixel as far below B_min, whose
-//! modulation is not kept.
+//! averaged over its error: e^(−x²/4)/(2π), x = (B − B_min)/σ, has the same integral over all B, σ/√π. It counts twice, for the pixel
+//! as far below B_min, whose modulation is not kept. The error of the part's motion, which moves the region by some hundredths of a
+//! pixel, is left out.
 
 use crate::phase::Decoder;
 use crate::pipeline::NO_OFFSET;

@@ -3,7 +3,6 @@
 use super::counts::TRUSTS;
 use super::coverage;
 use super::pose::PoseField;
-use super::squares::extreme::Extreme;
 use super::{CellBuffers, Input, MAX_GAUGES, Measure, Production, Strip, Strips};
 use crate::inspect::Reading;
 use crate::inspect::align::Placed;
@@ -177,7 +176,7 @@ impl Production {
             Measure::PeakToValley { .. } => return peak_to_valley(cells, cell, placed, weights),
             Measure::RmsDeviation { .. } => return rms(cells, cell, placed),
             Measure::OutOfTolerance { tolerance, .. } => {
-                return share_outside(cells, cell, tolerance);
+                return share_outside(cells, cell, tolerance, placed);
             }
             Measure::MeanHeight => mean(cells, weights)?,
             Measure::Tilt(about) => tilt(cells, about, weights)?,
@@ -211,33 +210,5 @@ impl Production {
         }
         let least = (side > 0).then(|| patch.grid.least());
         cells(sums, &patch.taught, least, out);
-    }
-
-    /// The reading of a square; its σ is worked out here, for this one square alone.
-    fn deviation(
-        &self,
-        best: Extreme,
-        side: usize,
-        input: Input<'_>,
-        pose: &PoseField,
-        strip: &mut Strip,
-    ) -> Reading {
-        let half = side / 2;
-        let bottom = (best.row + half + 1).min(self.window.len());
-        let mut variance = 0.0;
-        for v in best.row.saturating_sub(half)..bottom {
-            let window = &self.window[v];
-            let left = best.column.saturating_sub(half).max(window.start);
-            let right = (best.column + half + 1).min(window.end);
-            if left < right {
-                variance += strip.variance(self, pose, input, v, left..right);
-            }
-        }
-        let count = best.count as f64;
-        let sigma = libm::sqrt(variance) / count / 1e6;
-        Reading {
-            value: best.sum as f64 / count / 1e6,
-            sigma: (sigma > 0.0).then_some(sigma),
-        }
     }
 }

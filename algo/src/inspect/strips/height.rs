@@ -174,7 +174,7 @@ fn sums_variances(v: usize) -> bool {
 }
 
 /// z₀ that offsets count from: golden's height, 0 where that is not known.
-fn base_nm(golden: Height) -> i32 {
+pub(super) fn base_nm(golden: Height) -> i32 {
     if golden.is_known() { golden.nm() } else { 0 }
 }
 

@@ -9,7 +9,7 @@
 //!    and its deviation from golden there;
 //! 4. **accumulate** (`counts`, `coverage`, `weighted`, `squares`): counts, the sums of the gauges' cells ([`gauge`](super::gauge)), and
 //!    the square with the largest mean weighted deviation; for the squares, the rows before this one are kept (`recent`);
-//! 5. **gauge** (`findings`): after all strips, readings and their errors from these sums.
+//! 5. **gauge** (`findings`, `deviation`): after all strips, readings and their errors from these sums.
 //!
 //! Before that, where the part's motion is wanted, some rows go through stages 1 and 2 and a few points of each are kept: the
 //! motion is found from these, in the order of the rows.
@@ -27,6 +27,7 @@ mod coordinates;
 mod counts;
 mod coverage;
 mod decode;
+mod deviation;
 mod displaced;
 mod findings;
 mod gauges;

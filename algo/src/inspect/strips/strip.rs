@@ -2,6 +2,7 @@
 
 use super::coordinates::TaughtCoordinates;
 use super::counts::Counts;
+use super::deviation::SquareNoise;
 use super::height::HeightRow;
 use super::pose::PoseField;
 use super::recent::RecentRows;
@@ -120,27 +121,30 @@ impl Strip {
         }
     }
 
-    /// Σ of the variances of the weighted deviations of row `v` inside `columns`, nm².
-    pub fn variance(
+    /// Adds the pixels of row `v` inside `columns` to the noise of a square.
+    pub fn add_noise(
         &mut self,
         plan: &Production,
         pose: &PoseField,
         input: Input<'_>,
         v: usize,
         columns: Range<usize>,
-    ) -> f64 {
+        noise: &mut SquareNoise,
+    ) {
         self.measure(plan, input, v, columns.clone());
         self.align(plan, pose, v, columns.clone());
         let deviation = self.recent.row(v);
-        let mut sum = 0.0;
         for u in columns {
             if deviation[u] != NO_OFFSET {
                 let slope = plan.slope((u, v), self.decoded.phase[u]);
                 let weight = self.coordinates.weight(plan, u).share();
-                let sigma = plan.sigma_nm(self.decoded.modulation[u], slope) * weight;
-                sum += sigma * sigma;
+                let sigma = plan.sigma_nm(self.decoded.modulation[u], slope);
+                let lift = noise.is_sampled(u, v).then(|| {
+                    let offset = self.heights.offset[u];
+                    plan.lift(pose.placed.as_ref()?, (u, v), offset)
+                });
+                noise.add(weight, sigma * 1e-6, lift.flatten());
             }
         }
-        sum
     }
 }

@@ -1,0 +1,126 @@
+//! Stage 5, gauge: the reading of a deviation, the square with the largest mean.
+//!
+//! The mean over n pixels of weights w has, with σ_p the noise of a pixel's height and C the covariance of the motion that was
+//! taken back,
+//!
+//! ```text
+//! σ² = Σ w² σ_p² / n² + gᵀ C g        g = Σ w j / n
+//! ```
+//!
+//! j is the Jacobian of a pixel's height over the motion ([`Facet::jacobian`](crate::inspect::align::Facet::jacobian)); it changes
+//! little over a square, so its mean over some pixels is taken.
+
+use super::height::base_nm;
+use super::pose::PoseField;
+use super::squares::extreme::Extreme;
+use super::{Input, Production, Strip};
+use crate::inspect::Reading;
+use crate::inspect::align::{Placed, form};
+use crate::units::Height;
+
+/// Pixels of a square whose Jacobians are averaged, in each direction.
+const SAMPLES: usize = 4;
+
+/// Sums over the pixels of a square, from which the error of its mean follows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SquareNoise {
+    /// Every so many columns and rows a pixel's Jacobian is taken.
+    stride: usize,
+    /// Σ w² σ_p², mm².
+    variance: f64,
+    /// Σ w.
+    weight: f64,
+    /// Σ j, and how many.
+    jacobian: [f64; 6],
+    sampled: f64,
+}
+
+impl SquareNoise {
+    /// Of a square of `side` pixels.
+    fn new(side: usize) -> Self {
+        Self {
+            stride: (side / SAMPLES).max(1),
+            variance: 0.0,
+            weight: 0.0,
+            jacobian: [0.0; 6],
+            sampled: 0.0,
+        }
+    }
+
+    /// Whether the Jacobian of this pixel is taken.
+    pub fn is_sampled(&self, u: usize, v: usize) -> bool {
+        u.is_multiple_of(self.stride) && v.is_multiple_of(self.stride)
+    }
+
+    /// Adds a pixel: its weight, σ_p in mm and, of a sampled one, its Jacobian.
+    pub fn add(&mut self, weight: f64, sigma: f64, jacobian: Option<[f64; 6]>) {
+        self.variance += weight * weight * sigma * sigma;
+        self.weight += weight;
+        if let Some(jacobian) = jacobian {
+            self.sampled += 1.0;
+            for (sum, value) in self.jacobian.iter_mut().zip(jacobian) {
+                *sum += value;
+            }
+        }
+    }
+
+    /// The variances of the mean over `count` pixels, mm²: by the pixels' noise and by the motion.
+    fn variances(&self, count: f64, placed: Option<&Placed>) -> (f64, f64) {
+        // Beside an edge no pixel may have a facet: the surface is then taken to be flat.
+        let mean = match self.sampled > 0.0 {
+            true => self.jacobian.map(|sum| sum / self.sampled),
+            false => [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+        };
+        let g = mean.map(|value| value * self.weight / count);
+        let motion = placed.map_or(0.0, |placed| form(&g, &placed.covariance, &g).max(0.0));
+        (self.variance / (count * count), motion)
+    }
+}
+
+impl Production {
+    /// The reading of the square that was found; its σ is worked out here, for this one square alone.
+    pub(super) fn deviation(
+        &self,
+        best: Extreme,
+        side: usize,
+        input: Input<'_>,
+        pose: &PoseField,
+        strip: &mut Strip,
+    ) -> Reading {
+        let half = side / 2;
+        let bottom = (best.row + half + 1).min(self.window.len());
+        let mut noise = SquareNoise::new(side);
+        for v in best.row.saturating_sub(half)..bottom {
+            let window = &self.window[v];
+            let left = best.column.saturating_sub(half).max(window.start);
+            let right = (best.column + half + 1).min(window.end);
+            if left < right {
+                strip.add_noise(self, pose, input, v, left..right, &mut noise);
+            }
+        }
+        let count = best.count as f64;
+        let (pixels, motion) = noise.variances(count, pose.placed.as_ref());
+        let sigma = libm::sqrt(pixels + motion);
+        Reading {
+            value: best.sum as f64 / count / 1e6,
+            sigma: (sigma > 0.0).then_some(sigma),
+        }
+    }
+
+    /// The Jacobian, over the motion, of the height of what a pixel sees `offset_nm` above golden; none where the surface there has
+    /// no facet.
+    pub(super) fn lift(
+        &self,
+        placed: &Placed,
+        (u, v): (usize, usize),
+        offset_nm: i32,
+    ) -> Option<[f64; 6]> {
+        let alignment = self.alignment.as_ref()?;
+        let base = base_nm(self.cubics.surface().height[v * self.size().0 + u]);
+        let height = Height::from_nm(base.saturating_add(offset_nm));
+        let point = placed.motion.undo(self.triangulator.point(u, v, height)?);
+        let seen = self.triangulator.camera().project(point)?;
+        let facet = self.golden().facet(point, seen)?;
+        Some(facet.jacobian(point, (alignment.centre, alignment.radius)))
+    }
+}
