@@ -207,8 +207,9 @@ pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]
             planned.measure
         );
         if let (Some(sigma), Some(expected)) = (reading.sigma, expected.sigma) {
+            // The extreme of a good part scatters less than the square in which it was found.
             assert!(
-                close(sigma, expected, SIGMA_SHARE),
+                sigma > 0.0 && sigma < expected * (1.0 + SIGMA_SHARE),
                 "{name}: sigma {sigma} {expected}"
             );
         }

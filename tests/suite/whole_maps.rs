@@ -60,6 +60,7 @@ impl<'a> Comparison<'a> {
         Some(Reading {
             value: sum as f64 / count / 1e6,
             sigma: (sigma > 0.0).then_some(sigma),
+            expected: None,
         })
     }
 
@@ -89,6 +90,7 @@ impl<'a> Comparison<'a> {
         Reading {
             value: resolved as f64 / region.len().max(1) as f64,
             sigma: None,
+            expected: None,
         }
     }
 

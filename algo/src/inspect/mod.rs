@@ -3,6 +3,7 @@
 mod align;
 mod gauge;
 pub mod good;
+mod largest;
 mod mask;
 mod openings;
 mod region;
@@ -12,6 +13,7 @@ mod weight;
 
 pub use align::{Facet, GoldenSurface, Motion, Placed};
 pub use gauge::{Axis, Measure, Reading, TooFine};
+pub use largest::Largest;
 pub(crate) use mask::components;
 pub use mask::eroded;
 pub use openings::{Opening, openings};

@@ -59,6 +59,7 @@ fn range(
     Some(Reading {
         value,
         sigma: Some(libm::sqrt(top * top + bottom * bottom + motion)),
+        expected: None,
     })
 }
 
@@ -67,27 +68,48 @@ fn motion(g: &[f64; 6], placed: Option<&Placed>) -> f64 {
     placed.map_or(0.0, |placed| form(g, &placed.covariance, g).max(0.0))
 }
 
+/// Rounds in which the scatter of values is found without those that lie more than [`CLIP`] times of it off their mean.
+const ROUNDS: usize = 4;
+const CLIP: f64 = 3.0;
+/// Values that lie more than this many times the scatter off the mean belong to a defect, not to noise.
+const DEFECT: f64 = 5.0;
+
 /// Estimates of true values: the measured ones, moved towards their mean until their scatter is less by σ², so that the scatter that
-/// the errors make does not count twice.
+/// the errors make does not count twice. Those of a defect stay where they are.
 struct Drawn {
     mean: f64,
+    scatter: f64,
     share: f64,
 }
 
 impl Drawn {
     /// Of values with an error of `sigma` each.
     fn of(values: impl Iterator<Item = f64> + Clone, sigma: f64) -> Self {
-        let count = values.clone().count() as f64;
-        let mean = values.clone().sum::<f64>() / count;
-        let scatter = values.map(|x| (x - mean) * (x - mean)).sum::<f64>() / count;
-        let noise = sigma * sigma / scatter.max(f64::MIN_POSITIVE);
-        let share = libm::sqrt((1.0 - noise).max(0.0));
-        Self { mean, share }
+        let (mut mean, mut scatter) = (0.0, f64::INFINITY);
+        for _ in 0..ROUNDS {
+            let reach = CLIP * scatter;
+            let inside = values.clone().filter(|x| libm::fabs(x - mean) <= reach);
+            let count = (inside.clone().count() as f64).max(1.0);
+            let middle = inside.clone().sum::<f64>() / count;
+            let squares = inside.map(|x| (x - middle) * (x - middle)).sum::<f64>();
+            (mean, scatter) = (middle, libm::sqrt(squares / count));
+        }
+        let noise = sigma / scatter.max(f64::MIN_POSITIVE);
+        let share = libm::sqrt((1.0 - noise * noise).max(0.0));
+        Self {
+            mean,
+            scatter,
+            share,
+        }
     }
 
     /// The estimate for a measured value.
     fn value(&self, measured: f64) -> f64 {
-        self.mean + (measured - self.mean) * self.share
+        let off = measured - self.mean;
+        match libm::fabs(off) > DEFECT * self.scatter {
+            true => measured,
+            false => self.mean + off * self.share,
+        }
     }
 }
 
@@ -160,6 +182,7 @@ pub fn rms(cells: &[Cell], sigma: f64, placed: Option<&Placed>) -> Option<Readin
     Some(Reading {
         value,
         sigma: Some(libm::sqrt(scatter) / (2.0 * value.max(sigma).max(f64::MIN_POSITIVE))),
+        expected: None,
     })
 }
 
@@ -198,5 +221,6 @@ pub fn share_outside(
     Some(Reading {
         value: outside / count,
         sigma: Some(libm::sqrt(variance / (count * count) + motion(&g, placed))),
+        expected: None,
     })
 }

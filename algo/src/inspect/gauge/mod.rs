@@ -27,6 +27,8 @@ pub struct Reading {
     /// Its error over repeated measurements of the same part, 1 σ, where the noise is known. Golden's own noise adds the same error
     /// every time and is not in it.
     pub sigma: Option<f64>,
+    /// What its magnitude is expected to be on a good part with this noise: of a deviation, which is an extreme, and so not 0.
+    pub expected: Option<f64>,
 }
 
 /// The axes that a plane may be tilted about.

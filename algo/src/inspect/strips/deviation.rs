@@ -7,6 +7,7 @@
 //! σ² = Σ w² σ_p² / n² + gᵀ C g        g = Σ w j / n
 //! ```
 //!
+//! The deviation is the largest of many such means, so its own error is that of an extreme ([`largest`](crate::inspect::largest)).
 //! j is the Jacobian of a pixel's height over the motion ([`Facet::jacobian`](crate::inspect::align::Facet::jacobian)); it changes
 //! little over a square, so its mean over some pixels is taken.
 
@@ -14,8 +15,8 @@ use super::height::base_nm;
 use super::pose::PoseField;
 use super::squares::extreme::Extreme;
 use super::{Input, Production, Strip};
-use crate::inspect::Reading;
 use crate::inspect::align::{Placed, form};
+use crate::inspect::{Largest, Reading};
 use crate::units::Height;
 
 /// Pixels of a square whose Jacobians are averaged, in each direction.
@@ -78,14 +79,15 @@ impl SquareNoise {
 }
 
 impl Production {
-    /// The reading of the square that was found; its σ is worked out here, for this one square alone.
+    /// The reading of the square of `side` pixels that was found. `largest` is what good parts read with this noise. The error of the
+    /// square itself is worked out here, for this one square alone.
     pub(super) fn deviation(
         &self,
-        best: Extreme,
-        side: usize,
+        (best, side): (Extreme, usize),
         input: Input<'_>,
         pose: &PoseField,
         strip: &mut Strip,
+        largest: Largest,
     ) -> Reading {
         let half = side / 2;
         let bottom = (best.row + half + 1).min(self.window.len());
@@ -100,10 +102,13 @@ impl Production {
         }
         let count = best.count as f64;
         let (pixels, motion) = noise.variances(count, pose.placed.as_ref());
-        let sigma = libm::sqrt(pixels + motion);
+        let value = best.sum as f64 / count / 1e6;
+        let extreme = largest.uncertain(libm::fabs(value), libm::sqrt(pixels));
+        let sigma = libm::sqrt(extreme.variance + motion);
         Reading {
-            value: best.sum as f64 / count / 1e6,
+            value,
             sigma: (sigma > 0.0).then_some(sigma),
+            expected: Some(largest.mean).filter(|mean| *mean > 0.0),
         }
     }
 

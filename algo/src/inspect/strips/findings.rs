@@ -118,6 +118,7 @@ impl Production {
                 (pixels > 0).then(|| Reading {
                     value: covered as f64 / pixels as f64,
                     sigma: Some(coverage::sigma(variance, pixels)),
+                    expected: None,
                 })
             }
             Measure::Deviation { side } => {
@@ -127,13 +128,16 @@ impl Production {
                 let best =
                     extremes.reduce(|best, next| if next.reaches(&best) { next } else { best })?;
                 let strip = strips.first_mut()?;
-                Some(self.deviation(best, side, input, pose, strip))
+                let noise = libm::hypot(self.golden_noise, noisier) / self.golden_noise;
+                let largest = self.largest.get(gauge).copied().unwrap_or_default();
+                Some(self.deviation((best, side), input, pose, strip, largest.times(noise)))
             }
             Measure::Placement(component) => {
                 let (value, sigma) = pose.placed.as_ref()?.component(component)?;
                 Some(Reading {
                     value,
                     sigma: Some(sigma),
+                    expected: None,
                 })
             }
             _ => self.of_cells(gauge, noisier, pose, strips, cells),
@@ -192,6 +196,7 @@ impl Production {
         Some(Reading {
             value,
             sigma: Some(sigma(weights, cells, noise, placed)),
+            expected: None,
         })
     }
 

@@ -5,6 +5,7 @@ use super::gauges::{Gauge, Gauges, Unmeasurable};
 use super::taught::Taught;
 use super::weighted::WeightedTiles;
 use crate::geometry::Triangulator;
+use crate::inspect::Largest;
 use crate::inspect::align::{Alignment, GoldenSurface, levels};
 use crate::phase::Decoder;
 use crate::pipeline::{HeightCubics, VARIANCE_UNIT_NM};
@@ -35,6 +36,10 @@ pub struct Parts {
     pub noise_counts: f64,
     /// Whether the part's motion is found and taken back.
     pub aligned: bool,
+    /// σ of golden's heights, as a multiple of the taught σ, which is that with this decoder.
+    pub golden_noise: f64,
+    /// Per gauge, what a deviation is on good parts whose only noise is golden's; of other gauges not used.
+    pub largest: Vec<Largest>,
 }
 
 /// Everything that inspecting parts needs, worked out once.
@@ -61,6 +66,9 @@ pub struct Production {
     /// The middle of golden's heights and half their span, mm.
     pub(super) levels: (f64, f64),
     pub(super) gauges: Gauges,
+    /// See [`Parts`].
+    pub(super) golden_noise: f64,
+    pub(super) largest: Vec<Largest>,
 }
 
 impl Production {
@@ -80,6 +88,8 @@ impl Production {
             window,
             noise_counts,
             aligned,
+            golden_noise,
+            largest,
         } = parts;
         let width = cubics.surface().width;
         taught.mark_squares(width.max(1));
@@ -116,6 +126,8 @@ impl Production {
             noise_counts,
             alignment,
             gauges,
+            golden_noise,
+            largest,
         })
     }
 

@@ -44,7 +44,7 @@ impl Taught {
     }
 
     /// All pixels, row-major: [`COMPARED`], [`SQUARE`] and σ.
-    pub(super) fn pixels(&self) -> &[u16] {
+    pub(in crate::inspect) fn pixels(&self) -> &[u16] {
         &self.pixels
     }
 
@@ -64,7 +64,7 @@ impl Taught {
     }
 
     /// How much the deviation at a compared place counts.
-    pub(super) fn weight(&self, place: usize) -> Weight {
+    pub(in crate::inspect) fn weight(&self, place: usize) -> Weight {
         self.weights.get(place).copied().unwrap_or(Weight::FULL)
     }
 

@@ -27,7 +27,7 @@ use algo::pipeline::HeightCubics;
 use algo::units::Height;
 use hal::frame::Frame;
 use hal::projector::Raster;
-use run::{Run, Shared, prepare};
+use run::{Prepared, Run, Shared};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -179,7 +179,7 @@ impl Plan {
             // Golden was measured with the full sequence, the last.
             let taught = sequences.last().map_or(1.0, RecipeSequence::fundamental);
             let runs = sequences.into_iter();
-            runs.map(|sequence| prepare(sequence, (noise, taught), &arrays, range, &mut shots))
+            runs.map(|sequence| Prepared::of(sequence, (noise, taught), &arrays, range, &mut shots))
                 .collect::<Result<Vec<_>, _>>()
         };
         let (prepared, surface) = rayon::join(prepared, || golden::surface(size.0, &arrays));
@@ -193,6 +193,9 @@ impl Plan {
                 MAX_PATTERN_BYTES >> 20
             ));
         }
+        // The last sequence is the one that golden was measured with.
+        let golden = prepared.last().ok_or("it has no sequence")?;
+        let golden = golden.golden_noise(&gauges, size.0);
         // Freed before the expansion of the height is allocated, which takes the most memory.
         drop(arrays);
         let range = conditions.expansion_range_turns;
@@ -203,9 +206,13 @@ impl Plan {
             cubics: Arc::new(cubics),
             gauges,
             window,
+            noise_counts: conditions.noise_counts,
+            golden,
         };
-        let runs = prepared.into_iter().map(|join| join(&shared));
-        let runs = runs.collect::<Result<Vec<_>, _>>()?;
+        let runs = prepared
+            .into_iter()
+            .map(|sequence| sequence.join(&shared))
+            .collect::<Result<Vec<_>, _>>()?;
         let first = runs.first().ok_or("it has no sequence")?;
         let strips = first.production.strips(size.1.div_ceil(STRIPS));
         Ok(Self {

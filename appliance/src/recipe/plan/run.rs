@@ -4,10 +4,11 @@ use super::golden;
 use crate::recipe::archive::Arrays;
 use crate::recipe::{RecipeSequence, SequenceKind};
 use algo::geometry::Triangulator;
-use algo::inspect::{Gauge, Parts, Production};
+use algo::inspect::{Gauge, Largest, Measure, Parts, Production, Taught};
 use algo::pattern::{PhaseRange, Shot};
 use algo::phase::{Arrived, Decoder};
 use algo::pipeline::HeightCubics;
+use algo::units::{AbsolutePhase, Modulation};
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
@@ -31,36 +32,92 @@ pub(super) struct Shared {
     pub cubics: Arc<HeightCubics>,
     pub gauges: Vec<Gauge>,
     pub window: Vec<Range<usize>>,
+    pub noise_counts: f64,
+    pub golden: GoldenNoise,
 }
 
-/// Prepares a sequence of the recipe, for phases of `range`, and returns what joins it with what all sequences share: the recipe's
-/// arrays are dropped in between. `rasters` are what all runs show; what only this one shows is added. `fundamental` is that of the
-/// waveform that golden's modulation was measured with.
-pub(super) fn prepare(
-    sequence: RecipeSequence,
-    (noise_counts, fundamental): (f64, f64),
-    arrays: &Arrays,
-    (range, bit_depth): (PhaseRange, u8),
-    rasters: &mut Vec<Shot>,
-) -> Result<impl FnOnce(&Shared) -> Result<Run, String> + use<>, String> {
-    let brighter = sequence.fundamental() / fundamental;
-    let RecipeSequence {
-        kind,
-        shots,
-        levels,
-    } = sequence;
-    let decoder = Decoder::new(&levels, range, bit_depth).map_err(|error| error.to_string())?;
-    let indices = shots.into_iter().map(|shot| {
-        let shown = rasters.iter().position(|known| *known == shot);
-        shown.unwrap_or_else(|| {
-            rasters.push(shot);
-            rasters.len() - 1
+/// The noise of golden, and what it alone makes of gauges.
+pub(super) struct GoldenNoise {
+    /// σ of the phase of a pixel of full modulation, turns per count of noise.
+    phase: f64,
+    /// Per gauge.
+    largest: Vec<Largest>,
+}
+
+/// A sequence of the recipe without what it shares with the others.
+pub(super) struct Prepared {
+    kind: SequenceKind,
+    indices: Vec<usize>,
+    decoder: Decoder,
+    taught: Taught,
+    map: Option<Vec<AbsolutePhase>>,
+    /// Its modulation over that of golden.
+    brighter: f64,
+}
+
+impl Prepared {
+    /// Prepares a sequence for phases of `range`; the recipe's arrays can be dropped then. `rasters` are what all runs show; what only
+    /// this one shows is added. `fundamental` is that of the waveform that golden's modulation was measured with.
+    pub fn of(
+        sequence: RecipeSequence,
+        (noise_counts, fundamental): (f64, f64),
+        arrays: &Arrays,
+        (range, bit_depth): (PhaseRange, u8),
+        rasters: &mut Vec<Shot>,
+    ) -> Result<Self, String> {
+        let brighter = sequence.fundamental() / fundamental;
+        let RecipeSequence {
+            kind,
+            shots,
+            levels,
+        } = sequence;
+        let decoder = Decoder::new(&levels, range, bit_depth).map_err(|error| error.to_string())?;
+        let indices = shots.into_iter().map(|shot| {
+            let shown = rasters.iter().position(|known| *known == shot);
+            shown.unwrap_or_else(|| {
+                rasters.push(shot);
+                rasters.len() - 1
+            })
+        });
+        Ok(Self {
+            kind,
+            indices: indices.collect(),
+            taught: golden::taught(noise_counts / brighter, arrays, &decoder),
+            map: golden::safe_map(arrays, kind),
+            decoder,
+            brighter,
         })
-    });
-    let indices: Vec<usize> = indices.collect();
-    let taught = golden::taught(noise_counts / brighter, arrays, &decoder);
-    let map = golden::safe_map(arrays, kind);
-    Ok(move |shared: &Shared| {
+    }
+
+    /// The noise of golden, where golden was measured with this sequence in frames of `width` columns.
+    pub fn golden_noise(&self, gauges: &[Gauge], width: usize) -> GoldenNoise {
+        let largest = |gauge: &Gauge| match gauge.measure {
+            Measure::Deviation { side } => Largest::of(&self.taught, width, &gauge.region, side),
+            _ => Largest::default(),
+        };
+        GoldenNoise {
+            phase: self.phase_noise(),
+            largest: gauges.iter().map(largest).collect(),
+        }
+    }
+
+    /// σ of the phase of a pixel of full modulation in golden, turns per count of noise.
+    fn phase_noise(&self) -> f64 {
+        let full = Modulation::from_bits(u16::MAX);
+        self.decoder.phase_noise(full, 1.0 / self.brighter)
+    }
+
+    /// Joins it with what all sequences share.
+    pub fn join(self, shared: &Shared) -> Result<Run, String> {
+        let golden_noise = shared.golden.phase / self.phase_noise();
+        let Self {
+            kind,
+            indices,
+            decoder,
+            taught,
+            map,
+            ..
+        } = self;
         let bytes = size_of_val(map.as_deref().unwrap_or(&[])) + taught.bytes();
         let production = Production::new(Parts {
             decoder,
@@ -70,8 +127,10 @@ pub(super) fn prepare(
             taught,
             gauges: shared.gauges.clone(),
             window: shared.window.clone(),
-            noise_counts,
+            noise_counts: shared.noise_counts,
             aligned: shared.aligned,
+            golden_noise,
+            largest: shared.golden.largest.clone(),
         });
         Ok(Run {
             kind,
@@ -80,5 +139,5 @@ pub(super) fn prepare(
             production: production.map_err(|error| error.to_string())?,
             arrived: Mutex::new(None),
         })
-    })
+    }
 }
