@@ -42,6 +42,7 @@ mod promises_own;
 mod promises_shared;
 mod real_board;
 mod recovery;
+mod repeatability;
 mod replacing;
 mod rooms;
 mod sequences;

@@ -61,6 +61,7 @@ impl<'a> Comparison<'a> {
             value: sum as f64 / count / 1e6,
             sigma: (sigma > 0.0).then_some(sigma),
             expected: None,
+            systematic: 0.0,
         })
     }
 
@@ -91,6 +92,7 @@ impl<'a> Comparison<'a> {
             value: resolved as f64 / region.len().max(1) as f64,
             sigma: None,
             expected: None,
+            systematic: 0.0,
         }
     }
 

@@ -25,7 +25,7 @@ pub use look::{PoseError, look};
 pub use nodes::{Fringes, Node};
 pub use picture::Picture;
 pub use pose::Pose;
-pub use predict::Prediction;
+pub use predict::{LENGTH, Prediction};
 pub use rig::Rig;
 pub use solve::{CalibrationError, calibrate};
 

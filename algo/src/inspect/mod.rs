@@ -19,6 +19,7 @@ pub use mask::eroded;
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
 pub use strips::{
-    Findings, Gauge, Input, MAX_GAUGES, Parts, Production, Skipped, Strips, Taught, Unmeasurable,
+    CalibrationError, Findings, Gauge, Input, MAX_GAUGES, Parts, Production, Skipped, Strips,
+    Taught, Unmeasurable,
 };
 pub use weight::Weight;

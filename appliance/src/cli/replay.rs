@@ -193,11 +193,12 @@ fn table(entry: &Entry, from: &str) -> String {
     ];
     lines.extend(entry.gauges.iter().map(|gauge| {
         format!(
-            "{:<20} {:>10} {:<3} σ {:>8}  limits {} to {}",
+            "{:<20} {:>10} {:<3} σ {:>8}  U {:>8}  limits {} to {}",
             gauge.name,
             number(gauge.value),
             gauge.unit,
             number(gauge.sigma),
+            number(gauge.uncertainty),
             number(gauge.low),
             number(gauge.high)
         )

@@ -37,7 +37,7 @@ columns!(Entry in "result"; stages;
     seq time_utc_us recipe fingerprint part_id press_stroke token verdict error_code reason flags valid_points coverage_permille
     temperature_c height_noise_mm fitness_permille exposure_us total_us recording;
     uptime_s boot_id unkept placement);
-columns!(GaugeEntry in "gauge"; result place; name unit value sigma low high decision;);
+columns!(GaugeEntry in "gauge"; result place; name unit value sigma low high decision; uncertainty expected);
 
 /// Stores a result with its gauges.
 pub(super) fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {

@@ -15,7 +15,7 @@ const COLUMNS: &str = "seq,time_utc,recipe,fingerprint,part_id,press_stroke,toke
 
 impl Reader {
     /// Writes the results that pass the filter, newest first, with the names of all their gauges in the header line. A gauge
-    /// has five columns: value with its unit, σ, two limits and decision bits.
+    /// has seven columns: value with its unit, σ, two limits, decision bits, U and the magnitude that is expected on a good part.
     ///
     /// # Errors
     /// [`HistoryError`], also where `out` takes no more.
@@ -28,7 +28,15 @@ impl Reader {
             } else {
                 format!(" [{unit}]")
             };
-            for column in [&unit, " sigma", " low", " high", " decision"] {
+            for column in [
+                &unit,
+                " sigma",
+                " low",
+                " high",
+                " decision",
+                " U",
+                " expected",
+            ] {
                 head.push(',');
                 head.push_str(&quoted(&format!("{name}{column}")));
             }
@@ -113,9 +121,10 @@ fn one(line: &mut String, entry: &Entry, gauges: &[(String, String)]) {
                 for value in [gauge.value, gauge.sigma, gauge.low, gauge.high] {
                     let _ = write!(line, ",{}", number(value));
                 }
-                let _ = write!(line, ",{}", gauge.decision);
+                let (u, expected) = (number(gauge.uncertainty), number(gauge.expected));
+                let _ = write!(line, ",{},{u},{expected}", gauge.decision);
             }
-            None => line.push_str(",,,,,"),
+            None => line.push_str(",,,,,,,"),
         }
     }
 }

@@ -82,6 +82,10 @@ pub struct GaugeEntry {
     pub value: Option<f64>,
     /// 1 σ, as far as predicted.
     pub sigma: Option<f64>,
+    /// U = 2 u, with the systematic part of the error; `None` in results of older programs.
+    pub uncertainty: Option<f64>,
+    /// The magnitude that is expected on a good part, where noise moves the value away from 0; `None` in results of older programs.
+    pub expected: Option<f64>,
     /// Lower limit.
     pub low: Option<f64>,
     /// Upper limit.
@@ -183,6 +187,8 @@ fn gauges(record: &ResultRecord) -> Vec<GaugeEntry> {
             unit: gauge.unit.symbol().into(),
             value: finite(gauge.value),
             sigma: finite(gauge.sigma),
+            uncertainty: finite(gauge.uncertainty),
+            expected: finite(gauge.expected),
             low: finite(gauge.low),
             high: finite(gauge.high),
             decision: gauge.decision.bits(),
@@ -193,9 +199,28 @@ fn gauges(record: &ResultRecord) -> Vec<GaugeEntry> {
 /// Flags that say how a cycle went, not what its frames show.
 const COURSE: u16 = flag::RETRIED | flag::STEPPED_UP | flag::WARM_UP;
 
+/// A replayed gauge as far as it can be compared with the stored one: older programs have stored no uncertainty, and their σ of extremes
+/// was another one.
+fn comparable(stored: &GaugeEntry, replayed: &GaugeEntry) -> GaugeEntry {
+    if stored.uncertainty.is_some() {
+        return replayed.clone();
+    }
+    GaugeEntry {
+        sigma: stored.sigma.and(replayed.sigma).and(stored.sigma),
+        uncertainty: None,
+        expected: None,
+        ..replayed.clone()
+    }
+}
+
 /// How a replayed result differs from the stored one, in words; `None` if it is the same bit by bit. What belongs to the cycle
 /// and not to its frames is not compared: numbers, times, temperature, the flags of its course.
 pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
+    let gauges = replayed.gauges.iter().enumerate();
+    let gauges = gauges.map(|(at, gauge)| match stored.gauges.get(at) {
+        Some(before) => comparable(before, gauge),
+        None => gauge.clone(),
+    });
     let same = Entry {
         recipe: replayed.recipe,
         fingerprint: replayed.fingerprint.clone(),
@@ -207,7 +232,7 @@ pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
         coverage_permille: replayed.coverage_permille,
         height_noise_mm: replayed.height_noise_mm,
         fitness_permille: replayed.fitness_permille,
-        gauges: replayed.gauges.clone(),
+        gauges: gauges.collect(),
         // Older programs have not stored it.
         placement: stored.placement.and(replayed.placement),
         ..stored.clone()

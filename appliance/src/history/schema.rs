@@ -62,12 +62,14 @@ CREATE TABLE gauge (
 ) WITHOUT ROWID;
 ";
 
-/// Columns of `result` that came later; older databases get them when they are opened for writing.
-const ADDED: [(&str, &str); 4] = [
-    ("uptime_s", "INTEGER"),
-    ("boot_id", "TEXT"),
-    ("unkept", "TEXT"),
-    ("placement", "TEXT"),
+/// Columns that came later, with their tables; older databases get them when they are opened for writing.
+const ADDED: [(&str, &str, &str); 6] = [
+    ("result", "uptime_s", "INTEGER"),
+    ("result", "boot_id", "TEXT"),
+    ("result", "unkept", "TEXT"),
+    ("result", "placement", "TEXT"),
+    ("gauge", "uncertainty", "REAL"),
+    ("gauge", "expected", "REAL"),
 ];
 /// A table that came later: when a start of the daemon was, by the clock of a signed-in user's browser.
 const STARTS: &str =
@@ -101,10 +103,10 @@ pub(super) fn open(path: &Path) -> Result<Connection, HistoryError> {
 }
 
 fn complete(connection: &Connection) -> rusqlite::Result<()> {
-    for (name, kind) in ADDED {
-        let known = "SELECT count(*) > 0 FROM pragma_table_info('result') WHERE name = ?1";
-        if !connection.query_row(known, [name], |row| row.get(0))? {
-            connection.execute_batch(&format!("ALTER TABLE result ADD COLUMN {name} {kind}"))?;
+    for (table, name, kind) in ADDED {
+        let known = "SELECT count(*) > 0 FROM pragma_table_info(?1) WHERE name = ?2";
+        if !connection.query_row(known, [table, name], |row| row.get(0))? {
+            connection.execute_batch(&format!("ALTER TABLE {table} ADD COLUMN {name} {kind}"))?;
         }
     }
     connection.execute_batch(STARTS)

@@ -19,6 +19,8 @@ fn entry(seq: u32, recipe: u16, verdict: Verdict) -> Entry {
         unit: "mm".into(),
         value: Some(value),
         sigma: None,
+        uncertainty: Some(value / 7.0),
+        expected: None,
         low: Some(-0.25),
         high: Some(0.1 + 0.2),
         decision: 3,

@@ -3,8 +3,8 @@
 use super::*;
 use crate::station::refusal::reject::OTHER_RECIPE;
 use crate::station::{
-    ActiveRecipe, ConnectionEdges, Effect, GaugeValue, Identity, Inspection, JobId, Limits, Micros,
-    RecipeKey, Request, Settings, Station, Unit, Verdict,
+    ActiveRecipe, ConnectionEdges, Effect, GaugeValue, Identity, Inspection, JobId, Limits,
+    Measured, Micros, RecipeKey, Request, Settings, Station, Unit, Verdict,
 };
 use hal::lines::OutputLine;
 use rustix::io::{read, write};
@@ -134,7 +134,12 @@ fn ready() -> (StationHandle, Receiver<JobId>) {
 
 fn good() -> Arc<Inspection> {
     let limits = (Some(-1.0), Some(1.0));
-    let gauge = GaugeValue::judged("height", Unit::Length, Some(0.1), Some(0.01), limits);
+    let gauge = GaugeValue::judged(
+        "height",
+        Unit::Length,
+        Measured::new(Some(0.1), Some(0.01)),
+        limits,
+    );
     Arc::new(Inspection {
         judged: Verdict::Pass,
         gauges: [gauge].into_iter().collect(),

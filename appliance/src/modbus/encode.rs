@@ -122,6 +122,9 @@ pub fn block_words(snapshot: &Snapshot, block: &Block, order: WordOrder) -> Vec<
             map::result(&mut words, &shown(&snapshot.oldest));
         }
         map::GAUGE_DETAIL => map::gauge_detail(&mut words, &shown(&snapshot.result)),
+        map::GAUGE_UNCERTAINTY => {
+            map::gauge_uncertainty(&mut words, &shown(&snapshot.result));
+        }
         map::HEALTH => map::health(&mut words, snapshot),
         map::RECIPE_DIRECTORY => map::recipe_directory(&mut words, snapshot),
         map::IDENTITY => map::identity(&mut words, snapshot),

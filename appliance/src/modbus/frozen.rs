@@ -118,7 +118,12 @@ const VERSION_1_2: &str = "\
 635 LIBCAMERA_VERSION u16x2 HEALTH";
 
 /// Rows that version 1.3 adds.
-const VERSION_1_3: &str = "637 DRIFT u16 HEALTH";
+const VERSION_1_3: &str = "\
+637 DRIFT u16 HEALTH
+1000 SEQ u32 GAUGE_UNCERTAINTY
+1002 GAUGE_U f32x16 GAUGE_UNCERTAINTY
+1034 GAUGE_EXPECTED f32x16 GAUGE_UNCERTAINTY
+1066 SEQ_AGAIN u32 GAUGE_UNCERTAINTY";
 
 /// Name, first and last address of every block of version 1.0, and whether it can be written. All of them are served.
 const BLOCKS_1: [(&str, u16, u16, bool); 8] = [

@@ -227,6 +227,12 @@ registers! {
         936 TEST_U32 U32 x 1 = 0x1234_5678_u32, "0x12345678, word order test";
         938 TEST_F32 F32 x 1 = 123.456_f32.to_bits(), "123.456, word order test";
     }
+    gauge_uncertainty GAUGE_UNCERTAINTY 1000..=1069, false, record: ResultRecord {
+        1000 SEQ U32 x 1 = record.seq, "number of the result";
+        1002 GAUGE_U F32 x 16 = gauges(record, INVALID_F32, |gauge| f32_bits(measured(gauge, gauge.uncertainty))), "expanded uncertainty of each gauge, k = 2, with the systematic part, in mm, deg, mm3, share 0-1; NaN (0x7FC00000) not known";
+        1034 GAUGE_EXPECTED F32 x 16 = gauges(record, INVALID_F32, |gauge| f32_bits(measured(gauge, gauge.expected))), "magnitude that is expected on a good part, of an extreme, in the same units; NaN (0x7FC00000) where noise does not move the value away from 0";
+        1066 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
+    }
 }
 
 /// Block OLDEST: the layout of RESULT, with the oldest unacknowledged result.
@@ -238,7 +244,7 @@ pub const OLDEST: Block = Block {
 };
 
 /// Every block with its rows, by address. OLDEST repeats the rows of RESULT, moved by [`Block::first`].
-pub const BLOCKS: [(Block, &[Register]); 8] = [
+pub const BLOCKS: [(Block, &[Register]); 9] = [
     (CONTROL, at::control::ROWS),
     (STATUS, at::status::ROWS),
     (RESULT, at::result::ROWS),
@@ -247,6 +253,7 @@ pub const BLOCKS: [(Block, &[Register]); 8] = [
     (HEALTH, at::health::ROWS),
     (RECIPE_DIRECTORY, at::recipe_directory::ROWS),
     (IDENTITY, at::identity::ROWS),
+    (GAUGE_UNCERTAINTY, at::gauge_uncertainty::ROWS),
 ];
 
 /// Every row of the map with its address and block.

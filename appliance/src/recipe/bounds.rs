@@ -5,6 +5,7 @@
 use super::check::MAX_REGIONS;
 use super::comparison::QualityFile;
 use super::file::{GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFile};
+use crate::head::calibration::CalibrationSigma;
 use crate::station::MAX_GAUGES;
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use hal::bounds::{
@@ -72,6 +73,14 @@ impl RecipeFile {
         }
         let (least, most) = (MIN_NOISE_COUNTS, MAX_NOISE_COUNTS);
         within("noise_counts", self.noise_counts, least, most)?;
+        if let Some(CalibrationSigma {
+            height_mm,
+            length_mm,
+        }) = self.calibration_sigma
+        {
+            within("calibration_sigma.height_mm", height_mm, 0.0, MAX_SIGMA_MM)?;
+            within("calibration_sigma.length_mm", length_mm, 0.0, MAX_SIGMA_MM)?;
+        }
         let range = self.expansion_range_turns;
         within("expansion_range_turns", range, 1e-3, MAX_FRINGES)?;
         within("min_coverage", self.min_coverage, 0.0, 1.0)?;

@@ -4,7 +4,8 @@ use super::archive::{Arrays, short, unpack};
 use super::demands::Demands;
 use super::file::{PatternFile, RecipeFile, SequenceKind};
 use super::gauge::{check_limits, gauges};
-use algo::inspect::Gauge;
+use algo::calibration::LENGTH;
+use algo::inspect::{CalibrationError, Gauge};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use std::io::{Cursor, Read, Seek};
 
@@ -58,6 +59,8 @@ pub struct Conditions {
     pub exposure_us: Option<f64>,
     /// σ of one sample in counts.
     pub noise_counts: f64,
+    /// σ by the uncertainty of the calibration; 0 where it is not known.
+    pub calibration: CalibrationError,
     /// |ΔΦ| in turns up to which the expansion of the height holds.
     pub expansion_range_turns: f64,
 }
@@ -212,6 +215,12 @@ impl From<&RecipeFile> for Conditions {
             range_mm: file.range_mm,
             exposure_us: file.exposure_us,
             noise_counts: file.noise_counts,
+            calibration: file
+                .calibration_sigma
+                .map_or_else(CalibrationError::default, |sigma| CalibrationError {
+                    height: sigma.height_mm,
+                    length: sigma.length_mm / LENGTH,
+                }),
             expansion_range_turns: file.expansion_range_turns,
         }
     }

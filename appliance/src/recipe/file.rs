@@ -2,6 +2,7 @@
 
 use super::comparison::ComparisonFile;
 use super::good_parts::GoodPartsFile;
+use crate::head::calibration::CalibrationSigma;
 use algo::pattern::Shot;
 use algo::units::AbsolutePhase;
 use serde::{Deserialize, Serialize};
@@ -55,6 +56,9 @@ pub struct RecipeFile {
     pub exposure_us: Option<f64>,
     /// σ of one sample in counts.
     pub noise_counts: f64,
+    /// σ by the uncertainty of that calibration; `None` where it is not known, and in recipes of older programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration_sigma: Option<CalibrationSigma>,
     /// |ΔΦ| about the golden phase, in turns, up to which `height_slope.npy` and `height_curvature.npy` give the height accurately.
     pub expansion_range_turns: f64,
     /// Least share of the golden pixels that must be resolved, else the verdict is INVALID.

@@ -175,6 +175,7 @@ impl GoldenPart<'_> {
             // Heads take their exposure from the configuration.
             exposure_us: None,
             noise_counts: calibration.noise_counts,
+            calibration_sigma: calibration.sigma,
             expansion_range_turns: EXPANSION_TURNS,
             min_coverage: MIN_COVERAGE,
             regions,

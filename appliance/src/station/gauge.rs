@@ -104,6 +104,38 @@ impl Decision {
     }
 }
 
+/// k of the expanded uncertainty U = k u that is shown: about 95 % of normal errors (JCGM 100:2008, 6.2).
+pub const COVERAGE_FACTOR: f64 = 2.0;
+
+/// What was found for a gauge, in its unit.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Measured {
+    /// `None` if it could not be measured.
+    pub value: Option<f64>,
+    /// One standard deviation of the value; `None` where it is not predicted.
+    pub sigma: Option<f64>,
+    /// The part of the error that is the same in every measurement, 1 σ.
+    pub systematic: f64,
+    /// The magnitude that is expected on a good part, of a value that noise moves away from 0.
+    pub expected: Option<f64>,
+}
+
+impl Measured {
+    /// A value with its σ.
+    pub fn new(value: Option<f64>, sigma: Option<f64>) -> Self {
+        Self {
+            value,
+            sigma,
+            ..Self::default()
+        }
+    }
+
+    /// u = √(σ² + systematic²).
+    pub fn uncertainty(&self) -> Option<f64> {
+        self.sigma.map(|sigma| sigma.hypot(self.systematic))
+    }
+}
+
 /// One gauge of a result. Values in mm, °, mm³ or as a share 0…1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GaugeValue {
@@ -115,6 +147,10 @@ pub struct GaugeValue {
     pub value: Option<f64>,
     /// One standard deviation of the value; `None` where it is not predicted.
     pub sigma: Option<f64>,
+    /// U = [`COVERAGE_FACTOR`] · u, u with the systematic part of the error; `None` where σ is not predicted.
+    pub uncertainty: Option<f64>,
+    /// The magnitude that is expected on a good part; `None` where it is that of the part.
+    pub expected: Option<f64>,
     /// The lower limit.
     pub low: Option<f64>,
     /// The upper limit.
@@ -128,16 +164,22 @@ impl GaugeValue {
     pub fn judged(
         name: impl Into<Arc<str>>,
         unit: Unit,
-        value: Option<f64>,
-        sigma: Option<f64>,
-        limits: (Option<f64>, Option<f64>),
+        measured: Measured,
+        (low, high): (Option<f64>, Option<f64>),
     ) -> Self {
-        let (low, high) = limits;
+        let Measured {
+            value,
+            sigma,
+            expected,
+            ..
+        } = measured;
         Self {
             name: name.into(),
             unit,
             value,
             sigma,
+            uncertainty: measured.uncertainty().map(|u| COVERAGE_FACTOR * u),
+            expected,
             low,
             high,
             decision: Decision::of(value, sigma, low, high),

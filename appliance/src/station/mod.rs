@@ -2,7 +2,7 @@
 //!
 //! [`step()`] is a function `(station, event, now) → (station, effects)`. It knows no thread, no socket and no clock: time is
 //! an argument ([`Micros`]), the worker and the PLC are [`Event`]s, and everything it wants done is an [`Effect`]. Its
-//! registers follow `docs/modbus.md`, version 1.2. Modbus and the page see nothing but one immutable [`Snapshot`].
+//! registers follow `docs/modbus.md`, version 1.3. Modbus and the page see nothing but one immutable [`Snapshot`].
 //! [`StationHandle`] is the one place where the machine meets a clock, a mutex and channels.
 //!
 //! [`machine`] holds the parts: clock, PLC, request counters, recipes, worker, results. Each part has its own file and is changed
@@ -74,7 +74,7 @@ pub use clock::Micros;
 pub use control::{ConnectionEdges, ControlRegisters, ControlWrite, Masked, RefusedWrite};
 pub use event::{Condition, Effect, Effects, Event, Job, JobId, Request, Unstored};
 pub use fault::Fault;
-pub use gauge::{Decision, GaugeValue, Unit};
+pub use gauge::{Decision, GaugeValue, Measured, Unit};
 pub use handle::{StationHandle, tick};
 pub use health::{
     Drift, FULL_STORAGE_MIB, HOT_PROJECTOR_C, Health, Pace, Power, ProjectorHealth, System,

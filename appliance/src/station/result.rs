@@ -218,14 +218,19 @@ impl ResultRecord {
 
 #[cfg(test)]
 mod tests {
-    use super::super::gauge::Unit;
+    use super::super::gauge::{Measured, Unit};
     use super::*;
 
     fn inspection(judged: Verdict, values: &[Option<f64>]) -> Inspection {
         let gauges = values
             .iter()
             .map(|&value| {
-                GaugeValue::judged("g", Unit::Length, value, None, (Some(-1.0), Some(1.0)))
+                GaugeValue::judged(
+                    "g",
+                    Unit::Length,
+                    Measured::new(value, None),
+                    (Some(-1.0), Some(1.0)),
+                )
             })
             .collect();
         Inspection {

@@ -206,12 +206,14 @@ fn gauges_csv(site: &Site) -> Result<(String, Content), Problem> {
         .result
         .as_deref()
         .ok_or_else(|| Problem::missing(words))?;
-    let mut csv = String::from("seq,verdict,gauge,value,sigma,low,high,unit,pass,valid,doubtful\n");
+    let mut csv = String::from(
+        "seq,verdict,gauge,value,sigma,low,high,unit,pass,valid,doubtful,uncertainty,expected\n",
+    );
     let number = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
     for gauge in &result.inspection.gauges {
         let decision = gauge.decision;
         csv += &format!(
-            "{},{},\"{}\",{},{},{},{},{},{},{},{}\n",
+            "{},{},\"{}\",{},{},{},{},{},{},{},{},{},{}\n",
             result.seq,
             result.verdict.word(),
             gauge.name.replace('"', "\"\""),
@@ -223,6 +225,8 @@ fn gauges_csv(site: &Site) -> Result<(String, Content), Problem> {
             u8::from(decision.pass),
             u8::from(decision.valid),
             u8::from(decision.doubtful),
+            number(gauge.uncertainty),
+            number(gauge.expected),
         );
     }
     Ok((

@@ -135,6 +135,8 @@ fn gauge(gauge: &GaugeValue) -> Value {
         "unit": gauge.unit.symbol(),
         "value": gauge.value.filter(|_| decision.valid),
         "sigma": gauge.sigma,
+        "uncertainty": gauge.uncertainty,
+        "expected": gauge.expected,
         "lowest": gauge.low,
         "highest": gauge.high,
         "pass": decision.pass,

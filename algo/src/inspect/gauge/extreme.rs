@@ -3,9 +3,8 @@
 //! Cells do not share pixels, so the errors of their means are independent, with σ² = σ_z² / side² each. The models need the
 //! cells' values only; `tests/suite/precision.rs` compares them with simulation.
 
-use super::Cell;
 use super::level::Plane;
-use crate::inspect::Reading;
+use super::{Cell, Found};
 use crate::inspect::align::{Placed, form};
 use alloc::vec::Vec;
 use core::f64::consts::{PI, SQRT_2};
@@ -17,7 +16,7 @@ pub fn flatness(
     sigma: f64,
     placed: Option<&Placed>,
     room: &mut Vec<f64>,
-) -> Option<Reading> {
+) -> Option<Found> {
     let plane = Plane::of(cells)?;
     let slope = 1.0 + plane.along * plane.along + plane.down * plane.down;
     let heights = cells.iter().map(|cell| plane.above(cell));
@@ -32,7 +31,7 @@ pub fn peak_to_valley(
     sigma: f64,
     placed: Option<&Placed>,
     room: &mut Vec<f64>,
-) -> Option<Reading> {
+) -> Option<Found> {
     room.clear();
     room.extend(cells.iter().map(|cell| cell.height));
     range(cells, room, sigma, placed)
@@ -40,12 +39,7 @@ pub fn peak_to_valley(
 
 /// Largest less smallest value, one per cell. Its error is made of those of both ends, each the largest of many noisy values,
 /// and of what an error of the motion does to the difference of the two cells.
-fn range(
-    cells: &[Cell],
-    values: &mut [f64],
-    sigma: f64,
-    placed: Option<&Placed>,
-) -> Option<Reading> {
+fn range(cells: &[Cell], values: &mut [f64], sigma: f64, placed: Option<&Placed>) -> Option<Found> {
     let by = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
     let (high, low) = ((0..values.len()).max_by(by)?, (0..values.len()).min_by(by)?);
     let value = values[high] - values[low];
@@ -56,10 +50,11 @@ fn range(
         *value = -*value;
     }
     let bottom = spread_of_largest(values, sigma);
-    Some(Reading {
+    Some(Found {
         value,
-        sigma: Some(libm::sqrt(top * top + bottom * bottom + motion)),
-        expected: None,
+        pixels: top * top + bottom * bottom,
+        motion,
+        lever: 2.0,
     })
 }
 
@@ -161,7 +156,7 @@ fn density(x: f64) -> f64 {
 
 /// Root of the mean square of the deviations, mm. Var(mean d²) = (4σ² Σd² − 2nσ⁴) / n² + gᵀ C g: the scatter of d² about fixed true
 /// deviations, whose squares are estimated by d² − σ², and the error of the motion, g = Σ 2dᵢ jᵢ / n.
-pub fn rms(cells: &[Cell], sigma: f64, placed: Option<&Placed>) -> Option<Reading> {
+pub fn rms(cells: &[Cell], sigma: f64, placed: Option<&Placed>) -> Option<Found> {
     if cells.is_empty() {
         return None;
     }
@@ -177,12 +172,13 @@ pub fn rms(cells: &[Cell], sigma: f64, placed: Option<&Placed>) -> Option<Readin
     // At least what noise alone gives.
     let least = 2.0 * count * variance * variance;
     let own = (4.0 * variance * squares - least).max(least) / (count * count);
-    let scatter = own + motion(&g, placed);
     let value = libm::sqrt(squares / count);
-    Some(Reading {
+    let slope = 2.0 * value.max(sigma).max(f64::MIN_POSITIVE);
+    Some(Found {
         value,
-        sigma: Some(libm::sqrt(scatter) / (2.0 * value.max(sigma).max(f64::MIN_POSITIVE))),
-        expected: None,
+        pixels: own / (slope * slope),
+        motion: motion(&g, placed) / (slope * slope),
+        lever: 1.0,
     })
 }
 
@@ -197,7 +193,7 @@ pub fn share_outside(
     sigma: f64,
     tolerance: f64,
     placed: Option<&Placed>,
-) -> Option<Reading> {
+) -> Option<Found> {
     if cells.is_empty() {
         return None;
     }
@@ -205,7 +201,7 @@ pub fn share_outside(
     let sizes = cells.iter().map(|cell| libm::fabs(cell.deviation));
     let outside = sizes.filter(|size| *size > tolerance).count() as f64;
     let drawn = Drawn::of(cells.iter().map(|cell| cell.deviation), sigma);
-    let (mut variance, mut g) = (0.0, [0.0; 6]);
+    let (mut variance, mut lever, mut g) = (0.0, 0.0, [0.0; 6]);
     for cell in cells {
         let m = drawn.value(cell.deviation);
         let [upper, lower] = [(tolerance - m) / sigma, (tolerance + m) / sigma];
@@ -213,14 +209,16 @@ pub fn share_outside(
             let p = below(-upper) + below(-lower);
             variance += (p * (1.0 - p)).max(0.0);
             let slope = (density(upper) - density(lower)) / (sigma * count);
+            lever += libm::fabs(slope);
             for (g, j) in g.iter_mut().zip(cell.taught.jacobian) {
                 *g += slope * j;
             }
         }
     }
-    Some(Reading {
+    Some(Found {
         value: outside / count,
-        sigma: Some(libm::sqrt(variance / (count * count) + motion(&g, placed))),
-        expected: None,
+        pixels: variance / (count * count),
+        motion: motion(&g, placed),
+        lever,
     })
 }

@@ -1,21 +1,22 @@
 //! Gauges that are linear in height: mean, tilt, volume. Their errors follow exactly from those of the pixels.
 
-use super::{Axis, Cell};
+use super::{Axis, Cell, Found};
 use crate::inspect::align::{Placed, form};
 use alloc::vec::Vec;
 
 /// How a value changes with the mean height of each cell: its derivatives.
 pub type Weights = Vec<f64>;
 
-/// Error (1 σ) of a value with these weights: σ² = Σ wᵢ² σ_z² / nᵢ + gᵀ C g. n are a cell's pixels, `variance` gives σ_z² of a single pixel
+/// The error of a value with these weights: σ² = Σ wᵢ² σ_z² / nᵢ + gᵀ C g. n are a cell's pixels, `variance` gives σ_z² of a single pixel
 /// of each cell, g = Σ wᵢ jᵢ is the derivative of the value over the motion, j a cell's Jacobian, and C the motion's covariance. The
 /// two terms are taken as independent: the pixels that the motion is found from are one in some dozens of the gauge's.
-pub fn sigma(
+pub fn found(
+    value: f64,
     weights: &[f64],
     cells: &[Cell],
     variance: impl Fn(usize) -> f64,
     placed: Option<&Placed>,
-) -> f64 {
+) -> Found {
     let pairs = || weights.iter().zip(cells);
     let each = |(at, (w, cell)): (usize, (&f64, &Cell))| w * w * variance(at) / cell.pixels;
     let pixels: f64 = pairs().enumerate().map(each).sum();
@@ -28,7 +29,12 @@ pub fn sigma(
         }
         form(&g, &placed.covariance, &g)
     });
-    libm::sqrt(pixels + motion.max(0.0))
+    Found {
+        value,
+        pixels,
+        motion: motion.max(0.0),
+        lever: weights.iter().copied().map(libm::fabs).sum(),
+    }
 }
 
 /// The weight of a cell: its pixels as taught, so that it is the same in every measurement.

@@ -12,7 +12,7 @@ mod taught;
 
 pub use cells::{Cell, Grid, Sum, TooFine, cells};
 pub use extreme::{flatness, peak_to_valley, rms, share_outside};
-pub use level::{Weights, mean, sigma, step, tilt, volume};
+pub use level::{Weights, found, mean, step, tilt, volume};
 pub use taught::TaughtCell;
 pub(super) use taught::taught_cells;
 
@@ -29,6 +29,21 @@ pub struct Reading {
     pub sigma: Option<f64>,
     /// What its magnitude is expected to be on a good part with this noise: of a deviation, which is an extreme, and so not 0.
     pub expected: Option<f64>,
+    /// What is the same in every measurement and so not in σ, 1 σ: the effect of golden's noise and of the calibration's error.
+    pub systematic: f64,
+}
+
+/// A value with the parts of its error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// The value.
+    pub value: f64,
+    /// Variance by the noise of its pixels.
+    pub pixels: f64,
+    /// Variance by the error of the part's motion.
+    pub motion: f64,
+    /// By how much errors of all heights of 1 mm, each with the sign that does most, change the value.
+    pub lever: f64,
 }
 
 /// The axes that a plane may be tilted about.

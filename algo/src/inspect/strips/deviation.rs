@@ -15,8 +15,8 @@ use super::height::base_nm;
 use super::pose::PoseField;
 use super::squares::extreme::Extreme;
 use super::{Input, Production, Strip};
+use crate::inspect::Reading;
 use crate::inspect::align::{Placed, form};
-use crate::inspect::{Largest, Reading};
 use crate::units::Height;
 
 /// Pixels of a square whose Jacobians are averaged, in each direction.
@@ -79,15 +79,15 @@ impl SquareNoise {
 }
 
 impl Production {
-    /// The reading of the square of `side` pixels that was found. `largest` is what good parts read with this noise. The error of the
-    /// square itself is worked out here, for this one square alone.
+    /// The reading of the square of `side` pixels that was found. σ_z is `noisier` times the taught σ.
+    /// The error of the square itself is worked out here, for this one square alone.
     pub(super) fn deviation(
         &self,
         (best, side): (Extreme, usize),
         input: Input<'_>,
         pose: &PoseField,
         strip: &mut Strip,
-        largest: Largest,
+        (gauge, noisier): (usize, f64),
     ) -> Reading {
         let half = side / 2;
         let bottom = (best.row + half + 1).min(self.window.len());
@@ -103,12 +103,21 @@ impl Production {
         let count = best.count as f64;
         let (pixels, motion) = noise.variances(count, pose.placed.as_ref());
         let value = best.sum as f64 / count / 1e6;
+        // What good parts read: golden's noise and that of this measurement.
+        let golden = self.golden_variance(noisier);
+        let largest = self.largest.get(gauge).copied().unwrap_or_default();
+        let largest = largest.times(libm::sqrt(1.0 + 1.0 / golden));
         let extreme = largest.uncertain(libm::fabs(value), libm::sqrt(pixels));
         let sigma = libm::sqrt(extreme.variance + motion);
         Reading {
             value,
             sigma: (sigma > 0.0).then_some(sigma),
             expected: Some(largest.mean).filter(|mean| *mean > 0.0),
+            // The extreme of noise scatters with golden's noise, too; that of a defect is shifted by it.
+            systematic: libm::hypot(
+                libm::sqrt(golden * (extreme.defect * pixels + motion)),
+                self.displaced(pose.placed.as_ref()),
+            ),
         }
     }
 

@@ -3,11 +3,12 @@
 use super::counts::TRUSTS;
 use super::coverage;
 use super::pose::PoseField;
+use super::uncertainty::Made;
 use super::{CellBuffers, Input, MAX_GAUGES, Measure, Production, Strip, Strips};
 use crate::inspect::Reading;
 use crate::inspect::align::Placed;
 use crate::inspect::gauge::{
-    Sum, TaughtCell, cells, flatness, mean, peak_to_valley, rms, share_outside, sigma, step, tilt,
+    Sum, TaughtCell, cells, flatness, found, mean, peak_to_valley, rms, share_outside, step, tilt,
     volume,
 };
 use crate::phase::Trust;
@@ -119,6 +120,7 @@ impl Production {
                     value: covered as f64 / pixels as f64,
                     sigma: Some(coverage::sigma(variance, pixels)),
                     expected: None,
+                    systematic: 0.0,
                 })
             }
             Measure::Deviation { side } => {
@@ -128,9 +130,7 @@ impl Production {
                 let best =
                     extremes.reduce(|best, next| if next.reaches(&best) { next } else { best })?;
                 let strip = strips.first_mut()?;
-                let noise = libm::hypot(self.golden_noise, noisier) / self.golden_noise;
-                let largest = self.largest.get(gauge).copied().unwrap_or_default();
-                Some(self.deviation((best, side), input, pose, strip, largest.times(noise)))
+                Some(self.deviation((best, side), input, pose, strip, (gauge, noisier)))
             }
             Measure::Placement(component) => {
                 let (value, sigma) = pose.placed.as_ref()?.component(component)?;
@@ -138,6 +138,10 @@ impl Production {
                     value,
                     sigma: Some(sigma),
                     expected: None,
+                    systematic: libm::hypot(
+                        sigma * libm::sqrt(self.golden_variance(noisier)),
+                        value * self.calibration.length,
+                    ),
                 })
             }
             _ => self.of_cells(gauge, noisier, pose, strips, cells),
@@ -174,13 +178,24 @@ impl Production {
         let pixel = variance(taught);
         let cell = libm::sqrt(pixel) / side.max(1) as f64;
         let placed = pose.placed.as_ref();
+        let reading = |found, made| self.reading_of(found, made, noisier, placed);
         // The value of a gauge that is linear in height; the others return their readings.
         let value = match measure {
-            Measure::Flatness { .. } => return flatness(cells, cell, placed, weights),
-            Measure::PeakToValley { .. } => return peak_to_valley(cells, cell, placed, weights),
-            Measure::RmsDeviation { .. } => return rms(cells, cell, placed),
+            Measure::Flatness { .. } => {
+                let found = flatness(cells, cell, placed, weights)?;
+                return Some(reading(found, Made::OfHeights));
+            }
+            Measure::PeakToValley { .. } => {
+                let found = peak_to_valley(cells, cell, placed, weights)?;
+                return Some(reading(found, Made::OfHeights));
+            }
+            Measure::RmsDeviation { .. } => {
+                let found = rms(cells, cell, placed)?;
+                return Some(reading(found, Made::OfDeviations));
+            }
             Measure::OutOfTolerance { tolerance, .. } => {
-                return share_outside(cells, cell, tolerance, placed);
+                let found = share_outside(cells, cell, tolerance, placed)?;
+                return Some(reading(found, Made::OfDeviations));
             }
             Measure::MeanHeight => mean(cells, weights)?,
             Measure::Tilt(about) => tilt(cells, about, weights)?,
@@ -193,11 +208,8 @@ impl Production {
             variance(&self.gauges.patches[patches.end - 1].taught),
         ];
         let noise = |at: usize| noises[usize::from(at >= count)];
-        Some(Reading {
-            value,
-            sigma: Some(sigma(weights, cells, noise, placed)),
-            expected: None,
-        })
+        let found = found(value, weights, cells, noise, placed);
+        Some(reading(found, Made::OfHeights))
     }
 
     /// Appends the cells of a patch.

@@ -9,7 +9,7 @@
 //!    and its deviation from golden there;
 //! 4. **accumulate** (`counts`, `coverage`, `weighted`, `squares`): counts, the sums of the gauges' cells ([`gauge`](super::gauge)), and
 //!    the square with the largest mean weighted deviation; for the squares, the rows before this one are kept (`recent`);
-//! 5. **gauge** (`findings`, `deviation`): after all strips, readings and their errors from these sums.
+//! 5. **gauge** (`findings`, `deviation`, `uncertainty`): after all strips, readings and their errors from these sums.
 //!
 //! Before that, where the part's motion is wanted, some rows go through stages 1 and 2 and a few points of each are kept: the
 //! motion is found from these, in the order of the rows.
@@ -39,6 +39,7 @@ mod recent;
 mod squares;
 mod strip;
 mod taught;
+mod uncertainty;
 mod weighted;
 
 pub use findings::{Findings, Skipped};
@@ -46,6 +47,7 @@ pub use gauges::{Gauge, MAX_GAUGES, Unmeasurable};
 pub use input::Input;
 pub use plan::{Parts, Production};
 pub use taught::Taught;
+pub use uncertainty::CalibrationError;
 
 use super::align::{FitBuffers, Placed, Sample};
 use super::gauge::{Cell, Measure, Sum, Weights};

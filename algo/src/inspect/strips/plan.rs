@@ -3,6 +3,7 @@
 use super::coverage::Threshold;
 use super::gauges::{Gauge, Gauges, Unmeasurable};
 use super::taught::Taught;
+use super::uncertainty::CalibrationError;
 use super::weighted::WeightedTiles;
 use crate::geometry::Triangulator;
 use crate::inspect::Largest;
@@ -40,6 +41,8 @@ pub struct Parts {
     pub golden_noise: f64,
     /// Per gauge, what a deviation is on good parts whose only noise is golden's; of other gauges not used.
     pub largest: Vec<Largest>,
+    /// The error of the head's calibration.
+    pub calibration: CalibrationError,
 }
 
 /// Everything that inspecting parts needs, worked out once.
@@ -69,6 +72,7 @@ pub struct Production {
     /// See [`Parts`].
     pub(super) golden_noise: f64,
     pub(super) largest: Vec<Largest>,
+    pub(super) calibration: CalibrationError,
 }
 
 impl Production {
@@ -90,6 +94,7 @@ impl Production {
             aligned,
             golden_noise,
             largest,
+            calibration,
         } = parts;
         let width = cubics.surface().width;
         taught.mark_squares(width.max(1));
@@ -128,6 +133,7 @@ impl Production {
             gauges,
             golden_noise,
             largest,
+            calibration,
         })
     }
 

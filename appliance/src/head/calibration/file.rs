@@ -1,5 +1,6 @@
 //! `calibration.json`, version 2: its keys, its checks, its fingerprint and its checksum.
 
+use super::CalibrationSigma;
 use super::geometry::GeometryFile;
 use super::{Calibration, HeightsBy, size};
 use crate::head::seam;
@@ -322,6 +323,10 @@ impl CalibrationFile {
             heights_by: self.heights_by,
             response: self.response.as_deref().map_or(Ok(None), inverted)?,
             linear: self.response.is_some(),
+            sigma: self.geometry.as_ref().map(|geometry| CalibrationSigma {
+                height_mm: geometry.height_sigma_mm,
+                length_mm: geometry.length_sigma_mm,
+            }),
             ..Calibration::new(
                 (camera.width, camera.height, camera.bit_depth),
                 (projector.width, projector.height),

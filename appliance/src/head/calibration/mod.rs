@@ -58,6 +58,18 @@ pub struct Calibration {
     /// Whether the light is known to be linear in the grey level, by itself or with the inverse of `response`. Only then may a
     /// waveform have harmonics.
     pub linear: bool,
+    /// σ of what the models make of a measurement, where they were made from a board.
+    pub sigma: Option<CalibrationSigma>,
+}
+
+/// σ of measurements by the uncertainty of the models.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CalibrationSigma {
+    /// Of a height, mm.
+    pub height_mm: f64,
+    /// Of a length of 100 mm, mm.
+    pub length_mm: f64,
 }
 
 impl Calibration {
@@ -81,6 +93,7 @@ impl Calibration {
             noise_counts,
             response: None,
             linear: false,
+            sigma: None,
         })
     }
 

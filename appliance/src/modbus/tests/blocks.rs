@@ -181,6 +181,22 @@ async fn gauge_detail_has_sigma_and_unit_of_the_result_beside_it() {
 }
 
 #[tokio::test]
+async fn gauge_uncertainty_has_the_expanded_uncertainty_and_what_good_parts_read() {
+    let plant = Plant::new().await;
+    let mut plc = plant.client().await;
+    plc.write_single_register(1, 1).await.unwrap().unwrap();
+    plant.work();
+    let words = plc.read_input_registers(1000, 70).await.unwrap().unwrap();
+    assert_eq!((u32_at(&words, 0), u32_at(&words, 66)), (1000, 1000));
+    let float = |at: usize| f32::from_bits(u32_at(&words, at));
+    let expanded = 2.0 * 0.001_f64.hypot(0.0005);
+    assert_eq!((float(2), float(4)), (expanded as f32, 0.02));
+    assert_eq!(float(34), 0.03);
+    assert!(float(6).is_nan() && float(36).is_nan());
+    assert!(plc.read_input_registers(1070, 1).await.unwrap().is_err());
+}
+
+#[tokio::test]
 async fn health_says_what_is_known_and_what_is_not() {
     let plant = Plant::new().await;
     let mut plc = plant.client().await;

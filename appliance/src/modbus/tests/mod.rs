@@ -139,8 +139,22 @@ impl Plant {
 fn inspection() -> Inspection {
     let limits = (Some(-0.2), Some(0.2));
     let gauges = [
-        GaugeValue::judged("dome", Unit::Length, Some(0.12345), Some(0.001), limits),
-        GaugeValue::judged("flange", Unit::Angle, Some(-0.5), Some(0.01), limits),
+        GaugeValue::judged(
+            "dome",
+            Unit::Length,
+            Measured {
+                systematic: 0.0005,
+                expected: Some(0.03),
+                ..Measured::new(Some(0.12345), Some(0.001))
+            },
+            limits,
+        ),
+        GaugeValue::judged(
+            "flange",
+            Unit::Angle,
+            Measured::new(Some(-0.5), Some(0.01)),
+            limits,
+        ),
     ];
     let mut stages = Stages::default();
     for (stage, us) in [

@@ -1,7 +1,7 @@
 //! From findings to a verdict, or to the reason why a longer sequence should be tried.
 
 use crate::recipe::Demands;
-use crate::station::{GaugeValue, Inspection, Placement, Verdict};
+use crate::station::{GaugeValue, Inspection, Measured, Placement, Verdict};
 use algo::inspect::{Findings, Placed};
 use std::sync::Arc;
 
@@ -19,8 +19,12 @@ impl Demands {
             let judged = GaugeValue::judged(
                 Arc::clone(&limits.name),
                 limits.unit,
-                reading.map(|reading| reading.value),
-                reading.and_then(|reading| reading.sigma),
+                reading.map_or_else(Measured::default, |reading| Measured {
+                    value: Some(reading.value),
+                    sigma: reading.sigma,
+                    systematic: reading.systematic,
+                    expected: reading.expected,
+                }),
                 (limits.low, limits.high),
             );
             // Cannot be full: the recipe was checked for MAX_GAUGES.

@@ -207,6 +207,7 @@ impl Plan {
             gauges,
             window,
             noise_counts: conditions.noise_counts,
+            calibration: conditions.calibration,
             golden,
         };
         let runs = prepared

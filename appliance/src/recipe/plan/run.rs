@@ -4,7 +4,7 @@ use super::golden;
 use crate::recipe::archive::Arrays;
 use crate::recipe::{RecipeSequence, SequenceKind};
 use algo::geometry::Triangulator;
-use algo::inspect::{Gauge, Largest, Measure, Parts, Production, Taught};
+use algo::inspect::{CalibrationError, Gauge, Largest, Measure, Parts, Production, Taught};
 use algo::pattern::{PhaseRange, Shot};
 use algo::phase::{Arrived, Decoder};
 use algo::pipeline::HeightCubics;
@@ -33,6 +33,7 @@ pub(super) struct Shared {
     pub gauges: Vec<Gauge>,
     pub window: Vec<Range<usize>>,
     pub noise_counts: f64,
+    pub calibration: CalibrationError,
     pub golden: GoldenNoise,
 }
 
@@ -131,6 +132,7 @@ impl Prepared {
             aligned: shared.aligned,
             golden_noise,
             largest: shared.golden.largest.clone(),
+            calibration: shared.calibration,
         });
         Ok(Run {
             kind,

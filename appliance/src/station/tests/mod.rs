@@ -51,8 +51,7 @@ pub(super) fn good() -> Arc<Inspection> {
     let gauge = GaugeValue::judged(
         "height",
         Unit::Length,
-        Some(0.1),
-        Some(0.01),
+        Measured::new(Some(0.1), Some(0.01)),
         (Some(-1.0), Some(1.0)),
     );
     Arc::new(Inspection {

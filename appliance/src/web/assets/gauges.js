@@ -3,7 +3,7 @@ import { $, fill, make, show, text } from "./element.js";
 import { limits, quantity } from "./number.js";
 import { ask } from "./api.js";
 import { trend } from "./trend.js";
-import { decided, tag } from "./verdict.js";
+import { decided, tag, uncertainty } from "./verdict.js";
 
 // Values of a trend.
 const KEPT = 100;
@@ -34,8 +34,8 @@ function bar(gauge) {
 
 function row(gauge) {
   const value = make("td", "", make("span", "value", gauge.value === null ? "not measured" : quantity(gauge.value, gauge.unit)));
-  const sigma = gauge.value !== null && gauge.sigma !== null ? `± ${quantity(gauge.sigma, gauge.unit, 1)}` : "\u00a0";
-  value.append(make("small", sigma === "\u00a0" ? "room" : "", sigma));
+  const error = gauge.value !== null ? uncertainty(gauge) : "";
+  value.append(make("small", error ? "" : "room", error || "\u00a0"));
   const range = make("td", "limits", bar(gauge), make("small", "", limits(gauge.lowest, gauge.highest, gauge.unit)));
   const points = trends.get(gauge.name) || [];
   const verdict = make("td", "", tag(gauge));

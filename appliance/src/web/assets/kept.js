@@ -5,7 +5,7 @@ import { paint } from "./colour.js";
 import { about, limits, measures, milliseconds, moment, quantity, signed } from "./number.js";
 import { drawScale } from "./scale.js";
 import { nameOf } from "./times.js";
-import { decided, tag } from "./verdict.js";
+import { decided, tag, uncertainty } from "./verdict.js";
 
 const COMPONENTS = ["x", "y", "z", "about x", "about y", "about z"];
 const state = { seq: 0, layer: "height", asked: 0 };
@@ -15,7 +15,8 @@ function gauge(entry) {
   const verdict = make("td", "", tag(decision));
   if (decision.doubtful) verdict.append(make("small", "", "close to a limit"));
   const value = make("td", "nowrap", entry.value === null ? "not measured" : quantity(entry.value, entry.unit));
-  if (entry.value !== null && entry.sigma !== null) value.append(make("small", "", `± ${quantity(entry.sigma, entry.unit, 1)}`));
+  const error = entry.value !== null ? uncertainty(entry) : "";
+  if (error) value.append(make("small", "", error));
   const name = make("th", "", entry.name);
   name.scope = "row";
   return make("tr", "", name, value, make("td", "", limits(entry.low, entry.high, entry.unit)), verdict);

@@ -1,0 +1,75 @@
+//! Stage 5, gauge: from a value with the parts of its error to a reading.
+//!
+//! What changes from one measurement to the next is in σ; what is the same in each of them is systematic, and both together make the
+//! uncertainty u = √(σ² + systematic²) (JCGM 100:2008, 5.1.2). Systematic are:
+//!
+//! - the noise of golden, once, as a deviation from golden and through the motion, which is found against golden;
+//! - the error of the calibration: of a value that is made of heights the σ of heights times the value's lever, that is, as if errors
+//!   had the sign that does most everywhere; of one that is compared with golden, which the same head measured, only what a length
+//!   as long as the part's displacement is wrong by.
+
+use super::Production;
+use crate::inspect::Reading;
+use crate::inspect::align::Placed;
+use crate::inspect::gauge::Found;
+
+/// σ by the error of the calibration; 0 where it is not known.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CalibrationError {
+    /// Of a height, mm.
+    pub height: f64,
+    /// Of a length, relative.
+    pub length: f64,
+}
+
+/// A part whose noise is less than this share of that as taught was not measured at all.
+const LEAST_NOISE: f64 = 0.01;
+
+/// What a value is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Made {
+    /// Heights.
+    OfHeights,
+    /// Deviations from golden.
+    OfDeviations,
+}
+
+impl Production {
+    /// A reading; σ_z is `noisier` times the taught σ.
+    pub(super) fn reading_of(
+        &self,
+        found: Found,
+        made: Made,
+        noisier: f64,
+        placed: Option<&Placed>,
+    ) -> Reading {
+        let Found {
+            value,
+            pixels,
+            motion,
+            lever,
+        } = found;
+        let (golden, wrong) = match made {
+            Made::OfHeights => (motion, self.calibration.height),
+            Made::OfDeviations => (pixels + motion, self.displaced(placed)),
+        };
+        let golden = golden * self.golden_variance(noisier);
+        Reading {
+            value,
+            sigma: Some(libm::sqrt(pixels + motion)),
+            expected: None,
+            systematic: libm::sqrt(golden + wrong * wrong * lever * lever),
+        }
+    }
+
+    /// Variance of golden's heights over that of the measured ones.
+    pub(super) fn golden_variance(&self, noisier: f64) -> f64 {
+        let ratio = self.golden_noise / noisier.max(LEAST_NOISE);
+        ratio * ratio
+    }
+
+    /// By how much a length as long as the part's displacement is wrong, mm.
+    pub(super) fn displaced(&self, placed: Option<&Placed>) -> f64 {
+        placed.map_or(0.0, |placed| placed.reach * self.calibration.length)
+    }
+}
