@@ -25,7 +25,7 @@ const MEMBERS: [&str; 9] = [
 ];
 
 /// Keys of `recipe.json`, version 1, in a taught recipe. Do not change these either.
-const KEYS: [&str; 59] = [
+const KEYS: [&str; 60] = [
     "alignment",
     "calibration",
     "camera",
@@ -61,6 +61,7 @@ const KEYS: [&str; 59] = [
     "good_parts.scatter_mm",
     "good_parts.tolerance_mm",
     "good_parts.weighed",
+    "guard_k",
     "min_coverage",
     "name",
     "noise_counts",
@@ -87,7 +88,10 @@ const KEYS: [&str; 59] = [
     "version",
 ];
 /// Keys that `recipe.json` may have in addition.
-const OPTIONAL: [&str; 7] = [
+const OPTIONAL: [&str; 10] = [
+    "calibration_sigma",
+    "height_mm",
+    "length_mm",
     "exposure_us",
     "fringes",
     "from",

@@ -44,9 +44,10 @@ impl Measure {
     pub fn run(&self) -> Result<(), Failure> {
         let unpacked = Unpacked::of(&self.recording)?;
         let mut recording = Recording::open(unpacked.folder())?;
-        if let Some(calibration) = &self.calibration {
-            models::replace(&mut recording, calibration)?;
-        }
+        let models = match &self.calibration {
+            Some(calibration) => models::replace(&mut recording, calibration)?,
+            None => None,
+        };
         let recipe = self.recipe.as_deref().map(kept::read).transpose()?;
         let pool = self.threads.pool(0)?;
         let about = self.about.as_deref().map(expected_phase).transpose()?;
@@ -54,7 +55,8 @@ impl Measure {
             Some(map) => measure_about_map(&recording, unpacked.folder(), map),
             None => measure_with(&recording, unpacked.folder(), recipe.as_ref()),
         };
-        let measurement = pool.install(measured)?;
+        let mut measurement = pool.install(measured)?;
+        measurement.report.add_models(models);
         let folder = OutputFolder::create(&self.out)?;
         pool.install(|| write(&folder, &measurement))?;
         let json = serde_json::to_string_pretty(&measurement.report)

@@ -11,11 +11,12 @@ use std::path::Path;
 /// part, because it was not taken for this recording.
 const REACH: f64 = 0.5;
 
-/// Replaces the models of a recording by those of a calibration, and its working range, which was stated about another plane.
+/// Replaces the models of a recording by those of a calibration, and its working range, which was stated about another plane. Returns σ of
+/// a height by the uncertainty of these models, mm, if they were made from a board.
 ///
 /// # Errors
 /// If there is no such file (66), or it cannot be used or is of a head with frames or a raster of another size (65).
-pub fn replace(recording: &mut Recording, path: &Path) -> Result<(), Failure> {
+pub fn replace(recording: &mut Recording, path: &Path) -> Result<Option<f64>, Failure> {
     let failed = |exit, words: String| Failure::because(exit, path.display(), words);
     let bytes = std::fs::read(path).map_err(|error| match error.kind() {
         ErrorKind::NotFound => failed(Exit::Missing, "there is no such calibration".into()),
@@ -57,5 +58,5 @@ pub fn replace(recording: &mut Recording, path: &Path) -> Result<(), Failure> {
     recording.camera_model = Some(file.camera.model);
     recording.projector.model = Some(file.projector.model);
     recording.projector.plane = calibration.plane_by().cloned();
-    Ok(())
+    Ok(file.geometry.map(|geometry| geometry.height_sigma_mm))
 }

@@ -2,6 +2,7 @@
 
 use super::{Score, Truth};
 use crate::output::cloud::Surface;
+use crate::station::COVERAGE_FACTOR;
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use hal::replay::recording::RecipeReference;
@@ -59,6 +60,9 @@ pub struct Report {
     /// RMS of the predicted σ_z over resolved pixels, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma_mm: Option<f64>,
+    /// U = 2 √(`sigma_mm`² + σ²), σ that of a height by the uncertainty of the calibration that was named, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty_mm: Option<f64>,
     /// Errors against the recording's truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub score: Option<Score>,
@@ -111,8 +115,15 @@ impl Report {
             ),
             height_mm,
             sigma_mm,
+            uncertainty_mm: None,
             score: map.and_then(|map| truth.score(phases, map)),
         }
+    }
+
+    /// Adds the uncertainty of the models that were measured with: σ of a height in mm, if it is known.
+    pub fn add_models(&mut self, sigma_mm: Option<f64>) {
+        let both = self.sigma_mm.zip(sigma_mm);
+        self.uncertainty_mm = both.map(|(noise, models)| COVERAGE_FACTOR * noise.hypot(models));
     }
 
     /// The report as lines of a name and a value.
@@ -165,6 +176,9 @@ impl Report {
         }
         if let Some(sigma) = self.sigma_mm {
             line("predicted error (1 σ)", format!("{sigma:.4} mm RMS"));
+        }
+        if let Some(uncertainty) = self.uncertainty_mm {
+            line("uncertainty (k = 2)", format!("{uncertainty:.4} mm"));
         }
         if let Some(score) = &self.score {
             line(

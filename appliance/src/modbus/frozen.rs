@@ -138,7 +138,7 @@ const BLOCKS_1: [(&str, u16, u16, bool); 8] = [
 ];
 
 /// The meanings in version 1.0 of the rows whose meaning a later version extends.
-const MEANINGS_1: [(u16, &str); 3] = [
+const MEANINGS_1: [(u16, &str); 4] = [
     (2, "1-9999; 0 leave the recipe; 65535 select by PART_NUMBER"),
     (
         120,
@@ -147,6 +147,10 @@ const MEANINGS_1: [(u16, &str); 3] = [
     (
         103,
         "0 temperature, 1 storage, 2 plc_lost, 3 clock_unsynced, 4 low_light, 5 saturation, 6 pattern_unfit, 7 frame_slip",
+    ),
+    (
+        296,
+        "0 pass, 1 valid, 2 low, 3 high, 4 doubtful (a limit lies within 2 sigma)",
     ),
 ];
 
@@ -162,8 +166,11 @@ const MEANINGS_1_1: [(u16, &str); 2] = [
 /// Version 1.2 adds rows, and a bit of WARNING.
 const MEANINGS_1_2: [(u16, &str); 1] = [(103, ", 8 power")];
 
-/// Version 1.3 adds a row, and another bit of WARNING.
-const MEANINGS_1_3: [(u16, &str); 1] = [(103, ", 8 power, 9 geometry")];
+/// Version 1.3 adds a register, a block, another bit of WARNING, and what the bits of a value in a guard band are.
+const MEANINGS_1_3: [(u16, &str); 2] = [
+    (103, ", 8 power, 9 geometry"),
+    (296, "; 1 and 4 without 0, 2, 3"),
+];
 
 fn row(address: u16) -> Register {
     let mut rows = registers().map(|(_, row)| row);
@@ -171,8 +178,11 @@ fn row(address: u16) -> Register {
 }
 
 #[test]
-fn later_versions_say_more_of_three_rows_and_take_nothing_back() {
-    let added = MEANINGS_1_1.into_iter().chain(MEANINGS_1_2);
+fn later_versions_say_more_of_four_rows_and_take_nothing_back() {
+    let added = MEANINGS_1_1
+        .into_iter()
+        .chain(MEANINGS_1_2)
+        .chain(MEANINGS_1_3);
     for ((address, first), (same, added)) in MEANINGS_1.into_iter().zip(added) {
         assert_eq!(address, same);
         let meaning = row(address).meaning;

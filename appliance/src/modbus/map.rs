@@ -181,7 +181,7 @@ registers! {
         231 FLAGS Bits x 1 = record.flags(), "0 a pattern was retried, 1 single level used, 2 two levels used, 3 full sequence used, 4 stepped up from a shorter one, 5 simulated head, 6 warm-up, 7 at least one doubtful decision";
         232 GAUGE_STEPS I32 x 16 = gauges(record, INVALID_I32, |gauge| i32_steps(measured(gauge, gauge.value), gauge.unit.steps())), "value in the unit's step: length 0.1 um, angle 0.0001 deg, volume 0.01 mm3, share 0.1 per mille; saturates at +-(2^31-1), 0x80000000 invalid";
         264 GAUGE_VALUE F32 x 16 = gauges(record, INVALID_F32, |gauge| f32_bits(measured(gauge, gauge.value))), "the same in mm, deg, mm3, share 0-1; NaN (0x7FC00000) invalid";
-        296 GAUGE_DECISION Bits x 16 = gauges(record, 0, |gauge| gauge.decision.bits()), "0 pass, 1 valid, 2 low, 3 high, 4 doubtful (a limit lies within 2 sigma)";
+        296 GAUGE_DECISION Bits x 16 = gauges(record, 0, |gauge| gauge.decision.bits()), "0 pass, 1 valid, 2 low, 3 high, 4 doubtful (a limit lies within 2 sigma); 1 and 4 without 0, 2, 3: inside its limits, but nearer to one than the recipe's guard band";
         318 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
     }
     gauge_detail GAUGE_DETAIL 520..=583, false, record: ResultRecord {

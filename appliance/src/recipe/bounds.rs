@@ -23,6 +23,8 @@ const MAX_SEQUENCES: usize = 8;
 const MAX_CORNERS: usize = 256;
 /// Farthest that a part may lie from where it was taught, mm.
 pub const MAX_TOLERANCE_MM: f64 = 20.0;
+/// Widest guard band, in multiples of u.
+pub const MAX_GUARD_K: f64 = 10.0;
 /// The last second of the year 9999.
 const LAST_SECOND: u64 = 253_402_300_799;
 /// Largest σ_z, mm: no head is worse.
@@ -84,6 +86,7 @@ impl RecipeFile {
         let range = self.expansion_range_turns;
         within("expansion_range_turns", range, 1e-3, MAX_FRINGES)?;
         within("min_coverage", self.min_coverage, 0.0, 1.0)?;
+        within("guard_k", self.guard_k, 0.0, MAX_GUARD_K)?;
         length("regions", self.regions.len(), 0, MAX_REGIONS)?;
         each("regions", ".", &self.regions, RegionFile::check_bounds)?;
         length("gauges", self.gauges.len(), 1, MAX_GAUGES)?;

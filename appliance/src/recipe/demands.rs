@@ -13,6 +13,8 @@ pub struct Demands {
     pub(super) min_coverage: f64,
     /// How far the part may lie from where it was taught, mm.
     pub(super) tolerance_mm: f64,
+    /// Guard bands are this many times u wide.
+    pub(super) guard_k: f64,
     /// Whether the part's motion is found and taken back before it is gauged.
     pub(super) aligned: bool,
 }
@@ -38,6 +40,7 @@ impl From<&RecipeFile> for Demands {
             limits: limits.collect(),
             min_coverage: file.min_coverage,
             tolerance_mm: file.placement_tolerance_mm,
+            guard_k: file.guard_k,
             aligned: file.alignment == AlignmentKind::Rigid,
         }
     }

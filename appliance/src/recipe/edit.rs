@@ -1,4 +1,4 @@
-//! Edits a taught recipe: names, regions, gauges and least coverage.
+//! Edits a taught recipe: names, regions, gauges, guard band and least coverage.
 
 use super::bounds::LONGEST_NAME;
 use super::golden::TaughtRecipe;
@@ -20,6 +20,8 @@ pub struct Edit {
     pub part_number: Option<String>,
     /// Least share of the golden pixels that must be resolved.
     pub min_coverage: Option<f64>,
+    /// Width of the guard bands, in multiples of u.
+    pub guard_k: Option<f64>,
     /// All regions.
     pub regions: Option<Vec<RegionFile>>,
     /// All gauges.
@@ -46,6 +48,7 @@ pub fn edit(
     file.name = edit.name.map_or(file.name, |name| name.trim().to_owned());
     file.part_number = edit.part_number.unwrap_or(file.part_number);
     file.min_coverage = edit.min_coverage.unwrap_or(file.min_coverage);
+    file.guard_k = edit.guard_k.unwrap_or(file.guard_k);
     file.regions = edit.regions.unwrap_or(file.regions);
     file.gauges = edit.gauges.unwrap_or(file.gauges);
     let regions = file.regions.iter().map(|region| &region.name);

@@ -63,6 +63,10 @@ pub struct RecipeFile {
     pub expansion_range_turns: f64,
     /// Least share of the golden pixels that must be resolved, else the verdict is INVALID.
     pub min_coverage: f64,
+    /// A value inside its limits but nearer to one than this many times its uncertainty u is neither PASS nor FAIL; 0, which is left
+    /// out, in recipes of older programs.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub guard_k: f64,
     /// Polygons in camera pixels.
     pub regions: Vec<RegionFile>,
     /// At most 16.
@@ -73,6 +77,14 @@ pub struct RecipeFile {
     /// The deviation of good parts, as predicted when it was taught; `None` in recipes of older programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub good_parts: Option<GoodPartsFile>,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }
 
 /// A camera's frames.

@@ -33,6 +33,9 @@ const DEVIATION_MM: f64 = 0.15;
 const COVERAGE_CHANGE: f64 = 0.01;
 /// Least share of the golden surface that must be resolved.
 const MIN_COVERAGE: f64 = 0.80;
+/// Guard bands of new recipes: with k = 1.65 one in 20 parts that lie just outside of a limit would pass (ISO 14253-1:2017), with 2
+/// one in 44.
+const GUARD_K: f64 = 2.0;
 /// An opening has at least this many pixels.
 const OPENING_PIXELS: usize = 60;
 /// At most this share of an opening's region may be resolved on a good part.
@@ -178,6 +181,7 @@ impl GoldenPart<'_> {
             calibration_sigma: calibration.sigma,
             expansion_range_turns: EXPANSION_TURNS,
             min_coverage: MIN_COVERAGE,
+            guard_k: GUARD_K,
             regions,
             gauges,
             comparison: self.comparison.clone(),

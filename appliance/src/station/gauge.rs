@@ -60,7 +60,7 @@ impl Unit {
 /// What was decided about one gauge: bits 0–4 of registers 296–311.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Decision {
-    /// Measured and within its limits.
+    /// Measured and within its limits, farther from them than the guard band.
     pub pass: bool,
     /// Measured.
     pub valid: bool,
@@ -68,8 +68,29 @@ pub struct Decision {
     pub low: bool,
     /// Above its upper limit.
     pub high: bool,
-    /// A limit lies within 2 σ of the value.
+    /// A limit lies within 2 σ of the value, or the value lies within the guard band.
     pub doubtful: bool,
+}
+
+/// The limits of a gauge, inclusive.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct GaugeLimits {
+    /// The lower limit.
+    pub low: Option<f64>,
+    /// The upper limit.
+    pub high: Option<f64>,
+    /// The guard band inside each limit is this many times u wide (ISO 14253-1:2017); 0 is none.
+    pub guard_k: f64,
+}
+
+impl From<(Option<f64>, Option<f64>)> for GaugeLimits {
+    fn from((low, high): (Option<f64>, Option<f64>)) -> Self {
+        Self {
+            low,
+            high,
+            guard_k: 0.0,
+        }
+    }
 }
 
 impl Decision {
@@ -81,26 +102,34 @@ impl Decision {
             .fold(0, |bits, (k, &set)| bits | (u16::from(set) << k))
     }
 
-    /// The decision for a value with its σ and its limits (inclusive). Without a finite value it is not valid, and no other bit
-    /// is set.
-    pub fn of(value: Option<f64>, sigma: Option<f64>, low: Option<f64>, high: Option<f64>) -> Self {
-        let Some(value) = value.filter(|value| value.is_finite()) else {
+    /// The decision for a value. Without a finite value it is not valid, and no other bit is set. A value within its limits, but
+    /// inside the guard band of one, proves neither that the part conforms nor that it does not: it is doubtful and no pass.
+    pub fn of(measured: &Measured, limits: &GaugeLimits) -> Self {
+        let Some(value) = measured.value.filter(|value| value.is_finite()) else {
             return Self::default();
         };
+        let GaugeLimits { low, high, guard_k } = *limits;
         let below = low.is_some_and(|limit| value < limit);
         let above = high.is_some_and(|limit| value > limit);
-        let near = |limit: Option<f64>| {
-            limit
-                .zip(sigma)
-                .is_some_and(|(limit, sigma)| (value - limit).abs() < 2.0 * sigma)
+        let nearer = |to: Option<f64>, reach: Option<f64>| {
+            to.zip(reach)
+                .is_some_and(|(limit, reach)| (value - limit).abs() < reach)
         };
+        let near = |reach| nearer(low, reach) || nearer(high, reach);
+        let within = !below && !above;
+        let guarded = within && near(measured.uncertainty().map(|u| guard_k * u));
         Self {
-            pass: !below && !above,
+            pass: within && !guarded,
             valid: true,
             low: below,
             high: above,
-            doubtful: near(low) || near(high),
+            doubtful: guarded || near(measured.sigma.map(|sigma| 2.0 * sigma)),
         }
+    }
+
+    /// Whether the value was measured, lies within its limits and is no pass, because it lies in the guard band.
+    pub fn guarded(self) -> bool {
+        self.valid && !self.pass && !self.low && !self.high
     }
 }
 
@@ -165,8 +194,9 @@ impl GaugeValue {
         name: impl Into<Arc<str>>,
         unit: Unit,
         measured: Measured,
-        (low, high): (Option<f64>, Option<f64>),
+        limits: impl Into<GaugeLimits>,
     ) -> Self {
+        let limits = limits.into();
         let Measured {
             value,
             sigma,
@@ -180,9 +210,9 @@ impl GaugeValue {
             sigma,
             uncertainty: measured.uncertainty().map(|u| COVERAGE_FACTOR * u),
             expected,
-            low,
-            high,
-            decision: Decision::of(value, sigma, low, high),
+            low: limits.low,
+            high: limits.high,
+            decision: Decision::of(&measured, &limits),
         }
     }
 }
@@ -193,12 +223,35 @@ mod tests {
 
     #[test]
     fn a_limit_within_two_sigma_makes_a_decision_doubtful() {
-        let near = Decision::of(Some(0.9), Some(0.06), Some(-1.0), Some(1.0));
+        let limits = GaugeLimits::from((Some(-1.0), Some(1.0)));
+        let of = |value, sigma| Decision::of(&Measured::new(Some(value), sigma), &limits);
+        let near = of(0.9, Some(0.06));
         assert!(near.doubtful && near.pass);
-        assert!(!Decision::of(Some(0.9), Some(0.04), Some(-1.0), Some(1.0)).doubtful);
-        assert_eq!(
-            Decision::of(Some(1.5), None, None, Some(1.0)).bits(),
-            0b01010
-        );
+        assert!(!of(0.9, Some(0.04)).doubtful);
+        assert_eq!(of(1.5, None).bits(), 0b01010);
+    }
+
+    #[test]
+    fn a_value_in_the_guard_band_is_doubtful_and_neither_pass_nor_outside() {
+        let limits = GaugeLimits {
+            low: Some(-1.0),
+            high: Some(1.0),
+            guard_k: 2.0,
+        };
+        // u = 0.05.
+        let of = |value| {
+            let measured = Measured {
+                systematic: 0.04,
+                ..Measured::new(Some(value), Some(0.03))
+            };
+            Decision::of(&measured, &limits)
+        };
+        assert_eq!(of(0.89).bits(), 0b00011);
+        assert_eq!(of(0.91).bits(), 0b10010);
+        assert_eq!(of(-0.91).bits(), 0b10010);
+        assert!(of(0.91).guarded() && !of(0.89).guarded());
+        // Outside it is a fail, however near.
+        assert_eq!(of(1.01).bits(), 0b11010);
+        assert!(!of(1.01).guarded() && !Decision::default().guarded());
     }
 }

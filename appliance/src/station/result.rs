@@ -23,7 +23,7 @@ pub enum Verdict {
     Pass,
     /// 2: every gauge was measured and at least one lies outside.
     Fail,
-    /// 3: something could not be measured.
+    /// 3: something could not be measured, or a value lies so close to a limit that neither PASS nor FAIL is proven.
     Invalid,
 }
 
@@ -151,16 +151,32 @@ pub struct Inspection {
 
 impl Inspection {
     /// The verdict that is shown. The worker's judgement can make it worse than the gauges say, never better: it is INVALID
-    /// without a judgement, without gauges, or with a gauge that was not measured; it is not PASS with a gauge outside its limits.
+    /// without a judgement, without gauges, or with a gauge that was not measured; it is not PASS with a gauge outside its limits, or in
+    /// a guard band.
     pub fn verdict(&self) -> Verdict {
         let unmeasured =
             self.gauges.is_empty() || self.gauges.iter().any(|gauge| !gauge.decision.valid);
         match self.judged {
             Verdict::None | Verdict::Invalid => Verdict::Invalid,
             Verdict::Pass | Verdict::Fail if unmeasured => Verdict::Invalid,
-            Verdict::Pass if self.gauges.iter().any(|gauge| !gauge.decision.pass) => Verdict::Fail,
+            Verdict::Pass if self.gauges.iter().any(|gauge| !gauge.decision.pass) => {
+                match self.guarded().next() {
+                    Some(_) => Verdict::Invalid,
+                    None => Verdict::Fail,
+                }
+            }
             judged => judged,
         }
+    }
+}
+
+impl Inspection {
+    /// The gauges whose values lie in a guard band, if none lies outside its limits.
+    pub fn guarded(&self) -> impl Iterator<Item = &GaugeValue> {
+        let outside = |gauge: &GaugeValue| gauge.decision.low || gauge.decision.high;
+        let none = !self.gauges.iter().any(outside);
+        let guarded = move |gauge: &&GaugeValue| none && gauge.decision.guarded();
+        self.gauges.iter().filter(guarded)
     }
 }
 
@@ -218,7 +234,7 @@ impl ResultRecord {
 
 #[cfg(test)]
 mod tests {
-    use super::super::gauge::{Measured, Unit};
+    use super::super::gauge::{GaugeLimits, Measured, Unit};
     use super::*;
 
     fn inspection(judged: Verdict, values: &[Option<f64>]) -> Inspection {
@@ -259,6 +275,17 @@ mod tests {
             inspection(Verdict::Pass, &[Some(0.0), Some(1.1)]).verdict(),
             Verdict::Fail
         );
+        let mut close = inspection(Verdict::Pass, &[Some(0.95), Some(0.0)]);
+        let limits = GaugeLimits {
+            low: Some(-1.0),
+            high: Some(1.0),
+            guard_k: 2.0,
+        };
+        let measured = Measured::new(Some(0.95), Some(0.05));
+        close.gauges[0] = GaugeValue::judged("g", Unit::Length, measured, limits);
+        assert_eq!(close.verdict(), Verdict::Invalid);
+        close.gauges[1] = inspection(Verdict::Pass, &[Some(1.1)]).gauges[0].clone();
+        assert_eq!(close.verdict(), Verdict::Fail);
         assert_eq!(
             inspection(Verdict::None, &[Some(0.0)]).verdict(),
             Verdict::Invalid

@@ -1,7 +1,9 @@
 //! From findings to a verdict, or to the reason why a longer sequence should be tried.
 
 use crate::recipe::Demands;
-use crate::station::{GaugeValue, Inspection, Measured, Placement, Verdict};
+use crate::station::{
+    COVERAGE_FACTOR, GaugeLimits, GaugeValue, Inspection, Measured, Placement, Verdict,
+};
 use algo::inspect::{Findings, Placed};
 use std::sync::Arc;
 
@@ -25,7 +27,11 @@ impl Demands {
                     systematic: reading.systematic,
                     expected: reading.expected,
                 }),
-                (limits.low, limits.high),
+                GaugeLimits {
+                    low: limits.low,
+                    high: limits.high,
+                    guard_k: self.guard_k,
+                },
             );
             // Cannot be full: the recipe was checked for MAX_GAUGES.
             let _ = inspection.gauges.push(judged);
@@ -76,7 +82,7 @@ impl Demands {
             .map(|gauge| &*gauge.name)
             .collect();
         if missing.is_empty() {
-            return None;
+            return self.undecided(inspection);
         }
         let left_out = match lies.map(Placement::undetermined).as_deref() {
             None | Some([]) => String::new(),
@@ -88,8 +94,35 @@ impl Demands {
         ))
     }
 
+    /// Which values lie too close to a limit, and what to do; `None` if none does, or if another one lies outside its limits.
+    fn undecided(&self, inspection: &Inspection) -> Option<String> {
+        let close = |gauge: &GaugeValue| {
+            let value = gauge.value?;
+            let limits = [gauge.low, gauge.high].into_iter().flatten();
+            let nearest = limits.min_by(|a, b| (a - value).abs().total_cmp(&(b - value).abs()))?;
+            let band = self.guard_k * gauge.uncertainty? / COVERAGE_FACTOR;
+            let symbol = gauge.unit.symbol();
+            Some(format!(
+                "{} is {value:+.4} {symbol}, within {band:.4} {symbol} of its limit {nearest:+.4} {symbol}",
+                gauge.name
+            ))
+        };
+        let close: Vec<String> = inspection.guarded().filter_map(close).collect();
+        (!close.is_empty()).then(|| {
+            format!(
+                "too close to a limit to prove PASS or FAIL: {}; measure the part by other means, or lower the noise \
+                 (more light, a longer sequence)",
+                close.join("; ").replace("  ", " ")
+            )
+        })
+    }
+
     /// Why a longer sequence should be tried; `None` if this one is good enough.
-    pub(super) fn step_up(&self, findings: &Findings) -> Option<&'static str> {
+    pub(super) fn step_up(
+        &self,
+        findings: &Findings,
+        inspection: &Inspection,
+    ) -> Option<&'static str> {
         let placed = findings.placed.as_ref();
         let fitness = findings.taught_noise_mm / findings.height_noise_mm.max(f64::MIN_POSITIVE);
         if findings.contradicting > CONTRADICTING {
@@ -102,6 +135,8 @@ impl Demands {
             Some("the part lies outside of what the sequence is safe for")
         } else if placed.is_some_and(|placed| placed.outliers > OUTLIERS) {
             Some("many points lie off the taught surface")
+        } else if inspection.guarded().next().is_some() {
+            Some("a value lies too close to a limit")
         } else {
             None
         }

@@ -319,7 +319,7 @@ impl Plan {
             Ok(findings) => {
                 self.demands.judge(&findings, &mut inspection);
                 if sequence + 1 < self.runs.len() {
-                    inspection.step_up = self.demands.step_up(&findings);
+                    inspection.step_up = self.demands.step_up(&findings, &inspection);
                 }
             }
             Err(reason) => {

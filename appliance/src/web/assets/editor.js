@@ -36,6 +36,7 @@ export async function edit(number) {
   text("editor-words", "");
   $("editor-name").value = recipe.name;
   $("editor-part").value = recipe.part_number;
+  $("editor-guard").value = recipe.guard_k || 0;
   paint($("editor-map"), state.map, "height");
   state.wide = recipe.camera.width;
   $("editor-regions").setAttribute("viewBox", `0 0 ${recipe.camera.width} ${recipe.camera.height}`);
@@ -215,7 +216,7 @@ function removeCorner() {
 function save(event) {
   event.preventDefault();
   const { recipe } = state;
-  const body = { fingerprint: recipe.fingerprint, name: $("editor-name").value, part_number: $("editor-part").value, regions: recipe.regions, gauges: recipe.gauges };
+  const body = { fingerprint: recipe.fingerprint, name: $("editor-name").value, part_number: $("editor-part").value, guard_k: Number($("editor-guard").value), regions: recipe.regions, gauges: recipe.gauges };
   change(async () => {
     const stored = await ask("PUT", `/api/recipes/${recipe.number}`, body);
     recipe.fingerprint = stored.fingerprint;

@@ -5,7 +5,7 @@ import { clock, quantity } from "./number.js";
 const SENTENCES = {
   PASS: "every gauge is within its limits",
   FAIL: "a gauge is outside its limits",
-  INVALID: "not everything could be measured",
+  INVALID: "not everything could be measured or decided",
 };
 
 // The decision about a stored gauge by its bits, which are those of the register GAUGE_DECISION.
@@ -26,8 +26,10 @@ export function uncertainty({ uncertainty: expanded, sigma, expected, unit }) {
 
 // The tag that shows the decision about a gauge.
 export function tag({ pass, valid, low, high }) {
-  const kind = !valid ? "invalid" : pass ? "pass" : "fail";
-  const words = !valid ? "? invalid" : pass ? "✓ pass" : low ? "✗ low" : high ? "✗ high" : "✗ fail";
+  // Within its limits, but closer to one than the guard band.
+  const guarded = valid && !pass && !low && !high;
+  const kind = !valid || guarded ? "invalid" : pass ? "pass" : "fail";
+  const words = !valid ? "? invalid" : guarded ? "? too close" : pass ? "✓ pass" : low ? "✗ low" : high ? "✗ high" : "✗ fail";
   return make("span", `tag ${kind}`, words);
 }
 
