@@ -84,6 +84,53 @@ fn a_coverage_in_faint_light_repeats_as_well_as_it_says() {
     }
 }
 
+#[test]
+fn a_value_in_the_guard_band_is_invalid_and_says_why_and_passes_without_a_guard_band() {
+    let (mut bed, taught) = small();
+    let mut file = taught.manifest;
+    assert!((file.guard_k - 2.0).abs() < 1e-9);
+    // Of the deviation alone.
+    file.gauges.truncate(1);
+    let dent = Defect::Dent {
+        x: -20.0,
+        y: 4.0,
+        depth_mm: DEPTH_MM,
+        diameter_mm: DIAMETER_MM,
+    };
+    let part = part(vec![dent]);
+    bed.stage.place(&part, &Placement::default()).unwrap();
+    let mut judged = |file: &RecipeFile| {
+        let plan = plan(&bed, file, &taught.recipe.arrays);
+        let rasters = plan.rasters(&bed.calibration).unwrap();
+        bed.head.load(rasters).unwrap();
+        inspect(&mut bed, &plan)
+    };
+    let gauge = &judged(&file).gauges[0];
+    let (value, u) = (gauge.value.unwrap().abs(), gauge.uncertainty.unwrap() / 2.0);
+    // The next values differ by some σ: the limit is 5 u away, and the band is twice as wide.
+    let limit = value + 5.0 * u;
+    (file.gauges[0].low, file.gauges[0].high) = (Some(-limit), Some(limit));
+    file.guard_k = 10.0;
+    let close = judged(&file);
+    assert_eq!(close.verdict(), Verdict::Invalid);
+    assert_eq!(close.gauges[0].decision.bits(), 0b10010);
+    let reason = close.reason.unwrap();
+    assert!(
+        reason.contains("too close to a limit to prove PASS or FAIL: deviation is"),
+        "{reason}"
+    );
+    assert_eq!(
+        close.step_up.is_some(),
+        file.production + 1 < file.sequences.len()
+    );
+    file.guard_k = 0.0;
+    let without = judged(&file);
+    assert_eq!((without.verdict(), without.reason), (Verdict::Pass, None));
+    // A recipe without guard bands is written as those of older programs.
+    let written = serde_json::to_value(&file).unwrap();
+    assert_eq!(written.get("guard_k"), None);
+}
+
 /// Measures good parts, and parts with a dent; prints how many are rejected or missed and where the worst lay, and checks that there are none.
 fn rejects(good: usize, dented: usize) {
     let (mut bed, taught) = small();
