@@ -33,7 +33,7 @@
 //! `any_shifts_depth_ratios_size_and_stride_decode_as_the_textbook_says`, `no_fringe_order_slips_at_any_wrap_about_a_map`.
 
 use super::level::Demodulated;
-use super::unwrap_step::{Turns, UnwrapStep, UnwrapStepLanes, q15, word};
+use super::unwrap_step::{Absolute, Turns, UnwrapStep, UnwrapStepLanes, q15, word};
 use crate::pattern::{Level, Unwrapping};
 use crate::simd::Lanes;
 
@@ -89,19 +89,22 @@ impl About {
         // Used with three levels only.
         let mean_gain = part(0) * levels[1.min(finest)].ratio / (weight(0) + weight(finest));
         let dense = match unwrapping {
-            Unwrapping::DenseThree { n } => Some(Dense {
-                coarse: ratio_of(0),
-                fast: UnwrapStep::new(n, n / 2.0 + 1.0, 0.0)?,
-                middle: Some((ratio_of(1), UnwrapStep::new(n, 0.5, 0.0)?)),
-                weights: [
-                    (part(0) + part(1) * mean_gain) / total(0..3),
-                    part(1) / total(0..3),
-                ],
-                mean_gain,
-            }),
+            Unwrapping::DenseThree { n } => {
+                let slow = UnwrapStep::new(n, 0.5, 0.0, None)?;
+                Some(Dense {
+                    coarse: ratio_of(0),
+                    fast: UnwrapStep::new(n, n / 2.0 + 1.0, 0.0, Some(&slow))?,
+                    middle: Some((ratio_of(1), slow)),
+                    weights: [
+                        (part(0) + part(1) * mean_gain) / total(0..3),
+                        part(1) / total(0..3),
+                    ],
+                    mean_gain,
+                })
+            }
             Unwrapping::DenseTwo { n } => Some(Dense {
                 coarse: ratio_of(0),
-                fast: UnwrapStep::new(n, 0.5, 0.0)?,
+                fast: UnwrapStep::new(n, 0.5, 0.0, None)?,
                 middle: None,
                 weights: [part(0) / total(0..2), 0.0],
                 mean_gain: 0.0,
@@ -304,17 +307,15 @@ impl<V: Lanes> DenseLanes<V> {
         let q_c = v.sub(levels.coarse.phase[half], coarse_expected);
         let fast_beat = v.sub(q_f, q_c);
         let (mut residual, mut q_m) = (zero, zero);
-        let expected = if let Some((ratio, slow)) = &self.middle {
+        let mut fast = Absolute::from_wrapped(v, fast_beat);
+        if let Some((ratio, slow)) = &self.middle {
             q_m = v.sub(levels.middle.phase[half], ratio.fraction_below_one(v, map));
             let slow_beat = v.sub(q_f, q_m);
-            let [fast_expected, _] = slow.expected_from_wrapped(v, [slow_beat; 2]);
-            let fast;
-            (fast, residual) = slow.unwrap(v, fast_expected, fast_beat);
-            self.fast.expected(v, [fast; 2])[0]
-        } else {
-            self.fast.expected_from_wrapped(v, [fast_beat; 2])[0]
-        };
-        let (d_f, residual_fast) = self.fast.unwrap(v, expected, q_f);
+            let slow_beat = Absolute::from_wrapped(v, slow_beat);
+            [(fast, residual), _] = slow.unwrap(v, [slow_beat; 2], [fast_beat; 2]);
+        }
+        let [(d_f, residual_fast), _] = self.fast.unwrap(v, [fast; 2], [q_f; 2]);
+        let d_f = d_f.turns;
         let e_c = v.sub(self.coarse.fraction_below_one(v, d_f), q_c);
         residual = v.max_unsigned(residual, v.max_unsigned(residual_fast, v.abs(e_c)));
         let mut e_m = zero;
@@ -329,16 +330,10 @@ impl<V: Lanes> DenseLanes<V> {
         let known = [v.add32(known[0], delta[0]), v.add32(known[1], delta[1])];
         Unwrapped {
             phase: [
-                v.add32(known[0], rounded(v, correction[0])),
-                v.add32(known[1], rounded(v, correction[1])),
+                v.add32_rounded::<14>(known[0], correction[0]),
+                v.add32_rounded::<14>(known[1], correction[1]),
             ],
             residual,
         }
     }
-}
-
-/// A double word in Q14, rounded to the nearest whole number.
-#[inline(always)]
-fn rounded<V: Lanes>(v: V, x: V::D) -> V::D {
-    v.sar32_by(v.add32(x, v.splat32(1 << 13)), 14)
 }

@@ -35,11 +35,11 @@ impl Geometric {
         for pair in levels.windows(2) {
             let n = pair[1].ratio / pair[0].ratio;
             let next = libm::rint(n * origin);
-            let step = UnwrapStep::new(n, reach, n * origin - next).ok_or(SequenceError::Step {
+            let step = UnwrapStep::new(n, reach, n * origin - next, steps.last());
+            steps.push(step.ok_or(SequenceError::Step {
                 from: pair[0].ratio,
                 to: pair[1].ratio,
-            })?;
-            steps.push(step);
+            })?);
             reach = n * reach + 1.0;
             origin = next;
         }

@@ -9,7 +9,7 @@ use super::fold::{Folded, fold, fold_four};
 use super::level::{Demodulated, LevelLanes};
 use super::samples::BlockSample;
 use super::terms::{blocks, of_shifts, pointers};
-use crate::simd::{Lanes, Rows};
+use crate::simd::{LINE, Lanes, Rows};
 use core::sync::atomic::{Ordering, compiler_fence};
 
 /// The rows of a level's frames, in the order of their shifts.
@@ -44,9 +44,6 @@ pub(crate) trait Frames: Copy {
         kept: &mut Self::Kept<V>,
     ) -> Folded<V>;
 }
-
-/// Bytes of a cache line.
-pub(crate) const LINE: usize = 64;
 
 /// Which block of a cache line is folded.
 #[derive(Clone, Copy)]
@@ -114,14 +111,28 @@ impl<const N: usize> Frames for [&[u8]; N] {
             Place::Other(block) => blocks = kept[block - 1],
             Place::First => {
                 while k < N {
+                    // Two rows at once where there are registers for it: their blocks are neighbours in what is kept, and are stored
+                    // in pairs.
+                    let pair = if V::FEW_REGISTERS {
+                        k
+                    } else {
+                        (k + 1).min(N - 1)
+                    };
                     v.fetch_line(self[k], ahead);
-                    blocks[k] = v.load8(self[k], at);
+                    let one = v.load_line(self[k], at);
+                    let mut two = one;
+                    if pair > k {
+                        v.fetch_line(self[pair], ahead);
+                        two = v.load_line(self[pair], at);
+                    }
+                    (blocks[pair], blocks[k]) = (two[0], one[0]);
                     let mut block = 1;
                     while block < LINE / V::PIXELS {
-                        kept[block - 1][k] = v.load8(self[k], at + block * V::PIXELS);
+                        kept[block - 1][k] = one[block];
+                        kept[block - 1][pair] = two[block];
                         block += 1;
                     }
-                    k += 1;
+                    k = pair + 1;
                     // Keeps the compiler from reading the second halves later.
                     if k.is_multiple_of(2) {
                         compiler_fence(Ordering::SeqCst);

@@ -18,6 +18,8 @@
 //! **Departure.** n · Φ does not fit a word, so it is computed twice ([`ExpectedPhase`]). Modulo one turn it is within 2/65536
 //! turn; that gives the residual. Its whole turns are needed only within ± 0.1 turn, because a residual above 0.40 is rejected
 //! anyway; they come from a fixed-point product with as many fractional bits as fit beside the largest number of turns.
+//! The coarse phase that it is taken of is in one word ([`Absolute`]): its whole turns and the leading bits of its fraction, with the
+//! fractional bits of the step before, whose order and fraction are then merged by a mask.
 //!
 //! **Accuracy.** No fringe order differs from the exact one: `no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes`,
 //! `as_many_turns_as_documented_decode_in_every_fringe_and_more_are_refused`,
@@ -35,12 +37,12 @@ pub(super) struct UnwrapStep {
     part_q16: i16,
     /// What the origins of both levels add to the fraction of n·Φ, Q16.
     origin: i16,
-    /// Bits of the coarse fringe order, with its sign.
-    order_bits: u8,
     /// n in the fixed point of the product with the coarse phase.
     gain: i16,
     /// Fractional bits of that product.
     bits: u8,
+    /// Fractional bits of the coarse phase in one word.
+    coarse_bits: u8,
     /// What the origins add to the product, and half a turn for rounding.
     offset: i16,
 }
@@ -54,8 +56,9 @@ const WHOLE: f64 = 1e-9;
 
 impl UnwrapStep {
     /// A step from coarse phases within ± `reach` turns of their origin to n times as many; `behind` is n · that origin less
-    /// the origin of the fine phase, in turns. `None` if a word cannot hold the fine phases with enough precision.
-    pub fn new(n: f64, reach: f64, behind: f64) -> Option<Self> {
+    /// the origin of the fine phase, in turns. The coarse phases come from the step `before`, or are wrapped ones. `None` if a word
+    /// cannot hold the fine phases with enough precision.
+    pub fn new(n: f64, reach: f64, behind: f64, before: Option<&Self>) -> Option<Self> {
         // The quotient of two ratios has rounding errors even where n is whole.
         let next = libm::rint(n);
         let n = if libm::fabs(n - next) < WHOLE {
@@ -63,14 +66,11 @@ impl UnwrapStep {
         } else {
             n
         };
-        let order_bits = if reach <= 0.5 {
-            0.0
-        } else {
-            libm::ceil(libm::log2(2.0 * (reach + 0.5)))
-        };
-        let range = libm::pow(2.0, order_bits);
+        let coarse_bits = before.map_or(16, |step| step.bits);
+        // Turns in the word of a coarse phase.
+        let range = libm::pow(2.0, 16.0 - f64::from(coarse_bits));
         // The product is taken by Q15, so its gain is half of n · range.
-        let largest = (n * (reach + 0.5) + libm::fabs(behind) + 1.0).max(n * range / 2.0);
+        let largest = (n * reach + libm::fabs(behind) + 1.0).max(n * range / 2.0);
         let bits = libm::floor(libm::log2(32_767.0 / largest)).min(15.0);
         if !(bits >= LEAST_BITS) {
             return None;
@@ -82,9 +82,9 @@ impl UnwrapStep {
             part_q15: q15(part),
             part_q16: word(part * 65_536.0),
             origin: word(behind * 65_536.0),
-            order_bits: order_bits as u8,
             gain: word(n * range / 2.0 * unit),
             bits: bits as u8,
+            coarse_bits,
             offset: word((behind + 0.5) * unit),
         })
     }
@@ -133,6 +133,25 @@ impl<V: Lanes> Turns<V> {
     }
 }
 
+/// The absolute phases of half a block, as a step found them.
+#[derive(Clone, Copy)]
+pub(super) struct Absolute<V: Lanes> {
+    pub turns: Turns<V>,
+    /// Fringe order and fraction in one word, with the fractional bits of that step's product.
+    word: V::W,
+}
+
+impl<V: Lanes> Absolute<V> {
+    /// From wrapped phases, taken as −½…½ turn.
+    #[inline(always)]
+    pub fn from_wrapped(v: V, phase: V::W) -> Self {
+        Self {
+            turns: Turns::from_wrapped(v, phase),
+            word: phase,
+        }
+    }
+}
+
 /// The phases that half a block's coarse level predicts for the finer one: n·Φ.
 #[derive(Clone, Copy)]
 pub(super) struct ExpectedPhase<V: Lanes> {
@@ -153,11 +172,11 @@ pub(super) struct UnwrapStepLanes<V: Lanes> {
     offset: V::W,
     /// Whether n is whole.
     integral: bool,
-    /// Shifts that put fringe order and fraction of the coarse phase into one word.
-    order_left: V::Count,
-    phase_right: V::Count,
     fine_right: V::Count,
     bits_right: V::Count,
+    coarse_right: V::Count,
+    /// Mask: the bits of the product that are whole turns.
+    whole_turns: V::W,
 }
 
 impl<V: Lanes> UnwrapStepLanes<V> {
@@ -171,93 +190,111 @@ impl<V: Lanes> UnwrapStepLanes<V> {
             gain: v.splat16(step.gain),
             offset: v.splat16(step.offset),
             integral: step.part_q16 == 0 && step.part_q15 == 0,
-            order_left: v.left(16 - step.order_bits),
-            phase_right: v.right(step.order_bits),
             fine_right: v.right(16 - step.bits),
             bits_right: v.right(step.bits),
+            // A wrapped phase has no bit of a whole turn but its sign.
+            coarse_right: v.right(step.coarse_bits.min(15)),
+            whole_turns: v.splat16((u16::MAX << step.bits).cast_signed()),
         }
     }
 
-    /// The expected phase from wrapped coarse phases of −½…½ turn, for a step with a `reach` of ½.
+    /// The expected phases from coarse ones.
     #[inline(always)]
-    pub fn expected_from_wrapped(&self, v: V, coarse: [V::W; 2]) -> [ExpectedPhase<V>; 2] {
-        let mut fraction = self.fraction(v, coarse);
+    pub fn expected(&self, v: V, [low, high]: [Absolute<V>; 2]) -> [ExpectedPhase<V>; 2] {
+        let mut fraction = [
+            v.add(v.mul_low(low.turns.phase, self.whole), self.origin),
+            v.add(v.mul_low(high.turns.phase, self.whole), self.origin),
+        ];
         if !self.integral {
-            fraction = self.add_part(v, fraction, coarse);
-        }
-        self.expected_of(v, fraction, coarse)
-    }
-
-    /// The expected phase from coarse phases of any number of turns.
-    #[inline(always)]
-    pub fn expected(&self, v: V, coarse: [Turns<V>; 2]) -> [ExpectedPhase<V>; 2] {
-        let [low, high] = coarse;
-        let phase = [low.phase, high.phase];
-        let mut fraction = self.fraction(v, phase);
-        if !self.integral {
-            fraction = self.add_part(v, fraction, phase);
             fraction = [
-                v.add(fraction[0], v.mul_low(low.nearest_order(v), self.part_q16)),
-                v.add(fraction[1], v.mul_low(high.nearest_order(v), self.part_q16)),
+                v.add(fraction[0], self.part(v, low)),
+                v.add(fraction[1], self.part(v, high)),
             ];
         }
-        let product = [self.word(v, low), self.word(v, high)];
-        self.expected_of(v, fraction, product)
-    }
-
-    /// Fraction of (whole part of n) · Φ and of the origin.
-    #[inline(always)]
-    fn fraction(&self, v: V, phase: [V::W; 2]) -> [V::W; 2] {
-        [
-            v.add(v.mul_low(phase[0], self.whole), self.origin),
-            v.add(v.mul_low(phase[1], self.whole), self.origin),
-        ]
-    }
-
-    /// Adds (fraction of n) · φ.
-    #[inline(always)]
-    fn add_part(&self, v: V, fraction: [V::W; 2], phase: [V::W; 2]) -> [V::W; 2] {
-        [
-            v.add(fraction[0], v.mul_q15(phase[0], self.part_q15)),
-            v.add(fraction[1], v.mul_q15(phase[1], self.part_q15)),
-        ]
-    }
-
-    /// The absolute phase in one word, with as many fractional bits as fit.
-    #[inline(always)]
-    fn word(&self, v: V, Turns { order, phase }: Turns<V>) -> V::W {
-        let high = v.shl_by(order, self.order_left);
-        v.add(high, v.shr_by(phase, self.phase_right))
-    }
-
-    /// The expected phase from its fraction and the coarse phase in one word.
-    #[inline(always)]
-    fn expected_of(&self, v: V, fraction: [V::W; 2], product: [V::W; 2]) -> [ExpectedPhase<V>; 2] {
-        let turns = [
-            v.add(v.mul_q15(product[0], self.gain), self.offset),
-            v.add(v.mul_q15(product[1], self.gain), self.offset),
-        ];
         [
             ExpectedPhase {
                 fraction: fraction[0],
-                turns: turns[0],
+                turns: self.turns(v, low),
             },
             ExpectedPhase {
                 fraction: fraction[1],
-                turns: turns[1],
+                turns: self.turns(v, high),
             },
         ]
     }
 
-    /// Unwraps `wrapped`, the fine level's phase: its absolute phase, and the residual's magnitude (unsigned, 1/65536 turn).
+    /// Unwraps `wrapped`, the fine level's phases, by coarse ones: the absolute phases, and the residuals' magnitudes (unsigned,
+    /// 1/65536 turn). The bits of [`Self::expected`] and [`Self::unwrap_expected`].
     #[inline(always)]
-    pub fn unwrap(&self, v: V, expected: ExpectedPhase<V>, wrapped: V::W) -> (Turns<V>, V::W) {
-        let residual = v.abs(v.sub(expected.fraction, wrapped));
-        let turns = v.sub(expected.turns, v.shr_by(wrapped, self.fine_right));
-        let phase = Turns {
-            order: v.sar_by(turns, self.bits_right),
-            phase: wrapped,
+    pub fn unwrap(
+        &self,
+        v: V,
+        [low, high]: [Absolute<V>; 2],
+        wrapped: [V::W; 2],
+    ) -> [(Absolute<V>, V::W); 2] {
+        let mut residual = [
+            v.sub_product(v.sub(wrapped[0], self.origin), low.turns.phase, self.whole),
+            v.sub_product(v.sub(wrapped[1], self.origin), high.turns.phase, self.whole),
+        ];
+        if !self.integral {
+            residual = [
+                v.sub(residual[0], self.part(v, low)),
+                v.sub(residual[1], self.part(v, high)),
+            ];
+        }
+        [
+            self.settled(v, residual[0], self.turns(v, low), wrapped[0]),
+            self.settled(v, residual[1], self.turns(v, high), wrapped[1]),
+        ]
+    }
+
+    /// The same by expected phases.
+    #[inline(always)]
+    pub fn unwrap_expected(
+        &self,
+        v: V,
+        [low, high]: [ExpectedPhase<V>; 2],
+        wrapped: [V::W; 2],
+    ) -> [(Absolute<V>, V::W); 2] {
+        let residual = [
+            v.sub(wrapped[0], low.fraction),
+            v.sub(wrapped[1], high.fraction),
+        ];
+        [
+            self.settled(v, residual[0], low.turns, wrapped[0]),
+            self.settled(v, residual[1], high.turns, wrapped[1]),
+        ]
+    }
+
+    /// (Fraction of n) · Φ modulo one turn.
+    #[inline(always)]
+    fn part(&self, v: V, coarse: Absolute<V>) -> V::W {
+        // From the word, so that no fringe order has to be kept where n is whole.
+        let turns = Turns {
+            order: v.sar_by(coarse.word, self.coarse_right),
+            phase: coarse.turns.phase,
         };
-        (phase, residual)
+        let orders = v.mul_low(turns.nearest_order(v), self.part_q16);
+        v.add(orders, v.mul_q15(turns.phase, self.part_q15))
+    }
+
+    /// n·Φ + ½ in the step's fixed point.
+    #[inline(always)]
+    fn turns(&self, v: V, coarse: Absolute<V>) -> V::W {
+        v.add(v.mul_q15(coarse.word, self.gain), self.offset)
+    }
+
+    #[inline(always)]
+    fn settled(&self, v: V, residual: V::W, turns: V::W, wrapped: V::W) -> (Absolute<V>, V::W) {
+        let part = v.shr_by(wrapped, self.fine_right);
+        let turns = v.sub(turns, part);
+        let phase = Absolute {
+            turns: Turns {
+                order: v.sar_by(turns, self.bits_right),
+                phase: wrapped,
+            },
+            word: v.merge(self.whole_turns, turns, part),
+        };
+        (phase, v.abs(residual))
     }
 }

@@ -10,6 +10,9 @@
 
 use core::fmt::Debug;
 
+/// Bytes of a cache line.
+pub(crate) const LINE: usize = 64;
+
 /// The components of the pointers of a block, scaled by a power of two (see [`Lanes::scaled`]).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scaled<W> {
@@ -48,6 +51,17 @@ pub(crate) trait Lanes: Copy + Debug {
     fn splat8(self, x: u8) -> Self::B;
     /// The block of `from` that starts at `at`.
     fn load8(self, from: &[u8], at: usize) -> Self::B;
+    /// The blocks of the cache line of `from` that starts at `at`: of the four the first [`LINE`] / [`Self::PIXELS`].
+    #[inline(always)]
+    fn load_line(self, from: &[u8], at: usize) -> [Self::B; 4] {
+        let mut blocks = [self.load8(from, at); 4];
+        let mut block = 1;
+        while block < LINE / Self::PIXELS {
+            blocks[block] = self.load8(from, at + block * Self::PIXELS);
+            block += 1;
+        }
+        blocks
+    }
     /// Prefetches what lies `after` samples behind the block at `at`. That is [`Self::AHEAD`] where whole rows are read, because
     /// rows follow one another in memory; where only some columns of each row are read it is the length of a row, so that the
     /// same columns of the next row are prefetched.
@@ -147,6 +161,11 @@ pub(crate) trait Lanes: Copy + Debug {
     fn mul_q15(self, a: Self::W, b: Self::W) -> Self::W;
     /// The low half of a · b.
     fn mul_low(self, a: Self::W, b: Self::W) -> Self::W;
+    /// a − b · c.
+    #[inline(always)]
+    fn sub_product(self, a: Self::W, b: Self::W, c: Self::W) -> Self::W {
+        self.sub(a, self.mul_low(b, c))
+    }
     /// x · 2ⁿ.
     fn shl<const N: i32>(self, x: Self::W) -> Self::W;
     /// x / 2ⁿ rounded down, signed.
@@ -192,6 +211,11 @@ pub(crate) trait Lanes: Copy + Debug {
     fn xor(self, a: Self::W, b: Self::W) -> Self::W;
     /// a where the mask is set, else b.
     fn pick(self, mask: Self::W, a: Self::W, b: Self::W) -> Self::W;
+    /// The bits of a that are set in the mask, and those of b, which has none of them.
+    #[inline(always)]
+    fn merge(self, mask: Self::W, a: Self::W, b: Self::W) -> Self::W {
+        self.or(self.and(mask, a), b)
+    }
 
     // Between words and double words.
 
@@ -219,12 +243,24 @@ pub(crate) trait Lanes: Copy + Debug {
     fn splat32(self, x: i32) -> Self::D;
     /// The block of `from` that starts at `at`.
     fn load32(self, from: &[i32], at: usize) -> [[Self::D; 2]; 2];
+    /// Writes the block of `to` that starts at `at`, double words low + 65536 · high.
+    #[inline(always)]
+    fn store32_joined(self, to: &mut [i32], at: usize, low: [Self::W; 2], high: [Self::W; 2]) {
+        let x = [self.join(low[0], high[0]), self.join(low[1], high[1])];
+        self.store32(to, at, x);
+    }
     /// Writes the block of `to` that starts at `at`.
     fn store32(self, to: &mut [i32], at: usize, x: [[Self::D; 2]; 2]);
     /// a + b.
     fn add32(self, a: Self::D, b: Self::D) -> Self::D;
     /// x / 2ⁿ rounded down, signed, n below 32.
     fn sar32_by(self, x: Self::D, n: u8) -> Self::D;
+    /// a + x / 2ⁿ, that rounded to nearest, signed; n from 1 to 31, and x + 2ⁿ⁻¹ must not overflow.
+    #[inline(always)]
+    fn add32_rounded<const N: i32>(self, a: Self::D, x: Self::D) -> Self::D {
+        let up = self.add32(x, self.splat32(1 << (N - 1)));
+        self.add32(a, self.sar32_by(up, N as u8))
+    }
     /// Mask: a > b, signed.
     fn gt32(self, a: Self::D, b: Self::D) -> Self::D;
     /// a where the mask is set, else b.

@@ -1,8 +1,9 @@
 //! The back-end of aarch64, where NEON is always available.
 
-use super::lanes::{Lanes, Scaled, operations};
+use super::lanes::{LINE, Lanes, Scaled, operations};
 use super::rows::{block, block_mut};
 use core::arch::aarch64::*;
+use core::arch::asm;
 
 /// Needs no proof: NEON is part of aarch64.
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +16,25 @@ macro_rules! neon {
     ($e:expr) => {{
         // SAFETY: every aarch64 processor that this is compiled for has NEON, the only condition of intrinsics on values.
         unsafe { $e }
+    }};
+}
+
+/// One instruction that changes its first operand, in lanes of this form. Of the intrinsics with the same result the compiler makes two
+/// or three: it computes the inverse of a mask, or adds in an order of its own.
+macro_rules! in_place {
+    ($instruction:literal, $lanes:literal, $a:expr, $b:expr, $c:expr) => {{
+        let mut a = $a;
+        // SAFETY: an instruction of NEON that reads and writes registers only.
+        unsafe {
+            asm!(
+                concat!($instruction, " {0:v}.", $lanes, ", {1:v}.", $lanes, ", {2:v}.", $lanes),
+                inout(vreg) a,
+                in(vreg) $b,
+                in(vreg) $c,
+                options(pure, nomem, nostack, preserves_flags),
+            );
+        }
+        a
     }};
 }
 
@@ -93,6 +113,19 @@ impl Lanes for Neon {
         unsafe { vld1q_u8(block.as_ptr()) }
     }
     #[inline(always)]
+    fn load_line(self, from: &[u8], at: usize) -> [Self::B; 4] {
+        let start = block(from, at, LINE).as_ptr();
+        // SAFETY: the slice holds the 64 bytes that are read, 16 at a time.
+        unsafe {
+            [
+                vld1q_u8(start),
+                vld1q_u8(start.add(16)),
+                vld1q_u8(start.add(32)),
+                vld1q_u8(start.add(48)),
+            ]
+        }
+    }
+    #[inline(always)]
     fn fetch<T>(self, _row: &[T], _at: usize, _after: usize) {}
     #[inline(always)]
     fn claim_ahead<T>(self, _row: &[T], _at: usize) {}
@@ -104,8 +137,7 @@ impl Lanes for Neon {
     }
     #[inline(always)]
     fn quarters8(self, mask: Self::B, s: Self::B, c: Self::B) -> Self::B {
-        // Not `pick8`: the compiler would compute the inverse of a mask that comes from a comparison, too.
-        let half = self.xor8(self.and8(mask, self.xor8(s, c)), c);
+        let half = in_place!("bit", "16b", c, s, mask);
         // Shifts to the right that round make 128 and 64 of 255.
         neon!(vrsraq_n_u8::<2>(vrshrq_n_u8::<1>(half), mask))
     }
@@ -265,6 +297,28 @@ impl Lanes for Neon {
                 [vld1q_s32(start), vld1q_s32(start.add(4))],
                 [vld1q_s32(start.add(8)), vld1q_s32(start.add(12))],
             ]
+        }
+    }
+    #[inline(always)]
+    fn add32_rounded<const N: i32>(self, a: Self::D, x: Self::D) -> Self::D {
+        neon!(vrsraq_n_s32::<N>(a, x))
+    }
+    #[inline(always)]
+    fn merge(self, mask: Self::W, a: Self::W, b: Self::W) -> Self::W {
+        in_place!("bit", "16b", b, a, mask)
+    }
+    #[inline(always)]
+    fn sub_product(self, a: Self::W, b: Self::W, c: Self::W) -> Self::W {
+        in_place!("mls", "8h", a, b, c)
+    }
+    #[inline(always)]
+    fn store32_joined(self, to: &mut [i32], at: usize, low: [Self::W; 2], high: [Self::W; 2]) {
+        let block = block_mut(to, at, BYTES);
+        let start = block.as_mut_ptr().cast();
+        // SAFETY: the slice holds the 16 double words that are written as pairs of words, 8 at a time; the lower word comes first.
+        unsafe {
+            vst2q_s16(start, int16x8x2_t(low[0], high[0]));
+            vst2q_s16(start.add(16), int16x8x2_t(low[1], high[1]));
         }
     }
     #[inline(always)]

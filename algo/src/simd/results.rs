@@ -59,9 +59,29 @@ impl<'a> Results<'a> {
         trust: V::B,
     ) {
         v.claim_ahead(self.phase, at);
+        v.store32(self.phase, at, phase);
+        self.store_others(v, at, modulation, trust);
+    }
+
+    /// The same from the fractions and the fringe orders of the phases.
+    #[inline(always)]
+    pub fn store_turns<V: Lanes>(
+        &mut self,
+        v: V,
+        at: usize,
+        [fraction, order]: [[V::W; 2]; 2],
+        modulation: [V::W; 2],
+        trust: V::B,
+    ) {
+        v.claim_ahead(self.phase, at);
+        v.store32_joined(self.phase, at, fraction, order);
+        self.store_others(v, at, modulation, trust);
+    }
+
+    #[inline(always)]
+    fn store_others<V: Lanes>(&mut self, v: V, at: usize, modulation: [V::W; 2], trust: V::B) {
         v.claim_ahead(self.modulation, at);
         v.claim_ahead(self.trust, at);
-        v.store32(self.phase, at, phase);
         v.store16(self.modulation, at, modulation);
         // SAFETY: `Trust` is one byte with the numbers 0 to `LAST`, and no byte above `LAST` is stored.
         let bytes = unsafe {

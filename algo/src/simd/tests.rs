@@ -1,6 +1,6 @@
 //! Every operation of every back-end gives the portable one's result, on random lanes.
 
-use super::lanes::Lanes;
+use super::lanes::{LINE, Lanes};
 use super::{Backend, back_end_entry};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -106,6 +106,10 @@ fn operations<V: Lanes>(v: V, inputs: &Inputs, out: &mut Outputs) {
         operations_of_doubles(v, inputs, at, out);
         at += V::PIXELS;
     }
+    let line = v.load_line(&inputs.bytes[0], 0);
+    for block in &line[..LINE / V::PIXELS] {
+        bytes(v, out, "load_line", *block);
+    }
     for place in 0..V::PIXELS {
         let mut row = [0; WIDTH];
         assert!(v.none8(v.load8(&row, 0)));
@@ -161,6 +165,7 @@ fn operations_of_words<V: Lanes>(v: V, inputs: &Inputs, at: usize, out: &mut Out
     let mask = v.load8(&inputs.bytes[2], at);
     let mask = v.widen(mask, mask);
     let sign = [v.sign_of(c[0]), v.sign_of(c[1])];
+    let others = [v.xor(v.or(b[0], c[0]), c[0]), v.xor(v.or(b[1], c[1]), c[1])];
     let odd = [v.or(b[0], v.splat16(1)), v.or(b[1], v.splat16(1))];
     results! { halves v, out;
         words add(a, b);
@@ -169,6 +174,7 @@ fn operations_of_words<V: Lanes>(v: V, inputs: &Inputs, at: usize, out: &mut Out
         words add_sat(a, b);
         words mul_q15(a, odd);
         words mul_low(a, b);
+        words sub_product(a, b, c);
         words shl::<7>(a);
         words sar::<15>(a);
         words shl_by(a; v.left(inputs.shift + 1));
@@ -186,11 +192,16 @@ fn operations_of_words<V: Lanes>(v: V, inputs: &Inputs, at: usize, out: &mut Out
         words or(a, b);
         words xor(a, b);
         words pick(mask, a, b);
+        words merge(c, a, others);
         doubles join(a, b);
         doubles dot(a, b, c, d);
         doubles dot_pair(a, b; v.splat32(inputs.doubles[0][0]));
     }
     words(v, out, "splat16", [v.splat16(-1234); 2]);
+    let mut joined = [0; WIDTH];
+    v.store32_joined(&mut joined, 0, a, b);
+    let joined = &joined[..V::PIXELS];
+    out.entry("store32_joined").or_default().extend(joined);
     let low = v.normalised(long[0], short[0]);
     let high = v.normalised(long[1], short[1]);
     words(v, out, "normalised long", [low[0], high[0]]);
@@ -206,7 +217,7 @@ fn operations_of_doubles<V: Lanes>(v: V, inputs: &Inputs, at: usize, out: &mut O
     words(v, out, "split low", [low.0, high.0]);
     words(v, out, "split high", [low.1, high.1]);
     let (mut greater, mut sum, mut shifted) = (x, x, x);
-    let (mut picked, mut halved, mut single) = (x, x, x);
+    let (mut picked, mut halved, mut rounded, mut single) = (x, x, x, x);
     for (half, quarter) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         let (x, y) = (x[half][quarter], y[half][quarter]);
         greater[half][quarter] = v.gt32(x, y);
@@ -214,6 +225,7 @@ fn operations_of_doubles<V: Lanes>(v: V, inputs: &Inputs, at: usize, out: &mut O
         shifted[half][quarter] = v.sar32_by(x, n);
         picked[half][quarter] = v.pick32(v.gt32(x, y), x, y);
         halved[half][quarter] = v.sar32_by(x, 1);
+        rounded[half][quarter] = v.add32_rounded::<14>(y, halved[half][quarter]);
         let product = v.mul_single(v.to_single(small[half][quarter]), v.splat_single(0.5));
         single[half][quarter] = v.to_whole(product);
     }
@@ -221,6 +233,7 @@ fn operations_of_doubles<V: Lanes>(v: V, inputs: &Inputs, at: usize, out: &mut O
     doubles(v, out, "add32", sum);
     doubles(v, out, "sar32_by", shifted);
     doubles(v, out, "pick32", picked);
+    doubles(v, out, "add32_rounded", rounded);
     doubles(v, out, "to_whole", single);
     results! { halves v, out;
         words narrow_mask32(greater);

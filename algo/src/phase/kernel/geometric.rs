@@ -20,13 +20,13 @@
 //! same columns.
 //!
 //! **Departures from the plain form.** Up to three levels are decoded in one pass over their frames ([`one_pass`]), so that only
-//! the result is written to memory. Level by level costs 32.6 instead of 23.2 instructions per pixel on NEON and 20.6 instead of 15.0
-//! on AVX2 (three levels of four shifts, 8 bits), so that is for longer sequences only. The kernel is compiled for 3 to 9
+//! the result is written to memory. Level by level costs 1.4 times as many instructions on NEON and on AVX2 (three levels of four
+//! shifts, 8 bits), so that is for longer sequences only. The kernel is compiled for 3 to 9
 //! shifts of 8 bits; for any others it branches to the form of their number, which costs 2 of 20 instructions per pixel. Coarser
 //! levels have rough angles: they only choose a fringe order, and 3.2e-4 turn more in a residual that may be 0.40 changes none.
 //! Rows of bytes are read a whole cache line at a time ([`Frames::fold_in_line`]), because a camera's frames begin at pages: then
 //! 0.21 instead of 0.39 lines per pixel come into the first-level cache of a Cortex-A76 (12 frames, blocks of 32 pixels). That costs
-//! 2 instructions per pixel on NEON, most of them loads and stores.
+//! instructions on NEON, because the blocks that are decoded later are kept in memory meanwhile.
 //!
 //! **Accuracy.** ε / r_K turn of the textbook in f64, with ε from the arctangent and the rounding of samples (algo/README.md):
 //! `any_shifts_depth_ratios_size_and_stride_decode_as_the_textbook_says`; no wrong fringe order:
@@ -41,9 +41,10 @@ use crate::phase::arrived::{Expected, NO_REASON};
 use crate::phase::geometric::Geometric;
 use crate::phase::level::{Level, LevelLanes};
 use crate::phase::samples::BlockSample;
-use crate::phase::source::{Frames, LINE, Place};
-use crate::simd::{Backend, Lanes, Results, Rows, back_end_entry};
+use crate::phase::source::{Frames, Place};
+use crate::simd::{Backend, LINE, Lanes, Results, Rows, back_end_entry};
 use crate::trust::Trust;
+use core::hint::black_box;
 use core::ops::Range;
 
 /// Decodes columns of a row from the rows of each level's frames, coarse to fine, in the order of their shifts.
@@ -217,6 +218,11 @@ fn one_pass_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
         finest,
     };
     let mut kept = [S::nothing_kept(v); 3];
+    let mut kept = &mut kept;
+    if !V::FEW_REGISTERS {
+        // Behind a pointer of its own: a pair of registers cannot be stored far from the stack pointer.
+        kept = black_box(kept);
+    }
     let mut after = V::AHEAD;
     let mut start = columns.start;
     // Where the next line begins.
@@ -226,11 +232,11 @@ fn one_pass_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
         if S::LINES && start >= line && line + LINE <= columns.end {
             let (mut at, place) = (line, Place::First);
             (line, start) = (line + LINE, line + LINE);
-            if pass.block(v, at, ahead, place, &mut kept, &mut out) {
+            if pass.block(v, at, ahead, place, kept, &mut out) {
                 let mut block = 1;
                 while block < LINE / V::PIXELS {
                     at += V::PIXELS;
-                    pass.block(v, at, at, Place::Other(block), &mut kept, &mut out);
+                    pass.block(v, at, at, Place::Other(block), kept, &mut out);
                     block += 1;
                 }
             } else {
@@ -244,7 +250,7 @@ fn one_pass_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
             continue;
         }
         start += V::PIXELS;
-        if !pass.block(v, at, at + after, Place::Alone, &mut kept, &mut out) {
+        if !pass.block(v, at, at + after, Place::Alone, kept, &mut out) {
             after = width;
             ahead = line + after;
         }
@@ -262,8 +268,8 @@ struct OnePass<'a, V: Lanes, S: Frames, const BETWEEN: usize> {
 }
 
 impl<V: Lanes, S: Frames, const BETWEEN: usize> OnePass<'_, V, S, BETWEEN> {
-    /// Decodes a block. False if it is dark: then only the coarsest level was read. The line of the sample
-    /// `ahead` is prefetched at finer levels.
+    /// Decodes a block. False if it is dark, which may not be asked of the others of a line: then only the coarsest level was read. The
+    /// line of the sample `ahead` is prefetched at finer levels.
     #[inline(always)]
     fn block(
         &self,
@@ -278,24 +284,23 @@ impl<V: Lanes, S: Frames, const BETWEEN: usize> OnePass<'_, V, S, BETWEEN> {
         let folded =
             (self.coarsest).fold_in_line(v, &self.level, at, at + V::AHEAD, place, kept_coarsest);
         let lit = folded.strong;
-        if v.none8(lit) {
+        // The line of a lit block is lit nearly everywhere. With few registers the question costs less than a longer stretch without
+        // a branch, whose instructions the compiler mixes.
+        let asked = V::FEW_REGISTERS || !matches!(place, Place::Other(_));
+        if asked && v.none8(lit) {
             out.store_unknown(v, at, v.splat8(Trust::Dark as u8));
             return false;
         }
-        let unwrapped = lanes.coarsest(v, lanes.rough(v, &folded), &folded);
+        let mut unwrapped = lanes.coarsest(v, lanes.rough(v, &folded), &folded);
         // At most one level is between.
-        let expected = match self.between.first() {
-            None => unwrapped.expected_from_coarsest(v, &finest.step),
-            Some(finer) => {
-                let expected = unwrapped.expected_from_coarsest(v, &finer.step);
-                let frames = &finer.frames;
-                let folded = frames.fold_in_line(v, &finer.level, at, ahead, place, kept_between);
-                let unwrapped = finer.rough(v, lanes, &expected, &folded);
-                unwrapped.expected(v, &finest.step)
-            }
-        };
+        if let Some(finer) = self.between.first() {
+            let (before, frames) = (unwrapped.before(v, &finer.step), &finer.frames);
+            let folded = frames.fold_in_line(v, &finer.level, at, ahead, place, kept_between);
+            unwrapped = finer.rough(v, lanes, &before, &folded);
+        }
+        let before = unwrapped.before(v, &finest.step);
         let folded = (finest.frames).fold_in_line(v, &finest.level, at, ahead, place, kept_finest);
-        let (unwrapped, modulation) = finest.fine(v, lanes, &expected, &folded);
+        let (unwrapped, modulation) = finest.fine(v, lanes, &before, &folded);
         // What is strong at every level is lit.
         let (clear, before) = (unwrapped.quality.strong, dark_unless(v, lit));
         lanes.store(v, &unwrapped, clear, before, modulation, at, out);

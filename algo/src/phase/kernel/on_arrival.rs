@@ -21,7 +21,7 @@
 
 use super::next_block;
 use super::quality::{Quality, dark_unless};
-use super::temporal::{ExpectedBlock, FinerLevel, GeometricLanes, of_bytes};
+use super::temporal::{Coarser, ExpectedBlock, FinerLevel, GeometricLanes, of_bytes};
 use crate::phase::arrived::{ExpectedRow, ExpectedRowMut, NO_REASON};
 use crate::phase::geometric::Geometric;
 use crate::phase::level::{Level, LevelLanes};
@@ -179,7 +179,7 @@ fn between_columns<V: Lanes, S: Frames>(
             continue;
         }
         let folded = finer.frames.fold(v, &finer.level, at, V::AHEAD);
-        let unwrapped = finer.rough(v, &lanes, &expected, &folded);
+        let unwrapped = finer.rough(v, &lanes, &Coarser::Expected(expected), &folded);
         let reason = v.min8(reason, unwrapped.quality.first_reason(v));
         out.store(v, at, &unwrapped.expected(v, &next), reason);
     }
@@ -210,7 +210,8 @@ fn finest_columns<V: Lanes, S: Frames>(
             continue;
         }
         let folded = finest.frames.fold(v, &finest.level, at, V::AHEAD);
-        let (unwrapped, modulation) = finest.fine(v, &lanes, &before.expected(v, at), &folded);
+        let before = Coarser::Expected(before.expected(v, at));
+        let (unwrapped, modulation) = finest.fine(v, &lanes, &before, &folded);
         let clear = v.eq8(reason, v.splat8(NO_REASON));
         lanes.store(v, &unwrapped, clear, reason, modulation, at, &mut out);
     }

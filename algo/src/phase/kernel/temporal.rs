@@ -12,7 +12,7 @@ use crate::phase::geometric::Geometric;
 use crate::phase::level::{Level, LevelLanes, Samples};
 use crate::phase::samples::BlockSample;
 use crate::phase::source::Frames;
-use crate::phase::unwrap_step::{ExpectedPhase, Turns, UnwrapStep, UnwrapStepLanes};
+use crate::phase::unwrap_step::{Absolute, ExpectedPhase, UnwrapStep, UnwrapStepLanes};
 use crate::simd::{Lanes, Results};
 use crate::trust::Trust;
 use crate::units::AbsolutePhase;
@@ -41,8 +41,8 @@ impl<V: Lanes> GeometricLanes<V> {
     pub fn coarsest(&self, v: V, phase: [V::W; 2], folded: &Folded<V>) -> UnwrappedBlock<V> {
         UnwrappedBlock {
             phase: [
-                Turns::from_wrapped(v, v.sub(phase[0], self.middle)),
-                Turns::from_wrapped(v, v.sub(phase[1], self.middle)),
+                Absolute::from_wrapped(v, v.sub(phase[0], self.middle)),
+                Absolute::from_wrapped(v, v.sub(phase[1], self.middle)),
             ],
             quality: Quality {
                 strong: folded.strong,
@@ -75,62 +75,65 @@ impl<V: Lanes> GeometricLanes<V> {
         at: usize,
         out: &mut Results<'_>,
     ) {
-        let [low, high] = unwrapped.phase;
+        let (low, high) = (unwrapped.phase[0].turns, unwrapped.phase[1].turns);
+        let order = [
+            v.add(low.order, self.origin),
+            v.add(high.order, self.origin),
+        ];
         if unwrapped.quality.all_resolved(v, clear) {
             // Nearly every block of the part.
-            let phases = [
-                v.join(low.phase, v.add(low.order, self.origin)),
-                v.join(high.phase, v.add(high.order, self.origin)),
-            ];
             let modulation = [
                 v.add(modulation[0], modulation[0]),
                 v.add(modulation[1], modulation[1]),
             ];
-            out.store(v, at, phases, modulation, v.splat8(Trust::Resolved as u8));
+            let (phases, trust) = (
+                [[low.phase, high.phase], order],
+                v.splat8(Trust::Resolved as u8),
+            );
+            out.store_turns(v, at, phases, modulation, trust);
             return;
         }
         let reason = v.min8(before, unwrapped.quality.first_reason(v));
         let resolved = resolved_mask(v, reason);
+        // `AbsolutePhase::UNKNOWN` elsewhere.
+        let unknown = v.splat16((AbsolutePhase::UNKNOWN.to_bits() >> 16) as i16);
         let phases = [
-            self.known(v, low, resolved[0]),
-            self.known(v, high, resolved[1]),
+            [
+                v.and(low.phase, resolved[0]),
+                v.and(high.phase, resolved[1]),
+            ],
+            [
+                v.pick(resolved[0], order[0], unknown),
+                v.pick(resolved[1], order[1], unknown),
+            ],
         ];
         let modulation = doubled_where(v, resolved, modulation);
-        out.store(v, at, phases, modulation, trust(v, reason));
-    }
-
-    /// The phase where the mask is set, [`AbsolutePhase::UNKNOWN`] elsewhere.
-    #[inline(always)]
-    fn known(&self, v: V, phase: Turns<V>, resolved: V::W) -> [V::D; 2] {
-        let unknown = v.splat16((AbsolutePhase::UNKNOWN.to_bits() >> 16) as i16);
-        let order = v.pick(resolved, v.add(phase.order, self.origin), unknown);
-        v.join(v.and(phase.phase, resolved), order)
+        out.store_turns(v, at, phases, modulation, trust(v, reason));
     }
 }
 
 /// A block, unwrapped up to a level.
 #[derive(Clone, Copy)]
 pub(super) struct UnwrappedBlock<V: Lanes> {
-    pub phase: [Turns<V>; 2],
+    pub phase: [Absolute<V>; 2],
     pub quality: Quality<V>,
 }
 
 impl<V: Lanes> UnwrappedBlock<V> {
+    /// What the next level is unwrapped by in the same pass: with few registers by the prediction, which is then computed at once.
+    #[inline(always)]
+    pub fn before(self, v: V, step: &UnwrapStepLanes<V>) -> Coarser<V> {
+        if V::FEW_REGISTERS {
+            return Coarser::Expected(self.expected(v, step));
+        }
+        Coarser::Unwrapped(self)
+    }
+
     /// What it predicts for the next level.
     #[inline(always)]
     pub fn expected(&self, v: V, step: &UnwrapStepLanes<V>) -> ExpectedBlock<V> {
         ExpectedBlock {
             phase: step.expected(v, self.phase),
-            quality: self.quality,
-        }
-    }
-
-    /// The same from the coarsest level.
-    #[inline(always)]
-    pub fn expected_from_coarsest(&self, v: V, step: &UnwrapStepLanes<V>) -> ExpectedBlock<V> {
-        let [low, high] = self.phase;
-        ExpectedBlock {
-            phase: step.expected_from_wrapped(v, [low.phase, high.phase]),
             quality: self.quality,
         }
     }
@@ -141,6 +144,39 @@ impl<V: Lanes> UnwrappedBlock<V> {
 pub(super) struct ExpectedBlock<V: Lanes> {
     pub phase: [ExpectedPhase<V>; 2],
     pub quality: Quality<V>,
+}
+
+/// What a finer level is unwrapped by.
+#[derive(Clone, Copy)]
+pub(super) enum Coarser<V: Lanes> {
+    /// The coarser level itself.
+    Unwrapped(UnwrappedBlock<V>),
+    /// What it predicts.
+    Expected(ExpectedBlock<V>),
+}
+
+impl<V: Lanes> Coarser<V> {
+    #[inline(always)]
+    fn quality(&self) -> Quality<V> {
+        match self {
+            Self::Unwrapped(block) => block.quality,
+            Self::Expected(block) => block.quality,
+        }
+    }
+
+    /// The phases of the finer level, and the magnitudes of the residuals.
+    #[inline(always)]
+    fn unwrap(
+        &self,
+        v: V,
+        step: &UnwrapStepLanes<V>,
+        phase: [V::W; 2],
+    ) -> [(Absolute<V>, V::W); 2] {
+        match self {
+            Self::Unwrapped(block) => step.unwrap(v, block.phase, phase),
+            Self::Expected(block) => step.unwrap_expected(v, block.phase, phase),
+        }
+    }
 }
 
 /// A level, its frames and the unwrapping step to it.
@@ -167,10 +203,10 @@ impl<'a, V: Lanes, S: Frames> FinerLevel<'a, V, S> {
         &self,
         v: V,
         lanes: &GeometricLanes<V>,
-        expected: &ExpectedBlock<V>,
+        coarser: &Coarser<V>,
         folded: &Folded<V>,
     ) -> UnwrappedBlock<V> {
-        self.unwrap(v, expected, lanes.rough(v, folded), folded)
+        self.unwrap(v, coarser, lanes.rough(v, folded), folded)
     }
 
     /// Unwraps a block at this level in fine quality, with its modulation.
@@ -179,25 +215,24 @@ impl<'a, V: Lanes, S: Frames> FinerLevel<'a, V, S> {
         &self,
         v: V,
         lanes: &GeometricLanes<V>,
-        expected: &ExpectedBlock<V>,
+        coarser: &Coarser<V>,
         folded: &Folded<V>,
     ) -> (UnwrappedBlock<V>, [V::W; 2]) {
         let (block, modulation) = (self.level).fine(v, &lanes.angle, folded, S::DOUBLED);
-        (self.unwrap(v, expected, block.phase, folded), modulation)
+        (self.unwrap(v, coarser, block.phase, folded), modulation)
     }
 
     #[inline(always)]
     fn unwrap(
         &self,
         v: V,
-        expected: &ExpectedBlock<V>,
+        coarser: &Coarser<V>,
         phase: [V::W; 2],
         folded: &Folded<V>,
     ) -> UnwrappedBlock<V> {
-        let (low, residual_low) = self.step.unwrap(v, expected.phase[0], phase[0]);
-        let (high, residual_high) = self.step.unwrap(v, expected.phase[1], phase[1]);
-        let before = &expected.quality;
-        let mut quality = *before;
+        let [(low, residual_low), (high, residual_high)] = coarser.unwrap(v, &self.step, phase);
+        let before = coarser.quality();
+        let mut quality = before;
         quality.add(v, folded.strong, folded.brightest);
         quality.residual = [
             v.max_unsigned(before.residual[0], residual_low),
