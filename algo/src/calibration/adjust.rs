@@ -4,7 +4,8 @@
 //! camera's ray through the node meets the board, and the projector sees that point). Minimised is Σ ρ(|r|/σ) over both, with Huber's ρ
 //! (P. J. Huber, 1964), by Levenberg's and Marquardt's method on the normal equations; σ of camera and of projector are estimated from
 //! their residuals and the redundancy, in rounds, until the weights agree with the residuals (variance components, W. Förstner, 1979).
-//! Derivatives are central differences: each residual depends on 33 numbers only. The inverse of the last normal matrix is the covariance.
+//! Derivatives are central differences: each residual depends on 33 numbers only. The inverse of the last normal matrix, and what errors of the
+//! print add to it (`print`), is the covariance.
 
 use super::board::FoundBoard;
 use super::nodes::Node;
@@ -123,11 +124,11 @@ pub(super) fn adjust(first: Rig, views: &[View], bowed: bool) -> Result<Adjusted
     })
 }
 
-struct Problem<'a> {
-    views: &'a [View],
+pub(super) struct Problem<'a> {
+    pub views: &'a [View],
     /// The numbers that are adjusted.
-    free: Vec<usize>,
-    sigma: [f64; 2],
+    pub free: Vec<usize>,
+    pub sigma: [f64; 2],
 }
 
 impl Problem<'_> {
@@ -181,7 +182,7 @@ impl Problem<'_> {
     }
 
     /// Residuals of one view: camera, then projector.
-    fn view(&self, rig: &Rig, at: usize) -> Option<Vec<[f64; 2]>> {
+    pub(super) fn view(&self, rig: &Rig, at: usize) -> Option<Vec<[f64; 2]>> {
         let (view, pose) = (&self.views[at], &rig.poses[at]);
         let mut all = Vec::with_capacity(view.found.corners.len() + view.nodes.len());
         for (corner, place) in places(rig, view) {
@@ -253,7 +254,7 @@ impl Problem<'_> {
     }
 
     /// Derivatives of a view's predictions with one number.
-    fn slopes(&self, rig: &Rig, at: usize, number: usize) -> Option<Vec<[f64; 2]>> {
+    pub(super) fn slopes(&self, rig: &Rig, at: usize, number: usize) -> Option<Vec<[f64; 2]>> {
         let step = step_of(number);
         let moved = |by: f64| {
             let mut all = vec![0.0; rig.numbers()];
@@ -315,14 +316,22 @@ impl Problem<'_> {
                 scaled[i * n + j] *= scale[i] * scale[j];
             }
         }
-        let all = rig.numbers();
-        let mut covariance = vec![0.0; all * all];
+        let mut inverse = vec![0.0; n * n];
         for i in 0..n {
             let mut unit = vec![0.0; n];
             unit[i] = 1.0;
             let column = solve_symmetric(&mut scaled.clone(), &mut unit)?;
             for j in 0..n {
-                covariance[self.free[i] * all + self.free[j]] = column[j] * scale[i] * scale[j];
+                inverse[i * n + j] = column[j] * scale[i] * scale[j];
+            }
+        }
+        let of_print = self.of_print(rig, &inverse)?;
+        let all = rig.numbers();
+        let mut covariance = vec![0.0; all * all];
+        for i in 0..n {
+            for j in 0..n {
+                covariance[self.free[i] * all + self.free[j]] =
+                    inverse[i * n + j] + of_print[i * n + j];
             }
         }
         Some(covariance)
@@ -342,7 +351,7 @@ pub(super) fn places<'a>(
 }
 
 /// Huber's weight.
-fn weight(residual: [f64; 2], sigma: f64) -> f64 {
+pub(super) fn weight(residual: [f64; 2], sigma: f64) -> f64 {
     let r = libm::hypot(residual[0], residual[1]) / sigma;
     if r <= HUBER { 1.0 } else { HUBER / r }
 }

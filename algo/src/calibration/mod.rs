@@ -13,6 +13,7 @@ mod nodes;
 mod picture;
 mod pose;
 mod predict;
+mod print;
 mod rig;
 mod solve;
 

@@ -6,6 +6,7 @@ use crate::calibration::{
 };
 use crate::geometry::{Lens, Vector};
 use std::string::ToString;
+use std::vec;
 use std::vec::Vec;
 
 const FRAME: (usize, usize) = (1456, 1088);
@@ -91,12 +92,21 @@ fn head(random: &mut Random, board: &Board, poses: usize, scale: f64) -> Rig {
 
 /// What the head sees of the board, with noise.
 fn views(random: &mut Random, rig: &Rig) -> Vec<View> {
+    let exact = vec![(0.0, 0.0); rig.board.corners()];
+    printed(random, rig, &exact)
+}
+
+/// The same of a board whose corners are printed off their places, mm.
+fn printed(random: &mut Random, rig: &Rig, off: &[(f64, f64)]) -> Vec<View> {
     let board = &rig.board;
     let view = |pose: &Pose| {
         let mut noisy = |(a, b): (f64, f64), sigma: f64| {
             (a + sigma * random.normal(), b + sigma * random.normal())
         };
-        let corner = |at: usize| rig.corner(pose, board.place(at)).unwrap();
+        let corner = |at: usize| {
+            let (x, y) = board.place(at);
+            rig.corner(pose, (x + off[at].0, y + off[at].1)).unwrap()
+        };
         let corners: Vec<_> = (0..board.corners())
             .map(|at| {
                 let (u, v) = noisy(corner(at), NOISE.0);
@@ -204,6 +214,39 @@ fn the_predicted_errors_cover_the_true_ones_of_50_heads() {
             covered[1] += i32::from(length <= sigmas * prediction.length);
         }
     }
+    for of in 0..2 {
+        assert!(
+            (25..=43).contains(&covered[0][of]),
+            "within 1 σ: {covered:?}"
+        );
+        assert!(covered[1][of] >= 45, "within 2 σ: {covered:?}");
+    }
+}
+
+#[test]
+fn the_predicted_errors_cover_the_true_ones_of_50_heads_with_a_bad_print() {
+    let board = Board {
+        columns: 9,
+        rows: 13,
+        square: 10.0,
+    };
+    // 0.12 camera px, more than twice the noise of a corner.
+    let print = 0.02;
+    let mut covered = [[0; 2]; 2];
+    for seed in 0..50 {
+        let mut random = Random::new(300 + seed);
+        let truth = head(&mut random, &board, 10, 0.0);
+        let off = |_| (print * random.normal(), print * random.normal());
+        let off: Vec<_> = (0..board.corners()).map(off).collect();
+        let adjusted = calibrate(&board, FRAME, &printed(&mut random, &truth, &off)).unwrap();
+        let prediction = adjusted.prediction(FRAME, RASTER, 0.0).unwrap();
+        let (height, length) = errors(&truth, &adjusted.rig);
+        for (sigmas, covered) in [1.0, 2.0].into_iter().zip(&mut covered) {
+            covered[0] += i32::from(height <= sigmas * prediction.height);
+            covered[1] += i32::from(length <= sigmas * prediction.length);
+        }
+    }
+    std::println!("within 1 and 2 σ, heights and lengths: {covered:?}");
     for of in 0..2 {
         assert!(
             (25..=43).contains(&covered[0][of]),
