@@ -199,18 +199,27 @@ fn gauges(record: &ResultRecord) -> Vec<GaugeEntry> {
 /// Flags that say how a cycle went, not what its frames show.
 const COURSE: u16 = flag::RETRIED | flag::STEPPED_UP | flag::WARM_UP;
 
+/// The bit of a decision that follows from σ.
+const DOUBTFUL: u16 = 1 << 4;
+
 /// A replayed gauge as far as it can be compared with the stored one: older programs have stored no uncertainty, and their σ of extremes
 /// was another one.
 fn comparable(stored: &GaugeEntry, replayed: &GaugeEntry) -> GaugeEntry {
-    if stored.uncertainty.is_some() {
+    if !is_older(stored) {
         return replayed.clone();
     }
     GaugeEntry {
-        sigma: stored.sigma.and(replayed.sigma).and(stored.sigma),
+        sigma: stored.sigma,
         uncertainty: None,
         expected: None,
+        decision: (replayed.decision & !DOUBTFUL) | (stored.decision & DOUBTFUL),
         ..replayed.clone()
     }
+}
+
+/// Whether an older program stored it.
+fn is_older(stored: &GaugeEntry) -> bool {
+    stored.sigma.is_some() && stored.uncertainty.is_none()
 }
 
 /// How a replayed result differs from the stored one, in words; `None` if it is the same bit by bit. What belongs to the cycle
@@ -221,13 +230,17 @@ pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
         Some(before) => comparable(before, gauge),
         None => gauge.clone(),
     });
+    let own = match stored.gauges.iter().any(is_older) {
+        true => COURSE | flag::DOUBTFUL,
+        false => COURSE,
+    };
     let same = Entry {
         recipe: replayed.recipe,
         fingerprint: replayed.fingerprint.clone(),
         verdict: replayed.verdict,
         error_code: replayed.error_code,
         reason: replayed.reason.clone(),
-        flags: (stored.flags & COURSE) | (replayed.flags & !COURSE),
+        flags: (stored.flags & own) | (replayed.flags & !own),
         valid_points: replayed.valid_points,
         coverage_permille: replayed.coverage_permille,
         height_noise_mm: replayed.height_noise_mm,

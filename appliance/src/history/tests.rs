@@ -319,6 +319,22 @@ fn a_damaged_database_is_set_aside_with_a_message_and_a_new_one_begun() {
 }
 
 #[test]
+fn a_result_of_an_older_program_is_compared_without_what_it_did_not_store() {
+    let replayed = entry(1, 1, Verdict::Pass);
+    let mut stored = replayed.clone();
+    for gauge in &mut stored.gauges {
+        (gauge.sigma, gauge.uncertainty, gauge.decision) = (Some(0.5), None, 3 | 16);
+    }
+    stored.flags = crate::station::result::flag::DOUBTFUL;
+    assert_eq!(difference(&stored, &replayed), None);
+    stored.gauges[0].value = Some(0.0);
+    assert!(difference(&stored, &replayed).is_some());
+    stored.clone_from(&replayed);
+    stored.gauges[0].uncertainty = Some(9.0);
+    assert!(difference(&stored, &replayed).is_some());
+}
+
+#[test]
 fn csv_has_a_line_per_result_and_a_column_per_gauge() {
     let state = tempfile::tempdir().unwrap();
     bounded(state.path(), ENOUGH).store(some(2).iter()).unwrap();

@@ -138,3 +138,36 @@ impl Production {
         Some(facet.jacobian(point, (alignment.centre, alignment.radius)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Vector;
+    use crate::inspect::align::Motion;
+
+    #[test]
+    fn noise_falls_with_the_pixels_of_a_square_and_the_error_of_the_motion_does_not() {
+        let mut covariance = [[0.0; 6]; 6];
+        covariance[2][2] = 0.02 * 0.02;
+        let placed = Placed {
+            motion: Motion::none(Vector::default()),
+            covariance,
+            radius: 50.0,
+            left_out: [false; 6],
+            points: 100,
+            outliers: 0.0,
+            reach: 0.0,
+        };
+        let mut noise = SquareNoise::new(8);
+        for at in 0..64 {
+            // On a slope a shift along z by 1 mm lifts what a pixel sees by 2 mm.
+            let lift = noise.is_sampled(at % 8, at / 8);
+            noise.add(0.5, 0.1, lift.then_some([0.0, 0.0, 2.0, 0.0, 0.0, 0.0]));
+        }
+        assert_eq!(noise.sampled, 16.0);
+        let (pixels, motion) = noise.variances(64.0, Some(&placed));
+        assert!((libm::sqrt(pixels) - 0.5 * 0.1 / 8.0).abs() < 1e-12);
+        assert!((libm::sqrt(motion) - 0.5 * 2.0 * 0.02).abs() < 1e-12);
+        assert_eq!(noise.variances(64.0, None).1, 0.0);
+    }
+}

@@ -193,11 +193,11 @@ impl Plan {
                 MAX_PATTERN_BYTES >> 20
             ));
         }
+        // Freed before the expansion of the height is allocated, which takes the most memory.
+        drop(arrays);
         // The last sequence is the one that golden was measured with.
         let golden = prepared.last().ok_or("it has no sequence")?;
         let golden = golden.golden_noise(&gauges, size.0);
-        // Freed before the expansion of the height is allocated, which takes the most memory.
-        drop(arrays);
         let range = conditions.expansion_range_turns;
         let cubics = HeightCubics::new(&triangulator, surface, range, &window, away.max(AROUND));
         let shared = Shared {
