@@ -98,9 +98,21 @@ const HEIGHT_REACH: f64 = i32::MAX as f64 / 1e6;
 /// Half the default working range, as a share of the camera's distance from the plane along its axis.
 const RANGE_SHARE: f64 = 0.2;
 
+impl HeightRange {
+    /// The default working range of a rig: ± 0.2 × the camera's distance from the reference plane along its axis, the upper end at most
+    /// 0.9 × the lower device's z.
+    pub fn of(camera: &Pinhole, projector: &Pinhole) -> Self {
+        let (eye, lamp) = (camera.centre(), projector.centre());
+        let reach = RANGE_SHARE * eye.z / -camera.axis().z;
+        Self {
+            low: -reach,
+            high: reach.min(0.9 * eye.z.min(lamp.z)),
+        }
+    }
+}
+
 impl Triangulator {
-    /// Joins the rig, the reference and the phase function. The default range is ± 0.2 × the camera's
-    /// distance from the reference plane along its axis, its upper end at most 0.9 × the lower device's z.
+    /// Joins the rig, the reference and the phase function. The default range is [`HeightRange::of`].
     /// Any range is cut to the heights that can be stored, ± 2147 mm, without an error.
     ///
     /// # Errors
@@ -121,13 +133,7 @@ impl Triangulator {
         if !((eye - lamp).length() > 1e-3) {
             return Err(RigError::NoBaseline);
         }
-        let range = range.unwrap_or_else(|| {
-            let reach = RANGE_SHARE * eye.z / -camera.axis().z;
-            HeightRange {
-                low: -reach,
-                high: reach.min(0.9 * eye.z.min(lamp.z)),
-            }
-        });
+        let range = range.unwrap_or_else(|| HeightRange::of(&camera, &projector));
         let stored = HeightRange {
             low: range.low.max(-HEIGHT_REACH),
             high: range.high.min(HEIGHT_REACH),

@@ -3,7 +3,9 @@
 mod figures;
 mod patterns;
 mod picture;
+mod volume;
 
 pub use figures::{Figures, Fringes};
 pub use patterns::{Show, rasters};
 pub use picture::Picture;
+pub use volume::{Outline, outlines};

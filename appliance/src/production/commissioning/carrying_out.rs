@@ -5,7 +5,7 @@ use crate::config::Backend;
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::calibration::place::Place;
 use crate::head::commission::{Commissioning, Exposing, Name, Outcome, Step, Subject};
-use crate::head::live::Picture;
+use crate::head::live::{Picture, outlines};
 use crate::production::{SIGN_OF_LIFE, Worker, active};
 use crate::recipe::plan::Plan;
 use crate::station::{Event, JobId};
@@ -223,6 +223,10 @@ impl Worker {
             problem: opened.problem.clone(),
             calibration: opened.calibration.clone(),
             exposing,
+            volume: match opened.problem {
+                None => outlines(&opened.calibration),
+                Some(_) => Vec::new(),
+            },
             least_gain: self.config.least_gain(),
             refresh_us: opened.head.refresh().as_micros() as u64,
         }));

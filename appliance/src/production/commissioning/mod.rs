@@ -9,6 +9,7 @@ mod view;
 
 use crate::head::calibration::Calibration;
 use crate::head::commission::{Commissioning, Exposing, Step};
+use crate::head::live::Outline;
 use crate::production::drift::Trend;
 use crate::station::{Event, Request, StationHandle};
 use std::path::{Path, PathBuf};
@@ -40,6 +41,8 @@ pub struct OpenHead {
     pub calibration: Calibration,
     /// Exposure and gain.
     pub exposing: Exposing,
+    /// Outlines of the measuring volume in the camera's picture; none before it is calibrated.
+    pub volume: Vec<Outline>,
     /// The least gain that the camera can be set to.
     pub least_gain: f64,
     /// Time between two refreshes of the projector, µs.

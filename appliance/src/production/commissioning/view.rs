@@ -34,6 +34,7 @@ impl Commission {
                 "refresh_us": head.refresh_us, "adjustable": head.adjustable,
             },
             "projector": { "columns": columns, "rows": rows },
+            "volume": head.volume,
             "running": running,
             "steps": steps(&inside, snapshot),
             "geometry": geometry(&inside.kept, head),

@@ -3,7 +3,7 @@ import { $, fill, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { moment } from "./number.js";
 import { trend } from "./trend.js";
-import { openLive, showCamera, start as startLive } from "./live.js";
+import { openLive, showCamera, showVolume, start as startLive } from "./live.js";
 import { showSteps, start as startSteps } from "./steps.js";
 import { showGeometry, start as startGeometry } from "./geometry.js";
 
@@ -40,6 +40,7 @@ async function refresh() {
   }
   openLive(visible, head.running ? head.running.said : "");
   showCamera(head.camera);
+  showVolume(head);
   showSteps(head);
   showGeometry(head);
   showDrift(head.drift);

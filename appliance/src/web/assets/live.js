@@ -1,6 +1,7 @@
 // The live picture of the head: each is asked for when the one before is shown, so nothing is exposed unless somebody looks.
 import { $, draw, fill, make, show, text } from "./element.js";
 import { ask, picture } from "./api.js";
+import { signed } from "./number.js";
 import { change, isSignedIn, notice, open, refresh } from "./session.js";
 
 // Until it is asked again, while the head is busy with something else, ms.
@@ -87,6 +88,26 @@ export function showCamera({ refresh_us, exposure_us, gain, least_gain, adjustab
   $("live-gain").value = String(gain);
 }
 
+// The outlines of the measuring volume, each with a label in a corner of its own.
+export function showVolume({ volume, camera }) {
+  show("live-outlined", volume.length > 0);
+  const key = JSON.stringify(volume);
+  if ($("live-volume").dataset.key === key) return;
+  $("live-volume").dataset.key = key;
+  $("live-volume").setAttribute("viewBox", `0 0 ${camera.columns} ${camera.rows}`);
+  const size = camera.columns / 28;
+  // Below right, above left and below left.
+  const corners = [([x, y]) => x + y, ([x, y]) => -x - y, ([x, y]) => y - x];
+  fill($("live-volume"), ...volume.flatMap(({ z_mm, points }, at) => {
+    const far = corners[at % 3];
+    const [x, y] = points.reduce((best, point) => (far(point) > far(best) ? point : best));
+    const label = draw("text", {
+      x: at === 0 ? x - size / 3 : x + size / 3, y: at === 1 ? y + 1.2 * size : y - size / 2, "font-size": size, "text-anchor": at === 0 ? "end" : "start",
+    }, `z = ${signed(z_mm, 0)} mm`);
+    return [draw("polygon", { points: points.map((point) => point.join(",")).join(" "), class: z_mm === 0 ? "plane" : "end" }), label];
+  }));
+}
+
 // Shows the picture at a path on a canvas, in place of words.
 export async function showPicture(canvas, words, path) {
   const bitmap = await picture(path);
@@ -166,5 +187,6 @@ export function start() {
   $("live-sign").addEventListener("click", () => open(null));
   for (const field of $("live-form").querySelectorAll(".exposing")) field.addEventListener("input", () => { state.edited = true; });
   $("live-form").addEventListener("submit", (event) => { event.preventDefault(); expose(false); });
+  $("live-outline").addEventListener("change", () => { $("live-volume").toggleAttribute("hidden", !$("live-outline").checked); });
   $("live-keep").addEventListener("click", () => expose(true));
 }
