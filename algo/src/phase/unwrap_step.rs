@@ -43,6 +43,8 @@ pub(super) struct UnwrapStep {
     bits: u8,
     /// Fractional bits of the coarse phase in one word.
     coarse_bits: u8,
+    /// By how much that word is shifted to the left before the product ([`UnwrapStepLanes::expected_of_any_step`]).
+    coarse_left: u8,
     /// What the origins add to the product, and half a turn for rounding.
     offset: i16,
 }
@@ -67,8 +69,15 @@ impl UnwrapStep {
             n
         };
         let coarse_bits = before.map_or(16, |step| step.bits);
+        // From the third step on the word may have room for more turns than there are; the first two, of which one pass consists, do
+        // without the shift.
+        let order_bits = libm::ceil(libm::log2(2.0 * (reach + 0.5))) as u8;
+        let coarse_left = match before {
+            Some(step) if step.coarse_bits < 16 => (16 - coarse_bits).saturating_sub(order_bits),
+            _ => 0,
+        };
         // Turns in the word of a coarse phase.
-        let range = libm::pow(2.0, 16.0 - f64::from(coarse_bits));
+        let range = libm::pow(2.0, 16.0 - f64::from(coarse_bits + coarse_left));
         // The product is taken by Q15, so its gain is half of n · range.
         let largest = (n * reach + libm::fabs(behind) + 1.0).max(n * range / 2.0);
         let bits = libm::floor(libm::log2(32_767.0 / largest)).min(15.0);
@@ -85,6 +94,7 @@ impl UnwrapStep {
             gain: word(n * range / 2.0 * unit),
             bits: bits as u8,
             coarse_bits,
+            coarse_left,
             offset: word((behind + 0.5) * unit),
         })
     }
@@ -175,6 +185,7 @@ pub(super) struct UnwrapStepLanes<V: Lanes> {
     fine_right: V::Count,
     bits_right: V::Count,
     coarse_right: V::Count,
+    coarse_left: V::Count,
     /// Mask: the bits of the product that are whole turns.
     whole_turns: V::W,
 }
@@ -194,8 +205,21 @@ impl<V: Lanes> UnwrapStepLanes<V> {
             bits_right: v.right(step.bits),
             // A wrapped phase has no bit of a whole turn but its sign.
             coarse_right: v.right(step.coarse_bits.min(15)),
+            coarse_left: v.left(step.coarse_left),
             whole_turns: v.splat16((u16::MAX << step.bits).cast_signed()),
         }
+    }
+
+    /// As [`Self::expected`], for any step of a sequence; the other functions are for its first two.
+    #[inline(always)]
+    pub fn expected_of_any_step(&self, v: V, coarse: [Absolute<V>; 2]) -> [ExpectedPhase<V>; 2] {
+        let [mut low, mut high] = coarse;
+        low.word = v.shl_by(low.word, self.coarse_left);
+        high.word = v.shl_by(high.word, self.coarse_left);
+        let mut expected = self.expected(v, coarse);
+        expected[0].turns = self.turns(v, low);
+        expected[1].turns = self.turns(v, high);
+        expected
     }
 
     /// The expected phases from coarse ones.

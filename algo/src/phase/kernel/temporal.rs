@@ -124,7 +124,10 @@ impl<V: Lanes> UnwrappedBlock<V> {
     #[inline(always)]
     pub fn before(self, v: V, step: &UnwrapStepLanes<V>) -> Coarser<V> {
         if V::FEW_REGISTERS {
-            return Coarser::Expected(self.expected(v, step));
+            return Coarser::Expected(ExpectedBlock {
+                phase: step.expected(v, self.phase),
+                quality: self.quality,
+            });
         }
         Coarser::Unwrapped(self)
     }
@@ -133,7 +136,7 @@ impl<V: Lanes> UnwrappedBlock<V> {
     #[inline(always)]
     pub fn expected(&self, v: V, step: &UnwrapStepLanes<V>) -> ExpectedBlock<V> {
         ExpectedBlock {
-            phase: step.expected(v, self.phase),
+            phase: step.expected_of_any_step(v, self.phase),
             quality: self.quality,
         }
     }
