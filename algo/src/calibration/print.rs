@@ -102,10 +102,10 @@ impl Problem<'_> {
             shared.normal[0] += dot(by[0], by[0]);
             shared.normal[1] += dot(by[0], by[1]);
             shared.normal[2] += dot(by[1], by[1]);
-            for axis in 0..2 {
-                shared.right[axis] += dot(by[axis], residuals[k]);
+            for (axis, by) in by.into_iter().enumerate() {
+                shared.right[axis] += dot(by, residuals[k]);
                 for (i, slopes) in &slopes {
-                    shared.moves[*i][axis] += dot(slopes[k], by[axis]);
+                    shared.moves[*i][axis] += dot(slopes[k], by);
                 }
             }
         }
