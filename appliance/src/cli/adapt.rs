@@ -9,16 +9,15 @@ use crate::measure::projected::Projected;
 use crate::storage::folder::OutputFolder;
 use algo::adaptive::{noise, paper};
 use algo::pattern::{Waveform, Waveforms};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use hal::npy;
 use hal::replay::Recording;
 use std::path::{Path, PathBuf};
 
-/// Numbers of frames that a sequence is made for.
-const FRAMES: [usize; 7] = [24, 12, 9, 6, 5, 4, 3];
-
-fn frames(text: &str) -> Result<usize, String> {
-    let known = FRAMES.into_iter().find(|frames| frames.to_string() == text);
-    known.ok_or_else(|| "write 24, 12, 9, 6, 5, 4 or 3".into())
+/// The numbers of frames that a sequence is made for.
+fn frames() -> impl TypedValueParser<Value = usize> {
+    PossibleValuesParser::new(["24", "12", "9", "6", "5", "4", "3"])
+        .try_map(|text| text.parse::<usize>())
 }
 
 /// The waveforms of a sequence.
@@ -67,7 +66,7 @@ pub struct Adapt {
     #[arg(long, value_name = "DIR", value_parser = names::folder())]
     patterns: Option<PathBuf>,
     /// How many pictures to project.
-    #[arg(long, value_name = "N", default_value_t = 12, requires = "patterns", value_parser = frames)]
+    #[arg(long, value_name = "N", default_value_t = 12, requires = "patterns", value_parser = frames())]
     frames: usize,
     /// What each level shows: the waveform with the most modulation for its number of shifts, or a sine. The former needs a
     /// projector whose light is linear in the grey level within 1 %.
