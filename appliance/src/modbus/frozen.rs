@@ -168,8 +168,8 @@ const MEANINGS_1_2: [(u16, &str); 1] = [(103, ", 8 power")];
 
 /// Version 1.3 adds a register, a block, another bit of WARNING, and what the bits of a value in a guard band are.
 const MEANINGS_1_3: [(u16, &str); 2] = [
-    (103, ", 8 power, 9 geometry"),
     (296, "; 1 and 4 without 0, 2, 3"),
+    (103, ", 8 power, 9 geometry"),
 ];
 
 fn row(address: u16) -> Register {
