@@ -57,6 +57,7 @@ impl Worker {
         if ended {
             // What it has found so far is not kept.
             self.opened.head.set_timing(timing);
+            self.tell_head();
             let name = asked.step.name().word();
             return self.progress.log(&format!("the step {name} was ended"));
         }

@@ -135,25 +135,24 @@ impl Trend {
     /// In words: it cannot be stored; it is known until the next start.
     pub fn add(&self, calibration: &str, seen: &Epipolar) -> Result<(), String> {
         let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
-        let bytes = {
-            let mut all = self.checks();
-            (all.format, all.version) = (FORMAT.into(), VERSION);
-            all.checks.push(Checked {
-                at_unix_s: clock::utc_us().unwrap_or(0) / 1_000_000,
-                calibration: calibration.into(),
-                epipolar_px: seen.rms,
-                offset_px: seen.offset,
-                gradient_px: seen.gradient,
-                noise_px: seen.noise,
-                pixels: seen.pixels,
-            });
-            let spare = all.checks.len().saturating_sub(MOST_KEPT);
-            all.checks.drain(..spare);
-            serde_json::to_vec(&*all).map_err(io::Error::from)
-        };
-        bytes
-            .and_then(|bytes| write_whole(&self.path, &bytes))
-            .map_err(|error| format!("write {}: {error}: free space", self.path.display()))
+        let mut all = self.checks().clone();
+        (all.format, all.version) = (FORMAT.into(), VERSION);
+        all.checks.push(Checked {
+            at_unix_s: clock::utc_us().unwrap_or(0) / 1_000_000,
+            calibration: calibration.into(),
+            epipolar_px: seen.rms,
+            offset_px: seen.offset,
+            gradient_px: seen.gradient,
+            noise_px: seen.noise,
+            pixels: seen.pixels,
+        });
+        let spare = all.checks.len().saturating_sub(MOST_KEPT);
+        all.checks.drain(..spare);
+        // Stored before it is shown: what was seen once is known after the next start.
+        let stored = serde_json::to_vec(&all).map_err(io::Error::from);
+        let stored = stored.and_then(|bytes| write_whole(&self.path, &bytes));
+        *self.checks() = all;
+        stored.map_err(|error| format!("write {}: {error}: free space", self.path.display()))
     }
 
     /// The last check of the head with this calibration; none if there was none.
