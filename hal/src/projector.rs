@@ -105,7 +105,8 @@ pub trait Projector: Send {
     /// Replaces the patterns behind the first `kept`; nothing is shown until [`Projector::queue`].
     ///
     /// # Errors
-    /// `Unsupported` if a raster does not have the projector's size, `Protocol` if fewer than `kept` patterns are loaded.
+    /// `Unsupported` if a raster does not have the projector's size or the projector shows nothing but what was recorded, `Protocol` if
+    /// fewer than `kept` patterns are loaded.
     fn load_behind(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error>;
 
     /// Replaces all patterns.

@@ -91,6 +91,12 @@ impl Scene for Played {
     fn load(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
         let recorded = self.played.len();
         let loaded = kept + rasters.len();
+        if kept == recorded && loaded > recorded {
+            return Err(Error::unsupported(
+                "loading patterns beside those of a recording",
+                "use a head that can show them",
+            ));
+        }
         if loaded != recorded {
             return Err(Error::protocol(
                 format!("loading {loaded} rasters to replay {recorded} recorded frames"),
