@@ -11,6 +11,7 @@ use appliance::recipe::teach::{Naming, TaughtRecipe, teach};
 use appliance::recipe::{AlignmentKind, GaugeFile, Recipe, RecipeFile, RegionFile, safe};
 use hal::head::Head;
 use sim::parts::{Cone, Plane, Sawtooth, SheetMetal, Sphere, Spline};
+use sim::scenario::Noise;
 use sim::{Part, Placement, Scenario, Stage};
 use std::time::{Duration, Instant};
 
@@ -37,7 +38,8 @@ pub(crate) fn scenario(part: Part) -> Scenario {
         part,
         ..Scenario::default()
     };
-    // Half the study's resolution and a quarter of its rays, with the same geometry.
+    // Half the study's resolution and a quarter of its rays, with the same geometry and noise.
+    scenario.noise.noise_counts = Some(Noise::PAPER);
     scenario.rig.camera.width = 256;
     scenario.rig.camera.height = 256;
     scenario.sub_rays = 2;

@@ -7,12 +7,14 @@ use appliance::recipe::teach::TaughtRecipe;
 use appliance::recipe::{GaugeKind, RecipeFile, SequenceKind};
 use appliance::station::{Inspection, Verdict};
 use sim::parts::{Defect, SheetMetal};
+use sim::scenario::Noise;
 use sim::{Part, Placement, Scenario};
 use std::time::Instant;
 use tests::random::Random;
 
-/// Largest relative difference between repeatability and prediction of a coverage; with 200 values the repeatability is known to 5 %.
-const COVERAGE: f64 = 0.30;
+/// Repeatability of a coverage, as a multiple of its prediction; with 200 values it is known to 5 %. At a quarter of the light the prediction
+/// is up to half too large, so σ errs to the safe side.
+const COVERAGE: std::ops::Range<f64> = 0.6..1.3;
 const REPEATS: usize = 200;
 /// Largest displacement of parts in each direction, and largest tilt about x and y.
 const SHIFT_MM: f64 = 1.0;
@@ -31,6 +33,7 @@ fn small() -> (Bed, TaughtRecipe) {
     let camera = &mut scenario.rig.camera;
     (camera.width, camera.height, camera.fov_deg) = (320, 240, [20.0, 15.0]);
     scenario.sub_rays = 2;
+    scenario.noise.noise_counts = Some(Noise::PAPER);
     let mut bed = bed(&scenario);
     let taught = taught_within(&mut bed, TOLERANCE_MM).unwrap();
     (bed, taught)
@@ -79,7 +82,7 @@ fn a_coverage_in_faint_light_repeats_as_well_as_it_says() {
             faint.head.load(rasters).unwrap();
             let found: Vec<_> = (0..REPEATS).map(|_| inspect(&mut faint, &plan)).collect();
             let ratio = repeats("coverage", &found, 0);
-            assert!((ratio - 1.0).abs() < COVERAGE, "{share} {kind:?}: {ratio}");
+            assert!(COVERAGE.contains(&ratio), "{share} {kind:?}: {ratio}");
         }
     }
 }

@@ -12,6 +12,7 @@ use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedFrame};
 use serde_json::Value;
 use sim::parts::Sphere;
+use sim::scenario::Noise;
 use sim::{Part, Scenario, Stage};
 use std::path::Path;
 use std::time::Duration;
@@ -33,6 +34,7 @@ impl Bench {
             sub_rays: 2,
             ..Scenario::default()
         };
+        scenario.noise.noise_counts = Some(Noise::PAPER);
         (scenario.rig.camera.width, scenario.rig.camera.height) = (128, 128);
         (scenario.rig.projector.width, scenario.rig.projector.height) = (512, 384);
         let (head, stage) = sim::head(&scenario).expect("a head");

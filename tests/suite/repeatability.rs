@@ -8,6 +8,7 @@ use appliance::recipe::teach::TaughtRecipe;
 use appliance::recipe::{GaugeKind, RecipeFile, SequenceFile};
 use appliance::station::{GaugeValue, Inspection};
 use sim::parts::{Defect, SheetMetal};
+use sim::scenario::Noise;
 use sim::{Part, Placement, Scenario};
 use std::time::Instant;
 use tests::random::Random;
@@ -43,8 +44,13 @@ fn line(noise: fn(&mut Scenario)) -> (Bed, TaughtRecipe) {
     (bed, taught)
 }
 
-/// The simulator's default: uniform noise of ± 2.5 %.
-fn uniform(_: &mut Scenario) {}
+/// The paper's: uniform noise of ± 2.5 %.
+fn uniform(scenario: &mut Scenario) {
+    scenario.noise.noise_counts = Some(Noise::PAPER);
+}
+
+/// The simulator's default: shot noise and read noise.
+fn shot(_: &mut Scenario) {}
 
 /// A plan with a gauge of every kind.
 fn every_kind(bed: &Bed, taught: &TaughtRecipe) -> (RecipeFile, Plan) {
@@ -223,6 +229,11 @@ fn every_kind_of_gauge_repeats_as_well_as_it_says_wherever_a_good_part_lies() {
 }
 
 #[test]
+fn with_shot_noise_every_kind_of_gauge_repeats_as_well_as_it_says() {
+    repeats(shot, false, 6, 40);
+}
+
+#[test]
 fn every_kind_of_gauge_repeats_as_well_as_it_says_wherever_a_dented_part_lies() {
     repeats(uniform, true, 6, 40);
 }
@@ -235,8 +246,10 @@ fn heights_are_as_accurate_as_they_say_wherever_a_part_lies() {
 #[test]
 #[ignore = "takes minutes: `.ci/run full`"]
 fn every_kind_of_gauge_repeats_two_hundred_times_in_twenty_placements_as_well_as_it_says() {
-    for dent in [false, true] {
-        repeats(uniform, dent, 20, 200);
+    for noise in [uniform as fn(&mut Scenario), shot] {
+        for dent in [false, true] {
+            repeats(noise, dent, 20, 200);
+        }
+        errors(noise, 20);
     }
-    errors(uniform, 20);
 }
