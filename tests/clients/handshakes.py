@@ -34,7 +34,7 @@ def identity(plc):
     expect(long(words, 36) == 0x12345678, "the test pattern is 0x12345678, high word first")
     value = struct.unpack(">f", struct.pack(">HH", *words[38:40]))[0]
     expect(value == struct.unpack(">f", struct.pack(">f", 123.456))[0], "the test pattern is 123.456")
-    expect(plc.status().map_version == 0x0102, "the map has version 1.2")
+    expect(plc.status().map_version == 0x0103, "the map has version 1.3")
     same = plc.answer(plc.client.read_input_registers(900, count=40)).registers
     expect(same == words, "FC4 reads what FC3 reads")
     expect(plc.read(0, 1) == [ONLINE], "CONTROL starts as ONLINE")
