@@ -62,9 +62,9 @@ export async function wizard({ browser, program, step, folder }) {
   }
 
   async function run(name) {
-    await page.waitForSelector(`#step-${name}[open] > button:enabled`);
+    await page.waitForSelector(`#step-${name}[open] > button:not(.end):enabled`);
     // Reloaded as soon as the step has begun.
-    await Promise.all([page.waitForResponse((response) => response.url().endsWith(`/steps/${name}`)), page.click(`#step-${name} > button`)]);
+    await Promise.all([page.waitForResponse((response) => response.url().endsWith(`/steps/${name}`)), page.click(`#step-${name} > button:not(.end)`)]);
     await page.reload();
     await ended(name);
     const { state: outcome, said, remedy } = await state(name);
@@ -197,7 +197,7 @@ export async function wizard({ browser, program, step, folder }) {
     });
 
     await step("the geometry is solved, and its result survives a reload", async () => {
-      await page.click("#step-geometry > button");
+      await page.click("#step-geometry > button:not(.end)");
       await ended("geometry");
       const { state: outcome, said, remedy } = await state("geometry");
       assert.equal(outcome, "done", `${said.join("; ")}: ${remedy}`);
@@ -217,7 +217,7 @@ export async function wizard({ browser, program, step, folder }) {
 
     await step("the good part is taught and passes, a dented one fails", async () => {
       await put("#part-place", "part is in place");
-      await page.click("#step-teach > button");
+      await page.click("#step-teach > button:not(.end)");
       await page.waitForSelector("#teaching:not([hidden])");
       await page.reload();
       await is("teach", "done");
