@@ -88,16 +88,6 @@ fn coverage_in_faint_light() -> Vec<f64> {
 }
 
 #[test]
-fn a_coverage_in_faint_light_scatters_no_more_than_it_says() {
-    let ratios = coverage_in_faint_light();
-    assert!(
-        ratios.iter().all(|ratio| *ratio < 1.0 + COVERAGE),
-        "{ratios:?}"
-    );
-}
-
-#[test]
-#[ignore = "fails: in faint light the predicted scatter is up to twice too large"]
 fn a_coverage_in_faint_light_repeats_as_well_as_it_says() {
     let ratios = coverage_in_faint_light();
     let near = |ratio: &f64| (ratio - 1.0).abs() < COVERAGE;

@@ -25,7 +25,7 @@ pub(super) struct Counts {
     /// Per gauge: pixels with a height.
     pub covered: Vec<u64>,
     /// Per gauge: the variance of that number, see [`super::coverage`].
-    pub variance: Vec<u64>,
+    pub variance: Vec<i64>,
     /// Per patch: its cells.
     pub cells: Vec<Vec<Sum>>,
 }
