@@ -9,7 +9,7 @@ use super::timing::{Contender, Effort, Round, interleaved};
 use super::variants::{decoders, references};
 use super::words;
 use crate::experiment::{BetterSequence, Method, OpticsKind, Runner, Scene};
-use algo::pattern::{PhaseRange, Sequence, Shot};
+use algo::pattern::{Level, PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::{AbsolutePhase, Modulation};
@@ -31,59 +31,53 @@ pub struct Study {
     pub effort: Effort,
 }
 
-/// A sequence that is compared: of the fixed pattern, or of the better one.
-struct Compared {
-    name: &'static str,
-    levels: usize,
-    shifts: usize,
+/// The patterns that are compared.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Pattern {
+    /// 100 fringes, three geometric levels of sines.
+    Fixed,
+    /// Made for the part, with the sequences of the experiments.
+    Better,
 }
 
-/// The name of the fixed pattern, and the pattern.
-const FIXED: &str = "fixed";
-const FIXED_METHOD: Method = Method::Fixed { fringes: 100 };
-/// n of the dense levels: reaches ± 4 turns, as recipes have it.
-const DENSE_N: f64 = 4.0;
+/// A sequence that is compared, of so many frames.
+struct Compared(Pattern, usize);
+
 /// The noise of all measurements.
 const SEED: u64 = 1;
 
-const fn compared(name: &'static str, levels: usize, shifts: usize) -> Compared {
-    Compared {
-        name,
-        levels,
-        shifts,
-    }
-}
-
 const SEQUENCES: [Compared; 10] = [
-    compared(FIXED, 3, 3),
-    compared(FIXED, 3, 4),
-    compared(FIXED, 3, 8),
-    compared("better", 3, 3),
-    compared("better", 3, 4),
-    compared("better", 3, 8),
-    compared("better", 2, 3),
-    compared("better", 1, 3),
-    compared("better", 1, 4),
-    compared("better", 1, 8),
+    Compared(Pattern::Fixed, 9),
+    Compared(Pattern::Fixed, 12),
+    Compared(Pattern::Fixed, 24),
+    Compared(Pattern::Better, 24),
+    Compared(Pattern::Better, 12),
+    Compared(Pattern::Better, 9),
+    Compared(Pattern::Better, 6),
+    Compared(Pattern::Better, 5),
+    Compared(Pattern::Better, 4),
+    Compared(Pattern::Better, 3),
 ];
 
 impl Compared {
-    fn method(&self) -> Method {
-        match self.name {
-            FIXED => FIXED_METHOD,
-            // Three levels are unwrapped about the preliminary map, fewer about the golden one.
-            _ if self.levels == 3 => Method::Better(BetterSequence::TWELVE),
-            _ => Method::Better(BetterSequence::FOUR),
+    fn name(&self) -> &'static str {
+        match self.0 {
+            Pattern::Fixed => "fixed",
+            Pattern::Better => "better",
         }
     }
 
-    fn frames(&self, range: PhaseRange) -> Vec<Shot> {
-        let level = |ratio| Shot::level(ratio, self.shifts);
-        match (self.name, self.levels) {
-            (FIXED, levels) => Sequence::geometric(range, levels, self.shifts),
-            (_, 3) => Sequence::dense(DENSE_N, self.shifts),
-            (_, 2) => level(1.0).chain(level(0.8)).collect(),
-            _ => level(1.0).collect(),
+    fn method(&self) -> Method {
+        match self.0 {
+            Pattern::Fixed => Method::Fixed { fringes: 100 },
+            Pattern::Better => Method::Better(BetterSequence::new(self.1)),
+        }
+    }
+
+    fn shots(&self, range: PhaseRange) -> Result<Vec<Shot>, String> {
+        match self.0 {
+            Pattern::Fixed => Ok(Sequence::geometric(range, 3, self.1 / 3)),
+            Pattern::Better => BetterSequence::new(self.1).shots(),
         }
     }
 }
@@ -134,8 +128,9 @@ impl Study {
                 let mut runner = Runner::new(&scene, OpticsKind::Sharp).map_err(words)?;
                 for compared in &SEQUENCES {
                     let words = format!(
-                        "{part}, {bit_depth} bit, {} {}x{}",
-                        compared.name, compared.levels, compared.shifts
+                        "{part}, {bit_depth} bit, {}-{}",
+                        compared.name(),
+                        compared.1
                     );
                     progress(done / total, &words);
                     points.extend(self.compare(
@@ -160,12 +155,12 @@ impl Study {
         bits: u8,
         base: &mut FloorSets,
     ) -> Result<Vec<Point>, String> {
-        let frames = |range| compared.frames(range);
+        let shots = |range| compared.shots(range).unwrap_or_default();
         let (measured, map) = runner
-            .measure_with(compared.method(), frames, SEED)
+            .measure_with(compared.method(), shots, SEED)
             .map_err(words)?;
         let range = measured.triangulator.function().range();
-        let sequence = Sequence::from_frames(&compared.frames(range)).map_err(words)?;
+        let sequence = Sequence::from_frames(&compared.shots(range)?).map_err(words)?;
         let set = FrameSet::of(&measured.frames, map);
         let truth = runner.truth();
         let lit = Truth::from(truth).whole_pixels().count();
@@ -197,9 +192,9 @@ impl Study {
             points.push(Point {
                 part,
                 implementation,
-                sequence: compared.name,
-                frames: compared.levels * compared.shifts,
-                shifts: compared.shifts,
+                sequence: compared.name(),
+                frames: compared.1,
+                shifts: sequence.levels().last().map_or(0, Level::shifts),
                 bits,
                 skipping,
                 ns_per_px,

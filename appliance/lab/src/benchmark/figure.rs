@@ -47,7 +47,7 @@ fn plot(means: &[Point], machine: &str) -> Plot {
         })
         .collect();
     series.push(Series {
-        name: "Pareto front: pattern, levels × N, bits, implementation".into(),
+        name: "Pareto front".into(),
         colour: FRONT,
         kind: Kind::Line,
         points: front
@@ -69,14 +69,12 @@ fn label(point: &Point) -> String {
     let Point {
         sequence,
         frames,
-        shifts,
         bits,
         implementation,
         ..
     } = point;
     let skipping = if point.skipping { ", skipping" } else { "" };
-    let levels = frames / shifts.max(&1);
-    format!("{sequence} {levels}×{shifts}, {bits} bit, {implementation}{skipping}")
+    format!("{sequence}-{frames}, {bits} bit, {implementation}{skipping}")
 }
 
 /// The Pareto front, from fast to slow: no other point is both faster and more accurate.

@@ -13,7 +13,7 @@ pub struct Point {
     pub sequence: &'static str,
     /// Frames of a set.
     pub frames: usize,
-    /// Shifts per level, N.
+    /// Shifts of the finest level, N.
     #[serde(rename = "steps")]
     pub shifts: usize,
     /// Bits of a sample.
