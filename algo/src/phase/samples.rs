@@ -10,7 +10,7 @@ pub(crate) trait BlockSample: Sample {
     type Block<V: Lanes>: Copy;
 
     /// The rows as bytes, if samples are bytes.
-    fn bytes<const N: usize>(rows: [&[Self]; N]) -> Option<[&[u8]; N]>;
+    fn bytes<'r, 'a, const N: usize>(rows: &'r [&'a [Self]; N]) -> Option<&'r [&'a [u8]; N]>;
     /// The block of `row` that starts at `at`.
     fn load<V: Lanes>(v: V, row: &[Self], at: usize) -> Self::Block<V>;
     /// The bits of the depth: samples above full scale, which levels of many shifts tolerate, must not overflow sums.
@@ -37,7 +37,7 @@ pub(crate) trait BlockSample: Sample {
 impl BlockSample for u8 {
     type Block<V: Lanes> = V::B;
 
-    fn bytes<const N: usize>(rows: [&[Self]; N]) -> Option<[&[u8]; N]> {
+    fn bytes<'r, 'a, const N: usize>(rows: &'r [&'a [Self]; N]) -> Option<&'r [&'a [u8]; N]> {
         Some(rows)
     }
     #[inline(always)]
@@ -87,7 +87,7 @@ impl BlockSample for u8 {
 impl BlockSample for u16 {
     type Block<V: Lanes> = [V::W; 2];
 
-    fn bytes<const N: usize>(_rows: [&[Self]; N]) -> Option<[&[u8]; N]> {
+    fn bytes<'r, 'a, const N: usize>(_rows: &'r [&'a [Self]; N]) -> Option<&'r [&'a [u8]; N]> {
         None
     }
     #[inline(always)]

@@ -50,7 +50,7 @@ pub(crate) fn decode_row<T: BlockSample>(
         return;
     }
     if let ([coarse, fine], [a, b]) = (levels, rows)
-        && let (Some(a), Some(b)) = (of_bytes::<T, 7>(coarse, a), of_bytes::<T, 5>(fine, b))
+        && let (Some(&a), Some(&b)) = (of_bytes::<T, 7>(coarse, a), of_bytes::<T, 5>(fine, b))
     {
         return dense(backend, plan, levels, [a], b, map, columns, &mut out);
     }
@@ -98,9 +98,9 @@ fn of_shifts<T: BlockSample, const N: usize>(
 ) -> bool {
     let columns = columns.clone();
     match rows_of_bytes::<T, N>(levels, rows)[..] {
-        [a] => single(backend, plan, levels, a, map, columns, out),
-        [a, b] => dense(backend, plan, levels, [a], b, map, columns, out),
-        [a, b, c] => dense(backend, plan, levels, [a, b], c, map, columns, out),
+        [&a] => single(backend, plan, levels, a, map, columns, out),
+        [&a, &b] => dense(backend, plan, levels, [a], b, map, columns, out),
+        [&a, &b, &c] => dense(backend, plan, levels, [a, b], c, map, columns, out),
         _ => return false,
     }
     true
@@ -126,7 +126,7 @@ pub(crate) fn finest_row<T: BlockSample>(
             .last()
             .and_then(|level| of_bytes::<T, 4>(level, rows))
         {
-            Some(frames) => dense(
+            Some(&frames) => dense(
                 backend,
                 plan,
                 levels,

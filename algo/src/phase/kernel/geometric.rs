@@ -72,11 +72,11 @@ pub(crate) fn decode_row<T: BlockSample>(
         match *rows {
             [a] => single(backend, plan, levels, all(a), columns, out),
             [a, b] => {
-                let frames = (all(a), [], all(b));
+                let frames = (&all(a), [], &all(b));
                 one_pass(backend, plan, levels, frames, width, columns, out);
             }
             [a, b, c] => {
-                let frames = (all(a), [all(b)], all(c));
+                let frames = (&all(a), [&all(b)], &all(c));
                 one_pass(backend, plan, levels, frames, width, columns, out);
             }
             _ => level_by_level(backend, plan, levels, rows, columns, out),
@@ -96,7 +96,7 @@ fn of_shifts<T: BlockSample, const N: usize>(
 ) -> bool {
     let (columns, width) = (columns.clone(), width(rows));
     match rows_of_bytes::<T, N>(levels, rows)[..] {
-        [a] => single(backend, plan, levels, a, columns, out),
+        [&a] => single(backend, plan, levels, a, columns, out),
         [a, b] => one_pass(backend, plan, levels, (a, [], b), width, columns, out),
         [a, b, c] => one_pass(backend, plan, levels, (a, [b], c), width, columns, out),
         _ => return false,
@@ -150,11 +150,12 @@ back_end_entry! {
 }
 
 back_end_entry! {
-    /// Two or three levels in one pass over the frames of all.
+    /// Two or three levels in one pass over the frames of all. These are not copied on the way: a copy in vectors of what has just been
+    /// written in words would wait for it.
     fn one_pass [S: Frames, const BETWEEN: usize] = one_pass_columns(
         plan: &Geometric,
         levels: &[Level],
-        frames: (S, [S; BETWEEN], S),
+        frames: (&S, [&S; BETWEEN], &S),
         width: usize,
         columns: Range<usize>,
         out: &mut Results<'_>,
@@ -190,7 +191,7 @@ fn one_pass_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
     v: V,
     plan: &Geometric,
     levels: &[Level],
-    (coarsest, between, finest): (S, [S; BETWEEN], S),
+    (coarsest, between, finest): (&S, [&S; BETWEEN], &S),
     width: usize,
     columns: Range<usize>,
     out: &mut Results<'_>,

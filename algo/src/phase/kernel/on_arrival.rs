@@ -78,7 +78,7 @@ pub(super) fn finest_row_unscaled<T: BlockSample>(
 ) {
     let all = Rows::new(rows, columns.end);
     match of_bytes::<T, 4>(level, rows) {
-        Some(frames) => finest(backend, plan, level, frames, before, columns, out),
+        Some(&frames) => finest(backend, plan, level, frames, before, columns, out),
         None => finest(backend, plan, level, all, before, columns, out),
     }
 }

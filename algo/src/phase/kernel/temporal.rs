@@ -249,10 +249,10 @@ impl<'a, V: Lanes, S: Frames> FinerLevel<'a, V, S> {
 }
 
 /// The rows of levels of N shifts of 8 bits each, up to three, for the kernels that are compiled for N; empty for other levels.
-pub(super) fn rows_of_bytes<'a, T: BlockSample, const N: usize>(
+pub(super) fn rows_of_bytes<'r, 'a, T: BlockSample, const N: usize>(
     levels: &[Level],
-    rows: &[&[&'a [T]]],
-) -> heapless::Vec<[&'a [u8]; N], 3> {
+    rows: &[&'r [&'a [T]]],
+) -> heapless::Vec<&'r [&'a [u8]; N], 3> {
     let mut bytes = heapless::Vec::new();
     if rows.len() <= 3 {
         bytes.extend(
@@ -269,15 +269,15 @@ pub(super) fn rows_of_bytes<'a, T: BlockSample, const N: usize>(
 }
 
 /// The rows of a level of N shifts of 8 bits that start at 0.
-pub(super) fn of_bytes<'a, T: BlockSample, const N: usize>(
+pub(super) fn of_bytes<'r, 'a, T: BlockSample, const N: usize>(
     level: &Level,
-    rows: &[&'a [T]],
-) -> Option<[&'a [u8]; N]> {
+    rows: &'r [&'a [T]],
+) -> Option<&'r [&'a [u8]; N]> {
     let rows: &[&[T]; N] = rows.try_into().ok()?;
     if level.samples == Samples::Weighted {
         return None;
     }
-    T::bytes(*rows)
+    T::bytes(rows)
 }
 
 /// Twice the words where the mask is set, 0 elsewhere.
