@@ -63,7 +63,7 @@ fn check_fringed(recording: &Recording, run: &Run, out: &Path) -> PatternSpec {
         (low.min(step), high.max(step))
     });
     assert!(
-        low > 0.0 && high <= 1.0 / 6.0 + 1e-9,
+        low > 0.0 && high <= 1.0 / 5.0 + 1e-9,
         "steps of {low} to {high} turns"
     );
     let (least, most) = values

@@ -19,7 +19,7 @@ pub struct ProjectorMap {
 }
 
 /// An unknown projector point.
-const UNKNOWN: [f64; 2] = [f64::NAN; 2];
+pub(super) const UNKNOWN: [f64; 2] = [f64::NAN; 2];
 
 impl ProjectorMap {
     /// From the heights of a preliminary measurement with vertical fringes: η follows from projecting the point. As camera and
@@ -75,9 +75,14 @@ impl ProjectorMap {
     /// The projector point of a camera pixel, if it is inside the frame and known.
     #[inline]
     pub fn at(&self, u: isize, v: isize) -> Option<[f64; 2]> {
-        let inside = u >= 0 && v >= 0 && u < self.width as isize && v < self.height() as isize;
+        let inside = self.is_inside(u, v);
         let point = inside.then(|| self.points[v as usize * self.width + u as usize])?;
         (!point[0].is_nan()).then_some(point)
+    }
+
+    /// Whether a pixel lies inside the frame.
+    pub(super) fn is_inside(&self, u: isize, v: isize) -> bool {
+        u >= 0 && v >= 0 && u < self.width as isize && v < self.height() as isize
     }
 
     /// Erodes the known region by one pixel, because silhouettes mix surfaces: a pixel stays known if all 3 × 3 pixels around it, inside the frame, are known.

@@ -1,43 +1,32 @@
-//! The pattern of least noise for the contrast of projector and camera.
+//! The pattern of least error for the light, the noise and the contrast that a part has.
 //!
-//! The height's noise is proportional to 1 / (g · M(g)), frequency times contrast. So each part of the
-//! surface gets the frequency that maximises g · M(g), instead of a fixed image pitch. Needs one
-//! preliminary measurement with vertical fringes.
+//! **Idea.** The height's noise is proportional to 1 / (g · M(g)), frequency times contrast. So each part of the surface gets the
+//! frequency with the least error, instead of a fixed image pitch, but none so fine that its modulation could not be trusted. Needs
+//! one preliminary measurement with vertical fringes.
+//!
+//! **Equation.** Of the frequencies with B₀ · M(g) at least what noise asks for, where B₀ is the modulation without blur, the one that maximises
+//!
+//! ```text
+//! g · M(g) / √(n² + R(g)²/2)
+//! ```
+//!
+//! n is the noise of the phase where M = 1, and R what the squares of the projector's pixels add ([`replicas`]), both in radian.
 
+use super::contrast::{Blur, Optics, contrast, replicas};
 use super::field::Field;
 use super::integrate::balanced_rows;
 use super::{AdaptError, ProjectorMap};
+use crate::math::around;
 use crate::pattern::PhaseFunction;
+use crate::phase::Decoder;
+use crate::pipeline::PhaseMap;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::f64::consts::PI;
 
-/// How contrast falls with frequency, and the limits of pitch.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Optics {
-    /// σ of the projector's Gaussian blur, projector pixels.
-    pub projector_blur: f64,
-    /// σ of the camera's Gaussian blur, camera pixels, beside the box of the pixel itself.
-    pub camera_blur: f64,
-    /// Smallest pitch in projector pixels.
-    pub projector_pitch: f64,
-    /// Smallest pitch in camera pixels.
-    pub image_pitch: f64,
-}
-
-/// Default of the smallest pitch in projector pixels. Below 6 px the projector's own
-/// pixels distort the fringes (a bilinear raster at 5 px: error / σ_z rises from 1.09 to 1.21 on the
-/// cone).
-pub const PROJECTOR_PITCH: f64 = 6.0;
+/// Default of the smallest pitch in projector pixels. Finer fringes gain little, and a part reaches fewer of them within its tolerance.
+pub const PROJECTOR_PITCH: f64 = 5.0;
 /// Default of the smallest pitch in camera pixels: the maximum of g · M(g) with the box of the pixel alone.
 pub const IMAGE_PITCH: f64 = 2.2;
-/// No blur but the pixels' own.
-const SHARP: Optics = Optics {
-    projector_blur: 0.0,
-    camera_blur: 0.0,
-    projector_pitch: PROJECTOR_PITCH,
-    image_pitch: IMAGE_PITCH,
-};
 /// Largest pitch of a pattern, projector pixels. Where the part is so steep that this is not resolved, no pitch is.
 const MAX_PITCH: f64 = 128.0;
 /// Neighbours that differ by more than this many projector pixels per camera pixel lie on different surfaces.
@@ -48,61 +37,109 @@ const FILL: usize = 8;
 const MINIMUM_REACH: usize = 1;
 /// σ of the smoothing after it, projector pixels.
 const SMOOTHING: f64 = 3.0;
-/// Share of the largest g · M(g) that is enough.
-const ENOUGH: f64 = 0.985;
+/// Share of the largest worth that is enough. The maximum is flat: the last 0.2 % would cost 4 % of the contrast.
+const ENOUGH: f64 = 0.998;
 /// Frequencies that are tried between the coarsest and the finest, in geometric progression.
 const STEPS: usize = 160;
+/// σ of a sample over the least modulation that is trusted, where the noise is not known.
+const NOISE: f64 = 0.23;
+/// √(2 / Σ N_i r_i² b_i²) of 12 frames: 7 + 5 of ratios 1 and 4/5 with the brightest waveforms.
+const TWELVE_FRAMES: f64 = 0.36;
+/// Error of the phase that light of an almost linear response leaves, radian: noise below it gains nothing.
+const LEAST_NOISE: f64 = 3e-3;
+/// By how many σ of a sample the modulation of sines stays above the least that is trusted. With the waveforms of 3 to 9 shifts, it is at least
+/// 15 % larger, and three times its own σ above.
+const SAFE: f64 = 1.0;
+/// Reach to each side of the median by which light is found, camera pixels: pixels that are lit in part, along shadows and silhouettes,
+/// ask for nothing, because a narrow line of coarse fringes would shear the rows beside it.
+const LIGHT_REACH: usize = 5;
+/// No more contrast than this is asked for: less light than it needs cannot be helped by a coarser pitch.
+const MOST_CONTRAST: f64 = 0.9;
 
-/// The contrast M of a sine of frequency `g` (turns per projector pixel) that the camera sees with
-/// gradient `[a, b]` (turns per camera pixel along u and v): that of the projector's bilinear pixels and
-/// blur, of the camera's blur and of the box of its pixel.
-pub fn contrast(optics: &Optics, g: f64, [a, b]: [f64; 2]) -> f64 {
-    let gauss = |sigma: f64, f: f64| libm::exp(-2.0 * (PI * sigma * f) * (PI * sigma * f));
-    let projector = sinc(g) * sinc(g) * gauss(optics.projector_blur, g);
-    let across = libm::sqrt(a * a + b * b);
-    projector * sinc(a) * sinc(b) * gauss(optics.camera_blur, across)
+/// The light of each camera pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Light {
+    /// Modulation of fringes that nothing blurs, counts; not positive or NaN where it is not known.
+    pub modulation: Vec<f64>,
+    /// σ of a sample, counts.
+    pub noise: f64,
+    /// The least modulation that is trusted, counts.
+    pub least: f64,
 }
 
-/// sin πx / πx.
-fn sinc(x: f64) -> f64 {
-    let angle = PI * x;
-    if libm::fabs(angle) < 1e-9 {
-        1.0
-    } else {
-        libm::sin(angle) / angle
+impl Light {
+    /// The light of a preliminary measurement with fringes of `g` turns per projector pixel, on slopes by [`ProjectorMap::slopes`].
+    /// `noise` is σ of a sample in counts, if it is known.
+    pub fn of(
+        (phases, decoder): (&PhaseMap, &Decoder),
+        slopes: &[[f64; 2]],
+        g: f64,
+        blur: &Blur,
+        noise: Option<f64>,
+    ) -> Self {
+        let full_scale = decoder.full_scale();
+        let pixels = phases.modulation.iter().zip(slopes);
+        let modulation: Vec<f64> = pixels
+            .map(|(modulation, [ju, jv])| {
+                modulation.counts(full_scale) / contrast(blur, g, [g * ju, g * jv])
+            })
+            .collect();
+        let least = decoder.least_modulation();
+        Self {
+            modulation: medians(&modulation, phases.width),
+            noise: noise.unwrap_or(NOISE * least),
+            least,
+        }
+    }
+
+    /// What one pixel asks of its fringes.
+    fn asked(&self, pixel: usize) -> Asked {
+        let modulation = self.modulation[pixel].max(self.least);
+        let needed = self.least + SAFE * self.noise;
+        Asked {
+            contrast: (needed / modulation).min(MOST_CONTRAST),
+            noise: (TWELVE_FRAMES * self.noise / modulation).max(LEAST_NOISE),
+        }
     }
 }
 
-/// σ of the blur of projector and camera together, in projector pixels, from the contrast that a
-/// preliminary measurement has at two frequencies: each sample is a pixel's slope J and its
-/// modulation at `fine` as a share of that at `coarse` (turns per projector pixel). Uses the median, which is robust
-/// against edges and noise.
-///
-/// `None` without samples; 0 if the contrast is better than that of the pixels alone.
-pub fn measured_blur(
-    samples: impl Iterator<Item = ([f64; 2], f64)>,
-    fine: f64,
-    coarse: f64,
-) -> Option<f64> {
-    let at = |g: f64, [ju, jv]: [f64; 2]| contrast(&SHARP, g, [g * ju, g * jv]);
-    let mut shares: Vec<f64> = samples
-        .map(|(slope, share)| share * at(coarse, slope) / at(fine, slope))
-        .filter(|share| share.is_finite() && *share > 0.0)
-        .collect();
-    if shares.is_empty() {
-        return None;
-    }
-    let middle = shares.len() / 2;
-    let (_, median, _) = shares.select_nth_unstable_by(middle, f64::total_cmp);
-    // M_fine / M_coarse = exp(−2π²σ²(fine² − coarse²)).
-    let variance = -libm::log(*median) / (2.0 * PI * PI * (fine * fine - coarse * coarse));
-    Some(libm::sqrt(variance.max(0.0)))
+/// The median of the positive values around each pixel; what is not positive stays as it is.
+fn medians(values: &[f64], width: usize) -> Vec<f64> {
+    let rows = values.len() / width.max(1);
+    let mut medians = values.to_vec();
+    crate::pipeline::for_each_row(&mut medians, width, |v, row| {
+        let mut window = Vec::new();
+        for (u, value) in row
+            .iter_mut()
+            .enumerate()
+            .filter(|(_, value)| **value > 0.0)
+        {
+            window.clear();
+            let columns = around(u, LIGHT_REACH, width);
+            for v in around(v, LIGHT_REACH, rows) {
+                let near = &values[v * width..][columns.clone()];
+                window.extend(near.iter().filter(|value| **value > 0.0));
+            }
+            let middle = window.len() / 2;
+            *value = *window.select_nth_unstable_by(middle, f64::total_cmp).1;
+        }
+    });
+    medians
 }
 
-/// The frequency for a surface that the camera sees with slope J: the lowest whose g · M(g)
-/// reaches 98.5 % of the maximum within both limits of pitch. The maximum is flat: the last 1.5 %
-/// would cost a tenth of the contrast, and with it resolved pixels.
-pub fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2]) -> f64 {
+/// What a pixel asks of its fringes.
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    /// Least contrast.
+    contrast: f64,
+    /// Noise of the phase with a contrast of 1, radian.
+    noise: f64,
+}
+
+/// The frequency for a surface that the camera sees with slope J: the lowest whose worth reaches 99.8 % of the maximum within both
+/// limits of pitch, or the highest with the contrast that is asked for, if that is lower.
+fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2], asked: Asked) -> f64 {
+    let blur = &optics.blur;
     let slope = libm::sqrt(ju * ju + jv * jv);
     let coarsest = 1.0 / MAX_PITCH;
     let finest = (1.0 / optics.projector_pitch)
@@ -110,12 +147,16 @@ pub fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2]) -> f64 {
         .max(coarsest);
     let ratio = libm::pow(finest / coarsest, 1.0 / STEPS as f64);
     let frequency = |i: usize| coarsest * libm::pow(ratio, i as f64);
+    let kept = |g: f64| contrast(blur, g, [g * ju, g * jv]);
     let worth = |i: usize| {
         let g = frequency(i);
-        g * contrast(optics, g, [g * ju, g * jv])
+        let squares = replicas(blur, g, [ju, jv]);
+        g * kept(g) / libm::sqrt(asked.noise * asked.noise + squares * squares / 2.0)
     };
-    // The logarithms of g, of each sinc and of each Gaussian are concave, so g · M(g) has a single peak.
-    let peak = first(STEPS, |i| worth(i) >= worth(i + 1));
+    // Contrast falls with g.
+    let resolved = first(STEPS, |i| kept(frequency(i + 1)) < asked.contrast);
+    // The worth has a single peak.
+    let peak = first(resolved, |i| worth(i) >= worth(i + 1));
     let enough = ENOUGH * worth(peak);
     frequency(first(peak, |i| worth(i) >= enough))
 }
@@ -141,14 +182,14 @@ pub fn predict(
     map: &ProjectorMap,
     before: &PhaseFunction,
     after: &PhaseFunction,
-    optics: &Optics,
+    blur: &Blur,
 ) -> Option<[f64; 2]> {
     let slopes = map.slopes(MAX_SLOPE);
     let (mut squares, mut count) = ([0.0; 2], 0.0);
     for ((sigma, [xi, eta]), [ju, jv]) in sigma.iter().zip(&map.points).zip(slopes) {
         let worth = |function: &PhaseFunction| {
             let g = function.at(xi + 0.5, *eta) - function.at(xi - 0.5, *eta);
-            g * contrast(optics, g, [g * ju, g * jv])
+            g * contrast(blur, g, [g * ju, g * jv])
         };
         let now = f64::from(*sigma);
         let then = now * worth(before) / worth(after);
@@ -169,9 +210,10 @@ pub fn adapt(
     columns: usize,
     rows: usize,
     optics: &Optics,
+    light: &Light,
 ) -> Result<PhaseFunction, AdaptError> {
     let slopes = map.slopes(MAX_SLOPE);
-    let frequencies = frequencies(&slopes, map.width, optics);
+    let frequencies = frequencies(&slopes, map.width, optics, light);
     let mut field = Field::uniform(columns, rows, f64::NAN);
     let mut seen = vec![false; columns * rows];
     for (point, g) in map.points.iter().zip(&frequencies) {
@@ -194,12 +236,13 @@ pub fn adapt(
     PhaseFunction::sampled(columns, rows, balanced_rows(&field, &seen)).map_err(AdaptError::Pattern)
 }
 
-fn frequencies(slopes: &[[f64; 2]], width: usize, optics: &Optics) -> Vec<f64> {
+fn frequencies(slopes: &[[f64; 2]], width: usize, optics: &Optics, light: &Light) -> Vec<f64> {
     let mut frequencies = vec![f64::NAN; slopes.len()];
     crate::pipeline::for_each_row(&mut frequencies, width, |v, row| {
-        for (g, slope) in row.iter_mut().zip(&slopes[v * width..]) {
-            if !slope[0].is_nan() {
-                *g = best_frequency(optics, *slope);
+        for (u, g) in row.iter_mut().enumerate() {
+            let pixel = v * width + u;
+            if !slopes[pixel][0].is_nan() {
+                *g = best_frequency(optics, slopes[pixel], light.asked(pixel));
             }
         }
     });
@@ -211,79 +254,123 @@ mod tests {
     use super::*;
 
     const FREE: Optics = Optics {
-        projector_blur: 0.0,
-        camera_blur: 0.0,
+        blur: Blur {
+            projector: 0.0,
+            camera: 0.0,
+        },
         projector_pitch: 2.0,
         image_pitch: 1.5,
     };
+    /// More noise than the squares of the projector's pixels add, and light enough.
+    const NOISY: Asked = Asked {
+        contrast: 0.1,
+        noise: 10.0,
+    };
+
+    fn blurred(projector: f64, camera: f64) -> Optics {
+        let blur = Blur { projector, camera };
+        Optics { blur, ..FREE }
+    }
 
     #[test]
     fn the_pitch_under_gaussian_blur_is_a_little_over_two_pi_sigma() {
-        let optics = Optics {
-            projector_blur: 2.0,
-            ..FREE
-        };
         // A face-on surface seen very finely: only the projector matters. x·exp(−x²/2) has its
-        // maximum at x = 1 (12.57 px; 13.0 px with bilinear pixels) and 98.5 % of it at x = 0.84.
-        let pitch = 1.0 / best_frequency(&optics, [0.01, 0.0]);
-        assert!((14.2..15.2).contains(&pitch), "{pitch}");
+        // maximum at x = 1 (12.57 px; 12.8 px with square pixels) and 99.8 % of it at x = 0.96.
+        let pitch = 1.0 / best_frequency(&blurred(2.0, 0.0), [0.01, 0.0], NOISY);
+        assert!((12.9..13.9).contains(&pitch), "{pitch}");
     }
 
     #[test]
     fn the_image_pitch_for_the_pixel_box_alone_is_a_little_over_two_pixels() {
         // Steep: 8 projector pixels per camera pixel, so that only the camera limits.
-        let pitch = 1.0 / (best_frequency(&FREE, [8.0, 0.0]) * 8.0);
-        assert!((2.1..2.6).contains(&pitch), "{pitch}");
+        // sin(π/p) has its maximum at p = 2, and 99.8 % of it at 2.08.
+        let pitch = 1.0 / (best_frequency(&FREE, [8.0, 0.0], NOISY) * 8.0);
+        assert!((2.05..2.12).contains(&pitch), "{pitch}");
     }
 
     #[test]
-    fn the_best_frequency_is_the_one_that_trying_all_of_them_finds() {
-        for blur in [0.0, 0.7, 2.0, 5.0] {
-            for at in 0..400 {
-                let optics = Optics {
-                    projector_blur: blur,
-                    camera_blur: f64::from(at % 3),
-                    ..SHARP
+    fn fringes_are_as_fine_as_their_contrast_allows() {
+        let optics = blurred(1.0, 0.5);
+        for slope in [[0.9, 0.0], [3.0, 0.5]] {
+            for wanted in [0.3, 0.5, 0.7, 0.9] {
+                let asked = Asked {
+                    contrast: wanted,
+                    ..NOISY
                 };
-                let angle = f64::from(at);
-                let slope = 0.01 * libm::pow(1.02, angle);
-                let [ju, jv] = [slope * libm::cos(angle), slope * libm::sin(angle)];
-                let coarsest = 1.0 / MAX_PITCH;
-                let finest = (1.0 / PROJECTOR_PITCH)
-                    .min(1.0 / (IMAGE_PITCH * libm::hypot(ju, jv)))
-                    .max(coarsest);
-                let ratio = libm::pow(finest / coarsest, 1.0 / STEPS as f64);
-                let all = || (0..=STEPS).map(|i| coarsest * libm::pow(ratio, i as f64));
-                let worth = |g: f64| g * contrast(&optics, g, [g * ju, g * jv]);
-                let best = all().map(worth).fold(0.0, f64::max);
-                let found = all().find(|&g| worth(g) >= ENOUGH * best).unwrap();
-                let searched = best_frequency(&optics, [ju, jv]);
-                assert!(
-                    (searched / found - 1.0).abs() < 1e-12,
-                    "{optics:?} {ju} {jv}"
-                );
+                let g = best_frequency(&optics, slope, asked);
+                let found = contrast(&optics.blur, g, slope.map(|j| g * j));
+                let free = best_frequency(&optics, slope, NOISY);
+                assert!(found >= wanted, "{found} for {wanted}");
+                assert!(found < 1.05 * wanted || g == free, "{found} for {wanted}");
             }
         }
     }
 
     #[test]
-    fn the_blur_is_found_from_the_contrast_of_two_levels() {
-        let blurred = Optics {
-            projector_blur: 1.3,
-            ..FREE
+    fn dark_pixels_ask_for_contrast_and_bright_ones_for_none() {
+        let light = Light {
+            modulation: vec![120.0, 30.0, 10.0, f64::NAN],
+            noise: 4.0,
+            least: 16.0,
         };
-        let (fine, coarse) = (1.0 / 20.0, 1.0 / 900.0);
-        let share = |[ju, jv]: [f64; 2]| {
-            contrast(&blurred, fine, [fine * ju, fine * jv])
-                / contrast(&blurred, coarse, [coarse * ju, coarse * jv])
+        let asked: Vec<f64> = (0..4).map(|pixel| light.asked(pixel).contrast).collect();
+        assert!((asked[0] - 20.0 / 120.0).abs() < 1e-9, "{asked:?}");
+        assert!((asked[1] - 20.0 / 30.0).abs() < 1e-9, "{asked:?}");
+        assert_eq!(asked[2..], [MOST_CONTRAST; 2]);
+    }
+
+    #[test]
+    fn the_squares_of_a_sharp_projector_ask_for_a_longer_pitch_where_noise_is_low() {
+        let pitch = |blur: f64, noise: f64| {
+            let asked = Asked { noise, ..NOISY };
+            1.0 / best_frequency(&blurred(blur, 0.0), [0.9, 0.0], asked)
         };
-        let slopes = (0..99).map(|i| [0.5 + 0.01 * f64::from(i), 0.1]);
-        let samples = slopes.map(|slope| (slope, share(slope)));
-        // One pixel at an edge decides nothing.
-        let samples = samples.chain([([1.0, 0.0], 0.1)]);
-        let sigma = measured_blur(samples, fine, coarse).unwrap();
-        assert!((sigma - 1.3).abs() < 1e-6, "{sigma}");
-        assert_eq!(measured_blur(core::iter::empty(), fine, coarse), None);
+        for blur in [0.25, 0.5] {
+            assert!(pitch(blur, 0.003) > 1.2 * pitch(blur, 0.1), "{blur}");
+        }
+        assert!(pitch(0.25, 0.013) > pitch(0.5, 0.013));
+    }
+
+    #[test]
+    fn the_best_frequency_is_the_one_that_trying_all_of_them_finds() {
+        for at in 0..6000 {
+            let optics = Optics {
+                projector_pitch: 4.0 + f64::from(at % 3),
+                image_pitch: IMAGE_PITCH,
+                ..blurred(
+                    [0.0, 0.25, 0.5, 0.7, 2.0, 5.0][at as usize % 6],
+                    f64::from(at % 5) / 2.0,
+                )
+            };
+            let asked = Asked {
+                contrast: f64::from(at % 10) / 10.0,
+                noise: [0.003, 0.01, 0.03, 0.1][at as usize % 4],
+            };
+            let angle = f64::from(at % 400);
+            let slope = 0.01 * libm::pow(1.02, angle);
+            let [ju, jv] = [slope * libm::cos(angle), slope * libm::sin(angle)];
+            let coarsest = 1.0 / MAX_PITCH;
+            let finest = (1.0 / optics.projector_pitch)
+                .min(1.0 / (IMAGE_PITCH * libm::hypot(ju, jv)))
+                .max(coarsest);
+            let ratio = libm::pow(finest / coarsest, 1.0 / STEPS as f64);
+            let kept = |g: f64| contrast(&optics.blur, g, [g * ju, g * jv]);
+            let all = || {
+                let all = (0..=STEPS).map(|i| coarsest * libm::pow(ratio, i as f64));
+                all.filter(|&g| g == coarsest || kept(g) >= asked.contrast)
+            };
+            let worth = |g: f64| {
+                let squares = replicas(&optics.blur, g, [ju, jv]);
+                g * kept(g) / libm::sqrt(asked.noise * asked.noise + squares * squares / 2.0)
+            };
+            let best = all().map(worth).fold(0.0, f64::max);
+            let found = all().find(|&g| worth(g) >= ENOUGH * best).unwrap();
+            let searched = best_frequency(&optics, [ju, jv], asked);
+            assert!(
+                (searched / found - 1.0).abs() < 1e-12,
+                "{optics:?} {asked:?} {ju} {jv}: {searched} for {found}"
+            );
+        }
     }
 
     #[test]
@@ -294,7 +381,7 @@ mod tests {
             ..FREE
         };
         for (slope, limit) in [([0.1, 0.0], 0.125), ([3.0, 4.0], 1.0 / 25.0)] {
-            let g = best_frequency(&optics, slope);
+            let g = best_frequency(&optics, slope, NOISY);
             assert!(g <= limit && g > 0.9 * limit, "{g}");
         }
     }
@@ -311,11 +398,14 @@ mod tests {
         };
         let mut sigma = [0.1; 64];
         sigma[0] = f32::NAN;
-        let [now, then] = predict(&sigma, &map, &before, &after, &SHARP).unwrap();
+        let [now, then] = predict(&sigma, &map, &before, &after, &Blur::default()).unwrap();
         assert!((now - 0.1).abs() < 1e-8);
         // The pixel's own box takes a little of the finer contrast.
         assert!((0.5..0.51).contains(&(then / now)), "{then}");
         let unknown = [f32::NAN; 64];
-        assert_eq!(predict(&unknown, &map, &before, &after, &SHARP), None);
+        assert_eq!(
+            predict(&unknown, &map, &before, &after, &Blur::default()),
+            None
+        );
     }
 }

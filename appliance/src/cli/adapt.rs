@@ -7,7 +7,7 @@ use crate::error::{Exit, Failure};
 use crate::measure::adapt::{AdaptOptions, Method, adapt};
 use crate::measure::projected::Projected;
 use crate::storage::folder::OutputFolder;
-use algo::adaptive::{noise, paper};
+use algo::adaptive::{Blur, Optics, noise, paper};
 use algo::pattern::{Waveform, Waveforms};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use hal::npy;
@@ -50,13 +50,13 @@ pub struct Adapt {
     /// The file for it: f64 turns, projector rows x columns.
     #[arg(long, value_name = "FILE.npy", value_parser = names::file("npy"))]
     out: PathBuf,
-    /// σ of the projector's blur, projector pixels.
-    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = number(0.0, 20.0))]
+    /// σ of the projector's blur, projector pixels; that of a sharp lens if not given.
+    #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = number(0.0, 20.0))]
     projector_blur: f64,
     /// σ of the camera's blur, camera pixels.
     #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = number(0.0, 20.0))]
     camera_blur: f64,
-    /// Smallest pitch in projector pixels; 6 if not given, and 8 always for the paper's method.
+    /// Smallest pitch in projector pixels; 5 if not given, and 8 always for the paper's method.
     #[arg(long, value_name = "PX", value_parser = number(2.0, 128.0))]
     projector_pitch: Option<f64>,
     /// Smallest pitch in camera pixels; if not given 2.2, and 5 for the paper's method.
@@ -136,9 +136,11 @@ impl Adapt {
         }
         Ok(AdaptOptions {
             method: self.method,
-            optics: noise::Optics {
-                projector_blur: self.projector_blur,
-                camera_blur: self.camera_blur,
+            optics: Optics {
+                blur: Blur {
+                    projector: self.projector_blur,
+                    camera: self.camera_blur,
+                },
                 projector_pitch: self.projector_pitch.unwrap_or(projector_pitch),
                 image_pitch: self.image_pitch.unwrap_or(image_pitch),
             },

@@ -3,7 +3,8 @@
 use crate::error::Failure;
 use crate::head::seam;
 use crate::measure::{measure, wrong};
-use algo::adaptive::{ProjectorMap, noise, paper};
+use algo::adaptive::noise::Light;
+use algo::adaptive::{Optics, ProjectorMap, noise, paper};
 use algo::pattern::PhaseFunction;
 use algo::units::AbsolutePhase;
 use hal::replay::Recording;
@@ -18,7 +19,7 @@ pub struct AdaptOptions {
     pub method: Method,
     /// Blur and smallest pitches. The paper's method uses only the image pitch: its projector pitch is
     /// [`paper::PROJECTOR_PITCH`], and the blur only enters the prediction.
-    pub optics: noise::Optics,
+    pub optics: Optics,
 }
 
 /// A method of making a pattern for a part.
@@ -27,7 +28,7 @@ pub struct AdaptOptions {
 pub enum Method {
     /// Peng & Gupta (2008), from vertical and horizontal fringes.
     Paper,
-    /// Least noise for the contrast that there is, from vertical fringes alone.
+    /// Least error for the light and the contrast that there are, from vertical fringes alone.
     Fringed,
 }
 
@@ -89,19 +90,32 @@ pub fn adapt(
             ProjectorMap::from_phases(phases, pitch, surface.map.width)
         }
     };
+    let spec = &recording.patterns[measurement.primary];
+    let before = seam::phase_function(spec, columns, rows).map_err(|error| wrong(&error))?;
     let made = match options.method {
-        Method::Fringed => noise::adapt(&map, columns, rows, &options.optics),
+        Method::Fringed => {
+            let slopes = map.slopes(noise::MAX_SLOPE);
+            let light = Light::of(
+                (
+                    &measurement.phases[measurement.primary],
+                    &measurement.decoder,
+                ),
+                &slopes,
+                1.0 / before.pitches()[0],
+                &options.optics.blur,
+                measurement.report.noise_counts,
+            );
+            noise::adapt(&map, columns, rows, &options.optics, &light)
+        }
         Method::Paper => paper::adapt(&map, columns, rows, options.optics.image_pitch),
     };
     let function = made.map_err(|error| wrong(&error))?;
-    let spec = &recording.patterns[measurement.primary];
-    let before = seam::phase_function(spec, columns, rows).map_err(|error| wrong(&error))?;
     let sigmas = noise::predict(
         &surface.map.sigma,
         &map,
         &before,
         &function,
-        &options.optics,
+        &options.optics.blur,
     );
     let on_raster = |point: &&[f64; 2]| {
         let inside = |x: f64, count: usize| x > -0.5 && x < count as f64 - 0.5;
@@ -116,8 +130,12 @@ pub fn adapt(
         preliminary_sigma_mm: sigmas.map(|[before, _]| before),
         predicted_sigma_mm: sigmas.map(|[_, after]| after),
     };
+    let trusted = match options.method {
+        Method::Fringed => map.without_blurred_silhouettes(options.optics.blur.camera),
+        Method::Paper => map,
+    };
     Ok(Adapted {
-        expected: map.expected_phase(&function),
+        expected: trusted.expected_phase(&function),
         function,
         report,
     })

@@ -3,26 +3,22 @@
 pub use super::golden::{Naming, TaughtRecipe};
 
 use super::PatternFile;
+use super::adaptive::{AdaptivePattern, Preliminary};
 use super::comparison::ComparisonFile;
 use super::golden::GoldenPart;
 use crate::error::code_of;
 use crate::head::calibrated::{CalibratedHead, MeasureError, Measured};
 use crate::head::calibration::Calibration;
-use crate::head::scan::Scan;
 use crate::station::error_code;
 use crate::system::computing::Computing;
-use algo::adaptive::{AdaptError, ProjectorMap, noise};
-use algo::pattern::{PhaseFunction, Sequence, Shot};
+use algo::adaptive::AdaptError;
+use algo::pattern::Sequence;
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use hal::head::Head;
 use std::time::Duration;
 
-/// Projector pitch of the preliminary pattern, in pixels (c·p_P of the paper).
-const PRELIMINARY_PITCH_PX: f64 = 20.0;
-/// Levels of the preliminary sequence.
-const LEVELS: usize = 3;
-/// Shifts per level of both sequences.
+/// Shifts per level of the part's own pattern.
 const SHIFTS: usize = 4;
 /// n of the dense levels about the expected map: they unwrap ± (n²/2 − n) = ± 4 turns.
 const DENSE_N: f64 = 4.0;
@@ -120,31 +116,17 @@ pub fn teach_while(
         calibration,
         timeout,
     };
-    let (columns, rows) = (
-        calibration.projector.width(),
-        calibration.projector.height(),
-    );
-    let preliminary = PhaseFunction::vertical(columns, rows, columns as f64 / PRELIMINARY_PITCH_PX)
-        .map_err(|error| TeachError::Rig(error.to_string()))?;
-    let shots = Sequence::geometric(preliminary.range(), LEVELS, SHIFTS);
-    let first = head.measure(&preliminary, &shots, None, &|share| {
+    let raster = &calibration.projector;
+    let preliminary = Preliminary::new((raster.width(), raster.height()))?;
+    let first = head.measure(&preliminary.function, &preliminary.shots, None, &|share| {
         // Checked before the next stage: a sequence is not interrupted.
         progress(0.3 * share, "measuring the part");
     })?;
     refuse_empty(&first.phases)?;
     stage(0.35, "making the part's own pattern")?;
-    let map = ProjectorMap::from_heights(&first.triangulator, &first.heights);
-    let function = computing.on(|| {
-        let optics = noise::Optics {
-            projector_blur: blur(&first, &shots, &map, columns as f64)?,
-            camera_blur: 0.0,
-            projector_pitch: noise::PROJECTOR_PITCH,
-            image_pitch: noise::IMAGE_PITCH,
-        };
-        noise::adapt(&map, columns, rows, &optics).map_err(TeachError::from)
-    })?;
+    let AdaptivePattern { function, expected } =
+        computing.on(|| preliminary.adapt(&first, calibration))?;
     stage(0.4, "measuring the part with its own pattern")?;
-    let expected = map.expected_phase(&function);
     let full = Sequence::dense(DENSE_N, SHIFTS);
     let golden = head.measure(&function, &full, Some(&expected), &|share| {
         progress(0.4 + 0.3 * share, "measuring the part with its own pattern");
@@ -153,7 +135,7 @@ pub fn teach_while(
     stage(0.75, "working out the expansion and the safe mask")?;
     let comparison = ComparisonFile::of(&first, &golden);
     // Their memory is free before the recipe's arrays are made.
-    drop((first, map, expected));
+    drop((first, expected));
     let Measured {
         phases,
         heights,
@@ -175,32 +157,6 @@ pub fn teach_while(
     let taught = taught.map_err(TeachError::Rig)?;
     stage(1.0, "taught")?;
     Ok(taught)
-}
-
-/// σ of the projector's blur on this part, projector pixels, from the modulation of the finest and the coarsest level of the
-/// preliminary measurement.
-fn blur(
-    first: &Measured,
-    shots: &[Shot],
-    map: &ProjectorMap,
-    columns: f64,
-) -> Result<f64, TeachError> {
-    let function = first.triangulator.function();
-    let coarse = Scan::new(function.range(), &shots[..SHIFTS], &first.frames[..SHIFTS])
-        .and_then(|coarse| coarse.phases(None))
-        .map_err(TeachError::Rig)?;
-    let slopes = map.slopes(noise::MAX_SLOPE);
-    let resolved = (0..slopes.len())
-        .filter(|&at| first.phases.trust[at] == Trust::Resolved && !slopes[at][0].is_nan());
-    let samples = resolved.map(|at| {
-        let fine = f64::from(first.phases.modulation[at].to_bits());
-        (
-            slopes[at],
-            fine / f64::from(coarse.modulation[at].to_bits()),
-        )
-    });
-    let frequency = function.range().span() / (columns - 1.0);
-    Ok(noise::measured_blur(samples, frequency, frequency * shots[0].ratio).unwrap_or(0.0))
 }
 
 /// Refuses a scene that shows too little to be taught.

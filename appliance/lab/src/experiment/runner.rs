@@ -7,13 +7,14 @@ use super::judge::judge;
 use super::methods::{self, BetterSequence, Method};
 use super::scenes::{Judged, OpticsKind, Scene};
 use super::table::Values;
-use algo::adaptive::{ProjectorMap, noise, paper};
+use algo::adaptive::{ProjectorMap, paper};
 use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use algo::units::AbsolutePhase;
 use appliance::head::calibrated::{CalibratedHead, MeasureError, Measured};
 use appliance::head::calibration::Calibration;
+use appliance::recipe::adaptive::{AdaptivePattern, Preliminary};
 use hal::head::Head;
 use sim::{Stage, Truth};
 use std::sync::Arc;
@@ -25,7 +26,6 @@ pub struct Runner {
     stage: Stage,
     truth: Truth,
     calibration: Calibration,
-    optics: OpticsKind,
     judged: Judged,
     learnt: Learnt,
 }
@@ -34,22 +34,10 @@ pub struct Runner {
 #[derive(Default)]
 struct Learnt {
     seed: u64,
-    preliminary: Option<Arc<Preliminary>>,
+    preliminary: Option<Arc<Measured>>,
     paper: Option<Arc<ProjectorMap>>,
-    better: Option<Arc<Better>>,
+    better: Option<Arc<AdaptivePattern>>,
     golden: Option<Arc<Vec<AbsolutePhase>>>,
-}
-
-/// The preliminary vertical measurement: its raw phase, and where each pixel's light comes from.
-struct Preliminary {
-    phase: Vec<AbsolutePhase>,
-    map: ProjectorMap,
-}
-
-/// The better pattern, and the phase that it has in each camera pixel on the measured surface.
-struct Better {
-    function: PhaseFunction,
-    expected: Vec<AbsolutePhase>,
 }
 
 /// A run: its measurement and how good it is.
@@ -97,7 +85,6 @@ impl Runner {
             truth: stage.truth(),
             stage,
             calibration,
-            optics,
             judged: scene.judged,
             learnt: Learnt::default(),
         })
@@ -205,17 +192,18 @@ impl Runner {
     }
 
     /// The preliminary measurement of both adaptive methods: one vertical sequence at 20 px pitch.
-    fn preliminary(&mut self) -> Result<Arc<Preliminary>, MeasureError> {
+    fn preliminary(&mut self) -> Result<Arc<Measured>, MeasureError> {
         if let Some(known) = &self.learnt.preliminary {
             return Ok(Arc::clone(known));
         }
-        let function = self.vertical(self.size().0 as f64 / PRELIMINARY_PITCH)?;
-        let shots = Sequence::geometric(function.range(), 3, 4);
-        let measured = self.measure(PRELIMINARY_STREAM, &function, &shots, None)?;
-        let map = ProjectorMap::from_heights(&measured.triangulator, &measured.heights);
-        let phase = measured.phases.phase;
-        let found = Arc::new(Preliminary { phase, map });
+        let first = self.first()?;
+        let measured = self.measure(PRELIMINARY_STREAM, &first.function, &first.shots, None)?;
+        let found = Arc::new(measured);
         Ok(Arc::clone(self.learnt.preliminary.insert(found)))
+    }
+
+    fn first(&self) -> Result<Preliminary, MeasureError> {
+        Preliminary::new(self.size()).map_err(rig)
     }
 
     /// The paper's preliminary maps: vertical and horizontal at 20 px, each measured by itself.
@@ -229,30 +217,20 @@ impl Runner {
         let function = PhaseFunction::horizontal(columns, rows, fringes).map_err(rig)?;
         let shots = Sequence::geometric(function.range(), 3, 4);
         let horizontal = self.measure(HORIZONTAL_STREAM, &function, &shots, None)?;
-        let phases = [&vertical.phase[..], &horizontal.phases.phase];
+        let phases = [&vertical.phases.phase[..], &horizontal.phases.phase];
         let width = horizontal.phases.width;
         let map = ProjectorMap::from_phases(phases, [PRELIMINARY_PITCH; 2], width);
         Ok(Arc::clone(self.learnt.paper.insert(Arc::new(map))))
     }
 
-    /// The better pattern, made for the blur of the scenario.
-    fn better(&mut self) -> Result<Arc<Better>, MeasureError> {
+    /// The better pattern, made as teaching makes it.
+    fn better(&mut self) -> Result<Arc<AdaptivePattern>, MeasureError> {
         if let Some(known) = &self.learnt.better {
             return Ok(Arc::clone(known));
         }
         let preliminary = self.preliminary()?;
-        let blur = self.optics.blur();
-        let optics = noise::Optics {
-            projector_blur: blur.projector_blur_px,
-            camera_blur: blur.camera_blur_px,
-            projector_pitch: noise::PROJECTOR_PITCH,
-            image_pitch: noise::IMAGE_PITCH,
-        };
-        let (columns, rows) = self.size();
-        let map = &preliminary.map;
-        let function = noise::adapt(map, columns, rows, &optics).map_err(rig)?;
-        let expected = map.expected_phase(&function);
-        let found = Arc::new(Better { function, expected });
+        let made = self.first()?.adapt(&preliminary, &self.calibration);
+        let found = Arc::new(made.map_err(rig)?);
         Ok(Arc::clone(self.learnt.better.insert(found)))
     }
 

@@ -47,13 +47,14 @@ impl Characteristics {
         })
     }
 
-    /// Gives a calibration the response and the noise.
+    /// Gives a calibration the response, the noise and the contrast.
     ///
     /// # Errors
     /// In words: the response cannot be inverted.
     pub fn adopt(&self, calibration: &mut Calibration) -> Result<(), String> {
         calibration.response = inverted(&self.response)?;
         calibration.noise_counts = self.noise.counts;
+        calibration.contrast = Some(self.contrast.clone());
         Ok(())
     }
 }

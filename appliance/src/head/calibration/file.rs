@@ -319,6 +319,7 @@ impl CalibrationFile {
             .map_err(|error| format!("{error}: calibrate anew"))?;
         let (camera, projector) = (&self.camera, &self.projector);
         Ok(Calibration {
+            contrast: self.contrast.clone(),
             plane: self.plane(),
             heights_by: self.heights_by,
             response: self.response.as_deref().map_or(Ok(None), inverted)?,

@@ -9,6 +9,8 @@ pub mod place;
 
 pub use current::Current;
 
+use file::ContrastFile;
+
 use crate::head::seam;
 use crate::storage::hex;
 use algo::geometry::{HeightRange, Pinhole, RigError, Triangulator};
@@ -53,6 +55,8 @@ pub struct Calibration {
     pub heights_by: HeightsBy,
     /// σ of one sample in counts.
     pub noise_counts: f64,
+    /// Contrast of fringes against their pitch, if it was measured.
+    pub contrast: Option<ContrastFile>,
     /// The projector's measured grey response, where it is not linear.
     pub response: Option<GreyResponse>,
     /// Whether the light is known to be linear in the grey level, by itself or with the inverse of `response`. Only then may a
@@ -91,6 +95,7 @@ impl Calibration {
             plane: None,
             heights_by: HeightsBy::Models,
             noise_counts,
+            contrast: None,
             response: None,
             linear: false,
             sigma: None,

@@ -1,0 +1,145 @@
+//! The blur of both lenses, from the contrast that fringes have on a part and on a plate.
+//!
+//! **Idea.** The projector's blur weakens fringes by their pitch in projector pixels, the camera's by their pitch in camera pixels. On
+//! steep surfaces these differ, so a part with slopes tells both apart.
+//!
+//! **Equation.** Of two frequencies f and c on a surface of slope J, the contrast beyond that of the pixels' squares falls by
+//! exp(−2π²(f² − c²)(σ_P² + |J|²σ_C²)): the logarithm is a straight line over |J|². Its two numbers are a least-squares fit through the
+//! medians of [`GROUPS`] groups of pixels of about the same slope, because medians ignore edges and noise. What calibration measured on
+//! a plate counts as much as all groups. Where all slopes are alike, the blur is put on the projector.
+
+use super::contrast::{Blur, contrast};
+use alloc::vec::Vec;
+use core::f64::consts::PI;
+
+/// Groups of pixels whose medians are fitted.
+const GROUPS: usize = 16;
+/// Below this variance of |J|², as a share of its mean square, all slopes are alike.
+const ALIKE: f64 = 0.05;
+
+/// σ_P² + |J|²σ_C² of a surface with slope J, as a point of the line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// |J|², squared projector pixels per squared camera pixel.
+    pub steepness: f64,
+    /// The variance of the blur, squared projector pixels.
+    pub variance: f64,
+}
+
+impl Spread {
+    /// From the modulation at `fine` as a share of that at `coarse` (turns per projector pixel) on a surface of slope `[ju, jv]`.
+    /// `None` if they tell nothing, for example because one of them is unknown.
+    pub fn new([ju, jv]: [f64; 2], share: f64, [fine, coarse]: [f64; 2]) -> Option<Self> {
+        let pixels = |g: f64| contrast(&Blur::default(), g, [g * ju, g * jv]);
+        let lost = -libm::log(share * pixels(coarse) / pixels(fine));
+        let variance = lost / (2.0 * PI * PI * (fine * fine - coarse * coarse));
+        let steepness = ju * ju + jv * jv;
+        (variance.is_finite() && steepness.is_finite()).then_some(Self {
+            steepness,
+            variance,
+        })
+    }
+}
+
+impl Blur {
+    /// The blur of both lenses from the pixels of a part, and from a plate, if one was measured. `None` without any.
+    pub fn fit(mut part: Vec<Spread>, plate: Option<Spread>) -> Option<Self> {
+        part.sort_unstable_by(|a, b| a.steepness.total_cmp(&b.steepness));
+        let size = part.len().div_ceil(GROUPS).max(1);
+        let groups: Vec<Spread> = part.chunks_mut(size).map(middle).collect();
+        let weight = groups.len().max(1) as f64;
+        let points = groups.iter().map(|group| (1.0, *group));
+        let points = points.chain(plate.map(|plate| (weight, plate)));
+        let [mut n, mut x, mut y, mut xx, mut xy] = [0.0; 5];
+        for (weight, point) in points {
+            let (steepness, variance) = (point.steepness, point.variance);
+            n += weight;
+            x += weight * steepness;
+            y += weight * variance;
+            xx += weight * steepness * steepness;
+            xy += weight * steepness * variance;
+        }
+        if n == 0.0 {
+            return None;
+        }
+        let spread = n * xx - x * x;
+        let camera = match spread > ALIKE * n * xx {
+            // Neither variance is below 0.
+            true => ((n * xy - x * y) / spread).clamp(0.0, (xy / xx).max(0.0)),
+            false => 0.0,
+        };
+        Some(Self {
+            projector: libm::sqrt(((y - camera * x) / n).max(0.0)),
+            camera: libm::sqrt(camera),
+        })
+    }
+}
+
+/// The medians of a group, which is sorted by steepness and not empty.
+fn middle(group: &mut [Spread]) -> Spread {
+    let middle = group.len() / 2;
+    let steepness = group[middle].steepness;
+    let (_, median, _) =
+        group.select_nth_unstable_by(middle, |a, b| a.variance.total_cmp(&b.variance));
+    Spread {
+        steepness,
+        variance: median.variance,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FREQUENCIES: [f64; 2] = [1.0 / 20.0, 1.0 / 900.0];
+
+    /// What a surface of slope `j` shows of a blur.
+    fn seen(blur: &Blur, j: f64, [fine, coarse]: [f64; 2]) -> Spread {
+        let at = |g: f64| contrast(blur, g, [g * j, 0.1 * g]);
+        Spread::new([j, 0.1], at(fine) / at(coarse), [fine, coarse]).unwrap()
+    }
+
+    #[test]
+    fn a_part_with_slopes_tells_the_blur_of_both_lenses_apart() {
+        let blur = Blur {
+            projector: 1.0,
+            camera: 0.5,
+        };
+        let slopes = (0..999).map(|i| 0.5 + 0.003 * f64::from(i));
+        let mut part: Vec<Spread> = slopes.map(|j| seen(&blur, j, FREQUENCIES)).collect();
+        // One pixel in nine lies at an edge.
+        for at in part.iter_mut().step_by(9) {
+            at.variance *= 3.0;
+        }
+        let plate = seen(&blur, 0.9, [1.0 / 8.0, 1.0 / 64.0]);
+        for found in [Blur::fit(part.clone(), Some(plate)), Blur::fit(part, None)] {
+            let found = found.unwrap();
+            assert!((found.projector - 1.0).abs() < 0.03, "{found:?}");
+            assert!((found.camera - 0.5).abs() < 0.03, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_flat_part_puts_all_blur_on_the_projector() {
+        let blur = Blur {
+            projector: 0.6,
+            camera: 0.5,
+        };
+        let part = [0.99, 1.0, 1.01].map(|j| seen(&blur, j, FREQUENCIES));
+        let found = Blur::fit(part.into(), None).unwrap();
+        assert_eq!(found.camera, 0.0);
+        assert!((found.projector - 0.781).abs() < 0.005, "{found:?}");
+    }
+
+    #[test]
+    fn contrast_above_that_of_the_pixels_is_no_blur_and_nothing_measured_is_none() {
+        let sharper = Spread {
+            steepness: 1.0,
+            variance: -0.1,
+        };
+        assert_eq!(Blur::fit([sharper].into(), None), Some(Blur::default()));
+        assert_eq!(Blur::fit(Vec::new(), None), None);
+        assert_eq!(Spread::new([1.0, 0.0], f64::NAN, FREQUENCIES), None);
+        assert_eq!(Spread::new([1.0, 0.0], 0.0, FREQUENCIES), None);
+    }
+}
