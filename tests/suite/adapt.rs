@@ -13,6 +13,7 @@ use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedFrame};
 use sim::parts::Sphere;
 use sim::{Part, Scenario, Stage};
+use std::f64::consts::PI;
 use std::ffi::OsStr;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -166,8 +167,11 @@ fn the_adapted_pattern_measures_as_much_better_as_adapt_predicts() {
         "{before} mm, then {after} mm: {}, predicted {predicted}",
         after / before
     );
-    // The renderer samples points, so its pixels do not lose contrast (10 to 15 % here).
-    let share = after / before / predicted;
+    // The renderer samples points, so its pixels do not lose contrast (10 to 15 % here), and no lens blurs them, where `adapt` takes
+    // one of σ 0.5 px if none is given.
+    let lens = |pitch_px: f64| (-2.0 * (PI * 0.5 / pitch_px).powi(2)).exp();
+    let pitch_px = report["pitch_px"][0].as_f64().expect("a pitch");
+    let share = after / before / predicted / (lens(pitch_px) / lens(20.0));
     assert!(predicted < 0.5 && (0.8..1.05).contains(&share), "{share}");
 }
 
