@@ -1,5 +1,6 @@
 //! The command line.
 
+mod accuracy;
 mod bench;
 mod experiment;
 
@@ -24,6 +25,8 @@ enum Command {
     Experiment(experiment::Experiment),
     /// Time the kernels, time against error, and trigger to verdict.
     Bench(bench::Bench),
+    /// Divide the error of heights into noise and what remains without it, and find the smallest dents that are seen.
+    Accuracy(accuracy::Accuracy),
     /// Print what makes a shell complete the command line.
     Completions(Completions),
 }
@@ -37,6 +40,7 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
     match arguments.command {
         Command::Experiment(command) => command.run(),
         Command::Bench(command) => command.run(),
+        Command::Accuracy(command) => command.run(),
         Command::Completions(command) => {
             command.run(Arguments::command());
             Ok(())

@@ -23,6 +23,8 @@ pub struct Scene {
     pub camera: u32,
     /// Bits of the camera: 8 in the study.
     pub bit_depth: u8,
+    /// Largest noise of a sample, counts: the paper's in the study.
+    pub noise_counts: f64,
 }
 
 /// The quantity that a part's figure shows.
@@ -84,6 +86,7 @@ impl Scene {
             placement,
             camera: CAMERA,
             bit_depth: BIT_DEPTH,
+            noise_counts: Noise::PAPER,
         })
     }
 
@@ -122,7 +125,7 @@ impl Scene {
             *fov = 2.0 * half.atan().to_degrees();
         }
         (camera.width, camera.height) = (self.camera, self.camera);
-        (scenario.noise.noise_counts, scenario.noise.seed) = (Some(Noise::PAPER), seed);
+        (scenario.noise.noise_counts, scenario.noise.seed) = (Some(self.noise_counts), seed);
         scenario
     }
 }
