@@ -253,10 +253,11 @@ mod tests {
     }
 
     fn rig(size: (usize, usize)) -> Triangulator {
-        // 24 pixels per fringe: 3 mm of height are a quarter of a turn.
-        let function = PhaseFunction::vertical(1024, 768, 1024.0 / 24.0).unwrap();
-        let camera = device(0.35, size, MM_PER_PIXEL);
-        let projector = device(-0.12, (1024, 768), 0.47);
+        // 16 pixels per fringe: 3 mm of height are a fifth of a turn.
+        let function = PhaseFunction::vertical(1024, 768, 1024.0 / 16.0).unwrap();
+        // From straight above, so that the rib's walls do not make it wider.
+        let camera = device(0.0, size, MM_PER_PIXEL);
+        let projector = device(-0.47, (1024, 768), 0.47);
         Triangulator::new(camera, projector, Reference::Models, function, None).unwrap()
     }
 
