@@ -57,6 +57,7 @@ mod together;
 mod triangulation;
 mod twin;
 mod two_clients;
+mod two_frames;
 mod weights;
 mod whole_maps;
 mod written;

@@ -52,8 +52,8 @@ fn uniform(scenario: &mut Scenario) {
 /// The simulator's default: shot noise and read noise.
 fn shot(_: &mut Scenario) {}
 
-/// A plan with a gauge of every kind.
-fn every_kind(bed: &Bed, taught: &TaughtRecipe) -> (RecipeFile, Plan) {
+/// A plan with a gauge of every kind, whose cycles begin with two frames if they are asked for.
+fn every_kind(bed: &Bed, taught: &TaughtRecipe, two_frames: bool) -> (RecipeFile, Plan) {
     let deviation = GaugeKind::Deviation { smoothing_px: SIDE };
     let mut gauges = all_kinds(CELL, 0.012);
     gauges[0] = gauge("on plate", "plate", deviation.clone());
@@ -67,6 +67,7 @@ fn every_kind(bed: &Bed, taught: &TaughtRecipe) -> (RecipeFile, Plan) {
     ];
     let mut file = RecipeFile {
         gauges,
+        two_frames,
         ..taught.manifest.clone()
     };
     file.regions.extend(regions(plate, bead));
@@ -135,8 +136,19 @@ impl Repeated {
 
 /// Measures a part again and again in each of random placements.
 fn repeats(noise: fn(&mut Scenario), dent: bool, placements: usize, repeats: usize) {
+    repeats_by(noise, dent, placements, repeats, false);
+}
+
+/// The same, by the first sequence of a recipe with or without two frames.
+fn repeats_by(
+    noise: fn(&mut Scenario),
+    dent: bool,
+    placements: usize,
+    repeats: usize,
+    two_frames: bool,
+) {
     let (mut bed, taught) = line(noise);
-    let (file, plan) = every_kind(&bed, &taught);
+    let (file, plan) = every_kind(&bed, &taught, two_frames);
     let rasters = plan.rasters(&bed.calibration).unwrap();
     bed.head.load(rasters).unwrap();
     // On the plate between bead, slot and the large hole.
@@ -236,6 +248,11 @@ fn with_shot_noise_every_kind_of_gauge_repeats_as_well_as_it_says() {
 #[test]
 fn every_kind_of_gauge_repeats_as_well_as_it_says_wherever_a_dented_part_lies() {
     repeats(uniform, true, 6, 40);
+}
+
+#[test]
+fn by_two_frames_every_kind_of_gauge_repeats_as_well_as_it_says() {
+    repeats_by(uniform, false, 6, 40, true);
 }
 
 #[test]

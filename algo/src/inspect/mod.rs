@@ -19,7 +19,7 @@ pub use mask::eroded;
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
 pub use strips::{
-    CalibrationError, Findings, Gauge, Input, MAX_GAUGES, Parts, Production, Skipped, Strips,
-    Taught, Unmeasurable,
+    CalibrationError, Findings, Found, Gauge, Input, MAX_GAUGES, PairBuffers, PairPlaced, Parts,
+    Picture, Production, Skipped, Strips, Taught, Unmeasurable,
 };
 pub use weight::Weight;

@@ -241,6 +241,21 @@ impl Sequence {
             .collect()
     }
 
+    /// The fringe and its complement at ratio 1: a level of two shifts, which no pixel can be demodulated from by itself.
+    /// [`crate::inspect::Production::place_pair`] fits it over windows.
+    pub fn pair() -> Self {
+        let level = Level {
+            ratio: 1.0,
+            start: 0.0,
+            frames: [0, 1].into_iter().collect(),
+            waveform: Waveform::SINE,
+        };
+        Self {
+            levels: [level].into_iter().collect(),
+            frame_count: 2,
+        }
+    }
+
     /// Three dense levels of `shifts` shifts: ratios 1, 1 − 1/n², 1 − 1/n, in this order.
     pub fn dense(n: f64, shifts: usize) -> Vec<Shot> {
         [1.0, 1.0 - 1.0 / (n * n), 1.0 - 1.0 / n]

@@ -157,6 +157,16 @@ impl Decoder {
         self.unwrapping
     }
 
+    /// Whether the sequence is the fringe and its complement ([`Sequence::pair`]): [`Self::row`] has no phase of it.
+    pub fn is_pair(&self) -> bool {
+        self.frame_count == 2
+    }
+
+    /// Bits per sample.
+    pub fn bit_depth(&self) -> u8 {
+        self.bit_depth
+    }
+
     /// Full scale of a sample, in counts.
     pub fn full_scale(&self) -> u16 {
         ((1_u32 << self.bit_depth) - 1) as u16

@@ -34,7 +34,7 @@ impl PhaseMap {
         }
     }
 
-    fn rows(&mut self) -> Vec<PhaseRow<'_>> {
+    pub(crate) fn rows(&mut self) -> Vec<PhaseRow<'_>> {
         let width = self.width.max(1);
         self.phase
             .chunks_mut(width)

@@ -46,6 +46,10 @@ pub struct Teach {
     /// or 1.
     #[arg(long, value_name = "MM", value_parser = number(0.0, MAX_TOLERANCE_MM))]
     tolerance: Option<f64>,
+    /// Let cycles begin with two frames, the fringe and its complement; where they do not hold, the sequence that the limits ask
+    /// for follows in the same cycle.
+    #[arg(long, value_name = "2", value_parser = number(2_u16, 2))]
+    frames: Option<u16>,
     /// Recording of the good part with the full sequence; its pattern becomes the recipe's. Without
     /// it, the part in front of the configured head is taught.
     #[arg(long, value_name = "DIR", requires = "out", conflicts_with = "state")]
@@ -135,6 +139,12 @@ impl Teach {
         };
         let taught = match replaced.filter(|_| self.keep_gauges) {
             Some(file) => replace::keep_gauges(taught, &file)
+                .map_err(|words| Failure::new(Exit::Content, format!("teach: {words}")))?,
+            None => taught,
+        };
+        let taught = match self.frames {
+            Some(_) => taught
+                .with_two_frames()
                 .map_err(|words| Failure::new(Exit::Content, format!("teach: {words}")))?,
             None => taught,
         };

@@ -170,6 +170,13 @@ impl Recipe {
 /// The sequence for production, and behind it those that unwrap further than the one before.
 fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, String> {
     let mut chain: Vec<RecipeSequence> = Vec::new();
+    if file.two_frames {
+        chain.push(RecipeSequence {
+            kind: SequenceKind::TwoFrames,
+            shots: Shot::level(1.0, 2).collect(),
+            levels: Sequence::pair(),
+        });
+    }
     for sequence in file.sequences.iter().skip(file.production) {
         if chain
             .last()

@@ -126,6 +126,7 @@ impl Store {
 fn of_manifest(file: RecipeFile) -> Listed {
     let production = file.sequences.get(file.production);
     let sequence = match production.map(|sequence| sequence.kind) {
+        Some(SequenceKind::TwoFrames) => "two frames",
         Some(SequenceKind::SingleLevel) => "single level",
         Some(SequenceKind::TwoLevels) => "two levels",
         Some(SequenceKind::Full) => "full",

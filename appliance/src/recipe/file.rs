@@ -44,6 +44,9 @@ pub struct RecipeFile {
     pub sequences: Vec<SequenceFile>,
     /// Which of them is projected first in production, counted from 0; longer ones may follow in the same cycle.
     pub production: usize,
+    /// Whether a cycle begins with the fringe and its complement at ratio 1, before the sequence for production.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub two_frames: bool,
     /// How far a part may lie from where it was taught, in any direction, mm.
     pub placement_tolerance_mm: f64,
     /// Whether the part's motion is measured and compensated before it is gauged.
@@ -148,6 +151,10 @@ pub struct SequenceFile {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SequenceKind {
+    /// The fringe and its complement, fitted in windows about golden as the part lies in the picture. It is not in the list of
+    /// sequences: [`RecipeFile::two_frames`].
+    #[serde(skip)]
+    TwoFrames,
     /// One level: |ΔΦ| < 0.4 turn, of 0.5 that are unambiguous.
     SingleLevel,
     /// Two dense levels of ratios 1 and 4/5: |ΔΦ| < 2.3 turns, of 2.5 that are unambiguous.
@@ -158,12 +165,13 @@ pub enum SequenceKind {
 
 impl SequenceKind {
     /// Largest |ΔΦ| about the golden map that is unwrapped correctly, in turns; `None` for the full sequence, in which a
-    /// wrong fringe order leaves a large residual, so that the pixel is rejected.
+    /// wrong fringe order leaves a large residual, so that the pixel is rejected, and for two frames, which are not unwrapped about
+    /// golden as it was taught.
     pub fn reach(self) -> Option<f32> {
         match self {
             Self::SingleLevel => Some(0.4),
             Self::TwoLevels => Some(2.3),
-            Self::Full => None,
+            Self::TwoFrames | Self::Full => None,
         }
     }
 }

@@ -116,6 +116,28 @@ impl TaughtRecipe {
     }
 }
 
+impl TaughtRecipe {
+    /// The same recipe, whose cycles begin with two frames.
+    ///
+    /// # Errors
+    /// In words, if it could not be packed.
+    pub fn with_two_frames(mut self) -> Result<Self, String> {
+        self.manifest.two_frames = true;
+        self.choice.reasons.push(
+            "2 frames are tried first, the sequence taken follows in the same cycle where they do not hold".into(),
+        );
+        let mut recipe = Recipe::check(&self.manifest, self.recipe.arrays)?;
+        let (bytes, fingerprint) = archive::pack(&self.manifest, &recipe.arrays)?;
+        recipe.id.fingerprint.clone_from(&fingerprint);
+        self.manifest.fingerprint = fingerprint;
+        Ok(Self {
+            bytes,
+            recipe,
+            ..self
+        })
+    }
+}
+
 impl GoldenPart<'_> {
     /// Makes the recipe: expansion of the height, phase reach (from which follows where a short sequence is safe), sequences, regions
     /// and gauges. The gauges are the deviation from golden and the coverage of the whole frame, and, for each of the up to
@@ -172,6 +194,7 @@ impl GoldenPart<'_> {
             pattern: self.pattern.clone(),
             sequences,
             production: choice.production,
+            two_frames: false,
             placement_tolerance_mm: naming.placement_tolerance_mm,
             alignment: AlignmentKind::Rigid,
             range_mm: [range.low, range.high],

@@ -76,7 +76,7 @@ pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<
     ))
 }
 
-/// Gives a recipe that was just taught the regions, gauges, limits, guard band and least coverage of the one that it replaces; the
+/// Gives a recipe that was just taught the regions, gauges, limits, guard band, least coverage and two frames of the one that it replaces; the
 /// production sequence is chosen again for those limits.
 ///
 /// # Errors
@@ -92,6 +92,7 @@ pub fn keep_gauges(taught: TaughtRecipe, replaced: &RecipeFile) -> Result<Taught
     manifest.gauges.clone_from(&replaced.gauges);
     manifest.min_coverage = replaced.min_coverage;
     manifest.guard_k = replaced.guard_k;
+    manifest.two_frames = replaced.two_frames;
     // The prediction is for the limits that teaching sets.
     manifest.good_parts = None;
     TaughtRecipe::of(manifest, recipe.arrays)

@@ -97,6 +97,8 @@ pub struct Fitting<'a> {
     pub golden: GoldenSurface<'a>,
     /// Where it is looked at, and the point that is turned about.
     pub plan: &'a Alignment,
+    /// The motion to begin with; directions that the shape does not determine keep it. None: none at all.
+    pub from: Option<Motion>,
     pub(super) backend: Backend,
 }
 
@@ -139,17 +141,22 @@ impl Fitting<'_> {
         Some(found.placed)
     }
 
-    /// The motion that is found from none at all, beginning with these weights.
+    /// The motion that is found from the first one, beginning with these weights.
     fn descend(
         &self,
         mut weights: WeightFunction,
         samples: &[Sample],
         buffers: &mut FitBuffers,
     ) -> Option<Descended> {
-        let mut motion = Motion::none(self.plan.centre);
+        let mut motion = self.from.unwrap_or(Motion::none(self.plan.centre));
         for round in 1..=ROUNDS {
             let equations = &mut buffers.equations;
-            self.linearise(samples, &motion, round == 1, equations);
+            self.linearise(
+                samples,
+                &motion,
+                round == 1 && self.from.is_none(),
+                equations,
+            );
             if equations.len() < LEAST_POINTS {
                 return None;
             }

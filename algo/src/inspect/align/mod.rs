@@ -45,6 +45,7 @@ pub struct Alignment {
     corners: Vec<Vector>,
     /// From the top row down.
     spots: Vec<Spot>,
+    pixels_per_spot: f64,
 }
 
 /// About so many rows of the part are used.
@@ -109,6 +110,7 @@ impl Alignment {
             radius: radius.max(1e-3),
             left_out: [false; 6],
             corners: corners(spots.iter().map(|spot| spot.point)),
+            pixels_per_spot: (rows * columns) as f64,
             spots,
         };
         let placed = alignment.still(golden)?;
@@ -128,6 +130,11 @@ impl Alignment {
             .fit(&samples, &mut FitBuffers::default())
     }
 
+    /// About how many pixels there are to each spot.
+    pub fn pixels_per_spot(&self) -> f64 {
+        self.pixels_per_spot
+    }
+
     /// The index of the first spot in some rows, and the spots in them.
     pub fn spots(&self, rows: Range<usize>) -> (usize, &[Spot]) {
         let first = self.spots.partition_point(|spot| spot.v < rows.start);
@@ -140,6 +147,7 @@ impl Alignment {
         Fitting {
             golden,
             plan: self,
+            from: None,
             backend: Backend::best(),
         }
     }

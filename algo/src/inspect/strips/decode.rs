@@ -26,6 +26,12 @@ impl Production {
             Input::Finest(arrived, frames) => {
                 decoder.last_row(arrived, frames, v, map, columns, out);
             }
+            Input::Phases(phases) => {
+                let there = v * phases.width + columns.start..v * phases.width + columns.end;
+                out.phase[columns.clone()].copy_from_slice(&phases.phase[there.clone()]);
+                out.modulation[columns.clone()].copy_from_slice(&phases.modulation[there.clone()]);
+                out.trust[columns].copy_from_slice(&phases.trust[there]);
+            }
         }
     }
 

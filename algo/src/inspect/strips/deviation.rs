@@ -102,9 +102,11 @@ impl Production {
         }
         let count = best.count as f64;
         let (pixels, motion) = noise.variances(count, pose.placed.as_ref());
+        let smoothed = self.square_variance(side);
+        let pixels = pixels * smoothed;
         let value = best.sum as f64 / count / 1e6;
         // What good parts read: golden's noise and that of this measurement.
-        let golden = self.golden_variance(noisier);
+        let golden = self.golden_variance(noisier) / smoothed;
         let largest = self.largest.get(gauge).copied().unwrap_or_default();
         let largest = largest.times(libm::sqrt(1.0 + 1.0 / golden));
         let extreme = largest.uncertain(libm::fabs(value), libm::sqrt(pixels));
@@ -115,7 +117,9 @@ impl Production {
             expected: Some(largest.mean).filter(|mean| *mean > 0.0),
             // The extreme of noise scatters with golden's noise, too; that of a defect is shifted by it.
             systematic: libm::hypot(
-                libm::sqrt(golden * (extreme.defect * pixels + motion)),
+                libm::sqrt(
+                    golden * (extreme.defect * pixels + motion * smoothed / self.spot_variance()),
+                ),
                 self.displaced(pose.placed.as_ref()),
             ),
         }

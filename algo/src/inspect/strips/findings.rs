@@ -8,8 +8,8 @@ use super::{CellBuffers, Input, MAX_GAUGES, Measure, Production, Strip, Strips};
 use crate::inspect::Reading;
 use crate::inspect::align::Placed;
 use crate::inspect::gauge::{
-    Sum, TaughtCell, cells, flatness, found, mean, peak_to_valley, rms, share_outside, step, tilt,
-    volume,
+    Found, Sum, TaughtCell, cells, flatness, found, mean, peak_to_valley, rms, share_outside, step,
+    tilt, volume,
 };
 use crate::phase::Trust;
 use crate::pipeline::VARIANCE_UNIT_NM;
@@ -71,6 +71,8 @@ impl Production {
         );
         // The ratio of σ_z to that as taught.
         let noisier = height_noise_mm / taught_noise_mm.max(f64::MIN_POSITIVE);
+        // From the noise of independent pixels to that of the map.
+        let windows = libm::sqrt(self.square_variance(1));
         let readings = (0..self.gauges.list.len())
             .map(|gauge| self.reading(gauge, input, noisier, strips))
             .collect();
@@ -80,8 +82,8 @@ impl Production {
             readings,
             resolved: trusts[Trust::Resolved as usize],
             coverage: tally.compared as f64 / self.compared.max(1) as f64,
-            height_noise_mm,
-            taught_noise_mm,
+            height_noise_mm: height_noise_mm * windows,
+            taught_noise_mm: taught_noise_mm * windows,
             contradicting: contradicting as f64
                 / (contradicting + count(Trust::Resolved)).max(1) as f64,
             placed: strips.pose.placed.clone(),
@@ -139,7 +141,7 @@ impl Production {
                     sigma: Some(sigma),
                     expected: None,
                     systematic: libm::hypot(
-                        sigma * libm::sqrt(self.golden_variance(noisier)),
+                        sigma * libm::sqrt(self.golden_variance(noisier) / self.spot_variance()),
                         value * self.calibration.length,
                     ),
                 })
@@ -162,7 +164,7 @@ impl Production {
         let side = measure.cell_side()?;
         buffers.cells.clear();
         buffers.weights.clear();
-        let taught = &self.gauges.patches[patches.start].taught;
+        let taught: &[TaughtCell] = &self.gauges.patches[patches.start].taught;
         self.gather(patches.start, side, strips, buffers);
         let count = buffers.cells.len();
         if measure == Measure::Step {
@@ -170,15 +172,25 @@ impl Production {
             self.gather(patches.end - 1, side, strips, buffers);
         }
         let CellBuffers { cells, weights, .. } = buffers;
+        let pixels = |taught: &[TaughtCell]| taught.iter().map(|cell| cell.pixels).sum::<u32>();
+        // A region without cells as a square of its area.
+        let smoothed = self.square_variance(match side {
+            0 => pixels(taught).isqrt() as usize,
+            side => side,
+        });
         let variance = |taught: &[TaughtCell]| {
-            let pixels: u32 = taught.iter().map(|cell| cell.pixels).sum();
+            let pixels = pixels(taught);
             let sum: f64 = taught.iter().map(|cell| cell.variance).sum();
-            sum / f64::from(pixels.max(1)) * noisier * noisier
+            sum / f64::from(pixels.max(1)) * noisier * noisier * smoothed
         };
         let pixel = variance(taught);
         let cell = libm::sqrt(pixel) / side.max(1) as f64;
         let placed = pose.placed.as_ref();
-        let reading = |found, made| self.reading_of(found, made, noisier, placed);
+        let reading = |found, made| self.reading_of(found, made, (noisier, smoothed), placed);
+        let together = |found: Found| Found {
+            pixels: found.pixels * self.cells_together(side),
+            ..found
+        };
         // The value of a gauge that is linear in height; the others return their readings.
         let value = match measure {
             Measure::Flatness { .. } => {
@@ -190,11 +202,11 @@ impl Production {
                 return Some(reading(found, Made::OfHeights));
             }
             Measure::RmsDeviation { .. } => {
-                let found = rms(cells, cell, placed)?;
+                let found = together(rms(cells, cell, placed)?);
                 return Some(reading(found, Made::OfDeviations));
             }
             Measure::OutOfTolerance { tolerance, .. } => {
-                let found = share_outside(cells, cell, tolerance, placed)?;
+                let found = together(share_outside(cells, cell, tolerance, placed)?);
                 return Some(reading(found, Made::OfDeviations));
             }
             Measure::MeanHeight => mean(cells, weights)?,

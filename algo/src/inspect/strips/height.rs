@@ -200,7 +200,7 @@ impl Production {
         })
     }
 
-    /// σ_z in nm of a pixel with this modulation and ∂z/∂Φ.
+    /// σ_z in nm of a pixel with this modulation and ∂z/∂Φ; of a pair that of the pixel's own samples, without its window.
     pub(super) fn sigma_nm(&self, modulation: Modulation, slope: f64) -> f64 {
         let turns = self.decoder.phase_noise(modulation, self.noise_counts);
         libm::fabs(turns * slope) * 1e6

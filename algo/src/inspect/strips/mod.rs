@@ -33,6 +33,7 @@ mod findings;
 mod gauges;
 mod height;
 mod input;
+mod pair;
 mod plan;
 mod pose;
 mod recent;
@@ -45,11 +46,12 @@ mod weighted;
 pub use findings::{Findings, Skipped};
 pub use gauges::{Gauge, MAX_GAUGES, Unmeasurable};
 pub use input::Input;
+pub use pair::{Found, PairBuffers, PairPlaced, Picture};
 pub use plan::{Parts, Production};
 pub use taught::Taught;
 pub use uncertainty::CalibrationError;
 
-use super::align::{FitBuffers, Placed, Sample};
+use super::align::{FitBuffers, Motion, Placed, Sample};
 use super::gauge::{Cell, Measure, Sum, Weights};
 use crate::frame::FrameView;
 use crate::phase::DecodeError;
@@ -123,6 +125,16 @@ impl Production {
         input: Input<'_>,
         strips: &mut Strips,
     ) -> Result<Option<Placed>, DecodeError> {
+        self.place_from(input, strips, None)
+    }
+
+    /// As [`Self::place`], from a motion that is nearly right.
+    fn place_from(
+        &self,
+        input: Input<'_>,
+        strips: &mut Strips,
+        from: Option<Motion>,
+    ) -> Result<Option<Placed>, DecodeError> {
         self.check(input)?;
         let Some(alignment) = &self.alignment else {
             return Ok(None);
@@ -134,7 +146,8 @@ impl Production {
         for strip in &strips.strips {
             strips.samples.extend(&strip.samples);
         }
-        let fitting = alignment.fitting(self.golden());
+        let mut fitting = alignment.fitting(self.golden());
+        fitting.from = from;
         Ok(fitting.fit(&strips.samples, &mut strips.fitting))
     }
 

@@ -17,10 +17,10 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 /// Pixels from node to node. A turn by half a degree seen through 22° over 1456 pixels is bent by 0.003 pixels between them.
-const SPACING: usize = 64;
+pub(super) const SPACING: usize = 64;
 
 /// The points that a node's pixel sees below and above the middle height; NaN where it sees nothing.
-type Sight = [Vector; 2];
+pub(super) type Sight = [Vector; 2];
 
 /// How the part of a cycle lies, and what that does to every pixel.
 #[derive(Debug)]
@@ -113,7 +113,7 @@ impl PoseField {
 }
 
 /// The places of the nodes along `pixels` pixels: every [`SPACING`]th, and the last.
-fn nodes(pixels: usize) -> impl Iterator<Item = usize> {
+pub(super) fn nodes(pixels: usize) -> impl Iterator<Item = usize> {
     (0..(pixels - 1).div_ceil(SPACING) + 1).map(move |at| (at * SPACING).min(pixels - 1))
 }
 
@@ -124,7 +124,7 @@ pub(super) fn blocks_of_row(width: usize) -> Vec<BlockNumbers> {
 
 impl Production {
     /// What the node at pixel (u, v) sees.
-    fn sight(&self, (u, v): (usize, usize)) -> Sight {
+    pub(super) fn sight(&self, (u, v): (usize, usize)) -> Sight {
         let (middle, half) = self.levels;
         let nothing = Vector::new(f64::NAN, f64::NAN, f64::NAN);
         [middle - half, middle + half].map(|z| self.seen(u, v, z).unwrap_or(nothing))
@@ -153,7 +153,7 @@ impl Production {
     }
 
     /// The displacement by a motion of what the node at pixel (u, v) sees.
-    fn node(&self, motion: &Motion, (u, v): (usize, usize), sight: &Sight) -> Node {
+    pub(super) fn node(&self, motion: &Motion, (u, v): (usize, usize), sight: &Sight) -> Node {
         let at = |point: Vector| {
             let back = motion.undo(point);
             let to = self.triangulator.camera().project(back);

@@ -99,6 +99,8 @@ impl Strip {
     /// Keeps the points of its rows that the part's motion is found from.
     pub fn sample(&mut self, plan: &Production, alignment: &Alignment, input: Input<'_>) {
         self.samples.clear();
+        // The windows of a pair's spots share pixels where the spots are dense.
+        let share = libm::sqrt(plan.spot_variance()) * 1e-6;
         let (first, spots) = alignment.spots(self.rows.clone());
         let mut at = first;
         for row in spots.chunk_by(|a, b| a.v == b.v) {
@@ -112,7 +114,7 @@ impl Strip {
                     let above = f64::from(offset) * 1e-6;
                     self.samples.push(Sample {
                         point: plan.triangulator.higher(spot.point, above),
-                        sigma: plan.sigma_nm(modulation, slope) * 1e-6,
+                        sigma: plan.sigma_nm(modulation, slope) * share,
                         over: Some((at, above)),
                     });
                 }

@@ -9,8 +9,9 @@
 //!   as long as the part's displacement is wrong by.
 
 use super::Production;
+use super::pair::{correlated, smoothed};
 use crate::inspect::Reading;
-use crate::inspect::align::Placed;
+use crate::inspect::align::{Alignment, Placed};
 use crate::inspect::gauge::Found;
 
 /// σ by the error of the calibration; 0 where it is not known.
@@ -35,12 +36,12 @@ pub(super) enum Made {
 }
 
 impl Production {
-    /// A reading; σ_z is `noisier` times the taught σ.
+    /// A reading; σ_z is `noisier` times the taught σ, and the variances of pixels were multiplied by `smoothed`.
     pub(super) fn reading_of(
         &self,
         found: Found,
         made: Made,
-        noisier: f64,
+        (noisier, smoothed): (f64, f64),
         placed: Option<&Placed>,
     ) -> Reading {
         let Found {
@@ -49,9 +50,11 @@ impl Production {
             motion,
             lever,
         } = found;
+        // Golden's pixels are independent of each other.
+        let moved = motion / self.spot_variance();
         let (golden, wrong) = match made {
-            Made::OfHeights => (motion, self.calibration.height),
-            Made::OfDeviations => (pixels + motion, self.displaced(placed)),
+            Made::OfHeights => (moved, self.calibration.height),
+            Made::OfDeviations => (pixels / smoothed + moved, self.displaced(placed)),
         };
         let golden = golden * self.golden_variance(noisier);
         Reading {
@@ -66,6 +69,34 @@ impl Production {
     pub(super) fn golden_variance(&self, noisier: f64) -> f64 {
         let ratio = self.golden_noise / noisier.max(LEAST_NOISE);
         ratio * ratio
+    }
+
+    /// The variance of the mean over a square of `side` pixels, over that of the mean of as many independent pixels
+    /// ([`smoothed`]): 1 but for a pair.
+    pub(super) fn square_variance(&self, side: usize) -> f64 {
+        match self.decoder.is_pair() {
+            true => smoothed(side),
+            false => 1.0,
+        }
+    }
+
+    /// What neighbouring cells of `side` pixels add to the variance of a sum over the squares of all ([`correlated`]): 1 but for a
+    /// pair.
+    pub(super) fn cells_together(&self, side: usize) -> f64 {
+        match self.decoder.is_pair() {
+            true => correlated(side),
+            false => 1.0,
+        }
+    }
+
+    /// The variance of a spot of the alignment, over that of an independent pixel: 1 but for a pair, whose windows share pixels
+    /// where the spots are dense.
+    pub(super) fn spot_variance(&self) -> f64 {
+        let apart = self
+            .alignment
+            .as_ref()
+            .map_or(1.0, Alignment::pixels_per_spot);
+        self.square_variance(1).max(1.0 / apart.max(1.0)).min(1.0)
     }
 
     /// By how much a length as long as the part's displacement is wrong, mm.

@@ -13,6 +13,8 @@ const CONTRADICTING: f64 = 0.03;
 const UNFIT: f64 = 0.67;
 /// Largest share of points off the taught surface: a defect covers less, wrong fringe orders more.
 const OUTLIERS: f64 = 0.2;
+/// Least share of the picture's variance along golden's edges that golden explains where two frames are used.
+pub(super) const ALIKE: f64 = 0.8;
 
 impl Demands {
     /// Judges the findings.

@@ -4,8 +4,9 @@ use super::Plan;
 use crate::head::seam;
 use crate::output::cloud::ply;
 use algo::pipeline;
-use algo::units::Height;
+use algo::units::{Height, Modulation};
 use hal::frame::Frame;
+use std::sync::PoisonError;
 
 /// Maps of one part, row-major.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,17 +35,29 @@ impl Plan {
             }
         });
         let deviation_mm = deviation.collect();
-        let decoder = production.decoder();
-        let views: Result<Vec<_>, _> = frames.iter().map(seam::view).collect();
-        let phases = pipeline::decode(decoder, &views.ok()?, Some(production.map()), None).ok()?;
-        let full_scale = decoder.full_scale();
-        let counts = phases.modulation.iter();
+        let full_scale = production.decoder().full_scale();
+        let modulation = self.modulation(sequence, frames)?;
+        let counts = modulation.iter();
         Some(Layers {
-            width: phases.width,
+            width: production.cubics().surface().width,
             height_mm,
             deviation_mm,
             modulation: counts.map(|b| b.counts(full_scale) as f32).collect(),
         })
+    }
+
+    /// The modulation of a part whose heights were just computed.
+    fn modulation(&self, sequence: usize, frames: &[Frame]) -> Option<Vec<Modulation>> {
+        let run = self.runs.get(sequence)?;
+        if let Some(pair) = &run.pair {
+            let buffers = pair.buffers.lock().unwrap_or_else(PoisonError::into_inner);
+            return Some(buffers.phases().modulation.clone());
+        }
+        let production = &run.production;
+        let views: Result<Vec<_>, _> = frames.iter().map(seam::view).collect();
+        let (decoder, map) = (production.decoder(), Some(production.map()));
+        let phases = pipeline::decode(decoder, &views.ok()?, map, None).ok()?;
+        Some(phases.modulation)
     }
 
     /// The point cloud of a part as binary PLY, with its modulation as intensity; `None` as for [`Self::layers`].

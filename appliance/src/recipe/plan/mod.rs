@@ -20,14 +20,14 @@ use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_L
 use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::{HeightRange, Triangulator};
-use algo::inspect::{Findings, Input, Production, Strips};
+use algo::inspect::{Findings, Input, PairPlaced, Production, Strips};
 use algo::pattern::{MAX_FRAMES, Shot};
 use algo::phase::Arrived;
 use algo::pipeline::HeightCubics;
 use algo::units::Height;
 use hal::frame::Frame;
 use hal::projector::Raster;
-use run::{Prepared, Run, Shared};
+use run::{Pair, Prepared, Run, Shared};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -142,6 +142,9 @@ impl Plan {
             gauges,
             mut arrays,
         } = recipe;
+        let two_frames = sequences
+            .iter()
+            .any(|sequence| sequence.kind == SequenceKind::TwoFrames);
         // Large arrays that production does not read.
         arrays.phase_function = Vec::new();
         arrays.height_curvature = Vec::new();
@@ -193,6 +196,10 @@ impl Plan {
                 MAX_PATTERN_BYTES >> 20
             ));
         }
+        let modulation = match two_frames {
+            true => std::mem::take(&mut arrays.modulation),
+            false => Vec::new(),
+        };
         // Freed before the expansion of the height is allocated, which takes the most memory.
         drop(arrays);
         // The last sequence is the one that golden was measured with.
@@ -209,6 +216,7 @@ impl Plan {
             noise_counts: conditions.noise_counts,
             calibration: conditions.calibration,
             golden,
+            picture: (modulation, away as f64),
         };
         let runs = prepared
             .into_iter()
@@ -316,10 +324,14 @@ impl Plan {
             self.run(sequence, frames, finest, None, &mut laps)
         });
         match found {
-            Ok(findings) => {
+            Ok((findings, likeness)) => {
                 self.demands.judge(&findings, &mut inspection);
                 if sequence + 1 < self.runs.len() {
-                    inspection.step_up = self.demands.step_up(&findings, &inspection);
+                    let unlike = likeness.is_some_and(|likeness| likeness < judge::ALIKE);
+                    inspection.step_up = match unlike {
+                        true => Some("the picture differs from that of the taught part"),
+                        false => self.demands.step_up(&findings, &inspection),
+                    };
                 }
             }
             Err(reason) => {
@@ -343,6 +355,7 @@ impl Plan {
         Some(height_mm)
     }
 
+    /// The findings, and of two frames how much the picture is like golden's.
     fn run(
         &self,
         sequence: usize,
@@ -350,7 +363,7 @@ impl Plan {
         finest: Option<(&Arrived, &[FrameView<'_>])>,
         heights: Option<&mut [f32]>,
         laps: &mut Laps,
-    ) -> Result<Findings, String> {
+    ) -> Result<(Findings, Option<f64>), String> {
         let run = self.runs.get(sequence);
         let run = run.ok_or_else(|| format!("the recipe has no sequence {sequence}"))?;
         // On the stack: a trigger allocates nothing.
@@ -367,13 +380,25 @@ impl Plan {
         // A poisoned lock does no harm: strips are cleared before they are used.
         let mut strips = self.strips.lock().unwrap_or_else(PoisonError::into_inner);
         let production = &run.production;
+        if let Some(Pair { picture, buffers }) = &run.pair {
+            let mut buffers = buffers.lock().unwrap_or_else(PoisonError::into_inner);
+            let placed = production.place_pair(&views, picture.as_ref(), &mut strips, &mut buffers);
+            laps.end(Stage::Alignment);
+            let findings = placed.and_then(|PairPlaced { found, placed }| {
+                let input = Input::Phases(buffers.phases());
+                let findings = production.inspect_placed(input, &mut strips, placed, heights)?;
+                Ok((findings, Some(found.map_or(0.0, |found| found.likeness))))
+            });
+            laps.end(Stage::Strips);
+            return findings.map_err(|error| error.to_string());
+        }
         let placed = production.place(input, &mut strips);
         laps.end(Stage::Alignment);
         let findings = placed
             .and_then(|placed| production.inspect_placed(input, &mut strips, placed, heights))
             .map_err(|error| error.to_string());
         laps.end(Stage::Strips);
-        findings
+        Ok((findings?, None))
     }
 }
 
@@ -411,7 +436,7 @@ fn pixels(triangulator: &Triangulator, mm: f64) -> usize {
 /// The flag of a result that says which kind of sequence was used.
 fn sequence_flag(kind: SequenceKind) -> u16 {
     match kind {
-        SequenceKind::SingleLevel => SINGLE_LEVEL,
+        SequenceKind::TwoFrames | SequenceKind::SingleLevel => SINGLE_LEVEL,
         SequenceKind::TwoLevels => TWO_LEVELS,
         SequenceKind::Full => FULL_SEQUENCE,
     }

@@ -4,7 +4,9 @@ use super::golden;
 use crate::recipe::archive::Arrays;
 use crate::recipe::{RecipeSequence, SequenceKind};
 use algo::geometry::Triangulator;
-use algo::inspect::{CalibrationError, Gauge, Largest, Measure, Parts, Production, Taught};
+use algo::inspect::{
+    CalibrationError, Gauge, Largest, Measure, PairBuffers, Parts, Picture, Production, Taught,
+};
 use algo::pattern::{PhaseRange, Shot};
 use algo::phase::{Arrived, Decoder};
 use algo::pipeline::HeightCubics;
@@ -19,10 +21,20 @@ pub(super) struct Run {
     /// Which of the plan's rasters its frames show.
     pub indices: Vec<usize>,
     pub production: Production,
+    /// Of two frames.
+    pub pair: Option<Pair>,
     /// Memory for the levels that are decoded on arrival, allocated by the first cycle.
     pub arrived: Mutex<Option<Arrived>>,
     /// Bytes of its maps.
     pub bytes: usize,
+}
+
+/// What a run of two frames has beside the others.
+#[derive(Debug)]
+pub(super) struct Pair {
+    /// Golden's picture; none if it has no edges, and then every cycle falls back.
+    pub picture: Option<Picture>,
+    pub buffers: Mutex<PairBuffers>,
 }
 
 /// What all runs of a recipe share.
@@ -35,6 +47,8 @@ pub(super) struct Shared {
     pub noise_counts: f64,
     pub calibration: CalibrationError,
     pub golden: GoldenNoise,
+    /// Golden's modulation in counts and how far the image of a part may be displaced, pixels: what two frames need.
+    pub picture: (Vec<f32>, f64),
 }
 
 /// The noise of golden, and what it alone makes of gauges.
@@ -134,11 +148,18 @@ impl Prepared {
             largest: shared.golden.largest.clone(),
             calibration: shared.calibration,
         });
+        let production = production.map_err(|error| error.to_string())?;
+        let (modulation, tolerance_px) = &shared.picture;
+        let pair = (kind == SequenceKind::TwoFrames).then(|| Pair {
+            picture: production.picture(modulation, *tolerance_px),
+            buffers: Mutex::new(production.pair_buffers()),
+        });
         Ok(Run {
             kind,
             indices,
             bytes,
-            production: production.map_err(|error| error.to_string())?,
+            production,
+            pair,
             arrived: Mutex::new(None),
         })
     }
