@@ -47,6 +47,9 @@ const NOISE: f64 = 0.23;
 const TWELVE_FRAMES: f64 = 0.36;
 /// Error of the phase that light of an almost linear response leaves, radian: noise below it gains nothing.
 const LEAST_NOISE: f64 = 3e-3;
+/// The least modulation, in σ of a sample, that pixels of a noisy head get, so that wrong fringe orders stay as rare there as with the
+/// study's noise at 16 counts.
+const CERTAIN: f64 = 1.0 / NOISE;
 /// By how many σ of a sample the modulation of sines stays above the least that is trusted. With the waveforms of 3 to 9 shifts, it is at least
 /// 15 % larger, and three times its own σ above.
 const SAFE: f64 = 1.0;
@@ -95,7 +98,7 @@ impl Light {
     /// What one pixel asks of its fringes.
     fn asked(&self, pixel: usize) -> Asked {
         let modulation = self.modulation[pixel].max(self.least);
-        let needed = self.least + SAFE * self.noise;
+        let needed = self.least.max(CERTAIN * self.noise) + SAFE * self.noise;
         Asked {
             contrast: (needed / modulation).min(MOST_CONTRAST),
             noise: (TWELVE_FRAMES * self.noise / modulation).max(LEAST_NOISE),
@@ -310,13 +313,19 @@ mod tests {
     fn dark_pixels_ask_for_contrast_and_bright_ones_for_none() {
         let light = Light {
             modulation: vec![120.0, 30.0, 10.0, f64::NAN],
-            noise: 4.0,
+            noise: 3.0,
             least: 16.0,
         };
         let asked: Vec<f64> = (0..4).map(|pixel| light.asked(pixel).contrast).collect();
-        assert!((asked[0] - 20.0 / 120.0).abs() < 1e-9, "{asked:?}");
-        assert!((asked[1] - 20.0 / 30.0).abs() < 1e-9, "{asked:?}");
+        assert!((asked[0] - 19.0 / 120.0).abs() < 1e-9, "{asked:?}");
+        assert!((asked[1] - 19.0 / 30.0).abs() < 1e-9, "{asked:?}");
         assert_eq!(asked[2..], [MOST_CONTRAST; 2]);
+        // Twice as much noise as 16 counts were meant for.
+        let noisy = Light {
+            noise: 2.0 * NOISE * 16.0,
+            ..light
+        };
+        assert!((noisy.asked(0).contrast - (32.0 + noisy.noise) / 120.0).abs() < 1e-9);
     }
 
     #[test]
