@@ -13,9 +13,12 @@ use appliance::recipe::{AlignmentKind, Recipe};
 use hal::frame::Frame;
 use sim::Placement;
 
-/// Largest difference between the two, mm: strips interpolate between nodes where on the taught part a pixel looks, this file computes
-/// it for each pixel.
+/// Largest difference between the two, mm, on gentle slopes: strips interpolate between nodes where on the taught part a pixel looks,
+/// this file computes it for each pixel.
 const BROUGHT_MM: f64 = 5e-5;
+/// How far that interpolation is off, pixels: a shift by half a pixel is bent by 1e-4 pixels between two nodes. It counts on steep
+/// slopes and beside creases.
+const BENT_PX: f64 = 2e-4;
 
 /// Sets weights in a pattern, so that squares of a gauge have several different ones. `valid` holds them as [`Weight::bits`]: 1 is full
 /// weight, 60 and 190 are 60/256 and 190/256.
@@ -64,8 +67,9 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
     let width = recipe.conditions.camera.0 as usize;
     let triangulator = production.triangulator();
     let arrays = &recipe.arrays;
-    // Golden as the pixel `at` sees it after the part's motion: the measured z minus its deviation, and the weight there.
-    let moved_golden = |at: usize, z: f64| {
+    // Golden as the pixel `at` sees it after the part's motion: the measured z minus its deviation, and the weight there. It looks
+    // `aside` pixels beside its place.
+    let moved_golden = |at: usize, z: f64, aside: f64| {
         let point = triangulator.point(at % width, at / width, Height::from_mm(z))?;
         let back = motion.undo(point);
         let (u, v) = triangulator.camera().project(back)?;
@@ -78,7 +82,7 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
             return None;
         }
         let [a, b, c, d] = corners.map(|at| f64::from(arrays.golden_height[at]));
-        let (along, down) = (u.fract(), v.fract());
+        let (along, down) = (u.fract() + aside, v.fract());
         let (upper, lower) = (a + (b - a) * along, c + (d - c) * along);
         let deviation = back.z - (upper + (lower - upper) * down);
         let nearest = v.round() as usize * width + u.round() as usize;
@@ -93,28 +97,36 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
             .collect(),
         sigma: vec![f32::NAN; heights.len()],
     };
-    let heights = heights.iter().map(|&mm| f64::from(mm));
-    let golden = heights.enumerate().map(|(at, z)| {
-        let golden = z.is_finite().then(|| moved_golden(at, z)).flatten();
-        golden.unwrap_or((Height::UNKNOWN, Weight::NONE))
-    });
-    let (height, weight) = golden.unzip();
-    let golden = Golden {
-        width,
-        height,
-        weight,
+    let golden = |aside: f64| {
+        let golden = heights.iter().enumerate().map(|(at, &mm)| {
+            let z = f64::from(mm);
+            let golden = z.is_finite().then(|| moved_golden(at, z, aside)).flatten();
+            golden.unwrap_or((Height::UNKNOWN, Weight::NONE))
+        });
+        let (height, weight) = golden.unzip();
+        Golden {
+            width,
+            height,
+            weight,
+        }
     };
+    let aside = [-BENT_PX, BENT_PX].map(golden);
+    let golden = golden(0.0);
     let unweighed = Golden {
         weight: vec![Weight::FULL; golden.weight.len()],
         ..golden.clone()
     };
     let gauge = &recipe.gauges[0];
     let reading = found.readings[0].unwrap().value;
-    let [expected, full] = [golden, unweighed].map(|golden| {
-        let comparison = Comparison::new(&golden, &measured);
+    let value = |golden: &Golden| {
+        let comparison = Comparison::new(golden, &measured);
         expected(&comparison, &gauge.measure, &gauge.region).value
-    });
-    println!("{name}: {reading} {expected}, without weights {full}");
-    assert!((reading - expected).abs() < BROUGHT_MM, "{name}");
+    };
+    let (expected, full) = (value(&golden), value(&unweighed));
+    // Another square may be the extreme one, of the other sign.
+    let bent = aside.map(|golden| (value(&golden).abs() - expected.abs()).abs());
+    let allowed = BROUGHT_MM + bent[0].max(bent[1]);
+    println!("{name}: {reading} {expected} ± {allowed}, without weights {full}");
+    assert!((reading - expected).abs() < allowed, "{name}");
     assert!((reading - full).abs() > 10.0 * BROUGHT_MM, "{name}");
 }

@@ -7,7 +7,10 @@ use std::collections::BTreeSet;
 
 /// What each option that the programs share does in each command that offers it; the options that one command has for itself say so in
 /// its help. A pair that is not here is refused.
-const SHARED: [(&str, &str, &str); 6] = [
+const SHARED: [(&str, &str, &str); 9] = [
+    ("accuracy", "threads", "of everything"),
+    ("accuracy", "quiet", "no progress, no tables"),
+    ("accuracy", "json", "the tables"),
     ("experiment", "threads", "of everything"),
     ("experiment", "quiet", "no progress, no tables"),
     ("experiment", "json", "the means"),
