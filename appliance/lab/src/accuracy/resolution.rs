@@ -16,7 +16,7 @@ pub struct Resolution {
     pub diameter_mm: f64,
     /// Of the height of a pixel.
     pub of_pixel: f64,
-    /// Of the mean of [`SIDE`] × [`SIDE`] pixels.
+    /// Of the mean of 9 × 9 pixels.
     pub of_mean: f64,
 }
 
