@@ -76,8 +76,8 @@ pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<
     ))
 }
 
-/// Gives a recipe that was just taught the regions, gauges, limits, guard band, least coverage and two frames of the one that it replaces; the
-/// production sequence is chosen again for those limits.
+/// Gives a recipe that was just taught the regions, gauges, limits, guard band and least coverage of the one that it replaces, and its
+/// two frames if it begins with them; the production sequence is chosen again for those limits.
 ///
 /// # Errors
 /// In words, if they do not fit what was taught.

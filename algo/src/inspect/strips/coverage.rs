@@ -3,14 +3,16 @@
 //! A pixel is resolved if its modulation B is at least B_min. Where B lies within its noise σ of that, the pixel is resolved in one
 //! measurement and not in the next: its variance is p(1 − p), p = Φ((B₀ − B_min)/σ) with the true modulation B₀. Of that only the
 //! measured B is known, which scatters by σ, too. But the density of measured modulations at B_min, per σ, is φ((B₀ − B_min)/σ) for
-//! every pixel, and φ/√π is p(1 − p) within .03 everywhere and in its integral over all B₀. So the variance of the number of resolved pixels is this density over √π, whether modulations are spread evenly or
-//! lie together some σ beside the threshold. Modulations below B_min are not kept: the density is that of the first half σ above it,
-//! extrapolated along a straight line.
+//! every pixel. φ/√π differs from p(1 − p) by less than 0.03 everywhere and has the same integral over all B₀, so the variance of the
+//! number of resolved pixels is this density over √π, whether modulations are spread evenly or lie together some σ beside the
+//! threshold. Modulations below B_min are not kept: the density is that of the first half σ above it, extrapolated along a straight
+//! line.
 //!
-//! Of L dense levels, whose pitches are nearly the same, a pixel must pass the threshold in each, and only the finest's modulation is
-//! kept. With the same modulation in all, pᴸ takes the place of p, and by the same comparison of integrals over B₀, with E_n the
-//! expected largest of n standard normal numbers, L (E_2L − E_L) that of 1/√π = E_2 − E_1; where the coarser levels have some σ more of
-//! it, 1/√π stays. The lens decides between the two; the geometric mean is within a quarter of σ of both.
+//! In each of L dense levels, whose pitches are nearly the same, a pixel must pass the threshold, but only the finest's modulation is
+//! kept. If all levels have the same modulation, the probability is pᴸ instead of p, and the same comparison of integrals gives
+//! L (E_2L − E_L) instead of 1/√π = E_2 − E_1, with E_n the expected largest of n standard normal numbers. If the coarser levels have
+//! some σ more modulation, it stays 1/√π. Which of both holds depends on the lens, which is not known here. Their geometric mean is
+//! taken: the predicted σ is within a quarter of both.
 //!
 //! The error of the part's motion, which moves the region by some hundredths of a pixel, is left out.
 

@@ -4,8 +4,8 @@
 //! 2. **expected** (`expected`): the phase that golden would have there.
 //! 3. **window** (`window`): half the difference is the fringe alone; fitted in a window about each pixel, it gives the phase.
 //! 4. The part's motion is found from these phases as from those of any sequence, in all six components; those that the shape does
-//!    not determine keep what the picture has found. Then stages 2 and 3
-//!    are repeated with it, and their map goes through the ordinary inspection ([`Input::Phases`]).
+//!    not determine keep what the picture has found. Then stages 2 and 3 are repeated with it, and their map goes through the
+//!    ordinary inspection ([`Input::Phases`]).
 //!
 //! Neighbouring phases share pixels. Their σ is therefore that of the two samples of the pixel alone, which is right for means over
 //! areas that are large against the window; means over smaller squares are less noisy (`shared`).
