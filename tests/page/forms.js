@@ -48,7 +48,9 @@ async function controls(page, where) {
     const wrong = await page.evaluate((finger) => {
       const seen = Array.from(document.querySelectorAll("a, button, input, select")).filter((one) => one.getClientRects().length && !one.matches(".unseen, .skip"));
       return seen.flatMap((one) => {
-        const box = one.getBoundingClientRect(), name = one.getAttribute("aria-label"), words = one.textContent.trim();
+        // A tap on its words ticks a box as well.
+        const target = one.matches("[type=checkbox]") ? one.closest("label") || one : one;
+        const box = target.getBoundingClientRect(), name = one.getAttribute("aria-label"), words = one.textContent.trim();
         const small = box.width < finger || box.height < finger ? [`${one.id || words} is ${box.width.toFixed(0)}×${box.height.toFixed(0)} px`] : [];
         const other = name && words && !name.toLowerCase().includes(words.toLowerCase()) ? [`"${words}" is called "${name}"`] : [];
         return small.concat(other);

@@ -24,8 +24,11 @@ function showDrift(drift) {
   const key = `${drift.trend.length} ${drift.at_unix_s} ${drift.epipolar_px}`;
   if ($("drift-trend").dataset.key === key) return;
   $("drift-trend").dataset.key = key;
+  // One check is told by the words above.
+  show("drift-chart", drift.trend.length > 1);
   const points = drift.trend.map((point) => ({ value: point.epipolar_px, pass: point.epipolar_px <= drift.limit_px }));
-  fill($("drift-trend"), trend(points, { unit: "px", lowest: null, highest: drift.limit_px }));
+  fill($("drift-trend"), trend(points, { unit: "px", lowest: 0, highest: drift.limit_px }));
+  text("drift-caption", `Distance from the epipolar lines in the last ${points.length} checks, the newest at the right; dashed: 0 and the limit, ${drift.limit_px.toFixed(2)} px`);
 }
 
 async function refresh() {
