@@ -36,14 +36,19 @@ impl Field {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
-    /// Gaussian smoothing with σ in pixels; edge values are repeated beyond the raster.
-    pub fn smoothed(&self, sigma: f64) -> Self {
+    /// Gaussian smoothing with σ in pixels along rows and along columns; edge values are repeated beyond the raster.
+    pub fn smoothed(&self, [rows, columns]: [f64; 2]) -> Self {
+        let rows = self.smoothed_rows(rows).transposed();
+        rows.smoothed_rows(columns).transposed()
+    }
+
+    fn smoothed_rows(&self, sigma: f64) -> Self {
         let reach = libm::ceil(4.0 * sigma) as isize;
         let weights: Vec<f64> = (-reach..=reach)
             .map(|i| libm::exp(-0.5 * (i as f64 / sigma) * (i as f64 / sigma)))
             .collect();
         let sum: f64 = weights.iter().sum();
-        self.filtered(reach, |window| {
+        self.along_rows(reach, &|window: &[f64]| {
             let products = window.iter().zip(&weights).map(|(g, w)| g * w);
             products.sum::<f64>() / sum
         })
@@ -51,19 +56,13 @@ impl Field {
 
     /// The smallest value within `reach` pixels along both axes.
     pub fn minimum(&self, reach: usize) -> Self {
-        self.filtered(reach as isize, |window| {
-            window.iter().copied().fold(f64::INFINITY, f64::min)
-        })
+        let least = |window: &[f64]| window.iter().copied().fold(f64::INFINITY, f64::min);
+        let reach = reach as isize;
+        let rows = self.along_rows(reach, &least).transposed();
+        rows.along_rows(reach, &least).transposed()
     }
 
-    /// Applies a separable filter of 2·reach + 1 taps along the rows, then along the columns.
-    fn filtered(&self, reach: isize, filter: impl Fn(&[f64]) -> f64 + Sync + Send) -> Self {
-        self.along_rows(reach, &filter)
-            .transposed()
-            .along_rows(reach, &filter)
-            .transposed()
-    }
-
+    /// Applies a filter of 2·reach + 1 taps along the rows.
     fn along_rows(&self, reach: isize, filter: &(impl Fn(&[f64]) -> f64 + Sync + Send)) -> Self {
         let mut out = self.clone();
         crate::pipeline::for_each_row(&mut out.values, self.columns, |row, out| {
@@ -182,10 +181,15 @@ mod tests {
     #[test]
     fn smoothing_keeps_a_uniform_field_and_the_mean_of_a_spike() {
         let mut field = Field::uniform(40, 30, 0.1);
-        let smooth = field.smoothed(3.0);
+        let smooth = field.smoothed([3.0, 5.0]);
         assert!(smooth.values.iter().all(|g| (g - 0.1).abs() < 1e-12));
         field.values[15 * 40 + 20] = 1.1;
-        let sum: f64 = field.smoothed(2.0).values.iter().map(|g| g - 0.1).sum();
+        let sum: f64 = field
+            .smoothed([2.0, 3.0])
+            .values
+            .iter()
+            .map(|g| g - 0.1)
+            .sum();
         assert!((sum - 1.0).abs() < 1e-9);
     }
 

@@ -35,8 +35,10 @@ pub const MAX_SLOPE: f64 = 6.0;
 const FILL: usize = 8;
 /// Reach of the minimum filter to each side, projector pixels.
 const MINIMUM_REACH: usize = 1;
-/// σ of the smoothing after it, projector pixels.
-const SMOOTHING: f64 = 3.0;
+/// σ of the smoothing after it along and across the rows, projector pixels. Across the rows it is larger, because rows whose pitches differ
+/// shear against each other, and a shear that changes from row to row falsifies the phase where blur mixes them: with 3 px, the rows that
+/// pass the tip of the study's cone were off by 30 µm without noise.
+const SMOOTHING: [f64; 2] = [3.0, 6.0];
 /// Share of the largest worth that is enough. The maximum is flat: the last 0.2 % would cost 4 % of the contrast.
 const ENOUGH: f64 = 0.998;
 /// Frequencies that are tried between the coarsest and the finest, in geometric progression.

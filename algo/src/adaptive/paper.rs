@@ -53,7 +53,7 @@ pub fn adapt(
             stretch(&mut field, &map, &slopes, &component, image_pitch);
         }
     }
-    let turns = rows_from_zero(&field.smoothed(SMOOTHING));
+    let turns = rows_from_zero(&field.smoothed([SMOOTHING; 2]));
     PhaseFunction::sampled(columns, rows, turns).map_err(AdaptError::Pattern)
 }
 
