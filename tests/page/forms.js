@@ -57,6 +57,11 @@ async function controls(page, where) {
       });
     }, FINGER);
     assert.deepEqual(wrong, [], `${view} at ${where}`);
+    const cut = await page.evaluate(() => {
+      const cells = Array.from(document.querySelectorAll("td, th")).filter((one) => one.getClientRects().length && !one.closest(".scroll"));
+      return cells.filter((one) => one.scrollWidth > one.clientWidth + 1 || one.getBoundingClientRect().right > one.closest(".card").getBoundingClientRect().right).map((one) => one.textContent);
+    });
+    assert.deepEqual(cut, [], `words reach beyond their cell or card in ${view} at ${where}`);
     assert.equal(await page.locator("h1").count(), 1);
     assert.ok(await page.locator("h1").isVisible());
   }

@@ -34,8 +34,8 @@ function bar(gauge) {
 
 function row(gauge) {
   const value = make("td", "", make("span", "value", gauge.value === null ? "not measured" : quantity(gauge.value, gauge.unit)));
-  const error = gauge.value !== null ? uncertainty(gauge) : "";
-  value.append(make("small", error ? "" : "room", error || "\u00a0"));
+  const lines = gauge.value !== null ? uncertainty(gauge) : [];
+  value.append(...(lines.length ? lines : [make("small", "room", "\u00a0")]));
   const range = make("td", "limits", bar(gauge), make("small", "", limits(gauge.lowest, gauge.highest, gauge.unit)));
   const points = trends.get(gauge.name) || [];
   const verdict = make("td", "", tag(gauge));

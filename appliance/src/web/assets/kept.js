@@ -15,8 +15,7 @@ function gauge(entry) {
   const verdict = make("td", "", tag(decision));
   if (decision.doubtful) verdict.append(make("small", "", "close to a limit"));
   const value = make("td", "nowrap", entry.value === null ? "not measured" : quantity(entry.value, entry.unit));
-  const error = entry.value !== null ? uncertainty(entry) : "";
-  if (error) value.append(make("small", "", error));
+  if (entry.value !== null) value.append(...uncertainty(entry));
   const name = make("th", "", entry.name);
   name.scope = "row";
   return make("tr", "", name, value, make("td", "", limits(entry.low, entry.high, entry.unit)), verdict);

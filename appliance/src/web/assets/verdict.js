@@ -14,14 +14,14 @@ export function decided({ decision }) {
   return { pass, valid, low, high, doubtful };
 }
 
-// "± 0.012 mm, good parts 0.026 mm": the expanded uncertainty U, and what is expected where noise alone moves the value away from 0.
+// "± 0.012 mm" and "good parts 0.026 mm", a line each: the expanded uncertainty U, and what is expected where noise alone moves the value away from 0.
 // Results of older programs have σ only.
 export function uncertainty({ uncertainty: expanded, sigma, expected, unit }) {
   const words = [];
   if (typeof expanded === "number") words.push(`± ${quantity(expanded, unit, 1)}`);
   else if (typeof sigma === "number") words.push(`σ ${quantity(sigma, unit, 1)}`);
   if (typeof expected === "number") words.push(`good parts ${quantity(expected, unit, 1)}`);
-  return words.join(", ");
+  return words.map((line) => make("small", "", line));
 }
 
 // The tag that shows the decision about a gauge.
