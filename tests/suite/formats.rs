@@ -25,7 +25,7 @@ const MEMBERS: [&str; 9] = [
 ];
 
 /// Keys of `recipe.json`, version 1, in a taught recipe. Do not change these either.
-const KEYS: [&str; 60] = [
+const KEYS: [&str; 63] = [
     "alignment",
     "calibration",
     "camera",
@@ -83,6 +83,9 @@ const KEYS: [&str; 60] = [
     "sequences.kind",
     "sequences.safe_share",
     "sequences.sigma_mm",
+    "sequences.unseen_orders",
+    "sequences.unseen_orders.darkest",
+    "sequences.unseen_orders.part",
     "taught_at_unix_s",
     "taught_by",
     "version",

@@ -5,6 +5,7 @@ mod function;
 mod interpolate;
 mod sequence;
 mod shot;
+mod slips;
 mod split;
 mod waveform;
 
@@ -15,5 +16,6 @@ pub use sequence::{
     SequenceError, Unwrapping,
 };
 pub use shot::Shot;
+pub use slips::Slips;
 pub use split::Split;
 pub use waveform::{MAX_ORDER, Waveform, Waveforms};

@@ -5,29 +5,19 @@
 //! wrong fringe orders that nobody sees allows.
 //!
 //! **Equation.** σ_Φ² = σ_I² / (2π² Σ N_i r_i² b_i² B²) with the fundamentals b_i of the levels' waveforms ([`super::Waveform`]), for ratios
-//! 1, 1 − 1/n² (not with two levels) and 1 − 1/n. A level's wrapped phase has σ_i = (σ_I/B) √(2/N_i) / 2π. The steps of unwrapping
-//! round (`phase::about`)
-//!
-//! ```text
-//! to the finest level, from the fast beat     (n − 1) δ_f − n δ_c
-//! to the fast beat, from the slow one         (n − 1) δ_f − n δ_m + δ_c        with three levels
-//! ```
-//!
-//! An order is wrong if one of these is above 1/2 turn, and nobody sees it if it is above 0.60, because the residual is then below
-//! the limit of 0.40 again: P = erfc(0.60 / (σ √2)), added up over the steps, at the least modulation that is trusted.
+//! 1, 1 − 1/n² (not with two levels) and 1 − 1/n. The rate of wrong orders that nobody sees is that of [`super::Slips`] with sines, at
+//! the map and at the least modulation that is trusted.
 //!
 //! **Reach.** How far the phase may lie from the map: 0.40 turn for one level, n/2 − 0.2 for two, n²/2 − n for three.
 
+use super::slips::{sigma, unseen};
 use super::{Shot, Waveforms};
 use alloc::vec::Vec;
-use core::f64::consts::TAU;
 
 /// The largest rate of unseen wrong orders among the pixels of the least trusted modulation, if any split keeps it.
 const MAX_SLIPS: f64 = 2e-4;
 /// σ of a sample over the least modulation that is trusted: uniform noise of ±2.5 % of full scale, and 16 of 255 counts.
 const NOISE: f64 = 0.23;
-/// One turn less the largest residual.
-const UNSEEN: f64 = 0.60;
 /// Fewest and most shifts of a level: the kernels add up these without a weight for each sample.
 const SHIFTS: core::ops::RangeInclusive<usize> = 3..=MAX_LEVEL_SHIFTS;
 const MAX_LEVEL_SHIFTS: usize = 9;
@@ -98,7 +88,8 @@ fn splits(frames: usize) -> Vec<Split> {
         let (coarse, middle) = (1.0 - 1.0 / n, 1.0 - 1.0 / (n * n));
         for finest in SHIFTS {
             let rest = frames.saturating_sub(finest);
-            let fast = |c: usize| unseen(&[(n - 1.0, finest), (n, c)]);
+            let wrong = |terms: &[_]| unseen(NOISE * sigma(terms));
+            let fast = |c: usize| wrong(&[(n - 1.0, finest, 1.0), (n, c, 1.0)]);
             if SHIFTS.contains(&rest) {
                 let levels = [(coarse, rest), (1.0, finest)];
                 splits.push(Split::of(levels, fast(rest), n / 2.0 - 0.2));
@@ -106,7 +97,7 @@ fn splits(frames: usize) -> Vec<Split> {
             for m in SHIFTS {
                 let c = rest.saturating_sub(m);
                 if SHIFTS.contains(&c) && n >= 3.0 {
-                    let slow = unseen(&[(n - 1.0, finest), (n, m), (1.0, c)]);
+                    let slow = wrong(&[(n - 1.0, finest, 1.0), (n, m, 1.0), (1.0, c, 1.0)]);
                     let levels = [(coarse, c), (middle, m), (1.0, finest)];
                     splits.push(Split::of(levels, slow + fast(c), n * n / 2.0 - n));
                 }
@@ -114,14 +105,6 @@ fn splits(frames: usize) -> Vec<Split> {
         }
     }
     splits
-}
-
-/// The rate of errors above [`UNSEEN`] of a sum of wrapped phases of levels, each with its factor and its number of shifts.
-fn unseen(terms: &[(f64, usize)]) -> f64 {
-    let variance = |&(factor, shifts): &(f64, usize)| factor * factor * 2.0 / shifts as f64;
-    let sum: f64 = terms.iter().map(variance).sum();
-    let sigma = NOISE / TAU * libm::sqrt(sum);
-    libm::erfc(UNSEEN / (sigma * core::f64::consts::SQRT_2))
 }
 
 #[cfg(test)]

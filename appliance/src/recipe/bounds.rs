@@ -4,7 +4,9 @@
 
 use super::check::MAX_REGIONS;
 use super::comparison::QualityFile;
-use super::file::{GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFile};
+use super::file::{
+    GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFile, UnseenFile,
+};
 use crate::head::calibration::CalibrationSigma;
 use crate::station::MAX_GAUGES;
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
@@ -136,6 +138,10 @@ impl SequenceFile {
         })?;
         within("sigma_mm", self.sigma_mm, 0.0, MAX_SIGMA_MM)?;
         within("safe_share", self.safe_share, 0.0, 1.0)?;
+        if let Some(UnseenFile { part, darkest }) = self.unseen_orders {
+            within("unseen_orders.part", part, 0.0, 1.0)?;
+            within("unseen_orders.darkest", darkest, 0.0, 1.0)?;
+        }
         Sequence::from_frames(&self.frames)
             .map(drop)
             .map_err(|error| format!("frames: {error}"))

@@ -144,6 +144,20 @@ pub struct SequenceFile {
     /// Share of the golden surface whose phase stays within the sequence's reach for every
     /// placement inside the tolerance.
     pub safe_share: f64,
+    /// How often it gets a fringe order wrong unseen; `None` in recipes of older programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unseen_orders: Option<UnseenFile>,
+}
+
+/// Shares of pixels that get a wrong fringe order without a residual, for parts anywhere within the placement tolerance
+/// ([`algo::pattern::Slips`]).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UnseenFile {
+    /// Mean over the golden surface where the sequence is safe, by the modulation and the phase reach of each pixel.
+    pub part: f64,
+    /// Of pixels of the least trusted modulation, where the phase reach is largest.
+    pub darkest: f64,
 }
 
 /// The kinds of sequence, ordered by how far from the golden map they can unwrap. Dense levels have the ratios 1, 1 − 1/n and perhaps

@@ -7,13 +7,13 @@ use super::good_parts::{GoodPartsFile, Noise};
 use super::planner::{self, Choice};
 use super::{
     AlignmentKind, GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile, SequenceFile,
-    SequenceKind,
+    SequenceKind, UnseenFile,
 };
 use crate::head::calibration::Calibration;
 use algo::adaptive::phase_reach;
 use algo::geometry::Triangulator;
 use algo::inspect::{eroded, openings};
-use algo::pattern::{Shot, Waveform};
+use algo::pattern::{Sequence, Shot, Slips, Waveform};
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
 use std::io::Cursor;
@@ -365,6 +365,7 @@ impl GoldenPart<'_> {
         };
         let valid = || (0..arrays.valid.len()).filter(|&at| arrays.valid[at] == 1);
         let variance = self.variance(kind, &frames, arrays);
+        let unseen_orders = self.unseen_orders(&frames, arrays, || valid().filter(safe));
         let count = valid().count().max(1) as f64;
         let sigma_mm = (valid().map(variance).sum::<f64>() / count).sqrt();
         SequenceFile {
@@ -372,7 +373,29 @@ impl GoldenPart<'_> {
             frames,
             sigma_mm,
             safe_share: valid().filter(safe).count() as f64 / count,
+            unseen_orders,
         }
+    }
+
+    /// How often these frames give one of some pixels a wrong order unseen, if they can be unwrapped.
+    fn unseen_orders<P: Iterator<Item = usize>>(
+        &self,
+        frames: &[Shot],
+        arrays: &Arrays,
+        pixels: impl Fn() -> P,
+    ) -> Option<UnseenFile> {
+        let sequence = Sequence::from_frames(frames).ok()?;
+        let slips = Slips::of(&sequence, self.triangulator.function().range()).ok()?;
+        let taught = finest_waveform(self.full).fundamental();
+        let noise = self.calibration.noise_counts * taught;
+        let reach = |at: usize| f64::from(arrays.phase_reach[at]);
+        let rates =
+            pixels().map(|at| slips.rate(noise / f64::from(arrays.modulation[at]), reach(at)));
+        let farthest = pixels().map(reach).fold(0.0, f64::max);
+        Some(UnseenFile {
+            part: rates.sum::<f64>() / pixels().count().max(1) as f64,
+            darkest: slips.rate(noise / self.decoder.least_modulation(), farthest),
+        })
     }
 }
 

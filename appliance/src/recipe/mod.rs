@@ -33,6 +33,6 @@ pub use check::{Conditions, Recipe, RecipeId, RecipeSequence};
 pub use demands::Demands;
 pub use file::{
     AlignmentKind, AxisFile, ComponentFile, GaugeFile, GaugeKind, PatternFile, RecipeFile,
-    RegionFile, SequenceFile, SequenceKind, safe,
+    RegionFile, SequenceFile, SequenceKind, UnseenFile, safe,
 };
 pub use store::{ChangeError, LoadError, Store};

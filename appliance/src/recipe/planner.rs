@@ -1,7 +1,7 @@
 //! Chooses the cheapest sequence whose noise and safe mask are good enough for a part's gauges.
 
 use super::GaugeFile;
-use super::file::{GaugeKind, SequenceFile, SequenceKind};
+use super::file::{GaugeKind, SequenceFile, SequenceKind, UnseenFile};
 
 /// A sequence is good enough if its noise, after a gauge's smoothing, stays this many times inside
 /// the gauge's limit: a frame has some thousand independent places, whose extremes reach 4 σ.
@@ -14,7 +14,8 @@ const SAFE_SHARE: f64 = 0.98;
 pub struct Choice {
     /// Its index.
     pub production: usize,
-    /// One line per sequence, cheapest first: its noise and safe share, and why it was chosen or not.
+    /// One line per sequence, cheapest first: its noise, its safe share and how often its fringe orders are wrong unseen, and why it was
+    /// chosen or not.
     pub reasons: Vec<String>,
 }
 
@@ -63,12 +64,16 @@ pub fn choose(sequences: &[SequenceFile], gauges: &[GaugeFile]) -> Choice {
             std::cmp::Ordering::Equal => "taken",
             std::cmp::Ordering::Greater => "better, not needed",
         };
+        let unseen = sequence.unseen_orders.map(|UnseenFile { part, darkest }| {
+            format!(", wrong fringe orders unseen at {part:.0e} of its pixels ({darkest:.0e} where it is darkest)")
+        });
         format!(
-            "{} frames: predicted σ {:.1} µm of {:.1} µm allowed, safe on {:.1} % of the part: {word}",
+            "{} frames: predicted σ {:.1} µm of {:.1} µm allowed, safe on {:.1} % of the part{}: {word}",
             sequence.frames.len(),
             sequence.sigma_mm * 1000.0,
             allowed * 1000.0,
             sequence.safe_share * 100.0,
+            unseen.unwrap_or_default(),
         )
     };
     Choice {
@@ -94,6 +99,10 @@ mod tests {
                 frames: Shot::level(1.0, [4, 6, 12][i]).collect(),
                 sigma_mm: sigmas[i],
                 safe_share: safe[i],
+                unseen_orders: Some(UnseenFile {
+                    part: 2e-9,
+                    darkest: 1.7e-3,
+                }),
             })
             .collect()
     }
@@ -146,6 +155,8 @@ mod tests {
             &gauge(0.25),
         );
         assert!(choice.reasons[0].contains("4 frames") && choice.reasons[0].contains("not safe"));
+        let unseen = "unseen at 2e-9 of its pixels (2e-3 where it is darkest)";
+        assert!(choice.reasons[0].contains(unseen), "{}", choice.reasons[0]);
         assert!(choice.reasons[1].ends_with("taken"));
         assert!(choice.reasons[2].ends_with("better, not needed"));
     }
