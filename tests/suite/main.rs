@@ -18,6 +18,7 @@ mod foreign;
 mod formats;
 mod fuzz;
 mod gauges;
+mod golden;
 mod guide;
 mod heights_by;
 mod history;

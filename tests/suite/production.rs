@@ -289,13 +289,22 @@ fn golden_sigma(recipe: &Recipe, plan: &Plan) -> Vec<f32> {
 
 fn golden(recipe: &Recipe) -> Golden {
     let arrays = &recipe.arrays;
-    let heights = arrays.golden_height.iter().zip(&arrays.valid);
+    // As the first sequence measured it.
+    let pixels = arrays.valid.len();
+    let turns = |at: usize| match recipe.sequences[0].offset {
+        Some(of) => f64::from(arrays.sequence_offset[of * pixels + at]) / 65_536.0,
+        None => 0.0,
+    };
+    let by_first = |at: usize| {
+        f64::from(arrays.golden_height[at]) + f64::from(arrays.height_slope[at]) * turns(at)
+    };
+    let heights = (0..pixels).map(by_first).zip(&arrays.valid);
     Golden {
         width: recipe.conditions.camera.0 as usize,
         height: heights
-            .map(|(&mm, &valid)| match valid {
+            .map(|(mm, &valid)| match valid {
                 0 => Height::UNKNOWN,
-                _ => Height::from_mm(f64::from(mm)),
+                _ => Height::from_mm(mm),
             })
             .collect(),
         weight: arrays

@@ -128,11 +128,11 @@ impl DeviationNoise<'_> {
     }
 }
 
-/// Variance of each pixel's deviation by the errors of the motion of golden and of a part, as far as both are found from
-/// heights with the noise of golden; 0 where no motion is found. The motion is found inside `window` from the pixels that count in
+/// Variance of each pixel's deviation by the error of the motion that is found from heights with the noise of `golden`; 0 where no motion
+/// is found. The motion is found inside `window` from the pixels that count in
 /// full in `golden`; the variance is that of the pixels that are compared in `whole`.
 ///
-/// An error δ of the motion lifts a pixel by j·δ ([`Facet::jacobian`]), so the variance is 2 jᵀ C j, C the
+/// An error δ of the motion lifts a pixel by j·δ ([`Facet::jacobian`]), so the variance is jᵀ C j, C the
 /// covariance of the motion of a part that lies as taught.
 pub fn motion_variance(
     golden: GoldenSurface<'_>,
@@ -148,7 +148,7 @@ pub fn motion_variance(
     };
     let fitting = alignment.fitting(golden);
     of_facets(whole, |facet, point| {
-        2.0 * fitting.lift_variance(&placed, facet, point)
+        fitting.lift_variance(&placed, facet, point)
     })
 }
 

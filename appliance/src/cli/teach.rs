@@ -275,6 +275,8 @@ impl Teach {
             triangulator: &surface.triangulator,
             phases,
             heights: &surface.map,
+            offsets: &[],
+            captures: 1,
             comparison: None,
         };
         part.recipe(naming).map_err(|error| wrong(&error))

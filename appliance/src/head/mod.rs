@@ -10,6 +10,7 @@ pub mod doctor;
 pub mod examine;
 pub mod geometry;
 pub mod live;
+pub mod means;
 pub mod placed;
 pub mod rasters;
 pub mod scale;

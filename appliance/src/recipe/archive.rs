@@ -13,8 +13,8 @@ use zip::{CompressionMethod, ZipWriter};
 
 /// The manifest's name in the archive.
 const MANIFEST: &str = "recipe.json";
-/// The manifest and eight arrays.
-const MAX_MEMBERS: usize = 9;
+/// The manifest and nine arrays.
+const MAX_MEMBERS: usize = 10;
 /// The largest manifest that is read, in bytes.
 const MAX_MANIFEST: u64 = 1 << 20;
 /// The fingerprint in the manifest while the fingerprint is computed.
@@ -72,6 +72,9 @@ arrays! {
     modulation: f32,
     /// Largest |ΔΦ| in turns that a placement within the tolerance can cause; infinite where golden is not resolved.
     phase_reach: f32,
+    /// For all sequences but the full one, behind each other: Φ as taught by this sequence less `golden_phase`, 1/65536 turn. Empty
+    /// where golden was not measured with them.
+    sequence_offset: i16,
 }
 
 /// What is wrong with a file that is not a ZIP, lacks a member, or has one that cannot be read; with the remedy.
@@ -93,15 +96,14 @@ pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), Str
     seal(&manifest, members(file, arrays))
 }
 
-/// The arrays by their members' names; a phase function that is given by a formula has no member.
+/// The arrays by their members' names; one that is empty has no member.
 pub(crate) fn members(file: &RecipeFile, arrays: &Arrays) -> Vec<(&'static str, Vec<u8>)> {
     let mut members = arrays.members(|name| match name {
         "phase_function" => file.projector.width,
         _ => file.camera.width,
     });
-    if arrays.phase_function.is_empty() {
-        members.remove(0);
-    }
+    let mut lengths = arrays.lengths().into_iter();
+    members.retain(|_| lengths.next().is_some_and(|(_, length)| length > 0));
     members
 }
 

@@ -29,6 +29,8 @@ pub const MAX_TOLERANCE_MM: f64 = 20.0;
 pub const MAX_GUARD_K: f64 = 10.0;
 /// The last second of the year 9999.
 const LAST_SECOND: u64 = 253_402_300_799;
+/// Most captures that golden is the mean of.
+const MAX_CAPTURES: usize = 1000;
 /// Largest σ_z, mm: no head is worse.
 const MAX_SIGMA_MM: f64 = 1000.0;
 
@@ -77,6 +79,7 @@ impl RecipeFile {
         }
         let (least, most) = (MIN_NOISE_COUNTS, MAX_NOISE_COUNTS);
         within("noise_counts", self.noise_counts, least, most)?;
+        within("golden_captures", self.golden_captures, 1, MAX_CAPTURES)?;
         if let Some(CalibrationSigma {
             height_mm,
             length_mm,

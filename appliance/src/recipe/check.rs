@@ -59,6 +59,8 @@ pub struct Conditions {
     pub exposure_us: Option<f64>,
     /// σ of one sample in counts.
     pub noise_counts: f64,
+    /// Captures that golden is the mean of.
+    pub golden_captures: usize,
     /// σ by the uncertainty of the calibration; 0 where it is not known.
     pub calibration: CalibrationError,
     /// |ΔΦ| in turns up to which the expansion of the height holds.
@@ -74,6 +76,8 @@ pub struct RecipeSequence {
     pub shots: Vec<Shot>,
     /// Its levels.
     pub levels: Sequence,
+    /// Which part of `sequence_offset.npy` is its own; the full one and the two frames have none.
+    pub offset: Option<usize>,
 }
 
 impl RecipeSequence {
@@ -135,9 +139,17 @@ impl Recipe {
         let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
         // A phase function has the size of the projector, which is checked below.
         for (name, length) in arrays.lengths().into_iter().skip(1) {
-            if Some(length) != pixels {
+            let of_short = name == "sequence_offset";
+            let maps = if of_short {
+                file.sequences.len() - 1
+            } else {
+                1
+            };
+            let expected = pixels.and_then(|pixels| pixels.checked_mul(maps));
+            if Some(length) != expected && !(of_short && length == 0) {
                 return Err(format!(
-                    "{name} has {length} values for a camera of {width}x{height}"
+                    "{name} has {length} values for a camera of {width}x{height} and {} sequences",
+                    file.sequences.len()
                 ));
             }
         }
@@ -175,9 +187,11 @@ fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, String> {
             kind: SequenceKind::TwoFrames,
             shots: Shot::level(1.0, 2).collect(),
             levels: Sequence::pair(),
+            offset: None,
         });
     }
-    for sequence in file.sequences.iter().skip(file.production) {
+    let last = file.sequences.len() - 1;
+    for (at, sequence) in file.sequences.iter().enumerate().skip(file.production) {
         if chain
             .last()
             .is_none_or(|before| before.kind < sequence.kind)
@@ -187,6 +201,7 @@ fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, String> {
                 kind: sequence.kind,
                 shots: sequence.frames.clone(),
                 levels: levels.map_err(|error| error.to_string())?,
+                offset: (at < last).then_some(at),
             });
         }
     }
@@ -222,6 +237,7 @@ impl From<&RecipeFile> for Conditions {
             range_mm: file.range_mm,
             exposure_us: file.exposure_us,
             noise_counts: file.noise_counts,
+            golden_captures: file.golden_captures,
             calibration: file
                 .calibration_sigma
                 .map_or_else(CalibrationError::default, |sigma| CalibrationError {

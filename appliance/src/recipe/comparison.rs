@@ -1,7 +1,7 @@
 //! The fixed pattern against the adaptive one on the taught part, as measured while teaching with equally many frames.
 
-use crate::head::calibrated::Measured;
 use algo::phase::Trust;
+use algo::pipeline::{HeightMap, PhaseMap};
 use serde::{Deserialize, Serialize};
 
 /// Both measurements.
@@ -26,22 +26,23 @@ pub struct QualityFile {
     pub coverage: f64,
 }
 
+/// A measurement with so many frames.
+type Measurement<'a> = (usize, &'a PhaseMap, &'a HeightMap);
+
 impl ComparisonFile {
     /// Compares a measurement with the fixed pattern and one with the adaptive pattern.
-    pub fn of(fixed: &Measured, adaptive: &Measured) -> Self {
-        let resolved = |of: &Measured, at: usize| of.phases.trust[at] == Trust::Resolved;
-        let both: Vec<usize> = (0..fixed.phases.trust.len())
+    pub fn of(fixed: Measurement<'_>, adaptive: Measurement<'_>) -> Self {
+        let resolved =
+            |(_, phases, _): Measurement<'_>, at: usize| phases.trust[at] == Trust::Resolved;
+        let both: Vec<usize> = (0..fixed.1.trust.len())
             .filter(|&at| resolved(fixed, at) && resolved(adaptive, at))
             .collect();
-        let quality = |of: &Measured| {
-            let squares = both
-                .iter()
-                .map(|&at| f64::from(of.heights.sigma[at]).powi(2));
+        let quality = |(frames, phases, heights): Measurement<'_>| {
+            let squares = both.iter().map(|&at| f64::from(heights.sigma[at]).powi(2));
             QualityFile {
-                frames: of.frames.len(),
+                frames,
                 sigma_mm: (squares.sum::<f64>() / both.len().max(1) as f64).sqrt(),
-                coverage: of.phases.count(Trust::Resolved) as f64
-                    / of.phases.trust.len().max(1) as f64,
+                coverage: phases.count(Trust::Resolved) as f64 / phases.trust.len().max(1) as f64,
             }
         };
         Self {

@@ -59,6 +59,9 @@ pub struct RecipeFile {
     pub exposure_us: Option<f64>,
     /// σ of one sample in counts.
     pub noise_counts: f64,
+    /// Captures that golden is the mean of; 1, which is left out, where it was taught from a recording and in recipes of older programs.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub golden_captures: usize,
     /// σ by the uncertainty of that calibration; `None` where it is not known, and in recipes of older programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration_sigma: Option<CalibrationSigma>,
@@ -88,6 +91,18 @@ pub struct RecipeFile {
 )]
 fn is_zero(number: &f64) -> bool {
     *number == 0.0
+}
+
+const fn one() -> usize {
+    1
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_one(number: &usize) -> bool {
+    *number == 1
 }
 
 /// A camera's frames.

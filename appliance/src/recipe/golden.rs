@@ -1,19 +1,19 @@
 //! Makes a recipe from a golden measurement, which comes from a head or from a recording.
 
 use super::archive::{self, Arrays};
+use super::captures::Offsets;
 use super::comparison::ComparisonFile;
 use super::file::{CameraFile, FORMAT, RasterFile, VERSION};
 use super::good_parts::{GoodPartsFile, Noise};
 use super::planner::{self, Choice};
 use super::{
     AlignmentKind, GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile, SequenceFile,
-    SequenceKind, UnseenFile,
 };
 use crate::head::calibration::Calibration;
 use algo::adaptive::phase_reach;
 use algo::geometry::Triangulator;
 use algo::inspect::{eroded, openings};
-use algo::pattern::{Sequence, Shot, Slips, Waveform};
+use algo::pattern::Shot;
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
 use std::io::Cursor;
@@ -76,8 +76,12 @@ pub struct GoldenPart<'a> {
     pub triangulator: &'a Triangulator,
     /// Golden phase of each camera pixel, with its modulation and trust.
     pub phases: &'a PhaseMap,
-    /// Golden height of each camera pixel, with its σ.
+    /// Golden height of each camera pixel, with the σ of one capture.
     pub heights: &'a HeightMap,
+    /// The difference from this phase by each of the other sequences, in their order; none if they were not measured.
+    pub offsets: &'a [Offsets],
+    /// Captures that all of this is the mean of; σ is that of one.
+    pub captures: usize,
     /// Fixed against adaptive pattern, if a fixed one was measured as well.
     pub comparison: Option<ComparisonFile>,
 }
@@ -201,6 +205,7 @@ impl GoldenPart<'_> {
             // Heads take their exposure from the configuration.
             exposure_us: None,
             noise_counts: calibration.noise_counts,
+            golden_captures: self.captures,
             calibration_sigma: calibration.sigma,
             expansion_range_turns: EXPANSION_TURNS,
             min_coverage: MIN_COVERAGE,
@@ -274,57 +279,7 @@ impl GoldenPart<'_> {
                 .map(|modulation| modulation.counts(full_scale) as f32)
                 .collect(),
             phase_reach: phase_reach(self.triangulator, surface, placement_tolerance_mm),
-        }
-    }
-
-    /// The sequences that the part can be measured with, each with its predicted noise and the share of the surface where it is safe:
-    /// where no placement within the tolerance makes its phase ambiguous.
-    fn sequences(&self, arrays: &Arrays) -> Vec<SequenceFile> {
-        let mut full = self.full.to_vec();
-        // The finest level last: the coarser ones are decoded while it is being exposed.
-        full.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
-        // Levels of ratios 0.8 and 1 repeat together only after 5 turns: unambiguous within ± 2.5 turns of golden, less a margin for
-        // noise ([`SequenceKind::reach`]).
-        let waveforms = self.calibration.waveforms();
-        let level = |ratio, shifts| Shot::level_as(ratio, shifts, waveforms);
-        let candidates = [
-            (SequenceKind::SingleLevel, level(1.0, 3).collect()),
-            (SequenceKind::SingleLevel, level(1.0, 4).collect()),
-            (
-                SequenceKind::TwoLevels,
-                level(0.8, 3).chain(level(1.0, 3)).collect(),
-            ),
-            (SequenceKind::Full, full),
-        ];
-        candidates
-            .map(|(kind, frames)| self.rated(kind, frames, arrays))
-            .into()
-    }
-
-    /// σ_z² in mm² of a pixel of golden, measured with these frames.
-    fn variance(
-        &self,
-        kind: SequenceKind,
-        frames: &[Shot],
-        arrays: &Arrays,
-    ) -> impl Fn(usize) -> f64 {
-        // Of a geometric sequence only the finest level contributes to the accuracy.
-        let absolute = !self.decoder.unwrapping().needs_map() && kind == SequenceKind::Full;
-        let carries = |ratio: f64| !absolute || ratio >= 0.999;
-        // The modulation as taught is that of golden's finest level, which is the full sequence's; other waveforms have another
-        // share of it.
-        let taught = finest_waveform(self.full).fundamental();
-        let squares = frames
-            .iter()
-            .filter(|shot| carries(shot.ratio))
-            .map(|shot| (shot.ratio * shot.waveform.fundamental() / taught).powi(2));
-        let information: f64 = squares.sum();
-        let noise = self.calibration.noise_counts;
-        move |at| {
-            let counts = f64::from(arrays.modulation[at]);
-            let turns =
-                noise / std::f64::consts::TAU * (2.0 / (information * counts * counts)).sqrt();
-            (turns * f64::from(arrays.height_slope[at])).powi(2)
+            sequence_offset: self.offsets.iter().flat_map(mean).collect(),
         }
     }
 
@@ -337,72 +292,32 @@ impl GoldenPart<'_> {
         sequences: &[SequenceFile],
         production: usize,
     ) -> GoodPartsFile {
-        let variances = |of: Option<&SequenceFile>| -> Vec<f32> {
-            let pixels = 0..arrays.valid.len();
-            match of {
-                Some(SequenceFile { kind, frames, .. }) => {
-                    let variance = self.variance(*kind, frames, arrays);
-                    pixels.map(|at| variance(at) as f32).collect()
-                }
-                None => vec![0.0; pixels.len()],
-            }
+        let first = &sequences[production];
+        let production = {
+            let variance = self.variance(first.kind, &first.frames, arrays);
+            (0..arrays.valid.len())
+                .map(|at| variance(at) as f32)
+                .collect()
         };
-        // Golden was measured with the full sequence, the last.
+        // Golden's phase is that by the first sequence, or by the full one, the last.
+        let golden = match sequences.last().filter(|_| self.offsets.is_empty()) {
+            Some(full) => (full.sigma_mm / first.sigma_mm.max(f64::MIN_POSITIVE)).powi(2),
+            None => 1.0,
+        };
         let noise = Noise {
             triangulator: self.triangulator,
             surface,
-            golden: variances(sequences.last()),
-            production: variances(sequences.get(production)),
+            production,
+            golden: golden / self.captures as f64,
         };
         noise.weigh(&mut arrays.valid, DEVIATION_MM)
     }
-
-    /// A sequence with its predicted noise (RMS over the compared pixels) and safe share.
-    fn rated(&self, kind: SequenceKind, frames: Vec<Shot>, arrays: &Arrays) -> SequenceFile {
-        let safe = |at: &usize| {
-            kind.reach()
-                .is_none_or(|reach| arrays.phase_reach[*at] < reach)
-        };
-        let valid = || (0..arrays.valid.len()).filter(|&at| arrays.valid[at] == 1);
-        let variance = self.variance(kind, &frames, arrays);
-        let unseen_orders = self.unseen_orders(&frames, arrays, || valid().filter(safe));
-        let count = valid().count().max(1) as f64;
-        let sigma_mm = (valid().map(variance).sum::<f64>() / count).sqrt();
-        SequenceFile {
-            kind,
-            frames,
-            sigma_mm,
-            safe_share: valid().filter(safe).count() as f64 / count,
-            unseen_orders,
-        }
-    }
-
-    /// How often these frames give one of some pixels a wrong order unseen, if they can be unwrapped.
-    fn unseen_orders<P: Iterator<Item = usize>>(
-        &self,
-        frames: &[Shot],
-        arrays: &Arrays,
-        pixels: impl Fn() -> P,
-    ) -> Option<UnseenFile> {
-        let sequence = Sequence::from_frames(frames).ok()?;
-        let slips = Slips::of(&sequence, self.triangulator.function().range()).ok()?;
-        let taught = finest_waveform(self.full).fundamental();
-        let noise = self.calibration.noise_counts * taught;
-        let reach = |at: usize| f64::from(arrays.phase_reach[at]);
-        let rates =
-            pixels().map(|at| slips.rate(noise / f64::from(arrays.modulation[at]), reach(at)));
-        let farthest = pixels().map(reach).fold(0.0, f64::max);
-        Some(UnseenFile {
-            part: rates.sum::<f64>() / pixels().count().max(1) as f64,
-            darkest: slips.rate(noise / self.decoder.least_modulation(), farthest),
-        })
-    }
 }
 
-/// What the finest level shows.
-fn finest_waveform(shots: &[Shot]) -> Waveform {
-    let finest = shots.iter().max_by(|a, b| a.ratio.total_cmp(&b.ratio));
-    finest.map(|shot| shot.waveform).unwrap_or_default()
+/// The mean of both.
+fn mean(offsets: &Offsets) -> impl Iterator<Item = i16> + '_ {
+    let [first, second] = offsets;
+    first.iter().zip(second).map(|(a, b)| a.midpoint(*b))
 }
 
 /// The regions and gauges of a part with these resolved pixels: those of the whole frame, and those of its openings.

@@ -63,10 +63,10 @@ pub(super) struct Noise<'a> {
     pub triangulator: &'a Triangulator,
     /// Golden.
     pub surface: KnownSurface,
-    /// σ_z² of golden's pixels and of those in production, mm².
-    pub golden: Vec<f32>,
-    /// See above.
+    /// σ_z² of pixels in production, mm².
     pub production: Vec<f32>,
+    /// The variance of golden's noise, as a share of that.
+    pub golden: f64,
 }
 
 impl Noise<'_> {
@@ -75,8 +75,8 @@ impl Noise<'_> {
     pub fn weigh(&self, mask: &mut [u8], tolerance_mm: f64) -> GoodPartsFile {
         let width = self.surface.width;
         let valid: Vec<bool> = mask.iter().map(|&valid| valid != 0).collect();
-        let both = self.golden.iter().zip(&self.production);
-        let pixel: Vec<f32> = both.map(|(a, b)| a + b).collect();
+        let both = 1.0 + self.golden as f32;
+        let pixel: Vec<f32> = self.production.iter().map(|z| z * both).collect();
         let still = vec![0.0; valid.len()];
         let mut noise = DeviationNoise {
             width,
@@ -90,7 +90,8 @@ impl Noise<'_> {
         let (_, weights) = limited(&noise, &valid, tolerance_mm);
         let taught = self.taught(&weights);
         let window = vec![0..width; valid.len() / width.max(1)];
-        let motion = motion_variance(self.golden_surface(&taught), whole, &window);
+        let mut motion = motion_variance(self.golden_surface(&taught), whole, &window);
+        motion.iter_mut().for_each(|variance| *variance *= both);
         noise.motion = &motion;
         let (limit_mm, weights) = limited(&noise, &valid, tolerance_mm);
         let squares = noise.of_squares(&weights, SMOOTHING_PX);
@@ -126,10 +127,10 @@ impl Noise<'_> {
         }
     }
 
-    /// Golden with these weights.
+    /// Golden with these weights, and the noise with which production takes it ([`Taught`]).
     fn taught(&self, weights: &[Weight]) -> Taught {
         let sigmas = self
-            .golden
+            .production
             .iter()
             .map(|variance| f64::from(*variance).sqrt());
         Taught::new(weights.iter().copied().zip(sigmas))

@@ -4,15 +4,17 @@ pub use super::golden::{Naming, TaughtRecipe};
 
 use super::PatternFile;
 use super::adaptive::{AdaptivePattern, Preliminary};
+use super::candidates::candidates;
+use super::captures::{CAPTURES, Captured};
 use super::comparison::ComparisonFile;
 use super::golden::GoldenPart;
 use crate::error::code_of;
-use crate::head::calibrated::{CalibratedHead, MeasureError, Measured};
+use crate::head::calibrated::{CalibratedHead, MeasureError};
 use crate::head::calibration::Calibration;
 use crate::station::error_code;
 use crate::system::computing::Computing;
 use algo::adaptive::AdaptError;
-use algo::pattern::Sequence;
+use algo::pattern::{Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use hal::head::Head;
@@ -58,6 +60,12 @@ impl TeachError {
     }
 }
 
+impl From<hal::error::Error> for TeachError {
+    fn from(error: hal::error::Error) -> Self {
+        Self::Device(error)
+    }
+}
+
 impl From<MeasureError> for TeachError {
     fn from(error: MeasureError) -> Self {
         match error {
@@ -73,8 +81,8 @@ impl From<AdaptError> for TeachError {
     }
 }
 
-/// Measures the part in front of the head with a fixed pattern, makes its adaptive pattern, measures it again with that one, and
-/// makes the recipe; nothing is stored here. `progress` gets the share done and the current stage in words.
+/// Measures the part in front of the head with a fixed pattern, makes its adaptive pattern, measures it again and again with that one by
+/// every sequence that production may use, and makes the recipe; nothing is stored here. The part must not move meanwhile. `progress` gets the share done and the current stage in words.
 ///
 /// # Errors
 /// If a device fails or the scene cannot be taught.
@@ -93,7 +101,7 @@ pub fn teach(
     teach_while(head, calibration, naming, timeout, &computing, &all)
 }
 
-/// As [`teach`], but it ends before the next stage when `progress` returns `false`. `computing` marks the stages that use no
+/// As [`teach`], but it ends before the next stage or capture when `progress` returns `false`. `computing` marks the stages that use no
 /// device.
 ///
 /// # Errors
@@ -126,31 +134,32 @@ pub fn teach_while(
     stage(0.35, "making the part's own pattern")?;
     let AdaptivePattern { function, expected } =
         computing.on(|| preliminary.adapt(&first, calibration))?;
-    stage(0.4, "measuring the part with its own pattern")?;
     let full = Sequence::dense(DENSE_N, SHIFTS);
-    let golden = head.measure(&function, &full, Some(&expected), &|share| {
-        progress(0.4 + 0.3 * share, "measuring the part with its own pattern");
+    let candidates = candidates(calibration.waveforms(), &full);
+    let sequences: Vec<&[Shot]> = candidates.iter().map(|(_, frames)| &frames[..]).collect();
+    let golden = Captured::take(&mut head, &function, &sequences, &expected, &|share| {
+        progress(
+            0.4 + 0.35 * share,
+            "measuring the part with its own pattern",
+        )
     })?;
     refuse_empty(&golden.phases)?;
     stage(0.75, "working out the expansion and the safe mask")?;
-    let comparison = ComparisonFile::of(&first, &golden);
+    let adaptive = (full.len(), &golden.phases, &golden.heights);
+    let fixed = (preliminary.shots.len(), &first.phases, &first.heights);
+    let comparison = ComparisonFile::of(fixed, adaptive);
     // Their memory is free before the recipe's arrays are made.
     drop((first, expected));
-    let Measured {
-        phases,
-        heights,
-        decoder,
-        triangulator,
-        ..
-    } = &golden;
     let part = GoldenPart {
         calibration,
         pattern: PatternFile::File,
         full: &full,
-        decoder,
-        triangulator,
-        phases,
-        heights,
+        decoder: &golden.decoder,
+        triangulator: &golden.triangulator,
+        phases: &golden.phases,
+        heights: &golden.heights,
+        offsets: &golden.offsets,
+        captures: CAPTURES,
         comparison: Some(comparison),
     };
     let taught = computing.on(|| part.recipe(naming));

@@ -24,9 +24,11 @@ pub struct Facet {
     pub lift: Vector,
     /// The area in x and y that a pixel sees, mm².
     pub area: f64,
-    /// Error of m's x and y from the noise of the taught heights, 1 σ.
+    /// Error of m's x and y, 1 σ: that by the noise of the heights of one measurement. Golden may be the mean of several, but the
+    /// errors of slopes by pattern, blur and lenses, which no mean lowers, remain: on a body that can turn about its axis they
+    /// would else be taken for a shape that determines this turn.
     pub lift_noise: f64,
-    /// Error of the taught height, mm (1 σ).
+    /// Error of a height by the noise of one measurement, mm (1 σ).
     pub sigma: f64,
 }
 

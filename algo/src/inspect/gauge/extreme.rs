@@ -66,7 +66,7 @@ fn motion(g: &[f64; 6], placed: Option<&Placed>) -> f64 {
 /// Rounds in which the scatter of values is found without those that lie more than [`CLIP`] times of it off their mean.
 const ROUNDS: usize = 4;
 const CLIP: f64 = 3.0;
-/// Values that lie more than this many times the scatter off the mean belong to a defect, not to noise.
+/// The largest of all values belongs to a defect, not to noise, where it lies more than this many times the scatter off the mean.
 const DEFECT: f64 = 5.0;
 
 /// Estimates of true values: the measured ones, moved towards their mean until their scatter is less by σ², so that the scatter that
@@ -98,10 +98,10 @@ impl Drawn {
         }
     }
 
-    /// The estimate for a measured value.
-    fn value(&self, measured: f64) -> f64 {
+    /// The estimate for a measured value; more than `defect` times the scatter off the mean it belongs to a defect.
+    fn value(&self, measured: f64, defect: f64) -> f64 {
         let off = measured - self.mean;
-        match libm::fabs(off) > DEFECT * self.scatter {
+        match libm::fabs(off) > defect * self.scatter {
             true => measured,
             false => self.mean + off * self.share,
         }
@@ -119,7 +119,7 @@ fn spread_of_largest(values: &[f64], sigma: f64) -> f64 {
         return 0.0;
     }
     let drawn = Drawn::of(values.iter().copied(), sigma);
-    let drawn = |value: &f64| drawn.value(*value);
+    let drawn = |value: &f64| drawn.value(*value, DEFECT);
     let top = values.iter().map(drawn).fold(f64::NEG_INFINITY, f64::max);
     let mut bins = [0.0; BINS];
     for value in values.iter().map(drawn) {
@@ -203,7 +203,8 @@ pub fn share_outside(
     let drawn = Drawn::of(cells.iter().map(|cell| cell.deviation), sigma);
     let (mut variance, mut lever, mut g) = (0.0, 0.0, [0.0; 6]);
     for cell in cells {
-        let m = drawn.value(cell.deviation);
+        // A rim of a defect lies near the tolerance.
+        let m = drawn.value(cell.deviation, CLIP);
         let [upper, lower] = [(tolerance - m) / sigma, (tolerance + m) / sigma];
         if libm::fabs(upper).min(libm::fabs(lower)) < SURE {
             let p = below(-upper) + below(-lower);

@@ -81,7 +81,7 @@ impl HeightRow {
         let mut cubics = plan.cubics.row(v);
         let map = plan.map_row(v);
         if !map.is_empty() {
-            // Equal wherever a pixel can be resolved, and already in the cache.
+            // Golden's phase by this sequence, and already in the cache.
             cubics.base = map;
         }
         offset_row(backend, cubics, input, columns.clone(), output);

@@ -25,7 +25,8 @@ pub struct Parts {
     pub triangulator: Arc<Triangulator>,
     /// How phases become heights.
     pub cubics: Arc<HeightCubics>,
-    /// Φ₀ that phases are unwrapped about, row-major, where it is not that of the cubics; a part of it.
+    /// Φ₀ that phases are unwrapped about and heights counted from, row-major, where it is not that of the cubics: a part of it, or the
+    /// part's phase as taught by this sequence, where the cubics have that by another one.
     pub map: Option<Vec<AbsolutePhase>>,
     /// The part as taught.
     pub taught: Taught,
@@ -37,7 +38,7 @@ pub struct Parts {
     pub noise_counts: f64,
     /// Whether the part's motion is found and taken back.
     pub aligned: bool,
-    /// σ of golden's heights, as a multiple of the taught σ, which is that with this decoder.
+    /// σ of golden's heights, as a multiple of the taught σ, which is that of one measurement with this decoder.
     pub golden_noise: f64,
     /// Per gauge, what a deviation is on good parts whose only noise is golden's; of other gauges not used.
     pub largest: Vec<Largest>,

@@ -5,7 +5,8 @@ use crate::pipeline::{COMPARED, SIGMA, SQUARE};
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// The part as taught, as far as parts are compared with it; row-major.
+/// The part as taught, as far as parts are compared with it; row-major. Its σ are those of one measurement with the sequence that parts
+/// are compared by: golden may be the mean of several ([`Parts::golden_noise`](super::Parts::golden_noise)).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Taught {
     /// [`COMPARED`], [`SQUARE`] and σ.

@@ -6,7 +6,7 @@ use algo::adaptive::Field;
 use algo::inspect::{Taught, Weight};
 use algo::phase::Decoder;
 use algo::pipeline::{self, KnownSurface};
-use algo::units::{AbsolutePhase, Height, Modulation};
+use algo::units::{AbsolutePhase, Height, Modulation, PhaseDelta};
 use rayon::prelude::*;
 
 /// The weight of each pixel's deviation, and the uncertainty of its taught height.
@@ -26,29 +26,53 @@ pub(super) fn taught(noise_counts: f64, arrays: &Arrays, decoder: &Decoder) -> T
     Taught::new(weights.zip(sigmas))
 }
 
-/// The phase that a sequence of limited reach is unwrapped about: golden's, unknown where a placement could move the phase
-/// further than the sequence reaches. `None` for the full sequence.
-pub(super) fn safe_map(arrays: &Arrays, kind: SequenceKind) -> Option<Vec<AbsolutePhase>> {
-    let limit = kind.reach()?;
-    let phase: Vec<_> = arrays
-        .golden_phase
-        .iter()
-        .copied()
-        .map(AbsolutePhase::from_turns)
-        .collect();
-    Some(safe(&phase, &arrays.phase_reach, limit))
+/// The phase that a sequence is unwrapped about and compared with: golden's by this sequence, which is `offset` from that by the full
+/// one. Of a sequence of limited reach it is unknown where a placement could move the phase further than that. `None` if it is that
+/// of the golden surface; `base` is the offset of the sequence that this is by.
+pub(super) fn map(
+    arrays: &Arrays,
+    kind: SequenceKind,
+    (offset, base): (&[i16], &[i16]),
+) -> Option<Vec<AbsolutePhase>> {
+    match kind.reach() {
+        Some(limit) => Some(safe(&phase(arrays, offset), &arrays.phase_reach, limit)),
+        None => (!base.is_empty()).then(|| phase(arrays, offset)),
+    }
 }
 
-/// The surface that deviations refer to. Where golden has none, such as in an opening, it is interpolated from the surface
+/// What golden's phase by a sequence is off that by the full one; empty if nothing.
+pub(super) fn offset(arrays: &Arrays, at: Option<usize>) -> &[i16] {
+    let pixels = arrays.golden_phase.len();
+    at.map_or(&[], |at| &arrays.sequence_offset[at * pixels..][..pixels])
+}
+
+/// Golden's phase by the sequence with this offset; an empty one is 0.
+fn phase(arrays: &Arrays, offset: &[i16]) -> Vec<AbsolutePhase> {
+    let by = |(at, &turns): (usize, &f64)| match AbsolutePhase::from_turns(turns) {
+        AbsolutePhase::UNKNOWN => AbsolutePhase::UNKNOWN,
+        full => full + delta(offset, at),
+    };
+    arrays.golden_phase.par_iter().enumerate().map(by).collect()
+}
+
+/// The offset of a pixel.
+fn delta(offset: &[i16], at: usize) -> PhaseDelta {
+    PhaseDelta::from_bits(offset.get(at).copied().map_or(0, i32::from))
+}
+
+/// The surface that deviations refer to, as the sequence with this offset measured it. Where golden has none, such as in an opening, it is interpolated from the surface
 /// around: material that should not be there must be found, by the full sequence at least.
-pub(super) fn surface(width: usize, arrays: &Arrays) -> KnownSurface {
-    let turns = arrays.golden_phase.par_iter().copied();
+pub(super) fn surface(width: usize, arrays: &Arrays, offset: &[i16]) -> KnownSurface {
     let mut height = vec![Height::UNKNOWN; arrays.golden_height.len()];
     pipeline::for_each_row(&mut height, width, |v, row| {
-        let taught = arrays.golden_height[v * width..].iter().copied();
+        let places = v * width..(v + 1) * width;
+        let taught = places.map(|at| match arrays.golden_height[at] {
+            mm if offset.is_empty() => f64::from(mm),
+            mm => f64::from(mm) + delta(offset, at).turns() * f64::from(arrays.height_slope[at]),
+        });
         let mut line = Field {
             columns: width,
-            values: taught.take(width).map(f64::from).collect(),
+            values: taught.collect(),
         };
         line.fill_rows(0.0);
         for (height, mm) in row.iter_mut().zip(line.values) {
@@ -57,7 +81,7 @@ pub(super) fn surface(width: usize, arrays: &Arrays) -> KnownSurface {
     });
     KnownSurface {
         width,
-        phase: turns.map(AbsolutePhase::from_turns).collect(),
+        phase: phase(arrays, offset),
         height,
     }
 }

@@ -176,16 +176,21 @@ impl Plan {
             window::add_compared(&mut window, &arrays.valid, size.0);
         }
         let range = triangulator.function().range();
+        // The golden surface is by the sequence that is projected first, so that deviations by that have no other error of golden's.
+        let base = sequences.first().and_then(|first| first.offset);
+        let base = base.filter(|_| !arrays.sequence_offset.is_empty());
         let mut shots = Vec::new();
         let prepared = || {
             let (noise, range) = (conditions.noise_counts, (range, camera.2));
             // Golden was measured with the full sequence, the last.
             let taught = sequences.last().map_or(1.0, RecipeSequence::fundamental);
             let runs = sequences.into_iter();
-            runs.map(|sequence| Prepared::of(sequence, (noise, taught), &arrays, range, &mut shots))
+            let golden = (&arrays, base);
+            runs.map(|sequence| Prepared::of(sequence, (noise, taught), golden, range, &mut shots))
                 .collect::<Result<Vec<_>, _>>()
         };
-        let (prepared, surface) = rayon::join(prepared, || golden::surface(size.0, &arrays));
+        let surface = || golden::surface(size.0, &arrays, golden::offset(&arrays, base));
+        let (prepared, surface) = rayon::join(prepared, surface);
         let prepared = prepared?;
         let patterns = shots.len() * raster.0 as usize * raster.1 as usize;
         if patterns > MAX_PATTERN_BYTES {
@@ -202,9 +207,10 @@ impl Plan {
         };
         // Freed before the expansion of the height is allocated, which takes the most memory.
         drop(arrays);
-        // The last sequence is the one that golden was measured with.
-        let golden = prepared.last().ok_or("it has no sequence")?;
-        let golden = golden.golden_noise(&gauges, size.0);
+        let full = prepared.last().ok_or("it has no sequence")?;
+        let first = prepared.first().filter(|_| base.is_some());
+        let captures = conditions.golden_captures;
+        let golden = full.golden_noise(first.unwrap_or(full), captures, (&gauges, size.0));
         let range = conditions.expansion_range_turns;
         let cubics = HeightCubics::new(&triangulator, surface, range, &window, away.max(AROUND));
         let shared = Shared {

@@ -51,11 +51,15 @@ pub(super) struct Shared {
     pub picture: (Vec<f32>, f64),
 }
 
-/// The noise of golden, and what it alone makes of gauges.
+/// The noise of golden.
 pub(super) struct GoldenNoise {
-    /// σ of the phase of a pixel of full modulation, turns per count of noise.
-    phase: f64,
-    /// Per gauge.
+    captures: f64,
+    /// σ of the phase of a pixel of full modulation, turns per count of noise: in one capture by the full sequence.
+    full: f64,
+    /// The same by the sequence that the golden surface is by, and the offset of that.
+    base: f64,
+    offset: Option<usize>,
+    /// Per gauge, what the noise of one capture by the full sequence makes of it.
     largest: Vec<Largest>,
 }
 
@@ -68,15 +72,18 @@ pub(super) struct Prepared {
     map: Option<Vec<AbsolutePhase>>,
     /// Its modulation over that of golden.
     brighter: f64,
+    /// Which offset from the full sequence golden has by this one.
+    offset: Option<usize>,
 }
 
 impl Prepared {
     /// Prepares a sequence for phases of `range`; the recipe's arrays can be dropped then. `rasters` are what all runs show; what only
-    /// this one shows is added. `fundamental` is that of the waveform that golden's modulation was measured with.
+    /// this one shows is added. `fundamental` is that of the waveform that golden's modulation was measured with; `base` is the offset of
+    /// the sequence that the golden surface is by.
     pub fn of(
         sequence: RecipeSequence,
         (noise_counts, fundamental): (f64, f64),
-        arrays: &Arrays,
+        (arrays, base): (&Arrays, Option<usize>),
         (range, bit_depth): (PhaseRange, u8),
         rasters: &mut Vec<Shot>,
     ) -> Result<Self, String> {
@@ -85,7 +92,10 @@ impl Prepared {
             kind,
             shots,
             levels,
+            offset,
         } = sequence;
+        let offset = offset.filter(|_| !arrays.sequence_offset.is_empty());
+        let offsets = (golden::offset(arrays, offset), golden::offset(arrays, base));
         let decoder = Decoder::new(&levels, range, bit_depth).map_err(|error| error.to_string())?;
         let indices = shots.into_iter().map(|shot| {
             let shown = rasters.iter().position(|known| *known == shot);
@@ -98,20 +108,29 @@ impl Prepared {
             kind,
             indices: indices.collect(),
             taught: golden::taught(noise_counts / brighter, arrays, &decoder),
-            map: golden::safe_map(arrays, kind),
+            map: golden::map(arrays, kind, offsets),
             decoder,
             brighter,
+            offset,
         })
     }
 
-    /// The noise of golden, where golden was measured with this sequence in frames of `width` columns.
-    pub fn golden_noise(&self, gauges: &[Gauge], width: usize) -> GoldenNoise {
+    /// The noise of golden, where this is the full sequence, in frames of `width` columns. The golden surface is by the sequence `base`.
+    pub fn golden_noise(
+        &self,
+        base: &Self,
+        captures: usize,
+        (gauges, width): (&[Gauge], usize),
+    ) -> GoldenNoise {
         let largest = |gauge: &Gauge| match gauge.measure {
             Measure::Deviation { side } => Largest::of(&self.taught, width, &gauge.region, side),
             _ => Largest::default(),
         };
         GoldenNoise {
-            phase: self.phase_noise(),
+            captures: captures as f64,
+            full: self.phase_noise(),
+            base: base.phase_noise(),
+            offset: base.offset,
             largest: gauges.iter().map(largest).collect(),
         }
     }
@@ -122,9 +141,26 @@ impl Prepared {
         self.decoder.phase_noise(full, 1.0 / self.brighter)
     }
 
+    /// σ of golden's heights that deviations by this sequence have, over that of one measurement by it.
+    ///
+    /// Golden's phase by this sequence is what deviations are from. Where the golden surface is by another one, a displaced part
+    /// is compared with heights by that one, and the heights of both places have its noise.
+    fn noise_of_golden(&self, golden: &GoldenNoise) -> f64 {
+        let own = self.phase_noise();
+        let measured = self.offset.is_some() || self.kind == SequenceKind::Full;
+        let variance = match measured {
+            false => golden.full * golden.full,
+            true if self.offset == golden.offset => own * own,
+            true => own * own + 2.0 * golden.base * golden.base,
+        };
+        (variance / golden.captures).sqrt() / own
+    }
+
     /// Joins it with what all sequences share.
     pub fn join(self, shared: &Shared) -> Result<Run, String> {
-        let golden_noise = shared.golden.phase / self.phase_noise();
+        let golden_noise = self.noise_of_golden(&shared.golden);
+        let over_full = golden_noise * self.phase_noise() / shared.golden.full;
+        let largest = shared.golden.largest.iter();
         let Self {
             kind,
             indices,
@@ -145,7 +181,7 @@ impl Prepared {
             noise_counts: shared.noise_counts,
             aligned: shared.aligned,
             golden_noise,
-            largest: shared.golden.largest.clone(),
+            largest: largest.map(|largest| largest.times(over_full)).collect(),
             calibration: shared.calibration,
         });
         let production = production.map_err(|error| error.to_string())?;

@@ -1,0 +1,140 @@
+//! The mean of several captures of a scene that does not move: one frame of 16 bits for each of the patterns that are loaded.
+
+use hal::error::Error;
+use hal::frame::{Frame, FrameFormat, Pixels, Samples};
+use hal::head::Head;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Captures that a mean is of.
+pub const CAPTURES: usize = 4;
+/// Bits of the samples that are summed; those of a camera with more lose their last ones. Four of them are less than
+/// [`SATURATED`].
+const BITS: u8 = 14;
+/// The sum where one of the samples was at full scale.
+const SATURATED: u16 = u16::MAX;
+
+/// Takes [`CAPTURES`] frames of each of the loaded patterns, and gives their means. Where one of the samples of a pixel was at full scale
+/// its mean is. `progress` gets the share of the frames taken; it may end the captures by `false`, and then there are no means.
+///
+/// # Errors
+/// Of the device that failed.
+pub fn take(
+    head: &mut Head,
+    patterns: usize,
+    timeout: Duration,
+    progress: &dyn Fn(f64) -> bool,
+) -> Result<Option<Vec<Frame>>, Error> {
+    let indices: Vec<usize> = (0..patterns).collect();
+    let mut sums: Vec<Sum> = Vec::with_capacity(patterns);
+    for capture in 0..CAPTURES {
+        if !progress(capture as f64 / CAPTURES as f64) {
+            return Ok(None);
+        }
+        head.acquire(&indices, timeout, &mut |at, frame| match sums.get_mut(at) {
+            Some(sum) => sum.add(&frame),
+            None => sums.push(Sum::of(frame)),
+        })?;
+    }
+    let means: Result<_, _> = sums.into_iter().map(Sum::mean).collect();
+    means.map(Some)
+}
+
+/// The sum of the frames of a pattern.
+struct Sum {
+    /// Without padding between the rows.
+    samples: Vec<u16>,
+    first: Frame,
+}
+
+impl Sum {
+    fn of(first: Frame) -> Self {
+        let FrameFormat { width, height, .. } = first.format();
+        let samples = vec![0; width as usize * height as usize];
+        let mut sum = Self { samples, first };
+        sum.add(&sum.first.clone());
+        sum
+    }
+
+    fn add(&mut self, frame: &Frame) {
+        match frame.samples() {
+            Samples::Eight(samples) => self.add_samples(samples, frame.format()),
+            Samples::Sixteen(samples) => self.add_samples(samples, frame.format()),
+        }
+    }
+
+    fn add_samples<T: Copy + Into<u16>>(&mut self, samples: &[T], format: FrameFormat) {
+        let (width, full_scale) = (format.width as usize, format.full_scale());
+        let shift = format.bit_depth.saturating_sub(BITS);
+        let rows = samples.chunks(format.stride);
+        for (sums, row) in self.samples.chunks_mut(width).zip(rows) {
+            for (sum, &sample) in sums.iter_mut().zip(row) {
+                let sample: u16 = sample.into();
+                *sum = match sample < full_scale {
+                    true => sum.saturating_add(sample >> shift),
+                    false => SATURATED,
+                };
+            }
+        }
+    }
+
+    /// The mean, scaled to 16 bits.
+    fn mean(mut self) -> Result<Frame, Error> {
+        let format = self.first.format();
+        let full_scale = (1_u32 << format.bit_depth.min(BITS)) - 1;
+        let whole = full_scale * CAPTURES as u32;
+        for sum in self.samples.iter_mut().filter(|sum| **sum != SATURATED) {
+            // At most 32 bits, as the sum is at most `whole`.
+            let mean = (u32::from(*sum) * u32::from(u16::MAX) + whole / 2) / whole;
+            *sum = mean.min(u32::from(SATURATED) - 1) as u16;
+        }
+        let format = FrameFormat::packed(format.width, format.height, 16);
+        let (at, count) = (self.first.timestamp(), self.first.count());
+        Frame::new(format, Arc::new(Pixels::Sixteen(self.samples)), at, count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hal::units::Timestamp;
+
+    /// The mean of rows of three samples, of which the last is padding.
+    fn mean(bit_depth: u8, rows: [[u16; 3]; CAPTURES]) -> [u16; 2] {
+        let format = FrameFormat {
+            stride: 3,
+            ..FrameFormat::packed(2, 1, bit_depth)
+        };
+        let pixels = |row: [u16; 3]| match bit_depth {
+            8 => Pixels::Eight(row.map(|sample| sample as u8).to_vec()),
+            _ => Pixels::Sixteen(row.to_vec()),
+        };
+        let mut frames = rows
+            .map(|row| Frame::new(format, Arc::new(pixels(row)), Timestamp(0), 0).unwrap())
+            .into_iter();
+        let mut sum = Sum::of(frames.next().unwrap());
+        frames.for_each(|frame| sum.add(&frame));
+        match sum.mean().unwrap().samples() {
+            Samples::Sixteen(&[a, b]) => [a, b],
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_mean_has_16_bits_and_is_saturated_where_one_of_its_samples_is() {
+        let eight = [[0, 10, 9], [1, 10, 9], [0, 255, 9], [1, 10, 9]];
+        // (0 + 1 + 0 + 1) / 4 of 255.
+        assert_eq!(
+            mean(8, eight),
+            [(0.5 * 65_535.0 / 255.0_f64).round() as u16, u16::MAX]
+        );
+        for (depth, largest) in [(8, 255), (12, 4095), (14, 16_383), (16, u16::MAX)] {
+            let [most, all] = mean(depth, [[largest - 1, largest, 0]; CAPTURES]);
+            let expected = f64::from(largest - 1) / f64::from(largest) * 65_535.0;
+            assert!(
+                (f64::from(most) - expected).abs() < 4.5 && most < all,
+                "{depth}: {most}"
+            );
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! The sequences that a part can be measured with, and what is predicted of each: noise, where it is safe, wrong orders.
+
+use super::archive::Arrays;
+use super::golden::GoldenPart;
+use super::{SequenceFile, SequenceKind, UnseenFile};
+use algo::pattern::{Sequence, Shot, Slips, Waveform, Waveforms};
+
+/// A sequence that a part may be measured with: what it can unwrap, and what each frame shows.
+pub(super) type Candidate = (SequenceKind, Vec<Shot>);
+
+/// All candidates, fewest frames first; the last is the full one.
+pub(super) fn candidates(waveforms: Waveforms, full: &[Shot]) -> Vec<Candidate> {
+    let mut full = full.to_vec();
+    // The finest level last: the coarser ones are decoded while it is being exposed.
+    full.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
+    // Levels of ratios 0.8 and 1 repeat together only after 5 turns: unambiguous within ± 2.5 turns of golden, less a margin for
+    // noise ([`SequenceKind::reach`]).
+    let level = |ratio, shifts| Shot::level_as(ratio, shifts, waveforms);
+    vec![
+        (SequenceKind::SingleLevel, level(1.0, 3).collect()),
+        (SequenceKind::SingleLevel, level(1.0, 4).collect()),
+        (
+            SequenceKind::TwoLevels,
+            level(0.8, 3).chain(level(1.0, 3)).collect(),
+        ),
+        (SequenceKind::Full, full),
+    ]
+}
+
+impl GoldenPart<'_> {
+    /// The candidates, each with its predicted noise, the share of the surface where it is safe (where no placement within the tolerance
+    /// makes its phase ambiguous), and how often its orders are wrong unseen.
+    pub(super) fn sequences(&self, arrays: &Arrays) -> Vec<SequenceFile> {
+        let candidates = candidates(self.calibration.waveforms(), self.full);
+        let rated = |(kind, frames)| self.rated(kind, frames, arrays);
+        candidates.into_iter().map(rated).collect()
+    }
+
+    /// σ_z² in mm² of a pixel of golden, measured once with these frames.
+    pub(super) fn variance(
+        &self,
+        kind: SequenceKind,
+        frames: &[Shot],
+        arrays: &Arrays,
+    ) -> impl Fn(usize) -> f64 {
+        // Of a geometric sequence only the finest level contributes to the accuracy.
+        let absolute = !self.decoder.unwrapping().needs_map() && kind == SequenceKind::Full;
+        let carries = |ratio: f64| !absolute || ratio >= 0.999;
+        // The modulation as taught is that of golden's finest level, which is the full sequence's; other waveforms have another
+        // share of it.
+        let taught = finest_waveform(self.full).fundamental();
+        let squares = frames
+            .iter()
+            .filter(|shot| carries(shot.ratio))
+            .map(|shot| (shot.ratio * shot.waveform.fundamental() / taught).powi(2));
+        let information: f64 = squares.sum();
+        let noise = self.calibration.noise_counts;
+        move |at| {
+            let counts = f64::from(arrays.modulation[at]);
+            let turns =
+                noise / std::f64::consts::TAU * (2.0 / (information * counts * counts)).sqrt();
+            (turns * f64::from(arrays.height_slope[at])).powi(2)
+        }
+    }
+
+    /// A sequence with its predicted noise (RMS over the compared pixels) and safe share.
+    fn rated(&self, kind: SequenceKind, frames: Vec<Shot>, arrays: &Arrays) -> SequenceFile {
+        let safe = |at: &usize| {
+            kind.reach()
+                .is_none_or(|reach| arrays.phase_reach[*at] < reach)
+        };
+        let valid = || (0..arrays.valid.len()).filter(|&at| arrays.valid[at] == 1);
+        let variance = self.variance(kind, &frames, arrays);
+        let unseen_orders = self.unseen_orders(&frames, arrays, || valid().filter(safe));
+        let count = valid().count().max(1) as f64;
+        let sigma_mm = (valid().map(variance).sum::<f64>() / count).sqrt();
+        SequenceFile {
+            kind,
+            frames,
+            sigma_mm,
+            safe_share: valid().filter(safe).count() as f64 / count,
+            unseen_orders,
+        }
+    }
+
+    /// How often these frames give one of some pixels a wrong order unseen, if they can be unwrapped.
+    fn unseen_orders<P: Iterator<Item = usize>>(
+        &self,
+        frames: &[Shot],
+        arrays: &Arrays,
+        pixels: impl Fn() -> P,
+    ) -> Option<UnseenFile> {
+        let sequence = Sequence::from_frames(frames).ok()?;
+        let slips = Slips::of(&sequence, self.triangulator.function().range()).ok()?;
+        let taught = finest_waveform(self.full).fundamental();
+        let noise = self.calibration.noise_counts * taught;
+        let reach = |at: usize| f64::from(arrays.phase_reach[at]);
+        let rates =
+            pixels().map(|at| slips.rate(noise / f64::from(arrays.modulation[at]), reach(at)));
+        let farthest = pixels().map(reach).fold(0.0, f64::max);
+        Some(UnseenFile {
+            part: rates.sum::<f64>() / pixels().count().max(1) as f64,
+            darkest: slips.rate(noise / self.decoder.least_modulation(), farthest),
+        })
+    }
+}
+
+/// What the finest level shows.
+fn finest_waveform(shots: &[Shot]) -> Waveform {
+    let finest = shots.iter().max_by(|a, b| a.ratio.total_cmp(&b.ratio));
+    finest.map(|shot| shot.waveform).unwrap_or_default()
+}

@@ -1,0 +1,156 @@
+//! Golden's captures: the part, measured several times without a motion between, by every sequence that production may use.
+//!
+//! Shifts of different numbers and levels of different ratios see the harmonics of an imperfect response differently, so each sequence
+//! has a periodic error of its own. Production compares phases with golden's by the same sequence, in which the error of a part that
+//! lies as taught is the same: so the difference of each sequence from the full one is measured here.
+//!
+//! The captures are averaged as two means, from which follows what of that difference is noise.
+
+use super::teach::TeachError;
+use crate::head::calibrated::CalibratedHead;
+use crate::head::means;
+use crate::head::rasters::rasters;
+use crate::head::scan::Scan;
+use algo::geometry::Triangulator;
+use algo::pattern::{PhaseFunction, Sequence, Shot};
+use algo::phase::{Decoder, Trust};
+use algo::pipeline::{self, HeightMap, PhaseMap};
+use algo::units::{AbsolutePhase, Modulation};
+use hal::frame::Frame;
+
+/// Means of captures.
+const MEANS: usize = 2;
+/// All captures.
+pub const CAPTURES: usize = MEANS * means::CAPTURES;
+
+/// For each pixel the phase by a sequence less that by the full one, 1/65536 turn: of each mean. 0 where one of both is not resolved.
+pub type Offsets = [Vec<i16>; MEANS];
+
+/// The part by all captures.
+#[derive(Debug)]
+pub struct Captured {
+    /// By the full sequence.
+    pub phases: PhaseMap,
+    /// With σ as of one capture.
+    pub heights: HeightMap,
+    /// The decoder of one capture of the full sequence.
+    pub decoder: Decoder,
+    /// The geometry with its phase function.
+    pub triangulator: Triangulator,
+    /// Of all sequences but the full one.
+    pub offsets: Vec<Offsets>,
+}
+
+impl Captured {
+    /// Measures the part with sequences of a phase function; the last is the full one, which is unwrapped about `expected`, the others
+    /// are about that. `progress` gets the share of the frames taken and may end it by `false`.
+    ///
+    /// # Errors
+    /// As of [`super::teach::teach`].
+    pub fn take(
+        CalibratedHead {
+            head,
+            calibration,
+            timeout,
+        }: &mut CalibratedHead<'_>,
+        function: &PhaseFunction,
+        sequences: &[&[Shot]],
+        expected: &[AbsolutePhase],
+        progress: &dyn Fn(f64) -> bool,
+    ) -> Result<Self, TeachError> {
+        let rig = |error: &dyn std::fmt::Display| TeachError::Rig(error.to_string());
+        let [short @ .., full] = sequences else {
+            return Err(TeachError::Rig("there is no sequence".into()));
+        };
+        let shots = distinct(sequences);
+        let decode = |shown: &[Shot], means: &[Frame], map: &[AbsolutePhase]| {
+            let frame = |shot| shots.iter().position(|other| other == shot);
+            let frames = shown.iter().filter_map(frame).map(|at| &means[at]);
+            let scan = Scan::new(function.range(), shown, frames)?;
+            scan.phases(scan.needs_map().then_some(map))
+        };
+        head.load(rasters(function, &shots, calibration)?)?;
+        let mut all: Vec<(PhaseMap, Vec<Vec<i16>>)> = Vec::new();
+        for mean in 0..MEANS {
+            let share = |share: f64| progress((mean as f64 + share) / MEANS as f64);
+            let means = means::take(head, shots.len(), *timeout, &share)?;
+            let means = means.ok_or(TeachError::Ended)?;
+            let phases = decode(full, &means, expected).map_err(|error| rig(&error))?;
+            let offsets = short.iter().map(|shown| {
+                let by = decode(shown, &means, &phases.phase)?;
+                Ok(offsets(&by, &phases))
+            });
+            let offsets: Result<_, String> = offsets.collect();
+            all.push((phases, offsets.map_err(|error| rig(&error))?));
+        }
+        let sequence = Sequence::from_frames(full).map_err(|error| rig(&error))?;
+        let (_, _, bit_depth) = calibration.frames();
+        let decoder = Decoder::new(&sequence, function.range(), bit_depth);
+        let decoder = decoder.map_err(|error| rig(&error))?;
+        let triangulator = calibration.triangulator(function.clone(), None);
+        let triangulator = triangulator.map_err(|error| rig(&error))?;
+        let Ok([(mut phases, first), (other, second)]) = <[_; MEANS]>::try_from(all) else {
+            return Err(TeachError::Ended);
+        };
+        average(&mut phases, &other);
+        let noise = Some(calibration.noise_counts);
+        let heights = pipeline::triangulate(&triangulator, &decoder, noise, &mut phases);
+        Ok(Self {
+            phases,
+            heights,
+            decoder,
+            triangulator,
+            offsets: first
+                .into_iter()
+                .zip(second)
+                .map(<[_; MEANS]>::from)
+                .collect(),
+        })
+    }
+}
+
+/// What the sequences show, each once.
+fn distinct(sequences: &[&[Shot]]) -> Vec<Shot> {
+    let mut shots: Vec<Shot> = Vec::new();
+    for shot in sequences.iter().copied().flatten() {
+        if !shots.contains(shot) {
+            shots.push(*shot);
+        }
+    }
+    shots
+}
+
+/// Phases less those by the full sequence.
+fn offsets(by: &PhaseMap, full: &PhaseMap) -> Vec<i16> {
+    let resolved = |map: &PhaseMap, at: usize| map.trust[at] == Trust::Resolved;
+    let offset = |at: usize| {
+        let offset = (by.phase[at] - full.phase[at]).to_bits();
+        let both = resolved(by, at) && resolved(full, at);
+        // More than half a turn is a wrong order.
+        i16::try_from(offset).ok().filter(|_| both).unwrap_or(0)
+    };
+    (0..by.phase.len()).map(offset).collect()
+}
+
+/// The mean of two maps. A pixel is resolved if it is in both, with the same fringe order.
+fn average(first: &mut PhaseMap, second: &PhaseMap) {
+    const QUARTER_TURN: i32 = 1 << 14;
+    for at in 0..first.phase.len() {
+        let (a, b) = (first.phase[at], second.phase[at]);
+        let apart = (b - a).to_bits();
+        let trust = match (first.trust[at], second.trust[at]) {
+            (Trust::Resolved, Trust::Resolved) if apart.abs() > QUARTER_TURN => Trust::Residual,
+            (Trust::Resolved, second) => second,
+            (first, _) => first,
+        };
+        let counts = [&*first, second].map(|map| u32::from(map.modulation[at].to_bits()));
+        first.trust[at] = trust;
+        (first.phase[at], first.modulation[at]) = match trust == Trust::Resolved {
+            true => (
+                AbsolutePhase::from_bits(a.to_bits() + apart / 2),
+                Modulation::from_bits(counts.iter().sum::<u32>().div_ceil(2) as u16),
+            ),
+            false => (AbsolutePhase::UNKNOWN, Modulation::default()),
+        };
+    }
+}

@@ -1,0 +1,79 @@
+//! Golden is the mean of captures by every sequence: what an uncorrected response leaves in deviations from it.
+
+use super::gauges::{frames, plan};
+use super::placement::{Bed, bed, scenario, taught};
+use appliance::recipe::archive::Arrays;
+use appliance::recipe::plan::Plan;
+use appliance::recipe::teach::TaughtRecipe;
+use sim::Part;
+use sim::parts::Plane;
+
+/// Exponent of the light, of which the calibration knows nothing: the doctor lets it pass.
+const GAMMA: f64 = 1.08;
+/// Largest periodic error of a part that lies as taught, RMS, and the least that golden by other shifts would leave.
+const AS_TAUGHT_MM: f64 = 0.001;
+const BY_OTHER_SHIFTS_MM: f64 = 0.005;
+/// Bins of a fringe. An error of 3 shifts has three periods in it.
+const BINS: usize = 48;
+const CAPTURES: usize = 4;
+
+/// A taught plane in front of a head with a response.
+fn line(gamma: f64) -> (Bed, TaughtRecipe) {
+    let mut scenario = scenario(Part::Plane(Plane::default()));
+    scenario.optics.gamma = gamma;
+    scenario.noise.noise_counts = None;
+    let mut bed = bed(&scenario);
+    let taught = taught(&mut bed).unwrap();
+    let first = &taught.manifest.sequences[taught.manifest.production];
+    assert_eq!(first.frames.len(), 3);
+    (bed, taught)
+}
+
+fn load(bed: &mut Bed, plan: &Plan) {
+    let rasters = plan.rasters(&bed.calibration).unwrap();
+    bed.head.load(rasters).unwrap();
+}
+
+/// The error that depends on the place in a fringe, RMS, mm, of the part by a sequence.
+fn periodic(bed: &mut Bed, taught: &TaughtRecipe, arrays: &Arrays, sequence: usize) -> f64 {
+    let plan = plan(bed, &taught.manifest, arrays);
+    load(bed, &plan);
+    let mut bins = [(0.0, 0.0); BINS];
+    for _ in 0..CAPTURES {
+        let frames = frames(bed, &plan, sequence);
+        let layers = plan.layers(sequence, &frames).unwrap();
+        for (at, &deviation) in layers.deviation_mm.iter().enumerate() {
+            if arrays.valid[at] != 0 && deviation.is_finite() {
+                let share = arrays.golden_phase[at].rem_euclid(1.0);
+                let (sum, count) = &mut bins[(share * BINS as f64) as usize % BINS];
+                (*sum, *count) = (*sum + f64::from(deviation), *count + 1.0);
+            }
+        }
+    }
+    let means = bins.map(|(sum, count)| sum / count);
+    let mean = means.iter().sum::<f64>() / BINS as f64;
+    let squares = means.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>();
+    (squares / BINS as f64).sqrt()
+}
+
+#[test]
+fn a_part_that_lies_as_taught_has_no_error_of_an_uncorrected_response() {
+    let (mut bed, taught) = line(GAMMA);
+    let arrays = &taught.recipe.arrays;
+    // Also the sequence that follows in the same cycle where the first one is in doubt.
+    for sequence in [0, 2] {
+        let error = periodic(&mut bed, &taught, arrays, sequence);
+        println!("sequence {sequence}: {:.2} µm", error * 1e3);
+        assert!(error < AS_TAUGHT_MM, "sequence {sequence}: {error}");
+    }
+    let full_alone = Arrays {
+        sequence_offset: Vec::new(),
+        ..arrays.clone()
+    };
+    let error = periodic(&mut bed, &taught, &full_alone, 0);
+    println!(
+        "about golden by the full sequence alone: {:.2} µm",
+        error * 1e3
+    );
+    assert!(error > BY_OTHER_SHIFTS_MM, "{error}");
+}
