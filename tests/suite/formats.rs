@@ -26,7 +26,7 @@ const MEMBERS: [&str; 10] = [
 ];
 
 /// Keys of `recipe.json`, version 1, in a taught recipe. Do not change these either.
-const KEYS: [&str; 64] = [
+const KEYS: [&str; 65] = [
     "alignment",
     "calibration",
     "camera",
@@ -83,6 +83,7 @@ const KEYS: [&str; 64] = [
     "sequences",
     "sequences.frames",
     "sequences.kind",
+    "sequences.ripple_mm",
     "sequences.safe_share",
     "sequences.sigma_mm",
     "sequences.unseen_orders",

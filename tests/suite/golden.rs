@@ -1,12 +1,14 @@
-//! Golden is the mean of captures by every sequence: what an uncorrected response leaves in deviations from it.
+//! Golden is the mean of captures by every sequence: what an uncorrected response leaves in deviations from it, and in their uncertainty.
 
 use super::gauges::{frames, plan};
 use super::placement::{Bed, bed, scenario, taught};
 use appliance::recipe::archive::Arrays;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::TaughtRecipe;
-use sim::Part;
 use sim::parts::Plane;
+use sim::{Part, Placement};
+use std::time::Instant;
+use tests::random::Random;
 
 /// Exponent of the light, of which the calibration knows nothing: the doctor lets it pass.
 const GAMMA: f64 = 1.08;
@@ -16,6 +18,7 @@ const BY_OTHER_SHIFTS_MM: f64 = 0.005;
 /// Bins of a fringe. An error of 3 shifts has three periods in it.
 const BINS: usize = 48;
 const CAPTURES: usize = 4;
+const PLACES: usize = 12;
 
 /// A taught plane in front of a head with a response.
 fn line(gamma: f64) -> (Bed, TaughtRecipe) {
@@ -76,4 +79,38 @@ fn a_part_that_lies_as_taught_has_no_error_of_an_uncorrected_response() {
         error * 1e3
     );
     assert!(error > BY_OTHER_SHIFTS_MM, "{error}");
+}
+#[test]
+fn the_error_of_a_moved_part_is_in_its_uncertainty() {
+    let (mut bed, taught) = line(GAMMA);
+    let arrays = &taught.recipe.arrays;
+    let plan = plan(&bed, &taught.manifest, arrays);
+    load(&mut bed, &plan);
+    let mut random = Random::new(5);
+    let (mut covered, mut without) = (0, 0);
+    for _ in 0..PLACES {
+        let mut between = |reach: f64| reach * (2.0 * random.share() - 1.0);
+        let placement = Placement {
+            shift_mm: [(); 3].map(|()| between(0.5)),
+            tilt_deg: [(); 2].map(|()| between(0.2)),
+            rotation_deg: 0.0,
+        };
+        let part = Part::Plane(Plane::default());
+        bed.stage.place(&part, &placement).unwrap();
+        let frames = frames(&mut bed, &plan, 0);
+        let found = plan.inspect(0, &frames, Instant::now());
+        let deviation = &found.gauges[0];
+        let [value, expected, sigma, uncertainty] = [
+            deviation.value,
+            deviation.expected,
+            deviation.sigma,
+            deviation.uncertainty,
+        ]
+        .map(Option::unwrap);
+        println!("{value:+.4} mm, expected {expected:.4}, sigma {sigma:.4}, U {uncertainty:.4}");
+        covered += usize::from(value.abs() - expected <= uncertainty);
+        without += usize::from(value.abs() - expected <= 2.0 * sigma);
+    }
+    println!("{covered} of {PLACES} are covered by U, {without} by the noise alone");
+    assert_eq!(covered, PLACES);
 }

@@ -7,6 +7,7 @@ mod largest;
 mod mask;
 mod openings;
 mod region;
+mod ripple;
 mod strips;
 mod table;
 mod weight;
@@ -18,6 +19,7 @@ pub(crate) use mask::components;
 pub use mask::eroded;
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
+pub use ripple::ripple;
 pub use strips::{
     CalibrationError, Findings, Found, Gauge, Input, MAX_GAUGES, PairBuffers, PairPlaced, Parts,
     Picture, Production, Skipped, Strips, Taught, Unmeasurable,

@@ -141,6 +141,12 @@ impl SequenceFile {
         })?;
         within("sigma_mm", self.sigma_mm, 0.0, MAX_SIGMA_MM)?;
         within("safe_share", self.safe_share, 0.0, 1.0)?;
+        within(
+            "ripple_mm",
+            self.ripple_mm.unwrap_or(0.0),
+            0.0,
+            MAX_SIGMA_MM,
+        )?;
         if let Some(UnseenFile { part, darkest }) = self.unseen_orders {
             within("unseen_orders.part", part, 0.0, 1.0)?;
             within("unseen_orders.darkest", darkest, 0.0, 1.0)?;

@@ -1,9 +1,12 @@
 //! The sequences that a part can be measured with, and what is predicted of each: noise, where it is safe, wrong orders.
 
 use super::archive::Arrays;
-use super::golden::GoldenPart;
+use super::captures::Offsets;
+use super::golden::{GoldenPart, SMOOTHING_PX};
 use super::{SequenceFile, SequenceKind, UnseenFile};
+use algo::inspect::ripple;
 use algo::pattern::{Sequence, Shot, Slips, Waveform, Waveforms};
+use algo::units::PhaseDelta;
 
 /// A sequence that a part may be measured with: what it can unwrap, and what each frame shows.
 pub(super) type Candidate = (SequenceKind, Vec<Shot>);
@@ -33,7 +36,30 @@ impl GoldenPart<'_> {
     pub(super) fn sequences(&self, arrays: &Arrays) -> Vec<SequenceFile> {
         let candidates = candidates(self.calibration.waveforms(), self.full);
         let rated = |(kind, frames)| self.rated(kind, frames, arrays);
-        candidates.into_iter().map(rated).collect()
+        let mut sequences: Vec<_> = candidates.into_iter().map(rated).collect();
+        for (sequence, offsets) in sequences.iter_mut().zip(self.offsets) {
+            sequence.ripple_mm = Some(self.ripple(offsets, arrays));
+        }
+        // The others are known against the full one alone, whose own is less than any of them: it is the mean of three levels.
+        let known = sequences.iter().filter_map(|sequence| sequence.ripple_mm);
+        let least = known.reduce(f64::min);
+        if let Some(full) = sequences.last_mut() {
+            full.ripple_mm = least;
+        }
+        sequences
+    }
+
+    /// RMS of the periodic error of mean heights by the sequence with these offsets, mm.
+    fn ripple(&self, offsets: &Offsets, arrays: &Arrays) -> f64 {
+        let (width, pixels) = (self.phases.width, arrays.valid.len());
+        let heights = |at: usize| {
+            let turns = offsets
+                .each_ref()
+                .map(|of| PhaseDelta::from_bits(of[at].into()).turns());
+            let valid = arrays.valid[at] != 0;
+            valid.then(|| turns.map(|turns| turns * f64::from(arrays.height_slope[at])))
+        };
+        ripple((width, pixels), SMOOTHING_PX, heights)
     }
 
     /// σ_z² in mm² of a pixel of golden, measured once with these frames.
@@ -79,6 +105,7 @@ impl GoldenPart<'_> {
             frames,
             sigma_mm,
             safe_share: valid().filter(safe).count() as f64 / count,
+            ripple_mm: None,
             unseen_orders,
         }
     }

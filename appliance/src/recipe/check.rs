@@ -78,6 +78,8 @@ pub struct RecipeSequence {
     pub levels: Sequence,
     /// Which part of `sequence_offset.npy` is its own; the full one and the two frames have none.
     pub offset: Option<usize>,
+    /// RMS of the periodic error of mean heights, mm.
+    pub ripple_mm: f64,
 }
 
 impl RecipeSequence {
@@ -188,6 +190,11 @@ fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, String> {
             shots: Shot::level(1.0, 2).collect(),
             levels: Sequence::pair(),
             offset: None,
+            ripple_mm: file
+                .sequences
+                .last()
+                .and_then(|full| full.ripple_mm)
+                .unwrap_or(0.0),
         });
     }
     let last = file.sequences.len() - 1;
@@ -202,6 +209,7 @@ fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, String> {
                 shots: sequence.frames.clone(),
                 levels: levels.map_err(|error| error.to_string())?,
                 offset: (at < last).then_some(at),
+                ripple_mm: sequence.ripple_mm.unwrap_or(0.0),
             });
         }
     }

@@ -159,6 +159,10 @@ pub struct SequenceFile {
     /// Share of the golden surface whose phase stays within the sequence's reach for every
     /// placement inside the tolerance.
     pub safe_share: f64,
+    /// RMS of the periodic error of the mean height over a square of 9 × 9 pixels by it, where it is largest, mm; `None` where it was taught from a recording
+    /// and in recipes of older programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ripple_mm: Option<f64>,
     /// How often it gets a fringe order wrong unseen; `None` in recipes of older programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unseen_orders: Option<UnseenFile>,

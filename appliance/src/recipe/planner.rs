@@ -99,6 +99,7 @@ mod tests {
                 frames: Shot::level(1.0, [4, 6, 12][i]).collect(),
                 sigma_mm: sigmas[i],
                 safe_share: safe[i],
+                ripple_mm: None,
                 unseen_orders: Some(UnseenFile {
                     part: 2e-9,
                     darkest: 1.7e-3,

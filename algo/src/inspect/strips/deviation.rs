@@ -120,7 +120,7 @@ impl Production {
                 libm::sqrt(
                     golden * (extreme.defect * pixels + motion * smoothed / self.spot_variance()),
                 ),
-                self.displaced(pose.placed.as_ref()),
+                libm::hypot(self.displaced(pose.placed.as_ref()), self.rippled()),
             ),
         }
     }

@@ -44,6 +44,8 @@ pub struct Parts {
     pub largest: Vec<Largest>,
     /// The error of the head's calibration.
     pub calibration: CalibrationError,
+    /// RMS of the periodic error of a mean height by this sequence, mm.
+    pub ripple: f64,
 }
 
 /// Everything that inspecting parts needs, worked out once.
@@ -74,6 +76,7 @@ pub struct Production {
     pub(super) golden_noise: f64,
     pub(super) largest: Vec<Largest>,
     pub(super) calibration: CalibrationError,
+    pub(super) ripple: f64,
 }
 
 impl Production {
@@ -96,6 +99,7 @@ impl Production {
             golden_noise,
             largest,
             calibration,
+            ripple,
         } = parts;
         let width = cubics.surface().width;
         taught.mark_squares(width.max(1));
@@ -135,6 +139,7 @@ impl Production {
             golden_noise,
             largest,
             calibration,
+            ripple,
         })
     }
 

@@ -6,7 +6,10 @@
 //! - the noise of golden, once, as a deviation from golden and through the motion, which is found against golden;
 //! - the error of the calibration: of a value that is made of heights the σ of heights times the value's lever, that is, as if errors
 //!   had the sign that does most everywhere; of one that is compared with golden, which the same head measured, only what a length
-//!   as long as the part's displacement is wrong by.
+//!   as long as the part's displacement is wrong by;
+//! - the periodic error of phases by an imperfect response, of RMS ρ ([`ripple`](crate::inspect::ripple)): a part that is displaced has it
+//!   at other places of the fringes than golden, so its deviation has √2 ρ, and 2 u is the largest by which two sines differ. ρ is
+//!   that of the place where it is largest, and taken to have the sign that does most everywhere.
 
 use super::Production;
 use super::pair::{correlated, smoothed};
@@ -57,6 +60,7 @@ impl Production {
             Made::OfDeviations => (pixels / smoothed + moved, self.displaced(placed)),
         };
         let golden = golden * self.golden_variance(noisier);
+        let wrong = libm::hypot(wrong, self.rippled());
         Reading {
             value,
             sigma: Some(libm::sqrt(pixels + motion)),
@@ -97,6 +101,11 @@ impl Production {
             .as_ref()
             .map_or(1.0, Alignment::pixels_per_spot);
         self.square_variance(1).max(1.0 / apart.max(1.0)).min(1.0)
+    }
+
+    /// What the periodic errors of golden and of a displaced part make of a deviation, mm.
+    pub(super) fn rippled(&self) -> f64 {
+        core::f64::consts::SQRT_2 * self.ripple
     }
 
     /// By how much a length as long as the part's displacement is wrong, mm.

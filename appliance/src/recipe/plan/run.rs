@@ -74,6 +74,8 @@ pub(super) struct Prepared {
     brighter: f64,
     /// Which offset from the full sequence golden has by this one.
     offset: Option<usize>,
+    /// RMS of the periodic error of mean heights, mm.
+    ripple_mm: f64,
 }
 
 impl Prepared {
@@ -93,6 +95,7 @@ impl Prepared {
             shots,
             levels,
             offset,
+            ripple_mm,
         } = sequence;
         let offset = offset.filter(|_| !arrays.sequence_offset.is_empty());
         let offsets = (golden::offset(arrays, offset), golden::offset(arrays, base));
@@ -112,6 +115,7 @@ impl Prepared {
             decoder,
             brighter,
             offset,
+            ripple_mm,
         })
     }
 
@@ -167,6 +171,7 @@ impl Prepared {
             decoder,
             taught,
             map,
+            ripple_mm,
             ..
         } = self;
         let bytes = size_of_val(map.as_deref().unwrap_or(&[])) + taught.bytes();
@@ -183,6 +188,7 @@ impl Prepared {
             golden_noise,
             largest: largest.map(|largest| largest.times(over_full)).collect(),
             calibration: shared.calibration,
+            ripple: ripple_mm,
         });
         let production = production.map_err(|error| error.to_string())?;
         let (modulation, tolerance_px) = &shared.picture;
