@@ -66,16 +66,19 @@ fn interpolate_row<V: Lanes>(
     share: f32,
     row: &mut [BlockNumbers],
 ) {
-    for ((out, a), b) in row.iter_mut().zip(above).zip(below) {
-        for i in 0..out.len() {
-            out[i] = a[i] + (b[i] - a[i]) * share;
-        }
+    let out = row.as_flattened_mut();
+    let (above, below) = (
+        &above.as_flattened()[..out.len()],
+        &below.as_flattened()[..out.len()],
+    );
+    for i in 0..out.len() {
+        out[i] = above[i] + (below[i] - above[i]) * share;
     }
 }
 
 /// The whole displacement of a block's middle, along and down: pixels, rounded down.
 #[derive(Clone, Copy)]
-pub(super) struct Whole([f32; 2]);
+pub struct Whole([f32; 2]);
 
 impl Whole {
     /// Of these numbers; none if it is not known.
@@ -114,7 +117,7 @@ impl Whole {
 
 /// du, dv (pixels, less whole ones) and dz (nm) of the pixels of a block.
 #[derive(Clone, Copy)]
-pub(super) struct Linear {
+pub struct Linear {
     /// Of the first pixel at height 0.
     first: [f32; VALUES],
     /// Change per column.
@@ -138,8 +141,14 @@ impl Linear {
     /// Of pixel `i` at height `z`, nm.
     #[inline(always)]
     pub fn at(&self, i: usize, z: i32) -> [f32; VALUES] {
+        self.at_height(i, z as f32)
+    }
+
+    /// Of pixel `i` at height `z`, nm.
+    #[inline(always)]
+    pub fn at_height(&self, i: usize, z: f32) -> [f32; VALUES] {
         let Self { first, step, slope } = self;
-        let (column, z) = (i as i32 as f32, z as f32);
+        let column = i as i32 as f32;
         [
             (first[0] + step[0] * column) + slope[0] * z,
             (first[1] + step[1] * column) + slope[1] * z,
@@ -150,13 +159,13 @@ impl Linear {
 
 /// Whether a displacement is known; NaN is not.
 #[inline(always)]
-pub(super) fn is_near(pixels: f32) -> bool {
+pub fn is_near(pixels: f32) -> bool {
     (pixels > -MAX_AWAY) & (pixels < MAX_AWAY)
 }
 
 /// Rounded down; of displacements.
 #[inline(always)]
-pub(super) fn floor(pixels: f32) -> f32 {
+pub fn floor(pixels: f32) -> f32 {
     let nearest = nearest(pixels);
     if nearest > pixels {
         nearest - 1.0

@@ -56,10 +56,20 @@ fn same<V: Lanes>(
         .zip(seen)
         .zip(upper.zip(lower).zip(taught).zip(out))
     {
+        v.fetch(golden.height, ahead + blocks_done * BLOCK, 0);
+        let mut measured = 0;
+        for offset in offsets {
+            measured |= mask(*offset != NO_OFFSET);
+        }
+        if measured == 0 {
+            // Beside the part, and in its openings.
+            out.fill(NO_OFFSET);
+            blocks_done += 1;
+            continue;
+        }
         if !from.fits(numbers) {
             break;
         }
-        v.fetch(golden.height, ahead + blocks_done * BLOCK, 0);
         let linear = Linear::of(numbers, from);
         let (mut farthest, mut largest) = (0, 0);
         for i in 0..BLOCK {
