@@ -170,7 +170,8 @@ fn of_facets(golden: GoldenSurface<'_>, value: impl Fn(&Facet, Vector) -> f64 + 
                 return None;
             }
             let point = golden.triangulator.point(u, v, height)?;
-            let facet = golden.facet(point, (u as f64, v as f64))?;
+            let seen = golden.triangulator.camera().project(point)?;
+            let facet = golden.facet(point, seen)?;
             Some(value(&facet, point) as f32)
         };
         for (u, value) in row.iter_mut().enumerate() {

@@ -95,7 +95,8 @@ impl Alignment {
             for u in full(v).filter(|u| u % columns == 0) {
                 let height = golden.surface.height[v * width + u];
                 let seen = golden.triangulator.point(u, v, height).and_then(|point| {
-                    let facet = golden.quiet_facet(point, (u as f64, v as f64))?;
+                    let seen = golden.triangulator.camera().project(point)?;
+                    let facet = golden.quiet_facet(point, seen)?;
                     Some(Spot { u, v, point, facet })
                 });
                 spots.extend(seen);

@@ -72,7 +72,8 @@ impl GoldenSurface<'_> {
         Some(upper + (lower - upper) * fv)
     }
 
-    /// The facet about the pixel next to (u, v), where `point` is seen; none unless all pixels of its square are compared.
+    /// The facet about the pixel next to where `point` is `seen`: where the camera projects it. None unless all pixels of its square are
+    /// compared.
     pub fn facet(&self, point: Vector, seen: (f64, f64)) -> Option<Facet> {
         self.facet_of(point, seen, Taught::all_compared)
     }
@@ -85,12 +86,12 @@ impl GoldenSurface<'_> {
     fn facet_of(
         &self,
         point: Vector,
-        (u, v): (f64, f64),
+        seen: (f64, f64),
         count: impl Fn(&Taught, Range<usize>) -> bool,
     ) -> Option<Facet> {
         let width = self.surface.width;
         let inside = |x: f64, end: usize| x >= REACH as f64 && x + REACH as f64 + 1.0 < end as f64;
-        let (u, v) = (libm::rint(u), libm::rint(v));
+        let (u, v) = (libm::rint(seen.0), libm::rint(seen.1));
         if !(inside(u, width) && inside(v, self.rows())) {
             return None;
         }
@@ -112,10 +113,9 @@ impl GoldenSurface<'_> {
         }
         let (along, down) = (along as f64 / SQUARES * 1e-6, down as f64 / SQUARES * 1e-6);
         let camera = self.triangulator.camera();
-        let here = camera.project(point)?;
         let beside = |x, y, z| {
             let (u, v) = camera.project(point + Vector::new(x, y, z) * DELTA_MM)?;
-            Some(((u - here.0) / DELTA_MM, (v - here.1) / DELTA_MM))
+            Some(((u - seen.0) / DELTA_MM, (v - seen.1) / DELTA_MM))
         };
         let (x, y, z) = (
             beside(1.0, 0.0, 0.0)?,

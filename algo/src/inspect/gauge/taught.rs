@@ -62,7 +62,8 @@ pub(in crate::inspect) fn taught_cells(
             if u % stride != 0 || v % stride != 0 {
                 continue;
             }
-            if let Some(facet) = golden.facet(point, (u as f64, *v as f64)) {
+            let seen = golden.triangulator.camera().project(point);
+            if let Some(facet) = seen.and_then(|seen| golden.facet(point, seen)) {
                 let jacobian = facet.jacobian(point, about);
                 for (sum, value) in cell.jacobian.iter_mut().zip(jacobian) {
                     *sum += value;
