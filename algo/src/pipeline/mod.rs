@@ -9,8 +9,8 @@ mod rows;
 mod wrapped;
 
 pub(crate) use cubic::{
-    COMPARED, CubicInput, CubicOutput, HeightTally, NO_OFFSET, SIGMA, SQUARE, VARIANCE_UNIT_NM,
-    offset_row, sum_variances,
+    COMPARED, CubicInput, CubicOutput, CubicRow, HeightTally, NO_OFFSET, SIGMA, SQUARE,
+    VARIANCE_UNIT_NM, offset_row, sum_variances,
 };
 pub use cubic::{HeightCubics, KnownSurface};
 pub use epipolar::Epipolar;

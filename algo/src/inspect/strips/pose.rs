@@ -17,10 +17,10 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 /// Pixels from node to node. A turn by half a degree seen through 22° over 1456 pixels is bent by 0.003 pixels between them.
-pub(super) const SPACING: usize = 64;
+const SPACING: usize = 64;
 
 /// The points that a node's pixel sees below and above the middle height; NaN where it sees nothing.
-pub(super) type Sight = [Vector; 2];
+type Sight = [Vector; 2];
 
 /// How the part of a cycle lies, and what that does to every pixel.
 #[derive(Debug)]
@@ -69,17 +69,24 @@ impl PoseField {
         let (width, height) = plan.size();
         // Without an alignment parts are taken to lie as taught.
         self.placed = placed.filter(|_| plan.alignment.is_some());
-        if let Some(Placed { motion, .. }) = &self.placed {
-            let (sights, columns) = (&self.sights, nodes(width).count());
-            for_each_row(&mut self.blocks, self.across, |row, blocks| {
-                let sights = &sights[row * columns..][..columns];
-                plan.displace(motion, nodes(width).zip(sights), row * SPACING, blocks);
-            });
+        if let Some(Placed { motion, .. }) = self.placed {
+            let motion = &motion;
+            self.displace(plan, motion);
             for (region, taught) in self.regions.iter_mut().zip(&plan.gauges.regions) {
                 let to = |at| plan.moved(motion, at);
                 region.become_moved(taught, (width, height), to, &mut self.crossed);
             }
         }
+    }
+
+    /// Finds the displacements by a motion, without the regions of gauges.
+    pub fn displace(&mut self, plan: &Production, motion: &Motion) {
+        let width = plan.size().0;
+        let (sights, columns) = (&self.sights, nodes(width).count());
+        for_each_row(&mut self.blocks, self.across, |row, blocks| {
+            let sights = &sights[row * columns..][..columns];
+            plan.displace(motion, nodes(width).zip(sights), row * SPACING, blocks);
+        });
     }
 
     /// A region of the plan, moved with the part.
@@ -113,7 +120,7 @@ impl PoseField {
 }
 
 /// The places of the nodes along `pixels` pixels: every [`SPACING`]th, and the last.
-pub(super) fn nodes(pixels: usize) -> impl Iterator<Item = usize> {
+fn nodes(pixels: usize) -> impl Iterator<Item = usize> {
     (0..(pixels - 1).div_ceil(SPACING) + 1).map(move |at| (at * SPACING).min(pixels - 1))
 }
 
@@ -124,7 +131,7 @@ pub(super) fn blocks_of_row(width: usize) -> Vec<BlockNumbers> {
 
 impl Production {
     /// What the node at pixel (u, v) sees.
-    pub(super) fn sight(&self, (u, v): (usize, usize)) -> Sight {
+    fn sight(&self, (u, v): (usize, usize)) -> Sight {
         let (middle, half) = self.levels;
         let nothing = Vector::new(f64::NAN, f64::NAN, f64::NAN);
         [middle - half, middle + half].map(|z| self.seen(u, v, z).unwrap_or(nothing))
@@ -153,7 +160,7 @@ impl Production {
     }
 
     /// The displacement by a motion of what the node at pixel (u, v) sees.
-    pub(super) fn node(&self, motion: &Motion, (u, v): (usize, usize), sight: &Sight) -> Node {
+    fn node(&self, motion: &Motion, (u, v): (usize, usize), sight: &Sight) -> Node {
         let at = |point: Vector| {
             let back = motion.undo(point);
             let to = self.triangulator.camera().project(back);

@@ -184,24 +184,6 @@ impl HeightCubics {
             .then(|| height.mm() + delta / self.range * self.coefficients(place)[0])
     }
 
-    /// The phase at which a pixel sees what lies `rise` mm above the known surface, if its cubic reaches there.
-    pub(crate) fn phase_of(&self, place: usize, rise: f64) -> Option<AbsolutePhase> {
-        let base = self.surface.phase[place];
-        let [first, second, third] = self.coefficients(place);
-        if !base.is_known() || self.reach[place] == 0 || first == 0.0 {
-            return None;
-        }
-        // A step of Newton's method from the linear solution: 1e-5 turn.
-        let y = rise / first;
-        let miss = y * (first + y * (second + y * third)) - rise;
-        let y = y - miss / (first + y * (2.0 * second + y * 3.0 * third));
-        let delta = y * self.range;
-        (libm::fabs(delta) < self.reach(place)).then(|| {
-            let bits = libm::rint(delta * 65_536.0) as i32;
-            AbsolutePhase::from_bits(base.to_bits().wrapping_add(bits))
-        })
-    }
-
     /// Coefficients of y, y² and y³ in mm.
     fn coefficients(&self, place: usize) -> [f64; 3] {
         [

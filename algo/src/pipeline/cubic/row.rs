@@ -47,6 +47,26 @@ pub(crate) struct CubicRow<'a> {
     pub range: f64,
 }
 
+impl CubicRow<'_> {
+    /// Those of some columns.
+    pub fn part(&self, columns: Range<usize>) -> Self {
+        Self {
+            base: &self.base[columns.clone()],
+            first: &self.first[columns.clone()],
+            second: &self.second[columns.clone()],
+            third: &self.third[columns.clone()],
+            reach: &self.reach[columns],
+            range: self.range,
+        }
+    }
+
+    /// A coefficient of y² or y³ in nm.
+    #[inline(always)]
+    pub fn coefficient(units: i16) -> f32 {
+        f32::from(units) * UNIT_NM as f32
+    }
+}
+
 /// A decoded row, with what is taught of its pixels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CubicInput<'a> {
@@ -173,7 +193,10 @@ fn offset_columns<V: Lanes>(
             let known = trust[i] as u8 == Trust::Resolved as u8;
             let inside = known & (delta < far) & (delta > -far);
             let y = delta as f32 * scale;
-            let (b, c) = (coefficient(second[i]), coefficient(third[i]));
+            let (b, c) = (
+                CubicRow::coefficient(second[i]),
+                CubicRow::coefficient(third[i]),
+            );
             let nm = whole(y * (first[i] + y * (b + y * c)));
             let compare = inside & (taught[i] >= COMPARED);
             offsets[i] = if inside { nm } else { NO_OFFSET };
@@ -227,7 +250,10 @@ fn sum_columns<V: Lanes>(
             let compare = inside & (taught[i] >= COMPARED);
             let delta = phase[i].to_bits().wrapping_sub(base[i].to_bits());
             let y = delta as f32 * scale;
-            let (b, c) = (coefficient(second[i]), coefficient(third[i]));
+            let (b, c) = (
+                CubicRow::coefficient(second[i]),
+                CubicRow::coefficient(third[i]),
+            );
             let slope = first[i] + y * ((b + b) + y * (3.0 * c));
             let counts = f32::from(modulation[i].to_bits());
             let variance = seen.noise * (slope * slope) / (counts * counts);
@@ -256,12 +282,6 @@ fn sum_columns<V: Lanes>(
 #[inline(always)]
 fn scale(range: f64) -> f32 {
     (1.0 / (range * 65_536.0)) as f32
-}
-
-/// A stored coefficient in nm.
-#[inline(always)]
-fn coefficient(units: i16) -> f32 {
-    f32::from(units) * UNIT_NM as f32
 }
 
 /// "No height" among offsets.

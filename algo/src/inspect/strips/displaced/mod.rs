@@ -25,7 +25,9 @@ use crate::simd::{Backend, Lanes, back_end_entry};
 use crate::units::Height;
 use block::Block;
 use core::ops::Range;
-pub(super) use linear::{BLOCK, BlockNumbers, Node, VALUES, between, interpolate};
+pub(super) use linear::{
+    BLOCK, BlockNumbers, Linear, Node, VALUES, Whole, between, floor, interpolate, is_near,
+};
 use next::align_next;
 use same::align_same;
 

@@ -1,7 +1,6 @@
 //! The mean of a pair at a fraction of its resolution.
 
 use crate::frame::{FrameView, Sample, Samples};
-use alloc::vec;
 use alloc::vec::Vec;
 
 /// A picture at one scale.
@@ -14,11 +13,10 @@ pub(super) struct Coarse {
 }
 
 impl Coarse {
-    /// The mean of a pair at half its resolution, in counts.
-    pub fn of(frames: [FrameView<'_>; 2]) -> Self {
-        let (width, height) = (frames[0].width() / 2, frames[0].height() / 2);
-        let mut brightness = vec![0.0; width * height];
-        for (v, row) in brightness.chunks_mut(width.max(1)).enumerate() {
+    /// Becomes the mean of a pair at half its resolution, in counts.
+    pub fn become_mean(&mut self, frames: [FrameView<'_>; 2]) {
+        self.clear(frames[0].width() / 2, frames[0].height() / 2);
+        for (v, row) in self.brightness.chunks_mut(self.width.max(1)).enumerate() {
             for frame in frames {
                 for v in [2 * v, 2 * v + 1] {
                     match frame.row(v) {
@@ -28,29 +26,25 @@ impl Coarse {
                 }
             }
         }
-        Self {
-            width,
-            height,
-            brightness,
+    }
+
+    /// Becomes another one at half its resolution.
+    pub fn become_half(&mut self, of: &Self) {
+        self.clear(of.width / 2, of.height / 2);
+        for (v, row) in self.brightness.chunks_mut(self.width.max(1)).enumerate() {
+            let rows = &of.brightness[2 * v * of.width..][..2 * of.width];
+            let (upper, lower) = rows.split_at(of.width);
+            let (upper, lower) = (upper.as_chunks::<2>().0, lower.as_chunks::<2>().0);
+            for ((out, [a, b]), [c, d]) in row.iter_mut().zip(upper).zip(lower) {
+                *out = (a + b + c + d) / 4.0;
+            }
         }
     }
 
-    /// At half its resolution.
-    pub fn halved(&self) -> Self {
-        let (width, height) = (self.width / 2, self.height / 2);
-        let mut brightness = vec![0.0; width * height];
-        for (v, row) in brightness.chunks_mut(width.max(1)).enumerate() {
-            for (u, out) in row.iter_mut().enumerate() {
-                let at = 2 * v * self.width + 2 * u;
-                let four = [at, at + 1, at + self.width, at + self.width + 1];
-                *out = four.map(|at| self.brightness[at]).iter().sum::<f32>() / 4.0;
-            }
-        }
-        Self {
-            width,
-            height,
-            brightness,
-        }
+    fn clear(&mut self, width: usize, height: usize) {
+        (self.width, self.height) = (width, height);
+        self.brightness.clear();
+        self.brightness.resize(width * height, 0.0);
     }
 
     /// Between four pixels; none outside.

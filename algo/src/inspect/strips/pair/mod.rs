@@ -14,28 +14,32 @@ mod coarse;
 mod expected;
 mod picture;
 mod shared;
+mod solve;
+mod sums;
 mod window;
 
 pub use picture::{Found, Picture};
 pub(super) use shared::{correlated, smoothed};
 
+use super::displaced::BlockNumbers;
+use super::pose::{PoseField, blocks_of_row};
 use super::{Input, Production, Strips};
 use crate::frame::FrameView;
-use crate::inspect::align::{Motion, Placed};
-use crate::phase::DecodeError;
+use crate::inspect::align::{Alignment, Placed, Spot};
+use crate::phase::{DecodeError, PhaseRow};
 use crate::pipeline::{PhaseMap, for_each};
 use alloc::vec::Vec;
 use coarse::Coarse;
-use window::{BAND_ROWS, Band, Expected, Seen, Windows};
+use window::{BAND_ROWS, Band, SIDE, Windows};
 
 /// The buffers of a pair, allocated once.
 #[derive(Debug)]
 pub struct PairBuffers {
     windows: Windows,
-    expected: Vec<Expected>,
     /// What was measured last.
     phases: PhaseMap,
-    bands: Vec<Band>,
+    /// Of each band of rows: the buffers of its windows, and the displacements along a row.
+    bands: Vec<(Band, Vec<BlockNumbers>)>,
     pictures: Vec<Coarse>,
 }
 
@@ -60,10 +64,15 @@ impl Production {
     pub fn pair_buffers(&self) -> PairBuffers {
         let (width, height) = self.size();
         PairBuffers {
-            windows: Windows::new(self.decoder.bit_depth(), self.noise_counts),
-            expected: self.as_taught().collect(),
+            windows: Windows::new(
+                self.decoder.backend(),
+                self.decoder.bit_depth(),
+                self.noise_counts,
+            ),
             phases: PhaseMap::new(width, height),
-            bands: window::bands(height),
+            bands: (0..height.div_ceil(BAND_ROWS))
+                .map(|_| (Band::default(), blocks_of_row(width)))
+                .collect(),
             pictures: Vec::new(),
         }
     }
@@ -105,43 +114,62 @@ impl Production {
         let found =
             picture.and_then(|picture| picture.find(triangulator, frames, &mut buffers.pictures));
         let motion = found.map(|found| found.motion);
-        self.fit_pair(frames, motion.as_ref(), buffers);
+        if let Some(motion) = &motion {
+            strips.pose.displace(self, motion);
+        }
+        let pose = motion.is_some().then_some(&strips.pose);
+        if let Some(alignment) = &self.alignment {
+            self.fit_pair(frames, pose, buffers, Some(alignment));
+        }
         let placed = self.place_from(Input::Phases(&buffers.phases), strips, motion)?;
         if let Some(placed) = &placed {
-            self.fit_pair(frames, Some(&placed.motion), buffers);
+            strips.pose.displace(self, &placed.motion);
         }
+        let pose = (placed.is_some() || motion.is_some()).then_some(&strips.pose);
+        self.fit_pair(frames, pose, buffers, None);
         Ok(PairPlaced { found, placed })
     }
 
-    /// Measures the phases of a part that lies so.
+    /// Measures the phases of a part that lies as in a field, as taught if none: in all rows, or only in those that its motion is found
+    /// from.
     fn fit_pair(
         &self,
         frames: [FrameView<'_>; 2],
-        motion: Option<&Motion>,
+        pose: Option<&PoseField>,
         buffers: &mut PairBuffers,
+        only: Option<&Alignment>,
     ) {
-        match motion {
-            Some(motion) => self.expect(motion, &mut buffers.expected),
-            None => {
-                let out = buffers.expected.iter_mut();
-                out.zip(self.as_taught())
-                    .for_each(|(out, taught)| *out = taught);
-            }
-        }
         let PairBuffers {
             windows,
-            expected,
             phases,
             bands,
             ..
         } = buffers;
-        let seen = Seen { frames, expected };
         let mut rows = phases.rows();
-        let work = rows.chunks_mut(BAND_ROWS).zip(bands).collect();
-        for_each(work, |at, (rows, band)| {
-            windows.fit(seen, at * BAND_ROWS, rows, band);
+        let work: Vec<_> = rows.chunks_mut(BAND_ROWS).zip(bands).collect();
+        for_each(work, |at, (rows, (band, blocks))| {
+            let top = at * BAND_ROWS;
+            let mut fit = |rows: &mut [PhaseRow<'_>], top: usize| {
+                windows.fit(frames, top, rows, band, |v, out| match pose {
+                    Some(pose) => self.expect(pose, v, blocks, out),
+                    None => self.expect_as_taught(v, out),
+                });
+            };
+            let Some(alignment) = only else {
+                return fit(rows, top);
+            };
+            let (_, spots) = alignment.spots(top..top + rows.len());
+            for near in spots.chunk_by(share_rows) {
+                let (first, last) = (near[0].v, near[near.len() - 1].v);
+                fit(&mut rows[first - top..=last - top], first);
+            }
         });
     }
+}
+
+/// Whether the windows of two spots share rows.
+fn share_rows(a: &Spot, b: &Spot) -> bool {
+    b.v - a.v < SIDE
 }
 
 #[cfg(test)]

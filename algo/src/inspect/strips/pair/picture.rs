@@ -90,7 +90,9 @@ impl Picture {
         let mut scales = Vec::new();
         let mut pixels = 1;
         while scales.is_empty() || (pixels as f64) < tolerance_px / COARSE_PX {
-            picture = picture.halved();
+            let mut half = Coarse::default();
+            half.become_half(&picture);
+            picture = half;
             pixels *= 2;
             let scale = Scale::new(triangulator, surface, (&picture, pixels), centre);
             if scale.points.len() < 8 * UNKNOWNS {
@@ -109,12 +111,13 @@ impl Picture {
         frames: [FrameView<'_>; 2],
         pictures: &mut Vec<Coarse>,
     ) -> Option<Found> {
-        pictures.clear();
-        pictures.push(Coarse::of(frames));
-        let coarsest = self.scales.first().map_or(2, |scale| scale.pixels);
-        while 2 << (pictures.len() - 1) < coarsest {
-            let next = pictures[pictures.len() - 1].halved();
-            pictures.push(next);
+        pictures.resize_with(self.scales.len(), Coarse::default);
+        let (finest, coarser) = pictures.split_first_mut()?;
+        finest.become_mean(frames);
+        let mut before = &*finest;
+        for picture in coarser {
+            picture.become_half(before);
+            before = picture;
         }
         let mut motion = [0.0; MOTIONS];
         let mut likeness = 0.0;

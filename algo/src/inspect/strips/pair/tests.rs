@@ -1,10 +1,11 @@
 //! Fits of made-up pairs against theory.
 
 use super::shared::{correlated, smoothed};
-use super::window::{Band, Expected, SIDE, Seen, Windows};
+use super::window::{Band, SIDE, Windows};
 use crate::frame::{FrameView, Samples};
 use crate::phase::Trust;
 use crate::pipeline::PhaseMap;
+use crate::simd::Backend;
 use crate::units::AbsolutePhase;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -55,6 +56,10 @@ impl Scene {
 
     /// The phases that are measured about the expected ones.
     fn measured(&self, seed: u64, about: &Self, tops: &[usize]) -> PhaseMap {
+        self.measured_on(Backend::best(), seed, about, tops)
+    }
+
+    fn measured_on(&self, backend: Backend, seed: u64, about: &Self, tops: &[usize]) -> PhaseMap {
         let [plus, minus] = self.frames(seed);
         let eight = [&plus, &minus].map(|frame| frame.iter().map(|&s| s as u8).collect::<Vec<_>>());
         let frames = [(&plus, &eight[0]), (&minus, &eight[1])].map(|(sixteen, eight)| {
@@ -64,22 +69,19 @@ impl Scene {
             };
             FrameView::new(samples, WIDTH, ROWS, WIDTH).unwrap()
         });
-        let expected = (0..WIDTH * ROWS).map(|at| Expected {
-            phase: AbsolutePhase::from_turns(about.expected(at)),
-            compared: true,
-        });
-        let expected: Vec<_> = expected.collect();
-        let seen = Seen {
-            frames,
-            expected: &expected,
-        };
         let scale = f64::from(1_u32 << (self.bit_depth - 8));
-        let windows = Windows::new(self.bit_depth, self.noise * scale);
+        let windows = Windows::new(backend, self.bit_depth, self.noise * scale);
         let mut map = PhaseMap::new(WIDTH, ROWS);
         let mut rows = map.rows();
         for (at, &top) in tops.iter().enumerate() {
             let end = tops.get(at + 1).copied().unwrap_or(ROWS);
-            windows.fit(seen, top, &mut rows[top..end], &mut Band::default());
+            let rows = &mut rows[top..end];
+            windows.fit(frames, top, rows, &mut Band::default(), |v, out| {
+                for (u, phase) in out.phase.iter_mut().enumerate() {
+                    *phase = AbsolutePhase::from_turns(about.expected(v * WIDTH + u));
+                }
+                out.compared.fill(true);
+            });
         }
         map
     }
@@ -217,9 +219,12 @@ fn another_carrier_than_the_expected_one_is_rejected() {
 }
 
 #[test]
-fn the_bits_do_not_depend_on_the_bands() {
+fn the_bits_depend_neither_on_the_bands_nor_on_the_back_end() {
     let whole = PLAIN.measured(5, &PLAIN, &[0]);
     for tops in [&[0, 3, 5, 64, 159][..], &[0, 80]] {
         assert_eq!(PLAIN.measured(5, &PLAIN, tops), whole);
+    }
+    for backend in Backend::available() {
+        assert_eq!(PLAIN.measured_on(backend, 5, &PLAIN, &[0]), whole);
     }
 }

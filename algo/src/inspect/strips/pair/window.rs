@@ -18,284 +18,308 @@
 //!
 //! # Shapes and units
 //! Sums are exact: samples as 12 bits, sines as Q15, products as 24 bits, 81 of them in 32 bits. So the result depends neither on
-//! tiles nor on threads.
+//! bands nor on threads. A row enters the sums down the columns as another one leaves them (`sums.rs`); from these follow the sums over
+//! windows and the phases (`solve.rs`), many pixels at a time.
 //!
 //! # Accuracy
 //! `the_noise_of_a_fitted_phase_is_that_of_theory`, `the_phase_of_a_pair_has_next_to_no_periodic_error`.
 
-use crate::frame::{FrameView, Samples};
-use crate::phase::{MIN_MODULATION_8_BIT, PhaseRow, Trust};
-use crate::units::{AbsolutePhase, Modulation};
-use alloc::vec;
+use super::solve::{Solved, Solver, solve_block};
+use super::sums::{BLOCK, Columns};
+use crate::frame::{FrameView, Sample, Samples};
+use crate::phase::PhaseRow;
+use crate::simd::{Backend, Lanes, back_end_entry};
+use crate::units::AbsolutePhase;
 use alloc::vec::Vec;
 
 /// The window's side in pixels.
 pub const SIDE: usize = 7;
-const REACH: usize = SIDE / 2;
+pub(super) const REACH: usize = SIDE / 2;
 /// Pixels of a window.
 pub const PIXELS: f64 = (SIDE * SIDE) as f64;
 /// Bits of the samples that are used.
 const BITS: u8 = 12;
 /// Steps of a turn in the table of sines.
 const TURN: usize = 4096;
-/// The determinant of the normal equations over its largest value; less than half a fringe in the window has less.
-const LEAST_DETERMINED: f64 = 0.2;
-/// Largest share of the light's change, beyond its noise, that the fit may leave.
-const MOST_LEFT: f64 = 0.15;
 
 /// What fitting windows needs, worked out once.
 #[derive(Clone, Debug)]
 pub struct Windows {
     bit_depth: u8,
-    /// Sines over one turn and a quarter, Q15.
-    sines: Vec<i16>,
-    /// Variance of I₁ − I₂ in the squared unit of the sums.
-    noise: f64,
-    /// The least modulation of I₁ − I₂ in the unit of the sums.
-    least: f64,
+    backend: Backend,
+    /// Sine and cosine of each step of a turn, Q15.
+    sines: Vec<[i16; 2]>,
+    solver: Solver,
 }
 
-/// A row of s, c and d in 12 bits.
+/// What a row is expected to show.
+#[derive(Debug)]
+pub(super) struct ExpectedRow<'a> {
+    pub phase: &'a mut [AbsolutePhase],
+    /// Whether golden is compared there; elsewhere its surface is interpolated.
+    pub compared: &'a mut [bool],
+}
+
+/// A row as the fit needs it. Whole blocks of pixels; those behind the row are 0, and nothing is expected there.
 #[derive(Clone, Debug, Default)]
-struct Terms {
-    s: Vec<i16>,
-    c: Vec<i16>,
-    d: Vec<i16>,
-}
-
-/// The sums over the rows of a window, per column.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    ss: i32,
-    sc: i32,
-    cc: i32,
-    ds: i32,
-    dc: i32,
-    dd: i32,
+pub(super) struct Terms {
+    pub phase: Vec<AbsolutePhase>,
+    pub compared: Vec<bool>,
+    /// (I₁ + I₂) / 2 in the unit of the sums, less than 0 where a sample is at full scale.
+    pub light: Vec<f32>,
+    /// s, c and d in 12 bits.
+    pub s: Vec<i16>,
+    pub c: Vec<i16>,
+    pub d: Vec<i16>,
 }
 
 /// The buffers of a band of rows.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Band {
-    terms: Vec<Terms>,
-    sums: Vec<Sums>,
+    /// Row v lies at v modulo their number: the rows of a window, and the one that it leaves.
+    terms: [Terms; SIDE + 1],
+    columns: Columns,
+    /// Of the row that enters.
+    sines: Vec<[i16; 2]>,
 }
 
-impl Sums {
-    /// Adds the products of a pixel (`sign` 1) or takes them off (−1).
-    #[inline(always)]
-    fn add(&mut self, sign: i32, [s, c, d]: [i16; 3]) {
-        let [s, c, d] = [s, c, d].map(i32::from);
-        let (s_signed, c_signed, d_signed) = (sign * s, sign * c, sign * d);
-        self.ss += s_signed * s;
-        self.sc += s_signed * c;
-        self.cc += c_signed * c;
-        self.ds += d_signed * s;
-        self.dc += d_signed * c;
-        self.dd += d_signed * d;
-    }
-
-    #[inline(always)]
-    fn plus(&mut self, sign: i32, other: &Self) {
-        self.ss += sign * other.ss;
-        self.sc += sign * other.sc;
-        self.cc += sign * other.cc;
-        self.ds += sign * other.ds;
-        self.dc += sign * other.dc;
-        self.dd += sign * other.dd;
+impl Terms {
+    fn clear(&mut self, pixels: usize) {
+        refill(&mut self.phase, pixels, AbsolutePhase::UNKNOWN);
+        refill(&mut self.compared, pixels, false);
+        refill(&mut self.light, pixels, 0.0);
+        for list in [&mut self.s, &mut self.c, &mut self.d] {
+            refill(list, pixels, 0);
+        }
     }
 }
 
-/// The frames of a pair, and what is expected (row-major).
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Seen<'a> {
-    pub frames: [FrameView<'a>; 2],
-    pub expected: &'a [Expected],
+fn refill<T: Copy>(list: &mut Vec<T>, length: usize, value: T) {
+    list.clear();
+    list.resize(length, value);
 }
 
-/// What a pixel is expected to see.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Expected {
-    pub phase: AbsolutePhase,
-    /// Whether golden is compared there; elsewhere its surface is interpolated.
-    pub compared: bool,
+impl Band {
+    /// Begins with rows of `width` pixels.
+    fn clear(&mut self, width: usize) {
+        let pixels = width.next_multiple_of(BLOCK);
+        for terms in &mut self.terms {
+            terms.clear(pixels);
+        }
+        self.columns.clear(pixels);
+        refill(&mut self.sines, pixels, [0; 2]);
+    }
 }
 
 /// By so many bits the terms of pixels are smaller where golden is not compared: beside the others they hardly count.
-const FAINT: u8 = 3;
+pub(super) const FAINT: u8 = 3;
 
 impl Windows {
     /// For samples of `bit_depth` bits with σ = `noise` counts.
-    pub fn new(bit_depth: u8, noise: f64) -> Self {
+    pub fn new(backend: Backend, bit_depth: u8, noise: f64) -> Self {
         let sine = |at: usize| {
             let turns = (at as f64 + 0.5) / TURN as f64;
             libm::rint(32_767.0 * libm::sin(core::f64::consts::TAU * turns)) as i16
         };
-        let count = unit(bit_depth);
         Self {
             bit_depth,
-            sines: (0..TURN + TURN / 4).map(sine).collect(),
-            noise: 2.0 * noise * noise * count * count,
-            least: 2.0 * MIN_MODULATION_8_BIT / 255.0 * full_scale(bit_depth) * count,
+            backend,
+            sines: (0..TURN)
+                .map(|at| [sine(at), sine(at + TURN / 4)])
+                .collect(),
+            solver: Solver::new(unit(bit_depth), full_scale(bit_depth), noise),
         }
     }
 
-    /// Fits the windows around the pixels of some rows, the first of which is row `top`.
+    /// Fits the windows around the pixels of some rows, the first of which is row `top`. `expect` tells what a row is expected to show;
+    /// it is asked for these rows and for those that their windows reach into, from the top row down.
     pub(super) fn fit(
         &self,
-        seen: Seen<'_>,
+        frames: [FrameView<'_>; 2],
         top: usize,
         rows: &mut [PhaseRow<'_>],
         band: &mut Band,
+        mut expect: impl FnMut(usize, ExpectedRow<'_>),
     ) {
-        let (width, height) = (seen.frames[0].width(), seen.frames[0].height());
-        band.terms.resize(SIDE, Terms::default());
-        for terms in &mut band.terms {
-            for list in [&mut terms.s, &mut terms.c, &mut terms.d] {
-                list.resize(width, 0);
+        let (width, height) = (frames[0].width(), frames[0].height());
+        band.clear(width);
+        for v in top.saturating_sub(REACH)..top + rows.len() + REACH {
+            let Band {
+                terms,
+                columns,
+                sines,
+            } = &mut *band;
+            let (entering, leaving) = (v % (SIDE + 1), (v + 1) % (SIDE + 1));
+            let row = &mut terms[entering];
+            if v < height {
+                let (phase, compared) = (&mut row.phase[..width], &mut row.compared[..width]);
+                expect(v, ExpectedRow { phase, compared });
+                self.terms(frames, v, row, sines);
+            } else {
+                row.clear(width.next_multiple_of(BLOCK));
             }
-        }
-        band.sums.clear();
-        band.sums.resize(width, Sums::default());
-        let Band { terms, sums } = band;
-        let first = top.saturating_sub(REACH);
-        for v in first..(top + REACH).min(height) {
-            self.terms(seen, v, &mut terms[v % SIDE]);
-            accumulate(1, &terms[v % SIDE], sums);
-        }
-        for (v, row) in (top..).zip(rows) {
-            if v > first + REACH {
-                accumulate(-1, &terms[(v - REACH - 1) % SIDE], sums);
+            columns.slide(self.backend, &terms[entering], &terms[leaving]);
+            if let Some(at) = v.checked_sub(top + REACH) {
+                let middle = &terms[(v - REACH) % (SIDE + 1)];
+                self.row(middle, columns, &mut rows[at]);
             }
-            if v + REACH < height {
-                self.terms(seen, v + REACH, &mut terms[(v + REACH) % SIDE]);
-                accumulate(1, &terms[(v + REACH) % SIDE], sums);
-            }
-            self.row(seen, v, sums, row);
         }
     }
 
     /// s, c and d of row `v`; 0 where nothing is expected or a sample is at full scale.
-    fn terms(&self, seen: Seen<'_>, v: usize, terms: &mut Terms) {
-        let width = seen.frames[0].width();
-        let expected = &seen.expected[v * width..(v + 1) * width];
-        match seen.frames.map(|frame| frame.row(v)) {
+    fn terms(
+        &self,
+        frames: [FrameView<'_>; 2],
+        v: usize,
+        terms: &mut Terms,
+        sines: &mut [[i16; 2]],
+    ) {
+        // Always.
+        if let Some(table) = self.sines.first_chunk::<TURN>() {
+            for (sine, phase) in sines.iter_mut().zip(&terms.phase) {
+                *sine = table[(phase.to_bits() & 0xffff) as usize / (65_536 / TURN)];
+            }
+        }
+        match frames.map(|frame| frame.row(v)) {
             [Samples::Eight(plus), Samples::Eight(minus)] => {
-                self.typed(plus, minus, expected, terms);
+                self.typed(plus, minus, sines, terms);
             }
             [Samples::Sixteen(plus), Samples::Sixteen(minus)] => {
-                self.typed(plus, minus, expected, terms);
+                self.typed(plus, minus, sines, terms);
             }
             // The frames were checked.
             _ => {}
         }
     }
 
-    fn typed<T: crate::frame::Sample>(
-        &self,
+    fn typed<T: Sample>(&self, plus: &[T], minus: &[T], sines: &[[i16; 2]], terms: &mut Terms) {
+        let Terms {
+            phase,
+            compared,
+            light,
+            s,
+            c,
+            d,
+        } = terms;
+        let scale = Scale {
+            brightest: full_scale(self.bit_depth) as i32,
+            left: u32::from(BITS.saturating_sub(self.bit_depth)),
+            right: u32::from(self.bit_depth.saturating_sub(BITS)),
+            unit: (unit(self.bit_depth) / 2.0) as f32,
+        };
+        let expected = (&phase[..], &compared[..]);
+        multiply(
+            self.backend,
+            scale,
+            plus,
+            minus,
+            expected,
+            sines,
+            light,
+            s,
+            c,
+            d,
+        );
+    }
+
+    /// From the sums of the columns to the phases of a row.
+    fn row(&self, terms: &Terms, columns: &Columns, out: &mut PhaseRow<'_>) {
+        let width = out.phase.len();
+        let mut solved = Solved::default();
+        for start in (0..width).step_by(BLOCK) {
+            let (pixels, end) = (start..start + BLOCK, (start + BLOCK).min(width));
+            solve_block(
+                self.backend,
+                &self.solver,
+                columns.of_windows(start),
+                (
+                    &terms.phase[pixels.clone()],
+                    &terms.compared[pixels.clone()],
+                ),
+                &terms.light[pixels],
+                &mut solved,
+            );
+            let length = end - start;
+            out.phase[start..end].copy_from_slice(&solved.phase[..length]);
+            out.modulation[start..end].copy_from_slice(&solved.modulation[..length]);
+            out.trust[start..end].copy_from_slice(&solved.trust[..length]);
+        }
+    }
+}
+
+/// How samples become terms.
+#[derive(Clone, Copy)]
+pub(super) struct Scale {
+    /// The largest sample.
+    brightest: i32,
+    /// To [`BITS`] bits.
+    left: u32,
+    right: u32,
+    /// Half a count in the unit of the sums.
+    unit: f32,
+}
+
+back_end_entry! {
+    /// The terms of a row.
+    fn multiply [T: Sample] = multiply_row(
+        scale: Scale,
         plus: &[T],
         minus: &[T],
-        expected: &[Expected],
-        terms: &mut Terms,
-    ) {
-        let brightest = full_scale(self.bit_depth) as i32;
-        let (left, right) = (
-            BITS.saturating_sub(self.bit_depth),
-            self.bit_depth.saturating_sub(BITS),
+        expected: (&[AbsolutePhase], &[bool]),
+        sines: &[[i16; 2]],
+        light: &mut [f32],
+        s: &mut [i16],
+        c: &mut [i16],
+        d: &mut [i16],
+    )
+}
+
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn multiply_row<V: Lanes, T: Sample>(
+    _: V,
+    scale: Scale,
+    plus: &[T],
+    minus: &[T],
+    (phase, compared): (&[AbsolutePhase], &[bool]),
+    sines: &[[i16; 2]],
+    light: &mut [f32],
+    s: &mut [i16],
+    c: &mut [i16],
+    d: &mut [i16],
+) {
+    let width = plus.len();
+    let (minus, sines) = (&minus[..width], &sines[..width]);
+    let (phase, compared) = (&phase[..width], &compared[..width]);
+    let (light, d) = (&mut light[..width], &mut d[..width]);
+    let (s, c) = (&mut s[..width], &mut c[..width]);
+    let Scale {
+        brightest,
+        left,
+        right,
+        unit,
+    } = scale;
+    for i in 0..width {
+        let (plus, minus) = (plus[i].count(), minus[i].count());
+        let sum = plus + minus;
+        let below = (plus < brightest) & (minus < brightest);
+        light[i] = if below { sum as f32 * unit } else { -1.0 };
+        let usable = phase[i].is_known() & below;
+        // Half the sum, so that it has as many bits as the difference.
+        let (half, change) = (
+            (sum << left) >> 1 >> right,
+            ((plus - minus) << left) >> right,
         );
-        let out = terms.s.iter_mut().zip(&mut terms.c).zip(&mut terms.d);
-        for (((&plus, &minus), &Expected { phase, compared }), ((s, c), d)) in
-            plus.iter().zip(minus).zip(expected).zip(out)
-        {
-            let (plus, minus) = (plus.count(), minus.count());
-            let usable = phase.is_known() && plus < brightest && minus < brightest;
-            // Half the sum, so that it has as many bits as the difference.
-            let faint = if compared { 0 } else { FAINT };
-            let sum = ((plus + minus) << left >> 1 >> right >> faint) * i32::from(usable);
-            let at = (phase.to_bits() & 0xffff) as usize / (65_536 / TURN);
-            let product = |sine: i16| ((sum * i32::from(sine) + (1 << 14)) >> 15) as i16;
-            *s = product(self.sines[at]);
-            *c = product(self.sines[at + TURN / 4]);
-            *d = ((plus - minus) << left >> right >> faint) as i16 * i16::from(usable);
-        }
-    }
-
-    /// From the sums of the columns to the phases of row `v`.
-    fn row(&self, seen: Seen<'_>, v: usize, columns: &[Sums], out: &mut PhaseRow<'_>) {
-        let width = columns.len();
-        let mut sums = Sums::default();
-        for column in &columns[..REACH.min(width)] {
-            sums.plus(1, column);
-        }
-        for u in 0..width {
-            if let Some(column) = columns.get(u + REACH) {
-                sums.plus(1, column);
-            }
-            if u > REACH {
-                sums.plus(-1, &columns[u - REACH - 1]);
-            }
-            let samples = seen.frames.map(|frame| sample(frame.row(v), u));
-            let (trust, change, power) = self.solve(&sums, samples);
-            let Expected { phase, compared } = seen.expected[v * width + u];
-            let trust = match phase.is_known() {
-                true => trust,
-                false => Trust::Unexpected,
-            };
-            let resolved = trust == Trust::Resolved;
-            out.trust[u] = trust;
-            out.phase[u] = match resolved {
-                true => AbsolutePhase::from_bits(phase.to_bits().wrapping_add(change)),
-                false => AbsolutePhase::UNKNOWN,
-            };
-            // B of I₁ − I₂ = 2 B sin, as a share of full scale.
-            let faint = if compared { 1.0 } else { f64::from(1 << FAINT) };
-            let scale =
-                65_535.0 * faint / (2.0 * unit(self.bit_depth) * full_scale(self.bit_depth));
-            out.modulation[u] = match resolved {
-                true => Modulation::from_bits((libm::sqrt(2.0 * power / PIXELS) * scale) as u16),
-                false => Modulation::default(),
-            };
-        }
-    }
-
-    /// Trust, δ in 1/65536 turn and the power that the fit explains, of a window around a pixel with these samples.
-    fn solve(&self, sums: &Sums, samples: [i32; 2]) -> (Trust, i32, f64) {
-        let [ss, sc, cc] = [sums.ss, sums.sc, sums.cc].map(f64::from);
-        let [ds, dc, dd] = [sums.ds, sums.dc, sums.dd].map(f64::from);
-        let determinant = ss * cc - sc * sc;
-        let half_trace = (ss + cc) / 2.0;
-        if samples.contains(&(full_scale(self.bit_depth) as i32)) {
-            return (Trust::Saturated, 0, 0.0);
-        }
-        let sum = f64::from(samples[0] + samples[1]) * unit(self.bit_depth) / 2.0;
-        if determinant < LEAST_DETERMINED * half_trace * half_trace || determinant <= 0.0 {
-            return (Trust::Dark, 0, 0.0);
-        }
-        let a = (ds * cc - dc * sc) / determinant;
-        let b = (dc * ss - ds * sc) / determinant;
-        if (a * a + b * b) * sum * sum < self.least * self.least {
-            return (Trust::Dark, 0, 0.0);
-        }
-        let power = a * ds + b * dc;
-        if dd - power > MOST_LEFT * dd + PIXELS * self.noise {
-            return (Trust::Residual, 0, 0.0);
-        }
-        (Trust::Resolved, turns(b as f32, a as f32), power)
-    }
-}
-
-/// Adds a row's products to the sums of its columns (`sign` 1), or takes them off (−1).
-fn accumulate(sign: i32, terms: &Terms, sums: &mut [Sums]) {
-    let lists = terms.s.iter().zip(&terms.c).zip(&terms.d);
-    for (sum, ((&s, &c), &d)) in sums.iter_mut().zip(lists) {
-        sum.add(sign, [s, c, d]);
-    }
-}
-
-fn sample(row: Samples<'_>, u: usize) -> i32 {
-    match row {
-        Samples::Eight(row) => i32::from(row[u]),
-        Samples::Sixteen(row) => i32::from(row[u]),
+        let (half, change) = if compared[i] {
+            (half, change)
+        } else {
+            (half >> FAINT, change >> FAINT)
+        };
+        let (half, change) = if usable { (half, change) } else { (0, 0) };
+        let [sine, cosine] = sines[i];
+        s[i] = ((half * i32::from(sine) + (1 << 14)) >> 15) as i16;
+        c[i] = ((half * i32::from(cosine) + (1 << 14)) >> 15) as i16;
+        d[i] = change as i16;
     }
 }
 
@@ -307,31 +331,6 @@ fn full_scale(bit_depth: u8) -> f64 {
 /// A count in the unit of the sums.
 fn unit(bit_depth: u8) -> f64 {
     libm::exp2(f64::from(BITS) - f64::from(bit_depth))
-}
-
-/// The angle of (x, y) in 1/65536 turn, to 1e-5 rad: 4.4.47 of M. Abramowitz, I. A. Stegun, *Handbook of Mathematical Functions*.
-fn turns(y: f32, x: f32) -> i32 {
-    let (across, along) = (y.abs(), x.abs());
-    let t = across.min(along) / across.max(along).max(f32::MIN_POSITIVE);
-    let square = t * t;
-    let series = 0.999_866
-        + square
-            * (-0.330_299_5 + square * (0.180_141 + square * (-0.085_133 + square * 0.020_835_1)));
-    let angle = t * series * (65_536.0 / core::f32::consts::TAU);
-    let angle = if across > along {
-        16_384.0 - angle
-    } else {
-        angle
-    };
-    let angle = if x < 0.0 { 32_768.0 - angle } else { angle };
-    let angle = if y < 0.0 { -angle } else { angle };
-    // To nearest.
-    libm::rintf(angle) as i32
-}
-
-/// A buffer for each band of a frame.
-pub(super) fn bands(rows: usize) -> Vec<Band> {
-    vec![Band::default(); rows.div_ceil(BAND_ROWS)]
 }
 
 /// Rows of a band.

@@ -1,0 +1,79 @@
+//! Sums of products down the columns of a window, which slide from row to row.
+
+use super::window::{REACH, SIDE, Terms};
+use crate::simd::{Backend, Lanes, back_end_entry};
+use alloc::vec::Vec;
+
+/// Pixels that are solved together.
+pub(super) const BLOCK: usize = 64;
+/// Columns of their windows.
+pub(super) const WIDE: usize = BLOCK + 2 * REACH;
+/// Σs², Σsc, Σc², Σds, Σdc, Σd².
+pub(super) const SUMS: usize = 6;
+
+/// The sums over the rows of a window, per column; [`REACH`] columns of 0 on both sides.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Columns([Vec<i32>; SUMS]);
+
+impl Columns {
+    /// Begins with no rows of so many pixels.
+    pub fn clear(&mut self, pixels: usize) {
+        for sums in &mut self.0 {
+            sums.clear();
+            sums.resize(pixels + 2 * REACH, 0);
+        }
+    }
+
+    /// Adds a row, and takes one off.
+    pub fn slide(&mut self, backend: Backend, entering: &Terms, leaving: &Terms) {
+        let (a, b) = (entering, leaving);
+        let [ss, sc, cc, ds, dc, dd] = &mut self.0;
+        let slide = |sums: &mut [i32], new: [&[i16]; 2], old: [&[i16]; 2]| {
+            let sums = &mut sums[REACH..REACH + new[0].len()];
+            slide_products(backend, new, old, sums);
+        };
+        slide(ss, [&a.s, &a.s], [&b.s, &b.s]);
+        slide(sc, [&a.s, &a.c], [&b.s, &b.c]);
+        slide(cc, [&a.c, &a.c], [&b.c, &b.c]);
+        slide(ds, [&a.d, &a.s], [&b.d, &b.s]);
+        slide(dc, [&a.d, &a.c], [&b.d, &b.c]);
+        slide(dd, [&a.d, &a.d], [&b.d, &b.d]);
+    }
+
+    /// The columns of the windows around the pixels of the block that begins at `start`.
+    pub fn of_windows(&self, start: usize) -> [&[i32]; SUMS] {
+        self.0.each_ref().map(|sums| &sums[start..start + WIDE])
+    }
+}
+
+back_end_entry! {
+    /// Adds the products of two lists of terms to sums, and takes off those of two others.
+    fn slide_products [] = slide_row(new: [&[i16]; 2], old: [&[i16]; 2], sums: &mut [i32])
+}
+
+#[inline(always)]
+fn slide_row<V: Lanes>(_: V, new: [&[i16]; 2], old: [&[i16]; 2], sums: &mut [i32]) {
+    let length = sums.len();
+    let [a, b] = [&new[0][..length], &new[1][..length]];
+    let [c, d] = [&old[0][..length], &old[1][..length]];
+    for i in 0..length {
+        let (enters, leaves) = (
+            i32::from(a[i]) * i32::from(b[i]),
+            i32::from(c[i]) * i32::from(d[i]),
+        );
+        sums[i] += enters - leaves;
+    }
+}
+
+/// The sums over windows, from those of their columns.
+#[inline(always)]
+pub(super) fn sum_up(columns: &[i32], windows: &mut [i32; BLOCK]) {
+    let columns = &columns[..WIDE];
+    for i in 0..BLOCK {
+        let mut sum = columns[i];
+        for j in 1..SIDE {
+            sum += columns[i + j];
+        }
+        windows[i] = sum;
+    }
+}
