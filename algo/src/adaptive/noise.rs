@@ -18,7 +18,7 @@ use super::integrate::balanced_rows;
 use super::{AdaptError, ProjectorMap};
 use crate::math::around;
 use crate::pattern::PhaseFunction;
-use crate::phase::Decoder;
+use crate::phase::{Decoder, LeastModulation, NOISE_OVER_LEAST};
 use crate::pipeline::PhaseMap;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -43,15 +43,10 @@ const SMOOTHING: [f64; 2] = [3.0, 6.0];
 const ENOUGH: f64 = 0.998;
 /// Frequencies that are tried between the coarsest and the finest, in geometric progression.
 const STEPS: usize = 160;
-/// σ of a sample over the least modulation that is trusted, where the noise is not known.
-const NOISE: f64 = 0.23;
 /// √(2 / Σ N_i r_i² b_i²) of 12 frames: 7 + 5 of ratios 1 and 4/5 with the brightest waveforms.
 const TWELVE_FRAMES: f64 = 0.36;
 /// Error of the phase that light of an almost linear response leaves, radian: noise below it gains nothing.
 const LEAST_NOISE: f64 = 3e-3;
-/// The least modulation, in σ of a sample, that pixels of a noisy head get, so that wrong fringe orders stay as rare there as with the
-/// study's noise at 16 counts.
-const CERTAIN: f64 = 1.0 / NOISE;
 /// By how many σ of a sample the modulation of sines stays above the least that is trusted. With the waveforms of 3 to 9 shifts, it is at least
 /// 15 % larger, and three times its own σ above.
 const SAFE: f64 = 1.0;
@@ -68,7 +63,7 @@ pub struct Light {
     pub modulation: Vec<f64>,
     /// σ of a sample, counts.
     pub noise: f64,
-    /// The least modulation that is trusted, counts.
+    /// The least modulation that is trusted, counts: the decoder's, or the noise's if that is more.
     pub least: f64,
 }
 
@@ -89,10 +84,13 @@ impl Light {
                 modulation.counts(full_scale) / contrast(blur, g, [g * ju, g * jv])
             })
             .collect();
-        let least = decoder.least_modulation();
+        let of_noise =
+            |noise| LeastModulation::of_noise(noise, decoder.bit_depth()).counts(full_scale);
+        let trusted = decoder.least_modulation().counts(full_scale);
+        let least = trusted.max(noise.map_or(0.0, of_noise));
         Self {
             modulation: medians(&modulation, phases.width),
-            noise: noise.unwrap_or(NOISE * least),
+            noise: noise.unwrap_or(NOISE_OVER_LEAST * least),
             least,
         }
     }
@@ -100,7 +98,7 @@ impl Light {
     /// What one pixel asks of its fringes.
     fn asked(&self, pixel: usize) -> Asked {
         let modulation = self.modulation[pixel].max(self.least);
-        let needed = self.least.max(CERTAIN * self.noise) + SAFE * self.noise;
+        let needed = self.least + SAFE * self.noise;
         Asked {
             contrast: (needed / modulation).min(MOST_CONTRAST),
             noise: (TWELVE_FRAMES * self.noise / modulation).max(LEAST_NOISE),
@@ -322,12 +320,6 @@ mod tests {
         assert!((asked[0] - 19.0 / 120.0).abs() < 1e-9, "{asked:?}");
         assert!((asked[1] - 19.0 / 30.0).abs() < 1e-9, "{asked:?}");
         assert_eq!(asked[2..], [MOST_CONTRAST; 2]);
-        // Twice as much noise as 16 counts were meant for.
-        let noisy = Light {
-            noise: 2.0 * NOISE * 16.0,
-            ..light
-        };
-        assert!((noisy.asked(0).contrast - (32.0 + noisy.noise) / 120.0).abs() < 1e-9);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::*;
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence, Shot};
-use crate::phase::Trust;
+use crate::phase::{LeastModulation, Trust};
 use crate::pipeline::{PhaseMap, wrapped};
 use core::f64::consts::TAU;
 use std::vec::Vec;
@@ -68,7 +68,7 @@ impl Levels<'_> {
         )?;
         let levels = sequence.levels().iter();
         let maps: Vec<_> = levels
-            .map(|level| wrapped(level, &frames, 8).unwrap())
+            .map(|level| wrapped(level, &frames, 8, LeastModulation::default()).unwrap())
             .collect();
         Ok(chain.unwrap(&maps, cells.map(|(_, cells)| cells)))
     }

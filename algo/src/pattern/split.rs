@@ -12,12 +12,11 @@
 
 use super::slips::{sigma, unseen};
 use super::{Shot, Waveforms};
+use crate::trust::NOISE_OVER_LEAST;
 use alloc::vec::Vec;
 
 /// The largest rate of unseen wrong orders among the pixels of the least trusted modulation, if any split keeps it.
 const MAX_SLIPS: f64 = 2e-4;
-/// σ of a sample over the least modulation that is trusted: uniform noise of ±2.5 % of full scale, and 16 of 255 counts.
-const NOISE: f64 = 0.23;
 /// Fewest and most shifts of a level: the kernels add up these without a weight for each sample.
 const SHIFTS: core::ops::RangeInclusive<usize> = 3..=MAX_LEVEL_SHIFTS;
 const MAX_LEVEL_SHIFTS: usize = 9;
@@ -88,7 +87,7 @@ fn splits(frames: usize) -> Vec<Split> {
         let (coarse, middle) = (1.0 - 1.0 / n, 1.0 - 1.0 / (n * n));
         for finest in SHIFTS {
             let rest = frames.saturating_sub(finest);
-            let wrong = |terms: &[_]| unseen(NOISE * sigma(terms));
+            let wrong = |terms: &[_]| unseen(NOISE_OVER_LEAST * sigma(terms));
             let fast = |c: usize| wrong(&[(n - 1.0, finest, 1.0), (n, c, 1.0)]);
             if SHIFTS.contains(&rest) {
                 let levels = [(coarse, rest), (1.0, finest)];

@@ -6,7 +6,7 @@ use super::unwrap::{Unwrapper, information};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence, SequenceError, Unwrapping};
 use crate::simd::Backend;
-use crate::trust::{MIN_MODULATION_8_BIT, Trust};
+use crate::trust::{LeastModulation, Trust};
 use crate::units::{AbsolutePhase, Modulation};
 use alloc::vec::Vec;
 use core::fmt;
@@ -23,6 +23,7 @@ pub struct Decoder {
     pub(super) backend: Backend,
     frame_count: usize,
     pub(super) bit_depth: u8,
+    least: LeastModulation,
 }
 
 /// One row of results, each slice as long as the row.
@@ -118,7 +119,7 @@ impl From<SequenceError> for DecodeError {
 
 impl Decoder {
     /// Prepares decoding of `sequence`, projected from a phase function with this range, from
-    /// samples of `bit_depth` bits.
+    /// samples of `bit_depth` bits, with the least modulation of unknown noise.
     ///
     /// # Errors
     /// If the levels are of no known form or the bit depth is not 8 to 16.
@@ -139,7 +140,17 @@ impl Decoder {
             backend: Backend::best(),
             frame_count: sequence.frame_count(),
             bit_depth,
+            least: LeastModulation::default(),
         })
+    }
+
+    /// The same decoder with another least modulation.
+    pub fn with_least_modulation(mut self, least: LeastModulation) -> Self {
+        let full_scale = self.full_scale();
+        for level in &mut self.levels {
+            level.trust_from(least, full_scale);
+        }
+        Self { least, ..self }
     }
 
     /// The same decoder on another back-end of this machine; the bits are the same.
@@ -182,9 +193,9 @@ impl Decoder {
         noise / core::f64::consts::TAU * libm::sqrt(2.0 / information)
     }
 
-    /// The smallest modulation that is trusted, in counts.
-    pub fn least_modulation(&self) -> f64 {
-        MIN_MODULATION_8_BIT * f64::from(self.full_scale()) / 255.0
+    /// The smallest modulation that is trusted.
+    pub fn least_modulation(&self) -> LeastModulation {
+        self.least
     }
 
     /// σ_B in counts: σ_I · √(2 / N) with σ_I = `noise` counts and the finest level's N.

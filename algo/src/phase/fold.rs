@@ -11,16 +11,18 @@
 //! S = Σ I_k cos 2πs_k      C = Σ I_k sin 2πs_k      φ = atan2(S, C) / 2π      B = (2/N) √(S² + C²)
 //! ```
 //!
-//! Four shifts of 8 bits are folded in bytes, exactly, all others in words from S and C of [`super::terms`].
+//! Four shifts of 8 bits are folded in bytes, exactly, where the least modulation is the one of unknown noise, all others in words from S
+//! and C of [`super::terms`]. Where less modulation is trusted, pointers may be too short to be normalised at once: they are lifted
+//! by two bits in blocks that have such pixels.
 //!
 //! **Shapes and units.** Samples in counts of the bit depth, one block of each of the N rows; components in words, scaled by a
 //! power of two so that the longer one uses 15 bits.
 //!
 //! **Accuracy.** Folding rounds nothing. The threshold of modulation is decided from S² + C² in words; at 8 bits that is exact
 //! for N = 3, 4 and 6 (`the_modulation_threshold_is_sixteen_counts_exactly`), else within 3/4 of a unit of the words, 2.5e-4 of
-//! the modulation.
+//! 16 counts and 1.5e-3 of 4.
 
-use super::level::LevelLanes;
+use super::level::{FAINT, LevelLanes};
 use super::terms::Pointers;
 use crate::simd::Lanes;
 
@@ -58,7 +60,7 @@ impl<V: Lanes> Folded<V> {
     }
 }
 
-/// At 8 bits and N = 4, B = √(S² + C²)/2 reaches 16 counts where S² + C² ≥ 32²: for each longer component from 16 to 31 the
+/// At 8 bits, N = 4 and the least modulation of unknown noise, B = √(S² + C²)/2 reaches 16 counts where S² + C² ≥ 32²: for each longer component from 16 to 31 the
 /// least shorter one that is enough; 255 where none is.
 const LEAST_SHORT: [u8; 16] = [
     255, 255, 255, 255, 255, 255, 255, 23, 22, 20, 19, 18, 16, 14, 12, 8,
@@ -100,16 +102,29 @@ pub(super) fn fold<V: Lanes>(
 ) -> Folded<V> {
     let (along, across) = ([v.abs(s[0]), v.abs(s[1])], [v.abs(c[0]), v.abs(c[1])]);
     let length = [v.max(along[0], across[0]), v.max(along[1], across[1])];
+    // What is normalised: a copy, because the modulation follows from the length itself.
+    let (mut along, mut across, mut long) = (along, across, length);
     // On most of a part the longer component is enough by itself.
     let enough = v.gt(v.min(length[0], length[1]), level.below_long_enough);
     let strong = if v.all8(v.bytes_of(enough)) {
         v.splat8(u8::MAX)
     } else {
         let low = strong(v, level, along[0], across[0]);
-        v.narrow_mask([low, strong(v, level, along[1], across[1])])
+        let strong = v.narrow_mask([low, strong(v, level, along[1], across[1])]);
+        if level.plan.faint {
+            let mut half = 0;
+            while half < 2 {
+                let faint = v.gt(v.splat16(FAINT), length[half]);
+                for component in [&mut along[half], &mut across[half], &mut long[half]] {
+                    *component = v.pick(faint, v.shl::<2>(*component), *component);
+                }
+                half += 1;
+            }
+        }
+        strong
     };
-    let low = octant(v, [s[0], c[0]], [along[0], across[0]], length[0]);
-    let high = octant(v, [s[1], c[1]], [along[1], across[1]], length[1]);
+    let low = octant(v, [s[0], c[0]], [along[0], across[0]], long[0]);
+    let high = octant(v, [s[1], c[1]], [along[1], across[1]], long[1]);
     Folded {
         long: [low.long, high.long],
         short: [low.short, high.short],

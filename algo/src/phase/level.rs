@@ -10,7 +10,7 @@ use super::angle::{AngleLanes, LENGTH, hypotenuse};
 use super::fold::Folded;
 use crate::pattern::{self, Waveform};
 use crate::simd::Lanes;
-use crate::trust::MIN_MODULATION_8_BIT;
+use crate::trust::LeastModulation;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
@@ -21,6 +21,8 @@ pub const FULL_TRUST_SHIFTS: usize = 8;
 /// What rounding may take off √(S² + C²) at the threshold, in units of S and C, so that a modulation of exactly the minimum is
 /// trusted.
 const TIE: f64 = 0.75;
+/// Where |S| and |C| are below this, [`Lanes::normalised`] needs them lifted first.
+pub(super) const FAINT: i16 = 1 << 10;
 /// Largest bit depth of the forms that subtract samples: four of them must fit a word.
 const WORD_FORM_BITS: u8 = 12;
 /// The largest S or C where its unit is chosen to fill a word, with room for roundings. With this one the rounded weights of N = 5,
@@ -46,10 +48,16 @@ pub(crate) struct Level {
     pub to_16_bits: u8,
     /// Full scale less one count, unsigned.
     below_full_scale: i16,
+    /// √(S² + C²) of a modulation of one count.
+    per_count: f64,
     /// S² + C² must be above this.
     pub below_least_power: i32,
-    /// Where |S| or |C| is above this, S² + C² is above `below_least_power`.
+    /// Where |S| or |C| is above this, S² + C² is above `below_least_power`, and the pointer is not [`FAINT`].
     below_long_enough: i16,
+    /// Whether a pixel whose pointer is [`FAINT`] can be trusted.
+    pub faint: bool,
+    /// Whether the least modulation is the one that [`super::fold::fold_four`] knows.
+    pub usual: bool,
     /// Coefficients of √(1 + t²), scaled so that the product with a length is a modulation.
     hypotenuse: [i16; 3],
     /// Whether that product is half of the modulation, because the coefficients would not fit Q15.
@@ -126,15 +134,13 @@ impl Level {
                 scale / f64::from(1_u32 << bit_depth)
             }
         };
-        let least = MIN_MODULATION_8_BIT * full_scale / 255.0;
-        let least_length = shifts as f64 / 2.0 * least * unit - TIE;
         // B = (2/N) · length · √(1 + t²) / unit, here as a share of full scale in half units of `Modulation`.
         let mut factor = 2.0 / shifts as f64 / (unit * full_scale) * 32_767.5;
         let doubled = factor * core::f64::consts::SQRT_2 >= 0.999;
         if doubled {
             factor /= 2.0;
         }
-        Self {
+        let mut planned = Self {
             frames,
             samples,
             terms,
@@ -143,12 +149,32 @@ impl Level {
             down,
             to_16_bits,
             below_full_scale: (((1_u32 << bit_depth) - 2) as u16).cast_signed(),
-            below_least_power: libm::ceil(least_length * least_length) as i32 - 1,
-            below_long_enough: libm::ceil(least_length) as i16 - 1,
+            per_count: shifts as f64 / 2.0 * unit,
+            below_least_power: 0,
+            below_long_enough: 0,
+            faint: false,
+            usual: true,
             hypotenuse: LENGTH.map(|c| libm::rint(c * factor * 32_768.0) as i16),
             doubled,
             saturates: shifts < FULL_TRUST_SHIFTS || level.waveform != Waveform::SINE,
-        }
+        };
+        planned.trust_from(LeastModulation::default(), full_scale as u16);
+        planned
+    }
+
+    /// Sets the least modulation that is trusted.
+    pub fn trust_from(&mut self, least: LeastModulation, full_scale: u16) {
+        let length = self.per_count * least.counts(full_scale) - TIE;
+        self.below_least_power = libm::ceil(length * length) as i32 - 1;
+        // The longer of two components is at least 1/√2 of the length.
+        self.faint = length < f64::from(FAINT) * core::f64::consts::SQRT_2;
+        let enough = libm::ceil(length) as i16 - 1;
+        self.below_long_enough = if self.faint {
+            enough.max(FAINT - 1)
+        } else {
+            enough
+        };
+        self.usual = least == LeastModulation::default();
     }
 }
 

@@ -20,7 +20,7 @@ mod terms;
 mod unwrap;
 mod unwrap_step;
 
-pub use crate::trust::{MIN_MODULATION_8_BIT, Trust};
+pub use crate::trust::{LeastModulation, NOISE_OVER_LEAST, Trust};
 pub use arrived::Arrived;
 pub use decode::{DecodeError, Decoder, PhaseRow};
 pub use level::FULL_TRUST_SHIFTS;

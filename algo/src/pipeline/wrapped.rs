@@ -3,14 +3,14 @@
 use super::{PhaseMap, decode};
 use crate::frame::FrameView;
 use crate::pattern::{Level, PhaseRange, Sequence, Shot};
-use crate::phase::{DecodeError, Decoder};
+use crate::phase::{DecodeError, Decoder, LeastModulation};
 use alloc::vec::Vec;
 
 /// Decodes one level of a sequence to its wrapped phase: `phase` is φ, 0 ≤ φ < 1 turn of that level, modulation and trust are the
 /// level's. `frames` are those of the whole sequence.
 ///
 /// A level of ratio 1 over a phase function of one turn is absolute by itself, so the production kernels decode it, with their
-/// accuracy ([`Decoder`]).
+/// accuracy ([`Decoder`]). Modulations are trusted from `least` on.
 ///
 /// # Errors
 /// If the frames do not fit the level, or `bit_depth` is not 8 to 16.
@@ -18,12 +18,13 @@ pub fn wrapped(
     level: &Level,
     frames: &[FrameView<'_>],
     bit_depth: u8,
+    least: LeastModulation,
 ) -> Result<PhaseMap, DecodeError> {
     let shifts = level.shifts();
     let shots = (0..shifts).map(|k| Shot::sine(1.0, level.start + k as f64 / shifts as f64));
     let sequence = Sequence::from_frames(&shots.collect::<Vec<_>>())?;
     let one_turn = PhaseRange { min: 0.0, max: 1.0 };
-    let decoder = Decoder::new(&sequence, one_turn, bit_depth)?;
+    let decoder = Decoder::new(&sequence, one_turn, bit_depth)?.with_least_modulation(least);
     let of_level: Vec<_> = level
         .frames
         .iter()
@@ -59,7 +60,13 @@ mod tests {
             let view = |row| FrameView::new(Samples::Eight(row), 64, 1, 64).unwrap();
             let frames: Vec<_> = rows.iter().map(|row| view(row)).collect();
             let sequence = Sequence::from_frames(&shots).unwrap();
-            let map = wrapped(&sequence.levels()[0], &frames, 8).unwrap();
+            let map = wrapped(
+                &sequence.levels()[0],
+                &frames,
+                8,
+                LeastModulation::default(),
+            )
+            .unwrap();
             for u in 0..64 {
                 assert_eq!(map.trust[u], Trust::Resolved);
                 let phase = map.phase[u].turns();

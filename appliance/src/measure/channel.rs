@@ -154,7 +154,8 @@ impl<'a> Channel<'a> {
     }
 
     fn wrapped(&self, level: &Level) -> Result<PhaseMap, String> {
-        pipeline::wrapped(level, &self.scan.frames, self.bit_depth).map_err(words)
+        let least = self.scan.decoder.least_modulation();
+        pipeline::wrapped(level, &self.scan.frames, self.bit_depth, least).map_err(words)
     }
 
     /// The wrapped phases of all levels, from coarse to fine.

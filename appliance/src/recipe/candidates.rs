@@ -127,7 +127,14 @@ impl GoldenPart<'_> {
         let farthest = pixels().map(reach).fold(0.0, f64::max);
         Some(UnseenFile {
             part: rates.sum::<f64>() / pixels().count().max(1) as f64,
-            darkest: slips.rate(noise / self.decoder.least_modulation(), farthest),
+            darkest: slips.rate(
+                noise
+                    / self
+                        .decoder
+                        .least_modulation()
+                        .counts(self.decoder.full_scale()),
+                farthest,
+            ),
         })
     }
 }

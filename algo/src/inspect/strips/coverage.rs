@@ -47,7 +47,7 @@ impl Threshold {
     /// Of samples with this noise, in counts.
     pub fn new(decoder: &Decoder, noise_counts: f64) -> Self {
         let unit = f64::from(u16::MAX) / f64::from(decoder.full_scale());
-        let least = decoder.least_modulation() * unit;
+        let least = decoder.least_modulation().counts(decoder.full_scale()) * unit;
         let sigma = decoder.modulation_noise(noise_counts) * unit;
         Self {
             least,

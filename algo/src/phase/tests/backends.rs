@@ -1,6 +1,6 @@
 //! All back-ends of this machine give the same bits.
 
-use super::super::{Decoder, PhaseRow, Trust};
+use super::super::{Decoder, LeastModulation, PhaseRow, Trust};
 use super::arrive;
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence, Shot};
@@ -45,7 +45,7 @@ impl Map {
 const WIDTH: usize = 75;
 const HEIGHT: usize = 4;
 
-/// Frames of random samples, with dark stretches and, of words, some of samples above full scale.
+/// Frames of random samples, with dark and faint stretches and, of words, some of samples above full scale.
 fn frames(count: usize, depth: u8, random: &mut SplitMix64) -> Vec<Vec<u16>> {
     (0..count)
         .map(|_| {
@@ -54,6 +54,7 @@ fn frames(count: usize, depth: u8, random: &mut SplitMix64) -> Vec<Vec<u16>> {
                     let x = random.next_u64() as u16;
                     match place / 40 % 4 {
                         0 => x >> (16 - depth) >> (depth - 3),
+                        1 => x >> (16 - depth) >> 3,
                         3 if depth > 8 => x,
                         _ => x >> (16 - depth),
                     }
@@ -121,7 +122,9 @@ fn every_back_end_and_levels_on_arrival_give_the_same_bits() {
                     .flat_map(|&ratio| Shot::level(ratio, steps))
                     .collect();
                 let sequence = Sequence::from_frames(&sequence).unwrap();
+                let least = [16.0, 4.0, 9.0][random.next_u64() as usize % 3];
                 let decoder = Decoder::new(&sequence, range, depth).unwrap();
+                let decoder = decoder.with_least_modulation(LeastModulation::new(least).unwrap());
                 let samples = frames(sequence.frame_count(), depth, &mut random);
                 let map: Vec<_> = (0..WIDTH * HEIGHT)
                     .map(|place| match place % 41 {

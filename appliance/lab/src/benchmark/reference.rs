@@ -8,7 +8,7 @@ use super::frames::{Buffer, FrameSet};
 use super::real::Real;
 use super::timing::Kernel;
 use algo::pattern::{Level, PhaseRange, Sequence, Unwrapping};
-use algo::phase::{DecodeError, FULL_TRUST_SHIFTS, MIN_MODULATION_8_BIT};
+use algo::phase::{DecodeError, FULL_TRUST_SHIFTS, LeastModulation};
 use algo::units::AbsolutePhase;
 
 /// Largest residual of a level that is unwrapped, turns.
@@ -81,7 +81,9 @@ impl<T: Real> Textbook<T> {
             unwrapping,
             lowest: T::of(coarsest * range.min - margin),
             full_scale: T::of(full_scale),
-            least_modulation: T::of(MIN_MODULATION_8_BIT * full_scale / 255.0 - 1e-3),
+            least_modulation: T::of(
+                LeastModulation::default().eight_bit() * full_scale / 255.0 - 1e-3,
+            ),
             sums: [buffer(), buffer()],
             wrapped: vec![buffer(); count],
             modulation: vec![buffer(); count],

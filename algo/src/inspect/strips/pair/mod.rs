@@ -68,6 +68,7 @@ impl Production {
                 self.decoder.backend(),
                 self.decoder.bit_depth(),
                 self.noise_counts,
+                self.decoder.least_modulation(),
             ),
             phases: PhaseMap::new(width, height),
             bands: (0..height.div_ceil(BAND_ROWS))

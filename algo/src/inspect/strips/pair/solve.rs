@@ -6,7 +6,7 @@
 use super::sums::{BLOCK, SUMS, sum_up};
 use super::window::{FAINT, PIXELS};
 use crate::math::nearest::whole;
-use crate::phase::{MIN_MODULATION_8_BIT, Trust};
+use crate::phase::{LeastModulation, Trust};
 use crate::simd::{Lanes, back_end_entry};
 use crate::units::{AbsolutePhase, Modulation};
 
@@ -45,9 +45,10 @@ impl Default for Solved {
 }
 
 impl Solver {
-    /// For samples with σ = `noise` counts, up to `full_scale`; `unit` is a count in the unit of the sums.
-    pub fn new(unit: f64, full_scale: f64, noise: f64) -> Self {
-        let least = 2.0 * MIN_MODULATION_8_BIT / 255.0 * full_scale * unit;
+    /// For samples with σ = `noise` counts, up to `full_scale`, trusted from a modulation of `least` on; `unit` is a count in the unit of
+    /// the sums.
+    pub fn new(unit: f64, full_scale: f64, noise: f64, least: LeastModulation) -> Self {
+        let least = 2.0 * least.eight_bit() / 255.0 * full_scale * unit;
         Self {
             noise: (PIXELS * 2.0 * noise * noise * unit * unit) as f32,
             least: (least * least) as f32,

@@ -3,7 +3,7 @@
 use super::shared::{correlated, smoothed};
 use super::window::{Band, SIDE, Windows};
 use crate::frame::{FrameView, Samples};
-use crate::phase::Trust;
+use crate::phase::{LeastModulation, Trust};
 use crate::pipeline::PhaseMap;
 use crate::simd::Backend;
 use crate::units::AbsolutePhase;
@@ -70,7 +70,12 @@ impl Scene {
             FrameView::new(samples, WIDTH, ROWS, WIDTH).unwrap()
         });
         let scale = f64::from(1_u32 << (self.bit_depth - 8));
-        let windows = Windows::new(backend, self.bit_depth, self.noise * scale);
+        let windows = Windows::new(
+            backend,
+            self.bit_depth,
+            self.noise * scale,
+            LeastModulation::default(),
+        );
         let mut map = PhaseMap::new(WIDTH, ROWS);
         let mut rows = map.rows();
         for (at, &top) in tops.iter().enumerate() {

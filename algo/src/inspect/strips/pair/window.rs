@@ -27,7 +27,7 @@
 use super::solve::{Solved, Solver, solve_block};
 use super::sums::{BLOCK, Columns};
 use crate::frame::{FrameView, Sample, Samples};
-use crate::phase::PhaseRow;
+use crate::phase::{LeastModulation, PhaseRow};
 use crate::simd::{Backend, Lanes, back_end_entry};
 use crate::units::AbsolutePhase;
 use alloc::vec::Vec;
@@ -115,8 +115,8 @@ impl Band {
 pub(super) const FAINT: u8 = 3;
 
 impl Windows {
-    /// For samples of `bit_depth` bits with σ = `noise` counts.
-    pub fn new(backend: Backend, bit_depth: u8, noise: f64) -> Self {
+    /// For samples of `bit_depth` bits with σ = `noise` counts, trusted from a modulation of `least` on.
+    pub fn new(backend: Backend, bit_depth: u8, noise: f64, least: LeastModulation) -> Self {
         let sine = |at: usize| {
             let turns = (at as f64 + 0.5) / TURN as f64;
             libm::rint(32_767.0 * libm::sin(core::f64::consts::TAU * turns)) as i16
@@ -127,7 +127,7 @@ impl Windows {
             sines: (0..TURN)
                 .map(|at| [sine(at), sine(at + TURN / 4)])
                 .collect(),
-            solver: Solver::new(unit(bit_depth), full_scale(bit_depth), noise),
+            solver: Solver::new(unit(bit_depth), full_scale(bit_depth), noise, least),
         }
     }
 
