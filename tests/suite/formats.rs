@@ -26,7 +26,7 @@ const MEMBERS: [&str; 10] = [
 ];
 
 /// Keys of `recipe.json`, version 1, in a taught recipe. Do not change these either.
-const KEYS: [&str; 65] = [
+const KEYS: [&str; 66] = [
     "alignment",
     "calibration",
     "camera",
@@ -64,6 +64,7 @@ const KEYS: [&str; 65] = [
     "good_parts.tolerance_mm",
     "good_parts.weighed",
     "guard_k",
+    "least_modulation",
     "min_coverage",
     "name",
     "noise_counts",

@@ -316,7 +316,7 @@ fn dents_where_pixels_have_weights_are_found_and_would_be_missed_without_these_p
 #[test]
 fn a_head_that_is_too_noisy_for_the_tolerance_says_so_with_the_numbers_and_good_parts_pass() {
     let mut scenario = small("flowerpot", 1);
-    scenario.noise.noise_counts = Some(2.0 * Noise::PAPER);
+    scenario.noise.noise_counts = Some(1.25 * Noise::PAPER);
     let mut line = line(&scenario);
     let GoodPartsFile {
         limit_mm,

@@ -70,6 +70,7 @@ impl CalibratedHead<'_> {
         let triangulator = triangulator.map_err(impossible)?;
         let frames = scan::take(self.head, calibration, function, shots, timeout, progress)?;
         let scan = Scan::new(function.range(), shots, &frames).map_err(impossible)?;
+        let scan = scan.trusting(calibration.least_modulation());
         let reference;
         let map = match map {
             None if scan.needs_map() => {

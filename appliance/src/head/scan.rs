@@ -7,7 +7,7 @@ use super::seam;
 use algo::frame::FrameView;
 use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
-use algo::phase::Decoder;
+use algo::phase::{Decoder, LeastModulation};
 use algo::pipeline::{self, HeightMap, PhaseMap};
 use algo::units::AbsolutePhase;
 use hal::frame::Frame;
@@ -94,6 +94,14 @@ impl<'a> Scan<'a> {
             decoder,
             frames: frames.map_err(words)?,
         })
+    }
+
+    /// The same, trusting modulations from `least` on instead of that of unknown noise.
+    pub fn trusting(self, least: LeastModulation) -> Self {
+        Self {
+            decoder: self.decoder.with_least_modulation(least),
+            ..self
+        }
     }
 
     /// Whether it is unwrapped about a map that must be known beforehand.

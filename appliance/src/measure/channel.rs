@@ -7,6 +7,7 @@ use algo::chain::{Cells, Chain, CodePictures, GrayCode};
 use algo::frame::FrameView;
 use algo::geometry::Triangulator;
 use algo::pattern::{Level, PhaseFunction};
+use algo::phase::LeastModulation;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::AbsolutePhase;
 use hal::frame::Frame;
@@ -48,7 +49,15 @@ pub(super) struct Phases {
 }
 
 impl<'a> Channel<'a> {
-    pub fn new(recording: &'a Recording, pattern: usize) -> Result<Self, String> {
+    /// The frames of a pattern, of which modulations are trusted from `least` on.
+    ///
+    /// # Errors
+    /// In words: the frames make no levels, or are not of one format.
+    pub fn new(
+        recording: &'a Recording,
+        pattern: usize,
+        least: LeastModulation,
+    ) -> Result<Self, String> {
         let projector = &recording.projector;
         let spec = &recording.patterns[pattern];
         let (columns, rows) = (projector.width as usize, projector.height as usize);
@@ -64,6 +73,7 @@ impl<'a> Channel<'a> {
                 (scan.map_err(|_| unknown)?, false)
             }
         };
+        let scan = scan.trusting(least);
         let code = recording.codes.iter().find(|code| code.pattern == pattern);
         let code = code.map(|code| Code::new(code, recording, spec, &scan));
         Ok(Self {

@@ -21,7 +21,7 @@ use crate::recipe::Recipe;
 use algo::adaptive::ProjectorMap;
 use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
 use algo::pattern::PhaseFunction;
-use algo::phase::Decoder;
+use algo::phase::{Decoder, LeastModulation};
 use algo::pipeline::{self, PhaseMap};
 use channel::Channel;
 use hal::npy::Array;
@@ -88,7 +88,8 @@ pub fn measure_about_map(
 }
 
 /// As [`measure`], with a recipe: the height comes from the recipe's pattern, and levels that need a map are unwrapped about its
-/// golden phase instead of the reference map. Noise and working range are the recipe's where the recording has none.
+/// golden phase instead of the reference map. The least modulation is the recipe's, and noise and working range are where the recording
+/// has none.
 ///
 /// # Errors
 /// As for [`measure`], and if the recipe is of another pattern or of frames of another size.
@@ -124,10 +125,12 @@ fn measure_about(
         let us = u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX);
         *stage_us.entry(stage).or_default() += us;
     };
+    let least = recipe.map(|recipe| recipe.conditions.least_modulation);
+    let least = least.unwrap_or_else(|| least_modulation(recording));
     let (mut phases, mut wrapped, mut wrapped_only) = (Vec::new(), Vec::new(), Vec::new());
     let mut chosen = None;
     for at in 0..recording.patterns.len() {
-        let channel = Channel::new(recording, at).map_err(|error| wrong(&error))?;
+        let channel = Channel::new(recording, at, least).map_err(|error| wrong(&error))?;
         let started = Instant::now();
         let geometry = devices.triangulator(&channel.function);
         let geometry = geometry.map_err(|error| wrong(&error))?;
@@ -202,6 +205,12 @@ fn measure_about(
         decoder: channel.scan.decoder,
         report,
     })
+}
+
+/// The least modulation that is trusted in a recording: that of its noise where it is stated.
+fn least_modulation(recording: &Recording) -> LeastModulation {
+    let of_noise = |noise| LeastModulation::of_noise(noise, recording.bit_depth);
+    recording.noise_counts.map(of_noise).unwrap_or_default()
 }
 
 /// The pattern that gives the height: the first vertical one, else the first.

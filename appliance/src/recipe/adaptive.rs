@@ -93,6 +93,7 @@ impl Preliminary {
     ) -> Result<Blur, TeachError> {
         let range = self.function.range();
         let coarse = Scan::new(range, &self.shots[..SHIFTS], &part.frames[..SHIFTS])
+            .map(|coarse| coarse.trusting(part.decoder.least_modulation()))
             .and_then(|coarse| coarse.phases(None))
             .map_err(TeachError::Rig)?;
         let fine = 1.0 / PRELIMINARY_PITCH_PX;

@@ -10,6 +10,7 @@ use super::file::{
 use crate::head::calibration::CalibrationSigma;
 use crate::station::MAX_GAUGES;
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
+use algo::phase::LeastModulation;
 use hal::bounds::{
     FINGERPRINT_DIGITS, MAX_EXPOSURE_US, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_RANGE_MM,
     MAX_SHIFT_TURNS, MAX_SIDE, MIN_NOISE_COUNTS, RATIOS, length, text, within,
@@ -80,6 +81,10 @@ impl RecipeFile {
         let (least, most) = (MIN_NOISE_COUNTS, MAX_NOISE_COUNTS);
         within("noise_counts", self.noise_counts, least, most)?;
         within("golden_captures", self.golden_captures, 1, MAX_CAPTURES)?;
+        if let Some(counts) = self.least_modulation {
+            let [least, most] = LeastModulation::BOUNDS;
+            within("least_modulation", counts, least, most)?;
+        }
         if let Some(CalibrationSigma {
             height_mm,
             length_mm,

@@ -125,16 +125,10 @@ impl GoldenPart<'_> {
         let rates =
             pixels().map(|at| slips.rate(noise / f64::from(arrays.modulation[at]), reach(at)));
         let farthest = pixels().map(reach).fold(0.0, f64::max);
+        let least = self.decoder.least_modulation();
         Some(UnseenFile {
             part: rates.sum::<f64>() / pixels().count().max(1) as f64,
-            darkest: slips.rate(
-                noise
-                    / self
-                        .decoder
-                        .least_modulation()
-                        .counts(self.decoder.full_scale()),
-                farthest,
-            ),
+            darkest: slips.rate(noise / least.counts(self.decoder.full_scale()), farthest),
         })
     }
 }

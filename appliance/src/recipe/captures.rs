@@ -63,10 +63,11 @@ impl Captured {
             return Err(TeachError::Rig("there is no sequence".into()));
         };
         let shots = distinct(sequences);
+        let least = calibration.least_modulation();
         let decode = |shown: &[Shot], means: &[Frame], map: &[AbsolutePhase]| {
             let frame = |shot| shots.iter().position(|other| other == shot);
             let frames = shown.iter().filter_map(frame).map(|at| &means[at]);
-            let scan = Scan::new(function.range(), shown, frames)?;
+            let scan = Scan::new(function.range(), shown, frames)?.trusting(least);
             scan.phases(scan.needs_map().then_some(map))
         };
         head.load(rasters(function, &shots, calibration)?)?;
@@ -86,7 +87,9 @@ impl Captured {
         let sequence = Sequence::from_frames(full).map_err(|error| rig(&error))?;
         let (_, _, bit_depth) = calibration.frames();
         let decoder = Decoder::new(&sequence, function.range(), bit_depth);
-        let decoder = decoder.map_err(|error| rig(&error))?;
+        let decoder = decoder
+            .map_err(|error| rig(&error))?
+            .with_least_modulation(least);
         let triangulator = calibration.triangulator(function.clone(), None);
         let triangulator = triangulator.map_err(|error| rig(&error))?;
         let Ok([(mut phases, first), (other, second)]) = <[_; MEANS]>::try_from(all) else {

@@ -7,6 +7,7 @@ use super::gauge::{check_limits, gauges};
 use algo::calibration::LENGTH;
 use algo::inspect::{CalibrationError, Gauge};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
+use algo::phase::LeastModulation;
 use std::io::{Cursor, Read, Seek};
 
 /// A recipe whose parts fit each other, parsed into what planning and measuring need.
@@ -61,6 +62,8 @@ pub struct Conditions {
     pub noise_counts: f64,
     /// Captures that golden is the mean of.
     pub golden_captures: usize,
+    /// The least modulation that is trusted.
+    pub least_modulation: LeastModulation,
     /// σ by the uncertainty of the calibration; 0 where it is not known.
     pub calibration: CalibrationError,
     /// |ΔΦ| in turns up to which the expansion of the height holds.
@@ -246,6 +249,10 @@ impl From<&RecipeFile> for Conditions {
             exposure_us: file.exposure_us,
             noise_counts: file.noise_counts,
             golden_captures: file.golden_captures,
+            least_modulation: file
+                .least_modulation
+                .and_then(LeastModulation::new)
+                .unwrap_or_default(),
             calibration: file
                 .calibration_sigma
                 .map_or_else(CalibrationError::default, |sigma| CalibrationError {

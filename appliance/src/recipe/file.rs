@@ -62,6 +62,9 @@ pub struct RecipeFile {
     /// Captures that golden is the mean of; 1, which is left out, where it was taught from a recording and in recipes of older programs.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub golden_captures: usize,
+    /// The least modulation that is trusted, in counts of an 8-bit sample; `None` in recipes of older programs: 16.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least_modulation: Option<f64>,
     /// σ by the uncertainty of that calibration; `None` where it is not known, and in recipes of older programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration_sigma: Option<CalibrationSigma>,

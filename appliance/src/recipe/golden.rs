@@ -206,6 +206,7 @@ impl GoldenPart<'_> {
             exposure_us: None,
             noise_counts: calibration.noise_counts,
             golden_captures: self.captures,
+            least_modulation: Some(self.decoder.least_modulation().eight_bit()),
             calibration_sigma: calibration.sigma,
             expansion_range_turns: EXPANSION_TURNS,
             min_coverage: MIN_COVERAGE,

@@ -2,7 +2,7 @@
 
 use super::demodulate::demodulate;
 use super::unwrap::{Form, recognise};
-use super::{Pattern, PixelTwin, Reason, Rig};
+use super::{Pattern, PixelTwin, Reason, Rig, Scale};
 use hal::frame::Samples;
 use hal::replay::Recording;
 use rayon::prelude::*;
@@ -71,7 +71,7 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
     let ratios: Vec<f64> = levels.iter().map(|level| level.ratio).collect();
     let form = recognise(&ratios, pattern.range()).expect("ratios of a known form");
     let rig = Rig::of(recording);
-    let full_scale = f64::from((1_u32 << recording.bit_depth) - 1);
+    let scale = Scale::of(recording.bit_depth, recording.noise_counts);
     let width = recording.width as usize;
     let pixels: Vec<PixelTwin> = (0..width * recording.height as usize)
         .into_par_iter()
@@ -84,7 +84,7 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
                 let rig = rig.as_ref().expect("a map is needed: there must be models");
                 rig.reference(&pattern, (pixel % width) as f64, (pixel / width) as f64)
             };
-            PixelTwin::of(form, &levels, &samples, full_scale, map)
+            PixelTwin::of(form, &levels, &samples, scale, map)
         })
         .collect();
     PhaseTwin {
@@ -92,10 +92,7 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
         phase: pixels.iter().map(|pixel| pixel.phase).collect(),
         information: pixels.iter().map(|pixel| pixel.information).collect(),
         reason: pixels.iter().map(|pixel| pixel.reason).collect(),
-        tie: pixels
-            .iter()
-            .map(|pixel| pixel.is_tie(full_scale))
-            .collect(),
+        tie: pixels.iter().map(PixelTwin::is_tie).collect(),
     }
 }
 

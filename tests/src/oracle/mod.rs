@@ -18,5 +18,5 @@ pub use demodulate::demodulate;
 pub use device::Device;
 pub use height::Rig;
 pub use pattern::Pattern;
-pub use pixel::PixelTwin;
+pub use pixel::{PixelTwin, Scale};
 pub use reason::Reason;

@@ -17,15 +17,33 @@ pub struct PixelTwin {
     pub levels: Vec<Demodulated>,
     /// How close the unwrapping was to another result; none if the pixel was rejected before.
     pub doubt: Option<Doubt>,
+    /// What decided about its samples.
+    pub scale: Scale,
 }
 
 /// Tolerance at the modulation threshold, counts. Sums of sines of 16-bit counts are exact to about 1e-11 counts, so with it a
 /// modulation of exactly 16 is not below 16.
 const TIE: f64 = 1e-9;
 
-/// The modulation threshold in counts: 16 of 255.
-pub fn least_modulation(full_scale: f64) -> f64 {
-    16.0 * full_scale / 255.0
+/// What decides about samples, in counts.
+#[derive(Clone, Copy, Debug)]
+pub struct Scale {
+    /// The largest sample.
+    pub full: f64,
+    /// The least modulation that is trusted.
+    pub least: f64,
+}
+
+impl Scale {
+    /// Of samples of so many bits: 16 of 255 counts, or with a known σ of a sample in counts σ/0.23, from 4 to 127.5 of 255.
+    pub fn of(bit_depth: u8, noise: Option<f64>) -> Self {
+        let full = f64::from((1_u32 << bit_depth) - 1);
+        let count = full / 255.0;
+        let least = noise.map_or(16.0 * count, |noise| {
+            (noise / 0.23).clamp(4.0 * count, 127.5 * count)
+        });
+        Self { full, least }
+    }
 }
 
 impl PixelTwin {
@@ -35,7 +53,7 @@ impl PixelTwin {
         form: Form,
         levels: &[Level],
         samples: &[Vec<f64>],
-        full_scale: f64,
+        scale: Scale,
         map: impl FnOnce() -> f64,
     ) -> Self {
         let seen: Vec<Demodulated> = levels
@@ -49,6 +67,7 @@ impl PixelTwin {
             reason: Reason::Residual,
             levels: seen,
             doubt: None,
+            scale,
         };
         let map = match form {
             Form::Geometric { .. } => f64::NAN,
@@ -58,7 +77,7 @@ impl PixelTwin {
             twin.reason = Reason::Unexpected;
             return twin;
         }
-        if let Some(reason) = distrust(levels, &twin.levels, full_scale) {
+        if let Some(reason) = distrust(levels, &twin.levels, scale) {
             twin.reason = reason;
             return twin;
         }
@@ -82,26 +101,24 @@ impl PixelTwin {
     }
 
     /// Whether a level's modulation is within `counts` of the threshold.
-    pub fn on_the_threshold(&self, full_scale: f64, counts: f64) -> bool {
-        let least = least_modulation(full_scale);
-        let near = |seen: &Demodulated| (seen.modulation - least).abs() < counts;
+    pub fn on_the_threshold(&self, counts: f64) -> bool {
+        let near = |seen: &Demodulated| (seen.modulation - self.scale.least).abs() < counts;
         self.levels.iter().any(near)
     }
 
     /// Whether a level's modulation is exactly at the threshold, to rounding.
-    pub fn is_tie(&self, full_scale: f64) -> bool {
-        self.on_the_threshold(full_scale, TIE)
+    pub fn is_tie(&self) -> bool {
+        self.on_the_threshold(TIE)
     }
 }
 
 /// The first reason in the samples for which a pixel is rejected; `levels` go from coarse to fine.
-fn distrust(levels: &[Level], seen: &[Demodulated], full_scale: f64) -> Option<Reason> {
-    let least = least_modulation(full_scale);
-    let weak = |seen: &Demodulated| seen.modulation < least - TIE;
+fn distrust(levels: &[Level], seen: &[Demodulated], scale: Scale) -> Option<Reason> {
+    let weak = |seen: &Demodulated| seen.modulation < scale.least - TIE;
     let saturated = levels
         .iter()
         .zip(seen)
-        .any(|(level, seen)| level.shifts.len() < 8 && seen.brightest >= full_scale);
+        .any(|(level, seen)| level.shifts.len() < 8 && seen.brightest >= scale.full);
     if weak(&seen[0]) {
         Some(Reason::Dark)
     } else if seen.iter().any(weak) {

@@ -7,9 +7,9 @@ pub enum Reason {
     Resolved,
     /// The map about which the levels are unwrapped has no phase here.
     Unexpected,
-    /// The coarsest level's modulation is below 16 counts of 255.
+    /// The coarsest level's modulation is below the least that is trusted.
     Dark,
-    /// The modulation of another level is below 16 counts of 255.
+    /// The modulation of another level is below the least that is trusted.
     LowModulation,
     /// A sample is at full scale in a level of fewer than 8 shifts.
     Saturated,

@@ -86,12 +86,11 @@ fn absolute(form: Form, levels: &[Level], twin: &PixelTwin, map: f64, stack: &St
 
 /// Whether a pixel is so near a threshold that rounding may decide.
 fn on_a_threshold(levels: &[Level], twin: &PixelTwin, stack: &Stack) -> bool {
-    let full_scale = f64::from(stack.full_scale());
     let each = || levels.iter().zip(&twin.levels);
     let counts = each().fold(0.0_f64, |worst, (level, seen)| {
         worst.max(rounding_counts(level, seen, stack))
     });
-    if twin.on_the_threshold(full_scale, counts) {
+    if twin.on_the_threshold(counts) {
         return true;
     }
     let Some(doubt) = twin.doubt else {

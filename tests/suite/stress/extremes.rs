@@ -4,15 +4,19 @@ use super::bounds::Tally;
 use super::random::{Draw, KINDS};
 use super::rig;
 use super::stack::{Stack, pool, shots};
-use algo::phase::{FULL_TRUST_SHIFTS, Trust};
+use algo::phase::{FULL_TRUST_SHIFTS, LeastModulation, Trust};
 use algo::pipeline::triangulate;
 use algo::units::AbsolutePhase;
 use std::f64::consts::TAU;
 use tests::random::Random;
 
 const SEED: u64 = 20_260_606;
-/// Smallest trusted modulation at 8 bit; proportional to full scale.
-const LEAST_COUNTS: f64 = 16.0;
+/// Smallest trusted modulations at 8 bit; proportional to full scale. The first is that of unknown noise.
+const LEAST_COUNTS: [f64; 4] = [16.0, 4.0, 7.5, 25.0];
+/// The arctangent, turns.
+const ARCTANGENT: f64 = 2.5e-5;
+/// Half a unit in S and in C, which have 128 units per count of 255 at least, over 2π: turns · counts.
+const UNITS: f64 = 0.71 / 128.0 / TAU;
 /// RMS of the error with 8 shifts if the light exceeds full scale by a tenth, turns: a clipped sine has harmonics, and with N
 /// shifts those of order N ± 1 have an effect. The maximum is √2 times this for one of them, and twice this for both.
 const SATURATED_RMS: f64 = 7e-4;
@@ -123,12 +127,19 @@ fn samples_beyond_the_bit_depth_are_survived_and_rejected_below_eight_shifts() {
 }
 
 #[test]
-fn from_sixteen_counts_on_the_phase_is_known_and_below_it_never() {
+fn from_the_least_modulation_on_the_phase_is_known_and_below_it_never() {
+    for least in LEAST_COUNTS {
+        the_phase_is_known_from(least);
+    }
+}
+
+fn the_phase_is_known_from(least: f64) {
     let mut tally = Tally::default();
     for shifts in 3..=16 {
         for bit_depth in [8, 10, 12, 16] {
             // A phase per column, a modulation per row.
             let mut stack = single((64, 40), bit_depth, shifts);
+            stack.least = LeastModulation::new(least).expect("a least modulation");
             let scale = f64::from(stack.full_scale()) / 255.0;
             let truth = |pixel: usize| (0.9 * ((pixel % 64) as f64 / 64.0 - 0.5), 1 + pixel / 64);
             for pixel in 0..stack.pixels() {
@@ -146,11 +157,11 @@ fn from_sixteen_counts_on_the_phase_is_known_and_below_it_never() {
                 let counts = counts as f64;
                 // Rounded samples change S and C by at most half a count each, and so B by at most one.
                 let rounding = 1.0 / scale;
-                if counts + rounding < LEAST_COUNTS {
+                if counts + rounding < least {
                     assert_eq!(map.trust[pixel], Trust::Dark, "B = {counts}");
-                } else if counts - rounding >= LEAST_COUNTS {
+                } else if counts - rounding >= least {
                     assert_eq!(map.trust[pixel], Trust::Resolved, "B = {counts}");
-                    let bound = rounding / counts / TAU + 1e-4;
+                    let bound = rounding / counts / TAU + ARCTANGENT + UNITS / counts;
                     let error = map.phase[pixel].turns() - turns;
                     assert!(error.abs() <= bound, "B = {counts}: {error}");
                 }

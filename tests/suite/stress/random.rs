@@ -2,6 +2,7 @@
 
 use super::stack::Stack;
 use algo::pattern::{MAX_LEVEL_FACTOR, Shot};
+use algo::phase::LeastModulation;
 use algo::units::AbsolutePhase;
 use std::f64::consts::TAU;
 use tests::random::Random;
@@ -69,6 +70,8 @@ pub fn stack(random: &mut Random, draw: Draw) -> Stack {
         }
     }
     stack.map = (!matches!(draw.kind, Kind::Geometric)).then_some(map);
+    let least = [16.0, 4.0, 7.5][stack.pixels() % 3];
+    stack.least = LeastModulation::new(least).expect("a least modulation");
     stack
 }
 
@@ -76,7 +79,7 @@ pub fn stack(random: &mut Random, draw: Draw) -> Stack {
 fn light(random: &mut Random) -> (f64, f64, f64) {
     let noise = [0.0, 0.003, 0.03][random.below(3)];
     match random.below(8) {
-        // Near the threshold of 16 of 255, and below it.
+        // Near the threshold of 4 to 16 of 255, and below it.
         0 => (0.3, between(random, 0.0, 0.08), noise),
         // Up to a tenth over full scale.
         1 => (0.55, between(random, 0.4, 0.55), noise),

@@ -2,14 +2,14 @@
 
 use algo::frame::{FrameView, Samples};
 use algo::pattern::{PhaseRange, Sequence, Shot};
-use algo::phase::{Decoder, Trust};
+use algo::phase::{Decoder, LeastModulation, Trust};
 use algo::pipeline::{self, PhaseMap, Window};
 use algo::simd::Backend;
 use algo::units::AbsolutePhase;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::OnceLock;
 use tests::oracle::unwrap::{Form, recognise};
-use tests::oracle::{Level, PixelTwin, levels_from};
+use tests::oracle::{Level, PixelTwin, Scale, levels_from};
 
 /// Frames of a sequence, and everything to decode them.
 #[derive(Clone, Debug)]
@@ -25,6 +25,8 @@ pub struct Stack {
     pub range: PhaseRange,
     /// The known map, row-major, for the forms that need one.
     pub map: Option<Vec<AbsolutePhase>>,
+    /// From which modulation on it is decoded.
+    pub least: LeastModulation,
     samples: Vec<Vec<u16>>,
 }
 
@@ -51,6 +53,7 @@ impl Stack {
             frames,
             range: PhaseRange { min, max },
             map: None,
+            least: LeastModulation::default(),
             samples,
         }
     }
@@ -114,7 +117,10 @@ impl Stack {
     /// The textbook's result for every pixel.
     pub fn twins(&self) -> Vec<PixelTwin> {
         let (levels, form) = (self.levels(), self.form());
-        let full_scale = f64::from(self.full_scale());
+        let scale = Scale {
+            full: f64::from(self.full_scale()),
+            least: self.least.counts(self.full_scale()),
+        };
         let twin = |pixel| {
             let samples: Vec<Vec<f64>> = levels
                 .iter()
@@ -127,7 +133,7 @@ impl Stack {
                 Some(map) if map[pixel].is_known() => map[pixel].turns(),
                 _ => f64::NAN,
             };
-            PixelTwin::of(form, &levels, &samples, full_scale, map)
+            PixelTwin::of(form, &levels, &samples, scale, map)
         };
         (0..self.pixels()).map(twin).collect()
     }
@@ -163,7 +169,9 @@ impl Stack {
     /// The plan with the default back-end.
     pub fn decoder(&self) -> Decoder {
         let sequence = Sequence::from_frames(&self.frames).expect("a sequence");
-        Decoder::new(&sequence, self.range, self.bit_depth).expect("a sequence that can be decoded")
+        Decoder::new(&sequence, self.range, self.bit_depth)
+            .expect("a sequence that can be decoded")
+            .with_least_modulation(self.least)
     }
 
     /// The plan for every back-end that runs on this machine, with the back-end's name. Only this function

@@ -15,6 +15,7 @@ use crate::head::seam;
 use crate::storage::hex;
 use algo::geometry::{HeightRange, Pinhole, RigError, Triangulator};
 use algo::pattern::{GreyResponse, PhaseFunction, Waveform, Waveforms};
+use algo::phase::LeastModulation;
 use hal::model::{DeviceModel, PlaneModel};
 use hal::replay::Recording;
 use hal::replay::recording::RecordedProjector;
@@ -127,6 +128,11 @@ impl Calibration {
             true => Waveform::brightest,
             false => Waveform::sine,
         }
+    }
+
+    /// The least modulation that is trusted on this head.
+    pub fn least_modulation(&self) -> LeastModulation {
+        LeastModulation::of_noise(self.noise_counts, self.bit_depth)
     }
 
     /// The calibration of the head that took a recording, from its models, with the noise of a sample in counts.

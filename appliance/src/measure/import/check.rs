@@ -3,6 +3,7 @@
 
 use crate::measure::channel::Channel;
 use crate::measure::layout::{Convention, ShiftSign, Shifts};
+use crate::measure::least_modulation;
 use algo::chain::Chain;
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
@@ -41,7 +42,7 @@ pub(super) fn notes(recording: &Recording, stated: Shifts) -> Result<Vec<String>
     same_pictures(recording, &mut notes);
     unused_bits(recording, &mut notes);
     for (pattern, spec) in recording.patterns.iter().enumerate() {
-        let channel = Channel::new(recording, pattern)?;
+        let channel = Channel::new(recording, pattern, least_modulation(recording))?;
         let levels = channel.wrapped_levels()?;
         let direction = match spec {
             PatternSpec::Horizontal { .. } => "horizontal",
@@ -115,9 +116,10 @@ fn light(channel: &Channel<'_>, levels: &[PhaseMap], note: &mut impl FnMut(Strin
     let lit = (resolved + saturated) as f64;
     if lit < LIT * pixels {
         note(format!(
-            "only {:.1} % of the pixels are modulated at the finest level by 16 of 255 counts or more: check the order of the \
+            "only {:.1} % of the pixels are modulated at the finest level by {:.0} of 255 counts or more: check the order of the \
              pictures, --fringes and --steps",
-            100.0 * lit / pixels
+            100.0 * lit / pixels,
+            channel.scan.decoder.least_modulation().eight_bit()
         ));
         return;
     }

@@ -181,7 +181,8 @@ impl Plan {
         let base = base.filter(|_| !arrays.sequence_offset.is_empty());
         let mut shots = Vec::new();
         let prepared = || {
-            let (noise, range) = (conditions.noise_counts, (range, camera.2));
+            let noise = conditions.noise_counts;
+            let range = (range, camera.2, conditions.least_modulation);
             // Golden was measured with the full sequence, the last.
             let taught = sequences.last().map_or(1.0, RecipeSequence::fundamental);
             let runs = sequences.into_iter();

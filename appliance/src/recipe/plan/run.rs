@@ -8,7 +8,7 @@ use algo::inspect::{
     CalibrationError, Gauge, Largest, Measure, PairBuffers, Parts, Picture, Production, Taught,
 };
 use algo::pattern::{PhaseRange, Shot};
-use algo::phase::{Arrived, Decoder};
+use algo::phase::{Arrived, Decoder, LeastModulation};
 use algo::pipeline::HeightCubics;
 use algo::units::{AbsolutePhase, Modulation};
 use std::ops::Range;
@@ -79,14 +79,14 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    /// Prepares a sequence for phases of `range`; the recipe's arrays can be dropped then. `rasters` are what all runs show; what only
-    /// this one shows is added. `fundamental` is that of the waveform that golden's modulation was measured with; `base` is the offset of
-    /// the sequence that the golden surface is by.
+    /// Prepares a sequence for phases of `range` with at least so much modulation; the recipe's arrays can be dropped then. `rasters` are
+    /// what all runs show; what only this one shows is added. `fundamental` is that of the waveform that golden's modulation was measured
+    /// with; `base` is the offset of the sequence that the golden surface is by.
     pub fn of(
         sequence: RecipeSequence,
         (noise_counts, fundamental): (f64, f64),
         (arrays, base): (&Arrays, Option<usize>),
-        (range, bit_depth): (PhaseRange, u8),
+        (range, bit_depth, least): (PhaseRange, u8, LeastModulation),
         rasters: &mut Vec<Shot>,
     ) -> Result<Self, String> {
         let brighter = sequence.fundamental() / fundamental;
@@ -100,6 +100,7 @@ impl Prepared {
         let offset = offset.filter(|_| !arrays.sequence_offset.is_empty());
         let offsets = (golden::offset(arrays, offset), golden::offset(arrays, base));
         let decoder = Decoder::new(&levels, range, bit_depth).map_err(|error| error.to_string())?;
+        let decoder = decoder.with_least_modulation(least);
         let indices = shots.into_iter().map(|shot| {
             let shown = rasters.iter().position(|known| *known == shot);
             shown.unwrap_or_else(|| {
