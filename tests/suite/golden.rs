@@ -18,7 +18,9 @@ const BY_OTHER_SHIFTS_MM: f64 = 0.005;
 /// Bins of a fringe. An error of 3 shifts has three periods in it.
 const BINS: usize = 48;
 const CAPTURES: usize = 4;
+/// Placements of the part, and how many of them at least are covered by U, which holds for 95 %.
 const PLACES: usize = 12;
+const COVERED: usize = 11;
 
 /// A taught plane in front of a head with a response.
 fn line(gamma: f64) -> (Bed, TaughtRecipe) {
@@ -112,5 +114,8 @@ fn the_error_of_a_moved_part_is_in_its_uncertainty() {
         without += usize::from(value.abs() - expected <= 2.0 * sigma);
     }
     println!("{covered} of {PLACES} are covered by U, {without} by the noise alone");
-    assert_eq!(covered, PLACES);
+    assert!(
+        covered >= COVERED && without < COVERED,
+        "{covered} {without}"
+    );
 }

@@ -68,6 +68,9 @@ const ROUNDS: usize = 4;
 const CLIP: f64 = 3.0;
 /// The largest of all values belongs to a defect, not to noise, where it lies more than this many times the scatter off the mean.
 const DEFECT: f64 = 5.0;
+/// Where all are counted, any one that lies more than this many times the scatter off belongs to the rim of a defect: of noise it is one in
+/// 2000.
+const RIM: f64 = 3.5;
 
 /// Estimates of true values: the measured ones, moved towards their mean until their scatter is less by σ², so that the scatter that
 /// the errors make does not count twice. Those of a defect stay where they are.
@@ -203,8 +206,7 @@ pub fn share_outside(
     let drawn = Drawn::of(cells.iter().map(|cell| cell.deviation), sigma);
     let (mut variance, mut lever, mut g) = (0.0, 0.0, [0.0; 6]);
     for cell in cells {
-        // A rim of a defect lies near the tolerance.
-        let m = drawn.value(cell.deviation, CLIP);
+        let m = drawn.value(cell.deviation, RIM);
         let [upper, lower] = [(tolerance - m) / sigma, (tolerance + m) / sigma];
         if libm::fabs(upper).min(libm::fabs(lower)) < SURE {
             let p = below(-upper) + below(-lower);
