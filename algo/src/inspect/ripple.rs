@@ -48,7 +48,7 @@ pub fn ripple(
         let [count, a, b] = sums.square(row, column, side);
         let enough = count >= MIN_SUPPORT * (side * side) as f64;
         let (a, b) = (a / count, b / count);
-        enough.then(|| [1.0, a * b - NOISE * (a - b) * (a - b)])
+        enough.then_some([1.0, a * b - NOISE * (a - b) * (a - b)])
     });
     let patch = PATCH * side;
     let least = FILLED * (patch * patch) as f64;

@@ -93,9 +93,9 @@ pub(super) fn fold_four<V: Lanes>(v: V, [i0, i1, i2, i3]: [V::B; 4]) -> Folded<V
     }
 }
 
-/// Folds the pointers of a block of any other level, in words.
+/// Folds the pointers of a block of any other level, in words; `LIFTED` where some may be [`FAINT`].
 #[inline(always)]
-pub(super) fn fold<V: Lanes>(
+pub(super) fn fold<V: Lanes, const LIFTED: bool>(
     v: V,
     level: &LevelLanes<'_, V>,
     Pointers { s, c, brightest }: Pointers<V>,
@@ -111,7 +111,7 @@ pub(super) fn fold<V: Lanes>(
     } else {
         let low = strong(v, level, along[0], across[0]);
         let strong = v.narrow_mask([low, strong(v, level, along[1], across[1])]);
-        if level.plan.faint {
+        if LIFTED && level.plan.faint {
             let mut half = 0;
             while half < 2 {
                 let faint = v.gt(v.splat16(FAINT), length[half]);

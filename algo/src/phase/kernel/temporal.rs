@@ -268,13 +268,14 @@ pub(super) fn rows_of_bytes<'r, 'a, T: BlockSample, const N: usize>(
     bytes
 }
 
-/// The rows of a level of N shifts of 8 bits that start at 0; of four only with the least modulation that is known in bytes.
+/// The rows of a level of N shifts of 8 bits that start at 0, without pointers that must be lifted; of four only with the least
+/// modulation that is known in bytes.
 pub(super) fn of_bytes<'r, 'a, T: BlockSample, const N: usize>(
     level: &Level,
     rows: &'r [&'a [T]],
 ) -> Option<&'r [&'a [u8]; N]> {
     let rows: &[&[T]; N] = rows.try_into().ok()?;
-    if level.samples == Samples::Weighted || N == 4 && !level.usual {
+    if level.samples == Samples::Weighted || level.faint || N == 4 && !level.usual {
         return None;
     }
     T::bytes(rows)
